@@ -1,0 +1,230 @@
+//! Which serial number sat in which position of which tail, from when to when.
+//!
+//! Logs know positions, not serial numbers; this table is the only bridge between the two, so it is
+//! checked whole before it is used: a unit cannot sit in two places, nor two units in one.
+
+use std::collections::BTreeMap;
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+use crate::ids::{PartNumber, Position, SerialNumber, TailNumber};
+
+/// One stay of one unit in one position: `[installed_utc, removed_utc)`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Installation {
+    /// The aircraft.
+    pub tail_number: TailNumber,
+    /// The place on it.
+    pub position: Position,
+    /// The design of the unit.
+    pub part_number: PartNumber,
+    /// The unit.
+    pub serial_number: SerialNumber,
+    /// First instant of the stay.
+    pub installed_utc: Timestamp,
+    /// First instant after the stay; none while the unit still sits there.
+    pub removed_utc: Option<Timestamp>,
+    /// Age of the unit when it was installed, hours, where the books say so.
+    pub unit_hours_at_install: Option<f64>,
+}
+
+impl Installation {
+    /// Whether the unit sat there at that instant.
+    pub fn covers(&self, at: Timestamp) -> bool {
+        self.installed_utc <= at && self.removed_utc.is_none_or(|removed| at < removed)
+    }
+
+    fn overlaps(&self, later: &Self) -> bool {
+        self.removed_utc.is_none_or(|removed| later.installed_utc < removed)
+    }
+}
+
+/// Why a table of installations cannot be true.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each field is named for what it holds; rows count from 1, header excluded")]
+pub enum Error {
+    /// A stay ends before it begins.
+    #[error("row {row}: {serial} is removed at {removed} before it is installed at {installed}")]
+    Reversed { row: usize, serial: SerialNumber, installed: Timestamp, removed: Timestamp },
+    /// Two units in one position at once.
+    #[error(
+        "rows {row} and {other}: {tail} {position} holds two units at {at}; give the earlier one its `removed_utc`"
+    )]
+    PositionTaken { row: usize, other: usize, tail: TailNumber, position: Position, at: Timestamp },
+    /// One unit in two positions at once.
+    #[error(
+        "rows {row} and {other}: {part} / {serial} sits in two places at {at}; give the earlier stay its `removed_utc`"
+    )]
+    UnitTwice { row: usize, other: usize, part: PartNumber, serial: SerialNumber, at: Timestamp },
+}
+
+/// The whole table, checked, and quick to ask.
+#[derive(Debug, Clone, Default)]
+pub struct Installations {
+    by_place: BTreeMap<TailNumber, BTreeMap<Position, Vec<Installation>>>,
+}
+
+impl Installations {
+    /// Takes the rows in any order and checks them against each other.
+    ///
+    /// # Errors
+    /// Every contradiction found, in row order: see [`Error`].
+    pub fn new(rows: Vec<Installation>) -> Result<Self, Vec<Error>> {
+        let mut errors: Vec<Error> =
+            rows.iter().enumerate().filter_map(|(i, r)| reversed(i + 1, r)).collect();
+        errors.extend(clashes(&rows, |r| (r.tail_number.as_str(), r.position.as_str(), "")).map(
+            |(row, other)| {
+                let later = &rows[other - 1];
+                Error::PositionTaken {
+                    row,
+                    other,
+                    tail: later.tail_number.clone(),
+                    position: later.position.clone(),
+                    at: later.installed_utc,
+                }
+            },
+        ));
+        errors.extend(clashes(&rows, |r| (r.part_number.as_str(), r.serial_number.as_str(), "unit")).map(
+            |(row, other)| {
+                let later = &rows[other - 1];
+                Error::UnitTwice {
+                    row,
+                    other,
+                    part: later.part_number.clone(),
+                    serial: later.serial_number.clone(),
+                    at: later.installed_utc,
+                }
+            },
+        ));
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        let mut table = Self::default();
+        for row in rows {
+            let places = table.by_place.entry(row.tail_number.clone()).or_default();
+            places.entry(row.position.clone()).or_default().push(row);
+        }
+        for stays in table.by_place.values_mut().flat_map(BTreeMap::values_mut) {
+            stays.sort_by_key(|stay| stay.installed_utc);
+        }
+        Ok(table)
+    }
+
+    /// The unit that sat in that position at that instant.
+    pub fn at(&self, tail: &TailNumber, position: &Position, at: Timestamp) -> Option<&Installation> {
+        self.by_place.get(tail)?.get(position)?.iter().find(|stay| stay.covers(at))
+    }
+
+    /// Every unit on that tail at that instant, by position.
+    pub fn on_tail(&self, tail: &TailNumber, at: Timestamp) -> impl Iterator<Item = &Installation> {
+        let places = self.by_place.get(tail).into_iter().flat_map(BTreeMap::values);
+        places.filter_map(move |stays| stays.iter().find(|stay| stay.covers(at)))
+    }
+
+    /// Whether the table has ever heard of the tail.
+    pub fn knows_tail(&self, tail: &TailNumber) -> bool {
+        self.by_place.contains_key(tail)
+    }
+
+    /// Every stay, by tail, position and date.
+    pub fn iter(&self) -> impl Iterator<Item = &Installation> {
+        self.by_place.values().flat_map(BTreeMap::values).flatten()
+    }
+}
+
+fn reversed(row: usize, stay: &Installation) -> Option<Error> {
+    let removed = stay.removed_utc.filter(|removed| *removed < stay.installed_utc)?;
+    let serial = stay.serial_number.clone();
+    Some(Error::Reversed { row, serial, installed: stay.installed_utc, removed })
+}
+
+/// Pairs of row numbers, counted from 1, that claim the same key at the same time.
+fn clashes<'a, K: Ord + 'a>(
+    rows: &'a [Installation],
+    key: impl Fn(&'a Installation) -> K,
+) -> impl Iterator<Item = (usize, usize)> {
+    let mut groups: BTreeMap<K, Vec<usize>> = BTreeMap::new();
+    for (i, row) in rows.iter().enumerate() {
+        groups.entry(key(row)).or_default().push(i);
+    }
+    let mut found = Vec::new();
+    for mut group in groups.into_values() {
+        group.sort_by_key(|&i| rows[i].installed_utc);
+        let pairs = group.windows(2).filter(|pair| rows[pair[0]].overlaps(&rows[pair[1]]));
+        found.extend(pairs.map(|pair| (pair[0] + 1, pair[1] + 1)));
+    }
+    found.sort_unstable();
+    found.into_iter()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn stay(tail: &str, position: &str, serial: &str, from: &str, to: Option<&str>) -> Installation {
+        Installation {
+            tail_number: TailNumber::new(tail).unwrap(),
+            position: Position::new(position).unwrap(),
+            part_number: PartNumber::new("EMA").unwrap(),
+            serial_number: SerialNumber::new(serial).unwrap(),
+            installed_utc: from.parse().unwrap(),
+            removed_utc: to.map(|t| t.parse().unwrap()),
+            unit_hours_at_install: None,
+        }
+    }
+
+    const JAN: &str = "2026-01-01T00:00:00Z";
+    const FEB: &str = "2026-02-01T00:00:00Z";
+    const MAR: &str = "2026-03-01T00:00:00Z";
+
+    #[test]
+    fn a_unit_owns_the_instant_it_is_installed_and_not_the_one_it_leaves() {
+        let rows = vec![stay("N1", "aileron", "A", JAN, Some(FEB)), stay("N1", "aileron", "B", FEB, None)];
+        let table = Installations::new(rows).unwrap();
+        let tail = TailNumber::new("N1").unwrap();
+        let place = Position::new("aileron").unwrap();
+        let at = |t: &str| table.at(&tail, &place, t.parse().unwrap()).map(|s| s.serial_number.as_str());
+        assert_eq!(at(JAN), Some("A"));
+        assert_eq!(at(FEB), Some("B"));
+        assert_eq!(at("2025-12-31T23:59:59Z"), None);
+    }
+
+    #[test]
+    fn two_units_in_one_position_are_named_by_row() {
+        let rows = vec![stay("N1", "aileron", "A", JAN, None), stay("N1", "aileron", "B", FEB, None)];
+        let errors = Installations::new(rows).unwrap_err();
+        assert!(matches!(errors[..], [Error::PositionTaken { row: 1, other: 2, .. }]), "{errors:?}");
+    }
+
+    #[test]
+    fn one_unit_in_two_places_is_refused_even_across_tails() {
+        let rows = vec![stay("N1", "aileron", "A", JAN, Some(MAR)), stay("N2", "aileron", "A", FEB, None)];
+        let errors = Installations::new(rows).unwrap_err();
+        assert!(matches!(errors[..], [Error::UnitTwice { row: 1, other: 2, .. }]), "{errors:?}");
+    }
+
+    #[test]
+    fn a_stay_that_ends_before_it_begins_is_refused() {
+        let errors = Installations::new(vec![stay("N1", "aileron", "A", MAR, Some(JAN))]).unwrap_err();
+        assert!(matches!(errors[0], Error::Reversed { row: 1, .. }));
+    }
+
+    proptest! {
+        /// The table is a set: the order in which a clerk typed it changes nothing that is asked of it.
+        #[test]
+        fn row_order_does_not_matter(order in Just((0..6).collect::<Vec<usize>>()).prop_shuffle(), day in 0_i64..180) {
+            let months: Vec<String> = (1..=7).map(|m| format!("2026-{m:02}-01T00:00:00Z")).collect();
+            let rows: Vec<_> = (0..6).map(|i| {
+                stay("N1", "aileron", &format!("S{i}"), &months[i], Some(&months[i + 1]))
+            }).collect();
+            let shuffled = order.iter().map(|&i| rows[i].clone()).collect();
+            let (one, other) = (Installations::new(rows).unwrap(), Installations::new(shuffled).unwrap());
+            let at = JAN.parse::<Timestamp>().unwrap() + jiff::SignedDuration::from_hours(24 * day);
+            let (tail, place) = (TailNumber::new("N1").unwrap(), Position::new("aileron").unwrap());
+            prop_assert_eq!(one.at(&tail, &place, at), other.at(&tail, &place, at));
+        }
+    }
+}
