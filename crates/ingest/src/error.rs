@@ -1,0 +1,224 @@
+//! Why a log or a table cannot be used: a stable code, the place, what was found and what to do.
+
+use std::path::{Path, PathBuf};
+
+use fleet::Complaint;
+
+/// One file's trouble.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {fault}", file.display())]
+pub struct Error {
+    /// The file.
+    pub file: PathBuf,
+    /// What is wrong with it.
+    #[source]
+    pub fault: Box<Fault>,
+}
+
+impl Error {
+    pub(crate) fn new(file: &Path, fault: Fault) -> Self {
+        Self { file: file.to_owned(), fault: Box::new(fault) }
+    }
+
+    /// The form in which people and scripts see it.
+    pub fn complaint(&self) -> Complaint {
+        self.fault.complaint().in_file(self.file.display())
+    }
+}
+
+/// What can be wrong: one variant for each thing its owner would do differently.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each field is named for what it holds; rows count from 0")]
+pub enum Fault {
+    /// The file cannot be opened or read at all.
+    #[error("the file cannot be read: {source}")]
+    Unreadable {
+        #[source]
+        source: std::io::Error,
+    },
+    /// It has no bytes, or no rows.
+    #[error("the log holds no rows")]
+    Empty,
+    /// It is not Parquet, or its footer is torn.
+    #[error("this is not a whole Parquet file: {detail}")]
+    NotParquet { detail: String },
+    /// The footer is sound, a page is not.
+    #[error("a column cannot be decoded: {detail}")]
+    Decode { column: String, row_group: Option<u64>, detail: String },
+    /// A column holds another number of rows than the footer declares.
+    #[error("the column holds {found} rows where the footer declares {declared}")]
+    RowCount { column: String, found: u64, declared: u64 },
+    /// A mapped column is not in the file.
+    #[error("the log has no column `{column}`")]
+    ColumnMissing { column: String, nearest: Option<String> },
+    /// A column is there, but its type holds no numbers.
+    #[error("column `{column}` holds {found}, not {wanted}")]
+    ColumnType { column: String, found: String, wanted: &'static str },
+    /// No column fits the `{position}` patterns.
+    #[error("no actuator is found: no column fits `{pattern}`")]
+    NoPosition { pattern: String, columns: Vec<String> },
+    /// The time column needs a unit, or has one that contradicts it.
+    #[error("the unit of the time column `{column}` is not known")]
+    TimeUnit { column: String, found: String },
+    /// Neither a time column nor a rate.
+    #[error("the log has no clock: neither `clock.column` nor `clock.rate_hz` is given")]
+    NoClock,
+    /// Stamps fall further than allowed.
+    #[error("the clock runs backwards")]
+    TimeGoesBack { column: String, row: u64, before_s: f64, after_s: f64, max_back_s: f64, times: u64 },
+    /// No two stamps differ.
+    #[error("the clock stands still")]
+    TimeStandsStill { column: String, rows: u64 },
+    /// A channel has no value at all.
+    #[error("column `{column}` holds no value in {rows} rows")]
+    AllMissing { column: String, rows: u64 },
+    /// A length was mapped for a part that turns, or an angle for a part whose lead is not given.
+    #[error("column `{column}` is logged in {unit}, which this part cannot be brought to the screw from")]
+    UnitForPart { column: String, unit: &'static str, wanted: &'static str },
+    /// No source states a fact that is needed.
+    #[error("the log does not say its {fact}")]
+    IdentityMissing { fact: &'static str, looked: Vec<String> },
+    /// A fact that cannot be read.
+    #[error("`{found}` is no {fact}: {detail}")]
+    IdentityInvalid { fact: &'static str, found: String, detail: String },
+    /// A column that should be constant is not.
+    #[error("column `{column}` should hold one {fact}, but changes")]
+    IdentityChanges { fact: &'static str, column: String, row: u64, found: String, before: String },
+    /// A table cannot be used.
+    #[error("the table cannot be used: {detail}")]
+    Table { row: Option<u64>, column: Option<String>, detail: String },
+}
+
+impl Fault {
+    /// The stable code; `docs/errors.md` has a paragraph for each.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Unreadable { .. } => "unreadable",
+            Self::Empty => "empty_log",
+            Self::NotParquet { .. } => "not_parquet",
+            Self::Decode { .. } => "decode_failed",
+            Self::RowCount { .. } => "row_count_differs",
+            Self::ColumnMissing { .. } => "column_missing",
+            Self::ColumnType { .. } => "column_type",
+            Self::NoPosition { .. } => "no_position",
+            Self::TimeUnit { .. } => "time_unit_unknown",
+            Self::NoClock => "no_clock",
+            Self::TimeGoesBack { .. } => "time_goes_back",
+            Self::TimeStandsStill { .. } => "time_stands_still",
+            Self::AllMissing { .. } => "channel_empty",
+            Self::UnitForPart { .. } => "unit_for_part",
+            Self::IdentityMissing { .. } => "identity_missing",
+            Self::IdentityInvalid { .. } => "identity_invalid",
+            Self::IdentityChanges { .. } => "identity_changes",
+            Self::Table { .. } => "bad_table",
+        }
+    }
+
+    fn complaint(&self) -> Complaint {
+        let mut c = Complaint::new(self.code(), self);
+        self.place(&mut c);
+        c.found = self.found();
+        c.wanted = self.wanted();
+        c.hint = Some(self.remedy());
+        c
+    }
+
+    fn place(&self, c: &mut Complaint) {
+        match self {
+            Self::Decode { column, row_group, .. } => {
+                c.column = Some(column.clone());
+                c.row_group = *row_group;
+            }
+            Self::RowCount { column, .. }
+            | Self::ColumnMissing { column, .. }
+            | Self::ColumnType { column, .. }
+            | Self::TimeUnit { column, .. }
+            | Self::TimeStandsStill { column, .. }
+            | Self::AllMissing { column, .. }
+            | Self::UnitForPart { column, .. } => c.column = Some(column.clone()),
+            Self::TimeGoesBack { column, row, .. } | Self::IdentityChanges { column, row, .. } => {
+                c.column = Some(column.clone());
+                c.row = Some(*row);
+            }
+            Self::Table { row, column, .. } => {
+                c.row = *row;
+                c.column.clone_from(column);
+            }
+            _ => {}
+        }
+    }
+
+    fn found(&self) -> Option<String> {
+        match self {
+            Self::NoPosition { columns, .. } => Some(format!("columns {}", shortened(columns))),
+            Self::TimeUnit { found, .. } => Some(found.clone()),
+            Self::TimeGoesBack { before_s, after_s, times, .. } => {
+                Some(format!("{after_s} s after {before_s} s, {times} such falls in all"))
+            }
+            Self::TimeStandsStill { rows, .. } => Some(format!("{rows} rows with one stamp")),
+            Self::IdentityMissing { looked, .. } => Some(format!("looked in {}", shortened(looked))),
+            Self::IdentityChanges { found, before, .. } => Some(format!("`{found}` after `{before}`")),
+            _ => None,
+        }
+    }
+
+    fn wanted(&self) -> Option<String> {
+        match self {
+            Self::TimeGoesBack { max_back_s, .. } => {
+                Some(format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)"))
+            }
+            Self::TimeUnit { .. } => Some("`clock.unit` = \"s\", \"ms\", \"us\" or \"ns\"".into()),
+            Self::UnitForPart { wanted, .. } => Some((*wanted).into()),
+            _ => None,
+        }
+    }
+
+    fn remedy(&self) -> String {
+        let text = match self {
+            Self::Unreadable { .. } => "does the file exist, and may this user read it?",
+            Self::Empty => {
+                "was the recorder on? Such a file can be deleted or left; it is not tried again until it changes"
+            }
+            Self::NotParquet { .. } => {
+                "was the copy cut short? Copy the file again, then `freeplay run --retry`"
+            }
+            Self::Decode { .. } | Self::RowCount { .. } => {
+                "the file is damaged: fetch it again from where it was recorded, then `freeplay run --retry`"
+            }
+            Self::ColumnMissing { nearest: Some(near), .. } => {
+                return format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`");
+            }
+            Self::ColumnMissing { .. } => "names are mapped under `[channel]`, `[clock]` and `[identity]`",
+            Self::ColumnType { .. } => "map another column, or have the recorder write numbers",
+            Self::NoPosition { .. } => "`freeplay check` on this log lists its columns beside the patterns",
+            Self::TimeUnit { .. } => "a wrong unit puts a flight in 1970, so it is never guessed",
+            Self::NoClock => "name the time column, or give the rate when rows are evenly spaced",
+            Self::TimeGoesBack { .. } => {
+                "two recorder segments in one file? Split it, or raise `clock.max_back_s`"
+            }
+            Self::TimeStandsStill { .. } => "map the column that counts, or give `clock.rate_hz` alone",
+            Self::AllMissing { .. } => "was the sensor connected? Map the other of two redundant channels",
+            Self::UnitForPart { .. } => {
+                "give the part `lead_m_per_rev`, or `kind = \"rotary\"` with `reference_radius_m`"
+            }
+            Self::IdentityMissing { .. } => {
+                "say under `[identity]` where it stands: `metadata`, `columns` or `path`"
+            }
+            Self::IdentityInvalid { .. } => "see `identity.departure_format` and `identity.time_zone`",
+            Self::IdentityChanges { .. } => "a log must hold one flight: split it by this column",
+            Self::Table { .. } => "columns and formats are in docs/configuration.md",
+        };
+        text.into()
+    }
+}
+
+/// A list a person can take in: the first eight, and how many more there are.
+fn shortened(names: &[String]) -> String {
+    const SHOWN: usize = 8;
+    let head = names.iter().take(SHOWN).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+    match names.len().saturating_sub(SHOWN) {
+        0 if head.is_empty() => "nothing".into(),
+        0 => head,
+        more => format!("{head} and {more} more"),
+    }
+}

@@ -1,0 +1,183 @@
+//! Which flight a log is: from its metadata, its constant columns or its path, in that order.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use fleet::{FlightId, Position, TailNumber};
+use jiff::{Timestamp, civil, tz::TimeZone};
+
+use crate::error::Fault;
+use crate::schema::{Fact, IdentityMapping};
+
+/// What a log says about its flight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identity {
+    /// The aircraft.
+    pub tail_number: TailNumber,
+    /// The flight.
+    pub flight_id: FlightId,
+    /// Departure, UTC.
+    pub departure_utc: Timestamp,
+    /// The place of the one actuator in the log, where its columns do not say.
+    pub position: Option<Position>,
+    /// Length of the flight, hours.
+    pub flight_hours: Option<f64>,
+    /// The tail's total hours after the flight.
+    pub tail_hours_end: Option<f64>,
+}
+
+/// Facts as text, before they are read.
+pub(crate) type Facts = BTreeMap<Fact, String>;
+
+/// The facts that the path's named groups hold.
+///
+/// # Errors
+/// [`Fault::IdentityInvalid`] when the expression itself cannot be read.
+pub(crate) fn from_path(path: &Path, expression: &str) -> Result<Facts, Fault> {
+    let regex = regex::Regex::new(expression).map_err(|e| Fault::IdentityInvalid {
+        fact: "path expression",
+        found: expression.to_owned(),
+        detail: e.to_string(),
+    })?;
+    // Backslashes of another system's paths would need another expression for the same fleet.
+    let text = path.to_string_lossy().replace('\\', "/");
+    let Some(groups) = regex.captures(&text) else { return Ok(Facts::new()) };
+    let named = |fact: &Fact| Some((*fact, groups.name(fact.as_str())?.as_str().to_owned()));
+    Ok(Fact::ALL.iter().filter_map(named).collect())
+}
+
+/// Reads the facts; what the log leaves open comes from its absolute clock.
+///
+/// # Errors
+/// [`Fault::IdentityMissing`] for a tail or departure that stands nowhere, [`Fault::IdentityInvalid`]
+/// for a fact that cannot be read.
+pub(crate) fn read(
+    facts: &Facts,
+    mapping: &IdentityMapping,
+    clock_start: Option<Timestamp>,
+) -> Result<Identity, Fault> {
+    let text = |fact: Fact| facts.get(&fact).map(|t| t.trim()).filter(|t| !t.is_empty());
+    let tail = text(Fact::TailNumber).ok_or_else(|| missing(Fact::TailNumber, mapping))?;
+    let departure_utc = match text(Fact::DepartureUtc) {
+        Some(departure) => instant(departure, mapping)?,
+        None => clock_start.ok_or_else(|| missing(Fact::DepartureUtc, mapping))?,
+    };
+    let flight = text(Fact::FlightId)
+        .map_or_else(|| departure_utc.strftime("%Y%m%dT%H%M%SZ").to_string(), str::to_owned);
+    let invalid = |fact: Fact| {
+        move |e: fleet::ids::EmptyName| Fault::IdentityInvalid {
+            fact: fact.as_str(),
+            found: String::new(),
+            detail: e.to_string(),
+        }
+    };
+    Ok(Identity {
+        tail_number: TailNumber::new(tail).map_err(invalid(Fact::TailNumber))?,
+        flight_id: FlightId::new(flight).map_err(invalid(Fact::FlightId))?,
+        departure_utc,
+        position: text(Fact::Position).map(Position::new).transpose().map_err(invalid(Fact::Position))?,
+        flight_hours: hours(Fact::FlightHours, text(Fact::FlightHours))?,
+        tail_hours_end: hours(Fact::TailHoursEnd, text(Fact::TailHoursEnd))?,
+    })
+}
+
+fn missing(fact: Fact, mapping: &IdentityMapping) -> Fault {
+    let looked = [
+        mapping.metadata.get(&fact).map(|key| format!("metadata `{key}`")),
+        mapping.columns.get(&fact).map(|column| format!("column `{column}`")),
+        mapping.path.as_ref().map(|expression| format!("path by `{expression}`")),
+    ];
+    Fault::IdentityMissing { fact: fact.as_str(), looked: looked.into_iter().flatten().collect() }
+}
+
+fn hours(fact: Fact, text: Option<&str>) -> Result<Option<f64>, Fault> {
+    let Some(text) = text else { return Ok(None) };
+    match text.parse::<f64>() {
+        Ok(h) if h.is_finite() && h >= 0.0 => Ok(Some(h)),
+        _ => Err(Fault::IdentityInvalid {
+            fact: fact.as_str(),
+            found: text.to_owned(),
+            detail: "hours are a number of at least 0".into(),
+        }),
+    }
+}
+
+/// Reads a departure. A zone or offset in the text wins; else the mapped zone; else it is refused.
+pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp, Fault> {
+    let invalid =
+        |detail: String| Fault::IdentityInvalid { fact: "departure_utc", found: text.to_owned(), detail };
+    let local = match &mapping.departure_format {
+        Some(format) => {
+            let parsed = jiff::fmt::strtime::parse(format, text).map_err(|e| invalid(e.to_string()))?;
+            if let Ok(instant) = parsed.to_timestamp() {
+                return Ok(instant);
+            }
+            parsed.to_datetime().map_err(|e| invalid(e.to_string()))?
+        }
+        None => match text.parse::<Timestamp>() {
+            Ok(instant) => return Ok(instant),
+            Err(_) => text.parse::<civil::DateTime>().map_err(|e| invalid(e.to_string()))?,
+        },
+    };
+    let zone = mapping
+        .time_zone
+        .as_deref()
+        .ok_or_else(|| invalid("it names no time zone, and `identity.time_zone` is not given".into()))?;
+    let zone = if zone.eq_ignore_ascii_case("utc") { Ok(TimeZone::UTC) } else { TimeZone::get(zone) };
+    let zone = zone.map_err(|e| invalid(e.to_string()))?;
+    zone.to_timestamp(local).map_err(|e| invalid(e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mapping(format: Option<&str>, zone: Option<&str>) -> IdentityMapping {
+        IdentityMapping {
+            departure_format: format.map(Into::into),
+            time_zone: zone.map(Into::into),
+            ..IdentityMapping::default()
+        }
+    }
+
+    #[test]
+    fn named_groups_of_a_path_become_facts() {
+        let path = Path::new("/logs/N412FP/0413_20261119T120409Z.parquet");
+        let facts =
+            from_path(path, r"(?<tail_number>N\w+)/(?<flight_id>\d+)_(?<departure_utc>\w+)\.parquet$")
+                .unwrap();
+        let identity = read(&facts, &mapping(Some("%Y%m%dT%H%M%SZ"), Some("UTC")), None).unwrap();
+        assert_eq!(identity.tail_number.as_str(), "N412FP");
+        assert_eq!(identity.flight_id.as_str(), "0413");
+        assert_eq!(identity.departure_utc.to_string(), "2026-11-19T12:04:09Z");
+    }
+
+    /// Istanbul keeps UTC+3 all year since 2016.
+    #[test]
+    fn a_local_departure_needs_a_zone_and_takes_it() {
+        let local = "2026-07-01T03:00:00";
+        assert!(instant(local, &mapping(None, None)).is_err());
+        let there = instant(local, &mapping(None, Some("Europe/Istanbul"))).unwrap();
+        assert_eq!(there.to_string(), "2026-07-01T00:00:00Z");
+        let offset = instant("2026-07-01T03:00:00+02:00", &mapping(None, Some("Europe/Istanbul"))).unwrap();
+        assert_eq!(offset.to_string(), "2026-07-01T01:00:00Z");
+    }
+
+    #[test]
+    fn a_log_that_does_not_say_its_tail_is_told_where_we_looked() {
+        let mut m = mapping(None, None);
+        m.metadata.insert(Fact::TailNumber, "ac_reg".into());
+        let fault = read(&Facts::new(), &m, None).unwrap_err();
+        assert!(
+            matches!(&fault, Fault::IdentityMissing { fact: "tail_number", looked } if looked == &["metadata `ac_reg`"])
+        );
+    }
+
+    #[test]
+    fn an_absolute_clock_stands_in_for_departure_and_flight() {
+        let facts = Facts::from([(Fact::TailNumber, "N1".into())]);
+        let start: Timestamp = "2026-11-19T04:13:00Z".parse().unwrap();
+        let identity = read(&facts, &mapping(None, None), Some(start)).unwrap();
+        assert_eq!(identity.flight_id.as_str(), "20261119T041300Z");
+    }
+}

@@ -1,0 +1,281 @@
+//! The tables a user gives beside the logs: read as text from CSV or Parquet, then checked cell by cell.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use arrow::array::{Array, AsArray};
+use arrow::compute::cast;
+use arrow::datatypes::DataType;
+use fleet::{Installation, Installations};
+use jiff::{Timestamp, civil, tz::TimeZone};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+use crate::error::{Error, Fault};
+use crate::pattern::nearest;
+
+/// A small table, every cell text; an empty cell is none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    file: std::path::PathBuf,
+    header: Vec<String>,
+    rows: Vec<Vec<Option<String>>>,
+}
+
+impl Table {
+    /// Reads a `.parquet` file as Parquet and anything else as CSV.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or is not the table its name says.
+    pub fn read(file: &Path) -> Result<Self, Error> {
+        let parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+        let (header, rows) =
+            if parquet { read_parquet(file) } else { read_csv(file) }.map_err(|f| Error::new(file, f))?;
+        Ok(Self { file: file.to_owned(), header, rows })
+    }
+
+    /// Rows without the header.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Where a column stands, if it is there under one of its names.
+    pub fn find(&self, names: &[&str]) -> Option<usize> {
+        names.iter().find_map(|name| self.header.iter().position(|h| h.trim() == *name))
+    }
+
+    /// Where a column stands.
+    ///
+    /// # Errors
+    /// When it is not there, with the nearest name that is.
+    pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
+        self.find(names).ok_or_else(|| {
+            let wanted = names[0];
+            let nearest = nearest(wanted, self.header.iter().map(String::as_str)).map(str::to_owned);
+            Error::new(&self.file, Fault::ColumnMissing { column: wanted.to_owned(), nearest })
+        })
+    }
+
+    /// The text of a cell.
+    pub fn text(&self, row: usize, column: usize) -> Option<&str> {
+        self.rows[row].get(column)?.as_deref().map(str::trim).filter(|t| !t.is_empty())
+    }
+
+    /// A cell that must hold something, read as `T`.
+    ///
+    /// # Errors
+    /// When it is empty or cannot be read.
+    pub fn required<T>(
+        &self,
+        row: usize,
+        column: usize,
+        read: impl Fn(&str) -> Result<T, String>,
+    ) -> Result<T, Error> {
+        let text = self.text(row, column).ok_or_else(|| self.error(row, column, "it is empty".into()))?;
+        read(text).map_err(|detail| self.error(row, column, detail))
+    }
+
+    /// A cell of an optional column that may be empty.
+    ///
+    /// # Errors
+    /// When it holds something that cannot be read.
+    pub fn optional<T>(
+        &self,
+        row: usize,
+        column: Option<usize>,
+        read: impl Fn(&str) -> Result<T, String>,
+    ) -> Result<Option<T>, Error> {
+        let Some((column, text)) = column.and_then(|c| Some((c, self.text(row, c)?))) else {
+            return Ok(None);
+        };
+        read(text).map(Some).map_err(|detail| self.error(row, column, detail))
+    }
+
+    fn error(&self, row: usize, column: usize, detail: String) -> Error {
+        let column = self.header.get(column).cloned();
+        Error::new(&self.file, Fault::Table { row: Some(row as u64), column, detail })
+    }
+}
+
+/// Reads the installations table: `tail_number, position, part_number, serial_number, installed_utc,
+/// removed_utc` and optionally `unit_hours_at_install`.
+///
+/// # Errors
+/// Every cell that cannot be read, or, when all can, every contradiction between rows.
+pub fn installations(file: &Path) -> Result<Installations, Vec<Error>> {
+    let table = Table::read(file).map_err(|e| vec![e])?;
+    let columns = InstallationColumns::find(&table)?;
+    let (mut rows, mut errors) = (Vec::new(), Vec::new());
+    for row in 0..table.len() {
+        match columns.installation(&table, row) {
+            Ok(stay) => rows.push(stay),
+            Err(error) => errors.push(error),
+        }
+    }
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    let contradiction = |e: fleet::installation::Error| {
+        Error::new(file, Fault::Table { row: None, column: None, detail: e.to_string() })
+    };
+    Installations::new(rows).map_err(|found| found.into_iter().map(contradiction).collect())
+}
+
+struct InstallationColumns {
+    names: [usize; 5],
+    removed: Option<usize>,
+    hours: Option<usize>,
+}
+
+impl InstallationColumns {
+    fn find(table: &Table) -> Result<Self, Vec<Error>> {
+        let wanted = ["tail_number", "position", "part_number", "serial_number", "installed_utc"];
+        let found = wanted.map(|name| table.column(&[name]));
+        if found.iter().any(Result::is_err) {
+            return Err(found.into_iter().filter_map(Result::err).collect());
+        }
+        let names = found.map(Result::unwrap_or_default);
+        Ok(Self {
+            names,
+            removed: table.find(&["removed_utc"]),
+            hours: table.find(&["unit_hours_at_install"]),
+        })
+    }
+
+    fn installation(&self, table: &Table, row: usize) -> Result<Installation, Error> {
+        let [tail, position, part, serial, installed] = self.names;
+        Ok(Installation {
+            tail_number: table.required(row, tail, name)?,
+            position: table.required(row, position, name)?,
+            part_number: table.required(row, part, name)?,
+            serial_number: table.required(row, serial, name)?,
+            installed_utc: table.required(row, installed, utc)?,
+            removed_utc: table.optional(row, self.removed, utc)?,
+            unit_hours_at_install: table.optional(row, self.hours, number)?,
+        })
+    }
+}
+
+/// Reads a name.
+///
+/// # Errors
+/// When it is blank.
+pub fn name<T: TryFrom<String, Error = fleet::ids::EmptyName>>(text: &str) -> Result<T, String> {
+    T::try_from(text.to_owned()).map_err(|e| e.to_string())
+}
+
+/// Reads a finite number.
+///
+/// # Errors
+/// When it is none.
+pub fn number(text: &str) -> Result<f64, String> {
+    match f64::from_str(text) {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(format!("`{text}` is no number")),
+    }
+}
+
+/// Reads an instant; in a column that says UTC, a date or a time without zone is UTC.
+///
+/// # Errors
+/// When it is neither a date nor a time.
+pub fn utc(text: &str) -> Result<Timestamp, String> {
+    let civil = || {
+        text.parse::<civil::DateTime>()
+            .or_else(|e| text.parse::<civil::Date>().map(civil::DateTime::from).map_err(|_| e))
+    };
+    let wanted =
+        |e: jiff::Error| format!("`{text}` is no UTC date or time such as 2026-11-19T04:13:00Z: {e}");
+    match text.parse::<Timestamp>() {
+        Ok(instant) => Ok(instant),
+        Err(_) => TimeZone::UTC.to_timestamp(civil().map_err(wanted)?).map_err(wanted),
+    }
+}
+
+type Cells = (Vec<String>, Vec<Vec<Option<String>>>);
+
+fn read_csv(file: &Path) -> Result<Cells, Fault> {
+    let bad = |e: &csv::Error| {
+        let row = e.position().map(|p| p.record().saturating_sub(1));
+        Fault::Table { row, column: None, detail: e.to_string() }
+    };
+    let text = std::fs::read(file).map_err(|source| Fault::Unreadable { source })?;
+    // Spreadsheets open their UTF-8 with a byte order mark.
+    let text = text.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&text);
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text);
+    let header = reader.headers().map_err(|e| bad(&e))?.iter().map(str::to_owned).collect();
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| bad(&e))?;
+        rows.push(record.iter().map(|cell| (!cell.is_empty()).then(|| cell.to_owned())).collect());
+    }
+    Ok((header, rows))
+}
+
+fn read_parquet(file: &Path) -> Result<Cells, Fault> {
+    let torn = |e: String| Fault::NotParquet { detail: e };
+    let open = std::fs::File::open(file).map_err(|source| Fault::Unreadable { source })?;
+    let reader = ParquetRecordBatchReaderBuilder::try_new(open).map_err(|e| torn(e.to_string()))?;
+    let header: Vec<String> = reader.schema().fields().iter().map(|f| f.name().clone()).collect();
+    let mut rows: Vec<Vec<Option<String>>> = Vec::new();
+    for batch in reader.build().map_err(|e| torn(e.to_string()))? {
+        let batch = batch.map_err(|e| torn(e.to_string()))?;
+        let text = |(name, array): (&String, &arrow::array::ArrayRef)| {
+            cast(array, &DataType::Utf8).map_err(|_| Fault::ColumnType {
+                column: name.clone(),
+                found: array.data_type().to_string(),
+                wanted: "text, numbers or times",
+            })
+        };
+        let columns = header.iter().zip(batch.columns()).map(text).collect::<Result<Vec<_>, _>>()?;
+        let cell = |column: &arrow::array::ArrayRef, row| {
+            let column = column.as_string::<i32>();
+            column.is_valid(row).then(|| column.value(row).to_owned())
+        };
+        rows.extend((0..batch.num_rows()).map(|row| columns.iter().map(|c| cell(c, row)).collect()));
+    }
+    Ok((header, rows))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("installations.csv");
+        std::fs::write(&file, text).unwrap();
+        (dir, file)
+    }
+
+    const HEADER: &str = "tail_number,position,part_number,serial_number,installed_utc,removed_utc\n";
+
+    #[test]
+    fn dates_in_a_utc_column_are_utc() {
+        let (_dir, file) = table(&format!("\u{feff}{HEADER}N1,aileron,EMA,17,2026-01-01,2026-02-01 06:00\n"));
+        let stays = installations(&file).unwrap();
+        let stay = stays.iter().next().unwrap();
+        assert_eq!(stay.installed_utc.to_string(), "2026-01-01T00:00:00Z");
+        assert_eq!(stay.removed_utc.unwrap().to_string(), "2026-02-01T06:00:00Z");
+    }
+
+    #[test]
+    fn every_bad_cell_is_named_by_row_and_column() {
+        let (_dir, file) =
+            table(&format!("{HEADER}N1,aileron,EMA,,2026-01-01,\nN1,elevator,EMA,18,yesterday,\n"));
+        let errors = installations(&file).unwrap_err();
+        let places: Vec<_> = errors.iter().map(|e| e.complaint().place().unwrap()).collect();
+        assert_eq!(places, ["column `serial_number`, row 0", "column `installed_utc`, row 1"]);
+    }
+
+    #[test]
+    fn a_missing_column_is_told_with_its_neighbour() {
+        let (_dir, file) = table("tail_number,position,part_number,serial_no,installed_utc\n");
+        let errors = installations(&file).unwrap_err();
+        assert!(errors[0].complaint().hint.unwrap().starts_with("`serial_no`?"));
+    }
+}

@@ -1,0 +1,101 @@
+//! Files that are torn, empty or lie: each becomes a reason with a stable code, never a number.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, Float64Array};
+use ingest::unit::Unit;
+use ingest::{Error, Log, Mapping};
+
+use crate::layouts::{channel, mapping, write};
+
+fn plain() -> Mapping {
+    mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton))
+}
+
+fn sound(file: &Path) {
+    let values: ArrayRef = Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()));
+    write(
+        file,
+        &[("t", Arc::clone(&values)), ("m", Arc::clone(&values)), ("s", Arc::clone(&values)), ("f", values)],
+    );
+}
+
+fn code(result: Result<Log<'_>, Error>) -> String {
+    result.err().map(|e| e.complaint().code).unwrap_or_default()
+}
+
+#[test]
+fn what_is_no_log_is_told_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let m = plain();
+    let at = |name: &str, bytes: &[u8]| {
+        let file = dir.path().join(name);
+        std::fs::write(&file, bytes).unwrap();
+        code(Log::open(&file, &m))
+    };
+    assert_eq!(at("empty.parquet", b""), "empty_log");
+    assert_eq!(at("text.parquet", b"time,motor,screw\n1,2,3\n"), "not_parquet");
+    assert_eq!(at("encrypted.parquet", b"PARE\x00\x00\x00\x00PARE"), "not_parquet");
+    assert_eq!(code(Log::open(dir.path(), &m)), "unreadable");
+    assert_eq!(code(Log::open(&dir.path().join("none.parquet"), &m)), "unreadable");
+}
+
+#[test]
+fn a_log_without_rows_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("none.parquet");
+    let none: ArrayRef = Arc::new(Float64Array::from(Vec::<f64>::new()));
+    write(&file, &[("t", none)]);
+    assert_eq!(code(Log::open(&file, &plain())), "empty_log");
+}
+
+#[test]
+fn a_log_cut_short_anywhere_is_no_whole_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("whole.parquet");
+    sound(&file);
+    let bytes = std::fs::read(&file).unwrap();
+    for cut in [4, bytes.len() / 3, bytes.len() / 2, bytes.len() - 9, bytes.len() - 1] {
+        let torn = dir.path().join("torn.parquet");
+        std::fs::write(&torn, &bytes[..cut]).unwrap();
+        assert_eq!(code(Log::open(&torn, &plain())), "not_parquet", "cut at {cut}");
+    }
+}
+
+/// The digest must notice what a reader without page checksums cannot.
+#[test]
+fn a_flipped_byte_changes_the_digest() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("whole.parquet");
+    sound(&file);
+    let m = plain();
+    let digest = |file: &Path| {
+        let log = Log::open(file, &m).unwrap();
+        let positions = log.positions(Some(&fleet::Position::new("a").unwrap())).unwrap();
+        log.digest(&positions).unwrap()
+    };
+    let before = digest(&file);
+    let mut bytes = std::fs::read(&file).unwrap();
+    bytes[100] ^= 1;
+    let moved = dir.path().join("flipped.parquet");
+    std::fs::write(&moved, &bytes).unwrap();
+    assert_ne!(digest(&moved), before);
+    bytes[100] ^= 1;
+    std::fs::write(&moved, &bytes).unwrap();
+    assert_eq!(digest(&moved), before, "a renamed log is the same log");
+}
+
+#[test]
+fn a_clock_without_a_unit_is_never_guessed() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("whole.parquet");
+    sound(&file);
+    let mut m = plain();
+    m.clock.unit = None;
+    let error = Log::open(&file, &m).unwrap().timeline().unwrap_err();
+    assert_eq!(error.complaint().code, "time_unit_unknown");
+    m.clock.column = None;
+    let error = Log::open(&file, &m).unwrap().timeline().unwrap_err();
+    assert_eq!(error.complaint().code, "no_clock");
+}

@@ -1,0 +1,6 @@
+//! The public door of `ingest`: files in, channels or a reason out.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod layouts;
+mod lying;
