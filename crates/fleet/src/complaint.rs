@@ -114,7 +114,9 @@ mod tests {
             column: Some("t_ns".into()),
             row: Some(9),
             found: Some("12:04:07 after 12:04:09".into()),
-            ..Complaint::new("time_goes_back", "the clock runs backwards").in_file("a.parquet").hint("sort it")
+            ..Complaint::new("time_goes_back", "the clock runs backwards")
+                .in_file("a.parquet")
+                .hint("sort it")
         };
         let text = "error[time_goes_back]: the clock runs backwards\n  file    a.parquet\n  at      column `t_ns`, row 9\n  found   12:04:07 after 12:04:09\nhint: sort it";
         assert_eq!(c.to_string(), text);

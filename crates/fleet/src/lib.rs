@@ -13,4 +13,4 @@ pub use complaint::Complaint;
 pub use flight::Flight;
 pub use ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 pub use installation::{Installation, Installations};
-pub use record::{GapRecord, Provenance, Status};
+pub use record::{Estimate, GapRecord, Provenance, Status};

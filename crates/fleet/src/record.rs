@@ -43,20 +43,11 @@ pub struct Provenance {
     pub processed_utc: Timestamp,
 }
 
-/// One row of the results: one actuator, one flight. The field names are the column names.
+/// What one actuator's channels in one flight say: the gap, or why there is none, and what it stands on.
+///
+/// It needs no identity: the same numbers come out of a log nobody has booked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GapRecord {
-    /// Which tail, which flight, when, how long.
-    #[serde(flatten)]
-    pub flight: Flight,
-    /// The place on the aircraft.
-    pub position: Position,
-    /// The design of the unit that sat there.
-    pub part_number: PartNumber,
-    /// The unit that sat there.
-    pub serial_number: SerialNumber,
-    /// The unit's own age after this flight, hours, where it is known.
-    pub unit_hours: Option<f64>,
+pub struct Estimate {
     /// Whether `gap_m` holds a number.
     pub status: Status,
     /// Stable code: why the flight was refused, or the gravest doubt about its number.
@@ -101,6 +92,55 @@ pub struct GapRecord {
     pub temperature_c: Option<f64>,
     /// Mean normalised innovation squared; a diagnostic to hold against the unit's own history.
     pub nis: Option<f64>,
+}
+
+impl Estimate {
+    /// A sound log that cannot show a gap, and why.
+    pub fn refused(reason: &str) -> Self {
+        Self {
+            status: Status::Refused,
+            reason: Some(reason.to_owned()),
+            flags: Vec::new(),
+            gap_m: None,
+            gap_se_m: None,
+            gap_p05_m: None,
+            gap_p95_m: None,
+            gap_midrange_m: None,
+            stiffness_n_per_m: None,
+            stiffness_se_n_per_m: None,
+            skew_s: None,
+            loop_width_m: None,
+            lost_motion_m: None,
+            reference_radius_m: None,
+            load_reversals: 0,
+            samples: 0,
+            samples_upper: 0,
+            samples_lower: 0,
+            load_p05_n: None,
+            load_p95_n: None,
+            temperature_c: None,
+            nis: None,
+        }
+    }
+}
+
+/// One row of the results: one actuator, one flight. The flattened field names are the column names.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GapRecord {
+    /// Which tail, which flight, when, how long.
+    #[serde(flatten)]
+    pub flight: Flight,
+    /// The place on the aircraft.
+    pub position: Position,
+    /// The design of the unit that sat there.
+    pub part_number: PartNumber,
+    /// The unit that sat there.
+    pub serial_number: SerialNumber,
+    /// The unit's own age after this flight, hours, where it is known.
+    pub unit_hours: Option<f64>,
+    /// What its channels say.
+    #[serde(flatten)]
+    pub estimate: Estimate,
     /// Where the number comes from.
     #[serde(flatten)]
     pub provenance: Provenance,

@@ -201,7 +201,7 @@ fn every_clock_gives_the_same_step() {
         write(&file, &[("t", clock), ("m", x.clone()), ("s", x.clone()), ("f", x.clone())]);
         let line = Log::open(&file, &m).unwrap().timeline().unwrap();
         assert!((line.step_s - 0.02).abs() < 1e-9, "{line:?}");
-        assert_eq!(line.start_utc.map(|t| t.as_second()), absolute.then_some(1_700_000_000));
+        assert_eq!(line.start_utc.map(jiff::Timestamp::as_second), absolute.then_some(1_700_000_000));
     }
 }
 
