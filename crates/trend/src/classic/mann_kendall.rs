@@ -1,0 +1,161 @@
+//! Mann–Kendall's test of a monotonic trend, and two remedies for values that are not independent.
+
+use super::{check, theil_sen};
+use crate::error::Error;
+use crate::normal::{quantile, two_sided};
+
+/// A Mann–Kendall test.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MannKendall {
+    /// Pairs that rise less pairs that fall.
+    pub s: f64,
+    /// Variance of S under no trend, ties corrected for.
+    pub variance: f64,
+    /// Standard score with continuity correction.
+    pub z: f64,
+    /// Two-sided p-value, free of cancellation also beyond |z| = 8.
+    pub p_value: f64,
+    /// S over the number of pairs.
+    pub tau: f64,
+}
+
+/// Mann–Kendall test of values in order of time (Mann 1945, Kendall 1975), in O(n log n).
+///
+/// # Errors
+/// [`Error::TooFew`] below two values, [`Error::Values`] for values that are not finite.
+pub fn mann_kendall(y: &[f64]) -> Result<MannKendall, Error> {
+    check("Mann-Kendall", 2, y)?;
+    Ok(test(y, 1.0))
+}
+
+/// Mann–Kendall with the variance of an autocorrelated series (Hamed & Rao 1998).
+///
+/// The ranks of the series, freed of its Sen slope by index, are autocorrelated at every lag; lags
+/// significant at 5 % scale the variance. (The lags cost O(n²), as the slope does.)
+///
+/// # Errors
+/// [`Error::TooFew`] below three values, [`Error::Values`] for values that are not finite.
+pub fn hamed_rao(y: &[f64]) -> Result<MannKendall, Error> {
+    check("Hamed-Rao", 3, y)?;
+    let n = y.len() as f64;
+    let ranks = mean_ranks(&detrended(y)?.0);
+    let significant = quantile(0.975) / n.sqrt();
+    let correlation = Correlation::new(&ranks);
+    let sum: f64 = (1..y.len())
+        .map(|lag| (lag as f64, correlation.at(lag)))
+        .filter(|(_, r)| r.abs() > significant)
+        .map(|(lag, r)| (n - lag) * (n - lag - 1.0) * (n - lag - 2.0) * r)
+        .sum();
+    Ok(test(y, 1.0 + 2.0 / (n * (n - 1.0) * (n - 2.0)) * sum))
+}
+
+/// Mann–Kendall after trend-free pre-whitening (Yue & Wang 2002): the Sen slope is taken off, the
+/// lag-one correlation of what is left is removed, the slope is put back, n − 1 values are tested.
+///
+/// # Errors
+/// [`Error::TooFew`] below three values, [`Error::Values`] for values that are not finite.
+pub fn trend_free_pre_whitening(y: &[f64]) -> Result<MannKendall, Error> {
+    check("trend-free pre-whitening", 3, y)?;
+    let (flat, slope) = detrended(y)?;
+    let lag_one = Correlation::new(&flat).at(1);
+    let whitened: Vec<f64> =
+        flat.windows(2).enumerate().map(|(i, w)| (w[1] - w[0] * lag_one) + (i + 1) as f64 * slope).collect();
+    Ok(test(&whitened, 1.0))
+}
+
+/// The test, with its variance multiplied by `inflation`.
+fn test(y: &[f64], inflation: f64) -> MannKendall {
+    let n = y.len() as f64;
+    let s = score(y);
+    let term = |k: f64| k * (k - 1.0) * (2.0 * k + 5.0);
+    let variance = inflation * (term(n) - tie_sizes(y).map(term).sum::<f64>()) / 18.0;
+    let z = if s == 0.0 { 0.0 } else { (s - s.signum()) / variance.sqrt() };
+    MannKendall { s, variance, z, p_value: two_sided(z), tau: s / (0.5 * n * (n - 1.0)) }
+}
+
+/// S: pairs less ties less twice the inversions, which a merge sort counts (Knight 1966).
+fn score(y: &[f64]) -> f64 {
+    let n = y.len() as f64;
+    let tied: f64 = tie_sizes(y).map(|k| 0.5 * k * (k - 1.0)).sum();
+    let mut values = y.to_vec();
+    let mut spare = y.to_vec();
+    0.5 * n * (n - 1.0) - tied - 2.0 * inversions(&mut values, &mut spare) as f64
+}
+
+/// Sorts the values and counts the pairs that stood strictly in falling order.
+fn inversions(values: &mut [f64], spare: &mut [f64]) -> u64 {
+    let half = values.len() / 2;
+    if half == 0 {
+        return 0;
+    }
+    let (left, right) = values.split_at_mut(half);
+    let mut count = inversions(left, &mut spare[..half]) + inversions(right, &mut spare[half..]);
+    let (mut i, mut j) = (0, 0);
+    for slot in spare.iter_mut() {
+        let from_left = j == right.len() || (i < left.len() && left[i] <= right[j]);
+        *slot = if from_left {
+            i += 1;
+            left[i - 1]
+        } else {
+            count += (left.len() - i) as u64;
+            j += 1;
+            right[j - 1]
+        };
+    }
+    values.copy_from_slice(spare);
+    count
+}
+
+/// Sizes of the groups of equal values.
+pub(super) fn tie_sizes(y: &[f64]) -> impl Iterator<Item = f64> {
+    let mut sorted = y.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let sizes: Vec<f64> = sorted.chunk_by(|a, b| a == b).map(|group| group.len() as f64).collect();
+    sizes.into_iter()
+}
+
+/// The series less its Sen slope by index counted from one, and that slope.
+fn detrended(y: &[f64]) -> Result<(Vec<f64>, f64), Error> {
+    let index: Vec<f64> = (0..y.len()).map(|i| i as f64).collect();
+    let slope = theil_sen(&index, y, 0.95)?.slope;
+    Ok((y.iter().zip(&index).map(|(y, i)| y - (i + 1.0) * slope).collect(), slope))
+}
+
+/// Ranks from one, ties sharing their mean.
+fn mean_ranks(y: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..y.len()).collect();
+    order.sort_unstable_by(|&a, &b| y[a].total_cmp(&y[b]));
+    let mut ranks = vec![0.0; y.len()];
+    let mut first = 0;
+    for group in order.chunk_by(|&a, &b| y[a] == y[b]) {
+        let mean = first as f64 + (group.len() + 1) as f64 / 2.0;
+        for &i in group {
+            ranks[i] = mean;
+        }
+        first += group.len();
+    }
+    ranks
+}
+
+/// Sample autocorrelation about the mean.
+struct Correlation {
+    centred: Vec<f64>,
+    power: f64,
+}
+
+impl Correlation {
+    fn new(y: &[f64]) -> Self {
+        let mean = y.iter().sum::<f64>() / y.len() as f64;
+        let centred: Vec<f64> = y.iter().map(|v| v - mean).collect();
+        let power = centred.iter().map(|v| v * v).sum();
+        Self { centred, power }
+    }
+
+    /// At a lag; zero for a constant series, which has none.
+    fn at(&self, lag: usize) -> f64 {
+        if self.power == 0.0 {
+            return 0.0;
+        }
+        self.centred.iter().zip(&self.centred[lag..]).map(|(a, b)| a * b).sum::<f64>() / self.power
+    }
+}

@@ -1,0 +1,27 @@
+//! What can be wrong with a history or with the settings it is judged by.
+
+/// Why a series, a statistic or a trend could not be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
+pub enum Error {
+    /// A number of an observation is not finite, or negative where that has no meaning.
+    #[error(
+        "{what} of the flight departing at {departure_us} µs is {value}: leave it out when it is not known"
+    )]
+    Observation { what: &'static str, departure_us: i64, value: f64 },
+    /// A limit, horizon or nominal figure that must be positive and finite is not.
+    #[error("setting {name} is {value}, which must be positive and finite")]
+    Setting { name: &'static str, value: f64 },
+    /// The watch limit does not lie below the act limit.
+    #[error("watch limit is {watch_m:e} m and act limit {limit_m:e} m: watch must come first")]
+    LimitOrder { watch_m: f64, limit_m: f64 },
+    /// Too few values for this statistic.
+    #[error("{statistic} needs at least {needed} values and was given {given}")]
+    TooFew { statistic: &'static str, needed: usize, given: usize },
+    /// Two slices that belong together differ in length.
+    #[error("{statistic} was given {left} and {right} values that belong in pairs")]
+    Lengths { statistic: &'static str, left: usize, right: usize },
+    /// A value is not finite, or every abscissa is the same.
+    #[error("{statistic} cannot use its values: {hint}")]
+    Values { statistic: &'static str, hint: &'static str },
+}

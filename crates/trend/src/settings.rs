@@ -1,0 +1,52 @@
+//! The limits a trend is judged by.
+
+use crate::error::Error;
+
+/// Limits and horizons of one part number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The gap that grounds, metres: state `act`, and what a crossing is a crossing of.
+    pub limit_m: f64,
+    /// The gap that reports, metres: state `watch`.
+    pub watch_m: f64,
+    /// State `plan` when the 5 % crossing lies within this many flight hours.
+    pub planning_horizon_hours: f64,
+    /// A crossing later than this many flight hours is *beyond the horizon*.
+    pub horizon_hours: f64,
+    /// Without an estimate for this many days there is no state.
+    pub stale_after_days: f64,
+}
+
+impl Settings {
+    /// Settings for an act limit: watch at 80 % of it, planning 500 h, horizon 20,000 h, stale after 45 days.
+    pub fn for_limit(limit_m: f64) -> Self {
+        Self {
+            limit_m,
+            watch_m: 0.8 * limit_m,
+            planning_horizon_hours: 500.0,
+            horizon_hours: 20_000.0,
+            stale_after_days: 45.0,
+        }
+    }
+
+    /// Refuses settings nothing can be judged by.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for a value that is not positive and finite, [`Error::LimitOrder`].
+    pub fn check(&self) -> Result<(), Error> {
+        let values = [
+            ("limit_m", self.limit_m),
+            ("watch_m", self.watch_m),
+            ("planning_horizon_hours", self.planning_horizon_hours),
+            ("horizon_hours", self.horizon_hours),
+            ("stale_after_days", self.stale_after_days),
+        ];
+        if let Some(&(name, value)) = values.iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
+            return Err(Error::Setting { name, value });
+        }
+        if self.watch_m > self.limit_m {
+            return Err(Error::LimitOrder { watch_m: self.watch_m, limit_m: self.limit_m });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,11 @@
+//! The public door of `trend`.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    reason = "a test may fail loudly, and exact values are meant"
+)]
+
+mod classic;
+mod series;
+mod statement;
