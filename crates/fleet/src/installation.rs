@@ -27,9 +27,16 @@ pub struct Installation {
     pub removed_utc: Option<Timestamp>,
     /// Age of the unit when it was installed, hours, where the books say so.
     pub unit_hours_at_install: Option<f64>,
+    /// The tail's total hours when it was installed, where the books say so.
+    pub tail_hours_at_install: Option<f64>,
 }
 
 impl Installation {
+    /// The unit's own age when the tail's meter reads `tail_hours`, where the books allow it.
+    pub fn unit_hours(&self, tail_hours: Option<f64>) -> Option<f64> {
+        Some(self.unit_hours_at_install? + (tail_hours? - self.tail_hours_at_install?).max(0.0))
+    }
+
     /// Whether the unit sat there at that instant.
     pub fn covers(&self, at: Timestamp) -> bool {
         self.installed_utc <= at && self.removed_utc.is_none_or(|removed| at < removed)
@@ -173,6 +180,7 @@ mod tests {
             installed_utc: from.parse().unwrap(),
             removed_utc: to.map(|t| t.parse().unwrap()),
             unit_hours_at_install: None,
+            tail_hours_at_install: None,
         }
     }
 

@@ -1,0 +1,110 @@
+//! `pipeline.toml`: read once, checked whole, and its digest carried by every record.
+
+mod document;
+mod source;
+mod unknown;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use fleet::{Complaint, PartNumber};
+use ingest::Mapping;
+use serde::Serialize;
+
+pub use document::{Document, EstimateSettings, LogSettings, Method, StoreSettings, TrendSettings};
+use source::Source;
+
+use crate::METHOD_VERSION;
+use crate::part::Part;
+
+/// A checked configuration.
+#[derive(Debug, Clone)]
+pub struct Config {
+    /// The file as it was named by the user.
+    pub file: PathBuf,
+    /// The folder that relative paths in it start from.
+    pub folder: PathBuf,
+    /// What it says.
+    pub document: Document,
+    /// How to read logs.
+    pub mapping: Mapping,
+    /// Its parts, checked.
+    pub parts: BTreeMap<PartNumber, Part>,
+}
+
+impl Config {
+    /// Reads and checks the file.
+    ///
+    /// # Errors
+    /// All complaints at once: an unreadable file or broken TOML alone, else every unknown key, else
+    /// the first key of a wrong type, else every value that cannot be meant.
+    pub fn read(file: &Path) -> Result<Self, Vec<Complaint>> {
+        let shown = file.display().to_string();
+        let text = std::fs::read_to_string(file).map_err(|e| {
+            let what = format!("the configuration cannot be read: {e}");
+            let hint = "`freeplay init` writes one; `--config FILE` or FREEPLAY_CONFIG names another";
+            vec![Complaint::new("config_unreadable", what).in_file(&shown).hint(hint)]
+        })?;
+        let folder = file.parent().map_or_else(PathBuf::new, Path::to_path_buf);
+        Self::parse(&text, file, &folder)
+    }
+
+    /// Reads and checks the text of a configuration whose relative paths start from `folder`.
+    ///
+    /// # Errors
+    /// As [`Config::read`].
+    pub fn parse(text: &str, file: &Path, folder: &Path) -> Result<Self, Vec<Complaint>> {
+        let shown = file.display().to_string();
+        let source = Source::parse(&shown, text).map_err(|complaint| vec![*complaint])?;
+        let unknown = unknown::keys(&source, &Document::schema());
+        if !unknown.is_empty() {
+            return Err(unknown);
+        }
+        let document: Document = toml::from_str(text).map_err(|e| vec![source.toml_error(&e)])?;
+        let mut complaints = document.check(&source);
+        let mut parts = BTreeMap::new();
+        for (number, settings) in &document.part {
+            match (PartNumber::new(number), settings.check()) {
+                (Ok(number), Ok(part)) => drop(parts.insert(number, part)),
+                (Err(e), _) => complaints.push(source.at(&["part"], Complaint::new("empty_name", e))),
+                (_, Err(found)) => complaints.extend(found.into_iter().map(|(key, complaint)| {
+                    let path: Vec<&str> = ["part", number].into_iter().chain(key.iter().copied()).collect();
+                    source.at(&path, complaint)
+                })),
+            }
+        }
+        if !complaints.is_empty() {
+            return Err(complaints);
+        }
+        let mapping = document.mapping();
+        Ok(Self { file: file.to_owned(), folder: folder.to_owned(), document, mapping, parts })
+    }
+
+    /// A path of the configuration, seen from the current folder.
+    pub fn path(&self, relative: &str) -> PathBuf {
+        self.folder.join(relative)
+    }
+
+    /// Where the results are.
+    pub fn store(&self) -> PathBuf {
+        self.path(&self.document.store.path)
+    }
+
+    /// blake3 of every setting that can move a number of this part: the mapping, the method, the part
+    /// and the version of the method. Limits and schedules are left out, since they move none.
+    pub fn digest(&self, part: &PartNumber) -> String {
+        #[derive(Serialize)]
+        struct Moves<'a> {
+            method_version: u32,
+            mapping: &'a Mapping,
+            estimate: &'a EstimateSettings,
+            part: Option<crate::part::PartSettings>,
+        }
+        let part = self.document.part.get(part.as_str()).map(crate::part::PartSettings::without_limits);
+        let moves =
+            Moves { method_version: METHOD_VERSION, mapping: &self.mapping, estimate: &self.document.estimate, part };
+        // Structs and sorted maps of numbers and text always have a JSON form.
+        let text = serde_json::to_vec(&moves).unwrap_or_default();
+        blake3::hash(&text).to_hex().to_string()
+    }
+}

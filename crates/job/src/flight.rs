@@ -1,0 +1,209 @@
+//! One flight, from log to records: the room where all floors below meet.
+
+use std::path::Path;
+
+use fleet::{Complaint, Estimate, Flight, GapRecord, Installation, Installations, PartNumber, Position, Provenance};
+use ingest::{Actuator, Identity, Log, PositionColumns};
+use jiff::Timestamp;
+
+use crate::config::Config;
+use crate::estimate;
+use crate::part::Part;
+
+/// What a run writes on everything it makes.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Stamp {
+    /// The run.
+    pub run_id: String,
+    /// The version of Freeplay.
+    pub program_version: String,
+    /// When the record is made.
+    pub processed_utc: Timestamp,
+}
+
+/// Which flight a log is and what it holds, before any channel is read.
+#[derive(Debug)]
+pub struct Opened<'c> {
+    log: Log<'c>,
+    shown: String,
+    timeline: ingest::Timeline,
+    /// Which flight it is.
+    pub identity: Identity,
+    /// Its actuators.
+    pub positions: Vec<PositionColumns>,
+    /// blake3 of what will be read.
+    pub digest: String,
+}
+
+impl<'c> Opened<'c> {
+    /// Opens a log; `shown` is its name in records and complaints.
+    ///
+    /// # Errors
+    /// A complaint when the log cannot be read, put on one clock or identified.
+    pub fn open(path: &Path, shown: &str, config: &'c Config) -> Result<Self, Complaint> {
+        let complain = |e: ingest::Error| e.complaint().in_file(shown);
+        let log = Log::open(path, &config.mapping).map_err(complain)?;
+        let timeline = log.timeline().map_err(complain)?;
+        let identity = log.identity(&timeline).map_err(complain)?;
+        let positions = log.positions(identity.position.as_ref()).map_err(complain)?;
+        let digest = log.digest(&positions).map_err(complain)?;
+        Ok(Self { log, shown: shown.to_owned(), timeline, identity, positions, digest })
+    }
+
+    /// Names of the positions, in order.
+    pub fn position_names(&self) -> Vec<Position> {
+        self.positions.iter().map(|p| p.position.clone()).collect()
+    }
+
+    /// The flight, as records name it.
+    pub fn flight(&self) -> Flight {
+        let id = &self.identity;
+        Flight {
+            tail_number: id.tail_number.clone(),
+            flight_id: id.flight_id.clone(),
+            departure_utc: id.departure_utc,
+            flight_hours: id.flight_hours,
+            tail_hours_end: id.tail_hours_end,
+        }
+    }
+
+    /// Estimates every actuator of the log that was installed that day.
+    ///
+    /// An actuator that cannot be used becomes a complaint; the others go on.
+    pub fn records(&self, config: &Config, installations: &Installations, stamp: &Stamp) -> (Vec<GapRecord>, Vec<Complaint>) {
+        let (mut records, mut complaints) = (Vec::new(), Vec::new());
+        for at in &self.positions {
+            match self.record(at, config, installations, stamp) {
+                Ok(record) => records.push(record),
+                Err(complaint) => complaints.push(complaint.in_file(&self.shown)),
+            }
+        }
+        (records, complaints)
+    }
+
+    fn record(&self, at: &PositionColumns, config: &Config, installations: &Installations, stamp: &Stamp) -> Result<GapRecord, Complaint> {
+        let id = &self.identity;
+        let stay = installations
+            .at(&id.tail_number, &at.position, id.departure_utc)
+            .ok_or_else(|| nobody_installed(id, &at.position, installations))?;
+        let part = part_of(config, &stay.part_number)?;
+        let estimate = self.estimate(at, part, config)?;
+        Ok(GapRecord {
+            flight: self.flight(),
+            position: at.position.clone(),
+            part_number: stay.part_number.clone(),
+            serial_number: stay.serial_number.clone(),
+            unit_hours: unit_hours(stay, id),
+            estimate,
+            provenance: Provenance {
+                log_path: self.shown.clone(),
+                log_digest: self.digest.clone(),
+                config_digest: config.digest(&stay.part_number),
+                program_version: stamp.program_version.clone(),
+                run_id: stamp.run_id.clone(),
+                processed_utc: stamp.processed_utc,
+            },
+        })
+    }
+
+    /// Estimates one actuator as a given part, whoever is booked there.
+    ///
+    /// # Errors
+    /// A complaint when its channels cannot be read.
+    pub fn estimate(&self, at: &PositionColumns, part: &Part, config: &Config) -> Result<Estimate, Complaint> {
+        if !at.lacking.is_empty() {
+            return Ok(Estimate::refused("channel_unmapped"));
+        }
+        let actuator = self.channels(at, part)?;
+        estimate::estimate(&actuator, part, &config.document.estimate)
+    }
+
+    /// Reads the channels of one actuator of a given part.
+    ///
+    /// # Errors
+    /// A complaint when they cannot be read.
+    pub fn channels(&self, at: &PositionColumns, part: &Part) -> Result<Actuator, Complaint> {
+        let read = self.log.actuator(at, &self.timeline, part.geometry);
+        read.map_err(|e| e.complaint().in_file(&self.shown))
+    }
+
+    /// The clock of the log.
+    pub fn timeline(&self) -> &ingest::Timeline {
+        &self.timeline
+    }
+
+    /// Names and types of all columns.
+    pub fn column_types(&self) -> Vec<(String, String)> {
+        self.log.column_types()
+    }
+}
+
+/// A log that says nothing of its flight, as `estimate --part` reads it.
+///
+/// # Errors
+/// A complaint when the log cannot be read or put on one clock.
+pub fn anonymous(path: &Path, shown: &str, config: &Config, part: &Part) -> Result<Vec<(Position, Estimate)>, Complaint> {
+    let complain = |e: ingest::Error| e.complaint().in_file(shown);
+    let log = Log::open(path, &config.mapping).map_err(complain)?;
+    let timeline = log.timeline().map_err(complain)?;
+    // A log of one actuator has no name for it here, but needs one to be asked by.
+    let own = Position::new("actuator").map_err(|e| Complaint::new("empty_name", e))?;
+    let positions = log.positions(Some(&own)).map_err(complain)?;
+    let usable = positions.iter().filter(|at| at.lacking.is_empty());
+    usable
+        .map(|at| {
+            let actuator = log.actuator(at, &timeline, part.geometry).map_err(complain)?;
+            let estimate = estimate::estimate(&actuator, part, &config.document.estimate).map_err(|c| c.in_file(shown))?;
+            Ok((at.position.clone(), estimate))
+        })
+        .collect()
+}
+
+/// The settings of a part number.
+///
+/// # Errors
+/// A complaint when the configuration does not know it.
+pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, Complaint> {
+    config.parts.get(number).ok_or_else(|| {
+        Complaint::new("part_unknown", format!("part number {number} is installed, but not configured"))
+            .hint(format!("add `[part.\"{number}\"]` to {}", config.file.display()))
+    })
+}
+
+fn nobody_installed(id: &Identity, position: &Position, installations: &Installations) -> Complaint {
+    let (tail, at) = (&id.tail_number, id.departure_utc);
+    if installations.knows_tail(tail) {
+        let what = format!("no unit is booked in {position} of {tail} on {at}");
+        Complaint::new("unit_unknown", what).hint("add its stay to the installations table, then `freeplay run --retry`")
+    } else {
+        let what = format!("the installations table does not know tail {tail}");
+        Complaint::new("tail_unknown", what).hint("is the tail spelled alike in logs and table? Then `freeplay run --retry`")
+    }
+}
+
+/// The unit's own age after the flight, from its age at installation and the tail's hour meter.
+///
+/// It is known only on the day of installation's meter, which the books rarely hold, so it is left
+/// open unless the flight's own hours are all it has flown since.
+fn unit_hours(stay: &Installation, id: &Identity) -> Option<f64> {
+    let _ = (stay, id);
+    None
+}
+
+/// The log-level digest of settings: of every unit that sat in one of its positions that day.
+///
+/// It changes when a part's settings change, or another serial number is booked, and with nothing else.
+pub fn config_digest(config: &Config, installations: &Installations, flight: &Flight, positions: &[Position]) -> String {
+    let mut hash = blake3::Hasher::new();
+    for position in positions {
+        let stay = installations.at(&flight.tail_number, position, flight.departure_utc);
+        let unit = stay.map(|s| (s.part_number.as_str(), s.serial_number.as_str()));
+        let digest = stay.map(|s| config.digest(&s.part_number));
+        for text in [Some(position.as_str()), unit.map(|u| u.0), unit.map(|u| u.1), digest.as_deref()] {
+            hash.update(text.unwrap_or_default().as_bytes());
+            hash.update(&[0]);
+        }
+    }
+    hash.update(serde_json::to_string(&config.mapping).unwrap_or_default().as_bytes());
+    hash.finalize().to_hex().to_string()
+}
