@@ -102,7 +102,7 @@ impl Table {
 }
 
 /// Reads the installations table: `tail_number, position, part_number, serial_number, installed_utc,
-/// removed_utc` and optionally `unit_hours_at_install`.
+/// removed_utc` and optionally `unit_hours_at_install`, `tail_hours_at_install`.
 ///
 /// # Errors
 /// Every cell that cannot be read, or, when all can, every contradiction between rows.
@@ -128,7 +128,7 @@ pub fn installations(file: &Path) -> Result<Installations, Vec<Error>> {
 struct InstallationColumns {
     names: [usize; 5],
     removed: Option<usize>,
-    hours: Option<usize>,
+    hours: [Option<usize>; 2],
 }
 
 impl InstallationColumns {
@@ -139,11 +139,8 @@ impl InstallationColumns {
             return Err(found.into_iter().filter_map(Result::err).collect());
         }
         let names = found.map(Result::unwrap_or_default);
-        Ok(Self {
-            names,
-            removed: table.find(&["removed_utc"]),
-            hours: table.find(&["unit_hours_at_install"]),
-        })
+        let hours = ["unit_hours_at_install", "tail_hours_at_install"].map(|name| table.find(&[name]));
+        Ok(Self { names, removed: table.find(&["removed_utc"]), hours })
     }
 
     fn installation(&self, table: &Table, row: usize) -> Result<Installation, Error> {
@@ -155,7 +152,8 @@ impl InstallationColumns {
             serial_number: table.required(row, serial, name)?,
             installed_utc: table.required(row, installed, utc)?,
             removed_utc: table.optional(row, self.removed, utc)?,
-            unit_hours_at_install: table.optional(row, self.hours, number)?,
+            unit_hours_at_install: table.optional(row, self.hours[0], number)?,
+            tail_hours_at_install: table.optional(row, self.hours[1], number)?,
         })
     }
 }

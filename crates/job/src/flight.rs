@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fleet::{Complaint, Estimate, Flight, GapRecord, Installation, Installations, PartNumber, Position, Provenance};
+use fleet::{Complaint, Estimate, Flight, GapRecord, Installations, PartNumber, Position, Provenance};
 use ingest::{Actuator, Identity, Log, PositionColumns};
 use jiff::Timestamp;
 
@@ -93,7 +93,7 @@ impl<'c> Opened<'c> {
             position: at.position.clone(),
             part_number: stay.part_number.clone(),
             serial_number: stay.serial_number.clone(),
-            unit_hours: unit_hours(stay, id),
+            unit_hours: stay.unit_hours(id.tail_hours_end),
             estimate,
             provenance: Provenance {
                 log_path: self.shown.clone(),
@@ -179,15 +179,6 @@ fn nobody_installed(id: &Identity, position: &Position, installations: &Installa
         let what = format!("the installations table does not know tail {tail}");
         Complaint::new("tail_unknown", what).hint("is the tail spelled alike in logs and table? Then `freeplay run --retry`")
     }
-}
-
-/// The unit's own age after the flight, from its age at installation and the tail's hour meter.
-///
-/// It is known only on the day of installation's meter, which the books rarely hold, so it is left
-/// open unless the flight's own hours are all it has flown since.
-fn unit_hours(stay: &Installation, id: &Identity) -> Option<f64> {
-    let _ = (stay, id);
-    None
 }
 
 /// The log-level digest of settings: of every unit that sat in one of its positions that day.
