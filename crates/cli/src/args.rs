@@ -1,0 +1,339 @@
+//! What may be typed. The doc comments are the help texts.
+
+use std::path::PathBuf;
+
+use clap::{ArgAction, Args as ClapArgs, Parser, Subcommand, ValueEnum};
+use jiff::Timestamp;
+
+const AFTER: &str = "\
+First steps:
+  freeplay init            write a commented pipeline.toml here
+  freeplay check           see what your logs offer, before anything is computed
+  freeplay run             estimate every new flight, store it, state the trends
+  freeplay query tail N412FP
+
+Exit codes: 0 all well, 1 some logs in error, 2 usage or configuration, 3 the run failed,
+4 a state was reached (--fail-on), 130 interrupted.";
+
+/// The backlash gap of flight-control actuators, from the logs a fleet records anyway.
+#[derive(Debug, Parser)]
+#[command(name = "freeplay", version, after_help = AFTER, infer_subcommands = false, propagate_version = true)]
+pub struct Args {
+    #[command(flatten)]
+    pub global: Global,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Options of every command.
+#[derive(Debug, ClapArgs)]
+pub struct Global {
+    /// The configuration.
+    #[arg(long, global = true, env = "FREEPLAY_CONFIG", default_value = "pipeline.toml", value_name = "FILE")]
+    pub config: PathBuf,
+    /// Say nothing but the answer and errors.
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// Say more; twice for everything.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    pub verbose: u8,
+    /// No progress bar or progress lines.
+    #[arg(long, global = true)]
+    pub no_progress: bool,
+    /// Colour in what people read.
+    #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN")]
+    pub color: Color,
+}
+
+/// When to colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Color {
+    /// On a terminal, unless `NO_COLOR` is set.
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Write a commented pipeline.toml and an example installations.csv; nothing is overwritten
+    #[command(after_help = "Example:\n  freeplay init fleet-a")]
+    Init(InitArgs),
+    /// Say channel by channel what was found, mapped and converted, and what would be refused
+    #[command(after_help = "Example:\n  freeplay check logs/N412FP/20261119_0413.parquet")]
+    Check(CheckArgs),
+    /// The nightly job: every log not yet accounted for, then the trends of the units it touched
+    #[command(after_help = "Examples:\n  freeplay run\n  freeplay run --since 2026-11-01 --tail N412FP --redo\n  freeplay run --fail-on act && echo nobody needs a hangar today")]
+    Run(RunArgs),
+    /// Estimate logs ad hoc; nothing is stored
+    #[command(after_help = "Examples:\n  freeplay estimate logs/N412FP/*.parquet\n  freeplay estimate bench.parquet --part EMA-27-1040 --trace trace.parquet")]
+    Estimate(EstimateArgs),
+    /// Stored records, of a tail, a serial number, a flight or a position
+    #[command(after_help = "Examples:\n  freeplay query tail N412FP --last 20\n  freeplay query serial 00317 --since 2026-01-01 --json")]
+    Query(QueryArgs),
+    /// Level, rate, crossing of the limit and state of each unit
+    #[command(after_help = "Examples:\n  freeplay trend --tail N412FP\n  freeplay trend --estimates history.csv --queries dates.csv --format csv")]
+    Trend(TrendArgs),
+    /// Fly a simulated fleet: logs, installations and the truth
+    #[command(after_help = "Example:\n  freeplay simulate --output /tmp/fleet && freeplay run --config /tmp/fleet/pipeline.toml")]
+    Simulate(SimulateArgs),
+    /// Care of the results
+    #[command(after_help = "Examples:\n  freeplay store info --max-age 30h\n  freeplay store export --format csv --output gaps.csv")]
+    Store(StoreArgs),
+    /// Completions for a shell
+    #[command(after_help = "Example:\n  freeplay completions bash > ~/.local/share/bash-completion/completions/freeplay")]
+    Completions(CompletionsArgs),
+    /// The manual page
+    #[command(after_help = "Example:\n  freeplay man | man -l -")]
+    Man,
+}
+
+/// Where rows go, and in which form.
+#[derive(Debug, Clone, ClapArgs)]
+pub struct Output {
+    /// Form of the rows.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    pub format: Format,
+    /// Short for `--format json`.
+    #[arg(long, conflicts_with = "format")]
+    pub json: bool,
+    /// File for the rows instead of stdout.
+    #[arg(long, short, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+impl Output {
+    /// The form asked for.
+    pub fn format(&self) -> Format {
+        if self.json { Format::Json } else { self.format }
+    }
+}
+
+/// Forms of rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// For people: µm, hours, dates.
+    Table,
+    /// An array of objects, SI.
+    Json,
+    /// SI, with a header.
+    Csv,
+    /// SI.
+    Parquet,
+}
+
+/// `init`.
+#[derive(Debug, ClapArgs)]
+pub struct InitArgs {
+    /// Folder to write to.
+    #[arg(default_value = ".")]
+    pub dir: PathBuf,
+}
+
+/// `check`.
+#[derive(Debug, ClapArgs)]
+pub struct CheckArgs {
+    /// Logs; those the configuration names when none is given.
+    pub logs: Vec<PathBuf>,
+    /// Look at so many of the configured logs at most.
+    #[arg(long, default_value_t = 20)]
+    pub limit: usize,
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// `run`.
+#[derive(Debug, ClapArgs)]
+pub struct RunArgs {
+    /// Departures from this UTC date or time on.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub since: Option<Timestamp>,
+    /// Departures before this UTC date or time.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub until: Option<Timestamp>,
+    /// One aircraft only.
+    #[arg(long)]
+    pub tail: Option<String>,
+    /// Flights of this unit only.
+    #[arg(long)]
+    pub serial: Option<String>,
+    /// So many logs at most.
+    #[arg(long)]
+    pub limit: Option<usize>,
+    /// Workers; as many as cores by default.
+    #[arg(long, short, value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// Logs in error again.
+    #[arg(long)]
+    pub retry: bool,
+    /// All logs again.
+    #[arg(long)]
+    pub redo: bool,
+    /// Say what would be done and why, and do nothing.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Wait for another run that holds the store, e.g. `20m`.
+    #[arg(long, value_parser = parse_span, value_name = "TIME")]
+    pub wait: Option<std::time::Duration>,
+    /// End with code 4 when a unit is at or past this state.
+    #[arg(long, value_enum, value_name = "STATE")]
+    pub fail_on: Option<FailOn>,
+    /// The account of the run as JSON on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// States that can fail a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum FailOn {
+    /// The watch limit.
+    Watch,
+    /// The planning horizon.
+    Plan,
+    /// The act limit.
+    Act,
+}
+
+/// `estimate`.
+#[derive(Debug, ClapArgs)]
+pub struct EstimateArgs {
+    /// Logs.
+    #[arg(required = true)]
+    pub logs: Vec<PathBuf>,
+    /// Take every actuator as this part: no identity or installations are needed.
+    #[arg(long, value_name = "PART")]
+    pub part: Option<String>,
+    /// Write S(t), δX, load, innovation and its variance per sample.
+    #[arg(long, value_name = "FILE.parquet")]
+    pub trace: Option<PathBuf>,
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// `query`.
+#[derive(Debug, ClapArgs)]
+pub struct QueryArgs {
+    /// What to ask by.
+    #[arg(value_enum)]
+    pub by: By,
+    /// Its name.
+    pub id: String,
+    /// Departures from this UTC date or time on.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub since: Option<Timestamp>,
+    /// Departures before this UTC date or time.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub until: Option<Timestamp>,
+    /// The newest N records only.
+    #[arg(long, value_name = "N")]
+    pub last: Option<usize>,
+    /// Of this part number only.
+    #[arg(long)]
+    pub part: Option<String>,
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// What records are asked by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum By {
+    /// The aircraft.
+    Tail,
+    /// The unit.
+    Serial,
+    /// The flight.
+    Flight,
+    /// The place on the aircraft.
+    Position,
+}
+
+/// `trend`.
+#[derive(Debug, ClapArgs)]
+pub struct TrendArgs {
+    /// Units on this tail.
+    #[arg(long)]
+    pub tail: Option<String>,
+    /// This unit.
+    #[arg(long)]
+    pub serial: Option<String>,
+    /// This part number.
+    #[arg(long)]
+    pub part: Option<String>,
+    /// The day of the statement; by default that of the newest record. Nothing later is looked at.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub as_of: Option<Timestamp>,
+    /// An estimates table made elsewhere, instead of the store.
+    #[arg(long, value_name = "FILE")]
+    pub estimates: Option<PathBuf>,
+    /// One row per query: `serial_number`, `as_of_utc`, optionally `part_number`.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["as_of", "tail", "serial", "part"])]
+    pub queries: Option<PathBuf>,
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// `simulate`.
+#[derive(Debug, ClapArgs)]
+pub struct SimulateArgs {
+    /// What to fly; a small fleet by default.
+    pub spec: Option<PathBuf>,
+    /// Folder for logs, installations and truth.
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Another seed than the spec's.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Workers; as many as cores by default.
+    #[arg(long, short, value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+}
+
+/// `store`.
+#[derive(Debug, ClapArgs)]
+pub struct StoreArgs {
+    #[command(subcommand)]
+    pub command: StoreCommand,
+}
+
+/// Care of the results.
+#[derive(Debug, Subcommand)]
+pub enum StoreCommand {
+    /// What the store holds, and when it was last fed
+    Info {
+        /// Fail (code 1) when the last completed run is older, e.g. `30h`.
+        #[arg(long, value_parser = parse_span, value_name = "TIME")]
+        max_age: Option<std::time::Duration>,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Look for missing, changed or doubled data
+    Verify,
+    /// Merge small files, sorted for queries
+    Compact,
+    /// All records, in order
+    Export {
+        #[command(flatten)]
+        output: Output,
+    },
+}
+
+/// `completions`.
+#[derive(Debug, ClapArgs)]
+pub struct CompletionsArgs {
+    /// The shell.
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+fn parse_utc(text: &str) -> Result<Timestamp, String> {
+    ingest::tables::utc(text)
+}
+
+fn parse_span(text: &str) -> Result<std::time::Duration, String> {
+    let span: jiff::SignedDuration = text.parse().map_err(|e| format!("`{text}` is no span of time such as 20m or 30h: {e}"))?;
+    span.try_into().map_err(|_| format!("`{text}` is below zero"))
+}

@@ -1,0 +1,99 @@
+//! `query`: stored records, by tail, serial number, flight or position.
+
+use fleet::GapRecord;
+use store::{Query, Store};
+
+use crate::args::{By, Global, QueryArgs};
+use crate::exit::{Code, Failure};
+use crate::rows;
+use crate::table::{self, number, text};
+use crate::talk::Talk;
+
+use super::{config, run::count};
+
+/// Answers with the records that fit, oldest first.
+///
+/// # Errors
+/// When configuration or store cannot be read.
+pub fn query(args: &QueryArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
+    let store = Store::open(&config(global)?.store())?;
+    let records = store.records(&asked(args))?;
+    rows::answer(&args.output, talk, || Ok(store::columns::to_batch(&records)?), || page(&records))?;
+    if records.is_empty() {
+        talk.note(&format!("no record of {} `{}`; `freeplay store info` says what there is", word(args.by), args.id));
+    }
+    Ok(Code::Well)
+}
+
+fn word(by: By) -> &'static str {
+    match by {
+        By::Tail => "tail",
+        By::Serial => "serial",
+        By::Flight => "flight",
+        By::Position => "position",
+    }
+}
+
+fn asked(args: &QueryArgs) -> Query {
+    let id = |by: By| (args.by == by).then(|| args.id.clone());
+    Query {
+        tail_number: id(By::Tail),
+        serial_number: id(By::Serial),
+        flight_id: id(By::Flight),
+        position: id(By::Position),
+        part_number: args.part.clone(),
+        since_utc: args.since,
+        until_utc: args.until,
+        last: args.last,
+    }
+}
+
+/// Records as people read them.
+pub fn page(records: &[GapRecord]) -> String {
+    let columns = [
+        text("departure UTC", 0),
+        text("tail", 2),
+        text("flight", 3),
+        text("position", 1),
+        text("part / serial", 2),
+        number("gap µm", 0),
+        number("± µm", 4),
+        number("mid-range µm", 5),
+        number("reversals", 7),
+        number("load N", 6),
+        text("doubts", 1),
+    ];
+    let cells = |r: &GapRecord| {
+        let e = &r.estimate;
+        vec![
+            r.flight.departure_utc.strftime("%Y-%m-%d %H:%M").to_string(),
+            r.flight.tail_number.to_string(),
+            r.flight.flight_id.to_string(),
+            r.position.to_string(),
+            format!("{} / {}", r.part_number, r.serial_number),
+            table::micrometres(e.gap_m),
+            table::micrometres(e.gap_se_m),
+            table::micrometres(e.gap_midrange_m),
+            e.load_reversals.to_string(),
+            load(e),
+            doubts(e),
+        ]
+    };
+    let head = format!("{}\n", count(records.len(), "record"));
+    if records.is_empty() { head } else { head + &table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>()) }
+}
+
+/// The load band a number stands on.
+pub fn load(e: &fleet::Estimate) -> String {
+    e.load_p05_n.zip(e.load_p95_n).map_or_else(table::dash, |(low, high)| format!("{low:.0}…{high:.0}"))
+}
+
+/// Why refused, or what is doubted.
+pub fn doubts(e: &fleet::Estimate) -> String {
+    let reason = e.reason.iter().map(|reason| match e.status {
+        fleet::Status::Refused => format!("refused: {reason}"),
+        fleet::Status::Estimated => reason.clone(),
+    });
+    let others = e.flags.iter().filter(|flag| Some(*flag) != e.reason.as_ref()).cloned();
+    reason.chain(others).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,195 @@
+//! `run`: the nightly job, and its account in the morning.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use fleet::{SerialNumber, TailNumber};
+use pipeline::schedule::{self, Context};
+use pipeline::trends::TrendRow;
+use pipeline::{Event, Plan, Report, Request};
+use store::Holder;
+
+use crate::args::{FailOn, Global, RunArgs};
+use crate::exit::{Code, Failure};
+use crate::progress::{Progress, span};
+use crate::table::{self, number, text};
+use crate::talk::{Talk, escape};
+
+use super::{VERSION, config, trend::state_mark};
+
+/// Runs the night's work.
+///
+/// # Errors
+/// When nothing could be run, or the store failed.
+pub fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
+    let config = config(global)?;
+    let request = request(args)?;
+    if args.dry_run {
+        return dry_run(&config, &request, talk);
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    listen(&stop)?;
+    let progress = Progress::new("run", talk);
+    let watch = |event: Event| follow(&event, &progress);
+    let context = Context { program_version: VERSION, holder: Holder::this_process(), wait: args.wait, stop: &stop, watch: &watch };
+    let report = schedule::run(&config, &request, &context);
+    progress.end();
+    let report = report?;
+    talk.complain_all(report.errors.iter().map(|e| &e.complaint));
+    let code = code(&report, args.fail_on, stop.load(Ordering::Relaxed));
+    if args.json {
+        let text = serde_json::to_string_pretty(&report).map_err(std::io::Error::from)?;
+        talk.answer(&(text + "\n"))?;
+    } else {
+        talk.answer(&account(&report, &global.config.display().to_string(), code))?;
+    }
+    Ok(code)
+}
+
+fn request(args: &RunArgs) -> Result<Request, Failure> {
+    let empty = |e: fleet::ids::EmptyName| Failure::usage("empty_name", e, "leave the option out to ask for all");
+    Ok(Request {
+        since_utc: args.since,
+        until_utc: args.until,
+        tail_number: args.tail.as_ref().map(TailNumber::new).transpose().map_err(empty)?,
+        serial_number: args.serial.as_ref().map(SerialNumber::new).transpose().map_err(empty)?,
+        limit: args.limit,
+        jobs: args.jobs.map(usize::from),
+        retry: args.retry,
+        redo: args.redo,
+    })
+}
+
+/// The first signal lets flights in hand finish; the second ends the process at once.
+fn listen(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, Code::Interrupted as i32, Arc::clone(stop))?;
+        signal_hook::flag::register(signal, Arc::clone(stop))?;
+    }
+    Ok(())
+}
+
+fn follow(event: &Event, progress: &Progress<'_>) {
+    match event {
+        Event::Planned { logs, .. } => progress.total(*logs),
+        Event::Started { log } => progress.started(log),
+        Event::Finished { log, refused, complaints, .. } => progress.finished(log, *refused, complaints.len()),
+        Event::Stored { .. } | Event::Trends { .. } => {}
+    }
+}
+
+fn code(report: &Report, fail_on: Option<FailOn>, stopped: bool) -> Code {
+    let at = |row: &TrendRow| match row.state {
+        Some("watch") => Some(FailOn::Watch),
+        Some("plan") => Some(FailOn::Plan),
+        Some("act") => Some(FailOn::Act),
+        _ => None,
+    };
+    let reached = fail_on.is_some_and(|least| report.trends.iter().any(|row| at(row) >= Some(least)));
+    if stopped && report.not_reached > 0 {
+        Code::Interrupted
+    } else if !report.errors.is_empty() {
+        Code::LogsInError
+    } else if reached {
+        Code::StateReached
+    } else {
+        Code::Well
+    }
+}
+
+/// The morning's page.
+fn account(report: &Report, config: &str, code: Code) -> String {
+    let mut page = format!("Freeplay {VERSION} · run {} · {config}\n", report.started_utc.strftime("%Y-%m-%dT%H:%M:%SZ"));
+    let new = report.found - report.known;
+    line(&mut page, "found", &format!("{}: {new} to do, {} known", count(report.found, "log"), report.known));
+    let records = report.estimated + report.refusals();
+    line(&mut page, "stored", &format!("{} of {}: {} estimated, {}", count(records, "record"), count(report.flights, "flight"), report.estimated, refused(report)));
+    if !report.errors.is_empty() {
+        line(&mut page, "in error", &format!("{}; everything else is stored", count(report.logs_in_error(), "log")));
+    }
+    for error in report.errors.iter().take(10) {
+        let place = error.complaint.place().map(|p| format!("  {p}")).unwrap_or_default();
+        line(&mut page, "", &format!("{}  {}{place}", escape(&error.log), error.complaint.code));
+    }
+    if report.errors.len() > 10 {
+        line(&mut page, "", &format!("and {} more, all in `freeplay run --json`", report.errors.len() - 10));
+    }
+    if report.not_reached > 0 {
+        line(&mut page, "not reached", &format!("{}; the next run does them", count(report.not_reached, "log")));
+    }
+    if let Some((log, seconds)) = &report.slowest {
+        let took = span(Duration::from_secs_f64(report.took_s));
+        line(&mut page, "slowest", &format!("{}, {seconds:.1} s · took {took}, {}", escape(log), count(report.workers, "worker")));
+    }
+    page.push_str(&attention(&report.trends));
+    if code == Code::LogsInError {
+        page.push_str("exit 1: some logs are in error. After mending: `freeplay run --retry`\n");
+    }
+    page
+}
+
+fn refused(report: &Report) -> String {
+    let reasons: Vec<String> = report.refused.iter().map(|(reason, n)| format!("{reason} {n}")).collect();
+    if reasons.is_empty() { "0 refused".into() } else { format!("{} refused ({})", report.refusals(), reasons.join(", ")) }
+}
+
+fn line(page: &mut String, label: &str, text: &str) {
+    let _ = writeln!(page, "  {label:<11} {text}");
+}
+
+/// `1 log`, `2 logs`.
+pub fn count(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+/// The units that need a decision, most urgent first; the others as one number.
+fn attention(rows: &[TrendRow]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let urgency = |row: &TrendRow| ["act", "plan", "watch"].iter().position(|s| row.state == Some(*s));
+    let mut urgent: Vec<&TrendRow> = rows.iter().filter(|r| urgency(r).is_some()).collect();
+    urgent.sort_by(|a, b| {
+        let hours = |r: &TrendRow| r.crossing_hours_p05.unwrap_or(f64::INFINITY);
+        urgency(a).cmp(&urgency(b)).then_with(|| hours(a).total_cmp(&hours(b)))
+    });
+    let silent = rows.iter().filter(|r| r.state.is_none()).count();
+    let normal = rows.len() - urgent.len() - silent;
+    let mut page = format!("\n{} touched: {} need attention, {normal} normal, {silent} without a statement\n", count(rows.len(), "unit"), urgent.len());
+    if !urgent.is_empty() {
+        let columns = [text("state", 0), text("part / serial", 0), text("tail", 2), text("position", 3), number("gap µm", 0), number("limit µm", 4), number("not before h", 1), text("why", 5)];
+        let cells = |r: &&TrendRow| {
+            vec![
+                state_mark(r.state),
+                format!("{} / {}", r.part_number.as_deref().unwrap_or("–"), r.serial_number),
+                r.tail_number.clone().unwrap_or_else(table::dash),
+                r.position.clone().unwrap_or_else(table::dash),
+                table::micrometres(r.gap_m),
+                table::micrometres(r.limit_m),
+                table::hours(r.crossing_hours_p05),
+                r.reason.clone().unwrap_or_default(),
+            ]
+        };
+        page.push_str(&table::layout(&columns, &urgent.iter().map(cells).collect::<Vec<_>>()));
+    }
+    page
+}
+
+fn dry_run(config: &job::Config, request: &Request, talk: &Talk) -> Result<Code, Failure> {
+    let Plan { found, known, work, .. } = schedule::dry_run(config, request)?;
+    let bytes: i64 = work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes).sum();
+    let head = format!("would do {} of {found} ({known} known), {:.1} MB; nothing was done\n", count(work.len(), "log"), bytes as f64 / 1e6);
+    let columns = [text("log", 0), text("why", 0), number("MB", 1)];
+    let rows: Vec<Vec<String>> = work
+        .iter()
+        .map(|w| {
+            let megabytes = w.stat.as_ref().map_or_else(table::dash, |s| format!("{:.2}", s.size_bytes as f64 / 1e6));
+            vec![w.shown.clone(), w.why.as_str().to_owned(), megabytes]
+        })
+        .collect();
+    talk.answer(&(head + &table::layout(&columns, &rows)))?;
+    Ok(Code::Well)
+}

@@ -1,0 +1,34 @@
+//! `completions` and `man`: for the shell.
+
+use clap::CommandFactory;
+
+use crate::args::{Args, CompletionsArgs};
+use crate::exit::{Code, Failure};
+use crate::talk::Talk;
+
+/// Writes completions for a shell.
+///
+/// # Errors
+/// When stdout is closed or full.
+pub fn completions(args: &CompletionsArgs, talk: &Talk) -> Result<Code, Failure> {
+    let mut text = Vec::new();
+    clap_complete::generate(args.shell, &mut Args::command(), "freeplay", &mut text);
+    talk.answer(&String::from_utf8_lossy(&text))?;
+    Ok(Code::Well)
+}
+
+/// Writes the manual page: the program, then each of its commands.
+///
+/// # Errors
+/// When stdout is closed or full.
+pub fn man(talk: &Talk) -> Result<Code, Failure> {
+    let mut text = Vec::new();
+    let command = Args::command();
+    clap_mangen::Man::new(command.clone()).render(&mut text)?;
+    for sub in command.get_subcommands() {
+        clap_mangen::Man::new(sub.clone()).render_description_section(&mut text)?;
+        clap_mangen::Man::new(sub.clone()).render_options_section(&mut text)?;
+    }
+    talk.answer(&String::from_utf8_lossy(&text))?;
+    Ok(Code::Well)
+}

@@ -1,0 +1,51 @@
+//! `freeplay`: the backlash gap of flight-control actuators, from the logs a fleet records anyway.
+//!
+//! This crate parses, calls and answers. Only it prints, exits and reads the environment: answers go
+//! to stdout, progress and complaints to stderr.
+
+mod args;
+mod commands;
+mod exit;
+mod progress;
+mod rows;
+mod table;
+mod talk;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Args, Command};
+use exit::Code;
+use talk::Talk;
+
+fn main() -> ExitCode {
+    let args = match Args::try_parse() {
+        Ok(args) => args,
+        // Help and version are answers; anything else is a usage error, and clap says which.
+        Err(error) => {
+            let _ = error.print();
+            return if error.use_stderr() { Code::Usage.into() } else { Code::Well.into() };
+        }
+    };
+    let talk = Talk::new(&args.global);
+    match dispatch(&args, &talk) {
+        Ok(code) => code.into(),
+        Err(failure) => talk.fail(&failure).into(),
+    }
+}
+
+fn dispatch(args: &Args, talk: &Talk) -> Result<Code, exit::Failure> {
+    match &args.command {
+        Command::Init(a) => commands::init::init(a, talk),
+        Command::Check(a) => commands::check::check(a, &args.global, talk),
+        Command::Run(a) => commands::run::run(a, &args.global, talk),
+        Command::Estimate(a) => commands::estimate::estimate(a, &args.global, talk),
+        Command::Query(a) => commands::query::query(a, &args.global, talk),
+        Command::Trend(a) => commands::trend::trend(a, &args.global, talk),
+        Command::Simulate(a) => commands::simulate::simulate(a, talk),
+        Command::Store(a) => commands::store::store(a, &args.global, talk),
+        Command::Completions(a) => commands::shell::completions(a, talk),
+        Command::Man => commands::shell::man(talk),
+    }
+}

@@ -1,0 +1,131 @@
+//! Progress of long work: a bar on a terminal, sparse whole lines without one, nothing when quiet.
+
+use std::collections::BTreeSet;
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::talk::Talk;
+
+/// Without a terminal, one line in this time at most.
+const SPARSE: Duration = Duration::from_secs(30);
+
+/// Progress of one piece of work.
+pub struct Progress<'t> {
+    name: &'static str,
+    talk: &'t Talk,
+    bar: ProgressBar,
+    terminal: bool,
+    state: Mutex<State>,
+}
+
+struct State {
+    total: u64,
+    done: u64,
+    refused: usize,
+    errors: usize,
+    begun: Instant,
+    told: Option<Instant>,
+    in_hand: BTreeSet<String>,
+}
+
+impl<'t> Progress<'t> {
+    /// Nothing is shown before [`Progress::total`] is known.
+    pub fn new(name: &'static str, talk: &'t Talk) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let target = if talk.progress() && terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let now = Instant::now();
+        let state = State { total: 0, done: 0, refused: 0, errors: 0, begun: now, told: None, in_hand: BTreeSet::new() };
+        Self { name, talk, bar: ProgressBar::with_draw_target(None, target), terminal, state: Mutex::new(state) }
+    }
+
+    /// So much is to be done.
+    pub fn total(&self, total: usize) {
+        self.update(|state| {
+            state.total = total as u64;
+            state.begun = Instant::now();
+        });
+        self.bar.set_length(total as u64);
+        let template = "{prefix} {bar:24} {pos}/{len}  {per_sec:>10}  left {eta}  {msg}";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            self.bar.set_style(style.progress_chars("━╸─"));
+        }
+        self.bar.set_prefix(self.name);
+        self.bar.enable_steady_tick(Duration::from_millis(200));
+    }
+
+    /// A worker took a piece.
+    pub fn started(&self, piece: &str) {
+        self.update(|state| {
+            state.in_hand.insert(piece.to_owned());
+        });
+    }
+
+    /// A piece is finished.
+    pub fn finished(&self, piece: &str, refused: usize, errors: usize) {
+        let message = self.update(|state| {
+            state.in_hand.remove(piece);
+            state.done += 1;
+            state.refused += refused;
+            state.errors += errors;
+            let hand = state.in_hand.first().cloned().unwrap_or_default();
+            format!("errors {}  {hand}", state.errors)
+        });
+        self.bar.set_message(message);
+        self.bar.inc(1);
+        self.tell();
+    }
+
+    /// The bar goes away; what follows is the answer.
+    pub fn end(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    fn update<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
+        // A panic elsewhere must not take the progress with it: the numbers are still right.
+        change(&mut self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
+    }
+
+    /// A plain line, the first at once, then one each half minute.
+    fn tell(&self) {
+        if self.terminal || !self.talk.progress() {
+            return;
+        }
+        let line = self.update(|state| {
+            let due = state.told.is_none_or(|told| told.elapsed() >= SPARSE);
+            due.then(|| {
+                state.told = Some(Instant::now());
+                line(self.name, state)
+            })
+        });
+        line.into_iter().for_each(|line| self.talk.note(&line));
+    }
+}
+
+fn line(name: &str, state: &State) -> String {
+    let elapsed = state.begun.elapsed();
+    let left = elapsed.mul_f64((state.total.saturating_sub(state.done)) as f64 / state.done.max(1) as f64);
+    let percent = 100 * state.done / state.total.max(1);
+    let now = jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ");
+    format!(
+        "{now} {name} {}/{} {percent} % elapsed {} left {} refused {} errors {}",
+        state.done,
+        state.total,
+        span(elapsed),
+        span(left),
+        state.refused,
+        state.errors
+    )
+}
+
+/// A span of time as people say it.
+pub fn span(span: Duration) -> String {
+    match span.as_secs() {
+        0 => format!("{:.1} s", span.as_secs_f64()),
+        s @ 1..60 => format!("{s} s"),
+        s @ 60..3600 => format!("{} min {} s", s / 60, s % 60),
+        s => format!("{} h {} min", s / 3600, s / 60 % 60),
+    }
+}

@@ -1,0 +1,109 @@
+//! How the program speaks: answers to stdout, everything else to stderr, colour only where it is wanted.
+
+use std::io::{self, IsTerminal, Write};
+
+use fleet::Complaint;
+
+use crate::args::{Color, Global};
+use crate::exit::{Code, Failure};
+
+/// Of alike complaints so many are shown whole.
+const SHOWN_WHOLE: usize = 3;
+
+/// The voice of the program.
+#[derive(Debug, Clone)]
+pub struct Talk {
+    quiet: bool,
+    verbose: u8,
+    progress: bool,
+    color_err: bool,
+}
+
+impl Talk {
+    /// Listens to the options, the terminal and `NO_COLOR`.
+    pub fn new(global: &Global) -> Self {
+        let auto = std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) && io::stderr().is_terminal();
+        let color_err = match global.color {
+            Color::Always => true,
+            Color::Never => false,
+            Color::Auto => auto,
+        };
+        Self { quiet: global.quiet, verbose: global.verbose, progress: !(global.no_progress || global.quiet), color_err }
+    }
+
+    /// Whether progress may be shown.
+    pub fn progress(&self) -> bool {
+        self.progress
+    }
+
+    /// Whether more should be said.
+    pub fn verbose(&self) -> bool {
+        self.verbose > 0
+    }
+
+    /// Writes an answer to stdout.
+    ///
+    /// # Errors
+    /// When stdout is closed or full.
+    pub fn answer(&self, text: &str) -> Result<(), Failure> {
+        let mut out = io::stdout().lock();
+        out.write_all(text.as_bytes())?;
+        Ok(out.flush()?)
+    }
+
+    /// Says something in passing, on stderr.
+    pub fn note(&self, text: &str) {
+        if !self.quiet {
+            self.err(text);
+        }
+    }
+
+    /// Shows a complaint, on stderr.
+    pub fn complain(&self, complaint: &Complaint) {
+        let text = escape(&complaint.to_string());
+        self.err(&if self.color_err { painted(&text) } else { text });
+    }
+
+    /// Shows complaints: of each kind the first few whole, and how many more there are.
+    pub fn complain_all<'c>(&self, complaints: impl IntoIterator<Item = &'c Complaint>) {
+        let mut seen: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
+        for complaint in complaints {
+            let count = seen.entry(&complaint.code).or_default();
+            *count += 1;
+            if *count <= SHOWN_WHOLE || self.verbose() {
+                self.complain(complaint);
+            }
+        }
+        let more = seen.into_iter().filter(|(_, count)| *count > SHOWN_WHOLE && !self.verbose());
+        more.for_each(|(code, count)| self.err(&format!("{} more like it [{code}]; -v shows all", count - SHOWN_WHOLE)));
+    }
+
+    /// Tells why a command could not answer.
+    pub fn fail(&self, failure: &Failure) -> Code {
+        match failure {
+            Failure::Refused(complaints) => {
+                self.complain_all(complaints);
+                self.err("nothing was run");
+            }
+            Failure::Failed(complaint) => self.complain(complaint),
+            Failure::PipeClosed => {}
+        }
+        failure.code()
+    }
+
+    /// Nobody can be told that stderr is closed.
+    fn err(&self, text: &str) {
+        let _ = writeln!(io::stderr().lock(), "{text}");
+    }
+}
+
+/// Makes control characters visible: a name from a log must not move the cursor or paint the screen.
+pub fn escape(text: &str) -> String {
+    let shown = |c: char| if c.is_control() && c != '\n' { c.escape_default().to_string() } else { c.to_string() };
+    text.chars().map(shown).collect()
+}
+
+fn painted(text: &str) -> String {
+    let (head, rest) = text.split_once(':').unwrap_or((text, ""));
+    format!("\u{1b}[1;31m{head}\u{1b}[0m:{}", rest.replace("\nhint:", "\n\u{1b}[36mhint\u{1b}[0m:"))
+}

@@ -1,0 +1,162 @@
+//! The account of a run: every log done, refused, in error, known or not reached; nothing is missing.
+
+use std::collections::BTreeMap;
+
+use fleet::{Complaint, GapRecord, Status};
+use jiff::Timestamp;
+use store::{LogAccount, Outcome, RunAccount};
+
+use crate::plan::Work;
+use crate::trends::TrendRow;
+
+/// One log's trouble.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct LogError {
+    /// The log.
+    pub log: String,
+    /// What is wrong with it.
+    pub complaint: Complaint,
+}
+
+/// What a run did.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Report {
+    /// Its name.
+    pub run_id: String,
+    /// When it began.
+    pub started_utc: Timestamp,
+    /// Logs that fit the patterns.
+    pub found: usize,
+    /// Logs that were accounted for already, or not asked for.
+    pub known: usize,
+    /// Logs finished, those in error included.
+    pub done: usize,
+    /// Flights whose records were stored.
+    pub flights: usize,
+    /// Records with a gap.
+    pub estimated: usize,
+    /// Records of sound logs that cannot show one, by reason.
+    pub refused: BTreeMap<String, usize>,
+    /// Logs in error, in the order of their names.
+    pub errors: Vec<LogError>,
+    /// Logs the run was stopped before.
+    pub not_reached: usize,
+    /// The slowest log and its seconds.
+    pub slowest: Option<(String, f64)>,
+    /// Seconds from plan to account.
+    pub took_s: f64,
+    /// Workers.
+    pub workers: usize,
+    /// Units whose records changed, with the statement made of each.
+    pub trends: Vec<TrendRow>,
+}
+
+impl Report {
+    pub(crate) fn begin(run_id: String, started_utc: Timestamp, found: usize, known: usize, workers: usize) -> Self {
+        Self {
+            run_id,
+            started_utc,
+            found,
+            known,
+            done: 0,
+            flights: 0,
+            estimated: 0,
+            refused: BTreeMap::new(),
+            errors: Vec::new(),
+            not_reached: 0,
+            slowest: None,
+            took_s: 0.0,
+            workers,
+            trends: Vec::new(),
+        }
+    }
+
+    pub(crate) fn count(&mut self, account: &LogAccount, records: &[GapRecord], complaints: &[Complaint]) {
+        self.done += 1;
+        self.flights += usize::from(!records.is_empty());
+        for record in records {
+            match record.estimate.status {
+                Status::Estimated => self.estimated += 1,
+                Status::Refused => {
+                    let reason = record.estimate.reason.clone().unwrap_or_default();
+                    *self.refused.entry(reason).or_default() += 1;
+                }
+            }
+        }
+        let log = &account.log_path;
+        self.errors.extend(complaints.iter().map(|c| LogError { log: log.clone(), complaint: c.clone() }));
+        if self.slowest.as_ref().is_none_or(|(_, seconds)| *seconds < account.duration_s) {
+            self.slowest = Some((log.clone(), account.duration_s));
+        }
+    }
+
+    pub(crate) fn close(&mut self, took_s: f64) {
+        self.errors.sort_by(|a, b| a.log.cmp(&b.log).then_with(|| a.complaint.code.cmp(&b.complaint.code)));
+        self.took_s = took_s;
+    }
+
+    /// Records that say no gap.
+    pub fn refusals(&self) -> usize {
+        self.refused.values().sum()
+    }
+
+    /// Logs in error; one log may have several complaints.
+    pub fn logs_in_error(&self) -> usize {
+        let mut logs: Vec<&str> = self.errors.iter().map(|e| e.log.as_str()).collect();
+        logs.dedup();
+        logs.len()
+    }
+
+    /// The row kept in the store.
+    pub(crate) fn row(&self, program_version: &str, config_path: &str, exit_code: Option<i64>) -> RunAccount {
+        RunAccount {
+            run_id: self.run_id.clone(),
+            started_utc: self.started_utc,
+            finished_utc: exit_code.map(|_| Timestamp::now()),
+            program_version: program_version.to_owned(),
+            config_path: config_path.to_owned(),
+            found: self.found as i64,
+            known: self.known as i64,
+            done: self.done as i64,
+            estimated: self.estimated as i64,
+            refused: self.refusals() as i64,
+            errors: self.logs_in_error() as i64,
+            not_reached: self.not_reached as i64,
+            exit_code,
+        }
+    }
+}
+
+/// The account of one log, before anything is known of its flight.
+pub(crate) fn of_log(work: &Work, run_id: &str) -> LogAccount {
+    let stat = work.stat.as_ref();
+    LogAccount {
+        log_path: work.shown.clone(),
+        size_bytes: stat.map_or(0, |s| s.size_bytes),
+        modified_utc_ns: stat.map_or(0, |s| s.modified_utc_ns),
+        file_id: stat.map(|s| s.file_id.clone()).unwrap_or_default(),
+        log_digest: None,
+        config_digest: None,
+        tail_number: None,
+        flight_id: None,
+        departure_utc: None,
+        positions: Vec::new(),
+        outcome: Outcome::Done,
+        estimated: 0,
+        refused: 0,
+        error_code: None,
+        error_detail: None,
+        duration_s: 0.0,
+        run_id: run_id.to_owned(),
+        processed_utc: Timestamp::now(),
+    }
+}
+
+/// Writes complaints into an account: the first one's code, all of their text.
+pub(crate) fn complain(account: &mut LogAccount, complaints: &[Complaint]) {
+    let Some(first) = complaints.first() else { return };
+    account.outcome = Outcome::Error;
+    account.error_code = Some(first.code.clone());
+    let all: Vec<String> = complaints.iter().map(ToString::to_string).collect();
+    account.error_detail = Some(all.join("\n"));
+}

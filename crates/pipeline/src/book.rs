@@ -1,0 +1,107 @@
+//! Who owns a flight: two logs may claim the same one, and the answer must not depend on who came first.
+//!
+//! The log whose name sorts first owns it. A copy of the same content is known and says nothing; a
+//! log of the same flight with other content is in error and names its rival.
+
+use std::collections::{BTreeSet, HashMap};
+
+use fleet::{Complaint, GapRecord};
+use store::{LogAccount, LogResult, Outcome};
+
+use crate::account::{self, Report};
+use crate::plan::{self, Plan, RecordName, record_name};
+use crate::schedule::Done;
+use crate::trends::Unit;
+
+/// The writer's book of the store as it is and as it will be.
+pub(crate) struct Book {
+    accounts: HashMap<String, LogAccount>,
+    owners: HashMap<RecordName, String>,
+    /// Units whose records changed.
+    pub(crate) touched: BTreeSet<Unit>,
+}
+
+impl Book {
+    pub(crate) fn of(plan: &Plan) -> Self {
+        let mut book = Self { accounts: HashMap::new(), owners: HashMap::new(), touched: BTreeSet::new() };
+        plan.accounts.values().for_each(|account| book.enter(account.clone()));
+        book
+    }
+
+    fn enter(&mut self, account: LogAccount) {
+        let names = plan::owned(&account);
+        self.owners.extend(names.into_iter().map(|name| (name, account.log_path.clone())));
+        self.accounts.insert(account.log_path.clone(), account);
+    }
+
+    /// Turns what came of a log into what is written, and counts it.
+    pub(crate) fn settle(&mut self, done: Done, report: &mut Report) -> Vec<LogResult> {
+        match done {
+            Done::NotWanted => {
+                report.known += 1;
+                Vec::new()
+            }
+            Done::Same(account) => {
+                report.known += 1;
+                self.enter((*account).clone());
+                vec![LogResult { account: *account, records: Vec::new(), retires: Vec::new() }]
+            }
+            Done::Read { account, records, complaints } => self.read(*account, records, complaints, report),
+        }
+    }
+
+    fn read(&mut self, account: LogAccount, records: Vec<GapRecord>, complaints: Vec<Complaint>, report: &mut Report) -> Vec<LogResult> {
+        let Some(rival) = self.rival(&account, &records) else {
+            return vec![self.store(account, records, &complaints, report)];
+        };
+        if rival.log_path < account.log_path {
+            let (account, complaints) = yielded(account, &rival);
+            return vec![self.store(account, Vec::new(), &complaints, report)];
+        }
+        let first = self.store(account, records, &complaints, report);
+        let (loser, complaints) = yielded(rival, &first.account);
+        vec![first, self.store(loser, Vec::new(), &complaints, report)]
+    }
+
+    /// Another log that speaks for one of these flights.
+    fn rival(&self, account: &LogAccount, records: &[GapRecord]) -> Option<LogAccount> {
+        let owner = |r: &GapRecord| self.owners.get(&record_name(&r.flight, r.position.as_str()));
+        let other = records.iter().filter_map(owner).find(|path| **path != account.log_path)?;
+        self.accounts.get(other).cloned()
+    }
+
+    fn store(&mut self, account: LogAccount, records: Vec<GapRecord>, complaints: &[Complaint], report: &mut Report) -> LogResult {
+        report.count(&account, &records, complaints);
+        let unit = |r: &GapRecord| (r.part_number.clone(), r.serial_number.clone());
+        self.touched.extend(records.iter().map(unit));
+        let retires = self.outdated(&account, &records);
+        self.enter(account.clone());
+        LogResult { account, records, retires }
+    }
+
+    /// Records this log made under another identity or for positions it no longer speaks for.
+    fn outdated(&mut self, account: &LogAccount, records: &[GapRecord]) -> Vec<RecordName> {
+        let Some(before) = self.accounts.get(&account.log_path) else { return Vec::new() };
+        let now: BTreeSet<RecordName> = records.iter().map(|r| record_name(&r.flight, r.position.as_str())).collect();
+        let mine = |name: &RecordName| self.owners.get(name) == Some(&account.log_path);
+        let gone: Vec<RecordName> = plan::owned(before).into_iter().filter(|n| mine(n) && !now.contains(n)).collect();
+        for name in &gone {
+            self.owners.remove(name);
+        }
+        gone
+    }
+}
+
+/// The account of a log whose flight belongs to another.
+fn yielded(mut account: LogAccount, owner: &LogAccount) -> (LogAccount, Vec<Complaint>) {
+    (account.estimated, account.refused) = (0, 0);
+    account.outcome = Outcome::Done;
+    if account.log_digest == owner.log_digest {
+        return (account, Vec::new());
+    }
+    let complaint = Complaint::new("duplicate_flight", format!("another log holds the same flight: {}", owner.log_path))
+        .in_file(&account.log_path)
+        .hint("the log whose name sorts first is used; remove one of them, or map what tells the flights apart");
+    account::complain(&mut account, std::slice::from_ref(&complaint));
+    (account, vec![complaint])
+}

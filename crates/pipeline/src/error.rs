@@ -1,0 +1,26 @@
+//! Why a run could not be made at all; what is wrong with single logs is in its account.
+
+use fleet::Complaint;
+
+/// What ends a run before or in the middle of its work.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Configuration, tables or the request are wrong: nothing was run.
+    #[error("{} complaints about configuration or tables", .0.len())]
+    Refused(Vec<Complaint>),
+    /// The store cannot be read or written: what was stored before is intact.
+    #[error(transparent)]
+    Store(#[from] store::Error),
+    /// A history or a limit cannot be judged.
+    #[error("a trend cannot be stated: {0}")]
+    Trend(#[from] trend::Error),
+    /// Workers cannot be started.
+    #[error("the workers cannot be started: {0}")]
+    Workers(#[from] rayon::ThreadPoolBuildError),
+}
+
+impl Error {
+    pub(crate) fn refused(complaint: Complaint) -> Self {
+        Self::Refused(vec![complaint])
+    }
+}

@@ -1,0 +1,43 @@
+//! What happens while a run goes on, for whoever wants to watch.
+
+use fleet::Complaint;
+
+/// One thing that happened. Events of different logs may come in any order.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Event {
+    /// The plan stands: so many logs of so many bytes will be read.
+    Planned {
+        /// Logs to do.
+        logs: usize,
+        /// Their size.
+        bytes: u64,
+    },
+    /// A worker took a log.
+    Started {
+        /// Its name.
+        log: String,
+    },
+    /// A log is finished: estimated, refused or in error.
+    Finished {
+        /// Its name.
+        log: String,
+        /// Its size.
+        bytes: u64,
+        /// Gaps.
+        estimated: usize,
+        /// Sound logs that cannot show one.
+        refused: usize,
+        /// What is wrong with it.
+        complaints: Vec<Complaint>,
+    },
+    /// So many logs are now safe in the store.
+    Stored {
+        /// Logs in this commit.
+        logs: usize,
+    },
+    /// The trends of so many units are being stated.
+    Trends {
+        /// Units.
+        units: usize,
+    },
+}

@@ -1,0 +1,22 @@
+//! A night's work: which logs are new, one flight per worker, every finished flight stored, and an
+//! account of all of them.
+//!
+//! The only crate that knows rayon. It prints nothing: it reports [`Event`]s and returns a
+//! [`Report`]. Results depend on neither the number of workers nor the order in which they finish.
+
+pub mod account;
+mod book;
+pub mod estimates;
+pub mod event;
+pub mod plan;
+pub mod schedule;
+pub mod simulate;
+pub mod trends;
+
+mod error;
+
+pub use account::Report;
+pub use error::Error;
+pub use event::Event;
+pub use plan::{Plan, Request, Why};
+pub use schedule::run;

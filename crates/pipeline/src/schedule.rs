@@ -1,0 +1,289 @@
+//! The run: one flight per worker, longest first, each stored as soon as it is finished.
+//!
+//! Workers pull the next log from one list, so the longest are begun first and no worker waits for
+//! another. What they finish goes to the one thread that writes: it commits whatever has gathered,
+//! whole flights at a time, so a run that is cut short keeps what it finished.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
+
+use fleet::{Complaint, GapRecord, Installations, Status};
+use jiff::Timestamp;
+use job::flight::{Opened, config_digest, unidentified_digest};
+use job::{Config, Stamp};
+use store::{Holder, LogAccount, LogResult, Store, Writer};
+
+use crate::account::{self, Report};
+use crate::error::Error;
+use crate::event::Event;
+use crate::book::Book;
+use crate::plan::{self, Plan, Request, Work};
+use crate::trends;
+
+/// Finished flights wait this long at most for company in a commit: each commit is a file and a log entry.
+const GATHER: Duration = Duration::from_millis(500);
+/// So many finished logs are committed without waiting.
+const GATHER_LOGS: usize = 256;
+
+/// What a run needs besides its configuration.
+pub struct Context<'a> {
+    /// The version written into every record.
+    pub program_version: &'a str,
+    /// Who holds the store meanwhile.
+    pub holder: Holder,
+    /// How long to wait for another run that holds it.
+    pub wait: Option<Duration>,
+    /// Set from outside to end the run after the flights in hand.
+    pub stop: &'a AtomicBool,
+    /// Told of everything that happens.
+    pub watch: &'a (dyn Fn(Event) + Sync),
+}
+
+/// Reads the installations table that the configuration names.
+///
+/// # Errors
+/// [`Error::Refused`] with every complaint about it.
+pub fn installations(config: &Config) -> Result<Installations, Error> {
+    let file = config.path(&config.document.logs.installations);
+    ingest::tables::installations(&file)
+        .map_err(|found| Error::Refused(found.iter().map(ingest::Error::complaint).collect()))
+}
+
+/// Says what a run would do, and does nothing.
+///
+/// # Errors
+/// As [`run`], except that no store is needed.
+pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
+    let accounts = if config.store().exists() { Store::open(&config.store())?.accounts()? } else { Vec::new() };
+    plan::plan(config, &installations(config)?, accounts, request)
+}
+
+/// Runs every log not yet accounted for, stores what it finds, and states the trends of the units it touched.
+///
+/// # Errors
+/// [`Error::Refused`] when nothing could be run; [`Error::Store`] when the store fails in the middle:
+/// what was committed before is intact, and the rest runs next time.
+pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<Report, Error> {
+    let clock = Instant::now();
+    let installations = installations(config)?;
+    let store = Store::create_or_open(&config.store())?;
+    let mut writer = store.lock(&context.holder, context.wait)?;
+    let plan = plan::plan(config, &installations, store.accounts()?, request)?;
+    let workers = workers(request, plan.work.len());
+    let started_utc = Timestamp::now();
+    let mut report = Report::begin(run_id(started_utc), started_utc, plan.found, plan.known, workers);
+    let config_path = config.file.display().to_string();
+    writer.begin_run(&report.row(context.program_version, &config_path, None))?;
+    let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
+    (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
+
+    let shop = Shop { config, installations: &installations, request, context, plan: &plan, run_id: &report.run_id.clone() };
+    let touched = shop.work(workers, &mut writer, &mut report)?;
+
+    (context.watch)(Event::Trends { units: touched.len() });
+    report.trends = trends::of_units(config, &installations, &store, &touched)?;
+    report.close(clock.elapsed().as_secs_f64());
+    let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
+    writer.end_run(&report.row(context.program_version, &config_path, Some(exit_code)))?;
+    Ok(report)
+}
+
+fn exit_code(report: &Report, stopped: bool) -> i64 {
+    match (stopped && report.not_reached > 0, report.errors.is_empty()) {
+        (true, _) => 130,
+        (false, false) => 1,
+        (false, true) => 0,
+    }
+}
+
+fn workers(request: &Request, logs: usize) -> usize {
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    request.jobs.unwrap_or(cores).clamp(1, logs.max(1))
+}
+
+/// Names sort as the runs did.
+fn run_id(started_utc: Timestamp) -> String {
+    format!("{}-{:08x}", started_utc.strftime("%Y%m%dT%H%M%S%3fZ"), std::process::id())
+}
+
+/// What came of one log.
+pub(crate) enum Done {
+    /// It is another than was asked for.
+    NotWanted,
+    /// Its content is known; only its name or date is new.
+    Same(Box<LogAccount>),
+    /// It was read.
+    Read {
+        /// Its account.
+        account: Box<LogAccount>,
+        /// Its records.
+        records: Vec<GapRecord>,
+        /// What is wrong with it.
+        complaints: Vec<Complaint>,
+    },
+}
+
+impl Done {
+    fn event(&self, work: &Work) -> Event {
+        let (log, bytes) = (work.shown.clone(), work.stat.as_ref().map_or(0, |s| s.size_bytes as u64));
+        let (estimated, refused, complaints) = match self {
+            Self::Read { account, complaints, .. } => {
+                (account.estimated as usize, account.refused as usize, complaints.clone())
+            }
+            Self::NotWanted | Self::Same(_) => (0, 0, Vec::new()),
+        };
+        Event::Finished { log, bytes, estimated, refused, complaints }
+    }
+}
+
+/// Everything a worker may look at.
+struct Shop<'a> {
+    config: &'a Config,
+    installations: &'a Installations,
+    request: &'a Request,
+    context: &'a Context<'a>,
+    plan: &'a Plan,
+    run_id: &'a str,
+}
+
+impl Shop<'_> {
+    /// Lets the workers loose and writes what they bring; returns the units whose records changed.
+    fn work(&self, workers: usize, writer: &mut Writer, report: &mut Report) -> Result<Vec<trends::Unit>, Error> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build()?;
+        let (next, taken) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let halt = AtomicBool::new(false);
+        let (sender, receiver) = channel();
+        std::thread::scope(|scope| {
+            let (next, taken, halt) = (&next, &taken, &halt);
+            scope.spawn(move || {
+                pool.scope(|pool_scope| {
+                    for _ in 0..workers {
+                        let sender = sender.clone();
+                        pool_scope.spawn(move |_| self.pull(next, taken, halt, &sender));
+                    }
+                });
+            });
+            let written = self.write(&receiver, writer, report);
+            // A store that fails must not keep the workers reading through the night.
+            halt.store(written.is_err(), Ordering::Relaxed);
+            drop(receiver);
+            report.not_reached = self.plan.work.len() - taken.load(Ordering::Relaxed);
+            written
+        })
+    }
+
+    /// One worker: takes the next log until there is none, or until it is stopped.
+    fn pull(&self, next: &AtomicUsize, taken: &AtomicUsize, halt: &AtomicBool, done: &Sender<Done>) {
+        while !(halt.load(Ordering::Relaxed) || self.context.stop.load(Ordering::Relaxed)) {
+            let Some(work) = self.plan.work.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
+            taken.fetch_add(1, Ordering::Relaxed);
+            (self.context.watch)(Event::Started { log: work.shown.clone() });
+            let finished = self.one(work);
+            (self.context.watch)(finished.event(work));
+            if done.send(finished).is_err() {
+                return;
+            }
+        }
+    }
+
+    /// One log; a panic in it is an error row like any other.
+    fn one(&self, work: &Work) -> Done {
+        let clock = Instant::now();
+        let done = catch_unwind(AssertUnwindSafe(|| self.open(work))).unwrap_or_else(|panic| {
+            let what = format!("reading this log failed in a way that should not happen: {}", panic_text(&*panic));
+            let complaint = Complaint::new("panic", what)
+                .in_file(&work.shown)
+                .hint("the file is probably damaged; please report it with the file");
+            self.failed(work, complaint)
+        });
+        match done {
+            Done::Read { mut account, records, complaints } => {
+                account.duration_s = clock.elapsed().as_secs_f64();
+                Done::Read { account, records, complaints }
+            }
+            other => other,
+        }
+    }
+
+    fn failed(&self, work: &Work, complaint: Complaint) -> Done {
+        let mut account = account::of_log(work, self.run_id);
+        account.config_digest = Some(unidentified_digest(self.config, self.installations));
+        account::complain(&mut account, std::slice::from_ref(&complaint));
+        Done::Read { account: Box::new(account), records: Vec::new(), complaints: vec![complaint] }
+    }
+
+    fn open(&self, work: &Work) -> Done {
+        let opened = match Opened::open(&work.path, &work.shown, self.config) {
+            Ok(opened) => opened,
+            Err(complaint) => return self.failed(work, complaint),
+        };
+        let flight = opened.flight();
+        if !self.request.wants(&flight, self.installations) {
+            return Done::NotWanted;
+        }
+        let names = opened.position_names();
+        let mut account = account::of_log(work, self.run_id);
+        account.config_digest = Some(config_digest(self.config, self.installations, &flight, &names));
+        account.log_digest = Some(opened.digest.clone());
+        account.tail_number = Some(flight.tail_number.to_string());
+        account.flight_id = Some(flight.flight_id.to_string());
+        account.departure_utc = Some(flight.departure_utc);
+        account.positions = names.iter().map(ToString::to_string).collect();
+        if !self.request.redo && plan::digests(&account).is_some_and(|d| self.plan.digests.contains(&d)) {
+            // Under its own name it still speaks for its records; under a new one they stay as they are.
+            let before = work.before.as_ref().filter(|before| plan::digests(before) == plan::digests(&account));
+            (account.estimated, account.refused) = before.map_or((0, 0), |b| (b.estimated, b.refused));
+            return Done::Same(Box::new(account));
+        }
+        self.read(&opened, account)
+    }
+
+    fn read(&self, opened: &Opened<'_>, mut account: LogAccount) -> Done {
+        let stamp = Stamp {
+            run_id: self.run_id.to_owned(),
+            program_version: self.context.program_version.to_owned(),
+            processed_utc: Timestamp::now(),
+        };
+        let (records, complaints) = opened.records(self.config, self.installations, &stamp);
+        let refused = records.iter().filter(|r| r.estimate.status == Status::Refused).count();
+        account.refused = refused as i64;
+        account.estimated = (records.len() - refused) as i64;
+        account::complain(&mut account, &complaints);
+        Done::Read { account: Box::new(account), records, complaints }
+    }
+
+    /// The writer's side: gathers, settles who owns a flight, commits.
+    fn write(&self, done: &Receiver<Done>, writer: &mut Writer, report: &mut Report) -> Result<Vec<trends::Unit>, Error> {
+        let mut book = Book::of(self.plan);
+        while let Ok(first) = done.recv() {
+            let gathered = gather(first, done).into_iter();
+            let results: Vec<LogResult> = gathered.flat_map(|done| book.settle(done, report)).collect();
+            if !results.is_empty() {
+                writer.commit(&results)?;
+                (self.context.watch)(Event::Stored { logs: results.len() });
+            }
+        }
+        Ok(book.touched.into_iter().collect())
+    }
+}
+
+/// What is finished within a short while, or nothing but the first when nothing follows.
+fn gather(first: Done, done: &Receiver<Done>) -> Vec<Done> {
+    let deadline = Instant::now() + GATHER;
+    let mut gathered = vec![first];
+    while gathered.len() < GATHER_LOGS {
+        let left = deadline.saturating_duration_since(Instant::now());
+        match done.recv_timeout(left) {
+            Ok(next) => gathered.push(next),
+            Err(_) => break,
+        }
+    }
+    gathered
+}
+
+fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
+}

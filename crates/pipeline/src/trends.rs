@@ -1,0 +1,307 @@
+//! Trends of units: the store's records, per part and serial number across tails, as statements.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use fleet::{GapRecord, Installations, PartNumber, SerialNumber};
+use jiff::Timestamp;
+use job::Config;
+use rayon::prelude::*;
+use serde::Serialize;
+use store::{Query, Store};
+use trend::{Observation, Series, Trend, Usage};
+
+use crate::error::Error;
+
+/// A unit, by part and serial number.
+pub type Unit = (PartNumber, SerialNumber);
+
+/// A change point, as the contract names its fields.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChangePoint {
+    /// The first flight after it.
+    pub departure_utc: Timestamp,
+    /// That flight.
+    pub flight_id: Option<String>,
+    /// `step`, `reset`, `onset` or `recorded`.
+    pub kind: &'static str,
+    /// Its size, m.
+    pub step_m: f64,
+}
+
+/// One unit's statement, as the contract names its columns.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
+pub struct TrendRow {
+    pub part_number: Option<String>,
+    pub serial_number: String,
+    pub tail_number: Option<String>,
+    pub position: Option<String>,
+    pub as_of_utc: Timestamp,
+    pub flights: i64,
+    pub unit_hours: Option<f64>,
+    pub gap_m: Option<f64>,
+    pub gap_se_m: Option<f64>,
+    pub rate_m_per_hour: Option<f64>,
+    pub rate_p05_m_per_hour: Option<f64>,
+    pub rate_p95_m_per_hour: Option<f64>,
+    pub trend: &'static str,
+    pub trend_p_value: Option<f64>,
+    pub change_points: Vec<ChangePoint>,
+    pub limit_m: Option<f64>,
+    pub crossing_hours_p05: Option<f64>,
+    pub crossing_hours_p50: Option<f64>,
+    pub crossing_hours_p95: Option<f64>,
+    pub state: Option<&'static str>,
+    pub reason: Option<String>,
+}
+
+/// Which units, and of which day, a statement is asked for.
+#[derive(Debug, Clone, Default)]
+pub struct Ask {
+    /// Units on this tail at the end of the records only.
+    pub tail_number: Option<String>,
+    /// This serial number only.
+    pub serial_number: Option<String>,
+    /// This part number only.
+    pub part_number: Option<String>,
+    /// The day; the newest departure in the store when not given.
+    pub as_of_utc: Option<Timestamp>,
+}
+
+/// States what is known of the asked units.
+///
+/// # Errors
+/// When the store cannot be read, or a part's limits cannot be judged by.
+pub fn of_store(config: &Config, installations: &Installations, store: &Store, ask: &Ask) -> Result<Vec<TrendRow>, Error> {
+    // A unit's history is on every tail it flew on, so a tail selects units and never cuts their records.
+    let query = Query { serial_number: ask.serial_number.clone(), part_number: ask.part_number.clone(), ..Query::default() };
+    let flown = store.records(&query)?.into_iter().map(|record| Flown::of(record, installations)).collect();
+    of_histories(config, installations, &histories(flown), ask)
+}
+
+/// States what is known of units whose records changed, on the newest day in the store.
+///
+/// # Errors
+/// As [`of_store`].
+pub fn of_units(config: &Config, installations: &Installations, store: &Store, units: &[Unit]) -> Result<Vec<TrendRow>, Error> {
+    if units.is_empty() {
+        return Ok(Vec::new());
+    }
+    let wanted: BTreeSet<(Option<&str>, &str)> = units.iter().map(|(p, s)| (Some(p.as_str()), s.as_str())).collect();
+    let mut rows = of_store(config, installations, store, &Ask::default())?;
+    rows.retain(|row| wanted.contains(&(row.part_number.as_deref(), row.serial_number.as_str())));
+    Ok(rows)
+}
+
+/// States what is known of the asked units of an estimates table made elsewhere.
+///
+/// # Errors
+/// When the table cannot be read, or a part's limits cannot be judged by.
+pub fn of_table(config: &Config, installations: &Installations, file: &Path, ask: &Ask) -> Result<Vec<TrendRow>, Error> {
+    of_histories(config, installations, &histories(crate::estimates::read(file)?), ask)
+}
+
+/// One statement for each query, from nothing later than its date.
+///
+/// # Errors
+/// When a table cannot be read, or a part's limits cannot be judged by.
+pub fn of_queries(
+    config: &Config,
+    installations: &Installations,
+    flown: Vec<Flown>,
+    queries: &[crate::estimates::AsOf],
+) -> Result<Vec<TrendRow>, Error> {
+    let histories = histories(flown);
+    let of = |query: &crate::estimates::AsOf| {
+        let fits = |unit: &&HistoryName| unit.1 == query.serial_number && (query.part_number.is_none() || unit.0 == query.part_number);
+        let name = histories.keys().find(fits).cloned().unwrap_or((query.part_number.clone(), query.serial_number.clone()));
+        statement(config, installations, &name, histories.get(&name).map_or(&[], Vec::as_slice), query.as_of_utc)
+    };
+    queries.par_iter().map(of).collect()
+}
+
+/// Every flight of the store, for queries of several days.
+///
+/// # Errors
+/// When the store cannot be read.
+pub fn flown_in_store(installations: &Installations, store: &Store) -> Result<Vec<Flown>, Error> {
+    Ok(store.records(&Query::default())?.into_iter().map(|record| Flown::of(record, installations)).collect())
+}
+
+/// One flight of one unit, wherever its gap was estimated.
+#[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
+pub struct Flown {
+    pub part_number: Option<String>,
+    pub serial_number: String,
+    pub tail_number: Option<String>,
+    pub position: Option<String>,
+    pub flight_id: Option<String>,
+    pub departure_utc: Timestamp,
+    /// The stay on the tail that the flight belongs to, where the books know it.
+    pub installed_utc: Option<Timestamp>,
+    pub flight_hours: Option<f64>,
+    pub tail_hours_end: Option<f64>,
+    pub load_reversals: Option<u64>,
+    pub gap_m: Option<f64>,
+    pub gap_se_m: Option<f64>,
+}
+
+impl Flown {
+    fn of(record: GapRecord, installations: &Installations) -> Self {
+        let flight = record.flight;
+        let stay = installations.at(&flight.tail_number, &record.position, flight.departure_utc);
+        Self {
+            part_number: Some(record.part_number.to_string()),
+            serial_number: record.serial_number.to_string(),
+            installed_utc: stay.map(|s| s.installed_utc),
+            tail_number: Some(flight.tail_number.to_string()),
+            position: Some(record.position.to_string()),
+            flight_id: Some(flight.flight_id.to_string()),
+            departure_utc: flight.departure_utc,
+            flight_hours: flight.flight_hours,
+            tail_hours_end: flight.tail_hours_end,
+            load_reversals: u64::try_from(record.estimate.load_reversals).ok(),
+            gap_m: record.estimate.gap_m,
+            gap_se_m: record.estimate.gap_se_m,
+        }
+    }
+}
+
+/// Part number where known, and serial number.
+type HistoryName = (Option<String>, String);
+
+fn histories(flown: Vec<Flown>) -> BTreeMap<HistoryName, Vec<Flown>> {
+    let mut units: BTreeMap<HistoryName, Vec<Flown>> = BTreeMap::new();
+    for flight in flown {
+        units.entry((flight.part_number.clone(), flight.serial_number.clone())).or_default().push(flight);
+    }
+    units
+}
+
+/// One statement for each unit, by part and serial number.
+fn of_histories(
+    config: &Config,
+    installations: &Installations,
+    histories: &BTreeMap<HistoryName, Vec<Flown>>,
+    ask: &Ask,
+) -> Result<Vec<TrendRow>, Error> {
+    let newest = || histories.values().flatten().map(|f| f.departure_utc).max();
+    let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(Vec::new()) };
+    let asked = |name: &HistoryName| {
+        ask.serial_number.as_ref().is_none_or(|s| *s == name.1) && (ask.part_number.is_none() || ask.part_number == name.0)
+    };
+    let units: Vec<_> = histories.iter().filter(|(name, _)| asked(name)).collect();
+    let state = |(name, flown): &(&HistoryName, &Vec<Flown>)| statement(config, installations, name, flown, as_of);
+    let mut rows = units.par_iter().map(state).collect::<Result<Vec<_>, _>>()?;
+    rows.retain(|row| row.flights > 0 && (ask.tail_number.is_none() || row.tail_number == ask.tail_number));
+    Ok(rows)
+}
+
+fn statement(config: &Config, installations: &Installations, name: &HistoryName, flown: &[Flown], as_of: Timestamp) -> Result<TrendRow, Error> {
+    let until: Vec<&Flown> = flown.iter().filter(|f| f.departure_utc <= as_of).collect();
+    let part = name.0.as_deref().and_then(|number| PartNumber::new(number).ok()).and_then(|n| config.parts.get(&n));
+    let limit_m = part.and_then(|p| p.limit_m);
+    let settings = settings(config, limit_m, part.and_then(|p| p.watch_m));
+    let series = series(installations, name, &until)?;
+    let trend = trend::trend(&series, as_of.as_microsecond(), &settings, None)?;
+    Ok(row(name, &until, limit_m, &trend, as_of))
+}
+
+/// Without a limit there is still a level and a rate; only crossings and states need one.
+fn settings(config: &Config, limit_m: Option<f64>, watch_m: Option<f64>) -> trend::Settings {
+    /// A gap no actuator has: a stand-in that is never met and never shown.
+    const NEVER_M: f64 = 1.0;
+    let of = &config.document.trend;
+    let base = trend::Settings::for_limit(limit_m.unwrap_or(NEVER_M));
+    trend::Settings {
+        watch_m: watch_m.unwrap_or(base.watch_m),
+        planning_horizon_hours: of.planning_horizon_hours,
+        horizon_hours: of.horizon_hours,
+        stale_after_days: of.stale_after_days,
+        ..base
+    }
+}
+
+fn series(installations: &Installations, name: &HistoryName, flown: &[&Flown]) -> Result<Series, Error> {
+    let mut stays = BTreeMap::new();
+    let observations = flown.iter().map(|f| {
+        let count = stays.len() as u32;
+        Observation {
+            departure_us: f.departure_utc.as_microsecond(),
+            installation: *stays.entry((&f.tail_number, &f.position, f.installed_utc)).or_insert(count),
+            flight_hours: f.flight_hours,
+            tail_hours_end: f.tail_hours_end,
+            load_reversals: f.load_reversals,
+            gap_m: f.gap_m,
+            gap_se_m: f.gap_se_m.filter(|se| *se > 0.0),
+        }
+    });
+    let mine = |s: &&fleet::Installation| {
+        s.serial_number.as_str() == name.1 && name.0.as_deref().is_none_or(|part| s.part_number.as_str() == part)
+    };
+    let first = installations.iter().filter(mine).min_by_key(|s| s.installed_utc);
+    let usage = Usage { unit_hours_at_start: first.and_then(|s| s.unit_hours_at_install), ..Usage::default() };
+    Ok(Series::new(observations, &usage)?)
+}
+
+fn row(name: &HistoryName, flown: &[&Flown], limit_m: Option<f64>, trend: &Trend, as_of: Timestamp) -> TrendRow {
+    let last = flown.iter().max_by_key(|f| f.departure_utc);
+    let crossing = trend.crossing.filter(|_| limit_m.is_some());
+    TrendRow {
+        part_number: name.0.clone(),
+        serial_number: name.1.clone(),
+        tail_number: last.and_then(|f| f.tail_number.clone()),
+        position: last.and_then(|f| f.position.clone()),
+        as_of_utc: as_of,
+        flights: trend.flights as i64,
+        unit_hours: trend.unit_hours,
+        gap_m: trend.level.map(|l| l.gap_m),
+        gap_se_m: trend.level.map(|l| l.se_m),
+        rate_m_per_hour: trend.rate.map(|r| r.m_per_hour),
+        rate_p05_m_per_hour: trend.rate.map(|r| r.p05_m_per_hour),
+        rate_p95_m_per_hour: trend.rate.map(|r| r.p95_m_per_hour),
+        trend: wear(trend.wear),
+        trend_p_value: trend.trend_p_value,
+        change_points: trend.changes.iter().filter_map(|c| change_point(c, flown)).collect(),
+        limit_m,
+        crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
+        crossing_hours_p50: crossing.and_then(|c| c.p50_hours),
+        crossing_hours_p95: crossing.and_then(|c| c.p95_hours),
+        state: trend.state.filter(|_| limit_m.is_some()).map(state_word),
+        reason: Some(if limit_m.is_some() { trend.reason.to_string() } else { "no limit is configured".into() }),
+    }
+}
+
+fn change_point(change: &trend::Change, flown: &[&Flown]) -> Option<ChangePoint> {
+    let flight = flown.iter().find(|f| f.departure_utc.as_microsecond() == change.departure_us);
+    Some(ChangePoint {
+        departure_utc: Timestamp::from_microsecond(change.departure_us).ok()?,
+        flight_id: flight.and_then(|f| f.flight_id.clone()),
+        kind: match change.kind {
+            trend::ChangeKind::Step => "step",
+            trend::ChangeKind::Reset => "reset",
+            trend::ChangeKind::Onset => "onset",
+            trend::ChangeKind::Recorded => "recorded",
+        },
+        step_m: change.step_m,
+    })
+}
+
+fn wear(wear: trend::Wear) -> &'static str {
+    match wear {
+        trend::Wear::Wearing => "wearing",
+        trend::Wear::Steady => "steady",
+        trend::Wear::Unknown => "unknown",
+    }
+}
+
+fn state_word(state: trend::State) -> &'static str {
+    match state {
+        trend::State::Normal => "normal",
+        trend::State::Watch => "watch",
+        trend::State::Plan => "plan",
+        trend::State::Act => "act",
+    }
+}
