@@ -1,0 +1,279 @@
+//! The linear Kalman filter (equations 24–28): a step that allocates nothing, and a batch over slices.
+//!
+//! The covariance depends on no measurement. Where every sample is measured it settles, and from there
+//! the batch runs with the settled gain alone; a missing sample takes it back to the full recursion.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::Samples;
+use crate::discretise::Discrete;
+use crate::error::Error;
+use crate::model::Actuator;
+use crate::noise::{Covariances, Noise};
+
+/// Variance of the initial speed, (m/s)², and of the initial backlash, m²: the paper gives none.
+const INITIAL_VARIANCE: (f64, f64) = (1e-4, 1e-6);
+/// The gain has settled when the covariance changes by less than this share of itself in a step.
+const SETTLED: f64 = 1e-15;
+/// Steps within which a sound tuning settles many times over.
+const SETTLING_STEPS: usize = 200_000;
+
+/// State x = [δX m, δẊ m/s, S m] and its covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// The state, 3×1 (7).
+    pub x: Vector3<f64>,
+    /// Its covariance, 3×3.
+    pub p: Matrix3<f64>,
+}
+
+/// What one sample did to the state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Before the measurement: x(k+1/k), P(k+1/k).
+    pub prior: Estimate,
+    /// After it: x(k+1/k+1), P(k+1/k+1); the prior where the measurement is missing.
+    pub posterior: Estimate,
+    /// e = y − C x(k+1/k), m; NaN where the measurement is missing.
+    pub innovation_m: f64,
+    /// Its variance C P Cᵀ + V_d, m².
+    pub innovation_variance_m2: f64,
+    /// K_f, 3×1 [1, s⁻¹, 1] (26); zero where the measurement is missing.
+    pub gain: Vector3<f64>,
+}
+
+/// S(t) of one actuator's flight, and how well the model explained it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// S at each sample, m; NaN outside the segments.
+    pub s_m: Vec<f64>,
+    /// Mean normalised innovation squared over the measured samples; 1 for a true model.
+    pub nis: f64,
+    /// Measured samples.
+    pub measured: usize,
+}
+
+/// What a batch may hand out for each sample.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Innovations {
+    /// e, m; NaN where nothing was measured.
+    pub innovation_m: Vec<f64>,
+    /// Its variance, m².
+    pub variance_m2: Vec<f64>,
+}
+
+/// A filter for one actuator, step and noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Filter {
+    discrete: Discrete,
+    noise: Covariances,
+    stiffness_n_per_m: f64,
+    step_s: f64,
+}
+
+impl Filter {
+    /// Brings model and noise to the step.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a step or noise level that no log can have.
+    pub fn new(actuator: &Actuator, step_s: f64, noise: &Noise) -> Result<Self, Error> {
+        let discrete = Discrete::new(actuator, step_s)?;
+        let noise = noise.covariances(actuator, &discrete, step_s)?;
+        Ok(Self { discrete, noise, stiffness_n_per_m: actuator.stiffness_n_per_m(), step_s })
+    }
+
+    /// A_d and B_d.
+    pub fn discrete(&self) -> &Discrete {
+        &self.discrete
+    }
+
+    /// W_d and V_d.
+    pub fn noise(&self) -> &Covariances {
+        &self.noise
+    }
+
+    /// The state before anything is measured, from the first measurement and its load:
+    /// x₀ = [y, 0, y − u/K], P₀ = diag(V_d, 10⁻⁴, 10⁻⁶). Starting at zero instead costs +650 % of the
+    /// gap where δX carries an offset of a millimetre.
+    pub fn start(&self, y_m: f64, load_n: f64) -> Estimate {
+        let (speed, backlash) = INITIAL_VARIANCE;
+        Estimate {
+            x: Vector3::new(y_m, 0.0, y_m - load_n / self.stiffness_n_per_m),
+            p: Matrix3::from_diagonal(&Vector3::new(self.noise.v_d_m2, speed, backlash)),
+        }
+    }
+
+    /// One step ahead under a held load (24, 25): x = A_d x + B_d u, P = A_d P A_dᵀ + W_d.
+    pub fn predict(&self, posterior: &Estimate, load_n: f64) -> Estimate {
+        let Discrete { a_d, b_d } = &self.discrete;
+        Estimate {
+            x: a_d * posterior.x + b_d * load_n,
+            p: symmetric(&(a_d * posterior.p * a_d.transpose() + self.noise.w_d)),
+        }
+    }
+
+    /// Folds one measured relative position into the predicted state (26–28).
+    ///
+    /// ```text
+    /// e = y − C x        1×1  m            s = C P Cᵀ + V_d   1×1  m²
+    /// K = P Cᵀ / s       3×1  (26)         x = x + K e        3×1  (27)
+    /// P = (I − K C) P    3×3  (28), made symmetric
+    /// ```
+    /// The paper calls this step a prediction and prints C as a column; it is a correction and a row.
+    /// A missing measurement (NaN) leaves the prediction as it is.
+    ///
+    /// # Errors
+    /// [`Error::InnovationCovariance`] when s is not a positive, finite number.
+    pub fn correct(&self, prior: &Estimate, y_m: f64) -> Result<Step, Error> {
+        let s_m2 = prior.p[(0, 0)] + self.noise.v_d_m2;
+        if !(s_m2.is_finite() && s_m2 > 0.0) {
+            return Err(Error::InnovationCovariance { s_m2 });
+        }
+        let (innovation_variance_m2, prior) = (s_m2, *prior);
+        if y_m.is_nan() {
+            let gain = Vector3::zeros();
+            return Ok(Step {
+                prior,
+                posterior: prior,
+                innovation_m: f64::NAN,
+                innovation_variance_m2,
+                gain,
+            });
+        }
+        let gain = prior.p.column(0) / s_m2;
+        let innovation_m = y_m - prior.x[0];
+        let p = symmetric(&(prior.p - gain * prior.p.row(0)));
+        let posterior = Estimate { x: prior.x + gain * innovation_m, p };
+        Ok(Step { prior, posterior, innovation_m, innovation_variance_m2, gain })
+    }
+
+    /// The gain once every sample is measured, 3×1, with P(k+1/k) it belongs to.
+    ///
+    /// # Errors
+    /// [`Error::Unsettled`] when it does not settle; [`Error::InnovationCovariance`].
+    pub fn settled(&self) -> Result<(Vector3<f64>, Matrix3<f64>), Error> {
+        let mut state = self.start(0.0, 0.0);
+        for _ in 0..SETTLING_STEPS {
+            let step = self.correct(&state, 0.0)?;
+            let next = self.predict(&step.posterior, 0.0);
+            if settled(&state.p, &next.p) {
+                return Ok((step.gain, next.p));
+            }
+            state = next;
+        }
+        Err(Error::Unsettled { steps: SETTLING_STEPS })
+    }
+
+    /// The bandwidth at which the settled filter lets S move, Hz: its slowest pole, −ln ρ/(2π Ts) with ρ
+    /// the spectral radius of (I − K C) A_d. To be held against the bandwidth that was asked for.
+    ///
+    /// # Errors
+    /// As [`Filter::settled`].
+    pub fn bandwidth_hz(&self) -> Result<f64, Error> {
+        Ok(-self.spectral_radius()?.ln() / (std::f64::consts::TAU * self.step_s))
+    }
+
+    /// ρ of (I − K C) A_d: a wrong start is forgotten by this factor at each step.
+    ///
+    /// # Errors
+    /// As [`Filter::settled`].
+    pub fn spectral_radius(&self) -> Result<f64, Error> {
+        let (gain, _) = self.settled()?;
+        let mut keep = Matrix3::<f64>::identity();
+        for row in 0..3 {
+            keep[(row, 0)] -= gain[row];
+        }
+        let poles = (keep * self.discrete.a_d).complex_eigenvalues();
+        Ok(poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max))
+    }
+
+    /// Runs over all segments, each from a start of its own, and hands out S(t).
+    ///
+    /// # Errors
+    /// [`Error::Lengths`] for channels that do not fit, [`Error::NothingMeasured`] when no segment
+    /// holds a measurement.
+    pub fn track(
+        &self,
+        samples: &Samples<'_>,
+        mut innovations: Option<&mut Innovations>,
+    ) -> Result<Track, Error> {
+        samples.check()?;
+        let count = samples.dx_m.len();
+        let mut track = Track { s_m: vec![f64::NAN; count], nis: 0.0, measured: 0 };
+        if let Some(out) = innovations.as_deref_mut() {
+            out.innovation_m = vec![f64::NAN; count];
+            out.variance_m2 = vec![f64::NAN; count];
+        }
+        for segment in samples.segments {
+            let (y, u) = (&samples.dx_m[segment.clone()], &samples.load_n[segment.clone()]);
+            let Some(first) = y.iter().position(|y| !y.is_nan()) else { continue };
+            let mut pass = Pass { filter: self, state: self.start(y[first], u[first]), settled: None };
+            for k in 0..y.len() {
+                if k > 0 {
+                    pass.predict(u[k - 1]);
+                }
+                let (e, variance) = pass.correct(y[k])?;
+                track.s_m[segment.start + k] = pass.state.x[2];
+                if let Some(out) = innovations.as_deref_mut() {
+                    (out.innovation_m[segment.start + k], out.variance_m2[segment.start + k]) = (e, variance);
+                }
+                if !e.is_nan() {
+                    track.nis += e * e / variance;
+                    track.measured += 1;
+                }
+            }
+        }
+        if track.measured == 0 {
+            return Err(Error::NothingMeasured);
+        }
+        track.nis /= track.measured as f64;
+        Ok(track)
+    }
+}
+
+/// A state on its way through a segment; once the gain has settled only x moves.
+struct Pass<'f> {
+    filter: &'f Filter,
+    state: Estimate,
+    settled: Option<(Vector3<f64>, f64)>,
+}
+
+impl Pass<'_> {
+    fn predict(&mut self, load_n: f64) {
+        if self.settled.is_some() {
+            let Discrete { a_d, b_d } = &self.filter.discrete;
+            self.state.x = a_d * self.state.x + b_d * load_n;
+        } else {
+            self.state = self.filter.predict(&self.state, load_n);
+        }
+    }
+
+    /// Innovation, NaN where nothing was measured, and its variance.
+    fn correct(&mut self, y_m: f64) -> Result<(f64, f64), Error> {
+        if let (Some((gain, variance)), false) = (self.settled, y_m.is_nan()) {
+            let e = y_m - self.state.x[0];
+            self.state.x += gain * e;
+            return Ok((e, variance));
+        }
+        if self.settled.take().is_some() {
+            // The covariance stood still as the settled posterior; a missing sample sets it moving again.
+            self.state.p = self.filter.predict(&self.state, 0.0).p;
+        }
+        let step = self.filter.correct(&self.state, y_m)?;
+        self.state = step.posterior;
+        if !y_m.is_nan() && settled(&step.prior.p, &self.filter.predict(&step.posterior, 0.0).p) {
+            self.settled = Some((step.gain, step.innovation_variance_m2));
+        }
+        Ok((step.innovation_m, step.innovation_variance_m2))
+    }
+}
+
+fn settled(before: &Matrix3<f64>, after: &Matrix3<f64>) -> bool {
+    // Entries are of several units; each is held against the spread of its own two states.
+    let scale = |i: usize, j: usize| (after[(i, i)] * after[(j, j)]).sqrt();
+    (0..3).all(|i| (0..3).all(|j| (after[(i, j)] - before[(i, j)]).abs() <= SETTLED * scale(i, j)))
+}
+
+fn symmetric(p: &Matrix3<f64>) -> Matrix3<f64> {
+    (p + p.transpose()) * 0.5
+}

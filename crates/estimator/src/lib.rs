@@ -1,0 +1,54 @@
+//! The published method, whole: model, discretisation, filter and gap statistic, and nothing else.
+//!
+//! The crate sees an actuator and slices of `f64`. No paths, no clock, no threads; the same input
+//! gives the same bits. Equation numbers are those of *The Backlash Gap size Estimation for
+//! Electromechanical Actuator in an Operational Behavior*; where print and meaning differ the item says so.
+
+pub mod discretise;
+mod error;
+pub mod filter;
+pub mod gap;
+pub mod load;
+pub mod midrange;
+pub mod model;
+pub mod noise;
+
+pub use discretise::Discrete;
+pub use error::Error;
+pub use filter::{Estimate, Filter, Step, Track};
+pub use gap::Gap;
+pub use midrange::MidRange;
+pub use model::Actuator;
+pub use noise::Noise;
+
+use std::ops::Range;
+
+/// One actuator's channels in one flight: all that an estimate may know.
+#[derive(Debug, Clone, Copy)]
+pub struct Samples<'a> {
+    /// Step between samples, s.
+    pub step_s: f64,
+    /// Motor position X₁ at the screw axis, m; NaN where missing.
+    pub motor_m: &'a [f64],
+    /// Relative position δX = X₂ − X₁, m; NaN where missing.
+    pub dx_m: &'a [f64],
+    /// Load, N.
+    pub load_n: &'a [f64],
+    /// Unbroken stretches; the filter starts again at each.
+    pub segments: &'a [Range<usize>],
+}
+
+impl Samples<'_> {
+    /// Refuses channels that do not fit each other.
+    ///
+    /// # Errors
+    /// [`Error::Lengths`] for channels of different length or a segment outside them.
+    pub fn check(&self) -> Result<(), Error> {
+        let (dx, load) = (self.dx_m.len(), self.load_n.len());
+        let end = self.segments.iter().map(|s| s.end).max().unwrap_or(0);
+        if dx != load || self.motor_m.len() != dx || end > dx {
+            return Err(Error::Lengths { dx, load, end });
+        }
+        model::positive("step_s", self.step_s)
+    }
+}

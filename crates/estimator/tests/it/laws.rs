@@ -1,0 +1,115 @@
+//! Laws that hold for any input: offset, scale, sign, restarts, missing samples, the asked bandwidth.
+
+use estimator::noise::Sensors;
+use estimator::{Actuator, Error, Filter, Noise, Samples, gap, model};
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+fn filter(step_s: f64, bandwidth_hz: f64) -> Filter {
+    let actuator = Actuator::linear(5e7, 2000.0, 8.0).unwrap();
+    let noise = Noise::Sensors(Sensors {
+        screw_rms_m: 3e-6,
+        screw_resolution_m: 2.3e-6,
+        motor_rms_m: 1e-6,
+        motor_resolution_m: 3e-7,
+        unknown_force_n: 200.0,
+        bandwidth_hz,
+    });
+    Filter::new(&actuator, step_s, &noise).unwrap()
+}
+
+fn track(filter: &Filter, dx_m: &[f64], load_n: &[f64], segments: &[std::ops::Range<usize>]) -> Vec<f64> {
+    let samples = Samples { step_s: 0.004, motor_m: dx_m, dx_m, load_n, segments };
+    filter.track(&samples, None).unwrap().s_m
+}
+
+/// The settled pole sits where it was asked: within a tenth at the rates of real logs.
+#[test]
+fn the_bandwidth_asked_for_is_the_bandwidth_got() {
+    for rate_hz in [100.0, 250.0, 1000.0] {
+        let got = filter(f64::recip(rate_hz), 10.0).bandwidth_hz().unwrap();
+        assert!((got / 10.0 - 1.0).abs() < 0.1, "{got} Hz at {rate_hz} Hz");
+    }
+}
+
+/// By hand: S = 0 and 1 µm, thrice and once, so ΔS is their difference.
+#[test]
+fn the_statistic_is_the_difference_of_two_means() {
+    let found = gap::mid_range(&[0.0, 1e-6, 0.0, f64::NAN, 0.0]).unwrap();
+    assert!((found.gap_m - 1e-6).abs() < 1e-20);
+    assert_eq!((found.upper, found.lower), (1, 3));
+    assert_eq!(gap::mid_range(&[2.0; 3]), Err(Error::Constant { samples: 3, s_m: 2.0 }));
+    assert_eq!(gap::mid_range(&[f64::NAN]), Err(Error::NothingMeasured));
+}
+
+/// By hand: 0.002 kg·m² behind a 5 mm lead weighs 0.002·(2π/0.005)² = 3158.27 kg; a quarter turn is 1.25 mm.
+#[test]
+fn motor_angle_and_inertia_come_to_the_screw() {
+    assert!((model::motor_position_m(std::f64::consts::FRAC_PI_2, 0.005) - 0.00125).abs() < 1e-18);
+    assert!((model::reflected_mass_kg(0.002, 0.005) - 3_158.273_408_348_595).abs() < 1e-9);
+}
+
+/// A part that only turns is the linear one seen at its radius: 2·10⁴ N·m/rad at 0.1 m is 2·10⁶ N/m.
+#[test]
+fn a_rotary_part_is_a_linear_one_at_its_radius() {
+    let (turning, pushing) =
+        (Actuator::rotary(2e4, 1.5, 0.02, 0.1).unwrap(), Actuator::linear(2e6, 150.0, 2.0).unwrap());
+    assert!((turning.a() - pushing.a()).amax() < 1e-9 * pushing.a().amax());
+    assert!(Actuator::rotary(2e4, 1.5, 0.02, 0.0).is_err());
+}
+
+proptest! {
+    /// δX₀ (eq 3) is unknown in service: it enters S as a constant, which a difference of means must not see.
+    #[test]
+    fn a_constant_offset_leaves_the_gap_alone(
+        upper_m in vec(40e-6..60e-6, 1..200), lower_m in vec(-60e-6..-40e-6, 1..200), offset_m in -1e-3..1e-3,
+    ) {
+        let s_m = [upper_m, lower_m].concat();
+        let moved_m: Vec<f64> = s_m.iter().map(|s| s + offset_m).collect();
+        let change_m = gap::mid_range(&moved_m).unwrap().gap_m - gap::mid_range(&s_m).unwrap().gap_m;
+        prop_assert!(change_m.abs() < 1e-15, "changed by {change_m:e} m");
+    }
+
+    /// The filter is linear: twice the motion under twice the load is twice the backlash.
+    #[test]
+    fn the_track_scales_with_its_inputs(dx in vec(-1e-4..1e-4, 50..200), load in vec(-8e3..8e3, 200), scale in -3.0..3.0) {
+        let load = &load[..dx.len()];
+        let times = |v: &[f64]| -> Vec<f64> { v.iter().map(|x: &f64| *x * scale).collect() };
+        let f = filter(0.004, 10.0);
+        let whole = 0..dx.len();
+        let one = track(&f, &dx, load, std::slice::from_ref(&whole));
+        let scaled = track(&f, &times(&dx), &times(load), std::slice::from_ref(&whole));
+        for (a, b) in one.iter().zip(&scaled) {
+            prop_assert!(f64::abs(a * scale - b) < 1e-12, "{} times {} is not {}", a, scale, b);
+        }
+    }
+
+    /// However samples are missing, S stays a number and the settled shortcut tells what the plain recursion tells.
+    #[test]
+    fn missing_samples_never_poison_the_track(dx in vec(prop_oneof![5 => (-1e-4..1e-4).boxed(), 1 => Just(f64::NAN).boxed()], 300..900)) {
+        prop_assume!(dx.iter().any(|y| !y.is_nan()));
+        let load = vec![500.0; dx.len()];
+        let f = filter(0.004, 20.0);
+        let whole = 0..dx.len();
+        let fast = track(&f, &dx, &load, std::slice::from_ref(&whole));
+        let first = dx.iter().position(|y| !y.is_nan()).unwrap();
+        let mut state = f.start(dx[first], load[first]);
+        for k in 0..dx.len() {
+            if k > 0 {
+                state = f.predict(&state, load[k - 1]);
+            }
+            state = f.correct(&state, dx[k]).unwrap().posterior;
+            prop_assert!((state.x[2] - fast[k]).abs() < 1e-12 * 1e-4, "row {k}: {} and {}", state.x[2], fast[k]);
+        }
+    }
+
+    /// A segment knows nothing of the one before it.
+    #[test]
+    fn a_segment_starts_afresh(dx in vec(-1e-4..1e-4, 100..300), load in vec(-8e3..8e3, 300)) {
+        let (f, load, half) = (filter(0.004, 10.0), &load[..dx.len()], dx.len() / 2);
+        let both = track(&f, &dx, load, &[0..half, half..dx.len()]);
+        let tail = 0..dx.len() - half;
+        let alone = track(&f, &dx[half..], &load[half..], std::slice::from_ref(&tail));
+        prop_assert_eq!(&both[half..], &alone[..]);
+    }
+}
