@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use fleet::{Complaint, Estimate, Flight, GapRecord, Installations, PartNumber, Position, Provenance};
+use fleet::{
+    Complaint, Estimate, Flight, GapRecord, Installation, Installations, PartNumber, Position, Provenance,
+};
 use ingest::{Actuator, Identity, Log, PositionColumns};
 use jiff::Timestamp;
 
@@ -70,7 +72,12 @@ impl<'c> Opened<'c> {
     /// Estimates every actuator of the log that was installed that day.
     ///
     /// An actuator that cannot be used becomes a complaint; the others go on.
-    pub fn records(&self, config: &Config, installations: &Installations, stamp: &Stamp) -> (Vec<GapRecord>, Vec<Complaint>) {
+    pub fn records(
+        &self,
+        config: &Config,
+        installations: &Installations,
+        stamp: &Stamp,
+    ) -> (Vec<GapRecord>, Vec<Complaint>) {
         let (mut records, mut complaints) = (Vec::new(), Vec::new());
         for at in &self.positions {
             match self.record(at, config, installations, stamp) {
@@ -81,19 +88,21 @@ impl<'c> Opened<'c> {
         (records, complaints)
     }
 
-    fn record(&self, at: &PositionColumns, config: &Config, installations: &Installations, stamp: &Stamp) -> Result<GapRecord, Complaint> {
-        let id = &self.identity;
-        let stay = installations
-            .at(&id.tail_number, &at.position, id.departure_utc)
-            .ok_or_else(|| nobody_installed(id, &at.position, installations))?;
-        let part = part_of(config, &stay.part_number)?;
+    fn record(
+        &self,
+        at: &PositionColumns,
+        config: &Config,
+        installations: &Installations,
+        stamp: &Stamp,
+    ) -> Result<GapRecord, Complaint> {
+        let (stay, part) = self.unit(at, config, installations)?;
         let estimate = self.estimate(at, part, config)?;
         Ok(GapRecord {
             flight: self.flight(),
             position: at.position.clone(),
             part_number: stay.part_number.clone(),
             serial_number: stay.serial_number.clone(),
-            unit_hours: stay.unit_hours(id.tail_hours_end),
+            unit_hours: stay.unit_hours(self.identity.tail_hours_end),
             estimate,
             provenance: Provenance {
                 log_path: self.shown.clone(),
@@ -106,11 +115,33 @@ impl<'c> Opened<'c> {
         })
     }
 
+    /// The unit that sat in a position that day, and the settings of its part.
+    ///
+    /// # Errors
+    /// A complaint when nobody is booked there, or the part is not configured.
+    pub fn unit<'u>(
+        &self,
+        at: &PositionColumns,
+        config: &'u Config,
+        installations: &'u Installations,
+    ) -> Result<(&'u Installation, &'u Part), Complaint> {
+        let id = &self.identity;
+        let stay = installations
+            .at(&id.tail_number, &at.position, id.departure_utc)
+            .ok_or_else(|| nobody_installed(id, &at.position, installations))?;
+        Ok((stay, part_of(config, &stay.part_number)?))
+    }
+
     /// Estimates one actuator as a given part, whoever is booked there.
     ///
     /// # Errors
     /// A complaint when its channels cannot be read.
-    pub fn estimate(&self, at: &PositionColumns, part: &Part, config: &Config) -> Result<Estimate, Complaint> {
+    pub fn estimate(
+        &self,
+        at: &PositionColumns,
+        part: &Part,
+        config: &Config,
+    ) -> Result<Estimate, Complaint> {
         if !at.lacking.is_empty() {
             return Ok(Estimate::refused("channel_unmapped"));
         }
@@ -138,25 +169,46 @@ impl<'c> Opened<'c> {
     }
 }
 
-/// A log that says nothing of its flight, as `estimate --part` reads it.
+/// Estimates every actuator of a log that says nothing of its flight, as one part.
 ///
 /// # Errors
 /// A complaint when the log cannot be read or put on one clock.
-pub fn anonymous(path: &Path, shown: &str, config: &Config, part: &Part) -> Result<Vec<(Position, Estimate)>, Complaint> {
+pub fn anonymous(
+    path: &Path,
+    shown: &str,
+    config: &Config,
+    part: &Part,
+) -> Result<Vec<(Position, Estimate)>, Complaint> {
+    let mut found = Vec::new();
+    each_anonymous(path, shown, config, part, |channels| {
+        found.push((
+            channels.position.clone(),
+            estimate::estimate(channels, part, &config.document.estimate)?,
+        ));
+        Ok(())
+    })?;
+    Ok(found)
+}
+
+/// Hands over the channels of every actuator of a log that says nothing of its flight, as one part.
+pub(crate) fn each_anonymous(
+    path: &Path,
+    shown: &str,
+    config: &Config,
+    part: &Part,
+    mut take: impl FnMut(&Actuator) -> Result<(), Complaint>,
+) -> Result<(), Complaint> {
     let complain = |e: ingest::Error| e.complaint().in_file(shown);
     let log = Log::open(path, &config.mapping).map_err(complain)?;
     let timeline = log.timeline().map_err(complain)?;
     // A log of one actuator has no name for it here, but needs one to be asked by.
     let own = Position::new("actuator").map_err(|e| Complaint::new("empty_name", e))?;
     let positions = log.positions(Some(&own)).map_err(complain)?;
-    let usable = positions.iter().filter(|at| at.lacking.is_empty());
-    usable
-        .map(|at| {
-            let actuator = log.actuator(at, &timeline, part.geometry).map_err(complain)?;
-            let estimate = estimate::estimate(&actuator, part, &config.document.estimate).map_err(|c| c.in_file(shown))?;
-            Ok((at.position.clone(), estimate))
-        })
-        .collect()
+    for at in positions.iter().filter(|at| at.lacking.is_empty()) {
+        let channels = log.actuator(at, &timeline, part.geometry).map_err(complain)?;
+        take(&channels).map_err(|complaint| complaint.in_file(shown))?;
+    }
+    Ok(())
 }
 
 /// The settings of a part number.
@@ -174,17 +226,24 @@ fn nobody_installed(id: &Identity, position: &Position, installations: &Installa
     let (tail, at) = (&id.tail_number, id.departure_utc);
     if installations.knows_tail(tail) {
         let what = format!("no unit is booked in {position} of {tail} on {at}");
-        Complaint::new("unit_unknown", what).hint("add its stay to the installations table, then `freeplay run --retry`")
+        Complaint::new("unit_unknown", what)
+            .hint("add its stay to the installations table, then `freeplay run --retry`")
     } else {
         let what = format!("the installations table does not know tail {tail}");
-        Complaint::new("tail_unknown", what).hint("is the tail spelled alike in logs and table? Then `freeplay run --retry`")
+        Complaint::new("tail_unknown", what)
+            .hint("is the tail spelled alike in logs and table? Then `freeplay run --retry`")
     }
 }
 
 /// The log-level digest of settings: of every unit that sat in one of its positions that day.
 ///
 /// It changes when a part's settings change, or another serial number is booked, and with nothing else.
-pub fn config_digest(config: &Config, installations: &Installations, flight: &Flight, positions: &[Position]) -> String {
+pub fn config_digest(
+    config: &Config,
+    installations: &Installations,
+    flight: &Flight,
+    positions: &[Position],
+) -> String {
     let mut hash = blake3::Hasher::new();
     for position in positions {
         let stay = installations.at(&flight.tail_number, position, flight.departure_utc);
@@ -196,5 +255,16 @@ pub fn config_digest(config: &Config, installations: &Installations, flight: &Fl
         }
     }
     hash.update(serde_json::to_string(&config.mapping).unwrap_or_default().as_bytes());
+    hash.finalize().to_hex().to_string()
+}
+
+/// Stands in for [`config_digest`] where a log could not be identified: of everything that might mend it.
+pub fn unidentified_digest(config: &Config, installations: &Installations) -> String {
+    let mut hash = blake3::Hasher::new();
+    hash.update(&crate::METHOD_VERSION.to_le_bytes());
+    hash.update(serde_json::to_string(&config.document).unwrap_or_default().as_bytes());
+    for stay in installations.iter() {
+        hash.update(serde_json::to_string(stay).unwrap_or_default().as_bytes());
+    }
     hash.finalize().to_hex().to_string()
 }

@@ -4,11 +4,13 @@
 //! the floors below it, the same in the nightly run, at the prompt and in a notebook.
 
 pub mod config;
+pub mod estimate;
 pub mod flight;
 pub mod part;
+pub mod trace;
 
 pub use config::Config;
-pub use flight::{Outcome, Stamp};
+pub use flight::{Opened, Stamp};
 pub use part::Part;
 
 /// Changes with every change to the method that can move a number; part of every configuration digest.

@@ -1,6 +1,6 @@
 //! A part number's settings: whose stiffness, damping, mass, sensors and limits we use.
 
-use estimator::noise::Noise;
+use estimator::noise::{Noise, Sensors};
 use fleet::Complaint;
 use ingest::Geometry;
 use schemars::JsonSchema;
@@ -144,5 +144,194 @@ pub struct Part {
     pub watch_m: Option<f64>,
 }
 
-/// A complaint about one key of a part.
+/// A key below the part's table, and what is wrong with it.
 pub(crate) type KeyComplaint = (&'static [&'static str], Complaint);
+
+impl PartSettings {
+    /// The settings that can move a gap: limits move none.
+    pub(crate) fn without_limits(&self) -> Self {
+        Self { limit_m: None, watch_m: None, ..self.clone() }
+    }
+
+    /// Brings the settings to the screw axis.
+    ///
+    /// # Errors
+    /// Every key that is missing, out of place or cannot be.
+    pub(crate) fn check(&self) -> Result<Part, Vec<KeyComplaint>> {
+        let mut keys = Keys::default();
+        self.check_kind(&mut keys);
+        keys.positive(&["reference_load_n"], self.reference_load_n);
+        keys.positive(&["limit_m"], self.limit_m);
+        keys.positive(&["watch_m"], self.watch_m);
+        if let Some((watch, limit)) = self.watch_m.zip(self.limit_m).filter(|(watch, limit)| watch > limit) {
+            let what = format!("`watch_m` {watch} lies above `limit_m` {limit}");
+            keys.complain(
+                &["watch_m"],
+                Complaint::new("limit_order", what)
+                    .hint("the gap that is reported comes before the one that grounds"),
+            );
+        }
+        let noise = self.check_noise(&mut keys);
+        let actuator = match self.kind {
+            Kind::Linear => self.linear(&mut keys),
+            Kind::Rotary => self.rotary(&mut keys),
+        };
+        match (actuator, noise, keys.found.is_empty()) {
+            (Some((actuator, geometry)), Some(noise), true) => Ok(Part {
+                actuator,
+                geometry,
+                noise,
+                reference_load_n: self.reference_load_n,
+                limit_m: self.limit_m,
+                watch_m: self.watch_m,
+            }),
+            _ => Err(keys.found),
+        }
+    }
+
+    /// A key of the other kind is a misunderstanding, not a spare.
+    fn check_kind(&self, keys: &mut Keys) {
+        let linear: [(&'static [&'static str], Option<f64>); 4] = [
+            (&["stiffness_n_per_m"], self.stiffness_n_per_m),
+            (&["damping_n_s_per_m"], self.damping_n_s_per_m),
+            (&["screw_mass_kg"], self.screw_mass_kg),
+            (&["lead_m_per_rev"], self.lead_m_per_rev),
+        ];
+        let rotary: [(&'static [&'static str], Option<f64>); 4] = [
+            (&["stiffness_nm_per_rad"], self.stiffness_nm_per_rad),
+            (&["damping_nm_s_per_rad"], self.damping_nm_s_per_rad),
+            (&["inertia_kg_m2"], self.inertia_kg_m2),
+            (&["reference_radius_m"], self.reference_radius_m),
+        ];
+        let (stray, kind) = match self.kind {
+            Kind::Linear => (rotary, "linear"),
+            Kind::Rotary => (linear, "rotary"),
+        };
+        for (key, _) in stray.into_iter().filter(|(_, value)| value.is_some()) {
+            let what = format!("`{}` is no key of a {kind} part", key[0]);
+            keys.complain(
+                key,
+                Complaint::new("key_of_other_kind", what)
+                    .hint("`kind` is \"linear\" (default) or \"rotary\""),
+            );
+        }
+    }
+
+    fn linear(&self, keys: &mut Keys) -> Option<(estimator::Actuator, Geometry)> {
+        let stiffness = keys.required(&["stiffness_n_per_m"], self.stiffness_n_per_m);
+        let damping = keys.required(&["damping_n_s_per_m"], self.damping_n_s_per_m);
+        let mass = keys.required(&["screw_mass_kg"], self.screw_mass_kg);
+        keys.positive(&["lead_m_per_rev"], self.lead_m_per_rev);
+        let actuator =
+            keys.made(&["stiffness_n_per_m"], estimator::Actuator::linear(stiffness?, damping?, mass?))?;
+        Some((actuator, Geometry::Linear { lead_m_per_rev: self.lead_m_per_rev }))
+    }
+
+    fn rotary(&self, keys: &mut Keys) -> Option<(estimator::Actuator, Geometry)> {
+        let stiffness = keys.required(&["stiffness_nm_per_rad"], self.stiffness_nm_per_rad);
+        let damping = keys.required(&["damping_nm_s_per_rad"], self.damping_nm_s_per_rad);
+        let inertia = keys.required(&["inertia_kg_m2"], self.inertia_kg_m2);
+        let radius = keys.required(&["reference_radius_m"], self.reference_radius_m)?;
+        let made = estimator::Actuator::rotary(stiffness?, damping?, inertia?, radius);
+        let actuator = keys.made(&["stiffness_nm_per_rad"], made)?;
+        Some((actuator, Geometry::Rotary { reference_radius_m: radius }))
+    }
+
+    fn check_noise(&self, keys: &mut Keys) -> Option<Noise> {
+        let Some(noise) = &self.noise else {
+            let hint = "[part.\"…\".noise] needs screw_rms_m, motor_rms_m, unknown_force_n and bandwidth_hz; see docs/configuration.md";
+            keys.complain(
+                &[],
+                Complaint::new("key_missing", "the part has no `noise`, and there are no default levels")
+                    .hint(hint),
+            );
+            return None;
+        };
+        match noise.model {
+            NoiseModel::Sensors => noise.sensors(self, keys).map(Noise::Sensors),
+            NoiseModel::PerStep => {
+                let v_d_m2 = keys.required(&["noise", "v_d_m2"], noise.v_d_m2);
+                let w_d = keys.required(&["noise", "w_d"], noise.w_d)?;
+                Some(Noise::PerStep { w_d: nalgebra::Matrix3::from_fn(|i, j| w_d[i][j]), v_d_m2: v_d_m2? })
+            }
+            NoiseModel::Continuous => {
+                let force = keys.required(&["noise", "force_psd_n2_s"], noise.force_psd_n2_s);
+                let rate =
+                    keys.required(&["noise", "backlash_rate_psd_m2_per_s"], noise.backlash_rate_psd_m2_per_s);
+                let v_d_m2 = keys.required(&["noise", "v_d_m2"], noise.v_d_m2);
+                Some(Noise::Continuous {
+                    force_psd_n2_s: force?,
+                    backlash_rate_psd_m2_per_s: rate?,
+                    v_d_m2: v_d_m2?,
+                })
+            }
+        }
+    }
+}
+
+impl NoiseSettings {
+    /// Sensor facts at the screw axis; a rotary part's are in radians and newton metres.
+    fn sensors(&self, part: &PartSettings, keys: &mut Keys) -> Option<Sensors> {
+        let bandwidth_hz = keys.required(&["noise", "bandwidth_hz"], self.bandwidth_hz);
+        let none = Some(0.0);
+        let (radius, levels) = match part.kind {
+            Kind::Linear => (
+                1.0,
+                [
+                    keys.required(&["noise", "screw_rms_m"], self.screw_rms_m),
+                    self.screw_resolution_m.or(none),
+                    keys.required(&["noise", "motor_rms_m"], self.motor_rms_m),
+                    self.motor_resolution_m.or(none),
+                    keys.required(&["noise", "unknown_force_n"], self.unknown_force_n),
+                ],
+            ),
+            Kind::Rotary => (
+                part.reference_radius_m.unwrap_or(1.0),
+                [
+                    keys.required(&["noise", "screw_rms_rad"], self.screw_rms_rad),
+                    self.screw_resolution_rad.or(none),
+                    keys.required(&["noise", "motor_rms_rad"], self.motor_rms_rad),
+                    self.motor_resolution_rad.or(none),
+                    keys.required(&["noise", "unknown_torque_nm"], self.unknown_torque_nm),
+                ],
+            ),
+        };
+        let [screw_rms, screw_resolution, motor_rms, motor_resolution, force] = levels;
+        Some(Sensors {
+            screw_rms_m: screw_rms? * radius,
+            screw_resolution_m: screw_resolution? * radius,
+            motor_rms_m: motor_rms? * radius,
+            motor_resolution_m: motor_resolution? * radius,
+            unknown_force_n: force? / radius,
+            bandwidth_hz: bandwidth_hz?,
+        })
+    }
+}
+
+/// Collects complaints about keys.
+#[derive(Default)]
+struct Keys {
+    found: Vec<KeyComplaint>,
+}
+
+impl Keys {
+    fn complain(&mut self, key: &'static [&'static str], complaint: Complaint) {
+        self.found.push((key, complaint));
+    }
+
+    fn required<T>(&mut self, key: &'static [&'static str], value: Option<T>) -> Option<T> {
+        if value.is_none() {
+            let name = key.join(".");
+            self.complain(key, Complaint::new("key_missing", format!("the part does not say its `{name}`")));
+        }
+        value
+    }
+
+    fn positive(&mut self, key: &'static [&'static str], value: Option<f64>) {
+        self.found.extend(crate::config::positive(key[0], value).map(|c| (key, c)));
+    }
+
+    fn made<T>(&mut self, key: &'static [&'static str], made: Result<T, estimator::Error>) -> Option<T> {
+        made.map_err(|e| self.complain(key, Complaint::new("bad_parameter", e))).ok()
+    }
+}

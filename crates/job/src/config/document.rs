@@ -101,7 +101,9 @@ impl Default for TrendSettings {
 impl Document {
     /// The JSON Schema of the file, every definition in its place.
     pub fn schema() -> serde_json::Value {
-        let settings = schemars::generate::SchemaSettings::draft2020_12().for_deserialize().with(|s| s.inline_subschemas = true);
+        let settings = schemars::generate::SchemaSettings::draft2020_12()
+            .for_deserialize()
+            .with(|s| s.inline_subschemas = true);
         settings.into_generator().into_root_schema_for::<Self>().to_value()
     }
 
@@ -113,7 +115,8 @@ impl Document {
     pub(super) fn check(&self, source: &Source<'_>) -> Vec<Complaint> {
         let mut found = Vec::new();
         if self.logs.files.is_empty() {
-            let c = Complaint::new("no_logs", "`logs.files` names no log").hint("files = [\"logs/**/*.parquet\"]");
+            let c = Complaint::new("no_logs", "`logs.files` names no log")
+                .hint("files = [\"logs/**/*.parquet\"]");
             found.push(source.at(&["logs", "files"], c));
         }
         self.check_channels(source, &mut found);
@@ -137,14 +140,25 @@ impl Document {
         let position = [Dimension::Length, Dimension::Angle];
         let load = [Dimension::Force, Dimension::Torque];
         let temperature = [Dimension::Temperature; 2];
-        let needed = [("motor_position", &c.motor_position, position), ("screw_position", &c.screw_position, position), ("load", &c.load, load)];
+        let needed = [
+            ("motor_position", &c.motor_position, position),
+            ("screw_position", &c.screw_position, position),
+            ("load", &c.load, load),
+        ];
         let all = needed.into_iter().chain(c.temperature.iter().map(|t| ("temperature", t, temperature)));
         let mut columns: BTreeMap<&str, &str> = BTreeMap::new();
         for (name, channel, wanted) in all {
-            found.extend(channel_complaints(name, channel, wanted).into_iter().map(|(key, c)| source.at(&["channel", name, key], c)));
+            found.extend(
+                channel_complaints(name, channel, wanted)
+                    .into_iter()
+                    .map(|(key, c)| source.at(&["channel", name, key], c)),
+            );
             if let Some(other) = columns.insert(&channel.column, name) {
-                let c = Complaint::new("column_twice", format!("`{}` is mapped to both {other} and {name}", channel.column))
-                    .hint("two channels cannot share a column");
+                let c = Complaint::new(
+                    "column_twice",
+                    format!("`{}` is mapped to both {other} and {name}", channel.column),
+                )
+                .hint("two channels cannot share a column");
                 found.push(source.at(&["channel", name, "column"], c));
             }
         }
@@ -169,13 +183,26 @@ pub(crate) fn positive(key: &str, value: Option<f64>) -> Option<Complaint> {
     Some(Complaint::new("not_positive", format!("`{key}` is {value}, which must be a number above zero")))
 }
 
-fn channel_complaints(name: &str, channel: &ChannelMapping, wanted: [Dimension; 2]) -> Vec<(&'static str, Complaint)> {
+fn channel_complaints(
+    name: &str,
+    channel: &ChannelMapping,
+    wanted: [Dimension; 2],
+) -> Vec<(&'static str, Complaint)> {
     let mut found = Vec::new();
     let dimension = channel.unit.dimension();
     if !wanted.contains(&dimension) {
-        let words: Vec<&str> = if wanted[0] == wanted[1] { vec![wanted[0].as_str()] } else { wanted.map(Dimension::as_str).to_vec() };
-        let what = format!("`channel.{name}` is in {}, a unit of {}", channel.unit.as_str(), dimension.as_str());
-        found.push(("unit", Complaint::new("unit_contradicts", what).hint(format!("it needs a unit of {}", words.join(" or ")))));
+        let words: Vec<&str> = if wanted[0] == wanted[1] {
+            vec![wanted[0].as_str()]
+        } else {
+            wanted.map(Dimension::as_str).to_vec()
+        };
+        let what =
+            format!("`channel.{name}` is in {}, a unit of {}", channel.unit.as_str(), dimension.as_str());
+        found.push((
+            "unit",
+            Complaint::new("unit_contradicts", what)
+                .hint(format!("it needs a unit of {}", words.join(" or "))),
+        ));
     }
     if channel.column.matches(PLACEHOLDER).count() > 1 {
         let what = format!("`{}` holds {PLACEHOLDER} more than once", channel.column);

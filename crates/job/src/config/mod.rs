@@ -11,6 +11,7 @@ use fleet::{Complaint, PartNumber};
 use ingest::Mapping;
 use serde::Serialize;
 
+pub(crate) use document::positive;
 pub use document::{Document, EstimateSettings, LogSettings, Method, StoreSettings, TrendSettings};
 use source::Source;
 
@@ -101,8 +102,12 @@ impl Config {
             part: Option<crate::part::PartSettings>,
         }
         let part = self.document.part.get(part.as_str()).map(crate::part::PartSettings::without_limits);
-        let moves =
-            Moves { method_version: METHOD_VERSION, mapping: &self.mapping, estimate: &self.document.estimate, part };
+        let moves = Moves {
+            method_version: METHOD_VERSION,
+            mapping: &self.mapping,
+            estimate: &self.document.estimate,
+            part,
+        };
         // Structs and sorted maps of numbers and text always have a JSON form.
         let text = serde_json::to_vec(&moves).unwrap_or_default();
         blake3::hash(&text).to_hex().to_string()

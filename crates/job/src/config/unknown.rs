@@ -44,7 +44,8 @@ fn each_table<'t, 'i>(value: &'t DeValue<'i>, visit: &mut impl FnMut(&'t DeTable
 
 /// The object in a schema, also where it may be absent or stands in a list.
 fn object_shape(schema: &Value) -> Option<&Value> {
-    if schema.get("properties").is_some() || schema.get("additionalProperties").is_some_and(Value::is_object) {
+    if schema.get("properties").is_some() || schema.get("additionalProperties").is_some_and(Value::is_object)
+    {
         return Some(schema);
     }
     let choices = ["anyOf", "oneOf", "allOf"].iter().filter_map(|k| schema.get(*k)?.as_array()).flatten();

@@ -1,0 +1,101 @@
+//! What the filter saw, per sample: for a person who wants to look.
+
+use std::path::Path;
+
+use estimator::filter::Innovations;
+use fleet::{Complaint, Installations, PartNumber};
+use ingest::write::Column;
+
+use crate::config::Config;
+use crate::estimate;
+use crate::flight::{Opened, each_anonymous, part_of};
+use crate::part::Part;
+
+/// S(t), δX, load, innovation and its variance of one or more actuators, one after the other.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Trace {
+    log: Vec<String>,
+    position: Vec<String>,
+    /// Time since the first kept sample, s; δX, m; load, N; S, m; innovation, m; its variance, m².
+    numbers: [Vec<f64>; 6],
+}
+
+impl Trace {
+    /// Samples.
+    pub fn len(&self) -> usize {
+        self.log.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.log.is_empty()
+    }
+
+    /// Puts another trace behind this one.
+    pub fn extend(&mut self, other: Self) {
+        self.log.extend(other.log);
+        self.position.extend(other.position);
+        for (mine, theirs) in self.numbers.iter_mut().zip(other.numbers) {
+            mine.extend(theirs);
+        }
+    }
+
+    /// As columns of a file.
+    pub fn columns(&self) -> Vec<(String, Column)> {
+        let names = ["time_s", "dx_m", "load_n", "s_m", "innovation_m", "innovation_variance_m2"];
+        let text = [("log_path", &self.log), ("position", &self.position)];
+        let text = text.into_iter().map(|(name, values)| (name.to_owned(), Column::Text(values.clone())));
+        let numbers = names.iter().zip(&self.numbers);
+        text.chain(numbers.map(|(name, values)| ((*name).to_owned(), Column::Real(values.clone())))).collect()
+    }
+
+    fn of(log: &str, channels: &ingest::Actuator, part: &Part) -> Result<Self, Complaint> {
+        let filter = estimate::filter(channels, part)?;
+        let mut seen = Innovations::default();
+        let track = filter
+            .track(&estimate::samples(channels), Some(&mut seen))
+            .map_err(|e| Complaint::new("estimate_failed", e))?;
+        let count = track.s_m.len();
+        let time_s = (0..count).map(|k| k as f64 * channels.step_s).collect();
+        Ok(Self {
+            log: vec![log.to_owned(); count],
+            position: vec![channels.position.to_string(); count],
+            numbers: [
+                time_s,
+                channels.dx_m.clone(),
+                channels.load_n.clone(),
+                track.s_m,
+                seen.innovation_m,
+                seen.variance_m2,
+            ],
+        })
+    }
+}
+
+/// Traces every actuator of a log: as booked, or all as one part.
+///
+/// # Errors
+/// A complaint when the log or an actuator in it cannot be read.
+pub fn of_log(
+    path: &Path,
+    shown: &str,
+    config: &Config,
+    installations: &Installations,
+    part: Option<&PartNumber>,
+) -> Result<Trace, Complaint> {
+    let mut whole = Trace::default();
+    if let Some(number) = part {
+        let part = part_of(config, number)?;
+        each_anonymous(path, shown, config, part, |channels| {
+            whole.extend(Trace::of(shown, channels, part)?);
+            Ok(())
+        })?;
+        return Ok(whole);
+    }
+    let opened = Opened::open(path, shown, config)?;
+    for at in opened.positions.iter().filter(|at| at.lacking.is_empty()) {
+        let (_, part) = opened.unit(at, config, installations)?;
+        whole.extend(Trace::of(shown, &opened.channels(at, part)?, part)?);
+    }
+    Ok(whole)
+}

@@ -1,0 +1,174 @@
+//! A configuration is checked whole: every complaint at once, each with its line and a remedy.
+
+use std::path::Path;
+
+use fleet::{Complaint, PartNumber};
+use job::Config;
+
+const GOOD: &str = r#"
+[logs]
+files = ["logs/*.parquet"]
+installations = "installations.csv"
+
+[clock]
+column = "t"
+unit = "s"
+
+[channel.motor_position]
+column = "{position}_motor"
+unit = "deg"
+
+[channel.screw_position]
+column = "{position}_screw"
+unit = "mm"
+
+[channel.load]
+column = "{position}_load"
+unit = "N"
+
+[part.EMA]
+stiffness_n_per_m = 5.0e7
+damping_n_s_per_m = 2000.0
+screw_mass_kg = 8.0
+lead_m_per_rev = 0.005
+limit_m = 150e-6
+
+[part.EMA.noise]
+screw_rms_m = 3e-6
+motor_rms_m = 1e-6
+unknown_force_n = 200.0
+bandwidth_hz = 10.0
+"#;
+
+fn parse(text: &str) -> Result<Config, Vec<Complaint>> {
+    Config::parse(text, Path::new("pipeline.toml"), Path::new("fleet"))
+}
+
+/// The complaints about the good text with one of its lines replaced.
+fn complaints(line: &str, by: &str) -> Vec<(String, usize, String)> {
+    assert!(GOOD.contains(line), "{line} is not in the text");
+    let found = parse(&GOOD.replacen(line, by, 1)).unwrap_err();
+    found.into_iter().map(|c| (c.code, c.line.map_or(0, |l| l.0), c.hint.unwrap_or_default())).collect()
+}
+
+fn line_of(text: &str) -> usize {
+    GOOD.lines().position(|l| l == text).unwrap() + 1
+}
+
+#[test]
+fn a_good_configuration_is_taken_and_its_paths_start_from_its_folder() {
+    let config = parse(GOOD).unwrap();
+    assert_eq!(config.store(), Path::new("fleet/results"));
+    assert_eq!(config.parts.len(), 1);
+}
+
+#[test]
+fn a_misspelled_key_is_named_with_its_line_and_neighbour() {
+    let found = complaints("stiffness_n_per_m = 5.0e7", "stifness_n_per_m = 5.0e7");
+    assert_eq!(
+        found,
+        [("unknown_key".to_owned(), line_of("stiffness_n_per_m = 5.0e7"), "`stiffness_n_per_m`?".to_owned())]
+    );
+}
+
+#[test]
+fn all_unknown_keys_are_told_at_once() {
+    let text = GOOD.replace("unit = \"s\"", "unitt = \"s\"").replace("bandwidth_hz", "bandwith_hz");
+    let text = format!("{text}\n[treend]\nx = 1\n");
+    let codes: Vec<_> = parse(&text).unwrap_err().into_iter().map(|c| (c.code, c.hint.unwrap())).collect();
+    let wanted = ["`unit`?", "`bandwidth_hz`?", "`trend`?"];
+    assert_eq!(codes, wanted.map(|hint| ("unknown_key".to_owned(), hint.to_owned())));
+}
+
+#[test]
+fn what_cannot_be_meant_is_refused_by_a_stable_code() {
+    let cases = [
+        ("unit = \"mm\"", "unit = \"N\"", "unit_contradicts"),
+        ("unit = \"N\"", "unit = \"mm\"", "unit_contradicts"),
+        ("column = \"{position}_screw\"", "column = \"{position}_motor\"", "column_twice"),
+        ("column = \"{position}_screw\"", "column = \"{position}_{position}\"", "bad_pattern"),
+        ("unit = \"deg\"", "unit = \"deg\"\nsign = 2", "bad_sign"),
+        ("unit = \"deg\"", "unit = \"deg\"\nscale = 0.0", "bad_scale"),
+        ("unit = \"deg\"", "unit = \"deg\"\ngear_ratio = -1.0", "not_positive"),
+        ("files = [\"logs/*.parquet\"]", "files = []", "no_logs"),
+        ("column = \"t\"", "", "no_clock"),
+        ("limit_m = 150e-6", "limit_m = -1.0", "not_positive"),
+        ("limit_m = 150e-6", "limit_m = 150e-6\nwatch_m = 200e-6", "limit_order"),
+        ("screw_mass_kg = 8.0", "", "key_missing"),
+        ("screw_mass_kg = 8.0", "screw_mass_kg = -8.0", "bad_parameter"),
+        ("lead_m_per_rev = 0.005", "reference_radius_m = 0.1", "key_of_other_kind"),
+        ("bandwidth_hz = 10.0", "", "key_missing"),
+        ("unit = \"mm\"", "unit = \"inches\"", "bad_toml"),
+        ("[logs]", "[logs", "bad_toml"),
+        ("column = \"t\"", "column = \"t\"\nrate_hz = 0.0", "not_positive"),
+    ];
+    for (line, by, code) in cases {
+        let found = complaints(line, by);
+        assert_eq!(found.iter().map(|c| c.0.as_str()).collect::<Vec<_>>(), [code], "{by}: {found:?}");
+    }
+}
+
+#[test]
+fn an_unreadable_file_says_how_to_get_one() {
+    let found = Config::read(Path::new("no/such/pipeline.toml")).unwrap_err();
+    assert_eq!(found[0].code, "config_unreadable");
+    assert!(found[0].hint.as_ref().unwrap().contains("freeplay init"));
+}
+
+/// A part's digest follows what can move its number, and nothing else.
+#[test]
+fn the_digest_follows_what_moves_a_number() {
+    let ema = PartNumber::new("EMA").unwrap();
+    let digest = |line: &str, by: &str| parse(&GOOD.replacen(line, by, 1)).unwrap().digest(&ema);
+    let base = digest("", "");
+    for (line, by) in [
+        ("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 5.1e7"),
+        ("bandwidth_hz = 10.0", "bandwidth_hz = 11.0"),
+        ("unit = \"mm\"", "unit = \"m\""),
+        ("column = \"t\"", "column = \"t\"\nrate_hz = 250.0"),
+    ] {
+        assert_ne!(digest(line, by), base, "{by}");
+    }
+    for (line, by) in [
+        ("limit_m = 150e-6", "limit_m = 160e-6"),
+        ("files = [\"logs/*.parquet\"]", "files = [\"elsewhere/*.parquet\"]"),
+        ("[part.EMA]", "[part.EMA] # a comment"),
+    ] {
+        assert_eq!(digest(line, by), base, "{by}");
+    }
+}
+
+/// Another part's settings are not this one's.
+#[test]
+fn a_second_part_leaves_the_first_ones_digest_alone() {
+    let ema = PartNumber::new("EMA").unwrap();
+    let second = GOOD[GOOD.find("[part.EMA]").unwrap()..].replace("part.EMA", "part.EMB");
+    let both = parse(&format!("{GOOD}\n{second}")).unwrap();
+    assert_eq!(both.digest(&ema), parse(GOOD).unwrap().digest(&ema));
+}
+
+#[test]
+fn a_rotary_part_takes_radians_and_newton_metres() {
+    let start = GOOD.find("[part.EMA]").unwrap();
+    let rotary = r#"
+[part.GEAR]
+kind = "rotary"
+stiffness_nm_per_rad = 2.0e4
+damping_nm_s_per_rad = 1.5
+inertia_kg_m2 = 0.02
+reference_radius_m = 0.1
+
+[part.GEAR.noise]
+screw_rms_rad = 2e-4
+motor_rms_rad = 1e-4
+unknown_torque_nm = 4.0
+bandwidth_hz = 8.0
+"#;
+    let config = parse(&format!("{}{rotary}", &GOOD[..start])).unwrap();
+    let part = &config.parts[&PartNumber::new("GEAR").unwrap()];
+    let estimator::Noise::Sensors(s) = part.noise else { panic!("{:?}", part.noise) };
+    // 0.2 mrad at 0.1 m is 20 µm; 4 N·m there is 40 N; 2·10⁴ N·m/rad is 2·10⁶ N/m.
+    assert!((s.screw_rms_m - 20e-6).abs() < 1e-18);
+    assert!((s.unknown_force_n - 40.0).abs() < 1e-12);
+    assert!((part.actuator.stiffness_n_per_m() - 2e6).abs() < 1e-6);
+}
