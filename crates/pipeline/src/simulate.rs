@@ -1,0 +1,241 @@
+//! Simulated fleets on disk: logs, installations, the truth, and a configuration that reads them.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use fleet::Complaint;
+use ingest::write::{Column, write_parquet};
+use jiff::Timestamp;
+use rayon::prelude::*;
+use simulator::plan::Unit;
+use simulator::spec::MotorLog;
+use simulator::{ActuatorLog, Plan, PlannedFlight, Spec};
+
+use crate::error::Error;
+use crate::event::Event;
+
+/// Reads a spec, or takes the small fleet that made `sample-data/`.
+///
+/// # Errors
+/// [`Error::Refused`] when it cannot be read or cannot be flown.
+pub fn spec(file: Option<&Path>, seed: Option<u64>) -> Result<Spec, Error> {
+    let shown = file.map_or_else(|| "the built-in spec".to_owned(), |f| f.display().to_string());
+    let text = match file {
+        None => simulator::SAMPLE_SPEC.to_owned(),
+        Some(file) => std::fs::read_to_string(file).map_err(|e| {
+            let what = format!("the spec cannot be read: {e}");
+            Error::refused(Complaint::new("spec_unreadable", what).in_file(&shown))
+        })?,
+    };
+    let mut spec: Spec = toml::from_str(&text).map_err(|e| {
+        Error::refused(Complaint::new("bad_spec", e.message()).in_file(&shown).hint("docs/simulator.md lists every key"))
+    })?;
+    spec.seed = seed.unwrap_or(spec.seed);
+    Ok(spec)
+}
+
+/// Flies every flight of a spec and writes `logs/`, `installations.csv`, `truth.parquet` and `pipeline.toml`.
+///
+/// The same spec and seed give the same files, whatever the number of workers.
+///
+/// # Errors
+/// [`Error::Refused`] when the spec cannot be flown or a file cannot be written.
+pub fn simulate(spec: &Spec, folder: &Path, jobs: Option<usize>, watch: &(dyn Fn(Event) + Sync)) -> Result<usize, Error> {
+    let plan = Plan::new(spec).map_err(|e| Error::refused(Complaint::new("bad_spec", e)))?;
+    watch(Event::Planned { logs: plan.flights.len(), bytes: 0 });
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
+    pool.install(|| {
+        (0..plan.flights.len()).into_par_iter().try_for_each(|index| {
+            let name = fly(&plan, index, folder)?;
+            watch(Event::Finished { log: name, bytes: 0, estimated: 0, refused: 0, complaints: Vec::new() });
+            Ok::<(), Error>(())
+        })
+    })?;
+    text(&folder.join("installations.csv"), &installations(&plan))?;
+    write_parquet(&folder.join("truth.parquet"), &truth(&plan), &[]).map_err(|e| Error::refused(e.complaint()))?;
+    text(&folder.join("pipeline.toml"), &configuration(spec))?;
+    Ok(plan.flights.len())
+}
+
+/// Flies one flight and writes its log: a column for each channel of each actuator.
+fn fly(plan: &Plan, index: usize, folder: &Path) -> Result<String, Error> {
+    let planned = &plan.flights[index];
+    let flight = plan.fly(index).map_err(|e| Error::refused(Complaint::new("bad_spec", e)))?;
+    let mut columns = vec![("time_s".to_owned(), Column::Real(flight.time_s))];
+    for actuator in flight.actuators {
+        columns.extend(channels(actuator));
+    }
+    let name = log_name(planned);
+    let file = folder.join("logs").join(&name);
+    write_parquet(&file, &columns, &facts(planned)).map_err(|e| Error::refused(e.complaint()))?;
+    Ok(name)
+}
+
+/// `N412FP/20260907T061500Z_FP0001.parquet`.
+fn log_name(flight: &PlannedFlight) -> String {
+    let departure = instant(flight.departure_us).strftime("%Y%m%dT%H%M%SZ");
+    format!("{}/{departure}_{}.parquet", flight.tail_number, flight.flight_id)
+}
+
+fn facts(flight: &PlannedFlight) -> Vec<(String, String)> {
+    vec![
+        ("tail_number".to_owned(), flight.tail_number.clone()),
+        ("flight_id".to_owned(), flight.flight_id.clone()),
+        ("departure_utc".to_owned(), instant(flight.departure_us).to_string()),
+        ("flight_hours".to_owned(), flight.flight_hours.to_string()),
+        ("tail_hours_end".to_owned(), flight.tail_hours_end.to_string()),
+    ]
+}
+
+/// The channels in the units of a recorder: degrees, millimetres, newtons or newton metres.
+fn channels(actuator: ActuatorLog) -> [(String, Column); 3] {
+    let named = |channel: &str, unit: Unit, values: Vec<f64>| {
+        let (suffix, factor) = recorded(unit);
+        (format!("{}_{channel}_{suffix}", actuator.position), Column::Single(values.into_iter().map(|v| v * factor).collect()))
+    };
+    [
+        named("motor", actuator.motor_unit, actuator.motor),
+        named("screw", actuator.screw_unit, actuator.screw),
+        named("load", actuator.load_unit, actuator.load),
+    ]
+}
+
+fn recorded(unit: Unit) -> (&'static str, f64) {
+    match unit {
+        Unit::Metre => ("mm", 1e3),
+        Unit::Radian => ("deg", 180.0 / std::f64::consts::PI),
+        Unit::Newton => ("n", 1.0),
+        Unit::NewtonMetre => ("nm", 1.0),
+    }
+}
+
+fn installations(plan: &Plan) -> String {
+    let mut text = "tail_number,position,part_number,serial_number,installed_utc,removed_utc,unit_hours_at_install,tail_hours_at_install\n".to_owned();
+    for stay in &plan.installations {
+        let removed = stay.removed_us.map(|us| instant(us).to_string()).unwrap_or_default();
+        let _ = writeln!(
+            text,
+            "{},{},{},{},{},{removed},{:.1},{:.1}",
+            stay.tail_number,
+            stay.position,
+            stay.part_number,
+            stay.serial_number,
+            instant(stay.installed_us),
+            stay.unit_hours_at_install,
+            stay.tail_hours_at_install
+        );
+    }
+    text
+}
+
+/// The contract's columns of a truth table.
+fn truth(plan: &Plan) -> Vec<(String, Column)> {
+    let all = || plan.flights.iter().flat_map(|flight| flight.actuators.iter().map(move |actuator| (flight, actuator)));
+    let text = |of: &dyn Fn(&PlannedFlight, &simulator::ActuatorTruth) -> String| Column::Text(all().map(|(f, a)| of(f, a)).collect());
+    let real = |of: &dyn Fn(&simulator::ActuatorTruth) -> f64| Column::Real(all().map(|(_, a)| of(a)).collect());
+    [
+        ("tail_number", text(&|f, _| f.tail_number.clone())),
+        ("flight_id", text(&|f, _| f.flight_id.clone())),
+        ("position", text(&|_, a| a.position.clone())),
+        ("part_number", text(&|_, a| a.part_number.clone())),
+        ("serial_number", text(&|_, a| a.serial_number.clone())),
+        ("departure_utc", Column::Instant(all().map(|(f, _)| instant(f.departure_us)).collect())),
+        ("gap_m", real(&|a| a.gap_m)),
+        ("stiffness_n_per_m", real(&|a| a.stiffness_n_per_m)),
+        ("skew_s", real(&|a| a.skew_s)),
+        ("expected", text(&|_, a| a.expected.as_str().to_owned())),
+    ]
+    .map(|(name, column)| (name.to_owned(), column))
+    .into()
+}
+
+/// A configuration that reads these logs: nominal parts, the sensors' own facts.
+fn configuration(spec: &Spec) -> String {
+    let mut text = HEAD.to_owned();
+    let rotary = spec.parts.first().is_some_and(|part| part.reference_radius_m.is_some());
+    let angle = rotary || spec.parts.first().is_some_and(|part| part.motor_log != MotorLog::Position);
+    let wrapped = spec.parts.first().is_some_and(|part| part.motor_log == MotorLog::WrappedAngle);
+    let unit = |angle: bool| if angle { ("deg", "deg") } else { ("mm", "mm") };
+    channel(&mut text, "motor_position", "motor", unit(angle), wrapped.then_some(360.0));
+    channel(&mut text, "screw_position", "screw", unit(rotary), None);
+    channel(&mut text, "load", "load", if rotary { ("nm", "N.m") } else { ("n", "N") }, None);
+    for part in &spec.parts {
+        part_table(&mut text, part, spec);
+    }
+    text
+}
+
+const HEAD: &str = r#"# Written with the simulated logs beside it: `freeplay run --config` on this file reads them.
+
+[logs]
+files = ["logs/**/*.parquet"]
+installations = "installations.csv"
+
+[store]
+path = "results"
+
+[identity]
+metadata = { tail_number = "tail_number", flight_id = "flight_id", departure_utc = "departure_utc", flight_hours = "flight_hours", tail_hours_end = "tail_hours_end" }
+
+[clock]
+column = "time_s"
+unit = "s"
+"#;
+
+fn channel(text: &mut String, channel: &str, column: &str, unit: (&str, &str), wraps_at: Option<f64>) {
+    let _ = writeln!(text, "\n[channel.{channel}]\ncolumn = \"{{position}}_{column}_{}\"\nunit = \"{}\"", unit.0, unit.1);
+    if let Some(turn) = wraps_at {
+        let _ = writeln!(text, "wraps_at = {turn}");
+    }
+}
+
+fn part_table(text: &mut String, part: &simulator::spec::Part, spec: &Spec) {
+    let (plant, name) = (&part.plant, &part.part_number);
+    let (screw, motor) = (&spec.sensors.screw, &spec.sensors.motor);
+    // Friction that the filter does not know is of the order of a fortieth of the load.
+    let unknown_n = spec.profile.load_n / 40.0;
+    let _ = write!(text, "\n[part.\"{name}\"]\n");
+    if let Some(r) = part.reference_radius_m {
+        let square = r * r;
+        let _ = writeln!(
+            text,
+            "kind = \"rotary\"\nreference_radius_m = {r}\nstiffness_nm_per_rad = {}\ndamping_nm_s_per_rad = {}\ninertia_kg_m2 = {}\nlimit_m = {}",
+            plant.contact.stiffness_n_per_m * square,
+            plant.contact.damping_n_s_per_m * square,
+            plant.screw_mass_kg * square,
+            part.limit_m
+        );
+        let _ = writeln!(
+            text,
+            "\n[part.\"{name}\".noise]\nscrew_rms_rad = {:e}\nscrew_resolution_rad = {:e}\nmotor_rms_rad = {:e}\nmotor_resolution_rad = {:e}\nunknown_torque_nm = {}\nbandwidth_hz = 10.0",
+            screw.noise_rms / r,
+            screw.resolution / r,
+            motor.noise_rms / r,
+            motor.resolution / r,
+            unknown_n * r
+        );
+        return;
+    }
+    let _ = writeln!(
+        text,
+        "stiffness_n_per_m = {:e}\ndamping_n_s_per_m = {}\nscrew_mass_kg = {}\nlead_m_per_rev = {}\nlimit_m = {:e}\nwatch_m = {:e}",
+        plant.contact.stiffness_n_per_m, plant.contact.damping_n_s_per_m, plant.screw_mass_kg, part.lead_m, part.limit_m, part.limit_m * 0.75
+    );
+    let _ = writeln!(
+        text,
+        "\n[part.\"{name}\".noise]\nscrew_rms_m = {:e}\nscrew_resolution_m = {:e}\nmotor_rms_m = {:e}\nmotor_resolution_m = {:e}\nunknown_force_n = {unknown_n}\nbandwidth_hz = 10.0",
+        screw.noise_rms, screw.resolution, motor.noise_rms, motor.resolution
+    );
+}
+
+/// A planned instant always lies within the calendar.
+fn instant(us: i64) -> Timestamp {
+    Timestamp::from_microsecond(us).unwrap_or(Timestamp::UNIX_EPOCH)
+}
+
+fn text(file: &Path, text: &str) -> Result<(), Error> {
+    std::fs::write(file, text).map_err(|e| {
+        let what = format!("the file cannot be written: {e}");
+        Error::refused(Complaint::new("output_failed", what).in_file(file.display()))
+    })
+}
