@@ -1,0 +1,83 @@
+//! The motor's position loop: a proportional position loop around a proportional-integral speed loop.
+
+use std::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, positive};
+
+/// The loop's bandwidths and limits, all at the screw.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Drive {
+    /// Bandwidth of the position loop, Hz. Default 6.
+    pub position_hz: f64,
+    /// Bandwidth of the speed loop, Hz. Default 40.
+    pub speed_hz: f64,
+    /// The most the motor can push, N. Default 40 000.
+    pub force_limit_n: f64,
+    /// The fastest it may be asked to go, m/s. Default 0.15.
+    pub speed_limit_m_per_s: f64,
+}
+
+impl Default for Drive {
+    fn default() -> Self {
+        Self { position_hz: 6.0, speed_hz: 40.0, force_limit_n: 40e3, speed_limit_m_per_s: 0.15 }
+    }
+}
+
+impl Drive {
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        positive("drive.position_hz", self.position_hz)?;
+        positive("drive.speed_hz", self.speed_hz)?;
+        positive("drive.force_limit_n", self.force_limit_n)?;
+        positive("drive.speed_limit_m_per_s", self.speed_limit_m_per_s)
+    }
+}
+
+/// A drive at work: its gains for one moved mass, and its integrator.
+#[derive(Debug, Clone, Copy)]
+pub struct Loop {
+    drive: Drive,
+    gain_n_s_per_m: f64,
+    integral_n: f64,
+}
+
+impl Loop {
+    /// A loop tuned for the mass it moves.
+    pub fn new(drive: Drive, moved_kg: f64) -> Self {
+        Self { drive, gain_n_s_per_m: TAU * drive.speed_hz * moved_kg, integral_n: 0.0 }
+    }
+
+    /// The force asked of the motor over the next step, N.
+    ///
+    /// The integrator has a fifth of the speed loop's bandwidth and stands still while the force
+    /// saturates, so it does not wind up.
+    pub fn force_n(&mut self, command_m: f64, motor_m: f64, motor_m_per_s: f64, step_s: f64) -> f64 {
+        let limit = self.drive.speed_limit_m_per_s;
+        let wanted = (TAU * self.drive.position_hz * (command_m - motor_m)).clamp(-limit, limit);
+        let push_n = self.gain_n_s_per_m * (wanted - motor_m_per_s);
+        let asked_n = push_n + self.integral_n;
+        let force_n = asked_n.clamp(-self.drive.force_limit_n, self.drive.force_limit_n);
+        if asked_n.abs() < self.drive.force_limit_n {
+            self.integral_n += TAU * 0.2 * self.drive.speed_hz * push_n * step_s;
+        }
+        force_n
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these values are exact")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loop_pushes_towards_its_command_and_never_harder_than_its_limit() {
+        let drive = Drive::default();
+        let mut slow = Loop::new(drive, 88.0);
+        assert_eq!(slow.force_n(1.0, 0.0, -10.0, 1e-4), drive.force_limit_n);
+        assert_eq!(slow.integral_n, 0.0);
+        let mut calm = Loop::new(drive, 88.0);
+        assert!(calm.force_n(0.0, 1e-6, 0.0, 1e-4) < 0.0);
+    }
+}

@@ -1,0 +1,61 @@
+//! Why nothing could be simulated.
+
+/// Why a specification cannot be flown.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "each field is named for what it holds; units stand in the key")]
+pub enum Error {
+    /// A number lies outside what the physics or the generator can use.
+    #[error("`{key}` is {value}, which must be {must}")]
+    Value { key: String, value: f64, must: &'static str },
+    /// A date is not written as year, month and day.
+    #[error("`start_date` is \"{text}\", which must be a date such as \"2026-03-02\"")]
+    Date { text: String },
+    /// A list that must name something is empty.
+    #[error("`{key}` is empty; name at least one")]
+    Empty { key: &'static str },
+    /// A name is used that is not declared.
+    #[error("{place} names {kind} \"{name}\", which is not declared; declared are: {known}")]
+    Unknown { place: String, kind: &'static str, name: String, known: String },
+    /// A name that must be unique is given twice.
+    #[error("{kind} \"{name}\" is declared twice; keep one of them")]
+    Twice { kind: &'static str, name: String },
+    /// Two places that exchange units hold different part numbers.
+    #[error("a swap at flight {flight} exchanges part {from} with part {to}; only like parts fit")]
+    Misfit { flight: usize, from: String, to: String },
+    /// Flights follow each other faster than they last.
+    #[error(
+        "a flight of {flight_hours} h does not fit into {days} days between flights; \
+         raise `days_between_flights` or lower `flight_hours`"
+    )]
+    Crowded { flight_hours: f64, days: f64 },
+    /// A flight is asked for that the plan does not hold.
+    #[error("flight {index} was asked for, but the plan holds {flights} flights, counted from 0")]
+    NoSuchFlight { index: usize, flights: usize },
+}
+
+/// A number that must be finite and greater than zero.
+pub(crate) fn positive(key: &str, value: f64) -> Result<(), Error> {
+    check(key, value, value > 0.0, "greater than zero and finite")
+}
+
+/// A number that must be finite and not negative.
+pub(crate) fn not_negative(key: &str, value: f64) -> Result<(), Error> {
+    check(key, value, value >= 0.0, "zero or more and finite")
+}
+
+/// A number that must lie within bounds, both included.
+pub(crate) fn within(key: &str, value: f64, low: f64, high: f64, must: &'static str) -> Result<(), Error> {
+    check(key, value, (low..=high).contains(&value), must)
+}
+
+/// Any finite number.
+pub(crate) fn finite(key: &str, value: f64) -> Result<(), Error> {
+    check(key, value, true, "finite")
+}
+
+fn check(key: &str, value: f64, holds: bool, must: &'static str) -> Result<(), Error> {
+    if holds && value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::Value { key: key.to_owned(), value, must })
+}

@@ -1,0 +1,80 @@
+//! What moves: two masses at the screw, the coupling between them, friction on both, and the drive.
+
+use serde::{Deserialize, Serialize};
+
+use crate::contact::Contact;
+use crate::drive::Drive;
+use crate::error::{Error, positive};
+use crate::friction::{self, Friction};
+
+/// One actuator. Defaults are a mid-sized aileron actuator of about 10 kN.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Plant {
+    /// The motor's inertia seen at the screw, `J (2π/lead)²`, kg. Default 80.
+    pub motor_mass_kg: f64,
+    /// The screw and what is fixed to it, kg. Default 8.
+    pub screw_mass_kg: f64,
+    /// The coupling. Default 5·10⁷ N/m, 2000 N·s/m, gap 100 µm, offset 100 µm, linear.
+    pub contact: Contact,
+    /// Friction on the motor. Default 250 N, 0.04, 3000 N·s/m.
+    pub motor_friction: Friction,
+    /// Friction on the screw. Default 150 N, 0.03, 1000 N·s/m.
+    pub screw_friction: Friction,
+    /// How dry friction answers to speed, for both masses. Default Coulomb, equation 1.
+    pub friction_law: friction::Law,
+    /// The position loop of the motor.
+    pub drive: Drive,
+}
+
+impl Default for Plant {
+    fn default() -> Self {
+        Self {
+            motor_mass_kg: 80.0,
+            screw_mass_kg: 8.0,
+            contact: Contact::default(),
+            motor_friction: Friction { dry_n: 250.0, load_share: 0.04, viscous_n_s_per_m: 3000.0 },
+            screw_friction: Friction { dry_n: 150.0, load_share: 0.03, viscous_n_s_per_m: 1000.0 },
+            friction_law: friction::Law::Coulomb,
+            drive: Drive::default(),
+        }
+    }
+}
+
+impl Plant {
+    /// The same actuator with another gap.
+    #[must_use]
+    pub fn with_gap_m(mut self, gap_m: f64) -> Self {
+        self.contact.gap_m = gap_m;
+        self
+    }
+
+    /// The same actuator with another stiffness.
+    #[must_use]
+    pub fn with_stiffness_n_per_m(mut self, stiffness_n_per_m: f64) -> Self {
+        self.contact.stiffness_n_per_m = stiffness_n_per_m;
+        self
+    }
+
+    /// The same actuator with dry and load-dependent friction of both masses times a factor.
+    #[must_use]
+    pub fn with_friction_factor(mut self, factor: f64) -> Self {
+        self.motor_friction = self.motor_friction.scaled(factor);
+        self.screw_friction = self.screw_friction.scaled(factor);
+        self
+    }
+
+    /// Says whether this can move at all.
+    ///
+    /// # Errors
+    /// [`Error::Value`] for the first parameter outside its range.
+    pub fn check(&self) -> Result<(), Error> {
+        positive("motor_mass_kg", self.motor_mass_kg)?;
+        positive("screw_mass_kg", self.screw_mass_kg)?;
+        self.contact.check()?;
+        self.motor_friction.check("motor_friction")?;
+        self.screw_friction.check("screw_friction")?;
+        self.friction_law.check()?;
+        self.drive.check()
+    }
+}

@@ -1,0 +1,74 @@
+//! What a flight asks of an actuator: how long, how hard, how busily.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, not_negative, positive, within};
+
+/// An operational flight in six phases: preflight checks, take-off, climb, cruise, approach, landing.
+///
+/// The phases stretch with the duration. The load is dynamic pressure × (manoeuvre + gust −
+/// stiffness × deflection), so it reverses many times unless it is told not to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Profile {
+    /// Length of the log, seconds, 5 to 20 000. Default 150.
+    pub duration_s: f64,
+    /// Samples per second, 10 to 5000. Default 250.
+    pub sample_rate_hz: f64,
+    /// The load that about one cruise sample in twenty exceeds, N. Default 8000.
+    pub load_n: f64,
+    /// Half the stroke: commands stay within ± this, metres. Default 0.03.
+    pub stroke_m: f64,
+    /// Rms of the gust-like load over `load_n`. Default 0.3.
+    pub gust_share: f64,
+    /// Corner of the gust's spectrum, which falls with the fourth power beyond, Hz. Default 0.8.
+    pub gust_hz: f64,
+    /// Rms of the ever-present small trim motion over the stroke. Default 0.01.
+    pub trim_share: f64,
+    /// Rms of the pilot's moves over the stroke. Default 0.12.
+    pub stick_share: f64,
+    /// Load that a full deflection takes off at full dynamic pressure, over `load_n`. Default 0.3.
+    pub hinge_share: f64,
+    /// The load keeps one sign throughout: the gap cannot be seen. Default false.
+    pub no_reversal: bool,
+}
+
+impl Default for Profile {
+    fn default() -> Self {
+        Self {
+            duration_s: 150.0,
+            sample_rate_hz: 250.0,
+            load_n: 8000.0,
+            stroke_m: 0.03,
+            gust_share: 0.3,
+            gust_hz: 0.8,
+            trim_share: 0.01,
+            stick_share: 0.12,
+            hinge_share: 0.3,
+            no_reversal: false,
+        }
+    }
+}
+
+impl Profile {
+    /// Samples in the log.
+    pub fn samples(&self) -> usize {
+        (self.duration_s * self.sample_rate_hz).round() as usize
+    }
+
+    /// Says whether this can be flown.
+    ///
+    /// # Errors
+    /// [`Error::Value`] for the first parameter outside its range.
+    pub fn check(&self) -> Result<(), Error> {
+        within("profile.duration_s", self.duration_s, 5.0, 20e3, "between 5 and 20000 s")?;
+        within("profile.sample_rate_hz", self.sample_rate_hz, 10.0, 5e3, "between 10 and 5000 Hz")?;
+        not_negative("profile.load_n", self.load_n)?;
+        positive("profile.stroke_m", self.stroke_m)?;
+        within("profile.gust_share", self.gust_share, 0.0, 2.0, "between 0 and 2")?;
+        within("profile.gust_hz", self.gust_hz, 0.01, 20.0, "between 0.01 and 20 Hz")?;
+        within("profile.trim_share", self.trim_share, 0.0, 0.2, "between 0 and 0.2")?;
+        within("profile.stick_share", self.stick_share, 0.0, 0.5, "between 0 and 0.5")?;
+        within("profile.hinge_share", self.hinge_share, 0.0, 0.4, "between 0 and 0.4")
+    }
+}

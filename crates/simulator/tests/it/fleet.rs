@@ -1,0 +1,152 @@
+//! A planned fleet: books that balance, and flights that do not depend on the order of asking.
+
+use simulator::{Error, Plan, SAMPLE_SPEC, Spec};
+
+fn sample() -> Spec {
+    toml::from_str(SAMPLE_SPEC).unwrap()
+}
+
+/// A fleet small enough to fly whole.
+fn small() -> Spec {
+    let text = r#"
+        seed = 9
+        tails = ["A", "B"]
+        flights_per_tail = 2
+        profile = { duration_s = 10.0, sample_rate_hz = 50.0 }
+        parts = [{ part_number = "P" }]
+        positions = [{ position = "left", part_number = "P" }, { position = "right", part_number = "P" }]
+    "#;
+    toml::from_str(text).unwrap()
+}
+
+#[test]
+fn flights_may_be_flown_in_any_order() {
+    let plan = Plan::new(&small()).unwrap();
+    let forward: Vec<_> = (0..4).map(|k| plan.fly(k).unwrap()).collect();
+    let again = Plan::new(&small()).unwrap();
+    for k in [2, 0, 3, 1] {
+        assert_eq!(again.fly(k).unwrap(), forward[k]);
+    }
+    assert_ne!(forward[0].actuators[0].load, forward[0].actuators[1].load);
+    assert_ne!(forward[0].actuators[0].load, forward[1].actuators[0].load);
+}
+
+#[test]
+fn a_flight_beyond_the_plan_is_refused() {
+    let plan = Plan::new(&small()).unwrap();
+    assert_eq!(plan.fly(4).unwrap_err(), Error::NoSuchFlight { index: 4, flights: 4 });
+}
+
+/// The contract's lookup: the stay that covers the departure names the serial the truth names, and its
+/// hours at installation give the unit's age.
+#[test]
+fn the_books_name_the_unit_that_flew_and_its_age() {
+    let plan = Plan::new(&sample()).unwrap();
+    for flight in &plan.flights {
+        for truth in &flight.actuators {
+            let stays: Vec<_> = plan
+                .installations
+                .iter()
+                .filter(|s| s.tail_number == flight.tail_number && s.position == truth.position)
+                .filter(|s| s.installed_us <= flight.departure_us)
+                .filter(|s| s.removed_us.is_none_or(|removed| flight.departure_us < removed))
+                .collect();
+            assert_eq!(stays.len(), 1);
+            assert_eq!(stays[0].serial_number, truth.serial_number);
+            let age = stays[0].unit_hours_at_install + flight.tail_hours_end - stays[0].tail_hours_at_install;
+            assert!((age - truth.unit_hours).abs() < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn flights_of_a_tail_follow_each_other_and_their_hours_add_up() {
+    let plan = Plan::new(&sample()).unwrap();
+    for tail in ["N412FP", "N413FP", "N414FP"] {
+        let flights: Vec<_> = plan.flights.iter().filter(|f| f.tail_number == tail).collect();
+        assert_eq!(flights.len(), 10);
+        for pair in flights.windows(2) {
+            assert!(pair[0].departure_us + (pair[0].flight_hours * 3.6e9) as i64 <= pair[1].departure_us);
+            assert!((pair[1].tail_hours_end - pair[0].tail_hours_end - pair[1].flight_hours).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn no_gap_ever_heals() {
+    let plan = Plan::new(&sample()).unwrap();
+    let mut gaps = std::collections::BTreeMap::new();
+    for truth in plan.flights.iter().flat_map(|flight| &flight.actuators) {
+        let before = gaps.insert(&truth.serial_number, truth.gap_m).unwrap_or(0.0);
+        assert!(truth.gap_m >= before);
+    }
+    assert_eq!(gaps.len(), 12);
+}
+
+#[test]
+fn a_swapped_unit_sits_in_each_place_in_turn() {
+    let mut spec = small();
+    spec.swaps = toml::from_str::<Spec>(&format!("{}\n{}", toml_of_small(), SWAP)).unwrap().swaps;
+    let plan = Plan::new(&spec).unwrap();
+    let serial =
+        |flight: usize, position: usize| plan.flights[flight].actuators[position].serial_number.as_str();
+    assert_eq!((serial(0, 0), serial(1, 1)), ("S10001", "S10004"));
+    assert_eq!((serial(2, 0), serial(3, 1)), ("S10004", "S10001"));
+    assert_eq!(plan.installations.len(), 6);
+}
+
+const SWAP: &str = r#"
+[[swaps]]
+before_flight = 2
+from = { tail = "A", position = "left" }
+to = { tail = "B", position = "right" }
+"#;
+
+fn toml_of_small() -> String {
+    toml::to_string(&small()).unwrap().replace("swaps = []\n", "")
+}
+
+#[test]
+fn a_rotary_part_is_logged_in_radians_and_newton_metres() {
+    let mut spec = small();
+    let linear = Plan::new(&spec).unwrap().fly(0).unwrap();
+    spec.parts[0].reference_radius_m = Some(0.05);
+    let rotary = Plan::new(&spec).unwrap().fly(0).unwrap();
+    let (a, b) = (&linear.actuators[0], &rotary.actuators[0]);
+    assert_eq!(
+        (b.screw_unit, b.load_unit),
+        (simulator::plan::Unit::Radian, simulator::plan::Unit::NewtonMetre)
+    );
+    assert!((a.screw[100] / b.screw[100] - 0.05).abs() < 1e-12);
+    assert!((b.load[100] / a.load[100] - 0.05).abs() < 1e-12);
+}
+
+#[test]
+fn several_flights_a_day_fit_into_it() {
+    let spec = Spec { days_between_flights: 0.2, flights_per_tail: 50, ..small() };
+    let plan = Plan::new(&spec).unwrap();
+    let flights: Vec<_> = plan.flights.iter().filter(|flight| flight.tail_number == "A").collect();
+    for pair in flights.windows(2) {
+        assert!(pair[0].departure_us + (pair[0].flight_hours * 3.6e9) as i64 <= pair[1].departure_us);
+    }
+    let crowded = Spec { days_between_flights: 0.05, ..spec };
+    assert!(matches!(Plan::new(&crowded), Err(Error::Crowded { .. })));
+}
+
+#[test]
+fn mistakes_are_named() {
+    let broken = |change: fn(&mut Spec)| {
+        let mut spec = small();
+        change(&mut spec);
+        Plan::new(&spec).unwrap_err().to_string()
+    };
+    let unknown = broken(|spec| "Q".clone_into(&mut spec.positions[0].part_number));
+    assert_eq!(unknown, "position \"left\" names part \"Q\", which is not declared; declared are: P");
+    let twice = broken(|spec| spec.tails.push("A".to_owned()));
+    assert_eq!(twice, "tail \"A\" is declared twice; keep one of them");
+    let date = broken(|spec| "2026-02-30".clone_into(&mut spec.start_date));
+    assert!(date.contains("2026-02-30"));
+    assert_eq!(broken(|spec| spec.tails.clear()), "`tails` is empty; name at least one");
+    let typo = toml::from_str::<Spec>(&SAMPLE_SPEC.replacen("seed", "sede", 1)).unwrap_err().to_string();
+    assert!(typo.contains("unknown field `sede`"), "{typo}");
+}
