@@ -24,6 +24,7 @@ pub mod wear;
 
 mod calendar;
 mod course;
+mod planner;
 mod random;
 mod roster;
 

@@ -149,7 +149,10 @@ impl Clock {
     }
 }
 
-/// All sensors of one actuator. Defaults are good ones: 1, 3 µm and 40 N of noise, no fault.
+/// All sensors of one actuator.
+///
+/// Defaults are good ones: noise of 1 and 3 µm and 40 N, steps of 0.3 and 2.3 µm and 10 N, no fault. A
+/// channel that a spec writes down starts from a perfect one instead: what it does not say is zero.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sensors {

@@ -1,6 +1,6 @@
 //! A planned fleet: books that balance, and flights that do not depend on the order of asking.
 
-use simulator::{Error, Plan, SAMPLE_SPEC, Spec};
+use simulator::{Error, Expected, Plan, SAMPLE_SPEC, Spec};
 
 fn sample() -> Spec {
     toml::from_str(SAMPLE_SPEC).unwrap()
@@ -149,4 +149,42 @@ fn mistakes_are_named() {
     assert_eq!(broken(|spec| spec.tails.clear()), "`tails` is empty; name at least one");
     let typo = toml::from_str::<Spec>(&SAMPLE_SPEC.replacen("seed", "sede", 1)).unwrap_err().to_string();
     assert!(typo.contains("unknown field `sede`"), "{typo}");
+}
+
+/// The promises in the head of `specs/sample.toml`.
+#[test]
+fn the_sample_fleet_swaps_two_units_wears_one_and_brings_one_near_its_limit() {
+    let plan = Plan::new(&sample()).unwrap();
+    assert_eq!((plan.flights.len(), plan.flights[0].actuators.len()), (30, 4));
+    assert!(plan.flights.iter().flat_map(|f| &f.actuators).all(|t| t.expected == Expected::Estimate));
+    let history = |serial: &str| -> Vec<(String, f64)> {
+        let rows = plan.flights.iter().flat_map(|f| f.actuators.iter().map(move |t| (f, t)));
+        rows.filter(|(_, t)| t.serial_number == serial)
+            .map(|(f, t)| (f.tail_number.clone(), t.gap_m))
+            .collect()
+    };
+    for (serial, before, after) in [("1060-0008", "N412FP", "N413FP"), ("1060-0012", "N413FP", "N412FP")] {
+        let tails: Vec<String> = history(serial).into_iter().map(|(tail, _)| tail).collect();
+        assert_eq!(tails, [vec![before; 5], vec![after; 5]].concat());
+    }
+    let growth = |serial: &str| history(serial).last().unwrap().1 - history(serial)[0].1;
+    assert!(growth("1040-0009") > 20e-6, "{:e}", growth("1040-0009"));
+    let near = history("1040-0013").last().unwrap().1 / plan.parts[0].limit_m;
+    assert!((0.9..1.0).contains(&near), "{near}");
+    for serial in ["1040-0005", "1040-0006", "1060-0007", "1060-0008", "1060-0011", "1060-0012"] {
+        assert!(growth(serial).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn every_spec_that_comes_with_the_crate_flies() {
+    for text in
+        [SAMPLE_SPEC, include_str!("../../specs/service.toml"), include_str!("../../specs/rough.toml")]
+    {
+        let mut spec: Spec = toml::from_str(text).unwrap();
+        spec.profile.duration_s = 10.0;
+        let flight = Plan::new(&spec).unwrap().fly(1).unwrap();
+        assert_eq!(flight.actuators.len(), spec.positions.len());
+        assert_eq!(flight.time_s.len(), flight.actuators[0].motor.len());
+    }
 }
