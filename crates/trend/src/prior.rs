@@ -1,45 +1,166 @@
-//! What the units of one part number teach about the next.
+//! What the units of one part number teach about the next (empirical Bayes).
 
-use crate::classic::median;
-use crate::rate;
-use crate::series::Series;
-use crate::trend::Rate;
+use crate::curve::{Curve, FAMILIES, Law};
+use crate::posterior::Segment;
+use crate::season::Season;
+use crate::series::Flight;
 
-/// Standard normal quantile of 95 %.
-const Z95: f64 = 1.644_853_626_951_472_2;
+/// Share of units first seen in service that were new then.
+const FRESH_SHARE: f64 = 0.4;
 
-/// The rates of a part number's units, learned from nothing later than a day.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A unit first seen in service has used at most this share of its life.
+const WORN_SHARE: f64 = 0.9;
+
+/// The exponential law's life in time constants: ln k is normal with this mean and spread.
+const LN_CONSTANTS: (f64, f64) = (0.9, 0.5);
+
+/// What wear of a part number follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axis {
+    /// Hours flown.
+    Hours,
+    /// Flights.
+    Flights,
+    /// Load reversals.
+    Reversals,
+}
+
+impl Axis {
+    /// The usage of a unit up to a flight, in the axis' own unit.
+    pub(crate) fn of(self, flight: &Flight) -> f64 {
+        match self {
+            Self::Hours => flight.hours,
+            Self::Flights => flight.flights,
+            Self::Reversals => flight.reversals,
+        }
+    }
+}
+
+/// How units of one part number wear.
+#[derive(Debug, Clone, PartialEq)]
 pub struct FleetPrior {
-    rate_m_per_hour: f64,
-    rate_sd_m_per_hour: f64,
+    /// What wear follows, and the hours that one unit of it is worth in the fleet's mean.
+    pub(crate) axis: Axis,
+    pub(crate) hours_per_unit: f64,
+    /// Growth that is a life: from new to the act limit, metres.
+    pub(crate) span_m: f64,
+    /// Gap of a new unit, mean and spread, metres.
+    pub(crate) new_m: f64,
+    pub(crate) new_sd_m: f64,
+    /// ln of the life in hours, mean and spread.
+    pub(crate) ln_life: f64,
+    pub(crate) ln_life_sd: f64,
+    /// Share of each family of laws.
+    pub(crate) shares: [f64; FAMILIES],
+    /// The yearly swing of what is measured.
+    pub(crate) season: Season,
+    /// Rate at which units that will begin to wear begin, per hour.
+    pub(crate) onsets_per_hour: f64,
+    /// Variance of the wear per metre of wear, metres.
+    pub(crate) wear_noise_m: f64,
+    /// Variance of the level per hour that no law explains, m²/h.
+    pub(crate) drift_m2_per_hour: f64,
+    /// Spread of what an installation adds to every gap measured in it, metres.
+    pub(crate) bias_sd_m: f64,
 }
 
 impl FleetPrior {
-    /// Median and robust spread of the units' rates; nothing from fewer than five units with a rate.
-    pub fn learn<'a>(fleet: impl IntoIterator<Item = &'a Series>, as_of_us: i64) -> Option<Self> {
-        let mut rates: Vec<f64> = fleet
-            .into_iter()
-            .filter_map(|series| rate::fit(&rate::points(series.until(as_of_us)), None))
-            .map(|fit| fit.rate.m_per_hour)
-            .collect();
-        if rates.len() < 5 {
-            return None;
+    /// What is assumed of a part number nobody has seen: a new gap of a fifth of the limit, lives around
+    /// 4,000 h within a factor of ten, any law.
+    pub fn vague(limit_m: f64) -> Self {
+        let mut shares = [0.4 / (FAMILIES - 3) as f64; FAMILIES];
+        shares[..3].copy_from_slice(&[0.2, 0.2, 0.2]);
+        Self {
+            axis: Axis::Hours,
+            hours_per_unit: 1.0,
+            span_m: 0.8 * limit_m,
+            new_m: 0.2 * limit_m,
+            new_sd_m: 0.05 * limit_m,
+            ln_life: 4000.0_f64.ln(),
+            ln_life_sd: 0.8,
+            shares,
+            season: Season::unknown(),
+            onsets_per_hour: 1.0 / 2000.0,
+            wear_noise_m: 0.2e-6,
+            drift_m2_per_hour: 1e-16,
+            bias_sd_m: 1.5e-6,
         }
-        let rate_m_per_hour = median(&mut rates);
-        let mut spread: Vec<f64> = rates.iter().map(|r| (r - rate_m_per_hour).abs()).collect();
-        let rate_sd_m_per_hour = 1.4826 * median(&mut spread);
-        (rate_sd_m_per_hour > 0.0).then_some(Self { rate_m_per_hour, rate_sd_m_per_hour })
     }
 
-    /// A unit's rate, drawn to the fleet's as far as it is uncertain (both taken as normal).
-    pub(crate) fn shrink(&self, own: Rate) -> Rate {
-        let own_precision = ((own.p95_m_per_hour - own.p05_m_per_hour) / (2.0 * Z95)).powi(-2).min(1e30);
-        let fleet_precision = self.rate_sd_m_per_hour.powi(-2);
-        let precision = own_precision + fleet_precision;
-        let m_per_hour =
-            (own.m_per_hour * own_precision + self.rate_m_per_hour * fleet_precision) / precision;
-        let reach = Z95 / precision.sqrt();
-        Rate { p05_m_per_hour: m_per_hour - reach, m_per_hour, p95_m_per_hour: m_per_hour + reach }
+    /// The usage of a unit up to a flight, hours' worth.
+    pub(crate) fn usage(&self, flight: &Flight) -> f64 {
+        self.axis.of(flight) * self.hours_per_unit
+    }
+
+    /// The prior's logarithms, taken once for many curves.
+    pub(crate) fn logs(&self) -> LogPrior<'_> {
+        LogPrior {
+            prior: self,
+            shares: self.shares.map(f64::ln),
+            life: -self.ln_life_sd.ln() - LN_ROOT_TAU,
+            fresh: FRESH_SHARE.ln(),
+            worn: ((1.0 - FRESH_SHARE) / WORN_SHARE).ln(),
+            worn_share: WORN_SHARE.ln(),
+            onset: self.onsets_per_hour.ln(),
+            constants: -LN_CONSTANTS.1.ln() - LN_ROOT_TAU,
+        }
     }
 }
+
+/// Log densities of a prior.
+pub(crate) struct LogPrior<'a> {
+    prior: &'a FleetPrior,
+    shares: [f64; FAMILIES],
+    life: f64,
+    fresh: f64,
+    worn: f64,
+    worn_share: f64,
+    onset: f64,
+    constants: f64,
+}
+
+impl LogPrior<'_> {
+    /// Of a law's family.
+    pub(crate) fn share(&self, law: Law) -> f64 {
+        self.shares[law.family()]
+    }
+
+    /// Of an onset that has not come in some hours.
+    pub(crate) fn waiting(&self, hours: f64) -> f64 {
+        self.share(Law::Onset { start: hours }) - self.prior.onsets_per_hour * hours
+    }
+
+    /// Of a curve's cell in the onset's start or the time constant, and of its age at first sight as far
+    /// as that does not depend on its life.
+    pub(crate) fn cell(&self, curve: &Curve, segment: &Segment<'_>) -> f64 {
+        let law = match curve.law {
+            Law::Onset { start } => self.onset - self.prior.onsets_per_hour * start,
+            _ => 0.0,
+        };
+        let age = match curve.law {
+            _ if segment.is_of_known_age() => 0.0,
+            Law::Onset { .. } => 0.0,
+            _ if curve.age == 0.0 => self.fresh,
+            _ => self.worn + curve.age_cell.ln(),
+        };
+        law + age + curve.law_cell.ln()
+    }
+
+    /// Of a life, per unit of ln life, and of a curve's age and time constant given it.
+    pub(crate) fn life(&self, ln_life: f64, ln_age: Option<f64>, ln_tau: Option<f64>) -> f64 {
+        let z = (ln_life - self.prior.ln_life) / self.prior.ln_life_sd;
+        let mut log = self.life - 0.5 * z * z;
+        if let Some(ln_tau) = ln_tau {
+            let z = (ln_life - ln_tau - LN_CONSTANTS.0) / LN_CONSTANTS.1;
+            log += self.constants - 0.5 * z * z;
+        }
+        match ln_age {
+            Some(ln_age) if ln_age < self.worn_share + ln_life => log - ln_life,
+            Some(_) => f64::NEG_INFINITY,
+            None => log,
+        }
+    }
+}
+
+/// ln √(2π).
+const LN_ROOT_TAU: f64 = 0.918_938_533_204_672_7;

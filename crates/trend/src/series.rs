@@ -112,6 +112,12 @@ impl Series {
         &self.flights[..self.flights.partition_point(|flight| flight.departure_us <= as_of_us)]
     }
 
+    /// The gaps known on a day, in order of departure: what the [classic statistics](crate::classic)
+    /// are asked about.
+    pub fn gaps_m(&self, as_of_us: i64) -> Vec<f64> {
+        self.until(as_of_us).iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect()
+    }
+
     /// The unit's own hours when its first flight here began, if known.
     pub fn unit_hours_at_start(&self) -> Option<f64> {
         self.unit_hours_at_start

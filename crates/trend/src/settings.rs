@@ -13,18 +13,25 @@ pub struct Settings {
     pub planning_horizon_hours: f64,
     /// A crossing later than this many flight hours is *beyond the horizon*.
     pub horizon_hours: f64,
+    /// Flight hours until the next check, for the probability of passing the limit before it.
+    pub check_interval_hours: f64,
+    /// A change that no book knows is watched for this many days.
+    pub change_watch_days: f64,
     /// Without an estimate for this many days there is no state.
     pub stale_after_days: f64,
 }
 
 impl Settings {
-    /// Settings for an act limit: watch at 80 % of it, planning 500 h, horizon 20,000 h, stale after 45 days.
+    /// Settings for an act limit: watch at 80 % of it, planning 500 h, horizon 20,000 h, checks
+    /// every 300 h, changes watched for 30 days, stale after 45.
     pub fn for_limit(limit_m: f64) -> Self {
         Self {
             limit_m,
             watch_m: 0.8 * limit_m,
             planning_horizon_hours: 500.0,
             horizon_hours: 20_000.0,
+            check_interval_hours: 300.0,
+            change_watch_days: 30.0,
             stale_after_days: 45.0,
         }
     }
@@ -39,6 +46,8 @@ impl Settings {
             ("watch_m", self.watch_m),
             ("planning_horizon_hours", self.planning_horizon_hours),
             ("horizon_hours", self.horizon_hours),
+            ("check_interval_hours", self.check_interval_hours),
+            ("change_watch_days", self.change_watch_days),
             ("stale_after_days", self.stale_after_days),
         ];
         if let Some(&(name, value)) = values.iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {

@@ -2,11 +2,15 @@
 
 use std::fmt;
 
+use crate::crossing::Remaining;
 use crate::error::Error;
+use crate::history::{self, History};
+use crate::level;
+use crate::posterior::{Posterior, Segment, posterior};
 use crate::prior::FleetPrior;
 use crate::series::{Flight, Series};
 use crate::settings::Settings;
-use crate::{classic, rate};
+use crate::state::{Evidence, Reason, State, judge};
 
 /// Estimates below which nothing but a level is said.
 pub const FEWEST_ESTIMATES: usize = 8;
@@ -28,12 +32,22 @@ pub struct Trend {
     pub rate: Option<Rate>,
     /// Does it wear?
     pub wear: Wear,
-    /// Two-sided Mann–Kendall p-value of the estimates; for information.
-    pub trend_p_value: Option<f64>,
+    /// Probability that the gap has grown by 2 µm or more since it was new here, or reset.
+    pub growth_probability: Option<f64>,
+    /// The law most believed in, and how much.
+    pub law: Option<(WearLaw, f64)>,
     /// Steps, resets and onsets, by departure.
     pub changes: Vec<Change>,
     /// When the act limit is met.
     pub crossing: Option<Crossing>,
+    /// Probability that it is met before the next check ([`Settings::check_interval_hours`]).
+    pub check_probability: Option<f64>,
+    /// How the unit is used now, to turn hours into flights and days.
+    pub pace: Option<Pace>,
+    /// Flights whose gap was left out as an outlier, by departure.
+    pub outliers_us: Vec<i64>,
+    /// Variance found between flights over the variance stated.
+    pub noise_factor: f64,
     /// What to do; nothing when no recent estimate supports a state.
     pub state: Option<State>,
     /// Why this state, or why none.
@@ -72,12 +86,36 @@ pub struct Crossing {
     pub p95_hours: Option<f64>,
 }
 
+/// The unit's recent use: over its last ninety days of flights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pace {
+    /// Flight hours a day.
+    pub hours_per_day: f64,
+    /// Flight hours a flight.
+    pub hours_per_flight: f64,
+}
+
+/// Forms of wear.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WearLaw {
+    /// It does not wear.
+    None,
+    /// Flat, then a line.
+    Onset,
+    /// Ever more slowly.
+    Slowing,
+    /// As the usage.
+    Linear,
+    /// Ever faster.
+    Accelerating,
+}
+
 /// Whether a unit wears.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wear {
-    /// It has grown, or grows.
+    /// It has grown by 2 µm or more with a probability above 95 %.
     Wearing,
-    /// No growth is seen.
+    /// That much growth is not certain.
     Steady,
     /// Too little is known.
     Unknown,
@@ -107,69 +145,22 @@ pub enum ChangeKind {
     Recorded,
 }
 
-/// What to do, from least to most urgent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum State {
-    /// Nothing.
-    Normal,
-    /// Look at it.
-    Watch,
-    /// Plan the change.
-    Plan,
-    /// Change it.
-    Act,
-}
-
-/// Why a state, or none.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub enum Reason {
-    /// No flight before the day, or none with a gap.
-    NoEstimate,
-    /// The last estimate is too old.
-    Stale { days: f64 },
-    /// Too few estimates.
-    TooFew { estimates: usize },
-    /// The gap is at its act limit.
-    AtLimit { gap_m: f64, limit_m: f64 },
-    /// The early crossing lies within the planning horizon.
-    CrossesSoon { p05_hours: f64, planning_horizon_hours: f64 },
-    /// The gap is at its watch limit.
-    AtWatch { gap_m: f64, watch_m: f64 },
-    /// Nothing calls for anything.
-    Clear,
-}
-
-impl fmt::Display for Reason {
+impl fmt::Display for ChangeKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let um = |m: f64| m * 1e6;
-        match *self {
-            Self::NoEstimate => write!(f, "no estimate yet"),
-            Self::Stale { days } => write!(f, "last estimate is {days:.0} days old"),
-            Self::TooFew { estimates } => {
-                write!(f, "only {estimates} estimates, {FEWEST_ESTIMATES} are needed")
-            }
-            Self::AtLimit { gap_m, limit_m } => {
-                write!(f, "gap {:.1} µm is at the limit of {:.1} µm", um(gap_m), um(limit_m))
-            }
-            Self::CrossesSoon { p05_hours, planning_horizon_hours } => {
-                write!(
-                    f,
-                    "limit may be met in {p05_hours:.0} h, within the planning horizon of {planning_horizon_hours:.0} h"
-                )
-            }
-            Self::AtWatch { gap_m, watch_m } => {
-                write!(f, "gap {:.1} µm is at the watch limit of {:.1} µm", um(gap_m), um(watch_m))
-            }
-            Self::Clear => write!(f, "no limit is near"),
-        }
+        f.write_str(match self {
+            Self::Step => "step",
+            Self::Reset => "reset",
+            Self::Onset => "onset",
+            Self::Recorded => "recorded",
+        })
     }
 }
 
 /// States what is known of a unit on a day from its flights until then.
 ///
 /// `prior` is what the part number's fleet teaches, learned from nothing later than the same day;
-/// without one a unit is judged by itself alone.
+/// without one a unit is judged by itself alone. `previous` is the state it was given last time, which
+/// it leaves only when it is clearly past the limit that caused it.
 ///
 /// # Errors
 /// [`Error::Setting`] or [`Error::LimitOrder`] for unusable settings.
@@ -178,60 +169,95 @@ pub fn trend(
     as_of_us: i64,
     settings: &Settings,
     prior: Option<&FleetPrior>,
+    previous: Option<State>,
 ) -> Result<Trend, Error> {
     settings.check()?;
+    let vague = FleetPrior::vague(settings.limit_m);
+    let prior = prior.unwrap_or(&vague);
     let flights = series.until(as_of_us);
-    let points = rate::points(flights);
-    let line = rate::fit(&points, prior);
-    let crossing = line.as_ref().map(|line| line.crossing(settings));
-    let (state, reason) =
-        judge(flights, points.len(), as_of_us, settings, line.as_ref().map(|l| l.level), crossing);
-    let gaps: Vec<f64> = points.iter().map(|p| p.gap_m).collect();
+    let history = history::read(flights, series.unit_hours_at_start(), prior);
+    let (changes, judged) = follow(&history, flights, prior);
+    let judged = judged.filter(|_| history.estimates.len() >= FEWEST_ESTIMATES);
+    let ratio = hours_per_usage(flights, prior);
+    let remaining = judged.as_ref().map(|p| Remaining::new(p, prior, settings, ratio, history.offset_m2));
+    let level = judged.as_ref().map(|p| level::level(p, prior, history.offset_m2));
+    let crossing = remaining.as_ref().map(Remaining::crossing);
+    let estimates = history.estimates.len();
+    let evidence = Evidence { flights, estimates, as_of_us, level, crossing, changes: &changes };
+    let (state, reason) = judge(&evidence, settings, previous);
+    let growth_probability = judged.as_ref().map(level::growth_probability);
     Ok(Trend {
         as_of_us,
         flights: flights.len(),
-        estimates: points.len(),
+        estimates,
         unit_hours: series.unit_hours_at_start().zip(flights.last()).map(|(start, last)| start + last.hours),
-        level: line.as_ref().map(|l| l.level),
-        rate: line.as_ref().map(|l| l.rate),
-        wear: line.as_ref().map_or(Wear::Unknown, rate::Fit::wear),
-        trend_p_value: classic::mann_kendall(&gaps).ok().map(|test| test.p_value),
-        changes: Vec::new(),
+        level,
+        rate: judged.as_ref().map(|p| level::rate(p, ratio)),
+        wear: wear(growth_probability),
+        growth_probability,
+        law: judged.as_ref().and_then(level::law),
+        changes,
         crossing,
+        check_probability: remaining.as_ref().map(|r| r.within(settings.check_interval_hours)),
+        pace: pace(flights),
+        outliers_us: history.outliers.iter().map(|&flight| flights[flight].departure_us).collect(),
+        noise_factor: history.noise_factor,
         state,
         reason,
     })
 }
 
-/// The state and its reason, most urgent first.
-fn judge(
+/// Changes found, onsets of every segment included, and what the last segment says.
+fn follow(history: &History, flights: &[Flight], prior: &FleetPrior) -> (Vec<Change>, Option<Posterior>) {
+    let mut changes = history.changes.clone();
+    let mut judged = None;
+    for segment in history.segments() {
+        judged = posterior(&segment, prior);
+        changes.extend(judged.as_ref().and_then(|p| onset(p, &segment, flights, prior)));
+    }
+    changes.sort_by_key(|change| change.departure_us);
+    (changes, judged)
+}
+
+/// The onset of wear in a segment as a change.
+fn onset(
+    posterior: &Posterior,
+    segment: &Segment<'_>,
     flights: &[Flight],
-    estimates: usize,
-    as_of_us: i64,
-    settings: &Settings,
-    level: Option<Level>,
-    crossing: Option<Crossing>,
-) -> (Option<State>, Reason) {
+    prior: &FleetPrior,
+) -> Option<Change> {
+    let start = segment.begin + level::onset(posterior)?;
+    let first = flights.partition_point(|flight| prior.usage(flight) < start);
+    let departure_us = flights.get(first)?.departure_us;
+    Some(Change { departure_us, kind: ChangeKind::Onset, step_m: 0.0 })
+}
+
+fn wear(growth_probability: Option<f64>) -> Wear {
+    match growth_probability {
+        Some(probability) if probability > 0.95 => Wear::Wearing,
+        Some(_) => Wear::Steady,
+        None => Wear::Unknown,
+    }
+}
+
+/// Flight hours per hour's worth of usage, over the unit's last three hundred flights.
+fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
+    let Some((last, first)) = flights.last().zip(flights.get(flights.len().saturating_sub(300))) else {
+        return 1.0;
+    };
+    let ratio = (last.hours - first.hours) / (prior.usage(last) - prior.usage(first));
+    if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
+}
+
+/// The pace of the last ninety days of flights; nothing when they show no hours.
+fn pace(flights: &[Flight]) -> Option<Pace> {
     const DAY_US: f64 = 86_400e6;
-    let Some(last) = flights.iter().rev().find(|f| f.gap.is_some()) else {
-        return (None, Reason::NoEstimate);
-    };
-    let days = (as_of_us - last.departure_us) as f64 / DAY_US;
-    if days > settings.stale_after_days {
-        return (None, Reason::Stale { days });
-    }
-    let (Some(Level { gap_m, .. }), Some(crossing)) = (level, crossing) else {
-        return (None, Reason::TooFew { estimates });
-    };
-    let Settings { limit_m, watch_m, planning_horizon_hours, .. } = *settings;
-    if gap_m >= limit_m {
-        return (Some(State::Act), Reason::AtLimit { gap_m, limit_m });
-    }
-    if let Some(p05_hours) = crossing.p05_hours.filter(|h| *h <= planning_horizon_hours) {
-        return (Some(State::Plan), Reason::CrossesSoon { p05_hours, planning_horizon_hours });
-    }
-    if gap_m >= watch_m {
-        return (Some(State::Watch), Reason::AtWatch { gap_m, watch_m });
-    }
-    (Some(State::Normal), Reason::Clear)
+    let last = flights.last()?;
+    let from = flights.partition_point(|f| ((last.departure_us - f.departure_us) as f64) > 90.0 * DAY_US);
+    let first = &flights[from];
+    let (hours, days) = (last.hours - first.hours, (last.departure_us - first.departure_us) as f64 / DAY_US);
+    (hours > 0.0 && days > 0.0).then(|| Pace {
+        hours_per_day: hours / days,
+        hours_per_flight: hours / (last.flights - first.flights),
+    })
 }

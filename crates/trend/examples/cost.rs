@@ -1,0 +1,72 @@
+//! What a statement costs: time per serial against the length of its history, on one thread.
+//!
+//! `cost [SERIALS]` makes wearing units of 100 to 4,000 flights and prints microseconds for the series,
+//! the statement and the prior.
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a developer's tool, which may fail loudly")]
+
+use std::time::Instant;
+
+use trend::{FleetPrior, Observation, Series, Settings, Usage, trend};
+
+const LIMIT_M: f64 = 1e-4;
+
+/// Uniform numbers in [0, 1), the same in every run.
+struct Random(u64);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+fn rows(seed: u64, flights: usize) -> Vec<Observation> {
+    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let (life, exponent, worn) =
+        (2500.0 + 4000.0 * random.uniform(), 0.6 + 1.2 * random.uniform(), 0.4 * random.uniform());
+    (0..flights)
+        .map(|flight| {
+            let hours = 1.7 * (flight + 1) as f64;
+            let age = hours / life + worn;
+            let outlier = if random.uniform() < 0.02 { 30.0 } else { 0.0 };
+            let gap_um = 20.0 + 80.0 * age.powf(exponent) + 3.0 * random.normal() + outlier;
+            Observation {
+                departure_us: flight as i64 * 30_000_000_000,
+                installation: 0,
+                flight_hours: Some(1.7),
+                tail_hours_end: Some(hours),
+                load_reversals: Some((100.0 + 100.0 * random.uniform()) as u64),
+                gap_m: Some(gap_um * 1e-6),
+                gap_se_m: Some(3e-6),
+            }
+        })
+        .collect()
+}
+
+fn main() {
+    let serials: u64 = std::env::args().nth(1).map_or(200, |n| n.parse().unwrap());
+    println!("flights  series µs  statement µs  prior ms");
+    for flights in [100, 300, 1000, 2000, 4000] {
+        let rows: Vec<Vec<Observation>> = (0..serials).map(|seed| rows(seed, flights)).collect();
+        let per_serial = |began: Instant| began.elapsed().as_secs_f64() * 1e6 / serials as f64;
+        let began = Instant::now();
+        let fleet: Vec<Series> =
+            rows.into_iter().map(|rows| Series::new(rows, &Usage::default()).unwrap()).collect();
+        let series_us = per_serial(began);
+        let as_of_us = flights as i64 * 30_000_000_000;
+        let began = Instant::now();
+        let prior = FleetPrior::learn(fleet.iter().take(30), as_of_us, LIMIT_M);
+        let prior_ms = began.elapsed().as_secs_f64() * 1e3;
+        let began = Instant::now();
+        for series in &fleet {
+            std::hint::black_box(
+                trend(series, as_of_us, &Settings::for_limit(LIMIT_M), Some(&prior), None).unwrap(),
+            );
+        }
+        println!("{flights:7}  {series_us:9.1}  {:12.1}  {prior_ms:8.0}", per_serial(began));
+    }
+}

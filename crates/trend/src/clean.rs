@@ -1,0 +1,115 @@
+//! A unit's estimates made ready: outliers marked, and how large the scatter really is.
+
+use crate::classic::median;
+use crate::series::{Flight, Gap};
+
+/// Residuals beyond this many standard deviations are outliers.
+const OUTLIER_SIGMA: f64 = 4.0;
+
+/// Flights of the running median.
+const WINDOW: usize = 11;
+
+/// One estimate that takes part.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Estimate {
+    /// Index of its flight.
+    pub(crate) flight: usize,
+    pub(crate) installation: u32,
+    pub(crate) departure_us: i64,
+    /// Usage at its end: hours flown, until an axis is chosen.
+    pub(crate) usage: f64,
+    pub(crate) gap_m: f64,
+    /// 1/σ², with the scatter that was found and not the one that was stated.
+    pub(crate) weight: f64,
+}
+
+/// The estimates that take part, those that do not, and the noise found.
+#[derive(Debug, Clone)]
+pub(crate) struct Clean {
+    pub(crate) estimates: Vec<Estimate>,
+    /// Flights whose gap is an outlier.
+    pub(crate) outliers: Vec<usize>,
+    /// Variance found over variance stated.
+    pub(crate) noise_factor: f64,
+}
+
+/// Marks outliers against a running median and rescales the stated standard errors.
+///
+/// The factor is that of [`classic::dispersion`](crate::classic::dispersion); errors that were not
+/// stated, or stated far too small for their neighbours, count as the unit's median one.
+pub(crate) fn clean(flights: &[Flight]) -> Clean {
+    let stated: Vec<(usize, Gap)> =
+        flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?))).collect();
+    let typical_m = typical_error(&stated);
+    let errors: Vec<f64> = stated.iter().map(|(_, gap)| error(*gap, typical_m)).collect();
+    let gaps: Vec<f64> = stated.iter().map(|(_, gap)| gap.gap_m).collect();
+    let noise_factor = noise_factor(&gaps, &errors);
+    let smooth = running_median(&gaps);
+    let mut clean = Clean { estimates: Vec::with_capacity(gaps.len()), outliers: Vec::new(), noise_factor };
+    for (k, &(flight, gap)) in stated.iter().enumerate() {
+        let variance = noise_factor * errors[k] * errors[k];
+        if (gap.gap_m - smooth[k]).powi(2) > OUTLIER_SIGMA * OUTLIER_SIGMA * variance {
+            clean.outliers.push(flight);
+        } else {
+            let Flight { installation, departure_us, hours: usage, .. } = flights[flight];
+            clean.estimates.push(Estimate {
+                flight,
+                installation,
+                departure_us,
+                usage,
+                gap_m: gap.gap_m,
+                weight: variance.recip(),
+            });
+        }
+    }
+    clean
+}
+
+/// The median stated error; where nothing is stated, a micrometre, which the noise factor corrects.
+fn typical_error(stated: &[(usize, Gap)]) -> f64 {
+    let mut errors: Vec<f64> = stated.iter().map(|(_, gap)| gap.se_m).filter(|se| se.is_finite()).collect();
+    if errors.is_empty() { 1e-6 } else { median(&mut errors) }
+}
+
+/// A stated error no smaller than half the typical one: a between-flight scatter that nobody states
+/// bounds what a single flight can be worth.
+fn error(gap: Gap, typical_m: f64) -> f64 {
+    if gap.se_m.is_finite() { gap.se_m.max(0.5 * typical_m) } else { typical_m }
+}
+
+/// Found over stated variance from successive differences, drawn to one while they are few.
+fn noise_factor(gaps: &[f64], errors: &[f64]) -> f64 {
+    const PRIOR_COUNT: f64 = 4.0;
+    let mut ratios: Vec<f64> = gaps
+        .windows(2)
+        .zip(errors.windows(2))
+        .map(|(y, se)| (y[1] - y[0]).abs() / se[0].hypot(se[1]))
+        .collect();
+    if ratios.is_empty() {
+        return 1.0;
+    }
+    let count = ratios.len() as f64;
+    let found = (1.4826 * median(&mut ratios)).powi(2);
+    ((found * count + PRIOR_COUNT) / (count + PRIOR_COUNT)).max(0.05)
+}
+
+/// Median of the eleven values around each, of the nearest eleven at the ends.
+fn running_median(values: &[f64]) -> Vec<f64> {
+    let width = WINDOW.min(values.len());
+    let mut window: Vec<f64> = values[..width].to_vec();
+    window.sort_unstable_by(f64::total_cmp);
+    let middle = |window: &[f64]| window[width / 2];
+    let mut smooth = Vec::with_capacity(values.len());
+    let lead = width.div_ceil(2).min(values.len());
+    smooth.resize(lead, if width == 0 { 0.0 } else { middle(&window) });
+    for (leaving, entering) in values.iter().zip(values.iter().skip(width)) {
+        let out = window.partition_point(|v| v.total_cmp(leaving).is_lt());
+        window.remove(out);
+        let into = window.partition_point(|v| v.total_cmp(entering).is_lt());
+        window.insert(into, *entering);
+        smooth.push(middle(&window));
+    }
+    let last = smooth.last().copied().unwrap_or(0.0);
+    smooth.resize(values.len(), last);
+    smooth
+}

@@ -1,0 +1,126 @@
+//! When the limit is met: every node's crossing, added up.
+
+use crate::curve::Law;
+use crate::posterior::{Node, Posterior};
+use crate::prior::FleetPrior;
+use crate::settings::Settings;
+use crate::trend::Crossing;
+
+/// Five-point Gauss–Hermite rule for a standard normal variable.
+const NORMAL_RULE: [(f64, f64); 5] = [
+    (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
+    (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (0.0, 0.533_333_333_333_333_3),
+    (1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (2.856_970_013_872_806, 0.011_257_411_327_720_69),
+];
+
+/// Quantiles of an exponential wait, one for each tenth.
+const WAIT_RULE: usize = 10;
+
+/// Weight, as a share of the largest, below which a node cannot move a quantile.
+const NEGLIGIBLE: f64 = 2e-3;
+
+/// Cells of the distribution, even in ln hours from one hour to the horizon.
+const CELLS: usize = 240;
+
+/// The distribution of the hours left.
+#[derive(Debug, Clone)]
+pub(crate) struct Remaining {
+    cells: Vec<f64>,
+    over: f64,
+    horizon_hours: f64,
+}
+
+impl Remaining {
+    /// Adds up the crossings of the act limit; usage turns to hours by `hours_per_usage`, and undone
+    /// offsets leave `offset_m2` in the level.
+    pub(crate) fn new(
+        posterior: &Posterior,
+        prior: &FleetPrior,
+        settings: &Settings,
+        hours_per_usage: f64,
+        offset_m2: f64,
+    ) -> Self {
+        let Settings { limit_m, horizon_hours, .. } = *settings;
+        let mut remaining = Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours };
+        let spread_m2 = posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2);
+        let best = posterior.nodes.iter().map(|n| n.weight).fold(0.0, f64::max);
+        let likely = || posterior.nodes.iter().filter(|n| n.weight > NEGLIGIBLE * best);
+        let kept: f64 = likely().map(|n| n.weight).sum();
+        for node in likely() {
+            let node = &Node { weight: node.weight / kept, ..*node };
+            remaining.add_node(node, prior, limit_m, spread_m2, hours_per_usage);
+        }
+        remaining
+    }
+
+    fn add_node(
+        &mut self,
+        node: &Node,
+        prior: &FleetPrior,
+        limit_m: f64,
+        spread_m2: f64,
+        hours_per_usage: f64,
+    ) {
+        let left_m = limit_m - node.level_m;
+        let sd_m = (spread_m2 + prior.wear_noise_m * left_m.max(0.0)).sqrt();
+        for (z, share) in NORMAL_RULE {
+            let left_m = left_m + z * sd_m;
+            let weight = node.weight * share;
+            if left_m <= 0.0 {
+                self.over += weight;
+            } else if node.waits {
+                let wear_hours = node.ln_life.exp() * left_m / prior.span_m;
+                for i in 0..WAIT_RULE {
+                    let quantile = (i as f64 + 0.5) / WAIT_RULE as f64;
+                    let wait_hours = -(1.0 - quantile).ln() / prior.onsets_per_hour;
+                    self.add((wait_hours + wear_hours) * hours_per_usage, weight / WAIT_RULE as f64);
+                }
+            } else if node.law != Law::None {
+                let height = node.law.height(node.age_now) + left_m / node.amplitude_m;
+                self.add((node.law.age_at(height) - node.age_now) * hours_per_usage, weight);
+            }
+        }
+    }
+
+    fn add(&mut self, hours: f64, weight: f64) {
+        let place = hours.max(1.0).ln() / self.horizon_hours.ln() * CELLS as f64;
+        if let Some(cell) = self.cells.get_mut(place as usize) {
+            *cell += weight;
+        }
+    }
+
+    /// Its 5 %, 50 % and 95 % quantiles.
+    pub(crate) fn crossing(&self) -> Crossing {
+        Crossing {
+            p05_hours: self.quantile(0.05),
+            p50_hours: self.quantile(0.5),
+            p95_hours: self.quantile(0.95),
+        }
+    }
+
+    /// The hours by which the limit is met with this probability; nothing when that is beyond the horizon.
+    fn quantile(&self, probability: f64) -> Option<f64> {
+        let mut sum = self.over;
+        if sum >= probability {
+            return Some(0.0);
+        }
+        for (i, cell) in self.cells.iter().enumerate() {
+            if sum + cell >= probability {
+                let place = (i as f64 + (probability - sum) / cell) / CELLS as f64;
+                return Some((place * self.horizon_hours.ln()).exp());
+            }
+            sum += cell;
+        }
+        None
+    }
+
+    /// Probability that the limit is met within some hours.
+    pub(crate) fn within(&self, hours: f64) -> f64 {
+        let place = hours.max(1.0).ln() / self.horizon_hours.ln() * CELLS as f64;
+        let whole = (place as usize).min(CELLS);
+        let part = self.cells.get(whole).map_or(0.0, |cell| cell * (place - whole as f64));
+        self.over + self.cells[..whole].iter().sum::<f64>() + part
+    }
+}

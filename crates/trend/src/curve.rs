@@ -1,0 +1,241 @@
+//! The bank of wear laws: how far a gap has grown at an age, whatever its size.
+//!
+//! ```text
+//! gap(u) = N + A · F(u + a)     N gap when new, A amplitude, a age at first sight, u usage since
+//!
+//! power        F(t) = (t/1000)^p            p = ½ … 3
+//! exponential  F(t) = e^(t/τ) − 1
+//! onset        F(t) = max(0, t − o)/1000    flat, then a line
+//! none         F(t) = 0
+//! ```
+//! Ages are hours, or another usage brought to hours by the part number's mean. Each law is known by
+//! its *life*: the age T at which it has grown by a given span, so A = span/F(T).
+
+/// Age that a power law's amplitude refers to, hours.
+const REFERENCE_HOURS: f64 = 1000.0;
+
+/// Exponents in eighths, so that a power is a product of square roots: 0.5 to 3.
+const POWER_EIGHTHS: [u8; 14] = [4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 22, 24];
+
+/// Time constants of the exponential law, hours.
+const TIME_CONSTANTS: [f64; 10] =
+    [250.0, 350.0, 500.0, 700.0, 1000.0, 1400.0, 2000.0, 2800.0, 4000.0, 6000.0];
+
+/// Ages at first sight, hours.
+const AGES: [f64; 14] =
+    [0.0, 75.0, 150.0, 250.0, 400.0, 600.0, 850.0, 1150.0, 1500.0, 2000.0, 2600.0, 3400.0, 4500.0, 6000.0];
+
+/// Number of exponents, the last families.
+pub(crate) const POWERS: usize = POWER_EIGHTHS.len();
+
+/// Number of [`Law::family`] values: every exponent is one, the other laws are one each.
+pub(crate) const FAMILIES: usize = POWER_EIGHTHS.len() + 3;
+
+/// A law's form.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Law {
+    /// No wear.
+    None,
+    /// Flat until `start` hours after first sight, then a line.
+    Onset { start: f64 },
+    /// Index into the time constants.
+    Exponential { index: usize },
+    /// Index into the exponents.
+    Power { index: usize },
+}
+
+/// A law and the age at which its unit was first seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Curve {
+    pub(crate) law: Law,
+    /// Age at first sight, hours, and its index in [`Bank::ages`].
+    pub(crate) age: f64,
+    age_index: usize,
+    /// Width of the cell this member of the grid stands for: of its age, and of ln τ or the start.
+    pub(crate) age_cell: f64,
+    pub(crate) law_cell: f64,
+}
+
+impl Law {
+    /// The family whose share of a fleet is learned.
+    pub(crate) fn family(self) -> usize {
+        match self {
+            Self::None => 0,
+            Self::Onset { .. } => 1,
+            Self::Exponential { .. } => 2,
+            Self::Power { index } => 3 + index,
+        }
+    }
+
+    /// F at an age.
+    pub(crate) fn height(self, age: f64) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Onset { start } => (age - start).max(0.0) / REFERENCE_HOURS,
+            Self::Exponential { index } => (age / TIME_CONSTANTS[index]).exp_m1(),
+            Self::Power { index } => {
+                eighth_power(roots((age / REFERENCE_HOURS).max(0.0)), POWER_EIGHTHS[index])
+            }
+        }
+    }
+
+    /// dF/dt at an age; at least that of one hour, where a falling rate begins without bound.
+    pub(crate) fn slope(self, age: f64) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Onset { start } => f64::from(u8::from(age >= start)) / REFERENCE_HOURS,
+            Self::Exponential { index } => (age / TIME_CONSTANTS[index]).exp() / TIME_CONSTANTS[index],
+            Self::Power { index } => {
+                let age = age.max(1.0);
+                0.125 * f64::from(POWER_EIGHTHS[index]) * self.height(age) / age
+            }
+        }
+    }
+
+    /// The age at which F is reached.
+    pub(crate) fn age_at(self, height: f64) -> f64 {
+        match self {
+            Self::None => f64::INFINITY,
+            Self::Onset { start } => start + height * REFERENCE_HOURS,
+            Self::Exponential { index } => TIME_CONSTANTS[index] * height.ln_1p(),
+            Self::Power { index } => {
+                REFERENCE_HOURS * height.max(0.0).powf(8.0 / f64::from(POWER_EIGHTHS[index]))
+            }
+        }
+    }
+
+    /// F at the end of a life of `hours`, counted from the onset where there is one.
+    pub(crate) fn height_of_life(self, hours: f64) -> f64 {
+        match self {
+            Self::Onset { .. } => hours / REFERENCE_HOURS,
+            law => law.height(hours),
+        }
+    }
+
+    /// ln of the time constant, for the law that has one.
+    pub(crate) fn ln_tau(self) -> Option<f64> {
+        if let Self::Exponential { index } = self { Some(TIME_CONSTANTS[index].ln()) } else { None }
+    }
+
+    /// How fast an amplitude falls with ln life where that is a power: d ln A/d ln T = −p.
+    pub(crate) fn exponent(self) -> Option<f64> {
+        match self {
+            Self::Power { index } => Some(0.125 * f64::from(POWER_EIGHTHS[index])),
+            Self::Onset { .. } => Some(1.0),
+            _ => None,
+        }
+    }
+
+    /// The life of an amplitude over a span: inverse of span/F(T).
+    pub(crate) fn life(self, height: f64) -> f64 {
+        match self {
+            Self::Onset { .. } => height * REFERENCE_HOURS,
+            law => law.age_at(height),
+        }
+    }
+}
+
+/// x, x^½, x^¼ and x^⅛.
+fn roots(x: f64) -> [f64; 4] {
+    let half = x.sqrt();
+    let quarter = half.sqrt();
+    [x, half, quarter, quarter.sqrt()]
+}
+
+/// x^(n/8) from the roots of x.
+fn eighth_power([x, half, quarter, eighth]: [f64; 4], eighths: u8) -> f64 {
+    let factor = |bit: u8, value: f64| if eighths & bit == 0 { 1.0 } else { value };
+    let whole = match eighths >> 3 {
+        0 => 1.0,
+        1 => x,
+        2 => x * x,
+        _ => x * x * x,
+    };
+    whole * factor(4, half) * factor(2, quarter) * factor(1, eighth)
+}
+
+/// The curves tried for a segment.
+pub(crate) struct Bank {
+    pub(crate) curves: Vec<Curve>,
+    ages: Vec<f64>,
+}
+
+impl Bank {
+    /// The bank for a unit seen from `fresh` (new, or just reset) over `span_hours` of usage.
+    ///
+    /// A unit that may have worn before gets every age of the grid; onsets lie on a grid of starts
+    /// within what was seen. Starts later than now are the business of whoever asks for the future.
+    pub(crate) fn new(fresh: bool, known_age: Option<f64>, span_hours: f64, starts: usize) -> Self {
+        let ages = ages(fresh, known_age);
+        let at_birth = |law, law_cell| Curve { law, age: 0.0, age_index: 0, age_cell: 0.0, law_cell };
+        let cell = span_hours / starts as f64;
+        let mut curves = vec![at_birth(Law::None, 1.0)];
+        curves.extend((0..starts).map(|i| at_birth(Law::Onset { start: (i as f64 + 0.5) * cell }, cell)));
+        let step = (TIME_CONSTANTS[TIME_CONSTANTS.len() - 1] / TIME_CONSTANTS[0]).ln()
+            / (TIME_CONSTANTS.len() - 1) as f64;
+        let exponentials = (0..TIME_CONSTANTS.len()).map(|index| (Law::Exponential { index }, step));
+        let powers = (0..POWERS).map(|index| (Law::Power { index }, 1.0));
+        for (law, law_cell) in exponentials.chain(powers) {
+            curves.extend(ages.iter().enumerate().map(|(age_index, &(age, age_cell))| Curve {
+                law,
+                age,
+                age_index,
+                age_cell,
+                law_cell,
+            }));
+        }
+        Self { curves, ages: ages.into_iter().map(|(age, _)| age).collect() }
+    }
+}
+
+/// Ages at first sight and the widths of their cells; a known age is one cell without width.
+fn ages(fresh: bool, known_age: Option<f64>) -> Vec<(f64, f64)> {
+    if let Some(age) = known_age {
+        return vec![(age, 0.0)];
+    }
+    if fresh {
+        return vec![(0.0, 0.0)];
+    }
+    let width = |i: usize| match i {
+        0 => 0.0,
+        i if i + 1 == AGES.len() => AGES[i] - AGES[i - 1],
+        i => 0.5 * (AGES[i + 1] - AGES[i - 1]),
+    };
+    AGES.iter().enumerate().map(|(i, &age)| (age, width(i))).collect()
+}
+
+/// Heights of every curve at the same usages, made of what many curves share: roots for each age,
+/// exponentials for each time constant.
+pub(crate) struct Heights {
+    usages: Vec<f64>,
+    roots: Vec<Vec<[f64; 4]>>,
+    exponentials: Vec<Vec<f64>>,
+}
+
+impl Heights {
+    /// For usages counted from the segment's begin.
+    pub(crate) fn new(bank: &Bank, usages: Vec<f64>) -> Self {
+        let of_age = |age: &f64| usages.iter().map(|u| roots((u + age).max(0.0) / REFERENCE_HOURS)).collect();
+        let of_tau = |tau: &f64| usages.iter().map(|u| (u / tau).exp()).collect();
+        let (roots, exponentials) =
+            (bank.ages.iter().map(of_age).collect(), TIME_CONSTANTS.iter().map(of_tau).collect());
+        Self { usages, roots, exponentials }
+    }
+
+    /// Writes a curve's heights into `heights`.
+    pub(crate) fn fill(&self, curve: &Curve, heights: &mut Vec<f64>) {
+        heights.clear();
+        match curve.law {
+            Law::None => heights.resize(self.usages.len(), 0.0),
+            Law::Onset { .. } => heights.extend(self.usages.iter().map(|u| curve.law.height(*u))),
+            Law::Exponential { index } => {
+                let before = (curve.age / TIME_CONSTANTS[index]).exp();
+                heights.extend(self.exponentials[index].iter().map(|e| before * e - 1.0));
+            }
+            Law::Power { index } => {
+                let eighths = POWER_EIGHTHS[index];
+                heights.extend(self.roots[curve.age_index].iter().map(|r| eighth_power(*r, eighths)));
+            }
+        }
+    }
+}

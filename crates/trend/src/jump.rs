@@ -1,0 +1,168 @@
+//! A step that wear cannot make, found by comparing lines on both sides of every flight.
+
+use crate::clean::Estimate;
+
+/// Estimates on each side of a candidate, from a quick look to a long one.
+const REACHES: [usize; 4] = [15, 30, 60, 120];
+
+/// Places passed over in the first search.
+const STRIDE: usize = 3;
+
+/// Fewest estimates on either side.
+const FEWEST: usize = 6;
+
+/// A step is believed beyond this many standard errors.
+const BELIEVED: f64 = 6.5;
+
+/// Estimates on each side of the near look, which a bend of the wear cannot deceive.
+const NEAR: usize = 20;
+
+/// Estimates of one side's slope.
+const SIDE: usize = 60;
+
+/// Standard errors, and share of the step, that must be there in the near look.
+const NEAR_BELIEVED: f64 = 3.5;
+const NEAR_SHARE: f64 = 0.6;
+
+/// Spread of the wear rates the common slope is drawn to zero by, metres per hour.
+const SLOPE_SD: f64 = 5e-8;
+
+/// A step of the measured gap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Jump {
+    /// The first estimate after it.
+    pub(crate) at: usize,
+    pub(crate) step_m: f64,
+    pub(crate) se_m: f64,
+}
+
+/// All steps of a history, by place: the largest first, then what it left on either side.
+pub(crate) fn jumps(estimates: &[Estimate]) -> Vec<Jump> {
+    let sums = Sums::new(estimates);
+    let mut found = Vec::new();
+    let mut open = vec![(0, estimates.len())];
+    while let Some((low, high)) = open.pop() {
+        if let Some(jump) = sums.largest(low, high) {
+            open.extend([(low, jump.at), (jump.at, high)]);
+            found.push(jump);
+        }
+    }
+    found.sort_unstable_by_key(|jump| jump.at);
+    found
+}
+
+/// Squared steps at changes of installation, less what their errors explain, and how many there are.
+///
+/// Half of the mean is the variance of what one installation adds to every gap measured in it.
+pub(crate) fn installation_steps(estimates: &[Estimate]) -> (f64, f64) {
+    const REACH: usize = 60;
+    let sums = Sums::new(estimates);
+    let changes = (FEWEST..estimates.len().saturating_sub(FEWEST))
+        .filter(|&i| estimates[i].installation != estimates[i - 1].installation);
+    changes.fold((0.0, 0.0), |(squares, count), at| {
+        let (jump, _) = sums.jump(at.saturating_sub(REACH), at, (at + REACH).min(estimates.len()));
+        if jump.step_m.abs() > LARGEST_BIAS_M || jump.se_m > 0.5 * LARGEST_BIAS_M {
+            return (squares, count);
+        }
+        (squares + jump.step_m * jump.step_m - jump.se_m * jump.se_m, count + 1.0)
+    })
+}
+
+/// A step larger than this at a change of installation was more than the change, metres.
+const LARGEST_BIAS_M: f64 = 8e-6;
+
+/// Weighted sums up to each estimate, from which a line over any stretch follows at once.
+struct Sums(Vec<[f64; 5]>);
+
+/// A stretch's weight, means, and centred squares.
+struct Stretch {
+    weight: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+}
+
+impl Sums {
+    fn new(estimates: &[Estimate]) -> Self {
+        let origin = estimates.first().map_or((0.0, 0.0), |e| (e.usage, e.gap_m));
+        let mut sums = Vec::with_capacity(estimates.len() + 1);
+        let mut sum = [0.0; 5];
+        sums.push(sum);
+        for e in estimates {
+            let (w, x, y) = (e.weight, e.usage - origin.0, e.gap_m - origin.1);
+            for (s, term) in sum.iter_mut().zip([w, w * x, w * y, w * x * x, w * x * y]) {
+                *s += term;
+            }
+            sums.push(sum);
+        }
+        Self(sums)
+    }
+
+    fn stretch(&self, from: usize, to: usize) -> Stretch {
+        let (a, b) = (&self.0[from], &self.0[to]);
+        let weight = b[0] - a[0];
+        let (x, y) = ((b[1] - a[1]) / weight, (b[2] - a[2]) / weight);
+        Stretch { weight, x, y, xx: b[3] - a[3] - weight * x * x, xy: b[4] - a[4] - weight * x * y }
+    }
+
+    /// Step between the stretches around `at`, with one slope for both, and that slope.
+    fn jump(&self, low: usize, at: usize, high: usize) -> (Jump, f64) {
+        let (left, right) = (self.stretch(low, at), self.stretch(at, high));
+        let information = left.xx + right.xx + SLOPE_SD.powi(-2);
+        let slope = (left.xy + right.xy) / information;
+        let apart = right.x - left.x;
+        let variance = left.weight.recip() + right.weight.recip() + apart * apart / information;
+        (Jump { at, step_m: right.y - left.y - slope * apart, se_m: variance.sqrt() }, slope)
+    }
+
+    /// Whether the step is there between the nearest flights too, whichever slope is taken off: the
+    /// common one, that of the left or that of the right.
+    ///
+    /// A bend, as at the onset of wear, makes a far line miss on one side; it does not make neighbours
+    /// differ.
+    fn is_near(&self, low: usize, high: usize, (jump, slope): &(Jump, f64)) -> bool {
+        let (from, to) = (
+            |reach: usize| jump.at.saturating_sub(reach).max(low),
+            |reach: usize| (jump.at + reach).min(high),
+        );
+        let (left, right) = (self.stretch(from(NEAR), jump.at), self.stretch(jump.at, to(NEAR)));
+        let se_m = (left.weight.recip() + right.weight.recip()).sqrt();
+        let slopes = [*slope, self.slope(from(SIDE), jump.at, *slope), self.slope(jump.at, to(SIDE), *slope)];
+        slopes.into_iter().all(|slope| {
+            let step_m = right.y - left.y - slope * (right.x - left.x);
+            step_m / jump.step_m > NEAR_SHARE && step_m.abs() > NEAR_BELIEVED * se_m
+        })
+    }
+
+    /// Slope of one side, drawn to another so far as it is uncertain.
+    fn slope(&self, from: usize, to: usize, other: f64) -> f64 {
+        let side = self.stretch(from, to);
+        let prior = SLOPE_SD.powi(-2);
+        (side.xy + prior * other) / (side.xx + prior)
+    }
+
+    /// The step with the largest ratio to its error, over all places and reaches.
+    ///
+    /// Every third place is looked at, then all those near one that is half way to belief.
+    fn largest(&self, low: usize, high: usize) -> Option<Jump> {
+        let ratio = |jump: &Jump| (jump.step_m / jump.se_m).abs();
+        let places = low + FEWEST..(high + 1).saturating_sub(FEWEST);
+        let at_reaches = |at: usize| {
+            REACHES.map(|reach| self.jump(at.saturating_sub(reach).max(low), at, (at + reach).min(high)))
+        };
+        let promising = |&at: &usize| at_reaches(at).iter().any(|(jump, _)| ratio(jump) > 0.6 * BELIEVED);
+        let near: Vec<usize> = places.clone().step_by(STRIDE).filter(promising).collect();
+        let mut all: Vec<usize> =
+            near.into_iter().flat_map(|at| at.saturating_sub(STRIDE - 1)..at + STRIDE).collect();
+        all.dedup();
+        all.into_iter()
+            .filter(|at| places.contains(at))
+            .flat_map(|at| {
+                REACHES.map(|reach| self.jump(at.saturating_sub(reach).max(low), at, (at + reach).min(high)))
+            })
+            .filter(|(jump, slope)| ratio(jump) > BELIEVED && self.is_near(low, high, &(*jump, *slope)))
+            .map(|(jump, _)| jump)
+            .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+    }
+}

@@ -1,0 +1,196 @@
+//! A fleet teaches a prior: what its units follow, how long they live, by which laws (empirical Bayes).
+
+use crate::curve::{FAMILIES, Law};
+use crate::history::{self, History};
+use crate::jump::installation_steps;
+use crate::posterior::{Node, Posterior, Segment, posterior};
+use crate::prior::{Axis, FleetPrior};
+use crate::season::{Season, Swing, swing};
+use crate::series::{Flight, Series};
+
+/// Units looked at, at most: more teach nothing new and cost as much as their own statements.
+const MOST_UNITS: usize = 200;
+
+/// Units a prior of nothing is worth: few, so that thirty units outvote it.
+const PSEUDO_UNITS: f64 = 6.0;
+
+/// The same for the spread of lives, for a new unit's gap, and for changes of installation.
+const PSEUDO_LIVES: f64 = 2.0;
+const PSEUDO_CHANGES: f64 = 4.0;
+
+/// Rounds of expectation and maximisation.
+const ROUNDS: usize = 20;
+
+impl FleetPrior {
+    /// Learns how units wear from what was known of them on a day: which usage wear follows, the shares
+    /// of the laws, the spread of lives, a new unit's gap, the season, and what an installation adds.
+    ///
+    /// The units should be of one design: a part number, or several that differ in life by a factor of
+    /// two at most, which then share what they teach. Of a large fleet every n-th unit is looked at. The
+    /// order of the units changes no bit, and nothing later than the day is looked at; a prior of an
+    /// earlier day may stand in for a later one's.
+    pub fn learn<'a>(fleet: impl IntoIterator<Item = &'a Series>, as_of_us: i64, limit_m: f64) -> Self {
+        let fleet = sample(fleet.into_iter().map(|series| series.until(as_of_us)));
+        let mut best: Option<(f64, Self)> = None;
+        for axis in [Axis::Hours, Axis::Flights, Axis::Reversals] {
+            let Some(learned) = learn_along(&fleet, axis, limit_m) else { continue };
+            if best.as_ref().is_none_or(|(evidence, _)| learned.0 > *evidence) {
+                best = Some(learned);
+            }
+        }
+        best.map_or_else(|| Self::vague(limit_m), |(_, prior)| prior)
+    }
+}
+
+/// Units with flights in an order of their own, every n-th of many.
+fn sample<'a>(fleet: impl Iterator<Item = &'a [Flight]>) -> Vec<&'a [Flight]> {
+    let mut fleet: Vec<&[Flight]> = fleet.filter(|flights| !flights.is_empty()).collect();
+    fleet.sort_by_cached_key(|flights| identity(flights));
+    let stride = fleet.len().div_ceil(MOST_UNITS).max(1);
+    fleet.into_iter().step_by(stride).collect()
+}
+
+/// What tells two units apart, whatever the order they came in.
+fn identity(flights: &[Flight]) -> (i64, usize, [u64; 3]) {
+    let last = &flights[flights.len() - 1];
+    let gaps: f64 = flights.iter().filter_map(|f| f.gap).map(|g| g.gap_m).sum();
+    (flights[0].departure_us, flights.len(), [last.hours, last.reversals, gaps].map(f64::to_bits))
+}
+
+/// The prior learned along one axis, and the log evidence of the fleet under it.
+fn learn_along(fleet: &[&[Flight]], axis: Axis, limit_m: f64) -> Option<(f64, FleetPrior)> {
+    let total = |of: &dyn Fn(&Flight) -> f64| fleet.iter().filter_map(|f| f.last()).map(of).sum::<f64>();
+    let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
+    if !hours_per_unit.is_finite() {
+        return None;
+    }
+    let mut base = FleetPrior { axis, hours_per_unit, ..FleetPrior::vague(limit_m) };
+    let histories: Vec<History> = fleet.iter().map(|flights| history::read(flights, None, &base)).collect();
+    base.bias_sd_m = bias(&histories, base.bias_sd_m);
+    let segments: Vec<Segment<'_>> = histories.iter().flat_map(History::segments).collect();
+    let swings: Vec<Swing> = segments.iter().filter_map(|s| swing(s, &base, &posterior(s, &base)?)).collect();
+    base.season = Season::learn(&swings);
+    let units: Vec<Posterior> = segments.iter().filter_map(|segment| posterior(segment, &base)).collect();
+    let learned = (0..ROUNDS).fold(base.clone(), |current, _| step(&base, &current, &units));
+    let change = |unit: &Posterior| Ratio::new(&base, &learned).weights(&unit.nodes).iter().sum::<f64>().ln();
+    let evidence = units.iter().map(|unit| unit.log_evidence + change(unit)).sum();
+    Some((evidence, learned))
+}
+
+/// Spread of what an installation adds: half the mean square of the steps between installations.
+fn bias(histories: &[History], assumed_m: f64) -> f64 {
+    let assumed = (PSEUDO_CHANGES * 2.0 * assumed_m * assumed_m, PSEUDO_CHANGES);
+    let (squares, count) = histories
+        .iter()
+        .map(|history| installation_steps(&history.estimates))
+        .fold(assumed, |sum, found| (sum.0 + found.0, sum.1 + found.1));
+    (0.5 * squares / count).max(0.0).sqrt()
+}
+
+/// One round: weights by `current`, moments by weights, `base` as the pseudo-units that keep a small
+/// fleet sane.
+fn step(base: &FleetPrior, current: &FleetPrior, units: &[Posterior]) -> FleetPrior {
+    let ratio = Ratio::new(base, current);
+    let mut shares = base.shares.map(|share| share * PSEUDO_UNITS);
+    let mut life = Moments::assumed(base.ln_life, base.ln_life_sd);
+    let mut new = Moments::assumed(base.new_m, base.new_sd_m);
+    let (mut onsets, mut waited_hours) = (1.0, base.onsets_per_hour.recip());
+    for unit in units {
+        let weights = ratio.weights(&unit.nodes);
+        let total: f64 = weights.iter().sum();
+        for (node, weight) in unit.nodes.iter().zip(weights.into_iter().map(|w| w / total)) {
+            shares[family(node)] += weight;
+            if node.law != Law::None {
+                life.add(node.ln_life, weight);
+            }
+            if node.age_begin == 0.0 {
+                new.add(node.new_m, weight);
+            }
+            if let Law::Onset { start } = node.law {
+                onsets += weight;
+                waited_hours += weight * start;
+            } else if node.waits {
+                waited_hours += weight * node.age_now;
+            }
+        }
+    }
+    let total: f64 = shares.iter().sum();
+    FleetPrior {
+        shares: shares.map(|share| share / total),
+        ln_life: life.mean,
+        ln_life_sd: life.spread(),
+        new_m: new.mean,
+        new_sd_m: new.spread(),
+        onsets_per_hour: onsets / waited_hours,
+        ..base.clone()
+    }
+}
+
+/// The family whose share a node counts for: one that waits will have an onset.
+fn family(node: &Node) -> usize {
+    if node.waits { Law::Onset { start: node.age_now }.family() } else { node.law.family() }
+}
+
+/// How one prior's weights follow from another's.
+struct Ratio<'a> {
+    base: &'a FleetPrior,
+    current: &'a FleetPrior,
+    shares: [f64; FAMILIES],
+    life: f64,
+    onset: f64,
+}
+
+impl<'a> Ratio<'a> {
+    fn new(base: &'a FleetPrior, current: &'a FleetPrior) -> Self {
+        let mut shares = current.shares;
+        for (share, base) in shares.iter_mut().zip(&base.shares) {
+            *share = (*share / base).ln();
+        }
+        let life = (base.ln_life_sd / current.ln_life_sd).ln();
+        let onset = (current.onsets_per_hour / base.onsets_per_hour).ln();
+        Self { base, current, shares, life, onset }
+    }
+
+    /// Weights under the current prior of nodes weighted under the base; they need not add up to one.
+    fn weights(&self, nodes: &[Node]) -> Vec<f64> {
+        nodes.iter().map(|node| node.weight * self.log(node).exp()).collect()
+    }
+
+    fn log(&self, node: &Node) -> f64 {
+        let mut log = self.shares[family(node)];
+        if node.law != Law::None {
+            let square = |p: &FleetPrior| ((node.ln_life - p.ln_life) / p.ln_life_sd).powi(2);
+            log += self.life - 0.5 * (square(self.current) - square(self.base));
+        }
+        let sooner = self.current.onsets_per_hour - self.base.onsets_per_hour;
+        match node.law {
+            Law::Onset { start } => log + self.onset - sooner * start,
+            _ if node.waits => log - sooner * node.age_now,
+            _ => log,
+        }
+    }
+}
+
+/// Weighted mean and spread.
+struct Moments {
+    count: f64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Moments {
+    fn assumed(mean: f64, sd: f64) -> Self {
+        Self { count: PSEUDO_LIVES, mean, squares: PSEUDO_LIVES * sd * sd }
+    }
+
+    fn add(&mut self, value: f64, weight: f64) {
+        self.count += weight;
+        let off = value - self.mean;
+        self.mean += off * weight / self.count;
+        self.squares += weight * off * (value - self.mean);
+    }
+
+    fn spread(&self) -> f64 {
+        (self.squares / self.count).sqrt()
+    }
+}

@@ -1,0 +1,100 @@
+//! One look at a segment: its bins, the filter they share, and what it says of a curve.
+
+use crate::bins::Bin;
+use crate::filter::{Filter, Pass, Regression};
+use crate::posterior::Segment;
+use crate::prior::{FleetPrior, LogPrior};
+
+/// A segment's bins behind one filter, with the season fitted beside whatever curve is asked about.
+pub(crate) struct Look<'a> {
+    pub(crate) segment: &'a Segment<'a>,
+    pub(crate) prior: &'a FleetPrior,
+    pub(crate) logs: LogPrior<'a>,
+    pub(crate) bins: Vec<Bin>,
+    pub(crate) filter: Filter,
+    /// The gaps less the fleet's mean season.
+    pub(crate) gaps: Pass,
+    /// The season's swing of unit size, and what the gaps alone say of its size.
+    wave: Pass,
+    wave_by_gaps: f64,
+    wave_information: f64,
+}
+
+impl<'a> Look<'a> {
+    /// `growth_m(from, to)` is the wear expected between two usages: the level walks by a variance
+    /// proportional to it.
+    pub(crate) fn new(
+        segment: &'a Segment<'a>,
+        prior: &'a FleetPrior,
+        bins: Vec<Bin>,
+        growth_m: impl Fn(f64, f64) -> f64,
+    ) -> Self {
+        let filter = Filter::new(&bins, &walk(&bins, prior, growth_m));
+        let swing: Vec<f64> = bins.iter().map(|b| prior.season.wave(b.departure_us)).collect();
+        let wave = filter.pass(swing.iter().copied());
+        let mut gaps = filter.pass(bins.iter().zip(&swing).map(|(b, w)| b.gap_m - prior.season.mean_m * w));
+        let alone = filter.curve(&gaps, &wave, &swing);
+        let wave_information = alone.sff + prior.season.sd_m.powi(-2);
+        gaps.end -= alone.sfy / wave_information * wave.end;
+        gaps.start -= alone.sfy / wave_information * wave.start;
+        Self {
+            segment,
+            prior,
+            logs: prior.logs(),
+            bins,
+            filter,
+            gaps,
+            wave,
+            wave_by_gaps: alone.sfy,
+            wave_information,
+        }
+    }
+
+    /// A curve's regression with the unit's own swing, drawn to the fleet's, fitted beside it.
+    pub(crate) fn regress(&self, heights: &[f64]) -> Regression {
+        let mut pass = self.filter.curve(&self.gaps, &self.wave, heights);
+        let share = pass.sfs / self.wave_information;
+        pass.sff -= share * pass.sfs;
+        pass.sfy -= share * self.wave_by_gaps;
+        pass.end -= share * self.wave.end;
+        pass.start -= share * self.wave.start;
+        pass
+    }
+
+    /// Variance of the level now, whatever the curve.
+    pub(crate) fn level_m2(&self) -> f64 {
+        self.filter.end_m2 + self.wave.end * self.wave.end / self.wave_information
+    }
+
+    /// Variance of the first level about a new unit's mean gap.
+    pub(crate) fn new_m2(&self) -> f64 {
+        self.filter.start_m2 + self.prior.new_sd_m.powi(2)
+    }
+
+    /// What every curve's likelihood shares; it matters when one usage axis is weighed against another.
+    pub(crate) fn shared_log_likelihood(&self) -> f64 {
+        let fitted = self.wave_by_gaps * self.wave_by_gaps / self.wave_information;
+        -0.5 * (self.gaps.square - fitted + self.filter.log_variance + self.wave_information.ln())
+    }
+}
+
+/// Variance by which the level walks before each bin: wear's own, a little drift, and a new
+/// installation's bias where it changed.
+fn walk(bins: &[Bin], prior: &FleetPrior, growth_m: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    let mut walk_m2 = vec![0.0; bins.len()];
+    for (step_m2, pair) in walk_m2.iter_mut().skip(1).zip(bins.windows(2)) {
+        let (from, to) = (pair[0].usage, pair[1].usage);
+        let moved = f64::from(u8::from(pair[0].installation != pair[1].installation));
+        *step_m2 = prior.wear_noise_m * growth_m(from, to).max(0.0)
+            + prior.drift_m2_per_hour * (to - from)
+            + 2.0 * moved * prior.bias_sd_m * prior.bias_sd_m;
+    }
+    walk_m2
+}
+
+/// Growth between the means of the first and the last quarter of the bins, brought to the whole.
+pub(crate) fn straight_growth(bins: &[Bin]) -> f64 {
+    let quarter = bins.len().div_ceil(4);
+    let mean = |bins: &[Bin]| bins.iter().map(|b| b.gap_m).sum::<f64>() / bins.len() as f64;
+    (4.0 / 3.0 * (mean(&bins[bins.len() - quarter..]) - mean(&bins[..quarter]))).max(0.0)
+}

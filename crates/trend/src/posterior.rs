@@ -1,0 +1,286 @@
+//! What a segment's bins say about every curve of the bank: weights, amplitudes, levels.
+
+use crate::bins;
+use crate::clean::Estimate;
+use crate::curve::{Bank, Curve, Heights, Law};
+use crate::filter::Regression;
+use crate::look::{Look, straight_growth};
+use crate::prior::FleetPrior;
+
+/// Bins of the first look, by which most curves are dropped.
+const COARSE_BINS: usize = 12;
+
+/// Log weight below the best at which a curve is dropped.
+const DROP: f64 = 8.0;
+
+/// What a prior over lives and cells can add to a curve's bound.
+const SLACK: f64 = 3.0;
+
+/// Lives tried for each curve, over this many standard deviations either side.
+const LIVES: usize = 7;
+const REACH: f64 = 3.5;
+
+/// A stretch of a unit's history without maintenance that resets it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Segment<'a> {
+    pub(crate) estimates: &'a [Estimate],
+    /// Usage at which it began and at which it is judged.
+    pub(crate) begin: f64,
+    pub(crate) now: f64,
+    /// New or just reset when it began.
+    pub(crate) fresh: bool,
+    /// Age when it began, if the books know it.
+    pub(crate) known_age: Option<f64>,
+}
+
+impl Segment<'_> {
+    /// Whether the age at its begin needs no guessing.
+    pub(crate) fn is_of_known_age(&self) -> bool {
+        self.fresh || self.known_age.is_some()
+    }
+}
+
+/// One law with one amplitude, and how much it is believed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Node {
+    pub(crate) law: Law,
+    /// Usage at the segment's begin on the law's own clock, and at its end.
+    pub(crate) age_begin: f64,
+    pub(crate) age_now: f64,
+    /// Metres per unit of height.
+    pub(crate) amplitude_m: f64,
+    pub(crate) ln_life: f64,
+    /// The gap now, metres.
+    pub(crate) level_m: f64,
+    /// The gap of this unit when new, metres.
+    pub(crate) new_m: f64,
+    /// Onset not seen yet: it comes after an exponential wait.
+    pub(crate) waits: bool,
+    /// Log weight, then (normalised) weight.
+    pub(crate) weight: f64,
+}
+
+/// A mixture over the bank.
+#[derive(Debug, Clone)]
+pub(crate) struct Posterior {
+    pub(crate) nodes: Vec<Node>,
+    /// Variance of every node's level.
+    pub(crate) level_m2: f64,
+    /// Variance of every node's growth since the segment began.
+    pub(crate) growth_m2: f64,
+    /// Log of the sum of the weights before they were normalised.
+    pub(crate) log_evidence: f64,
+}
+
+/// Judges a segment by a prior: all curves on a few bins, the likely ones on many.
+///
+/// The level walks by a variance proportional to the wear, so the first look assumes wear along a
+/// line and the second takes it from the first.
+pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Posterior> {
+    let span = segment.now - segment.begin;
+    if segment.estimates.is_empty() || span <= 0.0 {
+        return None;
+    }
+    let starts = segment.estimates.len().clamp(1, bins::BINS) / 2 + 1;
+    let mut bank = Bank::new(segment.fresh, segment.known_age, span, starts);
+    let coarse = bins::bin(segment.estimates, COARSE_BINS);
+    let grown_m = straight_growth(&coarse);
+    let first = Look::new(segment, prior, coarse, |from, to| grown_m * (to - from) / span);
+    let mut believed = nodes(&first, &bank);
+    if segment.estimates.len() <= COARSE_BINS {
+        return Some(finish(&first, believed));
+    }
+    normalise(&mut believed);
+    keep(&mut bank.curves, &believed);
+    let likely = likeliest(&believed);
+    let begin = segment.begin;
+    let fine = bins::bin(segment.estimates, bins::BINS);
+    let second = Look::new(segment, prior, fine, |from, to| mean_growth(&likely, from - begin, to - begin));
+    let believed = nodes(&second, &bank);
+    Some(finish(&second, believed))
+}
+
+/// Leaves only the curves that are believed.
+fn keep(curves: &mut Vec<Curve>, believed: &[(usize, Node)]) {
+    let mut kept: Vec<usize> = believed.iter().map(|(index, _)| *index).collect();
+    kept.dedup();
+    *curves = kept.into_iter().map(|index| curves[index]).collect();
+}
+
+fn finish(look: &Look<'_>, mut believed: Vec<(usize, Node)>) -> Posterior {
+    let log_sum = normalise(&mut believed);
+    Posterior {
+        nodes: believed.into_iter().map(|(_, node)| node).collect(),
+        level_m2: look.level_m2(),
+        growth_m2: look.filter.end_m2 + look.filter.start_m2,
+        log_evidence: log_sum + look.shared_log_likelihood(),
+    }
+}
+
+/// The likeliest nodes, with weights that add up to one: enough for a mean.
+fn likeliest(believed: &[(usize, Node)]) -> Vec<Node> {
+    const FEW: usize = 16;
+    let mut nodes: Vec<Node> = believed.iter().map(|(_, node)| *node).collect();
+    if FEW < nodes.len() {
+        nodes.select_nth_unstable_by(FEW, |a, b| b.weight.total_cmp(&a.weight));
+        nodes.truncate(FEW);
+    }
+    let total: f64 = nodes.iter().map(|n| n.weight).sum();
+    for node in &mut nodes {
+        node.weight /= total;
+    }
+    nodes
+}
+
+/// Growth between two usages since the segment's begin.
+fn mean_growth(nodes: &[Node], from: f64, to: f64) -> f64 {
+    let grown =
+        |n: &Node| n.amplitude_m * (n.law.height(n.age_begin + to) - n.law.height(n.age_begin + from));
+    nodes.iter().map(|n| n.weight * grown(n)).sum()
+}
+
+/// Turns log weights into weights that add up to one, drops what is not believed, and returns the log
+/// of their sum.
+fn normalise(believed: &mut Vec<(usize, Node)>) -> f64 {
+    let best = believed.iter().map(|(_, n)| n.weight).fold(f64::NEG_INFINITY, f64::max);
+    believed.retain(|(_, n)| n.weight > best - DROP);
+    let sum: f64 = believed.iter().map(|(_, n)| (n.weight - best).exp()).sum();
+    let log_sum = best + sum.ln();
+    for (_, node) in believed.iter_mut() {
+        node.weight = (node.weight - log_sum).exp();
+    }
+    log_sum
+}
+
+/// A curve's regression, the amplitude it fits best, and a bound on its log weight.
+struct Candidate {
+    index: usize,
+    pass: Regression,
+    best_m: f64,
+    information: f64,
+    bound: f64,
+}
+
+/// The nodes, with log weights, of every curve that can matter.
+fn nodes(look: &Look<'_>, bank: &Bank) -> Vec<(usize, Node)> {
+    let heights = Heights::new(bank, look.bins.iter().map(|b| b.usage - look.segment.begin).collect());
+    let mut buffer = Vec::with_capacity(look.bins.len());
+    let candidates: Vec<Candidate> = bank
+        .curves
+        .iter()
+        .enumerate()
+        .map(|(index, curve)| {
+            heights.fill(curve, &mut buffer);
+            candidate(look, index, curve, look.regress(&buffer))
+        })
+        .collect();
+    let add = |candidate: &Candidate, push: &mut dyn FnMut(Node)| {
+        let curve = &bank.curves[candidate.index];
+        if curve.law == Law::None { flat(look, push) } else { lives(look, curve, candidate, push) }
+    };
+    let Some(top) = candidates.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) else { return Vec::new() };
+    let mut best = f64::NEG_INFINITY;
+    add(top, &mut |node| best = best.max(node.weight));
+    let mut nodes = Vec::with_capacity(256);
+    for candidate in candidates.iter().filter(|c| c.bound > top.bound - DROP - SLACK) {
+        add(candidate, &mut |node| {
+            best = best.max(node.weight);
+            if node.weight > best - DROP {
+                nodes.push((candidate.index, node));
+            }
+        });
+    }
+    nodes
+}
+
+/// The amplitude that fits the gaps and a new unit's gap best, were amplitudes free.
+fn candidate(look: &Look<'_>, index: usize, curve: &Curve, pass: Regression) -> Candidate {
+    let spread = look.new_m2();
+    let off_m = look.gaps.start - look.prior.new_m;
+    let information = pass.sff + pass.start * pass.start / spread;
+    let best_m = if curve.law == Law::None {
+        0.0
+    } else {
+        ((pass.sfy + pass.start * off_m / spread) / information).max(0.0)
+    };
+    let log_likelihood = best_m * pass.sfy - 0.5 * best_m * best_m * pass.sff;
+    let smear_m = best_m * curve.law.slope(curve.age) * curve.age_cell;
+    let new_m2 = spread + smear_m * smear_m / 12.0;
+    let bound =
+        log_likelihood - 0.5 * (off_m - best_m * pass.start).powi(2) / new_m2 + look.logs.share(curve.law);
+    Candidate { index, pass, best_m, information, bound }
+}
+
+/// Nodes of one curve over the lives its amplitude may have.
+fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, push: &mut dyn FnMut(Node)) {
+    let Candidate { pass, best_m, information, .. } = candidate;
+    let prior = look.prior;
+    let reach_m = REACH / information.sqrt();
+    let Some((low, high)) = life_range(prior, curve.law, best_m - reach_m, best_m + reach_m) else { return };
+    let step = (high - low) / (LIVES - 1) as f64;
+    let spread = look.new_m2();
+    let smear = curve.law.slope(curve.age) * curve.age_cell / 12.0_f64.sqrt();
+    let age_now = curve.age + look.segment.now - look.segment.begin;
+    let height_now = curve.law.height(age_now);
+    let shared = step.ln() + look.logs.share(curve.law) + look.logs.cell(curve, look.segment);
+    let ln_tau = curve.law.ln_tau();
+    let ln_age = (curve.age > 0.0 && !look.segment.is_of_known_age()).then(|| curve.age.ln());
+    let falling = curve.law.exponent().map(|p| (-p * step).exp());
+    let mut amplitude_m = prior.span_m / curve.law.height_of_life(low.exp());
+    for i in 0..LIVES {
+        let ln_life = low + step * i as f64;
+        if i > 0 {
+            amplitude_m = match falling {
+                Some(factor) => amplitude_m * factor,
+                None => prior.span_m / curve.law.height_of_life(ln_life.exp()),
+            };
+        }
+        let new_m = look.gaps.start - amplitude_m * pass.start;
+        let new_m2 = spread + (amplitude_m * smear).powi(2);
+        let log_likelihood = amplitude_m * pass.sfy
+            - 0.5 * amplitude_m * amplitude_m * pass.sff
+            - 0.5 * ((new_m - prior.new_m).powi(2) / new_m2 + new_m2.ln());
+        push(Node {
+            law: curve.law,
+            age_begin: curve.age,
+            age_now,
+            amplitude_m,
+            ln_life,
+            level_m: look.gaps.end + amplitude_m * (height_now - pass.end),
+            new_m,
+            waits: false,
+            weight: log_likelihood + shared + look.logs.life(ln_life, ln_age, ln_tau),
+        });
+    }
+}
+
+/// The unit that does not wear, and the one whose onset is yet to come.
+fn flat(look: &Look<'_>, push: &mut dyn FnMut(Node)) {
+    let Look { prior, logs, segment, gaps, .. } = look;
+    let spread = look.new_m2();
+    let log_likelihood = -0.5 * ((gaps.start - prior.new_m).powi(2) / spread + spread.ln());
+    let usage = segment.now - segment.begin;
+    let node = Node {
+        law: Law::None,
+        age_begin: 0.0,
+        age_now: usage,
+        amplitude_m: 0.0,
+        ln_life: prior.ln_life,
+        level_m: gaps.end,
+        new_m: gaps.start,
+        waits: false,
+        weight: log_likelihood + logs.share(Law::None),
+    };
+    push(node);
+    push(Node { waits: true, weight: log_likelihood + logs.waiting(usage), ..node });
+}
+
+/// Range of ln life worth trying: where the amplitude may be, within what a life may be.
+fn life_range(prior: &FleetPrior, law: Law, low_m: f64, high_m: f64) -> Option<(f64, f64)> {
+    let reach = REACH * prior.ln_life_sd;
+    let (shortest, longest) = (prior.ln_life - reach, prior.ln_life + reach);
+    let ln_life = |amplitude_m: f64| law.life(prior.span_m / amplitude_m).ln();
+    let low = ln_life(high_m).max(shortest);
+    let high = if low_m > 0.0 { ln_life(low_m).min(longest) } else { longest };
+    (low < high).then_some((low, high))
+}

@@ -1,0 +1,127 @@
+//! A yearly swing of the measurement: one phase for a part number's fleet, a size for each unit.
+//!
+//! Grease stiffens in winter and the gap reads differently. Against a growth of a few micrometres a
+//! year a swing of one is an error of tens of per cent in the rate, so it is fitted with the wear and
+//! not left to the noise.
+
+use std::f64::consts::TAU;
+
+use crate::bins::{self, Bin};
+use crate::filter::Pass;
+use crate::look::{Look, straight_growth};
+use crate::posterior::{Posterior, Segment};
+use crate::prior::FleetPrior;
+
+/// A tropical year, microseconds.
+const YEAR_US: f64 = 365.242_2 * 86_400e6;
+
+/// Units a season of nothing is worth, and the size it then has, metres.
+const PSEUDO_UNITS: f64 = 4.0;
+const PSEUDO_SD_M: f64 = 0.3e-6;
+
+/// Standard errors beyond which the fleet's mean swing is believed.
+const BELIEVED: f64 = 3.0;
+
+/// What the fleet's swing looks like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Season {
+    phase: f64,
+    /// Mean amplitude and its spread from unit to unit, metres.
+    pub(crate) mean_m: f64,
+    pub(crate) sd_m: f64,
+}
+
+/// One unit's cosine and sine amplitudes, and their covariance (xx, xy, yy).
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Swing {
+    pub(crate) amplitude_m: [f64; 2],
+    pub(crate) covariance_m2: [f64; 3],
+}
+
+/// Cosine and sine of the season.
+pub(crate) fn waves(departure_us: f64) -> [f64; 2] {
+    let (sin, cos) = (TAU * departure_us / YEAR_US).sin_cos();
+    [cos, sin]
+}
+
+impl Season {
+    /// What is assumed before a fleet was seen.
+    pub(crate) fn unknown() -> Self {
+        Self { phase: 0.0, mean_m: 0.0, sd_m: PSEUDO_SD_M }
+    }
+
+    /// The swing of unit amplitude at a time.
+    pub(crate) fn wave(&self, departure_us: f64) -> f64 {
+        (TAU * departure_us / YEAR_US - self.phase).cos()
+    }
+
+    /// Phase and size from the units' own swings: each counts by its error and the spread among units.
+    pub(crate) fn learn(swings: &[Swing]) -> Self {
+        let mean = |component: usize, variance: usize| {
+            let weights = swings
+                .iter()
+                .map(|s| (s.amplitude_m[component], 1.0 / (s.covariance_m2[variance] + 0.25e-12)));
+            let (sum, total) = weights.fold((0.0, 0.0), |(sum, total), (x, w)| (sum + w * x, total + w));
+            if total > 0.0 { (sum / total, 1.0 / total) } else { (0.0, f64::INFINITY) }
+        };
+        let ((x, x_m2), (y, y_m2)) = (mean(0, 0), mean(1, 2));
+        let believed = x * x / x_m2 + y * y / y_m2 > 2.0 * BELIEVED * BELIEVED;
+        let phase = if believed { y.atan2(x) } else { 0.0 };
+        let (c, s) = (phase.cos(), phase.sin());
+        let along: Vec<(f64, f64)> = swings
+            .iter()
+            .map(|w| {
+                let [xx, xy, yy] = w.covariance_m2;
+                (c * w.amplitude_m[0] + s * w.amplitude_m[1], c * c * xx + 2.0 * c * s * xy + s * s * yy)
+            })
+            .collect();
+        Self::sized(phase, &along, believed)
+    }
+
+    /// Mean and spread by expectation–maximisation; without a believed swing the mean is none.
+    fn sized(phase: f64, along: &[(f64, f64)], believed: bool) -> Self {
+        let (mut mean_m, mut sd_m) = (0.0, PSEUDO_SD_M);
+        for _ in 0..30 {
+            let (mut sum, mut squares, mut count) = (0.0, PSEUDO_UNITS * PSEUDO_SD_M.powi(2), PSEUDO_UNITS);
+            for &(amplitude_m, error_m2) in along {
+                let share = sd_m * sd_m / (sd_m * sd_m + error_m2);
+                let own = mean_m + share * (amplitude_m - mean_m);
+                sum += own;
+                squares += (own - mean_m).powi(2) + share * error_m2;
+                count += 1.0;
+            }
+            mean_m = if believed { sum / (count - PSEUDO_UNITS) } else { 0.0 };
+            sd_m = (squares / count).sqrt();
+        }
+        Self { phase, mean_m, sd_m }
+    }
+}
+
+/// The season in one segment, beside wear of the likeliest form; nothing where the two cannot be told
+/// apart.
+pub(crate) fn swing(segment: &Segment<'_>, prior: &FleetPrior, posterior: &Posterior) -> Option<Swing> {
+    let best = posterior.nodes.iter().max_by(|a, b| a.weight.total_cmp(&b.weight))?;
+    let bins = bins::bin(segment.estimates, bins::BINS);
+    let height = |b: &Bin| best.law.height(best.age_begin + b.usage - segment.begin);
+    let sequences: [Vec<f64>; 3] = [
+        bins.iter().map(height).collect(),
+        bins.iter().map(|b| waves(b.departure_us)[0]).collect(),
+        bins.iter().map(|b| waves(b.departure_us)[1]).collect(),
+    ];
+    let span = segment.now - segment.begin;
+    let grown_m = straight_growth(&bins);
+    let Look { filter, gaps, .. } = Look::new(segment, prior, bins, |from, to| grown_m * (to - from) / span);
+    let [wear, cos, sin] = sequences.each_ref().map(|s| filter.pass(s.iter().copied()));
+    let against = |other: &Pass, own: &[f64]| filter.curve(&gaps, other, own);
+    let (w, c, s) =
+        (against(&cos, &sequences[0]), against(&sin, &sequences[1]), against(&wear, &sequences[2]));
+    let free = if w.sff > 0.0 { 1.0 / w.sff } else { 0.0 };
+    let (xx, xy, yy) =
+        (c.sff - free * w.sfs * w.sfs, c.sfs - free * w.sfs * s.sfs, s.sff - free * s.sfs * s.sfs);
+    let (x, y) = (c.sfy - free * w.sfs * w.sfy, s.sfy - free * s.sfs * w.sfy);
+    let determinant = xx * yy - xy * xy;
+    (determinant > 1e-9 * xx * yy && xx > 0.0).then(|| Swing {
+        amplitude_m: [(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant],
+        covariance_m2: [yy / determinant, -xy / determinant, xx / determinant],
+    })
+}
