@@ -1,0 +1,184 @@
+//! Accounts: what became of a log, and what became of a run.
+
+use jiff::Timestamp;
+
+use crate::error::Error;
+use crate::tabled::{Cells, Column, Get, Tabled};
+
+/// How a log ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Its flight's records are stored, or belong to another log.
+    Done,
+    /// It has a fault, which `error_code` names.
+    Error,
+}
+
+impl Outcome {
+    /// The word in the `outcome` column.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Error => "error",
+        }
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let known = [Self::Done, Self::Error].into_iter().find(|outcome| outcome.as_str() == text);
+        known.ok_or_else(|| format!("`{text}` is no outcome"))
+    }
+}
+
+/// The account of one log: enough to know, without opening it, whether it must be done again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogAccount {
+    /// Its name; the newest account of a name counts.
+    pub log_path: String,
+    /// Bytes.
+    pub size_bytes: i64,
+    /// Nanoseconds since 1970 UTC.
+    pub modified_utc_ns: i64,
+    /// What tells the file apart in its file system; empty where there is no such thing.
+    pub file_id: String,
+    /// blake3 of what was read of it, where it could be read.
+    pub log_digest: Option<String>,
+    /// blake3 of the settings that touch it.
+    pub config_digest: Option<String>,
+    /// The aircraft, where the log told it.
+    pub tail_number: Option<String>,
+    /// The flight, where the log told it.
+    pub flight_id: Option<String>,
+    /// The departure, where the log told it.
+    pub departure_utc: Option<Timestamp>,
+    /// The positions it has channels of.
+    pub positions: Vec<String>,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Records with a gap.
+    pub estimated: i64,
+    /// Records without one.
+    pub refused: i64,
+    /// Stable code of its fault.
+    pub error_code: Option<String>,
+    /// The fault in full.
+    pub error_detail: Option<String>,
+    /// Seconds of work.
+    pub duration_s: f64,
+    /// The run that finished with it.
+    pub run_id: String,
+    /// When.
+    pub processed_utc: Timestamp,
+}
+
+impl Tabled for LogAccount {
+    const COLUMNS: &'static [Column<Self>] = &[
+        Column::must("log_path", Get::Text(|a| Some(&a.log_path))),
+        Column::must("size_bytes", Get::Count(|a| Some(a.size_bytes))),
+        Column::must("modified_utc_ns", Get::Count(|a| Some(a.modified_utc_ns))),
+        Column::must("file_id", Get::Text(|a| Some(&a.file_id))),
+        Column::may("log_digest", Get::Text(|a| a.log_digest.as_deref())),
+        Column::may("config_digest", Get::Text(|a| a.config_digest.as_deref())),
+        Column::may("tail_number", Get::Text(|a| a.tail_number.as_deref())),
+        Column::may("flight_id", Get::Text(|a| a.flight_id.as_deref())),
+        Column::may("departure_utc", Get::Time(|a| a.departure_utc)),
+        Column::must("positions", Get::Texts(|a| &a.positions)),
+        Column::must("outcome", Get::Text(|a| Some(a.outcome.as_str()))),
+        Column::must("estimated", Get::Count(|a| Some(a.estimated))),
+        Column::must("refused", Get::Count(|a| Some(a.refused))),
+        Column::may("error_code", Get::Text(|a| a.error_code.as_deref())),
+        Column::may("error_detail", Get::Text(|a| a.error_detail.as_deref())),
+        Column::must("duration_s", Get::Number(|a| Some(a.duration_s))),
+        Column::must("run_id", Get::Text(|a| Some(&a.run_id))),
+        Column::must("processed_utc", Get::Time(|a| Some(a.processed_utc))),
+    ];
+
+    fn from_cells(cells: &mut Cells<'_>) -> Result<Self, Error> {
+        Ok(Self {
+            log_path: cells.owned()?,
+            size_bytes: cells.count()?,
+            modified_utc_ns: cells.count()?,
+            file_id: cells.owned()?,
+            log_digest: cells.owned_or_none(),
+            config_digest: cells.owned_or_none(),
+            tail_number: cells.owned_or_none(),
+            flight_id: cells.owned_or_none(),
+            departure_utc: cells.time_or_none()?,
+            positions: cells.texts(),
+            outcome: cells.parse(Outcome::parse)?,
+            estimated: cells.count()?,
+            refused: cells.count()?,
+            error_code: cells.owned_or_none(),
+            error_detail: cells.owned_or_none(),
+            duration_s: cells.number().unwrap_or_default(),
+            run_id: cells.owned()?,
+            processed_utc: cells.time()?,
+        })
+    }
+}
+
+/// The account of one run, written when it begins and again when it ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunAccount {
+    /// Its name; the newest account of a name counts.
+    pub run_id: String,
+    /// When it began.
+    pub started_utc: Timestamp,
+    /// When it ended; none for a run that was killed or still goes.
+    pub finished_utc: Option<Timestamp>,
+    /// The version of Freeplay.
+    pub program_version: String,
+    /// Its configuration.
+    pub config_path: String,
+    /// Logs that fit the patterns.
+    pub found: i64,
+    /// Logs accounted for before.
+    pub known: i64,
+    /// Logs finished, those in error included.
+    pub done: i64,
+    /// Records with a gap.
+    pub estimated: i64,
+    /// Records without one.
+    pub refused: i64,
+    /// Logs in error.
+    pub errors: i64,
+    /// Logs it was stopped before.
+    pub not_reached: i64,
+    /// What it told its caller; none for a run that was killed or still goes.
+    pub exit_code: Option<i64>,
+}
+
+impl Tabled for RunAccount {
+    const COLUMNS: &'static [Column<Self>] = &[
+        Column::must("run_id", Get::Text(|a| Some(&a.run_id))),
+        Column::must("started_utc", Get::Time(|a| Some(a.started_utc))),
+        Column::may("finished_utc", Get::Time(|a| a.finished_utc)),
+        Column::must("program_version", Get::Text(|a| Some(&a.program_version))),
+        Column::must("config_path", Get::Text(|a| Some(&a.config_path))),
+        Column::must("found", Get::Count(|a| Some(a.found))),
+        Column::must("known", Get::Count(|a| Some(a.known))),
+        Column::must("done", Get::Count(|a| Some(a.done))),
+        Column::must("estimated", Get::Count(|a| Some(a.estimated))),
+        Column::must("refused", Get::Count(|a| Some(a.refused))),
+        Column::must("errors", Get::Count(|a| Some(a.errors))),
+        Column::must("not_reached", Get::Count(|a| Some(a.not_reached))),
+        Column::may("exit_code", Get::Count(|a| a.exit_code)),
+    ];
+
+    fn from_cells(cells: &mut Cells<'_>) -> Result<Self, Error> {
+        Ok(Self {
+            run_id: cells.owned()?,
+            started_utc: cells.time()?,
+            finished_utc: cells.time_or_none()?,
+            program_version: cells.owned()?,
+            config_path: cells.owned()?,
+            found: cells.count()?,
+            known: cells.count()?,
+            done: cells.count()?,
+            estimated: cells.count()?,
+            refused: cells.count()?,
+            errors: cells.count()?,
+            not_reached: cells.count()?,
+            exit_code: cells.count_or_none(),
+        })
+    }
+}

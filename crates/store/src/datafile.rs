@@ -1,0 +1,81 @@
+//! A data file: Parquet whose name carries the digest of its content.
+//!
+//! The digest stands in the name, not in the action's tags nor in a sidecar: it survives checkpoints and
+//! log clean-up, which may drop tags, it cannot be parted from its file, and `b3sum` checks it by hand.
+
+use std::path::Path;
+
+use arrow::array::RecordBatch;
+use deltalake::kernel::Add;
+use jiff::Timestamp;
+use parquet::arrow::ArrowWriter;
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::file::properties::WriterProperties;
+
+use crate::durable;
+use crate::error::Error;
+use crate::stats;
+
+/// Rows of a row group: small enough that one tail's history decodes little of a big file.
+const GROUP_ROWS: usize = 16_384;
+
+/// Hexadecimal digits of a blake3 digest.
+const DIGEST_DIGITS: usize = 64;
+
+/// Writes a batch as a data file into a table's folder and returns the action that adds it.
+///
+/// The version the file is made for stands first in its name: the same content written again later
+/// is another file, since Delta cannot remove and add one name in one commit.
+pub(crate) fn write(dir: &Path, version: u64, batch: &RecordBatch, data_change: bool) -> Result<Add, Error> {
+    let content = encode(batch)?;
+    let name = format!("{version:012}-{}.parquet", blake3::hash(&content).to_hex());
+    let path = dir.join(&name);
+    match durable::create(&path, &content) {
+        Ok(()) => {}
+        // An attempt that was cut short left the same content under the same name.
+        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
+        Err(e) => return Err(Error::io(path, "written")(e)),
+    }
+    Ok(Add {
+        path: name,
+        size: content.len() as i64,
+        modification_time: Timestamp::now().as_millisecond(),
+        data_change,
+        stats: Some(stats::of(batch)),
+        ..Add::default()
+    })
+}
+
+fn encode(batch: &RecordBatch) -> Result<Vec<u8>, Error> {
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?))
+        .set_max_row_group_row_count(Some(GROUP_ROWS))
+        .build();
+    let mut writer = ArrowWriter::try_new(Vec::new(), batch.schema(), Some(properties))?;
+    writer.write(batch)?;
+    Ok(writer.into_inner()?)
+}
+
+/// The digest a file's name carries; none for a file that another program wrote.
+pub(crate) fn digest_of_name(name: &str) -> Option<&str> {
+    let (_, digest) = name.strip_suffix(".parquet")?.rsplit_once('-')?;
+    let hexadecimal = digest.len() == DIGEST_DIGITS && digest.bytes().all(|b| b.is_ascii_hexdigit());
+    hexadecimal.then_some(digest)
+}
+
+/// Compares a file's content with the digest its name carries.
+///
+/// # Errors
+/// [`Error::Damaged`] when they differ; [`Error::Io`] when it cannot be read.
+pub(crate) fn check(path: &Path) -> Result<(), Error> {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let Some(wanted) = digest_of_name(name) else { return Ok(()) };
+    let mut hasher = blake3::Hasher::new();
+    let file = std::fs::File::open(path).map_err(Error::io(path, "opened"))?;
+    hasher.update_reader(file).map_err(Error::io(path, "read"))?;
+    let found = hasher.finalize().to_hex();
+    if found.as_str() == wanted {
+        return Ok(());
+    }
+    Err(Error::Damaged { path: path.to_owned(), found: found.to_string(), wanted: wanted.to_owned() })
+}

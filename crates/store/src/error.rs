@@ -1,0 +1,114 @@
+//! What can be wrong with a store, and what to do about it.
+
+use std::path::PathBuf;
+
+use deltalake::DeltaTableError;
+use fleet::Complaint;
+
+/// Why the store could not be opened, read or written.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
+pub enum Error {
+    /// The folder is not there, or nothing was ever written into it.
+    #[error("there is no store at {}", dir.display())]
+    Missing { dir: PathBuf },
+    /// The folder holds something else.
+    #[error("{} is no Freeplay store: it holds `{found}` and no `store.json`", dir.display())]
+    Foreign { dir: PathBuf, found: String },
+    /// Delta Lake takes a percent sign and two hexadecimal digits in a path for another character.
+    #[error("{} cannot hold a store: Delta Lake takes `{found}` in its path for another character", dir.display())]
+    Name { dir: PathBuf, found: String },
+    /// The folder was written by another release, or its `store.json` is torn.
+    #[error("{} has format {found}, and this release knows format {known}", file.display())]
+    Format { file: PathBuf, found: String, known: u32 },
+    /// Another process writes.
+    #[error("the store is {holder}")]
+    Held { holder: String },
+    /// The system refused to read or write.
+    #[error("{} cannot be {verb}: {source}", path.display())]
+    Io { path: PathBuf, verb: &'static str, source: std::io::Error },
+    /// The Delta table could not be read or committed to.
+    #[error("table `{table}` cannot be {verb}: {source}")]
+    Table { table: &'static str, verb: &'static str, source: Box<DeltaTableError> },
+    /// A data file is not the one that was committed.
+    #[error("{} is damaged: its content has digest {found}, and {wanted} was committed", path.display())]
+    Damaged { path: PathBuf, found: String, wanted: String },
+    /// A column is not there or has another type.
+    #[error("column `{column}` {problem}")]
+    Column { column: String, problem: String },
+    /// A value cannot be what it stands for.
+    #[error("column `{column}`, row {row}: {problem}")]
+    Value { column: &'static str, row: usize, problem: String },
+    /// The engine that reads data files gave up.
+    #[error("data files cannot be read: {0}")]
+    Frame(#[from] polars::error::PolarsError),
+    /// Rows could not be brought into columns, or columns into a format.
+    #[error("rows cannot be brought into columns: {0}")]
+    Arrow(#[from] arrow::error::ArrowError),
+    /// A Parquet file could not be written or read.
+    #[error("Parquet: {0}")]
+    Parquet(#[from] parquet::errors::ParquetError),
+}
+
+impl Error {
+    /// The error as a person meets it: with its stable code, its file and a remedy.
+    pub fn complaint(&self) -> Complaint {
+        let complaint = Complaint::new(self.code(), self);
+        let complaint = match self.file() {
+            Some(file) => complaint.in_file(file.display()),
+            None => complaint,
+        };
+        complaint.hint(self.remedy())
+    }
+
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Missing { .. } => "store_missing",
+            Self::Foreign { .. } | Self::Name { .. } => "store_foreign",
+            Self::Format { .. } => "store_format",
+            Self::Held { .. } => "store_held",
+            Self::Io { .. } => "store_io",
+            Self::Table { .. } => "store_table",
+            Self::Damaged { .. } => "store_damaged",
+            Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) => "store_value",
+            Self::Frame(_) | Self::Parquet(_) => "store_unreadable",
+        }
+    }
+
+    fn file(&self) -> Option<&PathBuf> {
+        match self {
+            Self::Missing { dir } | Self::Foreign { dir, .. } | Self::Name { dir, .. } => Some(dir),
+            Self::Format { file, .. } => Some(file),
+            Self::Io { path, .. } | Self::Damaged { path, .. } => Some(path),
+            _ => None,
+        }
+    }
+
+    fn remedy(&self) -> &'static str {
+        match self {
+            Self::Missing { .. } => {
+                "`freeplay run` makes it; does `store` in the configuration name the right folder?"
+            }
+            Self::Foreign { .. } => "name a new or an empty folder as `store` in the configuration",
+            Self::Name { .. } => "name a folder without a percent sign as `store` in the configuration",
+            Self::Format { .. } => {
+                "read it with the release that wrote it, or restore `store.json` from a backup"
+            }
+            Self::Held { .. } => "wait for it with `--wait 20m`; readers need not wait",
+            Self::Io { .. } => "is the disk full, or the folder not ours to write?",
+            Self::Table { .. } => "is the disk full, or does another program write into this table?",
+            Self::Damaged { .. } => {
+                "restore this file from a backup; without one, remove the store and run its logs again"
+            }
+            Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) => {
+                "was the table changed by another program? `freeplay store verify` says more"
+            }
+            Self::Frame(_) | Self::Parquet(_) => "`freeplay store verify` says which files are wrong",
+        }
+    }
+
+    pub(crate) fn io(path: impl Into<PathBuf>, verb: &'static str) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::Io { path, verb, source }
+    }
+}

@@ -1,0 +1,41 @@
+//! Results: gap records, accounts of logs and accounts of runs, kept in Delta tables.
+//!
+//! A store is a folder that other engines can open as it is:
+//!
+//! ```text
+//! results/
+//!   store.json   the format of the folder
+//!   lock         who writes, while somebody does
+//!   gaps/        one row per actuator and flight
+//!   logs/        one row per log and run that finished with it
+//!   runs/        one row when a run begins and one when it ends
+//! ```
+//!
+//! One process writes at a time ([`Store::lock`]); any number read meanwhile, and each answer is made
+//! from one version of a table, so it shows whole commits only. A commit is on disk when it returns.
+//! The choice of Delta Lake, its layout and its guarantees are told in `docs/store.md`.
+
+mod account;
+pub mod columns;
+mod datafile;
+mod durable;
+mod error;
+mod export;
+mod frame;
+mod layout;
+mod lock;
+mod numbered;
+mod query;
+mod read;
+mod stats;
+mod table;
+mod tabled;
+mod writer;
+
+pub use account::{LogAccount, Outcome, RunAccount};
+pub use error::Error;
+pub use export::Format;
+pub use layout::Store;
+pub use lock::Holder;
+pub use query::{Query, RecordKey};
+pub use writer::{LogResult, Writer};

@@ -1,0 +1,28 @@
+//! Rows of which the newest counts: each carries the number of the commit that brought it.
+
+use std::sync::Arc;
+
+use arrow::array::{Int64Array, RecordBatch};
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+
+use crate::error::Error;
+use crate::tabled::{self, Tabled};
+
+/// The column that tells newer rows from older ones; clocks may go back, commits do not.
+pub(crate) const COMMIT: &str = "commit";
+
+/// A row type's columns and the number of the commit.
+pub(crate) fn schema<R: Tabled>() -> SchemaRef {
+    let columns = tabled::schema::<R>();
+    let fields =
+        columns.fields().iter().cloned().chain([Arc::new(Field::new(COMMIT, DataType::Int64, false))]);
+    Arc::new(Schema::new(fields.collect::<Vec<_>>()))
+}
+
+/// Rows as columns, all of one commit.
+pub(crate) fn to_batch<R: Tabled>(rows: &[R], commit: u64) -> Result<RecordBatch, Error> {
+    let batch = tabled::to_batch(rows)?;
+    let mut arrays = batch.columns().to_vec();
+    arrays.push(Arc::new(Int64Array::from(vec![commit as i64; rows.len()])));
+    Ok(RecordBatch::try_new(schema::<R>(), arrays)?)
+}

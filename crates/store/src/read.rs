@@ -1,0 +1,105 @@
+//! Answers: each is made from one version of a table, so it shows whole commits only.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use arrow::array::{AsArray, RecordBatch};
+use arrow::datatypes::SchemaRef;
+use fleet::{GapRecord, PartNumber, SerialNumber};
+
+use crate::account::{LogAccount, RunAccount};
+use crate::error::Error;
+use crate::frame::{self, Read};
+use crate::layout::Store;
+use crate::query::{Query, RecordKey};
+use crate::table::{Snapshot, Table};
+use crate::tabled::Tabled;
+use crate::{columns, numbered, tabled};
+
+impl Store {
+    /// The records that fit, as columns, by departure, tail, flight and position.
+    ///
+    /// Files whose bounds rule them out are not opened; those that are opened are compared with their
+    /// digests first.
+    ///
+    /// # Errors
+    /// [`Error::Table`] when the log cannot be read, [`Error::Damaged`] when a file is not the one that
+    /// was committed, [`Error::Frame`] when it cannot be decoded.
+    pub fn scan(&self, query: &Query) -> Result<RecordBatch, Error> {
+        self.select(&self.gaps.snapshot()?, query, columns::schema())
+    }
+
+    /// The same as rows.
+    ///
+    /// # Errors
+    /// As [`Store::scan`]; [`Error::Value`] when a cell cannot be what it stands for.
+    pub fn records(&self, query: &Query) -> Result<Vec<GapRecord>, Error> {
+        columns::from_batch(&self.scan(query)?)
+    }
+
+    /// Every unit with a record, by part and serial number.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn serials(&self) -> Result<Vec<(PartNumber, SerialNumber)>, Error> {
+        let files = self.files()?;
+        self.check(&files)?;
+        let schema = frame::only(&columns::schema(), &["part_number", "serial_number"])?;
+        let units = Read { files: &files, schema, condition: None, order: &[], last: None }.collect()?;
+        let [parts, serials] = [0, 1].map(|column| units.column(column).as_string::<i32>());
+        let units: BTreeSet<_> = parts.iter().flatten().zip(serials.iter().flatten()).collect();
+        let named = |(part, serial)| Some((PartNumber::new(part).ok()?, SerialNumber::new(serial).ok()?));
+        Ok(units.into_iter().filter_map(named).collect())
+    }
+
+    /// The newest account of every log, by name.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn accounts(&self) -> Result<Vec<LogAccount>, Error> {
+        self.newest(&self.logs, |account: &LogAccount| account.log_path.clone())
+    }
+
+    /// The newest account of every run, by the time it began.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn runs(&self) -> Result<Vec<RunAccount>, Error> {
+        let mut runs = self.newest(&self.runs, |run: &RunAccount| run.run_id.clone())?;
+        runs.sort_by_key(|run| run.started_utc);
+        Ok(runs)
+    }
+
+    /// The data files of the records as of now, for engines that do not read Delta's log.
+    ///
+    /// A plain look into the folder would find superseded files too.
+    ///
+    /// # Errors
+    /// [`Error::Table`] when the log cannot be read.
+    pub fn files(&self) -> Result<Vec<PathBuf>, Error> {
+        Ok(self.gaps.snapshot()?.files.into_iter().map(|file| file.path).collect())
+    }
+
+    pub(crate) fn select(
+        &self,
+        snapshot: &Snapshot,
+        query: &Query,
+        schema: SchemaRef,
+    ) -> Result<RecordBatch, Error> {
+        let files = snapshot.files.iter().filter(|file| query.may_be_in(&file.stats));
+        let files: Vec<PathBuf> = files.map(|file| file.path.clone()).collect();
+        self.check(&files)?;
+        let (condition, last) = (query.condition(), query.last);
+        Read { files: &files, schema, condition, order: &RecordKey::COLUMNS, last }.collect()
+    }
+
+    fn newest<R: Tabled>(&self, table: &Table, name: impl Fn(&R) -> String) -> Result<Vec<R>, Error> {
+        let files: Vec<PathBuf> = table.snapshot()?.files.into_iter().map(|file| file.path).collect();
+        self.check(&files)?;
+        let (schema, order) = (numbered::schema::<R>(), &[numbered::COMMIT][..]);
+        let batch = Read { files: &files, schema, condition: None, order, last: None }.collect()?;
+        let rows = tabled::from_batch::<R>(&batch)?;
+        let newest: BTreeMap<String, R> = rows.into_iter().map(|row| (name(&row), row)).collect();
+        Ok(newest.into_values().collect())
+    }
+}

@@ -1,0 +1,107 @@
+//! What Delta's log says about a file's content without opening it: rows, and bounds of its columns.
+
+use arrow::array::{Array, AsArray, RecordBatch};
+use arrow::compute::{max, max_string, min, min_string};
+use arrow::datatypes::{DataType, TimestampMicrosecondType};
+use jiff::Timestamp;
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+
+/// Bounds of times are kept in whole milliseconds: other engines cut them there.
+const MILLI_US: i64 = 1_000;
+
+/// A file's statistics as read from the log. What is not known is left out, and never prunes.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub(crate) struct Stats {
+    /// Rows.
+    pub(crate) num_records: Option<i64>,
+    min_values: Map<String, Value>,
+    max_values: Map<String, Value>,
+}
+
+impl Stats {
+    /// Statistics that cannot be understood are no statistics.
+    pub(crate) fn parse(text: Option<&str>) -> Self {
+        text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
+    }
+
+    /// Whether the text column may hold a value.
+    pub(crate) fn may_hold(&self, column: &str, value: &str) -> bool {
+        let bound =
+            |bounds: &Map<String, Value>| bounds.get(column).and_then(Value::as_str).map(str::to_owned);
+        bound(&self.min_values).is_none_or(|low| low.as_str() <= value)
+            && bound(&self.max_values).is_none_or(|high| value <= high.as_str())
+    }
+
+    /// The earliest and the latest time the column may hold, µs since 1970.
+    pub(crate) fn times_us(&self, column: &str) -> (i64, i64) {
+        let bound = |bounds: &Map<String, Value>| {
+            let time: Timestamp = bounds.get(column)?.as_str()?.parse().ok()?;
+            Some(time.as_microsecond())
+        };
+        let low = bound(&self.min_values).unwrap_or(i64::MIN);
+        (low, bound(&self.max_values).map_or(i64::MAX, |high| high.saturating_add(MILLI_US)))
+    }
+}
+
+/// Statistics of a file about to be added: bounds of every column of text or time that is never empty.
+pub(crate) fn of(batch: &RecordBatch) -> String {
+    let (mut low, mut high, mut nulls) = (Map::new(), Map::new(), Map::new());
+    for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {
+        if field.is_nullable() {
+            continue;
+        }
+        if let Some((least, most)) = bounds(array) {
+            low.insert(field.name().clone(), least);
+            high.insert(field.name().clone(), most);
+            nulls.insert(field.name().clone(), json!(0));
+        }
+    }
+    json!({ "numRecords": batch.num_rows(), "minValues": low, "maxValues": high, "nullCount": nulls })
+        .to_string()
+}
+
+fn bounds(array: &dyn Array) -> Option<(Value, Value)> {
+    match array.data_type() {
+        DataType::Utf8 => {
+            let texts = array.as_string::<i32>();
+            Some((json!(min_string(texts)?), json!(max_string(texts)?)))
+        }
+        DataType::Timestamp(..) => {
+            let times = array.as_primitive::<TimestampMicrosecondType>();
+            let low = min(times)?.div_euclid(MILLI_US);
+            let high = max(times)?.saturating_add(MILLI_US - 1).div_euclid(MILLI_US);
+            Some((json!(written(low)?), json!(written(high)?)))
+        }
+        _ => None,
+    }
+}
+
+/// Years of four digits only: others are written differently by every engine.
+fn written(milliseconds: i64) -> Option<String> {
+    let time = Timestamp::from_millisecond(milliseconds).ok()?;
+    let text = time.strftime("%Y-%m-%dT%H:%M:%S.%3fZ").to_string();
+    (text.len() == "2026-11-21T00:00:00.000Z".len()).then_some(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bound_of_time_is_widened_to_whole_milliseconds_and_never_narrowed() {
+        assert_eq!(written(0).as_deref(), Some("1970-01-01T00:00:00.000Z"));
+        let stats = Stats::parse(Some(
+            r#"{"numRecords":1,"minValues":{"t":"1970-01-01T00:00:00.001Z"},"maxValues":{"t":"1970-01-01T00:00:00.002Z"}}"#,
+        ));
+        assert_eq!(stats.times_us("t"), (1_000, 3_000));
+    }
+
+    #[test]
+    fn what_is_not_known_never_prunes() {
+        let stats = Stats::parse(Some("torn"));
+        assert!(stats.may_hold("tail_number", "N1"));
+        assert_eq!(stats.times_us("departure_utc"), (i64::MIN, i64::MAX));
+    }
+}

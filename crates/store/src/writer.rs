@@ -1,0 +1,176 @@
+//! The writer: finished logs become records and accounts, whole flights at a time, each flight once.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::slice;
+
+use arrow::array::{AsArray, BooleanArray, RecordBatch};
+use arrow::compute::filter_record_batch;
+use arrow::datatypes::{SchemaRef, TimestampMicrosecondType};
+use fleet::GapRecord;
+
+use crate::account::{LogAccount, RunAccount};
+use crate::error::Error;
+use crate::frame::{self, Read};
+use crate::layout::Store;
+use crate::lock::Lock;
+use crate::query::RecordKey;
+use crate::table::{Change, DataFile, Snapshot, Table};
+use crate::tabled::Tabled;
+use crate::{columns, datafile, numbered};
+
+/// What came of one log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LogResult {
+    /// Its account.
+    pub account: LogAccount,
+    /// Its records; each takes the place of a stored one with the same key.
+    pub records: Vec<GapRecord>,
+    /// Records stored before that are no longer true.
+    pub retires: Vec<RecordKey>,
+}
+
+/// The one who writes, for as long as it lives.
+#[derive(Debug)]
+pub struct Writer {
+    store: Store,
+    _lock: Lock,
+}
+
+/// What becomes of each record named: a new one, or none.
+type Verdicts<'a> = BTreeMap<RecordKey, Option<&'a GapRecord>>;
+
+impl Writer {
+    pub(crate) fn new(store: Store, lock: Lock) -> Self {
+        Self { store, _lock: lock }
+    }
+
+    /// The store as readers see it.
+    pub fn store(&self) -> &Store {
+        &self.store
+    }
+
+    /// Stores what came of some logs; where two of them speak of one record, the later one counts.
+    ///
+    /// The records of all of them appear in one commit, and their accounts in the next. A process that
+    /// dies in between has stored whole flights without accounts: its logs are run again, and supersede
+    /// their own records. Superseding copies those files only that hold a superseded record.
+    ///
+    /// # Errors
+    /// [`Error::Io`] and [`Error::Table`] when the disk refuses, [`Error::Damaged`] when a file to be
+    /// copied is not the one that was committed. What was stored before is intact.
+    pub fn commit(&mut self, results: &[LogResult]) -> Result<(), Error> {
+        let verdicts = verdicts(results);
+        if !verdicts.is_empty() {
+            self.store.gaps.change(|snapshot| self.supersede(snapshot, &verdicts))?;
+        }
+        let newest: BTreeMap<&str, &LogAccount> =
+            results.iter().map(|result| (result.account.log_path.as_str(), &result.account)).collect();
+        let accounts: Vec<LogAccount> = newest.into_values().cloned().collect();
+        if accounts.is_empty() { Ok(()) } else { account(&self.store.logs, &accounts) }
+    }
+
+    /// Writes down that a run begins.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
+    pub fn begin_run(&mut self, run: &RunAccount) -> Result<(), Error> {
+        account(&self.store.runs, slice::from_ref(run))
+    }
+
+    /// Writes down how a run ended.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
+    pub fn end_run(&mut self, run: &RunAccount) -> Result<(), Error> {
+        account(&self.store.runs, slice::from_ref(run))
+    }
+
+    fn supersede<'a>(&self, snapshot: &'a Snapshot, verdicts: &Verdicts<'_>) -> Result<Change<'a>, Error> {
+        let mut change = Change::default();
+        let (dir, version) = (self.store.gaps.dir(), snapshot.version + 1);
+        for file in snapshot.files.iter().filter(|file| may_hold_any(file, verdicts)) {
+            if let Some(rest) = self.without(file, verdicts)? {
+                change.remove.push(file);
+                if rest.num_rows() > 0 {
+                    change.add.push(datafile::write(dir, version, &rest, true)?);
+                }
+            }
+        }
+        let new: Vec<GapRecord> = verdicts.values().copied().flatten().cloned().collect();
+        if !new.is_empty() {
+            change.add.push(datafile::write(dir, version, &columns::to_batch(&new)?, true)?);
+        }
+        Ok(change)
+    }
+
+    /// What is left of a file without the records named; nothing when it holds none of them.
+    fn without(&self, file: &DataFile, verdicts: &Verdicts<'_>) -> Result<Option<RecordBatch>, Error> {
+        let files = slice::from_ref(&file.path);
+        self.store.check(files)?;
+        let keys = frame::only(&columns::schema(), &RecordKey::COLUMNS)?;
+        if stays(&rows(files, keys)?, verdicts)?.false_count() == 0 {
+            return Ok(None);
+        }
+        let all = rows(files, columns::schema())?;
+        Ok(Some(filter_record_batch(&all, &stays(&all, verdicts)?)?))
+    }
+}
+
+fn account<R: Tabled>(table: &Table, rows: &[R]) -> Result<(), Error> {
+    table.change(|snapshot| {
+        let version = snapshot.version + 1;
+        let add = datafile::write(table.dir(), version, &numbered::to_batch(rows, version)?, true)?;
+        Ok(Change { add: vec![add], ..Change::default() })
+    })
+}
+
+fn verdicts(results: &[LogResult]) -> Verdicts<'_> {
+    let mut verdicts = Verdicts::new();
+    for result in results {
+        verdicts.extend(result.retires.iter().map(|key| (key.clone(), None)));
+        verdicts.extend(result.records.iter().map(|record| (RecordKey::of(record), Some(record))));
+    }
+    verdicts
+}
+
+/// Whether the file's bounds leave room for one of the records.
+fn may_hold_any(file: &DataFile, verdicts: &Verdicts<'_>) -> bool {
+    let (earliest_us, latest_us) = file.stats.times_us("departure_utc");
+    let from = |departure_us| RecordKey {
+        departure_us,
+        tail_number: String::new(),
+        flight_id: String::new(),
+        position: String::new(),
+    };
+    let in_time = verdicts.range(from(earliest_us)..from(latest_us.saturating_add(1)));
+    in_time.map(|(key, _)| key).any(|key| file.stats.may_hold("tail_number", &key.tail_number))
+}
+
+fn rows(files: &[PathBuf], schema: SchemaRef) -> Result<RecordBatch, Error> {
+    Read { files, schema, condition: None, order: &[], last: None }.collect()
+}
+
+/// Which rows nobody speaks of.
+fn stays(batch: &RecordBatch, verdicts: &Verdicts<'_>) -> Result<BooleanArray, Error> {
+    let keys = keys(batch)?;
+    Ok(keys.iter().map(|key| Some(!verdicts.contains_key(key))).collect())
+}
+
+/// The keys of a batch, row by row.
+pub(crate) fn keys(batch: &RecordBatch) -> Result<Vec<RecordKey>, Error> {
+    let keys = batch.project(&indices(batch)?)?;
+    let departures = keys.column(0).as_primitive::<TimestampMicrosecondType>();
+    let [tails, flights, positions] = [1, 2, 3].map(|column| keys.column(column).as_string::<i32>());
+    let key = |row| RecordKey {
+        departure_us: departures.value(row),
+        tail_number: tails.value(row).to_owned(),
+        flight_id: flights.value(row).to_owned(),
+        position: positions.value(row).to_owned(),
+    };
+    Ok((0..departures.len()).map(key).collect())
+}
+
+fn indices(batch: &RecordBatch) -> Result<Vec<usize>, Error> {
+    RecordKey::COLUMNS.iter().map(|name| Ok(batch.schema_ref().index_of(name)?)).collect()
+}

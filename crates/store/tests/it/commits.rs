@@ -1,0 +1,123 @@
+//! Commits: whole flights, each once.
+
+use store::{Outcome, Query, RecordKey, Store};
+
+use crate::made::{POSITIONS, account, record, result, run, time, writer};
+
+#[test]
+fn what_is_committed_is_read_back_in_canonical_order() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    writer.commit(&[result(2, 1, 50e-6), result(1, 1, 40e-6)]).unwrap();
+    writer.commit(&[result(1, 0, 30e-6)]).unwrap();
+    let records = Store::open(dir.path()).unwrap().records(&Query::default()).unwrap();
+    let expected: Vec<_> = [(1, 0, 30e-6), (1, 1, 40e-6), (2, 1, 50e-6)]
+        .into_iter()
+        .flat_map(|(tail, flight, gap_m)| POSITIONS.map(|position| record(tail, flight, position, gap_m)))
+        .collect();
+    assert_eq!(records, expected);
+}
+
+#[test]
+fn a_flight_estimated_again_takes_the_place_of_the_old_one_and_of_no_other() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    writer.commit(&[result(1, 0, 30e-6), result(1, 1, 30e-6), result(2, 1, 30e-6)]).unwrap();
+    writer.commit(&[result(1, 1, 99e-6)]).unwrap();
+    let records = writer.store().records(&Query::default()).unwrap();
+    let gaps: Vec<_> =
+        records.iter().map(|r| (r.provenance.log_path.as_str(), r.estimate.gap_m.unwrap())).collect();
+    let expected = [("logs/N1/0.parquet", 30e-6), ("logs/N1/1.parquet", 99e-6), ("logs/N2/1.parquet", 30e-6)];
+    let expected: Vec<_> = expected.into_iter().flat_map(|row| [row; 3]).collect();
+    assert_eq!(gaps, expected);
+}
+
+#[test]
+fn files_that_hold_no_superseded_record_are_not_touched() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    for flight in 0..4 {
+        writer.commit(&[result(1, flight, 30e-6)]).unwrap();
+    }
+    let before = writer.store().files().unwrap();
+    writer.commit(&[result(1, 2, 31e-6)]).unwrap();
+    let after = writer.store().files().unwrap();
+    assert_eq!(before.iter().filter(|file| after.contains(file)).count(), 3);
+    assert_eq!(after.len(), 4);
+}
+
+#[test]
+fn the_same_commit_again_leaves_the_same_rows() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    let results = [result(1, 0, 30e-6), result(2, 0, 30e-6)];
+    writer.commit(&results).unwrap();
+    let once = writer.store().scan(&Query::default()).unwrap();
+    writer.commit(&results).unwrap();
+    assert_eq!(writer.store().scan(&Query::default()).unwrap(), once);
+}
+
+#[test]
+fn a_retired_record_is_gone_and_a_later_result_has_the_last_word() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    writer.commit(&[result(1, 0, 30e-6), result(1, 1, 30e-6)]).unwrap();
+    let mut gone = result(1, 0, 30e-6);
+    gone.retires = gone.records.drain(..).map(|record| RecordKey::of(&record)).collect();
+    let mut again = result(1, 1, 44e-6);
+    again.retires = gone.retires.clone();
+    again.records.push(record(1, 0, "elevator", 45e-6));
+    writer.commit(&[gone, again]).unwrap();
+    let records = writer.store().records(&Query::default()).unwrap();
+    let gaps: Vec<_> = records.iter().map(|r| r.estimate.gap_m.unwrap()).collect();
+    assert_eq!(gaps, [45e-6, 44e-6, 44e-6, 44e-6]);
+}
+
+#[test]
+fn a_log_in_error_leaves_an_account_and_no_record() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    let mut failed = result(1, 0, 30e-6);
+    failed.records.clear();
+    failed.account.outcome = Outcome::Error;
+    failed.account.error_code = Some("time_goes_back".into());
+    writer.commit(std::slice::from_ref(&failed)).unwrap();
+    assert_eq!(writer.store().accounts().unwrap(), [failed.account]);
+    assert_eq!(writer.store().records(&Query::default()).unwrap(), []);
+    assert_eq!(writer.store().files().unwrap(), Vec::<std::path::PathBuf>::new());
+}
+
+#[test]
+fn the_newest_account_of_a_log_counts_even_when_clocks_go_back() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    writer.commit(&[result(1, 1, 30e-6), result(1, 0, 30e-6)]).unwrap();
+    let mut second = result(1, 1, 30e-6);
+    second.account.processed_utc = time("1999-01-01T00:00:00Z");
+    second.account.error_detail = Some("a\n\"b\"".into());
+    writer.commit(std::slice::from_ref(&second)).unwrap();
+    assert_eq!(writer.store().accounts().unwrap(), [account(1, 0), second.account]);
+}
+
+#[test]
+fn a_run_that_began_and_never_ended_is_told_from_one_that_did() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    let killed = run("b", "2026-11-19T02:00:00Z", None);
+    writer.begin_run(&killed).unwrap();
+    let mut whole = run("a", "2026-11-20T02:00:00Z", None);
+    writer.begin_run(&whole).unwrap();
+    whole = run("a", "2026-11-20T02:00:00Z", Some(1));
+    writer.end_run(&whole).unwrap();
+    assert_eq!(writer.store().runs().unwrap(), [killed, whole]);
+}
+
+#[test]
+fn a_reader_that_opened_before_sees_what_came_after() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    let reader = Store::open(dir.path()).unwrap();
+    assert_eq!(reader.records(&Query::default()).unwrap(), []);
+    writer.commit(&[result(1, 0, 30e-6)]).unwrap();
+    assert_eq!(reader.records(&Query::default()).unwrap().len(), 3);
+}

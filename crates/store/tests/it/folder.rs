@@ -1,0 +1,83 @@
+//! The folder: made, known as ours, held by one.
+
+use std::time::{Duration, Instant};
+
+use store::{Error, Holder, Query, Store};
+
+use crate::made::{result, time, writer};
+
+#[test]
+fn a_missing_and_an_empty_folder_are_no_store_and_the_remedy_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    for place in [dir.path().join("nowhere"), dir.path().to_owned()] {
+        let error = Store::open(&place).unwrap_err();
+        assert!(matches!(error, Error::Missing { .. }), "{error}");
+        assert!(error.complaint().hint.unwrap().contains("freeplay run"));
+    }
+}
+
+#[test]
+fn a_folder_with_other_things_is_never_written_into() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("thesis.tex"), "x").unwrap();
+    for opened in [Store::open(dir.path()), Store::create_or_open(dir.path())] {
+        let error = opened.unwrap_err().to_string();
+        assert!(error.contains("`thesis.tex`"), "{error}");
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn another_format_is_refused_by_number_and_a_torn_mark_by_its_text() {
+    let dir = tempfile::tempdir().unwrap();
+    drop(writer(dir.path()));
+    let mark = dir.path().join("store.json");
+    for (text, expected) in
+        [("{\"freeplay_store\":7}", "has format 7, and"), ("{\"free", "has format `{\"free`")]
+    {
+        std::fs::write(&mark, text).unwrap();
+        let error = Store::open(dir.path()).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn a_store_whose_making_was_cut_short_is_finished_by_the_next() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("store.json"), "{\"freeplay_store\":1}").unwrap();
+    assert!(matches!(Store::open(dir.path()).unwrap_err(), Error::Missing { .. }));
+    Store::create_or_open(dir.path()).unwrap();
+    Store::open(dir.path()).unwrap();
+}
+
+#[test]
+fn a_folder_may_have_an_odd_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let odd = dir.path().join("ré sults*[1] 20%#?");
+    writer(&odd).commit(&[result(1, 0, 1e-6)]).unwrap();
+    assert_eq!(Store::open(&odd).unwrap().records(&Query::default()).unwrap().len(), 3);
+}
+
+#[test]
+fn a_name_that_delta_would_misread_is_refused_before_anything_is_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let odd = dir.path().join("night%20run");
+    let error = Store::create_or_open(&odd).unwrap_err();
+    assert!(error.to_string().contains("`%20`"), "{error}");
+    assert!(!odd.exists());
+}
+
+#[test]
+fn a_second_writer_is_told_who_holds_the_store_and_may_wait() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = Store::create_or_open(dir.path()).unwrap();
+    let holder = Holder { pid: 8812, host: "hangar2".into(), started_utc: time("2026-11-20T02:00:03Z") };
+    let first = store.lock(&holder, None).unwrap();
+    let error = store.lock(&Holder::this_process(), None).unwrap_err();
+    assert_eq!(error.to_string(), "the store is held by pid 8812 on hangar2 since 2026-11-20 02:00:03 UTC");
+    let clock = Instant::now();
+    assert!(store.lock(&Holder::this_process(), Some(Duration::from_millis(250))).is_err());
+    assert!(clock.elapsed() >= Duration::from_millis(250));
+    drop(first);
+    store.lock(&Holder::this_process(), Some(Duration::from_secs(5))).unwrap();
+}

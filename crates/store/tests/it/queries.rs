@@ -1,0 +1,112 @@
+//! Queries: the right rows, from the right files.
+
+use fleet::GapRecord;
+use jiff::SignedDuration;
+use proptest::prelude::*;
+use store::{Query, Store, Writer};
+
+use crate::made::{POSITIONS, departure, result, writer};
+
+fn filled(dir: &std::path::Path) -> Writer {
+    let mut writer = writer(dir);
+    for flight in 0..4 {
+        let results: Vec<_> = (0..3).map(|tail| result(tail, flight, 1e-6 * flight as f64)).collect();
+        writer.commit(&results).unwrap();
+    }
+    writer
+}
+
+/// The same question asked of rows one by one.
+fn fits(query: &Query, record: &GapRecord) -> bool {
+    let same = |asked: &Option<String>, found: &str| asked.as_ref().is_none_or(|asked| asked == found);
+    let at = record.flight.departure_utc;
+    same(&query.tail_number, record.flight.tail_number.as_str())
+        && same(&query.serial_number, record.serial_number.as_str())
+        && same(&query.part_number, record.part_number.as_str())
+        && same(&query.flight_id, record.flight.flight_id.as_str())
+        && same(&query.position, record.position.as_str())
+        && query.since_utc.is_none_or(|since| since <= at)
+        && query.until_utc.is_none_or(|until| at < until)
+}
+
+fn questions() -> impl Strategy<Value = Query> {
+    let text = |values: Vec<&'static str>| {
+        let values: Vec<String> = values.into_iter().map(str::to_owned).collect();
+        prop::option::of(prop::sample::select(values))
+    };
+    let near = || prop::option::of((-1_i64..5, -1_i64..2));
+    let when = |(flight, ns): (i64, i64)| departure(flight) + SignedDuration::from_nanos(ns);
+    (
+        text(vec!["N0", "N1", "N9", ""]),
+        text(vec!["S-1-elevator", "S-2-aileron_left", "none"]),
+        text(vec!["EMA-27"]),
+        text(vec!["F0001", "F0003"]),
+        text(POSITIONS.to_vec()),
+        near(),
+        near(),
+        prop::option::of(0_usize..40),
+    )
+        .prop_map(move |(tail, serial, part, flight, position, since, until, last)| Query {
+            tail_number: tail,
+            serial_number: serial,
+            part_number: part,
+            flight_id: flight,
+            position,
+            since_utc: since.map(when),
+            until_utc: until.map(when),
+            last,
+        })
+}
+
+#[test]
+fn a_query_answers_what_asking_every_row_would() {
+    let dir = tempfile::tempdir().unwrap();
+    let writer = filled(dir.path());
+    let all = writer.store().records(&Query::default()).unwrap();
+    assert_eq!(all.len(), 36);
+    proptest!(ProptestConfig::with_cases(40), |(query in questions())| {
+        let fitting: Vec<GapRecord> = all.iter().filter(|record| fits(&query, record)).cloned().collect();
+        let first = fitting.len() - query.last.unwrap_or(usize::MAX).min(fitting.len());
+        prop_assert_eq!(writer.store().records(&query).unwrap(), &fitting[first..]);
+    });
+}
+
+#[test]
+fn files_that_cannot_hold_an_answer_are_not_opened() {
+    let dir = tempfile::tempdir().unwrap();
+    let writer = filled(dir.path());
+    // The newest file alone holds the fourth day; the others may as well not be there.
+    let files = writer.store().files().unwrap();
+    for file in &files {
+        let name = file.file_name().unwrap().to_str().unwrap();
+        if !name.starts_with("000000000004-") {
+            std::fs::remove_file(file).unwrap();
+        }
+    }
+    let query = Query { since_utc: Some(departure(3)), ..Query::default() };
+    let store = Store::open(dir.path()).unwrap();
+    assert_eq!(store.records(&query).unwrap().len(), 9);
+    assert!(store.records(&Query::default()).is_err());
+}
+
+#[test]
+fn every_unit_is_listed_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let units = filled(dir.path()).store().serials().unwrap();
+    let names: Vec<String> = units.iter().map(|(part, serial)| format!("{part} {serial}")).collect();
+    let expected: Vec<String> =
+        (0..3).flat_map(|tail| POSITIONS.map(|position| format!("EMA-27 S-{tail}-{position}"))).collect();
+    assert_eq!(names, expected);
+}
+
+#[test]
+fn a_flipped_byte_is_an_error_and_not_a_number() {
+    let dir = tempfile::tempdir().unwrap();
+    let writer = filled(dir.path());
+    let file = writer.store().files().unwrap().remove(0);
+    let mut content = std::fs::read(&file).unwrap();
+    content[100] ^= 1;
+    std::fs::write(&file, content).unwrap();
+    let error = Store::open(dir.path()).unwrap().records(&Query::default()).unwrap_err();
+    assert!(matches!(error, store::Error::Damaged { .. }), "{error}");
+}

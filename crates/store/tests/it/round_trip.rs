@@ -1,0 +1,146 @@
+//! Every column comes back as it went in, through Parquet, Delta and Polars.
+
+use fleet::{
+    Estimate, Flight, FlightId, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status, TailNumber,
+};
+use jiff::Timestamp;
+use proptest::prelude::*;
+use store::{LogResult, Query, columns};
+
+use crate::made::{account, record, writer};
+
+/// Names keep no white space around them, and hold anything else.
+fn name() -> impl Strategy<Value = String> {
+    "\\PC{0,8}[a-zé漢🛩\u{0}\"',;\\\\%]".prop_map(|text| text.trim().to_owned())
+}
+
+fn text() -> impl Strategy<Value = String> {
+    prop_oneof![Just(String::new()), "\\PC*", ".*"]
+}
+
+fn number() -> impl Strategy<Value = Option<f64>> {
+    prop::option::of(prop_oneof![
+        prop::num::f64::POSITIVE | prop::num::f64::NEGATIVE | prop::num::f64::SUBNORMAL,
+        Just(0.0),
+        Just(-0.0),
+        Just(f64::MAX),
+    ])
+}
+
+/// Whole microseconds, from before year 0 to beyond 9999.
+fn times() -> impl Strategy<Value = Timestamp> {
+    let ends = Timestamp::MIN.as_microsecond() + 1..Timestamp::MAX.as_microsecond();
+    prop_oneof![ends, 0_i64..2_000_000_000_000_000].prop_map(|us| Timestamp::from_microsecond(us).unwrap())
+}
+
+prop_compose! {
+    fn estimates()(
+        status in prop_oneof![Just(Status::Estimated), Just(Status::Refused)],
+        reason in prop::option::of(text()),
+        flags in prop::collection::vec(text(), 0..4),
+        n in prop::array::uniform15(number()),
+        counts in prop::array::uniform4(any::<i64>()),
+    ) -> Estimate {
+        let [load_reversals, samples, samples_upper, samples_lower] = counts;
+        Estimate {
+            status, reason, flags,
+            gap_m: n[0], gap_se_m: n[1], gap_p05_m: n[2], gap_p95_m: n[3], gap_midrange_m: n[4],
+            stiffness_n_per_m: n[5], stiffness_se_n_per_m: n[6], skew_s: n[7], loop_width_m: n[8],
+            lost_motion_m: n[9], reference_radius_m: n[10],
+            load_reversals, samples, samples_upper, samples_lower,
+            load_p05_n: n[11], load_p95_n: n[12], temperature_c: n[13], nis: n[14],
+        }
+    }
+}
+
+prop_compose! {
+    fn records()(
+        names in prop::array::uniform5(name()),
+        texts in prop::array::uniform5(text()),
+        times in prop::array::uniform2(times()),
+        hours in prop::array::uniform3(number()),
+        estimate in estimates(),
+    ) -> GapRecord {
+        let [tail, flight, position, part, serial] = names;
+        let [log_path, log_digest, config_digest, program_version, run_id] = texts;
+        let [departure_utc, processed_utc] = times;
+        let [flight_hours, tail_hours_end, unit_hours] = hours;
+        GapRecord {
+            flight: Flight {
+                tail_number: TailNumber::new(tail).unwrap(),
+                flight_id: FlightId::new(flight).unwrap(),
+                departure_utc, flight_hours, tail_hours_end,
+            },
+            position: Position::new(position).unwrap(),
+            part_number: PartNumber::new(part).unwrap(),
+            serial_number: SerialNumber::new(serial).unwrap(),
+            unit_hours,
+            estimate,
+            provenance: Provenance { log_path, log_digest, config_digest, program_version, run_id, processed_utc },
+        }
+    }
+}
+
+fn bits(records: &[GapRecord]) -> Vec<String> {
+    // The debug form of an f64 is its shortest exact one, and tells -0.0 from 0.0.
+    records.iter().map(|record| format!("{record:?}")).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn every_column_comes_back_from_the_store(mut all in prop::collection::vec(records(), 1..12)) {
+        all.sort_by_key(GapRecord::canonical_key);
+        all.dedup_by_key(|record| store::RecordKey::of(record));
+        let dir = tempfile::tempdir().unwrap();
+        let mut writer = writer(dir.path());
+        writer.commit(&[LogResult { account: account(0, 0), records: all.clone(), retires: Vec::new() }]).unwrap();
+        prop_assert_eq!(bits(&writer.store().records(&Query::default()).unwrap()), bits(&all));
+        for record in &all {
+            let tail = record.flight.tail_number.to_string();
+            let query = Query { tail_number: Some(tail), since_utc: Some(record.flight.departure_utc), ..Query::default() };
+            let found = writer.store().records(&query).unwrap();
+            prop_assert!(bits(&found).contains(&bits(std::slice::from_ref(record))[0]));
+        }
+        writer.commit(&[LogResult { account: account(0, 0), records: all.clone(), retires: Vec::new() }]).unwrap();
+        prop_assert_eq!(bits(&writer.store().records(&Query::default()).unwrap()), bits(&all));
+    }
+
+    #[test]
+    fn columns_and_rows_are_two_forms_of_one_thing(all in prop::collection::vec(records(), 0..12)) {
+        let batch = columns::to_batch(&all).unwrap();
+        prop_assert_eq!(bits(&columns::from_batch(&batch).unwrap()), bits(&all));
+    }
+}
+
+#[test]
+fn the_columns_are_those_of_the_contract_in_its_order() {
+    let schema = columns::schema();
+    let names: Vec<&str> = schema.fields().iter().map(|field| field.name().as_str()).collect();
+    let contract = "tail_number position part_number serial_number flight_id departure_utc flight_hours \
+        tail_hours_end unit_hours status reason flags gap_m gap_se_m gap_p05_m gap_p95_m gap_midrange_m \
+        stiffness_n_per_m stiffness_se_n_per_m skew_s loop_width_m lost_motion_m reference_radius_m \
+        load_reversals samples samples_upper samples_lower load_p05_n load_p95_n temperature_c nis log_path \
+        log_digest config_digest program_version run_id processed_utc";
+    assert_eq!(names, contract.split_whitespace().collect::<Vec<_>>());
+}
+
+#[test]
+fn a_time_beyond_the_calendar_is_an_error_and_never_wraps() {
+    use arrow::array::{ArrayRef, RecordBatch, TimestampMicrosecondArray};
+    let batch = columns::to_batch(&[record(1, 0, "elevator", 1e-6)]).unwrap();
+    let mut arrays: Vec<ArrayRef> = batch.columns().to_vec();
+    let beyond = TimestampMicrosecondArray::from(vec![i64::MAX]).with_timezone("UTC");
+    arrays[5] = std::sync::Arc::new(beyond);
+    let batch = RecordBatch::try_new(batch.schema(), arrays).unwrap();
+    let error = columns::from_batch(&batch).unwrap_err().to_string();
+    assert!(error.starts_with("column `departure_utc`, row 0: 9223372036854775807 µs since 1970"), "{error}");
+}
+
+#[test]
+fn a_missing_column_is_named() {
+    let batch = columns::to_batch(&[]).unwrap().project(&[0, 1]).unwrap();
+    let error = columns::from_batch(&batch).unwrap_err().to_string();
+    assert_eq!(error, "column `part_number` is not there");
+}
