@@ -18,7 +18,7 @@ Exit codes: 0 all well, 1 some logs in error, 2 usage or configuration, 3 the ru
 /// The backlash gap of flight-control actuators, from the logs a fleet records anyway.
 #[derive(Debug, Parser)]
 #[command(name = "freeplay", version, after_help = AFTER, infer_subcommands = false, propagate_version = true)]
-pub struct Args {
+pub(crate) struct Args {
     #[command(flatten)]
     pub global: Global,
     #[command(subcommand)]
@@ -27,9 +27,15 @@ pub struct Args {
 
 /// Options of every command.
 #[derive(Debug, ClapArgs)]
-pub struct Global {
+pub(crate) struct Global {
     /// The configuration.
-    #[arg(long, global = true, env = "FREEPLAY_CONFIG", default_value = "pipeline.toml", value_name = "FILE")]
+    #[arg(
+        long,
+        global = true,
+        env = "FREEPLAY_CONFIG",
+        default_value = "pipeline.toml",
+        value_name = "FILE"
+    )]
     pub config: PathBuf,
     /// Say nothing but the answer and errors.
     #[arg(short, long, global = true)]
@@ -47,7 +53,7 @@ pub struct Global {
 
 /// When to colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Color {
+pub(crate) enum Color {
     /// On a terminal, unless `NO_COLOR` is set.
     Auto,
     /// Always.
@@ -58,7 +64,7 @@ pub enum Color {
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Write a commented pipeline.toml and an example installations.csv; nothing is overwritten
     #[command(after_help = "Example:\n  freeplay init fleet-a")]
     Init(InitArgs),
@@ -66,25 +72,39 @@ pub enum Command {
     #[command(after_help = "Example:\n  freeplay check logs/N412FP/20261119_0413.parquet")]
     Check(CheckArgs),
     /// The nightly job: every log not yet accounted for, then the trends of the units it touched
-    #[command(after_help = "Examples:\n  freeplay run\n  freeplay run --since 2026-11-01 --tail N412FP --redo\n  freeplay run --fail-on act && echo nobody needs a hangar today")]
+    #[command(
+        after_help = "Examples:\n  freeplay run\n  freeplay run --since 2026-11-01 --tail N412FP --redo\n  freeplay run --fail-on act && echo nobody needs a hangar today"
+    )]
     Run(RunArgs),
     /// Estimate logs ad hoc; nothing is stored
-    #[command(after_help = "Examples:\n  freeplay estimate logs/N412FP/*.parquet\n  freeplay estimate bench.parquet --part EMA-27-1040 --trace trace.parquet")]
+    #[command(
+        after_help = "Examples:\n  freeplay estimate logs/N412FP/*.parquet\n  freeplay estimate bench.parquet --part EMA-27-1040 --trace trace.parquet"
+    )]
     Estimate(EstimateArgs),
     /// Stored records, of a tail, a serial number, a flight or a position
-    #[command(after_help = "Examples:\n  freeplay query tail N412FP --last 20\n  freeplay query serial 00317 --since 2026-01-01 --json")]
+    #[command(
+        after_help = "Examples:\n  freeplay query tail N412FP --last 20\n  freeplay query serial 00317 --since 2026-01-01 --json"
+    )]
     Query(QueryArgs),
     /// Level, rate, crossing of the limit and state of each unit
-    #[command(after_help = "Examples:\n  freeplay trend --tail N412FP\n  freeplay trend --estimates history.csv --queries dates.csv --format csv")]
+    #[command(
+        after_help = "Examples:\n  freeplay trend --tail N412FP\n  freeplay trend --estimates history.csv --queries dates.csv --format csv"
+    )]
     Trend(TrendArgs),
     /// Fly a simulated fleet: logs, installations and the truth
-    #[command(after_help = "Example:\n  freeplay simulate --output /tmp/fleet && freeplay run --config /tmp/fleet/pipeline.toml")]
+    #[command(
+        after_help = "Example:\n  freeplay simulate --output /tmp/fleet && freeplay run --config /tmp/fleet/pipeline.toml"
+    )]
     Simulate(SimulateArgs),
     /// Care of the results
-    #[command(after_help = "Examples:\n  freeplay store info --max-age 30h\n  freeplay store export --format csv --output gaps.csv")]
+    #[command(
+        after_help = "Examples:\n  freeplay store info --max-age 30h\n  freeplay store export --format csv --output gaps.csv"
+    )]
     Store(StoreArgs),
     /// Completions for a shell
-    #[command(after_help = "Example:\n  freeplay completions bash > ~/.local/share/bash-completion/completions/freeplay")]
+    #[command(
+        after_help = "Example:\n  freeplay completions bash > ~/.local/share/bash-completion/completions/freeplay"
+    )]
     Completions(CompletionsArgs),
     /// The manual page
     #[command(after_help = "Example:\n  freeplay man | man -l -")]
@@ -93,7 +113,7 @@ pub enum Command {
 
 /// Where rows go, and in which form.
 #[derive(Debug, Clone, ClapArgs)]
-pub struct Output {
+pub(crate) struct Output {
     /// Form of the rows.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     pub format: Format,
@@ -107,14 +127,14 @@ pub struct Output {
 
 impl Output {
     /// The form asked for.
-    pub fn format(&self) -> Format {
+    pub(crate) fn format(&self) -> Format {
         if self.json { Format::Json } else { self.format }
     }
 }
 
 /// Forms of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Format {
+pub(crate) enum Format {
     /// For people: µm, hours, dates.
     Table,
     /// An array of objects, SI.
@@ -127,7 +147,7 @@ pub enum Format {
 
 /// `init`.
 #[derive(Debug, ClapArgs)]
-pub struct InitArgs {
+pub(crate) struct InitArgs {
     /// Folder to write to.
     #[arg(default_value = ".")]
     pub dir: PathBuf,
@@ -135,7 +155,7 @@ pub struct InitArgs {
 
 /// `check`.
 #[derive(Debug, ClapArgs)]
-pub struct CheckArgs {
+pub(crate) struct CheckArgs {
     /// Logs; those the configuration names when none is given.
     pub logs: Vec<PathBuf>,
     /// Look at so many of the configured logs at most.
@@ -147,7 +167,7 @@ pub struct CheckArgs {
 
 /// `run`.
 #[derive(Debug, ClapArgs)]
-pub struct RunArgs {
+pub(crate) struct RunArgs {
     /// Departures from this UTC date or time on.
     #[arg(long, value_parser = parse_utc, value_name = "UTC")]
     pub since: Option<Timestamp>,
@@ -188,7 +208,7 @@ pub struct RunArgs {
 
 /// States that can fail a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
-pub enum FailOn {
+pub(crate) enum FailOn {
     /// The watch limit.
     Watch,
     /// The planning horizon.
@@ -199,7 +219,7 @@ pub enum FailOn {
 
 /// `estimate`.
 #[derive(Debug, ClapArgs)]
-pub struct EstimateArgs {
+pub(crate) struct EstimateArgs {
     /// Logs.
     #[arg(required = true)]
     pub logs: Vec<PathBuf>,
@@ -215,7 +235,7 @@ pub struct EstimateArgs {
 
 /// `query`.
 #[derive(Debug, ClapArgs)]
-pub struct QueryArgs {
+pub(crate) struct QueryArgs {
     /// What to ask by.
     #[arg(value_enum)]
     pub by: By,
@@ -239,7 +259,7 @@ pub struct QueryArgs {
 
 /// What records are asked by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum By {
+pub(crate) enum By {
     /// The aircraft.
     Tail,
     /// The unit.
@@ -252,7 +272,7 @@ pub enum By {
 
 /// `trend`.
 #[derive(Debug, ClapArgs)]
-pub struct TrendArgs {
+pub(crate) struct TrendArgs {
     /// Units on this tail.
     #[arg(long)]
     pub tail: Option<String>,
@@ -277,7 +297,7 @@ pub struct TrendArgs {
 
 /// `simulate`.
 #[derive(Debug, ClapArgs)]
-pub struct SimulateArgs {
+pub(crate) struct SimulateArgs {
     /// What to fly; a small fleet by default.
     pub spec: Option<PathBuf>,
     /// Folder for logs, installations and truth.
@@ -293,14 +313,14 @@ pub struct SimulateArgs {
 
 /// `store`.
 #[derive(Debug, ClapArgs)]
-pub struct StoreArgs {
+pub(crate) struct StoreArgs {
     #[command(subcommand)]
     pub command: StoreCommand,
 }
 
 /// Care of the results.
 #[derive(Debug, Subcommand)]
-pub enum StoreCommand {
+pub(crate) enum StoreCommand {
     /// What the store holds, and when it was last fed
     Info {
         /// Fail (code 1) when the last completed run is older, e.g. `30h`.
@@ -323,7 +343,7 @@ pub enum StoreCommand {
 
 /// `completions`.
 #[derive(Debug, ClapArgs)]
-pub struct CompletionsArgs {
+pub(crate) struct CompletionsArgs {
     /// The shell.
     #[arg(value_enum)]
     pub shell: clap_complete::Shell,
@@ -334,6 +354,7 @@ fn parse_utc(text: &str) -> Result<Timestamp, String> {
 }
 
 fn parse_span(text: &str) -> Result<std::time::Duration, String> {
-    let span: jiff::SignedDuration = text.parse().map_err(|e| format!("`{text}` is no span of time such as 20m or 30h: {e}"))?;
+    let span: jiff::SignedDuration =
+        text.parse().map_err(|e| format!("`{text}` is no span of time such as 20m or 30h: {e}"))?;
     span.try_into().map_err(|_| format!("`{text}` is below zero"))
 }

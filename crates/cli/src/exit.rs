@@ -29,7 +29,7 @@ impl From<Code> for ExitCode {
 
 /// Why a command could not answer.
 #[derive(Debug)]
-pub enum Failure {
+pub(crate) enum Failure {
     /// Configuration, tables or arguments: code 2.
     Refused(Vec<Complaint>),
     /// Store or disk: code 3.
@@ -40,12 +40,12 @@ pub enum Failure {
 
 impl Failure {
     /// A wrong argument.
-    pub fn usage(code: &str, what: impl std::fmt::Display, hint: &str) -> Self {
+    pub(crate) fn usage(code: &str, what: impl std::fmt::Display, hint: &str) -> Self {
         Self::Refused(vec![Complaint::new(code, what).hint(hint)])
     }
 
     /// Its exit code.
-    pub fn code(&self) -> Code {
+    pub(crate) fn code(&self) -> Code {
         match self {
             Self::Refused(_) => Code::Usage,
             Self::Failed(_) => Code::RunFailed,

@@ -13,7 +13,7 @@ use crate::talk::Talk;
 const SPARSE: Duration = Duration::from_secs(30);
 
 /// Progress of one piece of work.
-pub struct Progress<'t> {
+pub(crate) struct Progress<'t> {
     name: &'static str,
     talk: &'t Talk,
     bar: ProgressBar,
@@ -33,16 +33,34 @@ struct State {
 
 impl<'t> Progress<'t> {
     /// Nothing is shown before [`Progress::total`] is known.
-    pub fn new(name: &'static str, talk: &'t Talk) -> Self {
+    pub(crate) fn new(name: &'static str, talk: &'t Talk) -> Self {
         let terminal = std::io::stderr().is_terminal();
-        let target = if talk.progress() && terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let target = if talk.progress() && terminal {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        };
         let now = Instant::now();
-        let state = State { total: 0, done: 0, refused: 0, errors: 0, begun: now, told: None, in_hand: BTreeSet::new() };
-        Self { name, talk, bar: ProgressBar::with_draw_target(None, target), terminal, state: Mutex::new(state) }
+        let state = State {
+            total: 0,
+            done: 0,
+            refused: 0,
+            errors: 0,
+            begun: now,
+            told: None,
+            in_hand: BTreeSet::new(),
+        };
+        Self {
+            name,
+            talk,
+            bar: ProgressBar::with_draw_target(None, target),
+            terminal,
+            state: Mutex::new(state),
+        }
     }
 
     /// So much is to be done.
-    pub fn total(&self, total: usize) {
+    pub(crate) fn total(&self, total: usize) {
         self.update(|state| {
             state.total = total as u64;
             state.begun = Instant::now();
@@ -57,14 +75,14 @@ impl<'t> Progress<'t> {
     }
 
     /// A worker took a piece.
-    pub fn started(&self, piece: &str) {
+    pub(crate) fn started(&self, piece: &str) {
         self.update(|state| {
             state.in_hand.insert(piece.to_owned());
         });
     }
 
     /// A piece is finished.
-    pub fn finished(&self, piece: &str, refused: usize, errors: usize) {
+    pub(crate) fn finished(&self, piece: &str, refused: usize, errors: usize) {
         let message = self.update(|state| {
             state.in_hand.remove(piece);
             state.done += 1;
@@ -79,7 +97,7 @@ impl<'t> Progress<'t> {
     }
 
     /// The bar goes away; what follows is the answer.
-    pub fn end(&self) {
+    pub(crate) fn end(&self) {
         self.bar.finish_and_clear();
     }
 
@@ -121,7 +139,7 @@ fn line(name: &str, state: &State) -> String {
 }
 
 /// A span of time as people say it.
-pub fn span(span: Duration) -> String {
+pub(crate) fn span(span: Duration) -> String {
     match span.as_secs() {
         0 => format!("{:.1} s", span.as_secs_f64()),
         s @ 1..60 => format!("{s} s"),

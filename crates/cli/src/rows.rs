@@ -22,11 +22,16 @@ use crate::talk::Talk;
 ///
 /// # Errors
 /// When the answer cannot be written.
-pub fn answer(output: &Output, talk: &Talk, batch: impl FnOnce() -> Result<RecordBatch, Failure>, table: impl FnOnce() -> String) -> Result<(), Failure> {
+pub(crate) fn answer(
+    output: &Output,
+    talk: &Talk,
+    batch: impl FnOnce() -> Result<RecordBatch, Failure>,
+    table: impl FnOnce() -> String,
+) -> Result<(), Failure> {
     match (output.format(), &output.output) {
         (Format::Table, None) => talk.answer(&table()),
         (Format::Table, Some(file)) => to_file(file, |out| Ok(out.write_all(table().as_bytes())?)),
-        (format, None) => write(&batch()?, format, &mut io::stdout().lock()),
+        (format, None) => write(&batch()?, format, &mut io::stdout()),
         (format, Some(file)) => {
             let batch = batch()?;
             to_file(file, |out| write(&batch, format, out))
@@ -35,7 +40,10 @@ pub fn answer(output: &Output, talk: &Talk, batch: impl FnOnce() -> Result<Recor
 }
 
 /// Writes beside and renames, so that nobody meets half an answer.
-fn to_file(file: &std::path::Path, fill: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
+fn to_file(
+    file: &std::path::Path,
+    fill: impl FnOnce(&mut File) -> Result<(), Failure>,
+) -> Result<(), Failure> {
     let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
     let mut beside = tempfile::NamedTempFile::new_in(folder).map_err(|e| not_written(file, &e))?;
     fill(beside.as_file_mut())?;
@@ -44,7 +52,9 @@ fn to_file(file: &std::path::Path, fill: impl FnOnce(&mut File) -> Result<(), Fa
 
 fn not_written(file: &std::path::Path, error: &io::Error) -> Failure {
     let what = format!("the answer cannot be written: {error}");
-    Failure::Failed(Complaint::new("output_failed", what).in_file(file.display()).hint("does the folder exist?"))
+    Failure::Failed(
+        Complaint::new("output_failed", what).in_file(file.display()).hint("does the folder exist?"),
+    )
 }
 
 fn write(batch: &RecordBatch, format: Format, out: &mut (impl Write + Send)) -> Result<(), Failure> {
@@ -54,7 +64,11 @@ fn write(batch: &RecordBatch, format: Format, out: &mut (impl Write + Send)) -> 
             writer.write(batch).and_then(|()| writer.finish()).map_err(|e| broken(&e))?;
             out.write_all(b"\n")?;
         }
-        Format::Csv => CsvWriter::new().with_header(true).build(&mut *out).write(&flat(batch)?).map_err(|e| broken(&e))?,
+        Format::Csv => CsvWriter::new()
+            .with_header(true)
+            .build(&mut *out)
+            .write(&flat(batch)?)
+            .map_err(|e| broken(&e))?,
         Format::Parquet => {
             let fail = |e: parquet::errors::ParquetError| broken(&e.into());
             let mut writer = ArrowWriter::try_new(&mut *out, batch.schema(), None).map_err(fail)?;
@@ -77,7 +91,11 @@ fn flat(batch: &RecordBatch) -> Result<RecordBatch, Failure> {
     let (mut fields, mut columns) = (Vec::new(), Vec::new());
     for (field, column) in batch.schema().fields().iter().zip(batch.columns()) {
         let nested = matches!(field.data_type(), DataType::List(_));
-        fields.push(Field::new(field.name(), if nested { DataType::Utf8 } else { field.data_type().clone() }, true));
+        fields.push(Field::new(
+            field.name(),
+            if nested { DataType::Utf8 } else { field.data_type().clone() },
+            true,
+        ));
         columns.push(if nested { joined(column)? } else { Arc::clone(column) });
     }
     RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).map_err(|e| broken(&e))
@@ -102,14 +120,17 @@ fn joined(column: &Arc<dyn Array>) -> Result<Arc<dyn Array>, Failure> {
 ///
 /// # Errors
 /// When a value does not fit its column.
-pub fn batch<T: Serialize>(schema: &SchemaRef, rows: &[T]) -> Result<RecordBatch, Failure> {
-    let mut decoder = ReaderBuilder::new(Arc::clone(schema)).with_batch_size(rows.len().max(1)).build_decoder().map_err(|e| broken(&e))?;
+pub(crate) fn batch<T: Serialize>(schema: &SchemaRef, rows: &[T]) -> Result<RecordBatch, Failure> {
+    let mut decoder = ReaderBuilder::new(Arc::clone(schema))
+        .with_batch_size(rows.len().max(1))
+        .build_decoder()
+        .map_err(|e| broken(&e))?;
     decoder.serialize(rows).map_err(|e| broken(&e))?;
     let batch = decoder.flush().map_err(|e| broken(&e))?;
     Ok(batch.unwrap_or_else(|| RecordBatch::new_empty(Arc::clone(schema))))
 }
 
 /// A column of instants.
-pub fn utc() -> DataType {
+pub(crate) fn utc() -> DataType {
     DataType::Timestamp(TimeUnit::Microsecond, Some("UTC".into()))
 }

@@ -6,7 +6,7 @@ use crate::talk::escape;
 
 /// A column of a table.
 #[derive(Debug, Clone, Copy)]
-pub struct Column {
+pub(crate) struct Column {
     /// Its heading, with its unit.
     pub heading: &'static str,
     /// Numbers stand to the right.
@@ -16,17 +16,17 @@ pub struct Column {
 }
 
 /// Text to the left.
-pub const fn text(heading: &'static str, rank: u8) -> Column {
+pub(crate) const fn text(heading: &'static str, rank: u8) -> Column {
     Column { heading, right: false, rank }
 }
 
 /// Numbers to the right.
-pub const fn number(heading: &'static str, rank: u8) -> Column {
+pub(crate) const fn number(heading: &'static str, rank: u8) -> Column {
     Column { heading, right: true, rank }
 }
 
 /// Lays out rows within the width of the terminal; a pipe gets everything.
-pub fn layout(columns: &[Column], rows: &[Vec<String>]) -> String {
+pub(crate) fn layout(columns: &[Column], rows: &[Vec<String>]) -> String {
     let width = terminal_width();
     let mut kept: Vec<usize> = (0..columns.len()).collect();
     let mut order: Vec<usize> = kept.clone();
@@ -61,7 +61,8 @@ fn grid(columns: &[Column], rows: &[Vec<String>], kept: &[usize], width: usize) 
         }
     }
     if width < usize::MAX {
-        grid.set_content_arrangement(ContentArrangement::Dynamic).set_width(u16::try_from(width).unwrap_or(u16::MAX));
+        grid.set_content_arrangement(ContentArrangement::Dynamic)
+            .set_width(u16::try_from(width).unwrap_or(u16::MAX));
         grid.set_truncation_indicator("…");
     }
     let lines: Vec<String> = grid.lines().map(|line| line.trim_end().to_owned()).collect();
@@ -83,16 +84,16 @@ fn terminal_width() -> usize {
 }
 
 /// Micrometres with one decimal, or a dash.
-pub fn micrometres(m: Option<f64>) -> String {
+pub(crate) fn micrometres(m: Option<f64>) -> String {
     m.map_or_else(dash, |m| format!("{:.1}", m * 1e6))
 }
 
 /// Whole hours, or a dash.
-pub fn hours(h: Option<f64>) -> String {
+pub(crate) fn hours(h: Option<f64>) -> String {
     h.map_or_else(dash, |h| format!("{h:.0}"))
 }
 
 /// What stands where nothing is known.
-pub fn dash() -> String {
+pub(crate) fn dash() -> String {
     "–".to_owned()
 }

@@ -12,7 +12,7 @@ const SHOWN_WHOLE: usize = 3;
 
 /// The voice of the program.
 #[derive(Debug, Clone)]
-pub struct Talk {
+pub(crate) struct Talk {
     quiet: bool,
     verbose: u8,
     progress: bool,
@@ -21,23 +21,28 @@ pub struct Talk {
 
 impl Talk {
     /// Listens to the options, the terminal and `NO_COLOR`.
-    pub fn new(global: &Global) -> Self {
+    pub(crate) fn new(global: &Global) -> Self {
         let auto = std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) && io::stderr().is_terminal();
         let color_err = match global.color {
             Color::Always => true,
             Color::Never => false,
             Color::Auto => auto,
         };
-        Self { quiet: global.quiet, verbose: global.verbose, progress: !(global.no_progress || global.quiet), color_err }
+        Self {
+            quiet: global.quiet,
+            verbose: global.verbose,
+            progress: !(global.no_progress || global.quiet),
+            color_err,
+        }
     }
 
     /// Whether progress may be shown.
-    pub fn progress(&self) -> bool {
+    pub(crate) fn progress(&self) -> bool {
         self.progress
     }
 
     /// Whether more should be said.
-    pub fn verbose(&self) -> bool {
+    pub(crate) fn verbose(&self) -> bool {
         self.verbose > 0
     }
 
@@ -45,27 +50,27 @@ impl Talk {
     ///
     /// # Errors
     /// When stdout is closed or full.
-    pub fn answer(&self, text: &str) -> Result<(), Failure> {
+    pub(crate) fn answer(&self, text: &str) -> Result<(), Failure> {
         let mut out = io::stdout().lock();
         out.write_all(text.as_bytes())?;
         Ok(out.flush()?)
     }
 
     /// Says something in passing, on stderr.
-    pub fn note(&self, text: &str) {
+    pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
             self.err(text);
         }
     }
 
     /// Shows a complaint, on stderr.
-    pub fn complain(&self, complaint: &Complaint) {
+    pub(crate) fn complain(&self, complaint: &Complaint) {
         let text = escape(&complaint.to_string());
         self.err(&if self.color_err { painted(&text) } else { text });
     }
 
     /// Shows complaints: of each kind the first few whole, and how many more there are.
-    pub fn complain_all<'c>(&self, complaints: impl IntoIterator<Item = &'c Complaint>) {
+    pub(crate) fn complain_all<'c>(&self, complaints: impl IntoIterator<Item = &'c Complaint>) {
         let mut seen: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
         for complaint in complaints {
             let count = seen.entry(&complaint.code).or_default();
@@ -75,11 +80,13 @@ impl Talk {
             }
         }
         let more = seen.into_iter().filter(|(_, count)| *count > SHOWN_WHOLE && !self.verbose());
-        more.for_each(|(code, count)| self.err(&format!("{} more like it [{code}]; -v shows all", count - SHOWN_WHOLE)));
+        more.for_each(|(code, count)| {
+            self.err(&format!("{} more like it [{code}]; -v shows all", count - SHOWN_WHOLE))
+        });
     }
 
     /// Tells why a command could not answer.
-    pub fn fail(&self, failure: &Failure) -> Code {
+    pub(crate) fn fail(&self, failure: &Failure) -> Code {
         match failure {
             Failure::Refused(complaints) => {
                 self.complain_all(complaints);
@@ -98,8 +105,9 @@ impl Talk {
 }
 
 /// Makes control characters visible: a name from a log must not move the cursor or paint the screen.
-pub fn escape(text: &str) -> String {
-    let shown = |c: char| if c.is_control() && c != '\n' { c.escape_default().to_string() } else { c.to_string() };
+pub(crate) fn escape(text: &str) -> String {
+    let shown =
+        |c: char| if c.is_control() && c != '\n' { c.escape_default().to_string() } else { c.to_string() };
     text.chars().map(shown).collect()
 }
 

@@ -113,12 +113,11 @@ impl<'m> Log<'m> {
 
     fn facts(&self) -> Result<Facts, Error> {
         let map = &self.mapping.identity;
-        let mut facts = match &map.path {
-            Some(expression) => {
-                identity::from_path(self.columns.path(), expression).map_err(|f| self.columns.error(f))?
-            }
-            None => Facts::new(),
-        };
+        let mut facts: Facts = map.values.clone();
+        if let Some(expression) = &map.path {
+            let found = identity::from_path(self.columns.path(), expression);
+            facts.extend(found.map_err(|f| self.columns.error(f))?);
+        }
         for (fact, column) in &map.columns {
             // A column the log lacks may still be covered by metadata or path; what is missing in all is named later.
             if self.columns.has(column) {

@@ -18,8 +18,8 @@ pub struct Mapping {
     pub channels: Channels,
 }
 
-/// Where tail, flight and departure stand: in the file's metadata, in constant columns, or in its
-/// path. For each fact the first source that has it wins, in that order.
+/// Where tail, flight and departure stand: in the file's metadata, in constant columns, in its path,
+/// or in the configuration itself. For each fact the first source that has it wins, in that order.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IdentityMapping {
@@ -34,6 +34,9 @@ pub struct IdentityMapping {
     /// `(?<tail_number>N\w+)/(?<flight_id>[^/]+)_(?<departure_utc>\d{8}T\d{6}Z)\.parquet$`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
+    /// What holds for every log that does not say otherwise: fact → value.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub values: BTreeMap<Fact, String>,
     /// How departures are written, by `strftime` signs; ISO 8601 when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub departure_format: Option<String>,

@@ -52,7 +52,13 @@ pub struct Report {
 }
 
 impl Report {
-    pub(crate) fn begin(run_id: String, started_utc: Timestamp, found: usize, known: usize, workers: usize) -> Self {
+    pub(crate) fn begin(
+        run_id: String,
+        started_utc: Timestamp,
+        found: usize,
+        known: usize,
+        workers: usize,
+    ) -> Self {
         Self {
             run_id,
             started_utc,

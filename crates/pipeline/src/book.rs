@@ -6,17 +6,17 @@
 use std::collections::{BTreeSet, HashMap};
 
 use fleet::{Complaint, GapRecord};
-use store::{LogAccount, LogResult, Outcome};
+use store::{LogAccount, LogResult, Outcome, RecordKey};
 
 use crate::account::{self, Report};
-use crate::plan::{self, Plan, RecordName, record_name};
+use crate::plan::{self, Plan};
 use crate::schedule::Done;
 use crate::trends::Unit;
 
 /// The writer's book of the store as it is and as it will be.
 pub(crate) struct Book {
     accounts: HashMap<String, LogAccount>,
-    owners: HashMap<RecordName, String>,
+    owners: HashMap<RecordKey, String>,
     /// Units whose records changed.
     pub(crate) touched: BTreeSet<Unit>,
 }
@@ -50,7 +50,13 @@ impl Book {
         }
     }
 
-    fn read(&mut self, account: LogAccount, records: Vec<GapRecord>, complaints: Vec<Complaint>, report: &mut Report) -> Vec<LogResult> {
+    fn read(
+        &mut self,
+        account: LogAccount,
+        records: Vec<GapRecord>,
+        complaints: Vec<Complaint>,
+        report: &mut Report,
+    ) -> Vec<LogResult> {
         let Some(rival) = self.rival(&account, &records) else {
             return vec![self.store(account, records, &complaints, report)];
         };
@@ -65,12 +71,18 @@ impl Book {
 
     /// Another log that speaks for one of these flights.
     fn rival(&self, account: &LogAccount, records: &[GapRecord]) -> Option<LogAccount> {
-        let owner = |r: &GapRecord| self.owners.get(&record_name(&r.flight, r.position.as_str()));
+        let owner = |r: &GapRecord| self.owners.get(&RecordKey::of(r));
         let other = records.iter().filter_map(owner).find(|path| **path != account.log_path)?;
         self.accounts.get(other).cloned()
     }
 
-    fn store(&mut self, account: LogAccount, records: Vec<GapRecord>, complaints: &[Complaint], report: &mut Report) -> LogResult {
+    fn store(
+        &mut self,
+        account: LogAccount,
+        records: Vec<GapRecord>,
+        complaints: &[Complaint],
+        report: &mut Report,
+    ) -> LogResult {
         report.count(&account, &records, complaints);
         let unit = |r: &GapRecord| (r.part_number.clone(), r.serial_number.clone());
         self.touched.extend(records.iter().map(unit));
@@ -80,11 +92,12 @@ impl Book {
     }
 
     /// Records this log made under another identity or for positions it no longer speaks for.
-    fn outdated(&mut self, account: &LogAccount, records: &[GapRecord]) -> Vec<RecordName> {
+    fn outdated(&mut self, account: &LogAccount, records: &[GapRecord]) -> Vec<RecordKey> {
         let Some(before) = self.accounts.get(&account.log_path) else { return Vec::new() };
-        let now: BTreeSet<RecordName> = records.iter().map(|r| record_name(&r.flight, r.position.as_str())).collect();
-        let mine = |name: &RecordName| self.owners.get(name) == Some(&account.log_path);
-        let gone: Vec<RecordName> = plan::owned(before).into_iter().filter(|n| mine(n) && !now.contains(n)).collect();
+        let now: BTreeSet<RecordKey> = records.iter().map(|r| RecordKey::of(r)).collect();
+        let mine = |name: &RecordKey| self.owners.get(name) == Some(&account.log_path);
+        let gone: Vec<RecordKey> =
+            plan::owned(before).into_iter().filter(|n| mine(n) && !now.contains(n)).collect();
         for name in &gone {
             self.owners.remove(name);
         }
@@ -99,9 +112,12 @@ fn yielded(mut account: LogAccount, owner: &LogAccount) -> (LogAccount, Vec<Comp
     if account.log_digest == owner.log_digest {
         return (account, Vec::new());
     }
-    let complaint = Complaint::new("duplicate_flight", format!("another log holds the same flight: {}", owner.log_path))
-        .in_file(&account.log_path)
-        .hint("the log whose name sorts first is used; remove one of them, or map what tells the flights apart");
+    let complaint = Complaint::new(
+        "duplicate_flight",
+        format!("another log holds the same flight: {}", owner.log_path),
+    )
+    .in_file(&account.log_path)
+    .hint("the log whose name sorts first is used; remove one of them, or map what tells the flights apart");
     account::complain(&mut account, std::slice::from_ref(&complaint));
     (account, vec![complaint])
 }

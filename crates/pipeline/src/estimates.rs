@@ -30,15 +30,25 @@ pub fn read(file: &Path) -> Result<Vec<Flown>, Error> {
     let departure = table.column(&["departure_utc"]).map_err(bad)?;
     let gap = table.column(&["gap_m"]).map_err(bad)?;
     let tail = table.find(&["tail_number", "tail"]);
-    let [position, part, flight, hours, meter, reversals, se] =
-        ["position", "part_number", "flight_id", "flight_hours", "tail_hours_end", "load_reversals", "gap_se_m"]
-            .map(|column| table.find(&[column]));
+    let [position, part, flight, hours, meter, reversals, se] = [
+        "position",
+        "part_number",
+        "flight_id",
+        "flight_hours",
+        "tail_hours_end",
+        "load_reversals",
+        "gap_se_m",
+    ]
+    .map(|column| table.find(&[column]));
     let text = |row, column: Option<usize>| column.and_then(|c| table.text(row, c)).map(str::to_owned);
     (0..table.len())
         .map(|row| {
             Ok(Flown {
                 part_number: text(row, part),
-                serial_number: table.required(row, serial, name::<fleet::SerialNumber>).map_err(bad)?.to_string(),
+                serial_number: table
+                    .required(row, serial, name::<fleet::SerialNumber>)
+                    .map_err(bad)?
+                    .to_string(),
                 tail_number: text(row, tail),
                 position: text(row, position),
                 flight_id: text(row, flight),
@@ -67,7 +77,10 @@ pub fn queries(file: &Path) -> Result<Vec<AsOf>, Error> {
         .map(|row| {
             Ok(AsOf {
                 part_number: part.and_then(|c| table.text(row, c)).map(str::to_owned),
-                serial_number: table.required(row, serial, name::<fleet::SerialNumber>).map_err(bad)?.to_string(),
+                serial_number: table
+                    .required(row, serial, name::<fleet::SerialNumber>)
+                    .map_err(bad)?
+                    .to_string(),
                 as_of_utc: table.required(row, as_of, utc).map_err(bad)?,
             })
         })

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use fleet::{Complaint, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
 use jiff::Timestamp;
 use job::Config;
-use store::{LogAccount, Outcome};
+use store::{LogAccount, Outcome, RecordKey};
 
 use crate::error::Error;
 
@@ -147,17 +147,24 @@ pub struct Plan {
 ///
 /// # Errors
 /// [`Error::Refused`] when a pattern fits no file.
-pub fn plan(config: &Config, installations: &Installations, accounts: Vec<LogAccount>, request: &Request) -> Result<Plan, Error> {
+pub fn plan(
+    config: &Config,
+    installations: &Installations,
+    accounts: Vec<LogAccount>,
+    request: &Request,
+) -> Result<Plan, Error> {
     let found = find(config)?;
     let digests = accounts.iter().filter_map(digests).collect();
     let here = accounts.into_iter().filter(|account| found.contains_key(&account.log_path));
-    let accounts: BTreeMap<String, LogAccount> = here.map(|account| (account.log_path.clone(), account)).collect();
+    let accounts: BTreeMap<String, LogAccount> =
+        here.map(|account| (account.log_path.clone(), account)).collect();
     let unidentified = job::flight::unidentified_digest(config, installations);
     let mut work = Vec::new();
     for (shown, path) in &found {
         let (before, stat) = (accounts.get(shown), FileStat::of(path));
         let why = reason(before, stat.as_ref(), config, installations, &unidentified, request);
-        let task = |why| Work { path: path.clone(), shown: shown.clone(), stat, why, before: before.cloned() };
+        let task =
+            |why| Work { path: path.clone(), shown: shown.clone(), stat, why, before: before.cloned() };
         work.extend(why.map(task));
     }
     let size = |w: &Work| w.stat.as_ref().map_or(0, |s| s.size_bytes);
@@ -174,22 +181,23 @@ pub fn digests(account: &LogAccount) -> Option<(String, String)> {
 }
 
 /// The actuators' flights that a log in the store speaks for.
-pub fn owned(account: &LogAccount) -> Vec<RecordName> {
+pub fn owned(account: &LogAccount) -> Vec<RecordKey> {
     match flight_of(account) {
         Some(flight) if account.estimated + account.refused > 0 => {
-            account.positions.iter().map(|position| record_name(&flight, position)).collect()
+            account.positions.iter().map(|position| record_key(&flight, position)).collect()
         }
         _ => Vec::new(),
     }
 }
 
-/// An actuator's flight: tail, flight, departure in µs, position.
-pub type RecordName = (String, String, i64, String);
-
-/// The name of an actuator's flight.
-pub fn record_name(flight: &Flight, position: &str) -> RecordName {
-    let departure_us = flight.departure_utc.as_microsecond();
-    (flight.tail_number.to_string(), flight.flight_id.to_string(), departure_us, position.to_owned())
+/// By what the record of an actuator's flight is known.
+pub fn record_key(flight: &Flight, position: &str) -> RecordKey {
+    RecordKey {
+        departure_us: flight.departure_utc.as_microsecond(),
+        tail_number: flight.tail_number.to_string(),
+        flight_id: flight.flight_id.to_string(),
+        position: position.to_owned(),
+    }
 }
 
 /// The flight an account speaks of, where its log was identified.

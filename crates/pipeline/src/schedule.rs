@@ -16,9 +16,9 @@ use job::{Config, Stamp};
 use store::{Holder, LogAccount, LogResult, Store, Writer};
 
 use crate::account::{self, Report};
+use crate::book::Book;
 use crate::error::Error;
 use crate::event::Event;
-use crate::book::Book;
 use crate::plan::{self, Plan, Request, Work};
 use crate::trends;
 
@@ -56,7 +56,8 @@ pub fn installations(config: &Config) -> Result<Installations, Error> {
 /// # Errors
 /// As [`run`], except that no store is needed.
 pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
-    let accounts = if config.store().exists() { Store::open(&config.store())?.accounts()? } else { Vec::new() };
+    let accounts =
+        if config.store().exists() { Store::open(&config.store())?.accounts()? } else { Vec::new() };
     plan::plan(config, &installations(config)?, accounts, request)
 }
 
@@ -79,7 +80,14 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
 
-    let shop = Shop { config, installations: &installations, request, context, plan: &plan, run_id: &report.run_id.clone() };
+    let shop = Shop {
+        config,
+        installations: &installations,
+        request,
+        context,
+        plan: &plan,
+        run_id: &report.run_id.clone(),
+    };
     let touched = shop.work(workers, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
@@ -150,7 +158,12 @@ struct Shop<'a> {
 
 impl Shop<'_> {
     /// Lets the workers loose and writes what they bring; returns the units whose records changed.
-    fn work(&self, workers: usize, writer: &mut Writer, report: &mut Report) -> Result<Vec<trends::Unit>, Error> {
+    fn work(
+        &self,
+        workers: usize,
+        writer: &mut Writer,
+        report: &mut Report,
+    ) -> Result<Vec<trends::Unit>, Error> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build()?;
         let (next, taken) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let halt = AtomicBool::new(false);
@@ -192,7 +205,8 @@ impl Shop<'_> {
     fn one(&self, work: &Work) -> Done {
         let clock = Instant::now();
         let done = catch_unwind(AssertUnwindSafe(|| self.open(work))).unwrap_or_else(|panic| {
-            let what = format!("reading this log failed in a way that should not happen: {}", panic_text(&*panic));
+            let what =
+                format!("reading this log failed in a way that should not happen: {}", panic_text(&*panic));
             let complaint = Complaint::new("panic", what)
                 .in_file(&work.shown)
                 .hint("the file is probably damaged; please report it with the file");
@@ -233,7 +247,8 @@ impl Shop<'_> {
         account.positions = names.iter().map(ToString::to_string).collect();
         if !self.request.redo && plan::digests(&account).is_some_and(|d| self.plan.digests.contains(&d)) {
             // Under its own name it still speaks for its records; under a new one they stay as they are.
-            let before = work.before.as_ref().filter(|before| plan::digests(before) == plan::digests(&account));
+            let before =
+                work.before.as_ref().filter(|before| plan::digests(before) == plan::digests(&account));
             (account.estimated, account.refused) = before.map_or((0, 0), |b| (b.estimated, b.refused));
             return Done::Same(Box::new(account));
         }
@@ -255,7 +270,12 @@ impl Shop<'_> {
     }
 
     /// The writer's side: gathers, settles who owns a flight, commits.
-    fn write(&self, done: &Receiver<Done>, writer: &mut Writer, report: &mut Report) -> Result<Vec<trends::Unit>, Error> {
+    fn write(
+        &self,
+        done: &Receiver<Done>,
+        writer: &mut Writer,
+        report: &mut Report,
+    ) -> Result<Vec<trends::Unit>, Error> {
         let mut book = Book::of(self.plan);
         while let Ok(first) = done.recv() {
             let gathered = gather(first, done).into_iter();

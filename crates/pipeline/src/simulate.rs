@@ -28,7 +28,9 @@ pub fn spec(file: Option<&Path>, seed: Option<u64>) -> Result<Spec, Error> {
         })?,
     };
     let mut spec: Spec = toml::from_str(&text).map_err(|e| {
-        Error::refused(Complaint::new("bad_spec", e.message()).in_file(&shown).hint("docs/simulator.md lists every key"))
+        Error::refused(
+            Complaint::new("bad_spec", e.message()).in_file(&shown).hint("docs/simulator.md lists every key"),
+        )
     })?;
     spec.seed = seed.unwrap_or(spec.seed);
     Ok(spec)
@@ -40,7 +42,12 @@ pub fn spec(file: Option<&Path>, seed: Option<u64>) -> Result<Spec, Error> {
 ///
 /// # Errors
 /// [`Error::Refused`] when the spec cannot be flown or a file cannot be written.
-pub fn simulate(spec: &Spec, folder: &Path, jobs: Option<usize>, watch: &(dyn Fn(Event) + Sync)) -> Result<usize, Error> {
+pub fn simulate(
+    spec: &Spec,
+    folder: &Path,
+    jobs: Option<usize>,
+    watch: &(dyn Fn(Event) + Sync),
+) -> Result<usize, Error> {
     let plan = Plan::new(spec).map_err(|e| Error::refused(Complaint::new("bad_spec", e)))?;
     watch(Event::Planned { logs: plan.flights.len(), bytes: 0 });
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
@@ -52,7 +59,8 @@ pub fn simulate(spec: &Spec, folder: &Path, jobs: Option<usize>, watch: &(dyn Fn
         })
     })?;
     text(&folder.join("installations.csv"), &installations(&plan))?;
-    write_parquet(&folder.join("truth.parquet"), &truth(&plan), &[]).map_err(|e| Error::refused(e.complaint()))?;
+    write_parquet(&folder.join("truth.parquet"), &truth(&plan), &[])
+        .map_err(|e| Error::refused(e.complaint()))?;
     text(&folder.join("pipeline.toml"), &configuration(spec))?;
     Ok(plan.flights.len())
 }
@@ -91,7 +99,10 @@ fn facts(flight: &PlannedFlight) -> Vec<(String, String)> {
 fn channels(actuator: ActuatorLog) -> [(String, Column); 3] {
     let named = |channel: &str, unit: Unit, values: Vec<f64>| {
         let (suffix, factor) = recorded(unit);
-        (format!("{}_{channel}_{suffix}", actuator.position), Column::Single(values.into_iter().map(|v| v * factor).collect()))
+        (
+            format!("{}_{channel}_{suffix}", actuator.position),
+            Column::Single(values.into_iter().map(|v| v * factor).collect()),
+        )
     };
     [
         named("motor", actuator.motor_unit, actuator.motor),
@@ -130,9 +141,14 @@ fn installations(plan: &Plan) -> String {
 
 /// The contract's columns of a truth table.
 fn truth(plan: &Plan) -> Vec<(String, Column)> {
-    let all = || plan.flights.iter().flat_map(|flight| flight.actuators.iter().map(move |actuator| (flight, actuator)));
-    let text = |of: &dyn Fn(&PlannedFlight, &simulator::ActuatorTruth) -> String| Column::Text(all().map(|(f, a)| of(f, a)).collect());
-    let real = |of: &dyn Fn(&simulator::ActuatorTruth) -> f64| Column::Real(all().map(|(_, a)| of(a)).collect());
+    let all = || {
+        plan.flights.iter().flat_map(|flight| flight.actuators.iter().map(move |actuator| (flight, actuator)))
+    };
+    let text = |of: &dyn Fn(&PlannedFlight, &simulator::ActuatorTruth) -> String| {
+        Column::Text(all().map(|(f, a)| of(f, a)).collect())
+    };
+    let real =
+        |of: &dyn Fn(&simulator::ActuatorTruth) -> f64| Column::Real(all().map(|(_, a)| of(a)).collect());
     [
         ("tail_number", text(&|f, _| f.tail_number.clone())),
         ("flight_id", text(&|f, _| f.flight_id.clone())),
@@ -183,7 +199,11 @@ unit = "s"
 "#;
 
 fn channel(text: &mut String, channel: &str, column: &str, unit: (&str, &str), wraps_at: Option<f64>) {
-    let _ = writeln!(text, "\n[channel.{channel}]\ncolumn = \"{{position}}_{column}_{}\"\nunit = \"{}\"", unit.0, unit.1);
+    let _ = writeln!(
+        text,
+        "\n[channel.{channel}]\ncolumn = \"{{position}}_{column}_{}\"\nunit = \"{}\"",
+        unit.0, unit.1
+    );
     if let Some(turn) = wraps_at {
         let _ = writeln!(text, "wraps_at = {turn}");
     }
@@ -219,7 +239,12 @@ fn part_table(text: &mut String, part: &simulator::spec::Part, spec: &Spec) {
     let _ = writeln!(
         text,
         "stiffness_n_per_m = {:e}\ndamping_n_s_per_m = {}\nscrew_mass_kg = {}\nlead_m_per_rev = {}\nlimit_m = {:e}\nwatch_m = {:e}",
-        plant.contact.stiffness_n_per_m, plant.contact.damping_n_s_per_m, plant.screw_mass_kg, part.lead_m, part.limit_m, part.limit_m * 0.75
+        plant.contact.stiffness_n_per_m,
+        plant.contact.damping_n_s_per_m,
+        plant.screw_mass_kg,
+        part.lead_m,
+        part.limit_m,
+        part.limit_m * 0.75
     );
     let _ = writeln!(
         text,

@@ -9,7 +9,7 @@ use job::Config;
 use rayon::prelude::*;
 use serde::Serialize;
 use store::{Query, Store};
-use trend::{Observation, Series, Trend, Usage};
+use trend::{FleetPrior, Observation, Series, Trend, Usage, classic};
 
 use crate::error::Error;
 
@@ -47,6 +47,9 @@ pub struct TrendRow {
     pub rate_p95_m_per_hour: Option<f64>,
     pub trend: &'static str,
     pub trend_p_value: Option<f64>,
+    pub sen_rate_m_per_hour: Option<f64>,
+    pub sen_low_m_per_hour: Option<f64>,
+    pub sen_high_m_per_hour: Option<f64>,
     pub change_points: Vec<ChangePoint>,
     pub limit_m: Option<f64>,
     pub crossing_hours_p05: Option<f64>,
@@ -73,10 +76,14 @@ pub struct Ask {
 ///
 /// # Errors
 /// When the store cannot be read, or a part's limits cannot be judged by.
-pub fn of_store(config: &Config, installations: &Installations, store: &Store, ask: &Ask) -> Result<Vec<TrendRow>, Error> {
-    // A unit's history is on every tail it flew on, so a tail selects units and never cuts their records.
-    let query = Query { serial_number: ask.serial_number.clone(), part_number: ask.part_number.clone(), ..Query::default() };
-    let flown = store.records(&query)?.into_iter().map(|record| Flown::of(record, installations)).collect();
+pub fn of_store(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+    ask: &Ask,
+) -> Result<Vec<TrendRow>, Error> {
+    // A statement leans on what the part's other units teach, so what is asked selects rows, not records.
+    let flown = flown_in_store(installations, store)?;
     of_histories(config, installations, &histories(flown), ask)
 }
 
@@ -84,11 +91,17 @@ pub fn of_store(config: &Config, installations: &Installations, store: &Store, a
 ///
 /// # Errors
 /// As [`of_store`].
-pub fn of_units(config: &Config, installations: &Installations, store: &Store, units: &[Unit]) -> Result<Vec<TrendRow>, Error> {
+pub fn of_units(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+    units: &[Unit],
+) -> Result<Vec<TrendRow>, Error> {
     if units.is_empty() {
         return Ok(Vec::new());
     }
-    let wanted: BTreeSet<(Option<&str>, &str)> = units.iter().map(|(p, s)| (Some(p.as_str()), s.as_str())).collect();
+    let wanted: BTreeSet<(Option<&str>, &str)> =
+        units.iter().map(|(p, s)| (Some(p.as_str()), s.as_str())).collect();
     let mut rows = of_store(config, installations, store, &Ask::default())?;
     rows.retain(|row| wanted.contains(&(row.part_number.as_deref(), row.serial_number.as_str())));
     Ok(rows)
@@ -98,7 +111,12 @@ pub fn of_units(config: &Config, installations: &Installations, store: &Store, u
 ///
 /// # Errors
 /// When the table cannot be read, or a part's limits cannot be judged by.
-pub fn of_table(config: &Config, installations: &Installations, file: &Path, ask: &Ask) -> Result<Vec<TrendRow>, Error> {
+pub fn of_table(
+    config: &Config,
+    installations: &Installations,
+    file: &Path,
+    ask: &Ask,
+) -> Result<Vec<TrendRow>, Error> {
     of_histories(config, installations, &histories(crate::estimates::read(file)?), ask)
 }
 
@@ -113,12 +131,30 @@ pub fn of_queries(
     queries: &[crate::estimates::AsOf],
 ) -> Result<Vec<TrendRow>, Error> {
     let histories = histories(flown);
-    let of = |query: &crate::estimates::AsOf| {
-        let fits = |unit: &&HistoryName| unit.1 == query.serial_number && (query.part_number.is_none() || unit.0 == query.part_number);
-        let name = histories.keys().find(fits).cloned().unwrap_or((query.part_number.clone(), query.serial_number.clone()));
-        statement(config, installations, &name, histories.get(&name).map_or(&[], Vec::as_slice), query.as_of_utc)
+    // Days are few and units many: what a part's fleet taught is learned once for each day.
+    let mut days: BTreeMap<Timestamp, Vec<usize>> = BTreeMap::new();
+    for (row, query) in queries.iter().enumerate() {
+        days.entry(query.as_of_utc).or_default().push(row);
+    }
+    let days: Vec<(Timestamp, Vec<usize>)> = days.into_iter().collect();
+    let of_day = |(as_of, rows): &(Timestamp, Vec<usize>)| {
+        let fleet = Fleet::until(config, installations, &histories, *as_of)?;
+        rows.iter()
+            .map(|&row| Ok((row, fleet.statement(&unit_of(&queries[row], &histories))?)))
+            .collect::<Result<Vec<_>, Error>>()
     };
-    queries.par_iter().map(of).collect()
+    let mut found: Vec<(usize, TrendRow)> =
+        days.par_iter().map(of_day).collect::<Result<Vec<_>, _>>()?.concat();
+    found.sort_by_key(|(row, _)| *row);
+    Ok(found.into_iter().map(|(_, statement)| statement).collect())
+}
+
+/// The unit a query means; one that never flew has a name all the same.
+fn unit_of(query: &crate::estimates::AsOf, histories: &BTreeMap<HistoryName, Vec<Flown>>) -> HistoryName {
+    let fits = |unit: &&HistoryName| {
+        unit.1 == query.serial_number && (query.part_number.is_none() || unit.0 == query.part_number)
+    };
+    histories.keys().find(fits).cloned().unwrap_or((query.part_number.clone(), query.serial_number.clone()))
 }
 
 /// Every flight of the store, for queries of several days.
@@ -180,7 +216,7 @@ fn histories(flown: Vec<Flown>) -> BTreeMap<HistoryName, Vec<Flown>> {
     units
 }
 
-/// One statement for each unit, by part and serial number.
+/// One statement for each asked unit, by part and serial number.
 fn of_histories(
     config: &Config,
     installations: &Installations,
@@ -189,34 +225,81 @@ fn of_histories(
 ) -> Result<Vec<TrendRow>, Error> {
     let newest = || histories.values().flatten().map(|f| f.departure_utc).max();
     let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(Vec::new()) };
-    let asked = |name: &HistoryName| {
-        ask.serial_number.as_ref().is_none_or(|s| *s == name.1) && (ask.part_number.is_none() || ask.part_number == name.0)
+    let fleet = Fleet::until(config, installations, histories, as_of)?;
+    let asked = |name: &&HistoryName| {
+        ask.serial_number.as_ref().is_none_or(|s| *s == name.1)
+            && (ask.part_number.is_none() || ask.part_number == name.0)
     };
-    let units: Vec<_> = histories.iter().filter(|(name, _)| asked(name)).collect();
-    let state = |(name, flown): &(&HistoryName, &Vec<Flown>)| statement(config, installations, name, flown, as_of);
-    let mut rows = units.par_iter().map(state).collect::<Result<Vec<_>, _>>()?;
+    let units: Vec<&HistoryName> = histories.keys().filter(asked).collect();
+    let mut rows = units.par_iter().map(|name| fleet.statement(name)).collect::<Result<Vec<_>, _>>()?;
     rows.retain(|row| row.flights > 0 && (ask.tail_number.is_none() || row.tail_number == ask.tail_number));
     Ok(rows)
 }
 
-fn statement(config: &Config, installations: &Installations, name: &HistoryName, flown: &[Flown], as_of: Timestamp) -> Result<TrendRow, Error> {
-    let until: Vec<&Flown> = flown.iter().filter(|f| f.departure_utc <= as_of).collect();
-    let part = name.0.as_deref().and_then(|number| PartNumber::new(number).ok()).and_then(|n| config.parts.get(&n));
-    let limit_m = part.and_then(|p| p.limit_m);
-    let settings = settings(config, limit_m, part.and_then(|p| p.watch_m));
-    let series = series(installations, name, &until)?;
-    let trend = trend::trend(&series, as_of.as_microsecond(), &settings, None)?;
-    Ok(row(name, &until, limit_m, &trend, as_of))
+/// All units until a day, and what each part's units teach about the next.
+struct Fleet<'a> {
+    config: &'a Config,
+    as_of: Timestamp,
+    units: BTreeMap<&'a HistoryName, (Vec<&'a Flown>, Series)>,
+    priors: BTreeMap<Option<&'a str>, FleetPrior>,
+}
+
+impl<'a> Fleet<'a> {
+    fn until(
+        config: &'a Config,
+        installations: &Installations,
+        histories: &'a BTreeMap<HistoryName, Vec<Flown>>,
+        as_of: Timestamp,
+    ) -> Result<Self, Error> {
+        let mut units = BTreeMap::new();
+        for (name, flown) in histories {
+            let until: Vec<&Flown> = flown.iter().filter(|f| f.departure_utc <= as_of).collect();
+            let series = series(installations, name, &until)?;
+            units.insert(name, (until, series));
+        }
+        let mut fleet = Self { config, as_of, units, priors: BTreeMap::new() };
+        let parts: BTreeSet<Option<&str>> = fleet.units.keys().map(|name| name.0.as_deref()).collect();
+        let parts: Vec<Option<&str>> = parts.into_iter().collect();
+        let learned: Vec<FleetPrior> = parts.par_iter().map(|part| fleet.learn(*part)).collect();
+        fleet.priors = parts.into_iter().zip(learned).collect();
+        Ok(fleet)
+    }
+
+    fn learn(&self, part: Option<&str>) -> FleetPrior {
+        let of_part =
+            self.units.iter().filter(|(name, _)| name.0.as_deref() == part).map(|(_, (_, series))| series);
+        FleetPrior::learn(
+            of_part,
+            self.as_of.as_microsecond(),
+            settings(self.config, self.part(part)).limit_m,
+        )
+    }
+
+    fn part(&self, number: Option<&str>) -> Option<&'a job::Part> {
+        number
+            .and_then(|number| PartNumber::new(number).ok())
+            .and_then(|number| self.config.parts.get(&number))
+    }
+
+    fn statement(&self, name: &HistoryName) -> Result<TrendRow, Error> {
+        let nothing = (Vec::new(), Series::new([], &Usage::default())?);
+        let (flown, series) = self.units.get(name).unwrap_or(&nothing);
+        let part = self.part(name.0.as_deref());
+        let prior = self.priors.get(&name.0.as_deref());
+        let trend =
+            trend::trend(series, self.as_of.as_microsecond(), &settings(self.config, part), prior, None)?;
+        Ok(row(name, flown, series, part.and_then(|p| p.limit_m), &trend, self.as_of))
+    }
 }
 
 /// Without a limit there is still a level and a rate; only crossings and states need one.
-fn settings(config: &Config, limit_m: Option<f64>, watch_m: Option<f64>) -> trend::Settings {
+fn settings(config: &Config, part: Option<&job::Part>) -> trend::Settings {
     /// A gap no actuator has: a stand-in that is never met and never shown.
     const NEVER_M: f64 = 1.0;
     let of = &config.document.trend;
-    let base = trend::Settings::for_limit(limit_m.unwrap_or(NEVER_M));
+    let base = trend::Settings::for_limit(part.and_then(|p| p.limit_m).unwrap_or(NEVER_M));
     trend::Settings {
-        watch_m: watch_m.unwrap_or(base.watch_m),
+        watch_m: part.and_then(|p| p.watch_m).unwrap_or(base.watch_m),
         planning_horizon_hours: of.planning_horizon_hours,
         horizon_hours: of.horizon_hours,
         stale_after_days: of.stale_after_days,
@@ -239,15 +322,27 @@ fn series(installations: &Installations, name: &HistoryName, flown: &[&Flown]) -
         }
     });
     let mine = |s: &&fleet::Installation| {
-        s.serial_number.as_str() == name.1 && name.0.as_deref().is_none_or(|part| s.part_number.as_str() == part)
+        s.serial_number.as_str() == name.1
+            && name.0.as_deref().is_none_or(|part| s.part_number.as_str() == part)
     };
     let first = installations.iter().filter(mine).min_by_key(|s| s.installed_utc);
-    let usage = Usage { unit_hours_at_start: first.and_then(|s| s.unit_hours_at_install), ..Usage::default() };
+    let usage =
+        Usage { unit_hours_at_start: first.and_then(|s| s.unit_hours_at_install), ..Usage::default() };
     Ok(Series::new(observations, &usage)?)
 }
 
-fn row(name: &HistoryName, flown: &[&Flown], limit_m: Option<f64>, trend: &Trend, as_of: Timestamp) -> TrendRow {
+fn row(
+    name: &HistoryName,
+    flown: &[&Flown],
+    series: &Series,
+    limit_m: Option<f64>,
+    trend: &Trend,
+    as_of: Timestamp,
+) -> TrendRow {
     let last = flown.iter().max_by_key(|f| f.departure_utc);
+    let (hours, gaps): (Vec<f64>, Vec<f64>) =
+        series.flights().iter().filter_map(|f| Some((f.hours, f.gap?.gap_m))).unzip();
+    let sen = classic::theil_sen(&hours, &gaps, 0.90).ok();
     let crossing = trend.crossing.filter(|_| limit_m.is_some());
     TrendRow {
         part_number: name.0.clone(),
@@ -263,14 +358,21 @@ fn row(name: &HistoryName, flown: &[&Flown], limit_m: Option<f64>, trend: &Trend
         rate_p05_m_per_hour: trend.rate.map(|r| r.p05_m_per_hour),
         rate_p95_m_per_hour: trend.rate.map(|r| r.p95_m_per_hour),
         trend: wear(trend.wear),
-        trend_p_value: trend.trend_p_value,
+        trend_p_value: classic::mann_kendall(&gaps).ok().map(|test| test.p_value),
+        sen_rate_m_per_hour: sen.map(|s| s.slope),
+        sen_low_m_per_hour: sen.map(|s| s.slope_low),
+        sen_high_m_per_hour: sen.map(|s| s.slope_high),
         change_points: trend.changes.iter().filter_map(|c| change_point(c, flown)).collect(),
         limit_m,
         crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
         crossing_hours_p50: crossing.and_then(|c| c.p50_hours),
         crossing_hours_p95: crossing.and_then(|c| c.p95_hours),
         state: trend.state.filter(|_| limit_m.is_some()).map(state_word),
-        reason: Some(if limit_m.is_some() { trend.reason.to_string() } else { "no limit is configured".into() }),
+        reason: Some(if limit_m.is_some() {
+            trend.reason.to_string()
+        } else {
+            "no limit is configured".into()
+        }),
     }
 }
 

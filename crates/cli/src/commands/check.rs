@@ -26,13 +26,15 @@ const SLOPE_TOLERANCE: f64 = 0.02;
 ///
 /// # Errors
 /// When configuration or tables are wrong. Logs in error make the code 1.
-pub fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
+pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
     let (config, installations) = booked(global)?;
     let logs = logs(args, &config)?;
     let (mut channels, mut complaints, mut page) = (Vec::new(), Vec::new(), String::new());
     for (path, name) in &logs {
         match Opened::open(path, name, &config) {
-            Ok(opened) => one(&opened, name, &config, &installations, &mut channels, &mut complaints, &mut page),
+            Ok(opened) => {
+                one(&opened, name, &config, &installations, &mut channels, &mut complaints, &mut page)
+            }
             Err(complaint) => complaints.push(complaint),
         }
     }
@@ -116,15 +118,27 @@ fn repairs(line: &ingest::Timeline) -> String {
     if r.none() {
         return String::new();
     }
-    format!("; mended: {} out of order, {} repeated, {} without a stamp", r.out_of_order, r.repeated, r.unstamped)
+    format!(
+        "; mended: {} out of order, {} repeated, {} without a stamp",
+        r.out_of_order, r.repeated, r.unstamped
+    )
 }
 
-fn actuator(opened: &Opened<'_>, name: &str, at: &PositionColumns, config: &Config, installations: &Installations) -> Result<Vec<Channel>, Complaint> {
+fn actuator(
+    opened: &Opened<'_>,
+    name: &str,
+    at: &PositionColumns,
+    config: &Config,
+    installations: &Installations,
+) -> Result<Vec<Channel>, Complaint> {
     let id = &opened.identity;
     let stay = installations.at(&id.tail_number, &at.position, id.departure_utc);
     let stay = stay.ok_or_else(|| {
-        Complaint::new("unit_unknown", format!("no unit is booked in {} of {} on {}", at.position, id.tail_number, id.departure_utc))
-            .hint("add its stay to the installations table; is the position spelled alike in logs and table?")
+        Complaint::new(
+            "unit_unknown",
+            format!("no unit is booked in {} of {} on {}", at.position, id.tail_number, id.departure_utc),
+        )
+        .hint("add its stay to the installations table; is the position spelled alike in logs and table?")
     })?;
     let base = |channel: &'static str, column: &Option<String>, unit: &'static str| Channel {
         log: name.to_owned(),
@@ -145,7 +159,8 @@ fn actuator(opened: &Opened<'_>, name: &str, at: &PositionColumns, config: &Conf
     };
     let [motor, screw, load, _] = &at.columns;
     if !at.lacking.is_empty() {
-        let note = Some(format!("would be refused, channel_unmapped: the log lacks {}", at.lacking.join(", ")));
+        let note =
+            Some(format!("would be refused, channel_unmapped: the log lacks {}", at.lacking.join(", ")));
         return Ok(vec![Channel { note, ..base("all", motor, "") }]);
     }
     let part = part_of(config, &stay.part_number)?;
@@ -203,7 +218,9 @@ fn layout(channels: &[Channel]) -> String {
         let scale = if c.unit == "m" { 1e3 } else { 1.0 };
         let value = |v: Option<f64>| v.map_or_else(table::dash, |v| format!("{:.3}", v * scale));
         let share = |v: Option<f64>| v.map_or_else(table::dash, |v| format!("{:.2}", v * 100.0));
-        let step = c.resolution.map_or_else(table::dash, |v| if c.unit == "m" { format!("{:.3} µm", v * 1e6) } else { format!("{v:.3}") });
+        let step = c.resolution.map_or_else(table::dash, |v| {
+            if c.unit == "m" { format!("{:.3} µm", v * 1e6) } else { format!("{v:.3}") }
+        });
         vec![
             c.position.clone(),
             c.serial_number.clone().unwrap_or_else(table::dash),

@@ -21,7 +21,7 @@ use super::{booked, config, run::count, shown};
 ///
 /// # Errors
 /// When configuration or tables are wrong. Logs in error make the code 1.
-pub fn estimate(args: &EstimateArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
+pub(crate) fn estimate(args: &EstimateArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
     let (config, installations) = match &args.part {
         Some(_) => (config(global)?, Installations::default()),
         None => booked(global)?,
@@ -66,7 +66,8 @@ struct Row {
 }
 
 fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
-    let name = PartNumber::new(number).map_err(|e| Failure::usage("empty_name", e, "name one that the configuration has"))?;
+    let name = PartNumber::new(number)
+        .map_err(|e| Failure::usage("empty_name", e, "name one that the configuration has"))?;
     match part_of(config, &name) {
         Ok(_) => Ok(name),
         Err(complaint) => Err(Failure::Refused(vec![complaint])),
@@ -94,13 +95,21 @@ fn as_part(path: &Path, config: &Config, number: &PartNumber) -> Result<Vec<Row>
     Ok(found.into_iter().map(row).collect())
 }
 
-fn booked_log(path: &Path, config: &Config, installations: &Installations, complaints: &mut Vec<Complaint>) -> Result<Vec<Row>, Complaint> {
+fn booked_log(
+    path: &Path,
+    config: &Config,
+    installations: &Installations,
+    complaints: &mut Vec<Complaint>,
+) -> Result<Vec<Row>, Complaint> {
     let name = shown(path);
     let opened = Opened::open(path, &name, config)?;
     let flight = opened.flight();
     let mut rows = Vec::new();
     for at in &opened.positions {
-        match opened.unit(at, config, installations).and_then(|(stay, part)| Ok((stay, opened.estimate(at, part, config)?))) {
+        match opened
+            .unit(at, config, installations)
+            .and_then(|(stay, part)| Ok((stay, opened.estimate(at, part, config)?)))
+        {
             Ok((stay, estimate)) => rows.push(Row {
                 tail_number: Some(flight.tail_number.to_string()),
                 position: Some(at.position.to_string()),
@@ -161,15 +170,28 @@ fn page(found: &[Row]) -> String {
         ]
     };
     let head = format!("{}; nothing was stored\n", count(found.len(), "estimate"));
-    if found.is_empty() { head } else { head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>()) }
+    if found.is_empty() {
+        head
+    } else {
+        head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
+    }
 }
 
 /// Writes what the filter saw, per sample, of every actuator of the logs.
-fn trace(file: &Path, logs: &[PathBuf], config: &Config, installations: &Installations, part: Option<&PartNumber>, talk: &Talk) -> Result<(), Failure> {
+fn trace(
+    file: &Path,
+    logs: &[PathBuf],
+    config: &Config,
+    installations: &Installations,
+    part: Option<&PartNumber>,
+    talk: &Talk,
+) -> Result<(), Failure> {
     let mut all = job::trace::Trace::default();
     for path in logs {
         // A log in error was told of already; its trace is simply not there.
-        let Ok(opened) = job::trace::of_log(path, &shown(path), config, installations, part) else { continue };
+        let Ok(opened) = job::trace::of_log(path, &shown(path), config, installations, part) else {
+            continue;
+        };
         all.extend(opened);
     }
     let columns = all.columns();

@@ -19,7 +19,7 @@ const FILES: [(&str, &str); 2] = [
 ///
 /// # Errors
 /// When one of them is there already; then nothing is written.
-pub fn init(args: &InitArgs, talk: &Talk) -> Result<Code, Failure> {
+pub(crate) fn init(args: &InitArgs, talk: &Talk) -> Result<Code, Failure> {
     let there = FILES.iter().map(|(name, _)| args.dir.join(name)).find(|path| path.exists());
     if let Some(path) = there {
         return Err(exists(&path));
@@ -28,7 +28,8 @@ pub fn init(args: &InitArgs, talk: &Talk) -> Result<Code, Failure> {
     for (name, text) in FILES {
         let path = args.dir.join(name);
         let file = OpenOptions::new().write(true).create_new(true).open(&path);
-        let mut file = file.map_err(|e| if e.kind() == ErrorKind::AlreadyExists { exists(&path) } else { e.into() })?;
+        let mut file =
+            file.map_err(|e| if e.kind() == ErrorKind::AlreadyExists { exists(&path) } else { e.into() })?;
         file.write_all(text.as_bytes())?;
         talk.answer(&format!("wrote {}\n", shown(&path)))?;
     }

@@ -15,12 +15,16 @@ use super::{config, run::count};
 ///
 /// # Errors
 /// When configuration or store cannot be read.
-pub fn query(args: &QueryArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
+pub(crate) fn query(args: &QueryArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
     let store = Store::open(&config(global)?.store())?;
     let records = store.records(&asked(args))?;
     rows::answer(&args.output, talk, || Ok(store::columns::to_batch(&records)?), || page(&records))?;
     if records.is_empty() {
-        talk.note(&format!("no record of {} `{}`; `freeplay store info` says what there is", word(args.by), args.id));
+        talk.note(&format!(
+            "no record of {} `{}`; `freeplay store info` says what there is",
+            word(args.by),
+            args.id
+        ));
     }
     Ok(Code::Well)
 }
@@ -49,7 +53,7 @@ fn asked(args: &QueryArgs) -> Query {
 }
 
 /// Records as people read them.
-pub fn page(records: &[GapRecord]) -> String {
+pub(crate) fn page(records: &[GapRecord]) -> String {
     let columns = [
         text("departure UTC", 0),
         text("tail", 2),
@@ -80,16 +84,20 @@ pub fn page(records: &[GapRecord]) -> String {
         ]
     };
     let head = format!("{}\n", count(records.len(), "record"));
-    if records.is_empty() { head } else { head + &table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>()) }
+    if records.is_empty() {
+        head
+    } else {
+        head + &table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>())
+    }
 }
 
 /// The load band a number stands on.
-pub fn load(e: &fleet::Estimate) -> String {
+pub(crate) fn load(e: &fleet::Estimate) -> String {
     e.load_p05_n.zip(e.load_p95_n).map_or_else(table::dash, |(low, high)| format!("{low:.0}…{high:.0}"))
 }
 
 /// Why refused, or what is doubted.
-pub fn doubts(e: &fleet::Estimate) -> String {
+pub(crate) fn doubts(e: &fleet::Estimate) -> String {
     let reason = e.reason.iter().map(|reason| match e.status {
         fleet::Status::Refused => format!("refused: {reason}"),
         fleet::Status::Estimated => reason.clone(),

@@ -23,7 +23,7 @@ use super::{VERSION, config, trend::state_mark};
 ///
 /// # Errors
 /// When nothing could be run, or the store failed.
-pub fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
+pub(crate) fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
     let config = config(global)?;
     let request = request(args)?;
     if args.dry_run {
@@ -33,7 +33,13 @@ pub fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, Failure
     listen(&stop)?;
     let progress = Progress::new("run", talk);
     let watch = |event: Event| follow(&event, &progress);
-    let context = Context { program_version: VERSION, holder: Holder::this_process(), wait: args.wait, stop: &stop, watch: &watch };
+    let context = Context {
+        program_version: VERSION,
+        holder: Holder::this_process(),
+        wait: args.wait,
+        stop: &stop,
+        watch: &watch,
+    };
     let report = schedule::run(&config, &request, &context);
     progress.end();
     let report = report?;
@@ -49,7 +55,8 @@ pub fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, Failure
 }
 
 fn request(args: &RunArgs) -> Result<Request, Failure> {
-    let empty = |e: fleet::ids::EmptyName| Failure::usage("empty_name", e, "leave the option out to ask for all");
+    let empty =
+        |e: fleet::ids::EmptyName| Failure::usage("empty_name", e, "leave the option out to ask for all");
     Ok(Request {
         since_utc: args.since,
         until_utc: args.until,
@@ -76,7 +83,9 @@ fn follow(event: &Event, progress: &Progress<'_>) {
     match event {
         Event::Planned { logs, .. } => progress.total(*logs),
         Event::Started { log } => progress.started(log),
-        Event::Finished { log, refused, complaints, .. } => progress.finished(log, *refused, complaints.len()),
+        Event::Finished { log, refused, complaints, .. } => {
+            progress.finished(log, *refused, complaints.len())
+        }
         Event::Stored { .. } | Event::Trends { .. } => {}
     }
 }
@@ -102,13 +111,30 @@ fn code(report: &Report, fail_on: Option<FailOn>, stopped: bool) -> Code {
 
 /// The morning's page.
 fn account(report: &Report, config: &str, code: Code) -> String {
-    let mut page = format!("Freeplay {VERSION} · run {} · {config}\n", report.started_utc.strftime("%Y-%m-%dT%H:%M:%SZ"));
+    let mut page = format!(
+        "Freeplay {VERSION} · run {} · {config}\n",
+        report.started_utc.strftime("%Y-%m-%dT%H:%M:%SZ")
+    );
     let new = report.found - report.known;
     line(&mut page, "found", &format!("{}: {new} to do, {} known", count(report.found, "log"), report.known));
     let records = report.estimated + report.refusals();
-    line(&mut page, "stored", &format!("{} of {}: {} estimated, {}", count(records, "record"), count(report.flights, "flight"), report.estimated, refused(report)));
+    line(
+        &mut page,
+        "stored",
+        &format!(
+            "{} of {}: {} estimated, {}",
+            count(records, "record"),
+            count(report.flights, "flight"),
+            report.estimated,
+            refused(report)
+        ),
+    );
     if !report.errors.is_empty() {
-        line(&mut page, "in error", &format!("{}; everything else is stored", count(report.logs_in_error(), "log")));
+        line(
+            &mut page,
+            "in error",
+            &format!("{}; everything else is stored", count(report.logs_in_error(), "log")),
+        );
     }
     for error in report.errors.iter().take(10) {
         let place = error.complaint.place().map(|p| format!("  {p}")).unwrap_or_default();
@@ -118,11 +144,19 @@ fn account(report: &Report, config: &str, code: Code) -> String {
         line(&mut page, "", &format!("and {} more, all in `freeplay run --json`", report.errors.len() - 10));
     }
     if report.not_reached > 0 {
-        line(&mut page, "not reached", &format!("{}; the next run does them", count(report.not_reached, "log")));
+        line(
+            &mut page,
+            "not reached",
+            &format!("{}; the next run does them", count(report.not_reached, "log")),
+        );
     }
     if let Some((log, seconds)) = &report.slowest {
         let took = span(Duration::from_secs_f64(report.took_s));
-        line(&mut page, "slowest", &format!("{}, {seconds:.1} s · took {took}, {}", escape(log), count(report.workers, "worker")));
+        line(
+            &mut page,
+            "slowest",
+            &format!("{}, {seconds:.1} s · took {took}, {}", escape(log), count(report.workers, "worker")),
+        );
     }
     page.push_str(&attention(&report.trends));
     if code == Code::LogsInError {
@@ -133,7 +167,11 @@ fn account(report: &Report, config: &str, code: Code) -> String {
 
 fn refused(report: &Report) -> String {
     let reasons: Vec<String> = report.refused.iter().map(|(reason, n)| format!("{reason} {n}")).collect();
-    if reasons.is_empty() { "0 refused".into() } else { format!("{} refused ({})", report.refusals(), reasons.join(", ")) }
+    if reasons.is_empty() {
+        "0 refused".into()
+    } else {
+        format!("{} refused ({})", report.refusals(), reasons.join(", "))
+    }
 }
 
 fn line(page: &mut String, label: &str, text: &str) {
@@ -141,7 +179,7 @@ fn line(page: &mut String, label: &str, text: &str) {
 }
 
 /// `1 log`, `2 logs`.
-pub fn count(n: usize, what: &str) -> String {
+pub(crate) fn count(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
@@ -158,9 +196,22 @@ fn attention(rows: &[TrendRow]) -> String {
     });
     let silent = rows.iter().filter(|r| r.state.is_none()).count();
     let normal = rows.len() - urgent.len() - silent;
-    let mut page = format!("\n{} touched: {} need attention, {normal} normal, {silent} without a statement\n", count(rows.len(), "unit"), urgent.len());
+    let mut page = format!(
+        "\n{} touched: {} need attention, {normal} normal, {silent} without a statement\n",
+        count(rows.len(), "unit"),
+        urgent.len()
+    );
     if !urgent.is_empty() {
-        let columns = [text("state", 0), text("part / serial", 0), text("tail", 2), text("position", 3), number("gap µm", 0), number("limit µm", 4), number("not before h", 1), text("why", 5)];
+        let columns = [
+            text("state", 0),
+            text("part / serial", 0),
+            text("tail", 2),
+            text("position", 3),
+            number("gap µm", 0),
+            number("limit µm", 4),
+            number("not before h", 1),
+            text("why", 5),
+        ];
         let cells = |r: &&TrendRow| {
             vec![
                 state_mark(r.state),
@@ -181,12 +232,17 @@ fn attention(rows: &[TrendRow]) -> String {
 fn dry_run(config: &job::Config, request: &Request, talk: &Talk) -> Result<Code, Failure> {
     let Plan { found, known, work, .. } = schedule::dry_run(config, request)?;
     let bytes: i64 = work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes).sum();
-    let head = format!("would do {} of {found} ({known} known), {:.1} MB; nothing was done\n", count(work.len(), "log"), bytes as f64 / 1e6);
+    let head = format!(
+        "would do {} of {found} ({known} known), {:.1} MB; nothing was done\n",
+        count(work.len(), "log"),
+        bytes as f64 / 1e6
+    );
     let columns = [text("log", 0), text("why", 0), number("MB", 1)];
     let rows: Vec<Vec<String>> = work
         .iter()
         .map(|w| {
-            let megabytes = w.stat.as_ref().map_or_else(table::dash, |s| format!("{:.2}", s.size_bytes as f64 / 1e6));
+            let megabytes =
+                w.stat.as_ref().map_or_else(table::dash, |s| format!("{:.2}", s.size_bytes as f64 / 1e6));
             vec![w.shown.clone(), w.why.as_str().to_owned(), megabytes]
         })
         .collect();

@@ -10,7 +10,7 @@ use crate::talk::Talk;
 ///
 /// # Errors
 /// When stdout is closed or full.
-pub fn completions(args: &CompletionsArgs, talk: &Talk) -> Result<Code, Failure> {
+pub(crate) fn completions(args: &CompletionsArgs, talk: &Talk) -> Result<Code, Failure> {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut Args::command(), "freeplay", &mut text);
     talk.answer(&String::from_utf8_lossy(&text))?;
@@ -21,7 +21,7 @@ pub fn completions(args: &CompletionsArgs, talk: &Talk) -> Result<Code, Failure>
 ///
 /// # Errors
 /// When stdout is closed or full.
-pub fn man(talk: &Talk) -> Result<Code, Failure> {
+pub(crate) fn man(talk: &Talk) -> Result<Code, Failure> {
     let mut text = Vec::new();
     let command = Args::command();
     clap_mangen::Man::new(command.clone()).render(&mut text)?;

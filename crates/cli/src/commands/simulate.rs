@@ -13,8 +13,11 @@ use super::{run::count, shown};
 ///
 /// # Errors
 /// When the spec cannot be flown, the folder holds logs already, or a file cannot be written.
-pub fn simulate(args: &SimulateArgs, talk: &Talk) -> Result<Code, Failure> {
-    let taken = ["logs", "pipeline.toml", "installations.csv"].iter().map(|name| args.output.join(name)).find(|p| p.exists());
+pub(crate) fn simulate(args: &SimulateArgs, talk: &Talk) -> Result<Code, Failure> {
+    let taken = ["logs", "pipeline.toml", "installations.csv"]
+        .iter()
+        .map(|name| args.output.join(name))
+        .find(|p| p.exists());
     if let Some(path) = taken {
         let what = format!("{} is there already", shown(&path));
         return Err(Failure::usage("would_overwrite", what, "name an empty folder; nothing was changed"));

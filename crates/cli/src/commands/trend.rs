@@ -18,7 +18,7 @@ use super::{booked, run::count};
 ///
 /// # Errors
 /// When configuration, tables or store cannot be read.
-pub fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
+pub(crate) fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
     let (config, installations) = booked(global)?;
     let ask = Ask {
         tail_number: args.tail.clone(),
@@ -43,7 +43,7 @@ pub fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Code, Fai
 }
 
 /// A state as word and shape, told apart without colour.
-pub fn state_mark(state: Option<&str>) -> String {
+pub(crate) fn state_mark(state: Option<&str>) -> String {
     let shape = match state {
         Some("act") => "◆",
         Some("plan") => "▲",
@@ -94,7 +94,11 @@ fn page(found: &[TrendRow]) -> String {
         || "no unit fits\n".to_owned(),
         |as_of| format!("{} as of {}\n", count(found.len(), "unit"), as_of.strftime("%Y-%m-%d %H:%M UTC")),
     );
-    if found.is_empty() { head } else { head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>()) }
+    if found.is_empty() {
+        head
+    } else {
+        head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
+    }
 }
 
 /// The contract's columns.
@@ -102,13 +106,8 @@ fn schema() -> SchemaRef {
     let text = |name: &str| Field::new(name, DataType::Utf8, true);
     let real = |name: &str| Field::new(name, DataType::Float64, true);
     let change = DataType::Struct(
-        vec![
-            Field::new("departure_utc", rows::utc(), true),
-            text("flight_id"),
-            text("kind"),
-            real("step_m"),
-        ]
-        .into(),
+        vec![Field::new("departure_utc", rows::utc(), true), text("flight_id"), text("kind"), real("step_m")]
+            .into(),
     );
     Arc::new(Schema::new(vec![
         text("part_number"),
@@ -125,6 +124,9 @@ fn schema() -> SchemaRef {
         real("rate_p95_m_per_hour"),
         text("trend"),
         real("trend_p_value"),
+        real("sen_rate_m_per_hour"),
+        real("sen_low_m_per_hour"),
+        real("sen_high_m_per_hour"),
         Field::new("change_points", DataType::List(Arc::new(Field::new("item", change, true))), true),
         real("limit_m"),
         real("crossing_hours_p05"),

@@ -1,0 +1,1 @@
+//! The `freeplay` command, as its users type it.
