@@ -1,9 +1,11 @@
-//! The published method, whole: model, discretisation, filter and gap statistic, and nothing else.
+//! The published method, whole: model, discretisation, filter and gap statistic; and beside it the gap we
+//! stand behind, by contact regression.
 //!
 //! The crate sees an actuator and slices of `f64`. No paths, no clock, no threads; the same input
 //! gives the same bits. Equation numbers are those of *The Backlash Gap size Estimation for
 //! Electromechanical Actuator in an Operational Behavior*; where print and meaning differ the item says so.
 
+pub mod contact;
 pub mod discretise;
 mod error;
 pub mod filter;
@@ -13,6 +15,7 @@ pub mod midrange;
 pub mod model;
 pub mod noise;
 
+pub use contact::ContactGap;
 pub use discretise::Discrete;
 pub use error::Error;
 pub use filter::{Estimate, Filter, Step, Track};

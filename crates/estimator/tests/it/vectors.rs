@@ -4,13 +4,12 @@
 use std::fs::File;
 use std::path::PathBuf;
 
-use arrow::array::{Array, AsArray};
-use arrow::datatypes::Float64Type;
 use estimator::noise::Sensors;
 use estimator::{Actuator, Filter, Noise, Samples, gap};
 use nalgebra::{Matrix3, Vector3};
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
+
+use crate::table::columns;
 
 const SETS: [&str; 4] =
     ["a_nominal_250hz", "b_stiff_light_1khz", "c_soft_heavy_100hz_missing", "d_rotary_200hz"];
@@ -27,18 +26,7 @@ struct Set {
 impl Set {
     fn load(name: &str) -> Self {
         let all: Value = serde_json::from_reader(File::open(data("vectors.json")).unwrap()).unwrap();
-        let file = File::open(data(&format!("{name}.parquet"))).unwrap();
-        let mut columns = std::collections::BTreeMap::<String, Vec<f64>>::new();
-        for batch in ParquetRecordBatchReaderBuilder::try_new(file).unwrap().build().unwrap() {
-            let batch = batch.unwrap();
-            for (field, column) in batch.schema().fields().iter().zip(batch.columns()) {
-                if let Some(values) = column.as_primitive_opt::<Float64Type>() {
-                    let values =
-                        (0..values.len()).map(|i| if values.is_null(i) { f64::NAN } else { values.value(i) });
-                    columns.entry(field.name().clone()).or_default().extend(values);
-                }
-            }
-        }
+        let columns = columns(&data(&format!("{name}.parquet")));
         Self { json: all[name].clone(), columns }
     }
 

@@ -1,0 +1,177 @@
+//! A flight in blocks of 20 ms: means of whole samples, without the missing and the wild.
+
+use std::ops::Range;
+
+use crate::Samples;
+
+use super::SHORTEST_S;
+use super::refusal::Refusal;
+use super::wild::Neighbours;
+
+/// Length of a block, s: short against the load's changes, long enough to calm the noise.
+const PERIOD_S: f64 = 0.02;
+
+/// Blocks that the search begins with, in windows of this many.
+const EXCERPT_BLOCKS: usize = 6000;
+/// See [`EXCERPT_BLOCKS`]: ten seconds.
+const WINDOW_BLOCKS: usize = 500;
+
+/// Means over blocks; NaN where fewer than half of a block's samples are sound.
+#[derive(Debug)]
+pub(super) struct Blocks {
+    /// Length of a block, s.
+    pub(super) period_s: f64,
+    /// The block at which each segment starts.
+    pub(super) starts: Vec<usize>,
+    /// Middle of each block, s from the first sample of the log.
+    pub(super) time_s: Vec<f64>,
+    /// X₁, m.
+    pub(super) motor_m: Vec<f64>,
+    /// δX once the screw's channel is brought to the motor's clock, m.
+    pub(super) dx_m: Vec<f64>,
+    /// F, N.
+    pub(super) load_n: Vec<f64>,
+    logged_dx_m: Vec<f64>,
+}
+
+impl Blocks {
+    /// # Errors
+    /// [`Refusal::ChannelConstant`], [`Refusal::TooShort`].
+    pub(super) fn gather(samples: &Samples<'_>) -> Result<Self, Refusal> {
+        let each = ((PERIOD_S / samples.step_s).round() as usize).max(1);
+        let watch = Watch::over(samples)?;
+        let mut blocks = Self::with_capacity(samples.dx_m.len() / each, each as f64 * samples.step_s);
+        for segment in samples.segments {
+            blocks.starts.push(blocks.len());
+            for start in segment.clone().step_by(each).take(segment.len() / each) {
+                let middle_s = (start as f64 + 0.5 * (each as f64 - 1.0)) * samples.step_s;
+                blocks.push(middle_s, watch.mean(&(start..start + each), segment));
+            }
+        }
+        blocks.logged_dx_m.clone_from(&blocks.dx_m);
+        let sound = blocks.dx_m.iter().filter(|y| y.is_finite()).count();
+        if (sound as f64) * blocks.period_s < SHORTEST_S { Err(Refusal::TooShort) } else { Ok(blocks) }
+    }
+
+    fn with_capacity(blocks: usize, period_s: f64) -> Self {
+        let room = || Vec::with_capacity(blocks);
+        let (time_s, motor_m, dx_m, load_n) = (room(), room(), room(), room());
+        Self { period_s, starts: Vec::new(), time_s, motor_m, dx_m, load_n, logged_dx_m: Vec::new() }
+    }
+
+    fn push(&mut self, middle_s: f64, mean: Option<[f64; 3]>) {
+        let [motor_m, dx_m, load_n] = mean.unwrap_or([f64::NAN; 3]);
+        self.time_s.push(middle_s);
+        self.motor_m.push(motor_m);
+        self.dx_m.push(dx_m);
+        self.load_n.push(load_n);
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// A part of a long flight, in windows spread over it, for the search to begin with; a short flight whole.
+    pub(super) fn excerpt(&self) -> Self {
+        let every = (self.len() / EXCERPT_BLOCKS).max(1);
+        let window = if every > 1 { WINDOW_BLOCKS } else { self.len().max(1) };
+        let mut part = Self::with_capacity(self.len() / every, self.period_s);
+        for (segment, &start) in self.starts.iter().enumerate() {
+            let end = self.starts.get(segment + 1).copied().unwrap_or(self.len());
+            for from in (start..end).step_by(every * window) {
+                part.starts.push(part.len());
+                for k in from..(from + window).min(end) {
+                    part.push(self.time_s[k], Some([self.motor_m[k], self.logged_dx_m[k], self.load_n[k]]));
+                }
+            }
+        }
+        part.logged_dx_m.clone_from(&part.dx_m);
+        part
+    }
+
+    /// Central difference over two blocks, per second; NaN at the ends.
+    pub(super) fn rate(&self, values: &[f64], at: usize) -> f64 {
+        if at == 0 || at + 1 >= values.len() {
+            return f64::NAN;
+        }
+        (values[at + 1] - values[at - 1]) / (2.0 * self.period_s)
+    }
+
+    /// Reads the screw's channel τ later, by a cubic through four blocks (Catmull–Rom), so that δX is
+    /// the difference of two positions of one moment.
+    pub(super) fn realign(&mut self, skew_s: f64) {
+        let shift = skew_s / self.period_s;
+        let (whole, part) = (shift.floor(), shift - shift.floor());
+        let weights = cubic(part);
+        let screw = |k: usize| self.motor_m[k] + self.logged_dx_m[k];
+        for k in 0..self.dx_m.len() {
+            let first = k as isize + whole as isize - 1;
+            let inside = first >= 0 && first as usize + 3 < self.motor_m.len();
+            let read_m = |j: usize| weights[j] * screw(first as usize + j);
+            self.dx_m[k] = if inside { (0..4).map(read_m).sum::<f64>() - self.motor_m[k] } else { f64::NAN };
+        }
+    }
+}
+
+/// Weights of four even points for a place between the middle two.
+fn cubic(u: f64) -> [f64; 4] {
+    let (square, cube) = (u * u, u * u * u);
+    [
+        0.5 * (2.0 * square - cube - u),
+        0.5 * (3.0 * cube - 5.0 * square + 2.0),
+        0.5 * (4.0 * square - 3.0 * cube + u),
+        0.5 * (cube - square),
+    ]
+}
+
+/// The samples, and how far neighbours of a channel may leap before they are looked at twice.
+#[derive(Debug)]
+struct Watch<'a> {
+    samples: &'a Samples<'a>,
+    dx: Neighbours,
+    load: Neighbours,
+}
+
+impl<'a> Watch<'a> {
+    fn over(samples: &'a Samples<'a>) -> Result<Self, Refusal> {
+        let of = |channel: &[f64]| Neighbours::of(channel).ok_or(Refusal::ChannelConstant);
+        of(samples.motor_m)?;
+        Ok(Self { samples, dx: of(samples.dx_m)?, load: of(samples.load_n)? })
+    }
+
+    /// Means of motor, δX and load over a block; none where fewer than half of its samples are sound.
+    fn mean(&self, block: &Range<usize>, segment: &Range<usize>) -> Option<[f64; 3]> {
+        self.calm_mean(block).or_else(|| self.careful_mean(block, segment))
+    }
+
+    /// For a block in which nothing is missing and nothing leaps: nearly every one.
+    fn calm_mean(&self, block: &Range<usize>) -> Option<[f64; 3]> {
+        let Samples { motor_m, dx_m, load_n, .. } = self.samples;
+        let before = block.start.saturating_sub(1);
+        let (mut last_y, mut last_f) = (dx_m[before], load_n[before]);
+        let (mut sum_y, mut sum_f, mut leap_y, mut leap_f) = (0.0, 0.0, 0.0_f64, 0.0_f64);
+        for (&y, &f) in dx_m[block.clone()].iter().zip(&load_n[block.clone()]) {
+            leap_y = leap_y.max((y - last_y).abs());
+            leap_f = leap_f.max((f - last_f).abs());
+            (sum_y, sum_f, last_y, last_f) = (sum_y + y, sum_f + f, y, f);
+        }
+        let sum_x: f64 = motor_m[block.clone()].iter().sum();
+        let calm = leap_y <= self.dx.leap && leap_f <= self.load.leap && (sum_x + sum_y + sum_f).is_finite();
+        let n = block.len() as f64;
+        calm.then(|| [sum_x / n, sum_y / n, sum_f / n])
+    }
+
+    fn careful_mean(&self, block: &Range<usize>, segment: &Range<usize>) -> Option<[f64; 3]> {
+        let Samples { motor_m, dx_m, load_n, .. } = self.samples;
+        let (mut sums, mut sound) = ([0.0; 3], 0_usize);
+        for i in block.clone() {
+            let here = [motor_m[i], dx_m[i], load_n[i]];
+            let wild = self.dx.is_wild(dx_m, i, segment) || self.load.is_wild(load_n, i, segment);
+            if here.iter().all(|v| v.is_finite()) && !wild {
+                sums.iter_mut().zip(here).for_each(|(sum, v)| *sum += v);
+                sound += 1;
+            }
+        }
+        (2 * sound >= block.len() && sound > 0).then(|| sums.map(|sum| sum / sound as f64))
+    }
+}

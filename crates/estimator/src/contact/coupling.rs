@@ -1,0 +1,115 @@
+//! The force in the coupling: the load less a friction that sticks and slips (equation 1, as it is meant).
+//!
+//! The screw moves when the force on it exceeds F_d + η|F|, and is held below. In quasi-static terms:
+//! hold the screw, let the motor move under it, and see what the coupling would then press; if load and
+//! coupling differ by more than friction can hold, the screw slips until they do not.
+//!
+//! ```text
+//! z ← z − ΔX₁                             the motor moves under a held screw
+//! c ← K·dead_zone(z, ΔS)                  what the coupling then presses
+//! c ← clamp(c, F − F_f, F + F_f)          the screw slips as far as it must; z follows
+//! ```
+//! So a moving screw has c = F − F_f·sgn Ẋ₂, a resting one keeps its c, and a flexing one (load changes,
+//! motor at rest) shows the loop that a sign of the motor's speed cannot.
+
+use super::blocks::Blocks;
+
+/// Dry friction of the screw and the share of the load lost (equation 1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Friction {
+    /// `F_d`, N.
+    pub dry_n: f64,
+    /// η, about 1 − efficiency.
+    pub lost_share: f64,
+}
+
+impl Friction {
+    /// F_d + η|F|, N.
+    pub fn at_n(&self, load_n: f64) -> f64 {
+        self.dry_n + self.lost_share * load_n.abs()
+    }
+}
+
+/// What the screw and its coupling are thought to be.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct State {
+    pub(super) stiffness_n_per_m: f64,
+    pub(super) gap_m: f64,
+    pub(super) friction: Friction,
+    pub(super) skew_s: f64,
+}
+
+/// Force in the coupling, and how it answers to friction.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Coupling {
+    /// c, N; NaN where a channel is missing.
+    pub(super) force_n: f64,
+    /// ∂c/∂F_d.
+    pub(super) by_dry: f64,
+    /// ∂c/∂η, N.
+    pub(super) by_share_n: f64,
+}
+
+/// The coupling's force at each block; each segment starts at rest, its friction unknown.
+pub(super) fn follow(blocks: &Blocks, state: &State) -> Vec<Coupling> {
+    let mut starts = blocks.starts.iter().copied().peekable();
+    let mut screw: Option<Screw> = None;
+    let mut forces = Vec::with_capacity(blocks.len());
+    for k in 0..blocks.len() {
+        if starts.next_if_eq(&k).is_some() {
+            screw = None;
+        }
+        let (motor_m, load_n) = (blocks.motor_m[k], blocks.load_n[k]);
+        if !(motor_m + load_n).is_finite() {
+            forces.push(Coupling { force_n: f64::NAN, by_dry: 0.0, by_share_n: 0.0 });
+            continue;
+        }
+        let moved = match screw {
+            Some(before) => before.moved(motor_m, load_n, state),
+            None => Screw::resting(motor_m, load_n, state),
+        };
+        forces.push(moved.coupling);
+        screw = Some(moved);
+    }
+    forces
+}
+
+/// The screw between two blocks.
+#[derive(Debug, Clone, Copy)]
+struct Screw {
+    motor_m: f64,
+    /// Relative position from the middle of the gap, m.
+    relative_m: f64,
+    coupling: Coupling,
+}
+
+impl Screw {
+    fn resting(motor_m: f64, load_n: f64, state: &State) -> Self {
+        let coupling = Coupling { force_n: load_n, by_dry: 0.0, by_share_n: 0.0 };
+        Self { motor_m, relative_m: relative_m(load_n, state), coupling }
+    }
+
+    fn moved(self, motor_m: f64, load_n: f64, state: &State) -> Self {
+        let held_m = self.relative_m - (motor_m - self.motor_m);
+        let half_m = 0.5 * state.gap_m;
+        let held_n = state.stiffness_n_per_m * (held_m - held_m.clamp(-half_m, half_m));
+        let friction_n = state.friction.at_n(load_n);
+        let (low_n, high_n) = (load_n - friction_n, load_n + friction_n);
+        if held_n >= low_n && held_n <= high_n {
+            let touching = held_n * self.coupling.force_n > 0.0;
+            let (by_dry, by_share_n) =
+                if touching { (self.coupling.by_dry, self.coupling.by_share_n) } else { (0.0, 0.0) };
+            let coupling = Coupling { force_n: held_n, by_dry, by_share_n };
+            return Self { motor_m, relative_m: held_m, coupling };
+        }
+        let (force_n, by_dry) = if held_n < low_n { (low_n, -1.0) } else { (high_n, 1.0) };
+        let coupling = Coupling { force_n, by_dry, by_share_n: by_dry * load_n.abs() };
+        Self { motor_m, relative_m: relative_m(force_n, state), coupling }
+    }
+}
+
+/// Where the screw stands against the motor under a force, m.
+fn relative_m(force_n: f64, state: &State) -> f64 {
+    let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
+    force_n / state.stiffness_n_per_m + 0.5 * state.gap_m * side
+}

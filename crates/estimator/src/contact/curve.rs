@@ -1,0 +1,99 @@
+//! Straight flanks, or soft ones: which of the two the samples at low load speak for.
+
+use super::blocks::Blocks;
+use super::coupling::State;
+use super::design::{CURVED, FIRM_SHARE, FORCE, Frame, GAP, LINEAR, SPEED, SPEED_M_PER_S};
+use super::refusal::Refusal;
+use super::search::{Found, search, start};
+
+/// Turns of the search over straight flanks, and over soft ones from there.
+const TURNS: (usize, usize) = (3, 4);
+/// The low-load samples leave the straight line by this many standard errors before a curve is tried.
+const SUSPICION: f64 = 2.0;
+/// Light rows further out than this share of the wind-up are in the gap, not on a soft flank; they count no more.
+const CLIP: f64 = 0.05;
+/// The two gaps differ by this many standard errors when flanks are soft. Over 700 simulated flights with
+/// straight flanks none reached 3.7; with soft ones none stayed under 4.6.
+const SOFT: f64 = 4.0;
+/// Doubt left by the choice of a curve, over what it changes.
+const CURVE_DOUBT: f64 = 0.1;
+/// The sandwich is too sure of itself by this factor (see `examples/accuracy.rs`).
+const SURENESS: f64 = 1.3;
+/// What a friction law that is not equation 1 may cost, over the wind-up under friction.
+const FRICTION_DOUBT: f64 = 0.01;
+
+/// How the flanks answer, and what was found with them.
+#[derive(Debug)]
+pub(super) struct Contact {
+    /// ΔS and its standard error, m.
+    pub(super) gap_m: (f64, f64),
+    /// 1/K and its standard error, m/N.
+    pub(super) compliance_m_per_n: (f64, f64),
+    pub(super) skew_se_s: f64,
+    pub(super) touched_s: (f64, f64),
+    pub(super) state: State,
+    pub(super) is_curved: bool,
+    /// The straight fit and its rows, for the witnesses.
+    pub(super) straight: Found<LINEAR>,
+}
+
+/// Fits straight flanks, and soft ones where low loads ask for them.
+///
+/// # Errors
+/// As [`search`].
+pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal> {
+    let mut excerpt = blocks.excerpt();
+    let guess: Found<LINEAR> = search(&mut excerpt, frame, start(frame), TURNS.0)
+        .or_else(|_| search(blocks, frame, start(frame), TURNS.0))?;
+    let straight: Found<LINEAR> = search(blocks, frame, guess.state, 2)?;
+    let error_m = |column: usize| straight.fit.standard_error_m(column, &straight.design.firm);
+    let (line_m, line_se_m) = (straight.fit.beta[GAP], error_m(GAP));
+    let bent = if low_loads_deviate(&straight, frame) {
+        soft(blocks, frame, straight.state, (line_m, line_se_m))
+    } else {
+        None
+    };
+    let (gap_m, se_m) = bent.unwrap_or((line_m, line_se_m));
+    let friction_m = straight.state.friction.at_n(frame.load_n) / straight.state.stiffness_n_per_m;
+    Ok(Contact {
+        gap_m: (gap_m, (SURENESS * se_m).hypot(FRICTION_DOUBT * friction_m)),
+        compliance_m_per_n: (
+            straight.fit.beta[FORCE] / frame.load_n,
+            SURENESS * error_m(FORCE) / frame.load_n,
+        ),
+        skew_se_s: SURENESS * error_m(SPEED) / SPEED_M_PER_S,
+        touched_s: straight.design.touched_s,
+        state: straight.state,
+        is_curved: bent.is_some(),
+        straight,
+    })
+}
+
+/// Whether the rows that the straight fit never saw lie inside its line, beyond the spread of their
+/// stretches; the lighter the touch the more a row counts. Friction, not softness, throws them outside.
+fn low_loads_deviate(straight: &Found<LINEAR>, frame: &Frame) -> bool {
+    let most_m = CLIP * frame.windup_m();
+    let (mut total, mut squares, mut sum_m, mut stretch) = (0.0, 0.0, 0.0, None);
+    for row in &straight.design.light {
+        if stretch != Some(row.stretch) {
+            (total, squares) = (total + sum_m, squares + sum_m * sum_m);
+            (stretch, sum_m) = (Some(row.stretch), 0.0);
+        }
+        let lightness = 1.0 - row.x[FORCE].abs() / FIRM_SHARE;
+        sum_m += lightness * (straight.fit.residual_m(row) * row.x[GAP].signum()).clamp(-most_m, most_m);
+    }
+    (total, squares) = (total + sum_m, squares + sum_m * sum_m);
+    total < -SUSPICION * squares.sqrt()
+}
+
+/// Gap and standard error of soft flanks, where they differ from the straight ones for certain.
+///
+/// The straight fit is the sharper one when flanks are straight, the curve right either way; so their
+/// difference has the variance of the curve less that of the line (Hausman 1978).
+fn soft(blocks: &mut Blocks, frame: &Frame, from: State, line_m: (f64, f64)) -> Option<(f64, f64)> {
+    let curve: Found<CURVED> = search(blocks, frame, from, TURNS.1).ok()?;
+    let (gap_m, se_m) = (curve.fit.beta[GAP], curve.fit.standard_error_m(GAP, &curve.design.firm));
+    let spread_m = (se_m.powi(2) - line_m.1.powi(2)).max(0.25 * se_m.powi(2)).sqrt();
+    let change_m = line_m.0 - gap_m;
+    (change_m > SOFT * spread_m).then_some((gap_m, se_m.hypot(CURVE_DOUBT * change_m)))
+}

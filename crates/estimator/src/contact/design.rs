@@ -1,0 +1,270 @@
+//! Blocks in contact as rows of a regression: averaged over stretches that stay on one flank.
+
+use super::Prior;
+use super::blocks::Blocks;
+use super::coupling::{Coupling, State};
+use super::refusal::Refusal;
+
+/// Columns while the flanks are straight.
+pub(super) const LINEAR: usize = 12;
+/// Columns with the four that let them bend.
+pub(super) const CURVED: usize = 16;
+
+/// δX₀.
+pub(super) const ORIGIN: usize = 0;
+/// s/2: its coefficient is the gap.
+pub(super) const GAP: usize = 1;
+/// c over the 95 % load.
+pub(super) const FORCE: usize = 2;
+/// ∂c/∂F_d, whose coefficient is what F_d lacks, over K.
+pub(super) const DRY: usize = 3;
+/// ∂c/∂η over the 95 % load.
+pub(super) const SHARE: usize = 4;
+/// Ẋ₁ over a reference speed: its coefficient is the skew.
+pub(super) const SPEED: usize = 5;
+/// Drift: t and t², from −1 to 1.
+pub(super) const DRIFT: usize = 6;
+/// Transducer error: X, X² and X³, from −1 to 1.
+pub(super) const PLACE: usize = 8;
+/// Ḟ: a load channel that lags.
+pub(super) const LOAD_RATE: usize = 11;
+/// Softness at low load.
+pub(super) const BEND: usize = 12;
+
+/// Loads over the 95 % load below which each bend acts.
+const KNEES: [f64; 3] = [0.06, 0.2, 0.5];
+/// Forces over the 95 % load below which flanks may be soft.
+pub(super) const FIRM_SHARE: f64 = 0.12;
+/// Speed that scales the skew's column, m/s.
+pub(super) const SPEED_M_PER_S: f64 = 0.02;
+/// Time that scales the load rate's column, s.
+pub(super) const LATE_S: f64 = 0.01;
+/// The first second is left out: offsets settle and logs start in motion, s.
+const START_S: f64 = 1.0;
+/// Residuals are taken as dependent within this time, s.
+const STRETCH_S: f64 = 2.0;
+/// Blocks in a row, at least and at most; long flights need no finer rows.
+const ROW_BLOCKS: (usize, usize) = (6, 25);
+/// Blocks of flight for each block in a row, so that long flights have no more rows than they need.
+const BLOCKS_PER_ROW_BLOCK: usize = 2000;
+
+/// Scales that bring every column to about one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Frame {
+    /// 95 % quantile of the load's magnitude, N.
+    pub(super) load_n: f64,
+    /// Stiffness of the part, N/m.
+    pub(super) stiffness_n_per_m: f64,
+    /// Middle and half length of the flight, s.
+    time_s: (f64, f64),
+    /// Middle and half of the stroke seen, m.
+    pub(super) place_m: (f64, f64),
+    row_blocks: f64,
+}
+
+impl Frame {
+    /// # Errors
+    /// [`Refusal::LoadTooSmall`], [`Refusal::TravelTooSmall`].
+    pub(super) fn of(blocks: &Blocks, prior: &Prior) -> Result<Self, Refusal> {
+        let mut loads_n: Vec<f64> = blocks.load_n.iter().filter(|f| f.is_finite()).map(|f| f.abs()).collect();
+        let at = (loads_n.len().max(1) - 1) * 19 / 20;
+        let load_n = *loads_n.select_nth_unstable_by(at, f64::total_cmp).1;
+        if load_n <= 0.0 {
+            return Err(Refusal::LoadTooSmall);
+        }
+        let place_m = middle_and_half(&blocks.motor_m);
+        if 2.0 * place_m.1 < load_n / prior.stiffness_n_per_m {
+            return Err(Refusal::TravelTooSmall);
+        }
+        let (fewest, most) = ROW_BLOCKS;
+        Ok(Self {
+            load_n,
+            stiffness_n_per_m: prior.stiffness_n_per_m,
+            time_s: middle_and_half(&blocks.time_s),
+            place_m,
+            row_blocks: (blocks.len() / BLOCKS_PER_ROW_BLOCK).clamp(fewest, most) as f64,
+        })
+    }
+
+    /// The wind-up of the part at the 95 % load, m.
+    pub(super) fn windup_m(&self) -> f64 {
+        self.load_n / self.stiffness_n_per_m
+    }
+}
+
+fn middle_and_half(values: &[f64]) -> (f64, f64) {
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    (0.5 * (low + high), 0.5 * (high - low))
+}
+
+/// The mean of some blocks in contact on one flank.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row<const N: usize> {
+    /// Regressors.
+    pub(super) x: [f64; N],
+    /// δX, m.
+    pub(super) y_m: f64,
+    /// How many blocks.
+    pub(super) blocks: f64,
+    /// Rows of one stretch are taken as dependent.
+    pub(super) stretch: u32,
+}
+
+/// All rows, and how long each flank was touched.
+#[derive(Debug)]
+pub(super) struct Design<const N: usize> {
+    /// Rows beyond the share of the load below which flanks may be soft.
+    pub(super) firm: Vec<Row<N>>,
+    /// Rows below it.
+    pub(super) light: Vec<Row<N>>,
+    /// Time in firm contact on the upper and the lower flank, s.
+    pub(super) touched_s: (f64, f64),
+}
+
+/// One of the two sides of the gap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Flank {
+    /// Pressed by a positive force.
+    Upper,
+    /// Pressed by a negative one.
+    Lower,
+}
+
+impl Flank {
+    /// s.
+    pub(super) fn sign(self) -> f64 {
+        match self {
+            Self::Upper => 1.0,
+            Self::Lower => -1.0,
+        }
+    }
+}
+
+/// Which flank a block presses, and whether firmly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Touch {
+    flank: Flank,
+    is_firm: bool,
+}
+
+impl Touch {
+    /// None in the gap, or where the force is unknown.
+    fn of(force: f64) -> Option<Self> {
+        let flank = if force > 0.0 {
+            Flank::Upper
+        } else if force < 0.0 {
+            Flank::Lower
+        } else {
+            return None;
+        };
+        Some(Self { flank, is_firm: force.abs() > FIRM_SHARE })
+    }
+
+    /// Whether the blocks around keep this flank, and firmly where this is firm.
+    fn is_kept_by(self, around: &[Option<Self>]) -> bool {
+        around.iter().flatten().filter(|t| t.flank == self.flank && (t.is_firm || !self.is_firm)).count()
+            == around.len()
+    }
+}
+
+/// Rows of all blocks that have kept their flank for two blocks before and one after, and their
+/// firmness as well, so that no row mixes flank and gap.
+pub(super) fn rows<const N: usize>(blocks: &Blocks, state: &State, frame: &Frame) -> Design<N> {
+    let forces = super::coupling::follow(blocks, state);
+    let mut design = Design { firm: Vec::new(), light: Vec::new(), touched_s: (0.0, 0.0) };
+    let mut open: Option<(Touch, Row<N>)> = None;
+    // The two blocks before, this one, and the one after.
+    let mut touches = [None; 4];
+    let mut starts = blocks.starts.iter().copied().peekable();
+    for next in 0..blocks.len() {
+        if starts.next_if_eq(&next).is_some() {
+            touches = [None; 4];
+        }
+        touches = [touches[1], touches[2], touches[3], Touch::of(forces[next].force_n / frame.load_n)];
+        let steady = touches[2].filter(|touch| touch.is_kept_by(&touches));
+        let row = steady.and_then(|touch| {
+            Some((touch, row(blocks, &forces[next - 1], frame, next - 1, touch.flank.sign())?))
+        });
+        open = match (open, row) {
+            (Some((before, sum)), Some((touch, row)))
+                if before == touch && sum.blocks < frame.row_blocks && sum.stretch == row.stretch =>
+            {
+                Some((touch, sum.plus(&row)))
+            }
+            (before, row) => {
+                design.close(before, blocks.period_s);
+                row
+            }
+        };
+    }
+    design.close(open, blocks.period_s);
+    design
+}
+
+impl<const N: usize> Design<N> {
+    fn close(&mut self, open: Option<(Touch, Row<N>)>, period_s: f64) {
+        let Some((touch, sum)) = open else { return };
+        if !touch.is_firm {
+            self.light.push(sum.mean());
+            return;
+        }
+        match touch.flank {
+            Flank::Upper => self.touched_s.0 += sum.blocks * period_s,
+            Flank::Lower => self.touched_s.1 += sum.blocks * period_s,
+        }
+        self.firm.push(sum.mean());
+    }
+}
+
+/// One block as a row; none where a channel is missing or the flight has only begun.
+fn row<const N: usize>(
+    blocks: &Blocks,
+    coupling: &Coupling,
+    frame: &Frame,
+    k: usize,
+    side: f64,
+) -> Option<Row<N>> {
+    let force = coupling.force_n / frame.load_n;
+    let time = (blocks.time_s[k] - frame.time_s.0) / frame.time_s.1;
+    let place = (blocks.motor_m[k] - frame.place_m.0) / frame.place_m.1;
+    let load_rate = blocks.rate(&blocks.load_n, k) * LATE_S / frame.load_n;
+    let speed = blocks.rate(&blocks.motor_m, k) / SPEED_M_PER_S;
+    let mut x = [0.0; N];
+    x[ORIGIN] = 1.0;
+    x[GAP] = 0.5 * side;
+    x[FORCE] = force;
+    x[DRY] = coupling.by_dry;
+    x[SHARE] = coupling.by_share_n / frame.load_n;
+    x[SPEED] = speed;
+    x[DRIFT..PLACE].copy_from_slice(&[time, time * time]);
+    x[PLACE..LOAD_RATE].copy_from_slice(&[place, place * place, place * place * place]);
+    x[LOAD_RATE] = load_rate;
+    if N == CURVED {
+        x[BEND..].copy_from_slice(&bends(force.abs()).map(|bend| side * bend));
+    }
+    let row = Row { x, y_m: blocks.dx_m[k], blocks: 1.0, stretch: (blocks.time_s[k] / STRETCH_S) as u32 };
+    (blocks.time_s[k] > START_S && (row.y_m + speed + load_rate).is_finite()).then_some(row)
+}
+
+/// Deflections of a soft flank under a force over the 95 % load, all zero at zero force: Hertz's law,
+/// δ ∝ c^(2/3), and three springs that bottom out.
+pub(super) fn bends(force: f64) -> [f64; CURVED - LINEAR] {
+    let root = force.cbrt();
+    [root * root, force.min(KNEES[0]), force.min(KNEES[1]), force.min(KNEES[2])]
+}
+
+impl<const N: usize> Row<N> {
+    fn plus(mut self, other: &Self) -> Self {
+        self.x.iter_mut().zip(other.x).for_each(|(sum, x)| *sum += x);
+        self.y_m += other.y_m;
+        self.blocks += other.blocks;
+        self
+    }
+
+    fn mean(mut self) -> Self {
+        self.x.iter_mut().for_each(|x| *x /= self.blocks);
+        self.y_m /= self.blocks;
+        self
+    }
+}

@@ -1,0 +1,56 @@
+//! Are the channels what they are said to be? Signs and ratios, before anything is believed.
+
+use super::blocks::Blocks;
+use super::design::{Frame, Row, SPEED_M_PER_S};
+use super::refusal::Refusal;
+use super::regression::{Belief, fit};
+
+/// Every so many blocks are looked at.
+const STRIDE: usize = 4;
+/// Slower than this the screw may stick, m/s.
+const SLIP_M_PER_S: f64 = 1e-3;
+/// The wind-up may be no less than this share of the part's against its sign before it counts as flipped.
+const FLIPPED: f64 = 0.3;
+/// Two positions of one screw have a slope of one; a lead or a unit that is off by more is a mapping error.
+const RATIO: f64 = 0.01;
+
+/// Rounds of reweighting.
+const ROUNDS: usize = 4;
+
+const SIDE: usize = 1;
+const LOAD: usize = 2;
+const SLIP: usize = 3;
+const SPEED: usize = 4;
+const PLACE: usize = 5;
+const COLUMNS: usize = 6;
+
+/// Regresses δX on the load, the side it presses to, the sign of the speed, speed and place.
+///
+/// δX must grow with the load. Where it falls, either the load's sign is flipped or the two positions
+/// are swapped; friction tells which, since it opposes the motion of the screw in either case.
+///
+/// # Errors
+/// [`Refusal::PositionRatio`], [`Refusal::LoadSignFlipped`], [`Refusal::PositionsSwapped`].
+pub(super) fn check(blocks: &Blocks, frame: &Frame) -> Result<(), Refusal> {
+    let rows: Vec<Row<COLUMNS>> =
+        (1..blocks.len()).step_by(STRIDE).filter_map(|k| row(blocks, frame, k)).collect();
+    let Some(found) = fit(&rows, &[Belief::NONE; COLUMNS], ROUNDS) else { return Ok(()) };
+    let beta = &found.beta;
+    if beta[PLACE].abs() > RATIO * frame.place_m.1 {
+        return Err(Refusal::PositionRatio);
+    }
+    if beta[SIDE] + beta[LOAD] > -FLIPPED * frame.windup_m() {
+        return Ok(());
+    }
+    let drag_m = beta[SLIP] + beta[SPEED];
+    Err(if drag_m > 0.0 { Refusal::PositionsSwapped } else { Refusal::LoadSignFlipped })
+}
+
+fn row(blocks: &Blocks, frame: &Frame, k: usize) -> Option<Row<COLUMNS>> {
+    let (load, speed) = (blocks.load_n[k] / frame.load_n, blocks.rate(&blocks.motor_m, k));
+    let place = (blocks.motor_m[k] - frame.place_m.0) / frame.place_m.1;
+    let slip = if speed.abs() > SLIP_M_PER_S { speed.signum() } else { 0.0 };
+    let x = [1.0, 0.5 * load.signum(), load, slip, speed / SPEED_M_PER_S, place];
+    let row = Row { x, y_m: blocks.dx_m[k], blocks: 1.0, stretch: 0 };
+    (row.y_m + speed + load + place).is_finite().then_some(row)
+}

@@ -1,0 +1,127 @@
+//! Why a sound log cannot show a gap, and what may be doubted about one that does.
+
+use super::design::Frame;
+use super::{ContactGap, DETECTION_SHARE};
+
+/// Standard errors a gap must exceed to count as seen.
+const SEEN: f64 = 2.0;
+/// Three spreads of 15 %: how far 1/K may lie from the part's.
+const IMPLAUSIBLE: f64 = 0.45;
+/// Load over friction below which friction rules the answer.
+const HEAVY: f64 = 3.0;
+/// Relative standard error of the gap's interval beyond which the flight says little, in wind-ups.
+const VAGUE: f64 = 0.1;
+
+/// Why a flight cannot show its gap. Each has a stable code and a remedy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Refusal {
+    /// The load presses on one flank only.
+    NoLoadReversal,
+    /// One flank is touched for less than a second.
+    OneSideBrief,
+    /// The load does not rise above nothing.
+    LoadTooSmall,
+    /// The motor moves less than the wind-up.
+    TravelTooSmall,
+    /// Fewer than 20 samples a second.
+    RateTooLow,
+    /// Under ten seconds of sound samples, or too few in contact.
+    TooShort,
+    /// A channel never changes.
+    ChannelConstant,
+    /// δX falls with the load, and friction agrees with the positions.
+    LoadSignFlipped,
+    /// δX falls with the load, and friction says motor and screw are exchanged.
+    PositionsSwapped,
+    /// One position is not a multiple of one of the other.
+    PositionRatio,
+}
+
+impl Refusal {
+    /// The code that records keep.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::NoLoadReversal => "no_load_reversal",
+            Self::OneSideBrief => "one_side_brief",
+            Self::LoadTooSmall => "load_too_small",
+            Self::TravelTooSmall => "travel_too_small",
+            Self::RateTooLow => "rate_too_low",
+            Self::TooShort => "too_short",
+            Self::ChannelConstant => "channel_constant",
+            Self::LoadSignFlipped => "load_sign_flipped",
+            Self::PositionsSwapped => "positions_swapped",
+            Self::PositionRatio => "position_ratio",
+        }
+    }
+
+    /// What somebody can do about it.
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Self::NoLoadReversal => "use a flight, or a ground check, in which the load changes sides",
+            Self::OneSideBrief => {
+                "use a longer flight, or one with more manoeuvres, so that both flanks are pressed"
+            }
+            Self::LoadTooSmall => {
+                "check the load channel and its unit; a surface without airload shows no gap"
+            }
+            Self::TravelTooSmall => {
+                "use a flight in which the actuator moves; friction cannot be told from play at rest"
+            }
+            Self::RateTooLow => "record at 20 samples a second or more, 50 or more for a small gap",
+            Self::TooShort => {
+                "record at least 10 s of valid samples in which the load presses on both flanks"
+            }
+            Self::ChannelConstant => "check wiring and mapping: a channel that never changes is not measured",
+            Self::LoadSignFlipped => {
+                "reverse the sign of the load in the mapping: it must be positive along +X"
+            }
+            Self::PositionsSwapped => {
+                "exchange motor and screw position in the mapping, or reverse both signs"
+            }
+            Self::PositionRatio => {
+                "check lead, unit and sign of the positions: screw against motor must have slope 1"
+            }
+        }
+    }
+}
+
+/// A doubt that does not forbid the number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Flag {
+    /// The gap is under two standard errors, or under a hundredth of the wind-up: read the upper bound.
+    BelowDetection,
+    /// 1/K lies more than three spreads from the part's.
+    StiffnessImplausible,
+    /// The 95 % load is under three times the friction.
+    FrictionHeavy,
+    /// Flanks are soft at low load; the gap is read off a curve.
+    SoftContact,
+    /// The standard error exceeds a tenth of the wind-up.
+    Imprecise,
+}
+
+impl Flag {
+    /// The code that records keep.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::BelowDetection => "below_detection",
+            Self::StiffnessImplausible => "stiffness_implausible",
+            Self::FrictionHeavy => "friction_heavy",
+            Self::SoftContact => "soft_contact",
+            Self::Imprecise => "imprecise",
+        }
+    }
+}
+
+pub(super) fn flags(found: &ContactGap, frame: &Frame, is_curved: bool) -> Vec<Flag> {
+    let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * frame.windup_m());
+    let compliance = frame.stiffness_n_per_m / found.stiffness_n_per_m;
+    let doubts = [
+        (Flag::BelowDetection, found.gap_m < least_m),
+        (Flag::StiffnessImplausible, (compliance - 1.0).abs() > IMPLAUSIBLE),
+        (Flag::FrictionHeavy, found.load_p95_n < HEAVY * found.friction_n()),
+        (Flag::SoftContact, is_curved),
+        (Flag::Imprecise, found.gap_se_m > VAGUE * frame.windup_m()),
+    ];
+    doubts.into_iter().filter_map(|(flag, holds)| holds.then_some(flag)).collect()
+}

@@ -1,0 +1,168 @@
+//! Robust regression with Gaussian priors, and standard errors that know residuals to be dependent.
+
+use nalgebra::{Cholesky, Const, SMatrix, SVector};
+
+use super::design::Row;
+
+/// Residuals beyond this many times their spread lose weight (Huber).
+const HUBER: f64 = 2.0;
+/// Beyond this many they lose all of it: a frozen channel is no noise.
+const WILD: f64 = 10.0;
+/// Normal standard deviations in a median absolute deviation.
+const MAD: f64 = 1.482_602_218_505_602;
+/// The least spread of residuals, m; below any sensor's, it keeps exact data from dividing by zero.
+const LEAST_SPREAD_M: f64 = 1e-12;
+
+/// What a coefficient is believed to be, m.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Belief {
+    pub(super) mean: f64,
+    /// Infinite where nothing is believed.
+    pub(super) sd: f64,
+}
+
+impl Belief {
+    pub(super) const NONE: Self = Self { mean: 0.0, sd: f64::INFINITY };
+}
+
+/// Coefficients of the first N columns, m.
+#[derive(Debug, Clone)]
+pub(super) struct Fit<const N: usize> {
+    pub(super) beta: [f64; N],
+    inverse: SMatrix<f64, N, N>,
+    weights: Vec<f64>,
+    /// Precision lent by each belief, in units of the rows' weights.
+    lent: [f64; N],
+    beliefs: [Belief; N],
+}
+
+/// Reweighted least squares: `rounds` rounds from even weights.
+///
+/// A belief counts as residual variance over its own, times the factor by which dependence within
+/// stretches inflates the variance of a mean; otherwise thousands of dependent rows would talk it down.
+pub(super) fn fit<const N: usize>(rows: &[Row<N>], beliefs: &[Belief; N], rounds: usize) -> Option<Fit<N>> {
+    let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len().max(1) as f64;
+    let even: Vec<f64> = rows.iter().map(|r| r.blocks / mean_blocks).collect();
+    let mut found = solve(rows, beliefs, even.clone(), [0.0; N])?;
+    for round in 1..=rounds {
+        let residuals_m: Vec<f64> = rows.iter().map(|r| found.residual_m(r)).collect();
+        let spread_m = spread_m(&residuals_m);
+        let weights: Vec<f64> = even
+            .iter()
+            .zip(&residuals_m)
+            .map(|(w, e)| w * trust(e.abs() / spread_m, round == rounds))
+            .collect();
+        let noise = variance_of_a_row(rows, &weights, &residuals_m);
+        let lent = beliefs.map(|b| if b.sd.is_finite() { noise / (b.sd * b.sd) } else { 0.0 });
+        found = solve(rows, beliefs, weights, lent)?;
+    }
+    Some(found)
+}
+
+/// Weight of a residual. The wild are cut off only in the last round: before, a bad start could take a
+/// whole flank for wild.
+fn trust(deviation: f64, last: bool) -> f64 {
+    if last && deviation > WILD {
+        0.0
+    } else if deviation > HUBER {
+        HUBER / deviation
+    } else {
+        1.0
+    }
+}
+
+fn spread_m(residuals_m: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = residuals_m.iter().map(|e| e.abs()).collect();
+    let middle = sizes.len() / 2;
+    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    (MAD * median).max(LEAST_SPREAD_M)
+}
+
+/// Residual variance of a row of weight one, inflated by dependence within stretches.
+fn variance_of_a_row<const N: usize>(rows: &[Row<N>], weights: &[f64], residuals_m: &[f64]) -> f64 {
+    let (mut alone, mut together, mut sum, mut total) = (0.0, 0.0, 0.0, 0.0);
+    let mut stretch = None;
+    for ((row, w), e) in rows.iter().zip(weights).zip(residuals_m) {
+        if stretch != Some(row.stretch) {
+            together += sum * sum;
+            (stretch, sum) = (Some(row.stretch), 0.0);
+        }
+        sum += w * e;
+        alone += w * w * e * e;
+        total += w;
+    }
+    together += sum * sum;
+    let size: f64 = weights.iter().zip(residuals_m).map(|(w, e)| w * e * e).sum();
+    let inflation = if alone > 0.0 { (together / alone).max(1.0) } else { 1.0 };
+    (size / total).max(LEAST_SPREAD_M * LEAST_SPREAD_M) * inflation
+}
+
+fn solve<const N: usize>(
+    rows: &[Row<N>],
+    beliefs: &[Belief; N],
+    weights: Vec<f64>,
+    lent: [f64; N],
+) -> Option<Fit<N>> {
+    let (mut normal, mut right) = ([[0.0; N]; N], [0.0; N]);
+    for (row, w) in rows.iter().zip(&weights) {
+        let x = &row.x;
+        for (i, (line, side)) in normal.iter_mut().zip(&mut right).enumerate() {
+            let wx = w * x[i];
+            line.iter_mut().zip(x).for_each(|(entry, x)| *entry += wx * x);
+            *side += wx * row.y_m;
+        }
+    }
+    let mut normal = SMatrix::<f64, N, N>::from_fn(|i, j| normal[i][j]);
+    let mut right = SVector::<f64, N>::from(right);
+    for i in 0..N {
+        normal[(i, i)] += lent[i];
+        right[i] += lent[i] * beliefs[i].mean;
+        // A column no row touches, such as friction that never acts, keeps its belief or stays zero.
+        if normal[(i, i)] <= 0.0 {
+            normal[(i, i)] = 1.0;
+        }
+    }
+    let factor: Cholesky<f64, Const<N>> = normal.cholesky()?;
+    let beta = factor.solve(&right);
+    Some(Fit { beta: beta.into(), inverse: factor.inverse(), weights, lent, beliefs: *beliefs })
+}
+
+impl<const N: usize> Fit<N> {
+    pub(super) fn predict_m(&self, x: &[f64; N]) -> f64 {
+        self.beta.iter().zip(x).map(|(b, x)| b * x).sum()
+    }
+
+    pub(super) fn residual_m(&self, row: &Row<N>) -> f64 {
+        row.y_m - self.predict_m(&row.x)
+    }
+
+    /// Standard error of a coefficient, m: the sandwich over stretches, and what beliefs lend in doubt.
+    ///
+    /// ```text
+    /// Var β_j = Σ_stretches (Σ w e aᵀx)² · B/(B − N) + Σ_i (a_i λ_i σ_i)²      a = row j of H⁻¹
+    /// ```
+    pub(super) fn standard_error_m(&self, column: usize, rows: &[Row<N>]) -> f64 {
+        let influence: [f64; N] = self.inverse.row(column).transpose().into();
+        let (mut total, mut sum, mut stretches) = (0.0, 0.0, 0_usize);
+        let mut stretch = None;
+        for (row, w) in rows.iter().zip(&self.weights) {
+            if stretch != Some(row.stretch) {
+                total += sum * sum;
+                (stretch, sum) = (Some(row.stretch), 0.0);
+                stretches += 1;
+            }
+            let leverage: f64 = influence.iter().zip(&row.x).map(|(a, x)| a * x).sum();
+            sum += w * self.residual_m(row) * leverage;
+        }
+        total += sum * sum;
+        let freedom = stretches as f64 / (stretches as f64 - N as f64).max(1.0);
+        let lent = |i: usize| {
+            if self.beliefs[i].sd.is_finite() {
+                influence[i] * self.lent[i] * self.beliefs[i].sd
+            } else {
+                0.0
+            }
+        };
+        (total * freedom + (0..N).map(|i| lent(i).powi(2)).sum::<f64>()).sqrt()
+    }
+}

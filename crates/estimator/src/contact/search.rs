@@ -1,0 +1,130 @@
+//! Gauss–Newton over what the force in the coupling depends on: friction, stiffness, gap and skew.
+
+use super::blocks::Blocks;
+use super::coupling::{Friction, State};
+use super::design::{
+    self, BEND, CURVED, DRIFT, DRY, Design, FORCE, Frame, GAP, LATE_S, LOAD_RATE, ORIGIN, PLACE, SHARE,
+    SPEED, SPEED_M_PER_S,
+};
+use super::refusal::Refusal;
+use super::regression::{Belief, Fit, fit};
+use super::{BRIEF_S, TOUCH_S};
+
+/// What the design of any actuator says: 1/K within 15 % of the part's.
+const COMPLIANCE: f64 = 0.15;
+/// Dry friction over the 95 % load, and the share of load lost: most likely value and spread.
+const FRICTION_DRY: (f64, f64) = (0.02, 0.06);
+/// See [`FRICTION_DRY`].
+const FRICTION_SHARE: (f64, f64) = (0.03, 0.06);
+/// Spread of the skews between channels, s.
+const SKEW_S: f64 = 5e-3;
+/// Spread of the drift within a flight, straight and bent, m.
+const DRIFT_M: [f64; 2] = [50e-6, 20e-6];
+/// Spread of the transducer's error at the ends of the stroke, m.
+const PLACE_M: f64 = 60e-6;
+/// Spread of the deflections that soft flanks add, m.
+const BEND_M: f64 = 50e-6;
+/// Stiffness may move by this factor between turns, lest one bad turn ruins the next.
+const STRETCH: f64 = 3.0;
+/// Friction beyond this share of the load leaves nothing to see.
+const MOST_FRICTION: f64 = 0.5;
+/// A gap wider than this many wind-ups is kept from misleading the search.
+const WIDEST: f64 = 20.0;
+/// Rounds of reweighting within a turn, and in the last.
+const ROUNDS: (usize, usize) = (4, 5);
+
+/// The last turn: rows, coefficients, and the state they were made with.
+#[derive(Debug)]
+pub(super) struct Found<const N: usize> {
+    pub(super) design: Design<N>,
+    pub(super) fit: Fit<N>,
+    pub(super) state: State,
+}
+
+/// Turns from a state: rows of that state, a fit, and the state the fit asks for.
+///
+/// # Errors
+/// [`Refusal::NoLoadReversal`], [`Refusal::OneSideBrief`], [`Refusal::TooShort`].
+pub(super) fn search<const N: usize>(
+    blocks: &mut Blocks,
+    frame: &Frame,
+    mut state: State,
+    turns: usize,
+) -> Result<Found<N>, Refusal> {
+    let mut found = None;
+    for turn in 1..=turns {
+        blocks.realign(state.skew_s);
+        let mut design = design::rows(blocks, &state, frame);
+        touched(&design)?;
+        if N == CURVED {
+            design.firm.append(&mut design.light);
+        }
+        let rounds = if turn == turns { ROUNDS.1 } else { ROUNDS.0 };
+        let fit = fit(&design.firm, &beliefs(frame, &state), rounds).ok_or(Refusal::TooShort)?;
+        state = next(frame, &state, &fit);
+        found = Some(Found { design, fit, state });
+    }
+    found.ok_or(Refusal::TooShort)
+}
+
+/// Where a search starts: the part's stiffness, usual friction, no gap and no skew.
+pub(super) fn start(frame: &Frame) -> State {
+    State {
+        stiffness_n_per_m: frame.stiffness_n_per_m,
+        gap_m: 0.0,
+        friction: Friction { dry_n: FRICTION_DRY.0 * frame.load_n, lost_share: FRICTION_SHARE.0 },
+        skew_s: 0.0,
+    }
+}
+
+fn touched<const N: usize>(design: &Design<N>) -> Result<(), Refusal> {
+    let least_s = design.touched_s.0.min(design.touched_s.1);
+    if least_s < BRIEF_S {
+        Err(Refusal::NoLoadReversal)
+    } else if least_s < TOUCH_S {
+        Err(Refusal::OneSideBrief)
+    } else {
+        Ok(())
+    }
+}
+
+fn beliefs<const N: usize>(frame: &Frame, state: &State) -> [Belief; N] {
+    let windup_m = frame.windup_m();
+    let lack = |(usual, spread): (f64, f64), now: f64| {
+        let windup_m = frame.load_n / state.stiffness_n_per_m;
+        Belief { mean: (usual - now) * windup_m, sd: spread * windup_m }
+    };
+    let zero = |sd: f64| Belief { mean: 0.0, sd };
+    let compliance = if N == CURVED { 2.0 * COMPLIANCE } else { COMPLIANCE };
+    std::array::from_fn(|column| match column {
+        ORIGIN | GAP => Belief::NONE,
+        FORCE => Belief { mean: windup_m, sd: compliance * windup_m },
+        DRY => lack(FRICTION_DRY, state.friction.dry_n / frame.load_n),
+        SHARE => lack(FRICTION_SHARE, state.friction.lost_share),
+        // What is left of the skew once the channels are realigned.
+        SPEED => Belief { mean: state.skew_s * SPEED_M_PER_S, sd: SKEW_S * SPEED_M_PER_S },
+        LOAD_RATE => zero(SKEW_S / LATE_S * windup_m),
+        _ if column < PLACE => zero(DRIFT_M[column - DRIFT]),
+        _ if column < LOAD_RATE => zero(PLACE_M),
+        _ => zero(BEND_M),
+    })
+}
+
+fn next<const N: usize>(frame: &Frame, state: &State, fit: &Fit<N>) -> State {
+    let beta = &fit.beta;
+    // The secant at the 95 % load: bends included, or a soft flank would make the force too stiff.
+    let secant_m: f64 =
+        beta[FORCE] + beta.iter().skip(BEND).zip(design::bends(1.0)).map(|(b, x)| b * x).sum::<f64>();
+    let stiffness = frame.load_n / secant_m.clamp(frame.windup_m() / STRETCH, frame.windup_m() * STRETCH);
+    let lacking = |column: usize| beta[column] * stiffness / frame.load_n;
+    State {
+        stiffness_n_per_m: stiffness,
+        gap_m: beta[GAP].clamp(0.0, WIDEST * frame.windup_m()),
+        friction: Friction {
+            dry_n: frame.load_n
+                * (state.friction.dry_n / frame.load_n + lacking(DRY)).clamp(0.0, MOST_FRICTION),
+            lost_share: (state.friction.lost_share + lacking(SHARE)).clamp(0.0, MOST_FRICTION),
+        },
+        skew_s: state.skew_s - beta[SPEED] / SPEED_M_PER_S,
+    }
+}

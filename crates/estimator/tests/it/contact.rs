@@ -1,0 +1,212 @@
+//! Contact regression against flights of `simulator`, which shares no equation with it.
+
+use estimator::contact::{self, ContactGap, Flag, Outcome, Prior, Refusal};
+use estimator::{Error, Samples};
+use simulator::contact::Law;
+use simulator::{Flight, Plant, Profile, Sensors, simulate};
+
+type Fault = fn(&mut Case);
+
+/// A flight to be estimated, and the stiffness it is estimated with.
+struct Case {
+    plant: Plant,
+    profile: Profile,
+    sensors: Sensors,
+    assumed_stiffness: f64,
+}
+
+impl Case {
+    fn nominal(gap_m: f64) -> Self {
+        let profile = Profile { duration_s: 90.0, sample_rate_hz: 125.0, ..Profile::default() };
+        let plant = Plant::default().with_gap_m(gap_m);
+        Self { plant, profile, sensors: Sensors::default(), assumed_stiffness: 1.0 }
+    }
+
+    fn with(gap_m: f64, change: impl FnOnce(&mut Self)) -> Self {
+        let mut case = Self::nominal(gap_m);
+        change(&mut case);
+        case
+    }
+
+    fn fly(&self, seed: u64) -> Flight {
+        simulate(&self.plant, &self.profile, &self.sensors, seed).unwrap()
+    }
+
+    fn outcome(&self, flight: &Flight) -> Outcome {
+        let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
+        self.look(&flight.motor_m, &dx_m, &flight.load_n)
+    }
+
+    fn look(&self, motor_m: &[f64], dx_m: &[f64], load_n: &[f64]) -> Outcome {
+        let whole = 0..dx_m.len();
+        let segments = std::slice::from_ref(&whole);
+        let samples =
+            Samples { step_s: self.profile.sample_rate_hz.recip(), motor_m, dx_m, load_n, segments };
+        let stiffness_n_per_m = self.plant.contact.stiffness_n_per_m * self.assumed_stiffness;
+        let prior = Prior { stiffness_n_per_m, reference_load_n: Some(4000.0) };
+        contact::estimate(&samples, &prior).unwrap()
+    }
+
+    fn gap(&self, seed: u64) -> Box<ContactGap> {
+        gap(self.outcome(&self.fly(seed)))
+    }
+}
+
+fn gap(outcome: Outcome) -> Box<ContactGap> {
+    match outcome {
+        Outcome::Estimated(gap) => gap,
+        Outcome::Refused(refusal) => panic!("refused: {}", refusal.code()),
+    }
+}
+
+/// Median ≤ 0.2 % and worst ≤ 0.5 % of 100 µm, whichever single thing is wrong.
+#[test]
+fn no_single_fault_costs_half_a_per_cent() {
+    let faults: [(&str, Fault); 10] = [
+        ("nominal", |_| ()),
+        ("stiffness assumed 30 % high", |c| c.assumed_stiffness = 1.3),
+        ("stiffness assumed 30 % low", |c| c.assumed_stiffness = 0.7),
+        ("load cell 5 % high", |c| c.sensors.load.gain_error = 0.05),
+        ("load channel 5 ms late", |c| c.sensors.load.delay_s = 5e-3),
+        ("screw channel 5 ms late", |c| c.sensors.screw.delay_s = 5e-3),
+        ("transducer bent by 15 µm", |c| c.sensors.screw.nonlinearity = 15e-6),
+        ("drift of 50 µm", |c| c.sensors.screw.drift = 50e-6),
+        ("spikes of 2 mm", |c| (c.sensors.screw.spikes_per_minute, c.sensors.screw.spike) = (2.0, 2e-3)),
+        ("a screw channel that freezes", |c| {
+            (c.sensors.screw.freezes_per_minute, c.sensors.screw.freeze_s) = (1.0, 1.0);
+        }),
+    ];
+    let mut errors = Vec::new();
+    for (name, fault) in faults {
+        for seed in 0..2 {
+            let found = Case::with(100e-6, fault).gap(seed);
+            let error = (found.gap_m / 100e-6 - 1.0).abs();
+            assert!(error < 5e-3, "{name}, seed {seed}: {:.2} % with {found:?}", 100.0 * error);
+            errors.push(error);
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    assert!(errors[errors.len() / 2] < 2e-3, "median {}", errors[errors.len() / 2]);
+}
+
+#[test]
+fn eightfold_friction_costs_under_one_per_cent() {
+    for seed in 0..4 {
+        let found = Case::with(100e-6, |c| c.plant = c.plant.with_friction_factor(8.0)).gap(seed);
+        assert!((found.gap_m / 100e-6 - 1.0).abs() < 1e-2, "{found:?}");
+        assert!(found.flags.contains(&Flag::FrictionHeavy));
+    }
+}
+
+#[test]
+fn a_true_zero_is_declared_below_detection() {
+    for seed in 0..4 {
+        let found = Case::nominal(0.0).gap(seed);
+        assert!(found.gap_m.abs() < 1.5e-6 && found.gap_bounds_m.1 < 2e-6, "{found:?}");
+        assert!(found.flags.contains(&Flag::BelowDetection));
+    }
+}
+
+#[test]
+fn the_skew_between_the_positions_is_found_with_its_sign() {
+    for delay_s in [-4e-3, 3e-3] {
+        let found = Case::with(100e-6, |c| {
+            (c.sensors.motor.delay_s, c.sensors.screw.delay_s) = (5e-3, 5e-3 + delay_s);
+        })
+        .gap(1);
+        assert!((found.skew_s - delay_s).abs() < 0.2e-3, "{delay_s}: {found:?}");
+    }
+}
+
+/// The play a soft flank hides below its knee is 24 µm on a straight line.
+#[test]
+fn soft_flanks_are_flagged_and_their_gap_read_off_a_curve() {
+    let laws = [
+        (Law::Soft { share: 0.4, depth_m: 20e-6 }, 6e-6),
+        (Law::Soft { share: 0.4, depth_m: 100e-6 }, 10e-6),
+        (Law::Hertz { share: 1.0, reference_m: 100e-6 }, 6e-6),
+    ];
+    for (law, within_m) in laws {
+        let found = Case::with(100e-6, |c| c.plant.contact.law = law).gap(2);
+        assert!(found.flags.contains(&Flag::SoftContact), "{law:?}: {found:?}");
+        assert!((found.gap_m - 100e-6).abs() < within_m, "{law:?}: {found:?}");
+    }
+}
+
+/// By hand: 100 µm and twice 4000 N over 5·10⁷ N/m are 260 µm; at zero load the gap remains.
+#[test]
+fn lost_motion_is_gap_and_windup() {
+    let found = Case::nominal(100e-6).gap(3);
+    assert!((found.lost_motion_m.unwrap() - 260e-6).abs() < 1e-6, "{found:?}");
+    assert!((found.loop_width_m.unwrap() - 100e-6).abs() < 1e-6, "{found:?}");
+}
+
+#[test]
+fn a_flight_in_two_segments_with_missing_samples_shows_the_same_gap() {
+    let case = Case::with(100e-6, |c| c.sensors.screw.dropout_share = 0.05);
+    let flight = case.fly(4);
+    let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
+    let half = dx_m.len() / 2;
+    let segments = [0..half, half + 100..dx_m.len()];
+    let samples = Samples {
+        step_s: case.profile.sample_rate_hz.recip(),
+        motor_m: &flight.motor_m,
+        dx_m: &dx_m,
+        load_n: &flight.load_n,
+        segments: &segments,
+    };
+    let prior = Prior { stiffness_n_per_m: 5e7, reference_load_n: None };
+    let found = gap(contact::estimate(&samples, &prior).unwrap());
+    assert!((found.gap_m / 100e-6 - 1.0).abs() < 5e-3, "{found:?}");
+}
+
+#[test]
+fn channels_that_are_not_what_they_are_said_to_be_are_refused() {
+    let case = Case::nominal(100e-6);
+    let flight = case.fly(5);
+    let (motor, screw, load) = (&flight.motor_m, &flight.screw_m, &flight.load_n);
+    let minus = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<f64>>();
+    let dx = minus(screw, motor);
+    let flipped: Vec<f64> = load.iter().map(|f| -f).collect();
+    let half_lead: Vec<f64> = motor.iter().map(|m| 0.97 * m).collect();
+    let still = vec![0.0; dx.len()];
+    let refusals = [
+        (case.look(motor, &dx, &flipped), Refusal::LoadSignFlipped),
+        (case.look(screw, &minus(motor, screw), load), Refusal::PositionsSwapped),
+        (case.look(&half_lead, &minus(screw, &half_lead), load), Refusal::PositionRatio),
+        (case.look(&still, &dx, load), Refusal::ChannelConstant),
+        (case.look(motor, &dx, &still), Refusal::ChannelConstant),
+        (case.look(&motor[..900], &dx[..900], &load[..900]), Refusal::TooShort),
+    ];
+    for (found, wanted) in refusals {
+        assert_eq!(found, Outcome::Refused(wanted));
+        assert!(!wanted.remedy().is_empty());
+    }
+}
+
+#[test]
+fn a_flight_that_cannot_show_its_gap_is_refused() {
+    let one_sided = Case::with(100e-6, |c| c.profile.no_reversal = true);
+    let slow = Case::with(100e-6, |c| c.profile.sample_rate_hz = 15.0);
+    let refusal = |case: &Case| case.outcome(&case.fly(6));
+    assert_eq!(refusal(&one_sided), Outcome::Refused(Refusal::NoLoadReversal));
+    assert_eq!(refusal(&slow), Outcome::Refused(Refusal::RateTooLow));
+}
+
+#[test]
+fn the_same_flight_gives_the_same_bits() {
+    let case = Case::nominal(50e-6);
+    let flight = case.fly(7);
+    let (once, again) = (gap(case.outcome(&flight)), gap(case.outcome(&flight)));
+    assert_eq!(once.gap_m.to_bits(), again.gap_m.to_bits());
+    assert_eq!(once.gap_se_m.to_bits(), again.gap_se_m.to_bits());
+}
+
+#[test]
+fn a_prior_that_cannot_be_is_an_error() {
+    let samples = Samples { step_s: 0.01, motor_m: &[], dx_m: &[], load_n: &[], segments: &[] };
+    let prior = Prior { stiffness_n_per_m: 0.0, reference_load_n: None };
+    assert!(matches!(contact::estimate(&samples, &prior), Err(Error::Parameter { .. })));
+    let nothing = contact::estimate(&samples, &Prior { stiffness_n_per_m: 5e7, ..prior });
+    assert_eq!(nothing, Ok(Outcome::Refused(Refusal::ChannelConstant)));
+}
