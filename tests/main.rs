@@ -1,1 +1,12 @@
-//! The `freeplay` command, as its users type it.
+//! The `freeplay` command as its users type it, on the sample fleet, on logs of other machines, and on
+//! logs that are damaged.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod bench;
+mod damaged;
+mod interrupted;
+mod known;
+mod oracle;
+mod speech;
+mod truth;

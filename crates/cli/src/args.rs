@@ -167,6 +167,7 @@ pub(crate) struct CheckArgs {
 
 /// `run`.
 #[derive(Debug, ClapArgs)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag that a user types")]
 pub(crate) struct RunArgs {
     /// Departures from this UTC date or time on.
     #[arg(long, value_parser = parse_utc, value_name = "UTC")]

@@ -33,7 +33,7 @@ pub(crate) enum Failure {
     /// Configuration, tables or arguments: code 2.
     Refused(Vec<Complaint>),
     /// Store or disk: code 3.
-    Failed(Complaint),
+    Failed(Box<Complaint>),
     /// The reader of our answer closed its pipe; nobody is left to tell.
     PipeClosed,
 }
@@ -42,6 +42,11 @@ impl Failure {
     /// A wrong argument.
     pub(crate) fn usage(code: &str, what: impl std::fmt::Display, hint: &str) -> Self {
         Self::Refused(vec![Complaint::new(code, what).hint(hint)])
+    }
+
+    /// Store or disk.
+    pub(crate) fn failed(complaint: Complaint) -> Self {
+        Self::Failed(Box::new(complaint))
     }
 
     /// Its exit code.
@@ -59,14 +64,14 @@ impl From<pipeline::Error> for Failure {
         match error {
             pipeline::Error::Refused(complaints) => Self::Refused(complaints),
             pipeline::Error::Store(error) => error.into(),
-            other => Self::Failed(Complaint::new("run_failed", other)),
+            other => Self::failed(Complaint::new("run_failed", other)),
         }
     }
 }
 
 impl From<store::Error> for Failure {
     fn from(error: store::Error) -> Self {
-        Self::Failed(error.complaint())
+        Self::failed(error.complaint())
     }
 }
 
@@ -75,6 +80,6 @@ impl From<std::io::Error> for Failure {
         if error.kind() == std::io::ErrorKind::BrokenPipe {
             return Self::PipeClosed;
         }
-        Self::Failed(Complaint::new("output_failed", format!("the answer cannot be written: {error}")))
+        Self::failed(Complaint::new("output_failed", format!("the answer cannot be written: {error}")))
     }
 }

@@ -52,7 +52,7 @@ fn to_file(
 
 fn not_written(file: &std::path::Path, error: &io::Error) -> Failure {
     let what = format!("the answer cannot be written: {error}");
-    Failure::Failed(
+    Failure::failed(
         Complaint::new("output_failed", what).in_file(file.display()).hint("does the folder exist?"),
     )
 }
@@ -83,7 +83,7 @@ fn broken(error: &arrow::error::ArrowError) -> Failure {
     if error.to_string().contains("Broken pipe") {
         return Failure::PipeClosed;
     }
-    Failure::Failed(Complaint::new("output_failed", format!("the answer cannot be written: {error}")))
+    Failure::failed(Complaint::new("output_failed", format!("the answer cannot be written: {error}")))
 }
 
 /// CSV has no lists: theirs become text, its items parted by semicolons, other nests JSON.

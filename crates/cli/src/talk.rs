@@ -50,6 +50,7 @@ impl Talk {
     ///
     /// # Errors
     /// When stdout is closed or full.
+    #[expect(clippy::unused_self, reason = "only who holds the voice may speak")]
     pub(crate) fn answer(&self, text: &str) -> Result<(), Failure> {
         let mut out = io::stdout().lock();
         out.write_all(text.as_bytes())?;
@@ -81,7 +82,7 @@ impl Talk {
         }
         let more = seen.into_iter().filter(|(_, count)| *count > SHOWN_WHOLE && !self.verbose());
         more.for_each(|(code, count)| {
-            self.err(&format!("{} more like it [{code}]; -v shows all", count - SHOWN_WHOLE))
+            self.err(&format!("{} more like it [{code}]; -v shows all", count - SHOWN_WHOLE));
         });
     }
 
@@ -99,6 +100,7 @@ impl Talk {
     }
 
     /// Nobody can be told that stderr is closed.
+    #[expect(clippy::unused_self, reason = "only who holds the voice may speak")]
     fn err(&self, text: &str) {
         let _ = writeln!(io::stderr().lock(), "{text}");
     }

@@ -46,7 +46,7 @@ impl Book {
                 self.enter((*account).clone());
                 vec![LogResult { account: *account, records: Vec::new(), retires: Vec::new() }]
             }
-            Done::Read { account, records, complaints } => self.read(*account, records, complaints, report),
+            Done::Read { account, records, complaints } => self.read(*account, records, &complaints, report),
         }
     }
 
@@ -54,17 +54,17 @@ impl Book {
         &mut self,
         account: LogAccount,
         records: Vec<GapRecord>,
-        complaints: Vec<Complaint>,
+        complaints: &[Complaint],
         report: &mut Report,
     ) -> Vec<LogResult> {
         let Some(rival) = self.rival(&account, &records) else {
-            return vec![self.store(account, records, &complaints, report)];
+            return vec![self.store(account, records, complaints, report)];
         };
         if rival.log_path < account.log_path {
             let (account, complaints) = yielded(account, &rival);
             return vec![self.store(account, Vec::new(), &complaints, report)];
         }
-        let first = self.store(account, records, &complaints, report);
+        let first = self.store(account, records, complaints, report);
         let (loser, complaints) = yielded(rival, &first.account);
         vec![first, self.store(loser, Vec::new(), &complaints, report)]
     }
@@ -94,7 +94,7 @@ impl Book {
     /// Records this log made under another identity or for positions it no longer speaks for.
     fn outdated(&mut self, account: &LogAccount, records: &[GapRecord]) -> Vec<RecordKey> {
         let Some(before) = self.accounts.get(&account.log_path) else { return Vec::new() };
-        let now: BTreeSet<RecordKey> = records.iter().map(|r| RecordKey::of(r)).collect();
+        let now: BTreeSet<RecordKey> = records.iter().map(RecordKey::of).collect();
         let mine = |name: &RecordKey| self.owners.get(name) == Some(&account.log_path);
         let gone: Vec<RecordKey> =
             plan::owned(before).into_iter().filter(|n| mine(n) && !now.contains(n)).collect();

@@ -57,7 +57,7 @@ pub fn installations(config: &Config) -> Result<Installations, Error> {
 /// As [`run`], except that no store is needed.
 pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
     let accounts =
-        if config.store().exists() { Store::open(&config.store())?.accounts()? } else { Vec::new() };
+        if config.store().exists() { Store::open(config.store())?.accounts()? } else { Vec::new() };
     plan::plan(config, &installations(config)?, accounts, request)
 }
 
@@ -69,7 +69,7 @@ pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
 pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<Report, Error> {
     let clock = Instant::now();
     let installations = installations(config)?;
-    let store = Store::create_or_open(&config.store())?;
+    let store = Store::create_or_open(config.store())?;
     let mut writer = store.lock(&context.holder, context.wait)?;
     let plan = plan::plan(config, &installations, store.accounts()?, request)?;
     let workers = workers(request, plan.work.len());

@@ -33,7 +33,7 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
     for (path, name) in &logs {
         match Opened::open(path, name, &config) {
             Ok(opened) => {
-                one(&opened, name, &config, &installations, &mut channels, &mut complaints, &mut page)
+                one(&opened, name, &config, &installations, &mut channels, &mut complaints, &mut page);
             }
             Err(complaint) => complaints.push(complaint),
         }

@@ -195,7 +195,7 @@ fn trace(
         all.extend(opened);
     }
     let columns = all.columns();
-    ingest::write::write_parquet(file, &columns, &[]).map_err(|e| Failure::Failed(e.complaint()))?;
+    ingest::write::write_parquet(file, &columns, &[]).map_err(|e| Failure::failed(e.complaint()))?;
     talk.note(&format!("wrote {} samples to {}", all.len(), shown(file)));
     Ok(())
 }

@@ -16,7 +16,7 @@ use super::{config, run::count};
 /// # Errors
 /// When configuration or store cannot be read.
 pub(crate) fn query(args: &QueryArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
-    let store = Store::open(&config(global)?.store())?;
+    let store = Store::open(config(global)?.store())?;
     let records = store.records(&asked(args))?;
     rows::answer(&args.output, talk, || Ok(store::columns::to_batch(&records)?), || page(&records))?;
     if records.is_empty() {

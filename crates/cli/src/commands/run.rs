@@ -84,7 +84,7 @@ fn follow(event: &Event, progress: &Progress<'_>) {
         Event::Planned { logs, .. } => progress.total(*logs),
         Event::Started { log } => progress.started(log),
         Event::Finished { log, refused, complaints, .. } => {
-            progress.finished(log, *refused, complaints.len())
+            progress.finished(log, *refused, complaints.len());
         }
         Event::Stored { .. } | Event::Trends { .. } => {}
     }

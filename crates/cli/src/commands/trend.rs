@@ -28,12 +28,12 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Co
     };
     let found = match (&args.estimates, &args.queries) {
         (Some(file), None) => trends::of_table(&config, &installations, file, &ask)?,
-        (None, None) => trends::of_store(&config, &installations, &Store::open(&config.store())?, &ask)?,
+        (None, None) => trends::of_store(&config, &installations, &Store::open(config.store())?, &ask)?,
         (estimates, Some(queries)) => {
             let queries = pipeline::estimates::queries(queries)?;
             let flown = match estimates {
                 Some(file) => pipeline::estimates::read(file)?,
-                None => trends::flown_in_store(&installations, &Store::open(&config.store())?)?,
+                None => trends::flown_in_store(&installations, &Store::open(config.store())?)?,
             };
             trends::of_queries(&config, &installations, flown, &queries)?
         }

@@ -1,0 +1,150 @@
+//! What every test here needs: a folder of its own, a configuration in it, and the binary.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use arrow::array::{Array, AsArray, RecordBatch};
+use arrow::compute::{cast, concat_batches};
+use arrow::datatypes::{DataType, Float64Type};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+/// The top of the repository.
+pub(crate) fn top() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// A fleet in a folder of its own.
+pub(crate) struct Bench {
+    folder: tempfile::TempDir,
+}
+
+/// How a command ended.
+#[derive(Debug)]
+pub(crate) struct Ended {
+    pub(crate) code: Option<i32>,
+    pub(crate) out: String,
+    pub(crate) err: String,
+}
+
+impl Bench {
+    /// A copy of the sample fleet.
+    pub(crate) fn sample() -> Self {
+        let bench = Self { folder: tempfile::tempdir().unwrap() };
+        copy(&top().join("sample-data"), &bench.path("sample-data"));
+        std::fs::copy(top().join("pipeline.toml"), bench.path("pipeline.toml")).unwrap();
+        bench
+    }
+
+    /// A copy of a folder of `tests/data`.
+    pub(crate) fn of(data: &str) -> Self {
+        let bench = Self { folder: tempfile::tempdir().unwrap() };
+        copy(&top().join("tests/data").join(data), bench.folder.path());
+        bench
+    }
+
+    pub(crate) fn empty() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    pub(crate) fn path(&self, relative: &str) -> PathBuf {
+        self.folder.path().join(relative)
+    }
+
+    /// The command, in this folder, as a scheduler would start it.
+    pub(crate) fn command(&self, args: &[&str]) -> std::process::Command {
+        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("freeplay"));
+        command.args(args).current_dir(self.folder.path());
+        command.env_remove("FREEPLAY_CONFIG").env_remove("NO_COLOR").stdin(std::process::Stdio::null());
+        command
+    }
+
+    pub(crate) fn freeplay(&self, args: &[&str]) -> Ended {
+        let output = self.command(args).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        Ended { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+    }
+
+    /// Runs a command that must end well.
+    pub(crate) fn well(&self, args: &[&str]) -> String {
+        let ended = self.freeplay(args);
+        assert_eq!(ended.code, Some(0), "{args:?}: {ended:?}");
+        ended.out
+    }
+
+    /// Every stored record as CSV, without what differs between two runs of the same logs.
+    pub(crate) fn exported(&self) -> String {
+        let all = self.well(&["store", "export", "--format", "csv"]);
+        let header: Vec<&str> = all.lines().next().unwrap().split(',').collect();
+        let of_a_run = ["run_id", "processed_utc", "log_path"];
+        let kept: Vec<usize> = (0..header.len()).filter(|&i| !of_a_run.contains(&header[i])).collect();
+        let line = |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            kept.iter().map(|&i| cells[i]).collect::<Vec<_>>().join(",")
+        };
+        all.lines().map(line).collect::<Vec<_>>().join("\n")
+    }
+
+    /// Replaces text in the configuration.
+    pub(crate) fn configure(&self, from: &str, to: &str) {
+        let file = self.path("pipeline.toml");
+        let text = std::fs::read_to_string(&file).unwrap();
+        assert!(text.contains(from), "{from} is not in the configuration");
+        std::fs::write(file, text.replacen(from, to, 1)).unwrap();
+    }
+
+    /// The logs of the fleet, by name.
+    pub(crate) fn logs(&self) -> Vec<PathBuf> {
+        let pattern = self.path("sample-data/logs/*/*.parquet");
+        let mut logs: Vec<PathBuf> = glob::glob(pattern.to_str().unwrap()).unwrap().flatten().collect();
+        logs.sort();
+        logs
+    }
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap().flatten() {
+        let (path, target) = (entry.path(), to.join(entry.file_name()));
+        if path.is_dir() {
+            copy(&path, &target);
+        } else {
+            std::fs::copy(&path, &target).unwrap();
+        }
+    }
+}
+
+/// A Parquet table, read whole with the plain reader of the Arrow library.
+pub(crate) struct Table(RecordBatch);
+
+impl Table {
+    pub(crate) fn read(file: &Path) -> Self {
+        let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(file).unwrap()).unwrap();
+        let schema = reader.schema().clone();
+        let batches: Vec<RecordBatch> = reader.build().unwrap().map(Result::unwrap).collect();
+        Self(concat_batches(&schema, &batches).unwrap())
+    }
+
+    pub(crate) fn rows(&self) -> usize {
+        self.0.num_rows()
+    }
+
+    pub(crate) fn texts(&self, column: &str) -> Vec<String> {
+        let text = cast(self.0.column_by_name(column).unwrap(), &DataType::Utf8).unwrap();
+        text.as_string::<i32>().iter().map(|v| v.unwrap_or_default().to_owned()).collect()
+    }
+
+    /// NaN where null.
+    pub(crate) fn numbers(&self, column: &str) -> Vec<f64> {
+        let values = self.0.column_by_name(column).unwrap().as_primitive::<Float64Type>();
+        (0..values.len()).map(|i| if values.is_null(i) { f64::NAN } else { values.value(i) }).collect()
+    }
+
+    /// One number for each flight and position.
+    pub(crate) fn by_flight(&self, column: &str) -> BTreeMap<(String, String, String), f64> {
+        let keys =
+            self.texts("tail_number").into_iter().zip(self.texts("flight_id")).zip(self.texts("position"));
+        keys.zip(self.numbers(column))
+            .map(|(((tail, flight), position), v)| ((tail, flight, position), v))
+            .collect()
+    }
+}

@@ -1,0 +1,137 @@
+//! Only new work: what is accounted for is not done again, and what changed is.
+
+use crate::bench::Bench;
+
+fn to_do(account: &str) -> String {
+    account.lines().find(|l| l.trim_start().starts_with("found")).unwrap().trim().to_owned()
+}
+
+#[test]
+fn a_second_run_does_nothing() {
+    let bench = Bench::sample();
+    bench.well(&["run"]);
+    let before = bench.exported();
+    let account = bench.well(&["run"]);
+    assert!(to_do(&account).ends_with("30 logs: 0 to do, 30 known"), "{account}");
+    assert_eq!(bench.exported(), before);
+}
+
+#[test]
+fn a_changed_part_redoes_only_the_logs_it_flew_in() {
+    let bench = Bench::sample();
+    bench.well(&["run", "--tail", "N412FP"]);
+    bench.configure("stiffness_n_per_m = 6.5e7", "stiffness_n_per_m = 6.6e7");
+    let plan = bench.well(&["run", "--dry-run", "--tail", "N412FP"]);
+    assert_eq!(plan.matches("setting changed").count(), 10, "{plan}");
+    bench.configure("limit_m = 150e-6", "limit_m = 151e-6");
+    bench.well(&["run", "--tail", "N412FP"]);
+    let plan = bench.well(&["run", "--dry-run", "--tail", "N412FP"]);
+    assert_eq!(plan.matches("setting changed").count(), 0, "{plan}");
+    let records = bench.well(&["query", "tail", "N412FP", "--json"]);
+    assert_eq!(records.matches("\"flight_id\"").count(), 40, "a flight is there once");
+}
+
+#[test]
+fn a_changed_limit_moves_no_gap_and_redoes_nothing() {
+    let bench = Bench::sample();
+    bench.well(&["run"]);
+    bench.configure("limit_m = 150e-6", "limit_m = 160e-6");
+    assert!(to_do(&bench.well(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
+}
+
+#[test]
+fn a_renamed_or_touched_log_is_recognised_by_its_content() {
+    let bench = Bench::sample();
+    bench.well(&["run"]);
+    let before = bench.exported();
+    let log = &bench.logs()[0];
+    std::fs::rename(log, log.with_file_name("renamed.parquet")).unwrap();
+    let other = &bench.logs()[5];
+    let bytes = std::fs::read(other).unwrap();
+    std::fs::remove_file(other).unwrap();
+    std::fs::write(other, bytes).unwrap();
+    let account = bench.well(&["run"]);
+    assert!(account.contains("0 records of 0 flights"), "{account}");
+    assert_eq!(bench.exported(), before);
+    assert!(to_do(&bench.well(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
+}
+
+#[test]
+fn a_copy_of_a_log_adds_nothing_whichever_is_read_first() {
+    let bench = Bench::sample();
+    let log = &bench.logs()[3];
+    std::fs::copy(log, log.with_file_name("copy.parquet")).unwrap();
+    bench.well(&["run"]);
+    let plain = Bench::sample();
+    plain.well(&["run"]);
+    assert_eq!(bench.exported(), plain.exported());
+}
+
+/// Two recordings of one flight: the one whose name sorts first is used, and the other is named.
+#[test]
+fn a_rival_log_of_the_same_flight_is_in_error_whichever_is_read_first() {
+    for jobs in ["1", "2"] {
+        let bench = Bench::sample();
+        let logs = bench.logs();
+        let truth = ingest_facts(&logs[3]);
+        rewrite(&logs[4], &logs[3].with_file_name("z_rival.parquet"), &truth);
+        let ended = bench.freeplay(&["run", "--jobs", jobs]);
+        assert_eq!(ended.code, Some(1), "{ended:?}");
+        assert!(ended.err.contains("error[duplicate_flight]"), "{}", ended.err);
+        assert!(ended.err.contains("z_rival.parquet"), "{}", ended.err);
+        let plain = Bench::sample();
+        plain.well(&["run"]);
+        assert_eq!(bench.exported(), plain.exported());
+    }
+}
+
+#[test]
+fn redo_does_all_again_and_stores_each_flight_once() {
+    let bench = Bench::sample();
+    bench.well(&["run"]);
+    let before = bench.exported();
+    let account = bench.well(&["run", "--redo", "--tail", "N413FP"]);
+    assert!(account.contains("40 records of 10 flights"), "{account}");
+    assert_eq!(bench.exported(), before);
+}
+
+#[test]
+fn a_limit_leaves_the_rest_for_the_next_run() {
+    let bench = Bench::sample();
+    assert!(bench.well(&["run", "--limit", "7"]).contains("28 records of 7 flights"));
+    assert!(bench.well(&["run"]).contains("92 records of 23 flights"));
+}
+
+type Facts = Vec<(String, String)>;
+
+/// The footer's metadata that says which flight a log is.
+fn ingest_facts(log: &std::path::Path) -> Facts {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    let reader = SerializedFileReader::new(std::fs::File::open(log).unwrap()).unwrap();
+    let pairs = reader.metadata().file_metadata().key_value_metadata().unwrap();
+    pairs
+        .iter()
+        .filter_map(|p| Some((p.key.clone(), p.value.clone()?)))
+        .filter(|p| p.0 != "ARROW:schema")
+        .collect()
+}
+
+/// Writes the channels of one log under the identity of another.
+fn rewrite(from: &std::path::Path, to: &std::path::Path, facts: &Facts) {
+    use ingest::write::{Column, write_parquet};
+    use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+    let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(from).unwrap()).unwrap();
+    let names: Vec<String> = reader.schema().fields().iter().map(|f| f.name().clone()).collect();
+    let mut columns: Vec<(String, Column)> =
+        names.into_iter().map(|n| (n, Column::Real(Vec::new()))).collect();
+    for batch in reader.build().unwrap() {
+        for (array, (_, column)) in batch.unwrap().columns().iter().zip(&mut columns) {
+            let real = arrow::compute::cast(array, &arrow::datatypes::DataType::Float64).unwrap();
+            let real = arrow::array::AsArray::as_primitive::<arrow::datatypes::Float64Type>(&real);
+            if let Column::Real(values) = column {
+                values.extend(real.values());
+            }
+        }
+    }
+    write_parquet(to, &columns, facts).unwrap();
+}

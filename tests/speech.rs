@@ -1,0 +1,161 @@
+//! How the program speaks: codes, forms, quiet pipes, and help that a stranger can use.
+
+use std::io::Read;
+
+use crate::bench::Bench;
+
+#[test]
+fn every_command_has_a_purpose_and_an_example() {
+    let bench = Bench::empty();
+    let all = bench.well(&["--help"]);
+    for command in
+        ["init", "check", "run", "estimate", "query", "trend", "simulate", "store", "completions", "man"]
+    {
+        assert!(all.contains(&format!("  {command} ")), "{command} is not in the help");
+        let help = bench.well(&[command, "--help"]);
+        assert!(help.contains("Example"), "{command} shows no example: {help}");
+        assert!(help.contains("freeplay "), "{command}");
+    }
+}
+
+#[test]
+fn init_writes_a_configuration_that_is_good_and_never_overwrites() {
+    let bench = Bench::empty();
+    bench.well(&["init", "fleet"]);
+    let again = bench.freeplay(&["init", "fleet"]);
+    assert_eq!(again.code, Some(2));
+    assert!(again.err.contains("error[would_overwrite]"), "{}", again.err);
+    let silent = bench.freeplay(&["run", "--config", "fleet/pipeline.toml"]);
+    assert_eq!(silent.code, Some(2), "no log fits: {silent:?}");
+    assert!(silent.err.contains("error[no_log_matched]"), "{}", silent.err);
+}
+
+#[test]
+fn usage_and_configuration_errors_are_code_2_and_run_nothing() {
+    let bench = Bench::sample();
+    for args in [&["fly"][..], &["run", "--tale", "N1"], &["query", "tail"], &["run", "--since", "yesterday"]]
+    {
+        assert_eq!(bench.freeplay(args).code, Some(2), "{args:?}");
+    }
+    let tale = bench.freeplay(&["run", "--tale", "N1"]);
+    assert!(tale.err.contains("--tail"), "{}", tale.err);
+    bench.configure("bandwidth_hz", "bandwith_hz");
+    let ended = bench.freeplay(&["run"]);
+    assert_eq!(ended.code, Some(2));
+    assert!(ended.err.contains("error[unknown_key]"), "{}", ended.err);
+    assert!(ended.err.contains("hint: `bandwidth_hz`?"), "{}", ended.err);
+    assert!(ended.err.contains("nothing was run"), "{}", ended.err);
+    assert!(!bench.path("results").exists());
+}
+
+#[test]
+fn rows_come_as_table_json_csv_and_parquet() {
+    let bench = Bench::sample();
+    bench.well(&["run", "--limit", "3"]);
+    let json: Vec<serde_json::Value> =
+        serde_json::from_str(&bench.well(&["store", "export", "--json"])).unwrap();
+    assert_eq!(json.len(), 12);
+    assert!(json[0]["gap_se_m"].is_null(), "nulls are written");
+    assert!(json[0]["departure_utc"].as_str().unwrap().ends_with('Z'));
+    let csv = bench.well(&["store", "export", "--format", "csv"]);
+    assert!(
+        csv.starts_with("tail_number,position,part_number,serial_number,flight_id,departure_utc,"),
+        "{csv}"
+    );
+    assert_eq!(csv.lines().count(), 13);
+    let gap: f64 = csv.lines().nth(1).unwrap().split(',').nth(12).unwrap().parse().unwrap();
+    assert_eq!(Some(gap), json[0]["gap_m"].as_f64(), "both forms hold the same bits");
+    bench.well(&["store", "export", "--format", "parquet", "--output", "all.parquet"]);
+    assert_eq!(crate::bench::Table::read(&bench.path("all.parquet")).rows(), 12);
+    assert!(bench.well(&["trend"]).contains(" units as of "));
+}
+
+#[test]
+fn a_query_that_finds_nothing_is_well_and_has_no_rows() {
+    let bench = Bench::sample();
+    bench.well(&["run", "--limit", "1"]);
+    assert_eq!(bench.well(&["query", "tail", "N000", "--json"]).trim(), "[]");
+}
+
+#[test]
+fn a_store_that_is_not_there_says_who_makes_it() {
+    let bench = Bench::sample();
+    let ended = bench.freeplay(&["query", "tail", "N412FP"]);
+    assert_eq!(ended.code, Some(3));
+    assert!(ended.err.contains("freeplay run"), "{}", ended.err);
+}
+
+#[test]
+fn a_trace_holds_every_sample_the_filter_saw() {
+    let bench = Bench::of("flights");
+    bench.well(&["estimate", "A_nominal.parquet", "--part", "A", "--trace", "trace.parquet"]);
+    let trace = crate::bench::Table::read(&bench.path("trace.parquet"));
+    assert_eq!(trace.rows(), 37_495);
+    assert!(trace.numbers("s_m").iter().all(|s| s.is_finite()));
+}
+
+/// A reader that closes the pipe after a line ends the program quietly.
+#[test]
+fn a_closed_pipe_ends_quietly() {
+    let bench = Bench::sample();
+    bench.well(&["run"]);
+    let mut child = bench
+        .command(&["store", "export", "--format", "csv"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut first = [0; 64];
+    child.stdout.take().unwrap().read_exact(&mut first).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
+    assert!(output.status.success());
+}
+
+/// A second run stops, naming who holds the store.
+#[test]
+fn a_held_store_is_code_3() {
+    let bench = Bench::sample();
+    bench.well(&["run", "--limit", "1"]);
+    let lock = std::fs::File::options().write(true).open(bench.path("results/lock")).unwrap();
+    lock.lock().unwrap();
+    let ended = bench.freeplay(&["run"]);
+    assert_eq!(ended.code, Some(3), "{ended:?}");
+    assert!(ended.err.contains("error[store_held]"), "{}", ended.err);
+    assert_eq!(bench.freeplay(&["query", "tail", "N412FP"]).code, Some(0), "readers need not wait");
+    drop(lock);
+    bench.well(&["run"]);
+}
+
+#[test]
+fn fail_on_tells_a_scheduler_with_code_4() {
+    let bench = Bench::sample();
+    assert_eq!(bench.freeplay(&["run", "--fail-on", "watch"]).code, Some(4));
+}
+
+#[test]
+fn estimates_made_elsewhere_get_statements_and_queries_see_nothing_later() {
+    let bench = Bench::sample();
+    let mut table = "serial,departure_utc,gap_m,flight_hours,part_number\n".to_owned();
+    for day in 1..=28 {
+        let gap_m = 50e-6 + f64::from(day) * 1e-6;
+        table.push_str(&format!("U1,2026-02-{day:02}T08:00:00Z,{gap_m:e},2.0,EMA-27-1040\n"));
+    }
+    std::fs::write(bench.path("history.csv"), &table).unwrap();
+    std::fs::write(
+        bench.path("dates.csv"),
+        "serial,as_of_utc\nU1,2026-02-15T12:00:00Z\nU1,2026-02-28T12:00:00Z\n",
+    )
+    .unwrap();
+    let args = ["trend", "--estimates", "history.csv", "--queries", "dates.csv", "--json"];
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&bench.well(&args)).unwrap();
+    assert_eq!(rows.iter().map(|r| r["flights"].as_i64().unwrap()).collect::<Vec<_>>(), [15, 28]);
+    // One micrometre in two hours.
+    for row in &rows {
+        assert!((row["sen_rate_m_per_hour"].as_f64().unwrap() / 0.5e-6 - 1.0).abs() < 1e-9, "{row}");
+    }
+    let cut: Vec<&str> = table.lines().take(16).collect();
+    std::fs::write(bench.path("history.csv"), cut.join("\n")).unwrap();
+    let early: Vec<serde_json::Value> = serde_json::from_str(&bench.well(&args)).unwrap();
+    assert_eq!(early[0], rows[0], "what came later changed what was known");
+}
