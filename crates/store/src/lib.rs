@@ -17,11 +17,13 @@
 
 mod account;
 pub mod columns;
+mod compact;
 mod datafile;
 mod durable;
 mod error;
 mod export;
 mod frame;
+mod info;
 mod layout;
 mod lock;
 mod numbered;
@@ -30,11 +32,14 @@ mod read;
 mod stats;
 mod table;
 mod tabled;
+mod verify;
 mod writer;
 
 pub use account::{LogAccount, Outcome, RunAccount};
+pub use compact::Compaction;
 pub use error::Error;
 pub use export::Format;
+pub use info::Info;
 pub use layout::Store;
 pub use lock::Holder;
 pub use query::{Query, RecordKey};

@@ -1,20 +1,23 @@
 //! One Delta table: its snapshot, and a change to it that lands whole or not at all.
 
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use arrow::datatypes::Schema;
 use deltalake::kernel::engine::arrow_conversion::TryIntoKernel;
 use deltalake::kernel::transaction::{CommitBuilder, CommitProperties, TransactionError};
-use deltalake::kernel::{Action, Add, LogicalFileView, StructType, Transaction};
+use deltalake::kernel::{Action, Add, LogicalFileView, StructType, TombstoneView, Transaction};
 use deltalake::operations::create::CreateBuilder;
 use deltalake::protocol::{DeltaOperation, SaveMode};
-use deltalake::{DeltaTable, DeltaTableBuilder, DeltaTableError};
+use deltalake::{DeltaTable, DeltaTableBuilder, DeltaTableError, TableProperty};
+use futures::TryStreamExt;
 use jiff::Timestamp;
 use tokio::runtime::Runtime;
 use url::Url;
 
+use crate::datafile;
 use crate::durable::DurableFiles;
 use crate::error::Error;
 use crate::stats::Stats;
@@ -23,6 +26,9 @@ use crate::stats::Stats;
 const ATTEMPTS: u32 = 5;
 /// The pause after the first attempt; it doubles.
 const PAUSE: Duration = Duration::from_millis(50);
+
+/// Commits between two checkpoints: so many small files at most are read to open the table.
+const CHECKPOINT: &str = "20";
 
 /// Every change that removes files carries a transaction of this name.
 ///
@@ -48,8 +54,17 @@ pub(crate) struct Snapshot {
 /// A data file as the log knows it.
 pub(crate) struct DataFile {
     pub(crate) path: PathBuf,
+    pub(crate) size_bytes: u64,
     pub(crate) stats: Stats,
     view: LogicalFileView,
+}
+
+impl DataFile {
+    /// Whether its name carries the digest of its content.
+    pub(crate) fn has_digest(&self) -> bool {
+        let name = self.path.file_name().and_then(|name| name.to_str());
+        name.is_some_and(|name| datafile::digest_of_name(name).is_some())
+    }
 }
 
 /// What a commit does.
@@ -94,6 +109,8 @@ impl Table {
             let columns: StructType = schema.try_into_kernel().map_err(DeltaTableError::from)?;
             let log_store = self.builder()?.build_storage()?;
             let create = CreateBuilder::new().with_log_store(log_store).with_table_name(self.name);
+            let create =
+                create.with_configuration_property(TableProperty::CheckpointInterval, Some(CHECKPOINT));
             create.with_columns(columns.fields().cloned()).await
         });
         match made {
@@ -116,6 +133,7 @@ impl Table {
     fn file(&self, view: LogicalFileView) -> DataFile {
         DataFile {
             path: self.dir.join(view.path().as_ref()),
+            size_bytes: u64::try_from(view.size()).unwrap_or_default(),
             stats: Stats::parse(view.stats().as_deref()),
             view,
         }
@@ -169,6 +187,48 @@ impl Table {
     }
 }
 
+impl Table {
+    /// Deletes files that no snapshot younger than `kept` needs, and counts them.
+    pub(crate) fn vacuum(&self, kept: Duration) -> Result<usize, Error> {
+        let snapshot = self.snapshot()?;
+        let active: HashSet<&Path> = snapshot.files.iter().map(|file| file.path.as_path()).collect();
+        let superseded = self.superseded(&snapshot).map_err(self.failed("read"))?;
+        let horizon = SystemTime::now().checked_sub(kept).unwrap_or(SystemTime::UNIX_EPOCH);
+        let mut deleted = 0;
+        for path in data_files(&self.dir).map_err(Error::io(&self.dir, "read"))? {
+            let since = superseded.get(&path).copied().or_else(|| written(&path));
+            if !active.contains(path.as_path()) && since.is_some_and(|since| since <= horizon) {
+                std::fs::remove_file(&path).map_err(Error::io(path, "deleted"))?;
+                deleted += 1;
+            }
+        }
+        Ok(deleted)
+    }
+
+    /// When each file that the log still remembers was superseded.
+    fn superseded(&self, snapshot: &Snapshot) -> Result<HashMap<PathBuf, SystemTime>, DeltaTableError> {
+        let tombstones: Vec<TombstoneView> = self.runtime.block_on(async {
+            let log_store = snapshot.delta.log_store();
+            snapshot.delta.snapshot()?.all_tombstones(&log_store).try_collect().await
+        })?;
+        let since = |ms: i64| UNIX_EPOCH + Duration::from_millis(u64::try_from(ms).unwrap_or_default());
+        let entry =
+            |t: &TombstoneView| Some((self.dir.join(t.path().as_ref()), since(t.deletion_timestamp()?)));
+        Ok(tombstones.iter().filter_map(entry).collect())
+    }
+}
+
+/// Data files in a folder, those half written included.
+fn data_files(dir: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let paths = std::fs::read_dir(dir)?.map(|entry| Ok(entry?.path()));
+    let is_data = |path: &PathBuf| path.to_str().is_some_and(|path| path.contains(".parquet"));
+    paths.filter(|path| path.as_ref().map_or(true, is_data)).collect()
+}
+
+fn written(path: &Path) -> Option<SystemTime> {
+    std::fs::metadata(path).and_then(|data| data.modified()).ok()
+}
+
 /// Whether a fresh plan may succeed where this one failed.
 fn is_conflict(error: &DeltaTableError) -> bool {
     let DeltaTableError::Transaction { source } = error else { return false };
@@ -178,4 +238,76 @@ fn is_conflict(error: &DeltaTableError) -> bool {
             | TransactionError::CommitConflict(_)
             | TransactionError::MaxCommitAttempts(_)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use arrow::array::{Int64Array, RecordBatch};
+    use arrow::datatypes::{DataType, Field};
+
+    use super::*;
+
+    fn table(dir: &Path) -> Table {
+        let runtime =
+            tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
+        let table = Table::new(&std::fs::canonicalize(dir).unwrap(), "numbers", Arc::new(runtime));
+        table.create(&Schema::new(vec![Field::new("n", DataType::Int64, false)])).unwrap();
+        table
+    }
+
+    fn batch(numbers: Vec<i64>) -> RecordBatch {
+        let schema = Schema::new(vec![Field::new("n", DataType::Int64, false)]);
+        RecordBatch::try_new(Arc::new(schema), vec![Arc::new(Int64Array::from(numbers))]).unwrap()
+    }
+
+    fn append(table: &Table, n: i64) {
+        let write =
+            |snapshot: &Snapshot| datafile::write(&table.dir, snapshot.version + 1, &batch(vec![n]), true);
+        table.change(|snapshot| Ok(Change { add: vec![write(snapshot)?], ..Change::default() })).unwrap();
+    }
+
+    fn merged<'a>(table: &Table, snapshot: &'a Snapshot, name: u64) -> Change<'a> {
+        let add = datafile::write(&table.dir, name, &batch(vec![1, 2]), false).unwrap();
+        Change { add: vec![add], remove: snapshot.files.iter().collect(), rearranges: true }
+    }
+
+    fn rows(table: &Table) -> i64 {
+        table.snapshot().unwrap().files.iter().filter_map(|file| file.stats.num_records).sum()
+    }
+
+    #[test]
+    fn two_compactions_from_one_snapshot_do_not_change_the_row_count() {
+        let dir = tempfile::tempdir().unwrap();
+        let table = table(dir.path());
+        append(&table, 1);
+        append(&table, 2);
+        let snapshot = table.snapshot().unwrap();
+        table.commit(&snapshot, merged(&table, &snapshot, 8)).unwrap();
+        let second = table.commit(&snapshot, merged(&table, &snapshot, 9)).unwrap_err();
+        assert!(is_conflict(&second), "{second}");
+        assert_eq!(rows(&table), 2);
+    }
+
+    #[test]
+    fn a_compaction_does_not_lose_what_is_appended_meanwhile() {
+        let dir = tempfile::tempdir().unwrap();
+        let table = table(dir.path());
+        append(&table, 1);
+        append(&table, 2);
+        let snapshot = table.snapshot().unwrap();
+        append(&table, 3);
+        table.commit(&snapshot, merged(&table, &snapshot, 9)).unwrap();
+        assert_eq!(rows(&table), 3);
+    }
+
+    #[test]
+    fn bounds_and_rows_are_still_known_after_a_checkpoint() {
+        let dir = tempfile::tempdir().unwrap();
+        let table = table(dir.path());
+        for n in 0..24 {
+            append(&table, n);
+        }
+        assert!(table.dir.join("_delta_log/_last_checkpoint").exists());
+        assert_eq!(rows(&table), 24);
+    }
 }

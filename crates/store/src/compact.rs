@@ -1,0 +1,162 @@
+//! Compaction: many small files become few, sorted by tail, unit and departure, so that a question opens one.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use arrow::array::{AsArray, RecordBatch};
+use arrow::datatypes::SchemaRef;
+use polars::prelude::{Expr, col, lit};
+
+use crate::datafile;
+use crate::error::Error;
+use crate::frame::{self, Read};
+use crate::numbered;
+use crate::table::{Change, DataFile, Snapshot, Table};
+use crate::writer::Writer;
+
+/// Rows of a full file: many enough to open few, few enough to copy one for a flight estimated again.
+const FILE_ROWS: usize = 100_000;
+
+/// Superseded files stay as long, so that a reader that began before may finish: Delta's own default.
+const KEPT: Duration = Duration::from_hours(7 * 24);
+
+/// What a compaction did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Compaction {
+    /// Data files before, of all tables.
+    pub before: usize,
+    /// Data files after.
+    pub after: usize,
+    /// Superseded files that nobody can need any more, and that were deleted.
+    pub deleted: usize,
+}
+
+impl Writer {
+    /// Merges the files of every table and deletes superseded ones older than seven days.
+    ///
+    /// Rows stay what they are. Memory holds one file's rows, or one tail's where it has more.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`]; the tables are unchanged then.
+    pub fn compact(&mut self) -> Result<Compaction, Error> {
+        let store = self.store();
+        let by_unit =
+            Plan { slice_by: "tail_number", order: &["tail_number", "serial_number", "departure_utc"] };
+        let by_log = Plan { slice_by: "log_path", order: &["log_path", numbered::COMMIT] };
+        let by_run = Plan { slice_by: "run_id", order: &[numbered::COMMIT] };
+        let mut total = Compaction { before: 0, after: 0, deleted: 0 };
+        for ((table, schema), plan) in store.tables().into_iter().zip([by_unit, by_log, by_run]) {
+            let before = table.snapshot()?.files.len();
+            table.change(|snapshot| plan.change(table, snapshot, &schema, |files| store.check(files)))?;
+            total.before += before;
+            total.after += table.snapshot()?.files.len();
+        }
+        total.deleted = self.vacuum(KEPT)?;
+        Ok(total)
+    }
+
+    /// Deletes data files that were superseded, or written and never committed, longer ago than given.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when a file cannot be deleted, [`Error::Table`] when the log cannot be read.
+    pub fn vacuum(&mut self, kept: Duration) -> Result<usize, Error> {
+        let tables = self.store().tables();
+        tables.iter().map(|(table, _)| table.vacuum(kept)).sum()
+    }
+}
+
+/// How a table is laid out anew.
+struct Plan {
+    /// Rows of one value lie together.
+    slice_by: &'static str,
+    /// The order within a slice.
+    order: &'static [&'static str],
+}
+
+impl Plan {
+    fn change<'a>(
+        &self,
+        table: &Table,
+        snapshot: &'a Snapshot,
+        schema: &SchemaRef,
+        check: impl Fn(&[PathBuf]) -> Result<(), Error>,
+    ) -> Result<Change<'a>, Error> {
+        let files: Vec<PathBuf> = snapshot.files.iter().map(|file| file.path.clone()).collect();
+        // A flipped byte must not be given a new digest.
+        check(&files)?;
+        let slices = slices(&self.counts(&files, schema)?, FILE_ROWS);
+        let planned: usize = slices.iter().map(|slice| slice.rows.div_ceil(FILE_ROWS)).sum();
+        let all_ours = snapshot.files.iter().all(DataFile::has_digest);
+        if planned >= files.len() && all_ours {
+            return Ok(Change::default());
+        }
+        let mut change =
+            Change { remove: snapshot.files.iter().collect(), rearranges: true, ..Change::default() };
+        for slice in slices {
+            let rows = self.rows(&files, schema, &slice)?;
+            for first in (0..rows.num_rows()).step_by(FILE_ROWS) {
+                let part = rows.slice(first, FILE_ROWS.min(rows.num_rows() - first));
+                change.add.push(datafile::write(table.dir(), snapshot.version + 1, &part, false)?);
+            }
+        }
+        Ok(change)
+    }
+
+    fn counts(&self, files: &[PathBuf], schema: &SchemaRef) -> Result<BTreeMap<String, usize>, Error> {
+        let schema = frame::only(schema, &[self.slice_by])?;
+        let values = Read { files, schema, condition: None, order: &[], last: None }.collect()?;
+        let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+        for value in values.column(0).as_string::<i32>().iter().flatten() {
+            match counts.get_mut(value) {
+                Some(count) => *count += 1,
+                None => drop(counts.insert(value.to_owned(), 1)),
+            }
+        }
+        Ok(counts)
+    }
+
+    fn rows(&self, files: &[PathBuf], schema: &SchemaRef, slice: &Slice) -> Result<RecordBatch, Error> {
+        let value = || col(self.slice_by);
+        let from: Expr = value().gt_eq(lit(slice.first.clone()));
+        let condition = Some(from.and(value().lt_eq(lit(slice.last.clone()))));
+        Read { files, schema: schema.clone(), condition, order: self.order, last: None }.collect()
+    }
+}
+
+/// Neighbouring values whose rows fill a file together.
+#[derive(Debug, PartialEq)]
+struct Slice {
+    first: String,
+    last: String,
+    rows: usize,
+}
+
+fn slices(counts: &BTreeMap<String, usize>, file_rows: usize) -> Vec<Slice> {
+    let mut slices: Vec<Slice> = Vec::new();
+    for (value, &rows) in counts {
+        match slices.last_mut() {
+            Some(slice) if slice.rows + rows <= file_rows => {
+                slice.last.clone_from(value);
+                slice.rows += rows;
+            }
+            _ => slices.push(Slice { first: value.clone(), last: value.clone(), rows }),
+        }
+    }
+    slices
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_never_cut_and_a_file_never_overfull_with_several() {
+        let counts = [("a", 4), ("b", 6), ("c", 1), ("d", 30), ("e", 2)];
+        let counts = counts.into_iter().map(|(name, rows)| (name.to_owned(), rows)).collect();
+        let found: Vec<(String, String, usize)> =
+            slices(&counts, 10).into_iter().map(|s| (s.first, s.last, s.rows)).collect();
+        let expected = [("a", "b", 10), ("c", "c", 1), ("d", "d", 30), ("e", "e", 2)];
+        assert_eq!(found, expected.map(|(first, last, rows)| (first.to_owned(), last.to_owned(), rows)));
+    }
+}

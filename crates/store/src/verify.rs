@@ -1,0 +1,101 @@
+//! Is the store still what was committed? Every file against its log, its digest and its rows.
+
+use std::fs::File;
+use std::path::PathBuf;
+
+use fleet::Complaint;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+
+use crate::columns;
+use crate::datafile;
+use crate::error::Error;
+use crate::frame::{self, Read};
+use crate::layout::Store;
+use crate::query::RecordKey;
+use crate::table::{DataFile, Table};
+use crate::writer::keys;
+
+/// So many alike are named; the rest is counted.
+const NAMED: usize = 3;
+
+impl Store {
+    /// What is wrong with the store; nothing when all is well.
+    ///
+    /// Each data file must be there, as long as its log says, with the content its digest says and as
+    /// many rows; and no record may be there twice.
+    pub fn verify(&self) -> Vec<Complaint> {
+        let tables = self.tables();
+        let mut findings: Vec<Complaint> = tables.iter().flat_map(|(table, _)| files_of(table)).collect();
+        if findings.is_empty() {
+            findings.extend(self.duplicates().unwrap_or_else(|error| vec![error.complaint()]));
+        }
+        findings
+    }
+
+    fn duplicates(&self) -> Result<Vec<Complaint>, Error> {
+        let files: Vec<PathBuf> = self.files()?;
+        let schema = frame::only(&columns::schema(), &RecordKey::COLUMNS)?;
+        let order = &RecordKey::COLUMNS;
+        let batch = Read { files: &files, schema, condition: None, order, last: None }.collect()?;
+        let keys = keys(&batch)?;
+        let twice: Vec<&RecordKey> = keys.windows(2).filter(|k| k[0] == k[1]).map(|k| &k[0]).collect();
+        let mut findings: Vec<Complaint> = twice.iter().take(NAMED).map(|key| duplicate(key)).collect();
+        if twice.len() > NAMED {
+            let more = format!("{} more records are stored twice", twice.len() - NAMED);
+            findings.push(Complaint::new("store_duplicate", more));
+        }
+        Ok(findings)
+    }
+}
+
+fn duplicate(key: &RecordKey) -> Complaint {
+    let RecordKey { tail_number, flight_id, position, .. } = key;
+    Complaint::new("store_duplicate", format!("{tail_number} {flight_id} {position} is stored twice"))
+        .hint("did another program compact the table while a run was writing? `freeplay run --redo` mends it")
+}
+
+fn files_of(table: &Table) -> Vec<Complaint> {
+    match table.snapshot() {
+        Ok(snapshot) => snapshot.files.iter().filter_map(wrong_with).collect(),
+        Err(error) => vec![error.complaint()],
+    }
+}
+
+fn wrong_with(file: &DataFile) -> Option<Complaint> {
+    let complaint = |code: &str, what: &str| Complaint::new(code, what).in_file(file.path.display());
+    let Ok(data) = std::fs::metadata(&file.path) else {
+        let what = "a data file that was committed is not there";
+        return Some(complaint("store_file_missing", what).hint("restore it from a backup of the store"));
+    };
+    if let Err(error) = datafile::check(&file.path) {
+        return Some(error.complaint());
+    }
+    if data.len() != file.size_bytes {
+        let mut wrong = complaint("store_damaged", "a data file has another length than was committed");
+        (wrong.found, wrong.wanted) = (Some(bytes(data.len())), Some(bytes(file.size_bytes)));
+        return Some(wrong.hint("restore it from a backup of the store"));
+    }
+    let rows = match rows(file) {
+        Ok(rows) => rows,
+        Err(error) => return Some(error.complaint().in_file(file.path.display())),
+    };
+    if file.stats.num_records.is_some_and(|committed| committed != rows) {
+        let mut wrong =
+            complaint("store_damaged", "a data file has another number of rows than was committed");
+        (wrong.found, wrong.wanted) = (Some(rows.to_string()), file.stats.num_records.map(|n| n.to_string()));
+        return Some(wrong.hint("restore it from a backup of the store"));
+    }
+    (!file.has_digest()).then(|| {
+        complaint("store_file_foreign", "a data file was written by another program and carries no digest")
+            .hint("`freeplay store compact` writes its rows anew, with digests; compare them with the logs first")
+    })
+}
+
+fn bytes(count: u64) -> String {
+    format!("{count} bytes")
+}
+
+fn rows(file: &DataFile) -> Result<i64, Error> {
+    let opened = File::open(&file.path).map_err(Error::io(&file.path, "opened"))?;
+    Ok(SerializedFileReader::new(opened)?.metadata().file_metadata().num_rows())
+}

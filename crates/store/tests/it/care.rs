@@ -1,0 +1,159 @@
+//! Care: what the store says of itself, and that merging its files changes no row.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use store::{Query, Store, Writer};
+
+use crate::made::{departure, result, run, writer};
+
+fn filled(dir: &Path) -> Writer {
+    let mut writer = writer(dir);
+    for flight in 0..6 {
+        writer.commit(&[result(1, flight, 1e-6), result(2, flight, 2e-6)]).unwrap();
+    }
+    writer
+}
+
+fn codes(store: &Store) -> Vec<String> {
+    store.verify().into_iter().map(|finding| finding.code).collect()
+}
+
+fn data_file(writer: &Writer) -> PathBuf {
+    writer.store().files().unwrap().remove(0)
+}
+
+#[test]
+fn a_sound_store_has_no_findings_and_is_told_in_numbers() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = filled(dir.path());
+    writer.end_run(&run("a", "2026-11-18T02:00:00Z", Some(0))).unwrap();
+    writer.end_run(&run("b", "2026-11-19T02:00:00Z", Some(1))).unwrap();
+    writer.end_run(&run("c", "2026-11-20T02:00:00Z", Some(130))).unwrap();
+    assert_eq!(writer.store().verify(), []);
+    let info = writer.store().info().unwrap();
+    assert_eq!((info.records, info.flights, info.serials, info.tails, info.logs), (36, 12, 6, 2, 12));
+    assert_eq!((info.files, info.version), (6, 6));
+    assert_eq!((info.first_departure_utc, info.last_departure_utc), (Some(departure(0)), Some(departure(5))));
+    assert_eq!(info.last_completed.unwrap().run_id, "b");
+}
+
+#[test]
+fn an_empty_store_is_sound_and_told_in_zeros() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = Store::create_or_open(dir.path()).unwrap();
+    assert_eq!(store.verify(), []);
+    let info = store.info().unwrap();
+    assert_eq!((info.records, info.logs, info.last_departure_utc, info.last_completed), (0, 0, None, None));
+}
+
+#[test]
+fn verify_finds_any_flipped_byte() {
+    let dir = tempfile::tempdir().unwrap();
+    let writer = filled(dir.path());
+    let file = data_file(&writer);
+    let sound = fs::read(&file).unwrap();
+    for at in (0..sound.len()).step_by(sound.len() / 7) {
+        let mut flipped = sound.clone();
+        flipped[at] ^= 0x10;
+        fs::write(&file, flipped).unwrap();
+        assert_eq!(codes(writer.store()), ["store_damaged"], "byte {at}");
+    }
+    fs::write(&file, sound).unwrap();
+    assert_eq!(codes(writer.store()), Vec::<String>::new());
+}
+
+#[test]
+fn verify_names_a_file_that_is_gone_and_one_cut_short() {
+    let dir = tempfile::tempdir().unwrap();
+    let writer = filled(dir.path());
+    let files = writer.store().files().unwrap();
+    fs::remove_file(&files[0]).unwrap();
+    fs::write(&files[1], &fs::read(&files[1]).unwrap()[..100]).unwrap();
+    let findings = writer.store().verify();
+    let named: Vec<_> =
+        findings.iter().map(|f| (f.code.as_str(), PathBuf::from(f.file.clone().unwrap()))).collect();
+    assert_eq!(named, [("store_file_missing", files[0].clone()), ("store_damaged", files[1].clone())]);
+    assert!(findings.iter().all(|finding| finding.hint.is_some()));
+}
+
+#[test]
+fn a_torn_log_is_an_error_that_names_the_table() {
+    let dir = tempfile::tempdir().unwrap();
+    let writer = filled(dir.path());
+    fs::write(dir.path().join("gaps/_delta_log/00000000000000000003.json"), "{\"add\":{\"pa").unwrap();
+    let error = writer.store().records(&Query::default()).unwrap_err().to_string();
+    assert!(error.starts_with("table `gaps` cannot be read: "), "{error}");
+    assert_eq!(codes(writer.store()), ["store_table"]);
+}
+
+#[test]
+fn stray_files_beside_the_data_are_no_rows() {
+    let dir = tempfile::tempdir().unwrap();
+    let writer = filled(dir.path());
+    fs::copy(data_file(&writer), dir.path().join("gaps/copy of yesterday.parquet")).unwrap();
+    fs::write(dir.path().join("gaps/notes.txt"), "x").unwrap();
+    assert_eq!(writer.store().verify(), []);
+    assert_eq!(writer.store().records(&Query::default()).unwrap().len(), 36);
+}
+
+/// As if another program had added a file that is there already.
+#[test]
+fn verify_finds_records_that_are_there_twice() {
+    let dir = tempfile::tempdir().unwrap();
+    let writer = filled(dir.path());
+    let log = dir.path().join("gaps/_delta_log");
+    let commit = fs::read_to_string(log.join("00000000000000000006.json")).unwrap();
+    let add: &str = commit.lines().find(|line| line.starts_with("{\"add\"")).unwrap();
+    let name = add.split('"').find(|part| part.ends_with(".parquet")).unwrap();
+    let copy = name.replacen("000000000006-", "000000000007-", 1);
+    fs::copy(dir.path().join("gaps").join(name), dir.path().join("gaps").join(&copy)).unwrap();
+    fs::write(log.join("00000000000000000007.json"), add.replace(name, &copy)).unwrap();
+    let findings = writer.store().verify();
+    assert_eq!(findings.len(), 4);
+    assert_eq!(findings[0].what, "N1 F0005 aileron_left is stored twice");
+    assert_eq!(findings[3].what, "3 more records are stored twice");
+}
+
+#[test]
+fn compaction_leaves_one_sorted_file_and_the_same_answers() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = filled(dir.path());
+    let reader = Store::open(dir.path()).unwrap();
+    let (records, accounts) = (reader.scan(&Query::default()).unwrap(), reader.accounts().unwrap());
+    let done = writer.compact().unwrap();
+    assert_eq!((done.before, done.after, done.deleted), (12, 2, 0));
+    assert_eq!(writer.compact().unwrap().before, 2);
+    assert_eq!(reader.info().unwrap().version, 7);
+    assert_eq!(reader.scan(&Query::default()).unwrap(), records);
+    assert_eq!(reader.accounts().unwrap(), accounts);
+    assert_eq!(reader.verify(), []);
+}
+
+#[test]
+fn compaction_refuses_to_give_a_damaged_file_a_new_digest() {
+    let dir = tempfile::tempdir().unwrap();
+    drop(filled(dir.path()));
+    let mut writer = writer(dir.path());
+    let file = data_file(&writer);
+    let mut content = fs::read(&file).unwrap();
+    content[200] ^= 1;
+    fs::write(&file, content).unwrap();
+    assert!(matches!(writer.compact(), Err(store::Error::Damaged { .. })));
+    assert_eq!(codes(writer.store()), ["store_damaged"]);
+}
+
+#[test]
+fn superseded_files_are_kept_for_readers_until_they_are_old() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = filled(dir.path());
+    let before = writer.store().files().unwrap();
+    writer.compact().unwrap();
+    assert!(before.iter().all(|file| file.exists()));
+    fs::write(dir.path().join("gaps/000000000099-half.parquet#4711"), "x").unwrap();
+    assert_eq!(writer.vacuum(Duration::ZERO).unwrap(), 13);
+    assert!(before.iter().all(|file| !file.exists()));
+    assert_eq!(writer.store().verify(), []);
+    assert_eq!(writer.store().records(&Query::default()).unwrap().len(), 36);
+}
