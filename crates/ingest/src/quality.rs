@@ -23,12 +23,14 @@ impl Quality {
         let present = || values.iter().copied().filter(|v| !v.is_nan());
         let samples = values.len();
         let share = |count: usize| count as f64 / samples.max(1) as f64;
+        let min = present().fold(f64::INFINITY, f64::min);
+        let max = present().fold(f64::NEG_INFINITY, f64::max);
         Self {
             samples,
             missing_share: share(samples - present().count()),
-            min: present().fold(f64::INFINITY, f64::min),
-            max: present().fold(f64::NEG_INFINITY, f64::max),
-            resolution: resolution(values),
+            min,
+            max,
+            resolution: resolution(values, ROUNDING * (max - min)),
             frozen_share: share(longest_run(values)),
         }
     }
@@ -39,8 +41,11 @@ impl Quality {
     }
 }
 
-fn resolution(values: &[f64]) -> Option<f64> {
-    let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
+/// Steps below this share of the range are the rounding of arithmetic, not of a sensor.
+const ROUNDING: f64 = 1e-10;
+
+fn resolution(values: &[f64], least: f64) -> Option<f64> {
+    let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > least);
     steps.min_by(f64::total_cmp)
 }
 

@@ -1,5 +1,6 @@
-//! One actuator's channels to its estimate: the paper's number, and when it must not be given.
+//! One actuator's channels to its estimate: both numbers beside each other, the configured one as the gap.
 
+use estimator::contact::{self, ContactGap, Outcome, Prior};
 use estimator::{Filter, MidRange, Samples, midrange};
 use fleet::{Complaint, Estimate, Status};
 use ingest::{Actuator, Geometry, Quality};
@@ -7,14 +8,13 @@ use ingest::{Actuator, Geometry, Quality};
 use crate::config::{EstimateSettings, Method};
 use crate::part::Part;
 
-/// Each side of the load must be visited, or only one flank of the gap was seen.
-const FEWEST_REVERSALS: usize = 1;
-/// Below so many samples the filter has hardly settled.
-const FEWEST_SAMPLES: usize = 500;
-/// A fitted bandwidth further off than this share is not the one that was asked for.
+/// A filter whose slow pole is further off than this share is not the one that was asked for.
 const BANDWIDTH_TOLERANCE: f64 = 0.25;
 
 /// Estimates the gap, or says why these channels cannot show one.
+///
+/// The paper's number is kept in `gap_midrange_m` whatever the method, and also for a flight that is
+/// refused; what the contact regression fits beside its gap is kept whenever it gives one.
 ///
 /// # Errors
 /// A complaint when the settings of the part do not fit the step of the log.
@@ -24,15 +24,18 @@ pub fn estimate(
     settings: &EstimateSettings,
 ) -> Result<Estimate, Complaint> {
     let filter = filter(channels, part)?;
-    let mut estimate = match blind(channels) {
-        Some(reason) => Estimate::refused(reason),
-        None => match midrange::estimate(&samples(channels), &filter) {
-            Ok(found) => judged(&found, settings),
-            Err(estimator::Error::Constant { .. } | estimator::Error::NothingMeasured) => {
-                Estimate::refused("channel_constant")
-            }
-            Err(other) => return Err(Complaint::new("estimate_failed", other)),
-        },
+    let prior = prior(part);
+    let failed = |e: estimator::Error| Complaint::new("estimate_failed", e);
+    let mut estimate = if let Some(reason) = blind(channels) {
+        Estimate::refused(reason)
+    } else {
+        let published = match midrange::estimate(&samples(channels), &filter) {
+            Ok(found) => Some(found),
+            Err(estimator::Error::Constant { .. } | estimator::Error::NothingMeasured) => None,
+            Err(other) => return Err(failed(other)),
+        };
+        let outcome = contact::estimate(&samples(channels), &prior).map_err(failed)?;
+        judged(published.as_ref(), &outcome, &prior, settings.method)
     };
     estimate.temperature_c = channels.temperature_c;
     if let Geometry::Rotary { reference_radius_m } = part.geometry {
@@ -41,7 +44,9 @@ pub fn estimate(
     if channels.missing_share > 0.0 {
         estimate.flags.push("samples_missing".into());
     }
-    flag_bandwidth(&mut estimate, &filter, part);
+    if bandwidth_differs(&filter, part) {
+        estimate.flags.push("bandwidth_differs".into());
+    }
     Ok(estimate)
 }
 
@@ -65,46 +70,70 @@ pub fn samples(channels: &Actuator) -> Samples<'_> {
     }
 }
 
-/// Why no statistic could mean anything, seen before any is made.
-fn blind(channels: &Actuator) -> Option<&'static str> {
-    let usable: usize = channels.segments.iter().map(ExactSizeIterator::len).sum();
-    if Quality::of(&channels.motor_m).is_constant() || Quality::of(&channels.dx_m).is_constant() {
-        Some("channel_constant")
-    } else if Quality::of(&channels.load_n).is_constant() {
-        Some("load_constant")
-    } else if usable < FEWEST_SAMPLES {
-        Some("too_short")
-    } else {
-        None
-    }
+fn prior(part: &Part) -> Prior {
+    Prior { stiffness_n_per_m: part.actuator.stiffness_n_per_m(), reference_load_n: part.reference_load_n }
 }
 
-/// The paper's number as a record: kept, but not given as the gap where the load never changed sides.
-fn judged(found: &MidRange, settings: &EstimateSettings) -> Estimate {
-    let one_sided = found.load.reversals < FEWEST_REVERSALS;
-    let Method::Midrange = settings.method;
+/// Why no statistic could mean anything, seen before any is made.
+fn blind(channels: &Actuator) -> Option<&'static str> {
+    let constant = |values: &[f64]| Quality::of(values).is_constant();
+    let still = constant(&channels.motor_m) || constant(&channels.dx_m) || constant(&channels.load_n);
+    still.then_some("channel_constant")
+}
+
+/// The configured method decides; the other stands beside it.
+///
+/// The published statistic never refuses, so under either method a flight that the regression finds
+/// blind is refused: its mid-range number is kept, and is not given as the gap.
+fn judged(published: Option<&MidRange>, outcome: &Outcome, prior: &Prior, method: Method) -> Estimate {
+    let mut estimate = match outcome {
+        Outcome::Estimated(found) => regressed(found),
+        Outcome::Refused(why) => Estimate::refused(why.code()),
+    };
+    let Some(published) = published else { return estimate };
+    estimate.gap_midrange_m = Some(published.gap.gap_m);
+    estimate.load_reversals = published.load.reversals as i64;
+    estimate.samples = published.samples as i64;
+    estimate.samples_upper = published.gap.upper as i64;
+    estimate.samples_lower = published.gap.lower as i64;
+    estimate.load_p05_n = Some(published.load.p05_n);
+    estimate.load_p95_n = Some(published.load.p95_n);
+    estimate.nis = Some(published.nis);
+    if let Outcome::Estimated(found) = outcome {
+        if !found.explains(published.gap.gap_m, prior) {
+            estimate.flags.push("estimators_disagree".into());
+        }
+        if method == Method::Midrange {
+            estimate.gap_m = Some(published.gap.gap_m);
+            // The naive standard error of this statistic covers 4–21 %: none is better.
+            (estimate.gap_se_m, estimate.gap_p05_m, estimate.gap_p95_m) = (None, None, None);
+        }
+        estimate.reason = estimate.flags.first().cloned();
+    }
+    estimate
+}
+
+fn regressed(found: &ContactGap) -> Estimate {
+    let (p05_m, p95_m) = found.gap_bounds_m;
     Estimate {
-        status: if one_sided { Status::Refused } else { Status::Estimated },
-        gap_m: (!one_sided).then_some(found.gap.gap_m),
-        gap_midrange_m: Some(found.gap.gap_m),
-        load_reversals: found.load.reversals as i64,
-        samples: found.samples as i64,
-        samples_upper: found.gap.upper as i64,
-        samples_lower: found.gap.lower as i64,
-        load_p05_n: Some(found.load.p05_n),
-        load_p95_n: Some(found.load.p95_n),
-        nis: Some(found.nis),
-        reason: one_sided.then(|| "no_load_reversal".to_owned()),
+        status: Status::Estimated,
+        flags: found.flags.iter().map(|flag| flag.code().to_owned()).collect(),
+        gap_m: Some(found.gap_m),
+        gap_se_m: Some(found.gap_se_m),
+        gap_p05_m: Some(p05_m),
+        gap_p95_m: Some(p95_m),
+        stiffness_n_per_m: Some(found.stiffness_n_per_m),
+        stiffness_se_n_per_m: Some(found.stiffness_se_n_per_m),
+        skew_s: Some(found.skew_s),
+        loop_width_m: found.loop_width_m,
+        lost_motion_m: found.lost_motion_m,
+        reason: None,
         ..Estimate::refused("")
     }
 }
 
-/// A lightly damped mode, or one near Nyquist, can put the pole elsewhere: the number still stands, with a flag.
-fn flag_bandwidth(estimate: &mut Estimate, filter: &Filter, part: &Part) {
-    let estimator::Noise::Sensors(asked) = part.noise else { return };
-    let off =
-        filter.bandwidth_hz().is_ok_and(|got| (got / asked.bandwidth_hz - 1.0).abs() > BANDWIDTH_TOLERANCE);
-    if off {
-        estimate.flags.push("bandwidth_differs".into());
-    }
+/// A lightly damped mode, or one near Nyquist, puts the pole elsewhere: the number stands, with a flag.
+fn bandwidth_differs(filter: &Filter, part: &Part) -> bool {
+    let estimator::Noise::Sensors(asked) = part.noise else { return false };
+    filter.bandwidth_hz().is_ok_and(|got| (got / asked.bandwidth_hz - 1.0).abs() > BANDWIDTH_TOLERANCE)
 }

@@ -93,13 +93,16 @@ fn one(
     let line = opened.timeline();
     let _ = writeln!(
         page,
-        "{name}\n  {} flight {} departed {}\n  {} rows, {:.3} Hz, {} unbroken stretches{}",
+        "{name}\n  {} flight {} departed {}\n  {} rows, {:.3} Hz, {}{}",
         id.tail_number,
         id.flight_id,
         id.departure_utc,
         line.rows,
         line.step_s.recip(),
-        line.segments.len(),
+        match line.segments.len() {
+            1 => "unbroken".to_owned(),
+            n => format!("{n} unbroken stretches"),
+        },
         repairs(line)
     );
     let first = channels.len();

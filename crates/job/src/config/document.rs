@@ -67,8 +67,10 @@ impl Default for StoreSettings {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// The paper's statistic, equations 29–31.
+    /// Contact regression: finds stiffness, skew and friction in the flight, and carries an interval.
     #[default]
+    Contact,
+    /// The paper's statistic, equations 29–31, as it is.
     Midrange,
 }
 
