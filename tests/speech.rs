@@ -159,3 +159,39 @@ fn estimates_made_elsewhere_get_statements_and_queries_see_nothing_later() {
     let early: Vec<serde_json::Value> = serde_json::from_str(&bench.well(&args)).unwrap();
     assert_eq!(early[0], rows[0], "what came later changed what was known");
 }
+
+#[test]
+fn the_store_tells_what_it_holds_and_whether_it_is_fed() {
+    let bench = Bench::sample();
+    bench.well(&["run"]);
+    let info: serde_json::Value = serde_json::from_str(&bench.well(&["store", "info", "--json"])).unwrap();
+    assert_eq!(
+        (info["records"].as_i64(), info["flights"].as_i64(), info["serials"].as_i64()),
+        (Some(120), Some(30), Some(12))
+    );
+    bench.well(&["store", "info", "--max-age", "1h"]);
+    let late = bench.freeplay(&["store", "info", "--max-age", "0s"]);
+    assert_eq!(late.code, Some(1), "{late:?}");
+    assert!(late.err.contains("error[run_overdue]"), "{}", late.err);
+}
+
+#[test]
+fn a_compacted_store_holds_the_same_records_and_a_flipped_byte_is_found() {
+    let bench = Bench::sample();
+    bench.well(&["run", "--limit", "10"]);
+    bench.well(&["run"]);
+    let before = bench.exported();
+    bench.well(&["store", "compact"]);
+    assert_eq!(bench.exported(), before);
+    assert!(bench.well(&["store", "verify"]).contains("is whole"));
+    let files = glob::glob(bench.path("results/gaps/*.parquet").to_str().unwrap()).unwrap().flatten();
+    for file in files {
+        let mut bytes = std::fs::read(&file).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        std::fs::write(&file, bytes).unwrap();
+    }
+    let ended = bench.freeplay(&["store", "verify"]);
+    assert_eq!(ended.code, Some(1), "{ended:?}");
+    assert!(ended.err.contains("hint:"), "{}", ended.err);
+}

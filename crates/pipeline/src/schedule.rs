@@ -27,6 +27,9 @@ const GATHER: Duration = Duration::from_millis(500);
 /// So many finished logs are committed without waiting.
 const GATHER_LOGS: usize = 256;
 
+/// More data files than this slow every question; they are merged at the end of a run.
+const MANY_FILES: usize = 100;
+
 /// What a run needs besides its configuration.
 pub struct Context<'a> {
     /// The version written into every record.
@@ -94,6 +97,9 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     report.trends = trends::of_units(config, &installations, &store, &touched)?;
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
+    if store.files()?.len() > MANY_FILES {
+        writer.compact()?;
+    }
     writer.end_run(&report.row(context.program_version, &config_path, Some(exit_code)))?;
     Ok(report)
 }

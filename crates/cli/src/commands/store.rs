@@ -1,13 +1,19 @@
 //! `store`: care of the results.
 
-use store::{Query, Store};
+use std::time::Duration;
+
+use fleet::Complaint;
+use jiff::Timestamp;
+use serde_json::json;
+use store::{Holder, Info, Query, RunAccount, Store};
 
 use crate::args::{Format, Global, Output, StoreArgs, StoreCommand};
 use crate::exit::{Code, Failure};
+use crate::progress::span;
 use crate::rows;
 use crate::talk::Talk;
 
-use super::{config, query};
+use super::{config, query, run::count};
 
 /// Cares for the store that the configuration names.
 ///
@@ -16,9 +22,104 @@ use super::{config, query};
 pub(crate) fn store(args: &StoreArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
     let store = Store::open(config(global)?.store())?;
     match &args.command {
+        StoreCommand::Info { max_age, json } => info(&store, *max_age, *json, talk),
+        StoreCommand::Verify => verify(&store, talk),
+        StoreCommand::Compact => compact(&store, talk),
         StoreCommand::Export { output } => export(&store, output, talk),
-        StoreCommand::Info { .. } | StoreCommand::Verify | StoreCommand::Compact => Ok(Code::Well),
     }
+}
+
+fn info(store: &Store, max_age: Option<Duration>, as_json: bool, talk: &Talk) -> Result<Code, Failure> {
+    let found = store.info()?;
+    let age = found.last_completed.as_ref().and_then(age);
+    if as_json {
+        talk.answer(&format!("{:#}\n", in_json(store, &found, age)))?;
+    } else {
+        talk.answer(&in_words(store, &found, age))?;
+    }
+    let late = max_age.filter(|allowed| age.is_none_or(|age| age > *allowed));
+    let Some(allowed) = late else { return Ok(Code::Well) };
+    let what = match age {
+        Some(age) => {
+            format!("the last completed run ended {} ago, and {} are allowed", span(age), span(allowed))
+        }
+        None => "no run was ever completed".to_owned(),
+    };
+    talk.complain(
+        &Complaint::new("run_overdue", what)
+            .hint("did the timer start `freeplay run`, and did it end with code 0 or 1?"),
+    );
+    Ok(Code::LogsInError)
+}
+
+/// Time since a run ended.
+fn age(run: &RunAccount) -> Option<Duration> {
+    Timestamp::now().duration_since(run.finished_utc?).try_into().ok()
+}
+
+fn in_words(store: &Store, found: &Info, age: Option<Duration>) -> String {
+    let day = |t: Option<Timestamp>| {
+        t.map_or_else(crate::table::dash, |t| t.strftime("%Y-%m-%d %H:%M UTC").to_string())
+    };
+    let last = match (&found.last_completed, age) {
+        (Some(run), Some(age)) => {
+            format!("{}, {} ago, exit code {}", run.run_id, span(age), run.exit_code.unwrap_or_default())
+        }
+        _ => "none was ever completed".to_owned(),
+    };
+    format!(
+        "{}\n  records     {} of {}, {}, {}\n  departures  {} to {}\n  logs        {} accounted for\n  data        {}, {:.1} MB, Delta version {}\n  last run    {last}\n",
+        store.dir().display(),
+        found.records,
+        count(found.flights, "flight"),
+        count(found.serials, "unit"),
+        count(found.tails, "tail"),
+        day(found.first_departure_utc),
+        day(found.last_departure_utc),
+        found.logs,
+        count(found.files, "file"),
+        found.bytes as f64 / 1e6,
+        found.version,
+    )
+}
+
+fn in_json(store: &Store, found: &Info, age: Option<Duration>) -> serde_json::Value {
+    let run = found.last_completed.as_ref();
+    json!({
+        "path": store.dir().display().to_string(),
+        "records": found.records,
+        "flights": found.flights,
+        "serials": found.serials,
+        "tails": found.tails,
+        "first_departure_utc": found.first_departure_utc,
+        "last_departure_utc": found.last_departure_utc,
+        "logs": found.logs,
+        "files": found.files,
+        "bytes": found.bytes,
+        "version": found.version,
+        "last_completed_run_id": run.map(|r| r.run_id.clone()),
+        "last_completed_utc": run.and_then(|r| r.finished_utc),
+        "last_completed_exit_code": run.and_then(|r| r.exit_code),
+        "age_s": age.map(|a| a.as_secs_f64()),
+    })
+}
+
+fn verify(store: &Store, talk: &Talk) -> Result<Code, Failure> {
+    let findings = store.verify();
+    if findings.is_empty() {
+        talk.answer(&format!("{} is whole\n", store.dir().display()))?;
+        return Ok(Code::Well);
+    }
+    talk.complain_all(&findings);
+    talk.answer(&format!("{} in {}\n", count(findings.len(), "finding"), store.dir().display()))?;
+    Ok(Code::LogsInError)
+}
+
+fn compact(store: &Store, talk: &Talk) -> Result<Code, Failure> {
+    let done = store.lock(&Holder::this_process(), None)?.compact()?;
+    let deleted = count(done.deleted, "superseded file");
+    talk.answer(&format!("merged {} into {}; {deleted} deleted\n", count(done.before, "file"), done.after))?;
+    Ok(Code::Well)
 }
 
 fn export(store: &Store, output: &Output, talk: &Talk) -> Result<Code, Failure> {
