@@ -83,7 +83,7 @@ fn noise_factor(gaps: &[f64], errors: &[f64]) -> f64 {
     let mut ratios: Vec<f64> = gaps
         .windows(2)
         .zip(errors.windows(2))
-        .map(|(y, se)| (y[1] - y[0]).abs() / se[0].hypot(se[1]))
+        .map(|(y, se)| (y[1] - y[0]).abs() / (se[0] * se[0] + se[1] * se[1]).sqrt())
         .collect();
     if ratios.is_empty() {
         return 1.0;

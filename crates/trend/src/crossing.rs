@@ -6,8 +6,10 @@ use crate::prior::FleetPrior;
 use crate::settings::Settings;
 use crate::trend::Crossing;
 
-/// Five-point Gauss–Hermite rule for a standard normal variable.
-const NORMAL_RULE: [(f64, f64); 5] = [
+/// Three- and five-point Gauss–Hermite rules for a standard normal variable.
+const SHORT_RULE: [(f64, f64); 3] =
+    [(-1.732_050_807_568_877_2, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0)];
+const LONG_RULE: [(f64, f64); 5] = [
     (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
     (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
     (0.0, 0.533_333_333_333_333_3),
@@ -20,6 +22,9 @@ const WAIT_RULE: usize = 10;
 
 /// Weight, as a share of the largest, below which a node cannot move a quantile.
 const NEGLIGIBLE: f64 = 2e-3;
+
+/// Weight above which a node deserves the longer rule.
+const NOTABLE: f64 = 0.02;
 
 /// Cells of the distribution, even in ln hours from one hour to the horizon.
 const CELLS: usize = 240;
@@ -65,7 +70,8 @@ impl Remaining {
     ) {
         let left_m = limit_m - node.level_m;
         let sd_m = (spread_m2 + prior.wear_noise_m * left_m.max(0.0)).sqrt();
-        for (z, share) in NORMAL_RULE {
+        let rule: &[(f64, f64)] = if node.weight > NOTABLE { &LONG_RULE } else { &SHORT_RULE };
+        for &(z, share) in rule {
             let left_m = left_m + z * sd_m;
             let weight = node.weight * share;
             if left_m <= 0.0 {

@@ -3,7 +3,7 @@
 use crate::curve::{FAMILIES, Law};
 use crate::history::{self, History};
 use crate::jump::installation_steps;
-use crate::posterior::{Node, Posterior, Segment, posterior};
+use crate::posterior::{Guess, Node, Posterior, posterior};
 use crate::prior::{Axis, FleetPrior};
 use crate::season::{Season, Swing, swing};
 use crate::series::{Flight, Series};
@@ -12,7 +12,7 @@ use crate::series::{Flight, Series};
 const MOST_UNITS: usize = 200;
 
 /// Units a prior of nothing is worth: few, so that thirty units outvote it.
-const PSEUDO_UNITS: f64 = 6.0;
+const PSEUDO_UNITS: f64 = 15.0;
 
 /// The same for the spread of lives, for a new unit's gap, and for changes of installation.
 const PSEUDO_LIVES: f64 = 2.0;
@@ -20,6 +20,9 @@ const PSEUDO_CHANGES: f64 = 4.0;
 
 /// Rounds of expectation and maximisation.
 const ROUNDS: usize = 20;
+
+/// Noises of wear tried, as factors of the assumed one.
+const WEAR_NOISES: [f64; 4] = [0.7, 1.0, 1.5, 2.2];
 
 impl FleetPrior {
     /// Learns how units wear from what was known of them on a day: which usage wear follows, the shares
@@ -31,15 +34,17 @@ impl FleetPrior {
     /// earlier day may stand in for a later one's.
     pub fn learn<'a>(fleet: impl IntoIterator<Item = &'a Series>, as_of_us: i64, limit_m: f64) -> Self {
         let fleet = sample(fleet.into_iter().map(|series| series.until(as_of_us)));
-        let mut best: Option<(f64, Self)> = None;
-        for axis in [Axis::Hours, Axis::Flights, Axis::Reversals] {
-            let Some(learned) = learn_along(&fleet, axis, limit_m) else { continue };
-            if best.as_ref().is_none_or(|(evidence, _)| learned.0 > *evidence) {
-                best = Some(learned);
-            }
-        }
-        best.map_or_else(|| Self::vague(limit_m), |(_, prior)| prior)
+        let axes = [Axis::Hours, Axis::Flights, Axis::Reversals];
+        let lesson = likeliest(axes.into_iter().filter_map(|axis| Lesson::along(&fleet, axis, limit_m)));
+        let Some(lesson) = lesson else { return Self::vague(limit_m) };
+        let noises = WEAR_NOISES.into_iter().map(|factor| lesson.with_wear_noise(factor).revised());
+        likeliest(noises).unwrap_or(lesson).revised().learned
     }
+}
+
+/// The lesson with the largest evidence, the first of equals.
+fn likeliest(lessons: impl Iterator<Item = Lesson>) -> Option<Lesson> {
+    lessons.reduce(|best, next| if next.evidence > best.evidence { next } else { best })
 }
 
 /// Units with flights in an order of their own, every n-th of many.
@@ -57,24 +62,61 @@ fn identity(flights: &[Flight]) -> (i64, usize, [u64; 3]) {
     (flights[0].departure_us, flights.len(), [last.hours, last.reversals, gaps].map(f64::to_bits))
 }
 
-/// The prior learned along one axis, and the log evidence of the fleet under it.
-fn learn_along(fleet: &[&[Flight]], axis: Axis, limit_m: f64) -> Option<(f64, FleetPrior)> {
-    let total = |of: &dyn Fn(&Flight) -> f64| fleet.iter().filter_map(|f| f.last()).map(of).sum::<f64>();
-    let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
-    if !hours_per_unit.is_finite() {
-        return None;
+/// What a fleet teaches along one axis.
+#[derive(Clone)]
+struct Lesson {
+    histories: Vec<History>,
+    /// Before the fleet was asked, and after.
+    assumed: FleetPrior,
+    learned: FleetPrior,
+    /// Log evidence of the fleet under what was learned.
+    evidence: f64,
+}
+
+impl Lesson {
+    fn along(fleet: &[&[Flight]], axis: Axis, limit_m: f64) -> Option<Self> {
+        let total = |of: &dyn Fn(&Flight) -> f64| fleet.iter().filter_map(|f| f.last()).map(of).sum::<f64>();
+        let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
+        if !hours_per_unit.is_finite() {
+            return None;
+        }
+        let mut assumed = FleetPrior { axis, hours_per_unit, ..FleetPrior::vague(limit_m) };
+        let histories: Vec<History> =
+            fleet.iter().map(|flights| history::read(flights, None, &assumed)).collect();
+        assumed.bias_sd_m = bias(&histories, assumed.bias_sd_m);
+        let swings: Vec<Swing> = histories
+            .iter()
+            .flat_map(History::segments)
+            .filter_map(|s| swing(&s, &assumed, &posterior(&s, &assumed)?))
+            .collect();
+        assumed.season = Season::learn(&swings);
+        let learned = assumed.clone();
+        Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.revised())
     }
-    let mut base = FleetPrior { axis, hours_per_unit, ..FleetPrior::vague(limit_m) };
-    let histories: Vec<History> = fleet.iter().map(|flights| history::read(flights, None, &base)).collect();
-    base.bias_sd_m = bias(&histories, base.bias_sd_m);
-    let segments: Vec<Segment<'_>> = histories.iter().flat_map(History::segments).collect();
-    let swings: Vec<Swing> = segments.iter().filter_map(|s| swing(s, &base, &posterior(s, &base)?)).collect();
-    base.season = Season::learn(&swings);
-    let units: Vec<Posterior> = segments.iter().filter_map(|segment| posterior(segment, &base)).collect();
-    let learned = (0..ROUNDS).fold(base.clone(), |current, _| step(&base, &current, &units));
-    let change = |unit: &Posterior| Ratio::new(&base, &learned).weights(&unit.nodes).iter().sum::<f64>().ln();
-    let evidence = units.iter().map(|unit| unit.log_evidence + change(unit)).sum();
-    Some((evidence, learned))
+
+    /// The same with another noise of wear.
+    fn with_wear_noise(&self, factor: f64) -> Self {
+        let mut lesson = self.clone();
+        lesson.assumed.wear_noise_m *= factor;
+        lesson.learned.wear_noise_m *= factor;
+        lesson
+    }
+
+    /// Judges every segment by what was learned and learns again, by expectation–maximisation.
+    ///
+    /// Within a revision the weights of the laws and lives move; that a new unit's gap is known better
+    /// than was assumed only tells in the next.
+    fn revised(self) -> Self {
+        let segments = self.histories.iter().flat_map(History::segments);
+        let units: Vec<Posterior> =
+            segments.filter_map(|segment| posterior(&segment, &self.learned)).collect();
+        let round = |current: FleetPrior, _| step(&self.assumed, &self.learned, &current, &units);
+        let learned = (0..ROUNDS).fold(self.learned.clone(), round);
+        let ratio = Ratio::new(&self.learned, &learned);
+        let change = |unit: &Posterior| ratio.weights(&unit.nodes).iter().sum::<f64>().ln();
+        let evidence = units.iter().map(|unit| unit.log_evidence + change(unit)).sum();
+        Self { learned, evidence, ..self }
+    }
 }
 
 /// Spread of what an installation adds: half the mean square of the steps between installations.
@@ -87,14 +129,16 @@ fn bias(histories: &[History], assumed_m: f64) -> f64 {
     (0.5 * squares / count).max(0.0).sqrt()
 }
 
-/// One round: weights by `current`, moments by weights, `base` as the pseudo-units that keep a small
-/// fleet sane.
-fn step(base: &FleetPrior, current: &FleetPrior, units: &[Posterior]) -> FleetPrior {
-    let ratio = Ratio::new(base, current);
-    let mut shares = base.shares.map(|share| share * PSEUDO_UNITS);
-    let mut life = Moments::assumed(base.ln_life, base.ln_life_sd);
-    let mut new = Moments::assumed(base.new_m, base.new_sd_m);
-    let (mut onsets, mut waited_hours) = (1.0, base.onsets_per_hour.recip());
+/// One round: weights by `current` for units judged by `judge`, moments by weights, and `assumed` as the
+/// pseudo-units that keep a small fleet sane.
+fn step(assumed: &FleetPrior, judge: &FleetPrior, current: &FleetPrior, units: &[Posterior]) -> FleetPrior {
+    let ratio = Ratio::new(judge, current);
+    let mut shares = assumed.shares.map(|share| share * PSEUDO_UNITS);
+    let mut life = Moments::assumed(assumed.ln_life, assumed.ln_life_sd);
+    let mut new = Moments::assumed(assumed.new_m, assumed.new_sd_m);
+    let (mut fresh, mut worn) =
+        (PSEUDO_LIVES * assumed.fresh_share, PSEUDO_LIVES * (1.0 - assumed.fresh_share));
+    let (mut onsets, mut waited_hours) = (1.0, assumed.onsets_per_hour.recip());
     for unit in units {
         let weights = ratio.weights(&unit.nodes);
         let total: f64 = weights.iter().sum();
@@ -105,6 +149,11 @@ fn step(base: &FleetPrior, current: &FleetPrior, units: &[Posterior]) -> FleetPr
             }
             if node.age_begin == 0.0 {
                 new.add(node.new_m, weight);
+            }
+            match node.guess {
+                Guess::Fresh => fresh += weight,
+                Guess::Worn => worn += weight,
+                Guess::Unneeded => {}
             }
             if let Law::Onset { start } = node.law {
                 onsets += weight;
@@ -122,7 +171,8 @@ fn step(base: &FleetPrior, current: &FleetPrior, units: &[Posterior]) -> FleetPr
         new_m: new.mean,
         new_sd_m: new.spread(),
         onsets_per_hour: onsets / waited_hours,
-        ..base.clone()
+        fresh_share: fresh / (fresh + worn),
+        ..assumed.clone()
     }
 }
 
@@ -162,6 +212,11 @@ impl<'a> Ratio<'a> {
             let square = |p: &FleetPrior| ((node.ln_life - p.ln_life) / p.ln_life_sd).powi(2);
             log += self.life - 0.5 * (square(self.current) - square(self.base));
         }
+        log += match node.guess {
+            Guess::Fresh => (self.current.fresh_share / self.base.fresh_share).ln(),
+            Guess::Worn => ((1.0 - self.current.fresh_share) / (1.0 - self.base.fresh_share)).ln(),
+            Guess::Unneeded => 0.0,
+        };
         let sooner = self.current.onsets_per_hour - self.base.onsets_per_hour;
         match node.law {
             Law::Onset { start } => log + self.onset - sooner * start,

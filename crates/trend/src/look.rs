@@ -21,15 +21,15 @@ pub(crate) struct Look<'a> {
 }
 
 impl<'a> Look<'a> {
-    /// `growth_m(from, to)` is the wear expected between two usages: the level walks by a variance
-    /// proportional to it.
+    /// `growth_m` is the wear expected up to a usage since the segment's begin: the level walks by a
+    /// variance proportional to it.
     pub(crate) fn new(
         segment: &'a Segment<'a>,
         prior: &'a FleetPrior,
         bins: Vec<Bin>,
-        growth_m: impl Fn(f64, f64) -> f64,
+        growth_m: impl Fn(f64) -> f64,
     ) -> Self {
-        let filter = Filter::new(&bins, &walk(&bins, prior, growth_m));
+        let filter = Filter::new(&bins, &walk(&bins, segment.begin, prior, growth_m));
         let swing: Vec<f64> = bins.iter().map(|b| prior.season.wave(b.departure_us)).collect();
         let wave = filter.pass(swing.iter().copied());
         let mut gaps = filter.pass(bins.iter().zip(&swing).map(|(b, w)| b.gap_m - prior.season.mean_m * w));
@@ -80,14 +80,16 @@ impl<'a> Look<'a> {
 
 /// Variance by which the level walks before each bin: wear's own, a little drift, and a new
 /// installation's bias where it changed.
-fn walk(bins: &[Bin], prior: &FleetPrior, growth_m: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+fn walk(bins: &[Bin], begin: f64, prior: &FleetPrior, growth_m: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut walk_m2 = vec![0.0; bins.len()];
+    let mut before_m = bins.first().map_or(0.0, |bin| growth_m(bin.usage - begin));
     for (step_m2, pair) in walk_m2.iter_mut().skip(1).zip(bins.windows(2)) {
-        let (from, to) = (pair[0].usage, pair[1].usage);
+        let grown_m = growth_m(pair[1].usage - begin);
         let moved = f64::from(u8::from(pair[0].installation != pair[1].installation));
-        *step_m2 = prior.wear_noise_m * growth_m(from, to).max(0.0)
-            + prior.drift_m2_per_hour * (to - from)
+        *step_m2 = prior.wear_noise_m * (grown_m - before_m).max(0.0)
+            + prior.drift_m2_per_hour * (pair[1].usage - pair[0].usage)
             + 2.0 * moved * prior.bias_sd_m * prior.bias_sd_m;
+        before_m = grown_m;
     }
     walk_m2
 }

@@ -16,9 +16,19 @@ const DROP: f64 = 8.0;
 /// What a prior over lives and cells can add to a curve's bound.
 const SLACK: f64 = 3.0;
 
-/// Lives tried for each curve, over this many standard deviations either side.
-const LIVES: usize = 7;
-const REACH: f64 = 3.5;
+/// Standard deviations within which a life may lie.
+const LIFE_REACH: f64 = 3.5;
+
+/// How many lives are tried for each curve, over how many standard deviations of its amplitude.
+#[derive(Debug, Clone, Copy)]
+struct Lives {
+    count: usize,
+    reach: f64,
+}
+
+/// Enough to weigh a curve, and enough to state quantiles.
+const ROUGH: Lives = Lives { count: 3, reach: 1.7 };
+const THOROUGH: Lives = Lives { count: 7, reach: 3.5 };
 
 /// A stretch of a unit's history without maintenance that resets it.
 #[derive(Debug, Clone, Copy)]
@@ -40,6 +50,14 @@ impl Segment<'_> {
     }
 }
 
+/// What had to be guessed of a unit's age at first sight, where the law makes a difference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Guess {
+    Unneeded,
+    Fresh,
+    Worn,
+}
+
 /// One law with one amplitude, and how much it is believed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Node {
@@ -54,6 +72,8 @@ pub(crate) struct Node {
     pub(crate) level_m: f64,
     /// The gap of this unit when new, metres.
     pub(crate) new_m: f64,
+    /// What had to be guessed of its age at first sight.
+    pub(crate) guess: Guess,
     /// Onset not seen yet: it comes after an exponential wait.
     pub(crate) waits: bool,
     /// Log weight, then (normalised) weight.
@@ -72,6 +92,25 @@ pub(crate) struct Posterior {
     pub(crate) log_evidence: f64,
 }
 
+impl Posterior {
+    /// The mixture a little less sure of itself, for statements about the future.
+    ///
+    /// The true law is seldom one of the bank's, so what the gaps say for one curve and against its
+    /// neighbours is worth less than the likelihood has it. Weights to this power made 90 % intervals hold
+    /// 89 % where the plain ones held 85, on two simulated fleets, without moving the median.
+    pub(crate) fn tempered(mut self) -> Self {
+        const TEMPER: f64 = 0.78;
+        for node in &mut self.nodes {
+            node.weight = node.weight.powf(TEMPER);
+        }
+        let total: f64 = self.nodes.iter().map(|node| node.weight).sum();
+        for node in &mut self.nodes {
+            node.weight /= total;
+        }
+        self
+    }
+}
+
 /// Judges a segment by a prior: all curves on a few bins, the likely ones on many.
 ///
 /// The level walks by a variance proportional to the wear, so the first look assumes wear along a
@@ -85,18 +124,17 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
     let mut bank = Bank::new(segment.fresh, segment.known_age, span, starts);
     let coarse = bins::bin(segment.estimates, COARSE_BINS);
     let grown_m = straight_growth(&coarse);
-    let first = Look::new(segment, prior, coarse, |from, to| grown_m * (to - from) / span);
-    let mut believed = nodes(&first, &bank);
+    let first = Look::new(segment, prior, coarse, |usage| grown_m * usage / span);
     if segment.estimates.len() <= COARSE_BINS {
-        return Some(finish(&first, believed));
+        return Some(finish(&first, nodes(&first, &bank, THOROUGH)));
     }
+    let mut believed = nodes(&first, &bank, ROUGH);
     normalise(&mut believed);
     keep(&mut bank.curves, &believed);
     let likely = likeliest(&believed);
-    let begin = segment.begin;
     let fine = bins::bin(segment.estimates, bins::BINS);
-    let second = Look::new(segment, prior, fine, |from, to| mean_growth(&likely, from - begin, to - begin));
-    let believed = nodes(&second, &bank);
+    let second = Look::new(segment, prior, fine, |usage| mean_growth(&likely, usage));
+    let believed = nodes(&second, &bank, THOROUGH);
     Some(finish(&second, believed))
 }
 
@@ -119,7 +157,7 @@ fn finish(look: &Look<'_>, mut believed: Vec<(usize, Node)>) -> Posterior {
 
 /// The likeliest nodes, with weights that add up to one: enough for a mean.
 fn likeliest(believed: &[(usize, Node)]) -> Vec<Node> {
-    const FEW: usize = 16;
+    const FEW: usize = 10;
     let mut nodes: Vec<Node> = believed.iter().map(|(_, node)| *node).collect();
     if FEW < nodes.len() {
         nodes.select_nth_unstable_by(FEW, |a, b| b.weight.total_cmp(&a.weight));
@@ -132,11 +170,9 @@ fn likeliest(believed: &[(usize, Node)]) -> Vec<Node> {
     nodes
 }
 
-/// Growth between two usages since the segment's begin.
-fn mean_growth(nodes: &[Node], from: f64, to: f64) -> f64 {
-    let grown =
-        |n: &Node| n.amplitude_m * (n.law.height(n.age_begin + to) - n.law.height(n.age_begin + from));
-    nodes.iter().map(|n| n.weight * grown(n)).sum()
+/// Wear up to a usage since the segment's begin, of units new at the age of zero.
+fn mean_growth(nodes: &[Node], usage: f64) -> f64 {
+    nodes.iter().map(|n| n.weight * n.amplitude_m * n.law.height(n.age_begin + usage)).sum()
 }
 
 /// Turns log weights into weights that add up to one, drops what is not believed, and returns the log
@@ -162,7 +198,7 @@ struct Candidate {
 }
 
 /// The nodes, with log weights, of every curve that can matter.
-fn nodes(look: &Look<'_>, bank: &Bank) -> Vec<(usize, Node)> {
+fn nodes(look: &Look<'_>, bank: &Bank, tried: Lives) -> Vec<(usize, Node)> {
     let heights = Heights::new(bank, look.bins.iter().map(|b| b.usage - look.segment.begin).collect());
     let mut buffer = Vec::with_capacity(look.bins.len());
     let candidates: Vec<Candidate> = bank
@@ -176,7 +212,7 @@ fn nodes(look: &Look<'_>, bank: &Bank) -> Vec<(usize, Node)> {
         .collect();
     let add = |candidate: &Candidate, push: &mut dyn FnMut(Node)| {
         let curve = &bank.curves[candidate.index];
-        if curve.law == Law::None { flat(look, push) } else { lives(look, curve, candidate, push) }
+        if curve.law == Law::None { flat(look, push) } else { lives(look, curve, candidate, tried, push) }
     };
     let Some(top) = candidates.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) else { return Vec::new() };
     let mut best = f64::NEG_INFINITY;
@@ -212,22 +248,28 @@ fn candidate(look: &Look<'_>, index: usize, curve: &Curve, pass: Regression) -> 
 }
 
 /// Nodes of one curve over the lives its amplitude may have.
-fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, push: &mut dyn FnMut(Node)) {
+fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, tried: Lives, push: &mut dyn FnMut(Node)) {
     let Candidate { pass, best_m, information, .. } = candidate;
     let prior = look.prior;
-    let reach_m = REACH / information.sqrt();
+    let reach_m = tried.reach / information.sqrt();
     let Some((low, high)) = life_range(prior, curve.law, best_m - reach_m, best_m + reach_m) else { return };
-    let step = (high - low) / (LIVES - 1) as f64;
+    let step = (high - low) / (tried.count - 1) as f64;
     let spread = look.new_m2();
     let smear = curve.law.slope(curve.age) * curve.age_cell / 12.0_f64.sqrt();
     let age_now = curve.age + look.segment.now - look.segment.begin;
     let height_now = curve.law.height(age_now);
     let shared = step.ln() + look.logs.share(curve.law) + look.logs.cell(curve, look.segment);
     let ln_tau = curve.law.ln_tau();
+    let guess = match curve.law {
+        _ if look.segment.is_of_known_age() => Guess::Unneeded,
+        Law::Onset { .. } => Guess::Unneeded,
+        _ if curve.age > 0.0 => Guess::Worn,
+        _ => Guess::Fresh,
+    };
     let ln_age = (curve.age > 0.0 && !look.segment.is_of_known_age()).then(|| curve.age.ln());
     let falling = curve.law.exponent().map(|p| (-p * step).exp());
     let mut amplitude_m = prior.span_m / curve.law.height_of_life(low.exp());
-    for i in 0..LIVES {
+    for i in 0..tried.count {
         let ln_life = low + step * i as f64;
         if i > 0 {
             amplitude_m = match falling {
@@ -248,6 +290,7 @@ fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, push: &mut dyn F
             ln_life,
             level_m: look.gaps.end + amplitude_m * (height_now - pass.end),
             new_m,
+            guess,
             waits: false,
             weight: log_likelihood + shared + look.logs.life(ln_life, ln_age, ln_tau),
         });
@@ -268,6 +311,7 @@ fn flat(look: &Look<'_>, push: &mut dyn FnMut(Node)) {
         ln_life: prior.ln_life,
         level_m: gaps.end,
         new_m: gaps.start,
+        guess: Guess::Unneeded,
         waits: false,
         weight: log_likelihood + logs.share(Law::None),
     };
@@ -277,7 +321,7 @@ fn flat(look: &Look<'_>, push: &mut dyn FnMut(Node)) {
 
 /// Range of ln life worth trying: where the amplitude may be, within what a life may be.
 fn life_range(prior: &FleetPrior, law: Law, low_m: f64, high_m: f64) -> Option<(f64, f64)> {
-    let reach = REACH * prior.ln_life_sd;
+    let reach = LIFE_REACH * prior.ln_life_sd;
     let (shortest, longest) = (prior.ln_life - reach, prior.ln_life + reach);
     let ln_life = |amplitude_m: f64| law.life(prior.span_m / amplitude_m).ln();
     let low = ln_life(high_m).max(shortest);

@@ -5,14 +5,11 @@ use crate::posterior::Segment;
 use crate::season::Season;
 use crate::series::Flight;
 
-/// Share of units first seen in service that were new then.
-const FRESH_SHARE: f64 = 0.4;
-
 /// A unit first seen in service has used at most this share of its life.
 const WORN_SHARE: f64 = 0.9;
 
 /// The exponential law's life in time constants: ln k is normal with this mean and spread.
-const LN_CONSTANTS: (f64, f64) = (0.9, 0.5);
+const LN_CONSTANTS: (f64, f64) = (1.1, 0.5);
 
 /// What wear of a part number follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,6 +51,8 @@ pub struct FleetPrior {
     pub(crate) shares: [f64; FAMILIES],
     /// The yearly swing of what is measured.
     pub(crate) season: Season,
+    /// Share of units first seen in service that were new then.
+    pub(crate) fresh_share: f64,
     /// Rate at which units that will begin to wear begin, per hour.
     pub(crate) onsets_per_hour: f64,
     /// Variance of the wear per metre of wear, metres.
@@ -80,6 +79,7 @@ impl FleetPrior {
             ln_life_sd: 0.8,
             shares,
             season: Season::unknown(),
+            fresh_share: 0.3,
             onsets_per_hour: 1.0 / 2000.0,
             wear_noise_m: 0.2e-6,
             drift_m2_per_hour: 1e-16,
@@ -98,8 +98,8 @@ impl FleetPrior {
             prior: self,
             shares: self.shares.map(f64::ln),
             life: -self.ln_life_sd.ln() - LN_ROOT_TAU,
-            fresh: FRESH_SHARE.ln(),
-            worn: ((1.0 - FRESH_SHARE) / WORN_SHARE).ln(),
+            fresh: self.fresh_share.ln(),
+            worn: ((1.0 - self.fresh_share) / WORN_SHARE).ln(),
             worn_share: WORN_SHARE.ln(),
             onset: self.onsets_per_hour.ln(),
             constants: -LN_CONSTANTS.1.ln() - LN_ROOT_TAU,

@@ -110,7 +110,7 @@ pub(crate) fn swing(segment: &Segment<'_>, prior: &FleetPrior, posterior: &Poste
     ];
     let span = segment.now - segment.begin;
     let grown_m = straight_growth(&bins);
-    let Look { filter, gaps, .. } = Look::new(segment, prior, bins, |from, to| grown_m * (to - from) / span);
+    let Look { filter, gaps, .. } = Look::new(segment, prior, bins, |usage| grown_m * usage / span);
     let [wear, cos, sin] = sequences.each_ref().map(|s| filter.pass(s.iter().copied()));
     let against = |other: &Pass, own: &[f64]| filter.curve(&gaps, other, own);
     let (w, c, s) =

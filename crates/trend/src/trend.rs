@@ -178,6 +178,8 @@ pub fn trend(
     let history = history::read(flights, series.unit_hours_at_start(), prior);
     let (changes, judged) = follow(&history, flights, prior);
     let judged = judged.filter(|_| history.estimates.len() >= FEWEST_ESTIMATES);
+    let growth_probability = judged.as_ref().map(level::growth_probability);
+    let judged = judged.map(Posterior::tempered);
     let ratio = hours_per_usage(flights, prior);
     let remaining = judged.as_ref().map(|p| Remaining::new(p, prior, settings, ratio, history.offset_m2));
     let level = judged.as_ref().map(|p| level::level(p, prior, history.offset_m2));
@@ -185,7 +187,6 @@ pub fn trend(
     let estimates = history.estimates.len();
     let evidence = Evidence { flights, estimates, as_of_us, level, crossing, changes: &changes };
     let (state, reason) = judge(&evidence, settings, previous);
-    let growth_probability = judged.as_ref().map(level::growth_probability);
     Ok(Trend {
         as_of_us,
         flights: flights.len(),
@@ -240,11 +241,15 @@ fn wear(growth_probability: Option<f64>) -> Wear {
     }
 }
 
-/// Flight hours per hour's worth of usage, over the unit's last three hundred flights.
+/// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or
+/// over its last flights while that is young.
 fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
-    let Some((last, first)) = flights.last().zip(flights.get(flights.len().saturating_sub(300))) else {
-        return 1.0;
-    };
+    const YOUNG: usize = 20;
+    const LAST: usize = 300;
+    let Some(last) = flights.last() else { return 1.0 };
+    let here = flights.iter().rev().take_while(|flight| flight.installation == last.installation).count();
+    let count = if here < YOUNG { LAST } else { here.min(LAST) };
+    let first = &flights[flights.len().saturating_sub(count)];
     let ratio = (last.hours - first.hours) / (prior.usage(last) - prior.usage(first));
     if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
 }

@@ -7,5 +7,6 @@
 )]
 
 mod classic;
+mod fleet;
 mod series;
 mod statement;

@@ -1,0 +1,286 @@
+//! Fleets whose truth a small simulator knows, with laws the bank does and does not contain.
+
+use proptest::prelude::*;
+use trend::{
+    Change, ChangeKind, FleetPrior, Observation, Series, Settings, State, Trend, Usage, Wear, trend,
+};
+
+const DAY_US: i64 = 86_400_000_000;
+const LIMIT_M: f64 = 1e-4;
+
+/// Uniform and normal numbers, the same in every run.
+struct Random(u64);
+
+impl Random {
+    fn new(seed: u64) -> Self {
+        let mut random = Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x2545_f491_4f6c_dd1d);
+        (0..8).for_each(|_| {
+            random.uniform();
+        });
+        random
+    }
+
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.uniform()
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// Share of the life's growth at a share of the life.
+type Law = fn(f64) -> f64;
+
+/// None of these is in the bank.
+const STRANGE: [Law; 4] = [
+    // Running in, then a line.
+    |t| 0.15 * (1.0 - (-t / 0.05).exp()) + 0.85 * t,
+    // Slow, fast, slow again: it meets the limit on the steep part.
+    |t| ((1.0 / (1.0 + (-6.0 * (t - 0.8)).exp())) - 0.008) / (0.7685 - 0.008),
+    // Two slopes with a knee.
+    |t| if t < 0.6 { 0.6 * t } else { 0.36 + 1.6 * (t - 0.6) },
+    // A logarithm.
+    |t| (1.0 + 4.0 * t).ln() / 5.0_f64.ln(),
+];
+
+/// A unit of two flights a day at 1.7 h, four in five of which leave an estimate.
+struct Unit {
+    series: Series,
+    /// True hours at which the gap meets the limit, from the first flight.
+    crossing_hours: f64,
+    life_hours: f64,
+}
+
+fn unit(seed: u64, law: Law, flights: i64) -> Unit {
+    let mut random = Random::new(seed);
+    let life_hours = 3000.0 * (0.4 * random.normal()).exp();
+    let new_um = 20.0 + 3.0 * random.normal();
+    let mut rows = Vec::new();
+    let (mut crossing_hours, mut gap_um, mut before) = (f64::INFINITY, new_um, law(0.0));
+    for flight in 0..20_000_i64 {
+        let hours = 1.7 * (flight + 1) as f64;
+        let height = law(hours / life_hours);
+        let mean_um = 80.0 * (height - before).max(0.0);
+        before = height;
+        // Wear comes in lumps: the mean at its rate, its variance 0.2 µm times the mean.
+        let lump = if mean_um > 0.0 { 0.2 } else { 1.0 };
+        gap_um += if random.uniform() < mean_um / lump { lump } else { 0.0 };
+        if gap_um >= 100.0 && crossing_hours.is_infinite() {
+            crossing_hours = hours;
+        }
+        if flight < flights && random.uniform() < 0.8 {
+            let se_um = random.between(1.5, 4.0);
+            let outlier = if random.uniform() < 0.02 { 40.0 } else { 0.0 };
+            rows.push(Observation {
+                departure_us: flight * DAY_US / 2,
+                installation: 0,
+                flight_hours: Some(1.7),
+                tail_hours_end: Some(hours),
+                load_reversals: Some(150),
+                gap_m: Some((gap_um + se_um * random.normal() + outlier) * 1e-6),
+                gap_se_m: Some(se_um * 1e-6),
+            });
+        } else if flight >= flights && crossing_hours.is_finite() {
+            break;
+        }
+    }
+    Unit { series: Series::new(rows, &Usage::default()).unwrap(), crossing_hours, life_hours }
+}
+
+fn said(series: &Series, as_of_us: i64, prior: Option<&FleetPrior>) -> Trend {
+    trend(series, as_of_us, &Settings::for_limit(LIMIT_M), prior, None).unwrap()
+}
+
+/// Day on which a unit has flown some hours.
+fn day_of(hours: f64) -> i64 {
+    (hours / 3.4) as i64
+}
+
+/// Median relative error and coverage of the 90 % interval at shares of life, for a fleet of one law,
+/// each judged by a prior learned when the fleet stood at the same share.
+fn score(law: Law, shares: &[f64]) -> (f64, f64) {
+    let fleet: Vec<Unit> = (0..30).map(|seed| unit(seed, law, 3000)).collect();
+    let (mut errors, mut covered) = (Vec::new(), 0.0);
+    for share in shares {
+        // Every unit cut at its own share of life, so that the prior has seen no crossing.
+        let day = |u: &Unit| day_of(share * u.crossing_hours.min(2.0 * u.life_hours));
+        let cut = |u: &Unit| {
+            let known = u.series.until(day(u) * DAY_US);
+            let row = |f: &trend::series::Flight| Observation {
+                departure_us: f.departure_us,
+                installation: f.installation,
+                flight_hours: Some(1.7),
+                tail_hours_end: Some(f.hours),
+                load_reversals: Some(150),
+                gap_m: f.gap.map(|g| g.gap_m),
+                gap_se_m: f.gap.map(|g| g.se_m),
+            };
+            Series::new(known.iter().map(row), &Usage::default()).unwrap()
+        };
+        let known: Vec<Series> = fleet.iter().map(cut).collect();
+        let prior = FleetPrior::learn(&known, i64::MAX, LIMIT_M);
+        for (unit, series) in fleet.iter().zip(&known) {
+            let crossing = said(series, day(unit) * DAY_US, Some(&prior)).crossing.unwrap();
+            let left = unit.crossing_hours - 3.4 * day(unit) as f64;
+            let [low, likely, high] =
+                [crossing.p05_hours, crossing.p50_hours, crossing.p95_hours].map(|h| h.unwrap_or(20_000.0));
+            errors.push((likely - left).abs() / left);
+            covered += f64::from(u8::from(low <= left && left <= high));
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    (errors[errors.len() / 2], covered / errors.len() as f64)
+}
+
+#[test]
+fn a_fleet_on_a_line_is_forecast_within_a_tenth_and_its_intervals_hold() {
+    let (error, coverage) = score(|t| t, &[0.4, 0.7]);
+    println!("line: median error {error:.3}, coverage {coverage:.3}");
+    assert!(error < 0.12 && coverage > 0.8, "{error} {coverage}");
+}
+
+#[test]
+fn laws_the_bank_does_not_contain_are_still_forecast_with_intervals_that_mostly_hold() {
+    for (name, law) in ["running in", "sigmoid", "knee", "logarithm"].into_iter().zip(STRANGE) {
+        let (error, coverage) = score(law, &[0.5, 0.7, 0.85]);
+        println!("{name}: median error {error:.3}, coverage {coverage:.3}");
+        assert!(error < 0.6 && coverage > 0.35, "{name}: {error} {coverage}");
+    }
+}
+
+/// Rows of a unit wearing at 10 µm per 1,000 h with 2 µm noise, and what a caller does to its gaps.
+fn rows(seed: u64, change_um: impl Fn(i64, f64) -> f64) -> Vec<Observation> {
+    let mut random = Random::new(seed);
+    (0..500)
+        .map(|flight| {
+            let hours = 1.7 * (flight + 1) as f64;
+            Observation {
+                departure_us: flight * DAY_US / 2,
+                installation: 0,
+                flight_hours: Some(1.7),
+                tail_hours_end: Some(hours),
+                load_reversals: Some(150),
+                gap_m: Some((change_um(flight, 20.0 + 0.01 * hours) + 2.0 * random.normal()) * 1e-6),
+                gap_se_m: Some(2e-6),
+            }
+        })
+        .collect()
+}
+
+fn changes(rows: Vec<Observation>) -> Vec<Change> {
+    said(&Series::new(rows, &Usage::default()).unwrap(), 250 * DAY_US, None).changes
+}
+
+#[test]
+fn a_re_shim_is_a_reset_found_at_its_flight() {
+    let found = changes(rows(1, |flight, gap| if flight < 300 { gap + 30.0 } else { gap - 5.0 }));
+    let [change] = found[..] else { panic!("{found:?}") };
+    assert_eq!(change.kind, ChangeKind::Reset);
+    assert!((change.departure_us - 150 * DAY_US).abs() <= DAY_US, "{change:?}");
+    assert!((change.step_m + 35e-6).abs() < 2e-6, "{change:?}");
+}
+
+#[test]
+fn a_re_rig_is_a_step_whose_offset_does_not_change_the_gap() {
+    let series = |rise_um: f64| {
+        let rows = rows(2, |flight, gap| if flight < 200 { gap } else { gap + rise_um });
+        said(&Series::new(rows, &Usage::default()).unwrap(), 250 * DAY_US, None)
+    };
+    let (moved, still) = (series(9.0), series(0.0));
+    assert_eq!(moved.changes.iter().map(|c| c.kind).collect::<Vec<_>>(), [ChangeKind::Step]);
+    let off_m = moved.level.unwrap().gap_m - still.level.unwrap().gap_m;
+    assert!(off_m.abs() < 2e-6, "{off_m:e}");
+    assert!(still.changes.is_empty(), "{:?}", still.changes);
+}
+
+#[test]
+fn the_same_step_at_a_change_of_installation_is_the_books_own() {
+    let mut rows = rows(3, |flight, gap| if flight < 200 { gap } else { gap + 9.0 });
+    rows[200..].iter_mut().for_each(|row| row.installation = 1);
+    rows[200..].iter_mut().for_each(|row| row.tail_hours_end = row.tail_hours_end.map(|h| h + 5000.0));
+    assert_eq!(changes(rows).iter().map(|c| c.kind).collect::<Vec<_>>(), [ChangeKind::Recorded]);
+}
+
+#[test]
+fn wear_that_begins_late_is_an_onset_and_no_step() {
+    let found =
+        changes(rows(4, |flight, _| 20.0 + if flight < 250 { 0.0 } else { 0.08 * (flight - 250) as f64 }));
+    let [change] = found[..] else { panic!("{found:?}") };
+    assert_eq!(change.kind, ChangeKind::Onset);
+    assert!((change.departure_us - 125 * DAY_US).abs() < 20 * DAY_US, "{change:?}");
+}
+
+#[test]
+fn units_that_do_not_wear_are_seldom_called_wearing() {
+    let wearing = (0..60)
+        .filter(|&seed| {
+            let rows = rows(1000 + seed, |_, _| 20.0);
+            said(&Series::new(rows, &Usage::default()).unwrap(), 250 * DAY_US, None).wear == Wear::Wearing
+        })
+        .count();
+    assert!(wearing <= 2, "{wearing} of 60");
+}
+
+#[test]
+fn a_state_once_given_is_left_only_clearly_past_its_limit() {
+    // 500 flights end at 28.5 µm; the watch limit is set a hair above the level.
+    let series = Series::new(rows(5, |_, gap| gap), &Usage::default()).unwrap();
+    let level_m = said(&series, 250 * DAY_US, None).level.unwrap().gap_m;
+    let settings = Settings { watch_m: 1.01 * level_m, ..Settings::for_limit(1e-3) };
+    let state = |previous| trend(&series, 250 * DAY_US, &settings, None, previous).unwrap().state;
+    assert_eq!(state(None), Some(State::Normal));
+    assert_eq!(state(Some(State::Watch)), Some(State::Watch));
+    let far = Settings { watch_m: 1.2 * level_m, ..settings };
+    assert_eq!(
+        trend(&series, 250 * DAY_US, &far, None, Some(State::Watch)).unwrap().state,
+        Some(State::Normal)
+    );
+}
+
+#[test]
+fn a_prior_looks_at_nothing_later_than_its_day_and_not_at_the_order_of_its_units() {
+    let fleet: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 800)).collect();
+    let day = 200 * DAY_US;
+    let whole = FleetPrior::learn(fleet.iter().map(|u| &u.series), day, LIMIT_M);
+    let reversed = FleetPrior::learn(fleet.iter().rev().map(|u| &u.series), day, LIMIT_M);
+    assert_eq!(format!("{whole:?}"), format!("{reversed:?}"));
+    let short: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 401)).collect();
+    let cut = FleetPrior::learn(short.iter().map(|u| &u.series), day, LIMIT_M);
+    assert_eq!(format!("{whole:?}"), format!("{cut:?}"));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Whatever gaps a log throws up, the quantiles stand in order and nothing is not a number.
+    #[test]
+    fn a_statement_is_finite_and_in_order(
+        gaps_um in prop::collection::vec(prop::option::of(-20.0..200.0), 0..120), stated in any::<bool>(),
+    ) {
+        let rows = gaps_um.iter().enumerate().map(|(i, gap_um)| Observation {
+            departure_us: i as i64 * DAY_US,
+            installation: (i / 40) as u32,
+            flight_hours: Some(2.0),
+            tail_hours_end: None,
+            load_reversals: None,
+            gap_m: gap_um.map(|um| um * 1e-6),
+            gap_se_m: stated.then_some(2e-6),
+        });
+        let said = said(&Series::new(rows, &Usage::default()).unwrap(), 120 * DAY_US, None);
+        let hours = |h: Option<f64>| h.unwrap_or(f64::INFINITY);
+        if let (Some(crossing), Some(level), Some(rate)) = (said.crossing, said.level, said.rate) {
+            prop_assert!(hours(crossing.p05_hours) <= hours(crossing.p50_hours));
+            prop_assert!(hours(crossing.p50_hours) <= hours(crossing.p95_hours));
+            prop_assert!(level.gap_m.is_finite() && level.se_m.is_finite() && level.se_m > 0.0);
+            prop_assert!(rate.p05_m_per_hour <= rate.m_per_hour && rate.m_per_hour <= rate.p95_m_per_hour);
+            let probability = said.check_probability.unwrap();
+            prop_assert!((0.0..=1.0 + 1e-9).contains(&probability));
+        }
+    }
+}
