@@ -6,6 +6,7 @@
 //! power        F(t) = (t/1000)^p            p = ½ … 3
 //! exponential  F(t) = e^(t/τ) − 1
 //! onset        F(t) = max(0, t − o)/1000    flat, then a line
+//! bend         F(t) = (s t + (1 − s) max(0, t − o))/1000    one line, then another; s the ratio of rates
 //! none         F(t) = 0
 //! ```
 //! Ages are hours, or another usage brought to hours by the part number's mean. Each law is known by
@@ -21,6 +22,13 @@ const POWER_EIGHTHS: [u8; 14] = [4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 22, 2
 const TIME_CONSTANTS: [f64; 10] =
     [250.0, 350.0, 500.0, 700.0, 1000.0, 1400.0, 2000.0, 2800.0, 4000.0, 6000.0];
 
+/// Rates before a bend over those after it: knees, and running in.
+const BEND_RATIOS: [f64; 5] = [0.2, 0.45, 2.2, 5.0, 12.0];
+
+/// Knees tried within what was seen, and every how many ages.
+const KNEES: usize = 10;
+const BEND_AGE_STRIDE: usize = 4;
+
 /// Ages at first sight, hours.
 const AGES: [f64; 14] =
     [0.0, 75.0, 150.0, 250.0, 400.0, 600.0, 850.0, 1150.0, 1500.0, 2000.0, 2600.0, 3400.0, 4500.0, 6000.0];
@@ -29,7 +37,7 @@ const AGES: [f64; 14] =
 pub(crate) const POWERS: usize = POWER_EIGHTHS.len();
 
 /// Number of [`Law::family`] values: every exponent is one, the other laws are one each.
-pub(crate) const FAMILIES: usize = POWER_EIGHTHS.len() + 3;
+pub(crate) const FAMILIES: usize = 3 + BEND_RATIOS.len() + POWER_EIGHTHS.len();
 
 /// A law's form.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +46,8 @@ pub(crate) enum Law {
     None,
     /// Flat until `start` hours after first sight, then a line.
     Onset { start: f64 },
+    /// A line until an age of `knee`, then another; index into the ratios of their rates.
+    Bend { knee: f64, index: usize },
     /// Index into the time constants.
     Exponential { index: usize },
     /// Index into the exponents.
@@ -63,7 +73,8 @@ impl Law {
             Self::None => 0,
             Self::Onset { .. } => 1,
             Self::Exponential { .. } => 2,
-            Self::Power { index } => 3 + index,
+            Self::Bend { index, .. } => 3 + index,
+            Self::Power { index } => FAMILIES - POWERS + index,
         }
     }
 
@@ -72,6 +83,10 @@ impl Law {
         match self {
             Self::None => 0.0,
             Self::Onset { start } => (age - start).max(0.0) / REFERENCE_HOURS,
+            Self::Bend { knee, index } => {
+                let before = BEND_RATIOS[index];
+                (before * age + (1.0 - before) * (age - knee).max(0.0)) / REFERENCE_HOURS
+            }
             Self::Exponential { index } => (age / TIME_CONSTANTS[index]).exp_m1(),
             Self::Power { index } => {
                 eighth_power(roots((age / REFERENCE_HOURS).max(0.0)), POWER_EIGHTHS[index])
@@ -84,6 +99,9 @@ impl Law {
         match self {
             Self::None => 0.0,
             Self::Onset { start } => f64::from(u8::from(age >= start)) / REFERENCE_HOURS,
+            Self::Bend { knee, index } => {
+                (if age < knee { BEND_RATIOS[index] } else { 1.0 }) / REFERENCE_HOURS
+            }
             Self::Exponential { index } => (age / TIME_CONSTANTS[index]).exp() / TIME_CONSTANTS[index],
             Self::Power { index } => {
                 let age = age.max(1.0);
@@ -97,6 +115,14 @@ impl Law {
         match self {
             Self::None => f64::INFINITY,
             Self::Onset { start } => start + height * REFERENCE_HOURS,
+            Self::Bend { knee, index } => {
+                let (height_hours, before) = (height * REFERENCE_HOURS, BEND_RATIOS[index]);
+                if height_hours < before * knee {
+                    height_hours / before
+                } else {
+                    height_hours + (1.0 - before) * knee
+                }
+            }
             Self::Exponential { index } => TIME_CONSTANTS[index] * height.ln_1p(),
             Self::Power { index } => {
                 REFERENCE_HOURS * height.max(0.0).powf(8.0 / f64::from(POWER_EIGHTHS[index]))
@@ -184,8 +210,23 @@ impl Bank {
                 law_cell,
             }));
         }
+        curves.extend(bends(&ages, span_hours));
         Self { curves, ages: ages.into_iter().map(|(age, _)| age).collect() }
     }
+}
+
+/// One line and then another, the knee within what was seen, at every few ages.
+fn bends(ages: &[(f64, f64)], span_hours: f64) -> Vec<Curve> {
+    let cell = span_hours / KNEES as f64;
+    let mut curves = Vec::new();
+    for (age_index, &(age, width)) in ages.iter().enumerate().step_by(BEND_AGE_STRIDE) {
+        let age_cell = BEND_AGE_STRIDE as f64 * width;
+        for (knee, index) in (0..KNEES).flat_map(|k| (0..BEND_RATIOS.len()).map(move |index| (k, index))) {
+            let law = Law::Bend { knee: age + (knee as f64 + 0.5) * cell, index };
+            curves.push(Curve { law, age, age_index, age_cell, law_cell: 1.0 / KNEES as f64 });
+        }
+    }
+    curves
 }
 
 /// Ages at first sight and the widths of their cells; a known age is one cell without width.
@@ -227,7 +268,9 @@ impl Heights {
         heights.clear();
         match curve.law {
             Law::None => heights.resize(self.usages.len(), 0.0),
-            Law::Onset { .. } => heights.extend(self.usages.iter().map(|u| curve.law.height(*u))),
+            Law::Onset { .. } | Law::Bend { .. } => {
+                heights.extend(self.usages.iter().map(|u| curve.law.height(u + curve.age)));
+            }
             Law::Exponential { index } => {
                 let before = (curve.age / TIME_CONSTANTS[index]).exp();
                 heights.extend(self.exponentials[index].iter().map(|e| before * e - 1.0));

@@ -66,6 +66,13 @@ fn name(node: &Node) -> WearLaw {
         Law::None => WearLaw::None,
         Law::Onset { .. } => WearLaw::Onset,
         Law::Exponential { .. } => WearLaw::Accelerating,
+        law @ Law::Bend { .. } => {
+            if law.slope(0.0) < law.slope(f64::MAX) {
+                WearLaw::Accelerating
+            } else {
+                WearLaw::Slowing
+            }
+        }
         law @ Law::Power { .. } => match law.exponent() {
             Some(p) if p < SLOWING => WearLaw::Slowing,
             Some(p) if p > SPEEDING => WearLaw::Accelerating,

@@ -1,6 +1,6 @@
 //! What the units of one part number teach about the next (empirical Bayes).
 
-use crate::curve::{Curve, FAMILIES, Law};
+use crate::curve::{Curve, FAMILIES, Law, POWERS};
 use crate::posterior::Segment;
 use crate::season::Season;
 use crate::series::Flight;
@@ -67,8 +67,9 @@ impl FleetPrior {
     /// What is assumed of a part number nobody has seen: a new gap of a fifth of the limit, lives around
     /// 4,000 h within a factor of ten, any law.
     pub fn vague(limit_m: f64) -> Self {
-        let mut shares = [0.4 / (FAMILIES - 3) as f64; FAMILIES];
-        shares[..3].copy_from_slice(&[0.2, 0.2, 0.2]);
+        let mut shares = [0.4 / POWERS as f64; FAMILIES];
+        shares[..3].copy_from_slice(&[0.18, 0.18, 0.14]);
+        shares[3..FAMILIES - POWERS].fill(0.1 / (FAMILIES - POWERS - 3) as f64);
         Self {
             axis: Axis::Hours,
             hours_per_unit: 1.0,
