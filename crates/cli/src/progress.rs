@@ -1,13 +1,13 @@
 //! Progress of long work: a bar on a terminal, sparse whole lines without one, nothing when quiet.
 
 use std::collections::BTreeSet;
-use std::io::IsTerminal;
+use std::fmt::Write;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-use crate::talk::Talk;
+use crate::talk::{Talk, is_attended};
 
 /// Without a terminal, one line in this time at most.
 const SPARSE: Duration = Duration::from_secs(30);
@@ -34,7 +34,7 @@ struct State {
 impl<'t> Progress<'t> {
     /// Nothing is shown before [`Progress::total`] is known.
     pub(crate) fn new(name: &'static str, talk: &'t Talk) -> Self {
-        let terminal = std::io::stderr().is_terminal();
+        let terminal = is_attended();
         let target = if talk.progress() && terminal {
             ProgressDrawTarget::stderr()
         } else {
@@ -66,9 +66,12 @@ impl<'t> Progress<'t> {
             state.begun = Instant::now();
         });
         self.bar.set_length(total as u64);
-        let template = "{prefix} {bar:24} {pos}/{len}  {per_sec:>10}  left {eta}  {msg}";
+        let template = "{prefix} {bar:24} {pos}/{len}  {rate:>10}  left {eta}  {msg}";
         if let Ok(style) = ProgressStyle::with_template(template) {
-            self.bar.set_style(style.progress_chars("━╸─"));
+            let rate = |state: &ProgressState, out: &mut dyn Write| {
+                let _ = write!(out, "{:.1}/min", 60.0 * state.per_sec());
+            };
+            self.bar.set_style(style.with_key("rate", rate).progress_chars("━╸─"));
         }
         self.bar.set_prefix(self.name);
         self.bar.enable_steady_tick(Duration::from_millis(200));

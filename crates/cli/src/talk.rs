@@ -10,6 +10,11 @@ use crate::exit::{Code, Failure};
 /// Of alike complaints so many are shown whole.
 const SHOWN_WHOLE: usize = 3;
 
+/// Whether a person sits at the other end: a pipe on any side gets no bar and no colour.
+pub(crate) fn is_attended() -> bool {
+    io::stdin().is_terminal() && io::stdout().is_terminal() && io::stderr().is_terminal()
+}
+
 /// The voice of the program.
 #[derive(Debug, Clone)]
 pub(crate) struct Talk {
@@ -22,7 +27,7 @@ pub(crate) struct Talk {
 impl Talk {
     /// Listens to the options, the terminal and `NO_COLOR`.
     pub(crate) fn new(global: &Global) -> Self {
-        let auto = std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) && io::stderr().is_terminal();
+        let auto = std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) && is_attended();
         let color_err = match global.color {
             Color::Always => true,
             Color::Never => false,
