@@ -41,7 +41,8 @@ impl Stats {
             Some(time.as_microsecond())
         };
         let low = bound(&self.min_values).unwrap_or(i64::MIN);
-        (low, bound(&self.max_values).map_or(i64::MAX, |high| high.saturating_add(MILLI_US)))
+        let high = bound(&self.max_values).map_or(i64::MAX, |high| high.saturating_add(MILLI_US));
+        if low <= high { (low, high) } else { (i64::MIN, i64::MAX) }
     }
 }
 
@@ -99,9 +100,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_never_prunes() {
+    fn what_is_not_known_or_cannot_be_never_prunes() {
         let stats = Stats::parse(Some("torn"));
         assert!(stats.may_hold("tail_number", "N1"));
         assert_eq!(stats.times_us("departure_utc"), (i64::MIN, i64::MAX));
+        let reversed = Stats::parse(Some(
+            r#"{"minValues":{"t":"2026-01-02T00:00:00Z"},"maxValues":{"t":"2026-01-01T00:00:00Z"}}"#,
+        ));
+        assert_eq!(reversed.times_us("t"), (i64::MIN, i64::MAX));
     }
 }

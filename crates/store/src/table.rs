@@ -242,22 +242,28 @@ fn is_conflict(error: &DeltaTableError) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use arrow::array::{Int64Array, RecordBatch};
+    use arrow::array::{RecordBatch, StringArray, TimestampMicrosecondArray};
     use arrow::datatypes::{DataType, Field};
 
     use super::*;
+    use crate::tabled::time;
+
+    fn schema() -> Schema {
+        Schema::new(vec![Field::new("name", DataType::Utf8, false), Field::new("at", time(), false)])
+    }
 
     fn table(dir: &Path) -> Table {
         let runtime =
             tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
         let table = Table::new(&std::fs::canonicalize(dir).unwrap(), "numbers", Arc::new(runtime));
-        table.create(&Schema::new(vec![Field::new("n", DataType::Int64, false)])).unwrap();
+        table.create(&schema()).unwrap();
         table
     }
 
     fn batch(numbers: Vec<i64>) -> RecordBatch {
-        let schema = Schema::new(vec![Field::new("n", DataType::Int64, false)]);
-        RecordBatch::try_new(Arc::new(schema), vec![Arc::new(Int64Array::from(numbers))]).unwrap()
+        let names = StringArray::from_iter_values(numbers.iter().map(|n| format!("n{n:02}")));
+        let at = TimestampMicrosecondArray::from(numbers).with_timezone("UTC");
+        RecordBatch::try_new(Arc::new(schema()), vec![Arc::new(names), Arc::new(at)]).unwrap()
     }
 
     fn append(table: &Table, n: i64) {
@@ -304,10 +310,16 @@ mod tests {
     fn bounds_and_rows_are_still_known_after_a_checkpoint() {
         let dir = tempfile::tempdir().unwrap();
         let table = table(dir.path());
-        for n in 0..24 {
+        for n in 1..25 {
             append(&table, n);
         }
         assert!(table.dir.join("_delta_log/_last_checkpoint").exists());
         assert_eq!(rows(&table), 24);
+        let snapshot = table.snapshot().unwrap();
+        let with =
+            |name: &str| snapshot.files.iter().filter(|file| file.stats.may_hold("name", name)).count();
+        assert_eq!((with("n03"), with("n23"), with("n99")), (1, 1, 0));
+        // Microseconds 1 to 24 lie in the first millisecond, whose end may have been cut off.
+        assert!(snapshot.files.iter().all(|file| file.stats.times_us("at") == (0, 2_000)));
     }
 }

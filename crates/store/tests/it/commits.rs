@@ -1,6 +1,10 @@
 //! Commits: whole flights, each once.
 
-use store::{Outcome, Query, RecordKey, Store};
+use std::collections::BTreeMap;
+
+use fleet::GapRecord;
+use proptest::prelude::*;
+use store::{LogResult, Outcome, Query, RecordKey, Store};
 
 use crate::made::{POSITIONS, account, record, result, run, time, writer};
 
@@ -120,4 +124,46 @@ fn a_reader_that_opened_before_sees_what_came_after() {
     assert_eq!(reader.records(&Query::default()).unwrap(), []);
     writer.commit(&[result(1, 0, 30e-6)]).unwrap();
     assert_eq!(reader.records(&Query::default()).unwrap().len(), 3);
+}
+
+/// One log's result: a tail, a flight, which positions have a record, which are retired, a gap.
+fn results() -> impl Strategy<Value = LogResult> {
+    let some = || prop::sample::subsequence(POSITIONS.to_vec(), 0..=3);
+    (0_usize..2, 0_i64..3, some(), some(), 1e-6..1e-4).prop_map(|(tail, flight, there, gone, gap_m)| {
+        LogResult {
+            account: account(tail, flight),
+            records: there.iter().map(|position| record(tail, flight, position, gap_m)).collect(),
+            retires: gone
+                .iter()
+                .map(|position| RecordKey::of(&record(tail, flight, position, 0.0)))
+                .collect(),
+        }
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(10) })]
+
+    #[test]
+    fn a_store_is_a_map_from_actuators_flights_to_their_newest_records(
+        commits in prop::collection::vec(prop::collection::vec(results(), 1..4), 1..7),
+        compact_after in 0_usize..7,
+    ) {
+        let dir = tempfile::tempdir().unwrap();
+        let mut writer = writer(dir.path());
+        let mut map: BTreeMap<RecordKey, GapRecord> = BTreeMap::new();
+        for (i, commit) in commits.iter().enumerate() {
+            for result in commit {
+                map.retain(|key, _| !result.retires.contains(key));
+                map.extend(result.records.iter().map(|record| (RecordKey::of(record), record.clone())));
+            }
+            writer.commit(commit).unwrap();
+            if i == compact_after {
+                writer.compact().unwrap();
+            }
+            let expected: Vec<GapRecord> = map.values().cloned().collect();
+            prop_assert_eq!(writer.store().records(&Query::default()).unwrap(), expected);
+        }
+        prop_assert_eq!(writer.store().verify(), []);
+    }
 }

@@ -64,7 +64,8 @@ fn a_query_answers_what_asking_every_row_would() {
     let writer = filled(dir.path());
     let all = writer.store().records(&Query::default()).unwrap();
     assert_eq!(all.len(), 36);
-    proptest!(ProptestConfig::with_cases(40), |(query in questions())| {
+    let config = ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) };
+    proptest!(config, |(query in questions())| {
         let fitting: Vec<GapRecord> = all.iter().filter(|record| fits(&query, record)).cloned().collect();
         let first = fitting.len() - query.last.unwrap_or(usize::MAX).min(fitting.len());
         prop_assert_eq!(writer.store().records(&query).unwrap(), &fitting[first..]);

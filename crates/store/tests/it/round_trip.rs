@@ -87,7 +87,7 @@ fn bits(records: &[GapRecord]) -> Vec<String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(12) })]
 
     #[test]
     fn every_column_comes_back_from_the_store(mut all in prop::collection::vec(records(), 1..12)) {
