@@ -1,20 +1,20 @@
-//! The linear Kalman filter (equations 24–28): a step that allocates nothing, and a batch over slices.
-//!
-//! The covariance depends on no measurement. Where every sample is measured it settles, and from there
-//! the batch runs with the settled gain alone; a missing sample takes it back to the full recursion.
+//! The linear Kalman filter (equations 24–28), one sample at a time and without allocating.
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::Samples;
 use crate::discretise::Discrete;
 use crate::error::Error;
 use crate::model::Actuator;
 use crate::noise::{Covariances, Noise};
+pub use crate::track::{Innovations, Track};
 
 /// Variance of the initial speed, (m/s)², and of the initial backlash, m²: the paper gives none.
 const INITIAL_VARIANCE: (f64, f64) = (1e-4, 1e-6);
-/// The gain has settled when the covariance changes by less than this share of itself in a step.
+/// The covariance has settled when it changes by less than this share of itself in a step.
 const SETTLED: f64 = 1e-15;
+/// Rounding may keep it from that; then it has settled when it came no closer in so many steps, and is at
+/// least this close.
+const STALLED: (usize, f64) = (100, 1e-9);
 /// Steps within which a sound tuning settles many times over.
 const SETTLING_STEPS: usize = 200_000;
 
@@ -40,26 +40,6 @@ pub struct Step {
     pub innovation_variance_m2: f64,
     /// K_f, 3×1 [1, s⁻¹, 1] (26); zero where the measurement is missing.
     pub gain: Vector3<f64>,
-}
-
-/// S(t) of one actuator's flight, and how well the model explained it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Track {
-    /// S at each sample, m; NaN outside the segments.
-    pub s_m: Vec<f64>,
-    /// Mean normalised innovation squared over the measured samples; 1 for a true model.
-    pub nis: f64,
-    /// Measured samples.
-    pub measured: usize,
-}
-
-/// What a batch may hand out for each sample.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Innovations {
-    /// e, m; NaN where nothing was measured.
-    pub innovation_m: Vec<f64>,
-    /// Its variance, m².
-    pub variance_m2: Vec<f64>,
 }
 
 /// A filter for one actuator, step and noise.
@@ -153,10 +133,13 @@ impl Filter {
     /// [`Error::Unsettled`] when it does not settle; [`Error::InnovationCovariance`].
     pub fn settled(&self) -> Result<(Vector3<f64>, Matrix3<f64>), Error> {
         let mut state = self.start(0.0, 0.0);
+        let (mut least, mut since) = (f64::INFINITY, 0);
         for _ in 0..SETTLING_STEPS {
             let step = self.correct(&state, 0.0)?;
             let next = self.predict(&step.posterior, 0.0);
-            if settled(&state.p, &next.p) {
+            let change = distance(&next.p, &state.p);
+            (least, since) = if change < least { (change, 0) } else { (least, since + 1) };
+            if change <= SETTLED || (since > STALLED.0 && least <= STALLED.1) {
                 return Ok((step.gain, next.p));
             }
             state = next;
@@ -186,92 +169,13 @@ impl Filter {
         let poles = (keep * self.discrete.a_d).complex_eigenvalues();
         Ok(poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max))
     }
-
-    /// Runs over all segments, each from a start of its own, and hands out S(t).
-    ///
-    /// # Errors
-    /// [`Error::Lengths`] for channels that do not fit, [`Error::NothingMeasured`] when no segment
-    /// holds a measurement.
-    pub fn track(
-        &self,
-        samples: &Samples<'_>,
-        mut innovations: Option<&mut Innovations>,
-    ) -> Result<Track, Error> {
-        samples.check()?;
-        let count = samples.dx_m.len();
-        let mut track = Track { s_m: vec![f64::NAN; count], nis: 0.0, measured: 0 };
-        if let Some(out) = innovations.as_deref_mut() {
-            out.innovation_m = vec![f64::NAN; count];
-            out.variance_m2 = vec![f64::NAN; count];
-        }
-        for segment in samples.segments {
-            let (y, u) = (&samples.dx_m[segment.clone()], &samples.load_n[segment.clone()]);
-            let Some(first) = y.iter().position(|y| !y.is_nan()) else { continue };
-            let mut pass = Pass { filter: self, state: self.start(y[first], u[first]), settled: None };
-            for k in 0..y.len() {
-                if k > 0 {
-                    pass.predict(u[k - 1]);
-                }
-                let (e, variance) = pass.correct(y[k])?;
-                track.s_m[segment.start + k] = pass.state.x[2];
-                if let Some(out) = innovations.as_deref_mut() {
-                    (out.innovation_m[segment.start + k], out.variance_m2[segment.start + k]) = (e, variance);
-                }
-                if !e.is_nan() {
-                    track.nis += e * e / variance;
-                    track.measured += 1;
-                }
-            }
-        }
-        if track.measured == 0 {
-            return Err(Error::NothingMeasured);
-        }
-        track.nis /= track.measured as f64;
-        Ok(track)
-    }
 }
 
-/// A state on its way through a segment; once the gain has settled only x moves.
-struct Pass<'f> {
-    filter: &'f Filter,
-    state: Estimate,
-    settled: Option<(Vector3<f64>, f64)>,
-}
-
-impl Pass<'_> {
-    fn predict(&mut self, load_n: f64) {
-        if self.settled.is_some() {
-            let Discrete { a_d, b_d } = &self.filter.discrete;
-            self.state.x = a_d * self.state.x + b_d * load_n;
-        } else {
-            self.state = self.filter.predict(&self.state, load_n);
-        }
-    }
-
-    /// Innovation, NaN where nothing was measured, and its variance.
-    fn correct(&mut self, y_m: f64) -> Result<(f64, f64), Error> {
-        if let (Some((gain, variance)), false) = (self.settled, y_m.is_nan()) {
-            let e = y_m - self.state.x[0];
-            self.state.x += gain * e;
-            return Ok((e, variance));
-        }
-        if self.settled.take().is_some() {
-            // The covariance stood still as the settled posterior; a missing sample sets it moving again.
-            self.state.p = self.filter.predict(&self.state, 0.0).p;
-        }
-        let step = self.filter.correct(&self.state, y_m)?;
-        self.state = step.posterior;
-        if !y_m.is_nan() && settled(&step.prior.p, &self.filter.predict(&step.posterior, 0.0).p) {
-            self.settled = Some((step.gain, step.innovation_variance_m2));
-        }
-        Ok((step.innovation_m, step.innovation_variance_m2))
-    }
-}
-
-fn settled(before: &Matrix3<f64>, after: &Matrix3<f64>) -> bool {
-    // Entries are of several units; each is held against the spread of its own two states.
-    let scale = |i: usize, j: usize| (after[(i, i)] * after[(j, j)]).sqrt();
-    (0..3).all(|i| (0..3).all(|j| (after[(i, j)] - before[(i, j)]).abs() <= SETTLED * scale(i, j)))
+/// The largest difference of two covariances. Entries are of several units; each is held against the
+/// spread of its own two states.
+pub(crate) fn distance(p: &Matrix3<f64>, other: &Matrix3<f64>) -> f64 {
+    let entry = |i: usize, j: usize| (p[(i, j)] - other[(i, j)]).abs() / (p[(i, i)] * p[(j, j)]).sqrt();
+    (0..9).map(|k| entry(k / 3, k % 3)).fold(0.0, f64::max)
 }
 
 fn symmetric(p: &Matrix3<f64>) -> Matrix3<f64> {

@@ -14,15 +14,17 @@ pub mod load;
 pub mod midrange;
 pub mod model;
 pub mod noise;
+mod track;
 
 pub use contact::ContactGap;
 pub use discretise::Discrete;
 pub use error::Error;
-pub use filter::{Estimate, Filter, Step, Track};
+pub use filter::{Estimate, Filter, Step};
 pub use gap::Gap;
 pub use midrange::MidRange;
 pub use model::Actuator;
 pub use noise::Noise;
+pub use track::{Innovations, Track};
 
 use std::ops::Range;
 

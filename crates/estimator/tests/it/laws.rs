@@ -103,6 +103,20 @@ proptest! {
         }
     }
 
+    /// A missing load is held; S stays a number.
+    #[test]
+    fn missing_loads_never_poison_the_track(load in vec(prop_oneof![5 => (-8e3..8e3).boxed(), 1 => Just(f64::NAN).boxed()], 300..900)) {
+        let dx: Vec<f64> = load.iter().scan(0.0, |last, f| { *last = if f.is_nan() { *last } else { *f }; Some(*last / 5e7) }).collect();
+        let held: Vec<f64> = dx.iter().map(|y| y * 5e7).collect();
+        let f = filter(0.004, 20.0);
+        let whole = 0..dx.len();
+        let found = track(&f, &dx, &load, std::slice::from_ref(&whole));
+        let wanted = track(&f, &dx, &held, std::slice::from_ref(&whole));
+        for (a, b) in found.iter().zip(&wanted) {
+            prop_assert!((a - b).abs() < 1e-15, "{a} is not {b}");
+        }
+    }
+
     /// A segment knows nothing of the one before it.
     #[test]
     fn a_segment_starts_afresh(dx in vec(-1e-4..1e-4, 100..300), load in vec(-8e3..8e3, 300)) {
