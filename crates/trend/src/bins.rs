@@ -17,8 +17,7 @@ pub(crate) struct Bin {
     pub(crate) variance_m2: f64,
 }
 
-/// At most `count` bins of as equal a count as can be, each within two standard deviations free of
-/// what the running median let pass.
+/// At most `count` bins of as equal a count as can be.
 pub(crate) fn bin(estimates: &[Estimate], count: usize) -> Vec<Bin> {
     let count = count.min(estimates.len());
     (0..count)

@@ -2,6 +2,18 @@
 //!
 //! This crate knows ages and gaps, never a file, a filter or a clock: the day of a statement is an
 //! argument, and nothing later than it is looked at.
+//!
+//! A [`Series`] adds up a unit's usage, a [`FleetPrior`] learns from a part number's units, and [`trend()`]
+//! weighs a bank of wear curves by both.
+//!
+//! # What would make it wrong
+//!
+//! - A law far from every curve of the bank: on fleets that run in, or slow down before the limit, the
+//!   90 % interval held 42 to 58 % in our own simulation.
+//! - Life that ends other than by growth to the limit, or growth that depends on what no usage axis shows.
+//! - A measurement whose bias drifts for years: it is taken for wear. A yearly swing is not.
+//! - Maintenance that lowers the gap by less than about 5 µm: no step is found, wear is underestimated.
+//! - A fleet of fewer than some thirty units: the prior then is mostly what was assumed.
 
 mod bins;
 pub mod classic;
