@@ -26,7 +26,7 @@ pub struct Complaint {
     /// The column of a table or log.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub column: Option<String>,
-    /// The row, from 0.
+    /// The row: of a log from 0, of a table from 1, header excluded.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row: Option<u64>,
     /// The row group of a Parquet file, from 0.

@@ -14,6 +14,9 @@ use crate::error::Fault;
 /// A step longer than this many median steps is a break: the filter cannot predict across it.
 const BREAK_STEPS: f64 = 1.5;
 
+/// A declared rate and the stamps may differ by this share: more is another rate, not a better one.
+const RATE_TOLERANCE: f64 = 0.25;
+
 /// The rows of a log on one clock.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timeline {
@@ -58,6 +61,8 @@ pub struct Stamps {
     pub seconds: Vec<f64>,
     /// The first stamp, where it is absolute.
     pub start_utc: Option<Timestamp>,
+    /// Whether that stamp is a local time whose zone the log does not name.
+    pub is_local: bool,
 }
 
 /// Evenly spaced rows at a declared rate, when a log has no stamps.
@@ -76,7 +81,7 @@ pub fn even(rows: usize, rate_hz: f64) -> Timeline {
 ///
 /// # Errors
 /// [`Fault::TimeGoesBack`] when stamps fall by more than `max_back_s`; [`Fault::TimeStandsStill`] when
-/// fewer than two differ.
+/// fewer than two differ; [`Fault::RateContradicts`] when they tell of another rate than was declared.
 pub fn align(stamps: &Stamps, rate_hz: Option<f64>, max_back_s: f64) -> Result<Timeline, Fault> {
     let t = &stamps.seconds;
     let falls = check_falls(stamps, max_back_s)?;
@@ -87,7 +92,12 @@ pub fn align(stamps: &Stamps, rate_hz: Option<f64>, max_back_s: f64) -> Result<T
     if count < 2 {
         return Err(Fault::TimeStandsStill { column: stamps.column.clone(), rows: t.len() as u64 });
     }
-    let step_s = rate_hz.map_or_else(|| median((1..count).map(step).collect()), f64::recip);
+    let seen_s = median((1..count).map(step).collect());
+    let step_s = rate_hz.map_or(seen_s, f64::recip);
+    if (seen_s / step_s - 1.0).abs() > RATE_TOLERANCE {
+        let (column, declared_hz) = (stamps.column.clone(), step_s.recip());
+        return Err(Fault::RateContradicts { column, declared_hz, seen_hz: seen_s.recip() });
+    }
     let breaks: Vec<usize> = (1..count).filter(|&i| step(i) > BREAK_STEPS * step_s).collect();
     let unstamped = t.iter().filter(|s| s.is_nan()).count();
     let repairs = Repairs { unstamped, out_of_order: falls, repeated: t.len() - unstamped - count };
@@ -155,7 +165,7 @@ mod tests {
     use super::*;
 
     fn stamps(seconds: &[f64]) -> Stamps {
-        Stamps { column: "t".into(), seconds: seconds.to_vec(), start_utc: None }
+        Stamps { column: "t".into(), seconds: seconds.to_vec(), start_utc: None, is_local: false }
     }
 
     #[test]

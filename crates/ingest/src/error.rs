@@ -66,6 +66,9 @@ pub enum Fault {
     /// Stamps fall further than allowed.
     #[error("the clock runs backwards")]
     TimeGoesBack { column: String, row: u64, before_s: f64, after_s: f64, max_back_s: f64, times: u64 },
+    /// The stamps tell of another rate than was declared.
+    #[error("the stamps tell of another rate than `clock.rate_hz`")]
+    RateContradicts { column: String, declared_hz: f64, seen_hz: f64 },
     /// No two stamps differ.
     #[error("the clock stands still")]
     TimeStandsStill { column: String, rows: u64 },
@@ -104,6 +107,7 @@ impl Fault {
             Self::TimeUnit { .. } => "time_unit_unknown",
             Self::NoClock => "no_clock",
             Self::TimeGoesBack { .. } => "time_goes_back",
+            Self::RateContradicts { .. } => "rate_contradicts",
             Self::TimeStandsStill { .. } => "time_stands_still",
             Self::AllMissing { .. } => "channel_empty",
             Self::UnitForPart { .. } => "unit_for_part",
@@ -133,6 +137,7 @@ impl Fault {
             | Self::ColumnMissing { column, .. }
             | Self::ColumnType { column, .. }
             | Self::TimeUnit { column, .. }
+            | Self::RateContradicts { column, .. }
             | Self::TimeStandsStill { column, .. }
             | Self::AllMissing { column, .. }
             | Self::UnitForPart { column, .. } => c.column = Some(column.clone()),
@@ -156,6 +161,7 @@ impl Fault {
                 Some(format!("{after_s} s after {before_s} s, {times} such falls in all"))
             }
             Self::TimeStandsStill { rows, .. } => Some(format!("{rows} rows with one stamp")),
+            Self::RateContradicts { seen_hz, .. } => Some(format!("{seen_hz:.6} Hz by the median step")),
             Self::IdentityMissing { looked, .. } => Some(format!("looked in {}", shortened(looked))),
             Self::IdentityChanges { found, before, .. } => Some(format!("`{found}` after `{before}`")),
             _ => None,
@@ -167,6 +173,7 @@ impl Fault {
             Self::TimeGoesBack { max_back_s, .. } => {
                 Some(format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)"))
             }
+            Self::RateContradicts { declared_hz, .. } => Some(format!("{declared_hz} Hz (`clock.rate_hz`)")),
             Self::TimeUnit { .. } => Some("`clock.unit` = \"s\", \"ms\", \"us\" or \"ns\"".into()),
             Self::UnitForPart { wanted, .. } => Some((*wanted).into()),
             _ => None,
@@ -195,6 +202,9 @@ impl Fault {
             Self::NoClock => "name the time column, or give the rate when rows are evenly spaced",
             Self::TimeGoesBack { .. } => {
                 "two recorder segments in one file? Split it, or raise `clock.max_back_s`"
+            }
+            Self::RateContradicts { .. } => {
+                "is `clock.unit` right? Leave `clock.rate_hz` out to take the stamps' own"
             }
             Self::TimeStandsStill { .. } => "map the column that counts, or give `clock.rate_hz` alone",
             Self::AllMissing { .. } => "was the sensor connected? Map the other of two redundant channels",

@@ -39,8 +39,9 @@ pub(crate) fn from_path(path: &Path, expression: &str) -> Result<Facts, Fault> {
         found: expression.to_owned(),
         detail: e.to_string(),
     })?;
-    // Backslashes of another system's paths would need another expression for the same fleet.
-    let text = path.to_string_lossy().replace('\\', "/");
+    // The same log must be the same flight wherever the command was typed, and on whichever system.
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let text = whole.to_string_lossy().replace('\\', "/");
     let Some(groups) = regex.captures(&text) else { return Ok(Facts::new()) };
     let named = |fact: &Fact| Some((*fact, groups.name(fact.as_str())?.as_str().to_owned()));
     Ok(Fact::ALL.iter().filter_map(named).collect())
@@ -119,13 +120,28 @@ pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp
             Err(_) => text.parse::<civil::DateTime>().map_err(|e| invalid(e.to_string()))?,
         },
     };
-    let zone = mapping
-        .time_zone
-        .as_deref()
-        .ok_or_else(|| invalid("it names no time zone, and `identity.time_zone` is not given".into()))?;
-    let zone = if zone.eq_ignore_ascii_case("utc") { Ok(TimeZone::UTC) } else { TimeZone::get(zone) };
-    let zone = zone.map_err(|e| invalid(e.to_string()))?;
-    zone.to_timestamp(local).map_err(|e| invalid(e.to_string()))
+    let name = mapping.time_zone.as_deref();
+    let name =
+        name.ok_or_else(|| invalid("it names no time zone, and `identity.time_zone` is not given".into()))?;
+    zone(name).map_err(invalid)?.to_timestamp(local).map_err(|e| invalid(e.to_string()))
+}
+
+/// A time zone by its name.
+///
+/// # Errors
+/// When no zone is called so.
+pub fn zone(name: &str) -> Result<TimeZone, String> {
+    if name.eq_ignore_ascii_case("utc") {
+        Ok(TimeZone::UTC)
+    } else {
+        TimeZone::get(name).map_err(|e| e.to_string())
+    }
+}
+
+/// The instant of a local time that was read as if it were UTC; nothing when no zone is mapped.
+pub(crate) fn from_local(as_utc: Timestamp, mapping: &IdentityMapping) -> Option<Timestamp> {
+    let zone = zone(mapping.time_zone.as_deref()?).ok()?;
+    zone.to_timestamp(TimeZone::UTC.to_datetime(as_utc)).ok()
 }
 
 #[cfg(test)]

@@ -14,6 +14,10 @@ use crate::read::Columns;
 use crate::schema::{ChannelMapping, Fact, Mapping};
 use crate::unit::{Dimension, Unit};
 
+/// A load is held over so many of its own steps, or so many seconds if that is more.
+const HOLD_STEPS: usize = 4;
+const HOLD_S: f64 = 0.2;
+
 /// How far stamps may fall back by default, s.
 const MAX_BACK_S: f64 = 1.0;
 
@@ -146,7 +150,8 @@ impl<'m> Log<'m> {
         }
         let found: BTreeSet<&str> =
             open.iter().flat_map(|p| self.columns.names().filter_map(|name| p.position_in(name))).collect();
-        let named = found.into_iter().filter_map(|text| Position::new(text).ok());
+        let asked = |text: &&str| map.positions.is_empty() || map.positions.iter().any(|p| p == text);
+        let named = found.into_iter().filter(asked).filter_map(|text| Position::new(text).ok());
         let all: Vec<PositionColumns> = named.map(|position| self.columns_of(position)).collect();
         if all.iter().any(|p| p.lacking.is_empty()) {
             return Ok(all);
@@ -197,7 +202,11 @@ impl<'m> Log<'m> {
         let map = &self.mapping.clock;
         match (&map.column, map.rate_hz) {
             (Some(column), rate_hz) => {
-                let stamps = self.columns.stamps(column, map.unit)?;
+                let mut stamps = self.columns.stamps(column, map.unit)?;
+                if stamps.is_local {
+                    stamps.start_utc =
+                        stamps.start_utc.and_then(|t| identity::from_local(t, &self.mapping.identity));
+                }
                 let max_back_s = map.max_back_s.unwrap_or(MAX_BACK_S);
                 clock::align(&stamps, rate_hz, max_back_s).map_err(|f| self.columns.error(f))
             }
@@ -227,9 +236,13 @@ impl<'m> Log<'m> {
         let mut dx_m = read(screw, &map.screw_position)?;
         dx_m.iter_mut().zip(&motor_m).for_each(|(screw, motor)| *screw -= motor);
         let mut load_n = read(load, &map.load)?;
-        let segments = hold(&mut load_n, &timeline.segments);
+        let longest = (HOLD_S / timeline.step_s).ceil() as usize;
+        let segments = hold(&mut load_n, &timeline.segments, longest);
         let temperature_c = match (temperature, &map.temperature) {
-            (Some(column), Some(channel)) => mean(&self.channel(column, channel, timeline, geometry)?),
+            // A temperature helps to understand a gap; its absence must not cost one.
+            (Some(column), Some(channel)) => {
+                self.channel(column, channel, timeline, geometry).ok().and_then(|values| mean(&values))
+            }
             _ => None,
         };
         let missing = dx_m.iter().filter(|y| y.is_nan()).count();
@@ -327,10 +340,10 @@ fn lever(unit: Unit, geometry: Geometry) -> Result<f64, &'static str> {
     }
 }
 
-/// Adds or takes turns so that no step exceeds half a turn; missing samples are passed over.
+/// Adds or takes turns so that no step exceeds half a turn; missing and infinite samples are passed over.
 fn unwrap_turns(values: &mut [f64], turn: f64) {
     let (mut turns, mut before) = (0.0, f64::NAN);
-    for value in values.iter_mut().filter(|v| !v.is_nan()) {
+    for value in values.iter_mut().filter(|v| v.is_finite()) {
         let raw = *value;
         if !f64::is_nan(before) {
             turns -= ((raw - before) / turn).round();
@@ -341,18 +354,43 @@ fn unwrap_turns(values: &mut [f64], turn: f64) {
 }
 
 /// Holds the last load over samples without one, and starts each segment at its first load.
-fn hold(load_n: &mut [f64], segments: &[Range<usize>]) -> Vec<Range<usize>> {
+///
+/// A load that is recorded more slowly is held over a few of its own steps, or `longest` samples if that
+/// is more; one that stays away longer has died, and the segment ends where it was last known.
+fn hold(load_n: &mut [f64], segments: &[Range<usize>], longest: usize) -> Vec<Range<usize>> {
+    let longest = longest.max(HOLD_STEPS * usual_step(load_n));
     let mut loaded = Vec::with_capacity(segments.len());
     for segment in segments {
-        let Some(first) = segment.clone().find(|&i| !load_n[i].is_nan()) else { continue };
-        for i in first + 1..segment.end {
-            if load_n[i].is_nan() {
-                load_n[i] = load_n[i - 1];
+        let mut known: Option<Range<usize>> = None;
+        for i in segment.clone().filter(|&i| !load_n[i].is_nan()).collect::<Vec<_>>() {
+            match &mut known {
+                Some(span) if i - span.end <= longest => {
+                    let last = load_n[span.end - 1];
+                    load_n[span.end..i].fill(last);
+                    span.end = i + 1;
+                }
+                before => {
+                    loaded.extend(before.take());
+                    known = Some(i..i + 1);
+                }
             }
         }
-        loaded.push(first..segment.end);
+        if let Some(span) = known {
+            let end = segment.end.min(span.end + longest);
+            let last = load_n[span.end - 1];
+            load_n[span.end..end].fill(last);
+            loaded.push(span.start..end);
+        }
     }
     loaded
+}
+
+/// Samples from one known load to the next, as the median has it.
+fn usual_step(load_n: &[f64]) -> usize {
+    let known: Vec<usize> = (0..load_n.len()).filter(|&i| !load_n[i].is_nan()).collect();
+    let mut steps: Vec<usize> = known.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() { 1 } else { *steps.select_nth_unstable(middle).1 }
 }
 
 fn mean(values: &[f64]) -> Option<f64> {
@@ -370,7 +408,7 @@ mod tests {
     fn a_slow_load_is_held_and_a_segment_waits_for_its_first() {
         let nan = f64::NAN;
         let mut load = [nan, 1.0, nan, 2.0, nan, nan];
-        let segments = hold(&mut load, &[0..3, 3..5, 5..6]);
+        let segments = hold(&mut load, &[0..3, 3..5, 5..6], 2);
         assert_eq!(segments, [1..3, 3..5]);
         assert_eq!(load[1..5], [1.0, 1.0, 2.0, 2.0]);
     }
@@ -383,6 +421,19 @@ mod tests {
         let torque = ChannelMapping { unit: Unit::NewtonMetre, sign: -1, ..ChannelMapping::default() };
         assert!((to_si("a", &angle, geometry).unwrap().apply(90.0) - 0.00125).abs() < 1e-15);
         assert!((to_si("t", &torque, geometry).unwrap().apply(0.1) + 125.663_706_143_591_7).abs() < 1e-9);
+    }
+
+    /// The load comes every other sample, so it is held over eight at most.
+    #[test]
+    fn a_load_that_died_ends_its_segment() {
+        let mut load = [f64::NAN; 40];
+        for i in [0, 2, 4, 6, 30, 32] {
+            load[i] = i as f64;
+        }
+        let segments = hold(&mut load, &[0..20, 20..40], 3);
+        assert_eq!(segments, [0..15, 30..40]);
+        assert_eq!((load[5], load[14], load[33]), (4.0, 6.0, 32.0));
+        assert!(load[15].is_nan());
     }
 
     #[test]

@@ -100,7 +100,7 @@ impl Columns {
         column: &str,
         mut take: impl FnMut(&ArrayRef) -> Result<(), Fault>,
     ) -> Result<(), Error> {
-        self.data_type(column)?;
+        let root = self.footer.schema().index_of(column).map_err(|_| self.no_column(column))?;
         let decode = |group: Option<usize>, detail: String| {
             let row_group = group.map(|g| g as u64);
             self.error(Fault::Decode { column: column.to_owned(), row_group, detail })
@@ -109,7 +109,8 @@ impl Columns {
         for group in 0..self.footer.metadata().num_row_groups() {
             let file = self.file.try_clone().map_err(|source| self.error(Fault::Unreadable { source }))?;
             let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.footer.clone());
-            let mask = ProjectionMask::columns(builder.parquet_schema(), [column]);
+            // By index: a name with a dot in it would be taken for a path into a nest.
+            let mask = ProjectionMask::roots(builder.parquet_schema(), [root]);
             let reader = builder
                 .with_projection(mask)
                 .with_row_groups(vec![group])
@@ -168,8 +169,9 @@ impl Columns {
     /// The time column, in seconds since its first stamp.
     pub(crate) fn stamps(&self, column: &str, unit: Option<TimeUnit>) -> Result<Stamps, Error> {
         match (self.data_type(column)?.clone(), unit) {
-            (DataType::Timestamp(arrow_unit, _), _) => {
-                self.whole_stamps(column, per_second(arrow_unit), true)
+            (DataType::Timestamp(arrow_unit, zone), _) => {
+                let stamps = self.whole_stamps(column, per_second(arrow_unit), true)?;
+                Ok(Stamps { is_local: zone.is_none(), ..stamps })
             }
             (found, None) => {
                 let found = found.to_string();
@@ -195,7 +197,7 @@ impl Columns {
             Ok(())
         })?;
         let start_utc = first.filter(|_| absolute).and_then(|tick| instant(tick, per_second));
-        Ok(Stamps { column: column.to_owned(), seconds, start_utc })
+        Ok(Stamps { column: column.to_owned(), seconds, start_utc, is_local: false })
     }
 
     fn real_stamps(&self, column: &str, per_second: f64) -> Result<Stamps, Error> {
@@ -204,7 +206,7 @@ impl Columns {
         for s in &mut seconds {
             *s = (*s - first) / per_second;
         }
-        Ok(Stamps { column: column.to_owned(), seconds, start_utc: None })
+        Ok(Stamps { column: column.to_owned(), seconds, start_utc: None, is_local: false })
     }
 
     /// blake3 of the footer and of the chunks of the named columns, in the order of the file.

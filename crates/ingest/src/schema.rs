@@ -30,7 +30,7 @@ pub struct IdentityMapping {
     /// Columns that hold one value throughout: fact → column.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: BTreeMap<Fact, String>,
-    /// A regular expression on the path with named groups, e.g.
+    /// A regular expression on the absolute path with named groups, e.g.
     /// `(?<tail_number>N\w+)/(?<flight_id>[^/]+)_(?<departure_utc>\d{8}T\d{6}Z)\.parquet$`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
@@ -110,6 +110,9 @@ pub struct ClockMapping {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Channels {
+    /// Only these positions; all that column names tell of when not given.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub positions: Vec<String>,
     /// Motor position: an angle at the motor, or already a length at the screw.
     pub motor_position: ChannelMapping,
     /// Screw position.

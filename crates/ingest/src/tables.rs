@@ -97,7 +97,7 @@ impl Table {
 
     fn error(&self, row: usize, column: usize, detail: String) -> Error {
         let column = self.header.get(column).cloned();
-        Error::new(&self.file, Fault::Table { row: Some(row as u64), column, detail })
+        Error::new(&self.file, Fault::Table { row: Some(row as u64 + 1), column, detail })
     }
 }
 
@@ -198,7 +198,7 @@ type Cells = (Vec<String>, Vec<Vec<Option<String>>>);
 
 fn read_csv(file: &Path) -> Result<Cells, Fault> {
     let bad = |e: &csv::Error| {
-        let row = e.position().map(|p| p.record().saturating_sub(1));
+        let row = e.position().map(csv::Position::record);
         Fault::Table { row, column: None, detail: e.to_string() }
     };
     let text = std::fs::read(file).map_err(|source| Fault::Unreadable { source })?;
@@ -267,7 +267,7 @@ mod tests {
             table(&format!("{HEADER}N1,aileron,EMA,,2026-01-01,\nN1,elevator,EMA,18,yesterday,\n"));
         let errors = installations(&file).unwrap_err();
         let places: Vec<_> = errors.iter().map(|e| e.complaint().place().unwrap()).collect();
-        assert_eq!(places, ["column `serial_number`, row 0", "column `installed_utc`, row 1"]);
+        assert_eq!(places, ["column `serial_number`, row 1", "column `installed_utc`, row 2"]);
     }
 
     #[test]

@@ -46,7 +46,7 @@ pub(crate) fn mapping(motor: ChannelMapping, screw: ChannelMapping, load: Channe
             unit: Some(TimeUnit::Second),
             ..ClockMapping::default()
         },
-        channels: Channels { motor_position: motor, screw_position: screw, load, temperature: None },
+        channels: Channels { motor_position: motor, screw_position: screw, load, ..Channels::default() },
     }
 }
 
@@ -293,4 +293,31 @@ fn text_where_numbers_should_stand_is_refused_by_name() {
     let error = log.actuator(&positions[0], &log.timeline().unwrap(), LINEAR).unwrap_err();
     assert_eq!(error.complaint().code, "column_type");
     assert_eq!(error.complaint().column.as_deref(), Some("m"));
+}
+
+/// `SYSTEM.CHANNEL` is an ordinary name in flight logs, not a path into a nest.
+#[test]
+fn a_dot_in_a_name_is_part_of_the_name() {
+    let m =
+        mapping(channel("ail.m", Unit::Metre), channel("ail.s", Unit::Metre), channel("ail.f", Unit::Newton));
+    let x = || reals(&[1.0, 2.0]);
+    let a = only(&m, &[("t", reals(&[0.0, 0.1])), ("ail.m", x()), ("ail.s", x()), ("ail.f", x())], LINEAR);
+    assert_eq!(a.motor_m, [1.0, 2.0]);
+}
+
+/// Istanbul is three hours ahead: a clock that names no zone is local, and never taken for UTC.
+#[test]
+fn a_local_clock_takes_the_mapped_zone_or_says_nothing() {
+    let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let start = |m: &Mapping| {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("x.parquet");
+        let stamps = TimestampMillisecondArray::from(vec![1_763_525_580_250, 1_763_525_580_350]);
+        write(&file, &[("t", Arc::new(stamps))]);
+        Log::open(&file, m).unwrap().timeline().unwrap().start_utc.map(|t| t.to_string())
+    };
+    m.identity.time_zone = Some("Europe/Istanbul".into());
+    assert_eq!(start(&m).as_deref(), Some("2025-11-19T01:13:00.25Z"));
+    m.identity.time_zone = None;
+    assert_eq!(start(&m), None);
 }
