@@ -135,3 +135,51 @@ fn rewrite(from: &std::path::Path, to: &std::path::Path, facts: &Facts) {
     }
     write_parquet(to, &columns, facts).unwrap();
 }
+
+/// When the log that spoke for a flight breaks, its copy takes over on the next run.
+#[test]
+fn a_copy_speaks_when_the_first_log_breaks() {
+    let bench = Bench::sample();
+    let log = &bench.logs()[3];
+    std::fs::copy(log, log.with_file_name("z_copy.parquet")).unwrap();
+    bench.well(&["run"]);
+    let before = bench.exported();
+    std::fs::write(log, b"broken").unwrap();
+    assert_eq!(bench.freeplay(&["run"]).code, Some(1));
+    assert!(bench.well(&["run", "--dry-run"]).contains("its flight has no other log now"));
+    bench.well(&["run"]);
+    assert_eq!(bench.exported(), before);
+    assert!(to_do(&bench.well(&["run"])).ends_with("31 logs: 0 to do, 31 known"));
+}
+
+/// What is asked for is found out before the limit cuts, also of logs never seen.
+#[test]
+fn a_limit_counts_only_what_was_asked_for() {
+    let bench = Bench::sample();
+    let account = bench.well(&["run", "--tail", "N414FP", "--limit", "3"]);
+    assert!(account.contains("3 to do, 0 known, 20 not asked for, 7 left by the limit"), "{account}");
+    assert!(account.contains("12 records of 3 flights"), "{account}");
+}
+
+#[test]
+fn the_account_does_not_depend_on_who_was_faster() {
+    let account = |jobs: &str| {
+        let bench = Bench::sample();
+        let logs = bench.logs();
+        rewrite(&logs[4], &logs[3].with_file_name("z_rival.parquet"), &ingest_facts(&logs[3]));
+        let json = bench.freeplay(&["run", "--json", "--jobs", jobs]).out;
+        let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+        ["found", "known", "done", "flights", "estimated", "refused"].map(|key| report[key].to_string())
+    };
+    assert_eq!(account("1"), account("2"));
+}
+
+#[test]
+fn a_pattern_that_reaches_our_own_results_does_not_read_them() {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "**/*_N41*.parquet");
+    bench.well(&["run"]);
+    bench.configure("**/*_N41*.parquet", "**/*.parquet");
+    std::fs::remove_file(bench.path("sample-data/truth.parquet")).unwrap();
+    assert!(to_do(&bench.well(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
+}

@@ -55,7 +55,7 @@ fn rows_come_as_table_json_csv_and_parquet() {
     let json: Vec<serde_json::Value> =
         serde_json::from_str(&bench.well(&["store", "export", "--json"])).unwrap();
     assert_eq!(json.len(), 12);
-    assert!(json[0]["gap_se_m"].is_null(), "nulls are written");
+    assert!(json[0]["temperature_c"].is_null(), "nulls are written");
     assert!(json[0]["departure_utc"].as_str().unwrap().ends_with('Z'));
     let csv = bench.well(&["store", "export", "--format", "csv"]);
     assert!(
@@ -194,4 +194,24 @@ fn a_compacted_store_holds_the_same_records_and_a_flipped_byte_is_found() {
     let ended = bench.freeplay(&["store", "verify"]);
     assert_eq!(ended.code, Some(1), "{ended:?}");
     assert!(ended.err.contains("hint:"), "{}", ended.err);
+}
+
+#[test]
+fn a_refused_run_leaves_nothing_behind() {
+    let bench = Bench::empty();
+    bench.well(&["init"]);
+    assert_eq!(bench.freeplay(&["run"]).code, Some(2));
+    assert!(!bench.path("results").exists());
+}
+
+/// The configuration may lie elsewhere, in a folder whose name looks like a pattern.
+#[test]
+fn a_configuration_elsewhere_is_read_from_there() {
+    let bench = Bench::sample();
+    let odd = bench.path("fleet [1] ü");
+    std::fs::create_dir(&odd).unwrap();
+    std::fs::rename(bench.path("pipeline.toml"), odd.join("pipeline.toml")).unwrap();
+    std::fs::rename(bench.path("sample-data"), odd.join("sample-data")).unwrap();
+    bench.well(&["run", "--limit", "2", "--config", "fleet [1] ü/pipeline.toml"]);
+    assert!(odd.join("results").exists());
 }

@@ -16,7 +16,8 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use args::{Args, Command};
-use exit::Code;
+use exit::{Code, Failure};
+use fleet::Complaint;
 use talk::Talk;
 
 fn main() -> ExitCode {
@@ -29,13 +30,19 @@ fn main() -> ExitCode {
         }
     };
     let talk = Talk::new(&args.global);
-    match dispatch(&args, &talk) {
+    // A panic while reading a log becomes a complaint about that log; its backtrace would help nobody.
+    std::panic::set_hook(Box::new(|_| {}));
+    let ended = std::panic::catch_unwind(|| dispatch(&args, &talk)).unwrap_or_else(|_| {
+        let complaint = Complaint::new("panic", "the program failed in a way that should not happen");
+        Err(Failure::failed(complaint.hint("what was stored before is intact; please report the command")))
+    });
+    match ended {
         Ok(code) => code.into(),
         Err(failure) => talk.fail(&failure).into(),
     }
 }
 
-fn dispatch(args: &Args, talk: &Talk) -> Result<Code, exit::Failure> {
+fn dispatch(args: &Args, talk: &Talk) -> Result<Code, Failure> {
     match &args.command {
         Command::Init(a) => commands::init::init(a, talk),
         Command::Check(a) => commands::check::check(a, &args.global, talk),

@@ -45,9 +45,17 @@ fn to_file(
     fill: impl FnOnce(&mut File) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
-    let mut beside = tempfile::NamedTempFile::new_in(folder).map_err(|e| not_written(file, &e))?;
+    let mut beside = shared().tempfile_in(folder).map_err(|e| not_written(file, &e))?;
     fill(beside.as_file_mut())?;
     beside.persist(file).map(drop).map_err(|e| not_written(file, &e.error))
+}
+
+/// Readable by whom the user's mask allows, as any file a command writes.
+fn shared() -> tempfile::Builder<'static, 'static> {
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder
 }
 
 fn not_written(file: &std::path::Path, error: &io::Error) -> Failure {

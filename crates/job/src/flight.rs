@@ -1,5 +1,6 @@
 //! One flight, from log to records: the room where all floors below meet.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use fleet::{
@@ -59,14 +60,15 @@ impl<'c> Opened<'c> {
 
     /// The flight, as records name it.
     pub fn flight(&self) -> Flight {
+        flight_of(&self.identity)
+    }
+
+    /// The actuators of the log. A position that lacks a channel is one only where a unit is booked:
+    /// `battery_load` may fit a pattern without being an actuator.
+    pub fn actuators(&self, installations: &Installations) -> impl Iterator<Item = &PositionColumns> {
         let id = &self.identity;
-        Flight {
-            tail_number: id.tail_number.clone(),
-            flight_id: id.flight_id.clone(),
-            departure_utc: id.departure_utc,
-            flight_hours: id.flight_hours,
-            tail_hours_end: id.tail_hours_end,
-        }
+        let booked = |at: &Position| installations.at(&id.tail_number, at, id.departure_utc).is_some();
+        self.positions.iter().filter(move |at| at.lacking.is_empty() || booked(&at.position))
     }
 
     /// Estimates every actuator of the log that was installed that day.
@@ -79,7 +81,7 @@ impl<'c> Opened<'c> {
         stamp: &Stamp,
     ) -> (Vec<GapRecord>, Vec<Complaint>) {
         let (mut records, mut complaints) = (Vec::new(), Vec::new());
-        for at in &self.positions {
+        for at in self.actuators(installations) {
             match self.record(at, config, installations, stamp) {
                 Ok(record) => records.push(record),
                 Err(complaint) => complaints.push(complaint.in_file(&self.shown)),
@@ -247,9 +249,10 @@ pub fn config_digest(
     let mut hash = blake3::Hasher::new();
     for position in positions {
         let stay = installations.at(&flight.tail_number, position, flight.departure_utc);
-        let unit = stay.map(|s| (s.part_number.as_str(), s.serial_number.as_str()));
+        // The whole stay, its hours included: they stand in the record too.
+        let stay_text = stay.map(|s| serde_json::to_string(s).unwrap_or_default());
         let digest = stay.map(|s| config.digest(&s.part_number));
-        for text in [Some(position.as_str()), unit.map(|u| u.0), unit.map(|u| u.1), digest.as_deref()] {
+        for text in [Some(position.as_str()), stay_text.as_deref(), digest.as_deref()] {
             hash.update(text.unwrap_or_default().as_bytes());
             hash.update(&[0]);
         }
@@ -267,4 +270,43 @@ pub fn unidentified_digest(config: &Config, installations: &Installations) -> St
         hash.update(serde_json::to_string(stay).unwrap_or_default().as_bytes());
     }
     hash.finalize().to_hex().to_string()
+}
+
+/// Which flight a log is, without reading its channels.
+///
+/// # Errors
+/// A complaint when the log cannot be read, put on one clock or identified.
+pub fn identify(path: &Path, shown: &str, config: &Config) -> Result<Flight, Complaint> {
+    caught(shown, || {
+        let complain = |e: ingest::Error| e.complaint().in_file(shown);
+        let log = Log::open(path, &config.mapping).map_err(complain)?;
+        let id = log.identity(&log.timeline().map_err(complain)?).map_err(complain)?;
+        Ok(flight_of(&id))
+    })
+}
+
+fn flight_of(id: &Identity) -> Flight {
+    Flight {
+        tail_number: id.tail_number.clone(),
+        flight_id: id.flight_id.clone(),
+        departure_utc: id.departure_utc,
+        flight_hours: id.flight_hours,
+        tail_hours_end: id.tail_hours_end,
+    }
+}
+
+/// Does something with one log; a panic in it is a complaint like any other.
+///
+/// # Errors
+/// What the work complains of, or code `panic`.
+pub fn caught<T>(shown: &str, work: impl FnOnce() -> Result<T, Complaint>) -> Result<T, Complaint> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<&str>().copied();
+        let text =
+            text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
+        let what = format!("reading this log failed in a way that should not happen: {text}");
+        Err(Complaint::new("panic", what)
+            .in_file(shown)
+            .hint("the file is probably damaged; please report it with the file"))
+    })
 }

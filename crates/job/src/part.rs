@@ -296,6 +296,11 @@ impl NoiseSettings {
                 ],
             ),
         };
+        keys.positive(&["noise", "bandwidth_hz"], self.bandwidth_hz);
+        for level in levels.into_iter().flatten().filter(|level| !(level.is_finite() && *level >= 0.0)) {
+            let what = format!("a noise level is {level}, which must be a number of at least zero");
+            keys.complain(&["noise"], Complaint::new("bad_parameter", what));
+        }
         let [screw_rms, screw_resolution, motor_rms, motor_resolution, force] = levels;
         Some(Sensors {
             screw_rms_m: screw_rms? * radius,
@@ -328,7 +333,8 @@ impl Keys {
     }
 
     fn positive(&mut self, key: &'static [&'static str], value: Option<f64>) {
-        self.found.extend(crate::config::positive(key[0], value).map(|c| (key, c)));
+        let name = key.last().copied().unwrap_or_default();
+        self.found.extend(crate::config::positive(name, value).map(|c| (key, c)));
     }
 
     fn made<T>(&mut self, key: &'static [&'static str], made: Result<T, estimator::Error>) -> Option<T> {

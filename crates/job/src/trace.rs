@@ -93,7 +93,7 @@ pub fn of_log(
         return Ok(whole);
     }
     let opened = Opened::open(path, shown, config)?;
-    for at in opened.positions.iter().filter(|at| at.lacking.is_empty()) {
+    for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
         let (_, part) = opened.unit(at, config, installations)?;
         whole.extend(Trace::of(shown, &opened.channels(at, part)?, part)?);
     }

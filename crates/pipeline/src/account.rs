@@ -6,7 +6,7 @@ use fleet::{Complaint, GapRecord, Status};
 use jiff::Timestamp;
 use store::{LogAccount, Outcome, RunAccount};
 
-use crate::plan::Work;
+use crate::plan::{Plan, Work};
 use crate::trends::TrendRow;
 
 /// One log's trouble.
@@ -27,8 +27,12 @@ pub struct Report {
     pub started_utc: Timestamp,
     /// Logs that fit the patterns.
     pub found: usize,
-    /// Logs that were accounted for already, or not asked for.
+    /// Logs that were accounted for already.
     pub known: usize,
+    /// Logs of flights that were not asked for.
+    pub not_asked: usize,
+    /// Logs left by the limit.
+    pub left: usize,
     /// Logs finished, those in error included.
     pub done: usize,
     /// Flights whose records were stored.
@@ -49,21 +53,29 @@ pub struct Report {
     pub workers: usize,
     /// Units whose records changed, with the statement made of each.
     pub trends: Vec<TrendRow>,
+    /// What came of each log; the last word on it counts, whoever was faster.
+    #[serde(skip)]
+    logs: BTreeMap<String, Counted>,
+}
+
+/// What came of one log.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Counted {
+    estimated: usize,
+    refused: BTreeMap<String, usize>,
+    complaints: Vec<Complaint>,
+    duration_s: f64,
 }
 
 impl Report {
-    pub(crate) fn begin(
-        run_id: String,
-        started_utc: Timestamp,
-        found: usize,
-        known: usize,
-        workers: usize,
-    ) -> Self {
+    pub(crate) fn begin(run_id: String, started_utc: Timestamp, plan: &Plan, workers: usize) -> Self {
         Self {
             run_id,
             started_utc,
-            found,
-            known,
+            found: plan.found,
+            known: plan.known,
+            not_asked: plan.not_asked,
+            left: plan.left,
             done: 0,
             flights: 0,
             estimated: 0,
@@ -74,31 +86,41 @@ impl Report {
             took_s: 0.0,
             workers,
             trends: Vec::new(),
+            logs: BTreeMap::new(),
         }
     }
 
     pub(crate) fn count(&mut self, account: &LogAccount, records: &[GapRecord], complaints: &[Complaint]) {
-        self.done += 1;
-        self.flights += usize::from(!records.is_empty());
+        let mut counted =
+            Counted { complaints: complaints.to_vec(), duration_s: account.duration_s, ..Counted::default() };
         for record in records {
             match record.estimate.status {
-                Status::Estimated => self.estimated += 1,
+                Status::Estimated => counted.estimated += 1,
                 Status::Refused => {
                     let reason = record.estimate.reason.clone().unwrap_or_default();
-                    *self.refused.entry(reason).or_default() += 1;
+                    *counted.refused.entry(reason).or_default() += 1;
                 }
             }
         }
-        let log = &account.log_path;
-        self.errors.extend(complaints.iter().map(|c| LogError { log: log.clone(), complaint: c.clone() }));
-        if self.slowest.as_ref().is_none_or(|(_, seconds)| *seconds < account.duration_s) {
-            self.slowest = Some((log.clone(), account.duration_s));
-        }
+        self.logs.insert(account.log_path.clone(), counted);
     }
 
+    /// Adds up the logs, in the order of their names.
     pub(crate) fn close(&mut self, took_s: f64) {
-        self.errors.sort_by(|a, b| a.log.cmp(&b.log).then_with(|| a.complaint.code.cmp(&b.complaint.code)));
         self.took_s = took_s;
+        self.done = self.logs.len();
+        for (log, counted) in &self.logs {
+            self.flights += usize::from(counted.estimated > 0 || !counted.refused.is_empty());
+            self.estimated += counted.estimated;
+            for (reason, count) in &counted.refused {
+                *self.refused.entry(reason.clone()).or_default() += count;
+            }
+            let error = |complaint: &Complaint| LogError { log: log.clone(), complaint: complaint.clone() };
+            self.errors.extend(counted.complaints.iter().map(error));
+            if self.slowest.as_ref().is_none_or(|(_, seconds)| *seconds < counted.duration_s) {
+                self.slowest = Some((log.clone(), counted.duration_s));
+            }
+        }
     }
 
     /// Records that say no gap.

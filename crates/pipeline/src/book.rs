@@ -37,10 +37,6 @@ impl Book {
     /// Turns what came of a log into what is written, and counts it.
     pub(crate) fn settle(&mut self, done: Done, report: &mut Report) -> Vec<LogResult> {
         match done {
-            Done::NotWanted => {
-                report.known += 1;
-                Vec::new()
-            }
             Done::Same(account) => {
                 report.known += 1;
                 self.enter((*account).clone());

@@ -1,11 +1,12 @@
 //! Which logs are there, which are already accounted for, and why each of the others is done.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use fleet::{Complaint, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
 use jiff::Timestamp;
 use job::Config;
+use rayon::prelude::*;
 use store::{LogAccount, Outcome, RecordKey};
 
 use crate::error::Error;
@@ -32,6 +33,14 @@ pub struct Request {
 }
 
 impl Request {
+    /// Whether anything but all flights is asked for.
+    fn is_narrow(&self) -> bool {
+        self.since_utc.is_some()
+            || self.until_utc.is_some()
+            || self.tail_number.is_some()
+            || self.serial_number.is_some()
+    }
+
     /// Whether a flight is asked for.
     pub fn wants(&self, flight: &Flight, installations: &Installations) -> bool {
         let at = flight.departure_utc;
@@ -54,6 +63,8 @@ pub enum Why {
     ContentChanged,
     /// A setting that touches it, or an installation, changed.
     SettingChanged,
+    /// The log it had yielded its flight to speaks for it no longer.
+    OwnerGone,
     /// It was in error, and `--retry` asks for it.
     Retry,
     /// `--redo` asks for it.
@@ -67,6 +78,7 @@ impl Why {
             Self::New => "new",
             Self::ContentChanged => "content changed",
             Self::SettingChanged => "setting changed",
+            Self::OwnerGone => "its flight has no other log now",
             Self::Retry => "in error, asked again",
             Self::Asked => "asked again",
         }
@@ -133,15 +145,24 @@ pub struct Work {
 pub struct Plan {
     /// Logs that fit the patterns.
     pub found: usize,
-    /// Those already accounted for, or not asked for.
+    /// Those already accounted for.
     pub known: usize,
     /// Those to be done, longest first.
     pub work: Vec<Work>,
     /// What is accounted for, by name, of the logs that are still there.
     pub accounts: BTreeMap<String, LogAccount>,
-    /// What was read, and under which settings, also of logs that are gone: they may be here renamed.
-    pub digests: HashSet<(String, String)>,
+    /// What was read, and under which settings, of logs that are there.
+    pub here: HashSet<Digests>,
+    /// The same of logs that are gone, with their records: they may be here under another name.
+    pub gone: HashMap<Digests, (i64, i64)>,
+    /// Logs of flights that were not asked for.
+    pub not_asked: usize,
+    /// Logs left by the limit.
+    pub left: usize,
 }
+
+/// What was read of a log, and under which settings.
+pub type Digests = (String, String);
 
 /// Makes the plan from the logs there are and the accounts kept.
 ///
@@ -154,24 +175,24 @@ pub fn plan(
     request: &Request,
 ) -> Result<Plan, Error> {
     let found = find(config)?;
-    let digests = accounts.iter().filter_map(digests).collect();
-    let here = accounts.into_iter().filter(|account| found.contains_key(&account.log_path));
-    let accounts: BTreeMap<String, LogAccount> =
-        here.map(|account| (account.log_path.clone(), account)).collect();
+    let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
+    let gone = gone.iter().filter_map(|a| Some((digests(a)?, (a.estimated, a.refused)))).collect();
+    let accounts: BTreeMap<String, LogAccount> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
+    let owned: HashSet<RecordKey> = accounts.values().flat_map(owned).collect();
     let unidentified = job::flight::unidentified_digest(config, installations);
-    let mut work = Vec::new();
-    for (shown, path) in &found {
-        let (before, stat) = (accounts.get(shown), FileStat::of(path));
-        let why = reason(before, stat.as_ref(), config, installations, &unidentified, request);
-        let task =
-            |why| Work { path: path.clone(), shown: shown.clone(), stat, why, before: before.cloned() };
-        work.extend(why.map(task));
-    }
+    let judge = Judge { config, installations, request, owned: &owned, unidentified: &unidentified };
+    let verdicts: Vec<Verdict> =
+        found.par_iter().map(|(shown, path)| judge.judge(shown, path, accounts.get(shown))).collect();
+    let not_asked = verdicts.iter().filter(|v| matches!(v, Verdict::NotAsked)).count();
+    let mut work: Vec<Work> = verdicts.into_iter().filter_map(Verdict::work).collect();
     let size = |w: &Work| w.stat.as_ref().map_or(0, |s| s.size_bytes);
     work.sort_by(|a, b| size(b).cmp(&size(a)).then_with(|| a.shown.cmp(&b.shown)));
+    let wanted = work.len();
     work.truncate(request.limit.unwrap_or(usize::MAX));
-    let known = found.len() - work.len();
-    Ok(Plan { found: found.len(), known, work, accounts, digests })
+    let left = wanted - work.len();
+    let known = found.len() - wanted - not_asked;
+    let here = accounts.values().filter_map(digests).collect();
+    Ok(Plan { found: found.len(), known, work, accounts, here, gone, not_asked, left })
 }
 
 /// What was read, and which settings touched it, of a log that went well.
@@ -211,34 +232,81 @@ pub fn flight_of(account: &LogAccount) -> Option<Flight> {
     })
 }
 
-/// Why this log is done tonight, or nothing when it is accounted for or not asked for.
-fn reason(
-    account: Option<&LogAccount>,
-    stat: Option<&FileStat>,
-    config: &Config,
-    installations: &Installations,
-    unidentified: &str,
-    request: &Request,
-) -> Option<Why> {
-    let Some(account) = account else { return Some(Why::New) };
-    let flight = flight_of(account);
-    if flight.as_ref().is_some_and(|flight| !request.wants(flight, installations)) {
-        return None;
+/// What becomes of one log tonight.
+enum Verdict {
+    Known,
+    NotAsked,
+    Do(Box<Work>),
+}
+
+impl Verdict {
+    fn work(self) -> Option<Work> {
+        match self {
+            Self::Do(work) => Some(*work),
+            Self::Known | Self::NotAsked => None,
+        }
     }
-    let settings = flight.map_or_else(
-        || unidentified.to_owned(),
-        |flight| job::flight::config_digest(config, installations, &flight, &positions_of(account)),
-    );
-    if request.redo {
-        Some(Why::Asked)
-    } else if !stat.is_some_and(|stat| stat.is_of(account)) {
-        Some(Why::ContentChanged)
-    } else if account.config_digest.as_deref() != Some(&settings) {
-        Some(Why::SettingChanged)
-    } else if request.retry && account.outcome == Outcome::Error {
-        Some(Why::Retry)
-    } else {
-        None
+}
+
+/// Everything that one log's verdict depends on.
+struct Judge<'a> {
+    config: &'a Config,
+    installations: &'a Installations,
+    request: &'a Request,
+    owned: &'a HashSet<RecordKey>,
+    unidentified: &'a str,
+}
+
+impl Judge<'_> {
+    fn judge(&self, shown: &str, path: &Path, before: Option<&LogAccount>) -> Verdict {
+        let stat = FileStat::of(path);
+        let Some(why) = self.reason(before, stat.as_ref()) else { return Verdict::Known };
+        // A log that cannot be identified is done whatever was asked, or its fault would never be told.
+        let flight =
+            || before.and_then(flight_of).or_else(|| job::flight::identify(path, shown, self.config).ok());
+        let asked =
+            !self.request.is_narrow() || flight().is_none_or(|f| self.request.wants(&f, self.installations));
+        if !asked {
+            return Verdict::NotAsked;
+        }
+        let (path, shown, before) = (path.to_owned(), shown.to_owned(), before.cloned());
+        Verdict::Do(Box::new(Work { path, shown, stat, why, before }))
+    }
+
+    /// Why this log is done tonight, or nothing when it is accounted for.
+    fn reason(&self, account: Option<&LogAccount>, stat: Option<&FileStat>) -> Option<Why> {
+        let Some(account) = account else { return Some(Why::New) };
+        let settings = flight_of(account).map_or_else(
+            || self.unidentified.to_owned(),
+            |flight| {
+                job::flight::config_digest(self.config, self.installations, &flight, &positions_of(account))
+            },
+        );
+        if self.request.redo {
+            Some(Why::Asked)
+        } else if !stat.is_some_and(|stat| stat.is_of(account)) {
+            Some(Why::ContentChanged)
+        } else if account.config_digest.as_deref() != Some(&settings) {
+            Some(Why::SettingChanged)
+        } else if self.is_orphan(account) {
+            Some(Why::OwnerGone)
+        } else if self.request.retry && account.outcome == Outcome::Error {
+            Some(Why::Retry)
+        } else {
+            None
+        }
+    }
+
+    /// A log that yielded its flight to another, which speaks for it no longer.
+    fn is_orphan(&self, account: &LogAccount) -> bool {
+        let yielded =
+            account.outcome == Outcome::Done || account.error_code.as_deref() == Some("duplicate_flight");
+        let silent = account.estimated + account.refused == 0;
+        let keys = flight_of(account)
+            .map(|f| account.positions.iter().map(|p| record_key(&f, p)).collect::<Vec<_>>());
+        yielded
+            && silent
+            && keys.is_some_and(|keys| !keys.is_empty() && keys.iter().all(|key| !self.owned.contains(key)))
     }
 }
 
@@ -247,16 +315,24 @@ fn positions_of(account: &LogAccount) -> Vec<Position> {
 }
 
 /// Every file that fits a pattern, by its shown name.
-fn find(config: &Config) -> Result<BTreeMap<String, PathBuf>, Error> {
+///
+/// # Errors
+/// [`Error::Refused`] when a pattern fits no file, or is no pattern.
+pub fn find(config: &Config) -> Result<BTreeMap<String, PathBuf>, Error> {
     let mut found = BTreeMap::new();
     let mut silent = BTreeSet::new();
+    // `**` reaches our own results and tables, which are no logs.
+    let (store, table) = (config.store(), config.path(&config.document.logs.installations));
     for pattern in &config.document.logs.files {
-        let full = config.path(pattern);
+        // The folder's own name may hold brackets; only what the user wrote is a pattern.
+        let folder = glob::Pattern::escape(&config.folder.to_string_lossy());
+        let full = Path::new(&folder).join(pattern);
         let paths = glob::glob(&full.to_string_lossy()).map_err(|e| {
             let what = format!("`{pattern}` is no pattern of files: {e}");
             Error::refused(Complaint::new("bad_pattern", what).in_file(config.file.display()))
         })?;
-        let files: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file()).collect();
+        let ours = |path: &PathBuf| path.starts_with(&store) || *path == table;
+        let files: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file() && !ours(path)).collect();
         if files.is_empty() {
             silent.insert(pattern.as_str());
         }

@@ -4,14 +4,13 @@
 //! another. What they finish goes to the one thread that writes: it commits whatever has gathered,
 //! whole flights at a time, so a run that is cut short keeps what it finished.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
 use fleet::{Complaint, GapRecord, Installations, Status};
 use jiff::Timestamp;
-use job::flight::{Opened, config_digest, unidentified_digest};
+use job::flight::{Opened, caught, config_digest, unidentified_digest};
 use job::{Config, Stamp};
 use store::{Holder, LogAccount, LogResult, Store, Writer};
 
@@ -19,7 +18,7 @@ use crate::account::{self, Report};
 use crate::book::Book;
 use crate::error::Error;
 use crate::event::Event;
-use crate::plan::{self, Plan, Request, Work};
+use crate::plan::{self, Plan, Request, Why, Work};
 use crate::trends;
 
 /// Finished flights wait this long at most for company in a commit: each commit is a file and a log entry.
@@ -72,12 +71,14 @@ pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
 pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<Report, Error> {
     let clock = Instant::now();
     let installations = installations(config)?;
+    // Before a store is made: a refused run leaves nothing behind.
+    plan::find(config)?;
     let store = Store::create_or_open(config.store())?;
     let mut writer = store.lock(&context.holder, context.wait)?;
     let plan = plan::plan(config, &installations, store.accounts()?, request)?;
     let workers = workers(request, plan.work.len());
     let started_utc = Timestamp::now();
-    let mut report = Report::begin(run_id(started_utc), started_utc, plan.found, plan.known, workers);
+    let mut report = Report::begin(run_id(started_utc), started_utc, &plan, workers);
     let config_path = config.file.display().to_string();
     writer.begin_run(&report.row(context.program_version, &config_path, None))?;
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
@@ -124,8 +125,6 @@ fn run_id(started_utc: Timestamp) -> String {
 
 /// What came of one log.
 pub(crate) enum Done {
-    /// It is another than was asked for.
-    NotWanted,
     /// Its content is known; only its name or date is new.
     Same(Box<LogAccount>),
     /// It was read.
@@ -146,7 +145,7 @@ impl Done {
             Self::Read { account, complaints, .. } => {
                 (account.estimated as usize, account.refused as usize, complaints.clone())
             }
-            Self::NotWanted | Self::Same(_) => (0, 0, Vec::new()),
+            Self::Same(_) => (0, 0, Vec::new()),
         };
         Event::Finished { log, bytes, estimated, refused, complaints }
     }
@@ -210,14 +209,8 @@ impl Shop<'_> {
     /// One log; a panic in it is an error row like any other.
     fn one(&self, work: &Work) -> Done {
         let clock = Instant::now();
-        let done = catch_unwind(AssertUnwindSafe(|| self.open(work))).unwrap_or_else(|panic| {
-            let what =
-                format!("reading this log failed in a way that should not happen: {}", panic_text(&*panic));
-            let complaint = Complaint::new("panic", what)
-                .in_file(&work.shown)
-                .hint("the file is probably damaged; please report it with the file");
-            self.failed(work, complaint)
-        });
+        let done = caught(&work.shown, || Ok(self.open(work)));
+        let done = done.unwrap_or_else(|complaint| self.failed(work, complaint));
         match done {
             Done::Read { mut account, records, complaints } => {
                 account.duration_s = clock.elapsed().as_secs_f64();
@@ -240,9 +233,6 @@ impl Shop<'_> {
             Err(complaint) => return self.failed(work, complaint),
         };
         let flight = opened.flight();
-        if !self.request.wants(&flight, self.installations) {
-            return Done::NotWanted;
-        }
         let names = opened.position_names();
         let mut account = account::of_log(work, self.run_id);
         account.config_digest = Some(config_digest(self.config, self.installations, &flight, &names));
@@ -251,14 +241,24 @@ impl Shop<'_> {
         account.flight_id = Some(flight.flight_id.to_string());
         account.departure_utc = Some(flight.departure_utc);
         account.positions = names.iter().map(ToString::to_string).collect();
-        if !self.request.redo && plan::digests(&account).is_some_and(|d| self.plan.digests.contains(&d)) {
-            // Under its own name it still speaks for its records; under a new one they stay as they are.
-            let before =
-                work.before.as_ref().filter(|before| plan::digests(before) == plan::digests(&account));
-            (account.estimated, account.refused) = before.map_or((0, 0), |b| (b.estimated, b.refused));
+        if let Some(known) = self.known(work, &account) {
+            (account.estimated, account.refused) = known;
             return Done::Same(Box::new(account));
         }
         self.read(&opened, account)
+    }
+
+    /// The records that are known of this content under these settings: its own, those of a log that
+    /// is gone, whose place it takes, or none, when another log that is there speaks for them.
+    fn known(&self, work: &Work, account: &LogAccount) -> Option<(i64, i64)> {
+        let digests = plan::digests(account)?;
+        if matches!(work.why, Why::Asked | Why::OwnerGone) {
+            return None;
+        }
+        let own = work.before.as_ref().filter(|before| plan::digests(before).as_ref() == Some(&digests));
+        own.map(|before| (before.estimated, before.refused))
+            .or_else(|| self.plan.here.contains(&digests).then_some((0, 0)))
+            .or_else(|| self.plan.gone.get(&digests).copied())
     }
 
     fn read(&self, opened: &Opened<'_>, mut account: LogAccount) -> Done {
@@ -307,9 +307,4 @@ fn gather(first: Done, done: &Receiver<Done>) -> Vec<Done> {
         }
     }
     gathered
-}
-
-fn panic_text(panic: &(dyn std::any::Any + Send)) -> &str {
-    let text = panic.downcast_ref::<&str>().copied();
-    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
 }

@@ -7,7 +7,7 @@ use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use fleet::{Complaint, Installations};
 use ingest::{PositionColumns, Quality, quality};
 use job::Config;
-use job::flight::{Opened, part_of};
+use job::flight::{Opened, caught};
 use pipeline::Request;
 use serde::Serialize;
 
@@ -28,15 +28,15 @@ const SLOPE_TOLERANCE: f64 = 0.02;
 /// When configuration or tables are wrong. Logs in error make the code 1.
 pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
     let (config, installations) = booked(global)?;
-    let logs = logs(args, &config)?;
+    let logs = logs(args, &config, talk)?;
     let (mut channels, mut complaints, mut page) = (Vec::new(), Vec::new(), String::new());
     for (path, name) in &logs {
-        match Opened::open(path, name, &config) {
-            Ok(opened) => {
-                one(&opened, name, &config, &installations, &mut channels, &mut complaints, &mut page);
-            }
-            Err(complaint) => complaints.push(complaint),
-        }
+        let looked = caught(name, || {
+            let opened = Opened::open(path, name, &config)?;
+            one(&opened, name, &config, &installations, &mut channels, &mut complaints, &mut page);
+            Ok(())
+        });
+        complaints.extend(looked.err());
     }
     let table = || format!("{page}{}", summary(logs.len(), &complaints));
     if args.output.format() == Format::Table && args.output.output.is_none() {
@@ -48,7 +48,11 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
     Ok(if complaints.is_empty() { Code::Well } else { Code::LogsInError })
 }
 
-fn logs(args: &CheckArgs, config: &Config) -> Result<Vec<(std::path::PathBuf, String)>, Failure> {
+fn logs(
+    args: &CheckArgs,
+    config: &Config,
+    talk: &Talk,
+) -> Result<Vec<(std::path::PathBuf, String)>, Failure> {
     if !args.logs.is_empty() {
         return Ok(args.logs.iter().map(|path| (path.clone(), shown(path))).collect());
     }
@@ -56,7 +60,10 @@ fn logs(args: &CheckArgs, config: &Config) -> Result<Vec<(std::path::PathBuf, St
     let plan = pipeline::schedule::dry_run(config, &request)?;
     let mut logs: Vec<_> = plan.work.into_iter().map(|w| (w.path, w.shown)).collect();
     logs.sort();
-    logs.truncate(args.limit);
+    if logs.len() > args.limit {
+        talk.note(&format!("looking at {} of {} logs; `--limit` looks at more", args.limit, logs.len()));
+        logs.truncate(args.limit);
+    }
     Ok(logs)
 }
 
@@ -106,7 +113,7 @@ fn one(
         repairs(line)
     );
     let first = channels.len();
-    for at in &opened.positions {
+    for at in opened.actuators(installations) {
         match actuator(opened, name, at, config, installations) {
             Ok(found) => channels.extend(found),
             Err(complaint) => complaints.push(complaint.in_file(name)),
@@ -135,14 +142,7 @@ fn actuator(
     installations: &Installations,
 ) -> Result<Vec<Channel>, Complaint> {
     let id = &opened.identity;
-    let stay = installations.at(&id.tail_number, &at.position, id.departure_utc);
-    let stay = stay.ok_or_else(|| {
-        Complaint::new(
-            "unit_unknown",
-            format!("no unit is booked in {} of {} on {}", at.position, id.tail_number, id.departure_utc),
-        )
-        .hint("add its stay to the installations table; is the position spelled alike in logs and table?")
-    })?;
+    let (stay, part) = opened.unit(at, config, installations)?;
     let base = |channel: &'static str, column: &Option<String>, unit: &'static str| Channel {
         log: name.to_owned(),
         tail_number: id.tail_number.to_string(),
@@ -166,7 +166,6 @@ fn actuator(
             Some(format!("would be refused, channel_unmapped: the log lacks {}", at.lacking.join(", ")));
         return Ok(vec![Channel { note, ..base("all", motor, "") }]);
     }
-    let part = part_of(config, &stay.part_number)?;
     let a = opened.channels(at, part)?;
     let screw_m: Vec<f64> = a.motor_m.iter().zip(&a.dx_m).map(|(m, d)| m + d).collect();
     let slope = quality::slope(&a.motor_m, &a.dx_m).map(slope_note);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use arrow::datatypes::{Field, Schema};
 use fleet::{Complaint, Estimate, Installations, PartNumber, Position, SerialNumber};
 use job::Config;
-use job::flight::{Opened, anonymous, part_of};
+use job::flight::{Opened, anonymous, caught, part_of};
 use serde::Serialize;
 
 use crate::args::{EstimateArgs, Global};
@@ -30,8 +30,8 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, talk: &Talk) -> Res
     let (mut found, mut complaints) = (Vec::new(), Vec::new());
     for path in &args.logs {
         let read = match &part {
-            Some(number) => as_part(path, &config, number),
-            None => booked_log(path, &config, &installations, &mut complaints),
+            Some(number) => caught(&shown(path), || as_part(path, &config, number)),
+            None => caught(&shown(path), || booked_log(path, &config, &installations, &mut complaints)),
         };
         match read {
             Ok(rows) => found.extend(rows),
@@ -105,7 +105,7 @@ fn booked_log(
     let opened = Opened::open(path, &name, config)?;
     let flight = opened.flight();
     let mut rows = Vec::new();
-    for at in &opened.positions {
+    for at in opened.actuators(installations) {
         match opened
             .unit(at, config, installations)
             .and_then(|(stay, part)| Ok((stay, opened.estimate(at, part, config)?)))

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use fleet::{SerialNumber, TailNumber};
 use pipeline::schedule::{self, Context};
-use pipeline::trends::TrendRow;
+use pipeline::trends::{Ask, TrendRow};
 use pipeline::{Event, Plan, Report, Request};
 use store::Holder;
 
@@ -44,7 +44,8 @@ pub(crate) fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, 
     progress.end();
     let report = report?;
     talk.complain_all(report.errors.iter().map(|e| &e.complaint));
-    let code = code(&report, args.fail_on, stop.load(Ordering::Relaxed));
+    let reached = args.fail_on.map_or(Ok(false), |least| is_reached(&config, least))?;
+    let code = code(&report, reached, stop.load(Ordering::Relaxed));
     if args.json {
         let text = serde_json::to_string_pretty(&report).map_err(std::io::Error::from)?;
         talk.answer(&(text + "\n"))?;
@@ -90,14 +91,21 @@ fn follow(event: &Event, progress: &Progress<'_>) {
     }
 }
 
-fn code(report: &Report, fail_on: Option<FailOn>, stopped: bool) -> Code {
+/// Whether any unit of the store, touched tonight or not, is at or past a state.
+fn is_reached(config: &job::Config, least: FailOn) -> Result<bool, Failure> {
+    let store = store::Store::open(config.store())?;
+    let installations = schedule::installations(config)?;
+    let rows = pipeline::trends::of_store(config, &installations, &store, &Ask::default())?;
     let at = |row: &TrendRow| match row.state {
         Some("watch") => Some(FailOn::Watch),
         Some("plan") => Some(FailOn::Plan),
         Some("act") => Some(FailOn::Act),
         _ => None,
     };
-    let reached = fail_on.is_some_and(|least| report.trends.iter().any(|row| at(row) >= Some(least)));
+    Ok(rows.iter().any(|row| at(row) >= Some(least)))
+}
+
+fn code(report: &Report, reached: bool, stopped: bool) -> Code {
     if stopped && report.not_reached > 0 {
         Code::Interrupted
     } else if !report.errors.is_empty() {
@@ -115,8 +123,14 @@ fn account(report: &Report, config: &str, code: Code) -> String {
         "Freeplay {VERSION} · run {} · {config}\n",
         report.started_utc.strftime("%Y-%m-%dT%H:%M:%SZ")
     );
-    let new = report.found - report.known;
-    line(&mut page, "found", &format!("{}: {new} to do, {} known", count(report.found, "log"), report.known));
+    let new = report.found - report.known - report.not_asked - report.left;
+    let mut found = format!("{}: {new} to do, {} known", count(report.found, "log"), report.known);
+    for (what, n) in [("not asked for", report.not_asked), ("left by the limit", report.left)] {
+        if n > 0 {
+            let _ = write!(found, ", {n} {what}");
+        }
+    }
+    line(&mut page, "found", &found);
     let records = report.estimated + report.refusals();
     line(
         &mut page,

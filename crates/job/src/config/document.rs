@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use fleet::Complaint;
-use ingest::pattern::PLACEHOLDER;
+use ingest::identity::zone;
+use ingest::pattern::{PLACEHOLDER, nearest};
+use ingest::schema::Fact;
 use ingest::unit::Dimension;
 use ingest::{ChannelMapping, Channels, ClockMapping, IdentityMapping, Mapping};
 use schemars::JsonSchema;
@@ -123,10 +125,7 @@ impl Document {
         }
         self.check_channels(source, &mut found);
         self.check_clock(source, &mut found);
-        if let Some(Err(e)) = self.identity.path.as_ref().map(|p| regex::Regex::new(p)) {
-            let c = Complaint::new("bad_pattern", format!("`identity.path` is no regular expression: {e}"));
-            found.push(source.at(&["identity", "path"], c));
-        }
+        self.check_identity(source, &mut found);
         for (key, hours) in [
             ("planning_horizon_hours", self.trend.planning_horizon_hours),
             ("horizon_hours", self.trend.horizon_hours),
@@ -135,6 +134,36 @@ impl Document {
             found.extend(positive(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
         }
         found
+    }
+
+    fn check_identity(&self, source: &Source<'_>, found: &mut Vec<Complaint>) {
+        match self.identity.path.as_ref().map(|p| regex::Regex::new(p)) {
+            Some(Err(e)) => {
+                let c =
+                    Complaint::new("bad_pattern", format!("`identity.path` is no regular expression: {e}"));
+                found.push(source.at(&["identity", "path"], c));
+            }
+            Some(Ok(regex)) => {
+                let facts = || Fact::ALL.iter().map(|fact| fact.as_str());
+                for group in
+                    regex.capture_names().flatten().filter(|group| !facts().any(|fact| fact == *group))
+                {
+                    let c = Complaint::new(
+                        "unknown_key",
+                        format!("`{group}` in `identity.path` is no fact of a flight"),
+                    );
+                    let c = match nearest(group, facts()) {
+                        Some(near) => c.hint(format!("`{near}`?")),
+                        None => c.hint(format!("its facts are {}", facts().collect::<Vec<_>>().join(", "))),
+                    };
+                    found.push(source.at(&["identity", "path"], c));
+                }
+            }
+            None => {}
+        }
+        if let Some(Err(e)) = self.identity.time_zone.as_deref().map(zone) {
+            found.push(source.at(&["identity", "time_zone"], Complaint::new("bad_zone", e)));
+        }
     }
 
     fn check_channels(&self, source: &Source<'_>, found: &mut Vec<Complaint>) {
