@@ -136,11 +136,12 @@ fn fail_on_tells_a_scheduler_with_code_4() {
 #[test]
 fn estimates_made_elsewhere_get_statements_and_queries_see_nothing_later() {
     let bench = Bench::sample();
-    let mut table = "serial,departure_utc,gap_m,flight_hours,part_number\n".to_owned();
-    for day in 1..=28 {
+    let row = |day: i32| {
         let gap_m = 50e-6 + f64::from(day) * 1e-6;
-        table.push_str(&format!("U1,2026-02-{day:02}T08:00:00Z,{gap_m:e},2.0,EMA-27-1040\n"));
-    }
+        format!("U1,2026-02-{day:02}T08:00:00Z,{gap_m:e},2.0,EMA-27-1040\n")
+    };
+    let header = "serial,departure_utc,gap_m,flight_hours,part_number\n".to_owned();
+    let table: String = std::iter::once(header).chain((1..=28).map(row)).collect();
     std::fs::write(bench.path("history.csv"), &table).unwrap();
     std::fs::write(
         bench.path("dates.csv"),

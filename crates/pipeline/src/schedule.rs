@@ -84,14 +84,8 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
 
-    let shop = Shop {
-        config,
-        installations: &installations,
-        request,
-        context,
-        plan: &plan,
-        run_id: &report.run_id.clone(),
-    };
+    let shop =
+        Shop { config, installations: &installations, context, plan: &plan, run_id: &report.run_id.clone() };
     let touched = shop.work(workers, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
@@ -155,7 +149,6 @@ impl Done {
 struct Shop<'a> {
     config: &'a Config,
     installations: &'a Installations,
-    request: &'a Request,
     context: &'a Context<'a>,
     plan: &'a Plan,
     run_id: &'a str,
@@ -216,7 +209,7 @@ impl Shop<'_> {
                 account.duration_s = clock.elapsed().as_secs_f64();
                 Done::Read { account, records, complaints }
             }
-            other => other,
+            same @ Done::Same(_) => same,
         }
     }
 
