@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// A load counts as being on a side beyond this share of its 95 % magnitude, so noise about zero is no reversal.
+/// A load counts as being on a side beyond this share of its greater quantile, so noise about zero is no reversal.
 const SIDE_SHARE: f64 = 0.12;
 
 /// The load of a flight.
@@ -18,7 +18,7 @@ pub struct LoadBand {
 
 /// Describes the load over the segments; nothing when they are empty.
 ///
-/// A reversal is a change from beyond +12 % of the 95 % quantile of |load| to beyond −12 %, or back.
+/// A reversal is a change from beyond +12 % of the greater of the two quantiles to beyond −12 %, or back.
 pub fn band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
     let mut present: Vec<f64> =
         segments.iter().flat_map(|s| &load_n[s.clone()]).copied().filter(|f| !f.is_nan()).collect();
@@ -26,8 +26,7 @@ pub fn band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
         return None;
     }
     let (p05_n, p95_n) = (quantile(&mut present, 0.05), quantile(&mut present, 0.95));
-    present.iter_mut().for_each(|f| *f = f.abs());
-    let threshold = SIDE_SHARE * quantile(&mut present, 0.95);
+    let threshold = SIDE_SHARE * p05_n.abs().max(p95_n.abs());
     let mut reversals = 0;
     for segment in segments {
         let mut side = 0.0;
