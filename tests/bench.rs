@@ -1,12 +1,18 @@
 //! What every test here needs: a folder of its own, a configuration in it, and the binary.
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use arrow::array::{Array, AsArray, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Float64Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+/// Says a figure past the test runner, which keeps what tests print to itself.
+pub(crate) fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
 
 /// The top of the repository.
 pub(crate) fn top() -> PathBuf {
@@ -52,7 +58,7 @@ impl Bench {
 
     /// The command, in this folder, as a scheduler would start it.
     pub(crate) fn command(&self, args: &[&str]) -> std::process::Command {
-        let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin!("freeplay"));
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_freeplay"));
         command.args(args).current_dir(self.folder.path());
         command.env_remove("FREEPLAY_CONFIG").env_remove("NO_COLOR").stdin(std::process::Stdio::null());
         command

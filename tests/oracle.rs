@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::bench::Bench;
+use crate::bench::{Bench, tell};
 
 fn rows(json: &str) -> Vec<Value> {
     serde_json::from_str(json).unwrap()
@@ -22,13 +22,13 @@ fn the_papers_statistic_agrees_with_the_reference_to_1e_9() {
         let (gap_m, wanted_m) =
             (found["gap_midrange_m"].as_f64().unwrap(), truth["paper"]["gap_m"].as_f64().unwrap());
         let true_m = truth["true_gap_m"].as_f64().unwrap();
-        println!(
+        tell(&format!(
             "{name}: mid-range {:.3} µm, true {:.1} µm, error {:+.1} %, {}",
             gap_m * 1e6,
             true_m * 1e6,
             100.0 * (gap_m / true_m - 1.0),
             found["status"]
-        );
+        ));
         assert!((gap_m / wanted_m - 1.0).abs() < 1e-9, "{name}: {gap_m} is not {wanted_m}");
         let refused = truth["verdict"] == "refuse";
         assert_eq!(found["status"], if refused { "refused" } else { "estimated" }, "{name}");
@@ -54,7 +54,7 @@ fn a_real_robot_ends_with_a_record_or_a_refusal_for_each_axis() {
     for row in &found {
         let radius_m = row["reference_radius_m"].as_f64().unwrap();
         let gap = row["gap_m"].as_f64().map(|g| (g / radius_m).to_degrees());
-        println!("{}: {} {gap:?} deg, {}", row["position"], row["status"], row["reason"]);
+        tell(&format!("{}: {} {gap:?} deg, {}", row["position"], row["status"], row["reason"]));
         assert_eq!(row["status"] == "estimated", gap.is_some());
         assert_eq!(row["status"] == "refused", row["reason"].is_string());
     }

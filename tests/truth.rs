@@ -1,6 +1,6 @@
 //! The sample fleet against its truth, and one worker against several.
 
-use crate::bench::{Bench, Table};
+use crate::bench::{Bench, Table, tell};
 
 #[test]
 fn the_sample_fleet_runs_well_and_its_median_error_is_below_one_per_cent() {
@@ -15,7 +15,9 @@ fn the_sample_fleet_runs_well_and_its_median_error_is_below_one_per_cent() {
         found.iter().map(|(key, gap)| 100.0 * (gap / truth[key] - 1.0).abs()).collect();
     errors.sort_by(f64::total_cmp);
     let (median, p95, worst) = (errors[60], errors[114], errors[119]);
-    println!("gap against truth, 120 flights: median {median:.2} %, 95 % {p95:.2} %, worst {worst:.2} %");
+    tell(&format!(
+        "gap against truth, 120 flights: median {median:.2} %, 95 % {p95:.2} %, worst {worst:.2} %"
+    ));
     assert!(median < 1.0, "median error {median} %");
 }
 

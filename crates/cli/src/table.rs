@@ -97,3 +97,20 @@ pub(crate) fn hours(h: Option<f64>) -> String {
 pub(crate) fn dash() -> String {
     "–".to_owned()
 }
+
+/// `1 log`, `2 logs`.
+pub(crate) fn count(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
+/// A state as word and shape, told apart without colour.
+pub(crate) fn state_mark(state: Option<&str>) -> String {
+    let shape = match state {
+        Some("act") => "◆",
+        Some("plan") => "▲",
+        Some("watch") => "●",
+        Some("normal") => "○",
+        _ => "–",
+    };
+    state.map_or_else(|| shape.to_owned(), |word| format!("{shape} {word}"))
+}

@@ -8,6 +8,7 @@ pub mod estimate;
 pub mod flight;
 pub mod part;
 pub mod trace;
+mod value;
 
 pub use config::Config;
 pub use flight::{Opened, Stamp};

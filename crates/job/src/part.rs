@@ -334,7 +334,7 @@ impl Keys {
 
     fn positive(&mut self, key: &'static [&'static str], value: Option<f64>) {
         let name = key.last().copied().unwrap_or_default();
-        self.found.extend(crate::config::positive(name, value).map(|c| (key, c)));
+        self.found.extend(crate::value::positive(name, value).map(|c| (key, c)));
     }
 
     fn made<T>(&mut self, key: &'static [&'static str], made: Result<T, estimator::Error>) -> Option<T> {

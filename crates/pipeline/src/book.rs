@@ -9,9 +9,37 @@ use fleet::{Complaint, GapRecord};
 use store::{LogAccount, LogResult, Outcome, RecordKey};
 
 use crate::account::{self, Report};
-use crate::plan::{self, Plan};
-use crate::schedule::Done;
+use crate::event::Event;
+use crate::plan::{self, Plan, Work};
 use crate::trends::Unit;
+
+/// What came of one log.
+pub(crate) enum Done {
+    /// Its content is known; only its name or date is new.
+    Same(Box<LogAccount>),
+    /// It was read.
+    Read {
+        /// Its account.
+        account: Box<LogAccount>,
+        /// Its records.
+        records: Vec<GapRecord>,
+        /// What is wrong with it.
+        complaints: Vec<Complaint>,
+    },
+}
+
+impl Done {
+    pub(crate) fn event(&self, work: &Work) -> Event {
+        let (log, bytes) = (work.shown.clone(), work.stat.as_ref().map_or(0, |s| s.size_bytes as u64));
+        let (estimated, refused, complaints) = match self {
+            Self::Read { account, complaints, .. } => {
+                (account.estimated as usize, account.refused as usize, complaints.clone())
+            }
+            Self::Same(_) => (0, 0, Vec::new()),
+        };
+        Event::Finished { log, bytes, estimated, refused, complaints }
+    }
+}
 
 /// The writer's book of the store as it is and as it will be.
 pub(crate) struct Book {

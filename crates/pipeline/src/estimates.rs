@@ -3,21 +3,9 @@
 use std::path::Path;
 
 use ingest::tables::{Table, name, number, utc};
-use jiff::Timestamp;
 
 use crate::error::Error;
-use crate::trends::Flown;
-
-/// A unit and a day.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AsOf {
-    /// The design, where the table says it.
-    pub part_number: Option<String>,
-    /// The unit.
-    pub serial_number: String,
-    /// The day; nothing later is looked at.
-    pub as_of_utc: Timestamp,
-}
+use crate::trends::{AsOf, Flown};
 
 /// Reads an estimates table: `serial_number` (or `serial`), `departure_utc`, `gap_m`, and what else the
 /// contract allows.

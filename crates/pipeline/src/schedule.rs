@@ -8,14 +8,14 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-use fleet::{Complaint, GapRecord, Installations, Status};
+use fleet::{Complaint, Installations, Status};
 use jiff::Timestamp;
 use job::flight::{Opened, caught, config_digest, unidentified_digest};
 use job::{Config, Stamp};
 use store::{Holder, LogAccount, LogResult, Store, Writer};
 
 use crate::account::{self, Report};
-use crate::book::Book;
+use crate::book::{Book, Done};
 use crate::error::Error;
 use crate::event::Event;
 use crate::plan::{self, Plan, Request, Why, Work};
@@ -115,34 +115,6 @@ fn workers(request: &Request, logs: usize) -> usize {
 /// Names sort as the runs did.
 fn run_id(started_utc: Timestamp) -> String {
     format!("{}-{:08x}", started_utc.strftime("%Y%m%dT%H%M%S%3fZ"), std::process::id())
-}
-
-/// What came of one log.
-pub(crate) enum Done {
-    /// Its content is known; only its name or date is new.
-    Same(Box<LogAccount>),
-    /// It was read.
-    Read {
-        /// Its account.
-        account: Box<LogAccount>,
-        /// Its records.
-        records: Vec<GapRecord>,
-        /// What is wrong with it.
-        complaints: Vec<Complaint>,
-    },
-}
-
-impl Done {
-    fn event(&self, work: &Work) -> Event {
-        let (log, bytes) = (work.shown.clone(), work.stat.as_ref().map_or(0, |s| s.size_bytes as u64));
-        let (estimated, refused, complaints) = match self {
-            Self::Read { account, complaints, .. } => {
-                (account.estimated as usize, account.refused as usize, complaints.clone())
-            }
-            Self::Same(_) => (0, 0, Vec::new()),
-        };
-        Event::Finished { log, bytes, estimated, refused, complaints }
-    }
 }
 
 /// Everything a worker may look at.

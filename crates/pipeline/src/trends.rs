@@ -1,7 +1,6 @@
 //! Trends of units: the store's records, per part and serial number across tails, as statements.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use fleet::{GapRecord, Installations, PartNumber, SerialNumber};
 use jiff::Timestamp;
@@ -59,6 +58,17 @@ pub struct TrendRow {
     pub reason: Option<String>,
 }
 
+/// A unit and a day.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AsOf {
+    /// The design, where the table says it.
+    pub part_number: Option<String>,
+    /// The unit.
+    pub serial_number: String,
+    /// The day; nothing later is looked at.
+    pub as_of_utc: Timestamp,
+}
+
 /// Which units, and of which day, a statement is asked for.
 #[derive(Debug, Clone, Default)]
 pub struct Ask {
@@ -110,14 +120,14 @@ pub fn of_units(
 /// States what is known of the asked units of an estimates table made elsewhere.
 ///
 /// # Errors
-/// When the table cannot be read, or a part's limits cannot be judged by.
-pub fn of_table(
+/// When a history or a part's limits cannot be judged.
+pub fn of_flown(
     config: &Config,
     installations: &Installations,
-    file: &Path,
+    flown: Vec<Flown>,
     ask: &Ask,
 ) -> Result<Vec<TrendRow>, Error> {
-    of_histories(config, installations, &histories(crate::estimates::read(file)?), ask)
+    of_histories(config, installations, &histories(flown), ask)
 }
 
 /// One statement for each query, from nothing later than its date.
@@ -128,7 +138,7 @@ pub fn of_queries(
     config: &Config,
     installations: &Installations,
     flown: Vec<Flown>,
-    queries: &[crate::estimates::AsOf],
+    queries: &[AsOf],
 ) -> Result<Vec<TrendRow>, Error> {
     let histories = histories(flown);
     // Days are few and units many: what a part's fleet taught is learned once for each day.
@@ -150,7 +160,7 @@ pub fn of_queries(
 }
 
 /// The unit a query means; one that never flew has a name all the same.
-fn unit_of(query: &crate::estimates::AsOf, histories: &BTreeMap<HistoryName, Vec<Flown>>) -> HistoryName {
+fn unit_of(query: &AsOf, histories: &BTreeMap<HistoryName, Vec<Flown>>) -> HistoryName {
     let fits = |unit: &&HistoryName| {
         unit.1 == query.serial_number && (query.part_number.is_none() || unit.0 == query.part_number)
     };

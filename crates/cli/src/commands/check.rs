@@ -244,7 +244,7 @@ fn summary(logs: usize, complaints: &[Complaint]) -> String {
     let mut files: Vec<&str> = complaints.iter().filter_map(|c| c.file.as_deref()).collect();
     files.sort_unstable();
     files.dedup();
-    format!("{}: {} in error; nothing was computed or written\n", super::run::count(logs, "log"), files.len())
+    format!("{}: {} in error; nothing was computed or written\n", table::count(logs, "log"), files.len())
 }
 
 fn schema() -> SchemaRef {

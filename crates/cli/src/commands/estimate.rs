@@ -11,11 +11,11 @@ use serde::Serialize;
 use crate::args::{EstimateArgs, Global};
 use crate::exit::{Code, Failure};
 use crate::rows;
-use crate::table::{self, number, text};
+use crate::table::{self, count, number, text};
 use crate::talk::Talk;
 
 use super::query::{doubts, load};
-use super::{booked, config, run::count, shown};
+use super::{booked, config, shown};
 
 /// Estimates the given logs.
 ///

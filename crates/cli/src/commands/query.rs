@@ -6,10 +6,10 @@ use store::{Query, Store};
 use crate::args::{By, Global, QueryArgs};
 use crate::exit::{Code, Failure};
 use crate::rows;
-use crate::table::{self, number, text};
+use crate::table::{self, count, number, text};
 use crate::talk::Talk;
 
-use super::{config, run::count};
+use super::config;
 
 /// Answers with the records that fit, oldest first.
 ///

@@ -14,10 +14,10 @@ use store::Holder;
 use crate::args::{FailOn, Global, RunArgs};
 use crate::exit::{Code, Failure};
 use crate::progress::{Progress, span};
-use crate::table::{self, number, text};
+use crate::table::{self, count, number, state_mark, text};
 use crate::talk::{Talk, escape};
 
-use super::{VERSION, config, trend::state_mark};
+use super::{VERSION, config};
 
 /// Runs the night's work.
 ///
@@ -190,11 +190,6 @@ fn refused(report: &Report) -> String {
 
 fn line(page: &mut String, label: &str, text: &str) {
     let _ = writeln!(page, "  {label:<11} {text}");
-}
-
-/// `1 log`, `2 logs`.
-pub(crate) fn count(n: usize, what: &str) -> String {
-    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 /// The units that need a decision, most urgent first; the others as one number.

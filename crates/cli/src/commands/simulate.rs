@@ -5,9 +5,10 @@ use pipeline::{Event, simulate as fleet};
 use crate::args::SimulateArgs;
 use crate::exit::{Code, Failure};
 use crate::progress::Progress;
+use crate::table::count;
 use crate::talk::Talk;
 
-use super::{run::count, shown};
+use super::shown;
 
 /// Flies the fleet and says where it landed.
 ///

@@ -11,9 +11,10 @@ use crate::args::{Format, Global, Output, StoreArgs, StoreCommand};
 use crate::exit::{Code, Failure};
 use crate::progress::span;
 use crate::rows;
+use crate::table::count;
 use crate::talk::Talk;
 
-use super::{config, query, run::count};
+use super::{config, query};
 
 /// Cares for the store that the configuration names.
 ///

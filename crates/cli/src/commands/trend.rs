@@ -9,10 +9,10 @@ use store::Store;
 use crate::args::{Global, TrendArgs};
 use crate::exit::{Code, Failure};
 use crate::rows;
-use crate::table::{self, number, text};
+use crate::table::{self, count, number, state_mark, text};
 use crate::talk::Talk;
 
-use super::{booked, run::count};
+use super::booked;
 
 /// Answers with one row for each unit, or for each query.
 ///
@@ -27,7 +27,9 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Co
         as_of_utc: args.as_of,
     };
     let found = match (&args.estimates, &args.queries) {
-        (Some(file), None) => trends::of_table(&config, &installations, file, &ask)?,
+        (Some(file), None) => {
+            trends::of_flown(&config, &installations, pipeline::estimates::read(file)?, &ask)?
+        }
         (None, None) => trends::of_store(&config, &installations, &Store::open(config.store())?, &ask)?,
         (estimates, Some(queries)) => {
             let queries = pipeline::estimates::queries(queries)?;
@@ -40,18 +42,6 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Co
     };
     rows::answer(&args.output, talk, || rows::batch(&schema(), &found), || page(&found))?;
     Ok(Code::Well)
-}
-
-/// A state as word and shape, told apart without colour.
-pub(crate) fn state_mark(state: Option<&str>) -> String {
-    let shape = match state {
-        Some("act") => "◆",
-        Some("plan") => "▲",
-        Some("watch") => "●",
-        Some("normal") => "○",
-        _ => "–",
-    };
-    state.map_or_else(|| shape.to_owned(), |word| format!("{shape} {word}"))
 }
 
 fn page(found: &[TrendRow]) -> String {

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::source::Source;
 use crate::part::PartSettings;
+use crate::value::positive;
 
 /// The whole file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -206,12 +207,6 @@ impl Document {
             found.extend(positive(key, value).map(|c| source.at(&["clock", key], c)));
         }
     }
-}
-
-/// A value that must be above zero when it is given.
-pub(crate) fn positive(key: &str, value: Option<f64>) -> Option<Complaint> {
-    let value = value.filter(|v| !(v.is_finite() && *v > 0.0))?;
-    Some(Complaint::new("not_positive", format!("`{key}` is {value}, which must be a number above zero")))
 }
 
 fn channel_complaints(

@@ -11,7 +11,6 @@ use fleet::{Complaint, PartNumber};
 use ingest::Mapping;
 use serde::Serialize;
 
-pub(crate) use document::positive;
 pub use document::{Document, EstimateSettings, LogSettings, Method, StoreSettings, TrendSettings};
 use source::Source;
 
