@@ -227,7 +227,8 @@ fn row<const N: usize>(
 ) -> Option<Row<N>> {
     let force = coupling.force_n / frame.load_n;
     let time = (blocks.time_s[k] - frame.time_s.0) / frame.time_s.1;
-    let place = (blocks.motor_m[k] - frame.place_m.0) / frame.place_m.1;
+    // The screw's own place: its transducer's slope acts on the gap as well.
+    let place = (blocks.motor_m[k] + blocks.dx_m[k] - frame.place_m.0) / frame.place_m.1;
     let load_rate = blocks.rate(&blocks.load_n, k) * LATE_S / frame.load_n;
     let speed = blocks.rate(&blocks.motor_m, k) / SPEED_M_PER_S;
     let mut x = [0.0; N];

@@ -4,7 +4,7 @@
 //! wrong. Here they are found in the flight itself. While the coupling presses on one flank,
 //!
 //! ```text
-//! δX = δX₀ + s·ΔS/2 + c/K + d(t) + p(X₁) − τ·Ẋ₁        s = sgn c
+//! δX = δX₀ + s·ΔS/2 + c/K + d(t) + p(X₂) − τ·Ẋ₁        s = sgn c
 //! ```
 //! with c the force in the coupling (load less the screw's friction, which is set-valued at rest), d a
 //! slow drift, p the transducer's error over the stroke and τ the skew between the two position
