@@ -28,7 +28,15 @@ impl Friction {
     pub fn at_n(&self, load_n: f64) -> f64 {
         self.dry_n + self.lost_share * load_n.abs()
     }
+
+    /// Whether a load is under three times the friction it meets.
+    pub(super) fn is_heavy(&self, load_n: f64) -> bool {
+        load_n < HEAVY * self.at_n(load_n)
+    }
 }
+
+/// Load over friction below which friction rules what is seen.
+const HEAVY: f64 = 3.0;
 
 /// What the screw and its coupling are thought to be.
 #[derive(Debug, Clone, Copy)]

@@ -49,7 +49,9 @@ pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal
     let straight: Found<LINEAR> = search(blocks, frame, guess.state, 2)?;
     let error_m = |column: usize| straight.fit.standard_error_m(column, &straight.design.firm);
     let (line_m, line_se_m) = (straight.fit.beta[GAP], error_m(GAP));
-    let bent = if low_loads_deviate(&straight, frame) {
+    // Under heavy friction the forces at low load are friction's to say, not the flank's.
+    let heavy = straight.state.friction.is_heavy(frame.load_n);
+    let bent = if !heavy && low_loads_deviate(&straight, frame) {
         soft(blocks, frame, straight.state, (line_m, line_se_m))
     } else {
         None

@@ -7,8 +7,6 @@ use super::{ContactGap, DETECTION_SHARE};
 const SEEN: f64 = 2.0;
 /// Three spreads of 15 %: how far 1/K may lie from the part's.
 const IMPLAUSIBLE: f64 = 0.45;
-/// Load over friction below which friction rules the answer.
-const HEAVY: f64 = 3.0;
 /// Relative standard error of the gap's interval beyond which the flight says little, in wind-ups.
 const VAGUE: f64 = 0.1;
 
@@ -119,7 +117,7 @@ pub(super) fn flags(found: &ContactGap, frame: &Frame, is_curved: bool) -> Vec<F
     let doubts = [
         (Flag::BelowDetection, found.gap_m < least_m),
         (Flag::StiffnessImplausible, (compliance - 1.0).abs() > IMPLAUSIBLE),
-        (Flag::FrictionHeavy, found.load_p95_n < HEAVY * found.friction_n()),
+        (Flag::FrictionHeavy, found.friction.is_heavy(found.load_p95_n)),
         (Flag::SoftContact, is_curved),
         (Flag::Imprecise, found.gap_se_m > VAGUE * frame.windup_m()),
     ];

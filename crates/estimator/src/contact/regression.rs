@@ -36,12 +36,15 @@ pub(super) struct Fit<const N: usize> {
     beliefs: [Belief; N],
 }
 
-/// Reweighted least squares: `rounds` rounds from even weights.
+/// Reweighted least squares: `rounds` rounds from even weights; none where there are too few rows.
 ///
 /// A belief counts as residual variance over its own, times the factor by which dependence within
 /// stretches inflates the variance of a mean; otherwise thousands of dependent rows would talk it down.
 pub(super) fn fit<const N: usize>(rows: &[Row<N>], beliefs: &[Belief; N], rounds: usize) -> Option<Fit<N>> {
-    let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len().max(1) as f64;
+    if rows.len() <= N {
+        return None;
+    }
+    let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len() as f64;
     let even: Vec<f64> = rows.iter().map(|r| r.blocks / mean_blocks).collect();
     let mut found = solve(rows, beliefs, even.clone(), [0.0; N])?;
     for round in 1..=rounds {

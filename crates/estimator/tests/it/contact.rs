@@ -2,6 +2,9 @@
 
 use estimator::contact::{self, ContactGap, Flag, Outcome, Prior, Refusal};
 use estimator::{Error, Samples};
+use proptest::prelude::*;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use simulator::contact::Law;
 use simulator::{Flight, Plant, Profile, Sensors, simulate};
 
@@ -200,6 +203,34 @@ fn the_same_flight_gives_the_same_bits() {
     let (once, again) = (gap(case.outcome(&flight)), gap(case.outcome(&flight)));
     assert_eq!(once.gap_m.to_bits(), again.gap_m.to_bits());
     assert_eq!(once.gap_se_m.to_bits(), again.gap_se_m.to_bits());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Garbage is refused or answered, never fatal.
+    #[test]
+    fn no_channel_breaks_the_estimate(
+        seed in 0_u64..1000, rate_hz in 10.0_f64..500.0, missing in 0.0_f64..1.0, stuck in 0.0_f64..1.0, scale in -12.0_f64..6.0,
+    ) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut channel = |size: f64| {
+            let (mut last, size) = (0.0, size * 10_f64.powf(scale));
+            let next = |_| {
+                last = if rng.random::<f64>() < stuck { last } else { size * rng.random_range(-1.0..1.0) };
+                if rng.random::<f64>() < missing { f64::NAN } else { last }
+            };
+            (0..8000).map(next).collect::<Vec<f64>>()
+        };
+        let (motor_m, dx_m, load_n) = (channel(0.03), channel(1e-4), channel(8e3));
+        let segments = [0..0, 0..3, 3..4000, 4100..8000];
+        let samples =
+            Samples { step_s: rate_hz.recip(), motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments: &segments };
+        let prior = Prior { stiffness_n_per_m: 5e7, reference_load_n: Some(1e3) };
+        if let Outcome::Estimated(gap) = contact::estimate(&samples, &prior).unwrap() {
+            prop_assert!(gap.gap_m.is_finite() && gap.gap_se_m > 0.0 && gap.stiffness_n_per_m.is_finite());
+        }
+    }
 }
 
 #[test]
