@@ -81,6 +81,11 @@ pub(crate) enum Command {
         after_help = "Examples:\n  freeplay estimate logs/N412FP/*.parquet\n  freeplay estimate bench.parquet --part EMA-27-1040 --trace trace.parquet"
     )]
     Estimate(EstimateArgs),
+    /// Write each actuator's channels as `run` sees them: SI, one clock, one file
+    #[command(
+        after_help = "Examples:\n  freeplay normalize logs/N412FP/*.parquet --output normalized\n  freeplay normalize --output for-spark --encoding plain"
+    )]
+    Normalize(NormalizeArgs),
     /// Stored records, of a tail, a serial number, a flight or a position
     #[command(
         after_help = "Examples:\n  freeplay query tail N412FP --last 20\n  freeplay query serial 00317 --since 2026-01-01 --json"
@@ -163,6 +168,40 @@ pub(crate) struct CheckArgs {
     pub limit: usize,
     #[command(flatten)]
     pub output: Output,
+}
+
+/// `normalize`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct NormalizeArgs {
+    /// Logs; those the configuration names when none is given.
+    pub logs: Vec<PathBuf>,
+    /// Folder to write to: TAIL/FLIGHT/POSITION.parquet below it.
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+    /// How numbers lie in the files.
+    #[arg(long, value_enum, default_value_t = LogEncoding::Split)]
+    pub encoding: LogEncoding,
+    /// Workers; as many as cores by default.
+    #[arg(long, short, value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+}
+
+/// How numbers lie in a normalized log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LogEncoding {
+    /// Byte stream split: smallest, and quickest to read here.
+    Split,
+    /// Plain: for readers that know no byte stream split, such as Spark 4.2.
+    Plain,
+}
+
+impl From<LogEncoding> for ingest::write::Encoding {
+    fn from(encoding: LogEncoding) -> Self {
+        match encoding {
+            LogEncoding::Split => Self::Split,
+            LogEncoding::Plain => Self::Plain,
+        }
+    }
 }
 
 /// `run`.

@@ -48,6 +48,7 @@ fn dispatch(args: &Args, talk: &Talk) -> Result<Code, Failure> {
         Command::Check(a) => commands::check::check(a, &args.global, talk),
         Command::Run(a) => commands::run::run(a, &args.global, talk),
         Command::Estimate(a) => commands::estimate::estimate(a, &args.global, talk),
+        Command::Normalize(a) => commands::normalize::normalize(a, &args.global, talk),
         Command::Query(a) => commands::query::query(a, &args.global, talk),
         Command::Trend(a) => commands::trend::trend(a, &args.global, talk),
         Command::Simulate(a) => commands::simulate::simulate(a, talk),

@@ -1,35 +1,41 @@
 //! One clock for a log: which rows count, in which order, at which step, and where time breaks.
 //!
-//! The rule for damaged time (`docs/equations.md`, "Time"): rows without a stamp are left out; rows
-//! out of order are put in order by a stable sort; of repeated stamps the first row is kept; where a
-//! step exceeds one and a half times the median, time broke, and the filter starts again. Rows that
-//! are in order pass untouched.
+//! The rule for damaged time (`docs/equations.md`, "Time"): rows without a stamp are left out, unless
+//! the rate is declared and they are as many as fit between their neighbours; rows out of order are put
+//! in order by a stable sort; of repeated stamps the first row is kept, unless the clock is declared to
+//! tick coarsely; where a step exceeds one and a half times the usual one, time broke, and the filter
+//! starts again. Rows that are in order pass untouched.
 
 use std::ops::Range;
 
 use jiff::Timestamp;
 
 use crate::error::Fault;
+use crate::schema::ClockMapping;
 
-/// A step longer than this many median steps is a break: the filter cannot predict across it.
-const BREAK_STEPS: f64 = 1.5;
+/// A step longer than this many usual steps is a break: the filter cannot predict across it.
+pub(crate) const BREAK_STEPS: f64 = 1.5;
 
 /// A declared rate and the stamps may differ by this share: more is another rate, not a better one.
 const RATE_TOLERANCE: f64 = 0.25;
 
+/// How far stamps may fall back by default, s.
+const MAX_BACK_S: f64 = 1.0;
+
+/// A coarse clock's ticks are followed with this time constant, s: its rate is never quite the declared one.
+const FOLLOW_S: f64 = 10.0;
+
 /// The rows of a log on one clock.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timeline {
-    /// The declared rate's step, else the median step, s.
+    /// The declared rate's step, else the usual step, s.
     pub step_s: f64,
-    /// Rows in the file.
+    /// Rows there are.
     pub rows: usize,
     /// The rows that count, in order of time; none when every row counts as it stands.
-    pub kept: Option<Vec<usize>>,
+    pub kept: Option<Vec<u32>>,
     /// Unbroken stretches, in kept rows.
     pub segments: Vec<Range<usize>>,
-    /// The instant of the first kept row, where the clock is absolute.
-    pub start_utc: Option<Timestamp>,
     /// What had to be mended.
     pub repairs: Repairs,
 }
@@ -39,6 +45,8 @@ pub struct Timeline {
 pub struct Repairs {
     /// Rows without a stamp, left out.
     pub unstamped: usize,
+    /// Rows without a stamp that got one, since the rate is declared.
+    pub filled: usize,
     /// Stamps below the one before.
     pub out_of_order: usize,
     /// Rows that repeat a stamp, left out.
@@ -52,17 +60,58 @@ impl Repairs {
     }
 }
 
-/// The stamps of a log: seconds since the first one; NaN where a row has none.
+/// What the first stamp of a clock means.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Origin {
+    /// Where the log begins: rows without stamps.
+    Start,
+    /// Seconds on a zero of the clock's own, which all clocks of a log share.
+    Counted(f64),
+    /// An instant.
+    Utc(Timestamp),
+    /// A local time, read as if it were UTC, whose zone the log does not name.
+    Local(Timestamp),
+}
+
+impl Origin {
+    /// Seconds from another clock's origin to this one, where both mean the same kind of time.
+    pub fn since(self, other: Self) -> Option<f64> {
+        match (self, other) {
+            (Self::Start, _) | (_, Self::Start) => Some(0.0),
+            (Self::Counted(a), Self::Counted(b)) => Some(a - b),
+            (Self::Utc(a), Self::Utc(b)) | (Self::Local(a), Self::Local(b)) => {
+                Some(a.duration_since(b).as_secs_f64())
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The stamps of some rows: seconds since the first one; NaN where a row has none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stamps {
     /// The column they come from, for complaints.
     pub column: String,
     /// Seconds since the first stamp.
     pub seconds: Vec<f64>,
-    /// The first stamp, where it is absolute.
-    pub start_utc: Option<Timestamp>,
-    /// Whether that stamp is a local time whose zone the log does not name.
-    pub is_local: bool,
+    /// What the first stamp means.
+    pub origin: Origin,
+}
+
+impl Stamps {
+    /// Evenly spaced stamps, for rows that have none.
+    pub fn even(rows: usize, rate_hz: f64) -> Self {
+        let seconds = (0..rows).map(|k| k as f64 / rate_hz).collect();
+        Self { column: "clock.rate_hz".into(), seconds, origin: Origin::Start }
+    }
+
+    /// The instants of a timeline's rows, s since the first stamp.
+    pub fn of(&self, line: &Timeline) -> Vec<f64> {
+        match &line.kept {
+            None => self.seconds.clone(),
+            Some(kept) => kept.iter().map(|&row| self.seconds[row as usize]).collect(),
+        }
+    }
 }
 
 /// Evenly spaced rows at a declared rate, when a log has no stamps.
@@ -72,63 +121,119 @@ pub fn even(rows: usize, rate_hz: f64) -> Timeline {
         rows,
         kept: None,
         segments: std::iter::once(0..rows).collect(),
-        start_utc: None,
         repairs: Repairs::default(),
     }
 }
 
-/// Puts stamped rows on one clock.
+/// Puts stamped rows on one clock, and mends the stamps themselves where the mapping says how.
 ///
 /// # Errors
-/// [`Fault::TimeGoesBack`] when stamps fall by more than `max_back_s`; [`Fault::TimeStandsStill`] when
-/// fewer than two differ; [`Fault::RateContradicts`] when they tell of another rate than was declared.
-pub fn align(stamps: &Stamps, rate_hz: Option<f64>, max_back_s: f64) -> Result<Timeline, Fault> {
+/// [`Fault::TimeGoesBack`] when stamps fall by more than `max_back_s` and the log is not to be split
+/// there; [`Fault::TimeStandsStill`] when fewer than two differ; [`Fault::RateContradicts`] when they
+/// tell of another rate than was declared.
+pub fn align(stamps: &mut Stamps, clock: &ClockMapping) -> Result<Timeline, Fault> {
+    let max_back_s = clock.max_back_s.unwrap_or(MAX_BACK_S);
+    let filled = clock.rate_hz.map_or(0, |rate_hz| fill(&mut stamps.seconds, rate_hz));
+    let pieces = pieces(stamps, max_back_s, clock.split_at_jumps)?;
+    if let Some(tick_s) = clock.tick_s {
+        let step_s = clock.rate_hz.map_or_else(|| coarse_step(&stamps.seconds, tick_s), f64::recip);
+        pieces.iter().for_each(|piece| spread(&mut stamps.seconds[piece.clone()], step_s, tick_s));
+    }
     let t = &stamps.seconds;
-    let falls = check_falls(stamps, max_back_s)?;
-    let kept = if falls == 0 && strictly_rising(t) { None } else { Some(ordered(t)) };
-    let at = |i: usize| kept.as_ref().map_or(t[i], |rows| t[rows[i]]);
+    let falls = t.windows(2).filter(|w| w[1] < w[0]).count().saturating_sub(pieces.len() - 1);
+    let kept = if pieces.len() == 1 && strictly_rising(t) { None } else { Some(ordered(t, &pieces)) };
+    let at = |i: usize| kept.as_ref().map_or(t[i], |rows| t[rows[i] as usize]);
     let count = kept.as_ref().map_or(t.len(), Vec::len);
     let step = |i: usize| at(i) - at(i - 1);
     if count < 2 {
         return Err(Fault::TimeStandsStill { column: stamps.column.clone(), rows: t.len() as u64 });
     }
-    let seen_s = median((1..count).map(step).collect());
-    let step_s = rate_hz.map_or(seen_s, f64::recip);
+    let seen_s = usual_step((1..count).map(step).filter(|s| *s > 0.0).collect());
+    let step_s = clock.rate_hz.map_or(seen_s, f64::recip);
     if (seen_s / step_s - 1.0).abs() > RATE_TOLERANCE {
         let (column, declared_hz) = (stamps.column.clone(), step_s.recip());
         return Err(Fault::RateContradicts { column, declared_hz, seen_hz: seen_s.recip() });
     }
-    let breaks: Vec<usize> = (1..count).filter(|&i| step(i) > BREAK_STEPS * step_s).collect();
+    let breaks: Vec<usize> =
+        (1..count).filter(|&i| step(i) > BREAK_STEPS * step_s || step(i) <= 0.0).collect();
     let unstamped = t.iter().filter(|s| s.is_nan()).count();
-    let repairs = Repairs { unstamped, out_of_order: falls, repeated: t.len() - unstamped - count };
-    let start_utc = stamps.start_utc.and_then(|start| start.checked_add(seconds(at(0))).ok());
-    Ok(Timeline { step_s, rows: t.len(), segments: cut(count, &breaks), kept, start_utc, repairs })
+    let repairs = Repairs { unstamped, filled, out_of_order: falls, repeated: t.len() - unstamped - count };
+    Ok(Timeline { step_s, rows: t.len(), segments: cut(count, &breaks), kept, repairs })
 }
 
-fn seconds(s: f64) -> jiff::SignedDuration {
-    jiff::SignedDuration::try_from_secs_f64(s).unwrap_or_default()
+/// Gives rows without a stamp theirs where, at the declared rate, they just fill the time between their
+/// neighbours; returns how many got one.
+fn fill(seconds: &mut [f64], rate_hz: f64) -> usize {
+    let (mut filled, mut before) = (0, None::<usize>);
+    for row in 0..seconds.len() {
+        if seconds[row].is_nan() {
+            continue;
+        }
+        if let Some(last) = before {
+            let rows = row - last;
+            let between = seconds[row] - seconds[last];
+            if rows > 1 && (between * rate_hz - rows as f64).abs() < 0.5 {
+                let start = seconds[last];
+                (1..rows).for_each(|k| seconds[last + k] = start + between * k as f64 / rows as f64);
+                filled += rows - 1;
+            }
+        }
+        before = Some(row);
+    }
+    filled
 }
 
-/// Counts falls of the clock and refuses one that is too deep.
-fn check_falls(stamps: &Stamps, max_back_s: f64) -> Result<usize, Fault> {
-    let (mut falls, mut deep, mut first_deep) = (0, 0, None);
-    let mut newest = f64::NEG_INFINITY;
-    let mut before = f64::NEG_INFINITY;
+/// Cuts the rows where the clock falls too deep, or refuses to.
+fn pieces(stamps: &Stamps, max_back_s: f64, split: bool) -> Result<Vec<Range<usize>>, Fault> {
+    let (mut newest, mut deep, mut cuts) = (f64::NEG_INFINITY, None, Vec::new());
     for (row, &s) in stamps.seconds.iter().enumerate().filter(|(_, s)| !s.is_nan()) {
-        falls += usize::from(s < before);
         if newest - s > max_back_s {
-            deep += 1;
-            first_deep.get_or_insert((row as u64, newest, s));
+            deep.get_or_insert((row as u64, newest, s));
+            cuts.push(row);
+            newest = if split { s } else { newest };
         }
         newest = newest.max(s);
-        before = s;
     }
-    match first_deep {
-        None => Ok(falls),
-        Some((row, before_s, after_s)) => {
-            let column = stamps.column.clone();
-            Err(Fault::TimeGoesBack { column, row, before_s, after_s, max_back_s, times: deep })
+    match deep {
+        Some((row, before_s, after_s)) if !split => {
+            let (column, times) = (stamps.column.clone(), cuts.len() as u64);
+            Err(Fault::TimeGoesBack { column, row, before_s, after_s, max_back_s, times })
         }
+        _ => Ok(cut(stamps.seconds.len(), &cuts)),
+    }
+}
+
+/// The step of rows whose clock ticks coarsely: the time of all intervals between neighbouring ticks by
+/// the rows in them.
+fn coarse_step(seconds: &[f64], tick_s: f64) -> f64 {
+    let (mut time_s, mut rows, mut since) = (0.0, 0_usize, 0_usize);
+    let mut last = f64::NAN;
+    for &s in seconds.iter().filter(|s| !s.is_nan()) {
+        if s > last {
+            if s - last <= BREAK_STEPS * tick_s {
+                (time_s, rows) = (time_s + s - last, rows + since);
+            }
+            since = 0;
+        }
+        since += 1;
+        last = s;
+    }
+    if rows == 0 { tick_s } else { time_s / rows as f64 }
+}
+
+/// Spreads rows evenly over coarse ticks. A row lies within the tick that stamps it; where the stamps
+/// leave the even rows behind by more than a tick and a break, time broke there.
+fn spread(seconds: &mut [f64], step_s: f64, tick_s: f64) {
+    let follow = (step_s / FOLLOW_S).min(1.0);
+    let mut even = f64::NAN;
+    for s in seconds.iter_mut().filter(|s| !s.is_nan()) {
+        let (next, middle) = (even + step_s, *s + 0.5 * tick_s);
+        even = if (next - middle).abs() <= tick_s + BREAK_STEPS * step_s {
+            next + follow * (middle - next)
+        } else {
+            *s
+        };
+        *s = even;
     }
 }
 
@@ -137,19 +242,45 @@ fn strictly_rising(t: &[f64]) -> bool {
     t.first().is_some_and(|s| !s.is_nan()) && t.windows(2).all(|w| w[0] < w[1])
 }
 
-/// Rows with a stamp, in order of time, the first of each repeated stamp.
+/// Rows with a stamp, piece by piece in order of time, the first of each repeated stamp.
 #[expect(clippy::float_cmp, reason = "a repeated stamp repeats its bits")]
-fn ordered(t: &[f64]) -> Vec<usize> {
-    let mut rows: Vec<usize> = (0..t.len()).filter(|&i| !t[i].is_nan()).collect();
-    rows.sort_by(|&a, &b| t[a].total_cmp(&t[b]));
-    rows.dedup_by(|later, first| t[*later] == t[*first]);
+fn ordered(t: &[f64], pieces: &[Range<usize>]) -> Vec<u32> {
+    let mut rows = Vec::with_capacity(t.len());
+    for piece in pieces {
+        let first = rows.len();
+        rows.extend(piece.clone().filter(|&i| !t[i].is_nan()).map(|i| i as u32));
+        rows[first..].sort_by(|&a, &b| t[a as usize].total_cmp(&t[b as usize]));
+    }
+    rows.dedup_by(|later, first| t[*later as usize] == t[*first as usize]);
     rows
 }
 
-/// The lower median of a non-empty list, which is an element of it: no step is invented.
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = (values.len() - 1) / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+/// The usual step: the lower median, which is an element of the steps, so that none is invented.
+///
+/// Where stamps are rounded to ticks that are coarse beside the step (milliseconds at 400 Hz: 2, 3, 2, 3),
+/// no element is right; then it is the mean of the steps that are no breaks.
+fn usual_step(mut steps: Vec<f64>) -> f64 {
+    /// Steps one tick apart, when the tick is at least this share of the step.
+    const COARSE: f64 = 0.02;
+    /// Rounding of the stamps themselves, s.
+    const SAME_S: f64 = 1e-7;
+    if steps.is_empty() {
+        return f64::NAN;
+    }
+    let middle = (steps.len() - 1) / 2;
+    let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let even = |s: &&f64| **s <= (BREAK_STEPS + SAME_S) * median;
+    let (mut low, mut high) = (median, median);
+    for &s in steps.iter().filter(even) {
+        (low, high) = (low.min(s), high.max(s));
+    }
+    let between = |s: &f64| *s > low + SAME_S && *s < high - SAME_S;
+    let is_rounded = high - low > COARSE * median && !steps.iter().filter(even).any(between);
+    if !is_rounded {
+        return median;
+    }
+    let (sum, count) = steps.iter().filter(even).fold((0.0, 0_usize), |(sum, n), s| (sum + s, n + 1));
+    sum / count as f64
 }
 
 fn cut(count: usize, breaks: &[usize]) -> Vec<Range<usize>> {
@@ -165,13 +296,21 @@ mod tests {
     use super::*;
 
     fn stamps(seconds: &[f64]) -> Stamps {
-        Stamps { column: "t".into(), seconds: seconds.to_vec(), start_utc: None, is_local: false }
+        Stamps { column: "t".into(), seconds: seconds.to_vec(), origin: Origin::Counted(0.0) }
+    }
+
+    fn line(seconds: &[f64], clock: &ClockMapping) -> Result<Timeline, Fault> {
+        align(&mut stamps(seconds), clock)
+    }
+
+    fn usual() -> ClockMapping {
+        ClockMapping::default()
     }
 
     #[test]
     fn an_even_clock_passes_untouched() {
         let t: Vec<f64> = (0..100).map(|i| f64::from(i) * 0.01).collect();
-        let line = align(&stamps(&t), None, 1.0).unwrap();
+        let line = line(&t, &usual()).unwrap();
         assert_eq!(line.kept, None);
         assert_eq!(line.segments, cut(100, &[]));
         assert!((line.step_s - 0.01).abs() < 1e-15);
@@ -180,29 +319,63 @@ mod tests {
 
     #[test]
     fn a_pause_cuts_the_log_in_two() {
-        let line = align(&stamps(&[0.0, 0.1, 0.2, 5.0, 5.1, 5.2]), None, 1.0).unwrap();
+        let line = line(&[0.0, 0.1, 0.2, 5.0, 5.1, 5.2], &usual()).unwrap();
         assert_eq!(line.segments, [0..3, 3..6]);
     }
 
     #[test]
     fn repeated_missing_and_swapped_stamps_are_mended_and_counted() {
-        let line = align(&stamps(&[0.0, 0.2, 0.1, 0.1, f64::NAN, 0.3]), None, 1.0).unwrap();
+        let line = line(&[0.0, 0.2, 0.1, 0.1, f64::NAN, 0.3], &usual()).unwrap();
         assert_eq!(line.kept, Some(vec![0, 2, 1, 5]));
-        assert_eq!(line.repairs, Repairs { unstamped: 1, out_of_order: 1, repeated: 1 });
+        assert_eq!(line.repairs, Repairs { unstamped: 1, filled: 0, out_of_order: 1, repeated: 1 });
     }
 
     #[test]
-    fn a_deep_fall_is_refused_with_its_row() {
-        let fault = align(&stamps(&[0.0, 5.0, 1.0, 6.0]), None, 1.0).unwrap_err();
-        assert!(matches!(fault, Fault::TimeGoesBack { row: 2, times: 1, .. }), "{fault:?}");
+    fn a_deep_fall_is_refused_with_its_row_or_splits_the_log() {
+        let t = [0.0, 0.1, 5.0, 5.1, 1.0, 1.1, 1.2];
+        assert!(matches!(line(&t, &usual()), Err(Fault::TimeGoesBack { row: 4, times: 3, .. })));
+        let split = line(&t, &ClockMapping { split_at_jumps: true, ..usual() }).unwrap();
+        assert_eq!(split.segments, [0..2, 2..4, 4..7]);
+        assert_eq!(split.repairs.out_of_order, 0);
     }
 
     #[test]
     fn a_clock_that_stands_still_is_refused() {
-        assert!(matches!(
-            align(&stamps(&[1.0, 1.0]), None, 1.0),
-            Err(Fault::TimeStandsStill { rows: 2, .. })
-        ));
+        assert!(matches!(line(&[1.0, 1.0], &usual()), Err(Fault::TimeStandsStill { rows: 2, .. })));
+    }
+
+    /// 400 Hz in whole milliseconds steps 2, 3, 2, 3 ms: the step is 2.5 ms, and nothing broke.
+    #[test]
+    fn a_step_between_two_ticks_is_their_mean() {
+        let t: Vec<f64> = (0..4000).map(|k| (f64::from(k) * 2.5).floor() * 1e-3).collect();
+        let line = line(&t, &usual()).unwrap();
+        assert!((line.step_s - 2.5e-3).abs() < 1e-6, "{} s", line.step_s);
+        assert_eq!(line.segments.len(), 1);
+    }
+
+    /// A computer's clock ticks every 15.6 ms while samples come every 2.5 ms.
+    #[test]
+    fn rows_under_a_coarse_clock_are_spread_evenly() {
+        let (tick, step) = (0.015_625, 0.002_5);
+        let truth: Vec<f64> =
+            (0..8000).map(|k| f64::from(k) * step + if k < 4000 { 0.0 } else { 3.0 }).collect();
+        let mut coarse = stamps(&truth.iter().map(|t| (t / tick).floor() * tick).collect::<Vec<_>>());
+        let line = align(&mut coarse, &ClockMapping { tick_s: Some(tick), ..usual() }).unwrap();
+        assert_eq!((line.kept.is_none(), line.segments.clone()), (true, vec![0..4000, 4000..8000]));
+        assert!((line.step_s / step - 1.0).abs() < 0.01, "{} s", line.step_s);
+        let worst = coarse.seconds.iter().zip(&truth).map(|(s, t)| (s - t).abs()).fold(0.0, f64::max);
+        assert!(worst < tick, "{worst} s");
+    }
+
+    #[test]
+    fn rows_without_a_stamp_get_one_where_the_rate_says_which() {
+        let nan = f64::NAN;
+        let clock = ClockMapping { rate_hz: Some(10.0), ..usual() };
+        let mut holed = stamps(&[0.0, nan, nan, 0.3, nan, 9.0, 9.1]);
+        let line = align(&mut holed, &clock).unwrap();
+        assert!((holed.seconds[2] - 0.2).abs() < 1e-12);
+        assert_eq!((line.repairs.filled, line.repairs.unstamped), (2, 1));
+        assert_eq!(line.segments, [0..4, 4..6]);
     }
 
     proptest! {
@@ -214,9 +387,9 @@ mod tests {
             distinct.sort_unstable();
             distinct.dedup();
             prop_assume!(distinct.len() > 1);
-            let line = align(&stamps(&t), None, 2.0).unwrap();
-            let kept = line.kept.clone().unwrap_or_else(|| (0..t.len()).collect());
-            prop_assert!(kept.windows(2).all(|w| t[w[0]] < t[w[1]]));
+            let line = line(&t, &ClockMapping { max_back_s: Some(2.0), ..usual() }).unwrap();
+            let kept = line.kept.clone().unwrap_or_else(|| (0..t.len() as u32).collect());
+            prop_assert!(kept.windows(2).all(|w| t[w[0] as usize] < t[w[1] as usize]));
             prop_assert_eq!(kept.len(), distinct.len());
             prop_assert_eq!(line.segments.iter().map(ExactSizeIterator::len).sum::<usize>(), kept.len());
         }

@@ -51,6 +51,18 @@ pub enum Fault {
     /// A mapped column is not in the file.
     #[error("the log has no column `{column}`")]
     ColumnMissing { column: String, nearest: Option<String> },
+    /// A channel lies in a group of files, and no file of that group belongs to this flight.
+    #[error("no file of group `{group}` belongs to this flight")]
+    GroupMissing { group: String },
+    /// Two lists that should hold the samples of one row side by side do not.
+    #[error("the lists in `{column}` and `{other}` differ in length")]
+    ListLengths { column: String, other: String },
+    /// Two clocks of one log share no zero.
+    #[error("the clocks `{column}` and `{other}` cannot be brought together")]
+    ClocksDiffer { column: String, other: String },
+    /// A log that Freeplay normalized does not fit the settings any more.
+    #[error("this normalized log was made otherwise: {detail}")]
+    Normalized { detail: String },
     /// A column is there, but its type holds no numbers.
     #[error("column `{column}` holds {found}, not {wanted}")]
     ColumnType { column: String, found: String, wanted: &'static str },
@@ -87,6 +99,9 @@ pub enum Fault {
     /// A column that should be constant is not.
     #[error("column `{column}` should hold one {fact}, but changes")]
     IdentityChanges { fact: &'static str, column: String, row: u64, found: String, before: String },
+    /// A column of a table is not there.
+    #[error("the table has no column `{column}`")]
+    TableColumn { column: String, nearest: Option<String> },
     /// A table cannot be used.
     #[error("the table cannot be used: {detail}")]
     Table { row: Option<u64>, column: Option<String>, detail: String },
@@ -103,6 +118,10 @@ impl Fault {
             Self::RowCount { .. } => "row_count_differs",
             Self::ColumnMissing { .. } => "column_missing",
             Self::ColumnType { .. } => "column_type",
+            Self::GroupMissing { .. } => "group_missing",
+            Self::ListLengths { .. } => "list_lengths",
+            Self::ClocksDiffer { .. } => "clocks_differ",
+            Self::Normalized { .. } => "normalized_otherwise",
             Self::NoPosition { .. } => "no_position",
             Self::TimeUnit { .. } => "time_unit_unknown",
             Self::NoClock => "no_clock",
@@ -114,7 +133,7 @@ impl Fault {
             Self::IdentityMissing { .. } => "identity_missing",
             Self::IdentityInvalid { .. } => "identity_invalid",
             Self::IdentityChanges { .. } => "identity_changes",
-            Self::Table { .. } => "bad_table",
+            Self::TableColumn { .. } | Self::Table { .. } => "bad_table",
         }
     }
 
@@ -135,11 +154,14 @@ impl Fault {
             }
             Self::RowCount { column, .. }
             | Self::ColumnMissing { column, .. }
+            | Self::TableColumn { column, .. }
             | Self::ColumnType { column, .. }
             | Self::TimeUnit { column, .. }
             | Self::RateContradicts { column, .. }
             | Self::TimeStandsStill { column, .. }
             | Self::AllMissing { column, .. }
+            | Self::ListLengths { column, .. }
+            | Self::ClocksDiffer { column, .. }
             | Self::UnitForPart { column, .. } => c.column = Some(column.clone()),
             Self::TimeGoesBack { column, row, .. } | Self::IdentityChanges { column, row, .. } => {
                 c.column = Some(column.clone());
@@ -174,7 +196,9 @@ impl Fault {
                 Some(format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)"))
             }
             Self::RateContradicts { declared_hz, .. } => Some(format!("{declared_hz} Hz (`clock.rate_hz`)")),
-            Self::TimeUnit { .. } => Some("`clock.unit` = \"s\", \"ms\", \"us\" or \"ns\"".into()),
+            Self::TimeUnit { .. } => {
+                Some("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`".into())
+            }
             Self::UnitForPart { wanted, .. } => Some((*wanted).into()),
             _ => None,
         }
@@ -195,8 +219,22 @@ impl Fault {
             Self::ColumnMissing { nearest: Some(near), .. } => {
                 return format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`");
             }
+            Self::TableColumn { nearest: Some(near), .. } => {
+                return format!("`{near}`? A table may call its columns otherwise: see `[columns]`");
+            }
+            Self::TableColumn { .. } => {
+                "a table may call its columns otherwise: see `[columns]` in docs/configuration.md"
+            }
             Self::ColumnMissing { .. } => "names are mapped under `[channel]`, `[clock]` and `[identity]`",
             Self::ColumnType { .. } => "map another column, or have the recorder write numbers",
+            Self::GroupMissing { .. } => {
+                "is its file late? Files find each other by tail and flight (`freeplay check` shows what each says)"
+            }
+            Self::ListLengths { .. } => "channels in lists must hold as many samples in every row",
+            Self::ClocksDiffer { .. } => {
+                "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`"
+            }
+            Self::Normalized { .. } => "make it again from the recorder's log: `freeplay normalize`",
             Self::NoPosition { .. } => "`freeplay check` on this log lists its columns beside the patterns",
             Self::TimeUnit { .. } => "a wrong unit puts a flight in 1970, so it is never guessed",
             Self::NoClock => "name the time column, or give the rate when rows are evenly spaced",

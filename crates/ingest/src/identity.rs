@@ -5,6 +5,7 @@ use std::path::Path;
 
 use fleet::{FlightId, Position, TailNumber};
 use jiff::{Timestamp, civil, tz::TimeZone};
+use percent_encoding::percent_decode_str;
 
 use crate::error::Fault;
 use crate::schema::{Fact, IdentityMapping};
@@ -27,7 +28,7 @@ pub struct Identity {
 }
 
 /// Facts as text, before they are read.
-pub(crate) type Facts = BTreeMap<Fact, String>;
+pub type Facts = BTreeMap<Fact, String>;
 
 /// The facts that the path's named groups hold.
 ///
@@ -45,6 +46,22 @@ pub(crate) fn from_path(path: &Path, expression: &str) -> Result<Facts, Fault> {
     let Some(groups) = regex.captures(&text) else { return Ok(Facts::new()) };
     let named = |fact: &Fact| Some((*fact, groups.name(fact.as_str())?.as_str().to_owned()));
     Ok(Fact::ALL.iter().filter_map(named).collect())
+}
+
+/// The facts that folders called `name=value` hold, as Hive partitions are; the innermost wins.
+pub(crate) fn from_folders(path: &Path, folders: &BTreeMap<Fact, String>) -> Facts {
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let named: BTreeMap<String, String> = whole
+        .parent()
+        .into_iter()
+        .flat_map(Path::components)
+        .filter_map(|part| part.as_os_str().to_str()?.split_once('='))
+        .map(|(name, value)| (name.to_owned(), percent_decode_str(value).decode_utf8_lossy().into_owned()))
+        .collect();
+    let stated = |(fact, name): (&Fact, &String)| Some((*fact, named.get(name)?.clone()));
+    // Hive's own word for a null.
+    let is_value = |(_, value): &(Fact, String)| value != "__HIVE_DEFAULT_PARTITION__";
+    folders.iter().filter_map(stated).filter(is_value).collect()
 }
 
 /// Reads the facts; what the log leaves open comes from its absolute clock.
@@ -87,6 +104,7 @@ fn missing(fact: Fact, mapping: &IdentityMapping) -> Fault {
         mapping.metadata.get(&fact).map(|key| format!("metadata `{key}`")),
         mapping.columns.get(&fact).map(|column| format!("column `{column}`")),
         mapping.path.as_ref().map(|expression| format!("path by `{expression}`")),
+        mapping.folders.get(&fact).map(|name| format!("folder `{name}=…`")),
     ];
     Fault::IdentityMissing { fact: fact.as_str(), looked: looked.into_iter().flatten().collect() }
 }

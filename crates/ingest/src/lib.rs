@@ -4,25 +4,40 @@
 //! converts a unit. A log that cannot be used becomes an [`Error`] that names file, column, row and
 //! remedy, and nothing else is affected.
 //!
-//! The way of a log: [`Log::open`] reads the footer, [`Log::identity`] says which flight it was,
-//! [`Log::positions`] which actuators it holds, [`Log::timeline`] puts its rows on one clock, and
-//! [`Log::actuator`] reads the channels of one of them.
+//! The way of a log: [`Log::open`] reads the footers, [`Log::identity`] says which flight it was,
+//! [`Log::positions`] which actuators it holds, and [`Log::actuator`] reads the channels of one of them
+//! on one clock.
 
+mod channel;
+mod checksum;
 pub mod clock;
 pub mod error;
+mod file;
+pub mod flights;
+mod hold;
 pub mod identity;
+mod leaf;
 pub mod log;
+pub mod normal;
+mod numbers;
+mod page;
 pub mod pattern;
 pub mod quality;
-mod read;
+mod resample;
 pub mod schema;
+pub mod screw;
+mod sheet;
 pub mod tables;
 pub mod unit;
 pub mod write;
 
 pub use clock::Timeline;
 pub use error::{Error, Fault};
+pub use flights::Flights;
 pub use identity::Identity;
-pub use log::{Actuator, Geometry, Log, PositionColumns};
+pub use log::{Actuator, Files, Log, PositionColumns};
 pub use quality::Quality;
-pub use schema::{ChannelMapping, Channels, ClockMapping, IdentityMapping, Mapping};
+pub use schema::{
+    ChannelMapping, Channels, ClockMapping, GroupMapping, IdentityMapping, Layout, Mapping, Role,
+};
+pub use screw::Geometry;

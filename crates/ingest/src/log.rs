@@ -1,48 +1,45 @@
 //! One flight log: its identity, its actuators, and their channels in SI on one clock.
 
-use std::collections::BTreeSet;
+use std::cell::OnceCell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use fleet::Position;
+use jiff::Timestamp;
 
-use crate::clock::{self, Timeline};
+use crate::channel::{self, Follower, Sampling};
+use crate::clock::{Origin, Repairs, Timeline};
 use crate::error::{Error, Fault};
+use crate::file::LogFile;
+use crate::hold::hold;
 use crate::identity::{self, Facts, Identity};
+use crate::normal::Normalized;
 use crate::pattern::Pattern;
-use crate::read::Columns;
-use crate::schema::{ChannelMapping, Fact, Mapping};
-use crate::unit::{Dimension, Unit};
+use crate::quality::{self, Quality};
+use crate::schema::{ChannelMapping, Channels, Fact, Mapping, Role};
+use crate::screw::Geometry;
+use crate::sheet::Sheet;
 
-/// A load is held over so many of its own steps, or so many seconds if that is more.
-const HOLD_STEPS: usize = 4;
-const HOLD_S: f64 = 0.2;
-
-/// How far stamps may fall back by default, s.
-const MAX_BACK_S: f64 = 1.0;
-
-/// What brings a part's angles and torques to the screw axis.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Geometry {
-    /// A part that pushes: x = θ·lead/2π (the paper's X₁ = θ·r/2π).
-    Linear {
-        /// Metres for a turn; needed only when a channel is an angle or a torque.
-        lead_m_per_rev: Option<f64>,
-    },
-    /// A part that only turns: x = r·θ, F = T/r.
-    Rotary {
-        /// The radius at which the gap is stated, m.
-        reference_radius_m: f64,
-    },
+/// The files of one flight log: usually one.
+#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Files {
+    /// The main log, in one piece or in several.
+    pub main: Vec<PathBuf>,
+    /// Files of other kinds, by the name of their group.
+    pub groups: BTreeMap<String, Vec<PathBuf>>,
 }
 
-impl Geometry {
-    /// Metres at the screw axis for a radian, where it is known.
-    pub fn metres_per_radian(self) -> Option<f64> {
-        match self {
-            Self::Linear { lead_m_per_rev } => lead_m_per_rev.map(|lead| lead / std::f64::consts::TAU),
-            Self::Rotary { reference_radius_m } => Some(reference_radius_m),
-        }
+impl Files {
+    /// A log that is one file.
+    pub fn one(path: impl Into<PathBuf>) -> Self {
+        Self { main: vec![path.into()], groups: BTreeMap::new() }
+    }
+
+    /// Every file, the main log first.
+    pub fn all(&self) -> impl Iterator<Item = &PathBuf> {
+        self.main.iter().chain(self.groups.values().flatten())
     }
 }
 
@@ -51,9 +48,10 @@ impl Geometry {
 pub struct PositionColumns {
     /// Its place.
     pub position: Position,
-    /// The columns that make it, as mapped: motor position, screw position, load, temperature.
+    /// The channels that make it, as mapped: motor position, screw position, load, temperature. Of
+    /// redundant ones the first that the log has.
     pub columns: [Option<String>; 4],
-    /// Mapped columns that the log lacks, without which this actuator cannot be estimated.
+    /// Mapped channels that the log lacks, without which this actuator cannot be estimated.
     pub lacking: Vec<String>,
 }
 
@@ -76,61 +74,177 @@ pub struct Actuator {
     pub temperature_c: Option<f64>,
     /// Share of samples without δX.
     pub missing_share: f64,
+    /// What each channel looked like before anything was made of it: motor, screw, load.
+    pub quality: [Quality; 3],
+    /// Doubts about the channels: stable codes.
+    pub flags: Vec<String>,
+    /// What had to be mended in the clock.
+    pub repairs: Repairs,
 }
 
 /// An open log.
 #[derive(Debug)]
-pub struct Log<'m> {
-    columns: Columns,
-    mapping: &'m Mapping,
+pub struct Log {
+    main: Sheet,
+    groups: BTreeMap<String, Sheet>,
+    mapping: Arc<Mapping>,
+    normalized: Option<Normalized>,
+    names: OnceCell<BTreeSet<String>>,
 }
 
-impl<'m> Log<'m> {
-    /// Opens a log and reads its footer.
+impl Log {
+    /// Opens the files of a log and reads their footers.
     ///
     /// # Errors
-    /// When the file cannot be read, is empty, or is not whole Parquet.
-    pub fn open(path: &Path, mapping: &'m Mapping) -> Result<Self, Error> {
-        Ok(Self { columns: Columns::open(path)?, mapping })
+    /// When a file cannot be read, is empty, or is not whole Parquet.
+    pub fn open(files: &Files, mapping: &Arc<Mapping>) -> Result<Self, Error> {
+        let open = |paths: &[PathBuf]| paths.iter().map(|p| LogFile::open(p)).collect::<Result<Vec<_>, _>>();
+        let (clock, layout) = (mapping.clock.clone(), mapping.layout.clone());
+        let main = Sheet { files: open(&files.main)?, clock, layout };
+        let mut groups = BTreeMap::new();
+        for (name, group) in &mapping.groups {
+            let paths = files.groups.get(name).map(Vec::as_slice).unwrap_or_default();
+            if !paths.is_empty() {
+                let clock = group.clock.as_ref().unwrap_or(&mapping.clock).clone();
+                groups
+                    .insert(name.clone(), Sheet { files: open(paths)?, clock, layout: group.layout.clone() });
+            }
+        }
+        let Some(first) = main.files.first() else {
+            let source = std::io::Error::from(std::io::ErrorKind::NotFound);
+            return Err(Error::new(Path::new(""), Fault::Unreadable { source }));
+        };
+        let normalized = Normalized::of(first)?;
+        let mapping = Arc::clone(mapping);
+        let mut log = Self { main, groups, mapping, normalized, names: OnceCell::new() };
+        log.order_pieces()?;
+        Ok(log)
     }
 
-    /// Rows the footer declares.
+    /// The same open files, read by another mapping of the same kinds of files.
+    #[must_use]
+    pub fn remapped(mut self, mapping: &Arc<Mapping>) -> Self {
+        (self.main.clock, self.main.layout) = (mapping.clock.clone(), mapping.layout.clone());
+        for (name, sheet) in &mut self.groups {
+            if let Some(group) = mapping.groups.get(name) {
+                sheet.clock = group.clock.as_ref().unwrap_or(&mapping.clock).clone();
+                sheet.layout = group.layout.clone();
+            }
+        }
+        self.mapping = Arc::clone(mapping);
+        self.names = OnceCell::new();
+        self
+    }
+
+    /// Pieces of a flight follow each other in time, whatever their files are called.
+    fn order_pieces(&mut self) -> Result<(), Error> {
+        for sheet in std::iter::once(&mut self.main).chain(self.groups.values_mut()) {
+            let Some(column) = sheet.clock.column.clone() else { continue };
+            if sheet.files.len() < 2 {
+                continue;
+            }
+            let mut starts = Vec::with_capacity(sheet.files.len());
+            for file in std::mem::take(&mut sheet.files) {
+                let (clock, layout) = (sheet.clock.clone(), sheet.layout.clone());
+                let alone = Sheet { files: vec![file], clock, layout };
+                let samples = crate::sheet::Samples { leaf: column.clone(), rows: Vec::new() };
+                let stamps = alone.stamps(&samples, None)?;
+                starts.push((stamps.origin, alone.files));
+            }
+            let first = starts[0].0;
+            let since = |origin: &Origin| origin.since(first).unwrap_or(0.0);
+            starts.sort_by(|a, b| since(&a.0).total_cmp(&since(&b.0)));
+            sheet.files = starts.into_iter().flat_map(|(_, files)| files).collect();
+        }
+        Ok(())
+    }
+
+    /// Rows the footers of the main log declare.
     pub fn rows(&self) -> usize {
-        self.columns.rows()
+        self.main.rows()
+    }
+
+    /// Whether this is a log that Freeplay itself wrote with `normalize`.
+    pub fn is_normalized(&self) -> bool {
+        self.normalized.is_some()
     }
 
     /// Names and types of all columns, for `check`.
     pub fn column_types(&self) -> Vec<(String, String)> {
-        let kind =
-            |name: &str| self.columns.data_type(name).map_or_else(|_| String::new(), ToString::to_string);
-        self.columns.names().map(|name| (name.to_owned(), kind(name))).collect()
+        let leaves = self.main.files.iter().flat_map(|file| file.leaves());
+        leaves.map(|leaf| (leaf.name.clone(), leaf.kind.to_string())).collect()
     }
 
-    /// Which flight this is; `clock_start` stands in for a departure the log does not state.
+    /// Whether every page of the columns of these actuators carries a checksum.
+    ///
+    /// # Errors
+    /// When a page header cannot be.
+    pub fn is_checked(&self, used: &[(&Channels, &PositionColumns)]) -> Result<bool, Error> {
+        for (sheet, leaves) in self.leaves(used) {
+            for file in &sheet.files {
+                let names: Vec<&str> = leaves.iter().map(String::as_str).filter(|l| file.has(l)).collect();
+                if !file.is_checked(&names)? {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// Which flight this is; `known` fills what the log itself leaves open.
     ///
     /// # Errors
     /// When tail or departure stand nowhere, cannot be read, or change within the log.
-    pub fn identity(&self, timeline: &Timeline) -> Result<Identity, Error> {
-        identity::read(&self.facts()?, &self.mapping.identity, timeline.start_utc)
-            .map_err(|f| self.columns.error(f))
+    pub fn identity(&self, known: impl Fn(&Facts) -> Facts) -> Result<Identity, Error> {
+        if let Some(normalized) = &self.normalized {
+            let own = crate::schema::IdentityMapping::default();
+            return identity::read(&normalized.facts, &own, None).map_err(|f| self.main.error(f));
+        }
+        let mut facts = facts(&self.main, &self.mapping.identity)?;
+        for (fact, text) in known(&facts) {
+            facts.entry(fact).or_insert(text);
+        }
+        let start = if facts.contains_key(&Fact::DepartureUtc) { None } else { self.start_utc()? };
+        identity::read(&facts, &self.mapping.identity, start).map_err(|f| self.main.error(f))
     }
 
-    fn facts(&self) -> Result<Facts, Error> {
-        let map = &self.mapping.identity;
-        let mut facts: Facts = map.values.clone();
-        if let Some(expression) = &map.path {
-            let found = identity::from_path(self.columns.path(), expression);
-            facts.extend(found.map_err(|f| self.columns.error(f))?);
+    /// The first instant of an absolute clock.
+    ///
+    /// # Errors
+    /// When the time column cannot be read.
+    pub fn start_utc(&self) -> Result<Option<Timestamp>, Error> {
+        let Some(column) = &self.main.clock.column else { return Ok(None) };
+        if !self.main.files[0].has(column) {
+            return Ok(None);
         }
-        for (fact, column) in &map.columns {
-            // A column the log lacks may still be covered by metadata or path; what is missing in all is named later.
-            if self.columns.has(column) {
-                facts.extend(self.columns.constant(column, fact.as_str())?.map(|text| (*fact, text)));
+        let every_row = crate::sheet::Samples { leaf: column.clone(), rows: Vec::new() };
+        let stamps = self.main.stamps(&every_row, None)?;
+        let earliest = stamps.seconds.iter().copied().filter(|s| !s.is_nan()).fold(f64::INFINITY, f64::min);
+        let later = |start: Timestamp| start.checked_add(channel::duration(earliest)).ok();
+        Ok(match stamps.origin {
+            Origin::Utc(start) => later(start),
+            Origin::Local(start) => {
+                later(start).and_then(|local| identity::from_local(local, &self.mapping.identity))
             }
+            Origin::Counted(_) | Origin::Start => None,
+        })
+    }
+
+    /// The sheet that holds a channel.
+    fn sheet(&self, map: &ChannelMapping) -> Option<&Sheet> {
+        map.group.as_ref().map_or(Some(&self.main), |name| self.groups.get(name))
+    }
+
+    /// What channels may be called in the sheet of one.
+    fn names_for(&self, map: &ChannelMapping) -> Result<BTreeSet<String>, Error> {
+        if map.group.is_some() {
+            return self.sheet(map).map_or_else(|| Ok(BTreeSet::new()), Sheet::names);
         }
-        let stated = |(fact, key): (&Fact, &String)| Some((*fact, self.columns.metadata(key)?.to_owned()));
-        facts.extend(map.metadata.iter().filter_map(stated));
-        Ok(facts)
+        if self.names.get().is_none() {
+            let names = self.main.names()?;
+            return Ok(self.names.get_or_init(|| names).clone());
+        }
+        Ok(self.names.get().cloned().unwrap_or_default())
     }
 
     /// The actuators whose columns are here, in order of their names.
@@ -140,323 +254,332 @@ impl<'m> Log<'m> {
     /// # Errors
     /// [`Fault::NoPosition`] when no column fits; [`Fault::ColumnMissing`] or
     /// [`Fault::IdentityMissing`] in a log of one actuator.
-    pub fn positions(&self, own: Option<&Position>) -> Result<Vec<PositionColumns>, Error> {
-        let map = &self.mapping.channels;
-        let needed = [&map.motor_position, &map.screw_position, &map.load];
-        let open: Vec<Pattern<'_>> =
-            needed.iter().map(|c| Pattern::new(&c.column)).filter(Pattern::is_open).collect();
-        if open.is_empty() {
-            return self.only_position(own);
+    pub fn positions(
+        &self,
+        channels: &Channels,
+        own: Option<&Position>,
+    ) -> Result<Vec<PositionColumns>, Error> {
+        if self.normalized.is_some() {
+            let of = |position: &Position| PositionColumns {
+                position: position.clone(),
+                columns: Normalized::COLUMNS.map(|name| Some(name.to_owned())),
+                lacking: Vec::new(),
+            };
+            return Ok(own.map(of).into_iter().collect());
         }
-        let found: BTreeSet<&str> =
-            open.iter().flat_map(|p| self.columns.names().filter_map(|name| p.position_in(name))).collect();
-        let asked = |text: &&str| map.positions.is_empty() || map.positions.iter().any(|p| p == text);
+        let Some(found) = self.position_names(channels)? else { return self.only_position(channels, own) };
+        let asked = |text: &String| channels.positions.is_empty() || channels.positions.contains(text);
         let named = found.into_iter().filter(asked).filter_map(|text| Position::new(text).ok());
-        let all: Vec<PositionColumns> = named.map(|position| self.columns_of(position)).collect();
+        let all = named.map(|p| self.columns_of(channels, p)).collect::<Result<Vec<_>, _>>()?;
         if all.iter().any(|p| p.lacking.is_empty()) {
             return Ok(all);
         }
-        let columns = self.columns.names().map(str::to_owned).collect();
-        Err(self.columns.error(Fault::NoPosition { pattern: map.motor_position.column.clone(), columns }))
+        let columns = self.names_for(&channels.motor_position)?.into_iter().collect();
+        let pattern = channels.motor_position.column.clone();
+        Err(self.main.error(Fault::NoPosition { pattern, columns }))
     }
 
-    fn only_position(&self, own: Option<&Position>) -> Result<Vec<PositionColumns>, Error> {
+    /// The positions that rows or names speak of; none when neither can.
+    fn position_names(&self, channels: &Channels) -> Result<Option<BTreeSet<String>>, Error> {
+        if let Some(found) = self.main.row_positions()? {
+            return Ok(Some(found));
+        }
+        let (mut is_open, mut found) = (false, BTreeSet::new());
+        for map in Role::NEEDED.iter().filter_map(|role| channels.of(*role)).flat_map(ChannelMapping::choices)
+        {
+            let pattern = Pattern::new(&map.column);
+            if pattern.is_open() {
+                is_open = true;
+                let names = self.names_for(map)?;
+                found.extend(names.iter().filter_map(|name| pattern.position_in(name)).map(str::to_owned));
+            }
+        }
+        Ok(is_open.then_some(found))
+    }
+
+    fn only_position(
+        &self,
+        channels: &Channels,
+        own: Option<&Position>,
+    ) -> Result<Vec<PositionColumns>, Error> {
         let Some(position) = own else {
             let looked = vec!["the names of columns (no `{position}` in them)".into()];
-            return Err(self.columns.error(Fault::IdentityMissing { fact: "position", looked }));
+            return Err(self.main.error(Fault::IdentityMissing { fact: "position", looked }));
         };
-        let only = self.columns_of(position.clone());
+        let only = self.columns_of(channels, position.clone())?;
         match only.lacking.first() {
             None => Ok(vec![only]),
-            Some(column) => self.columns.data_type(column).map(|_| Vec::new()),
+            Some(column) => Err(self.main.lacks(column)),
         }
     }
 
-    fn columns_of(&self, position: Position) -> PositionColumns {
-        let map = &self.mapping.channels;
-        let name = |c: &ChannelMapping| Pattern::new(&c.column).column_for(position.as_str());
-        let needed = [&map.motor_position, &map.screw_position, &map.load].map(name);
-        let lacking = needed.iter().filter(|c| !self.columns.has(c)).cloned().collect();
-        let temperature = map.temperature.as_ref().map(name).filter(|c| self.columns.has(c));
-        let [motor, screw, load] = needed;
-        PositionColumns { position, columns: [Some(motor), Some(screw), Some(load), temperature], lacking }
-    }
-
-    /// blake3 of the footer and the chunks of every column that the positions and the clock use.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
-    pub fn digest(&self, positions: &[PositionColumns]) -> Result<String, Error> {
-        let mut names: Vec<String> =
-            positions.iter().flat_map(|p| p.columns.iter().flatten().cloned()).collect();
-        names.extend(self.mapping.clock.column.clone());
-        names.extend(self.mapping.identity.columns.values().cloned());
-        self.columns.digest(&names)
-    }
-
-    /// Puts the rows on one clock.
-    ///
-    /// # Errors
-    /// When there is no clock, its unit is unknown, it stands still or runs backwards.
-    pub fn timeline(&self) -> Result<Timeline, Error> {
-        let map = &self.mapping.clock;
-        match (&map.column, map.rate_hz) {
-            (Some(column), rate_hz) => {
-                let mut stamps = self.columns.stamps(column, map.unit)?;
-                if stamps.is_local {
-                    stamps.start_utc =
-                        stamps.start_utc.and_then(|t| identity::from_local(t, &self.mapping.identity));
-                }
-                let max_back_s = map.max_back_s.unwrap_or(MAX_BACK_S);
-                clock::align(&stamps, rate_hz, max_back_s).map_err(|f| self.columns.error(f))
+    fn columns_of(&self, channels: &Channels, position: Position) -> Result<PositionColumns, Error> {
+        let mut columns = [None, None, None, None];
+        let mut lacking = Vec::new();
+        for (slot, role) in columns.iter_mut().zip(Role::ALL) {
+            let Some(map) = channels.of(role) else { continue };
+            let first = self.present(map, &position)?.into_iter().next();
+            let name = Pattern::new(&map.column).column_for(position.as_str());
+            if first.is_none() && role != Role::Temperature {
+                lacking.push(name.clone());
             }
-            (None, Some(rate_hz)) => Ok(clock::even(self.rows(), rate_hz)),
-            (None, None) => Err(self.columns.error(Fault::NoClock)),
+            *slot = first.map(|(_, name)| name).or((role != Role::Temperature).then_some(name));
         }
+        Ok(PositionColumns { position, columns, lacking })
+    }
+
+    /// A channel and its alternatives, as far as the log has them, with their names here.
+    fn present<'c>(
+        &self,
+        map: &'c ChannelMapping,
+        position: &Position,
+    ) -> Result<Vec<(&'c ChannelMapping, String)>, Error> {
+        let mut found = Vec::new();
+        for choice in map.choices() {
+            let name = Pattern::new(&choice.column).column_for(position.as_str());
+            if self.names_for(choice)?.contains(&name) {
+                found.push((choice, name));
+            }
+        }
+        Ok(found)
+    }
+
+    /// The leaves that these actuators need, sheet by sheet.
+    fn leaves(&self, used: &[(&Channels, &PositionColumns)]) -> Vec<(&Sheet, BTreeSet<String>)> {
+        let sheets =
+            std::iter::once((None, &self.main)).chain(self.groups.iter().map(|(n, s)| (Some(n.as_str()), s)));
+        let needed = |(group, sheet): (Option<&str>, &Sheet)| {
+            let mut leaves = BTreeSet::new();
+            for (channels, at) in used {
+                let maps = Role::ALL.iter().filter_map(|role| channels.of(*role));
+                for map in maps.flat_map(ChannelMapping::choices).filter(|m| m.group.as_deref() == group) {
+                    let named = |column: &String| Pattern::new(column).column_for(at.position.as_str());
+                    for name in std::iter::once(&map.column).chain(&map.valid_column).map(named) {
+                        leaves.extend(sheet.leaves_of(&sheet.samples(&name, at.position.as_str())));
+                    }
+                    leaves.extend(map.time_column.iter().map(named));
+                }
+            }
+            leaves
+        };
+        sheets.map(|(group, sheet)| (sheet, needed((group, sheet)))).collect()
+    }
+
+    /// blake3 of the footers and the chunks of every column that the positions, the clock and the
+    /// identity use.
+    ///
+    /// # Errors
+    /// When a file cannot be read.
+    pub fn digest(&self, used: &[(&Channels, &PositionColumns)]) -> Result<String, Error> {
+        let mut hash = blake3::Hasher::new();
+        for (sheet, mut leaves) in self.leaves(used) {
+            leaves.extend(self.mapping.identity.columns.values().cloned());
+            if self.normalized.is_some() {
+                leaves.extend(Normalized::COLUMNS.map(str::to_owned));
+            }
+            let names: Vec<&str> = leaves.iter().map(String::as_str).collect();
+            for file in &sheet.files {
+                file.feed(&names, &mut hash)?;
+            }
+        }
+        Ok(hash.finalize().to_hex().to_string())
     }
 
     /// Reads the channels of one actuator.
     ///
     /// # Errors
     /// When a column is missing, holds no numbers or no value, cannot be decoded, or is in a unit
-    /// that this part cannot be brought to the screw from.
+    /// that this part cannot be brought to the screw from; when clocks cannot be brought together.
     pub fn actuator(
         &self,
         at: &PositionColumns,
-        timeline: &Timeline,
+        channels: &Channels,
         geometry: Geometry,
     ) -> Result<Actuator, Error> {
-        let map = &self.mapping.channels;
-        let [motor, screw, load, temperature] = &at.columns;
-        let read = |column: &Option<String>, channel: &ChannelMapping| {
-            let column = column.as_deref().unwrap_or(&channel.column);
-            self.channel(column, channel, timeline, geometry)
-        };
-        let motor_m = read(motor, &map.motor_position)?;
-        let mut dx_m = read(screw, &map.screw_position)?;
-        dx_m.iter_mut().zip(&motor_m).for_each(|(screw, motor)| *screw -= motor);
-        let mut load_n = read(load, &map.load)?;
-        let longest = (HOLD_S / timeline.step_s).ceil() as usize;
-        let segments = hold(&mut load_n, &timeline.segments, longest);
-        let temperature_c = match (temperature, &map.temperature) {
-            // A temperature helps to understand a gap; its absence must not cost one.
-            (Some(column), Some(channel)) => {
-                self.channel(column, channel, timeline, geometry).ok().and_then(|values| mean(&values))
+        if let Some(normalized) = &self.normalized {
+            return normalized.actuator(&self.main.files[0], at.position.clone(), geometry);
+        }
+        let (motor, master, mut flags) = self.motor(at, channels, geometry)?;
+        let read = |role: Role| self.follower(role, at, channels, geometry, &master);
+        let (screw, screw_flags) = read(Role::Screw)?;
+        let (load, load_flags) = read(Role::Load)?;
+        let temperature = channels.temperature.as_ref().and_then(|_| read(Role::Temperature).ok());
+        flags.extend(screw_flags.into_iter().chain(load_flags));
+        let read = Read { motor, screw, load, is_relative: channels.is_relative() };
+        Ok(finish(at.position.clone(), read, &master.0.line, temperature.and_then(|t| mean(&t.0)), flags))
+    }
+
+    /// The motor position, whose clock all other channels follow.
+    fn motor<'c>(
+        &self,
+        at: &PositionColumns,
+        channels: &'c Channels,
+        geometry: Geometry,
+    ) -> Result<Lead<'_, 'c>, Error> {
+        let mut found: Option<Lead<'_, 'c>> = None;
+        for (k, (map, name)) in self.present_or_lacking(Role::Motor, at, channels)?.into_iter().enumerate() {
+            let sampling = Sampling::new(self.sheet_of(map)?, map, &name, at.position.as_str())?;
+            let values = sampling.own(map, geometry)?;
+            let lives = channel::lives(&values);
+            if lives || found.is_none() {
+                found = Some((values, (sampling, map), alternative(Role::Motor, k)));
             }
-            _ => None,
-        };
-        let missing = dx_m.iter().filter(|y| y.is_nan()).count();
-        let missing_share = missing as f64 / dx_m.len().max(1) as f64;
-        Ok(Actuator {
-            position: at.position.clone(),
-            step_s: timeline.step_s,
-            motor_m,
-            dx_m,
-            load_n,
-            segments,
-            temperature_c,
-            missing_share,
+            if lives {
+                break;
+            }
+        }
+        let lead = found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
+        self.not_empty(&lead.0, lead.1.0.column())?;
+        Ok(lead)
+    }
+
+    /// A channel on the motor's clock.
+    fn follower(
+        &self,
+        role: Role,
+        at: &PositionColumns,
+        channels: &Channels,
+        geometry: Geometry,
+        master: &(Sampling<'_>, &ChannelMapping),
+    ) -> Result<(Vec<f64>, Vec<String>), Error> {
+        let mut found: Option<(Vec<f64>, usize)> = None;
+        let mut column = String::new();
+        for (k, (map, name)) in self.present_or_lacking(role, at, channels)?.into_iter().enumerate() {
+            let sheet = self.sheet_of(map)?;
+            let one = Follower { sheet, map, name: &name, position: at.position.as_str(), role };
+            let values = channel::follow(&master.0, master.1, &one, geometry)?;
+            let lives = channel::lives(&values);
+            if lives || found.is_none() {
+                column = name;
+                found = Some((values, k));
+            }
+            if lives {
+                break;
+            }
+        }
+        let (values, k) = found.unwrap_or_default();
+        self.not_empty(&values, &column)?;
+        Ok((values, alternative(role, k)))
+    }
+
+    fn present_or_lacking<'c>(
+        &self,
+        role: Role,
+        at: &PositionColumns,
+        channels: &'c Channels,
+    ) -> Result<Vec<(&'c ChannelMapping, String)>, Error> {
+        let map = channels.of(role).unwrap_or(&channels.motor_position);
+        let found = self.present(map, &at.position)?;
+        if found.is_empty() {
+            let name = Pattern::new(&map.column).column_for(at.position.as_str());
+            return Err(self.sheet(map).unwrap_or(&self.main).lacks(&name));
+        }
+        Ok(found)
+    }
+
+    fn sheet_of(&self, map: &ChannelMapping) -> Result<&Sheet, Error> {
+        self.sheet(map).ok_or_else(|| {
+            self.main.error(Fault::GroupMissing { group: map.group.clone().unwrap_or_default() })
         })
     }
 
-    fn channel(
-        &self,
-        column: &str,
-        map: &ChannelMapping,
-        timeline: &Timeline,
-        geometry: Geometry,
-    ) -> Result<Vec<f64>, Error> {
-        let si = to_si(column, map, geometry).map_err(|f| self.columns.error(f))?;
-        let mut values = self.columns.numbers(column)?;
-        if let Some(kept) = &timeline.kept {
-            values = kept.iter().map(|&row| values[row]).collect();
+    fn not_empty(&self, values: &[f64], column: &str) -> Result<(), Error> {
+        if values.iter().any(|v| v.is_finite()) {
+            return Ok(());
         }
-        if !map.missing.is_empty() {
-            values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
-        }
-        if values.iter().all(|v| !v.is_finite()) {
-            return Err(self
-                .columns
-                .error(Fault::AllMissing { column: column.to_owned(), rows: values.len() as u64 }));
-        }
-        if let Some(turn) = map.wraps_at {
-            unwrap_turns(&mut values, turn);
-        }
-        for value in &mut values {
-            *value = si.apply(*value);
-        }
-        Ok(values)
+        let (column, rows) = (column.to_owned(), values.len() as u64);
+        Err(self.main.error(Fault::AllMissing { column, rows }))
     }
 }
 
-/// One straight line from raw to SI.
-#[derive(Debug, Clone, Copy)]
-struct ToSi {
-    scale: f64,
-    offset: f64,
-    factor: f64,
-    shift: f64,
-}
+/// The motor position's values, how they lie in time and by which mapping, and doubts about them.
+type Lead<'s, 'c> = (Vec<f64>, (Sampling<'s>, &'c ChannelMapping), Vec<String>);
 
-impl ToSi {
-    /// An infinite reading is no reading.
-    fn apply(self, raw: f64) -> f64 {
-        let value = (raw * self.scale + self.offset) * self.factor + self.shift;
-        if value.is_finite() { value } else { f64::NAN }
+/// What a sheet's files say of their flight.
+fn facts(sheet: &Sheet, map: &crate::schema::IdentityMapping) -> Result<Facts, Error> {
+    let first = &sheet.files[0];
+    let mut facts: Facts = map.values.clone();
+    facts.extend(identity::from_folders(first.path(), &map.folders));
+    if let Some(expression) = &map.path {
+        facts.extend(identity::from_path(first.path(), expression).map_err(|f| sheet.error(f))?);
     }
-}
-
-fn to_si(column: &str, map: &ChannelMapping, geometry: Geometry) -> Result<ToSi, Fault> {
-    let (unit_factor, shift) = map.unit.to_si();
-    let lever = lever(map.unit, geometry).map_err(|wanted| Fault::UnitForPart {
-        column: column.to_owned(),
-        unit: map.unit.as_str(),
-        wanted,
-    })?;
-    let gear = match map.unit.dimension() {
-        Dimension::Torque => map.gear_ratio,
-        Dimension::Angle => map.gear_ratio.recip(),
-        _ => 1.0,
-    };
-    Ok(ToSi {
-        scale: map.scale,
-        offset: map.offset,
-        factor: f64::from(map.sign) * unit_factor * lever * gear,
-        shift,
-    })
-}
-
-/// What brings the unit's dimension to the screw axis, or what would be wanted instead.
-fn lever(unit: Unit, geometry: Geometry) -> Result<f64, &'static str> {
-    let rotary = matches!(geometry, Geometry::Rotary { .. });
-    match unit.dimension() {
-        Dimension::Length if rotary => Err("an angle (deg, rad, rev): the part only turns"),
-        Dimension::Force if rotary => Err("a torque (N.m, lbf.in, lbf.ft): the part only turns"),
-        Dimension::Length | Dimension::Force | Dimension::Temperature => Ok(1.0),
-        Dimension::Angle => geometry.metres_per_radian().ok_or("a length, or the part's `lead_m_per_rev`"),
-        Dimension::Torque => {
-            geometry.metres_per_radian().map(f64::recip).ok_or("a force, or the part's `lead_m_per_rev`")
-        }
+    for (fact, column) in &map.columns {
+        // A column the log lacks may still be covered by another source; what is missing in all is named later.
+        facts.extend(sheet.constant(column, fact.as_str())?.map(|text| (*fact, text)));
     }
+    let stated = |(fact, key): (&Fact, &String)| Some((*fact, first.metadata(key)?.to_owned()));
+    facts.extend(map.metadata.iter().filter_map(stated));
+    Ok(facts)
 }
 
-/// Adds or takes turns so that no step exceeds half a turn; missing and infinite samples are passed over.
-fn unwrap_turns(values: &mut [f64], turn: f64) {
-    let (mut turns, mut before) = (0.0, f64::NAN);
-    for value in values.iter_mut().filter(|v| v.is_finite()) {
-        let raw = *value;
-        if !f64::is_nan(before) {
-            turns -= ((raw - before) / turn).round();
-        }
-        before = raw;
-        *value = raw + turns * turn;
-    }
-}
-
-/// Holds the last load over samples without one, and starts each segment at its first load.
+/// What a file of a group says of its flight, so that it finds its main log.
 ///
-/// A load that is recorded more slowly is held over a few of its own steps, or `longest` samples if that
-/// is more; one that stays away longer has died, and the segment ends where it was last known.
-fn hold(load_n: &mut [f64], segments: &[Range<usize>], longest: usize) -> Vec<Range<usize>> {
-    let longest = longest.max(HOLD_STEPS * usual_step(load_n));
-    let mut loaded = Vec::with_capacity(segments.len());
-    for segment in segments {
-        let mut known: Option<Range<usize>> = None;
-        for i in segment.clone().filter(|&i| !load_n[i].is_nan()).collect::<Vec<_>>() {
-            match &mut known {
-                Some(span) if i - span.end <= longest => {
-                    let last = load_n[span.end - 1];
-                    load_n[span.end..i].fill(last);
-                    span.end = i + 1;
-                }
-                before => {
-                    loaded.extend(before.take());
-                    known = Some(i..i + 1);
-                }
-            }
-        }
-        if let Some(span) = known {
-            let end = segment.end.min(span.end + longest);
-            let last = load_n[span.end - 1];
-            load_n[span.end..end].fill(last);
-            loaded.push(span.start..end);
-        }
-    }
-    loaded
+/// # Errors
+/// As [`Log::open`] and [`Log::identity`].
+pub fn identity_of_file(
+    path: &Path,
+    mapping: &Mapping,
+    group: &str,
+    known: impl Fn(&Facts) -> Facts,
+) -> Result<Identity, Error> {
+    let settings = mapping.groups.get(group);
+    let identity = settings.and_then(|g| g.identity.clone()).unwrap_or_else(|| mapping.identity.clone());
+    let clock = settings.and_then(|g| g.clock.clone()).unwrap_or_else(|| mapping.clock.clone());
+    let layout = settings.map(|g| g.layout.clone()).unwrap_or_default();
+    let alone = Mapping { identity, clock, layout, ..Mapping::default() };
+    Log::open(&Files::one(path), &Arc::new(alone))?.identity(known)
 }
 
-/// Samples from one known load to the next, as the median has it.
-fn usual_step(load_n: &[f64]) -> usize {
-    let known: Vec<usize> = (0..load_n.len()).filter(|&i| !load_n[i].is_nan()).collect();
-    let mut steps: Vec<usize> = known.windows(2).map(|w| w[1] - w[0]).collect();
-    let middle = steps.len() / 2;
-    if steps.is_empty() { 1 } else { *steps.select_nth_unstable(middle).1 }
+fn alternative(role: Role, choice: usize) -> Vec<String> {
+    if choice == 0 { Vec::new() } else { vec![format!("{}_alternative", role.as_str())] }
+}
+
+/// Channels as read, on one clock.
+struct Read {
+    motor: Vec<f64>,
+    screw: Vec<f64>,
+    load: Vec<f64>,
+    is_relative: bool,
+}
+
+/// Looks at the channels, leaves out what a frozen one claims, and makes δX.
+fn finish(
+    position: Position,
+    read: Read,
+    line: &Timeline,
+    temperature_c: Option<f64>,
+    mut flags: Vec<String>,
+) -> Actuator {
+    let Read { motor: mut motor_m, screw: mut screw_m, load: mut load_n, is_relative } = read;
+    let quality = [&motor_m, &screw_m, &load_n].map(|values| Quality::of(values, line.step_s));
+    flags.extend(quality::doubts(&quality, line.step_s));
+    let mut dx_m = if is_relative {
+        screw_m
+    } else {
+        flags.extend(quality::thaw(&mut motor_m, &mut screw_m, line.step_s));
+        screw_m.iter_mut().zip(&motor_m).for_each(|(screw, motor)| *screw -= motor);
+        screw_m
+    };
+    dx_m.iter_mut().zip(&motor_m).filter(|(_, motor)| motor.is_nan()).for_each(|(dx, _)| *dx = f64::NAN);
+    flags.extend(quality::load_froze(&load_n, &motor_m, line.step_s));
+    let segments = hold(&mut load_n, &line.segments, line.step_s);
+    let missing = dx_m.iter().filter(|y| y.is_nan()).count();
+    Actuator {
+        position,
+        step_s: line.step_s,
+        missing_share: missing as f64 / dx_m.len().max(1) as f64,
+        motor_m,
+        dx_m,
+        load_n,
+        segments,
+        temperature_c,
+        quality,
+        flags,
+        repairs: line.repairs,
+    }
 }
 
 fn mean(values: &[f64]) -> Option<f64> {
     let (sum, count) = values.iter().filter(|v| !v.is_nan()).fold((0.0, 0_u64), |(s, n), v| (s + v, n + 1));
     (count > 0).then(|| sum / count as f64)
-}
-
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::*;
-
-    #[test]
-    fn a_slow_load_is_held_and_a_segment_waits_for_its_first() {
-        let nan = f64::NAN;
-        let mut load = [nan, 1.0, nan, 2.0, nan, nan];
-        let segments = hold(&mut load, &[0..3, 3..5, 5..6], 2);
-        assert_eq!(segments, [1..3, 3..5]);
-        assert_eq!(load[1..5], [1.0, 1.0, 2.0, 2.0]);
-    }
-
-    /// By hand: a 5 mm lead turns 0.1 N·m into 0.1·2π/0.005 = 125.66 N, and 90° into 1.25 mm.
-    #[test]
-    fn angles_and_torques_come_to_the_screw_by_the_lead() {
-        let geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
-        let angle = ChannelMapping { unit: Unit::Degree, ..ChannelMapping::default() };
-        let torque = ChannelMapping { unit: Unit::NewtonMetre, sign: -1, ..ChannelMapping::default() };
-        assert!((to_si("a", &angle, geometry).unwrap().apply(90.0) - 0.00125).abs() < 1e-15);
-        assert!((to_si("t", &torque, geometry).unwrap().apply(0.1) + 125.663_706_143_591_7).abs() < 1e-9);
-    }
-
-    /// The load comes every other sample, so it is held over eight at most.
-    #[test]
-    fn a_load_that_died_ends_its_segment() {
-        let mut load = [f64::NAN; 40];
-        for i in [0, 2, 4, 6, 30, 32] {
-            load[i] = i as f64;
-        }
-        let segments = hold(&mut load, &[0..20, 20..40], 3);
-        assert_eq!(segments, [0..15, 30..40]);
-        assert_eq!((load[5], load[14], load[33]), (4.0, 6.0, 32.0));
-        assert!(load[15].is_nan());
-    }
-
-    #[test]
-    fn a_length_on_a_part_that_only_turns_is_refused() {
-        let fault =
-            to_si("x", &ChannelMapping::default(), Geometry::Rotary { reference_radius_m: 0.1 }).unwrap_err();
-        assert!(matches!(fault, Fault::UnitForPart { unit: "m", .. }));
-    }
-
-    proptest! {
-        /// Wrapping loses only whole turns, and a resolver never moves half a turn in a sample.
-        #[test]
-        fn an_unwrapped_resolver_differs_from_the_truth_by_whole_turns(
-            steps in proptest::collection::vec(-170.0_f64..170.0, 1..200), start in 0.0_f64..360.0,
-        ) {
-            let truth: Vec<f64> = steps.iter().scan(start, |x, s| { *x += s; Some(*x) }).collect();
-            let mut values: Vec<f64> = truth.iter().map(|x| x.rem_euclid(360.0)).collect();
-            unwrap_turns(&mut values, 360.0);
-            let offset = values[0] - truth[0];
-            prop_assert!((offset / 360.0 - (offset / 360.0).round()).abs() < 1e-9);
-            for (v, t) in values.iter().zip(&truth) {
-                prop_assert!((v - t - offset).abs() < 1e-7);
-            }
-        }
-    }
 }

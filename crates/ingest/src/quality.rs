@@ -1,4 +1,10 @@
-//! What a channel looks like before anything is estimated: so that a mapping error is seen in seconds.
+//! What a channel looks like before anything is estimated: so that a mapping error is seen in seconds, and
+//! a sensor that lies is not believed.
+
+use std::ops::Range;
+
+use crate::hold::usual_step;
+use crate::schema::Role;
 
 /// One channel, described.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,29 +21,48 @@ pub struct Quality {
     pub resolution: Option<f64>,
     /// Longest share of samples, in a row, that repeat one value.
     pub frozen_share: f64,
+    /// How often a value comes, Hz: the rate actually seen.
+    pub rate_hz: f64,
+    /// Share of samples that stand at the smallest or largest value as if cut off there.
+    pub saturated_share: f64,
+    /// Samples that leap away from both their neighbours and back.
+    pub spikes: usize,
 }
 
 impl Quality {
     /// Describes a channel; missing samples are NaN.
-    pub fn of(values: &[f64]) -> Self {
-        let present = || values.iter().copied().filter(|v| !v.is_nan());
+    pub fn of(values: &[f64], step_s: f64) -> Self {
         let samples = values.len();
         let share = |count: usize| count as f64 / samples.max(1) as f64;
-        let min = present().fold(f64::INFINITY, f64::min);
-        let max = present().fold(f64::NEG_INFINITY, f64::max);
+        let (mut min, mut max, mut missing) = (f64::INFINITY, f64::NEG_INFINITY, 0);
+        for v in values {
+            (min, max) = (min.min(*v), max.max(*v));
+            missing += usize::from(v.is_nan());
+        }
+        let resolution = resolution(values, ROUNDING * (max - min));
         Self {
             samples,
-            missing_share: share(samples - present().count()),
+            missing_share: share(missing),
             min,
             max,
-            resolution: resolution(values, ROUNDING * (max - min)),
-            frozen_share: share(longest_run(values)),
+            resolution,
+            frozen_share: share(
+                runs(values, 2).map(|run| run.len()).max().unwrap_or(usize::from(samples > 0)),
+            ),
+            rate_hz: (step_s * usual_step(values) as f64).recip(),
+            saturated_share: share(saturated(values, min, max)),
+            spikes: spikes(values, resolution),
         }
     }
 
     /// Whether the channel never moves.
     pub fn is_constant(&self) -> bool {
         self.max <= self.min
+    }
+
+    /// Whether every value is zero.
+    pub fn is_zero(&self) -> bool {
+        self.is_constant() && self.max == 0.0
     }
 }
 
@@ -49,14 +74,132 @@ fn resolution(values: &[f64], least: f64) -> Option<f64> {
     steps.min_by(f64::total_cmp)
 }
 
+/// Stretches of at least so many samples that repeat one value.
 #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
-fn longest_run(values: &[f64]) -> usize {
-    let (mut longest, mut run) = (usize::from(!values.is_empty()), 1);
-    for pair in values.windows(2) {
-        run = if pair[0] == pair[1] { run + 1 } else { 1 };
-        longest = longest.max(run);
+fn runs(values: &[f64], least: usize) -> impl Iterator<Item = Range<usize>> {
+    let mut start = 0;
+    let mut ends = (1..=values.len()).filter(|&i| i == values.len() || values[i] != values[i - 1]);
+    std::iter::from_fn(move || {
+        for end in ends.by_ref() {
+            let run = start..end;
+            start = end;
+            if run.len() >= least {
+                return Some(run);
+            }
+        }
+        None
+    })
+}
+
+/// Samples at a rail: the channel comes to its smallest or largest value at full speed, stays there, and
+/// leaves it at full speed, more than once. A position that comes to rest slows down first.
+#[expect(clippy::float_cmp, reason = "a rail repeats its bits")]
+fn saturated(values: &[f64], min: f64, max: f64) -> usize {
+    const LEAST_RUN: usize = 5;
+    let speed = 0.5 * mean_step(values);
+    let mut count = [0, 0];
+    let mut samples = 0;
+    for run in runs(values, LEAST_RUN) {
+        let at = values[run.start];
+        // Two samples away, since the step that meets the rail is cut short.
+        let before = run.start.checked_sub(2).map(|i| values[i]);
+        let (Some(before), Some(after)) = (before, values.get(run.end + 1)) else { continue };
+        let cut = (before - at).abs() >= speed && (after - at).abs() >= speed;
+        if (at == min || at == max) && cut {
+            count[usize::from(at == max)] += 1;
+            samples += run.len();
+        }
     }
-    longest
+    if count.iter().any(|c| *c > 1) { samples } else { 0 }
+}
+
+/// Mean of the steps that are steps at all.
+fn mean_step(values: &[f64]) -> f64 {
+    let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
+    let (sum, count) = steps.fold((0.0, 0_usize), |(sum, n), step| (sum + step, n + 1));
+    sum / count.max(1) as f64
+}
+
+/// How far a sample lies from the line between its neighbours, against the usual.
+fn spikes(values: &[f64], resolution: Option<f64>) -> usize {
+    const FAR: f64 = 50.0;
+    const THINNED: usize = 4096;
+    let leap = |w: &[f64]| (w[1] - 0.5 * (w[0] + w[2])).abs();
+    let every = (values.len() / THINNED).max(1);
+    let mut usual: Vec<f64> = values.windows(3).step_by(every).map(leap).filter(|d| *d > 0.0).collect();
+    if usual.is_empty() {
+        return 0;
+    }
+    let middle = usual.len() / 2;
+    let median = *usual.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let far = FAR * median.max(resolution.unwrap_or(0.0));
+    // Its neighbours leap with it, half as far: only the peak of the three counts.
+    let leaps = |i: usize| leap(&values[i - 1..=i + 1]);
+    (2..values.len().saturating_sub(2))
+        .filter(|&i| leaps(i) > far && leaps(i) >= leaps(i - 1) && leaps(i) > leaps(i + 1))
+        .count()
+}
+
+/// What the motor, screw and load channels give reason to doubt: stable codes.
+pub(crate) fn doubts(channels: &[Quality; 3], step_s: f64) -> Vec<String> {
+    const SATURATED: f64 = 0.002;
+    const MISSING: f64 = 0.2;
+    let mut found = Vec::new();
+    for (quality, role) in channels.iter().zip(Role::NEEDED) {
+        let slow_load = role == Role::Load && quality.rate_hz * step_s < 0.75;
+        let said = [
+            (quality.missing_share > MISSING && !slow_load, "missing"),
+            (quality.saturated_share > SATURATED, "saturated"),
+            (quality.spikes > 0, "spikes"),
+        ];
+        found.extend(said.iter().filter(|(is, _)| *is).map(|(_, what)| format!("{}_{what}", role.as_str())));
+    }
+    found
+}
+
+/// Samples of a frozen position are no measurement: where one repeats its last value while the other
+/// travels further than any gap, it is marked as missing. Returns the codes of those that froze.
+pub(crate) fn thaw(motor_m: &mut [f64], screw_m: &mut [f64], step_s: f64) -> Vec<String> {
+    let still = [frozen(motor_m, screw_m, step_s), frozen(screw_m, motor_m, step_s)];
+    let mut found = Vec::new();
+    for ((spans, values), role) in still.iter().zip([motor_m, screw_m]).zip([Role::Motor, Role::Screw]) {
+        spans.iter().for_each(|span| values[span.clone()].fill(f64::NAN));
+        if !spans.is_empty() {
+            found.push(format!("{}_frozen", role.as_str()));
+        }
+    }
+    found
+}
+
+/// Where a position stands still for half a second at least while its partner travels a millimetre and a
+/// twentieth of its range. A channel that never moves is another matter, and refused as a whole.
+fn frozen(values: &[f64], partner: &[f64], step_s: f64) -> Vec<Range<usize>> {
+    const LEAST_S: f64 = 0.5;
+    const LEAST_TRAVEL_M: f64 = 1e-3;
+    const LEAST_SHARE: f64 = 0.05;
+    let least = ((LEAST_S / step_s).ceil() as usize).max(3);
+    let travel_m = (LEAST_SHARE * range(partner)).max(LEAST_TRAVEL_M);
+    runs(values, least)
+        .filter(|run| run.len() < values.len() && range(&partner[run.clone()]) > travel_m)
+        // The first of the repeated values was measured.
+        .map(|run| run.start + 1..run.end)
+        .collect()
+}
+
+/// Whether a load stood still for ten seconds in which the actuator travelled a fifth of its range.
+pub(crate) fn load_froze(load_n: &[f64], motor_m: &[f64], step_s: f64) -> Option<String> {
+    const LEAST_S: f64 = 10.0;
+    const LEAST_SHARE: f64 = 0.2;
+    let travel_m = LEAST_SHARE * range(motor_m);
+    let froze = |run: Range<usize>| run.len() < load_n.len() && range(&motor_m[run]) > travel_m;
+    let least = (LEAST_S / step_s).ceil() as usize;
+    runs(load_n, least.max(2)).any(froze).then(|| format!("{}_frozen", Role::Load.as_str()))
+}
+
+fn range(values: &[f64]) -> f64 {
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    high - low
 }
 
 /// Slope of one position on the other, by least squares about their means: 1 when both are mapped
@@ -82,11 +225,11 @@ mod tests {
 
     #[test]
     fn a_channel_is_described_as_a_hand_would() {
-        let q = Quality::of(&[1.0, 1.0, 1.0, f64::NAN, 1.5, 1.25, 3.0, 3.0]);
+        let q = Quality::of(&[1.0, 1.0, 1.0, f64::NAN, 1.5, 1.25, 3.0, 3.0], 0.01);
         assert!((q.missing_share - 0.125).abs() < 1e-15);
         assert_eq!((q.min, q.max, q.resolution), (1.0, 3.0, Some(0.25)));
         assert!((q.frozen_share - 3.0 / 8.0).abs() < 1e-15);
-        assert!(Quality::of(&[2.0; 9]).is_constant());
+        assert!(Quality::of(&[2.0; 9], 0.01).is_constant());
     }
 
     #[test]
@@ -97,5 +240,46 @@ mod tests {
             assert!((slope(&motor, &dx).unwrap() - ratio).abs() < 1e-12);
         }
         assert_eq!(slope(&[0.0; 5], &[1.0; 5]), None);
+    }
+
+    fn wave(amplitude: f64) -> Vec<f64> {
+        (0..4000)
+            .map(|k| amplitude * (f64::from(k) * 0.01).sin() + 1e-8 * f64::from(k * 7919 % 101))
+            .collect()
+    }
+
+    #[test]
+    fn a_channel_cut_off_at_a_rail_is_told_from_one_that_rests() {
+        let cut: Vec<f64> = wave(1.0).iter().map(|v| v.clamp(-0.8, 0.8)).collect();
+        let whole = Quality::of(&wave(1.0), 0.01);
+        assert!(Quality::of(&cut, 0.01).saturated_share > 0.2);
+        assert!(whole.saturated_share == 0.0 && whole.spikes == 0, "{whole:?}");
+    }
+
+    #[test]
+    fn each_leap_away_and_back_is_one_spike() {
+        let mut values = wave(0.03);
+        for at in [500, 1500, 2500] {
+            values[at] += 2e-3;
+        }
+        assert_eq!(Quality::of(&values, 0.004).spikes, 3);
+    }
+
+    /// The motor stands still for 1 s while the screw travels: that is a dead sensor. While the screw moves
+    /// within the gap, it is the gap.
+    #[test]
+    fn a_frozen_position_is_no_measurement() {
+        let (mut motor, mut screw) = (wave(0.03), wave(0.03));
+        let last = motor[999];
+        motor[1000..1250].fill(last);
+        let before = motor.clone();
+        assert_eq!(thaw(&mut motor, &mut screw, 0.004), ["motor_frozen"]);
+        assert!(
+            motor[1000..1250].iter().all(|m| m.is_nan()) && motor[999] == last && motor[1250] == before[1250]
+        );
+        let mut resting = vec![0.01; 4000];
+        let mut within: Vec<f64> = wave(2e-4);
+        resting[0] = 0.0;
+        assert!(thaw(&mut resting, &mut within, 0.004).is_empty());
     }
 }

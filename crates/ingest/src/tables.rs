@@ -1,5 +1,6 @@
 //! The tables a user gives beside the logs: read as text from CSV or Parquet, then checked cell by cell.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -19,7 +20,11 @@ pub struct Table {
     file: std::path::PathBuf,
     header: Vec<String>,
     rows: Vec<Vec<Option<String>>>,
+    names: Names,
 }
+
+/// What a user's table calls the columns that we know: our name → theirs.
+pub type Names = BTreeMap<String, String>;
 
 impl Table {
     /// Reads a `.parquet` file as Parquet and anything else as CSV.
@@ -30,7 +35,14 @@ impl Table {
         let parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
         let (header, rows) =
             if parquet { read_parquet(file) } else { read_csv(file) }.map_err(|f| Error::new(file, f))?;
-        Ok(Self { file: file.to_owned(), header, rows })
+        Ok(Self { file: file.to_owned(), header, rows, names: Names::new() })
+    }
+
+    /// The same table, whose columns go by a user's own names.
+    #[must_use]
+    pub fn called(mut self, names: &Names) -> Self {
+        self.names.clone_from(names);
+        self
     }
 
     /// Rows without the header.
@@ -45,7 +57,8 @@ impl Table {
 
     /// Where a column stands, if it is there under one of its names.
     pub fn find(&self, names: &[&str]) -> Option<usize> {
-        names.iter().find_map(|name| self.header.iter().position(|h| h.trim() == *name))
+        let theirs = |name: &str| self.names.get(name).map_or_else(|| name.to_owned(), Clone::clone);
+        names.iter().find_map(|name| self.header.iter().position(|h| h.trim() == theirs(name)))
     }
 
     /// Where a column stands.
@@ -54,9 +67,9 @@ impl Table {
     /// When it is not there, with the nearest name that is.
     pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
         self.find(names).ok_or_else(|| {
-            let wanted = names[0];
+            let wanted = self.names.get(names[0]).map_or(names[0], String::as_str);
             let nearest = nearest(wanted, self.header.iter().map(String::as_str)).map(str::to_owned);
-            Error::new(&self.file, Fault::ColumnMissing { column: wanted.to_owned(), nearest })
+            Error::new(&self.file, Fault::TableColumn { column: wanted.to_owned(), nearest })
         })
     }
 
@@ -106,8 +119,8 @@ impl Table {
 ///
 /// # Errors
 /// Every cell that cannot be read, or, when all can, every contradiction between rows.
-pub fn installations(file: &Path) -> Result<Installations, Vec<Error>> {
-    let table = Table::read(file).map_err(|e| vec![e])?;
+pub fn installations(file: &Path, names: &Names) -> Result<Installations, Vec<Error>> {
+    let table = Table::read(file).map_err(|e| vec![e])?.called(names);
     let columns = InstallationColumns::find(&table)?;
     let (mut rows, mut errors) = (Vec::new(), Vec::new());
     for row in 0..table.len() {
@@ -255,7 +268,7 @@ mod tests {
     #[test]
     fn dates_in_a_utc_column_are_utc() {
         let (_dir, file) = table(&format!("\u{feff}{HEADER}N1,aileron,EMA,17,2026-01-01,2026-02-01 06:00\n"));
-        let stays = installations(&file).unwrap();
+        let stays = installations(&file, &Names::new()).unwrap();
         let stay = stays.iter().next().unwrap();
         assert_eq!(stay.installed_utc.to_string(), "2026-01-01T00:00:00Z");
         assert_eq!(stay.removed_utc.unwrap().to_string(), "2026-02-01T06:00:00Z");
@@ -265,7 +278,7 @@ mod tests {
     fn every_bad_cell_is_named_by_row_and_column() {
         let (_dir, file) =
             table(&format!("{HEADER}N1,aileron,EMA,,2026-01-01,\nN1,elevator,EMA,18,yesterday,\n"));
-        let errors = installations(&file).unwrap_err();
+        let errors = installations(&file, &Names::new()).unwrap_err();
         let places: Vec<_> = errors.iter().map(|e| e.complaint().place().unwrap()).collect();
         assert_eq!(places, ["column `serial_number`, row 1", "column `installed_utc`, row 2"]);
     }
@@ -273,7 +286,7 @@ mod tests {
     #[test]
     fn a_missing_column_is_told_with_its_neighbour() {
         let (_dir, file) = table("tail_number,position,part_number,serial_no,installed_utc\n");
-        let errors = installations(&file).unwrap_err();
+        let errors = installations(&file, &Names::new()).unwrap_err();
         assert!(errors[0].complaint().hint.unwrap().starts_with("`serial_no`?"));
     }
 }

@@ -167,17 +167,21 @@ pub enum TimeUnit {
     /// Nanoseconds.
     #[serde(rename = "ns")]
     Nanosecond,
+    /// Samples: a counter that goes up by one with every row; `clock.rate_hz` says how fast.
+    #[serde(rename = "count")]
+    Count,
 }
 
 impl TimeUnit {
-    /// How many of them make a second.
-    pub fn per_second(self) -> f64 {
-        match self {
+    /// How many of them make a second; none for a counter, whose rate is given apart.
+    pub fn per_second(self) -> Option<f64> {
+        Some(match self {
+            Self::Count => return None,
             Self::Second => 1.0,
             Self::Millisecond => 1e3,
             Self::Microsecond => 1e6,
             Self::Nanosecond => 1e9,
-        }
+        })
     }
 }
 

@@ -3,7 +3,7 @@
 use estimator::contact::{self, ContactGap, Outcome, Prior};
 use estimator::{Filter, MidRange, Samples, midrange};
 use fleet::{Complaint, Estimate, Status};
-use ingest::{Actuator, Geometry, Quality};
+use ingest::{Actuator, Geometry};
 
 use crate::config::{EstimateSettings, Method};
 use crate::part::Part;
@@ -41,6 +41,7 @@ pub fn estimate(
     if let Geometry::Rotary { reference_radius_m } = part.geometry {
         estimate.reference_radius_m = Some(reference_radius_m);
     }
+    estimate.flags.extend(channels.flags.iter().cloned());
     if channels.missing_share > 0.0 {
         estimate.flags.push("samples_missing".into());
     }
@@ -76,9 +77,12 @@ fn prior(part: &Part) -> Prior {
 
 /// Why no statistic could mean anything, seen before any is made.
 fn blind(channels: &Actuator) -> Option<&'static str> {
-    let constant = |values: &[f64]| Quality::of(values).is_constant();
-    let still = constant(&channels.motor_m) || constant(&channels.dx_m) || constant(&channels.load_n);
-    still.then_some("channel_constant")
+    let [motor, screw, load] = &channels.quality;
+    let first = channels.dx_m.iter().find(|dx| !dx.is_nan());
+    let rigid = channels.dx_m.iter().all(|dx| dx.is_nan() || Some(dx) == first);
+    let still = motor.is_constant() || screw.is_constant() || load.is_constant() || rigid;
+    let zero = motor.is_zero() || screw.is_zero() || load.is_zero();
+    if zero { Some("channel_zero") } else { still.then_some("channel_constant") }
 }
 
 /// The configured method decides; the other stands beside it.

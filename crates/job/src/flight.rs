@@ -1,12 +1,15 @@
 //! One flight, from log to records: the room where all floors below meet.
 
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use fleet::{
     Complaint, Estimate, Flight, GapRecord, Installation, Installations, PartNumber, Position, Provenance,
 };
-use ingest::{Actuator, Identity, Log, PositionColumns};
+use ingest::identity::Facts;
+use ingest::{Actuator, Channels, Files, Identity, Log, Mapping, PositionColumns};
 use jiff::Timestamp;
 
 use crate::config::Config;
@@ -26,10 +29,11 @@ pub struct Stamp {
 
 /// Which flight a log is and what it holds, before any channel is read.
 #[derive(Debug)]
-pub struct Opened<'c> {
-    log: Log<'c>,
+pub struct Opened {
+    log: Log,
     shown: String,
-    timeline: ingest::Timeline,
+    /// How the channels of each position are read.
+    mappings: BTreeMap<Position, Arc<Mapping>>,
     /// Which flight it is.
     pub identity: Identity,
     /// Its actuators.
@@ -38,19 +42,48 @@ pub struct Opened<'c> {
     pub digest: String,
 }
 
-impl<'c> Opened<'c> {
+impl Opened {
     /// Opens a log; `shown` is its name in records and complaints.
     ///
     /// # Errors
-    /// A complaint when the log cannot be read, put on one clock or identified.
-    pub fn open(path: &Path, shown: &str, config: &'c Config) -> Result<Self, Complaint> {
+    /// A complaint when the log cannot be read or identified.
+    pub fn open(
+        files: &Files,
+        shown: &str,
+        config: &Config,
+        installations: &Installations,
+    ) -> Result<Self, Complaint> {
         let complain = |e: ingest::Error| e.complaint().in_file(shown);
-        let log = Log::open(path, &config.mapping).map_err(complain)?;
-        let timeline = log.timeline().map_err(complain)?;
-        let identity = log.identity(&timeline).map_err(complain)?;
-        let positions = log.positions(identity.position.as_ref()).map_err(complain)?;
-        let digest = log.digest(&positions).map_err(complain)?;
-        Ok(Self { log, shown: shown.to_owned(), timeline, identity, positions, digest })
+        let log = Log::open(files, config.base_mapping()).map_err(complain)?;
+        let identity = identity_of(&log, files, config).map_err(complain)?;
+        let log = log.remapped(&config.mapping(&identity.tail_number, None));
+        let mapped = mapped(&log, &identity, config, installations).map_err(complain)?;
+        let used: Vec<_> = mapped.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
+        let digest = log.digest(&used).map_err(complain)?;
+        let mappings =
+            mapped.iter().map(|(at, mapping)| (at.position.clone(), Arc::clone(mapping))).collect();
+        let positions = mapped.into_iter().map(|(at, _)| at).collect();
+        Ok(Self { log, shown: shown.to_owned(), mappings, identity, positions, digest })
+    }
+
+    /// Its name in records and complaints.
+    pub fn shown(&self) -> &str {
+        &self.shown
+    }
+
+    /// How the channels of a position are read.
+    pub fn channels_map(&self, at: &PositionColumns) -> Option<&Channels> {
+        self.mappings.get(&at.position).map(|mapping| &mapping.channels)
+    }
+
+    /// Whether every page that is read carries a checksum.
+    ///
+    /// # Errors
+    /// A complaint when a page header cannot be read.
+    pub fn is_checked(&self) -> Result<bool, Complaint> {
+        let used: Vec<_> =
+            self.positions.iter().filter_map(|at| Some((self.channels_map(at)?, at))).collect();
+        self.log.is_checked(&used).map_err(|e| e.complaint().in_file(&self.shown))
     }
 
     /// Names of the positions, in order.
@@ -109,7 +142,7 @@ impl<'c> Opened<'c> {
             provenance: Provenance {
                 log_path: self.shown.clone(),
                 log_digest: self.digest.clone(),
-                config_digest: config.digest(&stay.part_number),
+                config_digest: config.digest(&self.identity.tail_number, &stay.part_number),
                 program_version: stamp.program_version.clone(),
                 run_id: stamp.run_id.clone(),
                 processed_utc: stamp.processed_utc,
@@ -156,13 +189,17 @@ impl<'c> Opened<'c> {
     /// # Errors
     /// A complaint when they cannot be read.
     pub fn channels(&self, at: &PositionColumns, part: &Part) -> Result<Actuator, Complaint> {
-        let read = self.log.actuator(at, &self.timeline, part.geometry);
+        let Some(channels) = self.channels_map(at) else {
+            let what = format!("the log was not opened for {}", at.position);
+            return Err(Complaint::new("no_position", what).in_file(&self.shown));
+        };
+        let read = self.log.actuator(at, channels, part.geometry);
         read.map_err(|e| e.complaint().in_file(&self.shown))
     }
 
-    /// The clock of the log.
-    pub fn timeline(&self) -> &ingest::Timeline {
-        &self.timeline
+    /// Rows the footers declare.
+    pub fn rows(&self) -> usize {
+        self.log.rows()
     }
 
     /// Names and types of all columns.
@@ -176,13 +213,13 @@ impl<'c> Opened<'c> {
 /// # Errors
 /// A complaint when the log cannot be read or put on one clock.
 pub fn anonymous(
-    path: &Path,
+    files: &Files,
     shown: &str,
     config: &Config,
     part: &Part,
 ) -> Result<Vec<(Position, Estimate)>, Complaint> {
     let mut found = Vec::new();
-    each_anonymous(path, shown, config, part, |channels| {
+    each_anonymous(files, shown, config, part, |channels| {
         found.push((
             channels.position.clone(),
             estimate::estimate(channels, part, &config.document.estimate)?,
@@ -194,21 +231,21 @@ pub fn anonymous(
 
 /// Hands over the channels of every actuator of a log that says nothing of its flight, as one part.
 pub(crate) fn each_anonymous(
-    path: &Path,
+    files: &Files,
     shown: &str,
     config: &Config,
     part: &Part,
     mut take: impl FnMut(&Actuator) -> Result<(), Complaint>,
 ) -> Result<(), Complaint> {
     let complain = |e: ingest::Error| e.complaint().in_file(shown);
-    let log = Log::open(path, &config.mapping).map_err(complain)?;
-    let timeline = log.timeline().map_err(complain)?;
+    let log = Log::open(files, config.base_mapping()).map_err(complain)?;
+    let channels = &config.base_mapping().channels;
     // A log of one actuator has no name for it here, but needs one to be asked by.
     let own = Position::new("actuator").map_err(|e| Complaint::new("empty_name", e))?;
-    let positions = log.positions(Some(&own)).map_err(complain)?;
+    let positions = log.positions(channels, Some(&own)).map_err(complain)?;
     for at in positions.iter().filter(|at| at.lacking.is_empty()) {
-        let channels = log.actuator(at, &timeline, part.geometry).map_err(complain)?;
-        take(&channels).map_err(|complaint| complaint.in_file(shown))?;
+        let read = log.actuator(at, channels, part.geometry).map_err(complain)?;
+        take(&read).map_err(|complaint| complaint.in_file(shown))?;
     }
     Ok(())
 }
@@ -251,13 +288,20 @@ pub fn config_digest(
         let stay = installations.at(&flight.tail_number, position, flight.departure_utc);
         // The whole stay, its hours included: they stand in the record too.
         let stay_text = stay.map(|s| serde_json::to_string(s).unwrap_or_default());
-        let digest = stay.map(|s| config.digest(&s.part_number));
+        let digest = stay.map(|s| config.digest(&flight.tail_number, &s.part_number));
         for text in [Some(position.as_str()), stay_text.as_deref(), digest.as_deref()] {
             hash.update(text.unwrap_or_default().as_bytes());
             hash.update(&[0]);
         }
     }
-    hash.update(serde_json::to_string(&config.mapping).unwrap_or_default().as_bytes());
+    let mapping = config.mapping(&flight.tail_number, None);
+    hash.update(serde_json::to_string(&*mapping).unwrap_or_default().as_bytes());
+    // Hours stand in the record too, and the flights table may learn them later.
+    if let Some(known) = config.flights.of(flight) {
+        let hours =
+            [known.flight_hours, known.tail_hours_end].map(|h| h.map_or(0, f64::to_bits).to_le_bytes());
+        hash.update(&hours.concat());
+    }
     hash.finalize().to_hex().to_string()
 }
 
@@ -272,16 +316,104 @@ pub fn unidentified_digest(config: &Config, installations: &Installations) -> St
     hash.finalize().to_hex().to_string()
 }
 
-/// Which flight a log is, without reading its channels.
+/// Which flight a log is, and which actuator where it holds but one, without reading its channels.
 ///
 /// # Errors
 /// A complaint when the log cannot be read, put on one clock or identified.
-pub fn identify(path: &Path, shown: &str, config: &Config) -> Result<Flight, Complaint> {
+pub fn identify(
+    files: &Files,
+    shown: &str,
+    config: &Config,
+) -> Result<(Flight, Option<Position>), Complaint> {
     caught(shown, || {
         let complain = |e: ingest::Error| e.complaint().in_file(shown);
-        let log = Log::open(path, &config.mapping).map_err(complain)?;
-        let id = log.identity(&log.timeline().map_err(complain)?).map_err(complain)?;
-        Ok(flight_of(&id))
+        let log = Log::open(files, config.base_mapping()).map_err(complain)?;
+        let id = identity_of(&log, files, config).map_err(complain)?;
+        Ok((flight_of(&id), id.position))
+    })
+}
+
+/// Which flight a file of a group belongs to.
+///
+/// # Errors
+/// A complaint when the file cannot be read or identified.
+pub fn identify_companion(
+    path: &Path,
+    group: &str,
+    shown: &str,
+    config: &Config,
+) -> Result<(Flight, Option<Position>), Complaint> {
+    caught(shown, || {
+        let known = |said: &Facts| config.flights.facts(path, said, &config.document.identity);
+        let id = ingest::log::identity_of_file(path, config.base_mapping(), group, known)
+            .map_err(|e| e.complaint().in_file(shown))?;
+        Ok((flight_of(&id), id.position))
+    })
+}
+
+/// What a log says of itself, and what the flights table adds.
+fn identity_of(log: &Log, files: &Files, config: &Config) -> Result<Identity, ingest::Error> {
+    let path = files.main.first().map(PathBuf::as_path).unwrap_or(Path::new(""));
+    log.identity(|said| config.flights.facts(path, said, &config.document.identity))
+}
+
+type Mapped = (PositionColumns, Arc<Mapping>);
+
+/// The actuators of a log, each as its aircraft and the part that sits there want it read.
+fn mapped(
+    log: &Log,
+    id: &Identity,
+    config: &Config,
+    installations: &Installations,
+) -> Result<Vec<Mapped>, ingest::Error> {
+    let usual = config.mapping(&id.tail_number, None);
+    let found = log.positions(&usual.channels, id.position.as_ref());
+    let mut at: BTreeMap<Position, Mapped> = BTreeMap::new();
+    let mut failed = None;
+    match found {
+        Ok(found) => at.extend(found.into_iter().map(|p| (p.position.clone(), (p, Arc::clone(&usual))))),
+        Err(error) => failed = Some(error),
+    }
+    for part in config.own_parts() {
+        let mapping = config.mapping(&id.tail_number, Some(part));
+        let Ok(found) = log.positions(&mapping.channels, id.position.as_ref()) else { continue };
+        let sits = |p: &PositionColumns| {
+            let stay = installations.at(&id.tail_number, &p.position, id.departure_utc);
+            stay.is_some_and(|stay| stay.part_number == *part)
+        };
+        at.extend(found.into_iter().filter(sits).map(|p| (p.position.clone(), (p, Arc::clone(&mapping)))));
+    }
+    match failed {
+        Some(error) if at.is_empty() => Err(error),
+        _ => Ok(at.into_values().collect()),
+    }
+}
+
+/// blake3 of every sample of every actuator that could be read, in SI: two logs of one flight that hold
+/// the same samples are the same log, however they are encoded.
+///
+/// # Errors
+/// A complaint when a log or a channel cannot be read.
+pub fn sample_digest(
+    files: &Files,
+    shown: &str,
+    config: &Config,
+    installations: &Installations,
+) -> Result<String, Complaint> {
+    caught(shown, || {
+        let opened = Opened::open(files, shown, config, installations)?;
+        let mut hash = blake3::Hasher::new();
+        for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
+            let (_, part) = opened.unit(at, config, installations)?;
+            let read = opened.channels(at, part)?;
+            hash.update(at.position.as_str().as_bytes());
+            for values in [&read.motor_m, &read.dx_m, &read.load_n] {
+                for value in values {
+                    hash.update(&value.to_bits().to_le_bytes());
+                }
+            }
+        }
+        Ok(hash.finalize().to_hex().to_string())
     })
 }
 

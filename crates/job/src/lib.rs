@@ -6,6 +6,7 @@
 pub mod config;
 pub mod estimate;
 pub mod flight;
+pub mod normalize;
 pub mod part;
 pub mod trace;
 mod value;
@@ -15,4 +16,4 @@ pub use flight::{Opened, Stamp};
 pub use part::Part;
 
 /// Changes with every change to the method that can move a number; part of every configuration digest.
-pub const METHOD_VERSION: u32 = 1;
+pub const METHOD_VERSION: u32 = 2;

@@ -1,9 +1,8 @@
 //! What the filter saw, per sample: for a person who wants to look.
 
-use std::path::Path;
-
 use estimator::filter::Innovations;
 use fleet::{Complaint, Installations, PartNumber};
+use ingest::Files;
 use ingest::write::Column;
 
 use crate::config::Config;
@@ -77,7 +76,7 @@ impl Trace {
 /// # Errors
 /// A complaint when the log or an actuator in it cannot be read.
 pub fn of_log(
-    path: &Path,
+    files: &Files,
     shown: &str,
     config: &Config,
     installations: &Installations,
@@ -86,13 +85,13 @@ pub fn of_log(
     let mut whole = Trace::default();
     if let Some(number) = part {
         let part = part_of(config, number)?;
-        each_anonymous(path, shown, config, part, |channels| {
+        each_anonymous(files, shown, config, part, |channels| {
             whole.extend(Trace::of(shown, channels, part)?);
             Ok(())
         })?;
         return Ok(whole);
     }
-    let opened = Opened::open(path, shown, config)?;
+    let opened = Opened::open(files, shown, config, installations)?;
     for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
         let (_, part) = opened.unit(at, config, installations)?;
         whole.extend(Trace::of(shown, &opened.channels(at, part)?, part)?);

@@ -5,7 +5,9 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use fleet::{Complaint, GapRecord};
+use fleet::{Complaint, GapRecord, Installations};
+use job::Config;
+use job::flight::sample_digest;
 use store::{LogAccount, LogResult, Outcome, RecordKey};
 
 use crate::account::{self, Report};
@@ -42,16 +44,20 @@ impl Done {
 }
 
 /// The writer's book of the store as it is and as it will be.
-pub(crate) struct Book {
+pub(crate) struct Book<'a> {
+    config: &'a Config,
+    installations: &'a Installations,
+    plan: &'a Plan,
     accounts: HashMap<String, LogAccount>,
     owners: HashMap<RecordKey, String>,
     /// Units whose records changed.
     pub(crate) touched: BTreeSet<Unit>,
 }
 
-impl Book {
-    pub(crate) fn of(plan: &Plan) -> Self {
-        let mut book = Self { accounts: HashMap::new(), owners: HashMap::new(), touched: BTreeSet::new() };
+impl<'a> Book<'a> {
+    pub(crate) fn of(plan: &'a Plan, config: &'a Config, installations: &'a Installations) -> Self {
+        let (accounts, owners) = (HashMap::new(), HashMap::new());
+        let mut book = Self { config, installations, plan, accounts, owners, touched: BTreeSet::new() };
         plan.accounts.values().for_each(|account| book.enter(account.clone()));
         book
     }
@@ -84,13 +90,23 @@ impl Book {
         let Some(rival) = self.rival(&account, &records) else {
             return vec![self.store(account, records, complaints, report)];
         };
+        let same = account.log_digest == rival.log_digest || self.holds_the_same(&account, &rival);
         if rival.log_path < account.log_path {
-            let (account, complaints) = yielded(account, &rival);
+            let (account, complaints) = yielded(account, &rival, same);
             return vec![self.store(account, Vec::new(), &complaints, report)];
         }
         let first = self.store(account, records, complaints, report);
-        let (loser, complaints) = yielded(rival, &first.account);
+        let (loser, complaints) = yielded(rival, &first.account, same);
         vec![first, self.store(loser, Vec::new(), &complaints, report)]
+    }
+
+    /// Whether two logs hold the same samples in another encoding. Rare, so it is found out by reading both.
+    fn holds_the_same(&self, one: &LogAccount, other: &LogAccount) -> bool {
+        let digest = |account: &LogAccount| {
+            let files = self.plan.files.get(&account.log_path)?;
+            sample_digest(files, &account.log_path, self.config, self.installations).ok()
+        };
+        digest(one).is_some_and(|one| digest(other) == Some(one))
     }
 
     /// Another log that speaks for one of these flights.
@@ -130,10 +146,10 @@ impl Book {
 }
 
 /// The account of a log whose flight belongs to another.
-fn yielded(mut account: LogAccount, owner: &LogAccount) -> (LogAccount, Vec<Complaint>) {
+fn yielded(mut account: LogAccount, owner: &LogAccount, is_same: bool) -> (LogAccount, Vec<Complaint>) {
     (account.estimated, account.refused) = (0, 0);
     account.outcome = Outcome::Done;
-    if account.log_digest == owner.log_digest {
+    if is_same {
         return (account, Vec::new());
     }
     let complaint = Complaint::new(

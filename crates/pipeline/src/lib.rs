@@ -6,8 +6,10 @@
 
 pub mod account;
 mod book;
+pub mod bundle;
 pub mod estimates;
 pub mod event;
+pub mod normalize;
 pub mod plan;
 pub mod schedule;
 pub mod simulate;

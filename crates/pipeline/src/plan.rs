@@ -1,14 +1,16 @@
 //! Which logs are there, which are already accounted for, and why each of the others is done.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use fleet::{Complaint, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
+use ingest::Files;
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
 use store::{LogAccount, Outcome, RecordKey};
 
+use crate::bundle;
 use crate::error::Error;
 
 /// What is asked of a run.
@@ -107,6 +109,20 @@ impl FileStat {
         })
     }
 
+    /// Of all files of a log: one that differs makes the whole differ.
+    fn of_log(files: &Files) -> Option<Self> {
+        let mut stats = files.all().map(|path| Self::of(path));
+        let first = stats.next()??;
+        stats.try_fold(first, |whole, next| {
+            let next = next?;
+            Some(Self {
+                size_bytes: whole.size_bytes + next.size_bytes,
+                modified_utc_ns: whole.modified_utc_ns.max(next.modified_utc_ns),
+                file_id: format!("{} {}", whole.file_id, next.file_id),
+            })
+        })
+    }
+
     fn is_of(&self, account: &LogAccount) -> bool {
         self.size_bytes == account.size_bytes
             && self.modified_utc_ns == account.modified_utc_ns
@@ -128,8 +144,10 @@ fn file_id(_: &std::fs::Metadata) -> String {
 /// One log to be done.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Work {
-    /// Where it is.
-    pub path: PathBuf,
+    /// Its files.
+    pub files: Files,
+    /// Why it cannot be read, where that is known already.
+    pub fault: Option<Complaint>,
     /// Its name in records and messages: relative to the configuration where it lies below it.
     pub shown: String,
     /// What tells its file apart; none when it vanished since it was found.
@@ -159,6 +177,10 @@ pub struct Plan {
     pub not_asked: usize,
     /// Logs left by the limit.
     pub left: usize,
+    /// Files of groups whose flight has no main log.
+    pub strays: Vec<String>,
+    /// The files of every log that was found.
+    pub files: BTreeMap<String, Files>,
 }
 
 /// What was read of a log, and under which settings.
@@ -174,7 +196,15 @@ pub fn plan(
     accounts: Vec<LogAccount>,
     request: &Request,
 ) -> Result<Plan, Error> {
-    let found = find(config)?;
+    let found = bundle::find(config)?;
+    let strays = found.strays;
+    let mut logs: BTreeMap<String, (Files, Option<Complaint>)> =
+        found.logs.into_iter().map(|(shown, files)| (shown, (files, None))).collect();
+    let faulty = |(shown, (path, complaint)): (String, (PathBuf, Complaint))| {
+        (shown, (Files::one(path), Some(complaint)))
+    };
+    logs.extend(found.faulty.into_iter().map(faulty));
+    let found = logs;
     let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
     let gone = gone.iter().filter_map(|a| Some((digests(a)?, (a.estimated, a.refused)))).collect();
     let accounts: BTreeMap<String, LogAccount> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
@@ -182,7 +212,7 @@ pub fn plan(
     let unidentified = job::flight::unidentified_digest(config, installations);
     let judge = Judge { config, installations, request, owned: &owned, unidentified: &unidentified };
     let verdicts: Vec<Verdict> =
-        found.par_iter().map(|(shown, path)| judge.judge(shown, path, accounts.get(shown))).collect();
+        found.par_iter().map(|(shown, log)| judge.judge(shown, log, accounts.get(shown))).collect();
     let not_asked = verdicts.iter().filter(|v| matches!(v, Verdict::NotAsked)).count();
     let mut work: Vec<Work> = verdicts.into_iter().filter_map(Verdict::work).collect();
     let size = |w: &Work| w.stat.as_ref().map_or(0, |s| s.size_bytes);
@@ -192,7 +222,8 @@ pub fn plan(
     let left = wanted - work.len();
     let known = found.len() - wanted - not_asked;
     let here = accounts.values().filter_map(digests).collect();
-    Ok(Plan { found: found.len(), known, work, accounts, here, gone, not_asked, left })
+    let files = found.iter().map(|(shown, (files, _))| (shown.clone(), files.clone())).collect();
+    Ok(Plan { found: found.len(), known, work, accounts, here, gone, not_asked, left, strays, files })
 }
 
 /// What was read, and which settings touched it, of a log that went well.
@@ -258,19 +289,27 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    fn judge(&self, shown: &str, path: &Path, before: Option<&LogAccount>) -> Verdict {
-        let stat = FileStat::of(path);
+    fn judge(
+        &self,
+        shown: &str,
+        (files, fault): &(Files, Option<Complaint>),
+        before: Option<&LogAccount>,
+    ) -> Verdict {
+        let stat = FileStat::of_log(files);
         let Some(why) = self.reason(before, stat.as_ref()) else { return Verdict::Known };
         // A log that cannot be identified is done whatever was asked, or its fault would never be told.
-        let flight =
-            || before.and_then(flight_of).or_else(|| job::flight::identify(path, shown, self.config).ok());
+        let flight = || {
+            before
+                .and_then(flight_of)
+                .or_else(|| Some(job::flight::identify(files, shown, self.config).ok()?.0))
+        };
         let asked =
             !self.request.is_narrow() || flight().is_none_or(|f| self.request.wants(&f, self.installations));
         if !asked {
             return Verdict::NotAsked;
         }
-        let (path, shown, before) = (path.to_owned(), shown.to_owned(), before.cloned());
-        Verdict::Do(Box::new(Work { path, shown, stat, why, before }))
+        let (files, fault, shown) = (files.clone(), fault.clone(), shown.to_owned());
+        Verdict::Do(Box::new(Work { files, fault, shown, stat, why, before: before.cloned() }))
     }
 
     /// Why this log is done tonight, or nothing when it is accounted for.
@@ -312,44 +351,4 @@ impl Judge<'_> {
 
 fn positions_of(account: &LogAccount) -> Vec<Position> {
     account.positions.iter().filter_map(|p| Position::new(p).ok()).collect()
-}
-
-/// Every file that fits a pattern, by its shown name.
-///
-/// # Errors
-/// [`Error::Refused`] when a pattern fits no file, or is no pattern.
-pub fn find(config: &Config) -> Result<BTreeMap<String, PathBuf>, Error> {
-    let mut found = BTreeMap::new();
-    let mut silent = BTreeSet::new();
-    // `**` reaches our own results and tables, which are no logs.
-    let (store, table) = (config.store(), config.path(&config.document.logs.installations));
-    for pattern in &config.document.logs.files {
-        // The folder's own name may hold brackets; only what the user wrote is a pattern.
-        let folder = glob::Pattern::escape(&config.folder.to_string_lossy());
-        let full = Path::new(&folder).join(pattern);
-        let paths = glob::glob(&full.to_string_lossy()).map_err(|e| {
-            let what = format!("`{pattern}` is no pattern of files: {e}");
-            Error::refused(Complaint::new("bad_pattern", what).in_file(config.file.display()))
-        })?;
-        let ours = |path: &PathBuf| path.starts_with(&store) || *path == table;
-        let files: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file() && !ours(path)).collect();
-        if files.is_empty() {
-            silent.insert(pattern.as_str());
-        }
-        found.extend(files.into_iter().map(|path| (shown(config, &path), path)));
-    }
-    // Silence is a fault: a pattern that fits nothing is more often a moved folder than a day without flights.
-    if silent.is_empty() { Ok(found) } else { Err(Error::refused(no_log(config, &silent))) }
-}
-
-fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Complaint {
-    let patterns = silent.iter().map(|p| format!("`{p}`")).collect::<Vec<_>>().join(", ");
-    let folder = if config.folder.as_os_str().is_empty() { Path::new(".") } else { &config.folder };
-    Complaint::new("no_log_matched", format!("no log fits {patterns}"))
-        .in_file(config.file.display())
-        .hint(format!("patterns start from {}; are the logs there tonight?", folder.display()))
-}
-
-fn shown(config: &Config, path: &Path) -> String {
-    path.strip_prefix(&config.folder).unwrap_or(path).to_string_lossy().replace('\\', "/")
 }

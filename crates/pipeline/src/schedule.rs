@@ -16,6 +16,7 @@ use store::{Holder, LogAccount, LogResult, Store, Writer};
 
 use crate::account::{self, Report};
 use crate::book::{Book, Done};
+use crate::bundle;
 use crate::error::Error;
 use crate::event::Event;
 use crate::plan::{self, Plan, Request, Why, Work};
@@ -49,7 +50,7 @@ pub struct Context<'a> {
 /// [`Error::Refused`] with every complaint about it.
 pub fn installations(config: &Config) -> Result<Installations, Error> {
     let file = config.path(&config.document.logs.installations);
-    ingest::tables::installations(&file)
+    ingest::tables::installations(&file, &config.document.columns.installations)
         .map_err(|found| Error::Refused(found.iter().map(ingest::Error::complaint).collect()))
 }
 
@@ -72,7 +73,7 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let clock = Instant::now();
     let installations = installations(config)?;
     // Before a store is made: a refused run leaves nothing behind.
-    plan::find(config)?;
+    bundle::find(config)?;
     let store = Store::create_or_open(config.store())?;
     let mut writer = store.lock(&context.holder, context.wait)?;
     let plan = plan::plan(config, &installations, store.accounts()?, request)?;
@@ -193,7 +194,10 @@ impl Shop<'_> {
     }
 
     fn open(&self, work: &Work) -> Done {
-        let opened = match Opened::open(&work.path, &work.shown, self.config) {
+        if let Some(fault) = &work.fault {
+            return self.failed(work, fault.clone());
+        }
+        let opened = match Opened::open(&work.files, &work.shown, self.config, self.installations) {
             Ok(opened) => opened,
             Err(complaint) => return self.failed(work, complaint),
         };
@@ -226,7 +230,7 @@ impl Shop<'_> {
             .or_else(|| self.plan.gone.get(&digests).copied())
     }
 
-    fn read(&self, opened: &Opened<'_>, mut account: LogAccount) -> Done {
+    fn read(&self, opened: &Opened, mut account: LogAccount) -> Done {
         let stamp = Stamp {
             run_id: self.run_id.to_owned(),
             program_version: self.context.program_version.to_owned(),
@@ -247,7 +251,7 @@ impl Shop<'_> {
         writer: &mut Writer,
         report: &mut Report,
     ) -> Result<Vec<trends::Unit>, Error> {
-        let mut book = Book::of(self.plan);
+        let mut book = Book::of(self.plan, self.config, self.installations);
         while let Ok(first) = done.recv() {
             let gathered = gather(first, done).into_iter();
             let results: Vec<LogResult> = gathered.flat_map(|done| book.settle(done, report)).collect();

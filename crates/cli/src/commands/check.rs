@@ -1,14 +1,15 @@
 //! `check`: what logs offer, channel by channel, before anything is computed or written.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use fleet::{Complaint, Installations};
-use ingest::{PositionColumns, Quality, quality};
+use ingest::{Actuator, Files, PositionColumns, Quality, quality};
 use job::Config;
 use job::flight::{Opened, caught};
-use pipeline::Request;
+use pipeline::bundle;
 use serde::Serialize;
 
 use crate::args::{CheckArgs, Format, Global};
@@ -30,15 +31,17 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
     let (config, installations) = booked(global)?;
     let logs = logs(args, &config, talk)?;
     let (mut channels, mut complaints, mut page) = (Vec::new(), Vec::new(), String::new());
-    for (path, name) in &logs {
+    let mut schemas = Schemas::default();
+    for (files, name) in &logs {
         let looked = caught(name, || {
-            let opened = Opened::open(path, name, &config)?;
+            let opened = Opened::open(files, name, &config, &installations)?;
+            schemas.enter(name, &opened.column_types());
             one(&opened, name, &config, &installations, &mut channels, &mut complaints, &mut page);
             Ok(())
         });
         complaints.extend(looked.err());
     }
-    let table = || format!("{page}{}", summary(logs.len(), &complaints));
+    let table = || format!("{page}{}{}", schemas.drift(), summary(logs.len(), &complaints));
     if args.output.format() == Format::Table && args.output.output.is_none() {
         talk.answer(&table())?;
     } else {
@@ -48,18 +51,17 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
     Ok(if complaints.is_empty() { Code::Well } else { Code::LogsInError })
 }
 
-fn logs(
-    args: &CheckArgs,
-    config: &Config,
-    talk: &Talk,
-) -> Result<Vec<(std::path::PathBuf, String)>, Failure> {
+fn logs(args: &CheckArgs, config: &Config, talk: &Talk) -> Result<Vec<(Files, String)>, Failure> {
     if !args.logs.is_empty() {
-        return Ok(args.logs.iter().map(|path| (path.clone(), shown(path))).collect());
+        let whole = |path: &std::path::PathBuf| Ok((bundle::around(config, path)?, shown(path)));
+        return args.logs.iter().map(whole).collect();
     }
-    let request = Request { redo: true, ..Request::default() };
-    let plan = pipeline::schedule::dry_run(config, &request)?;
-    let mut logs: Vec<_> = plan.work.into_iter().map(|w| (w.path, w.shown)).collect();
-    logs.sort();
+    let found = bundle::find(config)?;
+    for stray in &found.strays {
+        talk.note(&format!("{stray}: no main log is of its flight, so it is not used"));
+    }
+    let faulty = found.faulty.into_iter().map(|(name, (path, _))| (Files::one(path), name));
+    let mut logs: Vec<_> = found.logs.into_iter().map(|(name, files)| (files, name)).chain(faulty).collect();
     if logs.len() > args.limit {
         talk.note(&format!("looking at {} of {} logs; `--limit` looks at more", args.limit, logs.len()));
         logs.truncate(args.limit);
@@ -83,12 +85,15 @@ struct Channel {
     min: Option<f64>,
     max: Option<f64>,
     resolution: Option<f64>,
+    rate_hz: Option<f64>,
     frozen_share: Option<f64>,
+    saturated_share: Option<f64>,
+    spikes: Option<i64>,
     note: Option<String>,
 }
 
 fn one(
-    opened: &Opened<'_>,
+    opened: &Opened,
     name: &str,
     config: &Config,
     installations: &Installations,
@@ -97,50 +102,66 @@ fn one(
     page: &mut String,
 ) {
     let id = &opened.identity;
-    let line = opened.timeline();
-    let _ = writeln!(
-        page,
-        "{name}\n  {} flight {} departed {}\n  {} rows, {:.3} Hz, {}{}",
-        id.tail_number,
-        id.flight_id,
-        id.departure_utc,
-        line.rows,
-        line.step_s.recip(),
-        match line.segments.len() {
-            1 => "unbroken".to_owned(),
-            n => format!("{n} unbroken stretches"),
-        },
-        repairs(line)
-    );
-    let first = channels.len();
+    let (first, mut clocks) = (channels.len(), Vec::new());
     for at in opened.actuators(installations) {
         match actuator(opened, name, at, config, installations) {
-            Ok(found) => channels.extend(found),
+            Ok((found, clock)) => {
+                channels.extend(found);
+                clocks.extend(clock);
+            }
             Err(complaint) => complaints.push(complaint.in_file(name)),
         }
     }
+    clocks.dedup();
+    let checksums = match opened.is_checked() {
+        Ok(true) => "every page carries a checksum",
+        Ok(false) => {
+            "no page checksums: a flipped byte may go unseen (`write_page_checksum=True` in pyarrow)"
+        }
+        Err(_) => "page headers cannot be read",
+    };
+    let _ = writeln!(
+        page,
+        "{name}\n  {} flight {} departed {}\n  {} rows, {}\n  {checksums}",
+        id.tail_number,
+        id.flight_id,
+        id.departure_utc,
+        opened.rows(),
+        clocks.join("; "),
+    );
     page.push_str(&layout(&channels[first..]));
     page.push('\n');
 }
 
-fn repairs(line: &ingest::Timeline) -> String {
-    let r = line.repairs;
-    if r.none() {
-        return String::new();
-    }
-    format!(
-        "; mended: {} out of order, {} repeated, {} without a stamp",
-        r.out_of_order, r.repeated, r.unstamped
-    )
+/// The clock of an actuator in words.
+fn clock(a: &Actuator) -> String {
+    let stretches = match a.segments.len() {
+        1 => "unbroken".to_owned(),
+        n => format!("{n} unbroken stretches"),
+    };
+    let r = a.repairs;
+    let mended = [
+        (r.out_of_order, "out of order"),
+        (r.repeated, "repeated"),
+        (r.unstamped, "without a stamp"),
+        (r.filled, "given a stamp by the rate"),
+    ];
+    let mended: Vec<String> = mended
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect();
+    let mended = if mended.is_empty() { String::new() } else { format!("; mended: {}", mended.join(", ")) };
+    format!("{:.3} Hz, {stretches}{mended}", a.step_s.recip())
 }
 
 fn actuator(
-    opened: &Opened<'_>,
+    opened: &Opened,
     name: &str,
     at: &PositionColumns,
     config: &Config,
     installations: &Installations,
-) -> Result<Vec<Channel>, Complaint> {
+) -> Result<(Vec<Channel>, Option<String>), Complaint> {
     let id = &opened.identity;
     let (stay, part) = opened.unit(at, config, installations)?;
     let base = |channel: &'static str, column: &Option<String>, unit: &'static str| Channel {
@@ -157,26 +178,34 @@ fn actuator(
         min: None,
         max: None,
         resolution: None,
+        rate_hz: None,
         frozen_share: None,
+        saturated_share: None,
+        spikes: None,
         note: None,
     };
     let [motor, screw, load, _] = &at.columns;
     if !at.lacking.is_empty() {
         let note =
             Some(format!("would be refused, channel_unmapped: the log lacks {}", at.lacking.join(", ")));
-        return Ok(vec![Channel { note, ..base("all", motor, "") }]);
+        return Ok((vec![Channel { note, ..base("all", motor, "") }], None));
     }
     let a = opened.channels(at, part)?;
-    let screw_m: Vec<f64> = a.motor_m.iter().zip(&a.dx_m).map(|(m, d)| m + d).collect();
     let slope = quality::slope(&a.motor_m, &a.dx_m).map(slope_note);
+    let [motor_seen, screw_seen, load_seen] = a.quality;
     let mut found = vec![
-        describe(base("motor_position", motor, "m"), &a.motor_m),
-        describe(base("screw_position", screw, "m"), &screw_m),
-        describe(base("screw − motor", screw, "m"), &a.dx_m),
-        describe(base("load", load, "N"), &a.load_n),
+        describe(base("motor_position", motor, "m"), motor_seen, &said(&a, "motor")),
+        describe(base("screw_position", screw, "m"), screw_seen, &said(&a, "screw")),
+        describe(base("screw − motor", screw, "m"), Quality::of(&a.dx_m, a.step_s), &[]),
+        describe(base("load", load, "N"), load_seen, &said(&a, "load")),
     ];
     found[2].note = found[2].note.take().or(slope);
-    Ok(found)
+    Ok((found, Some(clock(&a))))
+}
+
+/// The doubts about one channel.
+fn said<'a>(a: &'a Actuator, channel: &str) -> Vec<&'a str> {
+    a.flags.iter().map(String::as_str).filter(|flag| flag.starts_with(channel)).collect()
 }
 
 fn slope_note(slope: f64) -> String {
@@ -187,17 +216,23 @@ fn slope_note(slope: f64) -> String {
     }
 }
 
-fn describe(base: Channel, values: &[f64]) -> Channel {
-    let q = Quality::of(values);
-    let note = q.is_constant().then(|| "never moves".to_owned());
+fn describe(base: Channel, q: Quality, doubts: &[&str]) -> Channel {
+    let still = if q.is_zero() {
+        Some("is always zero: channel_zero".to_owned())
+    } else {
+        q.is_constant().then(|| "never moves: channel_constant".to_owned())
+    };
     Channel {
         samples: q.samples as i64,
         missing_share: Some(q.missing_share),
         min: Some(q.min),
         max: Some(q.max),
         resolution: q.resolution,
+        rate_hz: Some(q.rate_hz),
         frozen_share: Some(q.frozen_share),
-        note,
+        saturated_share: Some(q.saturated_share),
+        spikes: Some(q.spikes as i64),
+        note: still.or_else(|| (!doubts.is_empty()).then(|| doubts.join(", "))),
         ..base
     }
 }
@@ -212,8 +247,10 @@ fn layout(channels: &[Channel]) -> String {
         number("max", 0),
         text("unit", 0),
         number("smallest step", 4),
+        number("rate Hz", 6),
         number("missing %", 2),
         number("frozen %", 5),
+        number("spikes", 7),
         text("note", 0),
     ];
     let cells = |c: &Channel| {
@@ -232,12 +269,64 @@ fn layout(channels: &[Channel]) -> String {
             value(c.max),
             if c.unit == "m" { "mm".into() } else { c.unit.to_owned() },
             step,
+            c.rate_hz.map_or_else(table::dash, |rate| format!("{rate:.1}")),
             share(c.missing_share),
             share(c.frozen_share),
+            c.spikes.map_or_else(table::dash, |n| n.to_string()),
             c.note.clone().unwrap_or_default(),
         ]
     };
     table::layout(&columns, &channels.iter().map(cells).collect::<Vec<_>>())
+}
+
+/// Which columns the logs have, and of which types: they change over the years.
+#[derive(Default)]
+struct Schemas {
+    logs: usize,
+    /// Column → type → logs that have it so, and the first of them.
+    columns: BTreeMap<String, BTreeMap<String, (usize, String)>>,
+}
+
+impl Schemas {
+    fn enter(&mut self, log: &str, columns: &[(String, String)]) {
+        self.logs += 1;
+        for (name, kind) in columns {
+            let seen = self.columns.entry(name.clone()).or_default();
+            seen.entry(kind.clone()).or_insert_with(|| (0, log.to_owned())).0 += 1;
+        }
+    }
+
+    /// What is not alike in all logs; each is read as it is.
+    fn drift(&self) -> String {
+        const SHOWN: usize = 12;
+        let differs = |kinds: &BTreeMap<String, (usize, String)>| {
+            kinds.len() > 1 || kinds.values().any(|(count, _)| *count < self.logs)
+        };
+        let lines: Vec<String> = self
+            .columns
+            .iter()
+            .filter(|(_, kinds)| differs(kinds))
+            .map(|(name, kinds)| {
+                let kinds: Vec<String> = kinds
+                    .iter()
+                    .map(|(kind, (count, first))| format!("{kind} in {count} (first {first})"))
+                    .collect();
+                format!("  `{name}`: {}\n", kinds.join(", "))
+            })
+            .collect();
+        if lines.is_empty() {
+            return String::new();
+        }
+        let more = match lines.len().saturating_sub(SHOWN) {
+            0 => String::new(),
+            n => format!("  and {n} columns more\n"),
+        };
+        let shown: String = lines.into_iter().take(SHOWN).collect();
+        format!(
+            "columns that are not alike in all {} logs (each log is read as it is):\n{shown}{more}",
+            self.logs
+        )
+    }
 }
 
 fn summary(logs: usize, complaints: &[Complaint]) -> String {
@@ -264,7 +353,10 @@ fn schema() -> SchemaRef {
         real("min"),
         real("max"),
         real("resolution"),
+        real("rate_hz"),
         real("frozen_share"),
+        real("saturated_share"),
+        Field::new("spikes", DataType::Int64, true),
         text("note"),
     ]))
 }

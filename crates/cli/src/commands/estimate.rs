@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use arrow::datatypes::{Field, Schema};
 use fleet::{Complaint, Estimate, Installations, PartNumber, Position, SerialNumber};
+use ingest::Files;
 use job::Config;
 use job::flight::{Opened, anonymous, caught, part_of};
 use serde::Serialize;
@@ -31,7 +32,10 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, talk: &Talk) -> Res
     for path in &args.logs {
         let read = match &part {
             Some(number) => caught(&shown(path), || as_part(path, &config, number)),
-            None => caught(&shown(path), || booked_log(path, &config, &installations, &mut complaints)),
+            None => {
+                let files = pipeline::bundle::around(&config, path)?;
+                caught(&shown(path), || booked_log(path, &files, &config, &installations, &mut complaints))
+            }
         };
         match read {
             Ok(rows) => found.extend(rows),
@@ -76,7 +80,7 @@ fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
 
 fn as_part(path: &Path, config: &Config, number: &PartNumber) -> Result<Vec<Row>, Complaint> {
     let name = shown(path);
-    let found = anonymous(path, &name, config, part_of(config, number)?)?;
+    let found = anonymous(&Files::one(path), &name, config, part_of(config, number)?)?;
     let row = |(position, estimate): (Position, Estimate)| Row {
         tail_number: None,
         position: Some(position.to_string()),
@@ -89,7 +93,7 @@ fn as_part(path: &Path, config: &Config, number: &PartNumber) -> Result<Vec<Row>
         estimate,
         log_path: name.clone(),
         log_digest: None,
-        config_digest: config.digest(number),
+        config_digest: config.digest_of_part(number),
         program_version: super::VERSION,
     };
     Ok(found.into_iter().map(row).collect())
@@ -97,12 +101,13 @@ fn as_part(path: &Path, config: &Config, number: &PartNumber) -> Result<Vec<Row>
 
 fn booked_log(
     path: &Path,
+    files: &Files,
     config: &Config,
     installations: &Installations,
     complaints: &mut Vec<Complaint>,
 ) -> Result<Vec<Row>, Complaint> {
     let name = shown(path);
-    let opened = Opened::open(path, &name, config)?;
+    let opened = Opened::open(files, &name, config, installations)?;
     let flight = opened.flight();
     let mut rows = Vec::new();
     for at in opened.actuators(installations) {
@@ -122,7 +127,7 @@ fn booked_log(
                 estimate,
                 log_path: name.clone(),
                 log_digest: Some(opened.digest.clone()),
-                config_digest: config.digest(&stay.part_number),
+                config_digest: config.digest(&flight.tail_number, &stay.part_number),
                 program_version: super::VERSION,
             }),
             Err(complaint) => complaints.push(complaint.in_file(&name)),
@@ -189,7 +194,13 @@ fn trace(
     let mut all = job::trace::Trace::default();
     for path in logs {
         // A log in error was told of already; its trace is simply not there.
-        let Ok(opened) = job::trace::of_log(path, &shown(path), config, installations, part) else {
+        let Ok(opened) = job::trace::of_log(
+            &pipeline::bundle::around(config, path)?,
+            &shown(path),
+            config,
+            installations,
+            part,
+        ) else {
             continue;
         };
         all.extend(opened);

@@ -54,6 +54,6 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let table = dir.path().join("installations.csv");
         fs::write(&table, FILES[1].1).unwrap();
-        assert!(ingest::tables::installations(&table).is_ok());
+        assert!(ingest::tables::installations(&table, &std::collections::BTreeMap::new()).is_ok());
     }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod check;
 pub(crate) mod estimate;
 pub(crate) mod init;
+pub(crate) mod normalize;
 pub(crate) mod query;
 pub(crate) mod run;
 pub(crate) mod shell;

@@ -10,9 +10,10 @@ use arrow::array::{
 };
 use arrow::datatypes::{Int32Type, Schema};
 use fleet::Position;
+use ingest::identity::Facts;
 use ingest::schema::{Fact, IdentityMapping};
 use ingest::unit::{TimeUnit, Unit};
-use ingest::{Actuator, ChannelMapping, Channels, ClockMapping, Geometry, Log, Mapping};
+use ingest::{Actuator, ChannelMapping, Channels, ClockMapping, Files, Geometry, Log, Mapping};
 use parquet::arrow::ArrowWriter;
 
 /// Writes columns with the plain writer of the Arrow library.
@@ -46,7 +47,13 @@ pub(crate) fn mapping(motor: ChannelMapping, screw: ChannelMapping, load: Channe
             unit: Some(TimeUnit::Second),
             ..ClockMapping::default()
         },
-        channels: Channels { motor_position: motor, screw_position: screw, load, ..Channels::default() },
+        channels: Channels {
+            motor_position: motor,
+            screw_position: Some(screw),
+            load,
+            ..Channels::default()
+        },
+        ..Mapping::default()
     }
 }
 
@@ -57,10 +64,9 @@ fn only(mapping: &Mapping, columns: &[(&str, ArrayRef)], geometry: Geometry) -> 
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("N1_20261119T041300Z.parquet");
     write(&file, columns);
-    let log = Log::open(&file, mapping).unwrap();
-    let line = log.timeline().unwrap();
-    let positions = log.positions(Some(&Position::new("aileron").unwrap())).unwrap();
-    log.actuator(&positions[0], &line, geometry).unwrap()
+    let log = Log::open(&Files::one(&file), &Arc::new(mapping.clone())).unwrap();
+    let positions = log.positions(&mapping.channels, Some(&Position::new("aileron").unwrap())).unwrap();
+    log.actuator(&positions[0], &mapping.channels, geometry).unwrap()
 }
 
 fn reals(values: &[f64]) -> ArrayRef {
@@ -199,9 +205,14 @@ fn every_clock_gives_the_same_step() {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("N1_20261119T041300Z.parquet");
         write(&file, &[("t", clock), ("m", x.clone()), ("s", x.clone()), ("f", x.clone())]);
-        let line = Log::open(&file, &m).unwrap().timeline().unwrap();
+        let log = Log::open(&Files::one(&file), &Arc::new(m.clone())).unwrap();
+        let at = log.positions(&m.channels, Some(&Position::new("a").unwrap())).unwrap();
+        let line = log.actuator(&at[0], &m.channels, LINEAR).unwrap();
         assert!((line.step_s - 0.02).abs() < 1e-9, "{line:?}");
-        assert_eq!(line.start_utc.map(jiff::Timestamp::as_second), absolute.then_some(1_700_000_000));
+        assert_eq!(
+            log.start_utc().unwrap().map(jiff::Timestamp::as_second),
+            absolute.then_some(1_700_000_000)
+        );
     }
 }
 
@@ -219,11 +230,11 @@ fn a_wide_log_offers_each_position_and_names_what_one_lacks() {
         channel("{position}_s", Unit::Metre),
         channel("{position}_f", Unit::Newton),
     );
-    let log = Log::open(&file, &m).unwrap();
-    let found = log.positions(None).unwrap();
+    let log = Log::open(&Files::one(&file), &Arc::new(m.clone())).unwrap();
+    let found = log.positions(&m.channels, None).unwrap();
     let told: Vec<_> = found.iter().map(|p| (p.position.as_str(), p.lacking.clone())).collect();
     assert_eq!(told, [("left", vec![]), ("right", vec!["right_f".to_owned()])]);
-    let identity = log.identity(&log.timeline().unwrap()).unwrap();
+    let identity = log.identity(|_| Facts::new()).unwrap();
     assert_eq!(identity.tail_number.as_str(), "N1");
     assert_eq!(identity.departure_utc.to_string(), "2026-11-19T04:13:00Z");
 }
@@ -245,8 +256,8 @@ fn metadata_wins_over_columns_and_columns_over_the_path() {
     m.identity.columns =
         BTreeMap::from([(Fact::TailNumber, "tail".into()), (Fact::FlightId, "flight".into())]);
     let tail = |m: &Mapping| {
-        let log = Log::open(&file, m).unwrap();
-        log.identity(&log.timeline().unwrap()).unwrap()
+        let log = Log::open(&Files::one(&file), &Arc::new(m.clone())).unwrap();
+        log.identity(|_| Facts::new()).unwrap()
     };
     assert_eq!(tail(&m).tail_number.as_str(), "N2");
     m.identity.metadata =
@@ -263,7 +274,7 @@ fn an_absolute_clock_in_milliseconds_keeps_its_instant() {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("x.parquet");
         write(&file, &[("t", t)]);
-        Log::open(&file, &m).unwrap().timeline().unwrap().start_utc.unwrap().to_string()
+        Log::open(&Files::one(&file), &Arc::new(m.clone())).unwrap().start_utc().unwrap().unwrap().to_string()
     };
     assert_eq!(
         stamps(Arc::new(TimestampMillisecondArray::from(vec![1_763_525_580_250, 1_763_525_580_350]))),
@@ -288,9 +299,9 @@ fn text_where_numbers_should_stand_is_refused_by_name() {
         &file,
         &[("t", reals(&[0.0, 1.0])), ("m", text), ("s", reals(&[0.0, 1.0])), ("f", reals(&[0.0, 1.0]))],
     );
-    let log = Log::open(&file, &m).unwrap();
-    let positions = log.positions(Some(&Position::new("a").unwrap())).unwrap();
-    let error = log.actuator(&positions[0], &log.timeline().unwrap(), LINEAR).unwrap_err();
+    let log = Log::open(&Files::one(&file), &Arc::new(m.clone())).unwrap();
+    let positions = log.positions(&m.channels, Some(&Position::new("a").unwrap())).unwrap();
+    let error = log.actuator(&positions[0], &m.channels, LINEAR).unwrap_err();
     assert_eq!(error.complaint().code, "column_type");
     assert_eq!(error.complaint().column.as_deref(), Some("m"));
 }
@@ -314,7 +325,11 @@ fn a_local_clock_takes_the_mapped_zone_or_says_nothing() {
         let file = dir.path().join("x.parquet");
         let stamps = TimestampMillisecondArray::from(vec![1_763_525_580_250, 1_763_525_580_350]);
         write(&file, &[("t", Arc::new(stamps))]);
-        Log::open(&file, m).unwrap().timeline().unwrap().start_utc.map(|t| t.to_string())
+        Log::open(&Files::one(&file), &Arc::new(m.clone()))
+            .unwrap()
+            .start_utc()
+            .unwrap()
+            .map(|t| t.to_string())
     };
     m.identity.time_zone = Some("Europe/Istanbul".into());
     assert_eq!(start(&m).as_deref(), Some("2025-11-19T01:13:00.25Z"));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array};
 use ingest::unit::Unit;
-use ingest::{Error, Log, Mapping};
+use ingest::{Actuator, Error, Files, Geometry, Log, Mapping};
 
 use crate::layouts::{channel, mapping, write};
 
@@ -21,7 +21,13 @@ fn sound(file: &Path) {
     );
 }
 
-fn code(result: Result<Log<'_>, Error>) -> String {
+fn read(file: &Path, m: &Mapping) -> Result<Actuator, Error> {
+    let log = Log::open(&Files::one(file), &Arc::new(m.clone()))?;
+    let at = log.positions(&m.channels, Some(&fleet::Position::new("a").unwrap()))?;
+    log.actuator(&at[0], &m.channels, Geometry::Linear { lead_m_per_rev: None })
+}
+
+fn code(result: Result<Log, Error>) -> String {
     result.err().map(|e| e.complaint().code).unwrap_or_default()
 }
 
@@ -32,13 +38,16 @@ fn what_is_no_log_is_told_apart() {
     let at = |name: &str, bytes: &[u8]| {
         let file = dir.path().join(name);
         std::fs::write(&file, bytes).unwrap();
-        code(Log::open(&file, &m))
+        code(Log::open(&Files::one(&file), &Arc::new(m.clone())))
     };
     assert_eq!(at("empty.parquet", b""), "empty_log");
     assert_eq!(at("text.parquet", b"time,motor,screw\n1,2,3\n"), "not_parquet");
     assert_eq!(at("encrypted.parquet", b"PARE\x00\x00\x00\x00PARE"), "not_parquet");
-    assert_eq!(code(Log::open(dir.path(), &m)), "unreadable");
-    assert_eq!(code(Log::open(&dir.path().join("none.parquet"), &m)), "unreadable");
+    assert_eq!(code(Log::open(&Files::one(dir.path()), &Arc::new(m.clone()))), "unreadable");
+    assert_eq!(
+        code(Log::open(&Files::one(dir.path().join("none.parquet")), &Arc::new(m.clone()))),
+        "unreadable"
+    );
 }
 
 #[test]
@@ -47,7 +56,7 @@ fn a_log_without_rows_says_so() {
     let file = dir.path().join("none.parquet");
     let none: ArrayRef = Arc::new(Float64Array::from(Vec::<f64>::new()));
     write(&file, &[("t", none)]);
-    assert_eq!(code(Log::open(&file, &plain())), "empty_log");
+    assert_eq!(code(Log::open(&Files::one(&file), &Arc::new(plain()))), "empty_log");
 }
 
 #[test]
@@ -59,7 +68,7 @@ fn a_log_cut_short_anywhere_is_no_whole_file() {
     for cut in [4, bytes.len() / 3, bytes.len() / 2, bytes.len() - 9, bytes.len() - 1] {
         let torn = dir.path().join("torn.parquet");
         std::fs::write(&torn, &bytes[..cut]).unwrap();
-        assert_eq!(code(Log::open(&torn, &plain())), "not_parquet", "cut at {cut}");
+        assert_eq!(code(Log::open(&Files::one(&torn), &Arc::new(plain()))), "not_parquet", "cut at {cut}");
     }
 }
 
@@ -71,9 +80,9 @@ fn a_flipped_byte_changes_the_digest() {
     sound(&file);
     let m = plain();
     let digest = |file: &Path| {
-        let log = Log::open(file, &m).unwrap();
-        let positions = log.positions(Some(&fleet::Position::new("a").unwrap())).unwrap();
-        log.digest(&positions).unwrap()
+        let log = Log::open(&Files::one(file), &Arc::new(m.clone())).unwrap();
+        let positions = log.positions(&m.channels, Some(&fleet::Position::new("a").unwrap())).unwrap();
+        log.digest(&[(&m.channels, &positions[0])]).unwrap()
     };
     let before = digest(&file);
     let mut bytes = std::fs::read(&file).unwrap();
@@ -93,9 +102,9 @@ fn a_clock_without_a_unit_is_never_guessed() {
     sound(&file);
     let mut m = plain();
     m.clock.unit = None;
-    let error = Log::open(&file, &m).unwrap().timeline().unwrap_err();
+    let error = read(&file, &m).unwrap_err();
     assert_eq!(error.complaint().code, "time_unit_unknown");
     m.clock.column = None;
-    let error = Log::open(&file, &m).unwrap().timeline().unwrap_err();
+    let error = read(&file, &m).unwrap_err();
     assert_eq!(error.complaint().code, "no_clock");
 }

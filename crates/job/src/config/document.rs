@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 
 use fleet::Complaint;
 use ingest::identity::zone;
-use ingest::pattern::{PLACEHOLDER, nearest};
+use ingest::pattern::nearest;
 use ingest::schema::Fact;
-use ingest::unit::Dimension;
-use ingest::{ChannelMapping, Channels, ClockMapping, IdentityMapping, Mapping};
+use ingest::unit::TimeUnit;
+use ingest::{Channels, ClockMapping, GroupMapping, IdentityMapping, Layout, Mapping};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::channel;
 use super::source::Source;
 use crate::part::PartSettings;
 use crate::value::positive;
@@ -30,8 +31,20 @@ pub struct Document {
     /// The clock of the logs.
     #[serde(default)]
     pub clock: ClockMapping,
+    /// How rows are laid out, where a row is not one sample of every channel.
+    #[serde(default)]
+    pub layout: Layout,
     /// The channels of an actuator.
     pub channel: Channels,
+    /// Files of other kinds that belong to the same flight, by a name of your own.
+    #[serde(default)]
+    pub group: BTreeMap<String, GroupMapping>,
+    /// What is otherwise on some aircraft or for some parts; a later one wins.
+    #[serde(default, rename = "override")]
+    pub overrides: Vec<Override>,
+    /// What your tables call their columns.
+    #[serde(default)]
+    pub columns: TableNames,
     /// How the gap is estimated.
     #[serde(default)]
     pub estimate: EstimateSettings,
@@ -50,6 +63,43 @@ pub struct LogSettings {
     pub files: Vec<String>,
     /// The installations table, CSV or Parquet.
     pub installations: String,
+    /// The flights table, CSV or Parquet: what is known of flights beside their logs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flights: Option<String>,
+    /// Whether files of one flight are its pieces, one after the other. Without it a second file of the
+    /// same flight is a copy of the first, or an error.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub pieces: bool,
+}
+
+/// `[columns]`: our name → what the table calls it.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct TableNames {
+    /// Of the installations table.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub installations: BTreeMap<String, String>,
+    /// Of the flights table.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub flights: BTreeMap<String, String>,
+}
+
+/// `[[override]]`: settings of logs that differ on some aircraft, or for some parts.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Override {
+    /// Tail numbers, `*` and `?` stand for anything; every aircraft when not given.
+    pub tails: Vec<String>,
+    /// Part numbers, in the same way; every part when not given.
+    pub parts: Vec<String>,
+    /// Keys of `[clock]` that are otherwise; not for single parts, since a log has one clock.
+    #[schemars(with = "Option<ClockMapping>")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clock: Option<toml::Table>,
+    /// Keys of `[channel]` that are otherwise.
+    #[schemars(with = "Option<Channels>")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel: Option<toml::Table>,
 }
 
 /// `[store]`.
@@ -112,8 +162,17 @@ impl Document {
         settings.into_generator().into_root_schema_for::<Self>().to_value()
     }
 
+    /// How logs are read where nothing is otherwise.
     pub(super) fn mapping(&self) -> Mapping {
-        Mapping { identity: self.identity.clone(), clock: self.clock.clone(), channels: self.channel.clone() }
+        let bare = |group: &GroupMapping| GroupMapping { files: Vec::new(), ..group.clone() };
+        Mapping {
+            identity: self.identity.clone(),
+            clock: self.clock.clone(),
+            channels: self.channel.clone(),
+            layout: self.layout.clone(),
+            // Where a group's files lie moves no number.
+            groups: self.group.iter().map(|(name, group)| (name.clone(), bare(group))).collect(),
+        }
     }
 
     /// Everything that reads well but cannot be meant.
@@ -124,8 +183,10 @@ impl Document {
                 .hint("files = [\"logs/**/*.parquet\"]");
             found.push(source.at(&["logs", "files"], c));
         }
-        self.check_channels(source, &mut found);
-        self.check_clock(source, &mut found);
+        channel::check(&self.channel, &self.layout, &self.group, &["channel"], source, &mut found);
+        check_clock(&self.clock, &["clock"], source, &mut found);
+        check_layout(&self.layout, &["layout"], source, &mut found);
+        self.check_groups(source, &mut found);
         self.check_identity(source, &mut found);
         for (key, hours) in [
             ("planning_horizon_hours", self.trend.planning_horizon_hours),
@@ -167,82 +228,52 @@ impl Document {
         }
     }
 
-    fn check_channels(&self, source: &Source<'_>, found: &mut Vec<Complaint>) {
-        let c = &self.channel;
-        let position = [Dimension::Length, Dimension::Angle];
-        let load = [Dimension::Force, Dimension::Torque];
-        let temperature = [Dimension::Temperature; 2];
-        let needed = [
-            ("motor_position", &c.motor_position, position),
-            ("screw_position", &c.screw_position, position),
-            ("load", &c.load, load),
-        ];
-        let all = needed.into_iter().chain(c.temperature.iter().map(|t| ("temperature", t, temperature)));
-        let mut columns: BTreeMap<&str, &str> = BTreeMap::new();
-        for (name, channel, wanted) in all {
-            found.extend(
-                channel_complaints(name, channel, wanted)
-                    .into_iter()
-                    .map(|(key, c)| source.at(&["channel", name, key], c)),
-            );
-            if let Some(other) = columns.insert(&channel.column, name) {
-                let c = Complaint::new(
-                    "column_twice",
-                    format!("`{}` is mapped to both {other} and {name}", channel.column),
-                )
-                .hint("two channels cannot share a column");
-                found.push(source.at(&["channel", name, "column"], c));
+    fn check_groups(&self, source: &Source<'_>, found: &mut Vec<Complaint>) {
+        for (name, group) in &self.group {
+            let path = ["group", name.as_str()];
+            if group.files.is_empty() {
+                let c = Complaint::new("no_logs", format!("`group.{name}.files` names no file"));
+                found.push(source.at(&path, c.hint("files = [\"loads/**/*.parquet\"]")));
             }
-        }
-    }
-
-    fn check_clock(&self, source: &Source<'_>, found: &mut Vec<Complaint>) {
-        let clock = &self.clock;
-        if clock.column.is_none() && clock.rate_hz.is_none() {
-            let c = Complaint::new("no_clock", "neither `clock.column` nor `clock.rate_hz` is given")
-                .hint("[clock]\ncolumn = \"time_s\"\nunit = \"s\"");
-            found.push(source.at(&["clock"], c));
-        }
-        for (key, value) in [("rate_hz", clock.rate_hz), ("max_back_s", clock.max_back_s)] {
-            found.extend(positive(key, value).map(|c| source.at(&["clock", key], c)));
+            check_layout(&group.layout, &path, source, found);
+            if let Some(clock) = &group.clock {
+                check_clock(clock, &["group", name.as_str(), "clock"], source, found);
+            }
         }
     }
 }
 
-fn channel_complaints(
-    name: &str,
-    channel: &ChannelMapping,
-    wanted: [Dimension; 2],
-) -> Vec<(&'static str, Complaint)> {
-    let mut found = Vec::new();
-    let dimension = channel.unit.dimension();
-    if !wanted.contains(&dimension) {
-        let words: Vec<&str> = if wanted[0] == wanted[1] {
-            vec![wanted[0].as_str()]
-        } else {
-            wanted.map(Dimension::as_str).to_vec()
-        };
-        let what =
-            format!("`channel.{name}` is in {}, a unit of {}", channel.unit.as_str(), dimension.as_str());
-        found.push((
-            "unit",
-            Complaint::new("unit_contradicts", what)
-                .hint(format!("it needs a unit of {}", words.join(" or "))),
-        ));
+fn check_layout(layout: &Layout, path: &[&str], source: &Source<'_>, found: &mut Vec<Complaint>) {
+    if layout.name_column.is_some() != layout.value_column.is_some() {
+        let c = Complaint::new("key_missing", "`name_column` and `value_column` go together")
+            .hint("name_column = \"parameter\"\nvalue_column = \"value\"");
+        found.push(source.at(path, c));
     }
-    if channel.column.matches(PLACEHOLDER).count() > 1 {
-        let what = format!("`{}` holds {PLACEHOLDER} more than once", channel.column);
-        found.push(("column", Complaint::new("bad_pattern", what)));
+}
+
+/// Everything about a clock that cannot be meant.
+pub(super) fn check_clock(
+    clock: &ClockMapping,
+    path: &[&str],
+    source: &Source<'_>,
+    found: &mut Vec<Complaint>,
+) {
+    let at = |key| path.iter().copied().chain(std::iter::once(key)).collect::<Vec<_>>();
+    if clock.column.is_none() && clock.rate_hz.is_none() {
+        let c = Complaint::new("no_clock", "neither `clock.column` nor `clock.rate_hz` is given")
+            .hint("[clock]\ncolumn = \"time_s\"\nunit = \"s\"");
+        found.push(source.at(path, c));
     }
-    if !matches!(channel.sign, 1 | -1) {
-        let what = format!("`sign` is {}, which must be 1 or -1", channel.sign);
-        found.push(("sign", Complaint::new("bad_sign", what)));
+    if clock.unit == Some(TimeUnit::Count) && clock.rate_hz.is_none() {
+        let c = Complaint::new("no_clock", "a clock in `count` needs `rate_hz`: how fast does it count?");
+        found.push(source.at(&at("unit"), c));
     }
-    if channel.scale == 0.0 || !channel.scale.is_finite() {
-        let what = format!("`scale` is {}, which would make every value the same", channel.scale);
-        found.push(("scale", Complaint::new("bad_scale", what)));
+    for (key, value) in [
+        ("rate_hz", clock.rate_hz),
+        ("max_back_s", clock.max_back_s),
+        ("tick_s", clock.tick_s),
+        ("wraps_at", clock.wraps_at),
+    ] {
+        found.extend(positive(key, value).map(|c| source.at(&at(key), c)));
     }
-    found.extend(positive("gear_ratio", Some(channel.gear_ratio)).map(|c| ("gear_ratio", c)));
-    found.extend(positive("wraps_at", channel.wraps_at).map(|c| ("wraps_at", c)));
-    found
 }

@@ -1,18 +1,24 @@
 //! `pipeline.toml`: read once, checked whole, and its digest carried by every record.
 
+mod channel;
 mod document;
 mod source;
 mod unknown;
+mod variant;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use fleet::{Complaint, PartNumber};
-use ingest::Mapping;
+use fleet::{Complaint, PartNumber, TailNumber};
+use ingest::{Flights, Mapping};
 use serde::Serialize;
 
-pub use document::{Document, EstimateSettings, LogSettings, Method, StoreSettings, TrendSettings};
+pub use document::{
+    Document, EstimateSettings, LogSettings, Method, Override, StoreSettings, TableNames, TrendSettings,
+};
 use source::Source;
+use variant::Variants;
 
 use crate::METHOD_VERSION;
 use crate::part::Part;
@@ -26,14 +32,15 @@ pub struct Config {
     pub folder: PathBuf,
     /// What it says.
     pub document: Document,
-    /// How to read logs.
-    pub mapping: Mapping,
     /// Its parts, checked.
     pub parts: BTreeMap<PartNumber, Part>,
+    /// The flights table; empty when there is none.
+    pub flights: Flights,
+    variants: Variants,
 }
 
 impl Config {
-    /// Reads and checks the file.
+    /// Reads and checks the file, and the flights table that it names.
     ///
     /// # Errors
     /// All complaints at once: an unreadable file or broken TOML alone, else every unknown key, else
@@ -46,7 +53,13 @@ impl Config {
             vec![Complaint::new("config_unreadable", what).in_file(&shown).hint(hint)]
         })?;
         let folder = file.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-        Self::parse(&text, file, &folder)
+        let mut config = Self::parse(&text, file, &folder)?;
+        if let Some(table) = &config.document.logs.flights {
+            let names = &config.document.columns.flights;
+            let read = Flights::read(&config.path(table), names, &config.document.identity);
+            config.flights = read.map_err(|e| e.iter().map(ingest::Error::complaint).collect::<Vec<_>>())?;
+        }
+        Ok(config)
     }
 
     /// Reads and checks the text of a configuration whose relative paths start from `folder`.
@@ -73,11 +86,15 @@ impl Config {
                 })),
             }
         }
-        if !complaints.is_empty() {
-            return Err(complaints);
+        let variants = Variants::check(&document, &source);
+        match variants {
+            Ok(variants) if complaints.is_empty() => {
+                let (file, folder, flights) = (file.to_owned(), folder.to_owned(), Flights::default());
+                Ok(Self { file, folder, document, parts, flights, variants })
+            }
+            Ok(_) => Err(complaints),
+            Err(found) => Err(complaints.into_iter().chain(found).collect()),
         }
-        let mapping = document.mapping();
-        Ok(Self { file: file.to_owned(), folder: folder.to_owned(), document, mapping, parts })
     }
 
     /// A path of the configuration, seen from the current folder.
@@ -90,9 +107,34 @@ impl Config {
         self.path(&self.document.store.path)
     }
 
-    /// blake3 of every setting that can move a number of this part: the mapping, the method, the part
-    /// and the version of the method. Limits and schedules are left out, since they move none.
-    pub fn digest(&self, part: &PartNumber) -> String {
+    /// How logs are read where nothing is otherwise.
+    pub fn base_mapping(&self) -> &Arc<Mapping> {
+        self.variants.base()
+    }
+
+    /// How the logs of an aircraft are read; with a part, how the channels of its actuators are.
+    pub fn mapping(&self, tail: &TailNumber, part: Option<&PartNumber>) -> Arc<Mapping> {
+        self.variants.mapping(tail, part)
+    }
+
+    /// The configured parts whose channels are read otherwise somewhere.
+    pub(crate) fn own_parts(&self) -> impl Iterator<Item = &PartNumber> {
+        self.parts.keys().filter(|part| self.variants.touches(part))
+    }
+
+    /// blake3 of every setting that can move a number of this part on this aircraft: the mapping, the
+    /// method, the part and the version of the method. Limits and schedules are left out, since they move
+    /// none.
+    pub fn digest(&self, tail: &TailNumber, part: &PartNumber) -> String {
+        self.digest_with(&self.mapping(tail, Some(part)), part)
+    }
+
+    /// The same for a log that says nothing of its aircraft.
+    pub fn digest_of_part(&self, part: &PartNumber) -> String {
+        self.digest_with(self.base_mapping(), part)
+    }
+
+    fn digest_with(&self, mapping: &Mapping, part: &PartNumber) -> String {
         #[derive(Serialize)]
         struct Moves<'a> {
             method_version: u32,
@@ -100,12 +142,12 @@ impl Config {
             estimate: &'a EstimateSettings,
             part: Option<crate::part::PartSettings>,
         }
-        let part = self.document.part.get(part.as_str()).map(crate::part::PartSettings::without_limits);
+        let settings = self.document.part.get(part.as_str()).map(crate::part::PartSettings::without_limits);
         let moves = Moves {
             method_version: METHOD_VERSION,
-            mapping: &self.mapping,
+            mapping,
             estimate: &self.document.estimate,
-            part,
+            part: settings,
         };
         // Structs and sorted maps of numbers and text always have a JSON form.
         let text = serde_json::to_vec(&moves).unwrap_or_default();

@@ -119,7 +119,7 @@ fn an_unreadable_file_says_how_to_get_one() {
 #[test]
 fn the_digest_follows_what_moves_a_number() {
     let ema = PartNumber::new("EMA").unwrap();
-    let digest = |line: &str, by: &str| parse(&GOOD.replacen(line, by, 1)).unwrap().digest(&ema);
+    let digest = |line: &str, by: &str| parse(&GOOD.replacen(line, by, 1)).unwrap().digest_of_part(&ema);
     let base = digest("", "");
     for (line, by) in [
         ("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 5.1e7"),
@@ -144,7 +144,7 @@ fn a_second_part_leaves_the_first_ones_digest_alone() {
     let ema = PartNumber::new("EMA").unwrap();
     let second = GOOD[GOOD.find("[part.EMA]").unwrap()..].replace("part.EMA", "part.EMB");
     let both = parse(&format!("{GOOD}\n{second}")).unwrap();
-    assert_eq!(both.digest(&ema), parse(GOOD).unwrap().digest(&ema));
+    assert_eq!(both.digest_of_part(&ema), parse(GOOD).unwrap().digest_of_part(&ema));
 }
 
 #[test]

@@ -1,0 +1,236 @@
+//! One channel: from raw readings on its own clock to SI at the instants of the motor position.
+//!
+//! The motor position leads. A channel of the same rows and the same instants passes untouched; any
+//! other is brought to the motor's instants by [`crate::resample`].
+
+use std::borrow::Cow;
+
+use crate::clock::{self, BREAK_STEPS, Stamps, Timeline};
+use crate::error::{Error, Fault};
+use crate::pattern::Pattern;
+use crate::resample::{Between, Sampled, own_rows, place};
+use crate::schema::{ChannelMapping, ClockMapping, Role};
+use crate::screw::{Geometry, to_si, unwrap_turns};
+use crate::sheet::{Samples, Sheet};
+
+/// The least share of samples that a redundant channel must hold to be called alive.
+const ALIVE_SHARE: f64 = 0.5;
+
+/// Whether a channel can serve: at least half of its samples are there, and it moves.
+pub(crate) fn lives(values: &[f64]) -> bool {
+    let present = || values.iter().copied().filter(|v| v.is_finite());
+    let count = present().count() as f64;
+    let first = present().next();
+    count >= ALIVE_SHARE * values.len() as f64 && present().any(|v| Some(v) != first)
+}
+
+/// How the samples of a channel lie in time.
+#[derive(Debug)]
+pub(crate) struct Sampling<'s> {
+    sheet: &'s Sheet,
+    samples: Samples,
+    time_column: Option<String>,
+    valid: Option<Samples>,
+    shift_s: f64,
+    /// Rows between samples where the channel is slower than its rows; else 1.
+    every: usize,
+    /// Its rows on one clock.
+    pub(crate) line: Timeline,
+}
+
+impl<'s> Sampling<'s> {
+    /// Puts the rows of a channel on one clock.
+    ///
+    /// # Errors
+    /// When there is no clock, or it cannot be mended.
+    pub(crate) fn new(
+        sheet: &'s Sheet,
+        map: &ChannelMapping,
+        name: &str,
+        position: &str,
+    ) -> Result<Self, Error> {
+        let mut sampling = Self::unread(sheet, map, name, position);
+        sampling.line = sampling.read_line(map)?.1;
+        sampling.every = sampling.rows_between(map);
+        Ok(sampling)
+    }
+
+    fn unread(sheet: &'s Sheet, map: &ChannelMapping, name: &str, position: &str) -> Self {
+        let named = |column: &String| Pattern::new(column).column_for(position);
+        Self {
+            sheet,
+            samples: sheet.samples(name, position),
+            time_column: map.time_column.as_ref().map(named),
+            valid: map.valid_column.as_ref().map(|column| sheet.samples(&named(column), position)),
+            shift_s: map.shift_s(),
+            every: 1,
+            line: clock::even(0, 1.0),
+        }
+    }
+
+    /// The column of the channel.
+    pub(crate) fn column(&self) -> &str {
+        self.samples.rows.first().map_or(&self.samples.leaf, |(_, name)| name)
+    }
+
+    /// Whether its rows are those of another channel.
+    fn shares_rows(&self, other: &Self) -> bool {
+        std::ptr::eq(self.sheet, other.sheet)
+            && self.samples.rows == other.samples.rows
+            && self.time_column == other.time_column
+    }
+
+    fn is_apart(&self) -> bool {
+        self.time_column.is_some() || self.sheet.layout.name_column.is_some()
+    }
+
+    /// A channel that stands in rows of its own has a rate of its own.
+    fn clock(&self, map: &ChannelMapping) -> Cow<'s, ClockMapping> {
+        if !self.is_apart() || self.sheet.clock.rate_hz == map.rate_hz {
+            return Cow::Borrowed(&self.sheet.clock);
+        }
+        let shared = if self.time_column.is_some() { None } else { self.sheet.clock.rate_hz };
+        Cow::Owned(ClockMapping { rate_hz: map.rate_hz.or(shared), ..self.sheet.clock.clone() })
+    }
+
+    fn read_line(&self, map: &ChannelMapping) -> Result<(Option<Stamps>, Timeline), Error> {
+        let clock = self.clock(map);
+        if let (None, None, Some(rate_hz), true) =
+            (&clock.column, &self.time_column, clock.rate_hz, self.samples.rows.is_empty())
+        {
+            let rows = self.sheet.count(&self.samples)?;
+            return Ok((None, clock::even(rows, rate_hz)));
+        }
+        let mut stamps = self.sheet.stamps(&self.samples, self.time_column.as_deref())?;
+        let line = clock::align(&mut stamps, &clock).map_err(|f| self.sheet.error(f))?;
+        Ok((Some(stamps), line))
+    }
+
+    fn rows_between(&self, map: &ChannelMapping) -> usize {
+        match map.rate_hz {
+            Some(rate_hz) if !self.is_apart() => {
+                ((self.line.step_s * rate_hz).recip().round() as usize).max(1)
+            }
+            _ => 1,
+        }
+    }
+
+    /// The stamps of the rows that count, and their instants, shifted to when the channel was true.
+    fn instants(&self, map: &ChannelMapping) -> Result<(Stamps, Vec<f64>), Error> {
+        let (stamps, line) = self.read_line(map)?;
+        let stamps = stamps.unwrap_or_else(|| Stamps::even(line.rows, line.step_s.recip()));
+        let mut instants = stamps.of(&self.line);
+        instants.iter_mut().for_each(|t| *t += self.shift_s);
+        Ok((Stamps { seconds: Vec::new(), ..stamps }, instants))
+    }
+
+    /// The channel in SI at its own rows.
+    fn readings(&self, map: &ChannelMapping, geometry: Geometry) -> Result<Vec<f64>, Error> {
+        let si = to_si(self.column(), map, geometry).map_err(|f| self.sheet.error(f))?;
+        let kept = |values: Vec<f64>| match &self.line.kept {
+            Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
+            None => values,
+        };
+        let read = |samples: &Samples| self.sheet.numbers(samples);
+        let raw = read(&self.samples)?;
+        self.same_count(raw.len(), self.column())?;
+        let mut values = kept(raw);
+        if !map.missing.is_empty() {
+            values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
+        }
+        if let Some(valid) = &self.valid {
+            let marks = read(valid)?;
+            self.same_count(marks.len(), &valid.leaf)?;
+            let bad = |mark: &f64| !map.valid_values.contains(mark);
+            values.iter_mut().zip(kept(marks)).filter(|(_, m)| bad(m)).for_each(|(v, _)| *v = f64::NAN);
+        }
+        if let Some(turn) = map.wraps_at {
+            unwrap_turns(&mut values, turn);
+        }
+        values.iter_mut().for_each(|value| *value = si.apply(*value));
+        Ok(values)
+    }
+
+    fn same_count(&self, found: usize, column: &str) -> Result<(), Error> {
+        if found == self.line.rows {
+            return Ok(());
+        }
+        let (column, found, declared) = (column.to_owned(), found as u64, self.line.rows as u64);
+        Err(self.sheet.error(Fault::RowCount { column, found, declared }))
+    }
+
+    /// The channel in SI at every row of its own that counts.
+    ///
+    /// # Errors
+    /// When a column is missing, holds no numbers, cannot be decoded or is in an impossible unit.
+    pub(crate) fn own(&self, map: &ChannelMapping, geometry: Geometry) -> Result<Vec<f64>, Error> {
+        let values = self.readings(map, geometry)?;
+        if self.every == 1 {
+            return Ok(values);
+        }
+        let (_, instants) = self.instants(map)?;
+        let (at_s, values) = thinned(&instants, &values, self.every);
+        let step_s = self.line.step_s * self.every as f64;
+        Ok(place(Sampled { at_s: &at_s, values: &values, step_s }, &instants, Between::Line))
+    }
+}
+
+fn thinned(instants: &[f64], values: &[f64], every: usize) -> (Vec<f64>, Vec<f64>) {
+    own_rows(values, every).into_iter().map(|i| (instants[i as usize], values[i as usize])).unzip()
+}
+
+/// The channel of an actuator that is to be brought to the motor's clock.
+pub(crate) struct Follower<'s, 'c> {
+    /// Its files.
+    pub(crate) sheet: &'s Sheet,
+    /// How it is read.
+    pub(crate) map: &'c ChannelMapping,
+    /// What it is called there.
+    pub(crate) name: &'c str,
+    /// Whose it is.
+    pub(crate) position: &'c str,
+    /// What it measures.
+    pub(crate) role: Role,
+}
+
+/// Reads a channel in SI at the instants of the motor position.
+///
+/// # Errors
+/// As [`Sampling::own`]; [`Fault::ClocksDiffer`] when its clock and the motor's share no zero.
+pub(crate) fn follow(
+    master: &Sampling<'_>,
+    motor: &ChannelMapping,
+    channel: &Follower<'_, '_>,
+    geometry: Geometry,
+) -> Result<Vec<f64>, Error> {
+    let &Follower { sheet, map, name, position, role } = channel;
+    let mut own = Sampling::unread(sheet, map, name, position);
+    let shared = own.shares_rows(master);
+    own.line = if shared { master.line.clone() } else { own.read_line(map)?.1 };
+    own.every = own.rows_between(map);
+    let is_slow_load = role == Role::Load && own.every > 1;
+    if shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load) {
+        return own.readings(map, geometry);
+    }
+    let values = own.readings(map, geometry)?;
+    let (stamps, at_s) = own.instants(map)?;
+    let (at_s, values) = if own.every == 1 { (at_s, values) } else { thinned(&at_s, &values, own.every) };
+    let (lead, mut instants) = master.instants(motor)?;
+    let apart_s = lead.origin.since(stamps.origin).ok_or_else(|| {
+        sheet.error(Fault::ClocksDiffer { column: stamps.column.clone(), other: lead.column.clone() })
+    })?;
+    instants.iter_mut().for_each(|t| *t += apart_s);
+    let step_s = own.line.step_s * own.every as f64;
+    let is_slow = step_s > BREAK_STEPS * master.line.step_s;
+    let between = if role == Role::Load && is_slow { Between::First } else { Between::Line };
+    Ok(place(Sampled { at_s: &at_s, values: &values, step_s }, &instants, between))
+}
+
+/// A nanosecond is no shift.
+fn same_instants(a_s: f64, b_s: f64) -> bool {
+    (a_s - b_s).abs() < 1e-9
+}
+
+pub(crate) fn duration(seconds: f64) -> jiff::SignedDuration {
+    jiff::SignedDuration::try_from_secs_f64(seconds).unwrap_or_default()
+}

@@ -1,0 +1,105 @@
+//! Page checksums: the writer of the Arrow library leaves them out, so they are put in afterwards.
+//!
+//! A page header gets the CRC-32 of its body (Parquet format, `PageHeader.crc`), which makes it a few
+//! bytes longer; so chunks move, and the footer is written anew with their new places.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
+
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{
+    ColumnChunkMetaData, ParquetMetaData, ParquetMetaDataBuilder, ParquetMetaDataReader,
+    ParquetMetaDataWriter, RowGroupMetaData,
+};
+use polars_parquet_format::thrift::protocol::TCompactOutputProtocol;
+
+use crate::page::Pages;
+
+const MAGIC: &[u8; 4] = b"PAR1";
+
+/// Copies a Parquet file page by page, each with its checksum.
+///
+/// # Errors
+/// When the file cannot be read or written.
+pub(crate) fn copy(from: &File, to: &mut File) -> Result<(), ParquetError> {
+    let footer = ParquetMetaDataReader::new().parse_and_finish(from)?;
+    let mut sink = Sink { writer: BufWriter::with_capacity(1 << 20, to), written: 0 };
+    sink.write_all(MAGIC)?;
+    let mut groups = Vec::with_capacity(footer.num_row_groups());
+    for group in footer.row_groups() {
+        let columns = group.columns().iter().map(|chunk| copy_chunk(from, &mut sink, chunk));
+        groups.push(rebuilt(group, columns.collect::<Result<_, _>>()?)?);
+    }
+    let footer: ParquetMetaData =
+        ParquetMetaDataBuilder::new(footer.file_metadata().clone()).set_row_groups(groups).build();
+    ParquetMetaDataWriter::new(&mut sink, &footer).finish()?;
+    Ok(sink.flush()?)
+}
+
+fn rebuilt(
+    group: &RowGroupMetaData,
+    columns: Vec<ColumnChunkMetaData>,
+) -> Result<RowGroupMetaData, ParquetError> {
+    let first = columns.first().map(|chunk| chunk.byte_range().0 as i64);
+    let builder = group.clone().into_builder().set_column_metadata(columns);
+    match first {
+        Some(first) if group.file_offset().is_some() => builder.set_file_offset(first).build(),
+        _ => builder.build(),
+    }
+}
+
+fn copy_chunk(
+    from: &File,
+    sink: &mut Sink<'_>,
+    chunk: &ColumnChunkMetaData,
+) -> Result<ColumnChunkMetaData, ParquetError> {
+    let (start, bytes) = chunk.byte_range();
+    let began = sink.written;
+    let (mut pages, mut header_growth, mut first_data) = (Pages::of(from, start, bytes), 0, None);
+    while let Some(mut page) = pages.next().map_err(ParquetError::General)? {
+        let mut body = vec![0; page.header.compressed_page_size as usize];
+        let mut file = from;
+        file.seek(SeekFrom::Start(page.body_start))?;
+        file.read_exact(&mut body)?;
+        if page.header.dictionary_page_header.is_none() {
+            first_data.get_or_insert(sink.written);
+        }
+        page.header.crc = Some(crc32fast::hash(&body) as i32);
+        let header_start = sink.written;
+        let mut protocol = TCompactOutputProtocol::new(&mut *sink);
+        page.header.write_to_out_protocol(&mut protocol).map_err(|e| ParquetError::General(e.to_string()))?;
+        header_growth += (sink.written - header_start) as i64 - page.header_bytes as i64;
+        sink.write_all(&body)?;
+    }
+    let dictionary = chunk.dictionary_page_offset().map(|_| began as i64);
+    chunk
+        .clone()
+        .into_builder()
+        .set_data_page_offset(first_data.unwrap_or(began) as i64)
+        .set_dictionary_page_offset(dictionary)
+        .set_total_compressed_size((sink.written - began) as i64)
+        .set_total_uncompressed_size(chunk.uncompressed_size() + header_growth)
+        .set_offset_index_offset(None)
+        .set_offset_index_length(None)
+        .set_column_index_offset(None)
+        .set_column_index_length(None)
+        .build()
+}
+
+/// A writer that knows where it is.
+struct Sink<'f> {
+    writer: BufWriter<&'f mut File>,
+    written: u64,
+}
+
+impl Write for Sink<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.writer.write(bytes)?;
+        self.written += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}

@@ -1,0 +1,258 @@
+//! One Parquet file: its leaves by name, their values in batches, checked against the footer.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use arrow::array::ArrayRef;
+use arrow::datatypes::DataType;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
+};
+use parquet::file::metadata::ColumnChunkMetaData;
+
+use crate::error::{Error, Fault};
+use crate::leaf::{self, Leaf};
+use crate::page;
+use crate::pattern::nearest;
+
+/// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
+const BATCH_ROWS: usize = 8192;
+
+/// An open Parquet file, its footer read and nothing else.
+#[derive(Debug)]
+pub(crate) struct LogFile {
+    path: PathBuf,
+    file: File,
+    footer: ArrowReaderMetadata,
+    leaves: Vec<Leaf>,
+}
+
+impl LogFile {
+    pub(crate) fn open(path: &Path) -> Result<Self, Error> {
+        let fail = |fault| Error::new(path, fault);
+        let file = File::open(path).map_err(|source| fail(Fault::Unreadable { source }))?;
+        let length = file.metadata().map_err(|source| fail(Fault::Unreadable { source }))?;
+        if length.is_dir() {
+            let source = std::io::Error::from(std::io::ErrorKind::IsADirectory);
+            return Err(fail(Fault::Unreadable { source }));
+        }
+        if length.len() == 0 {
+            return Err(fail(Fault::Empty));
+        }
+        // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let footer = ArrowReaderMetadata::load(&file, options)
+            .map_err(|e| fail(Fault::NotParquet { detail: e.to_string() }))?;
+        let leaves = leaf::leaves(footer.schema().fields());
+        let opened = Self { path: path.to_owned(), file, footer, leaves };
+        if opened.rows() == 0 {
+            return Err(opened.error(Fault::Empty));
+        }
+        Ok(opened)
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(crate) fn error(&self, fault: Fault) -> Error {
+        Error::new(&self.path, fault)
+    }
+
+    /// Rows the footer declares.
+    pub(crate) fn rows(&self) -> usize {
+        usize::try_from(self.footer.metadata().file_metadata().num_rows()).unwrap_or(0)
+    }
+
+    /// Every leaf, in the order of the file.
+    pub(crate) fn leaves(&self) -> &[Leaf] {
+        &self.leaves
+    }
+
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.find(name).is_some()
+    }
+
+    fn find(&self, name: &str) -> Option<&Leaf> {
+        self.leaves.iter().find(|leaf| leaf.name == name)
+    }
+
+    /// A leaf by its name.
+    pub(crate) fn leaf(&self, name: &str) -> Result<&Leaf, Error> {
+        self.find(name).ok_or_else(|| {
+            let nearest = nearest(name, self.leaves.iter().map(|l| l.name.as_str())).map(str::to_owned);
+            self.error(Fault::ColumnMissing { column: name.to_owned(), nearest })
+        })
+    }
+
+    /// The type of a leaf's values.
+    pub(crate) fn kind(&self, name: &str) -> Result<&DataType, Error> {
+        self.leaf(name).map(|leaf| &leaf.kind)
+    }
+
+    /// A value of the footer's key-value metadata.
+    pub(crate) fn metadata(&self, key: &str) -> Option<&str> {
+        let pairs = self.footer.metadata().file_metadata().key_value_metadata()?;
+        pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
+    }
+
+    /// Hands the values of some leaves, batch by batch and sample by sample beside each other, to `take`.
+    ///
+    /// # Errors
+    /// When a leaf is missing, a page claims what cannot be, a page cannot be decoded, or other rows
+    /// come than were declared; and what `take` complains of.
+    pub(crate) fn each_batch(
+        &self,
+        names: &[&str],
+        mut take: impl FnMut(&[ArrayRef]) -> Result<(), Fault>,
+    ) -> Result<(), Error> {
+        self.each_flat(names, |names, flats| take(&leaf::together(names, flats)?))
+    }
+
+    /// As [`LogFile::each_batch`], before lists and single values are brought together.
+    pub(crate) fn each_flat(
+        &self,
+        names: &[&str],
+        mut take: impl FnMut(&[&str], Vec<leaf::Flat>) -> Result<(), Fault>,
+    ) -> Result<(), Error> {
+        let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
+        let mut rows = 0;
+        for group in 0..self.footer.metadata().num_row_groups() {
+            self.check_pages(group, &leaves)?;
+            let columns =
+                leaves.iter().map(|leaf| self.column(group, leaf)).collect::<Result<Vec<_>, _>>()?;
+            rows += self.each_row_group(columns, group, &leaves, |columns| {
+                take(names, columns.iter().map(leaf::descend).collect())
+            })?;
+        }
+        if rows != self.rows() {
+            let (found, declared) = (rows as u64, self.rows() as u64);
+            let column = names.first().copied().unwrap_or_default().to_owned();
+            return Err(self.error(Fault::RowCount { column, found, declared }));
+        }
+        Ok(())
+    }
+
+    /// Steps through one row group's leaves, each by its own reader: two fields of one struct would
+    /// otherwise come back as one column.
+    fn each_row_group(
+        &self,
+        mut columns: Vec<Batches>,
+        group: usize,
+        leaves: &[&Leaf],
+        mut take: impl FnMut(&[ArrayRef]) -> Result<(), Fault>,
+    ) -> Result<usize, Error> {
+        let mut rows = 0;
+        loop {
+            let mut batch: Vec<ArrayRef> = Vec::with_capacity(columns.len());
+            for (reader, leaf) in columns.iter_mut().zip(leaves) {
+                match reader.next() {
+                    Some(Ok(found)) => batch.push(std::sync::Arc::clone(found.column(0))),
+                    Some(Err(e)) => return Err(self.decode(leaf, group, e.to_string())),
+                    None => {}
+                }
+            }
+            let Some(first) = batch.first() else { return Ok(rows) };
+            if batch.len() < leaves.len() || batch.iter().any(|a| a.len() != first.len()) {
+                let detail = "its leaves hold different numbers of rows".to_owned();
+                return Err(self.decode(leaves[0], group, detail));
+            }
+            rows += first.len();
+            take(&batch).map_err(|fault| self.error(fault))?;
+        }
+    }
+
+    fn column(&self, group: usize, leaf: &Leaf) -> Result<Batches, Error> {
+        let file = self.file.try_clone().map_err(|source| self.error(Fault::Unreadable { source }))?;
+        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.footer.clone());
+        let mask = ProjectionMask::leaves(builder.parquet_schema(), [leaf.index]);
+        let reader = builder.with_projection(mask).with_row_groups(vec![group]).with_batch_size(BATCH_ROWS);
+        reader.build().map_err(|e| self.decode(leaf, group, e.to_string()))
+    }
+
+    fn check_pages(&self, group: usize, leaves: &[&Leaf]) -> Result<(), Error> {
+        let rows = self.footer.metadata().row_group(group).num_rows();
+        for leaf in leaves {
+            page::bounded(&self.file, self.chunk(group, leaf), rows)
+                .map_err(|detail| self.decode(leaf, group, detail))?;
+        }
+        Ok(())
+    }
+
+    /// Whether every page of these leaves carries a checksum.
+    pub(crate) fn is_checked(&self, names: &[&str]) -> Result<bool, Error> {
+        let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
+        for group in 0..self.footer.metadata().num_row_groups() {
+            let rows = self.footer.metadata().row_group(group).num_rows();
+            for leaf in &leaves {
+                let checked = page::bounded(&self.file, self.chunk(group, leaf), rows);
+                if !checked.map_err(|detail| self.decode(leaf, group, detail))? {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    fn chunk(&self, group: usize, leaf: &Leaf) -> &ColumnChunkMetaData {
+        self.footer.metadata().row_group(group).column(leaf.index)
+    }
+
+    fn decode(&self, leaf: &Leaf, group: usize, detail: String) -> Error {
+        let row_group = Some(group as u64);
+        self.error(Fault::Decode { column: leaf.name.clone(), row_group, detail })
+    }
+
+    /// Feeds the footer and the chunks of the named leaves, in the order of the file, into a hash.
+    ///
+    /// It says that what was read is what was read before, whatever the file is called now and
+    /// whatever else was added to it.
+    pub(crate) fn feed(&self, names: &[&str], hash: &mut blake3::Hasher) -> Result<(), Error> {
+        let unreadable = |source| self.error(Fault::Unreadable { source });
+        let mut file = self.file.try_clone().map_err(unreadable)?;
+        let length = file.metadata().map_err(unreadable)?.len();
+        let mut buffer = Vec::new();
+        let wanted: Vec<&Leaf> = self.leaves.iter().filter(|l| names.contains(&l.name.as_str())).collect();
+        for group in 0..self.footer.metadata().num_row_groups() {
+            for leaf in &wanted {
+                let (start, bytes) = self.chunk(group, leaf).byte_range();
+                feed(hash, &mut file, &mut buffer, start, bytes.min(length.saturating_sub(start)))
+                    .map_err(unreadable)?;
+            }
+        }
+        let start = length.saturating_sub(footer_bytes(&mut file, length).map_err(unreadable)?);
+        feed(hash, &mut file, &mut buffer, start, length - start).map_err(unreadable)
+    }
+}
+
+type Batches = parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+
+/// Metadata length, which its own trailer states, plus the eight bytes of that trailer.
+fn footer_bytes(file: &mut File, length: u64) -> std::io::Result<u64> {
+    let mut trailer = [0; 4];
+    file.seek(SeekFrom::Start(length.saturating_sub(8)))?;
+    file.read_exact(&mut trailer)?;
+    Ok((u64::from(u32::from_le_bytes(trailer)) + 8).min(length))
+}
+
+/// Reads a stretch of the file into the hash, a mebibyte at a time.
+fn feed(
+    hash: &mut blake3::Hasher,
+    file: &mut File,
+    buffer: &mut Vec<u8>,
+    start: u64,
+    bytes: u64,
+) -> std::io::Result<()> {
+    const CHUNK: u64 = 1 << 20;
+    file.seek(SeekFrom::Start(start))?;
+    let mut left = bytes;
+    while left > 0 {
+        buffer.resize(left.min(CHUNK) as usize, 0);
+        file.read_exact(buffer)?;
+        hash.update(buffer);
+        left -= buffer.len() as u64;
+    }
+    Ok(())
+}

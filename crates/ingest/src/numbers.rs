@@ -1,0 +1,58 @@
+//! Any numeric Arrow array as `f64`.
+
+use arrow::array::{Array, ArrayRef, AsArray, PrimitiveArray};
+use arrow::compute::cast;
+use arrow::datatypes::{ArrowPrimitiveType, DataType, Float32Type, Float64Type};
+
+use crate::error::Fault;
+
+/// Appends a whole array; nulls become NaN.
+pub(crate) fn append(column: &str, array: &ArrayRef, into: &mut Vec<f64>) -> Result<(), Fault> {
+    match array.data_type() {
+        DataType::Float64 => append_primitive(array.as_primitive::<Float64Type>(), into, |v| v),
+        DataType::Float32 => append_primitive(array.as_primitive::<Float32Type>(), into, f64::from),
+        _ => append_primitive(real(column, array)?.as_primitive::<Float64Type>(), into, |v| v),
+    }
+    Ok(())
+}
+
+/// Appends the rows that are marked.
+pub(crate) fn append_where(
+    column: &str,
+    array: &ArrayRef,
+    wanted: &[bool],
+    into: &mut Vec<f64>,
+) -> Result<(), Fault> {
+    let real = real(column, array)?;
+    let values = real.as_primitive::<Float64Type>();
+    let marked = values.iter().zip(wanted).filter(|(_, wanted)| **wanted);
+    into.extend(marked.map(|(value, _)| value.unwrap_or(f64::NAN)));
+    Ok(())
+}
+
+fn real(column: &str, array: &ArrayRef) -> Result<ArrayRef, Fault> {
+    let kind = array.data_type();
+    if kind.is_numeric() || matches!(kind, DataType::Boolean | DataType::Dictionary(..)) {
+        if let Ok(real) = cast(array, &DataType::Float64) {
+            return Ok(real);
+        }
+    }
+    Err(wrong_type(column, array, "numbers"))
+}
+
+/// The fault of a column whose type does not serve.
+pub(crate) fn wrong_type(column: &str, array: &ArrayRef, wanted: &'static str) -> Fault {
+    Fault::ColumnType { column: column.to_owned(), found: array.data_type().to_string(), wanted }
+}
+
+fn append_primitive<T: ArrowPrimitiveType>(
+    array: &PrimitiveArray<T>,
+    into: &mut Vec<f64>,
+    convert: impl Fn(T::Native) -> f64,
+) {
+    if array.null_count() == 0 {
+        into.extend(array.values().iter().map(|&v| convert(v)));
+    } else {
+        into.extend(array.iter().map(|v| v.map_or(f64::NAN, &convert)));
+    }
+}

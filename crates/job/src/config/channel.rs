@@ -1,0 +1,171 @@
+//! What `[channel]` says and cannot mean.
+
+use std::collections::BTreeMap;
+
+use fleet::Complaint;
+use ingest::pattern::{PLACEHOLDER, nearest};
+use ingest::unit::Dimension;
+use ingest::{ChannelMapping, Channels, GroupMapping, Layout};
+
+use super::source::Source;
+use crate::value::positive;
+
+/// Every complaint about the channels, each at its key.
+pub(super) fn check(
+    channels: &Channels,
+    layout: &Layout,
+    groups: &BTreeMap<String, GroupMapping>,
+    path: &[&str],
+    source: &Source<'_>,
+    found: &mut Vec<Complaint>,
+) {
+    let mut complain = |keys: &[&str], c: Complaint| {
+        let whole: Vec<&str> = path.iter().chain(keys).copied().collect();
+        found.push(source.at(&whole, c));
+    };
+    let mut columns: BTreeMap<(&str, Option<&str>), &str> = BTreeMap::new();
+    for (name, channel, wanted) in named(channels) {
+        for (key, c) in complaints(name, channel, wanted, layout, groups) {
+            complain(&[name, key], c);
+        }
+        for choice in channel.choices() {
+            if let Some(other) = columns.insert((&choice.column, choice.group.as_deref()), name) {
+                let what = format!("`{}` is mapped to both {other} and {name}", choice.column);
+                let what = if other == name {
+                    format!("`{}` is mapped to {name} twice", choice.column)
+                } else {
+                    what
+                };
+                let c = Complaint::new("column_twice", what).hint("two channels cannot share a column");
+                complain(&[name, "column"], c);
+            }
+        }
+    }
+    match (&channels.screw_position, &channels.relative_position) {
+        (None, None) => {
+            let what = "neither `screw_position` nor `relative_position` is mapped";
+            complain(&[], Complaint::new("key_missing", what).hint("[channel.screw_position]"));
+        }
+        (Some(_), Some(_)) => {
+            let what = "both `screw_position` and `relative_position` are mapped";
+            let c = Complaint::new("key_of_other_kind", what)
+                .hint("the relative position is screw − motor: map one of them");
+            complain(&["relative_position"], c);
+        }
+        _ => {}
+    }
+}
+
+fn named(channels: &Channels) -> impl Iterator<Item = (&'static str, &ChannelMapping, [Dimension; 2])> {
+    let position = [Dimension::Length, Dimension::Angle];
+    [
+        ("motor_position", Some(&channels.motor_position), position),
+        ("screw_position", channels.screw_position.as_ref(), position),
+        ("relative_position", channels.relative_position.as_ref(), position),
+        ("load", Some(&channels.load), [Dimension::Force, Dimension::Torque]),
+        ("temperature", channels.temperature.as_ref(), [Dimension::Temperature; 2]),
+    ]
+    .into_iter()
+    .filter_map(|(name, channel, wanted)| Some((name, channel?, wanted)))
+}
+
+fn complaints(
+    name: &str,
+    channel: &ChannelMapping,
+    wanted: [Dimension; 2],
+    layout: &Layout,
+    groups: &BTreeMap<String, GroupMapping>,
+) -> Vec<(&'static str, Complaint)> {
+    let mut found: Vec<_> =
+        channel.choices().flat_map(|choice| one(name, choice, wanted, layout, groups)).collect();
+    if channel.alternatives.iter().any(|a| !a.alternatives.is_empty()) {
+        let what = format!("an alternative of `channel.{name}` has alternatives of its own");
+        found.push((
+            "alternatives",
+            Complaint::new("bad_pattern", what).hint("list them all in one row, best first"),
+        ));
+    }
+    found
+}
+
+fn one(
+    name: &str,
+    channel: &ChannelMapping,
+    wanted: [Dimension; 2],
+    layout: &Layout,
+    groups: &BTreeMap<String, GroupMapping>,
+) -> Vec<(&'static str, Complaint)> {
+    let mut found = Vec::new();
+    found.extend(wrong_unit(name, channel, wanted).map(|c| ("unit", c)));
+    if channel.column.trim().is_empty() {
+        found.push(("column", Complaint::new("empty_name", format!("`channel.{name}` names no column"))));
+    }
+    if channel.column.matches(PLACEHOLDER).count() > 1 {
+        let what = format!("`{}` holds {PLACEHOLDER} more than once", channel.column);
+        found.push(("column", Complaint::new("bad_pattern", what)));
+    }
+    if layout.position_column.is_some() && channel.group.is_none() && channel.column.contains(PLACEHOLDER) {
+        let what = format!(
+            "`{}` speaks of {PLACEHOLDER}, which `layout.position_column` already tells",
+            channel.column
+        );
+        found.push(("column", Complaint::new("bad_pattern", what)));
+    }
+    if !matches!(channel.sign, 1 | -1) {
+        let what = format!("`sign` is {}, which must be 1 or -1", channel.sign);
+        found.push(("sign", Complaint::new("bad_sign", what)));
+    }
+    if channel.scale == 0.0 || !channel.scale.is_finite() {
+        let what = format!("`scale` is {}, which would make every value the same", channel.scale);
+        found.push(("scale", Complaint::new("bad_scale", what)));
+    }
+    for (key, value) in [
+        ("gear_ratio", Some(channel.gear_ratio)),
+        ("wraps_at", channel.wraps_at),
+        ("rate_hz", channel.rate_hz),
+    ] {
+        found.extend(positive(key, value).map(|c| (key, c)));
+    }
+    for (key, value) in
+        [("latency_s", channel.latency_s), ("instant_s", channel.instant_s), ("offset", channel.offset)]
+    {
+        if !value.is_finite() {
+            found.push((
+                key,
+                Complaint::new("bad_parameter", format!("`{key}` is {value}, which is no number")),
+            ));
+        }
+    }
+    found.extend(unknown_group(name, channel, groups).map(|c| ("group", c)));
+    found
+}
+
+fn wrong_unit(name: &str, channel: &ChannelMapping, wanted: [Dimension; 2]) -> Option<Complaint> {
+    let dimension = channel.unit.dimension();
+    if wanted.contains(&dimension) {
+        return None;
+    }
+    let words: Vec<&str> = if wanted[0] == wanted[1] {
+        vec![wanted[0].as_str()]
+    } else {
+        wanted.map(Dimension::as_str).to_vec()
+    };
+    let what = format!("`channel.{name}` is in {}, a unit of {}", channel.unit.as_str(), dimension.as_str());
+    Some(Complaint::new("unit_contradicts", what).hint(format!("it needs a unit of {}", words.join(" or "))))
+}
+
+fn unknown_group(
+    name: &str,
+    channel: &ChannelMapping,
+    groups: &BTreeMap<String, GroupMapping>,
+) -> Option<Complaint> {
+    let group = channel.group.as_ref().filter(|group| !groups.contains_key(*group))?;
+    let c = Complaint::new(
+        "unknown_key",
+        format!("`channel.{name}` lies in `{group}`, and there is no `[group.{group}]`"),
+    );
+    Some(match nearest(group, groups.keys().map(String::as_str)) {
+        Some(near) => c.hint(format!("`{near}`?")),
+        None => c.hint(format!("[group.{group}]\nfiles = [\"…\"]")),
+    })
+}

@@ -1,0 +1,165 @@
+//! Settings of logs that are otherwise on some aircraft or for some parts: overrides, laid over the rest.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use fleet::{Complaint, PartNumber, TailNumber};
+use ingest::{Channels, ClockMapping, Mapping};
+use serde::de::DeserializeOwned;
+
+use super::channel;
+use super::document::{Document, Override, check_clock};
+use super::source::Source;
+
+/// The overrides of a configuration, checked, and every mapping that was asked of them.
+#[derive(Debug)]
+pub(super) struct Variants {
+    base: Arc<Mapping>,
+    overrides: Vec<Checked>,
+    /// By the numbers of the overrides that apply.
+    made: Mutex<BTreeMap<Vec<usize>, Arc<Mapping>>>,
+}
+
+impl Clone for Variants {
+    fn clone(&self) -> Self {
+        Self { base: Arc::clone(&self.base), overrides: self.overrides.clone(), made: Mutex::default() }
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Checked {
+    tails: Vec<glob::Pattern>,
+    parts: Vec<glob::Pattern>,
+    clock: toml::Table,
+    channel: toml::Table,
+}
+
+impl Checked {
+    fn is_for(&self, tail: &TailNumber, part: Option<&PartNumber>) -> bool {
+        let fits = |patterns: &[glob::Pattern], text: &str| patterns.iter().any(|p| p.matches(text));
+        let tail_fits = self.tails.is_empty() || fits(&self.tails, tail.as_str());
+        let part_fits = self.parts.is_empty() || part.is_some_and(|part| fits(&self.parts, part.as_str()));
+        tail_fits && part_fits
+    }
+}
+
+impl Variants {
+    /// Reads the overrides and tries each alone on the rest of the configuration.
+    pub(super) fn check(document: &Document, source: &Source<'_>) -> Result<Self, Vec<Complaint>> {
+        let base = document.mapping();
+        let (mut overrides, mut found) = (Vec::new(), Vec::new());
+        for (number, settings) in document.overrides.iter().enumerate() {
+            match checked(settings) {
+                Ok(one) => {
+                    found.extend(try_alone(&one, number, document, &base, source));
+                    overrides.push(one);
+                }
+                Err(c) => found.push(source.at(&["override"], c)),
+            }
+        }
+        if !found.is_empty() {
+            return Err(found);
+        }
+        Ok(Self { base: Arc::new(base), overrides, made: Mutex::default() })
+    }
+
+    /// How the logs of an aircraft are read, or the channels of a part on it.
+    pub(super) fn mapping(&self, tail: &TailNumber, part: Option<&PartNumber>) -> Arc<Mapping> {
+        let applies = |(number, one): (usize, &Checked)| one.is_for(tail, part).then_some(number);
+        let numbers: Vec<usize> = self.overrides.iter().enumerate().filter_map(applies).collect();
+        if numbers.is_empty() {
+            return Arc::clone(&self.base);
+        }
+        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        let make = || Arc::new(self.made_of(&numbers));
+        Arc::clone(made.entry(numbers.clone()).or_insert_with(make))
+    }
+
+    /// Whether anything is otherwise for a part.
+    pub(super) fn touches(&self, part: &PartNumber) -> bool {
+        let fits = |one: &Checked| one.parts.iter().any(|p| p.matches(part.as_str()));
+        self.overrides.iter().any(fits)
+    }
+
+    fn made_of(&self, numbers: &[usize]) -> Mapping {
+        let mut mapping = Mapping::clone(&self.base);
+        for one in numbers.iter().map(|&number| &self.overrides[number]) {
+            // Each was tried alone; two that only clash together leave what was before.
+            if let Ok(clock) = laid_over(&mapping.clock, &one.clock) {
+                mapping.clock = clock;
+            }
+            if let Ok(channels) = laid_over(&mapping.channels, &one.channel) {
+                mapping.channels = channels;
+            }
+        }
+        mapping
+    }
+
+    /// How logs are read where nothing is otherwise.
+    pub(super) fn base(&self) -> &Arc<Mapping> {
+        &self.base
+    }
+}
+
+fn checked(settings: &Override) -> Result<Checked, Complaint> {
+    let pattern = |text: &String| {
+        glob::Pattern::new(text)
+            .map_err(|e| Complaint::new("bad_pattern", format!("`{text}` is no pattern of names: {e}")))
+    };
+    let patterns = |texts: &[String]| texts.iter().map(pattern).collect::<Result<Vec<_>, _>>();
+    if settings.clock.is_some() && !settings.parts.is_empty() {
+        let what = "an override for parts gives a `clock`, but a log has one clock for all its actuators";
+        return Err(Complaint::new("key_of_other_kind", what).hint("give it under `tails` alone"));
+    }
+    if settings.clock.is_none() && settings.channel.is_none() {
+        let what = "an override changes nothing";
+        return Err(Complaint::new("key_missing", what).hint("[override.channel.load]\nsign = -1"));
+    }
+    Ok(Checked {
+        tails: patterns(&settings.tails)?,
+        parts: patterns(&settings.parts)?,
+        clock: settings.clock.clone().unwrap_or_default(),
+        channel: settings.channel.clone().unwrap_or_default(),
+    })
+}
+
+fn try_alone(
+    one: &Checked,
+    number: usize,
+    document: &Document,
+    base: &Mapping,
+    source: &Source<'_>,
+) -> Vec<Complaint> {
+    let mut found = Vec::new();
+    let at = |key: &'static str, e: String| {
+        let what = format!("`{key}` of override {} cannot be laid over `[{key}]`: {e}", number + 1);
+        source.at(&["override"], Complaint::new("bad_toml", what))
+    };
+    match laid_over::<Channels>(&base.channels, &one.channel) {
+        Ok(channels) => {
+            channel::check(&channels, &document.layout, &document.group, &["override"], source, &mut found);
+        }
+        Err(e) => found.push(at("channel", e)),
+    }
+    match laid_over::<ClockMapping>(&base.clock, &one.clock) {
+        Ok(clock) => check_clock(&clock, &["override"], source, &mut found),
+        Err(e) => found.push(at("clock", e)),
+    }
+    found
+}
+
+/// Keys that are given replace those below; tables are laid over key by key.
+fn laid_over<T: serde::Serialize + DeserializeOwned>(base: &T, over: &toml::Table) -> Result<T, String> {
+    let mut table = toml::Table::try_from(base).map_err(|e| e.to_string())?;
+    merge(&mut table, over);
+    table.try_into().map_err(|e: toml::de::Error| e.message().to_owned())
+}
+
+fn merge(below: &mut toml::Table, over: &toml::Table) {
+    for (key, value) in over {
+        match (below.get_mut(key), value) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(value)) => merge(inner, value),
+            _ => drop(below.insert(key.clone(), value.clone())),
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! One log to normalized logs: a file for each actuator, which `run` reads back to the same gap.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use fleet::{Complaint, Installations};
+use ingest::write::Encoding;
+use ingest::{Files, PositionColumns};
+
+use crate::config::Config;
+use crate::flight::{Opened, caught};
+
+/// Writes the normalized logs of one log below a folder, as `TAIL/FLIGHT/POSITION.parquet`.
+///
+/// An actuator that cannot be used becomes a complaint; the others are written.
+///
+/// # Errors
+/// A complaint when the log cannot be read or identified.
+pub fn normalize(
+    files: &Files,
+    shown: &str,
+    config: &Config,
+    installations: &Installations,
+    (folder, encoding): (&Path, Encoding),
+) -> Result<(Vec<PathBuf>, Vec<Complaint>), Complaint> {
+    caught(shown, || {
+        let opened = Opened::open(files, shown, config, installations)?;
+        let (mut written, mut complaints) = (Vec::new(), Vec::new());
+        for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
+            match one(&opened, at, config, installations, (folder, encoding)) {
+                Ok(file) => written.push(file),
+                Err(complaint) => complaints.push(complaint.in_file(shown)),
+            }
+        }
+        Ok((written, complaints))
+    })
+}
+
+fn one(
+    opened: &Opened,
+    at: &PositionColumns,
+    config: &Config,
+    installations: &Installations,
+    (folder, encoding): (&Path, Encoding),
+) -> Result<PathBuf, Complaint> {
+    let (stay, part) = opened.unit(at, config, installations)?;
+    let channels = opened.channels(at, part)?;
+    let id = &opened.identity;
+    let names = [id.tail_number.as_str(), id.flight_id.as_str(), at.position.as_str()].map(file_name);
+    let file = folder.join(&names[0]).join(&names[1]).join(format!("{}.parquet", names[2]));
+    let provenance = BTreeMap::from([
+        ("source_log".to_owned(), opened.shown().to_owned()),
+        ("source_digest".to_owned(), opened.digest.clone()),
+        ("config_digest".to_owned(), config.digest(&id.tail_number, &stay.part_number)),
+        ("part_number".to_owned(), stay.part_number.to_string()),
+        ("serial_number".to_owned(), stay.serial_number.to_string()),
+    ]);
+    ingest::normal::write(&file, &channels, id, part.geometry, &provenance, encoding)
+        .map_err(|e| e.complaint())?;
+    Ok(file)
+}
+
+/// A name as a file may carry it: what is no letter, digit, dot, dash or underscore is written `%2F`.
+fn file_name(name: &str) -> String {
+    let plain = |b: &u8| b.is_ascii_alphanumeric() || matches!(b, b'-' | b'_') || *b == b'.';
+    let dots = name.bytes().all(|b| b == b'.');
+    name.bytes()
+        .map(|b| if plain(&b) && !dots { char::from(b).to_string() } else { format!("%{b:02X}") })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_name_leaves_its_folder() {
+        assert_eq!(file_name("N412FP"), "N412FP");
+        assert_eq!(file_name("../x"), "..%2Fx");
+        assert_eq!(file_name(".."), "%2E%2E");
+    }
+}

@@ -1,0 +1,159 @@
+//! Which files make a log: usually one; with groups or pieces, those that say they are of one flight.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use fleet::{Complaint, Flight, Position};
+use ingest::Files;
+use job::Config;
+use job::flight::{identify, identify_companion};
+use rayon::prelude::*;
+
+use crate::error::Error;
+
+/// The logs that fit the patterns.
+#[derive(Debug, Clone, Default)]
+pub struct Found {
+    /// Their files, by the name of the first.
+    pub logs: BTreeMap<String, Files>,
+    /// Files of groups that cannot be read, and why.
+    pub faulty: BTreeMap<String, (PathBuf, Complaint)>,
+    /// Files of groups whose flight has no main log.
+    pub strays: Vec<String>,
+}
+
+/// Every log that fits the patterns, by the shown name of its first file.
+///
+/// # Errors
+/// [`Error::Refused`] when a pattern fits no file, or is no pattern.
+pub fn find(config: &Config) -> Result<Found, Error> {
+    let main = matching(config, &config.document.logs.files)?;
+    let mut companions = Vec::new();
+    for (name, group) in &config.document.group {
+        companions.extend(matching(config, &group.files)?.into_iter().map(|file| (name.as_str(), file)));
+    }
+    if companions.is_empty() && !config.document.logs.pieces {
+        let logs = main.into_iter().map(|(shown, path)| (shown, Files::one(path))).collect();
+        return Ok(Found { logs, ..Found::default() });
+    }
+    Ok(join(config, main, companions))
+}
+
+/// The whole log that a file given by hand belongs to.
+///
+/// # Errors
+/// As [`find`], where groups or pieces have to be looked for.
+pub fn around(config: &Config, path: &Path) -> Result<Files, Error> {
+    if config.document.group.is_empty() && !config.document.logs.pieces {
+        return Ok(Files::one(path));
+    }
+    let same = |other: &PathBuf| std::fs::canonicalize(other).ok() == std::fs::canonicalize(path).ok();
+    let found = find(config)?.logs.into_values().find(|files| files.all().any(same));
+    Ok(found.unwrap_or_else(|| Files::one(path)))
+}
+
+type Who = (Flight, Option<Position>);
+
+fn join(config: &Config, main: Vec<(String, PathBuf)>, companions: Vec<(&str, (String, PathBuf))>) -> Found {
+    let known: Vec<_> = main
+        .into_par_iter()
+        .map(|(shown, path)| (identify(&Files::one(&path), &shown, config).ok(), shown, path))
+        .collect();
+    let mut found = Found::default();
+    let mut whose: Vec<(Option<Who>, String)> = Vec::new();
+    for (who, shown, path) in known {
+        let before =
+            whose.iter().find(|(other, _)| config.document.logs.pieces && who.is_some() && *other == who);
+        if let Some(files) = before.and_then(|(_, first)| found.logs.get_mut(first)) {
+            files.main.push(path);
+        } else {
+            whose.push((who, shown.clone()));
+            found.logs.insert(shown, Files::one(path));
+        }
+    }
+    let said: Vec<_> = companions
+        .into_par_iter()
+        .map(|(group, (shown, path))| (identify_companion(&path, group, &shown, config), group, shown, path))
+        .collect();
+    for (who, group, shown, path) in said {
+        match who {
+            Err(complaint) => drop(found.faulty.insert(shown, (path, complaint))),
+            Ok(who) => attach(&mut found, &whose, &who, group, shown, path),
+        }
+    }
+    found
+}
+
+/// A file of a group goes to every main log of its flight: of its actuator only, where both name one.
+fn attach(
+    found: &mut Found,
+    whose: &[(Option<Who>, String)],
+    who: &Who,
+    group: &str,
+    shown: String,
+    path: PathBuf,
+) {
+    let mut is_stray = true;
+    for (_, first) in whose.iter().filter(|(main, _)| main.as_ref().is_some_and(|main| belongs(who, main))) {
+        if let Some(files) = found.logs.get_mut(first) {
+            files.groups.entry(group.to_owned()).or_default().push(path.clone());
+            is_stray = false;
+        }
+    }
+    if is_stray {
+        found.strays.push(shown);
+    }
+}
+
+fn belongs((flight, position): &Who, (main, main_position): &Who) -> bool {
+    let same_flight = flight.flight_id == main.flight_id || flight.departure_utc == main.departure_utc;
+    let same_place = match (position, main_position) {
+        (Some(position), Some(main)) => position == main,
+        _ => true,
+    };
+    flight.tail_number == main.tail_number && same_flight && same_place
+}
+
+/// Files that fit some patterns, each by its shown name, in order of it.
+fn matching(config: &Config, patterns: &[String]) -> Result<Vec<(String, PathBuf)>, Error> {
+    let mut found = BTreeMap::new();
+    let mut silent = BTreeSet::new();
+    // `**` reaches our own results and tables, which are no logs.
+    let logs = &config.document.logs;
+    let tables: Vec<PathBuf> =
+        std::iter::once(&logs.installations).chain(&logs.flights).map(|table| config.path(table)).collect();
+    let store = config.store();
+    for pattern in patterns {
+        // The folder's own name may hold brackets; only what the user wrote is a pattern.
+        let folder = glob::Pattern::escape(&config.folder.to_string_lossy());
+        let full = Path::new(&folder).join(pattern);
+        let paths = glob::glob(&full.to_string_lossy()).map_err(|e| {
+            let what = format!("`{pattern}` is no pattern of files: {e}");
+            Error::refused(Complaint::new("bad_pattern", what).in_file(config.file.display()))
+        })?;
+        let ours = |path: &PathBuf| path.starts_with(&store) || tables.contains(path);
+        let files: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file() && !ours(path)).collect();
+        if files.is_empty() {
+            silent.insert(pattern.as_str());
+        }
+        found.extend(files.into_iter().map(|path| (shown(config, &path), path)));
+    }
+    // Silence is a fault: a pattern that fits nothing is more often a moved folder than a day without flights.
+    if silent.is_empty() {
+        Ok(found.into_iter().collect())
+    } else {
+        Err(Error::refused(no_log(config, &silent)))
+    }
+}
+
+fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Complaint {
+    let patterns = silent.iter().map(|p| format!("`{p}`")).collect::<Vec<_>>().join(", ");
+    let folder = if config.folder.as_os_str().is_empty() { Path::new(".") } else { &config.folder };
+    Complaint::new("no_log_matched", format!("no log fits {patterns}"))
+        .in_file(config.file.display())
+        .hint(format!("patterns start from {}; are the logs there tonight?", folder.display()))
+}
+
+fn shown(config: &Config, path: &Path) -> String {
+    path.strip_prefix(&config.folder).unwrap_or(path).to_string_lossy().replace('\\', "/")
+}

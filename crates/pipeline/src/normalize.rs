@@ -1,0 +1,51 @@
+//! Many logs to normalized logs, one log per worker.
+
+use std::path::{Path, PathBuf};
+
+use fleet::{Complaint, Installations};
+use ingest::Files;
+use ingest::write::Encoding;
+use job::Config;
+use rayon::prelude::*;
+
+use crate::error::Error;
+use crate::event::Event;
+
+/// What became of the logs.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Normalized {
+    /// The files written, in order of the logs.
+    pub written: Vec<PathBuf>,
+    /// What could not be.
+    pub complaints: Vec<Complaint>,
+}
+
+/// Writes the normalized logs of some logs below a folder.
+///
+/// # Errors
+/// When workers cannot be started. Logs in error are complaints.
+pub fn normalize(
+    config: &Config,
+    installations: &Installations,
+    logs: &[(Files, String)],
+    (folder, encoding): (&Path, Encoding),
+    jobs: Option<usize>,
+    watch: &(dyn Fn(Event) + Sync),
+) -> Result<Normalized, Error> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
+    watch(Event::Planned { logs: logs.len(), bytes: 0 });
+    let one = |(files, shown): &(Files, String)| {
+        let done = job::normalize::normalize(files, shown, config, installations, (folder, encoding));
+        let done = done.unwrap_or_else(|complaint| (Vec::new(), vec![complaint]));
+        let (log, complaints) = (shown.clone(), done.1.clone());
+        watch(Event::Finished { log, bytes: 0, estimated: done.0.len(), refused: 0, complaints });
+        done
+    };
+    let done: Vec<_> = pool.install(|| logs.par_iter().map(one).collect());
+    let mut all = Normalized::default();
+    for (written, complaints) in done {
+        all.written.extend(written);
+        all.complaints.extend(complaints);
+    }
+    Ok(all)
+}
