@@ -154,3 +154,40 @@ impl Table {
             .collect()
     }
 }
+
+/// Key-value pairs of a footer.
+pub(crate) type Facts = Vec<(String, String)>;
+
+/// The footer's metadata that says which flight a log is.
+pub(crate) fn facts(log: &Path) -> Facts {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    let reader = SerializedFileReader::new(std::fs::File::open(log).unwrap()).unwrap();
+    let pairs = reader.metadata().file_metadata().key_value_metadata().unwrap();
+    pairs
+        .iter()
+        .filter_map(|p| Some((p.key.clone(), p.value.clone()?)))
+        .filter(|p| p.0 != "ARROW:schema")
+        .collect()
+}
+
+/// Writes some columns and rows of a log anew, as doubles, under an identity.
+pub(crate) fn rewrite(
+    from: &Path,
+    to: &Path,
+    facts: &Facts,
+    columns: impl Fn(&str) -> bool,
+    rows: impl Fn(usize) -> bool,
+) {
+    use ingest::write::{Column, write_parquet};
+    let Table(batch) = Table::read(from);
+    let mut kept: Vec<(String, Column)> = Vec::new();
+    for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {
+        if columns(field.name()) {
+            let real = cast(array, &DataType::Float64).unwrap();
+            let values = real.as_primitive::<Float64Type>().values();
+            let values = values.iter().enumerate().filter(|(row, _)| rows(*row)).map(|(_, v)| *v).collect();
+            kept.push((field.name().clone(), Column::Real(values)));
+        }
+    }
+    write_parquet(to, &kept, facts).unwrap();
+}

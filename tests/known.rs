@@ -1,6 +1,6 @@
 //! Only new work: what is accounted for is not done again, and what changed is.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, facts, rewrite};
 
 fn to_do(account: &str) -> String {
     account.lines().find(|l| l.trim_start().starts_with("found")).unwrap().trim().to_owned()
@@ -73,8 +73,8 @@ fn a_rival_log_of_the_same_flight_is_in_error_whichever_is_read_first() {
     for jobs in ["1", "2"] {
         let bench = Bench::sample();
         let logs = bench.logs();
-        let truth = ingest_facts(&logs[3]);
-        rewrite(&logs[4], &logs[3].with_file_name("z_rival.parquet"), &truth);
+        let truth = facts(&logs[3]);
+        rewrite(&logs[4], &logs[3].with_file_name("z_rival.parquet"), &truth, |_| true, |_| true);
         let ended = bench.freeplay(&["run", "--jobs", jobs]);
         assert_eq!(ended.code, Some(1), "{ended:?}");
         assert!(ended.err.contains("error[duplicate_flight]"), "{}", ended.err);
@@ -100,40 +100,6 @@ fn a_limit_leaves_the_rest_for_the_next_run() {
     let bench = Bench::sample();
     assert!(bench.well(&["run", "--limit", "7"]).contains("28 records of 7 flights"));
     assert!(bench.well(&["run"]).contains("92 records of 23 flights"));
-}
-
-type Facts = Vec<(String, String)>;
-
-/// The footer's metadata that says which flight a log is.
-fn ingest_facts(log: &std::path::Path) -> Facts {
-    use parquet::file::reader::{FileReader, SerializedFileReader};
-    let reader = SerializedFileReader::new(std::fs::File::open(log).unwrap()).unwrap();
-    let pairs = reader.metadata().file_metadata().key_value_metadata().unwrap();
-    pairs
-        .iter()
-        .filter_map(|p| Some((p.key.clone(), p.value.clone()?)))
-        .filter(|p| p.0 != "ARROW:schema")
-        .collect()
-}
-
-/// Writes the channels of one log under the identity of another.
-fn rewrite(from: &std::path::Path, to: &std::path::Path, facts: &Facts) {
-    use ingest::write::{Column, write_parquet};
-    use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-    let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(from).unwrap()).unwrap();
-    let names: Vec<String> = reader.schema().fields().iter().map(|f| f.name().clone()).collect();
-    let mut columns: Vec<(String, Column)> =
-        names.into_iter().map(|n| (n, Column::Real(Vec::new()))).collect();
-    for batch in reader.build().unwrap() {
-        for (array, (_, column)) in batch.unwrap().columns().iter().zip(&mut columns) {
-            let real = arrow::compute::cast(array, &arrow::datatypes::DataType::Float64).unwrap();
-            let real = arrow::array::AsArray::as_primitive::<arrow::datatypes::Float64Type>(&real);
-            if let Column::Real(values) = column {
-                values.extend(real.values());
-            }
-        }
-    }
-    write_parquet(to, &columns, facts).unwrap();
 }
 
 /// When the log that spoke for a flight breaks, its copy takes over on the next run.
@@ -166,7 +132,8 @@ fn the_account_does_not_depend_on_who_was_faster() {
     let account = |jobs: &str| {
         let bench = Bench::sample();
         let logs = bench.logs();
-        rewrite(&logs[4], &logs[3].with_file_name("z_rival.parquet"), &ingest_facts(&logs[3]));
+        let rival = logs[3].with_file_name("z_rival.parquet");
+        rewrite(&logs[4], &rival, &facts(&logs[3]), |_| true, |_| true);
         let json = bench.freeplay(&["run", "--json", "--jobs", jobs]).out;
         let report: serde_json::Value = serde_json::from_str(&json).unwrap();
         ["found", "known", "done", "flights", "estimated", "refused"].map(|key| report[key].to_string())

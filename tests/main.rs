@@ -7,6 +7,7 @@ mod bench;
 mod damaged;
 mod interrupted;
 mod known;
+mod layouts;
 mod oracle;
 mod speech;
 mod truth;

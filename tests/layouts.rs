@@ -1,0 +1,227 @@
+//! Logs in other shapes give the numbers of the plain ones: normalized, re-encoded, in pieces, in groups of
+//! files, read by overrides.
+
+use std::path::PathBuf;
+
+use crate::bench::{Bench, Table, facts, rewrite};
+
+/// Every number of every record, without what names the log and the settings it was read by.
+fn numbers(bench: &Bench) -> Vec<String> {
+    let all = bench.exported();
+    let header: Vec<&str> = all.lines().next().unwrap().split(',').collect();
+    let of_a_log = ["log_digest", "config_digest"];
+    let kept: Vec<usize> = (0..header.len()).filter(|&i| !of_a_log.contains(&header[i])).collect();
+    let line = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        kept.iter().map(|&i| cells[i]).collect::<Vec<_>>().join(",")
+    };
+    let mut lines: Vec<String> = all.lines().map(line).collect();
+    lines.sort();
+    lines
+}
+
+/// One tail of the sample fleet, so that each case costs a third.
+fn one_tail() -> Bench {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N414FP/*.parquet");
+    bench
+}
+
+fn plain() -> Vec<String> {
+    let bench = one_tail();
+    bench.well(&["run"]);
+    numbers(&bench)
+}
+
+fn logs(bench: &Bench) -> Vec<PathBuf> {
+    bench.logs().into_iter().filter(|log| log.to_str().unwrap().contains("N414FP")).collect()
+}
+
+#[test]
+fn normalized_logs_give_the_same_gaps_bit_for_bit() {
+    for encoding in ["split", "plain"] {
+        let bench = one_tail();
+        let said = bench.well(&["normalize", "--output", "normalized", "--encoding", encoding]);
+        assert!(said.contains("40 normalized logs of 10 logs"), "{said}");
+        bench.configure("sample-data/logs/N414FP/*.parquet", "normalized/**/*.parquet");
+        bench.well(&["run"]);
+        assert_eq!(numbers(&bench), plain(), "{encoding}");
+        let one = glob::glob(bench.path("normalized/N414FP/*/*.parquet").to_str().unwrap()).unwrap();
+        let said = facts(&one.flatten().next().unwrap());
+        for key in ["freeplay.source_log", "freeplay.source_digest", "freeplay.step_s", "freeplay.units"] {
+            assert!(said.iter().any(|(k, v)| k == key && !v.is_empty()), "{key}");
+        }
+    }
+}
+
+#[test]
+fn a_normalized_log_of_another_lead_is_refused() {
+    let bench = one_tail();
+    bench.well(&["normalize", "--output", "normalized"]);
+    bench.configure("sample-data/logs/N414FP/*.parquet", "normalized/**/*.parquet");
+    bench.configure("lead_m_per_rev = 0.005", "lead_m_per_rev = 0.0051");
+    let ended = bench.freeplay(&["run"]);
+    assert_eq!(ended.code, Some(1), "{ended:?}");
+    assert!(ended.err.contains("error[normalized_otherwise]"), "{}", ended.err);
+}
+
+/// The same samples as doubles instead of floats: another file, another digest, the same flight.
+#[test]
+fn a_log_encoded_anew_is_recognised_by_its_samples() {
+    let bench = one_tail();
+    let log = &logs(&bench)[3];
+    rewrite(log, &log.with_file_name("again.parquet"), &facts(log), |_| true, |_| true);
+    bench.well(&["run"]);
+    assert_eq!(numbers(&bench), plain());
+}
+
+#[test]
+fn a_flight_in_pieces_is_one_flight_whatever_the_pieces_are_called() {
+    let bench = one_tail();
+    for (n, log) in logs(&bench).iter().enumerate() {
+        let names = if n % 2 == 0 { ["a", "b"] } else { ["b", "a"] };
+        let piece = |name: &str| log.with_file_name(format!("{n}-{name}.parquet"));
+        rewrite(log, &piece(names[0]), &facts(log), |_| true, |row| row < 4321);
+        rewrite(log, &piece(names[1]), &facts(log), |_| true, |row| row >= 4321);
+        std::fs::remove_file(log).unwrap();
+    }
+    bench.configure("[store]", "pieces = true\n\n[store]");
+    let account = bench.well(&["run"]);
+    assert!(account.contains("10 logs: 10 to do"), "{account}");
+    assert_eq!(numbers(&bench), plain());
+    assert!(bench.well(&["run"]).contains("10 logs: 0 to do, 10 known"));
+}
+
+/// Positions in one file, loads in another: the same numbers. Loads at half the rate: nearly so.
+#[test]
+fn loads_in_files_of_their_own_find_their_flights() {
+    for every in [1, 2] {
+        let bench = one_tail();
+        for log in logs(&bench) {
+            let name = log.file_name().unwrap();
+            let loads = bench.path("loads").join(name);
+            let is_load = |column: &str| column.ends_with("_load_n");
+            rewrite(&log, &loads, &facts(&log), |c| is_load(c) || c == "time_s", |row| row % every == 0);
+            let positions = bench.path("positions").join(name);
+            rewrite(&log, &positions, &facts(&log), |c| !is_load(c), |_| true);
+        }
+        bench.configure("sample-data/logs/N414FP/*.parquet", "positions/*.parquet");
+        bench.configure(
+            "[channel.load]",
+            "[group.loads]\nfiles = [\"loads/*.parquet\"]\n\n[channel.load]\ngroup = \"loads\"",
+        );
+        bench.well(&["run"]);
+        if every == 1 {
+            assert_eq!(numbers(&bench), plain());
+            continue;
+        }
+        bench.well(&["store", "export", "--format", "parquet", "--output", "half.parquet"]);
+        let truth = Table::read(&bench.path("sample-data/truth.parquet")).by_flight("gap_m");
+        let worst = Table::read(&bench.path("half.parquet")).by_flight("gap_m").into_iter();
+        let worst = worst.map(|(key, gap)| (gap / truth[&key] - 1.0).abs()).fold(0.0, f64::max);
+        assert!(worst < 0.02, "a load at 50 Hz costs {worst}");
+    }
+}
+
+#[test]
+fn a_broken_file_of_a_group_and_one_without_a_flight_are_told() {
+    let bench = one_tail();
+    for log in logs(&bench) {
+        let name = log.file_name().unwrap();
+        let load = |c: &str| c.ends_with("_load_n");
+        rewrite(&log, &bench.path("loads").join(name), &facts(&log), |c| load(c) || c == "time_s", |_| true);
+        rewrite(&log, &bench.path("positions").join(name), &facts(&log), |c| !load(c), |_| true);
+    }
+    bench.configure("sample-data/logs/N414FP/*.parquet", "positions/*.parquet");
+    bench.configure(
+        "[channel.load]",
+        "[group.loads]\nfiles = [\"loads/*.parquet\"]\n\n[channel.load]\ngroup = \"loads\"",
+    );
+    let all = |folder: &str| {
+        let found = glob::glob(bench.path(&format!("{folder}/*.parquet")).to_str().unwrap()).unwrap();
+        found.flatten().collect::<Vec<_>>()
+    };
+    std::fs::write(&all("loads")[0], b"PAR1 torn").unwrap();
+    std::fs::remove_file(&all("positions")[1]).unwrap();
+    let ended = bench.freeplay(&["run"]);
+    assert_eq!(ended.code, Some(1), "{ended:?}");
+    assert!(ended.err.contains("error[not_parquet]") && ended.err.contains("loads/"), "{}", ended.err);
+    let checked = bench.freeplay(&["check"]);
+    assert!(checked.err.contains("no main log is of its flight"), "{}", checked.err);
+}
+
+#[test]
+fn overrides_read_a_tail_and_a_part_otherwise() {
+    let bench = one_tail();
+    bench.configure("[channel.load]", "[channel.load]\nsign = -1");
+    bench.configure("column = \"{position}_motor_deg\"", "column = \"{position}_motor_deg\"\nscale = 2.0");
+    bench.configure(
+        "[estimate]",
+        "[[override]]\ntails = [\"N4*\"]\nchannel.load.sign = 1\n\n\
+         [[override]]\nparts = [\"EMA-27-10?0\"]\nchannel.motor_position.scale = 1.0\n\n[estimate]",
+    );
+    bench.well(&["run"]);
+    assert_eq!(numbers(&bench), plain());
+    bench.configure("parts = [\"EMA-27-10?0\"]", "parts = [\"EMA-27-1040\"]");
+    let plan = bench.well(&["run", "--dry-run"]);
+    assert_eq!(plan.matches("setting changed").count(), 10, "{plan}");
+}
+
+#[test]
+fn a_misspelled_override_is_refused_with_its_line() {
+    let bench = one_tail();
+    bench.configure("[estimate]", "[[override]]\ntails = [\"N4*\"]\nchannel.load.sgn = 1\n\n[estimate]");
+    let ended = bench.freeplay(&["run"]);
+    assert_eq!(ended.code, Some(2), "{ended:?}");
+    assert!(ended.err.contains("error[unknown_key]") && ended.err.contains("`sign`?"), "{}", ended.err);
+}
+
+/// A column that is renamed half-way through the years: each log is read as it is, and `check` says so.
+#[test]
+fn columns_that_change_are_told() {
+    let bench = one_tail();
+    let log = &logs(&bench)[0];
+    rewrite(log, &log.with_file_name("x.parquet"), &facts(log), |c| c != "aileron_left_load_n", |_| true);
+    std::fs::rename(log.with_file_name("x.parquet"), log).unwrap();
+    let said = bench.well(&["check"]);
+    assert!(said.contains("not alike in all 10 logs"), "{said}");
+    assert!(said.contains("`aileron_left_load_n`: Float32 in 9"), "{said}");
+    assert!(
+        said.contains("`aileron_left_motor_deg`: Float32 in 9") && said.contains("Float64 in 1"),
+        "{said}"
+    );
+    assert!(said.contains("channel_unmapped: the log lacks aileron_left_load_n"), "{said}");
+    let account = bench.well(&["run"]);
+    assert!(account.contains("40 records") && account.contains("channel_unmapped 1"), "{account}");
+}
+
+#[test]
+fn a_flights_table_tells_what_the_logs_do_not() {
+    let bench = one_tail();
+    let mut table = String::from("reg,leg,off,fh,log\n");
+    for (n, log) in logs(&bench).iter().enumerate() {
+        let known = facts(log);
+        let fact = |key: &str| known.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone()).unwrap();
+        table += &format!(
+            "N414FP,L{n},{},{},{}\n",
+            fact("departure_utc"),
+            n + 1,
+            log.file_name().unwrap().to_str().unwrap()
+        );
+    }
+    std::fs::write(bench.path("flights.csv"), table).unwrap();
+    let text = std::fs::read_to_string(bench.path("pipeline.toml")).unwrap();
+    let start = text.find("metadata = {").unwrap();
+    let end = start + text[start..].find('\n').unwrap();
+    let text = format!("{}{}", &text[..start], &text[end..]);
+    let text = text.replacen(
+        "[store]",
+        "flights = \"flights.csv\"\n\n[columns.flights]\ntail_number = \"reg\"\nflight_id = \"leg\"\n\
+         departure_utc = \"off\"\nflight_hours = \"fh\"\npath = \"log\"\n\n[store]",
+        1,
+    );
+    std::fs::write(bench.path("pipeline.toml"), text).unwrap();
+    bench.well(&["run"]);
+    let rows = bench.well(&["query", "flight", "L3", "--json"]);
+    assert!(rows.contains("\"flight_hours\": 4.0") || rows.contains("\"flight_hours\":4.0"), "{rows}");
+}
