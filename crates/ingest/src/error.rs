@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use fleet::Complaint;
 
+use crate::pattern::PLACEHOLDER;
+
 /// One file's trouble.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {fault}", file.display())]
@@ -235,7 +237,15 @@ impl Fault {
                 "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`"
             }
             Self::Normalized { .. } => "make it again from the recorder's log: `freeplay normalize`",
-            Self::NoPosition { .. } => "`freeplay check` on this log lists its columns beside the patterns",
+            Self::NoPosition { pattern, columns } => {
+                let meant = columns.iter().map(|c| (strsim::jaro_winkler(pattern, c), c));
+                return match meant.max_by(|a, b| a.0.total_cmp(&b.0)) {
+                    Some((_, near)) => format!(
+                        "what stands for {PLACEHOLDER} in `{near}`? Names are mapped under `[channel]`"
+                    ),
+                    None => "names are mapped under `[channel]`".into(),
+                };
+            }
             Self::TimeUnit { .. } => "a wrong unit puts a flight in 1970, so it is never guessed",
             Self::NoClock => "name the time column, or give the rate when rows are evenly spaced",
             Self::TimeGoesBack { .. } => {

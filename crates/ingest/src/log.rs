@@ -171,7 +171,7 @@ impl Log {
 
     /// Names and types of all columns, for `check`.
     pub fn column_types(&self) -> Vec<(String, String)> {
-        let leaves = self.main.files.iter().flat_map(|file| file.leaves());
+        let leaves = self.main.files.iter().flat_map(LogFile::leaves);
         leaves.map(|leaf| (leaf.name.clone(), leaf.kind.to_string())).collect()
     }
 
@@ -274,9 +274,21 @@ impl Log {
         if all.iter().any(|p| p.lacking.is_empty()) {
             return Ok(all);
         }
-        let columns = self.names_for(&channels.motor_position)?.into_iter().collect();
-        let pattern = channels.motor_position.column.clone();
-        Err(self.main.error(Fault::NoPosition { pattern, columns }))
+        Err(self.no_position(channels, &all)?)
+    }
+
+    /// Names the channel that is not there: none of its columns fits, or it is lacking where others are.
+    fn no_position(&self, channels: &Channels, partly: &[PositionColumns]) -> Result<Error, Error> {
+        let mut fewest = (usize::MAX, &channels.motor_position);
+        for map in Role::NEEDED.iter().filter_map(|role| channels.of(*role)) {
+            let name = |at: &PositionColumns| Pattern::new(&map.column).column_for(at.position.as_str());
+            let count = partly.iter().filter(|at| !at.lacking.contains(&name(at))).count();
+            if count < fewest.0 {
+                fewest = (count, map);
+            }
+        }
+        let (pattern, columns) = (fewest.1.column.clone(), self.names_for(fewest.1)?.into_iter().collect());
+        Ok(self.main.error(Fault::NoPosition { pattern, columns }))
     }
 
     /// The positions that rows or names speak of; none when neither can.

@@ -32,12 +32,11 @@ pub(crate) fn append_where(
 
 fn real(column: &str, array: &ArrayRef) -> Result<ArrayRef, Fault> {
     let kind = array.data_type();
-    if kind.is_numeric() || matches!(kind, DataType::Boolean | DataType::Dictionary(..)) {
-        if let Ok(real) = cast(array, &DataType::Float64) {
-            return Ok(real);
-        }
+    let is_number = kind.is_numeric() || matches!(kind, DataType::Boolean | DataType::Dictionary(..));
+    match cast(array, &DataType::Float64) {
+        Ok(real) if is_number => Ok(real),
+        _ => Err(wrong_type(column, array, "numbers")),
     }
-    Err(wrong_type(column, array, "numbers"))
 }
 
 /// The fault of a column whose type does not serve.

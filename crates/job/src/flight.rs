@@ -353,7 +353,7 @@ pub fn identify_companion(
 
 /// What a log says of itself, and what the flights table adds.
 fn identity_of(log: &Log, files: &Files, config: &Config) -> Result<Identity, ingest::Error> {
-    let path = files.main.first().map(PathBuf::as_path).unwrap_or(Path::new(""));
+    let path = files.main.first().map_or(Path::new(""), PathBuf::as_path);
     log.identity(|said| config.flights.facts(path, said, &config.document.identity))
 }
 

@@ -110,7 +110,7 @@ fn a_slower_position_is_joined_by_lines_and_a_slower_load_is_held() {
     }
     let load = holed(|k| k.is_multiple_of(10).then_some(k as f64));
     let a = read(&plain(), &with(columns(), "f", load)).unwrap();
-    assert_eq!((a.load_n[25], a.segments.clone()), (20.0, vec![0..ROWS]));
+    assert_eq!((a.load_n[25], a.segments.len(), a.segments[0].len()), (20.0, 1, ROWS));
 }
 
 #[test]
@@ -170,7 +170,7 @@ fn a_counter_that_wraps_is_a_clock() {
     m.clock.unit = Some(TimeUnit::Count);
     (m.clock.rate_hz, m.clock.wraps_at) = (Some(100.0), Some(65_536.0));
     let a = read(&m, &with(columns(), "t", count)).unwrap();
-    assert_eq!((a.step_s, a.segments.clone(), a.dx_m.len()), (0.01, vec![0..ROWS], ROWS));
+    assert_eq!((a.step_s, a.segments.len(), a.dx_m.len()), (0.01, 1, ROWS));
 }
 
 #[test]

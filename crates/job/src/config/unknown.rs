@@ -12,25 +12,54 @@ use super::source::Source;
 /// Every unknown key of the source.
 pub(super) fn keys(source: &Source<'_>, schema: &Value) -> Vec<Complaint> {
     let mut found = Vec::new();
-    walk(source, source.table(), schema, "", &mut found);
+    let types = Types(schema);
+    types.walk(source, source.table(), schema, "", &mut found);
     found.sort_by_key(|c| c.line);
     found
 }
 
-fn walk(source: &Source<'_>, table: &DeTable<'_>, schema: &Value, above: &str, found: &mut Vec<Complaint>) {
-    let Some(shape) = object_shape(schema) else { return };
-    let known = shape.get("properties").and_then(Value::as_object);
-    let others = shape.get("additionalProperties").filter(|v| v.is_object());
-    for (key, value) in table {
-        let name: &str = key.get_ref();
-        let path = if above.is_empty() { name.to_owned() } else { format!("{above}.{name}") };
-        match known.and_then(|k| k.get(name)).or(others) {
-            Some(inner) => each_table(value.get_ref(), &mut |t| walk(source, t, inner, &path, found)),
-            None => {
-                let names = known.into_iter().flat_map(|k| k.keys().map(String::as_str));
-                found.push(source.at_span(key.span(), complaint(name, above, names)));
+/// The whole schema, in which a type that holds its own kind is told by reference.
+struct Types<'s>(&'s Value);
+
+impl Types<'_> {
+    fn walk(
+        &self,
+        source: &Source<'_>,
+        table: &DeTable<'_>,
+        schema: &Value,
+        above: &str,
+        found: &mut Vec<Complaint>,
+    ) {
+        let Some(shape) = self.object_shape(schema) else { return };
+        let known = shape.get("properties").and_then(Value::as_object);
+        let others = shape.get("additionalProperties").filter(|v| v.is_object());
+        for (key, value) in table {
+            let name: &str = key.get_ref();
+            let path = if above.is_empty() { name.to_owned() } else { format!("{above}.{name}") };
+            match known.and_then(|k| k.get(name)).or(others) {
+                Some(inner) => {
+                    each_table(value.get_ref(), &mut |t| self.walk(source, t, inner, &path, found));
+                }
+                None => {
+                    let names = known.into_iter().flat_map(|k| k.keys().map(String::as_str));
+                    found.push(source.at_span(key.span(), complaint(name, above, names)));
+                }
             }
         }
+    }
+
+    /// The object in a schema, also where it may be absent or stands in a list.
+    fn object_shape<'v>(&'v self, schema: &'v Value) -> Option<&'v Value> {
+        if let Some(reference) = schema.get("$ref").and_then(Value::as_str) {
+            return self.object_shape(self.0.pointer(reference.trim_start_matches('#'))?);
+        }
+        if schema.get("properties").is_some()
+            || schema.get("additionalProperties").is_some_and(Value::is_object)
+        {
+            return Some(schema);
+        }
+        let choices = ["anyOf", "oneOf", "allOf"].iter().filter_map(|k| schema.get(*k)?.as_array()).flatten();
+        choices.chain(schema.get("items")).find_map(|s| self.object_shape(s))
     }
 }
 
@@ -40,16 +69,6 @@ fn each_table<'t, 'i>(value: &'t DeValue<'i>, visit: &mut impl FnMut(&'t DeTable
         DeValue::Array(values) => values.iter().for_each(|v| each_table(v.get_ref(), visit)),
         _ => {}
     }
-}
-
-/// The object in a schema, also where it may be absent or stands in a list.
-fn object_shape(schema: &Value) -> Option<&Value> {
-    if schema.get("properties").is_some() || schema.get("additionalProperties").is_some_and(Value::is_object)
-    {
-        return Some(schema);
-    }
-    let choices = ["anyOf", "oneOf", "allOf"].iter().filter_map(|k| schema.get(*k)?.as_array()).flatten();
-    choices.chain(schema.get("items")).find_map(object_shape)
 }
 
 fn complaint<'n>(name: &str, above: &str, known: impl Iterator<Item = &'n str> + Clone) -> Complaint {

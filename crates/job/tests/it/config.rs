@@ -172,3 +172,26 @@ bandwidth_hz = 8.0
     assert!((s.unknown_force_n - 40.0).abs() < 1e-12);
     assert!((part.actuator.stiffness_n_per_m() - 2e6).abs() < 1e-6);
 }
+
+/// Every example of `docs/layouts.md`, with what it leaves out, is a configuration.
+#[test]
+fn every_layout_of_the_documentation_is_read() {
+    let page = include_str!("../../../../docs/layouts.md");
+    let examples: Vec<&str> = page.split("```toml\n").skip(1).filter_map(|t| t.split("```").next()).collect();
+    assert!(examples.len() >= 12, "{} examples", examples.len());
+    let tail = "\n[part.EMA]\nstiffness_n_per_m = 5e7\ndamping_n_s_per_m = 2e3\nscrew_mass_kg = 8.0\nlead_m_per_rev = 0.005\n\
+        noise = { screw_rms_m = 3e-6, screw_resolution_m = 1e-6, motor_rms_m = 1e-6, motor_resolution_m = 1e-6, \
+        unknown_force_n = 200.0, bandwidth_hz = 10.0 }\n";
+    for example in examples {
+        let logs = "installations = \"installations.csv\"\n";
+        let text = if example.contains("[logs]\nfiles") {
+            example.replacen("[logs]\n", &format!("[logs]\n{logs}"), 1)
+        } else if example.contains("[logs]\n") {
+            example.replacen("[logs]\n", &format!("[logs]\nfiles = [\"*.parquet\"]\n{logs}"), 1)
+        } else {
+            format!("[logs]\nfiles = [\"*.parquet\"]\n{logs}\n{example}")
+        };
+        let whole = text + tail;
+        assert!(parse(&whole).is_ok(), "{:?} in\n{whole}", parse(&whole).err());
+    }
+}
