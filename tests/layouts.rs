@@ -1,6 +1,7 @@
 //! Logs in other shapes give the numbers of the plain ones: normalized, re-encoded, in pieces, in groups of
 //! files, read by overrides.
 
+use std::fmt::Write;
 use std::path::PathBuf;
 
 use crate::bench::{Bench, Table, facts, rewrite};
@@ -202,12 +203,8 @@ fn a_flights_table_tells_what_the_logs_do_not() {
     for (n, log) in logs(&bench).iter().enumerate() {
         let known = facts(log);
         let fact = |key: &str| known.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone()).unwrap();
-        table += &format!(
-            "N414FP,L{n},{},{},{}\n",
-            fact("departure_utc"),
-            n + 1,
-            log.file_name().unwrap().to_str().unwrap()
-        );
+        let name = log.file_name().unwrap().to_str().unwrap();
+        writeln!(table, "N414FP,L{n},{},{},{name}", fact("departure_utc"), n + 1).unwrap();
     }
     std::fs::write(bench.path("flights.csv"), table).unwrap();
     let text = std::fs::read_to_string(bench.path("pipeline.toml")).unwrap();

@@ -78,7 +78,7 @@ fn join(config: &Config, main: Vec<(String, PathBuf)>, companions: Vec<(&str, (S
     for (who, group, shown, path) in said {
         match who {
             Err(complaint) => drop(found.faulty.insert(shown, (path, complaint))),
-            Ok(who) => attach(&mut found, &whose, &who, group, shown, path),
+            Ok(who) => attach(&mut found, &whose, &who, group, shown, &path),
         }
     }
     found
@@ -91,12 +91,12 @@ fn attach(
     who: &Who,
     group: &str,
     shown: String,
-    path: PathBuf,
+    path: &Path,
 ) {
     let mut is_stray = true;
     for (_, first) in whose.iter().filter(|(main, _)| main.as_ref().is_some_and(|main| belongs(who, main))) {
         if let Some(files) = found.logs.get_mut(first) {
-            files.groups.entry(group.to_owned()).or_default().push(path.clone());
+            files.groups.entry(group.to_owned()).or_default().push(path.to_owned());
             is_stray = false;
         }
     }
