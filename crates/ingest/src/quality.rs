@@ -275,7 +275,9 @@ mod tests {
         let before = motor.clone();
         assert_eq!(thaw(&mut motor, &mut screw, 0.004), ["motor_frozen"]);
         assert!(
-            motor[1000..1250].iter().all(|m| m.is_nan()) && motor[999] == last && motor[1250] == before[1250]
+            motor[1000..1250].iter().all(|m| m.is_nan())
+                && motor[999].to_bits() == last.to_bits()
+                && motor[1250].to_bits() == before[1250].to_bits()
         );
         let mut resting = vec![0.01; 4000];
         let mut within: Vec<f64> = wave(2e-4);
