@@ -108,3 +108,43 @@ fn a_clock_without_a_unit_is_never_guessed() {
     let error = read(&file, &m).unwrap_err();
     assert_eq!(error.complaint().code, "no_clock");
 }
+
+/// Bytes changed anywhere in files of every writer: a number or a reason comes back, and never the end of
+/// the process. What was read holds as many samples as the file has rows.
+#[test]
+fn no_change_of_bytes_ends_the_process() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/writers");
+    let m = Arc::new(crate::writers::wide());
+    let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().flatten().map(|e| e.path()).collect();
+    files.retain(|f| f.extension().is_some_and(|e| e == "parquet"));
+    files.sort();
+    let dir = tempfile::tempdir().unwrap();
+    let damaged = dir.path().join("damaged.parquet");
+    // A fixed multiplicative congruence: the same bytes on every machine.
+    let mut state = 0x2545_f491_4f6c_dd1d_u64;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize
+    };
+    for file in &files {
+        let bytes = std::fs::read(file).unwrap();
+        for _ in 0..40 {
+            let mut changed = bytes.clone();
+            for _ in 0..1 + next() % 4 {
+                // Half of the changes go into the footer, where sizes and places stand.
+                let from = if next() % 2 == 0 { 0 } else { bytes.len() - bytes.len().min(3000) };
+                changed[from + next() % (bytes.len() - from)] = next() as u8;
+            }
+            std::fs::write(&damaged, &changed).unwrap();
+            let read = std::panic::catch_unwind(|| -> Result<usize, Error> {
+                let log = Log::open(&Files::one(&damaged), &m)?;
+                let at = log.positions(&m.channels, None)?;
+                let geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
+                Ok(log.actuator(&at[0], &m.channels, geometry)?.dx_m.len())
+            });
+            if let Ok(Ok(samples)) = read {
+                assert!(samples <= 400, "{}: {samples} samples of 400 rows", file.display());
+            }
+        }
+    }
+}

@@ -42,7 +42,7 @@ fn mapping(before: &str) -> Mapping {
     }
 }
 
-fn wide() -> Mapping {
+pub(crate) fn wide() -> Mapping {
     mapping("{position}_")
 }
 
