@@ -168,13 +168,16 @@ fn truth(plan: &Plan) -> Vec<(String, Column)> {
 /// A configuration that reads these logs: nominal parts, the sensors' own facts.
 fn configuration(spec: &Spec) -> String {
     let mut text = HEAD.to_owned();
-    let rotary = spec.parts.first().is_some_and(|part| part.reference_radius_m.is_some());
-    let angle = rotary || spec.parts.first().is_some_and(|part| part.motor_log != MotorLog::Position);
-    let wrapped = spec.parts.first().is_some_and(|part| part.motor_log == MotorLog::WrappedAngle);
-    let unit = |angle: bool| if angle { ("deg", "deg") } else { ("mm", "mm") };
-    channel(&mut text, "motor_position", "motor", unit(angle), wrapped.then_some(360.0));
-    channel(&mut text, "screw_position", "screw", unit(rotary), None);
-    channel(&mut text, "load", "load", if rotary { ("nm", "N.m") } else { ("n", "N") }, None);
+    let Some(first) = spec.parts.first() else { return text };
+    text += &channel_tables(first, "channel");
+    for part in &spec.parts[1..] {
+        // Parts that are logged in other units are read by other columns.
+        let (own, usual) =
+            (channel_tables(part, "override.channel"), channel_tables(first, "override.channel"));
+        if own != usual {
+            let _ = write!(text, "\n[[override]]\nparts = [\"{}\"]\n{own}", part.part_number);
+        }
+    }
     for part in &spec.parts {
         part_table(&mut text, part, spec);
     }
@@ -198,15 +201,31 @@ column = "time_s"
 unit = "s"
 "#;
 
-fn channel(text: &mut String, channel: &str, column: &str, unit: (&str, &str), wraps_at: Option<f64>) {
-    let _ = writeln!(
-        text,
-        "\n[channel.{channel}]\ncolumn = \"{{position}}_{column}_{}\"\nunit = \"{}\"",
-        unit.0, unit.1
-    );
-    if let Some(turn) = wraps_at {
-        let _ = writeln!(text, "wraps_at = {turn}");
+/// How the logs of a part name and measure its channels.
+fn channel_tables(part: &simulator::spec::Part, above: &str) -> String {
+    let rotary = part.reference_radius_m.is_some();
+    let unit = |angle: bool| if angle { ("deg", "deg") } else { ("mm", "mm") };
+    let motor = unit(rotary || part.motor_log != MotorLog::Position);
+    let load = if rotary { ("nm", "N.m") } else { ("n", "N") };
+    let mut text = String::new();
+    for (channel, column, (suffix, unit)) in [
+        ("motor_position", "motor", motor),
+        ("screw_position", "screw", unit(rotary)),
+        ("load", "load", load),
+    ] {
+        let _ = writeln!(
+            text,
+            "\n[{above}.{channel}]\ncolumn = \"{{position}}_{column}_{suffix}\"\nunit = \"{unit}\""
+        );
+        if column == "motor" && part.motor_log == MotorLog::WrappedAngle {
+            let _ = writeln!(text, "wraps_at = 360.0");
+        }
+        if let (Some(radius_m), "motor") = (part.reference_radius_m, column) {
+            // A motor turns so often for one turn of the part.
+            let _ = writeln!(text, "gear_ratio = {}", std::f64::consts::TAU * radius_m / part.lead_m);
+        }
     }
+    text
 }
 
 fn part_table(text: &mut String, part: &simulator::spec::Part, spec: &Spec) {
