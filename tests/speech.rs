@@ -216,3 +216,15 @@ fn a_configuration_elsewhere_is_read_from_there() {
     bench.well(&["run", "--limit", "2", "--config", "fleet [1] ü/pipeline.toml"]);
     assert!(odd.join("results").exists());
 }
+
+/// A stranger's first step: the proposal from the logs reads those very logs.
+#[test]
+fn a_proposal_from_logs_reads_them() {
+    let bench = Bench::sample();
+    std::fs::remove_file(bench.path("pipeline.toml")).unwrap();
+    bench.well(&["init", "--from", "sample-data/logs"]);
+    bench.configure("\"installations.csv\"", "\"sample-data/installations.csv\"");
+    bench.configure("[part.\"EMA-27-1040\"]", "[part.\"EMA-27-1060\"]\nstiffness_n_per_m = 6.5e7\ndamping_n_s_per_m = 2500.0\nscrew_mass_kg = 9.0\nlead_m_per_rev = 0.006\nnoise = { screw_rms_m = 3e-6, screw_resolution_m = 2e-6, motor_rms_m = 1e-6, motor_resolution_m = 3e-7, unknown_force_n = 200.0, bandwidth_hz = 10.0 }\n\n[part.\"EMA-27-1040\"]");
+    let account = bench.well(&["run"]);
+    assert!(account.contains("120 estimated"), "{account}");
+}

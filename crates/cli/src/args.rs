@@ -66,7 +66,7 @@ pub(crate) enum Color {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Write a commented pipeline.toml and an example installations.csv; nothing is overwritten
-    #[command(after_help = "Example:\n  freeplay init fleet-a")]
+    #[command(after_help = "Examples:\n  freeplay init fleet-a\n  freeplay init --from /data/logs")]
     Init(InitArgs),
     /// Say channel by channel what was found, mapped and converted, and what would be refused
     #[command(after_help = "Example:\n  freeplay check logs/N412FP/20261119_0413.parquet")]
@@ -156,6 +156,9 @@ pub(crate) struct InitArgs {
     /// Folder to write to.
     #[arg(default_value = ".")]
     pub dir: PathBuf,
+    /// Look at the logs below this folder and propose how to read them.
+    #[arg(long, value_name = "FOLDER")]
+    pub from: Option<PathBuf>,
 }
 
 /// `check`.

@@ -98,6 +98,12 @@ impl LogFile {
         pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
     }
 
+    /// The keys of that metadata.
+    pub(crate) fn metadata_keys(&self) -> Vec<&str> {
+        let pairs = self.footer.metadata().file_metadata().key_value_metadata();
+        pairs.into_iter().flatten().map(|pair| pair.key.as_str()).collect()
+    }
+
     /// Hands the values of some leaves, batch by batch and sample by sample beside each other, to `take`.
     ///
     /// # Errors

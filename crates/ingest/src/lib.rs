@@ -22,6 +22,7 @@ pub mod normal;
 mod numbers;
 mod page;
 pub mod pattern;
+pub mod propose;
 pub mod quality;
 mod resample;
 pub mod schema;

@@ -4,16 +4,19 @@ use std::fs::{self, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
+use ingest::Role;
+use ingest::propose::{Proposal, propose};
+
 use crate::args::InitArgs;
 use crate::exit::{Code, Failure};
 use crate::talk::Talk;
 
 use super::shown;
 
-const FILES: [(&str, &str); 2] = [
-    ("pipeline.toml", include_str!("../../templates/pipeline.toml")),
-    ("installations.csv", include_str!("../../templates/installations.csv")),
-];
+const TEMPLATE: &str = include_str!("../../templates/pipeline.toml");
+
+const FILES: [(&str, &str); 2] =
+    [("pipeline.toml", TEMPLATE), ("installations.csv", include_str!("../../templates/installations.csv"))];
 
 /// Writes both files.
 ///
@@ -24,8 +27,10 @@ pub(crate) fn init(args: &InitArgs, talk: &Talk) -> Result<Code, Failure> {
     if let Some(path) = there {
         return Err(exists(&path));
     }
+    let proposed = args.from.as_deref().map(|folder| proposed(folder, &args.dir)).transpose()?;
     fs::create_dir_all(&args.dir)?;
     for (name, text) in FILES {
+        let text = proposed.as_deref().filter(|_| name == "pipeline.toml").unwrap_or(text);
         let path = args.dir.join(name);
         let file = OpenOptions::new().write(true).create_new(true).open(&path);
         let mut file =
@@ -35,6 +40,74 @@ pub(crate) fn init(args: &InitArgs, talk: &Talk) -> Result<Code, Failure> {
     }
     talk.note("next: say in pipeline.toml where your logs are and what their columns are called, then `freeplay check`");
     Ok(Code::Well)
+}
+
+/// The template with what the logs below a folder seem to offer; a person confirms it with `check`.
+fn proposed(folder: &Path, dir: &Path) -> Result<String, Failure> {
+    let pattern = glob::Pattern::escape(&folder.to_string_lossy());
+    let found = glob::glob(&format!("{pattern}/**/*.parquet")).ok();
+    let Some(log) = found.and_then(|mut paths| paths.find_map(Result::ok)) else {
+        let what = format!("no Parquet log lies below {}", shown(folder));
+        return Err(Failure::usage("no_log_matched", what, "name the folder that holds your logs"));
+    };
+    let offer = propose(&log).map_err(|e| Failure::Refused(vec![e.complaint()]))?;
+    let (head, rest) = TEMPLATE.split_once("# Which flight a log is.").unwrap_or((TEMPLATE, ""));
+    let (_, tail) = rest.split_once("[estimate]").unwrap_or(("", rest));
+    let here = dir == Path::new(".") || folder.is_absolute();
+    let folder = if here { folder.to_owned() } else { std::path::absolute(folder)? };
+    let files = format!("files = [{:?}]", format!("{}/**/*.parquet", shown(&folder)));
+    let head = head.replace("files = [\"logs/**/*.parquet\"]", &files);
+    Ok(format!("{head}{}[estimate]{tail}", mapping(&offer, &shown(&log))))
+}
+
+/// The part of a configuration that a proposal fills; what it could not tell is left to be said.
+fn mapping(offer: &Proposal, log: &str) -> String {
+    let mut text =
+        format!("# Proposed from {log}: names, units and signs are guesses until `freeplay check` agrees.\n");
+    let positions: Vec<&str> = offer.positions.iter().map(String::as_str).collect();
+    text += &format!(
+        "# Positions found: {}.\n\n[identity]\n",
+        if positions.is_empty() { "none".into() } else { positions.join(", ") }
+    );
+    if offer.metadata.is_empty() {
+        text += "# The footer says nothing of the flight: from the path, folders or columns?\n";
+        text += "path = '(?<tail_number>[^/]+)/(?<departure_utc>\\d{8}T\\d{6}Z)[^/]*\\.parquet$'\n";
+        text += "departure_format = \"%Y%m%dT%H%M%SZ\"\n";
+    } else {
+        let facts = offer.metadata.iter().map(|(fact, key)| format!("{} = {key:?}", fact.as_str()));
+        text += &format!("metadata = {{ {} }}\n", facts.collect::<Vec<_>>().join(", "));
+    }
+    text += "# The zone of departures that do not name one.\ntime_zone = \"UTC\"\n\n[clock]\n";
+    text += &match &offer.clock {
+        Some((column, Some(unit))) => format!("column = {column:?}\nunit = {unit:?}\n"),
+        Some((column, None)) => format!(
+            "column = {column:?}\n# unit = \"s\"          # s, ms, us, ns; not needed for timestamps\n"
+        ),
+        None => "# No time column was recognised.\ncolumn = \"\"\nunit = \"s\"\n".to_owned(),
+    };
+    let channels = [
+        (Role::Motor, "motor_position", "deg"),
+        (Role::Screw, "screw_position", "mm"),
+        (Role::Load, "load", "N"),
+    ];
+    for (role, name, usual) in channels {
+        text += &format!("\n[channel.{name}]\n{}", channel(offer, role, usual));
+    }
+    if !offer.others.is_empty() {
+        let few: Vec<&str> = offer.others.iter().take(12).map(String::as_str).collect();
+        text += &format!("\n# Columns of numbers that were not understood: {}\n", few.join(", "));
+    }
+    text + "\n"
+}
+
+fn channel(offer: &Proposal, role: Role, usual: &str) -> String {
+    match offer.channels.get(&role) {
+        Some((column, Some(unit))) => format!("column = {column:?}\nunit = {:?}\n", unit.as_str()),
+        Some((column, None)) => {
+            format!("column = {column:?}\nunit = {usual:?}          # a guess: the name does not tell\n")
+        }
+        None => format!("column = \"\"           # no column was recognised\nunit = {usual:?}\n"),
+    }
 }
 
 fn exists(path: &Path) -> Failure {

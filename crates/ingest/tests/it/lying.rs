@@ -130,7 +130,7 @@ fn no_change_of_bytes_ends_the_process() {
         let bytes = std::fs::read(file).unwrap();
         for _ in 0..40 {
             let mut changed = bytes.clone();
-            for _ in 0..1 + next() % 4 {
+            for _ in 0..=(next() % 4) {
                 // Half of the changes go into the footer, where sizes and places stand.
                 let from = if next() % 2 == 0 { 0 } else { bytes.len() - bytes.len().min(3000) };
                 changed[from + next() % (bytes.len() - from)] = next() as u8;
