@@ -62,42 +62,53 @@ fn proposed(folder: &Path, dir: &Path) -> Result<String, Failure> {
 
 /// The part of a configuration that a proposal fills; what it could not tell is left to be said.
 fn mapping(offer: &Proposal, log: &str) -> String {
-    let mut text =
-        format!("# Proposed from {log}: names, units and signs are guesses until `freeplay check` agrees.\n");
     let positions: Vec<&str> = offer.positions.iter().map(String::as_str).collect();
-    text += &format!(
-        "# Positions found: {}.\n\n[identity]\n",
-        if positions.is_empty() { "none".into() } else { positions.join(", ") }
-    );
-    if offer.metadata.is_empty() {
-        text += "# The footer says nothing of the flight: from the path, folders or columns?\n";
-        text += "path = '(?<tail_number>[^/]+)/(?<departure_utc>\\d{8}T\\d{6}Z)[^/]*\\.parquet$'\n";
-        text += "departure_format = \"%Y%m%dT%H%M%SZ\"\n";
-    } else {
-        let facts = offer.metadata.iter().map(|(fact, key)| format!("{} = {key:?}", fact.as_str()));
-        text += &format!("metadata = {{ {} }}\n", facts.collect::<Vec<_>>().join(", "));
-    }
-    text += "# The zone of departures that do not name one.\ntime_zone = \"UTC\"\n\n[clock]\n";
-    text += &match &offer.clock {
-        Some((column, Some(unit))) => format!("column = {column:?}\nunit = {unit:?}\n"),
-        Some((column, None)) => format!(
-            "column = {column:?}\n# unit = \"s\"          # s, ms, us, ns; not needed for timestamps\n"
-        ),
-        None => "# No time column was recognised.\ncolumn = \"\"\nunit = \"s\"\n".to_owned(),
-    };
+    let positions = if positions.is_empty() { "none".to_owned() } else { positions.join(", ") };
+    let others: Vec<&str> = offer.others.iter().take(12).map(String::as_str).collect();
     let channels = [
         (Role::Motor, "motor_position", "deg"),
         (Role::Screw, "screw_position", "mm"),
         (Role::Load, "load", "N"),
     ];
-    for (role, name, usual) in channels {
-        text += &format!("\n[channel.{name}]\n{}", channel(offer, role, usual));
+    let channels =
+        channels.map(|(role, name, usual)| format!("\n[channel.{name}]\n{}", channel(offer, role, usual)));
+    [
+        format!("# Proposed from {log}: names, units and signs are guesses until `freeplay check` agrees.\n"),
+        format!("# Positions found: {positions}.\n\n[identity]\n{}", identity(offer)),
+        "# The zone of departures that do not name one.\ntime_zone = \"UTC\"\n".to_owned(),
+        format!("\n[clock]\n{}", clock(offer)),
+        channels.concat(),
+        if others.is_empty() {
+            "\n".to_owned()
+        } else {
+            format!("\n# Columns of numbers that were not understood: {}\n\n", others.join(", "))
+        },
+    ]
+    .concat()
+}
+
+fn identity(offer: &Proposal) -> String {
+    if offer.metadata.is_empty() {
+        return "# The footer says nothing of the flight: from the path, folders or columns?\n\
+                path = '(?<tail_number>[^/]+)/(?<departure_utc>\\d{8}T\\d{6}Z)[^/]*\\.parquet$'\n\
+                departure_format = \"%Y%m%dT%H%M%SZ\"\n"
+            .to_owned();
     }
-    if !offer.others.is_empty() {
-        let few: Vec<&str> = offer.others.iter().take(12).map(String::as_str).collect();
-        text += &format!("\n# Columns of numbers that were not understood: {}\n", few.join(", "));
+    let facts: Vec<String> =
+        offer.metadata.iter().map(|(fact, key)| format!("{} = {key:?}", fact.as_str())).collect();
+    format!("metadata = {{ {} }}\n", facts.join(", "))
+}
+
+fn clock(offer: &Proposal) -> String {
+    match &offer.clock {
+        Some((column, Some(unit))) => format!("column = {column:?}\nunit = {unit:?}\n"),
+        Some((column, None)) => {
+            format!(
+                "column = {column:?}\n# unit = \"s\"          # s, ms, us, ns; not needed for timestamps\n"
+            )
+        }
+        None => "# No time column was recognised.\ncolumn = \"\"\nunit = \"s\"\n".to_owned(),
     }
-    text + "\n"
 }
 
 fn channel(offer: &Proposal, role: Role, usual: &str) -> String {
