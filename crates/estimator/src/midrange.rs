@@ -24,8 +24,10 @@ pub struct MidRange {
 /// # Errors
 /// When the channels do not fit, nothing was measured, or S does not move.
 pub fn estimate(samples: &Samples<'_>, filter: &Filter) -> Result<MidRange, Error> {
+    // Before the track: neither needs the other's room.
+    let load = load::band(samples.load_n, samples.segments);
     let track = filter.track(samples, None)?;
     let gap = gap::mid_range(&track.s_m)?;
-    let load = load::band(samples.load_n, samples.segments).ok_or(Error::NothingMeasured)?;
+    let load = load.ok_or(Error::NothingMeasured)?;
     Ok(MidRange { gap, load, nis: track.nis, samples: gap.upper + gap.lower })
 }
