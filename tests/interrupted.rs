@@ -76,3 +76,142 @@ fn an_interrupted_run_says_130_and_the_next_one_does_the_rest() {
     bench.well(&["run"]);
     assert_eq!(stored(&bench), 120);
 }
+
+/// Two hundred kills at random instants, run after run on the same store until it is finished, and then
+/// from nothing again. After each, the store opens, holds whole flights, and each of them once.
+#[test]
+fn two_hundred_kills_lose_nothing_and_double_nothing() {
+    const KILLS: usize = 200;
+    let plain = small();
+    plain.well(&["run", "--jobs", "2"]);
+    let wanted = plain.exported();
+    // The machine may be busy with other tests: the quickest of three runs says how long one takes.
+    let took = |_| {
+        let bench = small();
+        let started = std::time::Instant::now();
+        bench.well(&["run", "--jobs", "2"]);
+        started.elapsed()
+    };
+    let longest = (0..3).map(took).min().unwrap();
+    let seed = std::env::var("FREEPLAY_KILL_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(412_u64);
+    tell(&format!("killing {KILLS} runs of up to {longest:?}, seed {seed} (FREEPLAY_KILL_SEED)"));
+    let mut chance = Chance(seed);
+    let (mut bench, mut finished, mut kept, mut partly, mut struck) = (small(), 0, 0, 0, 0);
+    for _ in 0..KILLS {
+        let mut child = bench.command(&["run", "--jobs", "2"]).stdout(null()).stderr(null()).spawn().unwrap();
+        std::thread::sleep(longest.mul_f64(chance.next()));
+        let over = child.try_wait().unwrap().is_some();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let now = whole_flights(&bench);
+        assert!(now >= kept, "{kept} records were kept, now {now}");
+        partly += usize::from(now > 0 && now < 40);
+        struck += usize::from(!over);
+        kept = now;
+        if over {
+            assert_eq!(bench.exported(), wanted, "after kills, the finished store is another one");
+            (bench, finished, kept) = (small(), finished + 1, 0);
+        }
+    }
+    bench.well(&["run"]);
+    assert_eq!(bench.exported(), wanted);
+    tell(&format!("{struck} runs were struck, {partly} stores found half full, {finished} finished between"));
+    assert!(struck > KILLS / 2, "kills came too late: {struck} runs were struck");
+}
+
+/// Ten flights of four actuators.
+fn small() -> Bench {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N413FP/*.parquet");
+    bench
+}
+
+fn null() -> std::process::Stdio {
+    std::process::Stdio::null()
+}
+
+/// Opens the store as another program would, and counts its records: four for each flight, each once.
+fn whole_flights(bench: &Bench) -> usize {
+    let store = match store::Store::open(bench.path("results")) {
+        Ok(store) => store,
+        // Killed before the store was made, or while it was.
+        Err(error) if error.complaint().code == "store_missing" => return 0,
+        Err(error) => panic!("the store does not open: {error}"),
+    };
+    let records = store.records(&store::Query::default()).unwrap();
+    let mut flights = std::collections::BTreeMap::<String, std::collections::BTreeSet<String>>::new();
+    for record in &records {
+        let new = flights
+            .entry(record.flight.flight_id.to_string())
+            .or_default()
+            .insert(record.position.to_string());
+        assert!(new, "{} of {} is there twice", record.position, record.flight.flight_id);
+    }
+    assert!(flights.values().all(|positions| positions.len() == 4), "half a flight: {flights:?}");
+    assert!(store.verify().is_empty(), "{:?}", store.verify());
+    records.len()
+}
+
+/// Numbers from 0 to 1, the same for the same seed on every machine.
+struct Chance(u64);
+
+impl Chance {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// A file that may not grow: the write fails at some byte, the run says so with code 3, and what was stored
+/// before stays whole. With room again the next run finishes.
+#[cfg(unix)]
+#[test]
+fn a_writer_that_fails_at_any_byte_leaves_the_store_whole() {
+    let plain = small();
+    plain.well(&["run"]);
+    let wanted = plain.exported();
+    let mut failed = 0;
+    for blocks in [0, 1, 2, 4, 6, 8, 12, 16, 24, 32] {
+        let bench = small();
+        let program = env!("CARGO_BIN_EXE_freeplay");
+        // Blocks of 512 bytes: the limit strikes inside data files and inside the log alike.
+        let limited = format!("ulimit -f {blocks}; exec '{program}' run --jobs 1");
+        let ended = std::process::Command::new("sh")
+            .args(["-c", &limited])
+            .current_dir(bench.path(""))
+            .env_remove("FREEPLAY_CONFIG")
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(matches!(ended.status.code(), Some(0 | 3)), "{blocks} blocks: {:?} {said}", ended.status);
+        failed += usize::from(ended.status.code() == Some(3));
+        assert!(ended.status.code() != Some(3) || said.contains("error["), "{blocks} blocks: {said}");
+        whole_flights(&bench);
+        bench.well(&["run"]);
+        assert_eq!(bench.exported(), wanted, "{blocks} blocks");
+    }
+    assert!(failed > 2, "the limit struck {failed} times only");
+}
+
+/// Two runs at once: one works, the other names it or waits; nothing is done twice.
+#[test]
+fn two_runs_at_once_store_each_flight_once() {
+    let plain = small();
+    plain.well(&["run"]);
+    let bench = small();
+    let run = |args: &[&str]| {
+        bench.command(args).stdout(null()).stderr(std::process::Stdio::piped()).spawn().unwrap()
+    };
+    let children = [run(&["run"]), run(&["run"]), run(&["run", "--wait", "2m"])];
+    for child in children {
+        let ended = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        match ended.status.code() {
+            Some(0) => {}
+            Some(3) => assert!(said.contains("pid"), "{said}"),
+            code => panic!("{code:?}: {said}"),
+        }
+    }
+    assert_eq!(whole_flights(&bench), 40);
+    assert_eq!(bench.exported(), plain.exported());
+}

@@ -29,6 +29,7 @@ fn main() -> ExitCode {
             return if error.use_stderr() { Code::Usage.into() } else { Code::Well.into() };
         }
     };
+    ignore_file_size_signal();
     let talk = Talk::new(&args.global);
     // A panic while reading a log becomes a complaint about that log; its backtrace would help nobody.
     std::panic::set_hook(Box::new(|_| {}));
@@ -39,6 +40,17 @@ fn main() -> ExitCode {
     match ended {
         Ok(code) => code.into(),
         Err(failure) => talk.fail(&failure).into(),
+    }
+}
+
+/// A file that outgrows its limit should fail to be written and be complained of, not end the process
+/// without a word, as the signal does by default.
+fn ignore_file_size_signal() {
+    #[cfg(unix)]
+    {
+        let heard = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
+        // Where it cannot be registered things stay as they are.
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, heard);
     }
 }
 
