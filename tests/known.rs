@@ -150,3 +150,82 @@ fn a_pattern_that_reaches_our_own_results_does_not_read_them() {
     std::fs::remove_file(bench.path("sample-data/truth.parquet")).unwrap();
     assert!(to_do(&bench.well(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
 }
+
+/// The number in the store can be made again from what the store says about it.
+#[test]
+fn a_record_explains_itself_and_comes_again() {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
+    bench.well(&["run"]);
+    let told = bench.well(&["explain", "N412FP-0003", "aileron_left"]);
+    for part in ["every bit is the same", "stiffness_n_per_m = 50000000.0", "motor m", "made by    Freeplay"]
+    {
+        assert!(told.contains(part), "{part} is not in {told}");
+    }
+    let json = bench.well(&["explain", "N412FP-0003", "aileron_left", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["replay"]["verdict"], "same");
+    bench.configure("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 5.1e7");
+    assert!(bench.well(&["explain", "N412FP-0003", "aileron_left"]).contains("settings have changed"));
+    std::fs::write(&bench.logs()[2], b"gone").unwrap();
+    let ended = bench.freeplay(&["explain", "N412FP-0003", "aileron_left"]);
+    assert_eq!(ended.code, Some(1), "{ended:?}");
+    assert!(ended.err.contains("error[not_parquet]"), "{}", ended.err);
+    assert_eq!(bench.freeplay(&["explain", "N412FP-0003", "rudder"]).code, Some(2));
+}
+
+/// Two methods side by side over the fleet: each in a store of its own, compared actuator by actuator.
+#[test]
+fn two_methods_live_side_by_side_and_are_compared() {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    bench.well(&["run"]);
+    assert!(bench.well(&["diff", "results", "results"]).starts_with("0 of 40 actuator-flights differ"));
+    bench.configure("path = \"results\"", "path = \"trial\"");
+    bench.configure("method = \"contact\"", "method = \"midrange\"");
+    bench.well(&["run"]);
+    let told = bench.well(&["diff", "results", "trial"]);
+    assert!(told.starts_with("40 of 40 actuator-flights differ"), "{told}");
+    let few = bench.well(&["diff", "results", "trial", "--least-um", "1000"]);
+    assert!(few.starts_with("0 of 40"), "{few}");
+    let rows = bench.well(&["diff", "results", "trial", "--format", "csv"]);
+    assert_eq!(rows.lines().count(), 41);
+}
+
+#[test]
+fn metrics_tell_when_a_run_last_completed_and_how() {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    std::fs::write(&bench.logs()[0], b"").unwrap();
+    let ended = bench.freeplay(&["run", "--metrics", "freeplay.prom"]);
+    assert_eq!(ended.code, Some(1));
+    let text = std::fs::read_to_string(bench.path("freeplay.prom")).unwrap();
+    for line in [
+        "freeplay_logs_found 10",
+        "freeplay_logs_in_error 1",
+        "freeplay_records_estimated 36",
+        "freeplay_run_exit_code 1",
+    ] {
+        assert!(text.contains(&format!("\n{line}\n")), "{line} is not in {text}");
+    }
+    assert!(text.contains("freeplay_run_completed_timestamp_seconds 1"));
+    // Every sample has its help and type, as the format asks.
+    let samples = text.lines().filter(|l| !l.starts_with('#')).count();
+    assert_eq!(text.lines().filter(|l| l.starts_with("# TYPE")).count(), samples);
+}
+
+#[test]
+fn a_tail_that_went_quiet_is_named() {
+    let bench = Bench::sample();
+    let account = bench.well(&["run"]);
+    assert!(!account.contains("quiet"), "{account}");
+    let installations = bench.path("pipeline.toml");
+    let text = std::fs::read_to_string(&installations).unwrap() + "stale_after_days = 20.0\n";
+    std::fs::write(&installations, text).unwrap();
+    for log in bench.logs().iter().rev().filter(|log| log.to_string_lossy().contains("N414FP")).take(6) {
+        std::fs::remove_file(log).unwrap();
+    }
+    std::fs::remove_dir_all(bench.path("results")).unwrap();
+    let account = bench.well(&["run"]);
+    assert!(account.contains("quiet       1 tail: N414FP since"), "{account}");
+}

@@ -96,6 +96,14 @@ pub(crate) enum Command {
         after_help = "Examples:\n  freeplay trend --tail N412FP\n  freeplay trend --estimates history.csv --queries dates.csv --format csv"
     )]
     Trend(TrendArgs),
+    /// How one number came about: its inputs, settings and channels, and the same number made again
+    #[command(after_help = "Example:\n  freeplay explain N412FP-0007 aileron_left")]
+    Explain(ExplainArgs),
+    /// Two stores side by side: what another method or other settings made of the same flights
+    #[command(
+        after_help = "Example:\n  freeplay run --config trial.toml && freeplay diff results results-trial\n\nMake the other one current by naming it under [store] in pipeline.toml."
+    )]
+    Diff(DiffArgs),
     /// Fly a simulated fleet: logs, installations and the truth
     #[command(
         after_help = "Example:\n  freeplay simulate --output /tmp/fleet && freeplay run --config /tmp/fleet/pipeline.toml"
@@ -173,6 +181,35 @@ pub(crate) struct CheckArgs {
     pub output: Output,
 }
 
+/// `explain`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ExplainArgs {
+    /// The flight.
+    pub flight: String,
+    /// The position.
+    pub position: String,
+    /// The aircraft, where two of them have a flight of this name.
+    #[arg(long)]
+    pub tail: Option<String>,
+    /// As JSON, SI.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `diff`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct DiffArgs {
+    /// One store.
+    pub before: PathBuf,
+    /// The other.
+    pub after: PathBuf,
+    /// Gaps that differ by less are alike, µm.
+    #[arg(long, default_value_t = 0.0)]
+    pub least_um: f64,
+    #[command(flatten)]
+    pub output: Output,
+}
+
 /// `normalize`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct NormalizeArgs {
@@ -238,6 +275,9 @@ pub(crate) struct RunArgs {
     /// Say what would be done and why, and do nothing.
     #[arg(long)]
     pub dry_run: bool,
+    /// Also write the account as metrics in Prometheus' text format, e.g. for a node exporter.
+    #[arg(long, value_name = "FILE")]
+    pub metrics: Option<PathBuf>,
     /// Wait for another run that holds the store, e.g. `20m`.
     #[arg(long, value_parser = parse_span, value_name = "TIME")]
     pub wait: Option<std::time::Duration>,

@@ -59,6 +59,8 @@ fn dispatch(args: &Args, talk: &Talk) -> Result<Code, Failure> {
         Command::Init(a) => commands::init::init(a, talk),
         Command::Check(a) => commands::check::check(a, &args.global, talk),
         Command::Run(a) => commands::run::run(a, &args.global, talk),
+        Command::Explain(a) => commands::explain::explain(a, &args.global, talk),
+        Command::Diff(a) => commands::diff::diff(a, talk),
         Command::Estimate(a) => commands::estimate::estimate(a, &args.global, talk),
         Command::Normalize(a) => commands::normalize::normalize(a, &args.global, talk),
         Command::Query(a) => commands::query::query(a, &args.global, talk),

@@ -40,7 +40,7 @@ pub(crate) fn answer(
 }
 
 /// Writes beside and renames, so that nobody meets half an answer.
-fn to_file(
+pub(crate) fn to_file(
     file: &std::path::Path,
     fill: impl FnOnce(&mut File) -> Result<(), Failure>,
 ) -> Result<(), Failure> {

@@ -18,6 +18,27 @@ pub struct LogError {
     pub complaint: Complaint,
 }
 
+/// An aircraft that sends nothing while others do.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Quiet {
+    /// The aircraft.
+    pub tail_number: String,
+    /// Its newest departure in the store.
+    pub since_utc: Timestamp,
+}
+
+/// The aircraft that have been silent for longer than `days` before the fleet's newest departure.
+pub(crate) fn quiet(accounts: &[LogAccount], days: f64) -> Vec<Quiet> {
+    let mut newest: BTreeMap<&str, Timestamp> = BTreeMap::new();
+    for (tail, at) in accounts.iter().filter_map(|a| Some((a.tail_number.as_deref()?, a.departure_utc?))) {
+        newest.entry(tail).and_modify(|known| *known = (*known).max(at)).or_insert(at);
+    }
+    let Some(&last) = newest.values().max() else { return Vec::new() };
+    let is_late = |at: Timestamp| last.duration_since(at).as_secs_f64() > days * 86_400.0;
+    let late = newest.into_iter().filter(|(_, at)| is_late(*at));
+    late.map(|(tail, since_utc)| Quiet { tail_number: tail.to_owned(), since_utc }).collect()
+}
+
 /// What a run did.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Report {
@@ -45,6 +66,10 @@ pub struct Report {
     pub errors: Vec<LogError>,
     /// Logs the run was stopped before.
     pub not_reached: usize,
+    /// Their names.
+    pub not_reached_logs: Vec<String>,
+    /// Aircraft whose newest departure is older than the fleet's by more than a trend may be stale.
+    pub quiet: Vec<Quiet>,
     /// The slowest log and its seconds.
     pub slowest: Option<(String, f64)>,
     /// Seconds from plan to account.
@@ -82,6 +107,8 @@ impl Report {
             refused: BTreeMap::new(),
             errors: Vec::new(),
             not_reached: 0,
+            not_reached_logs: Vec::new(),
+            quiet: Vec::new(),
             slowest: None,
             took_s: 0.0,
             workers,

@@ -90,6 +90,7 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let touched = shop.work(workers, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
+    report.quiet = account::quiet(&store.accounts()?, config.document.trend.stale_after_days);
     report.trends = trends::of_units(config, &installations, &store, &touched)?;
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
@@ -153,7 +154,11 @@ impl Shop<'_> {
             // A store that fails must not keep the workers reading through the night.
             halt.store(written.is_err(), Ordering::Relaxed);
             drop(receiver);
-            report.not_reached = self.plan.work.len() - taken.load(Ordering::Relaxed);
+            // Logs are taken in order, so those after the last one taken were not reached.
+            let reached = taken.load(Ordering::Relaxed).min(self.plan.work.len());
+            report.not_reached_logs =
+                self.plan.work[reached..].iter().map(|work| work.shown.clone()).collect();
+            report.not_reached = report.not_reached_logs.len();
             written
         })
     }

@@ -1,8 +1,11 @@
 //! A file for each command: arguments to a request, request to the library, answer to text.
 
 pub(crate) mod check;
+pub(crate) mod diff;
 pub(crate) mod estimate;
+pub(crate) mod explain;
 pub(crate) mod init;
+pub(crate) mod metrics;
 pub(crate) mod normalize;
 pub(crate) mod query;
 pub(crate) mod run;

@@ -17,7 +17,7 @@ use crate::progress::{Progress, span};
 use crate::table::{self, count, number, state_mark, text};
 use crate::talk::{Talk, escape};
 
-use super::{VERSION, config};
+use super::{VERSION, config, metrics};
 
 /// Runs the night's work.
 ///
@@ -46,6 +46,9 @@ pub(crate) fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, 
     talk.complain_all(report.errors.iter().map(|e| &e.complaint));
     let reached = args.fail_on.map_or(Ok(false), |least| is_reached(&config, least))?;
     let code = code(&report, reached, stop.load(Ordering::Relaxed));
+    if let Some(file) = &args.metrics {
+        metrics::write(file, &report, code)?;
+    }
     if args.json {
         let text = serde_json::to_string_pretty(&report).map_err(std::io::Error::from)?;
         talk.answer(&(text + "\n"))?;
@@ -163,6 +166,26 @@ fn account(report: &Report, config: &str, code: Code) -> String {
             "not reached",
             &format!("{}; the next run does them", count(report.not_reached, "log")),
         );
+        for log in report.not_reached_logs.iter().take(10) {
+            line(&mut page, "", &escape(log));
+        }
+        if report.not_reached > 10 {
+            line(
+                &mut page,
+                "",
+                &format!("and {} more, all in `freeplay run --json`", report.not_reached - 10),
+            );
+        }
+    }
+    if !report.quiet.is_empty() {
+        let tails: Vec<String> = report
+            .quiet
+            .iter()
+            .map(|quiet| {
+                format!("{} since {}", escape(&quiet.tail_number), quiet.since_utc.strftime("%Y-%m-%d"))
+            })
+            .collect();
+        line(&mut page, "quiet", &format!("{}: {}", count(tails.len(), "tail"), tails.join(", ")));
     }
     if let Some((log, seconds)) = &report.slowest {
         let took = span(Duration::from_secs_f64(report.took_s));
