@@ -40,7 +40,7 @@ fn logs(bench: &Bench) -> Vec<PathBuf> {
 
 #[test]
 fn normalized_logs_give_the_same_gaps_bit_for_bit() {
-    for encoding in ["split", "plain"] {
+    for encoding in ["split", "compatible"] {
         let bench = one_tail();
         let said = bench.well(&["normalize", "--output", "normalized", "--encoding", encoding]);
         assert!(said.contains("40 normalized logs of 10 logs"), "{said}");

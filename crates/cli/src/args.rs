@@ -83,7 +83,7 @@ pub(crate) enum Command {
     Estimate(EstimateArgs),
     /// Write each actuator's channels as `run` sees them: SI, one clock, one file
     #[command(
-        after_help = "Examples:\n  freeplay normalize logs/N412FP/*.parquet --output normalized\n  freeplay normalize --output for-spark --encoding plain"
+        after_help = "Examples:\n  freeplay normalize logs/N412FP/*.parquet --output normalized\n  freeplay normalize --output for-spark --encoding compatible"
     )]
     Normalize(NormalizeArgs),
     /// Stored records, of a tail, a serial number, a flight or a position
@@ -231,15 +231,15 @@ pub(crate) struct NormalizeArgs {
 pub(crate) enum LogEncoding {
     /// Byte stream split: smallest, and quickest to read here.
     Split,
-    /// Plain: for readers that know no byte stream split, such as Spark 4.2.
-    Plain,
+    /// Dictionary and plain: for readers that know no byte stream split, such as Spark 4.2.
+    Compatible,
 }
 
 impl From<LogEncoding> for ingest::write::Encoding {
     fn from(encoding: LogEncoding) -> Self {
         match encoding {
             LogEncoding::Split => Self::Split,
-            LogEncoding::Plain => Self::Plain,
+            LogEncoding::Compatible => Self::Compatible,
         }
     }
 }

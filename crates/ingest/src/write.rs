@@ -57,8 +57,9 @@ pub enum Encoding {
     /// Byte stream split: the smallest, and in this program the quickest to read (`docs/normalized.md`).
     #[default]
     Split,
-    /// Plain: for readers that know no byte stream split of double floats, Spark 4.2 among them.
-    Plain,
+    /// Dictionary while it pays, then plain: every reader knows it, also those that know no byte stream
+    /// split of double floats, Spark 4.2 among them.
+    Compatible,
 }
 
 /// Writes columns of one length as a Parquet file with key-value metadata, numbers split.
@@ -121,13 +122,12 @@ fn properties(batch: &RecordBatch, metadata: &[(String, String)], encoding: Enco
     for field in batch.schema().fields() {
         if matches!(field.data_type(), DataType::Float64 | DataType::Float32) {
             let path = parquet::schema::types::ColumnPath::from(field.name().as_str());
-            let encoding = match encoding {
-                Encoding::Split => basic::Encoding::BYTE_STREAM_SPLIT,
-                Encoding::Plain => basic::Encoding::PLAIN,
+            builder = match encoding {
+                Encoding::Split => builder
+                    .set_column_dictionary_enabled(path.clone(), false)
+                    .set_column_encoding(path, basic::Encoding::BYTE_STREAM_SPLIT),
+                Encoding::Compatible => builder.set_column_dictionary_enabled(path, true),
             };
-            builder = builder
-                .set_column_dictionary_enabled(path.clone(), false)
-                .set_column_encoding(path, encoding);
         }
     }
     builder.build()
