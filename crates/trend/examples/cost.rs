@@ -4,28 +4,17 @@
 //! the statement and the prior.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a developer's tool, which may fail loudly")]
 
+mod random;
+
 use std::time::Instant;
 
+use random::Random;
 use trend::{FleetPrior, Observation, Series, Settings, Usage, trend};
 
 const LIMIT_M: f64 = 1e-4;
 
-/// Uniform numbers in [0, 1), the same in every run.
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-    }
-}
-
 fn rows(seed: u64, flights: usize) -> Vec<Observation> {
-    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+    let mut random = Random::new(seed);
     let (life, exponent, worn) =
         (2500.0 + 4000.0 * random.uniform(), 0.6 + 1.2 * random.uniform(), 0.4 * random.uniform());
     (0..flights)

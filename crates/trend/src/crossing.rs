@@ -1,5 +1,6 @@
 //! When the limit is met: every node's crossing, added up.
 
+use crate::calibrate::Calibration;
 use crate::curve::Law;
 use crate::posterior::{Node, Posterior};
 use crate::prior::FleetPrior;
@@ -9,7 +10,7 @@ use crate::trend::Crossing;
 /// Three- and five-point Gauss–Hermite rules for a standard normal variable.
 const SHORT_RULE: [(f64, f64); 3] =
     [(-1.732_050_807_568_877_2, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0)];
-const LONG_RULE: [(f64, f64); 5] = [
+pub(crate) const LONG_RULE: [(f64, f64); 5] = [
     (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
     (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
     (0.0, 0.533_333_333_333_333_3),
@@ -18,7 +19,7 @@ const LONG_RULE: [(f64, f64); 5] = [
 ];
 
 /// Quantiles of an exponential wait, one for each tenth.
-const WAIT_RULE: usize = 10;
+pub(crate) const WAIT_RULE: usize = 10;
 
 /// Weight, as a share of the largest, below which a node cannot move a quantile.
 const NEGLIGIBLE: f64 = 2e-3;
@@ -29,12 +30,18 @@ const NOTABLE: f64 = 0.02;
 /// Cells of the distribution, even in ln hours from one hour to the horizon.
 const CELLS: usize = 240;
 
+/// Even quantiles of the wait for an onset, hours' worth of usage.
+pub(crate) fn waits(prior: &FleetPrior) -> [f64; WAIT_RULE] {
+    std::array::from_fn(|i| -(1.0 - (i as f64 + 0.5) / WAIT_RULE as f64).ln() / prior.onsets_per_hour)
+}
+
 /// The distribution of the hours left.
 #[derive(Debug, Clone)]
 pub(crate) struct Remaining {
     cells: Vec<f64>,
     over: f64,
     horizon_hours: f64,
+    calibration: Calibration,
 }
 
 impl Remaining {
@@ -48,7 +55,7 @@ impl Remaining {
         offset_m2: f64,
     ) -> Self {
         let Settings { limit_m, horizon_hours, .. } = *settings;
-        let mut remaining = Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours };
+        let mut remaining = Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, calibration: prior.calibration };
         let spread_m2 = posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2);
         let best = posterior.nodes.iter().map(|n| n.weight).fold(0.0, f64::max);
         let likely = || posterior.nodes.iter().filter(|n| n.weight > NEGLIGIBLE * best);
@@ -78,9 +85,7 @@ impl Remaining {
                 self.over += weight;
             } else if node.waits {
                 let wear_hours = node.ln_life.exp() * left_m / prior.span_m;
-                for i in 0..WAIT_RULE {
-                    let quantile = (i as f64 + 0.5) / WAIT_RULE as f64;
-                    let wait_hours = -(1.0 - quantile).ln() / prior.onsets_per_hour;
+                for wait_hours in waits(prior) {
                     self.add((wait_hours + wear_hours) * hours_per_usage, weight / WAIT_RULE as f64);
                 }
             } else if node.law != Law::None {
@@ -97,12 +102,23 @@ impl Remaining {
         }
     }
 
-    /// Its 5 %, 50 % and 95 % quantiles.
+    /// Its 5 %, 50 % and 95 % quantiles, after what the fleet's past says of such forecasts.
+    ///
+    /// Growth above what was foretold is time below it: the widths on the logarithm of the time are
+    /// those that growth was found to need.
     pub(crate) fn crossing(&self) -> Crossing {
+        let [p05, p50, p95] = [0.05, 0.5, 0.95].map(|p| self.quantile(p));
+        let at = |width: f64| {
+            let middle = p50?.max(1.0);
+            let bound = if width > 0.0 { p05?.max(1.0) } else { p95.unwrap_or(self.horizon_hours) };
+            let hours = (middle.ln() + width.abs() * (bound / middle).ln()).exp();
+            (hours < self.horizon_hours).then_some(hours)
+        };
+        let Calibration { low, middle, high } = self.calibration;
         Crossing {
-            p05_hours: self.quantile(0.05),
-            p50_hours: self.quantile(0.5),
-            p95_hours: self.quantile(0.95),
+            p05_hours: if p50.is_none() { p05 } else { at(high) },
+            p50_hours: if p50.is_none() { p50 } else { at(middle) },
+            p95_hours: if p95.is_none() { p95 } else { at(low) },
         }
     }
 

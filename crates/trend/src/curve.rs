@@ -39,6 +39,9 @@ pub(crate) const POWERS: usize = POWER_EIGHTHS.len();
 /// Number of [`Law::family`] values: every exponent is one, the other laws are one each.
 pub(crate) const FAMILIES: usize = 3 + BEND_RATIOS.len() + POWER_EIGHTHS.len();
 
+/// The family of wear that is proportional to usage.
+pub(crate) const LINEAR: usize = FAMILIES - POWERS + 4;
+
 /// A law's form.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Law {

@@ -1,5 +1,6 @@
 //! A fleet teaches a prior: what its units follow, how long they live, by which laws (empirical Bayes).
 
+use crate::calibrate::Calibration;
 use crate::curve::{FAMILIES, Law};
 use crate::history::{self, History};
 use crate::jump::installation_steps;
@@ -38,7 +39,7 @@ impl FleetPrior {
         let lesson = likeliest(axes.into_iter().filter_map(|axis| Lesson::along(&fleet, axis, limit_m)));
         let Some(lesson) = lesson else { return Self::vague(limit_m) };
         let noises = WEAR_NOISES.into_iter().map(|factor| lesson.with_wear_noise(factor).revised());
-        likeliest(noises).unwrap_or(lesson).revised().learned
+        likeliest(noises).unwrap_or(lesson).revised().calibrated()
     }
 }
 
@@ -100,6 +101,12 @@ impl Lesson {
         lesson.assumed.wear_noise_m *= factor;
         lesson.learned.wear_noise_m *= factor;
         lesson
+    }
+
+    /// What was learned, with what its own forecasts of the fleet's past were worth.
+    fn calibrated(self) -> FleetPrior {
+        let segments = self.histories.iter().flat_map(History::segments);
+        FleetPrior { calibration: Calibration::learn(segments, &self.learned), ..self.learned }
     }
 
     /// Judges every segment by what was learned and learns again, by expectation–maximisation.

@@ -82,13 +82,13 @@ fn name(node: &Node) -> WearLaw {
 }
 
 /// Values with weights, in order.
-struct Weighted {
+pub(crate) struct Weighted {
     values: Vec<(f64, f64)>,
     total: f64,
 }
 
 impl Weighted {
-    fn new(values: impl Iterator<Item = (f64, f64)>) -> Self {
+    pub(crate) fn new(values: impl Iterator<Item = (f64, f64)>) -> Self {
         let mut values: Vec<(f64, f64)> = values.collect();
         values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let total = values.iter().map(|v| v.1).sum();
@@ -96,7 +96,7 @@ impl Weighted {
     }
 
     /// The first value at which this share of the weight is reached; zero of nothing.
-    fn quantile(&self, share: f64) -> f64 {
+    pub(crate) fn quantile(&self, share: f64) -> f64 {
         let mut sum = 0.0;
         let reached = self.values.iter().find(|(_, weight)| {
             sum += weight;

@@ -16,6 +16,7 @@
 //! - A fleet of fewer than some thirty units: the prior then is mostly what was assumed.
 
 mod bins;
+mod calibrate;
 pub mod classic;
 mod clean;
 mod crossing;

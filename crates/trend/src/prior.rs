@@ -1,6 +1,7 @@
 //! What the units of one part number teach about the next (empirical Bayes).
 
-use crate::curve::{Curve, FAMILIES, Law, POWERS};
+use crate::calibrate::Calibration;
+use crate::curve::{Curve, FAMILIES, LINEAR, Law, POWERS};
 use crate::posterior::Segment;
 use crate::season::Season;
 use crate::series::Flight;
@@ -61,13 +62,16 @@ pub struct FleetPrior {
     pub(crate) drift_m2_per_hour: f64,
     /// Spread of what an installation adds to every gap measured in it, metres.
     pub(crate) bias_sd_m: f64,
+    /// How far the fleet's forecasts have missed so far.
+    pub(crate) calibration: Calibration,
 }
 
 impl FleetPrior {
     /// What is assumed of a part number nobody has seen: a new gap of a fifth of the limit, lives around
     /// 4,000 h within a factor of ten, any law.
     pub fn vague(limit_m: f64) -> Self {
-        let mut shares = [0.4 / POWERS as f64; FAMILIES];
+        let mut shares = [0.3 / POWERS as f64; FAMILIES];
+        shares[LINEAR] += 0.1;
         shares[..3].copy_from_slice(&[0.18, 0.18, 0.14]);
         shares[3..FAMILIES - POWERS].fill(0.1 / (FAMILIES - POWERS - 3) as f64);
         Self {
@@ -85,6 +89,7 @@ impl FleetPrior {
             wear_noise_m: 0.2e-6,
             drift_m2_per_hour: 1e-16,
             bias_sd_m: 1.5e-6,
+            calibration: Calibration::HONEST,
         }
     }
 
