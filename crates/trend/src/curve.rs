@@ -5,6 +5,7 @@
 //!
 //! power        F(t) = (t/1000)^p            p = ½ … 3
 //! exponential  F(t) = e^(t/τ) − 1
+//! settling     F(t) = 1 − e^(−t/τ)
 //! onset        F(t) = max(0, t − o)/1000    flat, then a line
 //! bend         F(t) = (s t + (1 − s) max(0, t − o))/1000    one line, then another; s the ratio of rates
 //! none         F(t) = 0
@@ -22,6 +23,9 @@ const POWER_EIGHTHS: [u8; 14] = [4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 22, 2
 const TIME_CONSTANTS: [f64; 10] =
     [250.0, 350.0, 500.0, 700.0, 1000.0, 1400.0, 2000.0, 2800.0, 4000.0, 6000.0];
 
+/// Time constants of wear that settles, hours.
+const SETTLING: [f64; 4] = [900.0, 1600.0, 2800.0, 5000.0];
+
 /// Rates before a bend over those after it: knees, and running in.
 const BEND_RATIOS: [f64; 5] = [0.2, 0.45, 2.2, 5.0, 12.0];
 
@@ -37,7 +41,7 @@ const AGES: [f64; 14] =
 pub(crate) const POWERS: usize = POWER_EIGHTHS.len();
 
 /// Number of [`Law::family`] values: every exponent is one, the other laws are one each.
-pub(crate) const FAMILIES: usize = 3 + BEND_RATIOS.len() + POWER_EIGHTHS.len();
+pub(crate) const FAMILIES: usize = 4 + BEND_RATIOS.len() + POWER_EIGHTHS.len();
 
 /// The family of wear that is proportional to usage.
 pub(crate) const LINEAR: usize = FAMILIES - POWERS + 4;
@@ -53,6 +57,8 @@ pub(crate) enum Law {
     Bend { knee: f64, index: usize },
     /// Index into the time constants.
     Exponential { index: usize },
+    /// Index into the constants of settling.
+    Settling { index: usize },
     /// Index into the exponents.
     Power { index: usize },
 }
@@ -76,7 +82,8 @@ impl Law {
             Self::None => 0,
             Self::Onset { .. } => 1,
             Self::Exponential { .. } => 2,
-            Self::Bend { index, .. } => 3 + index,
+            Self::Settling { .. } => 3,
+            Self::Bend { index, .. } => 4 + index,
             Self::Power { index } => FAMILIES - POWERS + index,
         }
     }
@@ -91,6 +98,7 @@ impl Law {
                 (before * age + (1.0 - before) * (age - knee).max(0.0)) / REFERENCE_HOURS
             }
             Self::Exponential { index } => (age / TIME_CONSTANTS[index]).exp_m1(),
+            Self::Settling { index } => -(-age / SETTLING[index]).exp_m1(),
             Self::Power { index } => {
                 eighth_power(roots((age / REFERENCE_HOURS).max(0.0)), POWER_EIGHTHS[index])
             }
@@ -106,6 +114,7 @@ impl Law {
                 (if age < knee { BEND_RATIOS[index] } else { 1.0 }) / REFERENCE_HOURS
             }
             Self::Exponential { index } => (age / TIME_CONSTANTS[index]).exp() / TIME_CONSTANTS[index],
+            Self::Settling { index } => (-age / SETTLING[index]).exp() / SETTLING[index],
             Self::Power { index } => {
                 let age = age.max(1.0);
                 0.125 * f64::from(POWER_EIGHTHS[index]) * self.height(age) / age
@@ -127,6 +136,8 @@ impl Law {
                 }
             }
             Self::Exponential { index } => TIME_CONSTANTS[index] * height.ln_1p(),
+            Self::Settling { .. } if height >= 1.0 => f64::INFINITY,
+            Self::Settling { index } => -SETTLING[index] * (-height).ln_1p(),
             Self::Power { index } => {
                 REFERENCE_HOURS * height.max(0.0).powf(8.0 / f64::from(POWER_EIGHTHS[index]))
             }
@@ -204,7 +215,8 @@ impl Bank {
             / (TIME_CONSTANTS.len() - 1) as f64;
         let exponentials = (0..TIME_CONSTANTS.len()).map(|index| (Law::Exponential { index }, step));
         let powers = (0..POWERS).map(|index| (Law::Power { index }, 1.0));
-        for (law, law_cell) in exponentials.chain(powers) {
+        let settling = (0..SETTLING.len()).map(|index| (Law::Settling { index }, 1.0 / SETTLING.len() as f64));
+        for (law, law_cell) in exponentials.chain(settling).chain(powers) {
             curves.extend(ages.iter().enumerate().map(|(age_index, &(age, age_cell))| Curve {
                 law,
                 age,
@@ -271,7 +283,7 @@ impl Heights {
         heights.clear();
         match curve.law {
             Law::None => heights.resize(self.usages.len(), 0.0),
-            Law::Onset { .. } | Law::Bend { .. } => {
+            Law::Onset { .. } | Law::Bend { .. } | Law::Settling { .. } => {
                 heights.extend(self.usages.iter().map(|u| curve.law.height(u + curve.age)));
             }
             Law::Exponential { index } => {

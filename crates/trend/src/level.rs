@@ -66,6 +66,7 @@ fn name(node: &Node) -> WearLaw {
         Law::None => WearLaw::None,
         Law::Onset { .. } => WearLaw::Onset,
         Law::Exponential { .. } => WearLaw::Accelerating,
+        Law::Settling { .. } => WearLaw::Slowing,
         law @ Law::Bend { .. } => {
             if law.slope(0.0) < law.slope(f64::MAX) {
                 WearLaw::Accelerating

@@ -72,8 +72,8 @@ impl FleetPrior {
     pub fn vague(limit_m: f64) -> Self {
         let mut shares = [0.3 / POWERS as f64; FAMILIES];
         shares[LINEAR] += 0.1;
-        shares[..3].copy_from_slice(&[0.18, 0.18, 0.14]);
-        shares[3..FAMILIES - POWERS].fill(0.1 / (FAMILIES - POWERS - 3) as f64);
+        shares[..4].copy_from_slice(&[0.18, 0.17, 0.12, 0.05]);
+        shares[4..FAMILIES - POWERS].fill(0.08 / (FAMILIES - POWERS - 4) as f64);
         Self {
             axis: Axis::Hours,
             hours_per_unit: 1.0,
