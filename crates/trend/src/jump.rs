@@ -27,6 +27,10 @@ const NEAR_SHARE: f64 = 0.6;
 /// Spread of the wear rates the common slope is drawn to zero by, metres per hour.
 const SLOPE_SD: f64 = 5e-8;
 
+/// Variance of the wear per metre of wear between the middles of both sides, metres: wear comes in
+/// spurts, which must not pass for steps.
+const WEAR_NOISE_M: f64 = 0.2e-6;
+
 /// A step of the measured gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Jump {
@@ -116,6 +120,16 @@ impl Sums {
         (Jump { at, step_m: right.y - left.y - slope * apart, se_m: variance.sqrt() }, slope)
     }
 
+    /// Whether the step is more than the measurement's errors and a spurt of the wear explain.
+    fn is_beyond_wear(&self, low: usize, high: usize, (jump, slope): &(Jump, f64)) -> bool {
+        let (left, right) = (
+            self.stretch(jump.at.saturating_sub(NEAR).max(low), jump.at),
+            self.stretch(jump.at, (jump.at + NEAR).min(high)),
+        );
+        let worn_m = (slope * (right.x - left.x)).abs();
+        jump.step_m.powi(2) > BELIEVED * BELIEVED * (jump.se_m.powi(2) + WEAR_NOISE_M * worn_m)
+    }
+
     /// Whether the step is there between the nearest flights too, whichever slope is taken off: the
     /// common one, that of the left or that of the right.
     ///
@@ -161,7 +175,7 @@ impl Sums {
             .flat_map(|at| {
                 REACHES.map(|reach| self.jump(at.saturating_sub(reach).max(low), at, (at + reach).min(high)))
             })
-            .filter(|(jump, slope)| ratio(jump) > BELIEVED && self.is_near(low, high, &(*jump, *slope)))
+            .filter(|found| self.is_beyond_wear(low, high, found) && self.is_near(low, high, found))
             .map(|(jump, _)| jump)
             .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
     }
