@@ -41,10 +41,17 @@ pub struct TrendRow {
     pub unit_hours: Option<f64>,
     pub gap_m: Option<f64>,
     pub gap_se_m: Option<f64>,
+    pub estimates: i64,
+    pub outliers: i64,
+    pub noise_factor: f64,
     pub rate_m_per_hour: Option<f64>,
     pub rate_p05_m_per_hour: Option<f64>,
     pub rate_p95_m_per_hour: Option<f64>,
     pub trend: &'static str,
+    pub growth_probability: Option<f64>,
+    pub wear_law: Option<String>,
+    pub wear_law_probability: Option<f64>,
+    pub usage_axis: Option<String>,
     pub trend_p_value: Option<f64>,
     pub sen_rate_m_per_hour: Option<f64>,
     pub sen_low_m_per_hour: Option<f64>,
@@ -54,6 +61,13 @@ pub struct TrendRow {
     pub crossing_hours_p05: Option<f64>,
     pub crossing_hours_p50: Option<f64>,
     pub crossing_hours_p95: Option<f64>,
+    pub crossing_flights_p05: Option<f64>,
+    pub crossing_flights_p50: Option<f64>,
+    pub crossing_flights_p95: Option<f64>,
+    pub not_before_utc: Option<Timestamp>,
+    pub likely_utc: Option<Timestamp>,
+    pub not_after_utc: Option<Timestamp>,
+    pub check_probability: Option<f64>,
     pub state: Option<&'static str>,
     pub reason: Option<String>,
 }
@@ -296,9 +310,11 @@ impl<'a> Fleet<'a> {
         let (flown, series) = self.units.get(name).unwrap_or(&nothing);
         let part = self.part(name.0.as_deref());
         let prior = self.priors.get(&name.0.as_deref());
-        let trend =
-            trend::trend(series, self.as_of.as_microsecond(), &settings(self.config, part), prior, None)?;
-        Ok(row(name, flown, series, part.and_then(|p| p.limit_m), &trend, self.as_of))
+        let settings = settings(self.config, part);
+        let trend = trend::remembered(series, self.as_of.as_microsecond(), &settings, prior)?;
+        let axis = prior.filter(|_| !flown.is_empty()).map(|prior| prior.axis().to_string());
+        let row = row(name, flown, series, part.and_then(|p| p.limit_m), &trend, self.as_of);
+        Ok(TrendRow { usage_axis: axis, ..row })
     }
 }
 
@@ -313,6 +329,7 @@ fn settings(config: &Config, part: Option<&job::Part>) -> trend::Settings {
         planning_horizon_hours: of.planning_horizon_hours,
         horizon_hours: of.horizon_hours,
         stale_after_days: of.stale_after_days,
+        check_interval_hours: of.next_check_hours,
         ..base
     }
 }
@@ -354,6 +371,9 @@ fn row(
         series.flights().iter().filter_map(|f| Some((f.hours, f.gap?.gap_m))).unzip();
     let sen = classic::theil_sen(&hours, &gaps, 0.90).ok();
     let crossing = trend.crossing.filter(|_| limit_m.is_some());
+    let flights = |hours: Option<f64>| Some(hours? / trend.pace?.hours_per_flight);
+    let last_flown = last.map(|f| f.departure_utc);
+    let day = |hours: Option<f64>| after(last_flown?, hours? / trend.pace?.hours_per_day);
     TrendRow {
         part_number: name.0.clone(),
         serial_number: name.1.clone(),
@@ -364,10 +384,17 @@ fn row(
         unit_hours: trend.unit_hours,
         gap_m: trend.level.map(|l| l.gap_m),
         gap_se_m: trend.level.map(|l| l.se_m),
+        estimates: trend.estimates as i64,
+        outliers: trend.outliers_us.len() as i64,
+        noise_factor: trend.noise_factor,
         rate_m_per_hour: trend.rate.map(|r| r.m_per_hour),
         rate_p05_m_per_hour: trend.rate.map(|r| r.p05_m_per_hour),
         rate_p95_m_per_hour: trend.rate.map(|r| r.p95_m_per_hour),
         trend: wear(trend.wear),
+        growth_probability: trend.growth_probability,
+        wear_law: trend.law.map(|(law, _)| law.to_string()),
+        wear_law_probability: trend.law.map(|(_, share)| share),
+        usage_axis: None,
         trend_p_value: classic::mann_kendall(&gaps).ok().map(|test| test.p_value),
         sen_rate_m_per_hour: sen.map(|s| s.slope),
         sen_low_m_per_hour: sen.map(|s| s.slope_low),
@@ -377,6 +404,13 @@ fn row(
         crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
         crossing_hours_p50: crossing.and_then(|c| c.p50_hours),
         crossing_hours_p95: crossing.and_then(|c| c.p95_hours),
+        crossing_flights_p05: flights(crossing.and_then(|c| c.p05_hours)),
+        crossing_flights_p50: flights(crossing.and_then(|c| c.p50_hours)),
+        crossing_flights_p95: flights(crossing.and_then(|c| c.p95_hours)),
+        not_before_utc: day(crossing.and_then(|c| c.p05_hours)),
+        likely_utc: day(crossing.and_then(|c| c.p50_hours)),
+        not_after_utc: day(crossing.and_then(|c| c.p95_hours)),
+        check_probability: trend.check_probability.filter(|_| limit_m.is_some()),
         state: trend.state.filter(|_| limit_m.is_some()).map(state_word),
         reason: Some(if limit_m.is_some() {
             trend.reason.to_string()
@@ -384,6 +418,12 @@ fn row(
             "no limit is configured".into()
         }),
     }
+}
+
+/// A day so many days later; nothing beyond the calendar.
+fn after(from: Timestamp, days: f64) -> Option<Timestamp> {
+    const DAY_S: f64 = 86_400.0;
+    from.checked_add(jiff::SignedDuration::try_from_secs_f64((days * DAY_S).round()).ok()?).ok()
 }
 
 fn change_point(change: &trend::Change, flown: &[&Flown]) -> Option<ChangePoint> {

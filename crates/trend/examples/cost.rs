@@ -16,7 +16,7 @@ const LIMIT_M: f64 = 1e-4;
 fn rows(seed: u64, flights: usize) -> Vec<Observation> {
     let mut random = Random::new(seed);
     let (life, exponent, worn) =
-        (2500.0 + 4000.0 * random.uniform(), 0.6 + 1.2 * random.uniform(), 0.4 * random.uniform());
+        (random.between(2500.0, 6500.0), random.between(0.6, 1.8), random.between(0.0, 0.4));
     (0..flights)
         .map(|flight| {
             let hours = 1.7 * (flight + 1) as f64;

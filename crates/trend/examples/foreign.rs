@@ -141,8 +141,7 @@ fn unit(fleet: usize, random: &mut Random, habits: &Habits) -> Unit {
         }
         let se_um = habits.noise_um * random.between(0.7, 1.4);
         let season_um = swing_um * (std::f64::consts::TAU * day / 365.25).cos();
-        let outlier_um =
-            if random.uniform() < 0.02 { se_um * random.between(-20.0, 20.0) } else { 0.0 };
+        let outlier_um = if random.uniform() < 0.02 { se_um * random.between(-20.0, 20.0) } else { 0.0 };
         let departure_us = (day * DAY_US) as i64;
         let seen = random.uniform() < 0.92;
         if seen {
@@ -226,7 +225,9 @@ fn main() {
     let mut arguments = std::env::args().skip(1);
     let serials: usize = arguments.next().map_or(150, |n| n.parse().unwrap());
     let seed: u64 = arguments.next().map_or(1, |n| n.parse().unwrap());
-    println!("fleet       asked  error  error 65-85%  held  too late  too early  width  within 20 %  false trend");
+    println!(
+        "fleet       asked  error  error 65-85%  held  too late  too early  width  within 20 %  false trend"
+    );
     for (fleet, name) in FLEETS.iter().enumerate() {
         let mut random = Random::new(seed * 100 + fleet as u64);
         let habits = Habits {

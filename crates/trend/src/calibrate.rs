@@ -79,7 +79,8 @@ fn foretold(judged: &Posterior, end: &Bin, now: f64, variance_m2: f64, prior: &F
     let mut points = Vec::with_capacity(LONG_RULE.len() * judged.nodes.len());
     let mut add = |node: &Node, grown_m: f64, share: f64| {
         let sd_m = (judged.level_m2 + variance_m2 + prior.wear_noise_m * grown_m).sqrt();
-        let point = |(z, weight): (f64, f64)| (node.level_m + grown_m + z * sd_m, node.weight * share * weight);
+        let point =
+            |(z, weight): (f64, f64)| (node.level_m + grown_m + z * sd_m, node.weight * share * weight);
         points.extend(LONG_RULE.map(point));
     };
     for node in &judged.nodes {

@@ -55,7 +55,8 @@ impl Remaining {
         offset_m2: f64,
     ) -> Self {
         let Settings { limit_m, horizon_hours, .. } = *settings;
-        let mut remaining = Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, calibration: prior.calibration };
+        let mut remaining =
+            Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, calibration: prior.calibration };
         let spread_m2 = posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2);
         let best = posterior.nodes.iter().map(|n| n.weight).fold(0.0, f64::max);
         let likely = || posterior.nodes.iter().filter(|n| n.weight > NEGLIGIBLE * best);
@@ -105,21 +106,21 @@ impl Remaining {
     /// Its 5 %, 50 % and 95 % quantiles, after what the fleet's past says of such forecasts.
     ///
     /// Growth above what was foretold is time below it: the widths on the logarithm of the time are
-    /// those that growth was found to need.
+    /// those that growth was found to need. A limit that is likely over, or likely beyond the horizon,
+    /// has no width to be corrected.
     pub(crate) fn crossing(&self) -> Crossing {
-        let [p05, p50, p95] = [0.05, 0.5, 0.95].map(|p| self.quantile(p));
-        let at = |width: f64| {
-            let middle = p50?.max(1.0);
-            let bound = if width > 0.0 { p05?.max(1.0) } else { p95.unwrap_or(self.horizon_hours) };
-            let hours = (middle.ln() + width.abs() * (bound / middle).ln()).exp();
-            (hours < self.horizon_hours).then_some(hours)
+        let [p05_hours, p50_hours, p95_hours] = [0.05, 0.5, 0.95].map(|p| self.quantile(p));
+        let (Some(early), Some(middle)) = (p05_hours, p50_hours.filter(|hours| *hours > 0.0)) else {
+            return Crossing { p05_hours, p50_hours, p95_hours };
         };
-        let Calibration { low, middle, high } = self.calibration;
-        Crossing {
-            p05_hours: if p50.is_none() { p05 } else { at(high) },
-            p50_hours: if p50.is_none() { p50 } else { at(middle) },
-            p95_hours: if p95.is_none() { p95 } else { at(low) },
-        }
+        let late = p95_hours.unwrap_or(self.horizon_hours);
+        let at = |width: f64| {
+            let bound = if width > 0.0 { early } else { late };
+            let hours = middle * (bound.max(1.0) / middle).powf(width.abs());
+            (hours < self.horizon_hours).then_some(if hours > 1.0 { hours } else { 0.0 })
+        };
+        let Calibration { low, middle: shift, high } = self.calibration;
+        Crossing { p05_hours: at(high), p50_hours: at(shift), p95_hours: p95_hours.and_then(|_| at(low)) }
     }
 
     /// The hours by which the limit is met with this probability; nothing when that is beyond the horizon.

@@ -215,7 +215,8 @@ impl Bank {
             / (TIME_CONSTANTS.len() - 1) as f64;
         let exponentials = (0..TIME_CONSTANTS.len()).map(|index| (Law::Exponential { index }, step));
         let powers = (0..POWERS).map(|index| (Law::Power { index }, 1.0));
-        let settling = (0..SETTLING.len()).map(|index| (Law::Settling { index }, 1.0 / SETTLING.len() as f64));
+        let settling =
+            (0..SETTLING.len()).map(|index| (Law::Settling { index }, 1.0 / SETTLING.len() as f64));
         for (law, law_cell) in exponentials.chain(settling).chain(powers) {
             curves.extend(ages.iter().enumerate().map(|(age_index, &(age, age_cell))| Curve {
                 law,

@@ -28,6 +28,7 @@ mod jump;
 mod learn;
 mod level;
 mod look;
+mod memory;
 mod normal;
 mod posterior;
 mod prior;
@@ -38,6 +39,7 @@ mod state;
 mod trend;
 
 pub use error::Error;
+pub use memory::remembered;
 pub use prior::{Axis, FleetPrior};
 pub use series::{Observation, Series, Usage};
 pub use settings::Settings;

@@ -1,5 +1,7 @@
 //! What the units of one part number teach about the next (empirical Bayes).
 
+use std::fmt;
+
 use crate::calibrate::Calibration;
 use crate::curve::{Curve, FAMILIES, LINEAR, Law, POWERS};
 use crate::posterior::Segment;
@@ -31,6 +33,16 @@ impl Axis {
             Self::Flights => flight.flights,
             Self::Reversals => flight.reversals,
         }
+    }
+}
+
+impl fmt::Display for Axis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Hours => "flight_hours",
+            Self::Flights => "flights",
+            Self::Reversals => "load_reversals",
+        })
     }
 }
 
@@ -91,6 +103,16 @@ impl FleetPrior {
             bias_sd_m: 1.5e-6,
             calibration: Calibration::HONEST,
         }
+    }
+
+    /// What wear follows.
+    pub fn axis(&self) -> Axis {
+        self.axis
+    }
+
+    /// The median life from new to the act limit, flight hours at the fleet's mean usage.
+    pub fn median_life_hours(&self) -> f64 {
+        self.ln_life.exp()
     }
 
     /// The usage of a unit up to a flight, hours' worth.

@@ -110,6 +110,18 @@ pub enum WearLaw {
     Accelerating,
 }
 
+impl fmt::Display for WearLaw {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "none",
+            Self::Onset => "onset",
+            Self::Slowing => "slowing",
+            Self::Linear => "linear",
+            Self::Accelerating => "accelerating",
+        })
+    }
+}
+
 /// Whether a unit wears.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wear {

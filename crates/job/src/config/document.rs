@@ -145,11 +145,18 @@ pub struct TrendSettings {
     pub horizon_hours: f64,
     /// Without an estimate for so many days there is no state. Default 30.
     pub stale_after_days: f64,
+    /// Hours until the next check, for the probability of meeting the limit before it. Default 300.
+    pub next_check_hours: f64,
 }
 
 impl Default for TrendSettings {
     fn default() -> Self {
-        Self { planning_horizon_hours: 500.0, horizon_hours: 20_000.0, stale_after_days: 30.0 }
+        Self {
+            planning_horizon_hours: 500.0,
+            horizon_hours: 20_000.0,
+            stale_after_days: 30.0,
+            next_check_hours: 300.0,
+        }
     }
 }
 
@@ -192,6 +199,7 @@ impl Document {
             ("planning_horizon_hours", self.trend.planning_horizon_hours),
             ("horizon_hours", self.trend.horizon_hours),
             ("stale_after_days", self.trend.stale_after_days),
+            ("next_check_hours", self.trend.next_check_hours),
         ] {
             found.extend(positive(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
         }

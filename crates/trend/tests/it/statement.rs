@@ -1,6 +1,6 @@
 //! Statements about units whose truth is known.
 
-use trend::{Observation, Reason, Series, Settings, State, Trend, Usage, Wear, trend};
+use trend::{Observation, Reason, Series, Settings, State, Trend, Usage, Wear, remembered, trend};
 
 const DAY_US: i64 = 86_400_000_000;
 
@@ -88,4 +88,16 @@ fn settings_nothing_can_be_judged_by_are_refused() {
     let settings = Settings { watch_m: 2e-4, ..Settings::for_limit(1e-4) };
     let text = trend(&unit(9, |_| 20.0), 0, &settings, None, None).unwrap_err().to_string();
     assert_eq!(text, "watch limit is 2e-4 m and act limit 1e-4 m: watch must come first");
+}
+
+#[test]
+fn a_remembered_state_does_not_flap_around_its_limit_and_follows_from_the_flights_alone() {
+    // 20 µm per 1,000 h from 20 µm: past the watch limit of 60 µm at 2,000 h, day 1,000; ± 1 µm of scatter.
+    let series = unit(1100, |h| 20.0 + 0.02 * h);
+    let settings = Settings { watch_m: 60e-6, planning_horizon_hours: 1.0, ..Settings::for_limit(1e-4) };
+    let states: Vec<State> = (940..1060)
+        .filter_map(|day| remembered(&series, day * DAY_US, &settings, None).unwrap().state)
+        .collect();
+    let changes = states.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    assert_eq!((states.first(), states.last(), changes), (Some(&State::Normal), Some(&State::Watch), 1));
 }
