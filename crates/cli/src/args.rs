@@ -104,6 +104,11 @@ pub(crate) enum Command {
         after_help = "Example:\n  freeplay run --config trial.toml && freeplay diff results results-trial\n\nMake the other one current by naming it under [store] in pipeline.toml."
     )]
     Diff(DiffArgs),
+    /// Past statements against what came true
+    #[command(
+        after_help = "Examples:\n  freeplay backtest\n  freeplay backtest --estimates history.parquet --json"
+    )]
+    Backtest(BacktestArgs),
     /// Fly a simulated fleet: logs, installations and the truth
     #[command(
         after_help = "Example:\n  freeplay simulate --output /tmp/fleet && freeplay run --config /tmp/fleet/pipeline.toml"
@@ -374,6 +379,16 @@ pub(crate) struct TrendArgs {
     /// One row per query: `serial_number`, `as_of_utc`, optionally `part_number`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["as_of", "tail", "serial", "part"])]
     pub queries: Option<PathBuf>,
+    #[command(flatten)]
+    pub output: Output,
+}
+
+/// `backtest`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct BacktestArgs {
+    /// An estimates table made elsewhere, instead of the store.
+    #[arg(long, value_name = "FILE")]
+    pub estimates: Option<PathBuf>,
     #[command(flatten)]
     pub output: Output,
 }

@@ -65,6 +65,7 @@ fn dispatch(args: &Args, talk: &Talk) -> Result<Code, Failure> {
         Command::Normalize(a) => commands::normalize::normalize(a, &args.global, talk),
         Command::Query(a) => commands::query::query(a, &args.global, talk),
         Command::Trend(a) => commands::trend::trend(a, &args.global, talk),
+        Command::Backtest(a) => commands::backtest::backtest(a, &args.global, talk),
         Command::Simulate(a) => commands::simulate::simulate(a, talk),
         Command::Store(a) => commands::store::store(a, &args.global, talk),
         Command::Completions(a) => commands::shell::completions(a, talk),

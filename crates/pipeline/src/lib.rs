@@ -5,6 +5,7 @@
 //! [`Report`]. Results depend on neither the number of workers nor the order in which they finish.
 
 pub mod account;
+pub mod backtest;
 mod book;
 pub mod bundle;
 pub mod estimates;

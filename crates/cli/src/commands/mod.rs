@@ -1,5 +1,6 @@
 //! A file for each command: arguments to a request, request to the library, answer to text.
 
+pub(crate) mod backtest;
 pub(crate) mod check;
 pub(crate) mod diff;
 pub(crate) mod estimate;

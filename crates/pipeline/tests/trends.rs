@@ -1,0 +1,96 @@
+//! Statements about a small fleet whose wear is a line: 2 h a day, 20 µm when new, limit 150 µm.
+
+use std::path::Path;
+
+use fleet::Installations;
+use jiff::{SignedDuration, Timestamp};
+use job::Config;
+use pipeline::backtest;
+use pipeline::trends::{self, Ask, Flown, TrendRow};
+
+const DAY: SignedDuration = SignedDuration::from_hours(24);
+const HOURS_A_DAY: f64 = 2.0;
+
+fn config() -> Config {
+    let text = include_str!("../../../pipeline.toml");
+    Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
+}
+
+fn day(count: i32) -> Timestamp {
+    "2024-01-01T06:00:00Z".parse::<Timestamp>().unwrap() + DAY * count
+}
+
+/// Scatter of ± 1 µm (1 sd), the same in every run: twelve uniform numbers less six.
+fn scatter_um(unit: i32, day: i32) -> f64 {
+    let mut state = (i64::from(unit) * 100_003 + i64::from(day) + 1) as u64;
+    state = state.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+}
+
+/// Fourteen units, the nth of which wears by 15 + n µm in 1,000 h.
+fn flown(days: i32) -> Vec<Flown> {
+    let flight = |unit: i32, at: i32| {
+        let hours = HOURS_A_DAY * f64::from(at + 1);
+        let gap_um = 20.0 + (15.0 + f64::from(unit)) * hours / 1000.0 + scatter_um(unit, at);
+        Flown {
+            part_number: Some("EMA-27-1040".into()),
+            serial_number: format!("S{unit:02}"),
+            tail_number: Some(format!("T{unit:02}")),
+            position: Some("aileron_left".into()),
+            flight_id: Some(format!("{unit}-{at}")),
+            departure_utc: day(at),
+            installed_utc: None,
+            flight_hours: Some(HOURS_A_DAY),
+            tail_hours_end: Some(500.0 + hours),
+            load_reversals: Some(100),
+            gap_m: Some(gap_um * 1e-6),
+            gap_se_m: Some(1e-6),
+        }
+    };
+    (0..14).flat_map(|unit| (0..days).map(move |at| flight(unit, at))).collect()
+}
+
+fn said(flown: Vec<Flown>, as_of: Timestamp) -> Vec<TrendRow> {
+    let ask = Ask { as_of_utc: Some(as_of), ..Ask::default() };
+    trends::of_flown(&config(), &Installations::new(Vec::new()).unwrap(), flown, &ask).unwrap()
+}
+
+#[test]
+fn neither_later_flights_nor_the_order_of_arrival_change_a_bit_of_a_statement() {
+    let known = said(flown(200), day(199));
+    assert_eq!(said(flown(330), day(199)), known);
+    let mut late = flown(330);
+    late.reverse();
+    assert_eq!(said(late, day(199)), known);
+}
+
+#[test]
+fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
+    for row in said(flown(300), day(299)) {
+        let hours = row.crossing_hours_p50.unwrap();
+        assert!((row.crossing_flights_p50.unwrap() - hours / HOURS_A_DAY).abs() < 1e-6, "{row:?}");
+        let days = (row.likely_utc.unwrap() - day(299)).total(jiff::Unit::Hour).unwrap() / 24.0;
+        assert!((days - hours / HOURS_A_DAY).abs() < 1e-3, "{days} days for {hours} h");
+        assert!(row.not_before_utc < row.likely_utc, "{row:?}");
+    }
+}
+
+#[test]
+fn a_fleet_that_no_unit_of_has_failed_is_held_against_the_levels_it_has_reached() {
+    let past = backtest::of_flown(&config(), &Installations::new(Vec::new()).unwrap(), flown(700)).unwrap();
+    assert!(past.len() > 30, "{} past statements", past.len());
+    for statement in &past {
+        let elapsed = (day(699) - statement.as_of_utc).total(jiff::Unit::Hour).unwrap() / 24.0 * HOURS_A_DAY;
+        assert_eq!(statement.target, "level");
+        assert!((statement.true_hours - elapsed).abs() < 1e-6, "{statement:?}");
+    }
+    let held = past.iter().filter(|p| p.interval == "held").count() as f64 / past.len() as f64;
+    let mut errors: Vec<f64> = past.iter().map(|p| p.relative_error).collect();
+    errors.sort_by(f64::total_cmp);
+    let error = errors[errors.len() / 2];
+    assert!(held > 0.8 && error < 0.15, "held {held}, median error {error}");
+}
