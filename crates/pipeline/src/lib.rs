@@ -11,6 +11,7 @@ pub mod bundle;
 pub mod estimates;
 pub mod event;
 pub mod normalize;
+pub mod maintenance;
 pub mod plan;
 pub mod schedule;
 pub mod simulate;

@@ -11,6 +11,7 @@ use store::{Query, Store};
 use trend::{FleetPrior, Observation, Series, Trend, Usage, classic};
 
 use crate::error::Error;
+use crate::maintenance;
 
 /// A unit, by part and serial number.
 pub type Unit = (PartNumber, SerialNumber);
@@ -26,6 +27,8 @@ pub struct ChangePoint {
     pub kind: &'static str,
     /// Its size, m.
     pub step_m: f64,
+    /// Standard error of its size, m.
+    pub step_se_m: f64,
 }
 
 /// One unit's statement, as the contract names its columns.
@@ -275,10 +278,12 @@ impl<'a> Fleet<'a> {
         histories: &'a BTreeMap<HistoryName, Vec<Flown>>,
         days: &[Timestamp],
     ) -> Result<Self, Error> {
+        let file = config.document.logs.maintenance.as_ref();
+        let book = file.map(|file| maintenance::read(&config.path(file))).transpose()?.unwrap_or_default();
         let read = |(name, flown): (&'a HistoryName, &'a Vec<Flown>)| {
             let mut flown: Vec<&Flown> = flown.iter().collect();
             flown.sort_by_key(|f| f.departure_utc);
-            let series = series(installations, name, &flown)?;
+            let series = series(installations, name, &flown)?.with_book(booked(&book, name));
             Ok((name, (flown, series)))
         };
         let units = histories.par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
@@ -376,6 +381,11 @@ impl<'a> Fleet<'a> {
         let row = row(name, flown, series, part.and_then(|p| p.limit_m), &trend, as_of);
         Ok(TrendRow { usage_axis, ..row })
     }
+}
+
+/// What the maintenance book says of a unit; of one whose part number is not known, nothing.
+fn booked(book: &maintenance::Book, (part, serial): &HistoryName) -> Vec<trend::Booked> {
+    part.clone().and_then(|part| book.get(&(part, serial.clone())).cloned()).unwrap_or_default()
 }
 
 /// Without a limit there is still a level and a rate; only crossings and states need one.
@@ -498,6 +508,7 @@ fn change_point(change: &trend::Change, flown: &[&Flown]) -> Option<ChangePoint>
             trend::ChangeKind::Recorded => "recorded",
         },
         step_m: change.step_m,
+        step_se_m: change.se_m,
     })
 }
 

@@ -1,4 +1,5 @@
 //! Statements about a small fleet whose wear is a line: 2 h a day, 20 µm when new, limit 150 µm.
+#![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
 
 use std::path::Path;
 
@@ -93,4 +94,33 @@ fn a_fleet_that_no_unit_of_has_failed_is_held_against_the_levels_it_has_reached(
     errors.sort_by(f64::total_cmp);
     let error = errors[errors.len() / 2];
     assert!(held > 0.8 && error < 0.15, "held {held}, median error {error}");
+}
+
+fn booked(file: &str) -> Config {
+    let text = include_str!("../../../pipeline.toml")
+        .replace("[logs]", &format!("[logs]\nmaintenance = \"tests/data/{file}\""));
+    Config::parse(&text, Path::new("pipeline.toml"), Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap()
+}
+
+#[test]
+fn what_the_maintenance_book_says_is_a_change_point_once_its_day_has_come() {
+    let nobody = Installations::new(Vec::new()).unwrap();
+    let ask = Ask { as_of_utc: Some(day(199)), ..Ask::default() };
+    let rows = trends::of_flown(&booked("maintenance.csv"), &nobody, flown(200), &ask).unwrap();
+    let recorded = |row: &TrendRow| row.change_points.iter().filter(|c| c.kind == "recorded").count();
+    let units: Vec<&str> =
+        rows.iter().filter(|row| recorded(row) > 0).map(|row| row.serial_number.as_str()).collect();
+    // The re-shim of S05 is of a later year.
+    assert_eq!(units, ["S03"]);
+    let change = &rows[3].change_points[0];
+    assert_eq!((change.departure_utc, change.flight_id.as_deref()), (day(101), Some("3-101")));
+}
+
+#[test]
+fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
+    let nobody = Installations::new(Vec::new()).unwrap();
+    let found = trends::of_flown(&booked("maintenance_unknown.csv"), &nobody, flown(20), &Ask::default());
+    let Err(pipeline::Error::Refused(complaints)) = found else { panic!("{found:?}") };
+    let text = format!("{complaints:?}");
+    assert!(text.contains("painted") && text.contains("overhaul"), "{text}");
 }

@@ -4,7 +4,7 @@ use crate::clean::{Clean, Estimate, clean};
 use crate::jump::{Jump, jumps};
 use crate::posterior::Segment;
 use crate::prior::FleetPrior;
-use crate::series::Flight;
+use crate::series::{Booked, Flight};
 use crate::trend::{Change, ChangeKind};
 
 /// A fall larger than this is never a matter of rigging, metres.
@@ -30,7 +30,12 @@ pub(crate) struct History {
 }
 
 /// Reads the flights along the axis that wear follows.
-pub(crate) fn read(flights: &[Flight], known_age: Option<f64>, prior: &FleetPrior) -> History {
+pub(crate) fn read(
+    flights: &[Flight],
+    book: &[Booked],
+    known_age: Option<f64>,
+    prior: &FleetPrior,
+) -> History {
     let now = flights.last().map_or(0.0, |f| prior.usage(f));
     let Clean { mut estimates, outliers, noise_factor } = clean(flights);
     let found = jumps(&estimates);
@@ -49,24 +54,28 @@ pub(crate) fn read(flights: &[Flight], known_age: Option<f64>, prior: &FleetPrio
         known_age,
     };
     for jump in &found {
-        history.apply(jump, flights, prior);
+        history.apply(jump, flights, book, prior);
     }
+    history.changes.extend(unseen(flights, book, &found, &history.estimates));
     history
 }
 
 impl History {
     /// Names a step and undoes it, or begins a segment with it.
-    fn apply(&mut self, jump: &Jump, flights: &[Flight], prior: &FleetPrior) {
+    fn apply(&mut self, jump: &Jump, flights: &[Flight], book: &[Booked], prior: &FleetPrior) {
         let flight = self.estimates[jump.at].flight;
-        let kind = if booked(flights, flight) {
+        let mut entries = book.iter().filter(|entry| is_near(entry, flights, flight)).peekable();
+        let kind = if entries.peek().is_some() || booked(flights, flight) {
             ChangeKind::Recorded
         } else if self.is_reset(jump, prior) {
             ChangeKind::Reset
         } else {
             ChangeKind::Step
         };
-        self.changes.push(Change { departure_us: flights[flight].departure_us, kind, step_m: jump.step_m });
-        if kind == ChangeKind::Reset {
+        let departure_us = flights[flight].departure_us;
+        self.changes.push(Change { departure_us, kind, step_m: jump.step_m, se_m: jump.se_m });
+        let renewed = entries.any(|entry| entry.renews) && jump.step_m < 0.0;
+        if kind == ChangeKind::Reset || renewed {
             self.begins.push(jump.at);
             self.begin_usage.push(self.estimates[jump.at - 1].usage);
             self.offset_m2 = 0.0;
@@ -103,6 +112,28 @@ impl History {
             }
         })
     }
+}
+
+/// Whether an entry of the book was made within a few flights of one.
+fn is_near(entry: &Booked, flights: &[Flight], flight: usize) -> bool {
+    let from = flights[flight.saturating_sub(BOOKED_FLIGHTS + 1)].departure_us;
+    let to = flights[(flight + BOOKED_FLIGHTS).min(flights.len() - 1)].departure_us;
+    (from..=to).contains(&entry.utc_us)
+}
+
+/// Entries of the book that the gap does not show, at the first flight after each.
+fn unseen<'a>(
+    flights: &'a [Flight],
+    book: &'a [Booked],
+    found: &'a [Jump],
+    estimates: &'a [Estimate],
+) -> impl Iterator<Item = Change> + 'a {
+    let shown = |entry: &Booked| found.iter().any(|jump| is_near(entry, flights, estimates[jump.at].flight));
+    book.iter().filter(move |entry| !shown(entry)).filter_map(|entry| {
+        let first = flights.get(flights.partition_point(|f| f.departure_us < entry.utc_us))?;
+        let departure_us = first.departure_us;
+        Some(Change { departure_us, kind: ChangeKind::Recorded, step_m: 0.0, se_m: 0.0 })
+    })
 }
 
 /// Whether the books know of a change of installation near this flight.

@@ -83,7 +83,7 @@ impl Lesson {
         }
         let mut assumed = FleetPrior { axis, hours_per_unit, ..FleetPrior::vague(limit_m) };
         let histories: Vec<History> =
-            fleet.iter().map(|flights| history::read(flights, None, &assumed)).collect();
+            fleet.iter().map(|flights| history::read(flights, &[], None, &assumed)).collect();
         assumed.bias_sd_m = bias(&histories, assumed.bias_sd_m);
         let swings: Vec<Swing> = histories
             .iter()

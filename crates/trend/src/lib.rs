@@ -42,7 +42,7 @@ mod trend;
 pub use error::Error;
 pub use memory::remembered;
 pub use prior::{Axis, FleetPrior};
-pub use series::{Observation, Series, Usage};
+pub use series::{Booked, Observation, Series, Usage};
 pub use settings::Settings;
 pub use state::{Reason, State};
 pub use trend::{

@@ -63,6 +63,16 @@ pub struct Flight {
     pub gap: Option<Gap>,
 }
 
+/// An entry of the maintenance book.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Booked {
+    /// When it was done, microseconds since 1970 UTC.
+    pub utc_us: i64,
+    /// Whether a fall of the gap around it makes the unit as good as new: a re-shim or an overhaul does,
+    /// rigging and lubrication only move what is measured.
+    pub renews: bool,
+}
+
 /// The flights of one serial number, by departure.
 ///
 /// Usage follows these rules, each of which looks backwards only, so that a series cut at a date is
@@ -80,6 +90,7 @@ pub struct Flight {
 pub struct Series {
     flights: Vec<Flight>,
     unit_hours_at_start: Option<f64>,
+    book: Vec<Booked>,
 }
 
 impl Series {
@@ -99,7 +110,20 @@ impl Series {
         rows.dedup_by_key(|row| (row.departure_us, row.installation));
         let mut meter = Meter::new(nominal);
         let flights = rows.iter().map(|row| meter.fly(row)).collect();
-        Ok(Self { flights, unit_hours_at_start: usage.unit_hours_at_start })
+        Ok(Self { flights, unit_hours_at_start: usage.unit_hours_at_start, book: Vec::new() })
+    }
+
+    /// The same with what the maintenance book says of the unit, in any order.
+    #[must_use]
+    pub fn with_book(mut self, mut book: Vec<Booked>) -> Self {
+        book.sort_unstable_by_key(|entry| (entry.utc_us, entry.renews));
+        self.book = book;
+        self
+    }
+
+    /// The entries of the book that were made at or before a date.
+    pub fn book_until(&self, as_of_us: i64) -> &[Booked] {
+        &self.book[..self.book.partition_point(|entry| entry.utc_us <= as_of_us)]
     }
 
     /// All flights.

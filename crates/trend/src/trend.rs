@@ -142,6 +142,8 @@ pub struct Change {
     pub kind: ChangeKind,
     /// Its size, metres; zero for an onset.
     pub step_m: f64,
+    /// Standard error of its size, metres; zero for an onset.
+    pub se_m: f64,
 }
 
 /// Kinds of change.
@@ -153,7 +155,7 @@ pub enum ChangeKind {
     Reset,
     /// Wear began, or sped up.
     Onset,
-    /// In the books: an installation or a maintenance entry.
+    /// In the books: an installation or a maintenance entry; without a step where the gap shows none.
     Recorded,
 }
 
@@ -187,7 +189,7 @@ pub fn trend(
     let vague = FleetPrior::vague(settings.limit_m);
     let prior = prior.unwrap_or(&vague);
     let flights = series.until(as_of_us);
-    let history = history::read(flights, series.unit_hours_at_start(), prior);
+    let history = history::read(flights, series.book_until(as_of_us), series.unit_hours_at_start(), prior);
     let (changes, judged) = follow(&history, flights, prior);
     let judged = judged.filter(|_| history.estimates.len() >= FEWEST_ESTIMATES);
     let growth_probability = judged.as_ref().map(level::growth_probability);
@@ -242,7 +244,7 @@ fn onset(
     let start = segment.begin + level::onset(posterior)?;
     let first = flights.partition_point(|flight| prior.usage(flight) < start);
     let departure_us = flights.get(first)?.departure_us;
-    Some(Change { departure_us, kind: ChangeKind::Onset, step_m: 0.0 })
+    Some(Change { departure_us, kind: ChangeKind::Onset, step_m: 0.0, se_m: 0.0 })
 }
 
 fn wear(growth_probability: Option<f64>) -> Wear {

@@ -98,8 +98,14 @@ fn schema() -> SchemaRef {
     let text = |name: &str| Field::new(name, DataType::Utf8, true);
     let real = |name: &str| Field::new(name, DataType::Float64, true);
     let change = DataType::Struct(
-        vec![Field::new("departure_utc", rows::utc(), true), text("flight_id"), text("kind"), real("step_m")]
-            .into(),
+        vec![
+            Field::new("departure_utc", rows::utc(), true),
+            text("flight_id"),
+            text("kind"),
+            real("step_m"),
+            real("step_se_m"),
+        ]
+        .into(),
     );
     Arc::new(Schema::new(vec![
         text("part_number"),

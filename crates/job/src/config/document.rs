@@ -70,6 +70,9 @@ pub struct LogSettings {
     /// same flight is a copy of the first, or an error.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub pieces: bool,
+    /// The maintenance table, CSV or Parquet, if there is one.
+    #[serde(default)]
+    pub maintenance: Option<String>,
 }
 
 /// `[columns]`: our name → what the table calls it.

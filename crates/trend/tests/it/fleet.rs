@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use trend::{
-    Change, ChangeKind, FleetPrior, Observation, Series, Settings, State, Trend, Usage, Wear, trend,
+    Booked, Change, ChangeKind, FleetPrior, Observation, Series, Settings, State, Trend, Usage, Wear, trend,
 };
 
 const DAY_US: i64 = 86_400_000_000;
@@ -283,4 +283,25 @@ proptest! {
             prop_assert!((0.0..=1.0 + 1e-9).contains(&probability));
         }
     }
+}
+
+#[test]
+fn a_booked_re_shim_is_the_books_own_and_begins_the_unit_anew() {
+    // A fall of 8 µm to some 25 µm above new: too small to be known for a reset without the book.
+    let at = 300;
+    let fell = rows(11, |flight, gap| if flight < at { gap + 30.0 } else { gap + 22.0 });
+    let departure_us = fell[at as usize].departure_us;
+    let said = |renews: Option<bool>| {
+        let book = renews.map(|renews| Booked { utc_us: departure_us - 1, renews });
+        let series =
+            Series::new(fell.clone(), &Usage::default()).unwrap().with_book(book.into_iter().collect());
+        trend(&series, 250 * DAY_US, &Settings::for_limit(LIMIT_M), None, None).unwrap()
+    };
+    let kinds = |trend: &Trend| trend.changes.iter().map(|c| c.kind).collect::<Vec<_>>();
+    let (alone, rigged, renewed) = (said(None), said(Some(false)), said(Some(true)));
+    assert!(!kinds(&alone).contains(&ChangeKind::Recorded), "{:?}", alone.changes);
+    assert_eq!(kinds(&rigged), [ChangeKind::Recorded]);
+    // Rigging moves the measurement, so the gap is what it was; a re-shim takes the 8 µm away.
+    let fall_um = (rigged.level.unwrap().gap_m - renewed.level.unwrap().gap_m) * 1e6;
+    assert!((fall_um - 8.0).abs() < 1.5, "{fall_um}");
 }
