@@ -20,7 +20,7 @@ const PSEUDO_LIVES: f64 = 2.0;
 const PSEUDO_CHANGES: f64 = 4.0;
 
 /// Rounds of expectation and maximisation.
-const ROUNDS: usize = 20;
+const ROUNDS: usize = 8;
 
 /// Noises of wear tried, as factors of the assumed one.
 const WEAR_NOISES: [f64; 4] = [0.7, 1.0, 1.5, 2.2];
