@@ -1,6 +1,7 @@
 //! `diff`: two stores that saw the same flights, actuator by actuator.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -38,8 +39,8 @@ struct Row {
 /// When one of them cannot be read.
 pub(crate) fn diff(args: &DiffArgs, talk: &Talk) -> Result<Code, Failure> {
     let (before, after) = (records(&args.before)?, records(&args.after)?);
-    let keys: std::collections::BTreeSet<_> = before.keys().chain(after.keys()).collect();
-    let rows: Vec<Row> = keys.iter().map(|key| row(before.get(*key), after.get(*key))).flatten().collect();
+    let keys: BTreeSet<_> = before.keys().chain(after.keys()).collect();
+    let rows: Vec<Row> = keys.iter().filter_map(|key| row(before.get(*key), after.get(*key))).collect();
     let shown: Vec<Row> = rows.into_iter().filter(|row| differs(row, args.least_um * 1e-6)).collect();
     let page = || page(&shown, keys.len(), &before, &after);
     rows::answer(&args.output, talk, || rows::batch(&schema(), &shown), page)?;
@@ -105,8 +106,12 @@ fn page(
         said(after)
     );
     if let (Some(middle), Some(largest)) = (middle, changes.last()) {
-        head +=
-            &format!("change of the gap: median {:.3} µm, largest {:.3} µm\n", middle * 1e6, largest * 1e6);
+        let _ = writeln!(
+            head,
+            "change of the gap: median {:.3} µm, largest {:.3} µm",
+            middle * 1e6,
+            largest * 1e6
+        );
     }
     if rows.is_empty() {
         return head;
