@@ -1,0 +1,55 @@
+//! Estimate against inspection: bias and limits of agreement (Bland and Altman 1986).
+
+/// How well two ways of measuring the same gap agree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Agreement {
+    /// Pairs.
+    pub pairs: usize,
+    /// Mean of estimate minus inspection, m.
+    pub bias_m: f64,
+    /// 95 % interval of the bias, m: half its width.
+    pub bias_half_width_m: f64,
+    /// Bias less 1.96 standard deviations, m.
+    pub lower_m: f64,
+    /// Bias plus 1.96 standard deviations, m.
+    pub upper_m: f64,
+}
+
+impl Agreement {
+    /// From pairs of estimate and inspection, metres; three are needed for a spread worth stating.
+    pub fn of(pairs: &[(f64, f64)]) -> Option<Self> {
+        if pairs.len() < 3 {
+            return None;
+        }
+        let n = pairs.len() as f64;
+        let bias_m = pairs.iter().map(|(estimate, play)| estimate - play).sum::<f64>() / n;
+        let square: f64 = pairs.iter().map(|(estimate, play)| (estimate - play - bias_m).powi(2)).sum();
+        let sd_m = (square / (n - 1.0)).sqrt();
+        Some(Self {
+            pairs: pairs.len(),
+            bias_m,
+            bias_half_width_m: 1.96 * sd_m / n.sqrt(),
+            lower_m: bias_m - 1.96 * sd_m,
+            upper_m: bias_m + 1.96 * sd_m,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Differences 1, 2 and 3 µm: mean 2, standard deviation 1, by hand.
+    #[test]
+    fn three_pairs_by_hand() {
+        let a = Agreement::of(&[(11e-6, 10e-6), (22e-6, 20e-6), (33e-6, 30e-6)]).unwrap();
+        assert!((a.bias_m - 2e-6).abs() < 1e-15);
+        assert!((a.lower_m - 0.04e-6).abs() < 1e-12 && (a.upper_m - 3.96e-6).abs() < 1e-12);
+        assert!((a.bias_half_width_m - 1.96e-6 / 3f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_pairs_show_no_spread() {
+        assert!(Agreement::of(&[(1.0, 1.0), (2.0, 2.0)]).is_none());
+    }
+}

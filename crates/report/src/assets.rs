@@ -1,0 +1,15 @@
+//! What all pages share: the style, the chart library (uPlot, MIT) and our lines that use it.
+
+use crate::Page;
+
+/// The shared files of a report.
+pub fn assets() -> Vec<Page> {
+    let files: [(&str, &[u8]); 5] = [
+        ("assets/report.css", include_bytes!("../assets/report.css")),
+        ("assets/report.js", include_bytes!("../assets/report.js")),
+        ("assets/uplot.js", include_bytes!("../assets/uplot.js")),
+        ("assets/uplot.css", include_bytes!("../assets/uplot.css")),
+        ("assets/uplot-LICENSE.txt", include_bytes!("../assets/uplot-LICENSE.txt")),
+    ];
+    files.map(|(path, body)| Page { path: path.to_owned(), body: body.to_vec() }).into()
+}

@@ -1,0 +1,268 @@
+//! The page of one unit: its statement, the evidence, and how good that is.
+
+use askama::Template;
+
+use crate::crossing::chance_in_words;
+use crate::fleet::{share, when};
+use crate::model::{FlightRow, Report, Unit};
+use crate::rates::spreads;
+use crate::standing::Standing;
+use crate::words::{
+    NO_DATA, count, counted, date, date_or, hours, level, minute, percent, rate, um, um_cell, um_or,
+};
+use crate::{Error, Page, chart, serial_path, tail_path};
+
+#[derive(Template)]
+#[template(path = "serial.html")]
+struct View {
+    root: &'static str,
+    title: String,
+    foot: String,
+    name: String,
+    place: Option<(String, String, String)>,
+    standing: Standing,
+    reason: String,
+    now: Facts,
+    remaining: Facts,
+    picture: String,
+    picture_words: String,
+    limit: String,
+    watch: String,
+    gap: String,
+    forecast: Vec<(&'static str, String)>,
+    events: Vec<(String, String, String, &'static str)>,
+    stays: Vec<(String, String, String, String, String)>,
+    quality: Facts,
+    past: Vec<(String, String, String, String, String, &'static str)>,
+    checks: Vec<(String, String, String, String, String)>,
+    record: Facts,
+    flights: Vec<Flight>,
+}
+
+type Facts = Vec<(&'static str, String)>;
+
+/// A flight as a row.
+struct Flight {
+    when: String,
+    id: String,
+    place: String,
+    hours: String,
+    gap: String,
+    low: String,
+    high: String,
+    midrange: String,
+    reversals: i64,
+    load: String,
+    remarks: String,
+}
+
+/// Makes the page of a unit.
+///
+/// # Errors
+/// When the picture cannot be drawn or the template not be filled.
+pub fn serial_page(report: &Report, unit: &Unit) -> Result<Page, Error> {
+    let s = &unit.statement;
+    let forecast =
+        [("not before", s.not_before_utc), ("likely", s.likely_utc), ("not after", s.not_after_utc)];
+    let view = View {
+        root: "../",
+        title: format!("{} · actuator free play", unit.name()),
+        foot: crate::fleet::foot(report),
+        name: unit.name(),
+        place: unit.tail_number.as_ref().map(|tail| {
+            (format!("../{}", tail_path(tail)), tail.clone(), unit.position.clone().unwrap_or_default())
+        }),
+        standing: unit.standing(),
+        reason: s.reason.clone().unwrap_or_else(|| NO_DATA.to_owned()),
+        now: now(report, unit),
+        remaining: remaining(report, unit),
+        picture: chart::history(unit)?,
+        picture_words: picture_words(unit),
+        limit: um_cell(s.limit_m),
+        watch: um_cell(s.watch_m),
+        gap: um_cell(s.gap_m),
+        forecast: forecast.into_iter().filter_map(|(word, t)| Some((word, date(t?)))).collect(),
+        events: events(unit),
+        stays: stays(unit),
+        quality: quality(unit),
+        past: past(unit),
+        checks: checks(unit),
+        record: record(unit),
+        flights: unit.flights.iter().map(flight).collect(),
+    };
+    Ok(Page { path: serial_path(unit), body: view.render()?.into_bytes() })
+}
+
+fn now(report: &Report, unit: &Unit) -> Facts {
+    let s = &unit.statement;
+    let fleet = spreads(report).into_iter().find(|f| Some(f.part) == unit.part_number.as_deref());
+    let fleet = fleet.map_or_else(
+        || NO_DATA.to_owned(),
+        |f| {
+            format!(
+                "median {}, 5 to 95 % {} to {}, {}",
+                rate(f.median),
+                rate(f.low),
+                rate(f.high),
+                counted(f.units, "unit")
+            )
+        },
+    );
+    vec![
+        ("Gap now", level(s.gap_m, s.gap_se_m)),
+        ("Act limit", s.limit_m.map_or_else(|| NO_DATA.to_owned(), |l| format!("{} µm", um(l)))),
+        ("Share of limit", share(unit).map_or_else(|| NO_DATA.to_owned(), percent)),
+        ("Rate, µm per 1000 h", rates(s.rate_p05_m_per_hour, s.rate_m_per_hour, s.rate_p95_m_per_hour)),
+        ("Rate of this part's fleet", fleet),
+        ("Trend", s.trend.clone()),
+    ]
+}
+
+fn rates(low: Option<f64>, middle: Option<f64>, high: Option<f64>) -> String {
+    match (low, middle, high) {
+        (Some(low), Some(middle), Some(high)) => {
+            format!("{} ({} to {})", rate(middle), rate(low), rate(high))
+        }
+        _ => NO_DATA.to_owned(),
+    }
+}
+
+fn remaining(report: &Report, unit: &Unit) -> Facts {
+    let s = &unit.statement;
+    let flights = s.crossing_hours_p50.zip(s.hours_per_flight).map(|(h, per)| h / per);
+    let pace = s.hours_per_day.map_or_else(|| NO_DATA.to_owned(), |h| format!("{h:.1} h a day"));
+    vec![
+        ("Not before", when(s.crossing_hours_p05, s.not_before_utc, unit)),
+        ("Likely", when(s.crossing_hours_p50, s.likely_utc, unit)),
+        ("Not after", when(s.crossing_hours_p95, s.not_after_utc, unit)),
+        ("Likely, in flights", flights.map_or_else(|| NO_DATA.to_owned(), |n| count(n.round() as usize))),
+        ("Limit met before the next check", chance_in_words(s, report.check_interval_hours)),
+        ("Use in the last 90 days", pace),
+    ]
+}
+
+fn picture_words(unit: &Unit) -> String {
+    let estimated = unit.flights.iter().filter(|f| f.gap_m.is_some());
+    let (first, last) = (estimated.clone().next(), estimated.clone().next_back());
+    match (first, last) {
+        (Some(first), Some(last)) => format!(
+            "Gap of {} against date: {} from {} to {}, now {}, act limit {} µm",
+            unit.name(),
+            counted(estimated.count(), "estimate"),
+            date(first.departure_utc),
+            date(last.departure_utc),
+            level(unit.statement.gap_m, unit.statement.gap_se_m),
+            um_or(unit.statement.limit_m),
+        ),
+        _ => "No estimate yet".to_owned(),
+    }
+}
+
+fn events(unit: &Unit) -> Vec<(String, String, String, &'static str)> {
+    let row = |e: &crate::model::Event| {
+        let size = if e.kind == "onset" { "–".to_owned() } else { um(e.step_m) };
+        (date(e.departure_utc), e.kind.clone(), size, if e.in_books { "yes" } else { "no" })
+    };
+    unit.events.iter().map(row).collect()
+}
+
+fn stays(unit: &Unit) -> Vec<(String, String, String, String, String)> {
+    let row = |s: &crate::model::Stay| {
+        let until = s.removed_utc.map_or_else(|| "still there".to_owned(), date);
+        (
+            format!("../{}", tail_path(&s.tail_number)),
+            s.tail_number.clone(),
+            s.position.clone(),
+            date(s.installed_utc),
+            until,
+        )
+    };
+    unit.stays.iter().map(row).collect()
+}
+
+fn quality(unit: &Unit) -> Facts {
+    let q = &unit.quality;
+    let list = |of: &[(String, usize)]| {
+        let words: Vec<String> = of.iter().map(|(word, n)| format!("{word} {}", count(*n))).collect();
+        if words.is_empty() { "none".to_owned() } else { words.join(", ") }
+    };
+    vec![
+        ("Flights used", count(q.estimated)),
+        ("Flights refused", count(q.refused)),
+        ("Why refused", list(&q.reasons)),
+        ("Doubts", list(&q.doubts)),
+        ("Last estimate", date_or(q.last_estimate_utc)),
+        ("Days since", q.days_since_estimate.map_or_else(|| NO_DATA.to_owned(), |d| format!("{d:.0}"))),
+        (
+            "Noise found over stated",
+            q.noise_found_over_stated.map_or_else(|| NO_DATA.to_owned(), |r| format!("{r:.2}")),
+        ),
+    ]
+}
+
+fn past(unit: &Unit) -> Vec<(String, String, String, String, String, &'static str)> {
+    let row = |p: &crate::model::Past| {
+        let interval =
+            format!("{} ({} to {})", um(p.foreseen_m), um(p.foreseen_low_m), um(p.foreseen_high_m));
+        let state = Standing::of(p.state.as_deref()).word().to_owned();
+        (
+            date(p.as_of_utc),
+            state,
+            um(p.gap_m),
+            interval,
+            um(p.found_m),
+            if p.held() { "held" } else { "missed" },
+        )
+    };
+    unit.past.iter().map(row).collect()
+}
+
+fn checks(unit: &Unit) -> Vec<(String, String, String, String, String)> {
+    let row = |i: &crate::model::Inspection| {
+        let force = i.force_n.map_or_else(|| NO_DATA.to_owned(), |f| format!("{f:.0}"));
+        let instrument = i.instrument.clone().unwrap_or_else(|| NO_DATA.to_owned());
+        (date(i.date_utc), um(i.play_m), um_or(i.estimate_m), instrument, force)
+    };
+    unit.inspections.iter().map(row).collect()
+}
+
+fn record(unit: &Unit) -> Facts {
+    let s = &unit.statement;
+    vec![
+        ("Unit hours", s.unit_hours.map_or_else(|| NO_DATA.to_owned(), hours)),
+        ("Wear law believed in most", s.law.clone().unwrap_or_else(|| NO_DATA.to_owned())),
+        ("Usage axis", s.axis.clone().unwrap_or_else(|| NO_DATA.to_owned())),
+        (
+            "Mann–Kendall, two-sided p",
+            s.mann_kendall_p.map_or_else(|| NO_DATA.to_owned(), |p| format!("{p:.3}")),
+        ),
+        (
+            "Sen's slope, µm per 1000 h",
+            rates(s.sen_low_m_per_hour, s.sen_rate_m_per_hour, s.sen_high_m_per_hour),
+        ),
+        (
+            "State the day before",
+            match &s.state_day_before {
+                Some(before) => Standing::of(before.as_deref()).word().to_owned(),
+                None => NO_DATA.to_owned(),
+            },
+        ),
+    ]
+}
+
+fn flight(f: &FlightRow) -> Flight {
+    let load = f.load_p05_n.zip(f.load_p95_n).map(|(low, high)| format!("{low:.0} to {high:.0}"));
+    Flight {
+        when: minute(f.departure_utc),
+        id: f.flight_id.clone(),
+        place: format!("{} {}", f.tail_number, f.position),
+        hours: f.unit_hours.map(|h| format!("{h:.1}")).unwrap_or_default(),
+        gap: um_cell(f.gap_m),
+        low: um_cell(f.gap_p05_m),
+        high: um_cell(f.gap_p95_m),
+        midrange: um_cell(f.gap_midrange_m),
+        reversals: f.load_reversals,
+        load: load.unwrap_or_default(),
+        remarks: f.remarks.clone(),
+    }
+}

@@ -1,0 +1,52 @@
+//! The page of one tail: what sits on it, and how good its data are.
+
+use askama::Template;
+
+use crate::fleet::Row;
+use crate::model::{Report, Tail};
+use crate::words::{count, minute_or};
+use crate::{Error, Page, tail_path};
+
+#[derive(Template)]
+#[template(path = "tail.html")]
+struct View<'a> {
+    root: &'static str,
+    title: String,
+    foot: String,
+    tail: &'a str,
+    facts: Vec<(&'static str, String)>,
+    label: &'static str,
+    groups: Vec<(String, String, Vec<Row>)>,
+    faults: Vec<(String, String, String)>,
+}
+
+/// Makes the page of a tail.
+///
+/// # Errors
+/// When the template cannot be filled.
+pub fn tail_page(report: &Report, tail: &Tail) -> Result<Page, Error> {
+    let name = tail.tail_number.as_str();
+    let mine = report.units.iter().filter(|u| u.tail_number.as_deref() == Some(name));
+    let mut rows: Vec<Row> = mine.map(|u| Row::of(u, "../")).collect();
+    rows.sort_by(|a, b| a.position.cmp(&b.position).then_with(|| a.name.cmp(&b.name)));
+    let faults = report.log_faults.iter().filter(|f| f.tail_number.as_deref() == Some(name));
+    let view = View {
+        root: "../",
+        title: format!("{name} · actuator free play"),
+        foot: crate::fleet::foot(report),
+        tail: name,
+        facts: vec![
+            ("Flights in the store", count(tail.flights)),
+            ("Records", format!("{}, {} refused", count(tail.records), count(tail.refused))),
+            ("Logs in error", count(tail.logs_in_error)),
+            ("Last flight", minute_or(tail.last_departure_utc)),
+            ("Last estimate", minute_or(tail.last_estimate_utc)),
+        ],
+        label: "Actuators of this tail",
+        groups: if rows.is_empty() { Vec::new() } else { vec![(String::new(), String::new(), rows)] },
+        faults: faults
+            .map(|f| (f.log_path.clone(), f.code.clone(), crate::words::minute(f.processed_utc)))
+            .collect(),
+    };
+    Ok(Page { path: tail_path(name), body: view.render()?.into_bytes() })
+}

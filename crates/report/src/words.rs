@@ -1,0 +1,117 @@
+//! Numbers and dates as people read them; what is not known says so.
+
+use jiff::Timestamp;
+use jiff::tz::TimeZone;
+
+/// What stands where nothing is known.
+pub(crate) const NO_DATA: &str = "no data";
+
+pub(crate) fn um(m: f64) -> String {
+    let text = format!("{:.1}", m * 1e6);
+    if text == "-0.0" { "0.0".to_owned() } else { text }
+}
+
+pub(crate) fn um_or(m: Option<f64>) -> String {
+    m.map_or_else(|| NO_DATA.to_owned(), um)
+}
+
+/// A cell of a long table: empty where nothing is known, since the caption says so.
+pub(crate) fn um_cell(m: Option<f64>) -> String {
+    m.map(um).unwrap_or_default()
+}
+
+/// `118.0 ± 4.1 µm`, the interval at 90 %.
+pub(crate) fn level(gap_m: Option<f64>, se_m: Option<f64>) -> String {
+    match (gap_m, se_m) {
+        (Some(gap), Some(se)) => format!("{} ± {} µm", um(gap), um(1.645 * se)),
+        (Some(gap), None) => format!("{} µm", um(gap)),
+        _ => NO_DATA.to_owned(),
+    }
+}
+
+/// Metres per hour as µm per 1,000 h.
+pub(crate) fn rate(m_per_hour: f64) -> String {
+    let text = format!("{:.1}", m_per_hour * 1e9);
+    if text == "-0.0" { "0.0".to_owned() } else { text }
+}
+
+pub(crate) fn date(t: Timestamp) -> String {
+    t.strftime("%Y-%m-%d").to_string()
+}
+
+pub(crate) fn date_or(t: Option<Timestamp>) -> String {
+    t.map_or_else(|| NO_DATA.to_owned(), date)
+}
+
+pub(crate) fn minute(t: Timestamp) -> String {
+    t.strftime("%Y-%m-%d %H:%M").to_string()
+}
+
+pub(crate) fn minute_or(t: Option<Timestamp>) -> String {
+    t.map_or_else(|| NO_DATA.to_owned(), |t| format!("{} UTC", minute(t)))
+}
+
+/// `1 205`: thin groups of three.
+pub(crate) fn count(n: usize) -> String {
+    let digits = n.to_string();
+    let head = digits.len() % 3;
+    let (first, rest) = digits.split_at(head);
+    let groups = rest.as_bytes().chunks(3).map(|g| String::from_utf8_lossy(g).into_owned());
+    let first = (!first.is_empty()).then(|| first.to_owned());
+    first.into_iter().chain(groups).collect::<Vec<_>>().join("\u{202f}")
+}
+
+/// `1 log`, `2 logs`.
+pub(crate) fn counted(n: usize, what: &str) -> String {
+    format!("{} {what}{}", count(n), if n == 1 { "" } else { "s" })
+}
+
+pub(crate) fn hours(h: f64) -> String {
+    count(h.max(0.0).round() as usize)
+}
+
+pub(crate) fn percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
+/// The first instant of the month, so many months on.
+pub(crate) fn month(from: Timestamp, months: i32) -> Option<Timestamp> {
+    let day = from.to_zoned(TimeZone::UTC).date().first_of_month();
+    let day = day.checked_add(jiff::Span::new().months(months)).ok()?;
+    day.to_zoned(TimeZone::UTC).ok().map(|z| z.timestamp())
+}
+
+/// `2026-11`.
+pub(crate) fn month_name(t: Timestamp) -> String {
+    t.strftime("%Y-%m").to_string()
+}
+
+/// Days from one instant to another.
+pub(crate) fn days_between(from: Timestamp, to: Timestamp) -> f64 {
+    to.duration_since(from).as_secs_f64() / 86_400.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_grouped_in_threes() {
+        assert_eq!(count(7), "7");
+        assert_eq!(count(1205), "1\u{202f}205");
+        assert_eq!(count(123_456), "123\u{202f}456");
+    }
+
+    #[test]
+    fn what_is_unknown_says_so() {
+        assert_eq!(level(None, Some(1e-6)), "no data");
+        assert_eq!(um_or(None), "no data");
+    }
+
+    #[test]
+    fn months_follow_the_calendar_across_the_year() {
+        let t: Timestamp = "2026-11-30T23:59:00Z".parse().unwrap();
+        assert_eq!(month_name(month(t, 0).unwrap()), "2026-11");
+        assert_eq!(month_name(month(t, 2).unwrap()), "2027-01");
+    }
+}
