@@ -109,6 +109,11 @@ pub(crate) enum Command {
         after_help = "Examples:\n  freeplay backtest\n  freeplay backtest --estimates history.parquet --json"
     )]
     Backtest(BacktestArgs),
+    /// Pages for people: the fleet, each tail, each unit; they open from disk, without a network
+    #[command(
+        after_help = "Examples:\n  freeplay report --output report\n  freeplay report --output n412fp --tail N412FP"
+    )]
+    Report(ReportArgs),
     /// Fly a simulated fleet: logs, installations and the truth
     #[command(
         after_help = "Example:\n  freeplay simulate --output /tmp/fleet && freeplay run --config /tmp/fleet/pipeline.toml"
@@ -391,6 +396,23 @@ pub(crate) struct BacktestArgs {
     pub estimates: Option<PathBuf>,
     #[command(flatten)]
     pub output: Output,
+}
+
+/// `report`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ReportArgs {
+    /// Folder of the pages; a report that is there is replaced, anything else is left alone.
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Units on this tail.
+    #[arg(long)]
+    pub tail: Option<String>,
+    /// This unit.
+    #[arg(long)]
+    pub serial: Option<String>,
+    /// The day of the statements; by default that of the newest record. Nothing later is looked at.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub as_of: Option<Timestamp>,
 }
 
 /// `simulate`.

@@ -66,6 +66,7 @@ fn dispatch(args: &Args, talk: &Talk) -> Result<Code, Failure> {
         Command::Query(a) => commands::query::query(a, &args.global, talk),
         Command::Trend(a) => commands::trend::trend(a, &args.global, talk),
         Command::Backtest(a) => commands::backtest::backtest(a, &args.global, talk),
+        Command::Report(a) => commands::report::report(a, &args.global, talk),
         Command::Simulate(a) => commands::simulate::simulate(a, talk),
         Command::Store(a) => commands::store::store(a, &args.global, talk),
         Command::Completions(a) => commands::shell::completions(a, talk),

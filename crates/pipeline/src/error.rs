@@ -14,6 +14,17 @@ pub enum Error {
     /// A history or a limit cannot be judged.
     #[error("a trend cannot be stated: {0}")]
     Trend(#[from] trend::Error),
+    /// A page cannot be made.
+    #[error(transparent)]
+    Page(#[from] ::report::Error),
+    /// A page cannot be written.
+    #[error("the report cannot be written to {}: {source}", .path.display())]
+    Pages {
+        /// Where.
+        path: std::path::PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// Workers cannot be started.
     #[error("the workers cannot be started: {0}")]
     Workers(#[from] rayon::ThreadPoolBuildError),

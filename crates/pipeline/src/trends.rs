@@ -200,7 +200,7 @@ pub struct Flown {
 }
 
 impl Flown {
-    fn of(record: GapRecord, installations: &Installations) -> Self {
+    pub(crate) fn of(record: GapRecord, installations: &Installations) -> Self {
         let flight = record.flight;
         let stay = installations.at(&flight.tail_number, &record.position, flight.departure_utc);
         Self {

@@ -9,6 +9,7 @@ pub(crate) mod init;
 pub(crate) mod metrics;
 pub(crate) mod normalize;
 pub(crate) mod query;
+pub(crate) mod report;
 pub(crate) mod run;
 pub(crate) mod shell;
 pub(crate) mod simulate;

@@ -73,6 +73,11 @@ pub struct LogSettings {
     /// The maintenance table, CSV or Parquet, if there is one.
     #[serde(default)]
     pub maintenance: Option<String>,
+    /// Hangar free-play checks, CSV or Parquet: `serial_number`, `date_utc`, `play_m`; optional
+    /// `part_number`, `instrument`, `force_n`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
+    pub inspections: Option<String>,
 }
 
 /// `[columns]`: our name → what the table calls it.
