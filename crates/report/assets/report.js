@@ -15,7 +15,7 @@
   var events = Array.prototype.map.call(document.querySelectorAll("#events tbody td:first-child"), function (e) { return time(e.textContent); });
   var limit = number(figure.dataset.limit), watch = number(figure.dataset.watch), gap = number(figure.dataset.gap);
   var first = rows[0].t, last = rows[rows.length - 1].t, span = Math.max(last - first, 864000);
-  var far = ends.reduce(function (a, t) { return Math.max(a, Math.min(t, last + 1.5 * span)); }, last);
+  var far = ends.reduce(function (a, t) { return Math.max(a, Math.min(t, last + 3 * span)); }, last);
   var whole = { min: first - 0.02 * span, max: far + 0.02 * span };
   var colour = function (name) { return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim(); };
 

@@ -27,7 +27,7 @@ pub(crate) fn history(unit: &Unit) -> Result<String, Error> {
     let s = &unit.statement;
     let fan: Fan = [s.not_before_utc, s.likely_utc, s.not_after_utc].map(|t| t.map(day));
     let span = (last.0 - first.0).max(10.0);
-    let horizon = last.0 + 1.5 * span;
+    let horizon = last.0 + 3.0 * span;
     let ends = fan.iter().flatten().copied().map(|d| d.min(horizon)).fold(last.0, f64::max);
     let top = points.iter().map(|p| p.3).chain(s.limit_m.map(|l| l * 1e6)).fold(1.0, f64::max) * 1.08;
     let bottom = points.iter().map(|p| p.2).fold(0.0, f64::min);

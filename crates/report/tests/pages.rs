@@ -1,0 +1,97 @@
+//! The public door: hostile names, missing data, and numbers that stand in the page.
+
+use report::{Quality, Report, Statement, Tail, Unit, fleet_pages, serial_page, serial_path, tail_page};
+
+const HOSTILE: &str = "<script>alert(1)</script>";
+
+fn unit(serial: &str, state: Option<&str>) -> Unit {
+    Unit {
+        part_number: Some("EMA".to_owned()),
+        serial_number: serial.to_owned(),
+        tail_number: Some(HOSTILE.to_owned()),
+        position: Some("aileron".to_owned()),
+        statement: Statement {
+            state: state.map(str::to_owned),
+            gap_m: state.map(|_| 118.04e-6),
+            limit_m: state.map(|_| 150e-6),
+            ..Statement::default()
+        },
+        quality: Quality::default(),
+        events: Vec::new(),
+        stays: Vec::new(),
+        past: Vec::new(),
+        inspections: Vec::new(),
+        flights: Vec::new(),
+    }
+}
+
+fn report(units: Vec<Unit>) -> Report {
+    Report {
+        made_utc: "2026-11-20T02:09:00Z".parse().unwrap(),
+        program: "Freeplay".to_owned(),
+        store_version: None,
+        scope: None,
+        as_of_utc: Some("2026-11-19T23:41:00Z".parse().unwrap()),
+        newest_departure_utc: None,
+        logs_known: 0,
+        check_interval_hours: 300.0,
+        log_faults: Vec::new(),
+        tails: vec![Tail {
+            tail_number: HOSTILE.to_owned(),
+            flights: 0,
+            records: 0,
+            refused: 0,
+            logs_in_error: 0,
+            last_departure_utc: None,
+            last_estimate_utc: None,
+        }],
+        units,
+        inspections_given: false,
+        inspections_unmatched: 0,
+    }
+}
+
+fn text(page: &report::Page) -> String {
+    String::from_utf8(page.body.clone()).unwrap()
+}
+
+#[test]
+fn a_hostile_name_is_shown_and_not_run() {
+    let report = report(vec![unit(HOSTILE, Some("plan"))]);
+    let mut pages = fleet_pages(&report).unwrap();
+    pages.push(serial_page(&report, &report.units[0]).unwrap());
+    pages.push(tail_page(&report, &report.tails[0]).unwrap());
+    for page in pages.iter().filter(|p| p.path.ends_with(".html")) {
+        let html = text(page);
+        assert!(!html.contains("<script>"), "{}", page.path);
+        assert!(html.contains("script&#62;"), "{} does not show the name", page.path);
+    }
+}
+
+#[test]
+fn a_unit_without_a_statement_is_never_called_normal() {
+    let report = report(vec![unit("A", None)]);
+    let html = text(&serial_page(&report, &report.units[0]).unwrap());
+    assert!(html.contains("without a statement") && html.contains("no data") && !html.contains("normal"));
+}
+
+#[test]
+fn the_gap_and_its_share_of_the_limit_stand_in_the_page_as_text() {
+    let report = report(vec![unit("A", Some("watch"))]);
+    let pages = fleet_pages(&report).unwrap();
+    let index = pages.iter().find(|p| p.path == "index.html").map(text).unwrap();
+    // 118.04 of 150 µm is 78.7 %, by hand.
+    assert!(index.contains("118.0 µm") && index.contains("79 %"), "{index}");
+    assert!(index.contains(&serial_path(&report.units[0])));
+}
+
+#[test]
+fn a_large_fleet_is_split_and_every_unit_keeps_a_link() {
+    let units: Vec<Unit> = (0..350).map(|k| unit(&format!("S{k:04}"), Some("plan"))).collect();
+    let report = report(units);
+    let pages = fleet_pages(&report).unwrap();
+    assert_eq!(pages.iter().filter(|p| p.path.starts_with("work-")).count(), 3);
+    let all: String =
+        pages.iter().filter(|p| p.path.starts_with("work-") || p.path == "index.html").map(text).collect();
+    assert!(report.units.iter().all(|u| all.contains(&serial_path(u))));
+}
