@@ -85,11 +85,54 @@ fn all(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<W
 }
 
 fn beside(dir: &Path, what: &str) -> PathBuf {
-    let name =
-        dir.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_else(|| "report".to_owned());
+    let name = dir.file_name().map_or_else(|| "report".to_owned(), |n| n.to_string_lossy().into_owned());
     dir.with_file_name(format!(".{name}.{what}"))
 }
 
 fn failed(path: &Path, source: std::io::Error) -> Error {
     Error::Pages { path: path.to_owned(), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn empty() -> Report {
+        Report {
+            made_utc: jiff::Timestamp::UNIX_EPOCH,
+            program: "Freeplay".to_owned(),
+            store_version: None,
+            scope: None,
+            as_of_utc: None,
+            newest_departure_utc: None,
+            logs_known: 0,
+            check_interval_hours: 300.0,
+            log_faults: Vec::new(),
+            tails: Vec::new(),
+            units: Vec::new(),
+            inspections_given: false,
+            inspections_unmatched: 0,
+        }
+    }
+
+    #[test]
+    fn a_folder_with_someone_elses_work_is_left_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        fs::create_dir(&out).unwrap();
+        fs::write(out.join("thesis.txt"), "years").unwrap();
+        assert!(matches!(write(&empty(), &out, &|_| ()), Err(Error::Refused(_))));
+        assert_eq!(fs::read_to_string(out.join("thesis.txt")).unwrap(), "years");
+    }
+
+    #[test]
+    fn a_report_takes_the_place_of_the_one_before_and_leaves_nothing_beside_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let first = write(&empty(), &out, &|_| ()).unwrap();
+        fs::write(out.join("serial/unit-GONE.html"), "old").unwrap();
+        assert_eq!(write(&empty(), &out, &|_| ()).unwrap(), first);
+        assert!(out.join("index.html").exists() && !out.join("serial/unit-GONE.html").exists());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
 }

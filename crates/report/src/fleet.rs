@@ -75,6 +75,9 @@ pub(crate) fn foot(report: &Report) -> String {
     format!("Made {} UTC by {}{version}.", crate::words::minute(report.made_utc), report.program)
 }
 
+/// Part, units, 5 %, median, 95 %, and the outlying units' pages.
+type SpreadRow = (String, String, String, String, String, Vec<(String, String)>);
+/// A tail, its page and its units.
 type Group = (String, String, Vec<Row>);
 
 #[derive(Template)]
@@ -94,7 +97,7 @@ struct FleetView {
     tail_pages: Vec<String>,
     months: Vec<(String, String, String, u32)>,
     undated: usize,
-    spreads: Vec<(String, String, String, String, String, Vec<(String, String)>)>,
+    spreads: Vec<SpreadRow>,
     gaps: Vec<(String, String, String, String, String, String)>,
     faults: Vec<(String, String)>,
     more_faults: usize,
@@ -323,7 +326,7 @@ fn months(report: &Report) -> Vec<(String, String, String, u32)> {
     months.iter().map(row).collect()
 }
 
-fn spread_rows(report: &Report) -> Vec<(String, String, String, String, String, Vec<(String, String)>)> {
+fn spread_rows(report: &Report) -> Vec<SpreadRow> {
     let row = |s: crate::rates::Spread<'_>| {
         let outlying = s.outlying.iter().take(10);
         let outlying = outlying.map(|u| {

@@ -1,4 +1,5 @@
 //! The public door: hostile names, missing data, and numbers that stand in the page.
+#![expect(clippy::unwrap_used, reason = "a test may fail")]
 
 use report::{Quality, Report, Statement, Tail, Unit, fleet_pages, serial_page, serial_path, tail_page};
 
@@ -61,7 +62,7 @@ fn a_hostile_name_is_shown_and_not_run() {
     let mut pages = fleet_pages(&report).unwrap();
     pages.push(serial_page(&report, &report.units[0]).unwrap());
     pages.push(tail_page(&report, &report.tails[0]).unwrap());
-    for page in pages.iter().filter(|p| p.path.ends_with(".html")) {
+    for page in pages.iter().filter(|p| p.path != "report.json") {
         let html = text(page);
         assert!(!html.contains("<script>"), "{}", page.path);
         assert!(html.contains("script&#62;"), "{} does not show the name", page.path);
