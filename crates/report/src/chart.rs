@@ -74,7 +74,7 @@ fn draw(
     }
     if let (Some(gap), Some(limit), Some(last)) = (s.gap_m, s.limit_m, points.last()) {
         for end in fan.into_iter().flatten() {
-            let line = [(last.0, gap * 1e6), (end.max(last.0), limit * 1e6)];
+            let line = [(last.0, gap * 1e6), cut((last.0, gap * 1e6), (end.max(last.0), limit * 1e6), x.1)];
             chart.draw_series(DashedLineSeries::new(line, 6, 4, PLAN.stroke_width(2))).map_err(lift)?;
         }
     }
@@ -82,6 +82,14 @@ fn draw(
     chart.draw_series(bars).map_err(lift)?;
     chart.draw_series(points.iter().map(|p| Circle::new((p.0, p.1), 3, DATA.filled()))).map_err(lift)?;
     root.present().map_err(lift)
+}
+
+/// Where a line ends in the picture: a point beyond the edge would be pulled in, and the line turned.
+fn cut(from: (f64, f64), to: (f64, f64), edge: f64) -> (f64, f64) {
+    if to.0 <= edge {
+        return to;
+    }
+    (edge, from.1 + (to.1 - from.1) * (edge - from.0) / (to.0 - from.0))
 }
 
 /// Day, gap, low and high of the estimated flights in µm, means of neighbours when they are many.
@@ -110,4 +118,15 @@ fn day(t: Timestamp) -> f64 {
 
 fn date_of(day: f64) -> String {
     Timestamp::from_second((day * 86_400.0) as i64).map(crate::words::date).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_that_leaves_the_picture_keeps_its_slope() {
+        assert_eq!(cut((0.0, 10.0), (10.0, 30.0), 5.0), (5.0, 20.0));
+        assert_eq!(cut((0.0, 10.0), (4.0, 30.0), 5.0), (4.0, 30.0));
+    }
 }
