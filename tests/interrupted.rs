@@ -97,9 +97,9 @@ fn two_hundred_kills_lose_nothing_and_double_nothing() {
     tell(&format!("killing {KILLS} runs of up to {longest:?}, seed {seed} (FREEPLAY_KILL_SEED)"));
     let mut chance = Chance(seed);
     let (mut bench, mut finished, mut kept, mut partly, mut struck) = (small(), 0, 0, 0, 0);
-    for _ in 0..KILLS {
+    while struck < KILLS {
         let mut child = bench.command(&["run", "--jobs", "2"]).stdout(null()).stderr(null()).spawn().unwrap();
-        std::thread::sleep(longest.mul_f64(chance.next()));
+        std::thread::sleep(longest.mul_f64(0.8 * chance.next()));
         let over = child.try_wait().unwrap().is_some();
         child.kill().unwrap();
         child.wait().unwrap();
@@ -116,7 +116,7 @@ fn two_hundred_kills_lose_nothing_and_double_nothing() {
     bench.well(&["run"]);
     assert_eq!(bench.exported(), wanted);
     tell(&format!("{struck} runs were struck, {partly} stores found half full, {finished} finished between"));
-    assert!(struck > KILLS / 2, "kills came too late: {struck} runs were struck");
+    assert!(partly > 0, "no kill came between two commits");
 }
 
 /// Ten flights of four actuators.
