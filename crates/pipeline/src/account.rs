@@ -28,9 +28,9 @@ pub struct Quiet {
 }
 
 /// The aircraft that have been silent for longer than `days` before the fleet's newest departure.
-pub(crate) fn quiet(accounts: &[LogAccount], days: f64) -> Vec<Quiet> {
+pub(crate) fn quiet<'a>(accounts: impl Iterator<Item = &'a LogAccount>, days: f64) -> Vec<Quiet> {
     let mut newest: BTreeMap<&str, Timestamp> = BTreeMap::new();
-    for (tail, at) in accounts.iter().filter_map(|a| Some((a.tail_number.as_deref()?, a.departure_utc?))) {
+    for (tail, at) in accounts.filter_map(|a| Some((a.tail_number.as_deref()?, a.departure_utc?))) {
         newest.entry(tail).and_modify(|known| *known = (*known).max(at)).or_insert(at);
     }
     let Some(&last) = newest.values().max() else { return Vec::new() };

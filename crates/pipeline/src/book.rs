@@ -62,6 +62,11 @@ impl<'a> Book<'a> {
         book
     }
 
+    /// What is accounted for now.
+    pub(crate) fn accounts(&self) -> impl Iterator<Item = &LogAccount> {
+        self.accounts.values()
+    }
+
     fn enter(&mut self, account: LogAccount) {
         let names = plan::owned(&account);
         self.owners.extend(names.into_iter().map(|name| (name, account.log_path.clone())));

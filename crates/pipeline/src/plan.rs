@@ -10,8 +10,7 @@ use job::Config;
 use rayon::prelude::*;
 use store::{LogAccount, Outcome, RecordKey};
 
-use crate::bundle;
-use crate::error::Error;
+use crate::bundle::Found;
 
 /// What is asked of a run.
 #[derive(Debug, Clone, Default)]
@@ -187,16 +186,13 @@ pub struct Plan {
 pub type Digests = (String, String);
 
 /// Makes the plan from the logs there are and the accounts kept.
-///
-/// # Errors
-/// [`Error::Refused`] when a pattern fits no file.
 pub fn plan(
     config: &Config,
     installations: &Installations,
+    found: Found,
     accounts: Vec<LogAccount>,
     request: &Request,
-) -> Result<Plan, Error> {
-    let found = bundle::find(config)?;
+) -> Plan {
     let strays = found.strays;
     let mut logs: BTreeMap<String, (Files, Option<Complaint>)> =
         found.logs.into_iter().map(|(shown, files)| (shown, (files, None))).collect();
@@ -223,7 +219,7 @@ pub fn plan(
     let known = found.len() - wanted - not_asked;
     let here = accounts.values().filter_map(digests).collect();
     let files = found.iter().map(|(shown, (files, _))| (shown.clone(), files.clone())).collect();
-    Ok(Plan { found: found.len(), known, work, accounts, here, gone, not_asked, left, strays, files })
+    Plan { found: found.len(), known, work, accounts, here, gone, not_asked, left, strays, files }
 }
 
 /// What was read, and which settings touched it, of a log that went well.

@@ -61,7 +61,7 @@ pub fn installations(config: &Config) -> Result<Installations, Error> {
 pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
     let accounts =
         if config.store().exists() { Store::open(config.store())?.accounts()? } else { Vec::new() };
-    plan::plan(config, &installations(config)?, accounts, request)
+    Ok(plan::plan(config, &installations(config)?, bundle::find(config)?, accounts, request))
 }
 
 /// Runs every log not yet accounted for, stores what it finds, and states the trends of the units it touched.
@@ -73,10 +73,10 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let clock = Instant::now();
     let installations = installations(config)?;
     // Before a store is made: a refused run leaves nothing behind.
-    bundle::find(config)?;
+    let found = bundle::find(config)?;
     let store = Store::create_or_open(config.store())?;
-    let mut writer = store.lock(&context.holder, context.wait)?;
-    let plan = plan::plan(config, &installations, store.accounts()?, request)?;
+    let mut writer = locked(&store, context)?;
+    let plan = plan::plan(config, &installations, found, store.accounts()?, request);
     let workers = workers(request, plan.work.len());
     let started_utc = Timestamp::now();
     let mut report = Report::begin(run_id(started_utc), started_utc, &plan, workers);
@@ -90,7 +90,6 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let touched = shop.work(workers, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
-    report.quiet = account::quiet(&store.accounts()?, config.document.trend.stale_after_days);
     report.trends = trends::of_units(config, &installations, &store, &touched)?;
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
@@ -99,6 +98,20 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     }
     writer.end_run(&report.row(context.program_version, &config_path, Some(exit_code)))?;
     Ok(report)
+}
+
+/// The store's lock, waited for in short turns so that a signal is heard meanwhile.
+fn locked(store: &Store, context: &Context<'_>) -> Result<Writer, Error> {
+    const TURN: Duration = Duration::from_millis(200);
+    let deadline = context.wait.map(|wait| Instant::now() + wait);
+    loop {
+        let left = deadline.map(|d| d.saturating_duration_since(Instant::now()));
+        match store.lock(&context.holder, left.map(|left| left.min(TURN))) {
+            Err(store::Error::Held { .. })
+                if left.is_some_and(|left| left > TURN) && !context.stop.load(Ordering::Relaxed) => {}
+            ended => return Ok(ended?),
+        }
+    }
 }
 
 fn exit_code(report: &Report, stopped: bool) -> i64 {
@@ -265,6 +278,7 @@ impl Shop<'_> {
                 (self.context.watch)(Event::Stored { logs: results.len() });
             }
         }
+        report.quiet = account::quiet(book.accounts(), self.config.document.trend.stale_after_days);
         Ok(book.touched.into_iter().collect())
     }
 }

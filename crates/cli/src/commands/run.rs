@@ -42,6 +42,12 @@ pub(crate) fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, 
     };
     let report = schedule::run(&config, &request, &context);
     progress.end();
+    if let (Err(pipeline::Error::Store(store::Error::Held { .. })), true) =
+        (&report, stop.load(Ordering::Relaxed))
+    {
+        talk.note("interrupted while waiting for another run; nothing was begun");
+        return Ok(Code::Interrupted);
+    }
     let report = report?;
     talk.complain_all(report.errors.iter().map(|e| &e.complaint));
     let reached = args.fail_on.map_or(Ok(false), |least| is_reached(&config, least))?;
