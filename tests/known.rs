@@ -229,3 +229,28 @@ fn a_tail_that_went_quiet_is_named() {
     let account = bench.well(&["run"]);
     assert!(account.contains("quiet       1 tail: N414FP since"), "{account}");
 }
+
+/// The screw channel of one aircraft comes 4 ms later from one night on: the run says so, and the gap stays.
+#[test]
+fn a_recorder_that_was_changed_is_told_from_wear() {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    let late: Vec<_> =
+        bench.logs().into_iter().filter(|log| log.to_string_lossy().contains("N412FP")).skip(6).collect();
+    std::fs::create_dir_all(bench.path("sample-data/late")).unwrap();
+    for log in &late {
+        std::fs::rename(log, bench.path("sample-data/late").join(log.file_name().unwrap())).unwrap();
+    }
+    assert!(!bench.well(&["run"]).contains("skew moved"));
+    // Read with a latency of −4 ms, those logs are what a recorder that is 4 ms late would have written.
+    bench.configure("sample-data/logs/N412FP/*.parquet", "sample-data/late/*.parquet");
+    bench.configure(
+        "column = \"{position}_screw_mm\"",
+        "column = \"{position}_screw_mm\"\nlatency_s = -0.004",
+    );
+    let account = bench.well(&["run"]);
+    assert!(
+        account.contains("skew moved  N412FP aileron_left, aileron_right, elevator_left, elevator_right"),
+        "{account}"
+    );
+}

@@ -7,6 +7,7 @@ use jiff::Timestamp;
 use store::{LogAccount, Outcome, RunAccount};
 
 use crate::plan::{Plan, Work};
+use crate::recorder::Moved;
 use crate::trends::TrendRow;
 
 /// One log's trouble.
@@ -70,6 +71,8 @@ pub struct Report {
     pub not_reached_logs: Vec<String>,
     /// Aircraft whose newest departure is older than the fleet's by more than a trend may be stale.
     pub quiet: Vec<Quiet>,
+    /// Delays between the positions that moved within the last month, on the aircraft this run touched.
+    pub skew_moved: Vec<Moved>,
     /// The slowest log and its seconds.
     pub slowest: Option<(String, f64)>,
     /// Seconds from plan to account.
@@ -109,6 +112,7 @@ impl Report {
             not_reached: 0,
             not_reached_logs: Vec::new(),
             quiet: Vec::new(),
+            skew_moved: Vec::new(),
             slowest: None,
             took_s: 0.0,
             workers,

@@ -14,6 +14,7 @@ pub mod maintenance;
 pub mod normalize;
 pub mod pages;
 pub mod plan;
+pub mod recorder;
 pub mod report;
 pub mod schedule;
 pub mod simulate;

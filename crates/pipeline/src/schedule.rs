@@ -12,7 +12,7 @@ use fleet::{Complaint, Installations, Status};
 use jiff::Timestamp;
 use job::flight::{Opened, caught, config_digest, unidentified_digest};
 use job::{Config, Stamp};
-use store::{Holder, LogAccount, LogResult, Store, Writer};
+use store::{Holder, LogAccount, LogResult, Query, Store, Writer};
 
 use crate::account::{self, Report};
 use crate::book::{Book, Done};
@@ -20,6 +20,7 @@ use crate::bundle;
 use crate::error::Error;
 use crate::event::Event;
 use crate::plan::{self, Plan, Request, Why, Work};
+use crate::recorder;
 use crate::trends;
 
 /// Finished flights wait this long at most for company in a commit: each commit is a file and a log entry.
@@ -29,6 +30,9 @@ const GATHER_LOGS: usize = 256;
 
 /// More data files than this slow every question; they are merged at the end of a run.
 const MANY_FILES: usize = 100;
+
+/// So many of an aircraft's latest records tell whether a delay moved: some months of flights.
+const LOOKED_AT: usize = 2000;
 
 /// What a run needs besides its configuration.
 pub struct Context<'a> {
@@ -91,6 +95,7 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
 
     (context.watch)(Event::Trends { units: touched.len() });
     report.trends = trends::of_units(config, &installations, &store, &touched)?;
+    report.skew_moved = skew_moved(&store, &report.trends)?;
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
     if store.files()?.len() > MANY_FILES {
@@ -98,6 +103,19 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     }
     writer.end_run(&report.row(context.program_version, &config_path, Some(exit_code)))?;
     Ok(report)
+}
+
+/// What moved on the aircraft of these units.
+fn skew_moved(store: &Store, touched: &[trends::TrendRow]) -> Result<Vec<recorder::Moved>, Error> {
+    let mut tails: Vec<&str> = touched.iter().filter_map(|row| row.tail_number.as_deref()).collect();
+    tails.sort_unstable();
+    tails.dedup();
+    let mut found = Vec::new();
+    for tail in tails {
+        let query = Query { tail_number: Some(tail.to_owned()), last: Some(LOOKED_AT), ..Query::default() };
+        found.extend(recorder::moved(&store.records(&query)?));
+    }
+    Ok(found)
 }
 
 /// The store's lock, waited for in short turns so that a signal is heard meanwhile.

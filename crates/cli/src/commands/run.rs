@@ -193,6 +193,17 @@ fn account(report: &Report, config: &str, code: Code) -> String {
             .collect();
         line(&mut page, "quiet", &format!("{}: {}", count(tails.len(), "tail"), tails.join(", ")));
     }
+    for moved in &report.skew_moved {
+        let text = format!(
+            "{} {}: {:.1} → {:.1} ms since {}; a recorder, a sensor or its wiring, not wear",
+            escape(&moved.tail_number),
+            escape(&moved.positions.join(", ")),
+            moved.from_s * 1e3,
+            moved.to_s * 1e3,
+            moved.since_utc.strftime("%Y-%m-%d")
+        );
+        line(&mut page, "skew moved", &text);
+    }
     if let Some((log, seconds)) = &report.slowest {
         let took = span(Duration::from_secs_f64(report.took_s));
         line(
