@@ -573,6 +573,7 @@ fn finish(
         screw_m
     };
     dx_m.iter_mut().zip(&motor_m).filter(|(_, motor)| motor.is_nan()).for_each(|(dx, _)| *dx = f64::NAN);
+    flags.extend(quality::coarse(&quality, &dx_m));
     flags.extend(quality::load_froze(&load_n, &motor_m, line.step_s));
     let segments = hold(&mut load_n, &line.segments, line.step_s);
     let missing = dx_m.iter().filter(|y| y.is_nan()).count();

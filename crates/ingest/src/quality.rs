@@ -157,6 +157,16 @@ pub(crate) fn doubts(channels: &[Quality; 3], step_s: f64) -> Vec<String> {
     found
 }
 
+/// Positions whose smallest step is large beside what they have to show: a twentieth of all that the relative
+/// position does in the flight.
+pub(crate) fn coarse(channels: &[Quality; 3], dx_m: &[f64]) -> Vec<String> {
+    const LARGEST_SHARE: f64 = 0.05;
+    let most_m = LARGEST_SHARE * range(dx_m);
+    let positions = channels.iter().zip(Role::NEEDED).take(2);
+    let is_coarse = |q: &Quality| q.resolution.is_some_and(|step_m| step_m > most_m);
+    positions.filter(|(q, _)| is_coarse(q)).map(|(_, role)| format!("{}_coarse", role.as_str())).collect()
+}
+
 /// Samples of a frozen position are no measurement: where one repeats its last value while the other
 /// travels further than any gap, it is marked as missing. Returns the codes of those that froze.
 pub(crate) fn thaw(motor_m: &mut [f64], screw_m: &mut [f64], step_s: f64) -> Vec<String> {
@@ -240,6 +250,15 @@ mod tests {
             assert!((slope(&motor, &dx).unwrap() - ratio).abs() < 1e-12);
         }
         assert_eq!(slope(&[0.0; 5], &[1.0; 5]), None);
+    }
+
+    /// Steps of 20 µm under a relative motion of 100 µm.
+    #[test]
+    fn a_position_in_steps_as_large_as_a_gap_is_coarse() {
+        let stepped: Vec<f64> = wave(0.03).iter().map(|v| (v / 2e-5).round() * 2e-5).collect();
+        let channels = [&wave(0.03), &stepped, &wave(8e3)].map(|values| Quality::of(values, 0.004));
+        assert_eq!(coarse(&channels, &wave(5e-5)), ["screw_coarse"]);
+        assert!(coarse(&channels, &wave(5e-4)).is_empty());
     }
 
     fn wave(amplitude: f64) -> Vec<f64> {
