@@ -92,6 +92,24 @@ fn a_trace_holds_every_sample_the_filter_saw() {
     let trace = crate::bench::Table::read(&bench.path("trace.parquet"));
     assert_eq!(trace.rows(), 37_495);
     assert!(trace.numbers("s_m").iter().all(|s| s.is_finite()));
+    let flank = trace.numbers("flank");
+    let pressed = |side: f64| flank.iter().filter(|f| **f * side > 0.0).count();
+    assert!(pressed(1.0) > 10_000 && pressed(-1.0) > 10_000 && pressed(1.0) + pressed(-1.0) < flank.len());
+}
+
+#[test]
+fn an_estimate_is_drawn_in_the_form_its_ending_names() {
+    let bench = Bench::of("flights");
+    let logs = ["estimate", "A_nominal.parquet", "D_no_reversal.parquet", "--part", "A", "--plot"];
+    for (name, start) in [("a.svg", &b"<svg"[..]), ("a.png", b"\x89PNG"), ("a.html", b"<!DOCTYPE html>")] {
+        bench.well(&[&logs[..], &[name]].concat());
+        assert!(std::fs::read(bench.path(name)).unwrap().starts_with(start), "{name}");
+    }
+    let page = std::fs::read_to_string(bench.path("a.html")).unwrap();
+    assert!(page.contains("gap 100.0 µm") && page.contains("refused: no_load_reversal"));
+    let ended = bench.freeplay(&[&logs[..], &["a.pdf"]].concat());
+    assert_eq!(ended.code, Some(2));
+    assert!(ended.err.contains(".svg, .png or .html"), "{}", ended.err);
 }
 
 /// A reader that closes the pipe after a line ends the program quietly.

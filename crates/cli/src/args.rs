@@ -78,7 +78,7 @@ pub(crate) enum Command {
     Run(RunArgs),
     /// Estimate logs ad hoc; nothing is stored
     #[command(
-        after_help = "Examples:\n  freeplay estimate logs/N412FP/*.parquet\n  freeplay estimate bench.parquet --part EMA-27-1040 --trace trace.parquet"
+        after_help = "Examples:\n  freeplay estimate logs/N412FP/*.parquet\n  freeplay estimate bench.parquet --part EMA-27-1040 --trace trace.parquet\n  freeplay estimate bench.parquet --part EMA-27-1040 --plot look.html"
     )]
     Estimate(EstimateArgs),
     /// Write each actuator's channels as `run` sees them: SI, one clock, one file
@@ -319,9 +319,12 @@ pub(crate) struct EstimateArgs {
     /// Take every actuator as this part: no identity or installations are needed.
     #[arg(long, value_name = "PART")]
     pub part: Option<String>,
-    /// Write S(t), δX, load, innovation and its variance per sample.
+    /// Write S(t), its inputs, innovation and its variance, and the flank pressed, per sample.
     #[arg(long, value_name = "FILE.parquet")]
     pub trace: Option<PathBuf>,
+    /// Draw it: δX, load and S(t) with both means, and δX against force with the flanks as fitted.
+    #[arg(long, value_name = "FILE.svg|png|html")]
+    pub plot: Option<PathBuf>,
     #[command(flatten)]
     pub output: Output,
 }

@@ -1,6 +1,6 @@
 //! One actuator's channels to its estimate: both numbers beside each other, the configured one as the gap.
 
-use estimator::contact::{self, ContactGap, Outcome, Prior};
+use estimator::contact::{self, ContactGap, Outcome, Picture, Prior};
 use estimator::{Filter, MidRange, Samples, midrange};
 use fleet::{Complaint, Estimate, Status};
 use ingest::{Actuator, Geometry};
@@ -58,6 +58,14 @@ pub fn estimate(
 pub fn filter(channels: &Actuator, part: &Part) -> Result<Filter, Complaint> {
     Filter::new(&part.actuator, channels.step_s, &part.noise)
         .map_err(|e| Complaint::new("bad_parameter", e).hint("see the part's settings in the configuration"))
+}
+
+/// What the contact regression stands on, for a person who wants to look; none where it refused.
+///
+/// # Errors
+/// A complaint when the settings of the part cannot be.
+pub fn picture(channels: &Actuator, part: &Part) -> Result<Option<Picture>, Complaint> {
+    contact::picture(&samples(channels), &prior(part)).map_err(|e| Complaint::new("estimate_failed", e))
 }
 
 /// The channels as the estimator takes them.

@@ -250,6 +250,30 @@ pub(crate) fn each_anonymous(
     Ok(())
 }
 
+/// Hands over the channels of every actuator of a log with its part: as booked, or all as one part.
+///
+/// # Errors
+/// A complaint when the log or an actuator in it cannot be read, or `take` complains.
+pub(crate) fn each(
+    files: &Files,
+    shown: &str,
+    config: &Config,
+    installations: &Installations,
+    part: Option<&PartNumber>,
+    mut take: impl FnMut(&Actuator, &Part) -> Result<(), Complaint>,
+) -> Result<(), Complaint> {
+    if let Some(number) = part {
+        let part = part_of(config, number)?;
+        return each_anonymous(files, shown, config, part, |channels| take(channels, part));
+    }
+    let opened = Opened::open(files, shown, config, installations)?;
+    for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
+        let (_, part) = opened.unit(at, config, installations)?;
+        take(&opened.channels(at, part)?, part)?;
+    }
+    Ok(())
+}
+
 /// The settings of a part number.
 ///
 /// # Errors

@@ -6,6 +6,7 @@
 pub mod config;
 pub mod estimate;
 pub mod flight;
+pub mod look;
 pub mod normalize;
 pub mod part;
 pub mod trace;

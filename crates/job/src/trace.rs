@@ -7,16 +7,17 @@ use ingest::write::Column;
 
 use crate::config::Config;
 use crate::estimate;
-use crate::flight::{Opened, each_anonymous, part_of};
+use crate::flight;
 use crate::part::Part;
 
-/// S(t), δX, load, innovation and its variance of one or more actuators, one after the other.
+/// S(t), its inputs, innovation and its variance of one or more actuators, one after the other.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trace {
     log: Vec<String>,
     position: Vec<String>,
-    /// Time since the first kept sample, s; δX, m; load, N; S, m; innovation, m; its variance, m².
-    numbers: [Vec<f64>; 6],
+    /// Time since the first kept sample, s; motor position, m; δX, m; load, N; S, m; innovation, m; its
+    /// variance, m²; and 1 or −1 where the regression saw the upper or lower flank pressed, else 0.
+    numbers: [Vec<f64>; 8],
 }
 
 impl Trace {
@@ -41,7 +42,8 @@ impl Trace {
 
     /// As columns of a file.
     pub fn columns(&self) -> Vec<(String, Column)> {
-        let names = ["time_s", "dx_m", "load_n", "s_m", "innovation_m", "innovation_variance_m2"];
+        let names =
+            ["time_s", "motor_m", "dx_m", "load_n", "s_m", "innovation_m", "innovation_variance_m2", "flank"];
         let text = [("log_path", &self.log), ("position", &self.position)];
         let text = text.into_iter().map(|(name, values)| (name.to_owned(), Column::Text(values.clone())));
         let numbers = names.iter().zip(&self.numbers);
@@ -61,14 +63,27 @@ impl Trace {
             position: vec![channels.position.to_string(); count],
             numbers: [
                 time_s,
+                channels.motor_m.clone(),
                 channels.dx_m.clone(),
                 channels.load_n.clone(),
                 track.s_m,
                 seen.innovation_m,
                 seen.variance_m2,
+                flanks(channels, part, count)?,
             ],
         })
     }
+}
+
+/// Which flank was pressed at each sample, as the contact regression saw it.
+fn flanks(channels: &ingest::Actuator, part: &Part, count: usize) -> Result<Vec<f64>, Complaint> {
+    let mut pressed = vec![0.0; count];
+    for touch in estimate::picture(channels, part)?.iter().flat_map(|picture| &picture.touches) {
+        let at = |time_s: f64| ((time_s / channels.step_s).round().max(0.0) as usize).min(count);
+        let half_s = 0.5 * touch.duration_s;
+        pressed[at(touch.time_s - half_s)..at(touch.time_s + half_s)].fill(touch.flank.sign());
+    }
+    Ok(pressed)
 }
 
 /// Traces every actuator of a log: as booked, or all as one part.
@@ -83,18 +98,9 @@ pub fn of_log(
     part: Option<&PartNumber>,
 ) -> Result<Trace, Complaint> {
     let mut whole = Trace::default();
-    if let Some(number) = part {
-        let part = part_of(config, number)?;
-        each_anonymous(files, shown, config, part, |channels| {
-            whole.extend(Trace::of(shown, channels, part)?);
-            Ok(())
-        })?;
-        return Ok(whole);
-    }
-    let opened = Opened::open(files, shown, config, installations)?;
-    for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
-        let (_, part) = opened.unit(at, config, installations)?;
-        whole.extend(Trace::of(shown, &opened.channels(at, part)?, part)?);
-    }
+    flight::each(files, shown, config, installations, part, |channels, part| {
+        whole.extend(Trace::of(shown, channels, part)?);
+        Ok(())
+    })?;
     Ok(whole)
 }

@@ -45,6 +45,9 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, talk: &Talk) -> Res
     if let Some(file) = &args.trace {
         trace(file, &args.logs, &config, &installations, part.as_ref(), talk)?;
     }
+    if let Some(file) = &args.plot {
+        super::plot::plot(file, &args.logs, &config, &installations, part.as_ref(), talk)?;
+    }
     rows::answer(&args.output, talk, || batch(&found), || page(&found))?;
     talk.complain_all(&complaints);
     Ok(if complaints.is_empty() { Code::Well } else { Code::LogsInError })

@@ -8,6 +8,7 @@ pub(crate) mod explain;
 pub(crate) mod init;
 pub(crate) mod metrics;
 pub(crate) mod normalize;
+mod plot;
 pub(crate) mod query;
 pub(crate) mod report;
 pub(crate) mod run;

@@ -32,8 +32,11 @@ pub(super) struct Contact {
     pub(super) compliance_m_per_n: (f64, f64),
     pub(super) skew_se_s: f64,
     pub(super) touched_s: (f64, f64),
+    /// Length of a block, s.
+    pub(super) period_s: f64,
     pub(super) state: State,
-    pub(super) is_curved: bool,
+    /// Coefficients of soft flanks, m, where low loads asked for them.
+    pub(super) curve: Option<[f64; CURVED]>,
     /// The straight fit and its rows, for the witnesses.
     pub(super) straight: Found<LINEAR>,
 }
@@ -56,7 +59,7 @@ pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal
     } else {
         None
     };
-    let (gap_m, se_m) = bent.unwrap_or((line_m, line_se_m));
+    let (gap_m, se_m) = bent.map_or((line_m, line_se_m), |(beta, se_m)| (beta[GAP], se_m));
     let friction_m = straight.state.friction.at_n(frame.load_n) / straight.state.stiffness_n_per_m;
     let floor_m = (FLOOR.0 * frame.windup_m()).hypot(FLOOR.1 * gap_m);
     let doubt_m = se_m.hypot(FRICTION_DOUBT * friction_m).hypot(floor_m);
@@ -65,8 +68,9 @@ pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal
         compliance_m_per_n: (straight.fit.beta[FORCE] / frame.load_n, error_m(FORCE) / frame.load_n),
         skew_se_s: error_m(SPEED) / SPEED_M_PER_S,
         touched_s: straight.design.touched_s,
+        period_s: blocks.period_s,
         state: straight.state,
-        is_curved: bent.is_some(),
+        curve: bent.map(|(beta, _)| beta),
         straight,
     })
 }
@@ -88,14 +92,14 @@ fn low_loads_deviate(straight: &Found<LINEAR>, frame: &Frame) -> bool {
     total < -SUSPICION * squares.sqrt()
 }
 
-/// Gap and standard error of soft flanks, where they differ from the straight ones for certain.
+/// Coefficients of soft flanks and the standard error of their gap, where they differ from the straight ones for certain.
 ///
 /// The straight fit is the sharper one when flanks are straight, the curve right either way; so their
 /// difference has the variance of the curve less that of the line (Hausman 1978).
-fn soft(blocks: &mut Blocks, frame: &Frame, from: State, line_m: (f64, f64)) -> Option<(f64, f64)> {
+fn soft(blocks: &mut Blocks, frame: &Frame, from: State, line_m: (f64, f64)) -> Option<([f64; CURVED], f64)> {
     let curve: Found<CURVED> = search(blocks, frame, from, TURNS.1).ok()?;
     let (gap_m, se_m) = (curve.fit.beta[GAP], curve.fit.standard_error_m(GAP, &curve.design.firm));
     let spread_m = (se_m.powi(2) - line_m.1.powi(2)).max(0.25 * se_m.powi(2)).sqrt();
     let change_m = line_m.0 - gap_m;
-    (change_m > SOFT * spread_m).then_some((gap_m, se_m.hypot(CURVE_DOUBT * change_m)))
+    (change_m > SOFT * spread_m).then_some((curve.fit.beta, se_m.hypot(CURVE_DOUBT * change_m)))
 }

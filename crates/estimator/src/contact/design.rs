@@ -90,6 +90,11 @@ impl Frame {
     pub(super) fn windup_m(&self) -> f64 {
         self.load_n / self.stiffness_n_per_m
     }
+
+    /// The middle of a row, s from the first sample of the log.
+    pub(super) fn moment_s(&self, row: &Row<LINEAR>) -> f64 {
+        self.time_s.0 + row.x[DRIFT] * self.time_s.1
+    }
 }
 
 fn middle_and_half(values: &[f64]) -> (f64, f64) {
@@ -124,7 +129,7 @@ pub(super) struct Design<const N: usize> {
 
 /// One of the two sides of the gap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Flank {
+pub enum Flank {
     /// Pressed by a positive force.
     Upper,
     /// Pressed by a negative one.
@@ -132,8 +137,8 @@ pub(super) enum Flank {
 }
 
 impl Flank {
-    /// s.
-    pub(super) fn sign(self) -> f64 {
+    /// s, +1 for the upper and −1 for the lower.
+    pub fn sign(self) -> f64 {
         match self {
             Self::Upper => 1.0,
             Self::Lower => -1.0,

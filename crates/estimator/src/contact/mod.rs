@@ -19,6 +19,7 @@ mod coupling;
 mod curve;
 mod design;
 mod orientation;
+mod picture;
 mod refusal;
 mod regression;
 mod search;
@@ -26,6 +27,7 @@ mod wild;
 mod witness;
 
 pub use coupling::Friction;
+pub use picture::{Flank, Picture, Touch};
 pub use refusal::{Flag, Refusal};
 
 use crate::error::Error;
@@ -106,18 +108,30 @@ pub enum Outcome {
 /// [`Error::Lengths`] for channels that do not fit, [`Error::Parameter`] for a stiffness or a reference
 /// load that is not positive.
 pub fn estimate(samples: &Samples<'_>, prior: &Prior) -> Result<Outcome, Error> {
-    samples.check()?;
-    model::positive("stiffness_n_per_m", prior.stiffness_n_per_m)?;
-    if let Some(load_n) = prior.reference_load_n {
-        model::positive("reference_load_n", load_n)?;
-    }
+    check(samples, prior)?;
     Ok(match look(samples, prior) {
-        Ok(gap) => Outcome::Estimated(Box::new(gap)),
+        Ok((frame, contact)) => Outcome::Estimated(Box::new(report(&frame, prior, &contact))),
         Err(refusal) => Outcome::Refused(refusal),
     })
 }
 
-fn look(samples: &Samples<'_>, prior: &Prior) -> Result<ContactGap, Refusal> {
+/// What the estimate stands on, for a person who wants to look: the stretches in contact and the flanks
+/// fitted through them. None where the flight was refused.
+///
+/// # Errors
+/// As [`estimate`].
+pub fn picture(samples: &Samples<'_>, prior: &Prior) -> Result<Option<Picture>, Error> {
+    check(samples, prior)?;
+    Ok(look(samples, prior).ok().map(|(frame, contact)| Picture::of(&frame, &contact)))
+}
+
+fn check(samples: &Samples<'_>, prior: &Prior) -> Result<(), Error> {
+    samples.check()?;
+    model::positive("stiffness_n_per_m", prior.stiffness_n_per_m)?;
+    prior.reference_load_n.map_or(Ok(()), |load_n| model::positive("reference_load_n", load_n))
+}
+
+fn look(samples: &Samples<'_>, prior: &Prior) -> Result<(Frame, Contact), Refusal> {
     if samples.step_s > LONGEST_STEP_S {
         return Err(Refusal::RateTooLow);
     }
@@ -125,7 +139,7 @@ fn look(samples: &Samples<'_>, prior: &Prior) -> Result<ContactGap, Refusal> {
     let frame = Frame::of(&blocks, prior)?;
     orientation::check(&blocks, &frame)?;
     let contact = curve::fit(&mut blocks, &frame)?;
-    Ok(report(&frame, prior, &contact))
+    Ok((frame, contact))
 }
 
 fn report(frame: &Frame, prior: &Prior, contact: &Contact) -> ContactGap {
@@ -148,7 +162,7 @@ fn report(frame: &Frame, prior: &Prior, contact: &Contact) -> ContactGap {
         load_p95_n: frame.load_n,
         flags: Vec::new(),
     };
-    found.flags = refusal::flags(&found, frame, contact.is_curved);
+    found.flags = refusal::flags(&found, frame, contact.curve.is_some());
     found
 }
 

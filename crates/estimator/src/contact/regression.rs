@@ -139,6 +139,12 @@ impl<const N: usize> Fit<N> {
         row.y_m - self.predict_m(&row.x)
     }
 
+    /// How far each row was believed: its weight over that of a row no residual of which is large.
+    pub(super) fn trusts(&self, rows: &[Row<N>]) -> impl Iterator<Item = f64> {
+        let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len() as f64;
+        rows.iter().zip(&self.weights).map(move |(row, w)| w * mean_blocks / row.blocks)
+    }
+
     /// Standard error of a coefficient, m: the sandwich over stretches, and what beliefs lend in doubt.
     ///
     /// ```text

@@ -241,3 +241,34 @@ fn a_prior_that_cannot_be_is_an_error() {
     let nothing = contact::estimate(&samples, &Prior { stiffness_n_per_m: 5e7, ..prior });
     assert_eq!(nothing, Ok(Outcome::Refused(Refusal::ChannelConstant)));
 }
+
+/// The flanks meet zero force a gap apart, and the stretches the fit believes lie on them: two thirds of the
+/// flight's contact within a twentieth of the gap, whatever drift and skew did to the channels as logged.
+#[test]
+fn a_picture_shows_the_flanks_a_gap_apart_and_the_stretches_on_them() {
+    let case = Case::with(100e-6, |c| (c.sensors.screw.drift, c.sensors.screw.delay_s) = (50e-6, 3e-3));
+    let flight = case.fly(7);
+    let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
+    let whole = 0..dx_m.len();
+    let samples = Samples {
+        step_s: case.profile.sample_rate_hz.recip(),
+        motor_m: &flight.motor_m,
+        dx_m: &dx_m,
+        load_n: &flight.load_n,
+        segments: std::slice::from_ref(&whole),
+    };
+    let stiffness_n_per_m = case.plant.contact.stiffness_n_per_m;
+    let prior = Prior { stiffness_n_per_m, reference_load_n: None };
+    let picture = contact::picture(&samples, &prior).unwrap().unwrap();
+    let (upper, lower) = (picture.upper[0], picture.lower[0]);
+    assert_eq!((upper.0, lower.0.abs()), (0.0, 0.0));
+    assert!((upper.1 - lower.1 - 100e-6).abs() < 0.5e-6, "{upper:?} {lower:?}");
+    let off_m = |t: &contact::Touch| {
+        let zero_m = if t.flank == contact::Flank::Upper { upper.1 } else { lower.1 };
+        (t.dx_m - zero_m - t.force_n / stiffness_n_per_m).abs()
+    };
+    let believed: Vec<_> = picture.touches.iter().filter(|t| t.trust.is_some_and(|w| w > 0.9)).collect();
+    let on_them = believed.iter().filter(|t| off_m(t) < 5e-6).count();
+    assert!(3 * on_them > 2 * picture.touches.len(), "{on_them} of {}", picture.touches.len());
+    assert!(picture.touches.iter().all(|t| (0.0..90.0).contains(&t.time_s) && t.duration_s > 0.0));
+}

@@ -1,0 +1,101 @@
+//! `estimate --plot`: what an estimate stands on, as a picture or a page.
+
+use std::path::{Path, PathBuf};
+
+use fleet::{Installations, PartNumber};
+use job::Config;
+use job::look::Look;
+use report::{Stretch, look_html, look_png, look_svg};
+
+use crate::exit::Failure;
+use crate::table;
+use crate::talk::Talk;
+
+use super::shown;
+
+/// Draws every actuator of the logs into one file; its ending says how.
+///
+/// # Errors
+/// When the ending is not one we can draw, or the file cannot be written.
+pub(super) fn plot(
+    file: &Path,
+    logs: &[PathBuf],
+    config: &Config,
+    installations: &Installations,
+    part: Option<&PartNumber>,
+    talk: &Talk,
+) -> Result<(), Failure> {
+    let draw = drawer(file)?;
+    let mut looks = Vec::new();
+    for path in logs {
+        let name = shown(path);
+        // A log in error was told of already; it is simply not drawn.
+        let files = pipeline::bundle::around(config, path)?;
+        let found = job::look::of_log(&files, &name, config, installations, part).unwrap_or_default();
+        looks.extend(found.into_iter().map(|look| drawn(&name, look)));
+    }
+    let failed = |what: &dyn std::fmt::Display| {
+        Failure::failed(fleet::Complaint::new("cannot_write", format!("{}: {what}", shown(file))))
+    };
+    let picture = draw(&looks).map_err(|e| failed(&e))?;
+    std::fs::write(file, picture).map_err(|e| failed(&e))?;
+    talk.note(&format!("drew {} to {}", table::count(looks.len(), "actuator"), shown(file)));
+    Ok(())
+}
+
+type Drawer = fn(&[report::Look]) -> Result<Vec<u8>, report::Error>;
+
+fn drawer(file: &Path) -> Result<Drawer, Failure> {
+    let ending = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    match ending.as_str() {
+        "svg" => Ok(|looks| look_svg(looks).map(String::into_bytes)),
+        "png" => Ok(look_png),
+        "html" | "htm" => Ok(|looks| look_html(looks).map(String::into_bytes)),
+        _ => Err(Failure::usage(
+            "unknown_ending",
+            format!("{} has no ending that says what to draw", shown(file)),
+            "end it in .svg, .png or .html",
+        )),
+    }
+}
+
+fn drawn(log: &str, look: Look) -> report::Look {
+    let (upper, lower, touches) = match look.picture {
+        Some(picture) => (picture.upper, picture.lower, picture.touches),
+        None => Default::default(),
+    };
+    let stretches = touches.into_iter().map(|touch| Stretch {
+        time_s: touch.time_s,
+        is_upper: touch.flank.sign() > 0.0,
+        is_used: touch.trust.is_some_and(|trust| trust > 0.0),
+        force_n: touch.force_n,
+        dx_m: touch.dx_m,
+    });
+    report::Look {
+        title: format!("{} in {log}", look.position),
+        words: words(&look.estimate),
+        step_s: look.step_s,
+        stretches: stretches.collect(),
+        bounds_m: look.midrange.map(|gap| (gap.upper_m, gap.lower_m)),
+        flanks: [upper, lower],
+        dx_m: look.dx_m,
+        load_n: look.load_n,
+        s_m: look.s_m,
+    }
+}
+
+fn words(e: &fleet::Estimate) -> String {
+    let mut words = Vec::new();
+    let mut say = |name: &str, value: Option<f64>, unit: &str| {
+        words.extend(value.map(|v| format!("{name} {v:.1} {unit}")));
+    };
+    say("gap", e.gap_m.map(|m| m * 1e6), "µm");
+    say("standard error", e.gap_se_m.map(|m| m * 1e6), "µm");
+    say("mid-range", e.gap_midrange_m.map(|m| m * 1e6), "µm");
+    say("stiffness", e.stiffness_n_per_m.map(|k| k / 1e6), "N/µm");
+    say("skew", e.skew_s.map(|s| s * 1e3), "ms");
+    say("lost motion", e.lost_motion_m.map(|m| m * 1e6), "µm");
+    words.extend(e.reason.as_ref().filter(|_| e.gap_m.is_none()).map(|why| format!("refused: {why}")));
+    words.extend((!e.flags.is_empty()).then(|| e.flags.join(", ")));
+    words.join(" · ")
+}

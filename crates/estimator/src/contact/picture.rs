@@ -1,0 +1,81 @@
+//! What the estimate stands on, as one would draw it: δX against the force in the coupling.
+
+use super::curve::Contact;
+pub use super::design::Flank;
+use super::design::{BEND, CURVED, FORCE, Frame, GAP, LINEAR, ORIGIN, Row, bends};
+
+/// Points of a flank's line.
+const POINTS: usize = 60;
+
+/// A stretch in contact on one flank, a tenth of a second or longer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// Its middle, s from the first sample of the log.
+    pub time_s: f64,
+    /// How long it lasted, s; parts that were missing not counted.
+    pub duration_s: f64,
+    /// Which flank was pressed.
+    pub flank: Flank,
+    /// Mean force in the coupling, N.
+    pub force_n: f64,
+    /// Mean δX with drift, skew, transducer error and wrong friction taken off, m.
+    pub dx_m: f64,
+    /// How far the fit believed it, from 0 to 1; none where the load was too small for a straight flank.
+    pub trust: Option<f64>,
+}
+
+/// Stretches in contact, and the flanks fitted through them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// In order of time on each side of the share of the load below which flanks may be soft.
+    pub touches: Vec<Touch>,
+    /// The upper flank as fitted, from zero to the greatest force: N, m.
+    pub upper: Vec<(f64, f64)>,
+    /// The lower flank, from zero to the greatest force: N, m.
+    pub lower: Vec<(f64, f64)>,
+}
+
+impl Picture {
+    pub(super) fn of(frame: &Frame, contact: &Contact) -> Self {
+        let design = &contact.straight.design;
+        let firm =
+            design.firm.iter().zip(contact.straight.fit.trusts(&design.firm)).map(|(r, t)| (r, Some(t)));
+        let light = design.light.iter().map(|row| (row, None));
+        let touches: Vec<Touch> =
+            firm.chain(light).map(|(row, trust)| touch(frame, contact, row, trust)).collect();
+        let flank = |flank: Flank| {
+            let forces_n = touches.iter().filter(|t| t.flank == flank).map(|t| t.force_n.abs());
+            line(frame, contact, flank, forces_n.fold(0.0, f64::max))
+        };
+        let (upper, lower) = (flank(Flank::Upper), flank(Flank::Lower));
+        Self { touches, upper, lower }
+    }
+}
+
+fn touch(frame: &Frame, contact: &Contact, row: &Row<LINEAR>, trust: Option<f64>) -> Touch {
+    let beta = &contact.straight.fit.beta;
+    let beside_m: f64 = (FORCE + 1..LINEAR).map(|column| beta[column] * row.x[column]).sum();
+    Touch {
+        time_s: frame.moment_s(row),
+        duration_s: row.blocks * contact.period_s,
+        flank: if row.x[GAP] > 0.0 { Flank::Upper } else { Flank::Lower },
+        force_n: row.x[FORCE] * frame.load_n,
+        dx_m: row.y_m - beside_m,
+        trust,
+    }
+}
+
+/// δX of a flank over the force that presses it, straight or bent.
+fn line(frame: &Frame, contact: &Contact, flank: Flank, most_n: f64) -> Vec<(f64, f64)> {
+    let side = flank.sign();
+    let straight = &contact.straight.fit.beta;
+    let dx_m = |force: f64| match &contact.curve {
+        None => straight[ORIGIN] + side * (0.5 * straight[GAP] + force * straight[FORCE]),
+        Some(curve) => {
+            let bent_m: f64 = curve[BEND..CURVED].iter().zip(bends(force)).map(|(b, x)| b * x).sum();
+            curve[ORIGIN] + side * (0.5 * curve[GAP] + force * curve[FORCE] + bent_m)
+        }
+    };
+    let at = |k: usize| most_n * k as f64 / (POINTS - 1) as f64;
+    (0..POINTS).map(at).map(|force_n| (side * force_n, dx_m(force_n / frame.load_n))).collect()
+}

@@ -1,0 +1,69 @@
+//! Everything one would draw of an estimate: channels, S(t), and the flanks as they were found.
+
+use estimator::contact::Picture;
+use estimator::gap::{self, Gap};
+use fleet::{Complaint, Estimate, Installations, PartNumber, Position};
+use ingest::{Actuator, Files};
+
+use crate::config::Config;
+use crate::estimate;
+use crate::flight;
+use crate::part::Part;
+
+/// One actuator in one flight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Look {
+    /// Its place.
+    pub position: Position,
+    /// Its record, or why there is none.
+    pub estimate: Estimate,
+    /// Time between samples, s.
+    pub step_s: f64,
+    /// δX, m; NaN where missing.
+    pub dx_m: Vec<f64>,
+    /// Load, N.
+    pub load_n: Vec<f64>,
+    /// S(t), m; NaN outside the segments.
+    pub s_m: Vec<f64>,
+    /// The published statistic of S, where it moves.
+    pub midrange: Option<Gap>,
+    /// What the contact regression stands on; none where it refused.
+    pub picture: Option<Picture>,
+}
+
+impl Look {
+    fn of(channels: &Actuator, part: &Part, config: &Config) -> Result<Self, Complaint> {
+        let track = estimate::filter(channels, part)?
+            .track(&estimate::samples(channels), None)
+            .map_err(|e| Complaint::new("estimate_failed", e))?;
+        Ok(Self {
+            position: channels.position.clone(),
+            estimate: estimate::estimate(channels, part, &config.document.estimate)?,
+            step_s: channels.step_s,
+            dx_m: channels.dx_m.clone(),
+            load_n: channels.load_n.clone(),
+            midrange: gap::mid_range(&track.s_m).ok(),
+            s_m: track.s_m,
+            picture: estimate::picture(channels, part)?,
+        })
+    }
+}
+
+/// Looks at every actuator of a log: as booked, or all as one part.
+///
+/// # Errors
+/// A complaint when the log or an actuator in it cannot be read.
+pub fn of_log(
+    files: &Files,
+    shown: &str,
+    config: &Config,
+    installations: &Installations,
+    part: Option<&PartNumber>,
+) -> Result<Vec<Look>, Complaint> {
+    let mut looks = Vec::new();
+    flight::each(files, shown, config, installations, part, |channels, part| {
+        looks.push(Look::of(channels, part, config)?);
+        Ok(())
+    })?;
+    Ok(looks)
+}
