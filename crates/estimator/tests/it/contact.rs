@@ -242,8 +242,8 @@ fn a_prior_that_cannot_be_is_an_error() {
     assert_eq!(nothing, Ok(Outcome::Refused(Refusal::ChannelConstant)));
 }
 
-/// The flanks meet zero force a gap apart, and the stretches the fit believes lie on them: two thirds of the
-/// flight's contact within a twentieth of the gap, whatever drift and skew did to the channels as logged.
+/// The flanks meet zero force a gap apart, and the stretches the fit believes lie on them
+/// within a twentieth of the gap, whatever drift and skew did to the channels as logged.
 #[test]
 fn a_picture_shows_the_flanks_a_gap_apart_and_the_stretches_on_them() {
     let case = Case::with(100e-6, |c| (c.sensors.screw.drift, c.sensors.screw.delay_s) = (50e-6, 3e-3));
@@ -269,6 +269,7 @@ fn a_picture_shows_the_flanks_a_gap_apart_and_the_stretches_on_them() {
     };
     let believed: Vec<_> = picture.touches.iter().filter(|t| t.trust.is_some_and(|w| w > 0.9)).collect();
     let on_them = believed.iter().filter(|t| off_m(t) < 5e-6).count();
-    assert!(3 * on_them > 2 * picture.touches.len(), "{on_them} of {}", picture.touches.len());
+    assert!(2 * believed.len() > picture.touches.len(), "{} of {}", believed.len(), picture.touches.len());
+    assert!(20 * on_them > 19 * believed.len(), "{on_them} of {}", believed.len());
     assert!(picture.touches.iter().all(|t| (0.0..90.0).contains(&t.time_s) && t.duration_s > 0.0));
 }
