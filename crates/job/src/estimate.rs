@@ -80,7 +80,15 @@ pub fn samples(channels: &Actuator) -> Samples<'_> {
 }
 
 fn prior(part: &Part) -> Prior {
-    Prior { stiffness_n_per_m: part.actuator.stiffness_n_per_m(), reference_load_n: part.reference_load_n }
+    let unknown_force_n = match part.noise {
+        estimator::Noise::Sensors(sensors) => Some(sensors.unknown_force_n).filter(|force_n| *force_n > 0.0),
+        _ => None,
+    };
+    Prior {
+        stiffness_n_per_m: part.actuator.stiffness_n_per_m(),
+        reference_load_n: part.reference_load_n,
+        unknown_force_n,
+    }
 }
 
 /// Why no statistic could mean anything, seen before any is made.

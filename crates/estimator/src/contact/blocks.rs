@@ -11,6 +11,9 @@ use super::wild::Neighbours;
 /// Length of a block, s: short against the load's changes, long enough to calm the noise.
 const PERIOD_S: f64 = 0.02;
 
+/// A screw that moves by less than this share of the motor's travel does not move: what is left is rounding.
+const STILL: f64 = 1e-9;
+
 /// Blocks that the search begins with, in windows of this many.
 const EXCERPT_BLOCKS: usize = 6000;
 /// See [`EXCERPT_BLOCKS`]: ten seconds.
@@ -124,6 +127,19 @@ fn cubic(u: f64) -> [f64; 4] {
     ]
 }
 
+/// Whether the screw's channel repeats one value while the motor's moves: a dead sensor, or a locked surface.
+fn is_still(samples: &Samples<'_>) -> bool {
+    let range = |values: &mut dyn Iterator<Item = f64>| {
+        let (low, high) = values
+            .filter(|v| !v.is_nan())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
+        high - low
+    };
+    let screw = samples.motor_m.iter().zip(samples.dx_m).map(|(x, dx)| x + dx);
+    let motor_m = range(&mut samples.motor_m.iter().copied());
+    range(&mut { screw }) <= STILL * motor_m
+}
+
 /// The samples, and how far neighbours of a channel may leap before they are looked at twice.
 #[derive(Debug)]
 struct Watch<'a> {
@@ -136,6 +152,9 @@ impl<'a> Watch<'a> {
     fn over(samples: &'a Samples<'a>) -> Result<Self, Refusal> {
         let of = |channel: &[f64]| Neighbours::of(channel).ok_or(Refusal::ChannelConstant);
         of(samples.motor_m)?;
+        if is_still(samples) {
+            return Err(Refusal::ChannelConstant);
+        }
         Ok(Self { samples, dx: of(samples.dx_m)?, load: of(samples.load_n)? })
     }
 

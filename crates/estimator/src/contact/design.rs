@@ -45,6 +45,9 @@ const START_S: f64 = 1.0;
 const STRETCH_S: f64 = 2.0;
 /// Blocks in a row, at least and at most; long flights need no finer rows.
 const ROW_BLOCKS: (usize, usize) = (6, 25);
+/// The 95 % load must exceed the force the model does not know by this factor, or friction alone may hold the
+/// screw within the gap for the whole flight.
+const LEAST_LOAD: f64 = 1.5;
 /// Blocks of flight for each block in a row, so that long flights have no more rows than they need.
 const BLOCKS_PER_ROW_BLOCK: usize = 2000;
 
@@ -69,7 +72,7 @@ impl Frame {
         let mut loads_n: Vec<f64> = blocks.load_n.iter().filter(|f| f.is_finite()).map(|f| f.abs()).collect();
         let at = (loads_n.len().max(1) - 1) * 19 / 20;
         let load_n = *loads_n.select_nth_unstable_by(at, f64::total_cmp).1;
-        if load_n <= 0.0 {
+        if load_n <= prior.unknown_force_n.map_or(0.0, |force_n| LEAST_LOAD * force_n) {
             return Err(Refusal::LoadTooSmall);
         }
         let place_m = middle_and_half(&blocks.motor_m);
@@ -220,6 +223,17 @@ impl<const N: usize> Design<N> {
         }
         self.firm.push(sum.mean());
     }
+}
+
+/// Single blocks as rows, every so many, whether in contact or in the gap.
+pub(super) fn every(blocks: &Blocks, state: &State, frame: &Frame, stride: usize) -> Vec<Row<LINEAR>> {
+    let forces = super::coupling::follow(blocks, state);
+    let row = |k: usize| {
+        let force_n = forces[k].force_n;
+        let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
+        row(blocks, &forces[k], frame, k, side)
+    };
+    (0..blocks.len()).step_by(stride).filter_map(row).filter(|row| row.x[FORCE].is_finite()).collect()
 }
 
 /// One block as a row; none where a channel is missing or the flight has only begun.

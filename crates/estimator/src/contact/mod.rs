@@ -37,7 +37,7 @@ use curve::Contact;
 use design::Frame;
 
 /// Blocks that span too little time to hold a flight, s.
-const SHORTEST_S: f64 = 10.0;
+const SHORTEST_S: f64 = 9.0;
 /// Slower logs blur the moment at which a flank is left, s.
 const LONGEST_STEP_S: f64 = 0.05;
 /// Each flank must be touched this long, s.
@@ -56,6 +56,9 @@ pub struct Prior {
     pub stiffness_n_per_m: f64,
     /// Load between whose positive and negative value lost motion is stated, N.
     pub reference_load_n: Option<f64>,
+    /// Rms of the force the model does not know, mainly friction, N, where somebody knows that: a load that
+    /// does not rise above it presses on no flank for certain.
+    pub unknown_force_n: Option<f64>,
 }
 
 /// The gap by contact regression, and what was found on the way.
@@ -105,8 +108,8 @@ pub enum Outcome {
 /// tenth of a second or more.
 ///
 /// # Errors
-/// [`Error::Lengths`] for channels that do not fit, [`Error::Parameter`] for a stiffness or a reference
-/// load that is not positive.
+/// [`Error::Lengths`] for channels that do not fit, [`Error::Parameter`] for a stiffness, a reference
+/// load or an unknown force that is not positive.
 pub fn estimate(samples: &Samples<'_>, prior: &Prior) -> Result<Outcome, Error> {
     check(samples, prior)?;
     Ok(match look(samples, prior) {
@@ -128,7 +131,8 @@ pub fn picture(samples: &Samples<'_>, prior: &Prior) -> Result<Option<Picture>, 
 fn check(samples: &Samples<'_>, prior: &Prior) -> Result<(), Error> {
     samples.check()?;
     model::positive("stiffness_n_per_m", prior.stiffness_n_per_m)?;
-    prior.reference_load_n.map_or(Ok(()), |load_n| model::positive("reference_load_n", load_n))
+    prior.reference_load_n.map_or(Ok(()), |load_n| model::positive("reference_load_n", load_n))?;
+    prior.unknown_force_n.map_or(Ok(()), |force_n| model::positive("unknown_force_n", force_n))
 }
 
 fn look(samples: &Samples<'_>, prior: &Prior) -> Result<(Frame, Contact), Refusal> {

@@ -13,6 +13,8 @@ const SLIP_M_PER_S: f64 = 1e-3;
 const FLIPPED: f64 = 0.3;
 /// Two positions of one screw have a slope of one; a lead or a unit that is off by more is a mapping error.
 const RATIO: f64 = 0.01;
+/// Less than this at the ends of the travel may be the transducer's own error, m.
+const TRANSDUCER_M: f64 = 60e-6;
 
 /// Rounds of reweighting.
 const ROUNDS: usize = 4;
@@ -36,7 +38,7 @@ pub(super) fn check(blocks: &Blocks, frame: &Frame) -> Result<(), Refusal> {
         (1..blocks.len()).step_by(STRIDE).filter_map(|k| row(blocks, frame, k)).collect();
     let Some(found) = fit(&rows, &[Belief::NONE; COLUMNS], ROUNDS) else { return Ok(()) };
     let beta = &found.beta;
-    if beta[PLACE].abs() > RATIO * frame.place_m.1 {
+    if beta[PLACE].abs() > (RATIO * frame.place_m.1).max(TRANSDUCER_M) {
         return Err(Refusal::PositionRatio);
     }
     if beta[SIDE] + beta[LOAD] > -FLIPPED * frame.windup_m() {

@@ -17,13 +17,15 @@ pub enum Refusal {
     NoLoadReversal,
     /// One flank is touched for less than a second.
     OneSideBrief,
-    /// The load does not rise above nothing.
+    /// The load does not rise above the friction that is to be expected, or above nothing.
     LoadTooSmall,
     /// The motor moves less than the wind-up.
     TravelTooSmall,
     /// Fewer than 20 samples a second.
     RateTooLow,
-    /// Under ten seconds of sound samples, or too few in contact.
+    /// δX travels further than gap and wind-up account for: friction may hold the screw within the gap.
+    MotionUnexplained,
+    /// Under nine seconds of sound samples, or too few in contact.
     TooShort,
     /// A channel never changes.
     ChannelConstant,
@@ -44,6 +46,7 @@ impl Refusal {
             Self::LoadTooSmall => "load_too_small",
             Self::TravelTooSmall => "travel_too_small",
             Self::RateTooLow => "rate_too_low",
+            Self::MotionUnexplained => "motion_unexplained",
             Self::TooShort => "too_short",
             Self::ChannelConstant => "channel_constant",
             Self::LoadSignFlipped => "load_sign_flipped",
@@ -66,9 +69,11 @@ impl Refusal {
                 "use a flight in which the actuator moves; friction cannot be told from play at rest"
             }
             Self::RateTooLow => "record at 20 samples a second or more, 50 or more for a small gap",
-            Self::TooShort => {
-                "record at least 10 s of valid samples in which the load presses on both flanks"
+            Self::MotionUnexplained => {
+                "check that the load is this actuator's; else use a flight with more load, or more travel, so \
+                 that friction does not hold the screw within its gap"
             }
+            Self::TooShort => "record at least 9 s of valid samples in which the load presses on both flanks",
             Self::ChannelConstant => "check wiring and mapping: a channel that never changes is not measured",
             Self::LoadSignFlipped => {
                 "reverse the sign of the load in the mapping: it must be positive along +X"

@@ -69,7 +69,7 @@ impl Log {
     fn contact(&self) -> Outcome {
         let whole = 0..self.dx_m.len();
         let stiffness_n_per_m = self.number("assumed", "stiffness_n_per_m");
-        let prior = Prior { stiffness_n_per_m, reference_load_n: Some(3000.0) };
+        let prior = Prior { stiffness_n_per_m, reference_load_n: Some(3000.0), unknown_force_n: None };
         contact::estimate(&self.samples(std::slice::from_ref(&whole)), &prior).unwrap()
     }
 
@@ -124,8 +124,11 @@ fn a_load_that_never_reverses_is_refused() {
 fn the_two_numbers_differ_by_what_the_stiffness_explains() {
     let log = Log::load("B_worn_stiffness_assumed_15pc_high");
     let (gap, midrange_m) = (log.gap(), log.midrange_m());
-    let prior =
-        Prior { stiffness_n_per_m: log.number("assumed", "stiffness_n_per_m"), reference_load_n: None };
+    let prior = Prior {
+        stiffness_n_per_m: log.number("assumed", "stiffness_n_per_m"),
+        reference_load_n: None,
+        unknown_force_n: None,
+    };
     assert!((midrange_m / gap.gap_m - 1.0) > 0.09);
     assert!(gap.explains(midrange_m, &prior));
     assert!(!gap.explains(midrange_m + 60e-6, &prior) && !gap.explains(midrange_m - 90e-6, &prior));

@@ -1,0 +1,117 @@
+//! The study as a page: tables between words that stand in `accuracy.md.in`.
+
+use std::fmt::Write as _;
+
+use crate::answer::METHODS;
+use crate::case::Kind;
+use crate::real::RealRow;
+use crate::tally::{Errors, Tally};
+
+/// Fills the page's places with tables.
+pub(crate) fn page(tallies: &[Tally], robot: &[RealRow], gears: Option<&[RealRow]>) -> String {
+    let of = |kinds: fn(Kind) -> bool| tallies.iter().filter(move |t| kinds(t.kind)).collect::<Vec<_>>();
+    let shown = of(|k| !matches!(k, Kind::Blind(_)));
+    let text = include_str!("../accuracy.md.in");
+    let gears = gears.map_or_else(|| "Not run: `--gears DIR` was not given.\n".to_owned(), real);
+    text.replace("{{errors}}", &errors(&shown))
+        .replace("{{intervals}}", &intervals(&shown))
+        .replace("{{refusals}}", &refusals(tallies))
+        .replace("{{robot}}", &real(robot))
+        .replace("{{gears}}", &gears)
+}
+
+/// Median / 95 % quantile / worst of every method.
+fn errors(tallies: &[&Tally]) -> String {
+    let mut table = format!("| scenario | flights | unit | {} |\n|---|---|---|", METHODS.join(" | "));
+    table += &"---|".repeat(METHODS.len());
+    table.push('\n');
+    for t in tallies {
+        let _ = write!(table, "| {} | {} | {} |", t.name, t.flights, t.kind.unit());
+        for errors in &t.errors {
+            let _ = write!(table, " {} |", three(errors));
+        }
+        table.push('\n');
+    }
+    table
+}
+
+fn three(errors: &Errors) -> String {
+    if errors.count == 0 {
+        return "–".to_owned();
+    }
+    let digits = if errors.median < 10.0 { 2 } else { 0 };
+    format!("{:.digits$} / {:.digits$} / {:.digits$}", errors.median, errors.p95, errors.worst)
+}
+
+/// How often the interval held, and which flags were raised.
+fn intervals(tallies: &[&Tally]) -> String {
+    let mut table = "| scenario | estimated | 90 % intervals that hold | of 100, with 90 % certainty | flags |\n|---|---|---|---|---|\n".to_owned();
+    for t in tallies {
+        let (share, low, high) = t.coverage();
+        let _ = writeln!(
+            table,
+            "| {} | {} | {:.1} % | {:.0} to {:.0} | {} |",
+            t.name,
+            t.estimated,
+            100.0 * share,
+            100.0 * low,
+            100.0 * high,
+            codes(t)
+        );
+    }
+    table
+}
+
+fn codes(tally: &Tally) -> String {
+    let said: Vec<String> = tally.codes.iter().map(|(code, n)| format!("`{code}` {n}")).collect();
+    if said.is_empty() { "–".to_owned() } else { said.join(", ") }
+}
+
+/// Flights that cannot show a gap, and what became of them; then the false refusals of all others.
+fn refusals(tallies: &[Tally]) -> String {
+    let mut table =
+        "| flights that cannot show a gap | flights | given a number | wanted | said |\n|---|---|---|---|---|\n".to_owned();
+    for t in tallies {
+        let Some(code) = t.must_refuse() else { continue };
+        let _ = writeln!(
+            table,
+            "| {} | {} | {} | `{code}` | {} |",
+            t.name,
+            t.flights,
+            t.missed_refusals(),
+            codes(t)
+        );
+    }
+    let (blind, sound): (Vec<&Tally>, Vec<&Tally>) = tallies.iter().partition(|t| t.must_refuse().is_some());
+    let sum = |of: &[&Tally], count: fn(&Tally) -> usize| of.iter().map(|t| count(t)).sum::<usize>();
+    let _ = writeln!(
+        table,
+        "\nMissed refusals: {} of {}. False refusals: {} of {}.",
+        sum(&blind, Tally::missed_refusals),
+        sum(&blind, |t| t.flights),
+        sum(&sound, Tally::false_refusals),
+        sum(&sound, |t| t.flights),
+    );
+    table
+}
+
+fn real(rows: &[RealRow]) -> String {
+    let mut table = "| log | contact regression ° | ± ° | skew ms | paper (29–31) ° | load lines ° | P99 − P1 ° | its authors ° | remarks |\n|---|---|---|---|---|---|---|---|---|\n".to_owned();
+    let cell = |v: f64, digits: usize| if v.is_nan() { "–".to_owned() } else { format!("{v:.digits$}") };
+    for r in rows {
+        let _ = writeln!(
+            table,
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            r.log,
+            cell(r.gap_deg, 4),
+            cell(r.se_deg, 4),
+            cell(r.skew_ms, 2),
+            cell(r.midrange_deg, 4),
+            cell(r.lines_deg, 4),
+            cell(r.spread_deg, 4),
+            cell(r.authors_deg, 3),
+            if r.remarks.is_empty() { "–" } else { &r.remarks },
+        );
+    }
+    table
+}

@@ -1,0 +1,102 @@
+//! Real machines: a robot whose play is near zero and whose channels are 3 ms apart; and gear actuators
+//! whose play their authors measured, where somebody has that data at hand.
+
+use std::path::{Path, PathBuf};
+
+use fleet::{Installations, PartNumber};
+use ingest::Files;
+use job::Config;
+use job::look::Look;
+
+use crate::answer::{load_lines_m, spread_m};
+
+/// What each method says of a real log, in degrees.
+pub(crate) struct RealRow {
+    pub(crate) log: String,
+    /// Degrees; NaN where refused.
+    pub(crate) gap_deg: f64,
+    pub(crate) se_deg: f64,
+    pub(crate) midrange_deg: f64,
+    pub(crate) lines_deg: f64,
+    pub(crate) spread_deg: f64,
+    pub(crate) skew_ms: f64,
+    /// What its authors say, degrees.
+    pub(crate) authors_deg: f64,
+    /// Refusal or flags.
+    pub(crate) remarks: String,
+}
+
+/// The robot's axes, by the configuration that lies beside them.
+pub(crate) fn robot(folder: &Path) -> Result<Vec<RealRow>, String> {
+    let config = Config::read(&folder.join("pipeline.toml")).map_err(|all| told(&all))?;
+    let mut rows = Vec::new();
+    for axis in ["AX1", "AX2", "AX3"] {
+        let log = folder.join(format!("KR300-{axis}_trajC.parquet"));
+        rows.extend(looked(&log, &config, &format!("KR300-{axis}"), f64::NAN)?);
+    }
+    Ok(rows)
+}
+
+/// The gear actuators, from a folder with their `manifest.csv`; nothing of it is kept but these figures.
+pub(crate) fn gears(folder: &Path) -> Result<Vec<RealRow>, String> {
+    let text = include_str!("../gears.toml");
+    let config = Config::parse(text, Path::new("gears.toml"), folder).map_err(|all| told(&all))?;
+    let manifest = folder.join("manifest.csv");
+    let listed = std::fs::read_to_string(&manifest).map_err(|e| format!("{}: {e}", manifest.display()))?;
+    let mut lines = listed.lines();
+    let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let column = |name: &str| {
+        header.iter().position(|h| *h == name).ok_or_else(|| format!("manifest.csv has no column `{name}`"))
+    };
+    let (file, serial, play) = (column("file")?, column("serial")?, column("authors_phase_play_deg")?);
+    let mut rows = Vec::new();
+    for line in lines {
+        let cells: Vec<&str> = line.split(',').collect();
+        let (Some(file), Some(serial), Some(play)) = (cells.get(file), cells.get(serial), cells.get(play))
+        else {
+            return Err(format!("manifest.csv has a short line: {line}"));
+        };
+        let play_deg = play.parse().map_err(|e| format!("manifest.csv: play `{play}`: {e}"))?;
+        rows.extend(looked(&folder.join(file), &config, serial, play_deg)?);
+    }
+    Ok(rows)
+}
+
+fn told(complaints: &[fleet::Complaint]) -> String {
+    complaints.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+fn looked(path: &PathBuf, config: &Config, part: &str, authors_deg: f64) -> Result<Vec<RealRow>, String> {
+    let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let number = PartNumber::new(part).map_err(|e| format!("{part}: {e}"))?;
+    let none = Installations::default();
+    let looks = job::look::of_log(&Files::one(path), &name, config, &none, Some(&number))
+        .map_err(|complaint| complaint.to_string())?;
+    Ok(looks.iter().map(|look| row(&name, look, authors_deg)).collect())
+}
+
+fn row(log: &str, look: &Look, authors_deg: f64) -> RealRow {
+    let e = &look.estimate;
+    let radius_m = e.reference_radius_m.unwrap_or(f64::NAN);
+    let degrees = |m: f64| (m / radius_m).to_degrees();
+    let or_nan = |m: Option<f64>| m.map_or(f64::NAN, degrees);
+    RealRow {
+        log: log.to_owned(),
+        gap_deg: or_nan(e.gap_m),
+        se_deg: or_nan(e.gap_se_m),
+        midrange_deg: or_nan(e.gap_midrange_m.or(look.midrange.map(|gap| gap.gap_m))),
+        lines_deg: degrees(load_lines_m(&look.dx_m, &look.load_n)),
+        spread_deg: degrees(spread_m(&look.dx_m)),
+        skew_ms: e.skew_s.map_or(f64::NAN, |s| s * 1e3),
+        authors_deg,
+        remarks: e
+            .reason
+            .iter()
+            .chain(&e.flags)
+            .cloned()
+            .collect::<std::collections::BTreeSet<_>>()
+            .into_iter()
+            .collect::<Vec<_>>()
+            .join(", "),
+    }
+}

@@ -1,0 +1,141 @@
+//! Errors of many flights as a few numbers, and how many flights those numbers stand on.
+
+use std::collections::BTreeMap;
+
+use crate::answer::{Answer, METHODS};
+use crate::case::{Kind, Scenario};
+
+/// One scenario, told in numbers.
+pub(crate) struct Tally {
+    pub(crate) name: &'static str,
+    pub(crate) kind: Kind,
+    pub(crate) flights: usize,
+    /// Errors of each method, in the scenario's unit.
+    pub(crate) errors: [Errors; METHODS.len()],
+    /// Flights that contact regression gave a number, and those whose 90 % interval holds the truth.
+    pub(crate) estimated: usize,
+    pub(crate) held: usize,
+    /// How often each code was given, as refusal or flag.
+    pub(crate) codes: BTreeMap<&'static str, usize>,
+    /// Every flight: true gap and contact regression's error, µm.
+    pub(crate) scatter_um: Vec<(f64, f64)>,
+    /// Error over standard error of every flight.
+    pub(crate) deviations: Vec<f64>,
+}
+
+/// Absolute errors: median, 95 % quantile, worst, and how many there are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Errors {
+    pub(crate) median: f64,
+    pub(crate) p95: f64,
+    pub(crate) worst: f64,
+    pub(crate) count: usize,
+}
+
+impl Errors {
+    fn of(mut sizes: Vec<f64>) -> Self {
+        sizes.retain(|e| e.is_finite());
+        sizes.sort_unstable_by(f64::total_cmp);
+        let count = sizes.len();
+        let at = |share: f64| {
+            sizes.get(((count.max(1) - 1) as f64 * share).round() as usize).copied().unwrap_or(f64::NAN)
+        };
+        Self { median: at(0.5), p95: at(0.95), worst: at(1.0), count }
+    }
+}
+
+/// Standard normal 95 % quantile: the bounds stand so many standard errors from the gap.
+const NORMAL_95: f64 = 1.644_853_626_951_472_2;
+
+impl Kind {
+    /// The unit errors are told in.
+    pub(crate) fn unit(self) -> &'static str {
+        if self == Self::Single { "%" } else { "µm" }
+    }
+}
+
+impl Tally {
+    pub(crate) fn of(scenario: &Scenario, answers: &[Answer]) -> Self {
+        let size = |a: &Answer, said_m: f64| {
+            let unit_m = if scenario.kind == Kind::Single { 0.01 * a.truth_m } else { 1e-6 };
+            (said_m - a.truth_m).abs() / unit_m
+        };
+        let errors = std::array::from_fn(|method| {
+            Errors::of(answers.iter().map(|a| size(a, a.by_method_m[method])).collect())
+        });
+        let said = || answers.iter().filter_map(|a| a.contact.map(|c| (a.truth_m, c)));
+        let mut codes = BTreeMap::new();
+        for code in answers.iter().flat_map(|a| &a.codes) {
+            *codes.entry(*code).or_insert(0) += 1;
+        }
+        Self {
+            name: scenario.name,
+            kind: scenario.kind,
+            flights: answers.len(),
+            errors,
+            estimated: said().count(),
+            held: said().filter(|(truth_m, (_, low_m, high_m))| (low_m..=high_m).contains(&truth_m)).count(),
+            codes,
+            scatter_um: said()
+                .map(|(truth_m, (gap_m, ..))| (truth_m * 1e6, (gap_m - truth_m) * 1e6))
+                .collect(),
+            deviations: said()
+                .map(|(truth_m, (gap_m, low_m, high_m))| {
+                    (gap_m - truth_m) * 2.0 * NORMAL_95 / (high_m - low_m)
+                })
+                .collect(),
+        }
+    }
+
+    /// Refused though the flight shows its gap.
+    pub(crate) fn false_refusals(&self) -> usize {
+        if self.must_refuse().is_some() { 0 } else { self.flights - self.estimated }
+    }
+
+    /// Given a number though the flight cannot show one.
+    pub(crate) fn missed_refusals(&self) -> usize {
+        if self.must_refuse().is_some() { self.estimated } else { 0 }
+    }
+
+    /// The code to be refused with.
+    pub(crate) fn must_refuse(&self) -> Option<&'static str> {
+        match self.kind {
+            Kind::Blind(code) => Some(code),
+            _ => None,
+        }
+    }
+
+    /// Share of intervals that hold, and the 90 % bounds of that share (Wilson).
+    pub(crate) fn coverage(&self) -> (f64, f64, f64) {
+        wilson(self.held, self.estimated)
+    }
+}
+
+/// A share and its 90 % bounds: Wilson's, which keep within 0 and 1.
+fn wilson(hits: usize, of: usize) -> (f64, f64, f64) {
+    let n = of.max(1) as f64;
+    let (share, z2) = (hits as f64 / n, NORMAL_95 * NORMAL_95);
+    let middle = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
+    let half = NORMAL_95 / (1.0 + z2 / n) * (share * (1.0 - share) / n + z2 / (4.0 * n * n)).sqrt();
+    (share, middle - half, middle + half)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 90 of 100: Wilson's 90 % interval by R's `binom::binom.confint(90, 100, 0.9, "wilson")`.
+    #[test]
+    fn a_share_is_told_with_its_bounds() {
+        let (share, low, high) = wilson(90, 100);
+        assert!((share - 0.9).abs() < 1e-12);
+        assert!((low - 0.8395).abs() < 1e-3 && (high - 0.9394).abs() < 1e-3, "{low} {high}");
+    }
+
+    #[test]
+    fn quantiles_pass_over_what_was_not_said() {
+        let errors = Errors::of((0..=100).map(f64::from).chain([f64::NAN]).collect());
+        assert_eq!((errors.median, errors.p95, errors.worst, errors.count), (50.0, 95.0, 100.0, 101));
+        assert!(Errors::of(Vec::new()).median.is_nan());
+    }
+}
