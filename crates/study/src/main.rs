@@ -7,6 +7,7 @@
 
 mod answer;
 mod case;
+mod gears;
 mod page;
 mod picture;
 mod real;
@@ -63,7 +64,7 @@ fn study(args: &Args) -> Result<(), String> {
     let wanted: Vec<&Scenario> =
         SCENARIOS.iter().filter(|s| args.only.as_ref().is_none_or(|text| s.name.contains(text))).collect();
     let robot = real::robot(&args.robot)?;
-    let gears = args.gears.as_deref().map(real::gears).transpose()?;
+    let gears = args.gears.as_deref().map(gears::gears).transpose()?;
     let tallies = fly(&wanted, args)?;
     let page = page::page(&tallies, &robot, gears.as_deref());
     let pictures = [

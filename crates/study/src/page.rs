@@ -4,15 +4,16 @@ use std::fmt::Write as _;
 
 use crate::answer::METHODS;
 use crate::case::Kind;
+use crate::gears::Gear;
 use crate::real::RealRow;
 use crate::tally::{Errors, Tally};
 
 /// Fills the page's places with tables.
-pub(crate) fn page(tallies: &[Tally], robot: &[RealRow], gears: Option<&[RealRow]>) -> String {
+pub(crate) fn page(tallies: &[Tally], robot: &[RealRow], gears: Option<&[Gear]>) -> String {
     let of = |kinds: fn(Kind) -> bool| tallies.iter().filter(move |t| kinds(t.kind)).collect::<Vec<_>>();
     let shown = of(|k| !matches!(k, Kind::Blind(_)));
     let text = include_str!("../accuracy.md.in");
-    let gears = gears.map_or_else(|| "Not run: `--gears DIR` was not given.\n".to_owned(), real);
+    let gears = gears.map_or_else(|| "Not run: `--gears DIR` was not given.\n".to_owned(), geared);
     text.replace("{{errors}}", &errors(&shown))
         .replace("{{intervals}}", &intervals(&shown))
         .replace("{{refusals}}", &refusals(tallies))
@@ -96,12 +97,12 @@ fn refusals(tallies: &[Tally]) -> String {
 }
 
 fn real(rows: &[RealRow]) -> String {
-    let mut table = "| log | contact regression ° | ± ° | skew ms | paper (29–31) ° | load lines ° | P99 − P1 ° | its authors ° | remarks |\n|---|---|---|---|---|---|---|---|---|\n".to_owned();
+    let mut table = "| log | contact regression ° | ± ° | skew ms | paper (29–31) ° | load lines ° | P99 − P1 ° | remarks |\n|---|---|---|---|---|---|---|---|\n".to_owned();
     let cell = |v: f64, digits: usize| if v.is_nan() { "–".to_owned() } else { format!("{v:.digits$}") };
     for r in rows {
         let _ = writeln!(
             table,
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} |",
             r.log,
             cell(r.gap_deg, 4),
             cell(r.se_deg, 4),
@@ -109,9 +110,30 @@ fn real(rows: &[RealRow]) -> String {
             cell(r.midrange_deg, 4),
             cell(r.lines_deg, 4),
             cell(r.spread_deg, 4),
-            cell(r.authors_deg, 3),
             if r.remarks.is_empty() { "–" } else { &r.remarks },
         );
     }
+    table
+}
+
+/// Against the authors' play: correlation, mean and mean absolute difference, of each method.
+fn geared(rows: &[Gear]) -> String {
+    let mut table = "| method | ramps | correlation | mean difference ° | mean absolute difference ° |\n|---|---|---|---|---|\n".to_owned();
+    let methods: [(&str, fn(&Gear) -> [f64; 2]); 3] =
+        [(METHODS[1], |g| g.midrange_deg), (METHODS[2], |g| g.lines_deg), (METHODS[3], |g| g.spread_deg)];
+    for (name, of) in methods {
+        for (k, ramps) in ["4 N·m", "4 and 40 N·m"].iter().enumerate() {
+            let pairs: Vec<(f64, f64)> =
+                rows.iter().map(|g| (g.authors_deg, of(g)[k])).filter(|(_, said)| said.is_finite()).collect();
+            let n = pairs.len() as f64;
+            let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n;
+            let (difference, size) = (mean(&|(a, s)| s - a), mean(&|(a, s)| (s - a).abs()));
+            let (a, s) = (mean(&|p| p.0), mean(&|p| p.1));
+            let correlation = mean(&|p| (p.0 - a) * (p.1 - s))
+                / (mean(&|p| (p.0 - a).powi(2)) * mean(&|p| (p.1 - s).powi(2))).sqrt();
+            let _ = writeln!(table, "| {name} | {ramps} | {correlation:.3} | {difference:+.3} | {size:.3} |");
+        }
+    }
+    let _ = writeln!(table, "\n{} logs.", rows.len());
     table
 }

@@ -1,5 +1,4 @@
-//! Real machines: a robot whose play is near zero and whose channels are 3 ms apart; and gear actuators
-//! whose play their authors measured, where somebody has that data at hand.
+//! A real machine: a robot whose play is near zero and whose channels are 3 ms apart.
 
 use std::path::{Path, PathBuf};
 
@@ -20,8 +19,6 @@ pub(crate) struct RealRow {
     pub(crate) lines_deg: f64,
     pub(crate) spread_deg: f64,
     pub(crate) skew_ms: f64,
-    /// What its authors say, degrees.
-    pub(crate) authors_deg: f64,
     /// Refusal or flags.
     pub(crate) remarks: String,
 }
@@ -32,32 +29,7 @@ pub(crate) fn robot(folder: &Path) -> Result<Vec<RealRow>, String> {
     let mut rows = Vec::new();
     for axis in ["AX1", "AX2", "AX3"] {
         let log = folder.join(format!("KR300-{axis}_trajC.parquet"));
-        rows.extend(looked(&log, &config, &format!("KR300-{axis}"), f64::NAN)?);
-    }
-    Ok(rows)
-}
-
-/// The gear actuators, from a folder with their `manifest.csv`; nothing of it is kept but these figures.
-pub(crate) fn gears(folder: &Path) -> Result<Vec<RealRow>, String> {
-    let text = include_str!("../gears.toml");
-    let config = Config::parse(text, Path::new("gears.toml"), folder).map_err(|all| told(&all))?;
-    let manifest = folder.join("manifest.csv");
-    let listed = std::fs::read_to_string(&manifest).map_err(|e| format!("{}: {e}", manifest.display()))?;
-    let mut lines = listed.lines();
-    let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let column = |name: &str| {
-        header.iter().position(|h| *h == name).ok_or_else(|| format!("manifest.csv has no column `{name}`"))
-    };
-    let (file, serial, play) = (column("file")?, column("serial")?, column("authors_phase_play_deg")?);
-    let mut rows = Vec::new();
-    for line in lines {
-        let cells: Vec<&str> = line.split(',').collect();
-        let (Some(file), Some(serial), Some(play)) = (cells.get(file), cells.get(serial), cells.get(play))
-        else {
-            return Err(format!("manifest.csv has a short line: {line}"));
-        };
-        let play_deg = play.parse().map_err(|e| format!("manifest.csv: play `{play}`: {e}"))?;
-        rows.extend(looked(&folder.join(file), &config, serial, play_deg)?);
+        rows.extend(looked(&log, &config, &format!("KR300-{axis}"))?);
     }
     Ok(rows)
 }
@@ -66,16 +38,16 @@ fn told(complaints: &[fleet::Complaint]) -> String {
     complaints.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
-fn looked(path: &PathBuf, config: &Config, part: &str, authors_deg: f64) -> Result<Vec<RealRow>, String> {
+fn looked(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<RealRow>, String> {
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let number = PartNumber::new(part).map_err(|e| format!("{part}: {e}"))?;
     let none = Installations::default();
     let looks = job::look::of_log(&Files::one(path), &name, config, &none, Some(&number))
         .map_err(|complaint| complaint.to_string())?;
-    Ok(looks.iter().map(|look| row(&name, look, authors_deg)).collect())
+    Ok(looks.iter().map(|look| row(&name, look)).collect())
 }
 
-fn row(log: &str, look: &Look, authors_deg: f64) -> RealRow {
+fn row(log: &str, look: &Look) -> RealRow {
     let e = &look.estimate;
     let radius_m = e.reference_radius_m.unwrap_or(f64::NAN);
     let degrees = |m: f64| (m / radius_m).to_degrees();
@@ -88,7 +60,6 @@ fn row(log: &str, look: &Look, authors_deg: f64) -> RealRow {
         lines_deg: degrees(load_lines_m(&look.dx_m, &look.load_n)),
         spread_deg: degrees(spread_m(&look.dx_m)),
         skew_ms: e.skew_s.map_or(f64::NAN, |s| s * 1e3),
-        authors_deg,
         remarks: e
             .reason
             .iter()

@@ -1,0 +1,119 @@
+//! Gear actuators with their output locked to the bench, whose play their authors measured: real play, real
+//! friction, hardening flanks. The logs carry a share-alike licence and are no part of the project; only
+//! figures come from them, where somebody has them at hand.
+//!
+//! A locked output cannot be told from a dead sensor, so our own estimate refuses these logs by design. What
+//! can be compared is the published statistic and the baselines, which never refuse.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::Path;
+
+use arrow::array::{AsArray, RecordBatch};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Float64Type};
+use estimator::noise::Sensors;
+use estimator::{Actuator, Filter, Noise, Samples, midrange};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+use crate::answer::{load_lines_m, spread_m};
+
+/// One log: degrees.
+pub(crate) struct Gear {
+    /// Play of this phase as its authors measured it, over three places of the output.
+    pub(crate) authors_deg: f64,
+    /// The paper's statistic over the ramps to 4 N·m, and over all, those to 40 N·m included.
+    pub(crate) midrange_deg: [f64; 2],
+    /// Load lines, over the same.
+    pub(crate) lines_deg: [f64; 2],
+    /// P99 − P1 of δX, over the same.
+    pub(crate) spread_deg: [f64; 2],
+}
+
+/// Stiffness as its authors give it, 0.084 °/(N·m), N·m/rad.
+const STIFFNESS_NM_PER_RAD: f64 = 680.0;
+/// Ramps up to this number go to 4 N·m.
+const LAST_SMALL_RAMP: f64 = 4.0;
+
+/// Reads every log of a folder that its `manifest.csv` lists.
+pub(crate) fn gears(folder: &Path) -> Result<Vec<Gear>, String> {
+    let manifest = folder.join("manifest.csv");
+    let text = std::fs::read_to_string(&manifest).map_err(|e| format!("{}: {e}", manifest.display()))?;
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let column = |name: &str| {
+        header.iter().position(|h| *h == name).ok_or_else(|| format!("manifest.csv has no column `{name}`"))
+    };
+    let (file, play) = (column("file")?, column("authors_phase_play_deg")?);
+    let listed = lines.map(|line| {
+        let cell =
+            |k: usize| line.split(',').nth(k).ok_or_else(|| format!("manifest.csv: short line {line}"));
+        let play_deg = cell(play)?.parse().map_err(|e| format!("manifest.csv: {line}: {e}"))?;
+        gear(folder, cell(file)?, play_deg)
+    });
+    listed.collect()
+}
+
+fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<Gear, String> {
+    let columns = columns(&folder.join(file)).map_err(|e| format!("{file}: {e}"))?;
+    let of = |name: &str| columns.get(name).ok_or_else(|| format!("{file}: no column `{name}`"));
+    let (time_s, motor_deg, torque_nm, ramp) =
+        (of("time_s")?, of("x_motor_deg")?, of("torque_motor_nm")?, of("test_nr")?);
+    let small = ramp.iter().take_while(|n| **n <= LAST_SMALL_RAMP).count();
+    let step_s = (time_s[time_s.len() - 1] - time_s[0]) / (time_s.len() - 1) as f64;
+    // Radians and newton metres stand for metres and newtons: the filter asks only that they fit each other.
+    let motor_rad: Vec<f64> = motor_deg.iter().map(|x| x.to_radians()).collect();
+    let dx_rad: Vec<f64> = motor_rad.iter().map(|x| -x).collect();
+    let load_nm: Vec<f64> = torque_nm.iter().map(|t| -t).collect();
+    let parts = [small, dx_rad.len()];
+    let published = |end: usize| {
+        let segment = 0..end;
+        let samples = Samples {
+            step_s,
+            motor_m: &motor_rad[..end],
+            dx_m: &dx_rad[..end],
+            load_n: &load_nm[..end],
+            segments: std::slice::from_ref(&segment),
+        };
+        let filter = filter(step_s).map_err(|e| format!("{file}: {e}"))?;
+        Ok::<f64, String>(
+            midrange::estimate(&samples, &filter).map_or(f64::NAN, |m| m.gap.gap_m.to_degrees()),
+        )
+    };
+    Ok(Gear {
+        authors_deg,
+        midrange_deg: [published(parts[0])?, published(parts[1])?],
+        lines_deg: parts.map(|end| load_lines_m(&dx_rad[..end], &load_nm[..end]).to_degrees()),
+        spread_deg: parts.map(|end| spread_m(&dx_rad[..end]).to_degrees()),
+    })
+}
+
+fn filter(step_s: f64) -> Result<Filter, estimator::Error> {
+    let noise = Sensors {
+        screw_rms_m: 1e-4,
+        screw_resolution_m: 0.0,
+        motor_rms_m: 1e-4,
+        motor_resolution_m: 0.0,
+        unknown_force_n: 2.0,
+        bandwidth_hz: 10.0,
+    };
+    Filter::new(&Actuator::linear(STIFFNESS_NM_PER_RAD, 5.0, 0.01)?, step_s, &Noise::Sensors(noise))
+}
+
+/// Every column of a file as numbers.
+fn columns(path: &Path) -> Result<BTreeMap<String, Vec<f64>>, Box<dyn std::error::Error>> {
+    let batches = ParquetRecordBatchReaderBuilder::try_new(File::open(path)?)?
+        .build()?
+        .collect::<Result<Vec<RecordBatch>, _>>()?;
+    let mut columns = BTreeMap::<String, Vec<f64>>::new();
+    for batch in &batches {
+        for (field, values) in batch.schema().fields().iter().zip(batch.columns()) {
+            let numbers = cast(values, &DataType::Float64)?;
+            columns
+                .entry(field.name().clone())
+                .or_default()
+                .extend(numbers.as_primitive::<Float64Type>().iter().map(|v| v.unwrap_or(f64::NAN)));
+        }
+    }
+    Ok(columns)
+}
