@@ -222,3 +222,34 @@ fn a_flights_table_tells_what_the_logs_do_not() {
     let rows = bench.well(&["query", "flight", "L3", "--json"]);
     assert!(rows.contains("\"flight_hours\": 4.0") || rows.contains("\"flight_hours\":4.0"), "{rows}");
 }
+
+/// A log of which a column selects a part gives the number of a log that is only this part.
+#[test]
+fn a_condition_selects_what_a_shorter_log_would_hold() {
+    use ingest::write::{Column, write_parquet};
+    let bench = Bench::of("flights");
+    let whole = bench.path("A_nominal.parquet");
+    let from = Table::read(&whole);
+    let airborne = |row: usize| (6_000..30_000).contains(&row);
+    let mut columns: Vec<(String, Column)> = ["time_s", "motor_position_m", "screw_position_m", "load_n"]
+        .map(|name| (name.to_owned(), Column::Real(from.numbers(name))))
+        .into();
+    let ground = (0..from.rows()).map(|row| f64::from(u8::from(!airborne(row)))).collect();
+    columns.push(("weight_on_wheels".to_owned(), Column::Real(ground)));
+    write_parquet(&bench.path("whole.parquet"), &columns, &[]).unwrap();
+    rewrite(&whole, &bench.path("part.parquet"), &Vec::new(), |_| true, airborne);
+    let estimate = |log: &str| {
+        let out = bench.well(&["estimate", log, "--part", "A", "--json"]);
+        serde_json::from_str::<serde_json::Value>(&out).unwrap()[0].clone()
+    };
+    let part = estimate("part.parquet");
+    bench.configure("[part.A]", "[[channel.when]]\ncolumn = \"weight_on_wheels\"\nequals = [0]\n\n[part.A]");
+    let selected = estimate("whole.parquet");
+    assert_eq!(selected["gap_midrange_m"], part["gap_midrange_m"]);
+    assert_eq!(selected["samples"], part["samples"]);
+    let gap_m = |row: &serde_json::Value| row["gap_m"].as_f64().unwrap();
+    assert!((gap_m(&selected) / gap_m(&part) - 1.0).abs() < 2e-3, "{selected} {part}");
+    let ended = bench.freeplay(&["estimate", "part.parquet", "--part", "A"]);
+    assert_eq!(ended.code, Some(1), "a log without the column");
+    assert!(ended.err.contains("weight_on_wheels"), "{}", ended.err);
+}

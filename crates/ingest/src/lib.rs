@@ -11,6 +11,7 @@
 mod channel;
 mod checksum;
 pub mod clock;
+mod condition;
 pub mod error;
 mod file;
 pub mod flights;
@@ -18,6 +19,7 @@ mod hold;
 pub mod identity;
 mod leaf;
 pub mod log;
+pub mod noise;
 pub mod normal;
 mod numbers;
 mod page;
@@ -33,6 +35,7 @@ pub mod unit;
 pub mod write;
 
 pub use clock::Timeline;
+pub use condition::Condition;
 pub use error::{Error, Fault};
 pub use flights::Flights;
 pub use identity::Identity;

@@ -11,6 +11,7 @@ use jiff::Timestamp;
 
 use crate::channel::{self, Follower, Sampling};
 use crate::clock::{Origin, Repairs, Timeline};
+use crate::condition::Condition;
 use crate::error::{Error, Fault};
 use crate::file::LogFile;
 use crate::hold::hold;
@@ -363,8 +364,10 @@ impl Log {
         let needed = |(group, sheet): (Option<&str>, &Sheet)| {
             let mut leaves = BTreeSet::new();
             for (channels, at) in used {
+                let conditions: Vec<ChannelMapping> = channels.when.iter().map(Condition::channel).collect();
                 let maps = Role::ALL.iter().filter_map(|role| channels.of(*role));
-                for map in maps.flat_map(ChannelMapping::choices).filter(|m| m.group.as_deref() == group) {
+                let maps = maps.flat_map(ChannelMapping::choices).chain(&conditions);
+                for map in maps.filter(|m| m.group.as_deref() == group) {
                     let named = |column: &String| Pattern::new(column).column_for(at.position.as_str());
                     for name in std::iter::once(&map.column).chain(&map.valid_column).map(named) {
                         leaves.extend(sheet.leaves_of(&sheet.samples(&name, at.position.as_str())));
@@ -417,8 +420,37 @@ impl Log {
         let (load, load_flags) = read(Role::Load)?;
         let temperature = channels.temperature.as_ref().and_then(|_| read(Role::Temperature).ok());
         flags.extend(screw_flags.into_iter().chain(load_flags));
-        let read = Read { motor, screw, load, is_relative: channels.is_relative() };
-        Ok(finish(at.position.clone(), read, &master.0.line, temperature.and_then(|t| mean(&t.0)), flags))
+        let line = &master.0.line;
+        let segments = self.selected(at, channels, geometry, &master)?;
+        let read = Read { motor, screw, load, is_relative: channels.is_relative(), segments };
+        Ok(finish(at.position.clone(), read, line, temperature.and_then(|t| mean(&t.0)), flags))
+    }
+
+    /// The stretches of the motor's clock in which every condition holds.
+    fn selected(
+        &self,
+        at: &PositionColumns,
+        channels: &Channels,
+        geometry: Geometry,
+        master: &(Sampling<'_>, &ChannelMapping),
+    ) -> Result<Vec<Range<usize>>, Error> {
+        let line = &master.0.line;
+        let mut segments = line.segments.clone();
+        for condition in &channels.when {
+            let map = condition.channel();
+            let name = Pattern::new(&map.column).column_for(at.position.as_str());
+            let sheet = self.sheet_of(&map)?;
+            if !self.names_for(&map)?.contains(&name) {
+                return Err(sheet.lacks(&name));
+            }
+            // A state stands until the next one comes, as a slow load does.
+            let position = at.position.as_str();
+            let one = Follower { sheet, map: &map, name: &name, position, role: Role::Load };
+            let mut values = channel::follow(&master.0, master.1, &one, geometry)?;
+            hold(&mut values, &line.segments, line.step_s);
+            segments = condition.within(&values, &segments, line.step_s);
+        }
+        Ok(segments)
     }
 
     /// The motor position, whose clock all other channels follow.
@@ -552,6 +584,8 @@ struct Read {
     screw: Vec<f64>,
     load: Vec<f64>,
     is_relative: bool,
+    /// The stretches that count.
+    segments: Vec<Range<usize>>,
 }
 
 /// Looks at the channels, leaves out what a frozen one claims, and makes δX.
@@ -562,7 +596,7 @@ fn finish(
     temperature_c: Option<f64>,
     mut flags: Vec<String>,
 ) -> Actuator {
-    let Read { motor: mut motor_m, screw: mut screw_m, load: mut load_n, is_relative } = read;
+    let Read { motor: mut motor_m, screw: mut screw_m, load: mut load_n, is_relative, segments } = read;
     let quality = [&motor_m, &screw_m, &load_n].map(|values| Quality::of(values, line.step_s));
     flags.extend(quality::doubts(&quality, line.step_s));
     let mut dx_m = if is_relative {
@@ -575,7 +609,7 @@ fn finish(
     dx_m.iter_mut().zip(&motor_m).filter(|(_, motor)| motor.is_nan()).for_each(|(dx, _)| *dx = f64::NAN);
     flags.extend(quality::coarse(&quality, &dx_m));
     flags.extend(quality::load_froze(&load_n, &motor_m, line.step_s));
-    let segments = hold(&mut load_n, &line.segments, line.step_s);
+    let segments = hold(&mut load_n, &segments, line.step_s);
     let missing = dx_m.iter().filter(|y| y.is_nan()).count();
     Actuator {
         position,

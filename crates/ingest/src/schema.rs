@@ -1,5 +1,6 @@
 //! What a log must offer, and where in it: the mapping that `pipeline.toml` writes down.
 
+use crate::condition::Condition;
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
@@ -205,6 +206,9 @@ pub struct Channels {
     /// Temperature, where logged.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ChannelMapping>,
+    /// Conditions on other columns under which samples count; all must hold. Every sample when not given.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub when: Vec<Condition>,
 }
 
 /// A channel of an actuator.

@@ -79,7 +79,8 @@ pub fn samples(channels: &Actuator) -> Samples<'_> {
     }
 }
 
-fn prior(part: &Part) -> Prior {
+/// What is known of a part before its flight is seen.
+pub fn prior(part: &Part) -> Prior {
     let unknown_force_n = match part.noise {
         estimator::Noise::Sensors(sensors) => Some(sensors.unknown_force_n).filter(|force_n| *force_n > 0.0),
         _ => None,
@@ -95,6 +96,9 @@ fn prior(part: &Part) -> Prior {
 fn blind(channels: &Actuator) -> Option<&'static str> {
     let [motor, screw, load] = &channels.quality;
     let first = channels.dx_m.iter().find(|dx| !dx.is_nan());
+    if channels.segments.is_empty() {
+        return Some("nothing_selected");
+    }
     let rigid = channels.dx_m.iter().all(|dx| dx.is_nan() || Some(dx) == first);
     let still = motor.is_constant() || screw.is_constant() || load.is_constant() || rigid;
     let zero = motor.is_zero() || screw.is_zero() || load.is_zero();

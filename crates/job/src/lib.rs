@@ -5,6 +5,7 @@
 
 pub mod config;
 pub mod estimate;
+pub mod facts;
 pub mod flight;
 pub mod look;
 pub mod normalize;

@@ -6,6 +6,7 @@ use fleet::{Complaint, GapRecord, Status};
 use jiff::Timestamp;
 use store::{LogAccount, Outcome, RunAccount};
 
+use crate::innovations::Unlike;
 use crate::plan::{Plan, Work};
 use crate::recorder::Moved;
 use crate::trends::TrendRow;
@@ -73,6 +74,8 @@ pub struct Report {
     pub quiet: Vec<Quiet>,
     /// Delays between the positions that moved within the last month, on the aircraft this run touched.
     pub skew_moved: Vec<Moved>,
+    /// Flights of the last month, on those aircraft, whose innovations are unlike their unit's others.
+    pub innovations_unlike: Vec<Unlike>,
     /// The slowest log and its seconds.
     pub slowest: Option<(String, f64)>,
     /// Seconds from plan to account.
@@ -113,6 +116,7 @@ impl Report {
             not_reached_logs: Vec::new(),
             quiet: Vec::new(),
             skew_moved: Vec::new(),
+            innovations_unlike: Vec::new(),
             slowest: None,
             took_s: 0.0,
             workers,

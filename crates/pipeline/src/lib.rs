@@ -10,6 +10,7 @@ mod book;
 pub mod bundle;
 pub mod estimates;
 pub mod event;
+pub mod innovations;
 pub mod maintenance;
 pub mod normalize;
 pub mod pages;

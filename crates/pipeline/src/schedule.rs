@@ -19,6 +19,7 @@ use crate::book::{Book, Done};
 use crate::bundle;
 use crate::error::Error;
 use crate::event::Event;
+use crate::innovations;
 use crate::plan::{self, Plan, Request, Why, Work};
 use crate::recorder;
 use crate::trends;
@@ -31,7 +32,7 @@ const GATHER_LOGS: usize = 256;
 /// More data files than this slow every question; they are merged at the end of a run.
 const MANY_FILES: usize = 100;
 
-/// So many of an aircraft's latest records tell whether a delay moved: some months of flights.
+/// So many of an aircraft's latest records tell what is usual: some months of flights.
 const LOOKED_AT: usize = 2000;
 
 /// What a run needs besides its configuration.
@@ -95,7 +96,7 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
 
     (context.watch)(Event::Trends { units: touched.len() });
     report.trends = trends::of_units(config, &installations, &store, &touched)?;
-    report.skew_moved = skew_moved(&store, &report.trends)?;
+    (report.skew_moved, report.innovations_unlike) = look_back(&store, &report.trends)?;
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
     if store.files()?.len() > MANY_FILES {
@@ -105,17 +106,22 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     Ok(report)
 }
 
-/// What moved on the aircraft of these units.
-fn skew_moved(store: &Store, touched: &[trends::TrendRow]) -> Result<Vec<recorder::Moved>, Error> {
+/// What is new on the aircraft of these units beside their gaps: delays that moved, filters that were surprised.
+fn look_back(
+    store: &Store,
+    touched: &[trends::TrendRow],
+) -> Result<(Vec<recorder::Moved>, Vec<innovations::Unlike>), Error> {
     let mut tails: Vec<&str> = touched.iter().filter_map(|row| row.tail_number.as_deref()).collect();
     tails.sort_unstable();
     tails.dedup();
-    let mut found = Vec::new();
+    let (mut moved, mut unlike) = (Vec::new(), Vec::new());
     for tail in tails {
         let query = Query { tail_number: Some(tail.to_owned()), last: Some(LOOKED_AT), ..Query::default() };
-        found.extend(recorder::moved(&store.records(&query)?));
+        let records = store.records(&query)?;
+        moved.extend(recorder::moved(&records));
+        unlike.extend(innovations::unlike(&records));
     }
-    Ok(found)
+    Ok((moved, unlike))
 }
 
 /// The store's lock, waited for in short turns so that a signal is heard meanwhile.

@@ -119,7 +119,8 @@ fn real(rows: &[RealRow]) -> String {
 /// Against the authors' play: correlation, mean and mean absolute difference, of each method.
 fn geared(rows: &[Gear]) -> String {
     let mut table = "| method | ramps | correlation | mean difference ° | mean absolute difference ° |\n|---|---|---|---|---|\n".to_owned();
-    let methods: [(&str, fn(&Gear) -> [f64; 2]); 3] =
+    type Said = fn(&Gear) -> [f64; 2];
+    let methods: [(&str, Said); 3] =
         [(METHODS[1], |g| g.midrange_deg), (METHODS[2], |g| g.lines_deg), (METHODS[3], |g| g.spread_deg)];
     for (name, of) in methods {
         for (k, ramps) in ["4 N·m", "4 and 40 N·m"].iter().enumerate() {

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
-use fleet::{Complaint, Installations};
+use fleet::{Complaint, Installations, PartNumber};
 use ingest::{Actuator, Files, PositionColumns, Quality, quality};
 use job::Config;
 use job::flight::{Opened, caught};
@@ -32,16 +32,26 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
     let logs = logs(args, &config, talk)?;
     let (mut channels, mut complaints, mut page) = (Vec::new(), Vec::new(), String::new());
     let mut schemas = Schemas::default();
+    let mut facts = Facts::new();
     for (files, name) in &logs {
         let looked = caught(name, || {
             let opened = Opened::open(files, name, &config, &installations)?;
             schemas.enter(name, &opened.column_types());
-            one(&opened, name, &config, &installations, &mut channels, &mut complaints, &mut page);
+            one(
+                &opened,
+                name,
+                &config,
+                &installations,
+                &mut Seen { channels: &mut channels, facts: &mut facts, complaints: &mut complaints },
+                &mut page,
+            );
             Ok(())
         });
         complaints.extend(looked.err());
     }
-    let table = || format!("{page}{}{}", schemas.drift(), summary(logs.len(), &complaints));
+    let table = || {
+        format!("{page}{}{}{}", schemas.drift(), proposals(&facts, &config), summary(logs.len(), &complaints))
+    };
     if args.output.format() == Format::Table && args.output.output.is_none() {
         talk.answer(&table())?;
     } else {
@@ -92,22 +102,42 @@ struct Channel {
     note: Option<String>,
 }
 
+/// What all logs said, so far.
+struct Seen<'s> {
+    channels: &'s mut Vec<Channel>,
+    facts: &'s mut Facts,
+    complaints: &'s mut Vec<Complaint>,
+}
+
+/// What actuators say of their part numbers.
+type Facts = BTreeMap<PartNumber, Vec<job::facts::Facts>>;
+
+/// What one actuator said.
+struct Looked {
+    found: Vec<Channel>,
+    clock: Option<String>,
+    says: Option<(PartNumber, job::facts::Facts)>,
+}
+
 fn one(
     opened: &Opened,
     name: &str,
     config: &Config,
     installations: &Installations,
-    channels: &mut Vec<Channel>,
-    complaints: &mut Vec<Complaint>,
+    seen: &mut Seen<'_>,
     page: &mut String,
 ) {
     let id = &opened.identity;
+    let Seen { channels, facts, complaints } = seen;
     let (first, mut clocks) = (channels.len(), Vec::new());
     for at in opened.actuators(installations) {
         match actuator(opened, name, at, config, installations) {
-            Ok((found, clock)) => {
+            Ok(Looked { found, clock, says }) => {
                 channels.extend(found);
                 clocks.extend(clock);
+                if let Some((part, says)) = says {
+                    facts.entry(part).or_default().push(says);
+                }
             }
             Err(complaint) => complaints.push(complaint.in_file(name)),
         }
@@ -161,7 +191,7 @@ fn actuator(
     at: &PositionColumns,
     config: &Config,
     installations: &Installations,
-) -> Result<(Vec<Channel>, Option<String>), Complaint> {
+) -> Result<Looked, Complaint> {
     let id = &opened.identity;
     let (stay, part) = opened.unit(at, config, installations)?;
     let base = |channel: &'static str, column: &Option<String>, unit: &'static str| Channel {
@@ -188,7 +218,11 @@ fn actuator(
     if !at.lacking.is_empty() {
         let note =
             Some(format!("would be refused, channel_unmapped: the log lacks {}", at.lacking.join(", ")));
-        return Ok((vec![Channel { note, ..base("all", motor, "") }], None));
+        return Ok(Looked {
+            found: vec![Channel { note, ..base("all", motor, "") }],
+            clock: None,
+            says: None,
+        });
     }
     let a = opened.channels(at, part)?;
     let slope = quality::slope(&a.motor_m, &a.dx_m).map(slope_note);
@@ -200,7 +234,8 @@ fn actuator(
         describe(base("load", load, "N"), load_seen, &said(&a, "load")),
     ];
     found[2].note = found[2].note.take().or(slope);
-    Ok((found, Some(clock(&a))))
+    let says = Some((stay.part_number.clone(), job::facts::Facts::of(&a, part)));
+    Ok(Looked { found, clock: Some(clock(&a)), says })
 }
 
 /// The doubts about one channel.
@@ -327,6 +362,29 @@ impl Schemas {
             self.logs
         )
     }
+}
+
+/// What the logs say of each part, beside what the configuration says.
+fn proposals(facts: &Facts, config: &Config) -> String {
+    let columns = [text("key", 0), number("found", 0), number("stated", 0)];
+    let mut page = String::new();
+    for (number, all) in facts {
+        let Some(part) = config.parts.get(number) else { continue };
+        let proposals = job::facts::Facts::medians(all).proposals(part);
+        let rows: Vec<Vec<String>> = proposals
+            .iter()
+            .map(|p| {
+                let stated = p.stated.map_or_else(table::dash, |v| format!("{v:.2e}"));
+                vec![p.key.to_owned(), format!("{:.2e}", p.found), stated]
+            })
+            .collect();
+        let actuators = table::count(all.len(), "actuator");
+        let _ =
+            writeln!(page, "what {actuators} in these logs say of part {number}; data sheets know better");
+        page.push_str(&table::layout(&columns, &rows));
+        page.push('\n');
+    }
+    page
 }
 
 fn summary(logs: usize, complaints: &[Complaint]) -> String {

@@ -19,6 +19,9 @@ use crate::talk::{Talk, escape};
 
 use super::{VERSION, config, metrics};
 
+/// Flights with unlike innovations that are named in the account.
+const UNLIKE_SHOWN: usize = 5;
+
 /// Runs the night's work.
 ///
 /// # Errors
@@ -203,6 +206,20 @@ fn account(report: &Report, config: &str, code: Code) -> String {
             moved.since_utc.strftime("%Y-%m-%d")
         );
         line(&mut page, "skew moved", &text);
+    }
+    for unlike in report.innovations_unlike.iter().take(UNLIKE_SHOWN) {
+        let text = format!(
+            "{} {}, flight {}: the filter's innovations (NIS {:.2}) are unlike this unit's other flights ({:.2})",
+            escape(&unlike.tail_number),
+            escape(&unlike.position),
+            escape(&unlike.flight_id),
+            unlike.nis,
+            unlike.usual
+        );
+        line(&mut page, "unlike", &text);
+    }
+    if let Some(more @ 1..) = report.innovations_unlike.len().checked_sub(UNLIKE_SHOWN) {
+        line(&mut page, "", &format!("and {more} more, all in `freeplay run --json`"));
     }
     if let Some((log, seconds)) = &report.slowest {
         let took = span(Duration::from_secs_f64(report.took_s));

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use fleet::Complaint;
 use ingest::pattern::{PLACEHOLDER, nearest};
 use ingest::unit::Dimension;
-use ingest::{ChannelMapping, Channels, GroupMapping, Layout};
+use ingest::{ChannelMapping, Channels, Condition, GroupMapping, Layout};
 
 use super::source::Source;
 use crate::value::positive;
@@ -39,6 +39,11 @@ pub(super) fn check(
                 let c = Complaint::new("column_twice", what).hint("two channels cannot share a column");
                 complain(&[name, "column"], c);
             }
+        }
+    }
+    for condition in &channels.when {
+        for c in conditions(condition, groups) {
+            complain(&["when"], c);
         }
     }
     match (&channels.screw_position, &channels.relative_position) {
@@ -152,6 +157,33 @@ fn wrong_unit(name: &str, channel: &ChannelMapping, wanted: [Dimension; 2]) -> O
     };
     let what = format!("`channel.{name}` is in {}, a unit of {}", channel.unit.as_str(), dimension.as_str());
     Some(Complaint::new("unit_contradicts", what).hint(format!("it needs a unit of {}", words.join(" or "))))
+}
+
+/// What a condition asks and cannot mean.
+fn conditions(condition: &Condition, groups: &BTreeMap<String, GroupMapping>) -> Vec<Complaint> {
+    let column = &condition.column;
+    let mut found = Vec::new();
+    if column.trim().is_empty() {
+        found.push(Complaint::new("empty_name", "a condition of `channel.when` names no column"));
+    }
+    if !condition.asks() {
+        let what = format!("the condition on `{column}` asks nothing of it");
+        found.push(Complaint::new("key_missing", what).hint("equals = [1]"));
+    }
+    if let Some((least, most)) =
+        condition.at_least.zip(condition.at_most).filter(|(least, most)| least > most)
+    {
+        let what = format!("`at_least` {least} lies above `at_most` {most}: no value of `{column}` will do");
+        found.push(Complaint::new("bad_parameter", what));
+    }
+    if let Some(margin_s) = condition.margin_s.filter(|s| !(s.is_finite() && *s >= 0.0)) {
+        let what = format!("`margin_s` of the condition on `{column}` is {margin_s}");
+        found.push(Complaint::new("bad_parameter", what).hint("seconds, zero or more"));
+    }
+    found.extend(positive("rate_hz", condition.rate_hz));
+    let map = ChannelMapping { group: condition.group.clone(), ..ChannelMapping::default() };
+    found.extend(unknown_group("when", &map, groups));
+    found
 }
 
 fn unknown_group(

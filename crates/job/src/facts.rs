@@ -1,0 +1,139 @@
+//! What logs themselves say of a part: stiffness, noise of its sensors, friction. To be held against the data
+//! sheet, so that nobody has to guess a noise level.
+
+use estimator::Noise;
+use estimator::contact::{self, Outcome};
+use ingest::{Actuator, Geometry, noise};
+
+use crate::estimate;
+use crate::part::Part;
+
+/// What one actuator in one flight says of its part, or the medians of many; SI at the screw axis.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Facts {
+    /// K that the contact regression fitted, N/m.
+    pub stiffness_n_per_m: Option<f64>,
+    /// White noise of the screw position, rms, m.
+    pub screw_rms_m: Option<f64>,
+    /// Its smallest step, m.
+    pub screw_resolution_m: Option<f64>,
+    /// White noise of the motor position, rms, m.
+    pub motor_rms_m: Option<f64>,
+    /// Its smallest step, m.
+    pub motor_resolution_m: Option<f64>,
+    /// Friction of the screw at the rms load, N: the force the model does not know.
+    pub unknown_force_n: Option<f64>,
+}
+
+/// A key of `[part."…"]`, what the logs say of it, and what the configuration says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Proposal {
+    /// The key, below the part.
+    pub key: &'static str,
+    /// From the logs, in the key's unit.
+    pub found: f64,
+    /// As configured; none where the noise model asks for no such level.
+    pub stated: Option<f64>,
+}
+
+impl Facts {
+    /// Looks at one actuator. What the flight does not show stays open.
+    pub fn of(channels: &Actuator, part: &Part) -> Self {
+        let [motor, screw, _] = &channels.quality;
+        let motor_rms_m = noise::rms(&channels.motor_m, motor.resolution);
+        // δX carries the noise of both positions; the motor's is known, the rest is the screw's.
+        let both_m = noise::rms(&channels.dx_m, None);
+        let rounding_m2 =
+            [motor, screw].iter().filter_map(|q| q.resolution).map(|r| r * r / 12.0).sum::<f64>();
+        let screw_rms_m = both_m
+            .zip(motor_rms_m)
+            .map(|(both_m, motor_m)| (both_m * both_m - motor_m * motor_m - rounding_m2).max(0.0).sqrt());
+        let mut facts = Self {
+            motor_rms_m,
+            screw_rms_m,
+            motor_resolution_m: motor.resolution,
+            screw_resolution_m: screw.resolution,
+            ..Self::default()
+        };
+        if let Ok(Outcome::Estimated(found)) =
+            contact::estimate(&estimate::samples(channels), &estimate::prior(part))
+        {
+            facts.stiffness_n_per_m = Some(found.stiffness_n_per_m);
+            facts.unknown_force_n = Some(found.friction.at_n(rms_n(&channels.load_n)));
+        }
+        facts
+    }
+
+    /// The median of each fact, over those that show it.
+    pub fn medians(all: &[Self]) -> Self {
+        let median = |of: fn(&Self) -> Option<f64>| {
+            let mut values: Vec<f64> = all.iter().filter_map(of).collect();
+            let middle = values.len() / 2;
+            (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+        };
+        Self {
+            stiffness_n_per_m: median(|f| f.stiffness_n_per_m),
+            screw_rms_m: median(|f| f.screw_rms_m),
+            screw_resolution_m: median(|f| f.screw_resolution_m),
+            motor_rms_m: median(|f| f.motor_rms_m),
+            motor_resolution_m: median(|f| f.motor_resolution_m),
+            unknown_force_n: median(|f| f.unknown_force_n),
+        }
+    }
+
+    /// The facts under the keys and in the units in which a part of this kind is configured.
+    pub fn proposals(&self, part: &Part) -> Vec<Proposal> {
+        let sensors = match part.noise {
+            Noise::Sensors(sensors) => Some(sensors),
+            _ => None,
+        };
+        let stiffness = part.actuator.stiffness_n_per_m();
+        // Keys of a linear and of a rotary part, and what a radius makes of their units.
+        let (column, length, force, rate) = match part.geometry {
+            Geometry::Linear { .. } => (0, 1.0, 1.0, 1.0),
+            Geometry::Rotary { reference_radius_m: r } => (1, r.recip(), r, r * r),
+        };
+        let lines = [
+            (["stiffness_n_per_m", "stiffness_nm_per_rad"], rate, self.stiffness_n_per_m, Some(stiffness)),
+            (
+                ["noise.screw_rms_m", "noise.screw_rms_rad"],
+                length,
+                self.screw_rms_m,
+                sensors.map(|s| s.screw_rms_m),
+            ),
+            (
+                ["noise.screw_resolution_m", "noise.screw_resolution_rad"],
+                length,
+                self.screw_resolution_m,
+                sensors.map(|s| s.screw_resolution_m),
+            ),
+            (
+                ["noise.motor_rms_m", "noise.motor_rms_rad"],
+                length,
+                self.motor_rms_m,
+                sensors.map(|s| s.motor_rms_m),
+            ),
+            (
+                ["noise.motor_resolution_m", "noise.motor_resolution_rad"],
+                length,
+                self.motor_resolution_m,
+                sensors.map(|s| s.motor_resolution_m),
+            ),
+            (
+                ["noise.unknown_force_n", "noise.unknown_torque_nm"],
+                force,
+                self.unknown_force_n,
+                sensors.map(|s| s.unknown_force_n),
+            ),
+        ];
+        let proposal = |(keys, scale, found, stated): ([&'static str; 2], f64, Option<f64>, Option<f64>)| {
+            Some(Proposal { key: keys[column], found: found? * scale, stated: stated.map(|v| v * scale) })
+        };
+        lines.into_iter().filter_map(proposal).collect()
+    }
+}
+
+fn rms_n(load_n: &[f64]) -> f64 {
+    let present = || load_n.iter().filter(|f| !f.is_nan());
+    (present().map(|f| f * f).sum::<f64>() / present().count().max(1) as f64).sqrt()
+}
