@@ -8,6 +8,9 @@ use ingest::{Actuator, Geometry, noise};
 use crate::estimate;
 use crate::part::Part;
 
+/// Friction below this share of the load is not told from none.
+const UNSEEN: f64 = 0.01;
+
 /// What one actuator in one flight says of its part, or the medians of many; SI at the screw axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Facts {
@@ -59,7 +62,9 @@ impl Facts {
             contact::estimate(&estimate::samples(channels), &estimate::prior(part))
         {
             facts.stiffness_n_per_m = Some(found.stiffness_n_per_m);
-            facts.unknown_force_n = Some(found.friction.at_n(rms_n(&channels.load_n)));
+            let load_n = rms_n(&channels.load_n);
+            let friction_n = found.friction.at_n(load_n);
+            facts.unknown_force_n = (friction_n > UNSEEN * load_n).then_some(friction_n);
         }
         facts
     }

@@ -116,10 +116,12 @@ fn real(rows: &[RealRow]) -> String {
     table
 }
 
+/// One method's answers to a log, over small ramps and over all.
+type Said = fn(&Gear) -> [f64; 2];
+
 /// Against the authors' play: correlation, mean and mean absolute difference, of each method.
 fn geared(rows: &[Gear]) -> String {
     let mut table = "| method | ramps | correlation | mean difference ° | mean absolute difference ° |\n|---|---|---|---|---|\n".to_owned();
-    type Said = fn(&Gear) -> [f64; 2];
     let methods: [(&str, Said); 3] =
         [(METHODS[1], |g| g.midrange_deg), (METHODS[2], |g| g.lines_deg), (METHODS[3], |g| g.spread_deg)];
     for (name, of) in methods {

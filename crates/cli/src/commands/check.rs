@@ -379,8 +379,10 @@ fn proposals(facts: &Facts, config: &Config) -> String {
             })
             .collect();
         let actuators = table::count(all.len(), "actuator");
-        let _ =
-            writeln!(page, "what {actuators} in these logs say of part {number}; data sheets know better");
+        let _ = writeln!(
+            page,
+            "part {number} as {actuators} of these logs would have it; data sheets know better"
+        );
         page.push_str(&table::layout(&columns, &rows));
         page.push('\n');
     }
