@@ -246,10 +246,14 @@ fn a_condition_selects_what_a_shorter_log_would_hold() {
     let part = estimate("part.parquet");
     bench.configure("[part.A]", "[[channel.when]]\ncolumn = \"weight_on_wheels\"\nequals = [0]\n\n[part.A]");
     let selected = estimate("whole.parquet");
-    assert_eq!(selected["gap_midrange_m"], part["gap_midrange_m"]);
     assert_eq!(selected["samples"], part["samples"]);
-    let gap_m = |row: &serde_json::Value| row["gap_m"].as_f64().unwrap();
-    assert!((gap_m(&selected) / gap_m(&part) - 1.0).abs() < 2e-3, "{selected} {part}");
+    let near = |key: &str, share: f64| {
+        let number = |row: &serde_json::Value| row[key].as_f64().unwrap();
+        assert!((number(&selected) / number(&part) - 1.0).abs() < share, "{key}: {selected} {part}");
+    };
+    // The step comes from stamps of other magnitude; contact regression leaves out the log's first second.
+    near("gap_midrange_m", 1e-12);
+    near("gap_m", 2e-3);
     let ended = bench.freeplay(&["estimate", "part.parquet", "--part", "A"]);
     assert_eq!(ended.code, Some(1), "a log without the column");
     assert!(ended.err.contains("weight_on_wheels"), "{}", ended.err);

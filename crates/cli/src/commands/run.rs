@@ -129,6 +129,24 @@ fn code(report: &Report, reached: bool, stopped: bool) -> Code {
     }
 }
 
+/// Flights in which the filter was surprised.
+fn unlike(report: &Report, page: &mut String) {
+    for unlike in report.innovations_unlike.iter().take(UNLIKE_SHOWN) {
+        let text = format!(
+            "{} {}, flight {}: the filter's innovations (NIS {:.2}) are unlike this unit's other flights ({:.2})",
+            escape(&unlike.tail_number),
+            escape(&unlike.position),
+            escape(&unlike.flight_id),
+            unlike.nis,
+            unlike.usual
+        );
+        line(page, "unlike", &text);
+    }
+    if let Some(more @ 1..) = report.innovations_unlike.len().checked_sub(UNLIKE_SHOWN) {
+        line(page, "", &format!("and {more} more, all in `freeplay run --json`"));
+    }
+}
+
 /// The morning's page.
 fn account(report: &Report, config: &str, code: Code) -> String {
     let mut page = format!(
@@ -207,20 +225,7 @@ fn account(report: &Report, config: &str, code: Code) -> String {
         );
         line(&mut page, "skew moved", &text);
     }
-    for unlike in report.innovations_unlike.iter().take(UNLIKE_SHOWN) {
-        let text = format!(
-            "{} {}, flight {}: the filter's innovations (NIS {:.2}) are unlike this unit's other flights ({:.2})",
-            escape(&unlike.tail_number),
-            escape(&unlike.position),
-            escape(&unlike.flight_id),
-            unlike.nis,
-            unlike.usual
-        );
-        line(&mut page, "unlike", &text);
-    }
-    if let Some(more @ 1..) = report.innovations_unlike.len().checked_sub(UNLIKE_SHOWN) {
-        line(&mut page, "", &format!("and {more} more, all in `freeplay run --json`"));
-    }
+    unlike(report, &mut page);
     if let Some((log, seconds)) = &report.slowest {
         let took = span(Duration::from_secs_f64(report.took_s));
         line(
