@@ -3,14 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use ::report::{Event, FlightRow, Inspection, LogFault, Past, Quality, Report, Statement, Stay, Tail, Unit};
-use fleet::{GapRecord, Installations, SerialNumber};
+use fleet::{GapRecord, Installations, PartNumber, SerialNumber};
 use ingest::tables::{Table, name, number, utc};
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
-use store::{Outcome, Query, Store};
+use store::{Outcome, Store};
 
 use crate::error::Error;
-use crate::trends::{self, AsOf, Ask, Flown, TrendRow};
+use crate::trends::{self, Ask, Flown, TrendRow};
 
 /// Days before the report of which statements are held against what came.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
@@ -36,26 +36,25 @@ pub fn compose(
     program: &str,
 ) -> Result<Report, Error> {
     let checks = inspections(config)?;
-    let mut records = store.records(&Query::default())?;
-    records.retain(|r| ask.as_of_utc.is_none_or(|day| r.flight.departure_utc <= day));
-    let flown: Vec<Flown> = records.iter().map(|r| Flown::of(r.clone(), installations)).collect();
-    let now = trends::of_flown(config, installations, flown.clone(), ask)?;
+    let Read { mut flown, mut rest, store_version } = Read::until(ask.as_of_utc, store, installations)?;
+    let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
+    let (now, before) = trends::now_and_before(config, installations, &flown, ask, &days)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
-    let before = statements_before(config, installations, flown, &now)?;
-    let mut of_unit: BTreeMap<Name, Vec<&GapRecord>> = BTreeMap::new();
-    for record in &records {
-        let name = (Some(record.part_number.to_string()), record.serial_number.to_string());
-        of_unit.entry(name).or_default().push(record);
-    }
-    let compose =
-        Compose { config, installations, before: &before, checks: checks.as_deref().unwrap_or(&[]) };
-    let units: Vec<Unit> = now
-        .iter()
-        .map(|row| {
-            let name = (row.part_number.clone(), row.serial_number.clone());
-            compose.unit(row, of_unit.get(&name).map_or(&[], Vec::as_slice))
-        })
-        .collect();
+    let newest_departure_utc = flown.values().flatten().map(|f| f.departure_utc).max();
+    let known = |c: &Check| flown.keys().any(|name| c.is_of(name));
+    let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
+    let mut tails = tails(flown.values().flatten());
+    let compose = Compose {
+        config,
+        before: &by_name(before),
+        checks: checks.as_deref().unwrap_or(&[]),
+        stays: &stays(installations),
+    };
+    let unit = |row: &TrendRow| {
+        let name = name_of(row);
+        compose.unit(row, flown.remove(&name).unwrap_or_default(), rest.remove(&name).unwrap_or_default())
+    };
+    let units: Vec<Unit> = now.iter().map(unit).collect();
     let accounts = store.accounts()?;
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
     let narrowed = ask.tail_number.is_some() || ask.serial_number.is_some();
@@ -69,22 +68,21 @@ pub fn compose(
             processed_utc: a.processed_utc,
         })
         .collect();
-    let mut tails = tails(&records, &faults);
-    tails.retain(|t| wanted(Some(&t.tail_number)));
-    let known = |c: &Check| of_unit.keys().any(|name| c.is_of(name));
+    blame(&mut tails, &faults);
+    let tails = tails.into_values().filter(|t| wanted(Some(&t.tail_number))).collect();
     Ok(Report {
         made_utc,
         program: program.to_owned(),
-        store_version: Some(store.info()?.version),
+        store_version: Some(store_version),
         scope: scope(ask),
         as_of_utc,
-        newest_departure_utc: records.iter().map(|r| r.flight.departure_utc).max(),
+        newest_departure_utc,
         logs_known: accounts.iter().filter(|a| wanted(a.tail_number.as_deref())).count(),
         check_interval_hours: config.document.trend.next_check_hours,
         log_faults: faults,
         tails,
         inspections_given: checks.is_some(),
-        inspections_unmatched: checks.iter().flatten().filter(|c| !known(c)).count(),
+        inspections_unmatched,
         units,
     })
 }
@@ -96,55 +94,92 @@ fn scope(ask: &Ask) -> Option<String> {
     (!both.is_empty()).then(|| both.join(", "))
 }
 
-/// The statements of one and of more days before, by days.
-type Before = BTreeMap<i64, BTreeMap<Name, TrendRow>>;
+/// All flights of all units, and what of them no statement needs but a page shows.
+struct Read {
+    flown: BTreeMap<Name, Vec<Flown>>,
+    rest: BTreeMap<Name, Vec<Rest>>,
+    store_version: u64,
+}
 
-fn statements_before(
-    config: &Config,
-    installations: &Installations,
-    flown: Vec<Flown>,
-    now: &[TrendRow],
-) -> Result<Before, Error> {
-    let mut queries = Vec::new();
-    let mut days_of = Vec::new();
-    for days in [1].into_iter().chain(LOOK_BACK_DAYS) {
-        for row in now {
-            queries.push(AsOf {
-                part_number: row.part_number.clone(),
-                serial_number: row.serial_number.clone(),
-                as_of_utc: row.as_of_utc - SignedDuration::from_hours(24 * days),
-            });
-            days_of.push(days);
+/// What a page shows of a flight beside what statements are made from.
+#[derive(Debug, Clone)]
+struct Rest {
+    unit_hours: Option<f64>,
+    gap_p05_m: Option<f64>,
+    gap_p95_m: Option<f64>,
+    gap_midrange_m: Option<f64>,
+    load_p05_n: Option<f64>,
+    load_p95_n: Option<f64>,
+    reason: Option<String>,
+    flags: Vec<String>,
+}
+
+impl Read {
+    /// Reads the store month by month and keeps what is used: records hold several times as much.
+    fn until(last: Option<Timestamp>, store: &Store, installations: &Installations) -> Result<Self, Error> {
+        let (mut flown, mut rest) = (BTreeMap::<Name, Vec<Flown>>::new(), BTreeMap::<Name, Vec<Rest>>::new());
+        let store_version = store.visit(|mut record| {
+            if last.is_none_or(|last| record.flight.departure_utc <= last) {
+                let name = (Some(record.part_number.to_string()), record.serial_number.to_string());
+                rest.entry(name.clone()).or_default().push(Rest::take(&mut record));
+                flown.entry(name).or_default().push(Flown::of(record, installations));
+            }
+        })?;
+        Ok(Self { flown, rest, store_version })
+    }
+}
+
+impl Rest {
+    fn take(record: &mut GapRecord) -> Self {
+        let e = &mut record.estimate;
+        Self {
+            unit_hours: record.unit_hours,
+            gap_p05_m: e.gap_p05_m,
+            gap_p95_m: e.gap_p95_m,
+            gap_midrange_m: e.gap_midrange_m,
+            load_p05_n: e.load_p05_n,
+            load_p95_n: e.load_p95_n,
+            reason: e.reason.take(),
+            flags: std::mem::take(&mut e.flags),
         }
     }
-    let rows = trends::of_queries(config, installations, flown, &queries)?;
-    let mut before = Before::new();
-    for (days, row) in days_of.into_iter().zip(rows).filter(|(_, row)| row.flights > 0) {
-        let name = (row.part_number.clone(), row.serial_number.clone());
-        before.entry(days).or_default().insert(name, row);
-    }
-    Ok(before)
+}
+
+fn name_of(row: &TrendRow) -> Name {
+    (row.part_number.clone(), row.serial_number.clone())
+}
+
+/// The statements of one and of more days before, by days; of units that had flown by then.
+type Before = BTreeMap<i64, BTreeMap<Name, TrendRow>>;
+
+fn by_name(before: BTreeMap<i64, Vec<TrendRow>>) -> Before {
+    let named = |rows: Vec<TrendRow>| {
+        rows.into_iter().filter(|row| row.flights > 0).map(|row| (name_of(&row), row)).collect()
+    };
+    before.into_iter().map(|(days, rows)| (days, named(rows))).collect()
 }
 
 /// What all units' pages are composed from.
 struct Compose<'a> {
     config: &'a Config,
-    installations: &'a Installations,
     before: &'a Before,
     checks: &'a [Check],
+    stays: &'a Stays,
 }
 
 impl Compose<'_> {
-    fn unit(&self, row: &TrendRow, records: &[&GapRecord]) -> Unit {
-        let name = (row.part_number.clone(), row.serial_number.clone());
-        let stays = self.stays(&name);
+    fn unit(&self, row: &TrendRow, flown: Vec<Flown>, rest: Vec<Rest>) -> Unit {
+        let name = name_of(row);
+        let stays = self.stays.get(&name.1).map_or(&[][..], Vec::as_slice);
+        let mine = stays.iter().filter(|(part, _)| name.0.as_ref().is_none_or(|p| p == part));
+        let stays: Vec<Stay> = mine.map(|(_, stay)| stay.clone()).collect();
         Unit {
-            statement: self.statement(row, records, &name),
-            quality: quality(records, row.as_of_utc),
+            statement: self.statement(row, &flown, &name),
+            quality: quality(&flown, &rest, row.as_of_utc),
             events: events(row, &stays),
-            past: self.past(row, records, &name),
-            inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.beside(records)).collect(),
-            flights: records.iter().map(|r| flight(r)).collect(),
+            past: self.past(row, &flown, &name),
+            inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.beside(&flown)).collect(),
+            flights: flown.into_iter().zip(rest).map(|(flown, rest)| flight(flown, rest)).collect(),
             stays,
             part_number: name.0,
             serial_number: name.1,
@@ -153,10 +188,11 @@ impl Compose<'_> {
         }
     }
 
-    fn statement(&self, row: &TrendRow, records: &[&GapRecord], name: &Name) -> Statement {
-        let part = records.first().and_then(|r| self.config.parts.get(&r.part_number));
+    fn statement(&self, row: &TrendRow, records: &[Flown], name: &Name) -> Statement {
+        let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
+        let part = part.and_then(|part| self.config.parts.get(&part));
         let pace = pace(records);
-        let last = records.last().map_or(row.as_of_utc, |r| r.flight.departure_utc);
+        let last = records.last().map_or(row.as_of_utc, |r| r.departure_utc);
         let at = |hours: Option<f64>| date(last, hours? / pace?.0);
         Statement {
             state: row.state.map(str::to_owned),
@@ -194,31 +230,32 @@ impl Compose<'_> {
         }
     }
 
-    fn stays(&self, name: &Name) -> Vec<Stay> {
-        let mine = self.installations.iter().filter(|s| {
-            s.serial_number.as_str() == name.1
-                && name.0.as_deref().is_none_or(|p| s.part_number.as_str() == p)
-        });
-        let mut stays: Vec<Stay> = mine
-            .map(|s| Stay {
-                tail_number: s.tail_number.to_string(),
-                position: s.position.to_string(),
-                installed_utc: s.installed_utc,
-                removed_utc: s.removed_utc,
-            })
-            .collect();
-        stays.sort_by_key(|s| s.installed_utc);
-        stays
-    }
-
     /// What was foreseen for today, and what is found.
-    fn past(&self, row: &TrendRow, records: &[&GapRecord], name: &Name) -> Vec<Past> {
+    fn past(&self, row: &TrendRow, records: &[Flown], name: &Name) -> Vec<Past> {
         let of_day = |days: &i64| {
             let then = self.before.get(days)?.get(name)?;
             foreseen(then, row, flown_hours(records, then.as_of_utc)?, *days)
         };
         LOOK_BACK_DAYS.iter().filter_map(of_day).collect()
     }
+}
+
+/// Stays by serial number, each with its part number, earliest first.
+type Stays = BTreeMap<String, Vec<(String, Stay)>>;
+
+fn stays(installations: &Installations) -> Stays {
+    let mut stays = Stays::new();
+    for s in installations.iter() {
+        let stay = Stay {
+            tail_number: s.tail_number.to_string(),
+            position: s.position.to_string(),
+            installed_utc: s.installed_utc,
+            removed_utc: s.removed_utc,
+        };
+        stays.entry(s.serial_number.to_string()).or_default().push((s.part_number.to_string(), stay));
+    }
+    stays.values_mut().for_each(|stays| stays.sort_by_key(|(_, s)| s.installed_utc));
+    stays
 }
 
 /// The level then, grown at the rate then over the hours since; the errors of both levels and the
@@ -241,17 +278,17 @@ fn foreseen(then: &TrendRow, now: &TrendRow, hours: f64, days_ago: i64) -> Optio
 }
 
 /// Hours flown after a day; nothing when a flight does not say its length.
-fn flown_hours(records: &[&GapRecord], after: Timestamp) -> Option<f64> {
-    records.iter().filter(|r| r.flight.departure_utc > after).map(|r| r.flight.flight_hours).sum()
+fn flown_hours(records: &[Flown], after: Timestamp) -> Option<f64> {
+    records.iter().filter(|r| r.departure_utc > after).map(|r| r.flight_hours).sum()
 }
 
 /// Hours a day and hours a flight over the last ninety days of flights.
-fn pace(records: &[&GapRecord]) -> Option<(f64, f64)> {
-    let last = records.last()?.flight.departure_utc;
-    let from = records.partition_point(|r| days(r.flight.departure_utc, last) > 90.0);
+fn pace(records: &[Flown]) -> Option<(f64, f64)> {
+    let last = records.last()?.departure_utc;
+    let from = records.partition_point(|r| days(r.departure_utc, last) > 90.0);
     let (first, since) = records[from..].split_first()?;
-    let hours: f64 = since.iter().map(|r| r.flight.flight_hours).sum::<Option<f64>>()?;
-    let days = days(first.flight.departure_utc, last);
+    let hours: f64 = since.iter().map(|r| r.flight_hours).sum::<Option<f64>>()?;
+    let days = days(first.departure_utc, last);
     (hours > 0.0 && days > 0.0).then(|| (hours / days, hours / since.len() as f64))
 }
 
@@ -281,18 +318,18 @@ fn events(row: &TrendRow, stays: &[Stay]) -> Vec<Event> {
     row.change_points.iter().map(event).collect()
 }
 
-fn quality(records: &[&GapRecord], as_of: Timestamp) -> Quality {
+fn quality(records: &[Flown], rest: &[Rest], as_of: Timestamp) -> Quality {
     let (mut reasons, mut doubts) = (BTreeMap::new(), BTreeMap::new());
-    for estimate in records.iter().map(|r| &r.estimate) {
-        if estimate.gap_m.is_none() {
-            *reasons.entry(estimate.reason.clone().unwrap_or_default()).or_default() += 1;
+    for (flown, rest) in records.iter().zip(rest) {
+        if flown.gap_m.is_none() {
+            *reasons.entry(rest.reason.clone().unwrap_or_default()).or_default() += 1;
         }
-        for flag in &estimate.flags {
+        for flag in &rest.flags {
             *doubts.entry(flag.clone()).or_default() += 1;
         }
     }
-    let estimated = records.iter().filter(|r| r.estimate.gap_m.is_some());
-    let last = estimated.clone().next_back().map(|r| r.flight.departure_utc);
+    let estimated = records.iter().filter(|r| r.gap_m.is_some());
+    let last = estimated.clone().next_back().map(|r| r.departure_utc);
     let count = estimated.count();
     Quality {
         estimated: count,
@@ -312,56 +349,62 @@ fn ranked(counts: BTreeMap<String, usize>) -> Vec<(String, usize)> {
 }
 
 /// The spread of neighbouring flights' differences, by the median, over the joint standard error.
-fn noise(records: &[&GapRecord]) -> Option<f64> {
-    let gaps: Vec<(f64, f64)> =
-        records.iter().filter_map(|r| Some((r.estimate.gap_m?, r.estimate.gap_se_m?))).collect();
+fn noise(records: &[Flown]) -> Option<f64> {
+    let gaps: Vec<(f64, f64)> = records.iter().filter_map(|r| Some((r.gap_m?, r.gap_se_m?))).collect();
     let ratio = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0).abs() / pair[0].1.hypot(pair[1].1);
     let mut ratios: Vec<f64> = gaps.windows(2).map(ratio).filter(|r| r.is_finite()).collect();
     ratios.sort_by(f64::total_cmp);
     (ratios.len() >= 5).then(|| 1.4826 * ratios[ratios.len() / 2])
 }
 
-fn flight(record: &GapRecord) -> FlightRow {
-    let e = &record.estimate;
-    let refusal =
-        e.reason.iter().map(|r| if e.gap_m.is_none() { format!("refused: {r}") } else { r.clone() });
-    let others = e.flags.iter().filter(|flag| Some(*flag) != e.reason.as_ref()).cloned();
+fn flight(flown: Flown, rest: Rest) -> FlightRow {
+    let Rest { reason, flags, .. } = rest;
+    let others: Vec<String> = flags.into_iter().filter(|flag| Some(flag) != reason.as_ref()).collect();
+    let refusal = reason.map(|r| if flown.gap_m.is_none() { format!("refused: {r}") } else { r });
     FlightRow {
-        departure_utc: record.flight.departure_utc,
-        flight_id: record.flight.flight_id.to_string(),
-        tail_number: record.flight.tail_number.to_string(),
-        position: record.position.to_string(),
-        unit_hours: record.unit_hours,
-        gap_m: e.gap_m,
-        gap_p05_m: e.gap_p05_m,
-        gap_p95_m: e.gap_p95_m,
-        gap_midrange_m: e.gap_midrange_m,
-        load_reversals: e.load_reversals,
-        load_p05_n: e.load_p05_n,
-        load_p95_n: e.load_p95_n,
-        remarks: refusal.chain(others).collect::<Vec<_>>().join(", "),
+        departure_utc: flown.departure_utc,
+        flight_id: flown.flight_id.unwrap_or_default(),
+        tail_number: flown.tail_number.unwrap_or_default(),
+        position: flown.position.unwrap_or_default(),
+        unit_hours: rest.unit_hours,
+        gap_m: flown.gap_m,
+        gap_p05_m: rest.gap_p05_m,
+        gap_p95_m: rest.gap_p95_m,
+        gap_midrange_m: rest.gap_midrange_m,
+        load_reversals: flown.load_reversals,
+        load_p05_n: rest.load_p05_n,
+        load_p95_n: rest.load_p95_n,
+        remarks: refusal.into_iter().chain(others).collect::<Vec<_>>().join(", "),
     }
 }
 
-fn tails(records: &[GapRecord], faults: &[LogFault]) -> Vec<Tail> {
+fn tails<'a>(flown: impl Iterator<Item = &'a Flown>) -> BTreeMap<String, Tail> {
     let mut tails: BTreeMap<&str, (Tail, BTreeSet<&str>)> = BTreeMap::new();
-    for record in records {
-        let name = record.flight.tail_number.as_str();
+    for record in flown {
+        let (Some(name), Some(flight)) = (record.tail_number.as_deref(), record.flight_id.as_deref()) else {
+            continue;
+        };
         let (tail, flights) = tails.entry(name).or_insert_with(|| (quiet(name), BTreeSet::new()));
-        flights.insert(record.flight.flight_id.as_str());
+        flights.insert(flight);
         tail.records += 1;
-        tail.last_departure_utc = tail.last_departure_utc.max(Some(record.flight.departure_utc));
-        if record.estimate.gap_m.is_some() {
-            tail.last_estimate_utc = tail.last_estimate_utc.max(Some(record.flight.departure_utc));
+        tail.last_departure_utc = tail.last_departure_utc.max(Some(record.departure_utc));
+        if record.gap_m.is_some() {
+            tail.last_estimate_utc = tail.last_estimate_utc.max(Some(record.departure_utc));
         } else {
             tail.refused += 1;
         }
     }
-    for fault in faults {
-        let Some(name) = fault.tail_number.as_deref() else { continue };
-        tails.entry(name).or_insert_with(|| (quiet(name), BTreeSet::new())).0.logs_in_error += 1;
+    let counted = |(name, (tail, flights)): (&str, (Tail, BTreeSet<&str>))| {
+        (name.to_owned(), Tail { flights: flights.len(), ..tail })
+    };
+    tails.into_iter().map(counted).collect()
+}
+
+/// Adds each tail's logs in error, of tails that never had a good one too.
+fn blame(tails: &mut BTreeMap<String, Tail>, faults: &[LogFault]) {
+    for name in faults.iter().filter_map(|fault| fault.tail_number.as_deref()) {
+        tails.entry(name.to_owned()).or_insert_with(|| quiet(name)).logs_in_error += 1;
     }
-    tails.into_values().map(|(tail, flights)| Tail { flights: flights.len(), ..tail }).collect()
 }
 
 fn quiet(tail_number: &str) -> Tail {
@@ -393,12 +436,12 @@ impl Check {
     }
 
     /// The check beside the median of the last estimates before it: what follows may be another gap.
-    fn beside(&self, records: &[&GapRecord]) -> Inspection {
+    fn beside(&self, records: &[Flown]) -> Inspection {
         let near = records
             .iter()
             .rev()
-            .filter(|r| (0.0..=BESIDE_DAYS).contains(&days(r.flight.departure_utc, self.date_utc)));
-        let mut gaps: Vec<f64> = near.filter_map(|r| r.estimate.gap_m).take(BESIDE).collect();
+            .filter(|r| (0.0..=BESIDE_DAYS).contains(&days(r.departure_utc, self.date_utc)));
+        let mut gaps: Vec<f64> = near.filter_map(|r| r.gap_m).take(BESIDE).collect();
         gaps.sort_by(f64::total_cmp);
         let middle = gaps.len() / 2;
         let median = gaps

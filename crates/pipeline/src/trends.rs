@@ -99,6 +99,19 @@ pub struct Ask {
     pub as_of_utc: Option<Timestamp>,
 }
 
+impl Ask {
+    /// Whether a unit of that name is asked for, wherever it flies.
+    fn names(&self, name: &HistoryName) -> bool {
+        self.serial_number.as_ref().is_none_or(|s| *s == name.1)
+            && (self.part_number.is_none() || self.part_number == name.0)
+    }
+
+    /// Whether a statement of a unit so named is asked for: it has flown, and on the tail that is meant.
+    fn fits(&self, row: &TrendRow) -> bool {
+        row.flights > 0 && (self.tail_number.is_none() || row.tail_number == self.tail_number)
+    }
+}
+
 /// States what is known of the asked units.
 ///
 /// # Errors
@@ -145,6 +158,35 @@ pub fn of_flown(
     ask: &Ask,
 ) -> Result<Vec<TrendRow>, Error> {
     of_histories(config, installations, &histories(flown), ask)
+}
+
+/// Statements of now, and those of so many days before, by days.
+pub(crate) type NowAndBefore = (Vec<TrendRow>, BTreeMap<i64, Vec<TrendRow>>);
+
+/// States what is known of the asked units, and what was known of them so many days before.
+///
+/// # Errors
+/// As [`of_flown`].
+pub(crate) fn now_and_before(
+    config: &Config,
+    installations: &Installations,
+    histories: &BTreeMap<HistoryName, Vec<Flown>>,
+    ask: &Ask,
+    days_before: &[i64],
+) -> Result<NowAndBefore, Error> {
+    let newest = || histories.values().flatten().map(|f| f.departure_utc).max();
+    let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(NowAndBefore::default()) };
+    let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
+    let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
+    let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
+    let fleet = Fleet::new(config, installations, histories, &days)?;
+    let now = fleet.statements(histories.keys().filter(|name| ask.names(name)), as_of)?;
+    let now: Vec<TrendRow> = now.into_iter().filter(|row| ask.fits(row)).collect();
+    let names: Vec<HistoryName> =
+        now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
+    let then = |(days, at): (i64, Timestamp)| Ok((days, fleet.statements(names.iter(), at)?));
+    let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
+    Ok((now, before))
 }
 
 /// One statement for each query, from nothing later than its date.
@@ -241,14 +283,8 @@ fn of_histories(
     let newest = || histories.values().flatten().map(|f| f.departure_utc).max();
     let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(Vec::new()) };
     let fleet = Fleet::new(config, installations, histories, &[as_of])?;
-    let asked = |name: &&HistoryName| {
-        ask.serial_number.as_ref().is_none_or(|s| *s == name.1)
-            && (ask.part_number.is_none() || ask.part_number == name.0)
-    };
-    let units: Vec<&HistoryName> = histories.keys().filter(asked).collect();
-    let mut rows =
-        units.par_iter().map(|name| fleet.statement(name, as_of)).collect::<Result<Vec<_>, _>>()?;
-    rows.retain(|row| row.flights > 0 && (ask.tail_number.is_none() || row.tail_number == ask.tail_number));
+    let mut rows = fleet.statements(histories.keys().filter(|name| ask.names(name)), as_of)?;
+    rows.retain(|row| ask.fits(row));
     Ok(rows)
 }
 
@@ -367,6 +403,15 @@ impl<'a> Fleet<'a> {
     pub(crate) fn prior(&self, name: &HistoryName, as_of: Timestamp) -> Option<&FleetPrior> {
         let (flown, _) = self.units.get_key_value(name)?;
         self.priors.get(&(month_us(as_of), flown.0.as_deref()))
+    }
+
+    fn statements<'b>(
+        &self,
+        names: impl Iterator<Item = &'b HistoryName>,
+        as_of: Timestamp,
+    ) -> Result<Vec<TrendRow>, Error> {
+        let names: Vec<&HistoryName> = names.collect();
+        names.par_iter().map(|name| self.statement(name, as_of)).collect()
     }
 
     fn statement(&self, name: &HistoryName, as_of: Timestamp) -> Result<TrendRow, Error> {

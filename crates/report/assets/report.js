@@ -27,6 +27,12 @@
   readout.className = "readout";
   var rest = "Hover for values, drag to zoom.";
   readout.textContent = rest;
+  var range = document.createElement("p");
+  range.className = "range";
+  var shown = function (u) {
+    var day = function (t) { return new Date(t * 1000).toISOString().slice(0, 10); };
+    range.textContent = day(u.scales.x.min) + " to " + day(u.scales.x.max);
+  };
   figure.insertBefore(live, figure.firstChild);
   figure.insertBefore(tools, live);
 
@@ -58,7 +64,8 @@
   };
   var values = rows.map(function (r) { return r.gap; });
   var top = rows.reduce(function (a, r) { return Math.max(a, r.high || 0, r.gap || 0); }, limit || 1) * 1.08;
-  var bottom = rows.reduce(function (a, r) { return Math.min(a, r.low || 0, r.gap || 0); }, 0);
+  var lowest = rows.reduce(function (a, r) { return r.gap === null ? a : Math.min(a, r.gap, r.low === null ? r.gap : r.low); }, top);
+  var bottom = Math.max(lowest - 0.2 * (top - lowest), Math.min(lowest, 0));
   var show = function (u) {
     var r = u.cursor.idx === null || u.cursor.idx === undefined ? null : rows[u.cursor.idx];
     if (!r) readout.textContent = rest;
@@ -75,7 +82,7 @@
       scales: { x: { min: whole.min, max: whole.max }, y: { range: [bottom, top] } },
       axes: [Object.assign({ values: [[31536000, "{YYYY}"], [2592000, "{YYYY}-{MM}"], [86400, "{YYYY}-{MM}-{DD}"], [3600, "{HH}:{mm}"]], space: 90 }, axis), Object.assign({ label: "gap µm", size: 56 }, axis)],
       series: [{}, { stroke: colour("normal"), paths: function () { return null; }, points: { show: true, size: 6, fill: colour("normal") } }],
-      hooks: { drawAxes: [draw], setCursor: [show] }
+      hooks: { drawAxes: [draw], setCursor: [show], setScale: [shown] }
     }, [rows.map(function (r) { return r.t; }), values], live);
   };
   var button = function (text, range) {
@@ -88,6 +95,7 @@
   button("All", function () { return whole; });
   button("Last 90 days", function () { return { min: last - 90 * 86400, max: last + 5 * 86400 }; });
   button("Forecast", function () { return { min: last - 0.05 * span, max: whole.max }; });
+  tools.appendChild(range);
   tools.appendChild(readout);
   document.documentElement.classList.add("js");
   make();

@@ -30,7 +30,8 @@ pub(crate) fn history(unit: &Unit) -> Result<String, Error> {
     let horizon = last.0 + 3.0 * span;
     let ends = fan.iter().flatten().copied().map(|d| d.min(horizon)).fold(last.0, f64::max);
     let top = points.iter().map(|p| p.3).chain(s.limit_m.map(|l| l * 1e6)).fold(1.0, f64::max) * 1.08;
-    let bottom = points.iter().map(|p| p.2).fold(0.0, f64::min);
+    let lowest = points.iter().map(|p| p.2).fold(f64::INFINITY, f64::min);
+    let bottom = (lowest - 0.2 * (top - lowest)).max(lowest.min(0.0));
     let mut svg = String::new();
     draw(&mut svg, unit, &points, (first.0 - 0.02 * span, ends + 0.02 * span), (bottom, top), fan)?;
     Ok(svg)

@@ -147,14 +147,13 @@ pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
     let mut work = work(report);
     let rest = work.split_off(WORK_ROWS.min(work.len()));
     let mut pages = Vec::new();
-    let html = |path: String, body: String| Page { path, body: body.into_bytes() };
     let mut more_work = Vec::new();
     for (k, chunk) in rest.chunks(WORK_ROWS).enumerate() {
         let path = format!("work-{}.html", k + 2);
         let title = format!("Work list, page {} · actuator free play", k + 2);
         let groups = grouped(chunk);
         let view = WorkView { root: "", title, foot: foot(report), groups, label: "Work list" };
-        pages.push(html(path.clone(), view.render()?));
+        pages.push(Page::html(path.clone(), &view.render()?));
         more_work.push(path);
     }
     let tails: Vec<&str> = report.tails.iter().map(|t| t.tail_number.as_str()).collect();
@@ -164,12 +163,12 @@ pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
             let path = format!("tails-{}.html", k + 1);
             let title = format!("All tails, page {} · actuator free play", k + 1);
             let view = TailsView { root: "", title, foot: foot(report), map: map(report, chunk) };
-            pages.push(html(path.clone(), view.render()?));
+            pages.push(Page::html(path.clone(), &view.render()?));
             tail_pages.push(path);
         }
     }
     let view = front(report, grouped(&work), more_work, tail_pages);
-    pages.push(html("index.html".to_owned(), view.render()?));
+    pages.push(Page::html("index.html".to_owned(), &view.render()?));
     pages.push(Page { path: "report.json".to_owned(), body: serde_json::to_vec(report)? });
     Ok(pages)
 }

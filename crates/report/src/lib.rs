@@ -23,6 +23,7 @@ pub use assets::assets;
 pub use fleet::fleet_pages;
 pub use look::{Look, Stretch, look_html, look_png, look_svg};
 pub use model::{Event, FlightRow, Inspection, LogFault, Past, Quality, Report, Statement, Stay, Tail, Unit};
+pub use rates::Spreads;
 pub use serial::serial_page;
 pub use standing::Standing;
 pub use tail::tail_page;
@@ -34,6 +35,13 @@ pub struct Page {
     pub path: String,
     /// What it holds.
     pub body: Vec<u8>,
+}
+
+impl Page {
+    /// A page for people: characters that no reader sees are named, so that no text can pose as another.
+    fn html(path: String, html: &str) -> Self {
+        Self { path, body: words::visible(html).into_bytes() }
+    }
 }
 
 /// Why a page could not be made.

@@ -193,7 +193,7 @@ pub struct FlightRow {
     pub gap_p05_m: Option<f64>,
     pub gap_p95_m: Option<f64>,
     pub gap_midrange_m: Option<f64>,
-    pub load_reversals: i64,
+    pub load_reversals: Option<u64>,
     pub load_p05_n: Option<f64>,
     pub load_p95_n: Option<f64>,
     /// Why refused, or what is doubted.

@@ -16,6 +16,22 @@ pub(crate) struct Spread<'a> {
     pub outlying: Vec<&'a Unit>,
 }
 
+/// The rates of every part number's units, compared once for all pages.
+#[derive(Debug)]
+pub struct Spreads<'a>(Vec<Spread<'a>>);
+
+impl<'a> Spreads<'a> {
+    /// Of all units of a report.
+    pub fn of(report: &'a Report) -> Self {
+        Self(spreads(report))
+    }
+
+    /// Of one part number, where any of its units has a rate.
+    pub(crate) fn part(&self, number: &str) -> Option<&Spread<'a>> {
+        self.0.iter().find(|spread| spread.part == number)
+    }
+}
+
 /// By part number.
 pub(crate) fn spreads(report: &Report) -> Vec<Spread<'_>> {
     let mut parts: BTreeMap<&str, Vec<(f64, &Unit)>> = BTreeMap::new();

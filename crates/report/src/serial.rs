@@ -5,7 +5,7 @@ use askama::Template;
 use crate::crossing::chance_in_words;
 use crate::fleet::{share, when};
 use crate::model::{FlightRow, Report, Unit};
-use crate::rates::spreads;
+use crate::rates::Spreads;
 use crate::standing::Standing;
 use crate::words::{
     NO_DATA, count, counted, date, date_or, hours, level, minute, percent, rate, um, um_cell, um_or,
@@ -51,7 +51,7 @@ struct Flight {
     low: String,
     high: String,
     midrange: String,
-    reversals: i64,
+    reversals: String,
     load: String,
     remarks: String,
 }
@@ -60,7 +60,7 @@ struct Flight {
 ///
 /// # Errors
 /// When the picture cannot be drawn or the template not be filled.
-pub fn serial_page(report: &Report, unit: &Unit) -> Result<Page, Error> {
+pub fn serial_page(report: &Report, spreads: &Spreads<'_>, unit: &Unit) -> Result<Page, Error> {
     let s = &unit.statement;
     let forecast =
         [("not before", s.not_before_utc), ("likely", s.likely_utc), ("not after", s.not_after_utc)];
@@ -74,7 +74,7 @@ pub fn serial_page(report: &Report, unit: &Unit) -> Result<Page, Error> {
         }),
         standing: unit.standing(),
         reason: s.reason.clone().unwrap_or_else(|| NO_DATA.to_owned()),
-        now: now(report, unit),
+        now: now(spreads, unit),
         remaining: remaining(report, unit),
         picture: chart::history(unit)?,
         picture_words: picture_words(unit),
@@ -90,12 +90,12 @@ pub fn serial_page(report: &Report, unit: &Unit) -> Result<Page, Error> {
         record: record(unit),
         flights: unit.flights.iter().map(flight).collect(),
     };
-    Ok(Page { path: serial_path(unit), body: view.render()?.into_bytes() })
+    Ok(Page::html(serial_path(unit), &view.render()?))
 }
 
-fn now(report: &Report, unit: &Unit) -> Facts {
+fn now(spreads: &Spreads<'_>, unit: &Unit) -> Facts {
     let s = &unit.statement;
-    let fleet = spreads(report).into_iter().find(|f| Some(f.part) == unit.part_number.as_deref());
+    let fleet = unit.part_number.as_deref().and_then(|part| spreads.part(part));
     let fleet = fleet.map_or_else(
         || NO_DATA.to_owned(),
         |f| {
@@ -231,11 +231,8 @@ fn record(unit: &Unit) -> Facts {
     vec![
         ("Unit hours", s.unit_hours.map_or_else(|| NO_DATA.to_owned(), hours)),
         ("Wear law believed in most", s.law.clone().unwrap_or_else(|| NO_DATA.to_owned())),
-        ("Usage axis", s.axis.clone().unwrap_or_else(|| NO_DATA.to_owned())),
-        (
-            "Mann–Kendall, two-sided p",
-            s.mann_kendall_p.map_or_else(|| NO_DATA.to_owned(), |p| format!("{p:.3}")),
-        ),
+        ("Usage axis", s.axis.as_ref().map_or_else(|| NO_DATA.to_owned(), |axis| axis.replace('_', " "))),
+        ("Mann–Kendall, two-sided p", s.mann_kendall_p.map_or_else(|| NO_DATA.to_owned(), small)),
         (
             "Sen's slope, µm per 1000 h",
             rates(s.sen_low_m_per_hour, s.sen_rate_m_per_hour, s.sen_high_m_per_hour),
@@ -250,6 +247,11 @@ fn record(unit: &Unit) -> Facts {
     ]
 }
 
+/// A probability; one too small for three places is never shown as none.
+fn small(p: f64) -> String {
+    if p < 0.001 { "below 0.001".to_owned() } else { format!("{p:.3}") }
+}
+
 fn flight(f: &FlightRow) -> Flight {
     let load = f.load_p05_n.zip(f.load_p95_n).map(|(low, high)| format!("{low:.0} to {high:.0}"));
     Flight {
@@ -261,7 +263,7 @@ fn flight(f: &FlightRow) -> Flight {
         low: um_cell(f.gap_p05_m),
         high: um_cell(f.gap_p95_m),
         midrange: um_cell(f.gap_midrange_m),
-        reversals: f.load_reversals,
+        reversals: f.load_reversals.map(|n| n.to_string()).unwrap_or_default(),
         load: load.unwrap_or_default(),
         remarks: f.remarks.clone(),
     }

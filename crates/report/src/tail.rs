@@ -48,5 +48,5 @@ pub fn tail_page(report: &Report, tail: &Tail) -> Result<Page, Error> {
             .map(|f| (f.log_path.clone(), f.code.clone(), crate::words::minute(f.processed_utc)))
             .collect(),
     };
-    Ok(Page { path: tail_path(name), body: view.render()?.into_bytes() })
+    Ok(Page::html(tail_path(name), &view.render()?))
 }

@@ -1,5 +1,7 @@
 //! Numbers and dates as people read them; what is not known says so.
 
+use std::fmt::Write as _;
+
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 
@@ -86,6 +88,28 @@ pub(crate) fn month_name(t: Timestamp) -> String {
     t.strftime("%Y-%m").to_string()
 }
 
+/// Names the characters that show nothing and change how their neighbours are read: controls, marks and
+/// overrides of direction, widths of zero.
+///
+/// A serial number that turns round the text after it makes 47 µm read as 74.
+pub(crate) fn visible(text: &str) -> String {
+    let unseen = |c: char| {
+        (c.is_control() && !matches!(c, '\n' | '\t'))
+            || matches!(c, '\u{61c}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{feff}')
+            || ('\u{2028}'..='\u{202e}').contains(&c)
+            || ('\u{2060}'..='\u{206f}').contains(&c)
+    };
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        if unseen(c) {
+            let _ = write!(shown, "[U+{:04X}]", u32::from(c));
+        } else {
+            shown.push(c);
+        }
+    }
+    shown
+}
+
 /// Days from one instant to another.
 pub(crate) fn days_between(from: Timestamp, to: Timestamp) -> f64 {
     to.duration_since(from).as_secs_f64() / 86_400.0
@@ -106,6 +130,13 @@ mod tests {
     fn what_is_unknown_says_so() {
         assert_eq!(level(None, Some(1e-6)), "no data");
         assert_eq!(um_or(None), "no data");
+    }
+
+    /// U+202E is RIGHT-TO-LEFT OVERRIDE (Unicode Standard Annex 9).
+    #[test]
+    fn a_name_cannot_turn_round_what_stands_after_it() {
+        assert_eq!(visible("S1\u{202e} (47.1)\n"), "S1[U+202E] (47.1)\n");
+        assert_eq!(visible("1\u{202f}205 µm 🛩"), "1\u{202f}205 µm 🛩");
     }
 
     #[test]

@@ -1,7 +1,9 @@
 //! The public door: hostile names, missing data, and numbers that stand in the page.
 #![expect(clippy::unwrap_used, reason = "a test may fail")]
 
-use report::{Quality, Report, Statement, Tail, Unit, fleet_pages, serial_page, serial_path, tail_page};
+use report::{
+    Quality, Report, Spreads, Statement, Tail, Unit, fleet_pages, serial_page, serial_path, tail_page,
+};
 
 const HOSTILE: &str = "<script>alert(1)</script>";
 
@@ -60,7 +62,7 @@ fn text(page: &report::Page) -> String {
 fn a_hostile_name_is_shown_and_not_run() {
     let report = report(vec![unit(HOSTILE, Some("plan"))]);
     let mut pages = fleet_pages(&report).unwrap();
-    pages.push(serial_page(&report, &report.units[0]).unwrap());
+    pages.push(serial_page(&report, &Spreads::of(&report), &report.units[0]).unwrap());
     pages.push(tail_page(&report, &report.tails[0]).unwrap());
     for page in pages.iter().filter(|p| p.path != "report.json") {
         let html = text(page);
@@ -72,7 +74,7 @@ fn a_hostile_name_is_shown_and_not_run() {
 #[test]
 fn a_unit_without_a_statement_is_never_called_normal() {
     let report = report(vec![unit("A", None)]);
-    let html = text(&serial_page(&report, &report.units[0]).unwrap());
+    let html = text(&serial_page(&report, &Spreads::of(&report), &report.units[0]).unwrap());
     assert!(html.contains("without a statement") && html.contains("no data") && !html.contains("normal"));
 }
 

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::SchemaRef;
 use fleet::{GapRecord, PartNumber, SerialNumber};
+use jiff::Timestamp;
 
 use crate::account::{LogAccount, RunAccount};
 use crate::error::Error;
@@ -35,6 +36,24 @@ impl Store {
     /// As [`Store::scan`]; [`Error::Value`] when a cell cannot be what it stands for.
     pub fn records(&self, query: &Query) -> Result<Vec<GapRecord>, Error> {
         columns::from_batch(&self.scan(query)?)
+    }
+
+    /// Hands over every record, earliest departure first, and returns the version they are of.
+    ///
+    /// A month's records at most are held at once, so a whole fleet's take no more memory than what the
+    /// caller keeps of them.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn visit(&self, mut take: impl FnMut(GapRecord)) -> Result<u64, Error> {
+        let snapshot = self.gaps.snapshot()?;
+        for (since_utc, until_utc) in months(&snapshot) {
+            let month = Query { since_utc, until_utc, ..Query::default() };
+            columns::from_batch(&self.select(&snapshot, &month, columns::schema())?)?
+                .into_iter()
+                .for_each(&mut take);
+        }
+        Ok(snapshot.version)
     }
 
     /// Every unit with a record, by part and serial number.
@@ -102,4 +121,18 @@ impl Store {
         let newest: BTreeMap<String, R> = rows.into_iter().map(|row| (name(&row), row)).collect();
         Ok(newest.into_values().collect())
     }
+}
+
+/// Spans of thirty days that together hold every departure; one without an end where the log does not say
+/// when its files begin and end.
+fn months(snapshot: &Snapshot) -> Vec<(Option<Timestamp>, Option<Timestamp>)> {
+    const MONTH_US: i64 = 30 * 86_400_000_000;
+    let times = || snapshot.files.iter().map(|file| file.stats.times_us("departure_utc"));
+    let edge = |us: i64| Timestamp::from_microsecond(us).ok();
+    let (first, last) = (times().map(|t| t.0).min(), times().map(|t| t.1).max());
+    let Some((first, last)) = first.zip(last).filter(|(first, last)| edge(*first).and(edge(*last)).is_some())
+    else {
+        return vec![(None, None)];
+    };
+    (first..=last).step_by(MONTH_US as usize).map(|from| (edge(from), edge(from + MONTH_US))).collect()
 }
