@@ -1,0 +1,257 @@
+//! A made-up fleet's store, for trying the report at any size: `large_fleet DIR UNITS FLIGHTS`.
+//!
+//! Writes `pipeline.toml`, the tables it names, and a store with a record for each unit and flight: four
+//! units to a tail, a flight of two hours a day, each with its own law of wear and its own scatter. Some
+//! units are steady, some step, some flights are refused, some logs are in error. The first tail and the
+//! names on it attack whoever shows them unescaped. The same arguments make the same records.
+
+use std::error::Error;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use fleet::{
+    Estimate, Flight, FlightId, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status, TailNumber,
+};
+use jiff::{SignedDuration, Timestamp};
+use store::{Holder, LogAccount, LogResult, Outcome, RunAccount, Store};
+
+type Outcomes<T> = Result<T, Box<dyn Error>>;
+
+const POSITIONS: [&str; 4] = ["aileron_left", "aileron_right", "elevator_left", "elevator_right"];
+const PARTS: [&str; 2] = ["EMA-27-1040", "EMA-27-1060"];
+const HOURS: f64 = 2.0;
+/// Flights in one commit.
+const COMMIT: usize = 4_000;
+/// One log in so many is in error, one record in so many refused.
+const ERROR_EVERY: usize = 997;
+const REFUSED_EVERY: usize = 19;
+
+fn main() -> Outcomes<()> {
+    let mut args = std::env::args().skip(1);
+    let usage = "usage: large_fleet DIR UNITS FLIGHTS";
+    let dir = args.next().ok_or(usage)?;
+    let units: usize = args.next().ok_or(usage)?.parse()?;
+    let flights: usize = args.next().ok_or(usage)?.parse()?;
+    let dir = Path::new(&dir);
+    fs::create_dir_all(dir)?;
+    fs::write(dir.join("pipeline.toml"), settings())?;
+    fs::write(dir.join("installations.csv"), installations(units))?;
+    fs::write(dir.join("inspections.csv"), inspections(units, flights)?)?;
+    fill(&dir.join("results"), units.div_ceil(POSITIONS.len()), flights)
+}
+
+/// The sample fleet's settings, with this fleet's tables.
+fn settings() -> String {
+    let inspected = "installations = \"installations.csv\"\ninspections = \"inspections.csv\"";
+    include_str!("../../../pipeline.toml")
+        .replace("sample-data/logs/", "logs/")
+        .replace("installations = \"sample-data/installations.csv\"", inspected)
+}
+
+fn tail(tail: usize) -> String {
+    if tail == 0 { "<script>alert(1)</script>".to_owned() } else { format!("N{tail:04}X") }
+}
+
+fn serial(tail: usize, place: usize) -> String {
+    match (tail, place) {
+        (0, 0) => "\"><img src=x onerror=alert(2)>".to_owned(),
+        (0, 1) => "'); alert(3); ('".to_owned(),
+        (0, 2) => "{{ 7 * 7 }}</title></table>&amp;".to_owned(),
+        (0, _) => "../../🛩 \u{202e}drawkcab".to_owned(),
+        _ => format!("S{:06}", tail * POSITIONS.len() + place),
+    }
+}
+
+fn departure(flight: usize) -> Outcomes<Timestamp> {
+    let first: Timestamp = "2025-11-01T06:00:00Z".parse()?;
+    Ok(first + SignedDuration::from_hours(24 * i64::try_from(flight)?))
+}
+
+/// How one unit wears.
+struct Unit {
+    new_um: f64,
+    um_per_1000_h: f64,
+    exponent: f64,
+    age_h: f64,
+    /// Flight and size of a step, where there is one.
+    step: Option<(usize, f64)>,
+}
+
+impl Unit {
+    fn of(tail: usize, place: usize, flights: usize) -> Self {
+        let chance = |what: u64| uniform(tail as u64, place as u64, what);
+        let wears = chance(0) < 0.8;
+        Self {
+            new_um: 20.0 + 6.0 * chance(1),
+            um_per_1000_h: if wears { (2.0 * (chance(2) - 0.5)).exp() * 14.0 } else { 0.0 },
+            exponent: 0.8 + 0.6 * chance(3),
+            age_h: 3500.0 * chance(4),
+            step: (chance(5) < 0.03).then(|| ((flights as f64 * chance(6)) as usize, -25.0 * chance(7))),
+        }
+    }
+
+    fn gap_um(&self, flight: usize) -> f64 {
+        let hours = self.age_h + HOURS * flight as f64;
+        let worn = self.um_per_1000_h * (hours / 1000.0).powf(self.exponent);
+        let step = self.step.filter(|(at, _)| flight >= *at).map_or(0.0, |(_, size)| size);
+        (self.new_um + worn + step).max(5.0)
+    }
+}
+
+/// A number from zero to one that depends on nothing but its names (SplitMix64's finish).
+fn uniform(a: u64, b: u64, c: u64) -> f64 {
+    let mut z = a.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ b.wrapping_mul(0xd1b5_4a32_d192_ed03) ^ (c << 17);
+    for factor in [0xbf58_476d_1ce4_e5b9, 0x94d0_49bb_1331_11eb] {
+        z = (z ^ (z >> 30)).wrapping_mul(factor);
+    }
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// Scatter of one standard deviation: twelve uniform numbers less six.
+fn scatter(tail: usize, place: usize, flight: usize) -> f64 {
+    let name = (tail * POSITIONS.len() + place) as u64;
+    (0..12).map(|k| uniform(name, flight as u64, k + 100)).sum::<f64>() - 6.0
+}
+
+fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<GapRecord> {
+    let gap_um = unit.gap_um(flight) + 1.2 * scatter(tail_at, place, flight);
+    let refused = (tail_at + 7 * place + flight).is_multiple_of(REFUSED_EVERY);
+    let estimate = Estimate {
+        status: Status::Estimated,
+        reason: None,
+        gap_m: Some(gap_um * 1e-6),
+        gap_se_m: Some(1e-6),
+        gap_p05_m: Some((gap_um - 1.645) * 1e-6),
+        gap_p95_m: Some((gap_um + 1.645) * 1e-6),
+        gap_midrange_m: Some((gap_um + 0.4) * 1e-6),
+        load_reversals: 120,
+        samples: 11_000,
+        samples_upper: 5_000,
+        samples_lower: 5_200,
+        load_p05_n: Some(-2_300.0),
+        load_p95_n: Some(2_600.0),
+        ..Estimate::refused("")
+    };
+    Ok(GapRecord {
+        flight: Flight {
+            tail_number: TailNumber::new(tail(tail_at))?,
+            flight_id: FlightId::new(format!("{tail_at}-{flight:04}"))?,
+            departure_utc: departure(flight)?,
+            flight_hours: Some(HOURS),
+            tail_hours_end: Some(1000.0 + HOURS * (flight + 1) as f64),
+        },
+        position: Position::new(POSITIONS[place])?,
+        part_number: PartNumber::new(PARTS[place / 2])?,
+        serial_number: SerialNumber::new(serial(tail_at, place))?,
+        unit_hours: Some(unit.age_h + HOURS * (flight + 1) as f64),
+        estimate: if refused { Estimate::refused("no_load_reversal") } else { estimate },
+        provenance: Provenance {
+            log_path: log(tail_at, flight),
+            log_digest: "made".to_owned(),
+            config_digest: "made".to_owned(),
+            program_version: "made".to_owned(),
+            run_id: "made".to_owned(),
+            processed_utc: departure(flight)?,
+        },
+    })
+}
+
+fn log(tail_at: usize, flight: usize) -> String {
+    format!("logs/{}/{flight:04}.parquet", tail(tail_at))
+}
+
+fn result(tail_at: usize, flight: usize, units: &[Unit]) -> Outcomes<LogResult> {
+    let bad = (tail_at * 31 + flight).is_multiple_of(ERROR_EVERY);
+    let places = units.iter().enumerate();
+    let records: Vec<GapRecord> =
+        places.map(|(place, unit)| record(tail_at, place, flight, unit)).collect::<Outcomes<_>>()?;
+    let refused = records.iter().filter(|r| r.estimate.status == Status::Refused).count() as i64;
+    let account = LogAccount {
+        log_path: log(tail_at, flight),
+        size_bytes: 1_000,
+        modified_utc_ns: 0,
+        file_id: String::new(),
+        log_digest: Some("made".to_owned()),
+        config_digest: Some("made".to_owned()),
+        tail_number: Some(tail(tail_at)),
+        flight_id: Some(format!("{tail_at}-{flight:04}")),
+        departure_utc: Some(departure(flight)?),
+        positions: POSITIONS.map(str::to_owned).to_vec(),
+        outcome: if bad { Outcome::Error } else { Outcome::Done },
+        estimated: if bad { 0 } else { records.len() as i64 - refused },
+        refused: if bad { 0 } else { refused },
+        error_code: bad.then(|| "time_goes_back".to_owned()),
+        error_detail: bad.then(|| "column <b>t_ns</b>, row 1204311".to_owned()),
+        duration_s: 0.1,
+        run_id: "made".to_owned(),
+        processed_utc: departure(flight)?,
+    };
+    Ok(LogResult { account, records: if bad { Vec::new() } else { records }, retires: Vec::new() })
+}
+
+fn fill(store: &Path, tails: usize, flights: usize) -> Outcomes<()> {
+    let mut writer = Store::create_or_open(store)?.lock(&Holder::this_process(), None)?;
+    let units: Vec<Vec<Unit>> =
+        (0..tails).map(|t| (0..POSITIONS.len()).map(|p| Unit::of(t, p, flights)).collect()).collect();
+    let mut night = Vec::new();
+    for flight in 0..flights {
+        for (tail_at, units) in units.iter().enumerate() {
+            night.push(result(tail_at, flight, units)?);
+        }
+        if night.len() >= COMMIT || flight + 1 == flights {
+            writer.commit(&std::mem::take(&mut night))?;
+        }
+    }
+    let done = (tails * flights) as i64;
+    writer.end_run(&RunAccount {
+        run_id: "made".to_owned(),
+        started_utc: departure(flights)?,
+        finished_utc: Some(departure(flights)?),
+        program_version: "made".to_owned(),
+        config_path: "pipeline.toml".to_owned(),
+        found: done,
+        known: 0,
+        done,
+        estimated: 0,
+        refused: 0,
+        errors: 0,
+        not_reached: 0,
+        exit_code: Some(0),
+    })?;
+    Ok(())
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+fn installations(units: usize) -> String {
+    let columns = "tail_number,position,part_number,serial_number,installed_utc,removed_utc";
+    let mut table = format!("{columns},unit_hours_at_install,tail_hours_at_install\n");
+    for tail_at in 0..units.div_ceil(POSITIONS.len()) {
+        for (place, position) in POSITIONS.iter().enumerate() {
+            let unit = Unit::of(tail_at, place, 1);
+            let (name, serial) = (quoted(&tail(tail_at)), quoted(&serial(tail_at, place)));
+            let part = PARTS[place / 2];
+            let hours = unit.age_h;
+            let _ = writeln!(table, "{name},{position},{part},{serial},2025-10-31T00:00:00Z,,{hours},1000");
+        }
+    }
+    table
+}
+
+/// A check of one unit in eight, 3 µm above the gap, with a dial gauge's scatter.
+fn inspections(units: usize, flights: usize) -> Outcomes<String> {
+    let mut table = "part_number,serial_number,date_utc,play_m,instrument,force_n\n".to_owned();
+    let at = flights.saturating_sub(flights / 5 + 1);
+    for k in (0..units).step_by(8) {
+        let (tail_at, place) = (k / POSITIONS.len(), (k / 8) % POSITIONS.len());
+        let gap_um =
+            Unit::of(tail_at, place, flights).gap_um(at) + 3.0 + 4.0 * scatter(tail_at, place, 9_999);
+        let (part, serial) = (PARTS[place / 2], quoted(&serial(tail_at, place)));
+        let date = departure(at)?;
+        writeln!(table, "{part},{serial},{date},{:e},<i>dial gauge</i>,200", gap_um * 1e-6)?;
+    }
+    Ok(table)
+}
