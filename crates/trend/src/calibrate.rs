@@ -5,7 +5,7 @@
 //! holds for time as for growth: where the true law is none of the bank's, intervals widen to where the
 //! fleet has really been, and lean to the side on which it surprised.
 
-use crate::bins::{self, BINS, Bin};
+use crate::bins::{self, BINS};
 use crate::crossing::{LONG_RULE, WAIT_RULE, waits};
 use crate::level::Weighted;
 use crate::posterior::{Node, Posterior, Segment, posterior};
@@ -66,16 +66,15 @@ fn miss(segment: &Segment<'_>, share: f64, prior: &FleetPrior) -> Option<f64> {
     let end = bins::bin(segment.estimates, BINS).pop()?;
     let moved = f64::from(u8::from(seen.last()?.installation != end.installation));
     let variance_m2 = end.variance_m2 + 2.0 * moved * prior.bias_sd_m.powi(2);
-    let [low_m, middle_m, high_m] = foretold(&judged, &end, now, variance_m2, prior);
+    let [low_m, middle_m, high_m] = foretold(&judged, end.usage - now, variance_m2, prior);
     let level_m: f64 = judged.nodes.iter().map(|n| n.weight * n.level_m).sum();
     let off_m = end.gap_m - middle_m;
     let width_m = if off_m > 0.0 { high_m - middle_m } else { middle_m - low_m };
     (middle_m - level_m > VISIBLE_M && width_m > 0.0).then(|| off_m / width_m)
 }
 
-/// 5 %, 50 % and 95 % bounds of the mean gap in a later bin.
-fn foretold(judged: &Posterior, end: &Bin, now: f64, variance_m2: f64, prior: &FleetPrior) -> [f64; 3] {
-    let usage = end.usage - now;
+/// 5 %, 50 % and 95 % bounds of the gap after more usage, as measured with some variance.
+pub(crate) fn foretold(judged: &Posterior, usage: f64, variance_m2: f64, prior: &FleetPrior) -> [f64; 3] {
     let mut points = Vec::with_capacity(LONG_RULE.len() * judged.nodes.len());
     let mut add = |node: &Node, grown_m: f64, share: f64| {
         let sd_m = (judged.level_m2 + variance_m2 + prior.wear_noise_m * grown_m).sqrt();

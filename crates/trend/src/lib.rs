@@ -31,6 +31,7 @@ mod level;
 mod look;
 mod memory;
 mod normal;
+mod outlook;
 mod posterior;
 mod prior;
 mod season;
@@ -41,6 +42,7 @@ mod trend;
 
 pub use error::Error;
 pub use memory::remembered;
+pub use outlook::{Band, Outlook, outlook};
 pub use prior::{Axis, FleetPrior};
 pub use series::{Booked, Observation, Series, Usage};
 pub use settings::Settings;

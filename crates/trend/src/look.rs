@@ -80,7 +80,7 @@ impl<'a> Look<'a> {
 
 /// Variance by which the level walks before each bin: wear's own, a little drift, and a new
 /// installation's bias where it changed.
-fn walk(bins: &[Bin], begin: f64, prior: &FleetPrior, growth_m: impl Fn(f64) -> f64) -> Vec<f64> {
+pub(crate) fn walk(bins: &[Bin], begin: f64, prior: &FleetPrior, growth_m: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut walk_m2 = vec![0.0; bins.len()];
     let mut before_m = bins.first().map_or(0.0, |bin| growth_m(bin.usage - begin));
     for (step_m2, pair) in walk_m2.iter_mut().skip(1).zip(bins.windows(2)) {

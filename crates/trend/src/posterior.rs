@@ -171,7 +171,7 @@ fn likeliest(believed: &[(usize, Node)]) -> Vec<Node> {
 }
 
 /// Wear up to a usage since the segment's begin, of units new at the age of zero.
-fn mean_growth(nodes: &[Node], usage: f64) -> f64 {
+pub(crate) fn mean_growth(nodes: &[Node], usage: f64) -> f64 {
     nodes.iter().map(|n| n.weight * n.amplitude_m * n.law.height(n.age_begin + usage)).sum()
 }
 

@@ -257,7 +257,7 @@ fn wear(growth_probability: Option<f64>) -> Wear {
 
 /// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or
 /// over its last flights while that is young.
-fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
+pub(crate) fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
     const YOUNG: usize = 20;
     const LAST: usize = 300;
     let Some(last) = flights.last() else { return 1.0 };

@@ -8,5 +8,6 @@
 
 mod classic;
 mod fleet;
+mod outlook;
 mod series;
 mod statement;

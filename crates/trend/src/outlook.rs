@@ -1,0 +1,124 @@
+//! The picture of a statement: the level through the flights, and where the gap may go.
+
+use crate::bins::{self, BINS, Bin};
+use crate::calibrate::{Calibration, foretold};
+use crate::error::Error;
+use crate::history;
+use crate::look::walk;
+use crate::posterior::{Posterior, Segment, mean_growth, posterior};
+use crate::prior::FleetPrior;
+use crate::series::Series;
+use crate::settings::Settings;
+use crate::trend::{FEWEST_ESTIMATES, hours_per_usage};
+
+/// Standard deviations from the middle to a 5 or 95 % bound.
+const Z90: f64 = 1.645;
+
+/// A gap and its 90 % interval, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Band {
+    /// 5 % bound.
+    pub p05_m: f64,
+    /// The middle.
+    pub m: f64,
+    /// 95 % bound.
+    pub p95_m: f64,
+}
+
+/// What lies behind a statement and before it, to be drawn; offsets of the measurement are undone, as
+/// they are in the statement's own gap.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Outlook {
+    /// The smoothed level at mean departures of neighbouring flights, microseconds since 1970 UTC.
+    pub past: Vec<(i64, Band)>,
+    /// The gap after so many more flight hours.
+    pub ahead: Vec<(f64, Band)>,
+}
+
+/// Draws what [`crate::trend()`] states: the level through each segment's flights, and the quantiles of
+/// the gap after more hours, from the same mixture and the same calibration as the crossing.
+///
+/// Nothing of a unit with too few estimates for a statement.
+///
+/// # Errors
+/// As [`crate::trend()`].
+pub fn outlook(
+    series: &Series,
+    as_of_us: i64,
+    settings: &Settings,
+    prior: Option<&FleetPrior>,
+    hours: impl IntoIterator<Item = f64>,
+) -> Result<Outlook, Error> {
+    settings.check()?;
+    let vague = FleetPrior::vague(settings.limit_m);
+    let prior = prior.unwrap_or(&vague);
+    let flights = series.until(as_of_us);
+    let history = history::read(flights, series.book_until(as_of_us), series.unit_hours_at_start(), prior);
+    if history.estimates.len() < FEWEST_ESTIMATES {
+        return Ok(Outlook::default());
+    }
+    let (mut past, mut judged) = (Vec::new(), None);
+    for segment in history.segments() {
+        judged = posterior(&segment, prior);
+        past.extend(judged.iter().flat_map(|judged| levels(&segment, judged, prior)));
+    }
+    let Some(judged) = judged.map(Posterior::tempered) else {
+        return Ok(Outlook { past, ahead: Vec::new() });
+    };
+    let ratio = hours_per_usage(flights, prior);
+    let variance_m2 = history.offset_m2 + prior.bias_sd_m.powi(2);
+    let after = |hours: f64| {
+        let [p05_m, m, p95_m] = foretold(&judged, hours / ratio, variance_m2, prior);
+        let band = Band { p05_m, m, p95_m };
+        (hours, if hours > 0.0 { band.calibrated(prior.calibration) } else { band })
+    };
+    Ok(Outlook { past, ahead: hours.into_iter().map(after).collect() })
+}
+
+impl Band {
+    /// The band in the widths that the fleet's past was found to need.
+    fn calibrated(self, Calibration { low, middle, high }: Calibration) -> Self {
+        let at =
+            |width: f64| self.m + width * if width > 0.0 { self.p95_m - self.m } else { self.m - self.p05_m };
+        Self { p05_m: at(low), m: at(middle), p95_m: at(high) }
+    }
+}
+
+/// The level at each bin of a segment: the mean curve, and beside it a walk, smoothed.
+fn levels(segment: &Segment<'_>, judged: &Posterior, prior: &FleetPrior) -> Vec<(i64, Band)> {
+    let bins = bins::bin(segment.estimates, BINS);
+    let grown_m = |usage: f64| mean_growth(&judged.nodes, usage);
+    let curve_m: Vec<f64> = bins.iter().map(|b| grown_m(b.usage - segment.begin)).collect();
+    let beside_m = bins
+        .iter()
+        .zip(&curve_m)
+        .map(|(b, curve_m)| b.gap_m - prior.season.mean_m * prior.season.wave(b.departure_us) - curve_m);
+    let smooth = smoothed(&bins, beside_m, &walk(&bins, segment.begin, prior, grown_m));
+    let level = |((bin, curve_m), (beside_m, variance_m2)): ((&Bin, &f64), (f64, f64))| {
+        let (m, half_m) = (curve_m + beside_m, Z90 * (variance_m2 + prior.bias_sd_m.powi(2)).sqrt());
+        (bin.departure_us as i64, Band { p05_m: m - half_m, m, p95_m: m + half_m })
+    };
+    bins.iter().zip(&curve_m).zip(smooth).map(level).collect()
+}
+
+/// A walking level measured with noise: mean and variance at each bin, all bins known
+/// (Rauch, Tung and Striebel 1965).
+fn smoothed(bins: &[Bin], values_m: impl Iterator<Item = f64>, walk_m2: &[f64]) -> Vec<(f64, f64)> {
+    let mut filtered: Vec<(f64, f64)> = Vec::with_capacity(bins.len());
+    for ((bin, value_m), walk_m2) in bins.iter().zip(values_m).zip(walk_m2) {
+        let next = filtered.last().map_or((value_m, bin.variance_m2), |(mean_m, variance_m2)| {
+            let before_m2 = variance_m2 + walk_m2;
+            let gain = before_m2 / (before_m2 + bin.variance_m2);
+            (mean_m + gain * (value_m - mean_m), (1.0 - gain) * before_m2)
+        });
+        filtered.push(next);
+    }
+    for i in (1..filtered.len()).rev() {
+        let ((later_m, later_m2), (mean_m, variance_m2)) = (filtered[i], filtered[i - 1]);
+        let before_m2 = variance_m2 + walk_m2[i];
+        let share = variance_m2 / before_m2;
+        filtered[i - 1] =
+            (mean_m + share * (later_m - mean_m), variance_m2 + share * share * (later_m2 - before_m2));
+    }
+    filtered
+}
