@@ -109,6 +109,7 @@ mod tests {
             logs_known: 0,
             check_interval_hours: 300.0,
             log_faults: Vec::new(),
+            priors: Vec::new(),
             tails: Vec::new(),
             units: Vec::new(),
             inspections_given: false,

@@ -2,15 +2,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ::report::{Event, FlightRow, Inspection, LogFault, Past, Quality, Report, Statement, Stay, Tail, Unit};
+use ::report::{
+    Banded, Event, FlightRow, Inspection, LogFault, Past, Prior, Quality, Report, Statement, Stay, Tail, Unit,
+};
 use fleet::{GapRecord, Installations, PartNumber, SerialNumber};
 use ingest::tables::{Table, name, number, utc};
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use store::{Outcome, Store};
+use trend::Outlook;
 
 use crate::error::Error;
-use crate::trends::{self, Ask, Flown, TrendRow};
+use crate::trends::{self, Ask, Flown, Told, TrendRow};
 
 /// Days before the report of which statements are held against what came.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
@@ -38,7 +41,7 @@ pub fn compose(
     let checks = inspections(config)?;
     let Read { mut flown, mut rest, store_version } = Read::until(ask.as_of_utc, store, installations)?;
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
-    let (now, before) = trends::now_and_before(config, installations, &flown, ask, &days)?;
+    let Told { now, drawn, before, priors } = trends::told(config, installations, &flown, ask, &days)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     let newest_departure_utc = flown.values().flatten().map(|f| f.departure_utc).max();
     let known = |c: &Check| flown.keys().any(|name| c.is_of(name));
@@ -50,11 +53,12 @@ pub fn compose(
         checks: checks.as_deref().unwrap_or(&[]),
         stays: &stays(installations),
     };
-    let unit = |row: &TrendRow| {
+    let unit = |(row, drawn): (&TrendRow, &Outlook)| {
         let name = name_of(row);
-        compose.unit(row, flown.remove(&name).unwrap_or_default(), rest.remove(&name).unwrap_or_default())
+        let (flown, rest) = (flown.remove(&name).unwrap_or_default(), rest.remove(&name).unwrap_or_default());
+        compose.unit(row, drawn, flown, rest)
     };
-    let units: Vec<Unit> = now.iter().map(unit).collect();
+    let units: Vec<Unit> = now.iter().zip(&drawn).map(unit).collect();
     let accounts = store.accounts()?;
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
     let narrowed = ask.tail_number.is_some() || ask.serial_number.is_some();
@@ -80,6 +84,7 @@ pub fn compose(
         logs_known: accounts.iter().filter(|a| wanted(a.tail_number.as_deref())).count(),
         check_interval_hours: config.document.trend.next_check_hours,
         log_faults: faults,
+        priors: priors.into_iter().map(prior).collect(),
         tails,
         inspections_given: checks.is_some(),
         inspections_unmatched,
@@ -168,12 +173,18 @@ struct Compose<'a> {
 }
 
 impl Compose<'_> {
-    fn unit(&self, row: &TrendRow, flown: Vec<Flown>, rest: Vec<Rest>) -> Unit {
+    fn unit(&self, row: &TrendRow, drawn: &Outlook, flown: Vec<Flown>, rest: Vec<Rest>) -> Unit {
         let name = name_of(row);
         let stays = self.stays.get(&name.1).map_or(&[][..], Vec::as_slice);
         let mine = stays.iter().filter(|(part, _)| name.0.as_ref().is_none_or(|p| p == part));
         let stays: Vec<Stay> = mine.map(|(_, stay)| stay.clone()).collect();
         Unit {
+            level: drawn
+                .past
+                .iter()
+                .filter_map(|(us, b)| banded(Timestamp::from_microsecond(*us).ok(), b))
+                .collect(),
+            forecast: forecast(drawn, &flown),
             statement: self.statement(row, &flown, &name),
             quality: quality(&flown, &rest, row.as_of_utc),
             events: events(row, &stays),
@@ -290,6 +301,33 @@ fn pace(records: &[Flown]) -> Option<(f64, f64)> {
     let hours: f64 = since.iter().map(|r| r.flight_hours).sum::<Option<f64>>()?;
     let days = days(first.departure_utc, last);
     (hours > 0.0 && days > 0.0).then(|| (hours / days, hours / since.len() as f64))
+}
+
+/// The fan on the calendar, at this unit's use; nothing where that is not known.
+fn forecast(drawn: &Outlook, flown: &[Flown]) -> Vec<Banded> {
+    let Some((last, (hours_per_day, _))) = flown.last().zip(pace(flown)) else { return Vec::new() };
+    let at = |hours: f64| date(last.departure_utc, hours / hours_per_day);
+    drawn.ahead.iter().filter_map(|(hours, band)| banded(at(*hours), band)).collect()
+}
+
+fn banded(at_utc: Option<Timestamp>, band: &trend::Band) -> Option<Banded> {
+    Some(Banded { at_utc: at_utc?, p05_m: band.p05_m, m: band.m, p95_m: band.p95_m })
+}
+
+fn prior((part_number, learned_until_utc, prior): (Option<String>, Timestamp, trend::FleetPrior)) -> Prior {
+    let (new_m, new_sd_m) = prior.new_gap_m();
+    let (life_p05_hours, life_p95_hours) = prior.life_range_hours();
+    Prior {
+        part_number,
+        learned_until_utc,
+        axis: prior.axis().to_string(),
+        new_m,
+        new_sd_m,
+        life_p05_hours,
+        life_p50_hours: prior.median_life_hours(),
+        life_p95_hours,
+        widening: prior.widening(),
+    }
 }
 
 fn days(from: Timestamp, to: Timestamp) -> f64 {

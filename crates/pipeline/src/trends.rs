@@ -160,22 +160,32 @@ pub fn of_flown(
     of_histories(config, installations, &histories(flown), ask)
 }
 
-/// Statements of now, and those of so many days before, by days.
-pub(crate) type NowAndBefore = (Vec<TrendRow>, BTreeMap<i64, Vec<TrendRow>>);
+/// All that a report says of the asked units.
+#[derive(Default)]
+pub(crate) struct Told {
+    /// Statements of the day.
+    pub(crate) now: Vec<TrendRow>,
+    /// What is drawn beside each of them.
+    pub(crate) drawn: Vec<trend::Outlook>,
+    /// Statements of so many days before, by days.
+    pub(crate) before: BTreeMap<i64, Vec<TrendRow>>,
+    /// What each part's units had taught, and by when.
+    pub(crate) priors: Vec<(Option<String>, Timestamp, FleetPrior)>,
+}
 
 /// States what is known of the asked units, and what was known of them so many days before.
 ///
 /// # Errors
 /// As [`of_flown`].
-pub(crate) fn now_and_before(
+pub(crate) fn told(
     config: &Config,
     installations: &Installations,
     histories: &BTreeMap<HistoryName, Vec<Flown>>,
     ask: &Ask,
     days_before: &[i64],
-) -> Result<NowAndBefore, Error> {
+) -> Result<Told, Error> {
     let newest = || histories.values().flatten().map(|f| f.departure_utc).max();
-    let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(NowAndBefore::default()) };
+    let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(Told::default()) };
     let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
@@ -184,9 +194,18 @@ pub(crate) fn now_and_before(
     let now: Vec<TrendRow> = now.into_iter().filter(|row| ask.fits(row)).collect();
     let names: Vec<HistoryName> =
         now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
+    let drawn =
+        names.par_iter().zip(&now).map(|(name, row)| fleet.outlook(name, row)).collect::<Result<_, _>>()?;
     let then = |(days, at): (i64, Timestamp)| Ok((days, fleet.statements(names.iter(), at)?));
     let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
-    Ok((now, before))
+    let asked: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
+    let taught = |part: Option<&str>| {
+        let month = month_us(as_of);
+        let prior = fleet.priors.get(&(month, part))?;
+        Some((part.map(str::to_owned), Timestamp::from_microsecond(month).ok()?, prior.clone()))
+    };
+    let priors = asked.into_iter().filter_map(taught).collect();
+    Ok(Told { now, drawn, before, priors })
 }
 
 /// One statement for each query, from nothing later than its date.
@@ -425,6 +444,21 @@ impl<'a> Fleet<'a> {
         let usage_axis = prior.filter(|_| !flown.is_empty()).map(|prior| prior.axis().to_string());
         let row = row(name, flown, series, part.and_then(|p| p.limit_m), &trend, as_of);
         Ok(TrendRow { usage_axis, ..row })
+    }
+
+    /// What is drawn beside a statement: as far ahead as its crossing, within sight of what was flown.
+    fn outlook(&self, name: &HistoryName, row: &TrendRow) -> Result<trend::Outlook, Error> {
+        const STEPS: u32 = 24;
+        let Some(series) = self.series(name) else { return Ok(trend::Outlook::default()) };
+        let as_of_us = row.as_of_utc.as_microsecond();
+        let flown = series.until(as_of_us);
+        let span_hours = flown.first().zip(flown.last()).map_or(0.0, |(a, b)| b.hours - a.hours);
+        let far = row
+            .crossing_hours_p95
+            .map_or(span_hours, |h| (1.1 * h).clamp(0.3 * span_hours, 2.0 * span_hours));
+        let steps = (0..=STEPS).map(|step| far * f64::from(step) / f64::from(STEPS));
+        let prior = self.prior(name, row.as_of_utc);
+        Ok(trend::outlook(series, as_of_us, &self.settings(name), prior, steps)?)
     }
 }
 

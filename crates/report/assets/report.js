@@ -11,11 +11,16 @@
     var cell = function (k) { return row.cells[k].textContent.trim(); };
     return { t: time(cell(0)), when: cell(0), id: cell(1), gap: number(cell(4)), low: number(cell(5)), high: number(cell(6)), remarks: cell(10) };
   });
-  var ends = Array.prototype.map.call(document.querySelectorAll(".forecast time"), function (e) { return time(e.textContent); });
+  var band = Array.prototype.map.call(document.querySelectorAll("#band tbody tr"), function (row) {
+    var cell = function (k) { return row.cells[k].textContent.trim(); };
+    return { t: time(cell(0)), what: cell(1), mid: number(cell(2)), low: number(cell(3)), high: number(cell(4)) };
+  });
+  var level = band.filter(function (b) { return b.what === "level"; });
+  var fan = band.filter(function (b) { return b.what === "forecast"; });
   var events = Array.prototype.map.call(document.querySelectorAll("#events tbody td:first-child"), function (e) { return time(e.textContent); });
-  var limit = number(figure.dataset.limit), watch = number(figure.dataset.watch), gap = number(figure.dataset.gap);
+  var limit = number(figure.dataset.limit), watch = number(figure.dataset.watch);
   var first = rows[0].t, last = rows[rows.length - 1].t, span = Math.max(last - first, 864000);
-  var far = ends.reduce(function (a, t) { return Math.max(a, Math.min(t, last + 3 * span)); }, last);
+  var far = fan.reduce(function (a, b) { return Math.max(a, b.t); }, last);
   var whole = { min: first - 0.02 * span, max: far + 0.02 * span };
   var colour = function (name) { return getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim(); };
 
@@ -51,19 +56,38 @@
     c.stroke();
     c.restore();
   };
+  var ribbon = function (u, points, stroke, dash) {
+    if (points.length < 2) return;
+    var c = u.ctx, px = function (x) { return u.valToPos(x, "x", true); }, py = function (y) { return u.valToPos(y, "y", true); };
+    c.save();
+    c.beginPath();
+    c.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+    c.clip();
+    c.beginPath();
+    points.forEach(function (b) { c.lineTo(px(b.t), py(b.high)); });
+    points.slice().reverse().forEach(function (b) { c.lineTo(px(b.t), py(b.low)); });
+    c.closePath();
+    c.globalAlpha = 0.18;
+    c.fillStyle = stroke;
+    c.fill();
+    c.restore();
+    for (var k = 1; k < points.length; k += 1) line(u, points[k - 1].t, points[k - 1].mid, points[k].t, points[k].mid, stroke, dash, 2);
+  };
   var draw = function (u) {
+    ribbon(u, level, colour("ink"), []);
+    ribbon(u, fan, colour("plan"), [6, 4]);
     var y = u.scales.y, x = u.scales.x;
     if (watch !== null) line(u, x.min, watch, x.max, watch, colour("watch"), [], 2);
     if (limit !== null) line(u, x.min, limit, x.max, limit, colour("act"), [], 2);
     events.forEach(function (t) { line(u, t, y.min, t, y.max, colour("plan"), [], 1); });
-    if (gap !== null && limit !== null) ends.forEach(function (t) { line(u, last, gap, Math.max(t, last), limit, colour("plan"), [6, 4], 2); });
     rows.forEach(function (r) {
       if (r.gap === null) line(u, r.t, y.min, r.t, y.min + 0.03 * (y.max - y.min), colour("unstated"), [], 2);
       else if (r.low !== null && r.high !== null) line(u, r.t, r.low, r.t, r.high, colour("normal"), [], 1);
     });
   };
   var values = rows.map(function (r) { return r.gap; });
-  var top = rows.reduce(function (a, r) { return Math.max(a, r.high || 0, r.gap || 0); }, limit || 1) * 1.08;
+  var ahead = Math.min(fan.reduce(function (a, b) { return Math.max(a, b.high); }, 0), limit === null ? Infinity : 1.15 * limit);
+  var top = rows.reduce(function (a, r) { return Math.max(a, r.high || 0, r.gap || 0); }, Math.max(limit || 1, ahead)) * 1.04;
   var lowest = rows.reduce(function (a, r) { return r.gap === null ? a : Math.min(a, r.gap, r.low === null ? r.gap : r.low); }, top);
   var bottom = Math.max(lowest - 0.2 * (top - lowest), Math.min(lowest, 0));
   var show = function (u) {
@@ -82,7 +106,7 @@
       scales: { x: { min: whole.min, max: whole.max }, y: { range: [bottom, top] } },
       axes: [Object.assign({ values: [[31536000, "{YYYY}"], [2592000, "{YYYY}-{MM}"], [86400, "{YYYY}-{MM}-{DD}"], [3600, "{HH}:{mm}"]], space: 90 }, axis), Object.assign({ label: "gap µm", size: 56 }, axis)],
       series: [{}, { stroke: colour("normal"), paths: function () { return null; }, points: { show: true, size: 6, fill: colour("normal") } }],
-      hooks: { drawAxes: [draw], setCursor: [show], setScale: [shown] }
+      hooks: { draw: [draw], setCursor: [show], setScale: [shown] }
     }, [rows.map(function (r) { return r.t; }), values], live);
   };
   var button = function (text, range) {

@@ -8,6 +8,7 @@ use crate::agreement::Agreement;
 use crate::model::{Report, Unit};
 use crate::rates::spreads;
 use crate::removals::removals;
+use crate::scatter::scatter;
 use crate::standing::Standing;
 use crate::words::{
     NO_DATA, count, counted, date, date_or, days_between, hours, level, minute_or, percent, rate, um,
@@ -103,6 +104,7 @@ struct FleetView {
     more_faults: usize,
     calibration: Vec<(String, String, String)>,
     inspections: String,
+    scatter: String,
     pairs: Vec<(String, String, String, String, String, String)>,
 }
 
@@ -167,18 +169,23 @@ pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
             tail_pages.push(path);
         }
     }
-    let view = front(report, grouped(&work), more_work, tail_pages);
+    let view = front(report, grouped(&work), more_work, tail_pages)?;
     pages.push(Page::html("index.html".to_owned(), &view.render()?));
     pages.push(Page { path: "report.json".to_owned(), body: serde_json::to_vec(report)? });
     Ok(pages)
 }
 
-fn front(report: &Report, groups: Vec<Group>, more_work: Vec<String>, tail_pages: Vec<String>) -> FleetView {
+fn front(
+    report: &Report,
+    groups: Vec<Group>,
+    more_work: Vec<String>,
+    tail_pages: Vec<String>,
+) -> Result<FleetView, Error> {
     let number = |s: Standing| report.units.iter().filter(|u| u.standing() == s).count();
     let worst = worst_tails(report);
     let faults = report.log_faults.iter().map(|f| (f.log_path.clone(), f.code.clone()));
     let (inspections, pairs) = inspected(report);
-    FleetView {
+    Ok(FleetView {
         root: "",
         title: "Actuator free play".to_owned(),
         foot: foot(report),
@@ -210,8 +217,9 @@ fn front(report: &Report, groups: Vec<Group>, more_work: Vec<String>, tail_pages
         faults: faults.take(FEW).collect(),
         calibration: calibration(report),
         inspections,
+        scatter: scatter(&compared(report))?,
         pairs,
-    }
+    })
 }
 
 /// Units that call for a decision, by the day before which nothing happens.
@@ -376,6 +384,12 @@ fn calibration(report: &Report) -> Vec<(String, String, String)> {
 
 type Pairs = Vec<(String, String, String, String, String, String)>;
 
+/// Estimates and hangar checks that stand beside each other, m.
+fn compared(report: &Report) -> Vec<(f64, f64)> {
+    let checks = report.units.iter().flat_map(|u| &u.inspections);
+    checks.filter_map(|i| Some((i.estimate_m?, i.play_m))).collect()
+}
+
 /// How estimates agree with hangar checks, in words and pair by pair.
 fn inspected(report: &Report) -> (String, Pairs) {
     if !report.inspections_given {
@@ -385,7 +399,7 @@ fn inspected(report: &Report) -> (String, Pairs) {
         );
     }
     let checks = || report.units.iter().flat_map(|u| u.inspections.iter().map(move |i| (u, i)));
-    let pairs: Vec<(f64, f64)> = checks().filter_map(|(_, i)| Some((i.estimate_m?, i.play_m))).collect();
+    let pairs = compared(report);
     let words = match Agreement::of(&pairs) {
         Some(a) => format!(
             "Estimate minus inspection over {}: bias {} ± {} µm (95 %), limits of agreement {} to {} µm.",

@@ -13,6 +13,7 @@ mod model;
 mod names;
 mod rates;
 mod removals;
+mod scatter;
 mod serial;
 mod standing;
 mod tail;
@@ -22,7 +23,9 @@ pub use agreement::Agreement;
 pub use assets::assets;
 pub use fleet::fleet_pages;
 pub use look::{Look, Stretch, look_html, look_png, look_svg};
-pub use model::{Event, FlightRow, Inspection, LogFault, Past, Quality, Report, Statement, Stay, Tail, Unit};
+pub use model::{
+    Banded, Event, FlightRow, Inspection, LogFault, Past, Prior, Quality, Report, Statement, Stay, Tail, Unit,
+};
 pub use rates::Spreads;
 pub use serial::serial_page;
 pub use standing::Standing;

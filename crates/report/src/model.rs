@@ -21,12 +21,40 @@ pub struct Report {
     /// Hours until the next check, for the probability to meet the limit before it.
     pub check_interval_hours: f64,
     pub log_faults: Vec<LogFault>,
+    pub priors: Vec<Prior>,
     pub tails: Vec<Tail>,
     pub units: Vec<Unit>,
     /// Whether a table of inspections was given at all.
     pub inspections_given: bool,
     /// Inspections of units that the records do not know.
     pub inspections_unmatched: usize,
+}
+
+/// What a part number's units had taught about the next one.
+#[derive(Debug, Clone, Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
+pub struct Prior {
+    pub part_number: Option<String>,
+    /// Nothing later was learned from.
+    pub learned_until_utc: Timestamp,
+    pub axis: String,
+    pub new_m: f64,
+    pub new_sd_m: f64,
+    pub life_p05_hours: f64,
+    pub life_p50_hours: f64,
+    pub life_p95_hours: f64,
+    /// How much wider forecasts are stated than the curves alone have them.
+    pub widening: f64,
+}
+
+/// A gap and its 90 % interval at a time.
+#[derive(Debug, Clone, Copy)]
+#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
+pub struct Banded {
+    pub at_utc: Timestamp,
+    pub p05_m: f64,
+    pub m: f64,
+    pub p95_m: f64,
 }
 
 /// A log that could not be read.
@@ -66,6 +94,12 @@ pub struct Unit {
     pub stays: Vec<Stay>,
     pub past: Vec<Past>,
     pub inspections: Vec<Inspection>,
+    /// The smoothed level through its flights; drawn, not repeated in the twin.
+    #[serde(skip)]
+    pub level: Vec<Banded>,
+    /// The gap to come, from now on; drawn, not repeated in the twin.
+    #[serde(skip)]
+    pub forecast: Vec<Banded>,
     /// In the pages and in the store, not repeated in the twin.
     #[serde(skip)]
     pub flights: Vec<FlightRow>,

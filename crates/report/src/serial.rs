@@ -28,7 +28,6 @@ struct View {
     picture_words: String,
     limit: String,
     watch: String,
-    gap: String,
     forecast: Vec<(&'static str, String)>,
     events: Vec<(String, String, String, &'static str)>,
     stays: Vec<(String, String, String, String, String)>,
@@ -36,6 +35,8 @@ struct View {
     past: Vec<(String, String, String, String, String, &'static str)>,
     checks: Vec<(String, String, String, String, String)>,
     record: Facts,
+    prior: String,
+    band: Vec<(String, &'static str, String, String, String)>,
     flights: Vec<Flight>,
 }
 
@@ -80,7 +81,6 @@ pub fn serial_page(report: &Report, spreads: &Spreads<'_>, unit: &Unit) -> Resul
         picture_words: picture_words(unit),
         limit: um_cell(s.limit_m),
         watch: um_cell(s.watch_m),
-        gap: um_cell(s.gap_m),
         forecast: forecast.into_iter().filter_map(|(word, t)| Some((word, date(t?)))).collect(),
         events: events(unit),
         stays: stays(unit),
@@ -88,6 +88,8 @@ pub fn serial_page(report: &Report, spreads: &Spreads<'_>, unit: &Unit) -> Resul
         past: past(unit),
         checks: checks(unit),
         record: record(unit),
+        prior: prior(report, unit),
+        band: band(unit),
         flights: unit.flights.iter().map(flight).collect(),
     };
     Ok(Page::html(serial_path(unit), &view.render()?))
@@ -245,6 +247,47 @@ fn record(unit: &Unit) -> Facts {
             },
         ),
     ]
+}
+
+/// Widening worth a word: less comes of counting few past forecasts.
+const WIDER: f64 = 1.15;
+
+/// What was believed of a unit like this one before its own flights were looked at.
+fn prior(report: &Report, unit: &Unit) -> String {
+    report.priors.iter().find(|p| p.part_number == unit.part_number).map_or_else(
+        || NO_DATA.to_owned(),
+        |p| {
+            let part = p.part_number.as_deref().unwrap_or("units without a part number");
+            let wider = if p.widening > WIDER {
+                format!(
+                    "Past forecasts of this fleet missed more often than they should: its intervals are {:.1} \
+                     times as wide as the curves alone have them.",
+                    p.widening
+                )
+            } else {
+                "Past forecasts of this fleet held: its intervals stand as the curves have them.".to_owned()
+            };
+            format!(
+                "Learned from {part} until {}: a new unit has {} ± {} µm; from new to the act limit it takes {} h, \
+                 90 % of units between {} and {} h; wear follows {}. {wider}",
+                date(p.learned_until_utc),
+                um(p.new_m),
+                um(1.645 * p.new_sd_m),
+                hours(p.life_p50_hours),
+                hours(p.life_p05_hours),
+                hours(p.life_p95_hours),
+                p.axis.replace('_', " "),
+            )
+        },
+    )
+}
+
+/// The level through past flights and the fan ahead, as rows.
+fn band(unit: &Unit) -> Vec<(String, &'static str, String, String, String)> {
+    let row = |what: &'static str| {
+        move |b: &crate::model::Banded| (minute(b.at_utc), what, um(b.m), um(b.p05_m), um(b.p95_m))
+    };
+    unit.level.iter().map(row("level")).chain(unit.forecast.iter().map(row("forecast"))).collect()
 }
 
 /// A probability; one too small for three places is never shown as none.

@@ -24,6 +24,8 @@ fn unit(serial: &str, state: Option<&str>) -> Unit {
         stays: Vec::new(),
         past: Vec::new(),
         inspections: Vec::new(),
+        level: Vec::new(),
+        forecast: Vec::new(),
         flights: Vec::new(),
     }
 }
@@ -39,6 +41,7 @@ fn report(units: Vec<Unit>) -> Report {
         logs_known: 0,
         check_interval_hours: 300.0,
         log_faults: Vec::new(),
+        priors: Vec::new(),
         tails: vec![Tail {
             tail_number: HOSTILE.to_owned(),
             flights: 0,

@@ -115,6 +115,23 @@ impl FleetPrior {
         self.ln_life.exp()
     }
 
+    /// 5 % and 95 % of the lives it expects, flight hours at the fleet's mean usage.
+    pub fn life_range_hours(&self) -> (f64, f64) {
+        let reach = 1.645 * self.ln_life_sd;
+        ((self.ln_life - reach).exp(), (self.ln_life + reach).exp())
+    }
+
+    /// Mean and standard deviation of a new unit's gap, m.
+    pub fn new_gap_m(&self) -> (f64, f64) {
+        (self.new_m, self.new_sd_m)
+    }
+
+    /// How much wider forecasts are stated than the curves alone have them, by what the fleet's own past
+    /// forecasts missed; one for a fleet whose past asks for nothing.
+    pub fn widening(&self) -> f64 {
+        0.5 * (self.calibration.high - self.calibration.low)
+    }
+
     /// The usage of a unit up to a flight, hours' worth.
     pub(crate) fn usage(&self, flight: &Flight) -> f64 {
         self.axis.of(flight) * self.hours_per_unit

@@ -1,0 +1,77 @@
+//! Estimate against inspection as a picture: pairs, where both are equal, bias and limits of agreement.
+
+use plotters::prelude::*;
+
+use crate::Error;
+use crate::agreement::Agreement;
+use crate::chart::{DATA, GRID, INK, PLAN};
+
+/// Draws pairs of estimate and inspection, metres; nothing without a pair.
+pub(crate) fn scatter(pairs: &[(f64, f64)]) -> Result<String, Error> {
+    let um: Vec<(f64, f64)> = pairs.iter().map(|(estimate, play)| (play * 1e6, estimate * 1e6)).collect();
+    if um.is_empty() {
+        return Ok(String::new());
+    }
+    let all = || um.iter().flat_map(|(play, estimate)| [*play, *estimate]);
+    let (low, high) = (all().fold(0.0, f64::min), all().fold(1.0, f64::max) * 1.08);
+    let mut svg = String::new();
+    draw(&mut svg, &um, Agreement::of(pairs), (low, high)).map_err(|e| Error::Picture(e.to_string()))?;
+    Ok(svg)
+}
+
+fn draw(
+    svg: &mut String,
+    points: &[(f64, f64)],
+    agreement: Option<Agreement>,
+    (low, high): (f64, f64),
+) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
+    let root = SVGBackend::with_string(svg, (560, 420)).into_drawing_area();
+    let mut chart = ChartBuilder::on(&root)
+        .margin(8)
+        .x_label_area_size(44)
+        .y_label_area_size(52)
+        .build_cartesian_2d(low..high, low..high)?;
+    chart
+        .configure_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(GRID)
+        .axis_style(INK)
+        .label_style(("sans-serif", 13).into_font().color(&INK))
+        .x_desc("inspection µm")
+        .y_desc("estimate µm")
+        .draw()?;
+    let shifted = |by_um: f64| [(low.max(low - by_um), low.max(low - by_um) + by_um), upper(high, by_um)];
+    chart.draw_series(LineSeries::new(shifted(0.0), INK.stroke_width(1)))?;
+    if let Some(a) = agreement {
+        chart.draw_series(LineSeries::new(shifted(a.bias_m * 1e6), PLAN.stroke_width(2)))?;
+        for limit_m in [a.lower_m, a.upper_m] {
+            let line = DashedLineSeries::new(shifted(limit_m * 1e6), 6, 4, PLAN.stroke_width(1));
+            chart.draw_series(line)?;
+        }
+    }
+    chart.draw_series(points.iter().map(|p| Circle::new(*p, 3, DATA.filled())))?;
+    root.present()
+}
+
+/// Where a line of slope one that lies so much above the diagonal leaves the picture.
+fn upper(high: f64, by_um: f64) -> (f64, f64) {
+    if by_um > 0.0 { (high - by_um, high) } else { (high, high + by_um) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_pair_is_a_mark_and_no_pair_is_no_picture() {
+        let pairs = [(30e-6, 33e-6), (40e-6, 42e-6), (50e-6, 51e-6)];
+        assert_eq!(scatter(&pairs).unwrap().matches("<circle").count(), 3);
+        assert_eq!(scatter(&[]).unwrap(), "");
+    }
+
+    #[test]
+    fn a_line_leaves_the_picture_at_its_corner() {
+        assert_eq!(upper(100.0, 10.0), (90.0, 100.0));
+        assert_eq!(upper(100.0, -10.0), (100.0, 90.0));
+    }
+}
