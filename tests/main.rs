@@ -3,11 +3,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod accounts;
 mod bench;
 mod damaged;
 mod interrupted;
 mod known;
 mod layouts;
+mod older;
 mod oracle;
 mod speech;
 mod truth;

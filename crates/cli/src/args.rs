@@ -453,6 +453,17 @@ pub(crate) enum StoreCommand {
         #[arg(long)]
         json: bool,
     },
+    /// The last runs with their figures, or the logs of one run by class and reason; killed runs too
+    Runs {
+        /// The logs of this run; `last` is the newest.
+        #[arg(long, value_name = "ID")]
+        run: Option<String>,
+        /// So many runs at most, the newest.
+        #[arg(long, default_value_t = 20)]
+        last: usize,
+        #[command(flatten)]
+        output: Output,
+    },
     /// Look for missing, changed or doubled data
     Verify,
     /// Merge small files, sorted for queries

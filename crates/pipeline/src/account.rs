@@ -41,6 +41,30 @@ pub(crate) fn quiet<'a>(accounts: impl Iterator<Item = &'a LogAccount>, days: f6
     late.map(|(tail, since_utc)| Quiet { tail_number: tail.to_owned(), since_utc }).collect()
 }
 
+/// An earlier run that ended without a word: it was killed, or its disk failed.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct CutShort {
+    /// Its name.
+    pub run_id: String,
+    /// When it began.
+    pub started_utc: Timestamp,
+    /// Logs it had finished.
+    pub done: i64,
+    /// Logs it had not come to.
+    pub not_reached: i64,
+}
+
+impl From<RunAccount> for CutShort {
+    fn from(run: RunAccount) -> Self {
+        Self {
+            run_id: run.run_id,
+            started_utc: run.started_utc,
+            done: run.done,
+            not_reached: run.not_reached,
+        }
+    }
+}
+
 /// What a run did.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Report {
@@ -48,6 +72,8 @@ pub struct Report {
     pub run_id: String,
     /// When it began.
     pub started_utc: Timestamp,
+    /// Runs before it that ended without a word.
+    pub cut_short: Vec<CutShort>,
     /// Logs that fit the patterns.
     pub found: usize,
     /// Logs that were accounted for already.
@@ -66,7 +92,7 @@ pub struct Report {
     pub refused: BTreeMap<String, usize>,
     /// Logs in error, in the order of their names.
     pub errors: Vec<LogError>,
-    /// Logs the run was stopped before.
+    /// Logs the run has not come to, or was stopped before.
     pub not_reached: usize,
     /// Their names.
     pub not_reached_logs: Vec<String>,
@@ -103,6 +129,7 @@ impl Report {
         Self {
             run_id,
             started_utc,
+            cut_short: Vec::new(),
             found: plan.found,
             known: plan.known,
             not_asked: plan.not_asked,
@@ -112,7 +139,7 @@ impl Report {
             estimated: 0,
             refused: BTreeMap::new(),
             errors: Vec::new(),
-            not_reached: 0,
+            not_reached: plan.work.len(),
             not_reached_logs: Vec::new(),
             quiet: Vec::new(),
             skew_moved: Vec::new(),
@@ -213,6 +240,11 @@ pub(crate) fn of_log(work: &Work, run_id: &str) -> LogAccount {
         run_id: run_id.to_owned(),
         processed_utc: Timestamp::now(),
     }
+}
+
+/// The account of a log that a run means to do.
+pub(crate) fn not_reached(work: &Work, run_id: &str) -> LogAccount {
+    LogAccount { outcome: Outcome::NotReached, ..of_log(work, run_id) }
 }
 
 /// Writes complaints into an account: the first one's code, all of their text.

@@ -224,8 +224,11 @@ pub fn plan(
 
 /// What was read, and which settings touched it, of a log that went well.
 pub fn digests(account: &LogAccount) -> Option<(String, String)> {
-    let well = account.outcome == Outcome::Done;
-    well.then(|| Some((account.log_digest.clone()?, account.config_digest.clone()?))).flatten()
+    account
+        .outcome
+        .is_well()
+        .then(|| Some((account.log_digest.clone()?, account.config_digest.clone()?)))
+        .flatten()
 }
 
 /// The actuators' flights that a log in the store speaks for.
@@ -334,8 +337,7 @@ impl Judge<'_> {
 
     /// A log that yielded its flight to another, which speaks for it no longer.
     fn is_orphan(&self, account: &LogAccount) -> bool {
-        let yielded =
-            account.outcome == Outcome::Done || account.error_code.as_deref() == Some("duplicate_flight");
+        let yielded = account.outcome.is_well() || account.error_code.as_deref() == Some("duplicate_flight");
         let silent = account.estimated + account.refused == 0;
         let keys = flight_of(account)
             .map(|f| account.positions.iter().map(|p| record_key(&f, p)).collect::<Vec<_>>());

@@ -12,9 +12,9 @@ use fleet::{Complaint, Installations, Status};
 use jiff::Timestamp;
 use job::flight::{Opened, caught, config_digest, unidentified_digest};
 use job::{Config, Stamp};
-use store::{Holder, LogAccount, LogResult, Query, Store, Writer};
+use store::{Holder, LogAccount, LogResult, Outcome, Query, Store, Writer};
 
-use crate::account::{self, Report};
+use crate::account::{self, CutShort, Report};
 use crate::book::{Book, Done};
 use crate::bundle;
 use crate::error::Error;
@@ -81,12 +81,16 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let found = bundle::find(config)?;
     let store = Store::create_or_open(config.store())?;
     let mut writer = locked(&store, context)?;
+    let killed = writer.close_killed_runs()?;
     let plan = plan::plan(config, &installations, found, store.accounts()?, request);
     let workers = workers(request, plan.work.len());
     let started_utc = Timestamp::now();
     let mut report = Report::begin(run_id(started_utc), started_utc, &plan, workers);
+    report.cut_short = killed.into_iter().map(CutShort::from).collect();
     let config_path = config.file.display().to_string();
-    writer.begin_run(&report.row(context.program_version, &config_path, None))?;
+    let to_do: Vec<LogAccount> =
+        plan.work.iter().map(|work| account::not_reached(work, &report.run_id)).collect();
+    writer.begin_run(&report.row(context.program_version, &config_path, None), &to_do)?;
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
 
@@ -254,6 +258,7 @@ impl Shop<'_> {
         account.positions = names.iter().map(ToString::to_string).collect();
         if let Some(known) = self.known(work, &account) {
             (account.estimated, account.refused) = known;
+            account.outcome = Outcome::Known;
             return Done::Same(Box::new(account));
         }
         self.read(&opened, account)

@@ -12,19 +12,40 @@ pub enum Outcome {
     Done,
     /// It has a fault, which `error_code` names.
     Error,
+    /// Its content is known, and only its name or its date is new.
+    Known,
+    /// Its records are stored, and the run was killed before it could account for it: the next run does it
+    /// again.
+    Unaccounted,
+    /// A run means to do it, or was cut short before it came to it. Written when the run begins, so that
+    /// a run that is killed has its account too.
+    NotReached,
 }
 
 impl Outcome {
+    const ALL: [Self; 5] = [Self::Done, Self::Error, Self::Known, Self::Unaccounted, Self::NotReached];
+
+    /// Those that do not settle what is known of a log.
+    pub(crate) const OPEN: [Self; 2] = [Self::Unaccounted, Self::NotReached];
+
+    /// Whether the log went well.
+    pub fn is_well(self) -> bool {
+        matches!(self, Self::Done | Self::Known)
+    }
+
     /// The word in the `outcome` column.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Done => "done",
             Self::Error => "error",
+            Self::Known => "known",
+            Self::Unaccounted => "unaccounted",
+            Self::NotReached => "not_reached",
         }
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let known = [Self::Done, Self::Error].into_iter().find(|outcome| outcome.as_str() == text);
+        let known = Self::ALL.into_iter().find(|outcome| outcome.as_str() == text);
         known.ok_or_else(|| format!("`{text}` is no outcome"))
     }
 }
@@ -32,7 +53,7 @@ impl Outcome {
 /// The account of one log: enough to know, without opening it, whether it must be done again.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogAccount {
-    /// Its name; the newest account of a name counts.
+    /// Its name; of its accounts that are neither *not reached* nor *unaccounted*, the newest counts.
     pub log_path: String,
     /// Bytes.
     pub size_bytes: i64,
@@ -123,7 +144,8 @@ pub struct RunAccount {
     pub run_id: String,
     /// When it began.
     pub started_utc: Timestamp,
-    /// When it ended; none for a run that was killed or still goes.
+    /// When it ended; for a run that was killed, when its last log was finished, once the next run has seen
+    /// to it.
     pub finished_utc: Option<Timestamp>,
     /// The version of Freeplay.
     pub program_version: String,
@@ -141,10 +163,17 @@ pub struct RunAccount {
     pub refused: i64,
     /// Logs in error.
     pub errors: i64,
-    /// Logs it was stopped before.
+    /// Logs it has not come to, or was stopped before.
     pub not_reached: i64,
     /// What it told its caller; none for a run that was killed or still goes.
     pub exit_code: Option<i64>,
+}
+
+impl RunAccount {
+    /// Whether its figures are final.
+    pub fn has_ended(&self) -> bool {
+        self.finished_utc.is_some()
+    }
 }
 
 impl Tabled for RunAccount {

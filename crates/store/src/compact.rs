@@ -46,9 +46,9 @@ impl Writer {
         let by_log = Plan { slice_by: "log_path", order: &["log_path", numbered::COMMIT] };
         let by_run = Plan { slice_by: "run_id", order: &[numbered::COMMIT] };
         let mut total = Compaction { before: 0, after: 0, deleted: 0 };
-        for ((table, schema), plan) in store.tables().into_iter().zip([by_unit, by_log, by_run]) {
+        for (table, plan) in store.tables().into_iter().zip([by_unit, by_log, by_run]) {
             let before = table.snapshot()?.files.len();
-            table.change(|snapshot| plan.change(table, snapshot, &schema, |files| store.check(files)))?;
+            table.change(|snapshot| plan.change(table, snapshot, |files| store.check(files)))?;
             total.before += before;
             total.after += table.snapshot()?.files.len();
         }
@@ -62,7 +62,7 @@ impl Writer {
     /// [`Error::Io`] when a file cannot be deleted, [`Error::Table`] when the log cannot be read.
     pub fn vacuum(&mut self, kept: Duration) -> Result<usize, Error> {
         let tables = self.store().tables();
-        tables.iter().map(|(table, _)| table.vacuum(kept)).sum()
+        tables.iter().map(|table| table.vacuum(kept)).sum()
     }
 }
 
@@ -79,16 +79,16 @@ impl Plan {
         &self,
         table: &Table,
         snapshot: &'a Snapshot,
-        schema: &SchemaRef,
         check: impl Fn(&[PathBuf]) -> Result<(), Error>,
     ) -> Result<Change<'a>, Error> {
         let files: Vec<PathBuf> = snapshot.files.iter().map(|file| file.path.clone()).collect();
         // A flipped byte must not be given a new digest.
         check(&files)?;
+        let schema = &table.schema;
         let slices = slices(&self.counts(&files, schema)?, FILE_ROWS);
         let planned: usize = slices.iter().map(|slice| slice.rows.div_ceil(FILE_ROWS)).sum();
         let all_ours = snapshot.files.iter().all(DataFile::has_digest);
-        if planned >= files.len() && all_ours {
+        if planned.max(1) >= files.len() && all_ours {
             return Ok(Change::default());
         }
         let mut change =

@@ -38,6 +38,8 @@ pub struct Info {
     pub version: u64,
     /// The newest run that ended with code 0 or 1.
     pub last_completed: Option<RunAccount>,
+    /// The newest run, however it ended.
+    pub last: Option<RunAccount>,
 }
 
 impl Store {
@@ -55,6 +57,7 @@ impl Store {
         let departures = batch.column(0).as_primitive::<TimestampMicrosecondType>();
         let text = |column: usize| batch.column(column).as_string::<i32>().iter().flatten();
         let at = |micros: Option<i64>| micros.and_then(|us| Timestamp::from_microsecond(us).ok());
+        let runs = self.runs()?;
         Ok(Info {
             records: batch.num_rows(),
             flights: departures.values().iter().zip(text(1).zip(text(2))).collect::<HashSet<_>>().len(),
@@ -66,7 +69,12 @@ impl Store {
             files: files.len(),
             bytes: snapshot.files.iter().map(|file| file.size_bytes).sum(),
             version: snapshot.version,
-            last_completed: self.runs()?.into_iter().filter(completed).max_by_key(|run| run.finished_utc),
+            last_completed: runs
+                .iter()
+                .filter(|run| completed(run))
+                .max_by_key(|run| run.finished_utc)
+                .cloned(),
+            last: runs.last().cloned(),
         })
     }
 }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use arrow::datatypes::SchemaRef;
 use fleet::GapRecord;
 use serde::{Deserialize, Serialize};
 use tokio::runtime::{Builder, Runtime};
@@ -19,7 +18,10 @@ use crate::writer::Writer;
 use crate::{datafile, durable, tabled};
 
 /// The format of the folder; it grows when an older release could no longer read or write it.
-const FORMAT: u32 = 1;
+///
+/// 1: accounts of logs are *done* or *error*. 2: they may be *known*, *not reached* or *unaccounted* too.
+/// Every format so far is read, and grows when it is next written to.
+const FORMAT: u32 = 2;
 const MARK: &str = "store.json";
 const LOCK: &str = "lock";
 
@@ -51,10 +53,10 @@ impl Store {
         let missing = || Error::Missing { dir: dir.to_owned() };
         match first_entry(dir)? {
             None => return Err(missing()),
-            Some(found) => check_mark(dir, &found)?,
+            Some(found) => drop(check_mark(dir, &found)?),
         }
         let store = Self::at(dir)?;
-        let whole = store.tables().iter().all(|(table, _)| table.exists());
+        let whole = store.tables().iter().all(|table| table.exists());
         if whole { Ok(store) } else { Err(missing()) }
     }
 
@@ -66,12 +68,14 @@ impl Store {
         let dir = dir.as_ref();
         match first_entry(dir)? {
             None => make_mark(dir)?,
-            Some(found) => check_mark(dir, &found)?,
+            Some(found) => drop(check_mark(dir, &found)?),
         }
         let store = Self::at(dir)?;
-        for (table, schema) in store.tables() {
-            if !table.exists() {
-                table.create(&schema)?;
+        for table in store.tables() {
+            if table.exists() {
+                table.fill()?;
+            } else {
+                table.create()?;
             }
         }
         durable::sync_dir(&store.dir).map_err(Error::io(&store.dir, "synced"))?;
@@ -81,10 +85,17 @@ impl Store {
     /// Takes the store for writing, and waits for another writer as long as is allowed.
     ///
     /// # Errors
-    /// [`Error::Held`] names who holds it.
+    /// [`Error::Held`] names who holds it; [`Error::Io`] when the folder cannot be written.
     pub fn lock(&self, holder: &Holder, wait: Option<Duration>) -> Result<Writer, Error> {
-        let lock = Lock::take(&self.dir.join(LOCK), holder, wait)?;
+        let lock = Lock::take(&self.lock_file(), holder, wait)?;
+        if check_mark(&self.dir, MARK)? < FORMAT {
+            write_mark(&self.dir)?;
+        }
         Ok(Writer::new(self.clone(), lock))
+    }
+
+    pub(crate) fn lock_file(&self) -> PathBuf {
+        self.dir.join(LOCK)
     }
 
     /// The folder.
@@ -95,18 +106,16 @@ impl Store {
     fn at(dir: &Path) -> Result<Self, Error> {
         let dir = std::fs::canonicalize(dir).map_err(Error::io(dir, "opened"))?;
         let runtime = Arc::new(runtime().map_err(Error::io(&dir, "opened"))?);
-        let table = |name| Table::new(&dir, name, Arc::clone(&runtime));
-        let (gaps, logs, runs) = (table("gaps"), table("logs"), table("runs"));
+        let table = |name, schema| Table::new(&dir, name, schema, Arc::clone(&runtime));
+        let gaps = table("gaps", tabled::schema::<GapRecord>());
+        let logs = table("logs", numbered::schema::<LogAccount>());
+        let runs = table("runs", numbered::schema::<RunAccount>());
         Ok(Self { gaps, logs, runs, sound: Arc::default(), dir })
     }
 
-    /// Every table with the columns it is made with.
-    pub(crate) fn tables(&self) -> [(&Table, SchemaRef); 3] {
-        [
-            (&self.gaps, tabled::schema::<GapRecord>()),
-            (&self.logs, numbered::schema::<LogAccount>()),
-            (&self.runs, numbered::schema::<RunAccount>()),
-        ]
+    /// Every table.
+    pub(crate) fn tables(&self) -> [&Table; 3] {
+        [&self.gaps, &self.logs, &self.runs]
     }
 
     /// Compares data files with their digests, each once in the life of this store.
@@ -155,23 +164,28 @@ fn first_entry(dir: &Path) -> Result<Option<String>, Error> {
     Ok(names.into_iter().next())
 }
 
-fn make_mark(dir: &Path) -> Result<(), Error> {
+fn write_mark(dir: &Path) -> Result<(), Error> {
     let mark = serde_json::json!(Mark { freeplay_store: FORMAT }).to_string();
     let path = dir.join(MARK);
-    durable::replace(&path, mark.as_bytes()).map_err(Error::io(path, "written"))?;
+    durable::replace(&path, mark.as_bytes()).map_err(Error::io(path, "written"))
+}
+
+fn make_mark(dir: &Path) -> Result<(), Error> {
+    write_mark(dir)?;
     // A bare name such as `results` has an empty parent, which is the current folder.
     let parent = dir.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
     parent.map_or(Ok(()), |parent| durable::sync_dir(parent).map_err(Error::io(parent, "synced")))
 }
 
-fn check_mark(dir: &Path, found: &str) -> Result<(), Error> {
+/// The format of the folder, when it is ours and known.
+fn check_mark(dir: &Path, found: &str) -> Result<u32, Error> {
     let file = dir.join(MARK);
     if found != MARK {
         return Err(Error::Foreign { dir: dir.to_owned(), found: found.to_owned() });
     }
     let text = std::fs::read_to_string(&file).map_err(Error::io(&file, "read"))?;
     match serde_json::from_str::<Mark>(&text) {
-        Ok(Mark { freeplay_store: FORMAT }) => Ok(()),
+        Ok(Mark { freeplay_store: format @ 1..=FORMAT }) => Ok(format),
         Ok(mark) => Err(Error::Format { file, found: mark.freeplay_store.to_string(), known: FORMAT }),
         Err(_) => Err(Error::Format { file, found: format!("`{}`", text.trim()), known: FORMAT }),
     }

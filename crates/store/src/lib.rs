@@ -29,6 +29,7 @@ mod lock;
 mod numbered;
 mod query;
 mod read;
+mod runs;
 mod stats;
 mod table;
 mod tabled;

@@ -52,7 +52,8 @@ pub(crate) struct Lock {
 impl Lock {
     /// Takes the lock, waiting for as long as is allowed.
     pub(crate) fn take(path: &Path, holder: &Holder, wait: Option<Duration>) -> Result<Self, Error> {
-        let deadline = Instant::now() + wait.unwrap_or_default();
+        // Whoever asks `is_held` has the lock for an instant: that is nobody to be refused for.
+        let deadline = Instant::now() + wait.unwrap_or_default().max(LOOK_AGAIN);
         let mut options = OpenOptions::new();
         options.read(true).write(true).create(true).truncate(false);
         let mut file = options.open(path).map_err(Error::io(path, "opened"))?;
@@ -66,6 +67,20 @@ impl Lock {
         }
         name(&mut file, holder).map_err(Error::io(path, "written"))?;
         Ok(Self { _file: file })
+    }
+
+    /// Whether somebody has the lock.
+    pub(crate) fn is_held(path: &Path) -> Result<bool, Error> {
+        let file = match File::open(path) {
+            Ok(file) => file,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(false),
+            Err(e) => return Err(Error::io(path, "opened")(e)),
+        };
+        match file.try_lock_shared() {
+            Ok(()) => Ok(false),
+            Err(TryLockError::WouldBlock) => Ok(true),
+            Err(TryLockError::Error(e)) => Err(Error::io(path, "locked")(e)),
+        }
     }
 }
 

@@ -49,6 +49,8 @@ pub struct Query {
     pub flight_id: Option<String>,
     /// One place.
     pub position: Option<String>,
+    /// One run.
+    pub run_id: Option<String>,
     /// Departures from then on.
     pub since_utc: Option<Timestamp>,
     /// Departures before then.
@@ -65,6 +67,7 @@ impl Query {
             ("part_number", &self.part_number),
             ("flight_id", &self.flight_id),
             ("position", &self.position),
+            ("run_id", &self.run_id),
         ]
         .into_iter()
         .filter_map(|(column, value)| Some((column, value.as_deref()?)))

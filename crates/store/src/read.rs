@@ -7,12 +7,14 @@ use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::SchemaRef;
 use fleet::{GapRecord, PartNumber, SerialNumber};
 use jiff::Timestamp;
+use polars::prelude::{Expr, col, lit};
 
-use crate::account::{LogAccount, RunAccount};
+use crate::account::{LogAccount, Outcome};
 use crate::error::Error;
 use crate::frame::{self, Read};
 use crate::layout::Store;
 use crate::query::{Query, RecordKey};
+use crate::stats::Stats;
 use crate::table::{Snapshot, Table};
 use crate::tabled::Tabled;
 use crate::{columns, numbered, tabled};
@@ -76,22 +78,19 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn accounts(&self) -> Result<Vec<LogAccount>, Error> {
-        self.newest(&self.logs, |account: &LogAccount| account.log_path.clone())
-    }
-
-    /// The newest account of every run, by the time it began.
-    ///
-    /// # Errors
-    /// As [`Store::records`].
-    pub fn runs(&self) -> Result<Vec<RunAccount>, Error> {
-        let mut runs = self.newest(&self.runs, |run: &RunAccount| run.run_id.clone())?;
-        runs.sort_by_key(|run| run.started_utc);
-        Ok(runs)
+        let open = |outcome: Outcome| col("outcome").neq(lit(outcome.as_str()));
+        let condition = Outcome::OPEN.into_iter().map(open).reduce(Expr::and);
+        self.newest(
+            &self.logs,
+            condition,
+            |stats| !Outcome::OPEN.iter().any(|outcome| stats.holds_only("outcome", outcome.as_str())),
+            |account: &LogAccount| account.log_path.clone(),
+        )
     }
 
     /// The data files of the records as of now, for engines that do not read Delta's log.
     ///
-    /// A plain look into the folder would find superseded files too.
+    /// A plain look into the folder would find superseded files too. There is always one at least.
     ///
     /// # Errors
     /// [`Error::Table`] when the log cannot be read.
@@ -105,18 +104,27 @@ impl Store {
         query: &Query,
         schema: SchemaRef,
     ) -> Result<RecordBatch, Error> {
-        let files = snapshot.files.iter().filter(|file| query.may_be_in(&file.stats));
+        let files = snapshot.files.iter().filter(|file| file.has_rows() && query.may_be_in(&file.stats));
         let files: Vec<PathBuf> = files.map(|file| file.path.clone()).collect();
         self.check(&files)?;
         let (condition, last) = (query.condition(), query.last);
         Read { files: &files, schema, condition, order: &RecordKey::COLUMNS, last }.collect()
     }
 
-    fn newest<R: Tabled>(&self, table: &Table, name: impl Fn(&R) -> String) -> Result<Vec<R>, Error> {
-        let files: Vec<PathBuf> = table.snapshot()?.files.into_iter().map(|file| file.path).collect();
+    /// Of the rows that fit, the newest of each name, by name; files that cannot hold one are passed over.
+    pub(crate) fn newest<R: Tabled>(
+        &self,
+        table: &Table,
+        condition: Option<Expr>,
+        may_hold: impl Fn(&Stats) -> bool,
+        name: impl Fn(&R) -> String,
+    ) -> Result<Vec<R>, Error> {
+        let files = table.snapshot()?.files.into_iter();
+        let files = files.filter(|file| file.has_rows() && may_hold(&file.stats));
+        let files: Vec<PathBuf> = files.map(|file| file.path).collect();
         self.check(&files)?;
         let (schema, order) = (numbered::schema::<R>(), &[numbered::COMMIT][..]);
-        let batch = Read { files: &files, schema, condition: None, order, last: None }.collect()?;
+        let batch = Read { files: &files, schema, condition, order, last: None }.collect()?;
         let rows = tabled::from_batch::<R>(&batch)?;
         let newest: BTreeMap<String, R> = rows.into_iter().map(|row| (name(&row), row)).collect();
         Ok(newest.into_values().collect())

@@ -34,6 +34,13 @@ impl Stats {
             && bound(&self.max_values).is_none_or(|high| value <= high.as_str())
     }
 
+    /// Whether every value of the text column is this one.
+    pub(crate) fn holds_only(&self, column: &str, value: &str) -> bool {
+        [&self.min_values, &self.max_values]
+            .into_iter()
+            .all(|bounds| bounds.get(column) == Some(&json!(value)))
+    }
+
     /// The earliest and the latest time the column may hold, µs since 1970.
     pub(crate) fn times_us(&self, column: &str) -> (i64, i64) {
         let bound = |bounds: &Map<String, Value>| {

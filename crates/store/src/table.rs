@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use arrow::datatypes::Schema;
+use arrow::array::RecordBatch;
+use arrow::datatypes::SchemaRef;
 use deltalake::kernel::engine::arrow_conversion::TryIntoKernel;
 use deltalake::kernel::transaction::{CommitBuilder, CommitProperties, TransactionError};
 use deltalake::kernel::{Action, Add, LogicalFileView, StructType, TombstoneView, Transaction};
@@ -40,6 +41,7 @@ const REWRITE: &str = "freeplay.rewrite";
 #[derive(Debug, Clone)]
 pub(crate) struct Table {
     pub(crate) name: &'static str,
+    pub(crate) schema: SchemaRef,
     dir: PathBuf,
     runtime: Arc<Runtime>,
 }
@@ -60,6 +62,11 @@ pub(crate) struct DataFile {
 }
 
 impl DataFile {
+    /// Whether it holds rows, as far as its log knows.
+    pub(crate) fn has_rows(&self) -> bool {
+        self.stats.num_records != Some(0)
+    }
+
     /// Whether its name carries the digest of its content.
     pub(crate) fn has_digest(&self) -> bool {
         let name = self.path.file_name().and_then(|name| name.to_str());
@@ -77,8 +84,8 @@ pub(crate) struct Change<'a> {
 }
 
 impl Table {
-    pub(crate) fn new(store: &Path, name: &'static str, runtime: Arc<Runtime>) -> Self {
-        Self { name, dir: store.join(name), runtime }
+    pub(crate) fn new(store: &Path, name: &'static str, schema: SchemaRef, runtime: Arc<Runtime>) -> Self {
+        Self { name, schema, dir: store.join(name), runtime }
     }
 
     pub(crate) fn dir(&self) -> &Path {
@@ -103,21 +110,40 @@ impl Table {
     }
 
     /// Makes the table with the lowest protocol there is: no feature of Delta is needed to read it.
-    pub(crate) fn create(&self, schema: &Schema) -> Result<(), Error> {
+    ///
+    /// Its first commit brings a file without rows: an engine that is handed the list of files, as DuckDB
+    /// is, fails on an empty one.
+    pub(crate) fn create(&self) -> Result<(), Error> {
         std::fs::create_dir_all(&self.dir).map_err(Error::io(&self.dir, "created"))?;
+        let empty = Action::Add(self.empty(0)?);
         let made = self.runtime.block_on(async {
-            let columns: StructType = schema.try_into_kernel().map_err(DeltaTableError::from)?;
+            let columns: StructType =
+                self.schema.as_ref().try_into_kernel().map_err(DeltaTableError::from)?;
             let log_store = self.builder()?.build_storage()?;
             let create = CreateBuilder::new().with_log_store(log_store).with_table_name(self.name);
             let create =
                 create.with_configuration_property(TableProperty::CheckpointInterval, Some(CHECKPOINT));
-            create.with_columns(columns.fields().cloned()).await
+            create.with_columns(columns.fields().cloned()).with_actions([empty]).await
         });
         match made {
             // Somebody else made it in the meantime.
             Err(_) if self.exists() => Ok(()),
             made => made.map(drop).map_err(self.failed("created")),
         }
+    }
+
+    /// A file without rows.
+    fn empty(&self, version: u64) -> Result<Add, Error> {
+        datafile::write(&self.dir, version, &RecordBatch::new_empty(Arc::clone(&self.schema)), true)
+    }
+
+    /// Gives a table without files, as earlier releases made them, one without rows.
+    pub(crate) fn fill(&self) -> Result<(), Error> {
+        self.change(|snapshot| {
+            let add =
+                if snapshot.files.is_empty() { vec![self.empty(snapshot.version + 1)?] } else { vec![] };
+            Ok(Change { add, ..Change::default() })
+        })
     }
 
     /// The table as it is now.
@@ -150,9 +176,12 @@ impl Table {
         let mut pause = PAUSE;
         for attempt in 1.. {
             let snapshot = self.snapshot()?;
-            let change = plan(&snapshot)?;
+            let mut change = plan(&snapshot)?;
             if change.add.is_empty() && change.remove.is_empty() {
                 break;
+            }
+            if change.add.is_empty() && change.remove.len() == snapshot.files.len() {
+                change.add.push(self.empty(snapshot.version + 1)?);
             }
             match self.commit(&snapshot, change) {
                 Ok(()) => break,
@@ -242,28 +271,31 @@ fn is_conflict(error: &DeltaTableError) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use arrow::array::{RecordBatch, StringArray, TimestampMicrosecondArray};
-    use arrow::datatypes::{DataType, Field};
+    use arrow::array::{StringArray, TimestampMicrosecondArray};
+    use arrow::datatypes::{DataType, Field, Schema};
 
     use super::*;
     use crate::tabled::time;
 
-    fn schema() -> Schema {
-        Schema::new(vec![Field::new("name", DataType::Utf8, false), Field::new("at", time(), false)])
+    fn schema() -> SchemaRef {
+        Arc::new(Schema::new(vec![
+            Field::new("name", DataType::Utf8, false),
+            Field::new("at", time(), false),
+        ]))
     }
 
     fn table(dir: &Path) -> Table {
         let runtime =
             tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
-        let table = Table::new(&std::fs::canonicalize(dir).unwrap(), "numbers", Arc::new(runtime));
-        table.create(&schema()).unwrap();
+        let table = Table::new(&std::fs::canonicalize(dir).unwrap(), "numbers", schema(), Arc::new(runtime));
+        table.create().unwrap();
         table
     }
 
     fn batch(numbers: Vec<i64>) -> RecordBatch {
         let names = StringArray::from_iter_values(numbers.iter().map(|n| format!("n{n:02}")));
         let at = TimestampMicrosecondArray::from(numbers).with_timezone("UTC");
-        RecordBatch::try_new(Arc::new(schema()), vec![Arc::new(names), Arc::new(at)]).unwrap()
+        RecordBatch::try_new(schema(), vec![Arc::new(names), Arc::new(at)]).unwrap()
     }
 
     fn append(table: &Table, n: i64) {
@@ -316,10 +348,10 @@ mod tests {
         assert!(table.dir.join("_delta_log/_last_checkpoint").exists());
         assert_eq!(rows(&table), 24);
         let snapshot = table.snapshot().unwrap();
-        let with =
-            |name: &str| snapshot.files.iter().filter(|file| file.stats.may_hold("name", name)).count();
+        let filled: Vec<&DataFile> = snapshot.files.iter().filter(|file| file.has_rows()).collect();
+        let with = |name: &str| filled.iter().filter(|file| file.stats.may_hold("name", name)).count();
         assert_eq!((with("n03"), with("n23"), with("n99")), (1, 1, 0));
         // Microseconds 1 to 24 lie in the first millisecond, whose end may have been cut off.
-        assert!(snapshot.files.iter().all(|file| file.stats.times_us("at") == (0, 2_000)));
+        assert!(filled.iter().all(|file| file.stats.times_us("at") == (0, 2_000)));
     }
 }

@@ -25,7 +25,7 @@ impl Store {
     /// many rows; and no record may be there twice.
     pub fn verify(&self) -> Vec<Complaint> {
         let tables = self.tables();
-        let mut findings: Vec<Complaint> = tables.iter().flat_map(|(table, _)| files_of(table)).collect();
+        let mut findings: Vec<Complaint> = tables.into_iter().flat_map(files_of).collect();
         if findings.is_empty() {
             findings.extend(self.duplicates().unwrap_or_else(|error| vec![error.complaint()]));
         }

@@ -9,7 +9,7 @@ use arrow::compute::filter_record_batch;
 use arrow::datatypes::{SchemaRef, TimestampMicrosecondType};
 use fleet::GapRecord;
 
-use crate::account::{LogAccount, RunAccount};
+use crate::account::LogAccount;
 use crate::error::Error;
 use crate::frame::{self, Read};
 use crate::layout::Store;
@@ -70,26 +70,10 @@ impl Writer {
         if accounts.is_empty() { Ok(()) } else { account(&self.store.logs, &accounts) }
     }
 
-    /// Writes down that a run begins.
-    ///
-    /// # Errors
-    /// As [`Writer::commit`].
-    pub fn begin_run(&mut self, run: &RunAccount) -> Result<(), Error> {
-        account(&self.store.runs, slice::from_ref(run))
-    }
-
-    /// Writes down how a run ended.
-    ///
-    /// # Errors
-    /// As [`Writer::commit`].
-    pub fn end_run(&mut self, run: &RunAccount) -> Result<(), Error> {
-        account(&self.store.runs, slice::from_ref(run))
-    }
-
     fn supersede<'a>(&self, snapshot: &'a Snapshot, verdicts: &Verdicts<'_>) -> Result<Change<'a>, Error> {
         let mut change = Change::default();
         let (dir, version) = (self.store.gaps.dir(), snapshot.version + 1);
-        for file in snapshot.files.iter().filter(|file| may_hold_any(file, verdicts)) {
+        for file in snapshot.files.iter().filter(|file| file.has_rows() && may_hold_any(file, verdicts)) {
             if let Some(rest) = self.without(file, verdicts)? {
                 change.remove.push(file);
                 if rest.num_rows() > 0 {
@@ -117,7 +101,8 @@ impl Writer {
     }
 }
 
-fn account<R: Tabled>(table: &Table, rows: &[R]) -> Result<(), Error> {
+/// Appends rows to a table of which the newest counts.
+pub(crate) fn account<R: Tabled>(table: &Table, rows: &[R]) -> Result<(), Error> {
     table.change(|snapshot| {
         let version = snapshot.version + 1;
         let add = datafile::write(table.dir(), version, &numbered::to_batch(rows, version)?, true)?;

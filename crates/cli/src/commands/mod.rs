@@ -12,6 +12,7 @@ mod plot;
 pub(crate) mod query;
 pub(crate) mod report;
 pub(crate) mod run;
+pub(crate) mod runs;
 pub(crate) mod shell;
 pub(crate) mod simulate;
 pub(crate) mod store;

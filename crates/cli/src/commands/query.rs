@@ -46,6 +46,7 @@ fn asked(args: &QueryArgs) -> Query {
         flight_id: id(By::Flight),
         position: id(By::Position),
         part_number: args.part.clone(),
+        run_id: None,
         since_utc: args.since,
         until_utc: args.until,
         last: args.last,

@@ -153,6 +153,15 @@ fn account(report: &Report, config: &str, code: Code) -> String {
         "Freeplay {VERSION} · run {} · {config}\n",
         report.started_utc.strftime("%Y-%m-%dT%H:%M:%SZ")
     );
+    for run in &report.cut_short {
+        let text = format!(
+            "{} ended without a word: {} done, {} not reached",
+            run.started_utc.strftime("run %Y-%m-%dT%H:%M:%SZ"),
+            count(run.done as usize, "log"),
+            run.not_reached
+        );
+        line(&mut page, "cut short", &text);
+    }
     let new = report.found - report.known - report.not_asked - report.left;
     let mut found = format!("{}: {new} to do, {} known", count(report.found, "log"), report.known);
     for (what, n) in [("not asked for", report.not_asked), ("left by the limit", report.left)] {

@@ -14,7 +14,7 @@ use crate::rows;
 use crate::table::count;
 use crate::talk::Talk;
 
-use super::{config, query};
+use super::{config, query, runs};
 
 /// Cares for the store that the configuration names.
 ///
@@ -24,6 +24,7 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, talk: &Talk) -> Result<Co
     let store = Store::open(config(global)?.store())?;
     match &args.command {
         StoreCommand::Info { max_age, json } => info(&store, *max_age, *json, talk),
+        StoreCommand::Runs { run, last, output } => runs::runs(&store, run.as_deref(), *last, output, talk),
         StoreCommand::Verify => verify(&store, talk),
         StoreCommand::Compact => compact(&store, talk),
         StoreCommand::Export { output } => export(&store, output, talk),
@@ -34,9 +35,9 @@ fn info(store: &Store, max_age: Option<Duration>, as_json: bool, talk: &Talk) ->
     let found = store.info()?;
     let age = found.last_completed.as_ref().and_then(age);
     if as_json {
-        talk.answer(&format!("{:#}\n", in_json(store, &found, age)))?;
+        talk.answer(&format!("{:#}\n", in_json(store, &found, age)?))?;
     } else {
-        talk.answer(&in_words(store, &found, age))?;
+        talk.answer(&(in_words(store, &found, age) + &unfinished(store, &found)?))?;
     }
     let late = max_age.filter(|allowed| age.is_none_or(|age| age > *allowed));
     let Some(allowed) = late else { return Ok(Code::Well) };
@@ -84,9 +85,41 @@ fn in_words(store: &Store, found: &Info, age: Option<Duration>) -> String {
     )
 }
 
-fn in_json(store: &Store, found: &Info, age: Option<Duration>) -> serde_json::Value {
+/// A line about the newest run where that is not the one that completed: it still goes, or was killed.
+fn unfinished(store: &Store, found: &Info) -> Result<String, Failure> {
+    let Some(run) = found.last.as_ref().filter(|run| run.exit_code.is_none()) else {
+        return Ok(String::new());
+    };
+    let began = run.started_utc.strftime("%Y-%m-%d %H:%M UTC");
+    let how = match runs::ended(run, store.is_held()?) {
+        "killed" => "ended without an exit: it was killed, or its disk failed",
+        other => other,
+    };
+    let left = if run.not_reached > 0 { "; `freeplay run` does those" } else { "" };
+    let (id, done, not_reached) = (&run.run_id, count(run.done as usize, "log"), run.not_reached);
+    let (estimated, refused, errors) = (run.estimated, run.refused, run.errors);
+    Ok(format!(
+        "  unfinished  {id}, begun {began}, {how}\n              {done} done ({estimated} estimated, {refused} refused, {errors} in error), {not_reached} not reached{left}\n",
+    ))
+}
+
+fn in_json(store: &Store, found: &Info, age: Option<Duration>) -> Result<serde_json::Value, Failure> {
     let run = found.last_completed.as_ref();
-    json!({
+    let is_held = store.is_held()?;
+    let last = found.last.as_ref().map(|run| {
+        json!({
+            "run_id": run.run_id,
+            "started_utc": run.started_utc,
+            "ended": runs::ended(run, is_held),
+            "exit_code": run.exit_code,
+            "done": run.done,
+            "estimated": run.estimated,
+            "refused": run.refused,
+            "errors": run.errors,
+            "not_reached": run.not_reached,
+        })
+    });
+    Ok(json!({
         "path": store.dir().display().to_string(),
         "records": found.records,
         "flights": found.flights,
@@ -102,7 +135,8 @@ fn in_json(store: &Store, found: &Info, age: Option<Duration>) -> serde_json::Va
         "last_completed_utc": run.and_then(|r| r.finished_utc),
         "last_completed_exit_code": run.and_then(|r| r.exit_code),
         "age_s": age.map(|a| a.as_secs_f64()),
-    })
+        "last_run": last,
+    }))
 }
 
 fn verify(store: &Store, talk: &Talk) -> Result<Code, Failure> {

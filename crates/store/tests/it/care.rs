@@ -34,7 +34,8 @@ fn a_sound_store_has_no_findings_and_is_told_in_numbers() {
     assert_eq!(writer.store().verify(), []);
     let info = writer.store().info().unwrap();
     assert_eq!((info.records, info.flights, info.serials, info.tails, info.logs), (36, 12, 6, 2, 12));
-    assert_eq!((info.files, info.version), (6, 6));
+    // One file without rows since the beginning, so that engines always find one.
+    assert_eq!((info.files, info.version), (7, 6));
     assert_eq!((info.first_departure_utc, info.last_departure_utc), (Some(departure(0)), Some(departure(5))));
     assert_eq!(info.last_completed.unwrap().run_id, "b");
 }
@@ -123,8 +124,8 @@ fn compaction_leaves_one_sorted_file_and_the_same_answers() {
     let reader = Store::open(dir.path()).unwrap();
     let (records, accounts) = (reader.scan(&Query::default()).unwrap(), reader.accounts().unwrap());
     let done = writer.compact().unwrap();
-    assert_eq!((done.before, done.after, done.deleted), (12, 2, 0));
-    assert_eq!(writer.compact().unwrap().before, 2);
+    assert_eq!((done.before, done.after, done.deleted), (15, 3, 0));
+    assert_eq!(writer.compact().unwrap().before, 3);
     assert_eq!(reader.info().unwrap().version, 7);
     assert_eq!(reader.scan(&Query::default()).unwrap(), records);
     assert_eq!(reader.accounts().unwrap(), accounts);
@@ -152,7 +153,7 @@ fn superseded_files_are_kept_for_readers_until_they_are_old() {
     writer.compact().unwrap();
     assert!(before.iter().all(|file| file.exists()));
     fs::write(dir.path().join("gaps/000000000099-half.parquet#4711"), "x").unwrap();
-    assert_eq!(writer.vacuum(Duration::ZERO).unwrap(), 13);
+    assert_eq!(writer.vacuum(Duration::ZERO).unwrap(), 15);
     assert!(before.iter().all(|file| !file.exists()));
     assert_eq!(writer.store().verify(), []);
     assert_eq!(writer.store().records(&Query::default()).unwrap().len(), 36);

@@ -12,3 +12,4 @@ mod made;
 mod measure;
 mod queries;
 mod round_trip;
+mod runs;

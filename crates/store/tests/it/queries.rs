@@ -52,6 +52,7 @@ fn questions() -> impl Strategy<Value = Query> {
             part_number: part,
             flight_id: flight,
             position,
+            run_id: None,
             since_utc: since.map(when),
             until_utc: until.map(when),
             last,

@@ -1,0 +1,164 @@
+//! What a run did, log by log: also of a run that was killed before it could say so.
+//!
+//! When a run begins it writes every log it means to do as *not reached*; each log's own account follows
+//! with the commit of its records. So the tables say at any instant what became of each. Between the two
+//! commits of a batch a log has records and no account yet: it is read as *unaccounted*.
+
+use std::collections::BTreeMap;
+use std::slice;
+
+use fleet::{GapRecord, Status};
+use polars::prelude::{col, lit};
+
+use crate::account::{LogAccount, Outcome, RunAccount};
+use crate::error::Error;
+use crate::layout::Store;
+use crate::lock::Lock;
+use crate::query::Query;
+use crate::writer::{self, Writer};
+
+impl Store {
+    /// What became of each log of a run, by name.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn run_logs(&self, run_id: &str) -> Result<Vec<LogAccount>, Error> {
+        let is_of_run = col("run_id").eq(lit(run_id.to_owned()));
+        let logs = self.newest(
+            &self.logs,
+            Some(is_of_run),
+            |stats| stats.may_hold("run_id", run_id),
+            |account: &LogAccount| account.log_path.clone(),
+        )?;
+        let mut logs: BTreeMap<String, LogAccount> =
+            logs.into_iter().map(|account| (account.log_path.clone(), account)).collect();
+        let records = self.records(&Query { run_id: Some(run_id.to_owned()), ..Query::default() })?;
+        for record in &records {
+            let log = logs.entry(record.provenance.log_path.clone()).or_insert_with(|| seen(record));
+            if matches!(log.outcome, Outcome::NotReached | Outcome::Unaccounted) {
+                count(log, record);
+            }
+        }
+        Ok(logs.into_values().collect())
+    }
+
+    /// The newest account of every run, by the time it began.
+    ///
+    /// The figures of a run that has not ended are those of its logs.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn runs(&self) -> Result<Vec<RunAccount>, Error> {
+        let mut runs = self.newest(&self.runs, None, |_| true, |run: &RunAccount| run.run_id.clone())?;
+        for run in runs.iter_mut().filter(|run| !run.has_ended()) {
+            add_up(run, &self.run_logs(&run.run_id)?);
+        }
+        runs.sort_by_key(|run| run.started_utc);
+        Ok(runs)
+    }
+
+    /// Whether somebody writes just now.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the lock cannot be looked at.
+    pub fn is_held(&self) -> Result<bool, Error> {
+        Lock::is_held(&self.lock_file())
+    }
+}
+
+impl Writer {
+    /// Writes down that a run begins, and the logs it means to do, each *not reached* as yet.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
+    pub fn begin_run(&mut self, run: &RunAccount, logs: &[LogAccount]) -> Result<(), Error> {
+        if !logs.is_empty() {
+            writer::account(&self.store().logs, logs)?;
+        }
+        writer::account(&self.store().runs, slice::from_ref(run))
+    }
+
+    /// Writes down how a run ended.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
+    pub fn end_run(&mut self, run: &RunAccount) -> Result<(), Error> {
+        writer::account(&self.store().runs, slice::from_ref(run))
+    }
+
+    /// Finishes the accounts of runs that were killed: who writes holds the lock, so none of them lives.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
+    pub fn close_killed_runs(&mut self) -> Result<Vec<RunAccount>, Error> {
+        let runs = self.store().runs()?;
+        let mut killed: Vec<RunAccount> = runs.into_iter().filter(|run| !run.has_ended()).collect();
+        for run in &mut killed {
+            let logs = self.store().run_logs(&run.run_id)?;
+            let reached = logs.iter().filter(|log| log.outcome != Outcome::NotReached);
+            run.finished_utc = reached.map(|log| log.processed_utc).max().or(Some(run.started_utc));
+            let cut: Vec<LogAccount> =
+                logs.into_iter().filter(|log| log.outcome == Outcome::Unaccounted).collect();
+            if !cut.is_empty() {
+                writer::account(&self.store().logs, &cut)?;
+            }
+            writer::account(&self.store().runs, slice::from_ref(run))?;
+        }
+        Ok(killed)
+    }
+}
+
+/// A log of which only records are stored.
+fn seen(record: &GapRecord) -> LogAccount {
+    LogAccount {
+        log_path: record.provenance.log_path.clone(),
+        size_bytes: 0,
+        modified_utc_ns: 0,
+        file_id: String::new(),
+        log_digest: None,
+        config_digest: None,
+        tail_number: None,
+        flight_id: None,
+        departure_utc: None,
+        positions: Vec::new(),
+        outcome: Outcome::NotReached,
+        estimated: 0,
+        refused: 0,
+        error_code: None,
+        error_detail: None,
+        duration_s: 0.0,
+        run_id: record.provenance.run_id.clone(),
+        processed_utc: record.provenance.processed_utc,
+    }
+}
+
+/// Counts a record into the account of a log that has none of its own.
+fn count(log: &mut LogAccount, record: &GapRecord) {
+    if log.outcome == Outcome::NotReached {
+        log.outcome = Outcome::Unaccounted;
+        log.log_digest = Some(record.provenance.log_digest.clone());
+        log.tail_number = Some(record.flight.tail_number.to_string());
+        log.flight_id = Some(record.flight.flight_id.to_string());
+        log.departure_utc = Some(record.flight.departure_utc);
+        log.processed_utc = record.provenance.processed_utc;
+    }
+    let position = record.position.to_string();
+    if log.positions.contains(&position) {
+        return;
+    }
+    log.positions.push(position);
+    match record.estimate.status {
+        Status::Estimated => log.estimated += 1,
+        Status::Refused => log.refused += 1,
+    }
+}
+
+fn add_up(run: &mut RunAccount, logs: &[LogAccount]) {
+    let with = |wanted: &[Outcome]| logs.iter().filter(|log| wanted.contains(&log.outcome)).count() as i64;
+    run.done = with(&[Outcome::Done, Outcome::Error, Outcome::Unaccounted]);
+    run.errors = with(&[Outcome::Error]);
+    run.not_reached = with(&[Outcome::NotReached]);
+    let stored = || logs.iter().filter(|log| log.outcome != Outcome::Known);
+    run.estimated = stored().map(|log| log.estimated).sum();
+    run.refused = stored().map(|log| log.refused).sum();
+}

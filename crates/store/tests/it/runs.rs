@@ -1,0 +1,148 @@
+//! What a run did is known at any instant, also when it was killed before it could say so.
+
+use fleet::Status;
+use store::{Holder, LogAccount, Outcome, Query, RunAccount, Store, Writer};
+
+use crate::made::{account, record, result, run, writer};
+
+/// The four logs of a run that means to do flights 0 to 3 of tail 1, and does the first three: estimated,
+/// refused in two of its three positions, and broken.
+fn cut_short(writer: &mut Writer) {
+    let to_do: Vec<LogAccount> = (0..4).map(|flight| not_reached(flight, "run")).collect();
+    writer.begin_run(&run("run", "2026-11-20T02:00:00Z", None), &to_do).unwrap();
+    let mut refused = result(1, 1, 0.0);
+    (refused.account.estimated, refused.account.refused) = (1, 2);
+    for record in &mut refused.records[1..] {
+        record.estimate.status = Status::Refused;
+    }
+    let mut broken = account(1, 2);
+    (broken.outcome, broken.estimated) = (Outcome::Error, 0);
+    let broken = store::LogResult { account: broken, records: Vec::new(), retires: Vec::new() };
+    writer.commit(&[result(1, 0, 30e-6), refused, broken]).unwrap();
+}
+
+fn not_reached(flight: i64, run_id: &str) -> LogAccount {
+    LogAccount {
+        outcome: Outcome::NotReached,
+        positions: Vec::new(),
+        estimated: 0,
+        run_id: run_id.into(),
+        ..account(1, flight)
+    }
+}
+
+fn figures(run: &RunAccount) -> [i64; 5] {
+    [run.done, run.estimated, run.refused, run.errors, run.not_reached]
+}
+
+fn outcomes(store: &Store, run_id: &str) -> Vec<Outcome> {
+    store.run_logs(run_id).unwrap().iter().map(|log| log.outcome).collect()
+}
+
+#[test]
+fn a_run_that_was_killed_is_accounted_for_log_by_log() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    cut_short(&mut writer);
+    let store = Store::open(dir.path()).unwrap();
+    let runs = store.runs().unwrap();
+    assert_eq!(figures(&runs[0]), [3, 4, 2, 1, 1]);
+    assert_eq!((runs[0].exit_code, runs[0].has_ended()), (None, false));
+    assert_eq!(outcomes(&store, "run"), [Outcome::Done, Outcome::Done, Outcome::Error, Outcome::NotReached]);
+    assert_eq!(store.info().unwrap().last, Some(runs[0].clone()));
+}
+
+/// The commit of records comes before that of their accounts: a kill between them leaves such a store.
+#[test]
+fn records_without_an_account_are_counted_and_their_log_is_done_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    let to_do: Vec<LogAccount> = (0..2).map(|flight| not_reached(flight, "run")).collect();
+    writer.begin_run(&run("run", "2026-11-20T02:00:00Z", None), &to_do).unwrap();
+    writer.commit(&[result(1, 0, 30e-6)]).unwrap();
+    let logs = dir.path().join("logs/_delta_log");
+    let last = |n: u64| logs.join(format!("{n:020}.json"));
+    assert!(last(2).exists() && !last(3).exists());
+    std::fs::remove_file(last(2)).unwrap();
+
+    assert_eq!(outcomes(writer.store(), "run"), [Outcome::Unaccounted, Outcome::NotReached]);
+    assert_eq!(figures(&writer.store().runs().unwrap()[0]), [1, 3, 0, 0, 1]);
+    assert_eq!(writer.store().accounts().unwrap(), [], "the next run must do both");
+}
+
+#[test]
+fn the_next_run_closes_the_account_of_a_killed_one_for_good() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    cut_short(&mut writer);
+    let closed = writer.close_killed_runs().unwrap();
+    assert_eq!(closed.iter().map(figures).collect::<Vec<_>>(), [[3, 4, 2, 1, 1]]);
+    assert_eq!((closed[0].has_ended(), closed[0].exit_code), (true, None));
+    assert_eq!(writer.close_killed_runs().unwrap(), []);
+    // The next run supersedes what the killed one stored; the account of that night stays.
+    let mut again = result(1, 0, 31e-6);
+    again.account.run_id = "next".into();
+    again.records.iter_mut().for_each(|record| record.provenance.run_id = "next".into());
+    writer.commit(&[again]).unwrap();
+    assert_eq!(writer.store().runs().unwrap(), closed);
+    assert_eq!(outcomes(writer.store(), "run").len(), 4);
+}
+
+#[test]
+fn a_log_that_is_not_reached_keeps_what_was_known_of_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    writer.commit(&[result(1, 0, 30e-6)]).unwrap();
+    writer.begin_run(&run("redo", "2026-11-20T02:00:00Z", None), &[not_reached(0, "redo")]).unwrap();
+    assert_eq!(writer.store().accounts().unwrap(), [account(1, 0)]);
+}
+
+#[test]
+fn runs_are_told_in_the_order_in_which_they_began_the_ended_as_they_ended() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    let whole = run("a", "2026-11-20T02:00:00Z", Some(1));
+    writer.begin_run(&run("a", "2026-11-20T02:00:00Z", None), &[]).unwrap();
+    writer.end_run(&whole).unwrap();
+    writer.begin_run(&run("b", "2026-11-19T02:00:00Z", None), &[]).unwrap();
+    let runs = writer.store().runs().unwrap();
+    assert_eq!(runs[0].run_id, "b");
+    assert_eq!(runs[1], whole);
+}
+
+/// DuckDB is handed the list of files, and fails on an empty one.
+#[test]
+fn a_table_always_has_a_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    assert_eq!(writer.store().files().unwrap().len(), 1);
+    let mut retired = result(1, 0, 30e-6);
+    writer.commit(&[retired.clone()]).unwrap();
+    writer.compact().unwrap();
+    let position = |name| store::RecordKey::of(&record(1, 0, name, 0.0));
+    retired.retires = crate::made::POSITIONS.map(position).to_vec();
+    retired.records.clear();
+    writer.commit(&[retired]).unwrap();
+    assert_eq!(writer.store().records(&Query::default()).unwrap(), []);
+    assert_eq!(writer.store().files().unwrap().len(), 1);
+    writer.compact().unwrap();
+    let again = writer.compact().unwrap();
+    assert_eq!((again.before, again.after), (3, 3));
+    assert_eq!(writer.store().verify(), []);
+}
+
+#[test]
+fn who_asks_whether_a_store_is_held_holds_nobody_up() {
+    let dir = tempfile::tempdir().unwrap();
+    let held = writer(dir.path());
+    let store = Store::open(dir.path()).unwrap();
+    assert!(store.is_held().unwrap());
+    drop(held);
+    assert!(!store.is_held().unwrap());
+    std::thread::scope(|scope| {
+        let asking = scope.spawn(|| (0..2_000).for_each(|_| assert!(store.is_held().is_ok())));
+        while !asking.is_finished() {
+            drop(store.lock(&Holder::this_process(), None).unwrap());
+        }
+    });
+}

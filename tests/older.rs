@@ -1,0 +1,54 @@
+//! Stores as earlier releases left them.
+//!
+//! `tests/data/store-0.1` was written by release 0.1 before accounts knew *not reached*: one run over two logs
+//! of the sample fleet, one over the rest of that tail with a log in error, one `--redo` of one log, and a
+//! run on another tail that was killed between the commits of its records and of their accounts.
+
+use crate::bench::{Bench, copy, top};
+
+fn old() -> Bench {
+    let bench = Bench::sample();
+    copy(&top().join("tests/data/store-0.1"), &bench.path("results"));
+    bench
+}
+
+#[test]
+fn an_older_store_is_read_as_it_is() {
+    let bench = old();
+    let mark = std::fs::read(bench.path("results/store.json")).unwrap();
+    assert!(bench.well(&["store", "verify"]).ends_with("is whole\n"));
+    let info = bench.well(&["store", "info"]);
+    assert!(info.contains("52 of 13 flights, 8 units, 2 tails"), "{info}");
+    assert!(info.contains("3 logs done (12 estimated, 0 refused, 0 in error), 0 not reached"), "{info}");
+    assert!(bench.well(&["query", "tail", "N412FP"]).starts_with("40 records"));
+    let runs: serde_json::Value = serde_json::from_str(&bench.well(&["store", "runs", "--json"])).unwrap();
+    let told: Vec<_> =
+        runs.as_array().unwrap().iter().map(|r| (r["done"].as_i64(), r["errors"].as_i64())).collect();
+    assert_eq!(told, [(2, 0), (9, 1), (1, 0), (3, 0)].map(|(done, errors)| (Some(done), Some(errors))));
+    assert_eq!(std::fs::read(bench.path("results/store.json")).unwrap(), mark, "reading changes nothing");
+}
+
+#[test]
+fn a_run_on_an_older_store_ends_where_a_new_one_does() {
+    let bench = old();
+    let account = bench.well(&["run"]);
+    assert!(account.contains("ended without a word: 3 logs done, 0 not reached"), "{account}");
+    let plain = Bench::sample();
+    plain.well(&["run"]);
+    let numbers = |bench: &Bench| without(&bench.exported(), &["program_version"]);
+    assert_eq!(numbers(&bench), numbers(&plain));
+    assert!(bench.well(&["store", "verify"]).ends_with("is whole\n"));
+    bench.well(&["store", "compact"]);
+    assert_eq!(numbers(&bench), numbers(&plain));
+    assert!(bench.well(&["run"]).contains("0 to do, 30 known"));
+}
+
+/// Rows without columns that name the release.
+fn without(rows: &str, columns: &[&str]) -> String {
+    let header: Vec<&str> = rows.lines().next().unwrap_or_default().split(',').collect();
+    let kept = |cells: Vec<&str>| {
+        let cells = header.iter().zip(cells).filter(|(name, _)| !columns.contains(name));
+        cells.map(|(_, cell)| cell).collect::<Vec<_>>().join(",")
+    };
+    rows.lines().map(|line| kept(line.split(',').collect())).collect::<Vec<_>>().join("\n")
+}
