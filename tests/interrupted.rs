@@ -120,7 +120,7 @@ fn two_hundred_kills_lose_nothing_and_double_nothing() {
 }
 
 /// Ten flights of four actuators.
-fn small() -> Bench {
+pub(crate) fn small() -> Bench {
     let bench = Bench::sample();
     bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N413FP/*.parquet");
     bench
@@ -131,7 +131,7 @@ fn null() -> std::process::Stdio {
 }
 
 /// Opens the store as another program would, and counts its records: four for each flight, each once.
-fn whole_flights(bench: &Bench) -> usize {
+pub(crate) fn whole_flights(bench: &Bench) -> usize {
     let store = match store::Store::open(bench.path("results")) {
         Ok(store) => store,
         // Killed before the store was made, or while it was.
@@ -153,10 +153,10 @@ fn whole_flights(bench: &Bench) -> usize {
 }
 
 /// Numbers from 0 to 1, the same for the same seed on every machine.
-struct Chance(u64);
+pub(crate) struct Chance(pub(crate) u64);
 
 impl Chance {
-    fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }

@@ -6,6 +6,8 @@
 mod accounts;
 mod bench;
 mod damaged;
+#[cfg(target_os = "linux")]
+mod disk;
 mod interrupted;
 mod known;
 mod layouts;
