@@ -127,7 +127,7 @@ fn cut(disk: &mut Disk<'_>, chance: &mut Chance, preload: Option<&Path>, mid: bo
     let copy = if mid {
         let mut child = run().spawn().unwrap();
         std::thread::sleep(longest.mul_f64(chance.next()));
-        done(Command::new("kill").args(["-STOP", &child.id().to_string()]))?;
+        done(Command::new("kill").args(["-STOP", &child.id().to_string()])).unwrap();
         let copy = disk.copy();
         child.kill().unwrap();
         child.wait().unwrap();
