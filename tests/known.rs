@@ -56,6 +56,41 @@ fn a_renamed_or_touched_log_is_recognised_by_its_content() {
     assert!(to_do(&bench.well(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
 }
 
+/// A changed byte that neither size nor date betray: it is found when contents are asked for, and only then.
+#[test]
+fn content_is_compared_when_it_is_asked_for() {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    bench.well(&["run"]);
+    let log = &bench.logs()[4];
+    let written = std::fs::metadata(log).unwrap().modified().unwrap();
+    let mut content = std::fs::read(log).unwrap();
+    let middle = content.len() / 2;
+    content[middle] ^= 1;
+    std::fs::write(log, content).unwrap();
+    std::fs::File::options().append(true).open(log).unwrap().set_modified(written).unwrap();
+    assert!(to_do(&bench.well(&["run"])).ends_with("10 logs: 0 to do, 10 known"));
+    let ended = bench.freeplay(&["run", "--verify-content"]);
+    assert!(to_do(&ended.out).ends_with("10 logs: 1 to do, 9 known"), "{ended:?}");
+    let page = bench.well(&["store", "runs", "--run", "last"]);
+    assert!(page.contains("known 9") && page.contains("10 logs"), "{page}");
+}
+
+/// Less memory and more workers than logs move no number.
+#[test]
+fn a_memory_budget_and_idle_workers_change_no_record() {
+    let plain = Bench::sample();
+    plain.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
+    plain.well(&["run", "--jobs", "1"]);
+    for settings in ["", "[run]\nmemory_mib = 1\n\n", "[run]\nmemory_mib = 4\n\n"] {
+        let spread = Bench::sample();
+        spread.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
+        spread.configure("[store]", &format!("{settings}[store]"));
+        spread.well(&["run", "--jobs", "8"]);
+        assert_eq!(spread.exported(), plain.exported(), "{settings}");
+    }
+}
+
 #[test]
 fn a_copy_of_a_log_adds_nothing_whichever_is_read_first() {
     let bench = Bench::sample();

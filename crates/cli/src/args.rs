@@ -282,6 +282,9 @@ pub(crate) struct RunArgs {
     /// All logs again.
     #[arg(long)]
     pub redo: bool,
+    /// Read the content of known logs too, and do those again that changed without a trace in size or date.
+    #[arg(long)]
+    pub verify_content: bool,
     /// Say what would be done and why, and do nothing.
     #[arg(long)]
     pub dry_run: bool,

@@ -1,7 +1,6 @@
 //! One Parquet file: its leaves by name, their values in batches, checked against the footer.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use arrow::array::ArrayRef;
@@ -16,6 +15,7 @@ use crate::error::{Error, Fault};
 use crate::leaf::{self, Leaf};
 use crate::page;
 use crate::pattern::nearest;
+use crate::positioned::{self, Positioned};
 
 /// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
 const BATCH_ROWS: usize = 8192;
@@ -172,7 +172,8 @@ impl LogFile {
 
     fn column(&self, group: usize, leaf: &Leaf) -> Result<Batches, Error> {
         let file = self.file.try_clone().map_err(|source| self.error(Fault::Unreadable { source }))?;
-        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.footer.clone());
+        let builder =
+            ParquetRecordBatchReaderBuilder::new_with_metadata(Positioned(file), self.footer.clone());
         let mask = ProjectionMask::leaves(builder.parquet_schema(), [leaf.index]);
         let reader = builder.with_projection(mask).with_row_groups(vec![group]).with_batch_size(BATCH_ROWS);
         reader.build().map_err(|e| self.decode(leaf, group, e.to_string()))
@@ -217,46 +218,44 @@ impl LogFile {
     /// whatever else was added to it.
     pub(crate) fn feed(&self, names: &[&str], hash: &mut blake3::Hasher) -> Result<(), Error> {
         let unreadable = |source| self.error(Fault::Unreadable { source });
-        let mut file = self.file.try_clone().map_err(unreadable)?;
+        let file = &self.file;
         let length = file.metadata().map_err(unreadable)?.len();
         let mut buffer = Vec::new();
         let wanted: Vec<&Leaf> = self.leaves.iter().filter(|l| names.contains(&l.name.as_str())).collect();
         for group in 0..self.footer.metadata().num_row_groups() {
             for leaf in &wanted {
                 let (start, bytes) = self.chunk(group, leaf).byte_range();
-                feed(hash, &mut file, &mut buffer, start, bytes.min(length.saturating_sub(start)))
+                feed(hash, file, &mut buffer, start, bytes.min(length.saturating_sub(start)))
                     .map_err(unreadable)?;
             }
         }
-        let start = length.saturating_sub(footer_bytes(&mut file, length).map_err(unreadable)?);
-        feed(hash, &mut file, &mut buffer, start, length - start).map_err(unreadable)
+        let start = length.saturating_sub(footer_bytes(file, length).map_err(unreadable)?);
+        feed(hash, file, &mut buffer, start, length - start).map_err(unreadable)
     }
 }
 
 type Batches = parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 
 /// Metadata length, which its own trailer states, plus the eight bytes of that trailer.
-fn footer_bytes(file: &mut File, length: u64) -> std::io::Result<u64> {
+fn footer_bytes(file: &File, length: u64) -> std::io::Result<u64> {
     let mut trailer = [0; 4];
-    file.seek(SeekFrom::Start(length.saturating_sub(8)))?;
-    file.read_exact(&mut trailer)?;
+    positioned::read_exact(file, &mut trailer, length.saturating_sub(8))?;
     Ok((u64::from(u32::from_le_bytes(trailer)) + 8).min(length))
 }
 
 /// Reads a stretch of the file into the hash, a mebibyte at a time.
 fn feed(
     hash: &mut blake3::Hasher,
-    file: &mut File,
+    file: &File,
     buffer: &mut Vec<u8>,
     start: u64,
     bytes: u64,
 ) -> std::io::Result<()> {
     const CHUNK: u64 = 1 << 20;
-    file.seek(SeekFrom::Start(start))?;
     let mut left = bytes;
     while left > 0 {
         buffer.resize(left.min(CHUNK) as usize, 0);
-        file.read_exact(buffer)?;
+        positioned::read_exact(file, buffer, start + bytes - left)?;
         hash.update(buffer);
         left -= buffer.len() as u64;
     }

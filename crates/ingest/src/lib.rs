@@ -24,6 +24,7 @@ pub mod normal;
 mod numbers;
 mod page;
 pub mod pattern;
+mod positioned;
 pub mod propose;
 pub mod quality;
 mod resample;

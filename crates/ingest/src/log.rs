@@ -1,10 +1,10 @@
 //! One flight log: its identity, its actuators, and their channels in SI on one clock.
 
-use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::OnceLock;
 
 use fleet::Position;
 use jiff::Timestamp;
@@ -90,7 +90,7 @@ pub struct Log {
     groups: BTreeMap<String, Sheet>,
     mapping: Arc<Mapping>,
     normalized: Option<Normalized>,
-    names: OnceCell<BTreeSet<String>>,
+    names: OnceLock<BTreeSet<String>>,
 }
 
 impl Log {
@@ -117,7 +117,7 @@ impl Log {
         };
         let normalized = Normalized::of(first)?;
         let mapping = Arc::clone(mapping);
-        let mut log = Self { main, groups, mapping, normalized, names: OnceCell::new() };
+        let mut log = Self { main, groups, mapping, normalized, names: OnceLock::new() };
         log.order_pieces()?;
         Ok(log)
     }
@@ -133,7 +133,7 @@ impl Log {
             }
         }
         self.mapping = Arc::clone(mapping);
-        self.names = OnceCell::new();
+        self.names = OnceLock::new();
         self
     }
 

@@ -5,12 +5,13 @@
 //! its chunk, its values must fit the page, and no page is larger than any writer makes.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
 
 use parquet::basic::Type;
 use parquet::file::metadata::ColumnChunkMetaData;
 use polars_parquet_format::thrift::protocol::TCompactInputProtocol;
 use polars_parquet_format::{Encoding, PageHeader, PageType};
+
+use crate::positioned;
 
 /// Largest page that is decoded. Writers make pages of about 1 MiB; a row group without cuts some tens.
 const LARGEST_PAGE: i64 = 256 << 20;
@@ -64,9 +65,7 @@ impl<'f> Pages<'f> {
         let mut wanted = USUAL_HEADER.min(left);
         loop {
             self.buffer.resize(wanted as usize, 0);
-            let mut file = self.file;
-            file.seek(SeekFrom::Start(self.at)).map_err(|e| e.to_string())?;
-            file.read_exact(&mut self.buffer).map_err(|e| e.to_string())?;
+            positioned::read_exact(self.file, &mut self.buffer, self.at).map_err(|e| e.to_string())?;
             let mut rest = self.buffer.as_slice();
             let mut protocol = TCompactInputProtocol::new(&mut rest, LARGEST_HEADER as usize);
             match PageHeader::read_from_in_protocol(&mut protocol) {

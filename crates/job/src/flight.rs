@@ -104,34 +104,20 @@ impl Opened {
         self.positions.iter().filter(move |at| at.lacking.is_empty() || booked(&at.position))
     }
 
-    /// Estimates every actuator of the log that was installed that day.
+    /// Estimates one actuator of the log.
     ///
-    /// An actuator that cannot be used becomes a complaint; the others go on.
-    pub fn records(
-        &self,
-        config: &Config,
-        installations: &Installations,
-        stamp: &Stamp,
-    ) -> (Vec<GapRecord>, Vec<Complaint>) {
-        let (mut records, mut complaints) = (Vec::new(), Vec::new());
-        for at in self.actuators(installations) {
-            match self.record(at, config, installations, stamp) {
-                Ok(record) => records.push(record),
-                Err(complaint) => complaints.push(complaint.in_file(&self.shown)),
-            }
-        }
-        (records, complaints)
-    }
-
-    fn record(
+    /// # Errors
+    /// A complaint when the actuator cannot be used; the others of the log are not affected.
+    pub fn record(
         &self,
         at: &PositionColumns,
         config: &Config,
         installations: &Installations,
         stamp: &Stamp,
     ) -> Result<GapRecord, Complaint> {
-        let (stay, part) = self.unit(at, config, installations)?;
-        let estimate = self.estimate(at, part, config)?;
+        let in_file = |complaint: Complaint| complaint.in_file(&self.shown);
+        let (stay, part) = self.unit(at, config, installations).map_err(in_file)?;
+        let estimate = self.estimate(at, part, config).map_err(in_file)?;
         Ok(GapRecord {
             flight: self.flight(),
             position: at.position.clone(),

@@ -7,6 +7,7 @@
 pub mod account;
 pub mod backtest;
 mod book;
+mod budget;
 pub mod bundle;
 pub mod estimates;
 pub mod event;

@@ -31,6 +31,8 @@ pub struct Request {
     pub retry: bool,
     /// Every log again.
     pub redo: bool,
+    /// The content of known logs too, though nothing about their files has changed.
+    pub verify_content: bool,
 }
 
 impl Request {
@@ -70,6 +72,8 @@ pub enum Why {
     Retry,
     /// `--redo` asks for it.
     Asked,
+    /// `--verify-content` asks whether it is still what was read.
+    Verify,
 }
 
 impl Why {
@@ -82,6 +86,7 @@ impl Why {
             Self::OwnerGone => "its flight has no other log now",
             Self::Retry => "in error, asked again",
             Self::Asked => "asked again",
+            Self::Verify => "content to be compared",
         }
     }
 }
@@ -330,6 +335,8 @@ impl Judge<'_> {
             Some(Why::OwnerGone)
         } else if self.request.retry && account.outcome == Outcome::Error {
             Some(Why::Retry)
+        } else if self.request.verify_content && account.outcome.is_well() {
+            Some(Why::Verify)
         } else {
             None
         }

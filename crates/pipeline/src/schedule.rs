@@ -2,20 +2,24 @@
 //!
 //! Workers pull the next log from one list, so the longest are begun first and no worker waits for
 //! another. What they finish goes to the one thread that writes: it commits whatever has gathered,
-//! whole flights at a time, so a run that is cut short keeps what it finished.
+//! whole flights at a time, so a run that is cut short keeps what it finished. Workers without a log left
+//! take actuators of the logs that are still in work.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-use fleet::{Complaint, Installations, Status};
+use fleet::{Complaint, GapRecord, Installations, Status};
+use ingest::PositionColumns;
 use jiff::Timestamp;
 use job::flight::{Opened, caught, config_digest, unidentified_digest};
 use job::{Config, Stamp};
+use rayon::prelude::*;
 use store::{Holder, LogAccount, LogResult, Outcome, Query, Store, Writer};
 
 use crate::account::{self, CutShort, Report};
 use crate::book::{Book, Done};
+use crate::budget::Budget;
 use crate::bundle;
 use crate::error::Error;
 use crate::event::Event;
@@ -83,7 +87,7 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let mut writer = locked(&store, context)?;
     let killed = writer.close_killed_runs()?;
     let plan = plan::plan(config, &installations, found, store.accounts()?, request);
-    let workers = workers(request, plan.work.len());
+    let workers = workers(request);
     let started_utc = Timestamp::now();
     let mut report = Report::begin(run_id(started_utc), started_utc, &plan, workers);
     report.cut_short = killed.into_iter().map(CutShort::from).collect();
@@ -94,8 +98,9 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
 
-    let shop =
-        Shop { config, installations: &installations, context, plan: &plan, run_id: &report.run_id.clone() };
+    let run_id = report.run_id.clone();
+    let budget = Budget::new(config.document.run.memory_mib);
+    let shop = Shop { config, installations: &installations, context, plan: &plan, run_id: &run_id, budget };
     let touched = shop.work(workers, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
@@ -150,9 +155,12 @@ fn exit_code(report: &Report, stopped: bool) -> i64 {
     }
 }
 
-fn workers(request: &Request, logs: usize) -> usize {
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    request.jobs.unwrap_or(cores).clamp(1, logs.max(1))
+/// As many as cores, also for one log: its actuators are spread over them.
+fn workers(request: &Request) -> usize {
+    request
+        .jobs
+        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get))
+        .max(1)
 }
 
 /// Names sort as the runs did.
@@ -167,6 +175,7 @@ struct Shop<'a> {
     context: &'a Context<'a>,
     plan: &'a Plan,
     run_id: &'a str,
+    budget: Budget,
 }
 
 impl Shop<'_> {
@@ -283,12 +292,30 @@ impl Shop<'_> {
             program_version: self.context.program_version.to_owned(),
             processed_utc: Timestamp::now(),
         };
-        let (records, complaints) = opened.records(self.config, self.installations, &stamp);
+        let (records, complaints) = self.records(opened, &stamp);
         let refused = records.iter().filter(|r| r.estimate.status == Status::Refused).count();
         account.refused = refused as i64;
         account.estimated = (records.len() - refused) as i64;
         account::complain(&mut account, &complaints);
         Done::Read { account: Box::new(account), records, complaints }
+    }
+
+    /// The records of a log: its actuators are spread over workers that have no log left to take.
+    fn records(&self, opened: &Opened, stamp: &Stamp) -> (Vec<GapRecord>, Vec<Complaint>) {
+        let actuators: Vec<_> = opened.actuators(self.installations).collect();
+        let bytes = Budget::actuator_bytes(opened.rows());
+        let one = |at: &&PositionColumns| {
+            let _held = self.budget.take(bytes);
+            opened.record(at, self.config, self.installations, stamp)
+        };
+        let (mut records, mut complaints) = (Vec::new(), Vec::new());
+        for done in actuators.par_iter().with_max_len(1).map(one).collect::<Vec<_>>() {
+            match done {
+                Ok(record) => records.push(record),
+                Err(complaint) => complaints.push(complaint),
+            }
+        }
+        (records, complaints)
     }
 
     /// The writer's side: gathers, settles who owns a flight, commits.

@@ -79,6 +79,7 @@ fn request(args: &RunArgs) -> Result<Request, Failure> {
         jobs: args.jobs.map(usize::from),
         retry: args.retry,
         redo: args.redo,
+        verify_content: args.verify_content,
     })
 }
 

@@ -25,6 +25,9 @@ pub struct Document {
     /// Where results are kept.
     #[serde(default)]
     pub store: StoreSettings,
+    /// What a run may use of the machine.
+    #[serde(default)]
+    pub run: RunSettings,
     /// Where a log says which flight it is.
     #[serde(default)]
     pub identity: IdentityMapping,
@@ -122,6 +125,16 @@ impl Default for StoreSettings {
     fn default() -> Self {
         Self { path: "results".into() }
     }
+}
+
+/// `[run]`.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunSettings {
+    /// An actuator is not begun while those in work would need more memory with it, MiB; one is always let
+    /// in. No limit by default.
+    #[serde(default)]
+    pub memory_mib: Option<u64>,
 }
 
 /// Which estimator fills `gap_m`.
