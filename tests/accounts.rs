@@ -76,6 +76,28 @@ fn the_run_after_a_killed_one_says_so_and_does_the_rest() {
     assert_eq!(records(&bench), 116, "29 sound logs of four actuators");
 }
 
+/// The list of files holds each row once, where the folder holds superseded files too.
+#[test]
+fn the_list_of_files_holds_every_row_once() {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    bench.well(&["run", "--limit", "6"]);
+    bench.well(&["run", "--redo", "--limit", "2"]);
+    let rows = |table: &str| -> i64 {
+        let listed = bench.well(&["store", "files", "--table", table]);
+        let rows = |file: &str| {
+            let file = std::fs::File::open(file).unwrap();
+            let footer =
+                parquet::file::metadata::ParquetMetaDataReader::new().parse_and_finish(&file).unwrap();
+            footer.file_metadata().num_rows()
+        };
+        listed.lines().map(rows).sum()
+    };
+    assert_eq!(rows("gaps"), 24);
+    // Two rows for each log that was to be done, and two for each run.
+    assert_eq!((rows("logs"), rows("runs")), (16, 4));
+}
+
 #[test]
 fn the_logs_of_a_run_are_told_by_class_and_reason() {
     let bench = Bench::sample();

@@ -467,6 +467,12 @@ pub(crate) enum StoreCommand {
         #[command(flatten)]
         output: Output,
     },
+    /// The data files of a table as of now, one a line, for engines that read no Delta log
+    Files {
+        /// The table.
+        #[arg(long, value_enum, default_value_t = Table::Gaps)]
+        table: Table,
+    },
     /// Look for missing, changed or doubled data
     Verify,
     /// Merge small files, sorted for queries
@@ -476,6 +482,17 @@ pub(crate) enum StoreCommand {
         #[command(flatten)]
         output: Output,
     },
+}
+
+/// Tables of the store.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Table {
+    /// One row per actuator and flight.
+    Gaps,
+    /// The accounts of logs.
+    Logs,
+    /// The accounts of runs.
+    Runs,
 }
 
 /// `completions`.

@@ -95,7 +95,23 @@ impl Store {
     /// # Errors
     /// [`Error::Table`] when the log cannot be read.
     pub fn files(&self) -> Result<Vec<PathBuf>, Error> {
-        Ok(self.gaps.snapshot()?.files.into_iter().map(|file| file.path).collect())
+        files_of(&self.gaps)
+    }
+
+    /// The same of the accounts of logs.
+    ///
+    /// # Errors
+    /// As [`Store::files`].
+    pub fn log_files(&self) -> Result<Vec<PathBuf>, Error> {
+        files_of(&self.logs)
+    }
+
+    /// The same of the accounts of runs.
+    ///
+    /// # Errors
+    /// As [`Store::files`].
+    pub fn run_files(&self) -> Result<Vec<PathBuf>, Error> {
+        files_of(&self.runs)
     }
 
     pub(crate) fn select(
@@ -143,4 +159,6 @@ fn months(snapshot: &Snapshot) -> Vec<(Option<Timestamp>, Option<Timestamp>)> {
         return vec![(None, None)];
     };
     (first..=last).step_by(MONTH_US as usize).map(|from| (edge(from), edge(from + MONTH_US))).collect()
+fn files_of(table: &Table) -> Result<Vec<PathBuf>, Error> {
+    Ok(table.snapshot()?.files.into_iter().map(|file| file.path).collect())
 }

@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use serde_json::json;
 use store::{Holder, Info, Query, RunAccount, Store};
 
-use crate::args::{Format, Global, Output, StoreArgs, StoreCommand};
+use crate::args::{Format, Global, Output, StoreArgs, StoreCommand, Table};
 use crate::exit::{Code, Failure};
 use crate::progress::span;
 use crate::rows;
@@ -25,10 +25,22 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, talk: &Talk) -> Result<Co
     match &args.command {
         StoreCommand::Info { max_age, json } => info(&store, *max_age, *json, talk),
         StoreCommand::Runs { run, last, output } => runs::runs(&store, run.as_deref(), *last, output, talk),
+        StoreCommand::Files { table } => files(&store, *table, talk),
         StoreCommand::Verify => verify(&store, talk),
         StoreCommand::Compact => compact(&store, talk),
         StoreCommand::Export { output } => export(&store, output, talk),
     }
+}
+
+fn files(store: &Store, table: Table, talk: &Talk) -> Result<Code, Failure> {
+    let files = match table {
+        Table::Gaps => store.files()?,
+        Table::Logs => store.log_files()?,
+        Table::Runs => store.run_files()?,
+    };
+    let lines: String = files.iter().map(|file| format!("{}\n", file.display())).collect();
+    talk.answer(&lines)?;
+    Ok(Code::Well)
 }
 
 fn info(store: &Store, max_age: Option<Duration>, as_json: bool, talk: &Talk) -> Result<Code, Failure> {
