@@ -36,7 +36,10 @@ def sail(gaps):
     server.start()
     spark = SparkSession.builder.remote(f"sc://localhost:{server.listening_address[1]}").getOrCreate()
     spark.read.format("delta").load(gaps).createOrReplaceTempView("gaps")
-    return tuple(spark.sql(f"select {ASKED} from gaps").collect()[0])
+    answer = tuple(spark.sql(f"select {ASKED} from gaps").collect()[0])
+    spark.stop()
+    server.stop()
+    return answer
 
 
 def main(store):
