@@ -4,6 +4,31 @@ use std::io::Read;
 
 use crate::bench::Bench;
 
+/// Each line of stderr is an object with a time, a level and an event; the answer stays what it is.
+#[test]
+fn logs_are_structured_when_that_is_asked_for() {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    std::fs::write(&bench.logs()[0], b"broken").unwrap();
+    let ended = bench.freeplay(&["run", "--log-format", "json", "--json"]);
+    assert_eq!(ended.code, Some(1), "{ended:?}");
+    let lines: Vec<serde_json::Value> =
+        ended.err.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert!(
+        lines.iter().all(|l| l["time_utc"].is_string() && l["level"].is_string() && l["event"].is_string())
+    );
+    let with = |event: &str| lines.iter().filter(|line| line["event"] == event).collect::<Vec<_>>();
+    assert_eq!(with("planned")[0]["logs"], 10);
+    assert_eq!(with("log_finished").len(), 10);
+    assert_eq!(with("complaint")[0]["code"], "not_parquet");
+    let stored: u64 = with("stored").iter().map(|line| line["logs"].as_u64().unwrap()).sum();
+    assert_eq!(stored, 10);
+    let report: serde_json::Value = serde_json::from_str(&ended.out).unwrap();
+    assert_eq!(report["done"], 10);
+    let wrong = bench.freeplay(&["run", "--config", "none.toml", "--log-format", "json"]);
+    assert!(wrong.err.lines().all(|line| line.starts_with('{')), "{}", wrong.err);
+}
+
 #[test]
 fn every_command_has_a_purpose_and_an_example() {
     let bench = Bench::empty();

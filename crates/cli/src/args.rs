@@ -46,9 +46,21 @@ pub(crate) struct Global {
     /// No progress bar or progress lines.
     #[arg(long, global = true)]
     pub no_progress: bool,
+    /// What stderr gets: lines for people, or one JSON object a line for whoever collects logs.
+    #[arg(long, global = true, value_enum, default_value_t = LogFormat::Text, value_name = "FORM")]
+    pub log_format: LogFormat,
     /// Colour in what people read.
     #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN")]
     pub color: Color,
+}
+
+/// Form of what is said beside the answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LogFormat {
+    /// For people.
+    Text,
+    /// For machines.
+    Json,
 }
 
 /// When to colour.

@@ -6,6 +6,7 @@
 mod args;
 mod commands;
 mod exit;
+mod journal;
 mod progress;
 mod rows;
 mod table;

@@ -4,8 +4,11 @@ use std::io::{self, IsTerminal, Write};
 
 use fleet::Complaint;
 
-use crate::args::{Color, Global};
+use pipeline::Event;
+
+use crate::args::{Color, Global, LogFormat};
 use crate::exit::{Code, Failure};
+use crate::journal;
 
 /// Of alike complaints so many are shown whole.
 const SHOWN_WHOLE: usize = 3;
@@ -22,6 +25,7 @@ pub(crate) struct Talk {
     verbose: u8,
     progress: bool,
     color_err: bool,
+    form: LogFormat,
 }
 
 impl Talk {
@@ -33,11 +37,13 @@ impl Talk {
             Color::Never => false,
             Color::Auto => auto,
         };
+        let json = global.log_format == LogFormat::Json;
         Self {
             quiet: global.quiet,
             verbose: global.verbose,
-            progress: !(global.no_progress || global.quiet),
+            progress: !(global.no_progress || global.quiet || json),
             color_err,
+            form: global.log_format,
         }
     }
 
@@ -65,12 +71,22 @@ impl Talk {
     /// Says something in passing, on stderr.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
-            self.err(text);
+            self.err(&if self.is_json() { journal::note(text) } else { text.to_owned() });
+        }
+    }
+
+    /// Tells whoever collects logs what happens while a run goes on; people see its progress instead.
+    pub(crate) fn event(&self, event: &Event) {
+        if self.is_json() && !self.quiet {
+            self.err(&journal::event(event));
         }
     }
 
     /// Shows a complaint, on stderr.
     pub(crate) fn complain(&self, complaint: &Complaint) {
+        if self.is_json() {
+            return self.err(&journal::complaint(complaint));
+        }
         let text = escape(&complaint.to_string());
         self.err(&if self.color_err { painted(&text) } else { text });
     }
@@ -81,14 +97,22 @@ impl Talk {
         for complaint in complaints {
             let count = seen.entry(&complaint.code).or_default();
             *count += 1;
-            if *count <= SHOWN_WHOLE || self.verbose() {
+            if *count <= SHOWN_WHOLE || self.shows_all() {
                 self.complain(complaint);
             }
         }
-        let more = seen.into_iter().filter(|(_, count)| *count > SHOWN_WHOLE && !self.verbose());
+        let more = seen.into_iter().filter(|(_, count)| *count > SHOWN_WHOLE && !self.shows_all());
         more.for_each(|(code, count)| {
             self.err(&format!("{} more like it [{code}]; -v shows all", count - SHOWN_WHOLE));
         });
+    }
+
+    fn is_json(&self) -> bool {
+        self.form == LogFormat::Json
+    }
+
+    fn shows_all(&self) -> bool {
+        self.verbose() || self.is_json()
     }
 
     /// Tells why a command could not answer.
@@ -96,7 +120,7 @@ impl Talk {
         match failure {
             Failure::Refused(complaints) => {
                 self.complain_all(complaints);
-                self.err("nothing was run");
+                self.note("nothing was run");
             }
             Failure::Failed(complaint) => self.complain(complaint),
             Failure::PipeClosed => {}

@@ -35,7 +35,10 @@ pub(crate) fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, 
     let stop = Arc::new(AtomicBool::new(false));
     listen(&stop)?;
     let progress = Progress::new("run", talk);
-    let watch = |event: Event| follow(&event, &progress);
+    let watch = |event: Event| {
+        talk.event(&event);
+        follow(&event, &progress);
+    };
     let context = Context {
         program_version: VERSION,
         holder: Holder::this_process(),
