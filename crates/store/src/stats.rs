@@ -1,5 +1,7 @@
 //! What Delta's log says about a file's content without opening it: rows, and bounds of its columns.
 
+use std::collections::BTreeSet;
+
 use arrow::array::{Array, AsArray, RecordBatch};
 use arrow::compute::{max, max_string, min, min_string};
 use arrow::datatypes::{DataType, TimestampMicrosecondType};
@@ -10,6 +12,13 @@ use serde_json::{Map, Value, json};
 /// Bounds of times are kept in whole milliseconds: other engines cut them there.
 const MILLI_US: i64 = 1_000;
 
+/// Of so few units at most their numbers are listed: files sorted by tail hold few, a night's file holds all.
+const LISTED_UNITS: usize = 256;
+
+/// The column of units, and where in the statistics its values stand. Every engine passes over names it does
+/// not know.
+const UNITS: (&str, &str) = ("serial_number", "freeplaySerials");
+
 /// A file's statistics as read from the log. What is not known is left out, and never prunes.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
@@ -18,6 +27,8 @@ pub(crate) struct Stats {
     pub(crate) num_records: Option<i64>,
     min_values: Map<String, Value>,
     max_values: Map<String, Value>,
+    /// The units in the file; a unit moves between tails, so bounds alone would rule out no file.
+    freeplay_serials: Option<BTreeSet<String>>,
 }
 
 impl Stats {
@@ -30,7 +41,9 @@ impl Stats {
     pub(crate) fn may_hold(&self, column: &str, value: &str) -> bool {
         let bound =
             |bounds: &Map<String, Value>| bounds.get(column).and_then(Value::as_str).map(str::to_owned);
-        bound(&self.min_values).is_none_or(|low| low.as_str() <= value)
+        let listed = self.freeplay_serials.as_ref().filter(|_| column == UNITS.0);
+        listed.is_none_or(|units| units.contains(value))
+            && bound(&self.min_values).is_none_or(|low| low.as_str() <= value)
             && bound(&self.max_values).is_none_or(|high| value <= high.as_str())
     }
 
@@ -66,8 +79,25 @@ pub(crate) fn of(batch: &RecordBatch) -> String {
             nulls.insert(field.name().clone(), json!(0));
         }
     }
-    json!({ "numRecords": batch.num_rows(), "minValues": low, "maxValues": high, "nullCount": nulls })
-        .to_string()
+    let mut stats =
+        json!({ "numRecords": batch.num_rows(), "minValues": low, "maxValues": high, "nullCount": nulls });
+    if let Some(units) = units(batch) {
+        stats[UNITS.1] = json!(units);
+    }
+    stats.to_string()
+}
+
+/// The units in a batch, where it has such a column and they are few.
+fn units(batch: &RecordBatch) -> Option<BTreeSet<&str>> {
+    let values = batch.column_by_name(UNITS.0)?.as_string_opt::<i32>()?;
+    let mut units = BTreeSet::new();
+    for unit in values.iter().flatten() {
+        units.insert(unit);
+        if units.len() > LISTED_UNITS {
+            return None;
+        }
+    }
+    Some(units)
 }
 
 fn bounds(array: &dyn Array) -> Option<(Value, Value)> {

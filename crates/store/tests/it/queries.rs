@@ -91,6 +91,34 @@ fn files_that_cannot_hold_an_answer_are_not_opened() {
     assert!(store.records(&Query::default()).is_err());
 }
 
+/// A unit moves between tails, and its number says nothing of theirs: bounds would rule out no file.
+#[test]
+fn a_units_life_opens_only_files_that_hold_it_also_after_a_checkpoint() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    for tail in 0..25 {
+        let mut result = result(tail, 0, 30e-6);
+        for (position, record) in result.records.iter_mut().enumerate() {
+            let number = (tail * 7 + position * 40) % 100;
+            record.serial_number = fleet::SerialNumber::new(format!("{number:02}")).unwrap();
+        }
+        writer.commit(&[result]).unwrap();
+    }
+    assert!(dir.path().join("gaps/_delta_log/_last_checkpoint").exists());
+    let wanted = Query { serial_number: Some("21".into()), ..Query::default() };
+    let found = writer.store().records(&wanted).unwrap();
+    assert!(!found.is_empty());
+    let tails: Vec<&str> = found.iter().map(|r| r.flight.tail_number.as_str()).collect();
+    // Without every other file the answer is the same: they are not opened.
+    for file in writer.store().files().unwrap() {
+        let version: usize = file.file_name().unwrap().to_str().unwrap()[..12].parse().unwrap();
+        if version > 0 && !tails.contains(&format!("N{}", version - 1).as_str()) {
+            std::fs::remove_file(file).unwrap();
+        }
+    }
+    assert_eq!(Store::open(dir.path()).unwrap().records(&wanted).unwrap(), found);
+}
+
 #[test]
 fn every_unit_is_listed_once() {
     let dir = tempfile::tempdir().unwrap();
