@@ -159,6 +159,8 @@ fn months(snapshot: &Snapshot) -> Vec<(Option<Timestamp>, Option<Timestamp>)> {
         return vec![(None, None)];
     };
     (first..=last).step_by(MONTH_US as usize).map(|from| (edge(from), edge(from + MONTH_US))).collect()
+}
+
 fn files_of(table: &Table) -> Result<Vec<PathBuf>, Error> {
     Ok(table.snapshot()?.files.into_iter().map(|file| file.path).collect())
 }
