@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3};
 
 use crate::error::Error;
+use crate::exponential::exponential;
 use crate::model::{Actuator, positive};
 
 /// x(k+1) = A_d x(k) + B_d u(k), with C_d = C = [1 0 0] (23).
@@ -26,7 +27,7 @@ impl Discrete {
         let mut whole = Matrix4::zeros();
         whole.fixed_view_mut::<3, 3>(0, 0).copy_from(&(actuator.a() * step_s));
         whole.fixed_view_mut::<3, 1>(0, 3).copy_from(&(actuator.b() * step_s));
-        let exp = whole.exp();
+        let exp = exponential(&whole);
         Ok(Self {
             a_d: exp.fixed_view::<3, 3>(0, 0).into_owned(),
             b_d: exp.fixed_view::<3, 1>(0, 3).into_owned(),
@@ -42,7 +43,7 @@ pub(crate) fn white_covariance(actuator: &Actuator, q_c: &Matrix3<f64>, step_s: 
     whole.fixed_view_mut::<3, 3>(0, 0).copy_from(&(-a * step_s));
     whole.fixed_view_mut::<3, 3>(0, 3).copy_from(&(q_c * step_s));
     whole.fixed_view_mut::<3, 3>(3, 3).copy_from(&(a.transpose() * step_s));
-    let exp = whole.exp();
+    let exp = exponential(&whole);
     let a_d = exp.fixed_view::<3, 3>(3, 3).transpose();
     let q_d = a_d * exp.fixed_view::<3, 3>(0, 3);
     (q_d + q_d.transpose()) * 0.5

@@ -1,11 +1,12 @@
 //! The linear Kalman filter (equations 24–28), one sample at a time and without allocating.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{ComplexField, Matrix3, Vector3};
 
 use crate::discretise::Discrete;
 use crate::error::Error;
 use crate::model::Actuator;
 use crate::noise::{Covariances, Noise};
+#[cfg(feature = "std")]
 pub use crate::track::{Innovations, Track};
 
 /// Variance of the initial speed, (m/s)², and of the initial backlash, m²: the paper gives none.
@@ -153,7 +154,7 @@ impl Filter {
     /// # Errors
     /// As [`Filter::settled`].
     pub fn bandwidth_hz(&self) -> Result<f64, Error> {
-        Ok(-self.spectral_radius()?.ln() / (std::f64::consts::TAU * self.step_s))
+        Ok(-ComplexField::ln(self.spectral_radius()?) / (core::f64::consts::TAU * self.step_s))
     }
 
     /// ρ of (I − K C) A_d: a wrong start is forgotten by this factor at each step.
@@ -167,14 +168,15 @@ impl Filter {
             keep[(row, 0)] -= gain[row];
         }
         let poles = (keep * self.discrete.a_d).complex_eigenvalues();
-        Ok(poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max))
+        Ok(poles.iter().map(|pole| pole.modulus()).fold(0.0, f64::max))
     }
 }
 
 /// The largest difference of two covariances. Entries are of several units; each is held against the
 /// spread of its own two states.
 pub(crate) fn distance(p: &Matrix3<f64>, other: &Matrix3<f64>) -> f64 {
-    let entry = |i: usize, j: usize| (p[(i, j)] - other[(i, j)]).abs() / (p[(i, i)] * p[(j, j)]).sqrt();
+    let entry =
+        |i: usize, j: usize| (p[(i, j)] - other[(i, j)]).abs() / ComplexField::sqrt(p[(i, i)] * p[(j, j)]);
     (0..9).map(|k| entry(k / 3, k % 3)).fold(0.0, f64::max)
 }
 

@@ -4,29 +4,51 @@
 //! The crate sees an actuator and slices of `f64`. No paths, no clock, no threads; the same input
 //! gives the same bits. Equation numbers are those of *The Backlash Gap size Estimation for
 //! Electromechanical Actuator in an Operational Behavior*; where print and meaning differ the item says so.
+//!
+//! Without the feature `std`, and with `libm`, what remains needs neither a standard library nor an
+//! allocator: model, discretisation, noise, filter, [`Stream`] and [`RunningGap`], for a controller on
+//! board.
 
+#![cfg_attr(not(feature = "std"), no_std)]
+
+#[cfg(not(any(feature = "std", feature = "libm")))]
+compile_error!("without `std` the estimator needs the feature `libm` for its square roots and exponentials");
+
+#[cfg(feature = "std")]
 pub mod contact;
 pub mod discretise;
 mod error;
+mod exponential;
 pub mod filter;
+mod folded;
 pub mod gap;
+#[cfg(feature = "std")]
 pub mod load;
+#[cfg(feature = "std")]
 pub mod midrange;
 pub mod model;
 pub mod noise;
+pub mod running;
+pub mod stream;
+#[cfg(feature = "std")]
 mod track;
 
+#[cfg(feature = "std")]
 pub use contact::ContactGap;
 pub use discretise::Discrete;
 pub use error::Error;
 pub use filter::{Estimate, Filter, Step};
 pub use gap::Gap;
+#[cfg(feature = "std")]
 pub use midrange::MidRange;
 pub use model::Actuator;
 pub use noise::Noise;
+pub use running::{Reading, RunningGap};
+pub use stream::Stream;
+#[cfg(feature = "std")]
 pub use track::{Innovations, Track};
 
-use std::ops::Range;
+use core::ops::Range;
 
 /// One actuator's channels in one flight: all that an estimate may know.
 #[derive(Debug, Clone, Copy)]

@@ -1,8 +1,8 @@
 //! The actuator brought to the screw axis, and its relative dynamics (equations 1–17).
 
-use std::f64::consts::TAU;
+use core::f64::consts::TAU;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{ComplexField, Matrix3, Vector3};
 
 use crate::error::Error;
 
@@ -17,7 +17,7 @@ pub fn motor_position_m(angle_rad: f64, lead_m_per_rev: f64) -> f64 {
 ///
 /// The paper prints J_m (r/2π)², which is no mass (kg·m⁴).
 pub fn reflected_mass_kg(inertia_kg_m2: f64, lead_m_per_rev: f64) -> f64 {
-    inertia_kg_m2 * (TAU / lead_m_per_rev).powi(2)
+    inertia_kg_m2 * ComplexField::powi(TAU / lead_m_per_rev, 2)
 }
 
 /// Stiffness, damping and screw mass of an actuator at the screw axis.

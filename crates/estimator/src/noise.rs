@@ -1,8 +1,8 @@
 //! Noise levels nobody has to guess: from sensor facts and a bandwidth, or as given.
 
-use std::f64::consts::TAU;
+use core::f64::consts::TAU;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{ComplexField, Matrix3, Vector3};
 
 use crate::discretise::{Discrete, white_covariance};
 use crate::error::Error;
@@ -87,7 +87,7 @@ impl Sensors {
         positive("bandwidth_hz", self.bandwidth_hz)?;
         let v_d_m2 = self.variance_m2();
         positive("measurement variance", v_d_m2)?;
-        let g = -(-TAU * self.bandwidth_hz * step_s).exp_m1();
+        let g = -ComplexField::exp_m1(-TAU * self.bandwidth_hz * step_s);
         let slack = self.unknown_force_n / actuator.stiffness_n_per_m();
         let q = (v_d_m2 + slack * slack) * g * g / (1.0 - g);
         let force = discrete.b_d * discrete.b_d.transpose() * (self.unknown_force_n * self.unknown_force_n);

@@ -5,15 +5,12 @@
 //! the processor runs side by side. A missing sample sets the covariance moving again, and the plain
 //! recursion runs until it is back.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use crate::Samples;
 use crate::error::Error;
-use crate::filter::{Filter, Step, distance};
-
-/// The folded map takes over when the covariance is this near to its limit, as a share of itself. The
-/// difference leaves a share as small in S, and is forgotten.
-const NEAR: f64 = 1e-13;
+use crate::filter::Filter;
+use crate::folded::Folded;
 
 /// S(t) of one actuator's flight, and how well the model explained it.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,63 +139,4 @@ impl Pass<'_> {
 /// How many samples from here have both a measurement and a load before it.
 fn whole_until(y_m: &[f64], load_n: &[f64]) -> usize {
     y_m.iter().zip(load_n).position(|(y, u)| (y + u).is_nan()).unwrap_or(y_m.len())
-}
-
-/// Predict and correct in one, at the settled gain K: F = (I − K C) A_d, g = (I − K C) B_d, k = K.
-#[derive(Debug, Clone, Copy)]
-struct Folded {
-    f: [[f64; 3]; 3],
-    g: [f64; 3],
-    k: [f64; 3],
-    /// First rows of A_d and B_d, which predict y.
-    a: [f64; 3],
-    b: f64,
-    variance_m2: f64,
-    p: Matrix3<f64>,
-}
-
-impl Folded {
-    fn new(filter: &Filter, gain: &Vector3<f64>, p: &Matrix3<f64>) -> Self {
-        let (a_d, b_d) = (&filter.discrete().a_d, &filter.discrete().b_d);
-        Self {
-            f: std::array::from_fn(|i| std::array::from_fn(|j| a_d[(i, j)] - gain[i] * a_d[(0, j)])),
-            g: std::array::from_fn(|i| b_d[i] - gain[i] * b_d[0]),
-            k: std::array::from_fn(|i| gain[i]),
-            a: std::array::from_fn(|j| a_d[(0, j)]),
-            b: b_d[0],
-            variance_m2: p[(0, 0)] + filter.noise().v_d_m2,
-            p: *p,
-        }
-    }
-
-    /// Whether a correction was made with a covariance near to the limit this map belongs to.
-    fn suits(&self, step: &Step) -> bool {
-        !step.innovation_m.is_nan() && distance(&self.p, &step.prior.p) <= NEAR
-    }
-
-    /// The last state, and the sum of the squared innovations.
-    ///
-    /// Sums are taken as trees, or each sample would wait for eight additions in a row.
-    #[inline]
-    fn run(
-        &self,
-        x: Vector3<f64>,
-        y_m: &[f64],
-        load_n: &[f64],
-        s_m: &mut [f64],
-        mut note: impl FnMut(usize, f64),
-    ) -> (Vector3<f64>, f64) {
-        let Self { f, g, k, a, b, .. } = self;
-        let [mut x0, mut x1, mut x2] = [x[0], x[1], x[2]];
-        let mut squares_m2 = 0.0;
-        for (at, ((&y, &u), s)) in y_m.iter().zip(load_n).zip(s_m).enumerate() {
-            let e = (y - b * u) - (a[0] * x0 + (a[1] * x1 + a[2] * x2));
-            let next = |i: usize| ((g[i] * u + k[i] * y) + f[i][0] * x0) + (f[i][1] * x1 + f[i][2] * x2);
-            [x0, x1, x2] = [next(0), next(1), next(2)];
-            *s = x2;
-            squares_m2 += e * e;
-            note(at, e);
-        }
-        (Vector3::new(x0, x1, x2), squares_m2)
-    }
 }

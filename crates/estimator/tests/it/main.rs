@@ -6,5 +6,6 @@
 mod contact;
 mod flights;
 mod laws;
+mod stream;
 mod table;
 mod vectors;

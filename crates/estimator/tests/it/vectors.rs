@@ -11,26 +11,26 @@ use serde_json::Value;
 
 use crate::table::columns;
 
-const SETS: [&str; 4] =
+pub(crate) const SETS: [&str; 4] =
     ["a_nominal_250hz", "b_stiff_light_1khz", "c_soft_heavy_100hz_missing", "d_rotary_200hz"];
 
 fn data(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/lkf").join(name)
 }
 
-struct Set {
+pub(crate) struct Set {
     json: Value,
-    columns: std::collections::BTreeMap<String, Vec<f64>>,
+    pub(crate) columns: std::collections::BTreeMap<String, Vec<f64>>,
 }
 
 impl Set {
-    fn load(name: &str) -> Self {
+    pub(crate) fn load(name: &str) -> Self {
         let all: Value = serde_json::from_reader(File::open(data("vectors.json")).unwrap()).unwrap();
         let columns = columns(&data(&format!("{name}.parquet")));
         Self { json: all[name].clone(), columns }
     }
 
-    fn number(&self, key: &str) -> f64 {
+    pub(crate) fn number(&self, key: &str) -> f64 {
         self.json[key].as_f64().unwrap()
     }
 
@@ -63,11 +63,11 @@ impl Set {
     }
 
     /// The noise as the rows have it, so that a last digit of W_d is not blamed on the recursion.
-    fn as_given(&self) -> Noise {
+    pub(crate) fn as_given(&self) -> Noise {
         Noise::PerStep { w_d: Self::matrix(&self.json["W_d"]), v_d_m2: self.number("V_d") }
     }
 
-    fn filter(&self, noise: &Noise) -> Filter {
+    pub(crate) fn filter(&self, noise: &Noise) -> Filter {
         Filter::new(&self.actuator(), self.step_s(), noise).unwrap()
     }
 }

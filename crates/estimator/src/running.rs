@@ -1,0 +1,163 @@
+//! The gap statistic as the samples come, in memory that does not grow.
+//!
+//! The batch needs S twice: for its mid-range, then for the means above and below. Here S is kept as
+//! counts and sums in bins of one width, beside its exact extremes. All bins but the one that holds the
+//! mid-range then fall whole on one side, and their sums are exact; what that one bin may hide is
+//! bounded, and every reading carries the bounds. Adding a sample touches one bin; reading goes once
+//! over all of them. Neither takes longer for one flight than for another.
+//!
+//! Measured against the batch on 48 simulated flights of a minute (friction half to three times the
+//! nominal, 50 and 125 Hz), largest error as a share of ΔS:
+//!
+//! | gap | bins of 1 µm | 2 µm | 4 µm | 8 µm | no bins |
+//! |---|---|---|---|---|---|
+//! | 30 µm | 0.02 % | 0.09 % | 0.16 % | 1.1 % | 2.6 % |
+//! | 60 µm | 0.005 % | 0.03 % | 0.12 % | 0.7 % | 3.3 % |
+//! | 100 µm | 0.002 % | 0.008 % | 0.03 % | 0.02 % | 6.8 % |
+//! | 300 µm | 0.001 % | 0.004 % | 0.004 % | 0.01 % | 4.3 % |
+//!
+//! So bins of a fifteenth of the smallest gap keep within 0.2 %, which the tests hold. "No bins" is the
+//! cheaper way, two sums divided at the mid-range as known when each sample came: on the reference
+//! vectors it is off by up to 34 %, the histogram by less than 1e-12.
+
+use crate::error::Error;
+use crate::model::positive;
+
+/// Counts and sums of S in `BINS` bins of one width, centred on the first sample.
+///
+/// What lies beyond the outermost bins counts in them, and is no less exact while the mid-range stays
+/// within. 256 bins take 4 KiB.
+#[derive(Debug, Clone, Copy)]
+pub struct RunningGap<const BINS: usize> {
+    bin_m: f64,
+    /// The first S, m; the others are held relative to it.
+    origin_m: f64,
+    least_m: f64,
+    greatest_m: f64,
+    bins: [Bin; BINS],
+}
+
+/// ΔS of everything added so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// ΔS, the bin of the mid-range taken to be evenly filled, m.
+    pub gap_m: f64,
+    /// The batch's ΔS is no smaller, m.
+    pub least_m: f64,
+    /// The batch's ΔS is no greater, m.
+    pub greatest_m: f64,
+    /// Samples it stands on.
+    pub samples: u64,
+}
+
+/// Samples, and their sum relative to the origin.
+#[derive(Debug, Clone, Copy, Default)]
+struct Bin {
+    count: u64,
+    sum_m: f64,
+}
+
+impl Bin {
+    fn add(&mut self, other: &Self) {
+        self.count += other.count;
+        self.sum_m += other.sum_m;
+    }
+
+    fn with(self, count: f64, each_m: f64) -> f64 {
+        (self.sum_m + count * each_m) / (self.count as f64 + count)
+    }
+}
+
+impl<const BINS: usize> RunningGap<BINS> {
+    /// Empty, with bins so wide, m: together they should span what S may move in, and one should be small
+    /// beside the gap.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a width that is not positive and finite.
+    pub fn new(bin_m: f64) -> Result<Self, Error> {
+        const { assert!(BINS > 1, "a histogram of one bin divides nothing") };
+        positive("bin_m", bin_m)?;
+        let (inf, bins) = (f64::INFINITY, [Bin::default(); BINS]);
+        Ok(Self { bin_m, origin_m: f64::NAN, least_m: inf, greatest_m: -inf, bins })
+    }
+
+    /// Adds S, m; NaN is passed over.
+    pub fn push(&mut self, s_m: f64) {
+        if s_m.is_nan() {
+            return;
+        }
+        self.origin_m = if self.origin_m.is_nan() { s_m } else { self.origin_m };
+        let relative_m = s_m - self.origin_m;
+        self.least_m = self.least_m.min(relative_m);
+        self.greatest_m = self.greatest_m.max(relative_m);
+        self.bins[self.place(relative_m)].add(&Bin { count: 1, sum_m: relative_m });
+    }
+
+    /// ΔS of everything so far, with the bounds of the batch's.
+    ///
+    /// # Errors
+    /// [`Error::NothingMeasured`] before the first sample; [`Error::Constant`] while S has not moved.
+    pub fn read(&self) -> Result<Reading, Error> {
+        let mid_m = f64::midpoint(self.least_m, self.greatest_m);
+        if self.origin_m.is_nan() {
+            return Err(Error::NothingMeasured);
+        }
+        let (below, within, above) = self.split(self.place(mid_m));
+        let count = below.count + within.count + above.count;
+        if mid_m <= self.least_m {
+            return Err(Error::Constant { samples: count as usize, s_m: self.origin_m + mid_m });
+        }
+        Ok(Reading { samples: count, ..self.divide(mid_m, [below, within, above]) })
+    }
+
+    /// Each mean is furthest out without the samples of the mid-range's bin, and furthest in with all
+    /// of them at the mid-range. An empty side has only its extreme.
+    fn divide(&self, mid_m: f64, [below, within, above]: [Bin; 3]) -> Reading {
+        let (low_m, high_m) = self.edges(mid_m);
+        let count = within.count as f64;
+        // Rounding at an edge may leave the bin no width.
+        let up = count * (high_m - mid_m) / (high_m - low_m).max(f64::MIN_POSITIVE);
+        let outermost_m = |bin: Bin, extreme_m| if bin.count == 0 { extreme_m } else { bin.with(0.0, 0.0) };
+        let (upper_m, lower_m) = (outermost_m(above, self.greatest_m), outermost_m(below, self.least_m));
+        let innermost_m =
+            |bin: Bin| if bin.count + within.count == 0 { mid_m } else { bin.with(count, mid_m) };
+        let mean_m = |bin: Bin, share, edge_m, else_m| {
+            if bin.count as f64 + share > 0.0 {
+                bin.with(share, f64::midpoint(mid_m, edge_m))
+            } else {
+                else_m
+            }
+        };
+        Reading {
+            gap_m: mean_m(above, up, high_m, upper_m) - mean_m(below, count - up, low_m, lower_m),
+            least_m: innermost_m(above) - innermost_m(below),
+            greatest_m: upper_m - lower_m,
+            samples: 0,
+        }
+    }
+
+    /// What lies in the bins below, at and above one.
+    fn split(&self, at: usize) -> (Bin, Bin, Bin) {
+        let sum = |bins: &[Bin]| {
+            bins.iter().fold(Bin::default(), |mut sum, bin| {
+                sum.add(bin);
+                sum
+            })
+        };
+        (sum(&self.bins[..at]), self.bins[at], sum(&self.bins[at + 1..]))
+    }
+
+    fn place(&self, relative_m: f64) -> usize {
+        // A cast to unsigned takes what is negative for zero.
+        ((relative_m / self.bin_m + BINS as f64 / 2.0) as usize).min(BINS - 1)
+    }
+
+    /// Where the bin that holds the mid-range begins and ends, within the extremes.
+    fn edges(&self, mid_m: f64) -> (f64, f64) {
+        let at = self.place(mid_m);
+        let edge_m = |at: usize| (at as f64 - BINS as f64 / 2.0) * self.bin_m;
+        let low_m = if at == 0 { self.least_m } else { edge_m(at).max(self.least_m) };
+        let high_m = if at == BINS - 1 { self.greatest_m } else { edge_m(at + 1).min(self.greatest_m) };
+        (low_m.min(mid_m), high_m.max(mid_m))
+    }
+}

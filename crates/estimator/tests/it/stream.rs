@@ -1,0 +1,195 @@
+//! The filter and the statistic as the samples come, against the batch that has them all.
+
+use estimator::noise::Sensors as Noises;
+use estimator::{Actuator, Error, Filter, Noise, Reading, RunningGap, Samples, Stream, gap};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use simulator::{Flight, Plant, Profile, Sensors, simulate};
+
+use crate::vectors::{SETS, Set};
+
+/// 256 bins of 2 µm: 4 KiB, for gaps from 30 to 300 µm.
+type Histogram = RunningGap<256>;
+const BIN_M: f64 = 2e-6;
+
+fn filter(rate_hz: f64, bandwidth_hz: f64) -> Filter {
+    let actuator = Actuator::linear(5e7, 2000.0, 8.0).unwrap();
+    let noise = Noise::Sensors(Noises {
+        screw_rms_m: 3e-6,
+        screw_resolution_m: 2.3e-6,
+        motor_rms_m: 1e-6,
+        motor_resolution_m: 3e-7,
+        unknown_force_n: 200.0,
+        bandwidth_hz,
+    });
+    Filter::new(&actuator, rate_hz.recip(), &noise).unwrap()
+}
+
+fn batch(filter: &Filter, dx_m: &[f64], load_n: &[f64]) -> Vec<f64> {
+    let whole = 0..dx_m.len();
+    let segments = std::slice::from_ref(&whole);
+    let samples = Samples { step_s: 0.004, motor_m: dx_m, dx_m, load_n, segments };
+    filter.track(&samples, None).unwrap().s_m
+}
+
+fn streamed(mut stream: Stream, dx_m: &[f64], load_n: &[f64]) -> Vec<f64> {
+    dx_m.iter().zip(load_n).map(|(y, u)| stream.push(*y, *u).unwrap()).collect()
+}
+
+fn running(s_m: &[f64]) -> Result<Reading, Error> {
+    let mut gap = Histogram::new(BIN_M).unwrap();
+    s_m.iter().for_each(|s| gap.push(*s));
+    gap.read()
+}
+
+/// Largest difference, held against the peak.
+fn difference(found: &[f64], wanted: &[f64]) -> f64 {
+    let peak = wanted.iter().fold(0.0, |p: f64, v| p.max(v.abs()));
+    found.iter().zip(wanted).fold(0.0, |d: f64, (f, w)| d.max((f - w).abs())) / peak
+}
+
+fn channels(flight: &Flight) -> (Vec<f64>, &[f64]) {
+    (flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect(), &flight.load_n)
+}
+
+fn fly(seed: u64, gap_m: f64, friction: f64, rate_hz: f64) -> Flight {
+    let profile = Profile { duration_s: 40.0, sample_rate_hz: rate_hz, ..Profile::default() };
+    let plant = Plant::default().with_gap_m(gap_m).with_friction_factor(friction);
+    simulate(&plant, &profile, &Sensors::default(), seed).unwrap()
+}
+
+/// Set d is in radians with a P₀ of its own; set c opens with two missing rows, which only a batch can
+/// fill from what follows.
+#[test]
+fn a_stream_agrees_with_the_fifty_digits() {
+    for name in &SETS[..2] {
+        let set = Set::load(name);
+        let filter = set.filter(&set.as_given());
+        let (y, u, wanted) = (&set.columns["y"], &set.columns["u"], &set.columns["x_filt_2"]);
+        for stream in [Stream::even(&filter), Stream::as_batch(&filter)] {
+            let error = difference(&streamed(stream, y, u), wanted);
+            assert!(error < 1e-10, "{name}: S off by {error:e} of the peak");
+        }
+    }
+}
+
+/// 1e-12 of the peak where the whole recursion goes on beyond settling; no bit where it does not.
+#[test]
+fn a_stream_is_the_batch_over_whole_flights() {
+    for (seed, rate_hz) in [(1, 100.0), (2, 250.0), (3, 1000.0)] {
+        let (flight, filter) = (fly(seed, 100e-6, 1.0, rate_hz), filter(rate_hz, 10.0));
+        let (dx_m, load_n) = channels(&flight);
+        let wanted = batch(&filter, &dx_m, load_n);
+        let even = difference(&streamed(Stream::even(&filter), &dx_m, load_n), &wanted);
+        assert!(even < 1e-12, "{rate_hz} Hz: off by {even:e} of the peak");
+        assert_eq!(streamed(Stream::as_batch(&filter), &dx_m, load_n), wanted);
+    }
+}
+
+#[test]
+fn a_restart_is_a_new_segment() {
+    let (flight, filter) = (fly(4, 100e-6, 1.0, 100.0), filter(100.0, 10.0));
+    let (dx_m, load_n) = channels(&flight);
+    for mut stream in [Stream::even(&filter), Stream::as_batch(&filter)] {
+        let fresh = streamed(stream, &dx_m, load_n);
+        stream.push(1e-3, -5e3).unwrap();
+        stream.restart();
+        assert!(stream.estimate().is_none());
+        assert_eq!(streamed(stream, &dx_m, load_n), fresh);
+    }
+}
+
+/// Before a position is measured there is no S; from there the stream is the batch of what follows.
+#[test]
+fn a_stream_starts_at_the_first_measurement() {
+    let (flight, filter) = (fly(5, 100e-6, 1.0, 100.0), filter(100.0, 10.0));
+    let (mut dx_m, load_n) = channels(&flight);
+    dx_m[..40].fill(f64::NAN);
+    let found = streamed(Stream::as_batch(&filter), &dx_m, load_n);
+    assert!(found[..40].iter().all(|s| s.is_nan()));
+    assert_eq!(found[40..], batch(&filter, &dx_m[40..], &load_n[40..]));
+}
+
+/// Thirty-two flights, four gaps, three frictions, two rates: bounds that hold, and the error that
+/// `RunningGap` states.
+#[test]
+fn a_running_gap_keeps_near_the_batch_over_many_flights() {
+    let (mut worst, mut widest) = (0.0_f64, 0.0_f64);
+    for seed in 0..32 {
+        let gap_m = [30e-6, 60e-6, 100e-6, 300e-6][seed as usize % 4];
+        let (friction, rate_hz) = ([0.5, 1.0, 3.0][seed as usize % 3], [50.0, 125.0][seed as usize % 2]);
+        let flight = fly(seed, gap_m, friction, rate_hz);
+        let (dx_m, load_n) = channels(&flight);
+        let s_m = batch(&filter(rate_hz, 10.0), &dx_m, load_n);
+        let (found, wanted) = (running(&s_m).unwrap(), gap::mid_range(&s_m).unwrap());
+        assert!(holds(&found, wanted.gap_m), "seed {seed}: {found:?} is not about {wanted:?}");
+        assert_eq!(found.samples, (wanted.upper + wanted.lower) as u64);
+        worst = worst.max((found.gap_m / wanted.gap_m - 1.0).abs());
+        widest = widest.max((found.greatest_m - found.least_m) / wanted.gap_m);
+    }
+    println!("worst error {worst:.2e} of the gap, widest bounds {widest:.2e}");
+    assert!(worst < 2e-3, "{worst:.2e} of the batch's gap");
+}
+
+/// The batch's gap lies within the bounds, but for the rounding of sums taken in another order.
+fn holds(found: &Reading, wanted_m: f64) -> bool {
+    let (slack_m, within) = (1e-12 * wanted_m.abs() + 1e-18, found.least_m..=found.greatest_m);
+    within.contains(&found.gap_m)
+        && found.least_m <= wanted_m + slack_m
+        && wanted_m - slack_m <= found.greatest_m
+}
+
+/// S moves through the mid-range of these between two samples: nothing is in its bin, nothing is lost.
+#[test]
+fn a_running_gap_agrees_with_the_fifty_digits() {
+    for name in &SETS[..3] {
+        let set = Set::load(name);
+        let found = running(&set.columns["x_filt_2"]).unwrap();
+        let error = found.gap_m / set.number("gap") - 1.0;
+        assert!(error.abs() < 1e-12, "{name}: off by {error:e} of the gap");
+    }
+}
+
+#[test]
+fn a_running_gap_without_motion_says_why() {
+    assert_eq!(running(&[f64::NAN]), Err(Error::NothingMeasured));
+    assert_eq!(running(&[2.0; 3]), Err(Error::Constant { samples: 3, s_m: 2.0 }));
+    assert!(matches!(Histogram::new(0.0), Err(Error::Parameter { name: "bin_m", .. })));
+}
+
+/// By hand: two samples about 0 and one at 100 µm, no bin shared with the mid-range, so nothing is hidden.
+#[test]
+fn a_gap_wide_of_the_bins_is_exact() {
+    let found = running(&[0.0, 1e-6, 100e-6]).unwrap();
+    for gap_m in [found.gap_m, found.least_m, found.greatest_m] {
+        assert!((gap_m - 99.5e-6).abs() < 1e-18, "{found:?}");
+    }
+}
+
+proptest! {
+    /// However samples and loads are missing, once the first is there: the same bits.
+    #[test]
+    fn a_stream_gives_the_bits_of_the_batch(
+        dx in vec(prop_oneof![9 => (-1e-4..1e-4).boxed(), 1 => Just(f64::NAN).boxed()], 300..900),
+        load in vec(prop_oneof![30 => (-8e3..8e3).boxed(), 1 => Just(f64::NAN).boxed()], 900),
+    ) {
+        let load = &load[..dx.len()];
+        prop_assume!(!dx[0].is_nan());
+        let f = filter(250.0, 40.0);
+        let wanted = batch(&f, &dx, load);
+        prop_assert_eq!(&streamed(Stream::as_batch(&f), &dx, load), &wanted);
+        let even = difference(&streamed(Stream::even(&f), &dx, load), &wanted);
+        prop_assert!(even < 1e-12, "off by {even:e} of the peak");
+    }
+
+    /// Whatever S does, within the bins or beyond them: the batch lies within the bounds.
+    #[test]
+    fn the_bounds_of_a_running_gap_hold(s_m in vec(-1e-3..1e-3, 2..300), offset_m in -1e-2..1e-2, share in 1e-3..1.0) {
+        let s_m: Vec<f64> = s_m.iter().map(|s: &f64| s * share + offset_m).collect();
+        let (found, wanted) = (running(&s_m).unwrap(), gap::mid_range(&s_m).unwrap());
+        let slack_m = 1e-15;
+        prop_assert!(found.least_m <= wanted.gap_m + slack_m && wanted.gap_m <= found.greatest_m + slack_m,
+            "{found:?} is not about {wanted:?}");
+        prop_assert!(found.least_m <= found.gap_m + slack_m && found.gap_m <= found.greatest_m + slack_m, "{found:?}");
+    }
+}
