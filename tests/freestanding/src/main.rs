@@ -1,0 +1,61 @@
+//! The filter and the running gap over a reference vector, on bare Linux x86-64: the exit code is 0 when
+//! they agree with it, 1 when they do not, 2 when an estimate could not be made.
+//!
+//! Asked with any argument, one position is read 1 nm wrong, and the exit code must be 1.
+
+#![no_std]
+#![no_main]
+
+mod bare;
+mod vector;
+
+use estimator::{Actuator, Error, Filter, Noise, RunningGap, Stream};
+use nalgebra::Matrix3;
+use vector::{GAP_M, LOAD_N, POSITION_M, S_M};
+
+/// Largest difference of S, as a share of its peak; of the gap, as `RunningGap` states for such bins.
+const TOLERANCE: (f64, f64) = (1e-12, 2e-3);
+/// Bins of a sixtieth of the gap.
+const BIN_M: f64 = 2e-6;
+/// The row that is read wrong, and by how much, m.
+const WRONG: (usize, f64) = (150, 1e-9);
+
+/// Where the process starts, with the number of its words: the program's name, and any argument.
+extern "C" fn run(words: usize) -> ! {
+    bare::exit(match agrees(words > 1) {
+        Ok(true) => 0,
+        Ok(false) => 1,
+        Err(_) => 2,
+    })
+}
+
+fn agrees(wrong: bool) -> Result<bool, Error> {
+    let filter = filter()?;
+    let even = follows(Stream::even(&filter), wrong)?;
+    let as_batch = follows(Stream::as_batch(&filter), wrong)?;
+    Ok(even && as_batch)
+}
+
+fn filter() -> Result<Filter, Error> {
+    let [stiffness_n_per_m, damping_n_s_per_m, screw_mass_kg] = vector::ACTUATOR;
+    let actuator = Actuator::linear(stiffness_n_per_m, damping_n_s_per_m, screw_mass_kg)?;
+    let w_d = Matrix3::from(vector::W_D);
+    Filter::new(&actuator, vector::STEP_S, &Noise::PerStep { w_d, v_d_m2: vector::V_D_M2 })
+}
+
+/// Whether S, sample by sample, and ΔS at the end are the reference's.
+fn follows(mut stream: Stream, wrong: bool) -> Result<bool, Error> {
+    let mut gap = RunningGap::<256>::new(BIN_M)?;
+    let (mut peak_m, mut worst_m) = (0.0_f64, 0.0_f64);
+    for (k, ((y_m, load_n), wanted_m)) in POSITION_M.iter().zip(LOAD_N).zip(S_M).enumerate() {
+        let error_m = if wrong && k == WRONG.0 { WRONG.1 } else { 0.0 };
+        let s_m = stream.push(y_m + error_m, load_n)?;
+        gap.push(s_m);
+        (peak_m, worst_m) = (peak_m.max(wanted_m.abs()), worst_m.max((s_m - wanted_m).abs()));
+    }
+    let found = gap.read()?;
+    let rounding_m = TOLERANCE.0 * GAP_M;
+    let bounded = found.least_m <= GAP_M + rounding_m && GAP_M <= found.greatest_m + rounding_m;
+    let near = (found.gap_m / GAP_M - 1.0).abs() <= TOLERANCE.1;
+    Ok(worst_m <= TOLERANCE.0 * peak_m && bounded && near)
+}
