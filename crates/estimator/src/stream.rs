@@ -54,13 +54,15 @@ impl Stream {
         self.last_load_n = load_n;
         let held_before_n = self.held_load_n;
         self.held_load_n = if load_n.is_nan() { held_before_n } else { load_n };
-        let Some(state) = self.state else { return self.start(y_m) };
-        if let Some(folded) = self.folded.filter(|_| self.settled && !(y_m + before_n).is_nan()) {
+        let Some(state) = &mut self.state else { return self.start(y_m) };
+        let whole = self.settled && !(y_m + before_n).is_nan();
+        if let Some(folded) = self.folded.as_ref().filter(|_| whole) {
             let (x, _) = folded.step(state.x.into(), y_m, before_n);
-            self.state = Some(Estimate { x: x.into(), ..state });
+            state.x = x.into();
             return Ok(x[2]);
         }
-        self.correct(self.filter.predict(&state, held_before_n), y_m)
+        let prior = self.filter.predict(state, held_before_n);
+        self.correct(prior, y_m)
     }
 
     /// The state after the last sample, once a position was measured. In the settled shortcut its
@@ -83,7 +85,7 @@ impl Stream {
 
     fn correct(&mut self, prior: Estimate, y_m: f64) -> Result<f64, Error> {
         let step = self.filter.correct(&prior, y_m)?;
-        self.settled = self.folded.is_some_and(|folded| folded.suits(&step));
+        self.settled = self.folded.as_ref().is_some_and(|folded| folded.suits(&step));
         self.state = Some(step.posterior);
         Ok(step.posterior.x[2])
     }
