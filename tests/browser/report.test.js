@@ -107,7 +107,7 @@ for (const which of Object.keys(reports)) {
           await inspect(page, "serial-open");
           await page.locator("details.twin summary").click();
           await inspect(page, "serial");
-          await page.locator("nav a").nth(1).click();
+          await page.locator("header nav a").nth(1).click();
           await inspect(page, "tail");
         });
       }

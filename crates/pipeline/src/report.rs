@@ -39,6 +39,7 @@ pub fn compose(
     program: &str,
 ) -> Result<Report, Error> {
     let checks = inspections(config)?;
+    let mut logs = Logs::of(store)?;
     let Read { mut flown, mut rest, store_version } = Read::until(ask.as_of_utc, store, installations)?;
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
     let Told { now, drawn, before, priors } = trends::told(config, installations, &flown, ask, &days)?;
@@ -59,20 +60,11 @@ pub fn compose(
         compose.unit(row, drawn, flown, rest)
     };
     let units: Vec<Unit> = now.iter().zip(&drawn).map(unit).collect();
-    let accounts = store.accounts()?;
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
     let narrowed = ask.tail_number.is_some() || ask.serial_number.is_some();
     let wanted = |tail: Option<&str>| !narrowed || tail.is_some_and(|tail| shown.contains(tail));
-    let faults = accounts.iter().filter(|a| a.outcome == Outcome::Error && wanted(a.tail_number.as_deref()));
-    let faults: Vec<LogFault> = faults
-        .map(|a| LogFault {
-            log_path: a.log_path.clone(),
-            tail_number: a.tail_number.clone(),
-            code: a.error_code.clone().unwrap_or_default(),
-            processed_utc: a.processed_utc,
-        })
-        .collect();
-    blame(&mut tails, &faults);
+    logs.faults.retain(|fault| wanted(fault.tail_number.as_deref()));
+    blame(&mut tails, &logs.faults);
     let tails = tails.into_values().filter(|t| wanted(Some(&t.tail_number))).collect();
     Ok(Report {
         made_utc,
@@ -81,9 +73,9 @@ pub fn compose(
         scope: scope(ask),
         as_of_utc,
         newest_departure_utc,
-        logs_known: accounts.iter().filter(|a| wanted(a.tail_number.as_deref())).count(),
+        logs_known: logs.known.iter().filter(|(tail, _)| wanted(tail.as_deref())).map(|(_, n)| n).sum(),
         check_interval_hours: config.document.trend.next_check_hours,
-        log_faults: faults,
+        log_faults: logs.faults,
         priors: priors.into_iter().map(prior).collect(),
         tails,
         inspections_given: checks.is_some(),
@@ -97,6 +89,30 @@ fn scope(ask: &Ask) -> Option<String> {
     let serial = ask.serial_number.as_ref().map(|serial| format!("Serial {serial} only"));
     let both: Vec<String> = tail.into_iter().chain(serial).collect();
     (!both.is_empty()).then(|| both.join(", "))
+}
+
+/// What became of all logs: how many of each tail, and those in error.
+struct Logs {
+    known: BTreeMap<Option<String>, usize>,
+    faults: Vec<LogFault>,
+}
+
+impl Logs {
+    fn of(store: &Store) -> Result<Self, Error> {
+        let (mut known, mut faults) = (BTreeMap::new(), Vec::new());
+        for account in store.accounts()? {
+            *known.entry(account.tail_number.clone()).or_default() += 1;
+            if account.outcome == Outcome::Error {
+                faults.push(LogFault {
+                    log_path: account.log_path,
+                    tail_number: account.tail_number,
+                    code: account.error_code.unwrap_or_default(),
+                    processed_utc: account.processed_utc,
+                });
+            }
+        }
+        Ok(Self { known, faults })
+    }
 }
 
 /// All flights of all units, and what of them no statement needs but a page shows.
@@ -130,6 +146,9 @@ impl Read {
                 flown.entry(name).or_default().push(Flown::of(record, installations));
             }
         })?;
+        // Room to grow is half as much again, and nothing grows any more.
+        flown.values_mut().for_each(Vec::shrink_to_fit);
+        rest.values_mut().for_each(Vec::shrink_to_fit);
         Ok(Self { flown, rest, store_version })
     }
 }

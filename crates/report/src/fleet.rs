@@ -147,7 +147,7 @@ struct Cell {
 /// When a template cannot be filled.
 pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
     let mut work = work(report);
-    let rest = work.split_off(WORK_ROWS.min(work.len()));
+    let rest = work.split_off(FEW.min(work.len()));
     let mut pages = Vec::new();
     let mut more_work = Vec::new();
     for (k, chunk) in rest.chunks(WORK_ROWS).enumerate() {

@@ -96,7 +96,7 @@ fn a_large_fleet_is_split_and_every_unit_keeps_a_link() {
     let units: Vec<Unit> = (0..350).map(|k| unit(&format!("S{k:04}"), Some("plan"))).collect();
     let report = report(units);
     let pages = fleet_pages(&report).unwrap();
-    assert_eq!(pages.iter().filter(|p| p.path.starts_with("work-")).count(), 3);
+    assert_eq!(pages.iter().filter(|p| p.path.starts_with("work-")).count(), 4);
     let all: String =
         pages.iter().filter(|p| p.path.starts_with("work-") || p.path == "index.html").map(text).collect();
     assert!(report.units.iter().all(|u| all.contains(&serial_path(u))));
