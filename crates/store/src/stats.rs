@@ -54,8 +54,12 @@ impl Stats {
             .all(|bounds| bounds.get(column) == Some(&json!(value)))
     }
 
-    /// The earliest and the latest time the column may hold, µs since 1970.
+    /// The earliest and the latest time the column may hold, µs since 1970; a file without rows holds none,
+    /// and its earliest is after its latest.
     pub(crate) fn times_us(&self, column: &str) -> (i64, i64) {
+        if self.num_records == Some(0) {
+            return (i64::MAX, i64::MIN);
+        }
         let bound = |bounds: &Map<String, Value>| {
             let time: Timestamp = bounds.get(column)?.as_str()?.parse().ok()?;
             Some(time.as_microsecond())
@@ -134,6 +138,13 @@ mod tests {
             r#"{"numRecords":1,"minValues":{"t":"1970-01-01T00:00:00.001Z"},"maxValues":{"t":"1970-01-01T00:00:00.002Z"}}"#,
         ));
         assert_eq!(stats.times_us("t"), (1_000, 3_000));
+    }
+
+    #[test]
+    fn a_file_without_rows_widens_no_span() {
+        let empty = Stats::parse(Some(r#"{"numRecords":0}"#));
+        let (first, last) = empty.times_us("t");
+        assert_eq!((first.min(3), last.max(5)), (3, 5));
     }
 
     #[test]
