@@ -8,6 +8,7 @@ mod bench;
 mod damaged;
 #[cfg(target_os = "linux")]
 mod disk;
+mod errors;
 mod interrupted;
 mod known;
 mod layouts;

@@ -1,4 +1,4 @@
-//! `init`: a commented configuration and an example table, never over something that is there.
+//! `init`: a commented configuration, its schema and an example table, never over something that is there.
 
 use std::fs::{self, OpenOptions};
 use std::io::{ErrorKind, Write};
@@ -18,12 +18,16 @@ const TEMPLATE: &str = include_str!("../../templates/pipeline.toml");
 const FILES: [(&str, &str); 2] =
     [("pipeline.toml", TEMPLATE), ("installations.csv", include_str!("../../templates/installations.csv"))];
 
-/// Writes both files.
+/// What an editor needs to complete and to check the configuration; its first line points here.
+const SCHEMA: &str = "pipeline.schema.json";
+
+/// Writes the configuration, the example table and the schema.
 ///
 /// # Errors
 /// When one of them is there already; then nothing is written.
 pub(crate) fn init(args: &InitArgs, talk: &Talk) -> Result<Code, Failure> {
-    let there = FILES.iter().map(|(name, _)| args.dir.join(name)).find(|path| path.exists());
+    let names = FILES.iter().map(|(name, _)| *name).chain([SCHEMA]);
+    let there = names.map(|name| args.dir.join(name)).find(|path| path.exists());
     if let Some(path) = there {
         return Err(exists(&path));
     }
@@ -31,15 +35,21 @@ pub(crate) fn init(args: &InitArgs, talk: &Talk) -> Result<Code, Failure> {
     fs::create_dir_all(&args.dir)?;
     for (name, text) in FILES {
         let text = proposed.as_deref().filter(|_| name == "pipeline.toml").unwrap_or(text);
-        let path = args.dir.join(name);
-        let file = OpenOptions::new().write(true).create_new(true).open(&path);
-        let mut file =
-            file.map_err(|e| if e.kind() == ErrorKind::AlreadyExists { exists(&path) } else { e.into() })?;
-        file.write_all(text.as_bytes())?;
-        talk.answer(&format!("wrote {}\n", shown(&path)))?;
+        write(&args.dir.join(name), text, talk)?;
     }
+    write(&args.dir.join(SCHEMA), &format!("{:#}\n", job::config::Document::schema()), talk)?;
     talk.note("next: say in pipeline.toml where your logs are and what their columns are called, then `freeplay check`");
     Ok(Code::Well)
+}
+
+/// Writes a file that was not there.
+fn write(path: &Path, text: &str, talk: &Talk) -> Result<(), Failure> {
+    let file = OpenOptions::new().write(true).create_new(true).open(path);
+    let mut file =
+        file.map_err(|e| if e.kind() == ErrorKind::AlreadyExists { exists(path) } else { e.into() })?;
+    file.write_all(text.as_bytes())?;
+    talk.answer(&format!("wrote {}\n", shown(path)))?;
+    Ok(())
 }
 
 /// The template with what the logs below a folder seem to offer; a person confirms it with `check`.
