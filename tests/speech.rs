@@ -47,6 +47,11 @@ fn every_command_has_a_purpose_and_an_example() {
 fn init_writes_a_configuration_that_is_good_and_never_overwrites() {
     let bench = Bench::empty();
     bench.well(&["init", "fleet"]);
+    let toml = std::fs::read_to_string(bench.path("fleet/pipeline.toml")).unwrap();
+    assert!(toml.starts_with("#:schema ./pipeline.schema.json\n"), "{toml}");
+    let schema = std::fs::read_to_string(bench.path("fleet/pipeline.schema.json")).unwrap();
+    let schema: serde_json::Value = serde_json::from_str(&schema).unwrap();
+    assert!(schema["properties"]["logs"]["properties"]["files"].is_object(), "{schema}");
     let again = bench.freeplay(&["init", "fleet"]);
     assert_eq!(again.code, Some(2));
     assert!(again.err.contains("error[would_overwrite]"), "{}", again.err);

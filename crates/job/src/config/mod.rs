@@ -2,6 +2,7 @@
 
 mod channel;
 mod document;
+mod meant;
 mod source;
 mod unknown;
 mod variant;

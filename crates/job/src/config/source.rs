@@ -6,6 +6,8 @@ use fleet::Complaint;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::meant;
+
 /// Text and its table with spans.
 pub(super) struct Source<'t> {
     file: &'t str,
@@ -55,8 +57,7 @@ impl<'t> Source<'t> {
 }
 
 fn from_toml(file: &str, text: &str, error: &toml::de::Error) -> Complaint {
-    let complaint = Complaint::new("bad_toml", error.message().trim());
-    place(file, text, error.span().unwrap_or(0..0), complaint)
+    place(file, text, error.span().unwrap_or(0..0), meant::complaint(error.message()))
 }
 
 fn place(file: &str, text: &str, span: Range<usize>, complaint: Complaint) -> Complaint {
