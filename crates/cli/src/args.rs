@@ -28,7 +28,7 @@ pub(crate) struct Args {
 /// Options of every command.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Global {
-    /// The configuration.
+    /// The configuration; a second one is laid over the first, key by key.
     #[arg(
         long,
         global = true,
@@ -36,7 +36,7 @@ pub(crate) struct Global {
         default_value = "pipeline.toml",
         value_name = "FILE"
     )]
-    pub config: PathBuf,
+    pub config: Vec<PathBuf>,
     /// Say nothing but the answer and errors.
     #[arg(short, long, global = true)]
     pub quiet: bool,
@@ -113,7 +113,7 @@ pub(crate) enum Command {
     Explain(ExplainArgs),
     /// Two stores side by side: what another method or other settings made of the same flights
     #[command(
-        after_help = "Example:\n  freeplay run --config trial.toml && freeplay diff results results-trial\n\nMake the other one current by naming it under [store] in pipeline.toml."
+        after_help = "Example:\n  freeplay run --config pipeline.toml --config trial.toml && freeplay diff results results-trial\n\nMake the other one current by naming it under [store] in pipeline.toml."
     )]
     Diff(DiffArgs),
     /// Past statements against what came true

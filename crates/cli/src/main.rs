@@ -9,6 +9,7 @@ mod exit;
 mod journal;
 mod progress;
 mod rows;
+mod spark;
 mod table;
 mod talk;
 

@@ -73,6 +73,9 @@ pub struct TrendRow {
     pub check_probability: Option<f64>,
     pub state: Option<&'static str>,
     pub reason: Option<String>,
+    /// The estimated gaps in order of flights, at most a hundred means of neighbours, m: a sketch for people.
+    #[serde(skip)]
+    pub sketch_m: Vec<f64>,
 }
 
 /// A unit and a day.
@@ -507,6 +510,13 @@ fn series(installations: &Installations, name: &HistoryName, flown: &[&Flown]) -
     Ok(Series::new(observations, &usage)?)
 }
 
+/// Means of neighbours, at most so many.
+fn sketched(gaps_m: &[f64]) -> Vec<f64> {
+    const MOST: usize = 100;
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    gaps_m.chunks(gaps_m.len().div_ceil(MOST).max(1)).map(mean).collect()
+}
+
 fn row(
     name: &HistoryName,
     flown: &[&Flown],
@@ -566,6 +576,7 @@ fn row(
         } else {
             "no limit is configured".into()
         }),
+        sketch_m: sketched(&gaps),
     }
 }
 

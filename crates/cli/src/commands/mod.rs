@@ -31,7 +31,7 @@ pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The configuration that the options name.
 pub(crate) fn config(global: &Global) -> Result<Config, Failure> {
-    Config::read(&global.config).map_err(Failure::Refused)
+    Config::read_layers(&global.config).map_err(Failure::Refused)
 }
 
 /// The configuration and its installations table.

@@ -1,15 +1,21 @@
 //! `query`: stored records, by tail, serial number, flight or position.
 
+use std::collections::BTreeMap;
+
 use fleet::GapRecord;
 use store::{Query, Store};
 
 use crate::args::{By, Global, QueryArgs};
 use crate::exit::{Code, Failure};
 use crate::rows;
+use crate::spark::spark;
 use crate::table::{self, count, number, text};
 use crate::talk::Talk;
 
 use super::config;
+
+/// Fewer estimates than this are no history.
+const LEAST_HISTORY: usize = 3;
 
 /// Answers with the records that fit, oldest first.
 ///
@@ -88,8 +94,30 @@ pub(crate) fn page(records: &[GapRecord]) -> String {
     if records.is_empty() {
         head
     } else {
-        head + &table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>())
+        head + &table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>()) + &sketches(records)
     }
+}
+
+/// A line for each unit with a history in these records: from which gap to which.
+fn sketches(records: &[GapRecord]) -> String {
+    let mut units: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
+    for r in records {
+        let key = (r.part_number.as_str(), r.serial_number.as_str());
+        units.entry(key).or_default().extend(r.estimate.gap_m);
+    }
+    units.retain(|_, gaps_m| gaps_m.len() >= LEAST_HISTORY);
+    let rows: Vec<Vec<String>> = units
+        .iter()
+        .map(|((part, serial), gaps_m)| {
+            let ends = [gaps_m.first(), gaps_m.last()].map(|gap_m| table::micrometres(gap_m.copied()));
+            vec![format!("{part} / {serial}"), spark(gaps_m), ends.join(" → "), gaps_m.len().to_string()]
+        })
+        .collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let columns = [text("part / serial", 0), text("so far", 0), text("gap µm", 0), number("estimates", 0)];
+    format!("\n{}", table::layout(&columns, &rows))
 }
 
 /// The load band a number stands on.

@@ -65,7 +65,7 @@ pub(crate) fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, 
         let text = serde_json::to_string_pretty(&report).map_err(std::io::Error::from)?;
         talk.answer(&(text + "\n"))?;
     } else {
-        talk.answer(&account(&report, &global.config.display().to_string(), code))?;
+        talk.answer(&account(&report, &config.file.display().to_string(), code))?;
     }
     Ok(code)
 }

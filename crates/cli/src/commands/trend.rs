@@ -9,6 +9,7 @@ use store::Store;
 use crate::args::{Global, TrendArgs};
 use crate::exit::{Code, Failure};
 use crate::rows;
+use crate::spark::spark;
 use crate::table::{self, count, number, state_mark, text};
 use crate::talk::Talk;
 
@@ -53,6 +54,7 @@ fn page(found: &[TrendRow]) -> String {
         number("flights", 6),
         number("gap µm", 0),
         number("± µm", 3),
+        text("so far", 4),
         number("nm/h", 1),
         text("trend", 3),
         number("limit µm", 5),
@@ -71,6 +73,7 @@ fn page(found: &[TrendRow]) -> String {
             r.flights.to_string(),
             table::micrometres(r.gap_m),
             table::micrometres(r.gap_se_m),
+            spark(&r.sketch_m),
             r.rate_m_per_hour.map_or_else(table::dash, |v| format!("{:.1}", v * 1e9)),
             r.trend.to_owned(),
             table::micrometres(r.limit_m),

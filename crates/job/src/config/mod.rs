@@ -18,7 +18,7 @@ use serde::Serialize;
 pub use document::{
     Document, EstimateSettings, LogSettings, Method, Override, StoreSettings, TableNames, TrendSettings,
 };
-use source::Source;
+use source::{Layer, Source};
 use variant::Variants;
 
 use crate::METHOD_VERSION;
@@ -27,7 +27,7 @@ use crate::part::Part;
 /// A checked configuration.
 #[derive(Debug, Clone)]
 pub struct Config {
-    /// The file as it was named by the user.
+    /// The file as it was named by the user; several stand with ` + ` between them.
     pub file: PathBuf,
     /// The folder that relative paths in it start from.
     pub folder: PathBuf,
@@ -44,17 +44,32 @@ impl Config {
     /// Reads and checks the file, and the flights table that it names.
     ///
     /// # Errors
+    /// As [`Config::read_layers`].
+    pub fn read(file: &Path) -> Result<Self, Vec<Complaint>> {
+        Self::read_layers(&[file.to_owned()])
+    }
+
+    /// Reads files, each laid over those before it, checks the whole, and reads the flights table that it
+    /// names. Relative paths start from the first file's folder.
+    ///
+    /// # Errors
     /// All complaints at once: an unreadable file or broken TOML alone, else every unknown key, else
     /// the first key of a wrong type, else every value that cannot be meant.
-    pub fn read(file: &Path) -> Result<Self, Vec<Complaint>> {
-        let shown = file.display().to_string();
-        let text = std::fs::read_to_string(file).map_err(|e| {
-            let what = format!("the configuration cannot be read: {e}");
-            let hint = "`freeplay init` writes one; `--config FILE` or FREEPLAY_CONFIG names another";
-            vec![Complaint::new("config_unreadable", what).in_file(&shown).hint(hint)]
-        })?;
-        let folder = file.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-        let mut config = Self::parse(&text, file, &folder)?;
+    pub fn read_layers(files: &[PathBuf]) -> Result<Self, Vec<Complaint>> {
+        let read = |file: &PathBuf| {
+            let shown = file.display().to_string();
+            let text = std::fs::read_to_string(file).map_err(|e| {
+                let what = format!("the configuration cannot be read: {e}");
+                let hint = "`freeplay init` writes one; `--config FILE` or FREEPLAY_CONFIG names another";
+                vec![Complaint::new("config_unreadable", what).in_file(&shown).hint(hint)]
+            })?;
+            Ok((shown, text))
+        };
+        let texts = files.iter().map(read).collect::<Result<Vec<_>, Vec<Complaint>>>()?;
+        let folder = files.first().and_then(|f| f.parent()).map_or_else(PathBuf::new, Path::to_path_buf);
+        let shown: Vec<&str> = texts.iter().map(|(shown, _)| shown.as_str()).collect();
+        let file = PathBuf::from(shown.join(" + "));
+        let mut config = Self::layered(&Layer::stack(texts), &file, &folder)?;
         if let Some(table) = &config.document.logs.flights {
             let names = &config.document.columns.flights;
             let read = Flights::read(&config.path(table), names, &config.document.identity);
@@ -66,15 +81,19 @@ impl Config {
     /// Reads and checks the text of a configuration whose relative paths start from `folder`.
     ///
     /// # Errors
-    /// As [`Config::read`].
+    /// As [`Config::read_layers`].
     pub fn parse(text: &str, file: &Path, folder: &Path) -> Result<Self, Vec<Complaint>> {
         let shown = file.display().to_string();
-        let source = Source::parse(&shown, text).map_err(|complaint| vec![*complaint])?;
+        Self::layered(&Layer::stack([(shown, text.to_owned())]), file, folder)
+    }
+
+    fn layered(layers: &[Layer], file: &Path, folder: &Path) -> Result<Self, Vec<Complaint>> {
+        let source = Source::parse(layers).map_err(|complaint| vec![*complaint])?;
         let unknown = unknown::keys(&source, &Document::schema());
         if !unknown.is_empty() {
             return Err(unknown);
         }
-        let document: Document = toml::from_str(text).map_err(|e| vec![source.toml_error(&e)])?;
+        let document: Document = source.document().map_err(|complaint| vec![complaint])?;
         let mut complaints = document.check(&source);
         let mut parts = BTreeMap::new();
         for (number, settings) in &document.part {

@@ -1,35 +1,64 @@
-//! The text of a configuration, and where in it a key stands.
+//! The text of a configuration, in one file or in several laid over each other, and where in it a key stands.
 
 use std::ops::Range;
 
 use fleet::Complaint;
+use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::meant;
 
-/// Text and its table with spans.
+/// A file of the configuration.
+pub(super) struct Layer {
+    file: String,
+    /// Its text behind as many empty lines as the files before have bytes: so a span says of itself in which
+    /// file it lies.
+    text: String,
+    start: usize,
+}
+
+impl Layer {
+    /// Names and texts of files, each laid over those before it.
+    pub(super) fn stack(files: impl IntoIterator<Item = (String, String)>) -> Vec<Self> {
+        let mut start = 0;
+        let layer = |(file, text): (String, String)| {
+            let layer = Self { file, text: "\n".repeat(start) + &text, start };
+            start = layer.text.len() + 1;
+            layer
+        };
+        files.into_iter().map(layer).collect()
+    }
+}
+
+/// Texts and their table with spans.
 pub(super) struct Source<'t> {
-    file: &'t str,
-    text: &'t str,
+    layers: &'t [Layer],
     table: Spanned<DeTable<'t>>,
 }
 
 impl<'t> Source<'t> {
-    pub(super) fn parse(file: &'t str, text: &'t str) -> Result<Self, Box<Complaint>> {
-        match DeTable::parse(text) {
-            Ok(table) => Ok(Self { file, text, table }),
-            Err(error) => Err(Box::new(from_toml(file, text, &error))),
+    /// Keys of a later layer replace those before; tables are laid over key by key, lists are replaced.
+    pub(super) fn parse(layers: &'t [Layer]) -> Result<Self, Box<Complaint>> {
+        let mut whole: Option<Spanned<DeTable<'t>>> = None;
+        for layer in layers {
+            let table = DeTable::parse(&layer.text).map_err(|e| Box::new(from_toml(layers, &e)))?;
+            match &mut whole {
+                None => whole = Some(table),
+                Some(below) => lay_over(below.get_mut(), table.into_inner()),
+            }
         }
+        Ok(Self { layers, table: whole.unwrap_or_else(|| Spanned::new(0..0, DeTable::new())) })
     }
 
     pub(super) fn table(&self) -> &DeTable<'t> {
         self.table.get_ref()
     }
 
-    /// A complaint of the TOML reader, with its line.
-    pub(super) fn toml_error(&self, error: &toml::de::Error) -> Complaint {
-        from_toml(self.file, self.text, error)
+    /// The whole as a type.
+    pub(super) fn document<T: DeserializeOwned>(&self) -> Result<T, Complaint> {
+        T::deserialize(toml::de::Deserializer::from(self.table.clone()))
+            .map_err(|e| from_toml(self.layers, &e))
     }
 
     /// Gives a complaint the line of a key, or of the nearest table above it that is written.
@@ -39,7 +68,7 @@ impl<'t> Source<'t> {
     }
 
     pub(super) fn at_span(&self, span: Range<usize>, complaint: Complaint) -> Complaint {
-        place(self.file, self.text, span, complaint)
+        place(self.layers, &span, complaint)
     }
 
     fn locate(&self, path: &[&str]) -> Option<Range<usize>> {
@@ -56,15 +85,34 @@ impl<'t> Source<'t> {
     }
 }
 
-fn from_toml(file: &str, text: &str, error: &toml::de::Error) -> Complaint {
-    place(file, text, error.span().unwrap_or(0..0), meant::complaint(error.message()))
+fn lay_over<'t>(below: &mut DeTable<'t>, over: DeTable<'t>) {
+    for (key, value) in over {
+        match (below.get_mut(&key).map(Spanned::get_mut), value.get_ref()) {
+            (Some(DeValue::Table(inner)), DeValue::Table(_)) => {
+                if let DeValue::Table(value) = value.into_inner() {
+                    lay_over(inner, value);
+                }
+            }
+            _ => {
+                // Taken out first, so that the key's place is that of the layer that won.
+                below.remove(&key);
+                below.insert(key, value);
+            }
+        }
+    }
 }
 
-fn place(file: &str, text: &str, span: Range<usize>, complaint: Complaint) -> Complaint {
-    let before = &text[..span.start.min(text.len())];
+fn from_toml(layers: &[Layer], error: &toml::de::Error) -> Complaint {
+    place(layers, &error.span().unwrap_or(0..0), meant::complaint(error.message()))
+}
+
+fn place(layers: &[Layer], span: &Range<usize>, complaint: Complaint) -> Complaint {
+    let Some(layer) = layers.iter().rfind(|layer| layer.start <= span.start) else { return complaint };
+    let text = &layer.text[layer.start..];
+    let before = &text[..(span.start - layer.start).min(text.len())];
     let line_start = before.rfind('\n').map_or(0, |i| i + 1);
     let line = before.matches('\n').count() + 1;
     let column = before[line_start..].chars().count() + 1;
     let content = text[line_start..].lines().next().unwrap_or_default().to_owned();
-    Complaint { line: Some((line, column)), text: Some(content), ..complaint.in_file(file) }
+    Complaint { line: Some((line, column)), text: Some(content), ..complaint.in_file(&layer.file) }
 }

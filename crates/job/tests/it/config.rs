@@ -195,3 +195,40 @@ fn every_layout_of_the_documentation_is_read() {
         assert!(parse(&whole).is_ok(), "{:?} in\n{whole}", parse(&whole).err());
     }
 }
+
+/// Files on disk, in a folder of their own.
+fn written(files: &[(&str, &str)]) -> (tempfile::TempDir, Vec<std::path::PathBuf>) {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |(name, text): &(&str, &str)| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, text).unwrap();
+        file
+    };
+    let paths = files.iter().map(write).collect();
+    (folder, paths)
+}
+
+#[test]
+fn a_second_file_is_laid_over_the_first_key_by_key() {
+    let test = "[store]\npath = \"trial\"\n[channel.load]\nsign = -1\n";
+    let (folder, files) = written(&[("pipeline.toml", GOOD), ("trial.toml", test)]);
+    let (one, both) = (Config::read(&files[0]).unwrap(), Config::read_layers(&files).unwrap());
+    assert_eq!(both.store(), folder.path().join("trial"));
+    assert_eq!(both.document.channel.load.sign, -1);
+    assert_eq!(both.document.channel.load.column, one.document.channel.load.column);
+    assert_eq!(both.document.part, one.document.part);
+    assert!(both.file.display().to_string().ends_with("trial.toml"));
+}
+
+#[test]
+fn a_complaint_names_the_file_and_line_of_the_layer_that_made_it() {
+    let over = "# for the bench\n\n[store]\npaht = \"trial\"\n";
+    let (_folder, files) = written(&[("pipeline.toml", GOOD), ("trial.toml", over)]);
+    let found = Config::read_layers(&files).unwrap_err();
+    assert_eq!((found[0].code.as_ref(), found[0].line), ("unknown_key", Some((4, 1))));
+    assert!(found[0].file.as_ref().unwrap().ends_with("trial.toml"));
+    let (_folder, files) = written(&[("pipeline.toml", GOOD), ("trial.toml", "[channel.load]\nsign = 3\n")]);
+    let found = Config::read_layers(&files).unwrap_err();
+    assert_eq!((found[0].code.as_ref(), found[0].line), ("bad_sign", Some((2, 1))));
+    assert!(found[0].file.as_ref().unwrap().ends_with("trial.toml"));
+}
