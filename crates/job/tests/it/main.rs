@@ -4,4 +4,5 @@
 
 mod config;
 mod facts;
+mod reference;
 mod schema;

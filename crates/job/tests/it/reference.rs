@@ -1,0 +1,139 @@
+//! `docs/keys.md`, the reference of every key, is written from the types: this test keeps it so.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use job::config::Document;
+use serde_json::Value;
+
+#[test]
+fn the_reference_of_keys_is_what_the_types_say() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/keys.md");
+    let mut page = "# Every key of `pipeline.toml`\n\nWritten from the types (`FREEPLAY_BLESS=1 cargo test -p job \
+                    reference`), so it cannot drift; a test compares it.\n[configuration.md](configuration.md) \
+                    explains, this page lists.\n"
+        .to_owned();
+    section(&mut page, "", &Document::schema(), &mut Told::new());
+    if std::env::var_os("FREEPLAY_BLESS").is_some() {
+        std::fs::write(&file, &page).unwrap();
+    }
+    let found = std::fs::read_to_string(&file).unwrap();
+    assert!(
+        found == page,
+        "docs/keys.md is not what the types say: FREEPLAY_BLESS=1 cargo test -p job reference"
+    );
+}
+
+/// Tables so far, and where each stands first: kinds that come again are told once.
+type Told = BTreeMap<String, String>;
+
+/// A table of the keys of one object, then a section for each object below it.
+fn section(page: &mut String, path: &str, schema: &Value, told: &mut Told) {
+    let Some(keys) = schema.get("properties").and_then(Value::as_object) else { return };
+    if !path.is_empty() {
+        let _ = write!(page, "\n## `{path}`\n\n{}\n", text(schema));
+    }
+    let required: Vec<&str> =
+        schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+    let mut table = String::new();
+    let mut below = Vec::new();
+    for (key, value) in keys {
+        let needed = if required.contains(&key.as_str()) { ", needed" } else { "" };
+        let _ = writeln!(table, "| `{key}` | {}{needed} | {} |", kind(value), text(value));
+        below.extend(inner(key, value, path));
+    }
+    if let Some(first) = told.get(&table) {
+        let _ = writeln!(page, "\nKeys as in `{first}`.");
+        return;
+    }
+    let _ = write!(page, "\n| key | is | meaning |\n|---|---|---|\n{table}");
+    told.insert(table, path.to_owned());
+    for (path, schema) in below {
+        section(page, &path, schema, told);
+    }
+}
+
+/// The object in a value, and what its table is called; alternatives of a channel are channels again.
+fn inner<'v>(key: &str, value: &'v Value, path: &str) -> Option<(String, &'v Value)> {
+    let value = choices(value)
+        .find(|v| v.get("properties").is_some() || v.get("items").is_some() || map(v).is_some())?;
+    let dotted =
+        if path.is_empty() { key.to_owned() } else { format!("{}.{key}", path.trim_matches(['[', ']'])) };
+    if let Some(of) = map(value).filter(|of| of.get("properties").is_some()) {
+        return Some((format!("[{dotted}.NAME]"), of));
+    }
+    if let Some(item) = value.get("items").filter(|item| item.get("properties").is_some()) {
+        return Some((format!("[[{dotted}]]"), item));
+    }
+    value.get("properties").is_some().then(|| (format!("[{dotted}]"), value))
+}
+
+fn map(value: &Value) -> Option<&Value> {
+    value.get("additionalProperties").filter(|v| v.is_object())
+}
+
+/// A schema, or those of which one must fit.
+fn choices(value: &Value) -> impl Iterator<Item = &Value> {
+    let any = value.get("anyOf").and_then(Value::as_array);
+    any.into_iter().flatten().chain(any.is_none().then_some(value))
+}
+
+/// The type in words.
+fn kind(value: &Value) -> String {
+    let one = |v: &Value| -> Option<String> {
+        if let Some(words) = words(v) {
+            return Some(words);
+        }
+        if let Some(items) = v.get("items") {
+            return Some(format!("list of {}", kind(items)));
+        }
+        let names: Vec<&str> = match v.get("type")? {
+            Value::String(name) => vec![name.as_str()],
+            Value::Array(names) => names.iter().filter_map(Value::as_str).collect(),
+            _ => return None,
+        };
+        let name = names.into_iter().find(|name| *name != "null")?;
+        Some(
+            match name {
+                "object" => "table",
+                "boolean" => "true or false",
+                "string" => "text",
+                "integer" => "whole number",
+                other => other,
+            }
+            .to_owned(),
+        )
+    };
+    let kinds: Vec<String> = choices(value).filter_map(one).collect();
+    if kinds.is_empty() { "table".to_owned() } else { kinds.join(" or ") }
+}
+
+/// The words that may stand there.
+fn words(value: &Value) -> Option<String> {
+    let listed =
+        value.get("enum").and_then(Value::as_array).map(|all| all.iter().filter_map(Value::as_str).collect());
+    let told = || {
+        let all = value.get("oneOf")?.as_array()?;
+        let each = |v: &'_ Value| -> Vec<String> {
+            let one = v.get("const").and_then(Value::as_str).map(str::to_owned);
+            let many = v.get("enum").and_then(Value::as_array).into_iter().flatten();
+            one.into_iter().chain(many.filter_map(Value::as_str).map(str::to_owned)).collect()
+        };
+        Some(all.iter().flat_map(each).collect::<Vec<_>>())
+    };
+    let words: Vec<String> = match listed {
+        Some(listed) => {
+            let listed: Vec<&str> = listed;
+            listed.into_iter().map(str::to_owned).collect()
+        }
+        None => told()?,
+    };
+    Some(words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", "))
+}
+
+/// The doc comment as one line of a table.
+fn text(value: &Value) -> String {
+    let text = value.get("description").and_then(Value::as_str).unwrap_or_default();
+    text.split_whitespace().collect::<Vec<_>>().join(" ").replace('|', "\\|")
+}
