@@ -52,3 +52,28 @@ fn without(rows: &str, columns: &[&str]) -> String {
     };
     rows.lines().map(|line| kept(line.split(',').collect())).collect::<Vec<_>>().join("\n")
 }
+
+/// Half of the files know columns that came later, half do not: they are one table to us and to others.
+#[test]
+fn files_of_two_releases_are_one_table() {
+    let bench = old();
+    bench.well(&["run", "--limit", "3"]);
+    let rows: serde_json::Value =
+        serde_json::from_str(&bench.well(&["query", "tail", "N412FP", "--json"])).unwrap();
+    let told = |row: &serde_json::Value| row["skew_se_s"].is_number();
+    let rows = rows.as_array().unwrap();
+    assert!(rows.iter().any(told) && !rows.iter().all(told), "old rows and new ones");
+    assert!(rows.iter().all(|row| row["gap_m"].is_number() == (row["status"] == "estimated")));
+    let log = bench.path("results/gaps/_delta_log");
+    let schemas: Vec<String> = std::fs::read_dir(log)
+        .unwrap()
+        .filter_map(|entry| std::fs::read_to_string(entry.unwrap().path()).ok())
+        .filter(|text| text.contains("\"metaData\"") && text.contains("skew_se_s"))
+        .collect();
+    assert_eq!(schemas.len(), 1, "the table was told once of its new columns");
+    assert!(bench.well(&["store", "verify"]).ends_with("is whole\n"));
+    bench.well(&["store", "compact"]);
+    let after: serde_json::Value =
+        serde_json::from_str(&bench.well(&["query", "tail", "N412FP", "--json"])).unwrap();
+    assert_eq!(after.as_array().unwrap(), rows);
+}

@@ -70,10 +70,16 @@ pub struct Estimate {
     pub stiffness_se_n_per_m: Option<f64>,
     /// Delay of the screw channel against the motor's found and allowed for, s.
     pub skew_s: Option<f64>,
+    /// Its standard error, s.
+    pub skew_se_s: Option<f64>,
     /// Lost motion at zero load, m.
     pub loop_width_m: Option<f64>,
+    /// Its standard error, m.
+    pub loop_width_se_m: Option<f64>,
     /// Relative travel between plus and minus the part's reference load, m.
     pub lost_motion_m: Option<f64>,
+    /// Its standard error, m.
+    pub lost_motion_se_m: Option<f64>,
     /// For a purely rotary part: metres of gap to a radian, m/rad.
     pub reference_radius_m: Option<f64>,
     /// How often the load changed sides.
@@ -109,8 +115,11 @@ impl Estimate {
             stiffness_n_per_m: None,
             stiffness_se_n_per_m: None,
             skew_s: None,
+            skew_se_s: None,
             loop_width_m: None,
+            loop_width_se_m: None,
             lost_motion_m: None,
+            lost_motion_se_m: None,
             reference_radius_m: None,
             load_reversals: 0,
             samples: 0,

@@ -149,8 +149,11 @@ fn regressed(found: &ContactGap) -> Estimate {
         stiffness_n_per_m: Some(found.stiffness_n_per_m),
         stiffness_se_n_per_m: Some(found.stiffness_se_n_per_m),
         skew_s: Some(found.skew_s),
+        skew_se_s: Some(found.skew_se_s),
         loop_width_m: found.loop_width_m,
+        loop_width_se_m: found.loop_width_se_m,
         lost_motion_m: found.lost_motion_m,
+        lost_motion_se_m: found.lost_motion_se_m,
         reason: None,
         ..Estimate::refused("")
     }

@@ -77,6 +77,10 @@ impl Tabled for GapRecord {
         Column::must("program_version", Get::Text(|r| Some(&r.provenance.program_version))),
         Column::must("run_id", Get::Text(|r| Some(&r.provenance.run_id))),
         Column::must("processed_utc", Get::Time(|r| Some(r.provenance.processed_utc))),
+        // What came later stands behind, so that the contract's columns keep their order.
+        Column::may("skew_se_s", Get::Number(|r| r.estimate.skew_se_s)),
+        Column::may("loop_width_se_m", Get::Number(|r| r.estimate.loop_width_se_m)),
+        Column::may("lost_motion_se_m", Get::Number(|r| r.estimate.lost_motion_se_m)),
     ];
 
     fn from_cells(cells: &mut Cells<'_>) -> Result<Self, Error> {
@@ -93,6 +97,8 @@ impl Tabled for GapRecord {
         };
         let unit_hours = cells.number();
         let (estimate, provenance) = (estimate(cells)?, provenance(cells)?);
+        let [skew_se_s, loop_width_se_m, lost_motion_se_m] = [cells.number(), cells.number(), cells.number()];
+        let estimate = Estimate { skew_se_s, loop_width_se_m, lost_motion_se_m, ..estimate };
         Ok(Self { flight, position, part_number, serial_number, unit_hours, estimate, provenance })
     }
 }
@@ -110,8 +116,11 @@ fn estimate(cells: &mut Cells<'_>) -> Result<Estimate, Error> {
         stiffness_n_per_m: cells.number(),
         stiffness_se_n_per_m: cells.number(),
         skew_s: cells.number(),
+        skew_se_s: None,
         loop_width_m: cells.number(),
+        loop_width_se_m: None,
         lost_motion_m: cells.number(),
+        lost_motion_se_m: None,
         reference_radius_m: cells.number(),
         load_reversals: cells.count()?,
         samples: cells.count()?,

@@ -1,5 +1,6 @@
 //! Data files as rows that fit a condition: read by Polars, handed on as Arrow.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -9,7 +10,8 @@ use arrow::array::{
 };
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use polars::prelude::{
-    Column, DataFrame, Expr, LazyFrame, PlRefPath, PolarsResult, ScanArgsParquet, SortMultipleOptions, col,
+    Column, DataFrame, Expr, LazyFrame, NULL, PlRefPath, PolarsResult, ScanArgsParquet, SortMultipleOptions,
+    UnionArgs, col, concat, lit,
 };
 
 use crate::error::Error;
@@ -41,10 +43,28 @@ impl Read<'_> {
         if self.files.is_empty() {
             return Ok(RecordBatch::new_empty(self.schema));
         }
-        let mut frame = scan(self.files)?;
-        if let Some(condition) = self.condition {
-            frame = frame.filter(condition);
+        // Files of one release are alike, and read as one. Where some lack columns that came later, or have
+        // some that we do not know, Polars refuses, and each is read by itself.
+        let alike = scan(self.files).and_then(|frame| self.told(vec![self.chosen(frame)]));
+        let frame = match alike {
+            Ok(frame) => frame,
+            Err(_) => {
+                self.told(self.files.iter().map(|file| self.alone(file)).collect::<PolarsResult<_>>()?)?
+            }
+        };
+        to_arrow(&frame, &self.schema)
+    }
+
+    fn chosen(&self, frame: LazyFrame) -> LazyFrame {
+        match &self.condition {
+            Some(condition) => frame.filter(condition.clone()),
+            None => frame,
         }
+    }
+
+    /// The rows of frames with the same columns, put together in order.
+    fn told(&self, frames: Vec<LazyFrame>) -> PolarsResult<DataFrame> {
+        let mut frame = concat(frames, UnionArgs::default())?;
         if !self.order.is_empty() {
             let order: Vec<Expr> = self.order.iter().map(|name| col(*name)).collect();
             frame = frame.sort_by_exprs(order, SortMultipleOptions::default().with_maintain_order(true));
@@ -53,7 +73,34 @@ impl Read<'_> {
             frame = frame.tail(last.try_into().unwrap_or(u32::MAX));
         }
         let names: Vec<Expr> = self.schema.fields().iter().map(|field| col(field.name().as_str())).collect();
-        to_arrow(&frame.select(names).collect()?, &self.schema)
+        frame.select(names).collect()
+    }
+
+    /// A file as if it had the columns wanted: those of a later release are empty.
+    fn alone(&self, file: &PathBuf) -> PolarsResult<LazyFrame> {
+        let mut frame = scan(std::slice::from_ref(file))?;
+        let has = frame.collect_schema()?;
+        let lacks =
+            self.schema.fields().iter().filter(|field| field.is_nullable() && !has.contains(field.name()));
+        let empty = lacks.map(|field| lit(NULL).cast(kind(field.data_type())).alias(field.name().as_str()));
+        let empty: Vec<Expr> = empty.collect();
+        // Columns that this release does not know are left behind, or frames could not be put together.
+        let wanted = self.schema.fields().iter().map(|field| field.name().as_str());
+        let kept: BTreeSet<&str> = wanted.chain(self.order.iter().copied()).collect();
+        let kept: Vec<Expr> = kept.into_iter().map(col).collect();
+        Ok(self.chosen(frame).with_columns(empty).select(kept))
+    }
+}
+
+/// Polars' name for a column's type.
+fn kind(kind: &DataType) -> polars::prelude::DataType {
+    use polars::prelude::{DataType as Kind, TimeUnit, TimeZone};
+    match kind {
+        DataType::Float64 => Kind::Float64,
+        DataType::Int64 => Kind::Int64,
+        DataType::Timestamp(..) => Kind::Datetime(TimeUnit::Microseconds, Some(TimeZone::UTC)),
+        DataType::List(_) => Kind::List(Box::new(Kind::String)),
+        _ => Kind::String,
     }
 }
 

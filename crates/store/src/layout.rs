@@ -20,8 +20,9 @@ use crate::{datafile, durable, tabled};
 /// The format of the folder; it grows when an older release could no longer read or write it.
 ///
 /// 1: accounts of logs are *done* or *error*. 2: they may be *known*, *not reached* or *unaccounted* too.
+/// 3: files of one table may differ in columns that came later.
 /// Every format so far is read, and grows when it is next written to.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 const MARK: &str = "store.json";
 const LOCK: &str = "lock";
 
@@ -74,6 +75,7 @@ impl Store {
         for table in store.tables() {
             if table.exists() {
                 table.fill()?;
+                table.widen()?;
             } else {
                 table.create()?;
             }

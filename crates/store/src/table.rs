@@ -9,7 +9,7 @@ use arrow::array::RecordBatch;
 use arrow::datatypes::SchemaRef;
 use deltalake::kernel::engine::arrow_conversion::TryIntoKernel;
 use deltalake::kernel::transaction::{CommitBuilder, CommitProperties, TransactionError};
-use deltalake::kernel::{Action, Add, LogicalFileView, StructType, TombstoneView, Transaction};
+use deltalake::kernel::{Action, Add, LogicalFileView, MetadataExt, StructType, TombstoneView, Transaction};
 use deltalake::operations::create::CreateBuilder;
 use deltalake::protocol::{DeltaOperation, SaveMode};
 use deltalake::{DeltaTable, DeltaTableBuilder, DeltaTableError, TableProperty};
@@ -143,6 +143,45 @@ impl Table {
             let add =
                 if snapshot.files.is_empty() { vec![self.empty(snapshot.version + 1)?] } else { vec![] };
             Ok(Change { add, ..Change::default() })
+        })
+    }
+
+    /// Tells the table of columns that came with a later release: older files have none, which reads as empty.
+    pub(crate) fn widen(&self) -> Result<(), Error> {
+        for attempt in 1.. {
+            let snapshot = self.snapshot()?;
+            let Some(action) = self.wider(&snapshot).map_err(self.failed("read"))? else { break };
+            match self.act(&snapshot, action) {
+                Ok(()) => break,
+                // Somebody else widened it, or wrote to it, in the meantime.
+                Err(error) if attempt < ATTEMPTS && is_conflict(&error) => std::thread::sleep(PAUSE),
+                Err(error) => return Err(self.failed("widened")(error)),
+            }
+        }
+        Ok(())
+    }
+
+    /// What the table's description should say, where it lacks a column.
+    fn wider(&self, snapshot: &Snapshot) -> Result<Option<Action>, DeltaTableError> {
+        let state = snapshot.delta.snapshot()?;
+        let wanted: StructType = self.schema.as_ref().try_into_kernel().map_err(DeltaTableError::from)?;
+        let known = state.schema();
+        if wanted.fields().all(|field| known.field(field.name()).is_some()) {
+            return Ok(None);
+        }
+        // What a release after this one added stays.
+        let others = known.fields().filter(|field| wanted.field(field.name()).is_none());
+        let all =
+            StructType::try_new(wanted.fields().chain(others).cloned()).map_err(DeltaTableError::from)?;
+        Ok(Some(Action::Metadata(MetadataExt::with_schema(state.metadata().clone(), &all)?)))
+    }
+
+    fn act(&self, snapshot: &Snapshot, action: Action) -> Result<(), DeltaTableError> {
+        let operation = DeltaOperation::Write { mode: SaveMode::Append, partition_by: None, predicate: None };
+        self.runtime.block_on(async {
+            let state = snapshot.delta.snapshot()?;
+            let builder = CommitBuilder::from(CommitProperties::default()).with_actions(vec![action]);
+            builder.build(Some(state), snapshot.delta.log_store(), operation).await.map(drop)
         })
     }
 

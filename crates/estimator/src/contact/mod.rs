@@ -83,8 +83,12 @@ pub struct ContactGap {
     /// Lost motion at zero load, m: a second witness, from lightly loaded samples that a straight
     /// fit leaves out. On soft flanks it lies between the gap and the line.
     pub loop_width_m: Option<f64>,
+    /// Its standard error, m.
+    pub loop_width_se_m: Option<f64>,
     /// Relative travel between + and − the reference load, m, from samples near it.
     pub lost_motion_m: Option<f64>,
+    /// Its standard error, m.
+    pub lost_motion_se_m: Option<f64>,
     /// Time in contact on the upper and on the lower flank that the number stands on, s.
     pub touched_s: (f64, f64),
     /// Load magnitude that one sample in twenty exceeds, N.
@@ -149,6 +153,9 @@ fn look(samples: &Samples<'_>, prior: &Prior) -> Result<(Frame, Contact), Refusa
 fn report(frame: &Frame, prior: &Prior, contact: &Contact) -> ContactGap {
     let (gap_m, gap_se_m) = contact.gap_m;
     let (compliance, compliance_se) = contact.compliance_m_per_n;
+    let loop_width = witness::loop_width_m(contact);
+    let lost_motion =
+        prior.reference_load_n.and_then(|load_n| witness::lost_motion_m(contact, frame, load_n));
     let mut found = ContactGap {
         gap_m,
         gap_se_m,
@@ -158,10 +165,10 @@ fn report(frame: &Frame, prior: &Prior, contact: &Contact) -> ContactGap {
         skew_s: contact.state.skew_s,
         skew_se_s: contact.skew_se_s,
         friction: contact.state.friction,
-        loop_width_m: witness::loop_width_m(contact),
-        lost_motion_m: prior
-            .reference_load_n
-            .and_then(|load_n| witness::lost_motion_m(contact, frame, load_n)),
+        loop_width_m: loop_width.map(|(m, _)| m),
+        loop_width_se_m: loop_width.map(|(_, se_m)| se_m),
+        lost_motion_m: lost_motion.map(|(m, _)| m),
+        lost_motion_se_m: lost_motion.map(|(_, se_m)| se_m),
         touched_s: contact.touched_s,
         load_p95_n: frame.load_n,
         flags: Vec::new(),

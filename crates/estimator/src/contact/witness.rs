@@ -5,36 +5,67 @@ use super::design::{FORCE, Flank, Frame, GAP, LINEAR, Row};
 
 /// Rows this near to the reference load count, as a share of it.
 const NEAR: f64 = 0.25;
+/// Normal standard deviations in a median absolute deviation.
+const MAD: f64 = 1.482_602_218_505_602;
+/// A median of a normal sample scatters so much more than its mean: √(π/2).
+const MEDIAN: f64 = 1.253_314_137_315_5;
 /// Rows on each flank below which a median says nothing.
 const FEWEST_ROWS: usize = 5;
 
-/// Lost motion at zero load, m, from the lightly loaded rows, which the straight fit never saw.
-pub(super) fn loop_width_m(contact: &Contact) -> Option<f64> {
+/// Lost motion at zero load and its standard error, m, from the lightly loaded rows, which the straight fit
+/// never saw.
+pub(super) fn loop_width_m(contact: &Contact) -> Option<(f64, f64)> {
     let light = &contact.straight.design.light;
     let beyond_m = |flank| beyond_m(contact, light.iter(), flank);
-    Some(contact.straight.fit.beta[GAP] + beyond_m(Flank::Upper)? + beyond_m(Flank::Lower)?)
+    Some(put_together(
+        contact,
+        contact.straight.fit.beta[GAP],
+        beyond_m(Flank::Upper)?,
+        beyond_m(Flank::Lower)?,
+    ))
 }
 
-/// Relative travel between + and − a load in the coupling, m: rows near it on either flank, drift, skew
-/// and transducer error taken off, brought to the load itself along the fitted line.
-pub(super) fn lost_motion_m(contact: &Contact, frame: &Frame, load_n: f64) -> Option<f64> {
+/// Relative travel between + and − a load in the coupling and its standard error, m: rows near it on either
+/// flank, drift, skew and transducer error taken off, brought to the load itself along the fitted line.
+pub(super) fn lost_motion_m(contact: &Contact, frame: &Frame, load_n: f64) -> Option<(f64, f64)> {
     let load = load_n / frame.load_n;
     let near = |row: &&Row<LINEAR>| (row.x[FORCE].abs() - load).abs() < NEAR * load;
     let rows = &contact.straight.design;
     let beyond_m = |flank| beyond_m(contact, rows.firm.iter().chain(&rows.light).filter(near), flank);
     let beta = &contact.straight.fit.beta;
-    Some(beta[GAP] + 2.0 * load * beta[FORCE] + beyond_m(Flank::Upper)? + beyond_m(Flank::Lower)?)
+    let line_m = beta[GAP] + 2.0 * load * beta[FORCE];
+    Some(put_together(contact, line_m, beyond_m(Flank::Upper)?, beyond_m(Flank::Lower)?))
 }
 
-/// How far outwards of the fitted line the rows of a flank lie, m: their median.
-fn beyond_m<'a>(contact: &Contact, rows: impl Iterator<Item = &'a Row<LINEAR>>, flank: Flank) -> Option<f64> {
-    let mut outward_m: Vec<f64> = rows
+/// A travel along the fitted line, and what both flanks lie beyond it. What is doubted of the gap (drift,
+/// transducer, friction) is doubted here as well; the medians' own scatter comes on top.
+fn put_together(contact: &Contact, line_m: f64, upper: (f64, f64), lower: (f64, f64)) -> (f64, f64) {
+    (line_m + upper.0 + lower.0, contact.gap_m.1.hypot(upper.1.hypot(lower.1)))
+}
+
+/// How far outwards of the fitted line the rows of a flank lie, m: their median, and its standard error with
+/// the rows of one stretch taken as one.
+fn beyond_m<'a>(
+    contact: &Contact,
+    rows: impl Iterator<Item = &'a Row<LINEAR>>,
+    flank: Flank,
+) -> Option<(f64, f64)> {
+    let (mut outward_m, mut stretches): (Vec<f64>, Vec<u32>) = rows
         .filter(|row| row.x[GAP] * flank.sign() > 0.0)
-        .map(|row| flank.sign() * contact.straight.fit.residual_m(row))
-        .collect();
+        .map(|row| (flank.sign() * contact.straight.fit.residual_m(row), row.stretch))
+        .unzip();
     if outward_m.len() < FEWEST_ROWS {
         return None;
     }
-    let middle = outward_m.len() / 2;
-    Some(*outward_m.select_nth_unstable_by(middle, f64::total_cmp).1)
+    stretches.sort_unstable();
+    stretches.dedup();
+    let median_m = median(&mut outward_m);
+    outward_m.iter_mut().for_each(|e| *e = (*e - median_m).abs());
+    let spread_m = MAD * median(&mut outward_m);
+    Some((median_m, MEDIAN * spread_m / (stretches.len() as f64).sqrt()))
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
