@@ -1,6 +1,6 @@
 //! What a fleet writes down in `pipeline.toml`, and what it makes of one flight: log in, records out.
 //!
-//! [`Config`] is checked whole before the first flight; [`Opened::records`] is a pure composition of
+//! [`Config`] is checked whole before the first flight; [`Opened::record`] is a pure composition of
 //! the floors below it, the same in the nightly run, at the prompt and in a notebook.
 
 pub mod config;
