@@ -9,6 +9,8 @@ use fleet::GapRecord;
 use jiff::Timestamp;
 use serde::Serialize;
 
+use crate::recorder::median;
+
 /// A flight whose innovations are unlike those of the unit's other flights.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Unlike {
@@ -69,11 +71,6 @@ fn usual(before: &[f64], this: f64) -> Option<f64> {
     let usual = median(before.to_vec());
     let spread = 1.4826 * median(before.iter().map(|v| (v - usual).abs()).collect());
     ((this - usual).abs() > (SPREADS * spread).max(FACTOR.ln())).then_some(usual)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn told(record: &GapRecord, this: f64, usual: f64) -> Unlike {

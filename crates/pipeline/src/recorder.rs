@@ -88,7 +88,8 @@ fn step(flights: &[(Timestamp, f64)]) -> Option<(Timestamp, f64, f64)> {
     is_moved.then(|| (flights[at].0, from, to))
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+/// The upper median of at least one value.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -8,9 +8,8 @@ use plotters::prelude::*;
 use resvg::{tiny_skia, usvg};
 
 use crate::Error;
+use crate::chart::{GRID, INK};
 
-const INK: RGBColor = RGBColor(0x1C, 0x25, 0x30);
-const GRID: RGBColor = RGBColor(0xE1, 0xE6, 0xEB);
 const FAINT: RGBColor = RGBColor(0x9A, 0xA5, 0xB1);
 const UPPER: RGBColor = RGBColor(0xC8, 0x52, 0x00);
 const LOWER: RGBColor = RGBColor(0x1F, 0x6F, 0xB2);

@@ -74,8 +74,7 @@ impl Store {
         let store = Self::at(dir)?;
         for table in store.tables() {
             if table.exists() {
-                table.fill()?;
-                table.widen()?;
+                table.renew()?;
             } else {
                 table.create()?;
             }

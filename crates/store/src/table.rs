@@ -81,6 +81,8 @@ pub(crate) struct Change<'a> {
     pub(crate) remove: Vec<&'a DataFile>,
     /// Whether the same rows only lie elsewhere afterwards.
     pub(crate) rearranges: bool,
+    /// The table's new description.
+    pub(crate) describes: Option<Action>,
 }
 
 impl Table {
@@ -137,31 +139,19 @@ impl Table {
         datafile::write(&self.dir, version, &RecordBatch::new_empty(Arc::clone(&self.schema)), true)
     }
 
-    /// Gives a table without files, as earlier releases made them, one without rows.
-    pub(crate) fn fill(&self) -> Result<(), Error> {
+    /// Brings a table of an earlier release up to this one: a file without rows where it has none, and the
+    /// columns it does not know.
+    pub(crate) fn renew(&self) -> Result<(), Error> {
         self.change(|snapshot| {
             let add =
                 if snapshot.files.is_empty() { vec![self.empty(snapshot.version + 1)?] } else { vec![] };
-            Ok(Change { add, ..Change::default() })
+            let describes = self.wider(snapshot).map_err(self.failed("read"))?;
+            Ok(Change { add, describes, ..Change::default() })
         })
     }
 
-    /// Tells the table of columns that came with a later release: older files have none, which reads as empty.
-    pub(crate) fn widen(&self) -> Result<(), Error> {
-        for attempt in 1.. {
-            let snapshot = self.snapshot()?;
-            let Some(action) = self.wider(&snapshot).map_err(self.failed("read"))? else { break };
-            match self.act(&snapshot, action) {
-                Ok(()) => break,
-                // Somebody else widened it, or wrote to it, in the meantime.
-                Err(error) if attempt < ATTEMPTS && is_conflict(&error) => std::thread::sleep(PAUSE),
-                Err(error) => return Err(self.failed("widened")(error)),
-            }
-        }
-        Ok(())
-    }
-
-    /// What the table's description should say, where it lacks a column.
+    /// What the table's description should say, where it lacks a column that came with a later release: older
+    /// files have none, which reads as empty.
     fn wider(&self, snapshot: &Snapshot) -> Result<Option<Action>, DeltaTableError> {
         let state = snapshot.delta.snapshot()?;
         let wanted: StructType = self.schema.as_ref().try_into_kernel().map_err(DeltaTableError::from)?;
@@ -174,15 +164,6 @@ impl Table {
         let all =
             StructType::try_new(wanted.fields().chain(others).cloned()).map_err(DeltaTableError::from)?;
         Ok(Some(Action::Metadata(MetadataExt::with_schema(state.metadata().clone(), &all)?)))
-    }
-
-    fn act(&self, snapshot: &Snapshot, action: Action) -> Result<(), DeltaTableError> {
-        let operation = DeltaOperation::Write { mode: SaveMode::Append, partition_by: None, predicate: None };
-        self.runtime.block_on(async {
-            let state = snapshot.delta.snapshot()?;
-            let builder = CommitBuilder::from(CommitProperties::default()).with_actions(vec![action]);
-            builder.build(Some(state), snapshot.delta.log_store(), operation).await.map(drop)
-        })
     }
 
     /// The table as it is now.
@@ -216,7 +197,7 @@ impl Table {
         for attempt in 1.. {
             let snapshot = self.snapshot()?;
             let mut change = plan(&snapshot)?;
-            if change.add.is_empty() && change.remove.is_empty() {
+            if change.add.is_empty() && change.remove.is_empty() && change.describes.is_none() {
                 break;
             }
             if change.add.is_empty() && change.remove.len() == snapshot.files.len() {
@@ -241,7 +222,8 @@ impl Table {
         }
         let removes =
             change.remove.iter().map(|file| Action::Remove(file.view.remove_action(!change.rearranges)));
-        let actions: Vec<Action> = removes.chain(change.add.into_iter().map(Action::Add)).collect();
+        let adds = change.add.into_iter().map(Action::Add);
+        let actions: Vec<Action> = change.describes.into_iter().chain(removes).chain(adds).collect();
         let operation = if change.rearranges {
             DeltaOperation::Optimize { predicate: None, target_size: 0 }
         } else {
@@ -345,7 +327,12 @@ mod tests {
 
     fn merged<'a>(table: &Table, snapshot: &'a Snapshot, name: u64) -> Change<'a> {
         let add = datafile::write(&table.dir, name, &batch(vec![1, 2]), false).unwrap();
-        Change { add: vec![add], remove: snapshot.files.iter().collect(), rearranges: true }
+        Change {
+            add: vec![add],
+            remove: snapshot.files.iter().collect(),
+            rearranges: true,
+            ..Change::default()
+        }
     }
 
     fn rows(table: &Table) -> i64 {

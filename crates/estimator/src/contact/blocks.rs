@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::Samples;
 
 use super::SHORTEST_S;
+use super::design::middle_and_half;
 use super::refusal::Refusal;
 use super::wild::Neighbours;
 
@@ -52,6 +53,9 @@ impl Blocks {
             }
         }
         blocks.logged_dx_m.clone_from(&blocks.dx_m);
+        if blocks.is_still() {
+            return Err(Refusal::ChannelConstant);
+        }
         let sound = blocks.dx_m.iter().filter(|y| y.is_finite()).count();
         if (sound as f64) * blocks.period_s < SHORTEST_S { Err(Refusal::TooShort) } else { Ok(blocks) }
     }
@@ -68,6 +72,13 @@ impl Blocks {
         self.motor_m.push(motor_m);
         self.dx_m.push(dx_m);
         self.load_n.push(load_n);
+    }
+
+    /// Whether the screw's channel repeats one value while the motor's moves: a dead sensor, or a locked surface.
+    fn is_still(&self) -> bool {
+        let screw: Vec<f64> = self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx).collect();
+        let (motor_m, screw_m) = (middle_and_half(&self.motor_m).1, middle_and_half(&screw).1);
+        (0.0..=STILL * motor_m).contains(&screw_m)
     }
 
     pub(super) fn len(&self) -> usize {
@@ -127,19 +138,6 @@ fn cubic(u: f64) -> [f64; 4] {
     ]
 }
 
-/// Whether the screw's channel repeats one value while the motor's moves: a dead sensor, or a locked surface.
-fn is_still(samples: &Samples<'_>) -> bool {
-    let range = |values: &mut dyn Iterator<Item = f64>| {
-        let (low, high) = values
-            .filter(|v| !v.is_nan())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-        high - low
-    };
-    let screw = samples.motor_m.iter().zip(samples.dx_m).map(|(x, dx)| x + dx);
-    let motor_m = range(&mut samples.motor_m.iter().copied());
-    range(&mut { screw }) <= STILL * motor_m
-}
-
 /// The samples, and how far neighbours of a channel may leap before they are looked at twice.
 #[derive(Debug)]
 struct Watch<'a> {
@@ -152,9 +150,6 @@ impl<'a> Watch<'a> {
     fn over(samples: &'a Samples<'a>) -> Result<Self, Refusal> {
         let of = |channel: &[f64]| Neighbours::of(channel).ok_or(Refusal::ChannelConstant);
         of(samples.motor_m)?;
-        if is_still(samples) {
-            return Err(Refusal::ChannelConstant);
-        }
         Ok(Self { samples, dx: of(samples.dx_m)?, load: of(samples.load_n)? })
     }
 

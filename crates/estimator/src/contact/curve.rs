@@ -3,7 +3,7 @@
 use super::blocks::Blocks;
 use super::coupling::State;
 use super::design::{
-    self, BEND, CURVED, FIRM_SHARE, FORCE, Frame, GAP, LINEAR, Row, SPEED, SPEED_M_PER_S, bends,
+    self, BEND, CURVED, FIRM_SHARE, FORCE, Frame, GAP, LINEAR, ORIGIN, Row, SPEED, SPEED_M_PER_S, bends,
 };
 use super::refusal::Refusal;
 use super::search::{Found, search, start};
@@ -47,6 +47,24 @@ pub(super) struct Contact {
     pub(super) curve: Option<[f64; CURVED]>,
     /// The straight fit and its rows, for the witnesses.
     pub(super) straight: Found<LINEAR>,
+}
+
+impl Contact {
+    /// δX on a flank, m, under a force over the 95 % load: straight or bent. The side is +1, −1, or 0 in the gap.
+    pub(super) fn flank_m(&self, side: f64, force: f64) -> f64 {
+        let on = |beta: &[f64], bent_m: f64| {
+            beta[ORIGIN] + side * (0.5 * beta[GAP] + force * beta[FORCE] + bent_m)
+        };
+        match &self.curve {
+            None => on(&self.straight.fit.beta, 0.0),
+            Some(curve) => on(curve, curve[BEND..].iter().zip(bends(force)).map(|(b, x)| b * x).sum()),
+        }
+    }
+
+    /// What lies in δX beside gap and wind-up, m: drift, skew, transducer error and wrong friction.
+    pub(super) fn beside_m(&self, row: &Row<LINEAR>) -> f64 {
+        (FORCE + 1..LINEAR).map(|column| self.straight.fit.beta[column] * row.x[column]).sum()
+    }
 }
 
 /// Fits straight flanks, and soft ones where low loads ask for them.
@@ -96,18 +114,9 @@ fn is_explained(blocks: &Blocks, frame: &Frame, contact: &Contact) -> bool {
 /// How far δX travels, m: as seen once all that is beside gap and wind-up is taken off, as gap and wind-up
 /// say it should, and by noise alone; each from the 5 % to the 95 % quantile.
 fn travels_m(blocks: &Blocks, frame: &Frame, contact: &Contact) -> (f64, f64, f64) {
-    let beta = &contact.straight.fit.beta;
     let rows = design::every(blocks, &contact.state, frame, blocks.len().div_ceil(LOOKS).max(1));
-    let beside_m = |row: &Row<LINEAR>| (FORCE + 1..LINEAR).map(|c| beta[c] * row.x[c]).sum::<f64>();
-    let flank_m = |row: &Row<LINEAR>| match &contact.curve {
-        None => row.x[GAP] * beta[GAP] + row.x[FORCE] * beta[FORCE],
-        Some(curve) => {
-            let bent = bends(row.x[FORCE].abs());
-            let bent_m: f64 = curve[BEND..].iter().zip(bent).map(|(b, x)| b * x).sum();
-            row.x[GAP] * curve[GAP] + row.x[FORCE] * curve[FORCE] + 2.0 * row.x[GAP] * bent_m
-        }
-    };
-    let seen_m = span_m(rows.iter().map(|row| row.y_m - beside_m(row)).collect());
+    let flank_m = |row: &Row<LINEAR>| contact.flank_m(2.0 * row.x[GAP], row.x[FORCE].abs());
+    let seen_m = span_m(rows.iter().map(|row| row.y_m - contact.beside_m(row)).collect());
     let expected_m = span_m(rows.iter().map(flank_m).collect());
     let firm = &contact.straight.design.firm;
     let noise_m = span_m(firm.iter().map(|row| contact.straight.fit.residual_m(row)).collect());

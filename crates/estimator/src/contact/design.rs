@@ -100,7 +100,8 @@ impl Frame {
     }
 }
 
-fn middle_and_half(values: &[f64]) -> (f64, f64) {
+/// Middle and half length of what values span; a negative length where there are none.
+pub(super) fn middle_and_half(values: &[f64]) -> (f64, f64) {
     let (low, high) =
         values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
     (0.5 * (low + high), 0.5 * (high - low))

@@ -2,7 +2,7 @@
 
 use super::curve::Contact;
 pub use super::design::Flank;
-use super::design::{BEND, CURVED, FORCE, Frame, GAP, LINEAR, ORIGIN, Row, bends};
+use super::design::{FORCE, Frame, GAP, LINEAR, Row};
 
 /// Points of a flank's line.
 const POINTS: usize = 60;
@@ -53,14 +53,12 @@ impl Picture {
 }
 
 fn touch(frame: &Frame, contact: &Contact, row: &Row<LINEAR>, trust: Option<f64>) -> Touch {
-    let beta = &contact.straight.fit.beta;
-    let beside_m: f64 = (FORCE + 1..LINEAR).map(|column| beta[column] * row.x[column]).sum();
     Touch {
         time_s: frame.moment_s(row),
         duration_s: row.blocks * contact.period_s,
         flank: if row.x[GAP] > 0.0 { Flank::Upper } else { Flank::Lower },
         force_n: row.x[FORCE] * frame.load_n,
-        dx_m: row.y_m - beside_m,
+        dx_m: row.y_m - contact.beside_m(row),
         trust,
     }
 }
@@ -68,14 +66,9 @@ fn touch(frame: &Frame, contact: &Contact, row: &Row<LINEAR>, trust: Option<f64>
 /// δX of a flank over the force that presses it, straight or bent.
 fn line(frame: &Frame, contact: &Contact, flank: Flank, most_n: f64) -> Vec<(f64, f64)> {
     let side = flank.sign();
-    let straight = &contact.straight.fit.beta;
-    let dx_m = |force: f64| match &contact.curve {
-        None => straight[ORIGIN] + side * (0.5 * straight[GAP] + force * straight[FORCE]),
-        Some(curve) => {
-            let bent_m: f64 = curve[BEND..CURVED].iter().zip(bends(force)).map(|(b, x)| b * x).sum();
-            curve[ORIGIN] + side * (0.5 * curve[GAP] + force * curve[FORCE] + bent_m)
-        }
-    };
     let at = |k: usize| most_n * k as f64 / (POINTS - 1) as f64;
-    (0..POINTS).map(at).map(|force_n| (side * force_n, dx_m(force_n / frame.load_n))).collect()
+    (0..POINTS)
+        .map(at)
+        .map(|force_n| (side * force_n, contact.flank_m(side, force_n / frame.load_n)))
+        .collect()
 }
