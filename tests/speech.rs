@@ -140,6 +140,9 @@ fn an_estimate_is_drawn_in_the_form_its_ending_names() {
     let ended = bench.freeplay(&[&logs[..], &["a.pdf"]].concat());
     assert_eq!(ended.code, Some(2));
     assert!(ended.err.contains(".svg, .png or .html"), "{}", ended.err);
+    let ended = bench.freeplay(&["estimate", "nowhere.parquet", "--part", "A", "--plot", "none.png"]);
+    assert!(ended.err.contains("none.png was not written"), "{}", ended.err);
+    assert!(!bench.path("none.png").exists(), "an empty picture says nothing");
 }
 
 /// A reader that closes the pipe after a line ends the program quietly.

@@ -34,6 +34,10 @@ pub(super) fn plot(
         let found = job::look::of_log(&files, &name, config, installations, part).unwrap_or_default();
         looks.extend(found.into_iter().map(|look| drawn(&name, look)));
     }
+    if looks.is_empty() {
+        talk.note(&format!("no actuator to draw; {} was not written", shown(file)));
+        return Ok(());
+    }
     let failed = |what: &dyn std::fmt::Display| {
         Failure::failed(fleet::Complaint::new("cannot_write", format!("{}: {what}", shown(file))))
     };
