@@ -227,6 +227,38 @@ fn two_methods_live_side_by_side_and_are_compared() {
     assert_eq!(rows.lines().count(), 41);
 }
 
+/// The store takes over what a trial found, and the next run under the trial's settings has nothing to do.
+#[test]
+fn a_trial_is_adopted_and_what_it_did_not_see_stays() {
+    let bench = Bench::sample();
+    bench.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N4*/*000[1-4].parquet");
+    bench.well(&["run"]);
+    let before = bench.exported();
+    bench.configure("path = \"results\"", "path = \"trial\"");
+    bench.configure("method = \"contact\"", "method = \"midrange\"");
+    bench.well(&["run", "--tail", "N412FP"]);
+    let trial = bench.exported();
+    bench.configure("path = \"trial\"", "path = \"results\"");
+    let told = bench.well(&["store", "adopt", "trial"]);
+    assert!(told.starts_with("16 records of 4 logs taken over"), "{told}");
+    assert!(bench.well(&["diff", "results", "trial"]).contains("differ"));
+
+    let now = bench.exported();
+    let of = |rows: &str, tail: &str| -> Vec<String> {
+        rows.lines().filter(|row| row.contains(tail)).map(str::to_owned).collect()
+    };
+    assert_eq!(of(&now, "N412FP"), of(&trial, "N412FP"));
+    let others: Vec<&str> = before.lines().filter(|row| !row.contains("N412FP")).collect();
+    assert_eq!(now.lines().filter(|row| !row.contains("N412FP")).collect::<Vec<_>>(), others);
+    let plan = bench.well(&["run", "--dry-run", "--tail", "N412FP"]);
+    assert!(plan.starts_with("would do 0 logs"), "{plan}");
+    bench.well(&["store", "verify"]);
+
+    let ended = bench.freeplay(&["store", "adopt", "results"]);
+    assert_eq!(ended.code, Some(3));
+    assert!(ended.err.contains("error[store_itself]"), "{}", ended.err);
+}
+
 #[test]
 fn metrics_tell_when_a_run_last_completed_and_how() {
     let bench = Bench::sample();

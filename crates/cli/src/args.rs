@@ -489,6 +489,12 @@ pub(crate) enum StoreCommand {
     Verify,
     /// Merge small files, sorted for queries
     Compact,
+    /// Take over what another store found of the same logs, e.g. a trial of other settings
+    Adopt {
+        /// The other store's folder; it stays as it is.
+        #[arg(value_name = "TRIAL")]
+        trial: PathBuf,
+    },
     /// All records, in order
     Export {
         #[command(flatten)]

@@ -12,7 +12,7 @@ use store::{LogAccount, LogResult, Outcome, RecordKey};
 
 use crate::account::{self, Report};
 use crate::event::Event;
-use crate::plan::{self, Plan, Work};
+use crate::plan::{Plan, Work};
 use crate::trends::Unit;
 
 /// What came of one log.
@@ -68,7 +68,7 @@ impl<'a> Book<'a> {
     }
 
     fn enter(&mut self, account: LogAccount) {
-        let names = plan::owned(&account);
+        let names = account.owned();
         self.owners.extend(names.into_iter().map(|name| (name, account.log_path.clone())));
         self.accounts.insert(account.log_path.clone(), account);
     }
@@ -142,7 +142,7 @@ impl<'a> Book<'a> {
         let now: BTreeSet<RecordKey> = records.iter().map(RecordKey::of).collect();
         let mine = |name: &RecordKey| self.owners.get(name) == Some(&account.log_path);
         let gone: Vec<RecordKey> =
-            plan::owned(before).into_iter().filter(|n| mine(n) && !now.contains(n)).collect();
+            before.owned().into_iter().filter(|n| mine(n) && !now.contains(n)).collect();
         for name in &gone {
             self.owners.remove(name);
         }

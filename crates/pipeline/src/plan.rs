@@ -209,7 +209,7 @@ pub fn plan(
     let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
     let gone = gone.iter().filter_map(|a| Some((digests(a)?, (a.estimated, a.refused)))).collect();
     let accounts: BTreeMap<String, LogAccount> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
-    let owned: HashSet<RecordKey> = accounts.values().flat_map(owned).collect();
+    let owned: HashSet<RecordKey> = accounts.values().flat_map(LogAccount::owned).collect();
     let unidentified = job::flight::unidentified_digest(config, installations);
     let judge = Judge { config, installations, request, owned: &owned, unidentified: &unidentified };
     let verdicts: Vec<Verdict> =
@@ -234,26 +234,6 @@ pub fn digests(account: &LogAccount) -> Option<(String, String)> {
         .is_well()
         .then(|| Some((account.log_digest.clone()?, account.config_digest.clone()?)))
         .flatten()
-}
-
-/// The actuators' flights that a log in the store speaks for.
-pub fn owned(account: &LogAccount) -> Vec<RecordKey> {
-    match flight_of(account) {
-        Some(flight) if account.estimated + account.refused > 0 => {
-            account.positions.iter().map(|position| record_key(&flight, position)).collect()
-        }
-        _ => Vec::new(),
-    }
-}
-
-/// By what the record of an actuator's flight is known.
-pub fn record_key(flight: &Flight, position: &str) -> RecordKey {
-    RecordKey {
-        departure_us: flight.departure_utc.as_microsecond(),
-        tail_number: flight.tail_number.to_string(),
-        flight_id: flight.flight_id.to_string(),
-        position: position.to_owned(),
-    }
 }
 
 /// The flight an account speaks of, where its log was identified.
@@ -346,11 +326,8 @@ impl Judge<'_> {
     fn is_orphan(&self, account: &LogAccount) -> bool {
         let yielded = account.outcome.is_well() || account.error_code.as_deref() == Some("duplicate_flight");
         let silent = account.estimated + account.refused == 0;
-        let keys = flight_of(account)
-            .map(|f| account.positions.iter().map(|p| record_key(&f, p)).collect::<Vec<_>>());
-        yielded
-            && silent
-            && keys.is_some_and(|keys| !keys.is_empty() && keys.iter().all(|key| !self.owned.contains(key)))
+        let keys = account.keys();
+        yielded && silent && !keys.is_empty() && keys.iter().all(|key| !self.owned.contains(key))
     }
 }
 

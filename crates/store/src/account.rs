@@ -3,6 +3,7 @@
 use jiff::Timestamp;
 
 use crate::error::Error;
+use crate::query::RecordKey;
 use crate::tabled::{Cells, Column, Get, Tabled};
 
 /// How a log ended.
@@ -89,6 +90,29 @@ pub struct LogAccount {
     pub run_id: String,
     /// When.
     pub processed_utc: Timestamp,
+}
+
+impl LogAccount {
+    /// The records it speaks for: those of its flight, where it made any.
+    pub fn owned(&self) -> Vec<RecordKey> {
+        if self.estimated + self.refused > 0 { self.keys() } else { Vec::new() }
+    }
+
+    /// The records its flight may have, one per position; none where the log was not identified.
+    pub fn keys(&self) -> Vec<RecordKey> {
+        let (Some(tail), Some(flight), Some(departure)) =
+            (&self.tail_number, &self.flight_id, self.departure_utc)
+        else {
+            return Vec::new();
+        };
+        let key = |position: &String| RecordKey {
+            departure_us: departure.as_microsecond(),
+            tail_number: tail.clone(),
+            flight_id: flight.clone(),
+            position: position.clone(),
+        };
+        self.positions.iter().map(key).collect()
+    }
 }
 
 impl Tabled for LogAccount {

@@ -24,6 +24,9 @@ pub enum Error {
     /// Another process writes.
     #[error("the store is {holder}")]
     Held { holder: String },
+    /// A store was to take over itself.
+    #[error("{} is the store itself", dir.display())]
+    Itself { dir: PathBuf },
     /// The system refused to read or write.
     #[error("{} cannot be {verb}: {source}", path.display())]
     Io { path: PathBuf, verb: &'static str, source: std::io::Error },
@@ -67,6 +70,7 @@ impl Error {
             Self::Foreign { .. } | Self::Name { .. } => "store_foreign",
             Self::Format { .. } => "store_format",
             Self::Held { .. } => "store_held",
+            Self::Itself { .. } => "store_itself",
             Self::Io { .. } => "store_io",
             Self::Table { .. } => "store_table",
             Self::Damaged { .. } => "store_damaged",
@@ -77,7 +81,10 @@ impl Error {
 
     fn file(&self) -> Option<&PathBuf> {
         match self {
-            Self::Missing { dir } | Self::Foreign { dir, .. } | Self::Name { dir, .. } => Some(dir),
+            Self::Missing { dir }
+            | Self::Foreign { dir, .. }
+            | Self::Name { dir, .. }
+            | Self::Itself { dir } => Some(dir),
             Self::Format { file, .. } => Some(file),
             Self::Io { path, .. } | Self::Damaged { path, .. } => Some(path),
             _ => None,
@@ -95,6 +102,9 @@ impl Error {
                 "read it with the release that wrote it, or restore `store.json` from a backup"
             }
             Self::Held { .. } => "wait for it with `--wait 20m`; readers need not wait",
+            Self::Itself { .. } => {
+                "name the store of the trial, and let the configuration name the one that takes it over"
+            }
             Self::Io { .. } => "is the disk full, or the folder not ours to write?",
             Self::Table { .. } => "is the disk full, or does another program write into this table?",
             Self::Damaged { .. } => {

@@ -16,6 +16,7 @@
 //! The choice of Delta Lake, its layout and its guarantees are told in `docs/store.md`.
 
 mod account;
+mod adopt;
 pub mod columns;
 mod compact;
 mod datafile;
@@ -37,6 +38,7 @@ mod verify;
 mod writer;
 
 pub use account::{LogAccount, Outcome, RunAccount};
+pub use adopt::Adopted;
 pub use compact::Compaction;
 pub use error::Error;
 pub use export::Format;

@@ -330,6 +330,7 @@ fn dry_run(config: &job::Config, request: &Request, talk: &Talk) -> Result<Code,
             vec![w.shown.clone(), w.why.as_str().to_owned(), megabytes]
         })
         .collect();
-    talk.answer(&(head + &table::layout(&columns, &rows)))?;
+    let table = if rows.is_empty() { String::new() } else { table::layout(&columns, &rows) };
+    talk.answer(&(head + &table))?;
     Ok(Code::Well)
 }

@@ -1,5 +1,6 @@
 //! `store`: care of the results.
 
+use std::path::Path;
 use std::time::Duration;
 
 use fleet::Complaint;
@@ -9,7 +10,7 @@ use store::{Holder, Info, Query, RunAccount, Store};
 
 use crate::args::{Format, Global, Output, StoreArgs, StoreCommand, Table};
 use crate::exit::{Code, Failure};
-use crate::progress::span;
+use crate::progress::{Progress, span};
 use crate::rows;
 use crate::table::count;
 use crate::talk::Talk;
@@ -28,6 +29,7 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, talk: &Talk) -> Result<Co
         StoreCommand::Files { table } => files(&store, *table, talk),
         StoreCommand::Verify => verify(&store, talk),
         StoreCommand::Compact => compact(&store, talk),
+        StoreCommand::Adopt { trial } => adopt(&store, trial, talk),
         StoreCommand::Export { output } => export(&store, output, talk),
     }
 }
@@ -160,6 +162,32 @@ fn verify(store: &Store, talk: &Talk) -> Result<Code, Failure> {
     talk.complain_all(&findings);
     talk.answer(&format!("{} in {}\n", count(findings.len(), "finding"), store.dir().display()))?;
     Ok(Code::LogsInError)
+}
+
+fn adopt(store: &Store, trial: &Path, talk: &Talk) -> Result<Code, Failure> {
+    let trial = Store::open(trial)?;
+    let mut writer = store.lock(&Holder::this_process(), None)?;
+    let progress = Progress::new("adopt", talk);
+    let mut begun = false;
+    let done = writer.adopt(&trial, |tail, total| {
+        if !std::mem::replace(&mut begun, true) {
+            progress.total(total);
+        }
+        progress.finished(tail, 0, 0);
+    });
+    progress.end();
+    let done = done?;
+    talk.answer(&format!(
+        "{} of {} taken over from {}{}\n  next  give pipeline.toml the settings of the trial; `freeplay run --dry-run` then finds nothing to do\n",
+        count(done.records, "record"),
+        count(done.logs, "log"),
+        trial.dir().display(),
+        match done.retired {
+            0 => String::new(),
+            retired => format!(", {} gone that it did not make", count(retired, "record")),
+        },
+    ))?;
+    Ok(Code::Well)
 }
 
 fn compact(store: &Store, talk: &Talk) -> Result<Code, Failure> {

@@ -1,0 +1,101 @@
+//! Adoption: what a trial found takes the place of what the store says of the same logs.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::account::LogAccount;
+use crate::error::Error;
+use crate::layout::Store;
+use crate::query::{Query, RecordKey};
+use crate::writer::{self, LogResult, Writer};
+
+/// What was taken over.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Adopted {
+    /// Logs the trial accounts for.
+    pub logs: usize,
+    /// Records stored.
+    pub records: usize,
+    /// Records of the same logs that the trial did not make, and that are gone now.
+    pub retired: usize,
+}
+
+impl Writer {
+    /// Takes over the records, accounts and runs of another store; flights of logs it does not know stay.
+    ///
+    /// `watch` is told each tail that is finished, and how many there are.
+    ///
+    /// Tail by tail, each in one commit, so memory holds one tail's records. A process that dies in between
+    /// leaves whole tails of either method; adopted again, the result is the same. A log counts as done
+    /// afterwards wherever its settings are those of the trial.
+    ///
+    /// # Errors
+    /// [`Error::Itself`] when both are one store, else as [`Writer::commit`] and [`Store::records`].
+    pub fn adopt(&mut self, trial: &Store, mut watch: impl FnMut(&str, usize)) -> Result<Adopted, Error> {
+        if trial.dir() == self.store().dir() {
+            return Err(Error::Itself { dir: trial.dir().to_owned() });
+        }
+        let before = by_name(self.store().accounts()?);
+        let mut tails: BTreeMap<Option<String>, Vec<LogAccount>> = BTreeMap::new();
+        for account in trial.accounts()? {
+            tails.entry(account.tail_number.clone()).or_default().push(account);
+        }
+        let mut adopted = Adopted::default();
+        let total = tails.len();
+        for (tail, accounts) in tails {
+            let results = results(trial, tail.as_deref(), accounts, &before)?;
+            self.commit(&results)?;
+            adopted.count(&results);
+            watch(tail.as_deref().unwrap_or("logs without identity"), total);
+        }
+        let runs = trial.runs()?;
+        if !runs.is_empty() {
+            writer::account(&self.store().runs, &runs)?;
+        }
+        Ok(adopted)
+    }
+}
+
+impl Adopted {
+    fn count(&mut self, results: &[LogResult]) {
+        self.logs += results.len();
+        self.records += results.iter().map(|result| result.records.len()).sum::<usize>();
+        self.retired += results.iter().map(|result| result.retires.len()).sum::<usize>();
+    }
+}
+
+/// What the trial found of one tail, or of the logs that told none.
+fn results(
+    trial: &Store,
+    tail: Option<&str>,
+    accounts: Vec<LogAccount>,
+    before: &BTreeMap<String, LogAccount>,
+) -> Result<Vec<LogResult>, Error> {
+    let records = match tail {
+        Some(tail) => trial.records(&Query { tail_number: Some(tail.to_owned()), ..Query::default() })?,
+        None => Vec::new(),
+    };
+    let made: BTreeSet<RecordKey> = records.iter().map(RecordKey::of).collect();
+    let mut owner = BTreeMap::new();
+    for (at, account) in accounts.iter().enumerate() {
+        owner.extend(account.owned().into_iter().map(|key| (key, at)));
+    }
+    let retires = |account: &LogAccount| match before.get(&account.log_path) {
+        Some(before) => before.owned().into_iter().filter(|key| !made.contains(key)).collect(),
+        None => Vec::new(),
+    };
+    let mut results: Vec<LogResult> = accounts
+        .into_iter()
+        .map(|account| LogResult { retires: retires(&account), account, records: Vec::new() })
+        .collect();
+    for record in records {
+        // A record without an account was cut off by a kill: the trial's next run makes it again.
+        if let Some(&at) = owner.get(&RecordKey::of(&record)) {
+            results[at].records.push(record);
+        }
+    }
+    Ok(results)
+}
+
+fn by_name(accounts: Vec<LogAccount>) -> BTreeMap<String, LogAccount> {
+    accounts.into_iter().map(|account| (account.log_path.clone(), account)).collect()
+}
