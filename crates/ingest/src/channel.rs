@@ -18,10 +18,10 @@ const ALIVE_SHARE: f64 = 0.5;
 
 /// Whether a channel can serve: at least half of its samples are there, and it moves.
 pub(crate) fn lives(values: &[f64]) -> bool {
+    let needed = (ALIVE_SHARE * values.len() as f64).ceil() as usize;
     let present = || values.iter().copied().filter(|v| v.is_finite());
-    let count = present().count() as f64;
     let first = present().next();
-    count >= ALIVE_SHARE * values.len() as f64 && present().any(|v| Some(v) != first)
+    present().take(needed).count() == needed && present().any(|v| Some(v) != first)
 }
 
 /// How the samples of a channel lie in time.
@@ -50,7 +50,7 @@ impl<'s> Sampling<'s> {
         position: &str,
     ) -> Result<Self, Error> {
         let mut sampling = Self::unread(sheet, map, name, position);
-        sampling.line = sampling.read_line(map)?.1;
+        sampling.line = sampling.line_of(map)?;
         sampling.every = sampling.rows_between(map);
         Ok(sampling)
     }
@@ -91,6 +91,22 @@ impl<'s> Sampling<'s> {
         }
         let shared = if self.time_column.is_some() { None } else { self.sheet.clock.rate_hz };
         Cow::Owned(ClockMapping { rate_hz: map.rate_hz.or(shared), ..self.sheet.clock.clone() })
+    }
+
+    /// The clock of its rows; that of a sheet's own rows is read once for all its channels.
+    fn line_of(&self, map: &ChannelMapping) -> Result<Timeline, Error> {
+        let of_sheet = self.time_column.is_none()
+            && self.samples.rows.is_empty()
+            && matches!(self.clock(map), Cow::Borrowed(_))
+            && !self.sheet.is_listed(&self.samples.leaf);
+        if !of_sheet {
+            return Ok(self.read_line(map)?.1);
+        }
+        if let Some(known) = self.sheet.line.get() {
+            return Ok(known.clone());
+        }
+        let line = self.read_line(map)?.1;
+        Ok(self.sheet.line.get_or_init(|| line).clone())
     }
 
     fn read_line(&self, map: &ChannelMapping) -> Result<(Option<Stamps>, Timeline), Error> {
@@ -206,7 +222,7 @@ pub(crate) fn follow(
     let &Follower { sheet, map, name, position, role } = channel;
     let mut own = Sampling::unread(sheet, map, name, position);
     let shared = own.shares_rows(master);
-    own.line = if shared { master.line.clone() } else { own.read_line(map)?.1 };
+    own.line = if shared { master.line.clone() } else { own.line_of(map)? };
     own.every = own.rows_between(map);
     let is_slow_load = role == Role::Load && own.every > 1;
     if shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load) {

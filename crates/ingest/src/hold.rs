@@ -11,6 +11,9 @@ const HOLD_S: f64 = 0.2;
 /// It is held over four of its own steps or 0.2 s, whichever is longer; one that stays away longer has
 /// died, and the segment ends where it was last known.
 pub(crate) fn hold(load_n: &mut [f64], segments: &[Range<usize>], step_s: f64) -> Vec<Range<usize>> {
+    if !load_n.iter().any(|f| f.is_nan()) {
+        return segments.iter().filter(|segment| !segment.is_empty()).cloned().collect();
+    }
     let longest = ((HOLD_S / step_s).ceil() as usize).max(HOLD_STEPS * usual_step(load_n));
     let mut loaded = Vec::with_capacity(segments.len());
     for segment in segments {

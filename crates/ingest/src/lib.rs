@@ -28,6 +28,7 @@ mod positioned;
 pub mod propose;
 pub mod quality;
 mod resample;
+mod scan;
 pub mod schema;
 pub mod screw;
 mod sheet;

@@ -101,14 +101,13 @@ impl Log {
     pub fn open(files: &Files, mapping: &Arc<Mapping>) -> Result<Self, Error> {
         let open = |paths: &[PathBuf]| paths.iter().map(|p| LogFile::open(p)).collect::<Result<Vec<_>, _>>();
         let (clock, layout) = (mapping.clock.clone(), mapping.layout.clone());
-        let main = Sheet { files: open(&files.main)?, clock, layout };
+        let main = Sheet::new(open(&files.main)?, clock, layout);
         let mut groups = BTreeMap::new();
         for (name, group) in &mapping.groups {
             let paths = files.groups.get(name).map(Vec::as_slice).unwrap_or_default();
             if !paths.is_empty() {
                 let clock = group.clock.as_ref().unwrap_or(&mapping.clock).clone();
-                groups
-                    .insert(name.clone(), Sheet { files: open(paths)?, clock, layout: group.layout.clone() });
+                groups.insert(name.clone(), Sheet::new(open(paths)?, clock, group.layout.clone()));
             }
         }
         let Some(first) = main.files.first() else {
@@ -125,11 +124,10 @@ impl Log {
     /// The same open files, read by another mapping of the same kinds of files.
     #[must_use]
     pub fn remapped(mut self, mapping: &Arc<Mapping>) -> Self {
-        (self.main.clock, self.main.layout) = (mapping.clock.clone(), mapping.layout.clone());
+        self.main.remap(&mapping.clock, &mapping.layout);
         for (name, sheet) in &mut self.groups {
             if let Some(group) = mapping.groups.get(name) {
-                sheet.clock = group.clock.as_ref().unwrap_or(&mapping.clock).clone();
-                sheet.layout = group.layout.clone();
+                sheet.remap(group.clock.as_ref().unwrap_or(&mapping.clock), &group.layout);
             }
         }
         self.mapping = Arc::clone(mapping);
@@ -147,7 +145,7 @@ impl Log {
             let mut starts = Vec::with_capacity(sheet.files.len());
             for file in std::mem::take(&mut sheet.files) {
                 let (clock, layout) = (sheet.clock.clone(), sheet.layout.clone());
-                let alone = Sheet { files: vec![file], clock, layout };
+                let alone = Sheet::new(vec![file], clock, layout);
                 let samples = crate::sheet::Samples { leaf: column.clone(), rows: Vec::new() };
                 let stamps = alone.stamps(&samples, None)?;
                 starts.push((stamps.origin, alone.files));
@@ -602,13 +600,14 @@ fn finish(
     let mut dx_m = if is_relative {
         screw_m
     } else {
-        flags.extend(quality::thaw(&mut motor_m, &mut screw_m, line.step_s));
+        let longest = quality[0].longest_run.max(quality[1].longest_run);
+        flags.extend(quality::thaw(&mut motor_m, &mut screw_m, longest, line.step_s));
         screw_m.iter_mut().zip(&motor_m).for_each(|(screw, motor)| *screw -= motor);
         screw_m
     };
     dx_m.iter_mut().zip(&motor_m).filter(|(_, motor)| motor.is_nan()).for_each(|(dx, _)| *dx = f64::NAN);
     flags.extend(quality::coarse(&quality, &dx_m));
-    flags.extend(quality::load_froze(&load_n, &motor_m, line.step_s));
+    flags.extend(quality::load_froze(&load_n, &motor_m, quality[2].longest_run, line.step_s));
     let segments = hold(&mut load_n, &segments, line.step_s);
     let missing = dx_m.iter().filter(|y| y.is_nan()).count();
     Actuator {

@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use crate::hold::usual_step;
+use crate::scan::{Scan, leap, range};
 use crate::schema::Role;
 
 /// One channel, described.
@@ -19,7 +20,9 @@ pub struct Quality {
     pub max: f64,
     /// Smallest step between neighbours that differ: the resolution actually seen.
     pub resolution: Option<f64>,
-    /// Longest share of samples, in a row, that repeat one value.
+    /// Most samples in a row that repeat one value.
+    pub longest_run: usize,
+    /// Their share of all samples.
     pub frozen_share: f64,
     /// How often a value comes, Hz: the rate actually seen.
     pub rate_hz: f64,
@@ -34,24 +37,19 @@ impl Quality {
     pub fn of(values: &[f64], step_s: f64) -> Self {
         let samples = values.len();
         let share = |count: usize| count as f64 / samples.max(1) as f64;
-        let (mut min, mut max, mut missing) = (f64::INFINITY, f64::NEG_INFINITY, 0);
-        for v in values {
-            (min, max) = (min.min(*v), max.max(*v));
-            missing += usize::from(v.is_nan());
-        }
-        let resolution = resolution(values, ROUNDING * (max - min));
+        let seen = Scan::of(values);
+        let resolution = resolution(values, &seen);
         Self {
             samples,
-            missing_share: share(missing),
-            min,
-            max,
+            missing_share: share(seen.missing),
+            min: seen.min,
+            max: seen.max,
             resolution,
-            frozen_share: share(
-                runs(values, 2).map(|run| run.len()).max().unwrap_or(usize::from(samples > 0)),
-            ),
-            rate_hz: (step_s * usual_step(values) as f64).recip(),
-            saturated_share: share(saturated(values, min, max)),
-            spikes: spikes(values, resolution),
+            longest_run: seen.longest_run,
+            frozen_share: share(seen.longest_run),
+            rate_hz: (step_s * if seen.missing == 0 { 1 } else { usual_step(values) } as f64).recip(),
+            saturated_share: share(saturated(values, &seen)),
+            spikes: spikes(values, resolution, seen.largest_leap),
         }
     }
 
@@ -69,7 +67,11 @@ impl Quality {
 /// Steps below this share of the range are the rounding of arithmetic, not of a sensor.
 const ROUNDING: f64 = 1e-10;
 
-fn resolution(values: &[f64], least: f64) -> Option<f64> {
+fn resolution(values: &[f64], seen: &Scan) -> Option<f64> {
+    let least = ROUNDING * (seen.max - seen.min);
+    if seen.least_step > least {
+        return seen.least_step.is_finite().then_some(seen.least_step);
+    }
     let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > least);
     steps.min_by(f64::total_cmp)
 }
@@ -94,8 +96,12 @@ fn runs(values: &[f64], least: usize) -> impl Iterator<Item = Range<usize>> {
 /// Samples at a rail: the channel comes to its smallest or largest value at full speed, stays there, and
 /// leaves it at full speed, more than once. A position that comes to rest slows down first.
 #[expect(clippy::float_cmp, reason = "a rail repeats its bits")]
-fn saturated(values: &[f64], min: f64, max: f64) -> usize {
+fn saturated(values: &[f64], seen: &Scan) -> usize {
     const LEAST_RUN: usize = 5;
+    let &Scan { min, max, longest_run, .. } = seen;
+    if longest_run < LEAST_RUN {
+        return 0;
+    }
     let speed = 0.5 * mean_step(values);
     let mut count = [0, 0];
     let mut samples = 0;
@@ -121,10 +127,10 @@ fn mean_step(values: &[f64]) -> f64 {
 }
 
 /// How far a sample lies from the line between its neighbours, against the usual.
-fn spikes(values: &[f64], resolution: Option<f64>) -> usize {
+fn spikes(values: &[f64], resolution: Option<f64>, largest_leap: f64) -> usize {
     const FAR: f64 = 50.0;
     const THINNED: usize = 4096;
-    let leap = |w: &[f64]| (w[1] - 0.5 * (w[0] + w[2])).abs();
+    let leap = |w: &[f64]| leap(w[0], w[1], w[2]);
     let every = (values.len() / THINNED).max(1);
     let mut usual: Vec<f64> = values.windows(3).step_by(every).map(leap).filter(|d| *d > 0.0).collect();
     if usual.is_empty() {
@@ -133,6 +139,9 @@ fn spikes(values: &[f64], resolution: Option<f64>) -> usize {
     let middle = usual.len() / 2;
     let median = *usual.select_nth_unstable_by(middle, f64::total_cmp).1;
     let far = FAR * median.max(resolution.unwrap_or(0.0));
+    if largest_leap <= far {
+        return 0;
+    }
     // Its neighbours leap with it, half as far: only the peak of the three counts.
     let leaps = |i: usize| leap(&values[i - 1..=i + 1]);
     (2..values.len().saturating_sub(2))
@@ -168,9 +177,14 @@ pub(crate) fn coarse(channels: &[Quality; 3], dx_m: &[f64]) -> Vec<String> {
 }
 
 /// Samples of a frozen position are no measurement: where one repeats its last value while the other
-/// travels further than any gap, it is marked as missing. Returns the codes of those that froze.
-pub(crate) fn thaw(motor_m: &mut [f64], screw_m: &mut [f64], step_s: f64) -> Vec<String> {
-    let still = [frozen(motor_m, screw_m, step_s), frozen(screw_m, motor_m, step_s)];
+/// travels further than any gap, it is marked as missing. Returns the codes of those that froze; no value of
+/// either is repeated for longer than `longest_run` samples.
+pub(crate) fn thaw(motor_m: &mut [f64], screw_m: &mut [f64], longest_run: usize, step_s: f64) -> Vec<String> {
+    let least = frozen_run(step_s);
+    if longest_run < least {
+        return Vec::new();
+    }
+    let still = [frozen(motor_m, screw_m, least), frozen(screw_m, motor_m, least)];
     let mut found = Vec::new();
     for ((spans, values), role) in still.iter().zip([motor_m, screw_m]).zip([Role::Motor, Role::Screw]) {
         spans.iter().for_each(|span| values[span.clone()].fill(f64::NAN));
@@ -181,13 +195,16 @@ pub(crate) fn thaw(motor_m: &mut [f64], screw_m: &mut [f64], step_s: f64) -> Vec
     found
 }
 
+/// Samples in the half second for which a position may repeat its value.
+fn frozen_run(step_s: f64) -> usize {
+    ((0.5 / step_s).ceil() as usize).max(3)
+}
+
 /// Where a position stands still for half a second at least while its partner travels a millimetre and a
 /// twentieth of its range. A channel that never moves is another matter, and refused as a whole.
-fn frozen(values: &[f64], partner: &[f64], step_s: f64) -> Vec<Range<usize>> {
-    const LEAST_S: f64 = 0.5;
+fn frozen(values: &[f64], partner: &[f64], least: usize) -> Vec<Range<usize>> {
     const LEAST_TRAVEL_M: f64 = 1e-3;
     const LEAST_SHARE: f64 = 0.05;
-    let least = ((LEAST_S / step_s).ceil() as usize).max(3);
     let travel_m = (LEAST_SHARE * range(partner)).max(LEAST_TRAVEL_M);
     runs(values, least)
         .filter(|run| run.len() < values.len() && range(&partner[run.clone()]) > travel_m)
@@ -197,19 +214,16 @@ fn frozen(values: &[f64], partner: &[f64], step_s: f64) -> Vec<Range<usize>> {
 }
 
 /// Whether a load stood still for ten seconds in which the actuator travelled a fifth of its range.
-pub(crate) fn load_froze(load_n: &[f64], motor_m: &[f64], step_s: f64) -> Option<String> {
+pub(crate) fn load_froze(load_n: &[f64], motor_m: &[f64], longest_run: usize, step_s: f64) -> Option<String> {
     const LEAST_S: f64 = 10.0;
     const LEAST_SHARE: f64 = 0.2;
+    let least = ((LEAST_S / step_s).ceil() as usize).max(2);
+    if longest_run < least {
+        return None;
+    }
     let travel_m = LEAST_SHARE * range(motor_m);
     let froze = |run: Range<usize>| run.len() < load_n.len() && range(&motor_m[run]) > travel_m;
-    let least = (LEAST_S / step_s).ceil() as usize;
-    runs(load_n, least.max(2)).any(froze).then(|| format!("{}_frozen", Role::Load.as_str()))
-}
-
-fn range(values: &[f64]) -> f64 {
-    let (low, high) =
-        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-    high - low
+    runs(load_n, least).any(froze).then(|| format!("{}_frozen", Role::Load.as_str()))
 }
 
 /// Slope of one position on the other, by least squares about their means: 1 when both are mapped
@@ -292,7 +306,7 @@ mod tests {
         let last = motor[999];
         motor[1000..1250].fill(last);
         let before = motor.clone();
-        assert_eq!(thaw(&mut motor, &mut screw, 0.004), ["motor_frozen"]);
+        assert_eq!(thaw(&mut motor, &mut screw, 251, 0.004), ["motor_frozen"]);
         assert!(
             motor[1000..1250].iter().all(|m| m.is_nan())
                 && motor[999].to_bits() == last.to_bits()
@@ -301,6 +315,6 @@ mod tests {
         let mut resting = vec![0.01; 4000];
         let mut within: Vec<f64> = wave(2e-4);
         resting[0] = 0.0;
-        assert!(thaw(&mut resting, &mut within, 0.004).is_empty());
+        assert!(thaw(&mut resting, &mut within, 3999, 0.004).is_empty());
     }
 }

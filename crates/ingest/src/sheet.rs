@@ -5,13 +5,14 @@
 //! there are only names of channels and lists of samples.
 
 use std::collections::BTreeSet;
+use std::sync::OnceLock;
 
 use arrow::array::{Array, ArrayRef, AsArray, PrimitiveArray};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Int64Type, TimeUnit as ArrowTimeUnit};
 use jiff::Timestamp;
 
-use crate::clock::{Origin, Stamps};
+use crate::clock::{Origin, Stamps, Timeline};
 use crate::error::{Error, Fault};
 use crate::file::LogFile;
 use crate::numbers::{append, append_where, wrong_type};
@@ -25,6 +26,8 @@ pub(crate) struct Sheet {
     pub(crate) files: Vec<LogFile>,
     pub(crate) clock: ClockMapping,
     pub(crate) layout: Layout,
+    /// The clock of its rows, once it was read.
+    pub(crate) line: OnceLock<Timeline>,
 }
 
 /// Which samples are meant: the leaf that holds them, and the rows in which it does.
@@ -37,6 +40,22 @@ pub(crate) struct Samples {
 }
 
 impl Sheet {
+    /// Some files read as one table.
+    pub(crate) fn new(files: Vec<LogFile>, clock: ClockMapping, layout: Layout) -> Self {
+        Self { files, clock, layout, line: OnceLock::new() }
+    }
+
+    /// The same files by another clock and layout.
+    pub(crate) fn remap(&mut self, clock: &ClockMapping, layout: &Layout) {
+        (self.clock, self.layout) = (clock.clone(), layout.clone());
+        self.line = OnceLock::new();
+    }
+
+    /// Whether a row holds a list of this leaf's samples in any file.
+    pub(crate) fn is_listed(&self, leaf: &str) -> bool {
+        self.files.iter().any(|file| file.leaf(leaf).is_ok_and(|leaf| leaf.is_listed))
+    }
+
     /// A fault of the whole sheet is told of its first file.
     pub(crate) fn error(&self, fault: Fault) -> Error {
         self.files[0].error(fault)
@@ -214,8 +233,7 @@ impl Sheet {
     /// # Errors
     /// When they cannot be read.
     pub(crate) fn count(&self, samples: &Samples) -> Result<usize, Error> {
-        let listed = |file: &LogFile| file.leaf(&samples.leaf).is_ok_and(|leaf| leaf.is_listed);
-        if samples.rows.is_empty() && !self.files.iter().any(listed) {
+        if samples.rows.is_empty() && !self.is_listed(&samples.leaf) {
             return Ok(self.rows());
         }
         let mut count = 0;

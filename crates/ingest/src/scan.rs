@@ -1,0 +1,176 @@
+//! What can be seen of a channel in one pass over it: sound channels need no other.
+//!
+//! Columns are longer than any cache, so each further pass would cost as much as reading memory. The pass
+//! goes in groups of samples whose figures are kept apart, since a chain of comparisons is as slow as its links.
+
+/// Samples in a group.
+const LANES: usize = 8;
+
+/// Figures of a channel; missing samples are NaN, and compare as nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Scan {
+    /// Smallest value; infinite where there is none.
+    pub(crate) min: f64,
+    /// Largest value; minus infinite where there is none.
+    pub(crate) max: f64,
+    /// Samples without a value.
+    pub(crate) missing: usize,
+    /// Smallest step between neighbours that differ; infinite where none do.
+    pub(crate) least_step: f64,
+    /// Furthest that a sample lies from the middle of its neighbours.
+    pub(crate) largest_leap: f64,
+    /// Most samples in a row that repeat one value.
+    pub(crate) longest_run: usize,
+}
+
+impl Scan {
+    /// Looks at a channel.
+    pub(crate) fn of(values: &[f64]) -> Self {
+        let (mut lanes, mut run, mut done) = (Lanes::new(), Run::default(), 0);
+        while let Some(group) = values[done..].first_chunk::<{ LANES + 2 }>() {
+            lanes.take(group);
+            run.take(&group[..=LANES]);
+            done += LANES;
+        }
+        let rest = &values[done..];
+        let at = |k: usize| rest.get(k).copied().unwrap_or(f64::NAN);
+        (0..rest.len()).for_each(|k| lanes.one(0, [at(k), at(k + 1), at(k + 2)]));
+        run.take(rest);
+        lanes.folded(if values.is_empty() { 0 } else { run.most + 1 })
+    }
+}
+
+/// How far a sample lies from the middle of its neighbours.
+#[inline]
+pub(crate) fn leap(before: f64, at: f64, after: f64) -> f64 {
+    (at - 0.5 * (before + after)).abs()
+}
+
+/// The lesser; the first where the second is no number. One instruction, unlike [`f64::min`].
+#[inline]
+fn lesser(known: f64, new: f64) -> f64 {
+    if new < known { new } else { known }
+}
+
+#[inline]
+fn greater(known: f64, new: f64) -> f64 {
+    if new > known { new } else { known }
+}
+
+/// Largest less smallest value; minus infinity where there is none.
+pub(crate) fn range(values: &[f64]) -> f64 {
+    let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
+    let (groups, rest) = values.as_chunks::<LANES>();
+    for group in groups {
+        for lane in 0..LANES {
+            low[lane] = lesser(low[lane], group[lane]);
+            high[lane] = greater(high[lane], group[lane]);
+        }
+    }
+    let low = low.iter().chain(rest).copied().fold(f64::INFINITY, lesser);
+    let high = high.iter().chain(rest).copied().fold(f64::NEG_INFINITY, greater);
+    high - low
+}
+
+/// Figures of every eighth sample, eight times side by side.
+struct Lanes {
+    min: [f64; LANES],
+    max: [f64; LANES],
+    missing: [u64; LANES],
+    least_step: [f64; LANES],
+    largest_leap: [f64; LANES],
+}
+
+impl Lanes {
+    fn new() -> Self {
+        Self {
+            min: [f64::INFINITY; LANES],
+            max: [f64::NEG_INFINITY; LANES],
+            missing: [0; LANES],
+            least_step: [f64::INFINITY; LANES],
+            largest_leap: [0.0; LANES],
+        }
+    }
+
+    /// A group and the two samples after it.
+    #[inline]
+    fn take(&mut self, group: &[f64; LANES + 2]) {
+        for lane in 0..LANES {
+            self.one(lane, [group[lane], group[lane + 1], group[lane + 2]]);
+        }
+    }
+
+    #[inline]
+    fn one(&mut self, lane: usize, [at, next, after]: [f64; 3]) {
+        self.min[lane] = lesser(self.min[lane], at);
+        self.max[lane] = greater(self.max[lane], at);
+        self.missing[lane] += u64::from(at.is_nan());
+        let step = (next - at).abs();
+        self.least_step[lane] = lesser(self.least_step[lane], if step > 0.0 { step } else { f64::INFINITY });
+        self.largest_leap[lane] = greater(self.largest_leap[lane], leap(at, next, after));
+    }
+
+    fn folded(&self, longest_run: usize) -> Scan {
+        Scan {
+            min: self.min.iter().copied().fold(f64::INFINITY, lesser),
+            max: self.max.iter().copied().fold(f64::NEG_INFINITY, greater),
+            missing: self.missing.iter().sum::<u64>() as usize,
+            least_step: self.least_step.iter().copied().fold(f64::INFINITY, lesser),
+            largest_leap: self.largest_leap.iter().copied().fold(0.0, greater),
+            longest_run,
+        }
+    }
+}
+
+/// Follows samples that repeat the one before.
+#[derive(Default)]
+struct Run {
+    /// Repeats up to here.
+    repeats: usize,
+    most: usize,
+}
+
+impl Run {
+    /// Some samples, of which the first was the last of those before.
+    #[inline]
+    #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
+    fn take(&mut self, values: &[f64]) {
+        let same = values.iter().zip(values.iter().skip(1)).filter(|(a, b)| a == b).count();
+        if same == 0 {
+            // Nearly always.
+            self.repeats = 0;
+            return;
+        }
+        for (a, b) in values.iter().zip(values.iter().skip(1)) {
+            self.repeats = if a == b { self.repeats + 1 } else { 0 };
+            self.most = self.most.max(self.repeats);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// One pass sees what a pass for each figure does, over channels with repeats and holes.
+        #[test]
+        fn the_lanes_see_what_plain_passes_do(ticks in proptest::collection::vec(-3_i32..4, 0..60)) {
+            let values: Vec<f64> =
+                ticks.iter().map(|&k| if k == -3 { f64::NAN } else { f64::from(k) * 0.5 }).collect();
+            let seen = Scan::of(&values);
+            let known = || values.iter().copied().filter(|v| !v.is_nan());
+            prop_assert_eq!(seen.min.to_bits(), known().fold(f64::INFINITY, f64::min).to_bits());
+            prop_assert_eq!(seen.max.to_bits(), known().fold(f64::NEG_INFINITY, f64::max).to_bits());
+            prop_assert_eq!(seen.missing, values.len() - known().count());
+            let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0);
+            prop_assert_eq!(seen.least_step.to_bits(), steps.fold(f64::INFINITY, f64::min).to_bits());
+            let leaps = values.windows(3).map(|w| (w[1] - 0.5 * (w[0] + w[2])).abs());
+            prop_assert_eq!(seen.largest_leap.to_bits(), leaps.fold(0.0, f64::max).to_bits());
+            let run = values.chunk_by(|a, b| a == b).map(<[f64]>::len).max();
+            prop_assert_eq!(seen.longest_run, run.unwrap_or(0));
+        }
+    }
+}
