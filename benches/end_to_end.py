@@ -14,7 +14,6 @@ import argparse
 import json
 import os
 import shutil
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -168,8 +167,72 @@ def run(freeplay, folder, logs, method, jobs):
     return measured([freeplay, "--config", str(config), "run", "-q", "--jobs", str(jobs)])
 
 
-def median(rounds, key):
-    return statistics.median(one[key] for one in rounds)
+def foreign_columns(actuators):
+    kinds = ("motor_deg", "screw_mm", "load_n")
+    return [[f"{position}_{kind}" for kind in kinds] for position in POSITIONS[:actuators]]
+
+
+def contestants(args, folder, logs, normalized):
+    """What runs in each round, by name: a call that gives CPU seconds and peak memory."""
+    positions = foreign_columns(args.actuators)
+    columns = [column for position in positions for column in position]
+    theirs = str(folder / "fleet" / "logs" / "**" / "*.parquet")
+    calls = {
+        "polars reads": lambda: peers("polars", logs, columns, positions, 1),
+        "pyarrow reads": lambda: peers("pyarrow", logs, columns, positions, 1),
+        "polars, numba filter": lambda: peers("polars-filter", logs, columns, positions, 1),
+        "freeplay, contact": lambda: run(args.freeplay, folder, theirs, "contact", 1),
+        "freeplay, midrange": lambda: run(args.freeplay, folder, theirs, "midrange", 1),
+        "freeplay, contact, two workers": lambda: run(args.freeplay, folder, theirs, "contact", 2),
+    }
+    for encoding, ours in normalized.items():
+        files = [str(log) for log in sorted(ours.rglob("*.parquet"))]
+        plain = ["motor_m", "dx_m", "load_n"]
+        for reader in ("polars", "pyarrow"):
+            calls[f"{reader} reads ours, {encoding}"] = lambda r=reader, f=files: peers(r, f, plain, [], 1)
+        pattern = str(ours / "**" / "*.parquet")
+        calls[f"freeplay from ours, {encoding}"] = lambda p=pattern: run(args.freeplay, folder, p, "contact", 1)
+    return calls
+
+
+def normalize(args, folder, logs):
+    made = {}
+    for encoding in ("split", "compatible"):
+        made[encoding] = folder / encoding
+        if not made[encoding].exists():
+            config = folder / "fleet" / "pipeline.toml"
+            command = [args.freeplay, "--config", config, "normalize", *logs, "--output", made[encoding]]
+            subprocess.run([*command, "--encoding", encoding, "-q"], check=True, stdout=subprocess.DEVNULL)
+    return made
+
+
+def accuracy(args, folder):
+    """Worst error of the gaps against the simulated truth, so that speed is not bought with it."""
+    store = ["--config", str(folder / "fleet" / "contact-1.toml"), "store", "export", "--format", "csv"]
+    said = subprocess.run([args.freeplay, *store], check=True, capture_output=True, text=True).stdout
+    code = (
+        "import io, sys, polars as pl\n"
+        "found = pl.read_csv(io.StringIO(sys.stdin.read()))\n"
+        "truth = pl.read_parquet(sys.argv[1]).select('flight_id', 'position', true_m='gap_m')\n"
+        "both = found.join(truth, on=['flight_id', 'position'])\n"
+        "print(both.height, (both['gap_m'] / both['true_m'] - 1).abs().max())"
+    )
+    truth = str(folder / "fleet" / "truth.parquet")
+    count, worst = subprocess.run(
+        [sys.executable, "-c", code, truth], input=said, check=True, capture_output=True, text=True
+    ).stdout.split()
+    return int(count), float(worst)
+
+
+def table(rounds, logs):
+    floor = [one["cpu_s"] for one in rounds["polars reads"]]
+    lines = ["| what | CPU s a flight | ratio to polars reading, each round | peak MB |", "|---|---|---|---|"]
+    for name, results in rounds.items():
+        spent = [one["cpu_s"] for one in results]
+        ratios = ", ".join(f"{a / b:.2f}" for a, b in zip(spent, floor))
+        least = min(spent) / len(logs)
+        lines.append(f"| {name} | {least:.3f} | {ratios} | {max(one['mb'] for one in results):.0f} |")
+    return "\n".join(lines)
 
 
 def main():
@@ -177,18 +240,33 @@ def main():
     parser.add_argument("freeplay", type=lambda text: str(Path(text).resolve()))
     parser.add_argument("--flights", type=int, default=4)
     parser.add_argument("--rows", type=int, default=1_000_000)
-    parser.add_argument("--actuators", type=int, default=8)
+    parser.add_argument("--actuators", type=int, default=8, choices=range(1, 9))
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--folder", type=Path)
+    parser.add_argument("--folder", type=Path, help="where the logs are made, and found again")
+    parser.add_argument("--make", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
-    folder = args.folder or Path(tempfile.mkdtemp(prefix="freeplay-bench-"))
+    folder = (args.folder or Path(tempfile.mkdtemp(prefix="freeplay-bench-"))).resolve()
     folder.mkdir(parents=True, exist_ok=True)
-    import pyarrow.parquet as pq
-
+    if args.make:
+        make(args.freeplay, folder, args.flights, args.rows, args.actuators)
+        return
+    if not (folder / "fleet").exists():
+        # In a process of its own: a child's peak memory counts what its parent held when it was born.
+        shape = ["--flights", args.flights, "--rows", args.rows, "--actuators", args.actuators]
+        made = [sys.executable, __file__, args.freeplay, "--make", "--folder", folder, *shape]
+        subprocess.run([str(word) for word in made], check=True, stdout=subprocess.DEVNULL)
     logs = sorted((folder / "fleet" / "logs").rglob("*.parquet"))
-    logs = logs or make(args.freeplay, folder, args.flights, args.rows, args.actuators)
-    names = pq.read_schema(logs[0]).names
-    print(names, file=sys.stderr)
+    calls = contestants(args, folder, logs, normalize(args, folder, logs))
+    rounds = {name: [] for name in calls}
+    for number in range(args.rounds):
+        for name, call in calls.items():
+            rounds[name].append(call())
+            print(f"round {number + 1}: {name}: {rounds[name][-1]['cpu_s']:.2f} CPU s", file=sys.stderr)
+    size = sum(log.stat().st_size for log in logs) / len(logs) / 1e6
+    print(f"{len(logs)} flights of {args.actuators} actuators × {args.rows} rows, {size:.0f} MB each, {args.rounds} rounds\n")
+    print(table(rounds, logs))
+    count, worst = accuracy(args, folder)
+    print(f"\nWorst error of {count} gaps against the truth: {100 * worst:.2f} %.")
 
 
 if __name__ == "__main__":

@@ -33,9 +33,6 @@ const GATHER: Duration = Duration::from_millis(500);
 /// So many finished logs are committed without waiting.
 const GATHER_LOGS: usize = 256;
 
-/// More data files than this slow every question; they are merged at the end of a run.
-const MANY_FILES: usize = 100;
-
 /// So many of an aircraft's latest records tell what is usual: some months of flights.
 const LOOKED_AT: usize = 2000;
 
@@ -108,7 +105,7 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     (report.skew_moved, report.innovations_unlike) = look_back(&store, &report.trends)?;
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
-    if store.files()?.len() > MANY_FILES {
+    if store.is_scattered()? {
         writer.compact()?;
     }
     writer.end_run(&report.row(context.program_version, &config_path, Some(exit_code)))?;

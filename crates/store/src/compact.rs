@@ -11,6 +11,7 @@ use polars::prelude::{Expr, col, lit};
 use crate::datafile;
 use crate::error::Error;
 use crate::frame::{self, Read};
+use crate::layout::Store;
 use crate::numbered;
 use crate::table::{Change, DataFile, Snapshot, Table};
 use crate::writer::Writer;
@@ -30,6 +31,26 @@ pub struct Compaction {
     pub after: usize,
     /// Superseded files that nobody can need any more, and that were deleted.
     pub deleted: usize,
+}
+
+/// So many files more than the rows need slow every question.
+const MANY_FILES: usize = 100;
+
+impl Store {
+    /// Whether compaction would spare many files: a table has a hundred more than twice what its rows fill.
+    ///
+    /// # Errors
+    /// [`Error::Table`] when a table's log cannot be read.
+    pub fn is_scattered(&self) -> Result<bool, Error> {
+        for table in self.tables() {
+            let files = table.snapshot()?.files;
+            let rows: i64 = files.iter().filter_map(|file| file.stats.num_records).sum();
+            if files.len() > MANY_FILES + 2 * (rows.max(0) as usize).div_ceil(FILE_ROWS) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
 }
 
 impl Writer {

@@ -40,6 +40,23 @@ fn a_sound_store_has_no_findings_and_is_told_in_numbers() {
     assert_eq!(info.last_completed.unwrap().run_id, "b");
 }
 
+/// Two commits a night of one row each: after fifty nights the accounts of runs alone ask for it, and the first
+/// compaction settles the matter.
+#[test]
+fn a_store_is_scattered_once_a_table_has_a_hundred_files_too_many() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    for _ in 0..101 {
+        writer.end_run(&run("a", "2026-11-18T02:00:00Z", Some(0))).unwrap();
+    }
+    assert!(!writer.store().is_scattered().unwrap());
+    writer.end_run(&run("b", "2026-11-19T02:00:00Z", Some(0))).unwrap();
+    assert!(writer.store().is_scattered().unwrap());
+    writer.compact().unwrap();
+    assert!(!writer.store().is_scattered().unwrap());
+    assert_eq!(writer.store().run_files().unwrap().len(), 1);
+}
+
 #[test]
 fn an_empty_store_is_sound_and_told_in_zeros() {
     let dir = tempfile::tempdir().unwrap();
