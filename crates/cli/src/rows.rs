@@ -7,11 +7,11 @@ use std::sync::Arc;
 use arrow::array::{Array, AsArray, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::csv::WriterBuilder as CsvWriter;
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef, TimeUnit};
-use arrow::json::ReaderBuilder;
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use arrow::json::writer::{JsonArray, WriterBuilder as JsonWriter};
 use fleet::Complaint;
 use parquet::arrow::ArrowWriter;
+pub(crate) use pipeline::rows::utc;
 use serde::Serialize;
 
 use crate::args::{Format, Output};
@@ -129,16 +129,5 @@ fn joined(column: &Arc<dyn Array>) -> Result<Arc<dyn Array>, Failure> {
 /// # Errors
 /// When a value does not fit its column.
 pub(crate) fn batch<T: Serialize>(schema: &SchemaRef, rows: &[T]) -> Result<RecordBatch, Failure> {
-    let mut decoder = ReaderBuilder::new(Arc::clone(schema))
-        .with_batch_size(rows.len().max(1))
-        .build_decoder()
-        .map_err(|e| broken(&e))?;
-    decoder.serialize(rows).map_err(|e| broken(&e))?;
-    let batch = decoder.flush().map_err(|e| broken(&e))?;
-    Ok(batch.unwrap_or_else(|| RecordBatch::new_empty(Arc::clone(schema))))
-}
-
-/// A column of instants.
-pub(crate) fn utc() -> DataType {
-    DataType::Timestamp(TimeUnit::Microsecond, Some("UTC".into()))
+    pipeline::rows::batch(schema, rows).map_err(|e| broken(&e))
 }

@@ -8,6 +8,7 @@
 //! [`Log::positions`] which actuators it holds, and [`Log::actuator`] reads the channels of one of them
 //! on one clock.
 
+pub mod arrays;
 mod channel;
 mod checksum;
 pub mod clock;

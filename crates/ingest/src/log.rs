@@ -577,17 +577,17 @@ fn alternative(role: Role, choice: usize) -> Vec<String> {
 }
 
 /// Channels as read, on one clock.
-struct Read {
-    motor: Vec<f64>,
-    screw: Vec<f64>,
-    load: Vec<f64>,
-    is_relative: bool,
+pub(crate) struct Read {
+    pub(crate) motor: Vec<f64>,
+    pub(crate) screw: Vec<f64>,
+    pub(crate) load: Vec<f64>,
+    pub(crate) is_relative: bool,
     /// The stretches that count.
-    segments: Vec<Range<usize>>,
+    pub(crate) segments: Vec<Range<usize>>,
 }
 
 /// Looks at the channels, leaves out what a frozen one claims, and makes δX.
-fn finish(
+pub(crate) fn finish(
     position: Position,
     read: Read,
     line: &Timeline,

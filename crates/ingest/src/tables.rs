@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::str::FromStr;
 
-use arrow::array::{Array, AsArray};
+use arrow::array::{Array, AsArray, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::DataType;
 use fleet::{Installation, Installations};
@@ -36,6 +36,17 @@ impl Table {
         let (header, rows) =
             if parquet { read_parquet(file) } else { read_csv(file) }.map_err(|f| Error::new(file, f))?;
         Ok(Self { file: file.to_owned(), header, rows, names: Names::new() })
+    }
+
+    /// The same table from memory; `name` stands for its file in complaints.
+    ///
+    /// # Errors
+    /// When a column is neither text, numbers nor times.
+    pub fn of_batches(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
+        let header = batches.first().map(header).unwrap_or_default();
+        let rows = batches.iter().map(texts).collect::<Result<Vec<_>, _>>();
+        let rows = rows.map_err(|f| Error::new(name, f))?.into_iter().flatten().collect();
+        Ok(Self { file: name.to_owned(), header, rows, names: Names::new() })
     }
 
     /// The same table, whose columns go by a user's own names.
@@ -234,22 +245,30 @@ fn read_parquet(file: &Path) -> Result<Cells, Fault> {
     let header: Vec<String> = reader.schema().fields().iter().map(|f| f.name().clone()).collect();
     let mut rows: Vec<Vec<Option<String>>> = Vec::new();
     for batch in reader.build().map_err(|e| torn(e.to_string()))? {
-        let batch = batch.map_err(|e| torn(e.to_string()))?;
-        let text = |(name, array): (&String, &arrow::array::ArrayRef)| {
-            cast(array, &DataType::Utf8).map_err(|_| Fault::ColumnType {
-                column: name.clone(),
-                found: array.data_type().to_string(),
-                wanted: "text, numbers or times",
-            })
-        };
-        let columns = header.iter().zip(batch.columns()).map(text).collect::<Result<Vec<_>, _>>()?;
-        let cell = |column: &arrow::array::ArrayRef, row| {
-            let column = column.as_string::<i32>();
-            column.is_valid(row).then(|| column.value(row).to_owned())
-        };
-        rows.extend((0..batch.num_rows()).map(|row| columns.iter().map(|c| cell(c, row)).collect()));
+        rows.extend(texts(&batch.map_err(|e| torn(e.to_string()))?)?);
     }
     Ok((header, rows))
+}
+
+fn header(batch: &RecordBatch) -> Vec<String> {
+    batch.schema_ref().fields().iter().map(|f| f.name().clone()).collect()
+}
+
+/// The cells of a batch, row by row.
+fn texts(batch: &RecordBatch) -> Result<Vec<Vec<Option<String>>>, Fault> {
+    let text = |(name, array): (&String, &arrow::array::ArrayRef)| {
+        cast(array, &DataType::Utf8).map_err(|_| Fault::ColumnType {
+            column: name.clone(),
+            found: array.data_type().to_string(),
+            wanted: "text, numbers or times",
+        })
+    };
+    let columns = header(batch).iter().zip(batch.columns()).map(text).collect::<Result<Vec<_>, _>>()?;
+    let cell = |column: &arrow::array::ArrayRef, row| {
+        let column = column.as_string::<i32>();
+        column.is_valid(row).then(|| column.value(row).to_owned())
+    };
+    Ok((0..batch.num_rows()).map(|row| columns.iter().map(|c| cell(c, row)).collect()).collect())
 }
 
 #[cfg(test)]

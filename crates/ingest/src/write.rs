@@ -8,6 +8,7 @@ use arrow::array::{
     ArrayRef, Float32Array, Float64Array, RecordBatch, StringArray, TimestampMicrosecondArray,
 };
 use arrow::datatypes::{DataType, Field, Schema};
+use arrow::error::ArrowError;
 use jiff::Timestamp;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{self, Compression, ZstdLevel};
@@ -87,12 +88,8 @@ pub fn write_encoded(
     let fail = |fault| Error::new(file, fault);
     let io = |source| fail(Fault::Unreadable { source });
     let bad = |e: String| fail(Fault::Table { row: None, column: None, detail: e });
-    let arrays: Vec<ArrayRef> = columns.iter().map(|(_, column)| column.array()).collect();
-    let field = |((name, column), array): (&(String, Column), &ArrayRef)| {
-        Field::new(name, array.data_type().clone(), column.nullable())
-    };
-    let schema = Arc::new(Schema::new(columns.iter().zip(&arrays).map(field).collect::<Vec<_>>()));
-    let batch = RecordBatch::try_new(Arc::clone(&schema), arrays).map_err(|e| bad(e.to_string()))?;
+    let batch = batch(columns).map_err(|e| bad(e.to_string()))?;
+    let schema = batch.schema();
     if let Some(folder) = file.parent() {
         fs::create_dir_all(folder).map_err(io)?;
     }
@@ -108,6 +105,19 @@ pub fn write_encoded(
     to.sync_all().map_err(io)?;
     fs::remove_file(&bare).map_err(io)?;
     fs::rename(&beside, file).map_err(io)
+}
+
+/// Columns of one length as they would be read back.
+///
+/// # Errors
+/// When the columns differ in length.
+pub fn batch(columns: &[(String, Column)]) -> Result<RecordBatch, ArrowError> {
+    let arrays: Vec<ArrayRef> = columns.iter().map(|(_, column)| column.array()).collect();
+    let field = |((name, column), array): (&(String, Column), &ArrayRef)| {
+        Field::new(name, array.data_type().clone(), column.nullable())
+    };
+    let schema = Arc::new(Schema::new(columns.iter().zip(&arrays).map(field).collect::<Vec<_>>()));
+    RecordBatch::try_new(schema, arrays)
 }
 
 fn properties(batch: &RecordBatch, metadata: &[(String, String)], encoding: Encoding) -> WriterProperties {

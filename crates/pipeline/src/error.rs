@@ -25,6 +25,12 @@ pub enum Error {
         /// Why.
         source: std::io::Error,
     },
+    /// Rows cannot be made.
+    #[error("rows cannot be made: {0}")]
+    Rows(#[from] arrow::error::ArrowError),
+    /// The engine that does the logs elsewhere failed, or gave an answer that cannot be read.
+    #[error("the engine that does the logs failed: {0}")]
+    Engine(String),
     /// Workers cannot be started.
     #[error("the workers cannot be started: {0}")]
     Workers(#[from] rayon::ThreadPoolBuildError),

@@ -13,7 +13,14 @@ use crate::trends::{AsOf, Flown};
 /// # Errors
 /// When the table cannot be read, lacks one of these, or holds a cell that cannot be read.
 pub fn read(file: &Path) -> Result<Vec<Flown>, Error> {
-    let table = Table::read(file).map_err(bad)?;
+    flown(&Table::read(file).map_err(bad)?)
+}
+
+/// The flights of an estimates table.
+///
+/// # Errors
+/// As [`read`].
+pub fn flown(table: &Table) -> Result<Vec<Flown>, Error> {
     let serial = table.column(&["serial_number", "serial"]).map_err(bad)?;
     let departure = table.column(&["departure_utc"]).map_err(bad)?;
     let gap = table.column(&["gap_m"]).map_err(bad)?;
@@ -57,7 +64,14 @@ pub fn read(file: &Path) -> Result<Vec<Flown>, Error> {
 /// # Errors
 /// As [`read`].
 pub fn queries(file: &Path) -> Result<Vec<AsOf>, Error> {
-    let table = Table::read(file).map_err(bad)?;
+    asked(&Table::read(file).map_err(bad)?)
+}
+
+/// The units and days of a table of queries.
+///
+/// # Errors
+/// As [`read`].
+pub fn asked(table: &Table) -> Result<Vec<AsOf>, Error> {
     let serial = table.column(&["serial_number", "serial"]).map_err(bad)?;
     let as_of = table.column(&["as_of_utc"]).map_err(bad)?;
     let part = table.find(&["part_number"]);

@@ -5,10 +5,12 @@
 //! [`Report`]. Results depend on neither the number of workers nor the order in which they finish.
 
 pub mod account;
+pub mod adhoc;
 pub mod backtest;
 mod book;
 mod budget;
 pub mod bundle;
+pub mod elsewhere;
 pub mod estimates;
 pub mod event;
 pub mod innovations;
@@ -18,6 +20,7 @@ pub mod pages;
 pub mod plan;
 pub mod recorder;
 pub mod report;
+pub mod rows;
 pub mod schedule;
 pub mod simulate;
 pub mod trends;

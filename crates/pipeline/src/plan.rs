@@ -163,7 +163,7 @@ pub struct Work {
 }
 
 /// The night's plan.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Plan {
     /// Logs that fit the patterns.
     pub found: usize,

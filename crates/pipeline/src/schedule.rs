@@ -76,6 +76,18 @@ pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
 /// [`Error::Refused`] when nothing could be run; [`Error::Store`] when the store fails in the middle:
 /// what was committed before is intact, and the rest runs next time.
 pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<Report, Error> {
+    let workers = workers(request);
+    night(config, request, context, workers, |shop, writer, report| shop.work(workers, writer, report))
+}
+
+/// A run from plan to account, whoever does the logs between.
+pub(crate) fn night(
+    config: &Config,
+    request: &Request,
+    context: &Context<'_>,
+    workers: usize,
+    work: impl FnOnce(&Shop<'_>, &mut Writer, &mut Report) -> Result<Vec<trends::Unit>, Error>,
+) -> Result<Report, Error> {
     let clock = Instant::now();
     let installations = installations(config)?;
     // Before a store is made: a refused run leaves nothing behind.
@@ -84,7 +96,6 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let mut writer = locked(&store, context)?;
     let killed = writer.close_killed_runs()?;
     let plan = plan::plan(config, &installations, found, store.accounts()?, request);
-    let workers = workers(request);
     let started_utc = Timestamp::now();
     let mut report = Report::begin(run_id(started_utc), started_utc, &plan, workers);
     report.cut_short = killed.into_iter().map(CutShort::from).collect();
@@ -98,7 +109,7 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     let run_id = report.run_id.clone();
     let budget = Budget::new(config.document.run.memory_mib);
     let shop = Shop { config, installations: &installations, context, plan: &plan, run_id: &run_id, budget };
-    let touched = shop.work(workers, &mut writer, &mut report)?;
+    let touched = work(&shop, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
     report.trends = trends::of_units(config, &installations, &store, &touched)?;
@@ -166,13 +177,13 @@ fn run_id(started_utc: Timestamp) -> String {
 }
 
 /// Everything a worker may look at.
-struct Shop<'a> {
-    config: &'a Config,
-    installations: &'a Installations,
-    context: &'a Context<'a>,
-    plan: &'a Plan,
-    run_id: &'a str,
-    budget: Budget,
+pub(crate) struct Shop<'a> {
+    pub(crate) config: &'a Config,
+    pub(crate) installations: &'a Installations,
+    pub(crate) context: &'a Context<'a>,
+    pub(crate) plan: &'a Plan,
+    pub(crate) run_id: &'a str,
+    pub(crate) budget: Budget,
 }
 
 impl Shop<'_> {
@@ -225,7 +236,7 @@ impl Shop<'_> {
     }
 
     /// One log; a panic in it is an error row like any other.
-    fn one(&self, work: &Work) -> Done {
+    pub(crate) fn one(&self, work: &Work) -> Done {
         let clock = Instant::now();
         let done = caught(&work.shown, || Ok(self.open(work)));
         let done = done.unwrap_or_else(|complaint| self.failed(work, complaint));
@@ -272,7 +283,7 @@ impl Shop<'_> {
 
     /// The records that are known of this content under these settings: its own, those of a log that
     /// is gone, whose place it takes, or none, when another log that is there speaks for them.
-    fn known(&self, work: &Work, account: &LogAccount) -> Option<(i64, i64)> {
+    pub(crate) fn known(&self, work: &Work, account: &LogAccount) -> Option<(i64, i64)> {
         let digests = plan::digests(account)?;
         if matches!(work.why, Why::Asked | Why::OwnerGone) {
             return None;

@@ -2,12 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use arrow::datatypes::{Field, Schema};
-use fleet::{Complaint, Estimate, Installations, PartNumber, Position, SerialNumber};
-use ingest::Files;
+use fleet::{Installations, PartNumber};
 use job::Config;
-use job::flight::{Opened, anonymous, caught, part_of};
-use serde::Serialize;
+use job::flight::part_of;
+use pipeline::adhoc::{self, EstimateRow};
 
 use crate::args::{EstimateArgs, Global};
 use crate::exit::{Code, Failure};
@@ -16,7 +14,7 @@ use crate::table::{self, count, number, text};
 use crate::talk::Talk;
 
 use super::query::{doubts, load};
-use super::{booked, config, shown};
+use super::{VERSION, booked, config, shown};
 
 /// Estimates the given logs.
 ///
@@ -30,17 +28,8 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, talk: &Talk) -> Res
     let part = args.part.as_ref().map(|number| configured(&config, number)).transpose()?;
     let (mut found, mut complaints) = (Vec::new(), Vec::new());
     for path in &args.logs {
-        let read = match &part {
-            Some(number) => caught(&shown(path), || as_part(path, &config, number)),
-            None => {
-                let files = pipeline::bundle::around(&config, path)?;
-                caught(&shown(path), || booked_log(path, &files, &config, &installations, &mut complaints))
-            }
-        };
-        match read {
-            Ok(rows) => found.extend(rows),
-            Err(complaint) => complaints.push(complaint),
-        }
+        let part = part.as_ref();
+        found.extend(adhoc::estimate(path, &config, &installations, part, VERSION, &mut complaints)?);
     }
     if let Some(file) = &args.trace {
         trace(file, &args.logs, &config, &installations, part.as_ref(), talk)?;
@@ -48,28 +37,10 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, talk: &Talk) -> Res
     if let Some(file) = &args.plot {
         super::plot::plot(file, &args.logs, &config, &installations, part.as_ref(), talk)?;
     }
-    rows::answer(&args.output, talk, || batch(&found), || page(&found))?;
+    let batch = || rows::batch(&pipeline::rows::estimates(), &found);
+    rows::answer(&args.output, talk, batch, || page(&found))?;
     talk.complain_all(&complaints);
     Ok(if complaints.is_empty() { Code::Well } else { Code::LogsInError })
-}
-
-/// A record without provenance of a run; what is not known of an unbooked log is null.
-#[derive(Debug, Serialize)]
-struct Row {
-    tail_number: Option<String>,
-    position: Option<String>,
-    part_number: Option<String>,
-    serial_number: Option<String>,
-    flight_id: Option<String>,
-    departure_utc: Option<jiff::Timestamp>,
-    flight_hours: Option<f64>,
-    tail_hours_end: Option<f64>,
-    #[serde(flatten)]
-    estimate: Estimate,
-    log_path: String,
-    log_digest: Option<String>,
-    config_digest: String,
-    program_version: &'static str,
 }
 
 fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
@@ -81,74 +52,7 @@ fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
     }
 }
 
-fn as_part(path: &Path, config: &Config, number: &PartNumber) -> Result<Vec<Row>, Complaint> {
-    let name = shown(path);
-    let found = anonymous(&Files::one(path), &name, config, part_of(config, number)?)?;
-    let row = |(position, estimate): (Position, Estimate)| Row {
-        tail_number: None,
-        position: Some(position.to_string()),
-        part_number: Some(number.to_string()),
-        serial_number: None,
-        flight_id: None,
-        departure_utc: None,
-        flight_hours: None,
-        tail_hours_end: None,
-        estimate,
-        log_path: name.clone(),
-        log_digest: None,
-        config_digest: config.digest_of_part(number),
-        program_version: super::VERSION,
-    };
-    Ok(found.into_iter().map(row).collect())
-}
-
-fn booked_log(
-    path: &Path,
-    files: &Files,
-    config: &Config,
-    installations: &Installations,
-    complaints: &mut Vec<Complaint>,
-) -> Result<Vec<Row>, Complaint> {
-    let name = shown(path);
-    let opened = Opened::open(files, &name, config, installations)?;
-    let flight = opened.flight();
-    let mut rows = Vec::new();
-    for at in opened.actuators(installations) {
-        match opened
-            .unit(at, config, installations)
-            .and_then(|(stay, part)| Ok((stay, opened.estimate(at, part, config)?)))
-        {
-            Ok((stay, estimate)) => rows.push(Row {
-                tail_number: Some(flight.tail_number.to_string()),
-                position: Some(at.position.to_string()),
-                part_number: Some(stay.part_number.to_string()),
-                serial_number: Some(SerialNumber::to_string(&stay.serial_number)),
-                flight_id: Some(flight.flight_id.to_string()),
-                departure_utc: Some(flight.departure_utc),
-                flight_hours: flight.flight_hours,
-                tail_hours_end: flight.tail_hours_end,
-                estimate,
-                log_path: name.clone(),
-                log_digest: Some(opened.digest.clone()),
-                config_digest: config.digest(&flight.tail_number, &stay.part_number),
-                program_version: super::VERSION,
-            }),
-            Err(complaint) => complaints.push(complaint.in_file(&name)),
-        }
-    }
-    Ok(rows)
-}
-
-/// The store's columns without those of a run, every one nullable.
-fn batch(found: &[Row]) -> Result<arrow::array::RecordBatch, Failure> {
-    let of_a_run = ["unit_hours", "run_id", "processed_utc"];
-    let all = store::columns::schema();
-    let fields = all.fields().iter().filter(|f| !of_a_run.contains(&f.name().as_str()));
-    let nullable: Vec<Field> = fields.map(|f| f.as_ref().clone().with_nullable(true)).collect();
-    rows::batch(&std::sync::Arc::new(Schema::new(nullable)), found)
-}
-
-fn page(found: &[Row]) -> String {
+fn page(found: &[EstimateRow]) -> String {
     let columns = [
         text("log", 3),
         text("position", 0),
@@ -161,11 +65,11 @@ fn page(found: &[Row]) -> String {
         number("nis", 7),
         text("doubts", 1),
     ];
-    let cells = |r: &Row| {
+    let cells = |r: &EstimateRow| {
         let e = &r.estimate;
         let known = |t: &Option<String>| t.clone().unwrap_or_else(table::dash);
         vec![
-            r.log_path.clone(),
+            known(&r.log_path),
             known(&r.position),
             format!("{} / {}", known(&r.part_number), known(&r.serial_number)),
             table::micrometres(e.gap_m),

@@ -1,8 +1,5 @@
 //! `trend`: level, rate, crossing of the limit and state of each unit.
 
-use std::sync::Arc;
-
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use pipeline::trends::{self, Ask, TrendRow};
 use store::Store;
 
@@ -41,7 +38,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Co
             trends::of_queries(&config, &installations, flown, &queries)?
         }
     };
-    rows::answer(&args.output, talk, || rows::batch(&schema(), &found), || page(&found))?;
+    rows::answer(&args.output, talk, || rows::batch(&pipeline::rows::trends(), &found), || page(&found))?;
     Ok(Code::Well)
 }
 
@@ -94,60 +91,4 @@ fn page(found: &[TrendRow]) -> String {
     } else {
         head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
     }
-}
-
-/// The contract's columns.
-fn schema() -> SchemaRef {
-    let text = |name: &str| Field::new(name, DataType::Utf8, true);
-    let real = |name: &str| Field::new(name, DataType::Float64, true);
-    let change = DataType::Struct(
-        vec![
-            Field::new("departure_utc", rows::utc(), true),
-            text("flight_id"),
-            text("kind"),
-            real("step_m"),
-            real("step_se_m"),
-        ]
-        .into(),
-    );
-    Arc::new(Schema::new(vec![
-        text("part_number"),
-        text("serial_number"),
-        text("tail_number"),
-        text("position"),
-        Field::new("as_of_utc", rows::utc(), true),
-        Field::new("flights", DataType::Int64, true),
-        real("unit_hours"),
-        real("gap_m"),
-        real("gap_se_m"),
-        Field::new("estimates", DataType::Int64, true),
-        Field::new("outliers", DataType::Int64, true),
-        real("noise_factor"),
-        real("rate_m_per_hour"),
-        real("rate_p05_m_per_hour"),
-        real("rate_p95_m_per_hour"),
-        text("trend"),
-        real("growth_probability"),
-        text("wear_law"),
-        real("wear_law_probability"),
-        text("usage_axis"),
-        real("trend_p_value"),
-        real("sen_rate_m_per_hour"),
-        real("sen_low_m_per_hour"),
-        real("sen_high_m_per_hour"),
-        Field::new("change_points", DataType::List(Arc::new(Field::new("item", change, true))), true),
-        real("limit_m"),
-        real("crossing_hours_p05"),
-        real("crossing_hours_p50"),
-        real("crossing_hours_p95"),
-        real("crossing_flights_p05"),
-        real("crossing_flights_p50"),
-        real("crossing_flights_p95"),
-        Field::new("not_before_utc", rows::utc(), true),
-        Field::new("likely_utc", rows::utc(), true),
-        Field::new("not_after_utc", rows::utc(), true),
-        real("check_probability"),
-        text("state"),
-        text("reason"),
-    ]))
 }

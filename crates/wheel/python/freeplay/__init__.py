@@ -1,0 +1,237 @@
+"""The backlash gap of flight-control actuators from flight logs, and its trend per serial number.
+
+The functions read the same ``pipeline.toml`` as the command ``freeplay`` and give the same rows, bit for bit.
+Tables come in and go out through Arrow's PyCapsule interface: hand a :class:`Table` to ``pyarrow.table``,
+``polars.DataFrame``, ``pandas.DataFrame.from_arrow`` or DuckDB, and hand any of theirs back. Work is done without
+the interpreter's lock. What is wrong is raised as :class:`FreeplayError`, with the command's code, text and remedy.
+
+The examples start from the folder of the repository, whose ``sample-data`` holds 30 simulated flights.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+from os import PathLike, fspath
+from typing import Any, TypeAlias, TypeVar
+
+from freeplay import _freeplay
+from freeplay._arrow import ArrowStream
+from freeplay._errors import ConfigError, FreeplayError, LogError, RunError
+from freeplay._freeplay import Config, Table, __version__
+
+__all__ = [
+    "ArrowStream",
+    "Config",
+    "ConfigError",
+    "FreeplayError",
+    "LogError",
+    "RunError",
+    "Table",
+    "__version__",
+    "estimate",
+    "estimate_arrays",
+    "load",
+    "normalize",
+    "records",
+    "run",
+    "trace",
+    "trend",
+]
+
+Path: TypeAlias = "str | PathLike[str]"
+Settings: TypeAlias = "Config | Path | Sequence[Path]"
+Instant: TypeAlias = "str | datetime"
+
+_Answer = TypeVar("_Answer")
+
+_USUAL = "pipeline.toml"
+
+
+def load(config: Settings = _USUAL) -> Config:
+    """Reads and checks a configuration once, for many calls; several files are laid over each other.
+
+    >>> import freeplay
+    >>> config = freeplay.load("pipeline.toml")
+    >>> config.parts
+    ['EMA-27-1040', 'EMA-27-1060']
+
+    Raises :class:`ConfigError` with every complaint about it:
+
+    >>> try:
+    ...     freeplay.load("nowhere.toml")
+    ... except freeplay.ConfigError as error:
+    ...     print(error.code, "|", error.help)
+    config_unreadable | `freeplay init` writes one; `--config FILE` or FREEPLAY_CONFIG names another
+    """
+    if isinstance(config, Config):
+        return config
+    files = [config] if isinstance(config, (str, PathLike)) else list(config)
+    return Config([fspath(file) for file in files])
+
+
+def estimate(
+    logs: Path | Iterable[Path], config: Settings = _USUAL, *, part: str | None = None
+) -> Table:
+    """Estimates the gap of every actuator in a log, or in several; nothing is stored.
+
+    The rows are those of ``freeplay estimate``: one for each actuator and flight. With ``part`` all are taken for
+    that part number, and neither an identity nor the installations table is needed.
+
+    >>> import freeplay, pyarrow as pa
+    >>> log = "sample-data/logs/N412FP/20260910T130719Z_N412FP-0001.parquet"
+    >>> table = pa.table(freeplay.estimate(log))
+    >>> table.num_rows
+    4
+    >>> table["position"].to_pylist()
+    ['aileron_left', 'aileron_right', 'elevator_left', 'elevator_right']
+    >>> [f"{1e6 * gap:.1f} um" for gap in table["gap_m"].to_pylist()][:2]
+    ['93.2 um', '76.0 um']
+
+    Raises :class:`LogError` when a log, or an actuator in it, cannot be used; its ``answer`` is the table of the
+    others.
+    """
+    found, trouble = _freeplay.estimate(_paths(logs), load(config), part)
+    return _or_raise(found, trouble)
+
+
+def estimate_arrays(
+    t: Any, motor: Any, screw: Any, load_n: Any, part: str, config: Settings = _USUAL
+) -> Table:
+    """Estimates the gap of one actuator from arrays: a table of one row.
+
+    ``t`` is time in s from any zero, ``motor`` the motor's position brought to the screw axis in m (angle times
+    lead / 2 pi), ``screw`` the screw's position in m, ``load_n`` the load in N; ``part`` names a part number of
+    the configuration. Each is anything that speaks Arrow's interface, a numpy array, or a sequence of numbers;
+    ``float64`` in one piece is read where it lies. NaN and null are missing readings.
+
+    >>> import freeplay, numpy as np, pyarrow as pa
+    >>> t = np.arange(0, 100, 0.01)
+    >>> motor = 0.03 * np.sin(0.25 * t)
+    >>> load = 8000 * np.sin(1.1 * t) + 500 * np.sin(5.0 * t)
+    >>> dx = load / 5e7 + 50e-6 * np.tanh(load / 300)
+    >>> found = pa.table(freeplay.estimate_arrays(t, motor, motor + dx, load, "EMA-27-1040")).to_pylist()[0]
+    >>> found["status"], found["samples"]
+    ('estimated', 10000)
+    """
+    return _freeplay.estimate_arrays(t, motor, screw, load_n, part, load(config))
+
+
+def trace(log: Path, config: Settings = _USUAL, *, part: str | None = None) -> Table:
+    """What the filter saw of a log, sample by sample: inputs, the backlash ``s_m``, innovation and its variance.
+
+    >>> import freeplay
+    >>> log = "sample-data/logs/N412FP/20260910T130719Z_N412FP-0001.parquet"
+    >>> freeplay.trace(log).column_names[:4]
+    ['log_path', 'position', 'time_s', 'motor_m']
+    """
+    return _freeplay.trace(fspath(log), load(config), part)
+
+
+def trend(
+    estimates: ArrowStream | None = None,
+    config: Settings = _USUAL,
+    *,
+    tail: str | None = None,
+    serial: str | None = None,
+    part: str | None = None,
+    as_of: Instant | None = None,
+    queries: ArrowStream | None = None,
+) -> Table:
+    """Level, rate, changes, crossing of the limit and state: one row for each unit.
+
+    ``estimates`` is any Arrow table with ``serial_number`` (or ``serial``), ``departure_utc`` and ``gap_m``, such as
+    that of :func:`estimate`; without it the store of the configuration is asked. ``queries`` (``serial_number``,
+    ``as_of_utc``, optional ``part_number``) asks for one row each, using nothing later than its date.
+
+    >>> import freeplay, glob, pyarrow as pa
+    >>> estimates = freeplay.estimate(sorted(glob.glob("sample-data/logs/*/*.parquet")))
+    >>> rows = pa.table(freeplay.trend(estimates)).to_pylist()
+    >>> [row["serial_number"] for row in rows if row["state"] == "plan"]
+    ['1040-0009', '1040-0013']
+    """
+    return _freeplay.trend(estimates, load(config), tail, serial, part, _text(as_of), queries)
+
+
+def records(
+    config: Settings = _USUAL,
+    *,
+    tail: str | None = None,
+    serial: str | None = None,
+    part: str | None = None,
+    flight: str | None = None,
+    position: str | None = None,
+    since: Instant | None = None,
+    until: Instant | None = None,
+    last: int | None = None,
+) -> Table:
+    """Stored records that fit, by departure, tail, flight and position.
+
+    >>> import freeplay
+    >>> account = freeplay.run()
+    >>> freeplay.records(tail="N412FP").num_rows
+    40
+    """
+    texts = [tail, serial, part, flight, position]
+    return _freeplay.records(load(config), texts, _text(since), _text(until), last)
+
+
+def normalize(
+    logs: Path | Iterable[Path],
+    output: Path,
+    config: Settings = _USUAL,
+    *,
+    compatible: bool = False,
+    jobs: int | None = None,
+) -> list[str]:
+    """Writes the canonical log of each actuator as ``TAIL/FLIGHT/POSITION.parquet`` below ``output``.
+
+    ``compatible`` keeps to encodings that every reader knows. Raises :class:`LogError` when a log cannot be used;
+    its ``answer`` lists the files of the others.
+
+    >>> import freeplay
+    >>> log = "sample-data/logs/N412FP/20260910T130719Z_N412FP-0001.parquet"
+    >>> files = freeplay.normalize(log, "normalized")
+    >>> files[0]
+    'normalized/N412FP/N412FP-0001/aileron_left.parquet'
+    """
+    written, trouble = _freeplay.normalize(_paths(logs), fspath(output), load(config), compatible, jobs)
+    return _or_raise([fspath(file) for file in written], trouble)
+
+
+def run(
+    config: Settings = _USUAL,
+    *,
+    jobs: int | None = None,
+    redo: bool = False,
+    retry: bool = False,
+    wait_s: float | None = None,
+) -> dict[str, Any]:
+    """The nightly run on this machine, and its account: that of ``freeplay run --json``.
+
+    Logs in error are listed under ``errors`` and raise nothing. ``retry`` does logs in error again, ``redo`` all.
+
+    >>> import freeplay
+    >>> freeplay.run()["found"]
+    30
+    """
+    account: dict[str, Any] = json.loads(_freeplay.run(load(config), jobs, redo, retry, wait_s))
+    return account
+
+
+def _paths(logs: Path | Iterable[Path]) -> list[str]:
+    if isinstance(logs, (str, PathLike)):
+        return [fspath(logs)]
+    return [fspath(log) for log in logs]
+
+
+def _text(instant: Instant | None) -> str | None:
+    return instant.isoformat() if isinstance(instant, datetime) else instant
+
+
+def _or_raise(answer: _Answer, trouble: Exception | None) -> _Answer:
+    if isinstance(trouble, LogError):
+        trouble.answer = answer
+        raise trouble
+    return answer
