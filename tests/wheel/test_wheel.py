@@ -76,6 +76,15 @@ def test_tables_of_every_library_come_in_and_go_out(kind: object, fleet: Path) -
     assert differing(pa.table(freeplay.trend(theirs)), pa.table(freeplay.trend(found.select(columns)))) == []
 
 
+def test_a_table_of_ours_is_read_by_every_library(logs: list[str]) -> None:
+    found = freeplay.estimate(logs[0])
+    gaps = pa.table(found)["gap_m"].to_pylist()
+    assert len(found) == len(gaps) == 4
+    assert pl.DataFrame(found)["gap_m"].to_list() == gaps
+    assert pd.DataFrame.from_arrow(found)["gap_m"].to_list() == gaps
+    assert [gap for (gap,) in duckdb.sql("select gap_m from found").fetchall()] == gaps
+
+
 def test_arrays_give_the_gap_of_the_log_they_come_from(logs: list[str]) -> None:
     """The log's own columns, brought to the screw by hand: a turn is 5 mm of travel."""
     raw = pq.read_table(logs[0])
