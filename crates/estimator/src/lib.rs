@@ -32,6 +32,8 @@ pub mod running;
 pub mod stream;
 #[cfg(feature = "std")]
 mod track;
+#[cfg(feature = "std")]
+mod wide;
 
 #[cfg(feature = "std")]
 pub use contact::ContactGap;

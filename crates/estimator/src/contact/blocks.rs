@@ -118,11 +118,16 @@ impl Blocks {
         let (whole, part) = (shift.floor(), shift - shift.floor());
         let weights = cubic(part);
         let screw = |k: usize| self.motor_m[k] + self.logged_dx_m[k];
-        for k in 0..self.dx_m.len() {
-            let first = k as isize + whole as isize - 1;
-            let inside = first >= 0 && first as usize + 3 < self.motor_m.len();
-            let read_m = |j: usize| weights[j] * screw(first as usize + j);
-            self.dx_m[k] = if inside { (0..4).map(read_m).sum::<f64>() - self.motor_m[k] } else { f64::NAN };
+        let (from, len) = ((whole as isize).saturating_sub(1), self.dx_m.len());
+        // The blocks for which all four lie within the flight.
+        let begin = len.min(from.saturating_neg().max(0) as usize);
+        let end = len.saturating_sub(from.saturating_add(3).max(0) as usize).max(begin);
+        self.dx_m[..begin].fill(f64::NAN);
+        self.dx_m[end..].fill(f64::NAN);
+        for k in begin..end {
+            let first = k.wrapping_add_signed(from);
+            let read_m = |j: usize| weights[j] * screw(first + j);
+            self.dx_m[k] = read_m(0) + read_m(1) + read_m(2) + read_m(3) - self.motor_m[k];
         }
     }
 }

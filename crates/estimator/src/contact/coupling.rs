@@ -12,8 +12,6 @@
 //! So a moving screw has c = F − F_f·sgn Ẋ₂, a resting one keeps its c, and a flexing one (load changes,
 //! motor at rest) shows the loop that a sign of the motor's speed cannot.
 
-use super::blocks::Blocks;
-
 /// Dry friction of the screw and the share of the load lost (equation 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Friction {
@@ -58,28 +56,36 @@ pub(super) struct Coupling {
     pub(super) by_share_n: f64,
 }
 
-/// The coupling's force at each block; each segment starts at rest, its friction unknown.
-pub(super) fn follow(blocks: &Blocks, state: &State) -> Vec<Coupling> {
-    let mut starts = blocks.starts.iter().copied().peekable();
-    let mut screw: Option<Screw> = None;
-    let mut forces = Vec::with_capacity(blocks.len());
-    for k in 0..blocks.len() {
-        if starts.next_if_eq(&k).is_some() {
-            screw = None;
-        }
-        let (motor_m, load_n) = (blocks.motor_m[k], blocks.load_n[k]);
-        if !(motor_m + load_n).is_finite() {
-            forces.push(Coupling { force_n: f64::NAN, by_dry: 0.0, by_share_n: 0.0 });
-            continue;
-        }
-        let moved = match screw {
-            Some(before) => before.moved(motor_m, load_n, state),
-            None => Screw::resting(motor_m, load_n, state),
-        };
-        forces.push(moved.coupling);
-        screw = Some(moved);
+/// The coupling followed from block to block; each segment starts at rest, its friction unknown.
+#[derive(Debug)]
+pub(super) struct Walk<'a> {
+    state: &'a State,
+    screw: Option<Screw>,
+}
+
+impl<'a> Walk<'a> {
+    pub(super) fn new(state: &'a State) -> Self {
+        Self { state, screw: None }
     }
-    forces
+
+    /// A new segment begins.
+    pub(super) fn restart(&mut self) {
+        self.screw = None;
+    }
+
+    /// The coupling at the next block. One with a channel missing is passed over.
+    #[inline]
+    pub(super) fn step(&mut self, motor_m: f64, load_n: f64) -> Coupling {
+        if !(motor_m + load_n).is_finite() {
+            return Coupling { force_n: f64::NAN, by_dry: 0.0, by_share_n: 0.0 };
+        }
+        let moved = match self.screw {
+            Some(before) => before.moved(motor_m, load_n, self.state),
+            None => Screw::resting(motor_m, load_n, self.state),
+        };
+        self.screw = Some(moved);
+        moved.coupling
+    }
 }
 
 /// The screw between two blocks.

@@ -3,7 +3,8 @@
 use super::blocks::Blocks;
 use super::coupling::State;
 use super::design::{
-    self, BEND, CURVED, FIRM_SHARE, FORCE, Frame, GAP, LINEAR, ORIGIN, Row, SPEED, SPEED_M_PER_S, bends,
+    self, BEND, CURVED, FIRM_SHARE, FORCE, Frame, GAP, Ground, LINEAR, ORIGIN, Pace, Row, SPEED,
+    SPEED_M_PER_S, bends,
 };
 use super::refusal::Refusal;
 use super::search::{Found, search, start};
@@ -73,15 +74,16 @@ impl Contact {
 /// As [`search`], and [`Refusal::MotionUnexplained`].
 pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal> {
     let mut excerpt = blocks.excerpt();
-    let guess: Found<LINEAR> = search(&mut excerpt, frame, start(frame), TURNS.0)
-        .or_else(|_| search(blocks, frame, start(frame), TURNS.0))?;
-    let straight: Found<LINEAR> = search(blocks, frame, guess.state, 2)?;
+    let (pace, thin) = (Pace::of(blocks, frame), Pace::of(&excerpt, frame));
+    let guess: Found<LINEAR> = search((&mut excerpt, &thin), frame, start(frame), TURNS.0)
+        .or_else(|_| search((blocks, &pace), frame, start(frame), TURNS.0))?;
+    let straight: Found<LINEAR> = search((blocks, &pace), frame, guess.state, 2)?;
     let error_m = |column: usize| straight.fit.standard_error_m(column, &straight.design.firm);
     let (line_m, line_se_m) = (straight.fit.beta[GAP], error_m(GAP));
     // Under heavy friction the forces at low load are friction's to say, not the flank's.
     let heavy = straight.state.friction.is_heavy(frame.load_n);
     let bent = if !heavy && low_loads_deviate(&straight, frame) {
-        soft(blocks, frame, straight.state, (line_m, line_se_m))
+        soft((blocks, &pace), frame, straight.state, (line_m, line_se_m))
     } else {
         None
     };
@@ -99,13 +101,17 @@ pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal
         curve: bent.map(|(beta, _)| beta),
         straight,
     };
-    if is_explained(blocks, frame, &contact) { Ok(contact) } else { Err(Refusal::MotionUnexplained) }
+    if is_explained(Ground { blocks, pace: &pace, frame }, &contact) {
+        Ok(contact)
+    } else {
+        Err(Refusal::MotionUnexplained)
+    }
 }
 
 /// Whether gap and wind-up travel as far as δX does. A screw that friction holds within its gap, or a load
 /// that is another actuator's, leaves travel over that no flank accounts for.
-fn is_explained(blocks: &Blocks, frame: &Frame, contact: &Contact) -> bool {
-    let (seen_m, expected_m, noise_m) = travels_m(blocks, frame, contact);
+fn is_explained(ground: Ground<'_>, contact: &Contact) -> bool {
+    let (seen_m, expected_m, noise_m) = travels_m(ground, contact);
     // A bad fit leaves noise enough to explain anything: it may explain only so much.
     let blurred_m = expected_m.hypot(noise_m.min(0.5 * expected_m));
     seen_m - blurred_m <= UNEXPLAINED * expected_m
@@ -113,8 +119,9 @@ fn is_explained(blocks: &Blocks, frame: &Frame, contact: &Contact) -> bool {
 
 /// How far δX travels, m: as seen once all that is beside gap and wind-up is taken off, as gap and wind-up
 /// say it should, and by noise alone; each from the 5 % to the 95 % quantile.
-fn travels_m(blocks: &Blocks, frame: &Frame, contact: &Contact) -> (f64, f64, f64) {
-    let rows = design::every(blocks, &contact.state, frame, blocks.len().div_ceil(LOOKS).max(1));
+fn travels_m(ground: Ground<'_>, contact: &Contact) -> (f64, f64, f64) {
+    let stride = ground.blocks.len().div_ceil(LOOKS).max(1);
+    let rows = design::every(ground, &contact.state, stride);
     let flank_m = |row: &Row<LINEAR>| contact.flank_m(2.0 * row.x[GAP], row.x[FORCE].abs());
     let seen_m = span_m(rows.iter().map(|row| row.y_m - contact.beside_m(row)).collect());
     let expected_m = span_m(rows.iter().map(flank_m).collect());
@@ -155,8 +162,13 @@ fn low_loads_deviate(straight: &Found<LINEAR>, frame: &Frame) -> bool {
 ///
 /// The straight fit is the sharper one when flanks are straight, the curve right either way; so their
 /// difference has the variance of the curve less that of the line (Hausman 1978).
-fn soft(blocks: &mut Blocks, frame: &Frame, from: State, line_m: (f64, f64)) -> Option<([f64; CURVED], f64)> {
-    let curve: Found<CURVED> = search(blocks, frame, from, TURNS.1).ok()?;
+fn soft(
+    (blocks, pace): (&mut Blocks, &Pace),
+    frame: &Frame,
+    from: State,
+    line_m: (f64, f64),
+) -> Option<([f64; CURVED], f64)> {
+    let curve: Found<CURVED> = search((blocks, pace), frame, from, TURNS.1).ok()?;
     let (gap_m, se_m) = (curve.fit.beta[GAP], curve.fit.standard_error_m(GAP, &curve.design.firm));
     let spread_m = (se_m.powi(2) - line_m.1.powi(2)).max(0.25 * se_m.powi(2)).sqrt();
     let change_m = line_m.0 - gap_m;

@@ -2,7 +2,7 @@
 
 use super::Prior;
 use super::blocks::Blocks;
-use super::coupling::{Coupling, State};
+use super::coupling::{Coupling, State, Walk};
 use super::refusal::Refusal;
 
 /// Columns while the flanks are straight.
@@ -43,6 +43,8 @@ pub(super) const LATE_S: f64 = 0.01;
 const START_S: f64 = 1.0;
 /// Residuals are taken as dependent within this time, s.
 const STRETCH_S: f64 = 2.0;
+/// Blocks around one that must keep its flank, itself among them: two before and one after.
+const KEPT_BLOCKS: u32 = 4;
 /// Blocks in a row, at least and at most; long flights need no finer rows.
 const ROW_BLOCKS: (usize, usize) = (6, 25);
 /// The 95 % load must exceed the force the model does not know by this factor, or friction alone may hold the
@@ -169,51 +171,117 @@ impl Touch {
         };
         Some(Self { flank, is_firm: force.abs() > FIRM_SHARE })
     }
+}
 
-    /// Whether the blocks around keep this flank, and firmly where this is firm.
-    fn is_kept_by(self, around: &[Option<Self>]) -> bool {
-        around.iter().flatten().filter(|t| t.flank == self.flank && (t.is_firm || !self.is_firm)).count()
-            == around.len()
+/// For how many blocks a flank has been kept.
+#[derive(Debug, Default)]
+struct Keeping {
+    last: Option<Touch>,
+    /// Blocks on the flank of the last one, and how many of the latest were firm without a break.
+    blocks: u32,
+    firm_blocks: u32,
+}
+
+impl Keeping {
+    /// Takes the next block. Gives the touch of the one before it where flank and firmness were kept for
+    /// two blocks before that and are kept in this one.
+    #[inline]
+    fn push(&mut self, next: Option<Touch>) -> Option<Touch> {
+        let before = std::mem::replace(&mut self.last, next);
+        let Some(touch) = next else {
+            (self.blocks, self.firm_blocks) = (0, 0);
+            return None;
+        };
+        if before.is_none_or(|before| before.flank != touch.flank) {
+            (self.blocks, self.firm_blocks) = (0, 0);
+        }
+        self.blocks += 1;
+        self.firm_blocks = if touch.is_firm { self.firm_blocks + 1 } else { 0 };
+        before.filter(|before| {
+            let kept = if before.is_firm { self.firm_blocks } else { self.blocks };
+            kept >= KEPT_BLOCKS
+        })
     }
+}
+
+/// What a block's row holds whatever the state: found once, used in every turn.
+#[derive(Debug)]
+pub(super) struct Pace {
+    /// t, from −1 to 1.
+    time: Vec<f64>,
+    /// Ẋ₁ over its scale.
+    speed: Vec<f64>,
+    /// Ḟ over its scale; NaN where the flight has only begun.
+    load_rate: Vec<f64>,
+    stretch: Vec<u32>,
+}
+
+impl Pace {
+    pub(super) fn of(blocks: &Blocks, frame: &Frame) -> Self {
+        let all = 0..blocks.len();
+        let begun = |k: usize| blocks.time_s[k] > START_S;
+        let load_rate = |k| blocks.rate(&blocks.load_n, k) * LATE_S / frame.load_n;
+        Self {
+            time: blocks.time_s.iter().map(|t| (t - frame.time_s.0) / frame.time_s.1).collect(),
+            speed: all.clone().map(|k| blocks.rate(&blocks.motor_m, k) / SPEED_M_PER_S).collect(),
+            load_rate: all.map(|k| if begun(k) { load_rate(k) } else { f64::NAN }).collect(),
+            stretch: blocks.time_s.iter().map(|t| (t / STRETCH_S) as u32).collect(),
+        }
+    }
+}
+
+/// Where rows are made from: blocks, what they hold whatever the state, and the scales.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ground<'a> {
+    pub(super) blocks: &'a Blocks,
+    pub(super) pace: &'a Pace,
+    pub(super) frame: &'a Frame,
 }
 
 /// Rows of all blocks that have kept their flank for two blocks before and one after, and their
 /// firmness as well, so that no row mixes flank and gap.
-pub(super) fn rows<const N: usize>(blocks: &Blocks, state: &State, frame: &Frame) -> Design<N> {
-    let forces = super::coupling::follow(blocks, state);
+pub(super) fn rows<const N: usize>(ground: Ground<'_>, state: &State) -> Design<N> {
+    let Ground { blocks, frame, .. } = ground;
     let mut design = Design { firm: Vec::new(), light: Vec::new(), touched_s: (0.0, 0.0) };
-    let mut open: Option<(Touch, Row<N>)> = None;
-    // The two blocks before, this one, and the one after.
-    let mut touches = [None; 4];
+    let (mut walk, mut keeping) = (Walk::new(state), Keeping::default());
+    let mut before = Press::default();
+    let (mut open, mut sum) = (None, Row::<N>::ZERO);
     let mut starts = blocks.starts.iter().copied().peekable();
-    for next in 0..blocks.len() {
+    for (next, (&motor_m, &load_n)) in blocks.motor_m.iter().zip(&blocks.load_n).enumerate() {
         if starts.next_if_eq(&next).is_some() {
-            touches = [None; 4];
+            walk.restart();
+            keeping = Keeping::default();
         }
-        touches = [touches[1], touches[2], touches[3], Touch::of(forces[next].force_n / frame.load_n)];
-        let steady = touches[2].filter(|touch| touch.is_kept_by(&touches));
-        let row = steady.and_then(|touch| {
-            Some((touch, row(blocks, &forces[next - 1], frame, next - 1, touch.flank.sign())?))
-        });
-        open = match (open, row) {
-            (Some((before, sum)), Some((touch, row)))
-                if before == touch && sum.blocks < frame.row_blocks && sum.stretch == row.stretch =>
+        let press = Press::of(walk.step(motor_m, load_n), frame);
+        let pressed = std::mem::replace(&mut before, press);
+        let steady = keeping.push(Touch::of(press.force));
+        let row =
+            steady.and_then(|touch| Some((touch, ground.row::<N>(&pressed, next - 1, touch.flank.sign())?)));
+        match (open, &row) {
+            (Some(touch), Some((same, row)))
+                if touch == *same && sum.blocks < frame.row_blocks && sum.stretch == row.stretch =>
             {
-                Some((touch, sum.plus(&row)))
+                sum.add(row);
             }
-            (before, row) => {
-                design.close(before, blocks.period_s);
-                row
+            (closed, row) => {
+                if let Some(touch) = closed {
+                    design.close(touch, &sum, blocks.period_s);
+                }
+                open = row.as_ref().map(|(touch, row)| {
+                    sum = *row;
+                    *touch
+                });
             }
-        };
+        }
     }
-    design.close(open, blocks.period_s);
+    if let Some(touch) = open {
+        design.close(touch, &sum, blocks.period_s);
+    }
     design
 }
 
 impl<const N: usize> Design<N> {
-    fn close(&mut self, open: Option<(Touch, Row<N>)>, period_s: f64) {
-        let Some((touch, sum)) = open else { return };
+    fn close(&mut self, touch: Touch, sum: &Row<N>, period_s: f64) {
         if !touch.is_firm {
             self.light.push(sum.mean());
             return;
@@ -227,45 +295,68 @@ impl<const N: usize> Design<N> {
 }
 
 /// Single blocks as rows, every so many, whether in contact or in the gap.
-pub(super) fn every(blocks: &Blocks, state: &State, frame: &Frame, stride: usize) -> Vec<Row<LINEAR>> {
-    let forces = super::coupling::follow(blocks, state);
-    let row = |k: usize| {
-        let force_n = forces[k].force_n;
-        let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
-        row(blocks, &forces[k], frame, k, side)
-    };
-    (0..blocks.len()).step_by(stride).filter_map(row).filter(|row| row.x[FORCE].is_finite()).collect()
+pub(super) fn every(ground: Ground<'_>, state: &State, stride: usize) -> Vec<Row<LINEAR>> {
+    let blocks = ground.blocks;
+    let mut walk = Walk::new(state);
+    let mut starts = blocks.starts.iter().copied().peekable();
+    let mut rows = Vec::with_capacity(blocks.len() / stride + 1);
+    for (k, (&motor_m, &load_n)) in blocks.motor_m.iter().zip(&blocks.load_n).enumerate() {
+        if starts.next_if_eq(&k).is_some() {
+            walk.restart();
+        }
+        let coupling = walk.step(motor_m, load_n);
+        if k % stride == 0 {
+            let force_n = coupling.force_n;
+            let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
+            rows.extend(ground.row(&Press::of(coupling, ground.frame), k, side));
+        }
+    }
+    rows.retain(|row| row.x[FORCE].is_finite());
+    rows
 }
 
-/// One block as a row; none where a channel is missing or the flight has only begun.
-fn row<const N: usize>(
-    blocks: &Blocks,
-    coupling: &Coupling,
-    frame: &Frame,
-    k: usize,
-    side: f64,
-) -> Option<Row<N>> {
-    let force = coupling.force_n / frame.load_n;
-    let time = (blocks.time_s[k] - frame.time_s.0) / frame.time_s.1;
-    // The screw's own place: its transducer's slope acts on the gap as well.
-    let place = (blocks.motor_m[k] + blocks.dx_m[k] - frame.place_m.0) / frame.place_m.1;
-    let load_rate = blocks.rate(&blocks.load_n, k) * LATE_S / frame.load_n;
-    let speed = blocks.rate(&blocks.motor_m, k) / SPEED_M_PER_S;
-    let mut x = [0.0; N];
-    x[ORIGIN] = 1.0;
-    x[GAP] = 0.5 * side;
-    x[FORCE] = force;
-    x[DRY] = coupling.by_dry;
-    x[SHARE] = coupling.by_share_n / frame.load_n;
-    x[SPEED] = speed;
-    x[DRIFT..PLACE].copy_from_slice(&[time, time * time]);
-    x[PLACE..LOAD_RATE].copy_from_slice(&[place, place * place, place * place * place]);
-    x[LOAD_RATE] = load_rate;
-    if N == CURVED {
-        x[BEND..].copy_from_slice(&bends(force.abs()).map(|bend| side * bend));
+/// The coupling of a block over the 95 % load.
+#[derive(Debug, Clone, Copy, Default)]
+struct Press {
+    force: f64,
+    by_dry: f64,
+    by_share: f64,
+}
+
+impl Press {
+    #[inline]
+    fn of(coupling: Coupling, frame: &Frame) -> Self {
+        let Coupling { force_n, by_dry, by_share_n } = coupling;
+        Self { force: force_n / frame.load_n, by_dry, by_share: by_share_n / frame.load_n }
     }
-    let row = Row { x, y_m: blocks.dx_m[k], blocks: 1.0, stretch: (blocks.time_s[k] / STRETCH_S) as u32 };
-    (blocks.time_s[k] > START_S && (row.y_m + speed + load_rate).is_finite()).then_some(row)
+}
+
+impl Ground<'_> {
+    /// One block as a row; none where a channel is missing or the flight has only begun.
+    #[inline]
+    fn row<const N: usize>(&self, press: &Press, k: usize, side: f64) -> Option<Row<N>> {
+        let Self { blocks, pace, frame } = self;
+        let (time, speed, load_rate, y_m) = (pace.time[k], pace.speed[k], pace.load_rate[k], blocks.dx_m[k]);
+        if !(y_m + speed + load_rate).is_finite() {
+            return None;
+        }
+        // The screw's own place: its transducer's slope acts on the gap as well.
+        let place = (blocks.motor_m[k] + y_m - frame.place_m.0) / frame.place_m.1;
+        let mut x = [0.0; N];
+        x[ORIGIN] = 1.0;
+        x[GAP] = 0.5 * side;
+        x[FORCE] = press.force;
+        x[DRY] = press.by_dry;
+        x[SHARE] = press.by_share;
+        x[SPEED] = speed;
+        x[DRIFT..PLACE].copy_from_slice(&[time, time * time]);
+        x[PLACE..LOAD_RATE].copy_from_slice(&[place, place * place, place * place * place]);
+        x[LOAD_RATE] = load_rate;
+        if N == CURVED {
+            x[BEND..].copy_from_slice(&bends(press.force.abs()).map(|bend| side * bend));
+        }
+        Some(Row { x, y_m, blocks: 1.0, stretch: pace.stretch[k] })
+    }
 }
 
 /// Deflections of a soft flank under a force over the 95 % load, all zero at zero force: Hertz's law,
@@ -276,16 +367,16 @@ pub(super) fn bends(force: f64) -> [f64; CURVED - LINEAR] {
 }
 
 impl<const N: usize> Row<N> {
-    fn plus(mut self, other: &Self) -> Self {
+    const ZERO: Self = Self { x: [0.0; N], y_m: 0.0, blocks: 0.0, stretch: 0 };
+
+    #[inline]
+    fn add(&mut self, other: &Self) {
         self.x.iter_mut().zip(other.x).for_each(|(sum, x)| *sum += x);
         self.y_m += other.y_m;
         self.blocks += other.blocks;
-        self
     }
 
-    fn mean(mut self) -> Self {
-        self.x.iter_mut().for_each(|x| *x /= self.blocks);
-        self.y_m /= self.blocks;
-        self
+    fn mean(&self) -> Self {
+        Self { x: self.x.map(|x| x / self.blocks), y_m: self.y_m / self.blocks, ..*self }
     }
 }

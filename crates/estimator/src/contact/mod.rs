@@ -108,7 +108,7 @@ pub enum Outcome {
 
 /// Estimates the gap of one flight, over all its segments together, or says why it cannot be seen.
 ///
-/// Time is linear in the samples; memory is five numbers for each 20 ms and a row of eighteen for each
+/// Time is linear in the samples; memory is nine numbers for each 20 ms and a row of eighteen for each
 /// tenth of a second or more.
 ///
 /// # Errors

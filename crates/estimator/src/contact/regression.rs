@@ -3,6 +3,7 @@
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
 use super::design::Row;
+use crate::wide::{Lanes, widest};
 
 /// Residuals beyond this many times their spread lose weight (Huber).
 const HUBER: f64 = 2.0;
@@ -100,21 +101,51 @@ fn variance_of_a_row<const N: usize>(rows: &[Row<N>], weights: &[f64], residuals
     (size / total).max(LEAST_SPREAD_M * LEAST_SPREAD_M) * inflation
 }
 
+widest! {
+    /// Σ w x xᵀ on and below the diagonal, which is all that a Cholesky decomposition reads; and Σ w x y.
+    fn normal_equations<const N: usize>(rows: &[Row<N>], weights: &[f64]) -> ([[f64; N]; N], [f64; N]) {
+        // The matrix in squares of eight by eight, filled up with zeros: upper left, lower left, lower right.
+        let mut squares = [[Lanes::ZERO; Lanes::COUNT]; 3];
+        let mut right = [Lanes::ZERO; 2];
+        for (row, &w) in rows.iter().zip(weights) {
+            let x = [Lanes::of(&row.x[..N.min(Lanes::COUNT)]), Lanes::of(&row.x[N.min(Lanes::COUNT)..])];
+            let (w, y_m) = (Lanes::all(w), Lanes::all(row.y_m));
+            let wx = [w.times(x[0]), w.times(x[1])];
+            right = [right[0].plus(wx[0].times(y_m)), right[1].plus(wx[1].times(y_m))];
+            add_products(&mut squares[0], wx[0], x[0]);
+            if N > Lanes::COUNT {
+                add_products(&mut squares[1], wx[1], x[0]);
+                add_products(&mut squares[2], wx[1], x[1]);
+            }
+        }
+        let (mut normal, mut side) = ([[0.0; N]; N], [0.0; N]);
+        for (i, line) in normal.iter_mut().enumerate() {
+            side[i] = right[i / Lanes::COUNT].0[i % Lanes::COUNT];
+            for (j, entry) in line.iter_mut().enumerate().take(i + 1) {
+                let square = &squares[i / Lanes::COUNT + j / Lanes::COUNT];
+                *entry = square[i % Lanes::COUNT].0[j % Lanes::COUNT];
+            }
+        }
+        (normal, side)
+    }
+}
+
+/// Adds a product to each entry of a square: lines by columns.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "see `widest`")]
+fn add_products(square: &mut [Lanes; Lanes::COUNT], lines: Lanes, columns: Lanes) {
+    for (sum, line) in square.iter_mut().zip(lines.0) {
+        *sum = sum.plus(Lanes::all(line).times(columns));
+    }
+}
+
 fn solve<const N: usize>(
     rows: &[Row<N>],
     beliefs: &[Belief; N],
     weights: Vec<f64>,
     lent: [f64; N],
 ) -> Option<Fit<N>> {
-    let (mut normal, mut right) = ([[0.0; N]; N], [0.0; N]);
-    for (row, w) in rows.iter().zip(&weights) {
-        let x = &row.x;
-        for (i, (line, side)) in normal.iter_mut().zip(&mut right).enumerate() {
-            let wx = w * x[i];
-            line.iter_mut().zip(x).for_each(|(entry, x)| *entry += wx * x);
-            *side += wx * row.y_m;
-        }
-    }
+    let (normal, right) = normal_equations(rows, &weights);
     let mut normal = SMatrix::<f64, N, N>::from_fn(|i, j| normal[i][j]);
     let mut right = SVector::<f64, N>::from(right);
     for i in 0..N {

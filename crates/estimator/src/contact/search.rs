@@ -3,8 +3,8 @@
 use super::blocks::Blocks;
 use super::coupling::{Friction, State};
 use super::design::{
-    self, BEND, CURVED, DRIFT, DRY, Design, FORCE, Frame, GAP, LATE_S, LOAD_RATE, ORIGIN, PLACE, SHARE,
-    SPEED, SPEED_M_PER_S,
+    self, BEND, CURVED, DRIFT, DRY, Design, FORCE, Frame, GAP, Ground, LATE_S, LOAD_RATE, ORIGIN, PLACE,
+    Pace, SHARE, SPEED, SPEED_M_PER_S,
 };
 use super::refusal::Refusal;
 use super::regression::{Belief, Fit, fit};
@@ -46,7 +46,7 @@ pub(super) struct Found<const N: usize> {
 /// # Errors
 /// [`Refusal::NoLoadReversal`], [`Refusal::OneSideBrief`], [`Refusal::TooShort`].
 pub(super) fn search<const N: usize>(
-    blocks: &mut Blocks,
+    (blocks, pace): (&mut Blocks, &Pace),
     frame: &Frame,
     mut state: State,
     turns: usize,
@@ -54,7 +54,7 @@ pub(super) fn search<const N: usize>(
     let mut found = None;
     for turn in 1..=turns {
         blocks.realign(state.skew_s);
-        let mut design = design::rows(blocks, &state, frame);
+        let mut design = design::rows(Ground { blocks, pace, frame }, &state);
         touched(&design)?;
         if N == CURVED {
             design.firm.append(&mut design.light);

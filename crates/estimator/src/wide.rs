@@ -1,0 +1,88 @@
+//! One body compiled several times, for the widest vectors that the machine turns out to have.
+//!
+//! Vectors change no result: lanes run the same operations in the same order as one number would, and
+//! products are never fused with sums. So every machine gives the same bits, and no record has to say
+//! which of the bodies it came from. Machines without such extensions, and those whose vectors need none
+//! (NEON), run the plain body.
+
+/// Defines a function whose body runs with AVX-512 or AVX2 where the processor has it.
+///
+/// A body must hold no closure: one would be compiled without the wider vectors.
+macro_rules! widest {
+    ($(#[$note:meta])* $seen:vis fn $name:ident$(<const $n:ident: usize>)?($($arg:ident: $is:ty),* $(,)?)
+        $(-> $out:ty)? $body:block) => {
+        $(#[$note])*
+        #[allow(clippy::inline_always, reason = "the body must be compiled within each of its shells")]
+        $seen fn $name$(<const $n: usize>)?($($arg: $is),*) $(-> $out)? {
+            #[inline(always)]
+            fn plain$(<const $n: usize>)?($($arg: $is),*) $(-> $out)? $body
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f,avx512vl,avx512dq")]
+                fn with_avx512$(<const $n: usize>)?($($arg: $is),*) $(-> $out)? {
+                    plain($($arg),*)
+                }
+                #[target_feature(enable = "avx2")]
+                fn with_avx2$(<const $n: usize>)?($($arg: $is),*) $(-> $out)? {
+                    plain($($arg),*)
+                }
+                if is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("avx512dq")
+                {
+                    // SAFETY: the processor has what the function was compiled for.
+                    #[allow(unsafe_code, reason = "the one door to wider vectors")]
+                    return unsafe { with_avx512($($arg),*) };
+                }
+                if is_x86_feature_detected!("avx2") {
+                    // SAFETY: as above.
+                    #[allow(unsafe_code, reason = "the one door to wider vectors")]
+                    return unsafe { with_avx2($($arg),*) };
+                }
+            }
+            plain($($arg),*)
+        }
+    };
+}
+
+pub(crate) use widest;
+
+/// Eight numbers that are computed side by side.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(crate) struct Lanes(pub(crate) [f64; Lanes::COUNT]);
+
+#[allow(clippy::inline_always, reason = "see `widest`")]
+impl Lanes {
+    pub(crate) const COUNT: usize = 8;
+    pub(crate) const ZERO: Self = Self([0.0; Self::COUNT]);
+
+    #[inline(always)]
+    pub(crate) fn all(value: f64) -> Self {
+        Self([value; Self::COUNT])
+    }
+
+    /// Up to eight numbers, filled up with zeros.
+    #[inline(always)]
+    pub(crate) fn of(values: &[f64]) -> Self {
+        let mut lanes = Self::ZERO;
+        lanes.0[..values.len()].copy_from_slice(values);
+        lanes
+    }
+
+    #[inline(always)]
+    pub(crate) fn plus(mut self, other: Self) -> Self {
+        for lane in 0..Self::COUNT {
+            self.0[lane] += other.0[lane];
+        }
+        self
+    }
+
+    #[inline(always)]
+    pub(crate) fn times(mut self, other: Self) -> Self {
+        for lane in 0..Self::COUNT {
+            self.0[lane] *= other.0[lane];
+        }
+        self
+    }
+}
