@@ -86,11 +86,16 @@ impl Filter {
 
     /// One step ahead under a held load (24, 25): x = A_d x + B_d u, P = A_d P A_dᵀ + W_d.
     pub fn predict(&self, posterior: &Estimate, load_n: f64) -> Estimate {
-        let Discrete { a_d, b_d } = &self.discrete;
+        let a_d = &self.discrete.a_d;
         Estimate {
-            x: a_d * posterior.x + b_d * load_n,
+            x: self.predict_state(&posterior.x, load_n),
             p: symmetric(&(a_d * posterior.p * a_d.transpose() + self.noise.w_d)),
         }
+    }
+
+    /// x = A_d x + B_d u.
+    pub(crate) fn predict_state(&self, x: &Vector3<f64>, load_n: f64) -> Vector3<f64> {
+        self.discrete.a_d * x + self.discrete.b_d * load_n
     }
 
     /// Folds one measured relative position into the predicted state (26–28).
@@ -154,7 +159,12 @@ impl Filter {
     /// # Errors
     /// As [`Filter::settled`].
     pub fn bandwidth_hz(&self) -> Result<f64, Error> {
-        Ok(-ComplexField::ln(self.spectral_radius()?) / (core::f64::consts::TAU * self.step_s))
+        Ok(self.bandwidth_at_hz(self.spectral_radius()?))
+    }
+
+    /// The bandwidth that belongs to a spectral radius, Hz.
+    pub(crate) fn bandwidth_at_hz(&self, radius: f64) -> f64 {
+        -ComplexField::ln(radius) / (core::f64::consts::TAU * self.step_s)
     }
 
     /// ρ of (I − K C) A_d: a wrong start is forgotten by this factor at each step.
@@ -162,13 +172,17 @@ impl Filter {
     /// # Errors
     /// As [`Filter::settled`].
     pub fn spectral_radius(&self) -> Result<f64, Error> {
-        let (gain, _) = self.settled()?;
+        Ok(self.radius_at(&self.settled()?.0))
+    }
+
+    /// ρ at a gain.
+    pub(crate) fn radius_at(&self, gain: &Vector3<f64>) -> f64 {
         let mut keep = Matrix3::<f64>::identity();
         for row in 0..3 {
             keep[(row, 0)] -= gain[row];
         }
         let poles = (keep * self.discrete.a_d).complex_eigenvalues();
-        Ok(poles.iter().map(|pole| pole.modulus()).fold(0.0, f64::max))
+        poles.iter().map(|pole| pole.modulus()).fold(0.0, f64::max)
     }
 }
 

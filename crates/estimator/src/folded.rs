@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+#[cfg(feature = "std")]
+use crate::eight::Eight;
 use crate::filter::{Filter, Step, distance};
 
 /// The folded map takes over when the covariance is this near to its limit, as a share of itself. The
@@ -53,19 +55,17 @@ impl Folded {
         ([next(0), next(1), next(2)], e_m)
     }
 
-    /// The last state, and the sum of the squared innovations.
+    /// Samples one after the other: the last state, and a sum with the squared innovations added.
     #[cfg(feature = "std")]
     #[inline]
     pub(crate) fn run(
         &self,
-        x: Vector3<f64>,
-        y_m: &[f64],
-        load_n: &[f64],
+        mut x: [f64; 3],
+        mut squares_m2: f64,
+        (y_m, load_n): (&[f64], &[f64]),
         s_m: &mut [f64],
         mut note: impl FnMut(usize, f64),
-    ) -> (Vector3<f64>, f64) {
-        let mut x = [x[0], x[1], x[2]];
-        let mut squares_m2 = 0.0;
+    ) -> ([f64; 3], f64) {
         for (at, ((&y, &u), s)) in y_m.iter().zip(load_n).zip(s_m).enumerate() {
             let e_m;
             (x, e_m) = self.step(x, y, u);
@@ -73,6 +73,51 @@ impl Folded {
             squares_m2 += e_m * e_m;
             note(at, e_m);
         }
-        (Vector3::from(x), squares_m2)
+        (x, squares_m2)
+    }
+
+    /// The same map for eight series side by side.
+    #[cfg(feature = "std")]
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "see `eight`")]
+    pub(crate) fn wide<E: Eight>(&self) -> Wide<E> {
+        let Self { f: [p, q, r], g, k, a, b, .. } = self;
+        Wide { f: [three(p), three(q), three(r)], g: three(g), k: three(k), a: three(a), b: E::all(*b) }
+    }
+}
+
+#[cfg(feature = "std")]
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "see `eight`")]
+fn three<E: Eight>(v: &[f64; 3]) -> [E; 3] {
+    [E::all(v[0]), E::all(v[1]), E::all(v[2])]
+}
+
+/// [`Folded`] for eight series at a time.
+#[cfg(feature = "std")]
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wide<E> {
+    f: [[E; 3]; 3],
+    g: [E; 3],
+    k: [E; 3],
+    a: [E; 3],
+    b: E,
+}
+
+#[cfg(feature = "std")]
+impl<E: Eight> Wide<E> {
+    /// [`Folded::step`], operation by operation: each series has the bits it would have alone.
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "see `eight`")]
+    pub(crate) fn step(&self, [x0, x1, x2]: [E; 3], y_m: E, load_n: E) -> ([E; 3], E) {
+        let Self { f, g, k, a, b } = self;
+        let seen_m = a[0].times(x0).plus(a[1].times(x1).plus(a[2].times(x2)));
+        let e_m = y_m.less(b.times(load_n)).less(seen_m);
+        let mut next = [x0; 3];
+        for i in 0..3 {
+            let pushed = g[i].times(load_n).plus(k[i].times(y_m)).plus(f[i][0].times(x0));
+            next[i] = pushed.plus(f[i][1].times(x1).plus(f[i][2].times(x2)));
+        }
+        (next, e_m)
     }
 }

@@ -17,11 +17,15 @@ compile_error!("without `std` the estimator needs the feature `libm` for its squ
 #[cfg(feature = "std")]
 pub mod contact;
 pub mod discretise;
+#[cfg(feature = "std")]
+mod eight;
 mod error;
 mod exponential;
 pub mod filter;
 mod folded;
 pub mod gap;
+#[cfg(feature = "std")]
+mod lanes;
 #[cfg(feature = "std")]
 pub mod load;
 #[cfg(feature = "std")]
@@ -29,6 +33,8 @@ pub mod midrange;
 pub mod model;
 pub mod noise;
 pub mod running;
+#[cfg(feature = "std")]
+mod schedule;
 pub mod stream;
 #[cfg(feature = "std")]
 mod track;
@@ -46,9 +52,11 @@ pub use midrange::MidRange;
 pub use model::Actuator;
 pub use noise::Noise;
 pub use running::{Reading, RunningGap};
+#[cfg(feature = "std")]
+pub use schedule::Schedule;
 pub use stream::Stream;
 #[cfg(feature = "std")]
-pub use track::{Innovations, Track};
+pub use track::{Innovations, Room, Track};
 
 use core::ops::Range;
 

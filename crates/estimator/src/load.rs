@@ -20,12 +20,7 @@ pub struct LoadBand {
 ///
 /// A reversal is a change from beyond +12 % of the greater of the two quantiles to beyond −12 %, or back.
 pub fn band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
-    let mut present: Vec<f64> =
-        segments.iter().flat_map(|s| &load_n[s.clone()]).copied().filter(|f| !f.is_nan()).collect();
-    if present.is_empty() {
-        return None;
-    }
-    let (p05_n, p95_n) = (quantile(&mut present, 0.05), quantile(&mut present, 0.95));
+    let [p05_n, p95_n] = quantiles(load_n, segments)?;
     let threshold = SIDE_SHARE * p05_n.abs().max(p95_n.abs());
     let mut reversals = 0;
     for segment in segments {
@@ -38,8 +33,114 @@ pub fn band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
     Some(LoadBand { p05_n, p95_n, reversals })
 }
 
-/// The element at a share of the order, no interpolation.
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    let at = ((values.len() - 1) as f64 * share).round() as usize;
-    *values.select_nth_unstable_by(at, f64::total_cmp).1
+/// Loads that brackets are laid by.
+const LOOKS: usize = 2048;
+/// Fewer loads for each of those are put in order at once.
+const WORTH_LOOKING: usize = 16;
+/// Half width of a bracket in the order of those loads: five standard deviations of a rank, or somewhat more.
+const HALF_BRACKET: usize = 50;
+
+/// 5 % and 95 % quantiles: elements, nothing between them. None when there is no load.
+///
+/// Only what lies about each is put in order, in brackets that a few loads tell; where a bracket misses its
+/// quantile, everything is.
+fn quantiles(load_n: &[f64], segments: &[Range<usize>]) -> Option<[f64; 2]> {
+    let present = || segments.iter().flat_map(|s| &load_n[s.clone()]).copied().filter(|f| !f.is_nan());
+    let in_order = || {
+        let mut all: Vec<f64> = present().collect();
+        let last = all.len().checked_sub(1)?;
+        Some([0.05, 0.95].map(|share| *all.select_nth_unstable_by(rank(last, share), f64::total_cmp).1))
+    };
+    let stride = segments.iter().map(Range::len).sum::<usize>() / LOOKS + 1;
+    if stride < WORTH_LOOKING {
+        return in_order();
+    }
+    let mut looks: Vec<f64> = present().step_by(stride).collect();
+    looks.sort_unstable_by(f64::total_cmp);
+    let mut brackets = [0.05, 0.95].map(|share| Bracket::about(share, &looks));
+    let mut count = 0;
+    for segment in segments {
+        for &f in &load_n[segment.clone()] {
+            count += usize::from(!f.is_nan());
+            for bracket in &mut brackets {
+                bracket.push(f);
+            }
+        }
+    }
+    let last = count.checked_sub(1)?;
+    let found = brackets.map(|bracket| bracket.quantile(last));
+    if let [Some(p05), Some(p95)] = found { Some([p05, p95]) } else { in_order() }
+}
+
+/// Where a share of the order lies, counted from zero to the last.
+fn rank(last: usize, share: f64) -> usize {
+    (last as f64 * share).round() as usize
+}
+
+/// Loads about a quantile, and how many lie below them.
+#[derive(Debug)]
+struct Bracket {
+    share: f64,
+    least: f64,
+    greatest: f64,
+    below: usize,
+    within: Vec<f64>,
+}
+
+impl Bracket {
+    fn about(share: f64, looks: &[f64]) -> Self {
+        let at = rank(looks.len().saturating_sub(1), share);
+        let least = at.checked_sub(HALF_BRACKET).map_or(f64::NEG_INFINITY, |k| looks[k]);
+        let greatest = looks.get(at + HALF_BRACKET).copied().unwrap_or(f64::INFINITY);
+        Self { share, least, greatest, below: 0, within: Vec::new() }
+    }
+
+    #[inline]
+    fn push(&mut self, f: f64) {
+        self.below += usize::from(f < self.least);
+        if f >= self.least && f <= self.greatest {
+            self.within.push(f);
+        }
+    }
+
+    /// None where it lies outside.
+    fn quantile(mut self, last: usize) -> Option<f64> {
+        let at = rank(last, self.share).checked_sub(self.below)?;
+        (at < self.within.len()).then(|| *self.within.select_nth_unstable_by(at, f64::total_cmp).1)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    /// Ranks by hand: of `n` numbers in order, round(0.05 (n − 1)) and round(0.95 (n − 1)).
+    fn check(load_n: &[f64]) {
+        let whole = 0..load_n.len();
+        let mut sorted: Vec<f64> = load_n.iter().copied().filter(|f| !f.is_nan()).collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let found = quantiles(load_n, std::slice::from_ref(&whole)).unwrap();
+        let last = (sorted.len() - 1) as f64;
+        let wanted = [0.05, 0.95].map(|share| sorted[(share * last).round() as usize]);
+        assert_eq!(found.map(f64::to_bits), wanted.map(f64::to_bits), "{} loads", load_n.len());
+    }
+
+    #[test]
+    fn quantiles_are_those_of_the_whole_order() {
+        // A full cycle of 65 536 different numbers, ties, missing ones, and few of them.
+        let mixed = |k: u32| f64::from((k.wrapping_mul(40503)) % 65536) - 3e4;
+        let all: Vec<f64> = (0..200_000).map(mixed).collect();
+        check(&all);
+        check(&all.iter().map(|f| (f / 5e3).round()).collect::<Vec<_>>());
+        check(&all.iter().map(|f| if *f as i64 % 7 == 0 { f64::NAN } else { *f }).collect::<Vec<_>>());
+        check(&all[..77]);
+    }
+
+    /// Looks fall on every forty-ninth load: on none but these, which tell nothing of the rest.
+    #[test]
+    fn quantiles_hold_where_the_looks_mislead() {
+        let stride = 100_000 / LOOKS + 1;
+        check(&(0..100_000).map(|k| if k % stride == 0 { 1e6 } else { k as f64 }).collect::<Vec<_>>());
+    }
 }

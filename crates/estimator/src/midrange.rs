@@ -5,6 +5,8 @@ use crate::error::Error;
 use crate::filter::Filter;
 use crate::gap::{self, Gap};
 use crate::load::{self, LoadBand};
+use crate::schedule::Schedule;
+use crate::track::Room;
 
 /// The paper's number with everything a record says about it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,10 +26,17 @@ pub struct MidRange {
 /// # Errors
 /// When the channels do not fit, nothing was measured, or S does not move.
 pub fn estimate(samples: &Samples<'_>, filter: &Filter) -> Result<MidRange, Error> {
-    // Before the track: neither needs the other's room.
+    estimate_in(samples, &Schedule::new(filter), &mut Room::default())
+}
+
+/// As [`estimate`], for one series of many: by a schedule that they share, in a room that they use in turn.
+///
+/// # Errors
+/// As [`estimate`].
+pub fn estimate_in(samples: &Samples<'_>, schedule: &Schedule, room: &mut Room) -> Result<MidRange, Error> {
     let load = load::band(samples.load_n, samples.segments);
-    let track = filter.track(samples, None)?;
-    let gap = gap::mid_range(&track.s_m)?;
+    let (nis, _) = schedule.track_in(samples, None, room)?;
+    let gap = gap::mid_range(&room.s_m)?;
     let load = load.ok_or(Error::NothingMeasured)?;
-    Ok(MidRange { gap, load, nis: track.nis, samples: gap.upper + gap.lower })
+    Ok(MidRange { gap, load, nis, samples: gap.upper + gap.lower })
 }

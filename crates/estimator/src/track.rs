@@ -2,15 +2,19 @@
 //!
 //! The covariance depends on no measurement, so while every sample is measured the gain settles. From
 //! there predict and correct fold into one map with constant coefficients, three chains of products that
-//! the processor runs side by side. A missing sample sets the covariance moving again, and the plain
+//! the processor runs side by side, for eight parts of the flight at a time. A missing sample sets the covariance moving again, and the plain
 //! recursion runs until it is back.
+
+use std::ops::Range;
 
 use nalgebra::Vector3;
 
 use crate::Samples;
 use crate::error::Error;
-use crate::filter::Filter;
+use crate::filter::{Estimate, Filter};
 use crate::folded::Folded;
+use crate::lanes::{Cut, PARTS, States, Work};
+use crate::schedule::Schedule;
 
 /// S(t) of one actuator's flight, and how well the model explained it.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,7 +36,7 @@ pub struct Innovations {
     pub variance_m2: Vec<f64>,
 }
 
-impl Filter {
+impl Schedule {
     /// Runs over all segments, each from a start of its own, and hands out S(t).
     ///
     /// A missing load (NaN) is taken to be the one before it.
@@ -43,72 +47,122 @@ impl Filter {
     pub fn track(
         &self,
         samples: &Samples<'_>,
-        mut innovations: Option<&mut Innovations>,
+        innovations: Option<&mut Innovations>,
     ) -> Result<Track, Error> {
+        let mut room = Room::default();
+        let (nis, measured) = self.track_in(samples, innovations, &mut room)?;
+        Ok(Track { s_m: room.s_m, nis, measured })
+    }
+
+    /// As [`Schedule::track`] with S left in the room: the mean normalised innovation squared, and how many samples
+    /// were measured.
+    pub(crate) fn track_in(
+        &self,
+        samples: &Samples<'_>,
+        mut innovations: Option<&mut Innovations>,
+        room: &mut Room,
+    ) -> Result<(f64, usize), Error> {
         samples.check()?;
         let count = samples.dx_m.len();
         if let Some(out) = innovations.as_deref_mut() {
             out.innovation_m = vec![f64::NAN; count];
             out.variance_m2 = vec![f64::NAN; count];
         }
-        let mut pass = Pass {
-            filter: self,
-            folded: self.settled().ok().map(|(gain, p)| Folded::new(self, &gain, &p)),
-            innovations,
-            track: Track { s_m: vec![f64::NAN; count], nis: 0.0, measured: 0 },
-        };
+        // What no segment covers is NaN; all else will be written.
+        room.s_m.resize(count, 0.0);
+        outside(samples.segments, count, |gap| room.s_m[gap].fill(f64::NAN));
+        let mut pass = Pass { schedule: self, innovations, room, nis: 0.0, measured: 0 };
         for segment in samples.segments {
             let (y_m, load_n) = (&samples.dx_m[segment.clone()], &samples.load_n[segment.clone()]);
             pass.segment(y_m, load_n, segment.start)?;
         }
-        let mut track = pass.track;
-        if track.measured == 0 {
-            return Err(Error::NothingMeasured);
-        }
-        track.nis /= track.measured as f64;
-        Ok(track)
+        let (nis, measured) = (pass.nis, pass.measured);
+        if measured == 0 { Err(Error::NothingMeasured) } else { Ok((nis / measured as f64, measured)) }
     }
+}
+
+/// Memory for S(t), to be used again for the next series instead of being asked for anew.
+#[derive(Debug, Default)]
+pub struct Room {
+    pub(crate) s_m: Vec<f64>,
+    /// Squared innovations of eight parts.
+    squares_m2: Vec<f64>,
+}
+
+/// The stretches that no segment covers.
+fn outside(segments: &[Range<usize>], count: usize, mut note: impl FnMut(Range<usize>)) {
+    let mut sorted: Vec<&Range<usize>> = segments.iter().collect();
+    sorted.sort_unstable_by_key(|segment| segment.start);
+    let mut covered = 0;
+    for segment in sorted {
+        note(covered..segment.start.max(covered));
+        covered = covered.max(segment.end);
+    }
+    note(covered..count);
 }
 
 /// A run over segments, and what it has handed out so far.
 struct Pass<'f> {
-    filter: &'f Filter,
-    folded: Option<Folded>,
+    schedule: &'f Schedule,
     innovations: Option<&'f mut Innovations>,
-    track: Track,
+    room: &'f mut Room,
+    nis: f64,
+    measured: usize,
 }
 
 impl Pass<'_> {
     fn segment(&mut self, y_m: &[f64], load_n: &[f64], offset: usize) -> Result<(), Error> {
-        let Some(first) = y_m.iter().position(|y| !y.is_nan()) else { return Ok(()) };
-        let load_at = |k: usize| load_n[..=k].iter().rfind(|u| !u.is_nan()).copied().unwrap_or(0.0);
-        let mut state = self.filter.start(y_m[first], load_at(first));
-        let mut k = 0;
+        let Schedule { filter, folded, .. } = self.schedule;
+        let Some(first) = y_m.iter().position(|y| !y.is_nan()) else {
+            self.room.s_m[offset..offset + y_m.len()].fill(f64::NAN);
+            return Ok(());
+        };
+        let mut state = filter.start(y_m[first], held(load_n, first));
+        let mut k = self.open(&mut state, y_m, load_n, offset);
+        let mut settled = k == self.schedule.openings.len() && self.schedule.settles;
         while k < y_m.len() {
-            if k > 0 {
-                state = self.filter.predict(&state, load_at(k - 1));
+            if let Some(folded) = folded.as_ref().filter(|_| settled) {
+                let end = k + whole_until(&y_m[k..], &load_n[k - 1..]);
+                state.x = self.stretch(folded, state.x, &y_m[k..end], &load_n[k - 1..end - 1], offset + k);
+                (k, settled) = (end, false);
+                continue;
             }
-            let step = self.filter.correct(&state, y_m[k])?;
+            if k > 0 {
+                state = filter.predict(&state, held(load_n, k - 1));
+            }
+            let step = filter.correct(&state, y_m[k])?;
             self.put(offset + k, &step.posterior.x, step.innovation_m, step.innovation_variance_m2);
             state = step.posterior;
             k += 1;
-            if let Some(folded) = self.folded.filter(|folded| folded.suits(&step)) {
-                let end = k + whole_until(&y_m[k..], &load_n[k - 1..]);
-                state.x = self.stretch(&folded, state.x, &y_m[k..end], &load_n[k - 1..end], offset + k);
-                k = end;
-            }
+            settled = folded.as_ref().is_some_and(|folded| folded.suits(&step));
         }
         Ok(())
     }
 
+    /// The first samples by the gains of the schedule, as long as none is missing; how many.
+    fn open(&mut self, state: &mut Estimate, y_m: &[f64], load_n: &[f64], offset: usize) -> usize {
+        let Schedule { filter, openings, .. } = self.schedule;
+        let mut done = 0;
+        for (opening, &y_m) in openings.iter().zip(y_m).take_while(|(_, y_m)| !y_m.is_nan()) {
+            if done > 0 {
+                state.x = filter.predict_state(&state.x, held(load_n, done - 1));
+            }
+            let innovation_m = y_m - state.x[0];
+            *state = Estimate { x: state.x + opening.gain * innovation_m, p: opening.p };
+            self.put(offset + done, &state.x, innovation_m, opening.variance_m2);
+            done += 1;
+        }
+        done
+    }
+
     fn put(&mut self, at: usize, x: &Vector3<f64>, innovation_m: f64, variance_m2: f64) {
-        self.track.s_m[at] = x[2];
+        self.room.s_m[at] = x[2];
         if let Some(out) = self.innovations.as_deref_mut() {
             (out.innovation_m[at], out.variance_m2[at]) = (innovation_m, variance_m2);
         }
         if !innovation_m.is_nan() {
-            self.track.nis += innovation_m * innovation_m / variance_m2;
-            self.track.measured += 1;
+            self.nis += innovation_m * innovation_m / variance_m2;
+            self.measured += 1;
         }
     }
 
@@ -121,22 +175,113 @@ impl Pass<'_> {
         load_n: &[f64],
         at: usize,
     ) -> Vector3<f64> {
-        let s_m = &mut self.track.s_m[at..at + y_m.len()];
+        let s_m = &mut self.room.s_m[at..at + y_m.len()];
         let (x, squares_m2) = match self.innovations.as_deref_mut() {
-            None => map.run(x, y_m, load_n, s_m, |_, _| ()),
+            None => {
+                Stretch { schedule: self.schedule, map, y_m, load_n, s_m }.run(x, &mut self.room.squares_m2)
+            }
             Some(out) => {
                 out.variance_m2[at..at + y_m.len()].fill(map.variance_m2);
                 let innovation_m = &mut out.innovation_m[at..at + y_m.len()];
-                map.run(x, y_m, load_n, s_m, |k, e_m| innovation_m[k] = e_m)
+                map.run(x.into(), 0.0, (y_m, load_n), s_m, |k, e_m| innovation_m[k] = e_m)
             }
         };
-        self.track.nis += squares_m2 / map.variance_m2;
-        self.track.measured += y_m.len();
-        x
+        self.nis += squares_m2 / map.variance_m2;
+        self.measured += y_m.len();
+        x.into()
     }
+}
+
+/// Samples without a gap, and the room for their S.
+struct Stretch<'a> {
+    schedule: &'a Schedule,
+    map: &'a Folded,
+    y_m: &'a [f64],
+    load_n: &'a [f64],
+    s_m: &'a mut [f64],
+}
+
+impl Stretch<'_> {
+    /// In eight parts at once while enough is left, then one after the other; the last state and the sum of
+    /// the squared innovations, added up in the order of the samples.
+    fn run(self, x: Vector3<f64>, room_m2: &mut Vec<f64>) -> ([f64; 3], f64) {
+        let Self { schedule, map, y_m, load_n, s_m } = self;
+        let (mut x, mut sum_m2, mut at) = (x.into(), 0.0, 0);
+        while let Some(cut) = schedule.lead.and_then(|lead| Cut::of(y_m.len() - at, lead)) {
+            let all = at..at + cut.samples();
+            let (y_m, load_n) = (&y_m[all.clone()], &load_n[all.clone()]);
+            room_m2.resize(room_m2.len().max(all.len()), 0.0);
+            let states = starts(&schedule.filter, cut, x, y_m, load_n);
+            let mut work = Work { map, cut, y_m, load_n, s_m: &mut s_m[all.clone()], squares_m2: room_m2 };
+            let done;
+            (done, x) = work.run(states);
+            sum_m2 = room_m2[..done].iter().fold(sum_m2, |sum, square| sum + square);
+            let rest = (&y_m[done..], &load_n[done..]);
+            (x, sum_m2) = map.run(x, sum_m2, rest, &mut s_m[at + done..all.end], |_, _| ());
+            at = all.end;
+        }
+        map.run(x, sum_m2, (&y_m[at..], &load_n[at..]), &mut s_m[at..], |_, _| ())
+    }
+}
+
+/// The state before each part: known for the first, guessed from the sample before for the others.
+fn starts(filter: &Filter, cut: Cut, x: [f64; 3], y_m: &[f64], load_n: &[f64]) -> States {
+    let mut states = x.map(|entry| [entry; PARTS]);
+    for part in 1..PARTS {
+        let before = cut.start(part) - 1;
+        let guess = filter.start(y_m[before], load_n[before]).x;
+        states.iter_mut().zip(&guess).for_each(|(entry, guess)| entry[part] = *guess);
+    }
+    states
+}
+
+/// The load at a sample, or the last before it that was there, N.
+fn held(load_n: &[f64], at: usize) -> f64 {
+    load_n[..=at].iter().rfind(|u| !u.is_nan()).copied().unwrap_or(0.0)
 }
 
 /// How many samples from here have both a measurement and a load before it.
 fn whole_until(y_m: &[f64], load_n: &[f64]) -> usize {
-    y_m.iter().zip(load_n).position(|(y, u)| (y + u).is_nan()).unwrap_or(y_m.len())
+    // Blocks first: without a way out of the loop it runs in vectors.
+    let (blocks, _) = y_m.as_chunks::<64>();
+    let is_whole = |(y_m, load_n): (&[f64; 64], &[f64])| {
+        y_m.iter().zip(load_n).fold(true, |whole, (y, u)| whole & !(y + u).is_nan())
+    };
+    let whole = 64 * blocks.iter().zip(load_n.chunks(64)).take_while(|block| is_whole(*block)).count();
+    let rest = y_m[whole..].iter().zip(&load_n[whole..]);
+    whole + rest.clone().position(|(y, u)| (y + u).is_nan()).unwrap_or(rest.len())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+    use crate::{Actuator, Noise};
+    use nalgebra::{Matrix3, Vector3};
+
+    /// However early the parts start, too late included, or in one piece: the same bits.
+    #[test]
+    fn a_lead_that_is_too_short_costs_time_and_no_bit() {
+        let w_d = Matrix3::from_diagonal(&Vector3::new(1e-14, 1e-8, 1e-12));
+        let noise = Noise::PerStep { w_d, v_d_m2: 1e-11 };
+        let filter = Filter::new(&Actuator::linear(5e7, 2000.0, 8.0).unwrap(), 0.004, &noise).unwrap();
+        let load_n: Vec<f64> = (0..30_000).map(|k| 5e3 * (f64::from(k) * 0.01).sin()).collect();
+        let mut dx_m: Vec<f64> = load_n.iter().map(|u| u / 5e7 + 50e-6 * u.signum()).collect();
+        dx_m[20_000] = f64::NAN;
+        let segments = [0..25_000, 25_500..30_000];
+        let samples =
+            Samples { step_s: 0.004, motor_m: &dx_m, dx_m: &dx_m, load_n: &load_n, segments: &segments };
+        let schedule = Schedule::new(&filter);
+        assert!(schedule.lead.is_some());
+        let track = |lead| {
+            let mut schedule = schedule.clone();
+            schedule.lead = lead;
+            let track = schedule.track(&samples, None).unwrap();
+            (track.s_m.iter().map(|s| s.to_bits()).collect::<Vec<_>>(), track.nis.to_bits(), track.measured)
+        };
+        let wanted = track(None);
+        for lead in [schedule.lead, Some(1), Some(17)] {
+            assert!(track(lead) == wanted, "a lead of {lead:?} changes the track");
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! One actuator's channels to its estimate: both numbers beside each other, the configured one as the gap.
 
 use estimator::contact::{self, ContactGap, Outcome, Picture, Prior};
-use estimator::{Filter, MidRange, Samples, midrange};
+use estimator::{Filter, MidRange, Room, Samples, Schedule, midrange};
 use fleet::{Complaint, Estimate, Status};
 use ingest::{Actuator, Geometry};
 
@@ -23,13 +23,13 @@ pub fn estimate(
     part: &Part,
     settings: &EstimateSettings,
 ) -> Result<Estimate, Complaint> {
-    let filter = filter(channels, part)?;
+    let schedule = part.schedules.of(&filter(channels, part)?);
     let prior = prior(part);
     let failed = |e: estimator::Error| Complaint::new("estimate_failed", e);
     let mut estimate = if let Some(reason) = blind(channels) {
         Estimate::refused(reason)
     } else {
-        let published = match midrange::estimate(&samples(channels), &filter) {
+        let published = match midrange::estimate_in(&samples(channels), &schedule, &mut Room::default()) {
             Ok(found) => Some(found),
             Err(estimator::Error::Constant { .. } | estimator::Error::NothingMeasured) => None,
             Err(other) => return Err(failed(other)),
@@ -45,7 +45,7 @@ pub fn estimate(
     if channels.missing_share > 0.0 {
         estimate.flags.push("samples_missing".into());
     }
-    if bandwidth_differs(&filter, part) {
+    if bandwidth_differs(&schedule, part) {
         estimate.flags.push("bandwidth_differs".into());
     }
     Ok(estimate)
@@ -160,7 +160,7 @@ fn regressed(found: &ContactGap) -> Estimate {
 }
 
 /// A lightly damped mode, or one near Nyquist, puts the pole elsewhere: the number stands, with a flag.
-fn bandwidth_differs(filter: &Filter, part: &Part) -> bool {
+fn bandwidth_differs(schedule: &Schedule, part: &Part) -> bool {
     let estimator::Noise::Sensors(asked) = part.noise else { return false };
-    filter.bandwidth_hz().is_ok_and(|got| (got / asked.bandwidth_hz - 1.0).abs() > BANDWIDTH_TOLERANCE)
+    schedule.bandwidth_hz().is_ok_and(|got| (got / asked.bandwidth_hz - 1.0).abs() > BANDWIDTH_TOLERANCE)
 }

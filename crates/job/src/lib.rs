@@ -10,6 +10,7 @@ pub mod flight;
 pub mod look;
 pub mod normalize;
 pub mod part;
+pub mod schedules;
 pub mod trace;
 mod value;
 

@@ -6,6 +6,8 @@ use ingest::Geometry;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::schedules::Schedules;
+
 /// How a part moves.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -142,6 +144,8 @@ pub struct Part {
     pub limit_m: Option<f64>,
     /// The gap that is reported, m.
     pub watch_m: Option<f64>,
+    /// Gain schedules of its logs, as far as they have been found.
+    pub schedules: Schedules,
 }
 
 /// A key below the part's table, and what is wrong with it.
@@ -184,6 +188,7 @@ impl PartSettings {
                 reference_load_n: self.reference_load_n,
                 limit_m: self.limit_m,
                 watch_m: self.watch_m,
+                schedules: Schedules::default(),
             }),
             _ => Err(keys.found),
         }

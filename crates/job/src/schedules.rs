@@ -1,0 +1,58 @@
+//! Gain schedules of a part: found once for each step of its logs, shared by all its flights.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use estimator::{Filter, Schedule};
+
+/// Logs whose steps differ in their last digits would fill memory: so many schedules are kept.
+const MOST: usize = 16;
+
+/// What has been found so far. Clones share it.
+#[derive(Debug, Clone, Default)]
+pub struct Schedules(Arc<Mutex<Vec<Arc<Schedule>>>>);
+
+impl Schedules {
+    /// The schedule of a filter, made now unless it is there.
+    pub fn of(&self, filter: &Filter) -> Arc<Schedule> {
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(schedule) = known.iter().find(|schedule| schedule.filter() == filter) {
+            return Arc::clone(schedule);
+        }
+        if known.len() == MOST {
+            known.remove(0);
+        }
+        let schedule = Arc::new(Schedule::new(filter));
+        known.push(Arc::clone(&schedule));
+        schedule
+    }
+}
+
+/// What has been found already is no setting of a part.
+impl PartialEq for Schedules {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    fn filter(step_s: f64) -> Filter {
+        let actuator = estimator::Actuator::linear(5e7, 2000.0, 8.0).unwrap();
+        let (w_d, v_d_m2) = (nalgebra::Matrix3::identity() * 1e-12, 1e-11);
+        Filter::new(&actuator, step_s, &estimator::Noise::PerStep { w_d, v_d_m2 }).unwrap()
+    }
+
+    #[test]
+    fn flights_of_one_step_share_a_schedule_and_others_do_not() {
+        let schedules = Schedules::default();
+        let first = schedules.of(&filter(0.004));
+        assert!(Arc::ptr_eq(&first, &schedules.clone().of(&filter(0.004))));
+        assert!(!Arc::ptr_eq(&first, &schedules.of(&filter(0.005))));
+        (0..40).for_each(|k| drop(schedules.of(&filter(0.01 + 1e-6 * f64::from(k)))));
+        assert_eq!(schedules.0.lock().unwrap().len(), MOST);
+        assert_eq!(schedules.of(&filter(0.004)).filter(), first.filter());
+    }
+}
