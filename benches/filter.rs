@@ -1,5 +1,9 @@
-//! Time of each way through the filter for 16 384 samples, in cache, beside the two floors of the
-//! machine measured on the spot: the shortest chain of operations a step must wait for, and memory.
+//! Time of each way through the filter for 16 384 samples, in cache, beside the floors of the machine measured
+//! on the spot: the shortest chain of operations a step must wait for, a sum in the order of the samples, and
+//! memory.
+//!
+//! `batch_in_a_room` has memory for S already and the gains found; what it costs beyond the lanes is the sum of
+//! squared innovations, which keeps its order and so waits for itself.
 //!
 //! `even_unsettled` restarts before the gain settles, `even` runs on long after: a step takes the same.
 
@@ -7,8 +11,9 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use estimator::contact::{self, Prior};
 use estimator::noise::Sensors;
-use estimator::{Actuator, Filter, Noise, RunningGap, Samples, Stream, gap};
+use estimator::{Actuator, Filter, Noise, Room, RunningGap, Samples, Schedule, Stream, gap, load, midrange};
 
 /// Positions, loads and S of so many samples stay in the second cache.
 const SAMPLES: usize = 16_384;
@@ -49,8 +54,66 @@ fn track(bencher: Bencher, count: usize) {
 }
 
 #[divan::bench]
+fn schedule(bencher: Bencher) {
+    let filter = filter();
+    bencher.bench_local(|| Schedule::new(black_box(&filter)));
+}
+
+#[divan::bench]
 fn batch(bencher: Bencher) {
     track(bencher, SAMPLES);
+}
+
+/// Too few samples to be cut into parts: one after the other.
+#[divan::bench]
+fn batch_too_short_for_parts(bencher: Bencher) {
+    track(bencher, 512);
+}
+
+fn published(bencher: Bencher, count: usize) {
+    let ((dx_m, load_n), schedule, whole) = (channels(count), Schedule::new(&filter()), 0..count);
+    let segments = std::slice::from_ref(&whole);
+    let samples = Samples { step_s: 0.004, motor_m: &dx_m, dx_m: &dx_m, load_n: &load_n, segments };
+    let mut room = Room::default();
+    bencher
+        .counter(ItemsCount::new(count))
+        .bench_local(|| midrange::estimate_in(black_box(&samples), &schedule, &mut room).unwrap());
+}
+
+#[divan::bench]
+fn published_estimate(bencher: Bencher) {
+    published(bencher, SAMPLES);
+}
+
+#[divan::bench(sample_count = 30)]
+fn published_estimate_out_of_cache(bencher: Bencher) {
+    published(bencher, OUT_OF_CACHE);
+}
+
+#[divan::bench(sample_count = 30)]
+fn load_band_out_of_cache(bencher: Bencher) {
+    let ((_, load_n), whole) = (channels(OUT_OF_CACHE), 0..OUT_OF_CACHE);
+    bencher
+        .counter(ItemsCount::new(OUT_OF_CACHE))
+        .bench_local(|| load::band(black_box(&load_n), std::slice::from_ref(&whole)));
+}
+
+/// A screw of K = 5·10⁷ N/m with a gap of 100 µm, 200 N of friction while it moves, and the load of [`channels`].
+#[divan::bench(sample_count = 10)]
+fn contact_regression(bencher: Bencher) {
+    let ((_, load_n), whole) = (channels(OUT_OF_CACHE), 0..OUT_OF_CACHE);
+    let time_s = |k: usize| k as f64 * 0.004;
+    let motor_m: Vec<f64> = (0..OUT_OF_CACHE).map(|k| 0.02 * (0.7 * time_s(k)).sin()).collect();
+    let dx_m: Vec<f64> = (0..OUT_OF_CACHE)
+        .map(|k| load_n[k] - 200.0 * (0.7 * time_s(k)).cos().signum())
+        .map(|force_n| force_n / 5e7 + 50e-6 * force_n.signum())
+        .collect();
+    let segments = std::slice::from_ref(&whole);
+    let samples = Samples { step_s: 0.004, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
+    let prior = Prior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
+    bencher
+        .counter(ItemsCount::new(OUT_OF_CACHE))
+        .bench_local(|| contact::estimate(black_box(&samples), &prior).unwrap());
 }
 
 #[divan::bench(sample_count = 30)]
@@ -111,6 +174,15 @@ fn floor_of_latency(bencher: Bencher) {
     bencher
         .counter(ItemsCount::new(SAMPLES))
         .bench_local(|| dx_m.iter().zip(&load_n).fold(black_box(0.5), |x: f64, (y, u)| (x * 0.5 + y) + u));
+}
+
+/// A sum in the order of the samples: each addition waits for the one before.
+#[divan::bench]
+fn floor_of_a_sum(bencher: Bencher) {
+    let (dx_m, _) = channels(SAMPLES);
+    bencher
+        .counter(ItemsCount::new(SAMPLES))
+        .bench_local(|| black_box(&dx_m).iter().fold(black_box(0.0), |sum: f64, y| sum + y));
 }
 
 /// Two columns read and one written, from memory.
