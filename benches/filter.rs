@@ -64,6 +64,26 @@ fn batch(bencher: Bencher) {
     track(bencher, SAMPLES);
 }
 
+fn in_a_room(bencher: Bencher, count: usize) {
+    let ((dx_m, load_n), schedule, whole) = (channels(count), Schedule::new(&filter()), 0..count);
+    let segments = std::slice::from_ref(&whole);
+    let samples = Samples { step_s: 0.004, motor_m: &dx_m, dx_m: &dx_m, load_n: &load_n, segments };
+    let mut room = Room::default();
+    bencher
+        .counter(ItemsCount::new(count))
+        .bench_local(|| schedule.track_in(black_box(&samples), None, &mut room).unwrap());
+}
+
+#[divan::bench]
+fn batch_in_a_room(bencher: Bencher) {
+    in_a_room(bencher, SAMPLES);
+}
+
+#[divan::bench(sample_count = 30)]
+fn batch_in_a_room_out_of_cache(bencher: Bencher) {
+    in_a_room(bencher, OUT_OF_CACHE);
+}
+
 /// Too few samples to be cut into parts: one after the other.
 #[divan::bench]
 fn batch_too_short_for_parts(bencher: Bencher) {

@@ -36,7 +36,7 @@ pub fn estimate(samples: &Samples<'_>, filter: &Filter) -> Result<MidRange, Erro
 pub fn estimate_in(samples: &Samples<'_>, schedule: &Schedule, room: &mut Room) -> Result<MidRange, Error> {
     let load = load::band(samples.load_n, samples.segments);
     let (nis, _) = schedule.track_in(samples, None, room)?;
-    let gap = gap::mid_range(&room.s_m)?;
+    let gap = gap::mid_range(room.s_m())?;
     let load = load.ok_or(Error::NothingMeasured)?;
     Ok(MidRange { gap, load, nis, samples: gap.upper + gap.lower })
 }

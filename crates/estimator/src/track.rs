@@ -56,7 +56,10 @@ impl Schedule {
 
     /// As [`Schedule::track`] with S left in the room: the mean normalised innovation squared, and how many samples
     /// were measured.
-    pub(crate) fn track_in(
+    ///
+    /// # Errors
+    /// As [`Schedule::track`].
+    pub fn track_in(
         &self,
         samples: &Samples<'_>,
         mut innovations: Option<&mut Innovations>,
@@ -84,9 +87,16 @@ impl Schedule {
 /// Memory for S(t), to be used again for the next series instead of being asked for anew.
 #[derive(Debug, Default)]
 pub struct Room {
-    pub(crate) s_m: Vec<f64>,
+    s_m: Vec<f64>,
     /// Squared innovations of eight parts.
     squares_m2: Vec<f64>,
+}
+
+impl Room {
+    /// S of the last series at each sample, m; NaN outside its segments.
+    pub fn s_m(&self) -> &[f64] {
+        &self.s_m
+    }
 }
 
 /// The stretches that no segment covers.
