@@ -19,6 +19,18 @@ pub enum Kind {
     Rotary,
 }
 
+/// What wear follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WearAxis {
+    /// Hours flown.
+    Hours,
+    /// Flights.
+    Flights,
+    /// Load reversals of the actuator.
+    Reversals,
+}
+
 /// `[part."EMA-27-1040"]`: what is known of a design.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -61,6 +73,9 @@ pub struct PartSettings {
     /// The gap that is reported: state `watch`, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub watch_m: Option<f64>,
+    /// What wear follows: `hours`, `flights` or `reversals`; that of `[trend]` when not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<WearAxis>,
 }
 
 /// Which noise model fills `W_d` and `V_d`.
@@ -146,15 +161,17 @@ pub struct Part {
     pub watch_m: Option<f64>,
     /// Gain schedules of its logs, as far as they have been found.
     pub schedules: Schedules,
+    /// What wear follows, where that is known.
+    pub axis: Option<WearAxis>,
 }
 
 /// A key below the part's table, and what is wrong with it.
 pub(crate) type KeyComplaint = (&'static [&'static str], Complaint);
 
 impl PartSettings {
-    /// The settings that can move a gap: limits move none.
+    /// The settings that can move a gap: limits and the axis of wear move none.
     pub(crate) fn without_limits(&self) -> Self {
-        Self { limit_m: None, watch_m: None, ..self.clone() }
+        Self { limit_m: None, watch_m: None, axis: None, ..self.clone() }
     }
 
     /// Brings the settings to the screw axis.
@@ -189,6 +206,7 @@ impl PartSettings {
                 limit_m: self.limit_m,
                 watch_m: self.watch_m,
                 schedules: Schedules::default(),
+                axis: self.axis,
             }),
             _ => Err(keys.found),
         }

@@ -124,3 +124,24 @@ fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
     let text = format!("{complaints:?}");
     assert!(text.contains("painted") && text.contains("overhaul"), "{text}");
 }
+
+fn told(axis: &str) -> Config {
+    let text =
+        include_str!("../../../pipeline.toml").replace("[trend]", &format!("[trend]\naxis = \"{axis}\""));
+    Config::parse(&text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
+}
+
+#[test]
+fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
+    let axes = |config: &Config| {
+        let nobody = Installations::new(Vec::new()).unwrap();
+        let rows = trends::of_flown(config, &nobody, flown(60), &Ask::default()).unwrap();
+        rows.into_iter().map(|row| row.usage_axis).collect::<std::collections::BTreeSet<_>>()
+    };
+    assert_eq!(axes(&told("flights")), [Some("flights".to_owned())].into());
+    let text = include_str!("../../../pipeline.toml")
+        .replace("[trend]", "[trend]\naxis = \"flights\"")
+        .replace("[part.\"EMA-27-1040\"]", "[part.\"EMA-27-1040\"]\naxis = \"reversals\"");
+    let own = Config::parse(&text, Path::new("pipeline.toml"), Path::new(".")).unwrap();
+    assert_eq!(axes(&own), [Some("load_reversals".to_owned())].into());
+}

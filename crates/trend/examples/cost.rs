@@ -48,7 +48,7 @@ fn main() {
         let series_us = per_serial(began);
         let as_of_us = flights as i64 * 30_000_000_000;
         let began = Instant::now();
-        let prior = FleetPrior::learn(&fleet, as_of_us, LIMIT_M);
+        let prior = FleetPrior::learn(&fleet, as_of_us, LIMIT_M, None);
         let prior_ms = began.elapsed().as_secs_f64() * 1e3;
         let began = Instant::now();
         for series in &fleet {

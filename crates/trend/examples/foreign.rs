@@ -193,7 +193,7 @@ fn judge(units: &[Unit]) -> Score {
     for unit in units {
         for question in &unit.questions {
             let month = question.as_of_us.div_euclid(month_us) * month_us;
-            let learn = || FleetPrior::learn(units.iter().map(|u| &u.series), month, LIMIT_UM * 1e-6);
+            let learn = || FleetPrior::learn(units.iter().map(|u| &u.series), month, LIMIT_UM * 1e-6, None);
             let prior = priors.entry(month).or_insert_with(learn);
             let said = trend(&unit.series, question.as_of_us, &settings, Some(prior), None).unwrap();
             if !unit.wears {

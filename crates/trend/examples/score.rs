@@ -49,7 +49,7 @@ fn main() {
     let mut priors: BTreeMap<i64, FleetPrior> = BTreeMap::new();
     let mut prior = |as_of_us: i64| {
         let month = as_of_us.div_euclid(MONTH_US);
-        let learn = || FleetPrior::learn(units.values().map(|u| &u.series), month * MONTH_US, LIMIT_M);
+        let learn = || FleetPrior::learn(units.values().map(|u| &u.series), month * MONTH_US, LIMIT_M, None);
         priors.entry(month).or_insert_with(learn).clone()
     };
     let mut predictions = String::from(

@@ -7,7 +7,7 @@ use crate::jump::installation_steps;
 use crate::posterior::{Guess, Node, Posterior, posterior};
 use crate::prior::{Axis, FleetPrior};
 use crate::season::{Season, Swing, swing};
-use crate::series::{Flight, Series};
+use crate::series::{Booked, Flight, Series};
 
 /// Units looked at, at most: more teach nothing new and cost as much as their own statements.
 const MOST_UNITS: usize = 200;
@@ -33,10 +33,17 @@ impl FleetPrior {
     /// two at most, which then share what they teach. Of a large fleet every n-th unit is looked at. The
     /// order of the units changes no bit, and nothing later than the day is looked at; a prior of an
     /// earlier day may stand in for a later one's.
-    pub fn learn<'a>(fleet: impl IntoIterator<Item = &'a Series>, as_of_us: i64, limit_m: f64) -> Self {
-        let fleet = sample(fleet.into_iter().map(|series| series.until(as_of_us)));
-        let axes = [Axis::Hours, Axis::Flights, Axis::Reversals];
-        let lesson = likeliest(axes.into_iter().filter_map(|axis| Lesson::along(&fleet, axis, limit_m)));
+    ///
+    /// Wear follows `axis` where it is given and the fleet has counted it, else the likeliest one.
+    pub fn learn<'a>(
+        fleet: impl IntoIterator<Item = &'a Series>,
+        as_of_us: i64,
+        limit_m: f64,
+        axis: Option<Axis>,
+    ) -> Self {
+        let fleet = sample(fleet.into_iter().map(|series| Known::on(series, as_of_us)));
+        let along = |axis| Lesson::along(&fleet, axis, limit_m);
+        let lesson = axis.and_then(along).or_else(|| likeliest(Axis::ALL.into_iter().filter_map(along)));
         let Some(lesson) = lesson else { return Self::vague(limit_m) };
         let noises = WEAR_NOISES.into_iter().map(|factor| lesson.with_wear_noise(factor).revised());
         likeliest(noises).unwrap_or(lesson).revised().calibrated()
@@ -48,10 +55,28 @@ fn likeliest(lessons: impl Iterator<Item = Lesson>) -> Option<Lesson> {
     lessons.reduce(|best, next| if next.evidence > best.evidence { next } else { best })
 }
 
+/// What was known of a unit on a day.
+#[derive(Clone, Copy)]
+struct Known<'a> {
+    flights: &'a [Flight],
+    book: &'a [Booked],
+    unit_hours_at_start: Option<f64>,
+}
+
+impl<'a> Known<'a> {
+    fn on(series: &'a Series, as_of_us: i64) -> Self {
+        Self {
+            flights: series.until(as_of_us),
+            book: series.book_until(as_of_us),
+            unit_hours_at_start: series.unit_hours_at_start(),
+        }
+    }
+}
+
 /// Units with flights in an order of their own, every n-th of many.
-fn sample<'a>(fleet: impl Iterator<Item = &'a [Flight]>) -> Vec<&'a [Flight]> {
-    let mut fleet: Vec<&[Flight]> = fleet.filter(|flights| !flights.is_empty()).collect();
-    fleet.sort_by_cached_key(|flights| identity(flights));
+fn sample<'a>(fleet: impl Iterator<Item = Known<'a>>) -> Vec<Known<'a>> {
+    let mut fleet: Vec<Known<'_>> = fleet.filter(|unit| !unit.flights.is_empty()).collect();
+    fleet.sort_by_cached_key(|unit| identity(unit.flights));
     let stride = fleet.len().div_ceil(MOST_UNITS).max(1);
     fleet.into_iter().step_by(stride).collect()
 }
@@ -75,15 +100,16 @@ struct Lesson {
 }
 
 impl Lesson {
-    fn along(fleet: &[&[Flight]], axis: Axis, limit_m: f64) -> Option<Self> {
-        let total = |of: &dyn Fn(&Flight) -> f64| fleet.iter().filter_map(|f| f.last()).map(of).sum::<f64>();
+    fn along(fleet: &[Known<'_>], axis: Axis, limit_m: f64) -> Option<Self> {
+        let last = |unit: &Known<'_>| unit.flights.last().copied();
+        let total = |of: &dyn Fn(&Flight) -> f64| fleet.iter().filter_map(last).map(|f| of(&f)).sum::<f64>();
         let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
         if !hours_per_unit.is_finite() {
             return None;
         }
         let mut assumed = FleetPrior { axis, hours_per_unit, ..FleetPrior::vague(limit_m) };
-        let histories: Vec<History> =
-            fleet.iter().map(|flights| history::read(flights, &[], None, &assumed)).collect();
+        let read = |u: &Known<'_>| history::read(u.flights, u.book, u.unit_hours_at_start, &assumed);
+        let histories: Vec<History> = fleet.iter().map(read).collect();
         assumed.bias_sd_m = bias(&histories, assumed.bias_sd_m);
         let swings: Vec<Swing> = histories
             .iter()

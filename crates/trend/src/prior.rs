@@ -15,7 +15,7 @@ const WORN_SHARE: f64 = 0.9;
 const LN_CONSTANTS: (f64, f64) = (1.1, 0.5);
 
 /// What wear of a part number follows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Axis {
     /// Hours flown.
     Hours,
@@ -26,6 +26,9 @@ pub enum Axis {
 }
 
 impl Axis {
+    /// Every one of them.
+    pub(crate) const ALL: [Self; 3] = [Self::Hours, Self::Flights, Self::Reversals];
+
     /// The usage of a unit up to a flight, in the axis' own unit.
     pub(crate) fn of(self, flight: &Flight) -> f64 {
         match self {

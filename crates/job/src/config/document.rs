@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::channel;
 use super::source::Source;
-use crate::part::PartSettings;
+use crate::part::{PartSettings, WearAxis};
 use crate::value::positive;
 
 /// The whole file.
@@ -168,6 +168,10 @@ pub struct TrendSettings {
     pub stale_after_days: f64,
     /// Hours until the next check, for the probability of meeting the limit before it. Default 300.
     pub next_check_hours: f64,
+    /// What wear follows: `hours`, `flights` or `reversals`; by default what each part number's own
+    /// histories speak for. A part's `axis` goes before it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<WearAxis>,
 }
 
 impl Default for TrendSettings {
@@ -177,6 +181,7 @@ impl Default for TrendSettings {
             horizon_hours: 20_000.0,
             stale_after_days: 30.0,
             next_check_hours: 300.0,
+            axis: None,
         }
     }
 }

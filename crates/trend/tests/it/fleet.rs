@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use trend::{
-    Booked, Change, ChangeKind, FleetPrior, Observation, Series, Settings, State, Trend, Usage, Wear, trend,
+    Axis, Booked, Change, ChangeKind, FleetPrior, Observation, Series, Settings, State, Trend, Usage, Wear,
+    trend,
 };
 
 const DAY_US: i64 = 86_400_000_000;
@@ -124,7 +125,7 @@ fn score(law: Law, shares: &[f64]) -> (f64, f64) {
             Series::new(known.iter().map(row), &Usage::default()).unwrap()
         };
         let known: Vec<Series> = fleet.iter().map(cut).collect();
-        let prior = FleetPrior::learn(&known, i64::MAX, LIMIT_M);
+        let prior = FleetPrior::learn(&known, i64::MAX, LIMIT_M, None);
         for (unit, series) in fleet.iter().zip(&known) {
             let crossing = said(series, day(unit) * DAY_US, Some(&prior)).crossing.unwrap();
             let left = unit.crossing_hours - 3.4 * day(unit) as f64;
@@ -247,11 +248,11 @@ fn a_state_once_given_is_left_only_clearly_past_its_limit() {
 fn a_prior_looks_at_nothing_later_than_its_day_and_not_at_the_order_of_its_units() {
     let fleet: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 800)).collect();
     let day = 200 * DAY_US;
-    let whole = FleetPrior::learn(fleet.iter().map(|u| &u.series), day, LIMIT_M);
-    let reversed = FleetPrior::learn(fleet.iter().rev().map(|u| &u.series), day, LIMIT_M);
+    let whole = FleetPrior::learn(fleet.iter().map(|u| &u.series), day, LIMIT_M, None);
+    let reversed = FleetPrior::learn(fleet.iter().rev().map(|u| &u.series), day, LIMIT_M, None);
     assert_eq!(format!("{whole:?}"), format!("{reversed:?}"));
     let short: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 401)).collect();
-    let cut = FleetPrior::learn(short.iter().map(|u| &u.series), day, LIMIT_M);
+    let cut = FleetPrior::learn(short.iter().map(|u| &u.series), day, LIMIT_M, None);
     assert_eq!(format!("{whole:?}"), format!("{cut:?}"));
 }
 
@@ -304,4 +305,54 @@ fn a_booked_re_shim_is_the_books_own_and_begins_the_unit_anew() {
     // Rigging moves the measurement, so the gap is what it was; a re-shim takes the 8 µm away.
     let fall_um = (rigged.level.unwrap().gap_m - renewed.level.unwrap().gap_m) * 1e6;
     assert!((fall_um - 8.0).abs() < 1.5, "{fall_um}");
+}
+
+/// Thirty units of 400 flights at 1.5 h that wear by 30 µm in 600 h from 20 µm; halfway the gap falls by 8 µm.
+fn reshimmed(is_booked: bool) -> Vec<Series> {
+    const HALF: i64 = 200;
+    let one = |seed: u64| {
+        let mut random = Random::new(seed + 500);
+        let new_um = 20.0 + 2.0 * random.normal();
+        let rows: Vec<Observation> = (0..2 * HALF)
+            .map(|flight| {
+                let hours = 1.5 * (flight + 1) as f64;
+                let shim_um = if flight < HALF { 0.0 } else { 8.0 };
+                Observation {
+                    departure_us: flight * DAY_US,
+                    installation: 0,
+                    flight_hours: Some(1.5),
+                    tail_hours_end: Some(hours),
+                    load_reversals: None,
+                    gap_m: Some((new_um + 0.05 * hours - shim_um + 1.5 * random.normal()) * 1e-6),
+                    gap_se_m: Some(1.5e-6),
+                }
+            })
+            .collect();
+        let entry = Booked { utc_us: HALF * DAY_US - DAY_US / 2, renews: true };
+        let book = if is_booked { vec![entry] } else { Vec::new() };
+        Series::new(rows, &Usage::default()).unwrap().with_book(book)
+    };
+    (0..30).map(one).collect()
+}
+
+/// New units begin at 20 µm, re-shimmed ones at 20 + 15 − 8 = 27 µm: 23.5 µm in the mean. Unbooked, the
+/// fall is one of the measurement, and only the 20 µm of the new teach.
+#[test]
+fn a_fleet_learns_from_its_maintenance_book_what_a_reshimmed_gap_is() {
+    let new_um = |booked| {
+        let prior = FleetPrior::learn(&reshimmed(booked), i64::MAX, LIMIT_M, Some(Axis::Hours));
+        prior.new_gap_m().0 * 1e6
+    };
+    let (booked, unbooked) = (new_um(true), new_um(false));
+    assert!((booked - 23.5).abs() < 1.5, "{booked} µm");
+    assert!((unbooked - 20.0).abs() < 1.5, "{unbooked} µm");
+}
+
+#[test]
+fn wear_follows_the_axis_it_is_told_to_unless_nobody_counted_it() {
+    let fleet = reshimmed(true);
+    let learned = |axis| FleetPrior::learn(&fleet, i64::MAX, LIMIT_M, axis);
+    assert_eq!(learned(Some(Axis::Flights)).axis(), Axis::Flights);
+    // No flight states its load reversals; all have one length, so hours and flights say the same.
+    assert_eq!(learned(Some(Axis::Reversals)), learned(None));
 }
