@@ -24,6 +24,7 @@ pub mod rows;
 pub mod schedule;
 pub mod simulate;
 pub mod trends;
+mod unlogged;
 
 mod error;
 

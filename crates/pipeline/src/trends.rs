@@ -13,6 +13,7 @@ use trend::{Axis, FleetPrior, Observation, Series, Trend, Usage, classic};
 
 use crate::error::Error;
 use crate::maintenance;
+use crate::unlogged::Unlogged;
 
 /// A unit, by part and serial number.
 pub type Unit = (PartNumber, SerialNumber);
@@ -339,10 +340,16 @@ impl<'a> Fleet<'a> {
     ) -> Result<Self, Error> {
         let file = config.document.logs.maintenance.as_ref();
         let book = file.map(|file| maintenance::read(&config.path(file))).transpose()?.unwrap_or_default();
+        let unlogged = Unlogged::of_table(&config.flights);
         let read = |(name, flown): (&'a HistoryName, &'a Vec<Flown>)| {
             let mut flown: Vec<&Flown> = flown.iter().collect();
             flown.sort_by_key(|f| f.departure_utc);
-            let series = series(installations, name, &flown)?.with_book(booked(&book, name));
+            let stays = || installations.iter().filter(|stay| is_of(stay, name));
+            let unlogged = unlogged.of_unit(stays(), &flown);
+            let first = stays().min_by_key(|stay| stay.installed_utc);
+            let unit_hours_at_start = first.and_then(|stay| stay.unit_hours_at_install);
+            let series = series(flown.iter().copied().chain(&unlogged), unit_hours_at_start)?;
+            let series = series.with_book(booked(&book, name));
             Ok((name, (flown, series)))
         };
         let units = histories.par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
@@ -501,9 +508,18 @@ fn settings(config: &Config, part: Option<&job::Part>) -> trend::Settings {
     }
 }
 
-fn series(installations: &Installations, name: &HistoryName, flown: &[&Flown]) -> Result<Series, Error> {
+/// Whether a stay is this unit's; where its part number is not known, its serial number says so.
+fn is_of(stay: &fleet::Installation, (part, serial): &HistoryName) -> bool {
+    stay.serial_number.as_str() == serial
+        && part.as_deref().is_none_or(|part| stay.part_number.as_str() == part)
+}
+
+fn series<'a>(
+    flown: impl Iterator<Item = &'a Flown>,
+    unit_hours_at_start: Option<f64>,
+) -> Result<Series, Error> {
     let mut stays = BTreeMap::new();
-    let observations = flown.iter().map(|f| {
+    let observations = flown.map(|f| {
         let count = stays.len() as u32;
         Observation {
             departure_us: f.departure_utc.as_microsecond(),
@@ -515,14 +531,7 @@ fn series(installations: &Installations, name: &HistoryName, flown: &[&Flown]) -
             gap_se_m: f.gap_se_m.filter(|se| *se > 0.0),
         }
     });
-    let mine = |s: &&fleet::Installation| {
-        s.serial_number.as_str() == name.1
-            && name.0.as_deref().is_none_or(|part| s.part_number.as_str() == part)
-    };
-    let first = installations.iter().filter(mine).min_by_key(|s| s.installed_utc);
-    let usage =
-        Usage { unit_hours_at_start: first.and_then(|s| s.unit_hours_at_install), ..Usage::default() };
-    Ok(Series::new(observations, &usage)?)
+    Ok(Series::new(observations, &Usage { unit_hours_at_start, ..Usage::default() })?)
 }
 
 /// Means of neighbours, at most so many.
@@ -546,7 +555,8 @@ fn row(
     let sen = classic::theil_sen(&hours, &gaps, 0.90).ok();
     let crossing = trend.crossing.filter(|_| limit_m.is_some());
     let flights = |hours: Option<f64>| Some(hours? / trend.pace?.hours_per_flight);
-    let last_flown = last.map(|f| f.departure_utc);
+    let last_flown = series.until(trend.as_of_us).last();
+    let last_flown = last_flown.and_then(|f| Timestamp::from_microsecond(f.departure_us).ok());
     let day = |hours: Option<f64>| after(last_flown?, hours? / trend.pace?.hours_per_day);
     TrendRow {
         part_number: name.0.clone(),

@@ -145,3 +145,47 @@ fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
     let own = Config::parse(&text, Path::new("pipeline.toml"), Path::new(".")).unwrap();
     assert_eq!(axes(&own), [Some("load_reversals".to_owned())].into());
 }
+
+/// The fleet of [`flown`], of which every second flight left no log and no hour meter is read: the flights
+/// table alone knows of it. Each flight is two hours, whoever tells it.
+#[test]
+fn flights_of_the_flights_table_that_left_no_log_are_usage() {
+    const UNITS: i32 = 14;
+    const DAYS: i32 = 300;
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../../../pipeline.toml").replace("[logs]", "[logs]\nflights = \"flights.csv\"");
+    std::fs::write(folder.path().join("pipeline.toml"), text).unwrap();
+    let row = |unit: i32, at: i32| format!("T{unit:02},{unit}-{at},{},2.0\n", day(at));
+    let rows = (0..UNITS).flat_map(|unit| (0..DAYS + 50).map(move |at| row(unit, at)));
+    let head = "tail_number,flight_id,departure_utc,flight_hours\n".to_owned();
+    std::fs::write(folder.path().join("flights.csv"), rows.fold(head, |all, row| all + &row)).unwrap();
+    let config_with = Config::read(&folder.path().join("pipeline.toml")).unwrap();
+    let stay = |unit: i32| fleet::Installation {
+        tail_number: fleet::TailNumber::new(format!("T{unit:02}")).unwrap(),
+        position: fleet::Position::new("aileron_left").unwrap(),
+        part_number: fleet::PartNumber::new("EMA-27-1040").unwrap(),
+        serial_number: fleet::SerialNumber::new(format!("S{unit:02}")).unwrap(),
+        installed_utc: day(-1),
+        removed_utc: None,
+        unit_hours_at_install: Some(100.0),
+        tail_hours_at_install: None,
+    };
+    let installations = Installations::new((0..UNITS).map(stay).collect()).unwrap();
+    let ask = Ask { as_of_utc: Some(day(DAYS - 1)), ..Ask::default() };
+    let said = |config: &Config| {
+        let mut logged = flown(DAYS);
+        logged.retain(|f| f.flight_id.as_deref().is_some_and(|id| id.ends_with(['1', '3', '5', '7', '9'])));
+        for flight in &mut logged {
+            (flight.tail_hours_end, flight.installed_utc) = (None, Some(day(-1)));
+        }
+        trends::of_flown(config, &installations, logged, &ask).unwrap()
+    };
+    for (unit, (with, without)) in said(&config_with).iter().zip(said(&config())).enumerate() {
+        assert_eq!((with.flights, with.unit_hours), (300, Some(700.0)));
+        assert_eq!((without.flights, without.unit_hours), (150, Some(400.0)));
+        let truth = (15.0 + unit as f64) * 1e-9;
+        let rate = with.rate_m_per_hour.unwrap();
+        assert!((rate / truth - 1.0).abs() < 0.15, "{rate} m/h of {truth}");
+        assert!(without.rate_m_per_hour.unwrap() > 1.5 * truth);
+    }
+}
