@@ -1,5 +1,6 @@
 //! Why a log or a table cannot be used: a stable code, the place, what was found and what to do.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use fleet::Complaint;
@@ -33,7 +34,7 @@ impl Error {
 #[expect(missing_docs, reason = "each field is named for what it holds; rows count from 0")]
 pub enum Fault {
     /// The file cannot be opened or read at all.
-    #[error("the file cannot be read: {source}")]
+    #[error("{}", unreadable(source))]
     Unreadable {
         #[source]
         source: std::io::Error,
@@ -186,7 +187,7 @@ impl Fault {
             }
             Self::TimeStandsStill { rows, .. } => Some(format!("{rows} rows with one stamp")),
             Self::RateContradicts { seen_hz, .. } => Some(format!("{seen_hz:.6} Hz by the median step")),
-            Self::IdentityMissing { looked, .. } => Some(format!("looked in {}", shortened(looked))),
+            Self::IdentityMissing { looked, .. } => Some(format!("looked in {}", told(looked))),
             Self::IdentityChanges { found, before, .. } => Some(format!("`{found}` after `{before}`")),
             _ => None,
         }
@@ -208,12 +209,13 @@ impl Fault {
 
     fn remedy(&self) -> String {
         let text = match self {
-            Self::Unreadable { .. } => "does the file exist, and may this user read it?",
+            Self::Unreadable { source } => return missing_remedy(source),
             Self::Empty => {
                 "was the recorder on? Such a file can be deleted or left; it is not tried again until it changes"
             }
             Self::NotParquet { .. } => {
-                "was the copy cut short? Copy the file again, then `freeplay run --retry`"
+                "was the copy cut short, or is it a file of another kind? Copy it again, or have `logs.files` pass \
+                 it over, then `freeplay run --retry`"
             }
             Self::Decode { .. } | Self::RowCount { .. } => {
                 "the file is damaged: fetch it again from where it was recorded, then `freeplay run --retry`"
@@ -268,6 +270,29 @@ impl Fault {
         };
         text.into()
     }
+}
+
+/// What the system said, in words of our own for the two cases that everybody meets.
+fn unreadable(source: &std::io::Error) -> String {
+    match source.kind() {
+        ErrorKind::NotFound => "there is no such file".into(),
+        ErrorKind::PermissionDenied => "this user may not read the file".into(),
+        _ => format!("the file cannot be read: {source}"),
+    }
+}
+
+fn missing_remedy(source: &std::io::Error) -> String {
+    match source.kind() {
+        ErrorKind::NotFound => "is the name right, and the disk or share there?",
+        ErrorKind::PermissionDenied => "who runs this command needs to read it: see its owner and mode",
+        _ => "is it a file, and the disk sound?",
+    }
+    .into()
+}
+
+/// The places where a fact was looked for.
+fn told(places: &[String]) -> String {
+    if places.is_empty() { "nothing: `[identity]` names no place for it".into() } else { places.join(", ") }
 }
 
 /// A list a person can take in: the first eight, and how many more there are.

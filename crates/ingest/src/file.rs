@@ -9,6 +9,7 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
 };
+use parquet::errors::ParquetError;
 use parquet::file::metadata::ColumnChunkMetaData;
 
 use crate::error::{Error, Fault};
@@ -19,6 +20,19 @@ use crate::positioned::{self, Positioned};
 
 /// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
 const BATCH_ROWS: usize = 8192;
+
+/// Why a footer could not be read: what the file begins with tells more than where its reader gave up.
+fn torn(file: &File, error: &ParquetError) -> String {
+    let mut head = [0; 4];
+    match (positioned::read_at(file, &mut head, 0), &head) {
+        (Ok(4), b"PAR1") => {
+            let detail = error.to_string();
+            format!("its end is torn ({})", detail.trim_start_matches("Parquet error: "))
+        }
+        (Ok(4), b"PARE") => "it is encrypted".into(),
+        _ => "it does not begin as one".into(),
+    }
+}
 
 /// An open Parquet file, its footer read and nothing else.
 #[derive(Debug)]
@@ -44,7 +58,7 @@ impl LogFile {
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let footer = ArrowReaderMetadata::load(&file, options)
-            .map_err(|e| fail(Fault::NotParquet { detail: e.to_string() }))?;
+            .map_err(|e| fail(Fault::NotParquet { detail: torn(&file, &e) }))?;
         let leaves = leaf::leaves(footer.schema().fields());
         let opened = Self { path: path.to_owned(), file, footer, leaves };
         if opened.rows() == 0 {

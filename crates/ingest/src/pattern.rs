@@ -43,7 +43,8 @@ impl<'a> Pattern<'a> {
 pub fn nearest<'n>(wanted: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
     /// Jaro–Winkler similarity below which two names have nothing to do with each other.
     const NEAR: f64 = 0.8;
-    let scored = known.into_iter().map(|name| (strsim::jaro_winkler(wanted, name), name));
+    let wanted = wanted.to_lowercase();
+    let scored = known.into_iter().map(|name| (strsim::jaro_winkler(&wanted, &name.to_lowercase()), name));
     let best = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (best.0 >= NEAR).then_some(best.1)
 }

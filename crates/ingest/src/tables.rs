@@ -26,6 +26,22 @@ pub struct Table {
 /// What a user's table calls the columns that we know: our name → theirs.
 pub type Names = BTreeMap<String, String>;
 
+/// Names that tables use for what they mean: none of them is another one misspelled.
+const KNOWN: [&str; 12] = [
+    "tail_number",
+    "position",
+    "part_number",
+    "serial_number",
+    "installed_utc",
+    "removed_utc",
+    "departure_utc",
+    "flight_id",
+    "flight_hours",
+    "tail_hours_end",
+    "gap_m",
+    "date_utc",
+];
+
 impl Table {
     /// Reads a `.parquet` file as Parquet and anything else as CSV.
     ///
@@ -79,7 +95,9 @@ impl Table {
     pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
         self.find(names).ok_or_else(|| {
             let wanted = self.names.get(names[0]).map_or(names[0], String::as_str);
-            let nearest = nearest(wanted, self.header.iter().map(String::as_str)).map(str::to_owned);
+            // A column that is one of ours already stands for what it says.
+            let others = self.header.iter().filter(|h| !KNOWN.contains(&h.trim()));
+            let nearest = nearest(wanted, others.map(String::as_str)).map(str::to_owned);
             Error::new(&self.file, Fault::TableColumn { column: wanted.to_owned(), nearest })
         })
     }
@@ -210,11 +228,25 @@ pub fn utc(text: &str) -> Result<Timestamp, String> {
         text.parse::<civil::DateTime>()
             .or_else(|e| text.parse::<civil::Date>().map(civil::DateTime::from).map_err(|_| e))
     };
-    let wanted =
-        |e: jiff::Error| format!("`{text}` is no UTC date or time such as 2026-11-19T04:13:00Z: {e}");
     match text.parse::<Timestamp>() {
         Ok(instant) => Ok(instant),
-        Err(_) => TimeZone::UTC.to_timestamp(civil().map_err(wanted)?).map_err(wanted),
+        Err(_) => {
+            let instant = civil().and_then(|civil| TimeZone::UTC.to_timestamp(civil));
+            instant.map_err(|_| not_utc(text))
+        }
+    }
+}
+
+/// Why a text is no instant: a day that no calendar has, or another form.
+fn not_utc(text: &str) -> String {
+    let is_date = |day: &str| {
+        let digits = |part: &str, n: usize| part.len() == n && part.bytes().all(|b| b.is_ascii_digit());
+        let parts: Vec<&str> = day.split('-').collect();
+        matches!(parts[..], [year, month, day] if digits(year, 4) && digits(month, 2) && digits(day, 2))
+    };
+    match text.get(..10).filter(|day| is_date(day)) {
+        Some(day) if day.parse::<civil::Date>().is_err() => format!("there is no day `{day}`"),
+        _ => format!("`{text}` is no UTC date or time such as 2026-11-19 or 2026-11-19T04:13:00Z"),
     }
 }
 

@@ -128,8 +128,8 @@ fn matching(config: &Config, patterns: &[String]) -> Result<Vec<(String, PathBuf
         let folder = glob::Pattern::escape(&config.folder.to_string_lossy());
         let full = Path::new(&folder).join(pattern);
         let paths = glob::glob(&full.to_string_lossy()).map_err(|e| {
-            let what = format!("`{pattern}` is no pattern of files: {e}");
-            Error::refused(Complaint::new("bad_pattern", what).in_file(config.file.display()))
+            let what = format!("`{pattern}` is no pattern of files: {}", e.msg);
+            Error::refused(config.at(pattern, Complaint::new("bad_pattern", what)))
         })?;
         let ours = |path: &PathBuf| path.starts_with(&store) || tables.contains(path);
         let files: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file() && !ours(path)).collect();
@@ -149,9 +149,9 @@ fn matching(config: &Config, patterns: &[String]) -> Result<Vec<(String, PathBuf
 fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Complaint {
     let patterns = silent.iter().map(|p| format!("`{p}`")).collect::<Vec<_>>().join(", ");
     let folder = if config.folder.as_os_str().is_empty() { Path::new(".") } else { &config.folder };
-    Complaint::new("no_log_matched", format!("no log fits {patterns}"))
-        .in_file(config.file.display())
-        .hint(format!("patterns start from {}; are the logs there tonight?", folder.display()))
+    let complaint = Complaint::new("no_log_matched", format!("no log fits {patterns}"))
+        .hint(format!("patterns start from {}; are the logs there tonight?", folder.display()));
+    config.at(silent.first().copied().unwrap_or_default(), complaint)
 }
 
 fn shown(config: &Config, path: &Path) -> String {

@@ -23,6 +23,9 @@ use super::{booked, shown};
 /// How far the slope of screw on motor may be off 1 before it is called a mapping error.
 const SLOPE_TOLERANCE: f64 = 0.02;
 
+/// What stands for the table of channels where no actuator could be looked at.
+const NOTHING: &str = "  no actuator could be looked at: see the errors\n";
+
 /// Looks at logs and says what was found.
 ///
 /// # Errors
@@ -139,7 +142,13 @@ fn one(
                     facts.entry(part).or_default().push(says);
                 }
             }
-            Err(complaint) => complaints.push(complaint.in_file(name)),
+            // What is wrong with the log as a whole is wrong with each of its actuators.
+            Err(complaint) => {
+                let complaint = complaint.in_file(name);
+                if !complaints.contains(&complaint) {
+                    complaints.push(complaint);
+                }
+            }
         }
     }
     clocks.dedup();
@@ -150,16 +159,16 @@ fn one(
         }
         Err(_) => "page headers cannot be read",
     };
+    let clocks = if clocks.is_empty() { String::new() } else { format!(", {}", clocks.join("; ")) };
     let _ = writeln!(
         page,
-        "{name}\n  {} flight {} departed {}\n  {} rows, {}\n  {checksums}",
+        "{name}\n  {} flight {} departed {}\n  {} rows{clocks}\n  {checksums}",
         id.tail_number,
         id.flight_id,
         id.departure_utc,
         opened.rows(),
-        clocks.join("; "),
     );
-    page.push_str(&layout(&channels[first..]));
+    page.push_str(&if channels.len() > first { layout(&channels[first..]) } else { NOTHING.to_owned() });
     page.push('\n');
 }
 

@@ -148,6 +148,16 @@ pub enum Method {
     Midrange,
 }
 
+impl Method {
+    /// Its name in the configuration.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Contact => "contact",
+            Self::Midrange => "midrange",
+        }
+    }
+}
+
 /// `[estimate]`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -235,8 +245,12 @@ impl Document {
     fn check_identity(&self, source: &Source<'_>, found: &mut Vec<Complaint>) {
         match self.identity.path.as_ref().map(|p| regex::Regex::new(p)) {
             Some(Err(e)) => {
-                let c =
-                    Complaint::new("bad_pattern", format!("`identity.path` is no regular expression: {e}"));
+                // The reader draws the expression over several lines; the last of them says what is wrong.
+                let e = e.to_string();
+                let why = e.lines().last().unwrap_or_default().trim_start_matches("error: ");
+                let what = format!("`identity.path` is no regular expression: {why}");
+                let c = Complaint::new("bad_pattern", what)
+                    .hint("such as '(?<tail_number>N\\w+)/(?<departure_utc>\\d{8}T\\d{6}Z)\\.parquet$'");
                 found.push(source.at(&["identity", "path"], c));
             }
             Some(Ok(regex)) => {
@@ -257,8 +271,8 @@ impl Document {
             }
             None => {}
         }
-        if let Some(Err(e)) = self.identity.time_zone.as_deref().map(zone) {
-            found.push(source.at(&["identity", "time_zone"], Complaint::new("bad_zone", e)));
+        if let Some(name) = self.identity.time_zone.as_deref().filter(|name| zone(name).is_err()) {
+            found.push(source.at(&["identity", "time_zone"], no_zone(name)));
         }
     }
 
@@ -274,6 +288,16 @@ impl Document {
                 check_clock(clock, &["group", name.as_str(), "clock"], source, found);
             }
         }
+    }
+}
+
+/// A zone that nobody knows, with the one that was probably meant.
+fn no_zone(name: &str) -> Complaint {
+    let known: Vec<String> = jiff::tz::db().available().map(|zone| zone.to_string()).collect();
+    let complaint = Complaint::new("bad_zone", format!("no time zone is called `{name}`"));
+    match nearest(name, known.iter().map(String::as_str)) {
+        Some(near) => complaint.hint(format!("`{near}`?")),
+        None => complaint.hint("names such as `UTC`, `Europe/Istanbul`, `America/New_York`"),
     }
 }
 

@@ -38,6 +38,7 @@ pub struct Config {
     /// The flights table; empty when there is none.
     pub flights: Flights,
     variants: Variants,
+    layers: Arc<[Layer]>,
 }
 
 impl Config {
@@ -69,7 +70,7 @@ impl Config {
         let folder = files.first().and_then(|f| f.parent()).map_or_else(PathBuf::new, Path::to_path_buf);
         let shown: Vec<&str> = texts.iter().map(|(shown, _)| shown.as_str()).collect();
         let file = PathBuf::from(shown.join(" + "));
-        let mut config = Self::layered(&Layer::stack(texts), &file, &folder)?;
+        let mut config = Self::layered(Layer::stack(texts), &file, &folder)?;
         if let Some(table) = &config.document.logs.flights {
             let names = &config.document.columns.flights;
             let read = Flights::read(&config.path(table), names, &config.document.identity);
@@ -84,11 +85,11 @@ impl Config {
     /// As [`Config::read_layers`].
     pub fn parse(text: &str, file: &Path, folder: &Path) -> Result<Self, Vec<Complaint>> {
         let shown = file.display().to_string();
-        Self::layered(&Layer::stack([(shown, text.to_owned())]), file, folder)
+        Self::layered(Layer::stack([(shown, text.to_owned())]), file, folder)
     }
 
-    fn layered(layers: &[Layer], file: &Path, folder: &Path) -> Result<Self, Vec<Complaint>> {
-        let source = Source::parse(layers).map_err(|complaint| vec![*complaint])?;
+    fn layered(layers: Vec<Layer>, file: &Path, folder: &Path) -> Result<Self, Vec<Complaint>> {
+        let source = Source::parse(&layers).map_err(|complaint| vec![*complaint])?;
         let unknown = unknown::keys(&source, &Document::schema());
         if !unknown.is_empty() {
             return Err(unknown);
@@ -110,11 +111,16 @@ impl Config {
         match variants {
             Ok(variants) if complaints.is_empty() => {
                 let (file, folder, flights) = (file.to_owned(), folder.to_owned(), Flights::default());
-                Ok(Self { file, folder, document, parts, flights, variants })
+                Ok(Self { file, folder, document, parts, flights, variants, layers: layers.into() })
             }
             Ok(_) => Err(complaints),
             Err(found) => Err(complaints.into_iter().chain(found).collect()),
         }
+    }
+
+    /// Names the line on which a text stands in the configuration, in a complaint about it.
+    pub fn at(&self, text: &str, complaint: Complaint) -> Complaint {
+        source::at_text(&self.layers, text, complaint)
     }
 
     /// A path of the configuration, seen from the current folder.

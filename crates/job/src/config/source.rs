@@ -10,6 +10,7 @@ use toml::de::{DeTable, DeValue};
 use super::meant;
 
 /// A file of the configuration.
+#[derive(Debug)]
 pub(super) struct Layer {
     file: String,
     /// Its text behind as many empty lines as the files before have bytes: so a span says of itself in which
@@ -99,6 +100,17 @@ fn lay_over<'t>(below: &mut DeTable<'t>, over: DeTable<'t>) {
                 below.insert(key, value);
             }
         }
+    }
+}
+
+/// Names the line on which a text value stands, or else the file.
+pub(super) fn at_text(layers: &[Layer], value: &str, complaint: Complaint) -> Complaint {
+    let quoted = [format!("\"{value}\""), format!("'{value}'")];
+    let found = layers.iter().rev().find_map(|layer| quoted.iter().find_map(|text| layer.text.find(text)));
+    match (found, layers.first()) {
+        (Some(start), _) => place(layers, &(start..start), complaint),
+        (None, Some(layer)) => complaint.in_file(&layer.file),
+        (None, None) => complaint,
     }
 }
 
