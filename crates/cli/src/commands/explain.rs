@@ -180,8 +180,9 @@ fn page(
             table::micrometres(e.gap_midrange_m)
         ),
     );
-    line("doubts", &super::query::doubts(e));
-    let newtons = |v: Option<f64>| v.map_or_else(table::dash, |v| format!("{v:.3e}"));
+    let doubts = super::query::doubts(e);
+    line("doubts", if doubts.is_empty() { "none" } else { &doubts });
+    let newtons = |v: Option<f64>| v.map_or_else(table::dash, |v| format!("{v:.2e}"));
     line(
         "fitted",
         &format!(
@@ -206,13 +207,21 @@ fn page(
     line(
         "settings",
         &format!(
-            "{} ({}), method {:?}",
+            "{} ({}), method {}",
             config.file.display(),
             short(&p.config_digest),
-            config.document.estimate.method
+            config.document.estimate.method.as_str()
         ),
     );
-    line("made by", &format!("Freeplay {} in run {} on {}", p.program_version, p.run_id, p.processed_utc));
+    line(
+        "made by",
+        &format!(
+            "Freeplay {} in run {} on {}",
+            p.program_version,
+            p.run_id,
+            p.processed_utc.strftime("%Y-%m-%d %H:%M UTC")
+        ),
+    );
     line("replay", &format!("{verdict}: freeplay estimate {}", config.path(&p.log_path).display()));
     if let Some(part) = config.document.part.get(record.part_number.as_str()) {
         let settings = serde_json::to_value(part).unwrap_or_default();
