@@ -5,6 +5,7 @@
 
 mod accounts;
 mod bench;
+mod book;
 mod damaged;
 #[cfg(target_os = "linux")]
 mod disk;
@@ -14,5 +15,7 @@ mod known;
 mod layouts;
 mod older;
 mod oracle;
+mod pages;
 mod speech;
+mod told;
 mod truth;

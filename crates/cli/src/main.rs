@@ -8,6 +8,8 @@ mod commands;
 mod exit;
 mod journal;
 mod progress;
+#[cfg(test)]
+mod reference;
 mod rows;
 mod spark;
 mod table;

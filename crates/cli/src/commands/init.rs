@@ -21,6 +21,12 @@ const FILES: [(&str, &str); 2] =
 /// What an editor needs to complete and to check the configuration; its first line points here.
 const SCHEMA: &str = "pipeline.schema.json";
 
+/// What a newcomer does next.
+const NEXT: &str = "next: say in pipeline.toml where your logs are and what their columns are called, and in \
+                    installations.csv which serial number sat where; then `freeplay check`";
+const NEXT_OF_PROPOSAL: &str = "next: read pipeline.toml and mend what was guessed wrong, say in installations.csv which \
+                                serial number sat where; then `freeplay check`";
+
 /// Writes the configuration, the example table and the schema.
 ///
 /// # Errors
@@ -38,7 +44,7 @@ pub(crate) fn init(args: &InitArgs, talk: &Talk) -> Result<Code, Failure> {
         write(&args.dir.join(name), text, talk)?;
     }
     write(&args.dir.join(SCHEMA), &format!("{:#}\n", job::config::Document::schema()), talk)?;
-    talk.note("next: say in pipeline.toml where your logs are and what their columns are called, then `freeplay check`");
+    talk.note(if args.from.is_some() { NEXT_OF_PROPOSAL } else { NEXT });
     Ok(Code::Well)
 }
 
