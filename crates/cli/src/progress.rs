@@ -66,7 +66,7 @@ impl<'t> Progress<'t> {
             state.begun = Instant::now();
         });
         self.bar.set_length(total as u64);
-        let template = "{prefix} {bar:24} {pos}/{len}  {rate:>10}  left {eta}  {msg}";
+        let template = "{prefix} {bar:24} {pos}/{len}  {rate:>10}  left {eta}  {wide_msg}";
         if let Ok(style) = ProgressStyle::with_template(template) {
             let rate = |state: &ProgressState, out: &mut dyn Write| {
                 let _ = write!(out, "{:.1}/min", 60.0 * state.per_sec());
@@ -91,7 +91,8 @@ impl<'t> Progress<'t> {
             state.done += 1;
             state.refused += refused;
             state.errors += errors;
-            let hand = state.in_hand.first().cloned().unwrap_or_default();
+            let hand = state.in_hand.first().map(|path| path.rsplit('/').next().unwrap_or(path));
+            let hand = hand.unwrap_or_default();
             format!("errors {}  {hand}", state.errors)
         });
         self.bar.set_message(message);

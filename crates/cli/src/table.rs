@@ -7,7 +7,7 @@ use crate::talk::escape;
 /// Blanks between two columns.
 const GAP: usize = 2;
 /// Text is not cut to less than this.
-const LEAST_TEXT: usize = 8;
+const LEAST_TEXT: usize = 6;
 
 /// A column of a table.
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +32,10 @@ pub(crate) const fn number(heading: &'static str, rank: u8) -> Column {
 
 /// Lays out rows within the width of the terminal; a pipe gets everything.
 pub(crate) fn layout(columns: &[Column], rows: &[Vec<String>]) -> String {
-    let width = terminal_width();
+    within(columns, rows, terminal_width())
+}
+
+fn within(columns: &[Column], rows: &[Vec<String>], width: usize) -> String {
     let mut kept: Vec<usize> = (0..columns.len()).collect();
     let mut order: Vec<usize> = kept.clone();
     order.sort_by_key(|&i| std::cmp::Reverse(columns[i].rank));
@@ -45,7 +48,7 @@ pub(crate) fn layout(columns: &[Column], rows: &[Vec<String>]) -> String {
     let mut text = grid(columns, rows, &kept, &widths(columns, rows, &kept, width));
     text.push('\n');
     if kept.len() < columns.len() {
-        let note = format!("{} of {} columns fit; `--format csv` has all\n", kept.len(), columns.len());
+        let note = format!("{} of {} columns fit here; a pipe gets all\n", kept.len(), columns.len());
         text.push_str(&note);
     }
     text
@@ -77,7 +80,7 @@ fn shortened(text: &str, width: usize) -> String {
     let length = text.chars().count();
     if length <= width {
         text.to_owned()
-    } else if text.contains('/') && !text.contains(' ') {
+    } else if is_path(text) {
         std::iter::once('…').chain(text.chars().skip(length + 1 - width)).collect()
     } else {
         text.chars().take(width - 1).chain(std::iter::once('…')).collect()
@@ -87,18 +90,27 @@ fn shortened(text: &str, width: usize) -> String {
 /// How wide each column may be: text gives way, the widest first; a number is never cut.
 fn widths(columns: &[Column], rows: &[Vec<String>], kept: &[usize], width: usize) -> Vec<usize> {
     let mut widths: Vec<usize> = kept.iter().map(|&i| wide(columns, rows, i)).collect();
+    let least: Vec<usize> = kept.iter().map(|&i| least(columns, rows, i)).collect();
     while widths.iter().map(|w| w + GAP).sum::<usize>() > width.saturating_add(GAP) {
-        let text = (0..kept.len()).filter(|&at| widths[at] > LEAST_TEXT && is_words(columns, rows, kept[at]));
+        let text = (0..kept.len()).filter(|&at| widths[at] > least[at]);
         let Some(widest) = text.max_by_key(|&at| widths[at]) else { break };
         widths[widest] -= 1;
     }
     widths
 }
 
-/// Whether a column may be cut: neither numbers nor dates.
-fn is_words(columns: &[Column], rows: &[Vec<String>], i: usize) -> bool {
-    let date = |row: &Vec<String>| row[i].starts_with(|c: char| c.is_ascii_digit() || c == '–');
-    !columns[i].right && !rows.iter().all(date)
+/// What a column may be cut to: the last digit in any of its cells stays, but for paths, which keep their end.
+fn least(columns: &[Column], rows: &[Vec<String>], i: usize) -> usize {
+    if columns[i].right {
+        return usize::MAX;
+    }
+    let digits = |text: &str| text.chars().collect::<Vec<_>>().iter().rposition(char::is_ascii_digit);
+    let cells = rows.iter().map(|row| row[i].as_str()).filter(|text| !is_path(text));
+    cells.filter_map(digits).map(|last| last + 2).max().unwrap_or(0).max(LEAST_TEXT)
+}
+
+fn is_path(text: &str) -> bool {
+    text.contains('/') && !text.contains(' ')
 }
 
 fn wide(columns: &[Column], rows: &[Vec<String>], i: usize) -> usize {
@@ -146,4 +158,39 @@ pub(crate) fn state_mark(state: Option<&str>) -> String {
         _ => "–",
     };
     state.map_or_else(|| shape.to_owned(), |word| format!("{shape} {word}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COLUMNS: [Column; 5] =
+        [text("log", 0), text("unit", 0), number("gap µm", 0), text("seen", 0), number("load N", 1)];
+
+    fn rows() -> Vec<Vec<String>> {
+        let row = |log: &str, unit: &str, gap: &str, seen: &str| {
+            [log, unit, gap, seen, "-4800"].map(str::to_owned).to_vec()
+        };
+        vec![
+            row("logs/N412FP/20261119_0413.parquet", "elevator left", "103.25", "moves 0.99856 for 1"),
+            row("logs/N412FP/20261120_0822.parquet", "aileron", "9.5", "–"),
+        ]
+    }
+
+    #[test]
+    fn a_table_keeps_to_the_terminal_and_cuts_no_number() {
+        for width in [56, 60, 80, 100] {
+            let table = within(&COLUMNS, &rows(), width);
+            assert!(table.lines().all(|line| line.chars().count() <= width), "{width}:\n{table}");
+            assert!(table.contains("103.25") && table.contains("0.99856") && table.contains("0413.parquet"));
+            assert_eq!(table.lines().count(), if table.contains("fit here") { 4 } else { 3 }, "{table}");
+        }
+    }
+
+    #[test]
+    fn a_pipe_gets_everything() {
+        let table = within(&COLUMNS, &rows(), usize::MAX);
+        assert!(table.contains("logs/N412FP/20261119_0413.parquet") && table.contains("-4800"), "{table}");
+        assert!(!table.contains('…'), "{table}");
+    }
 }

@@ -289,7 +289,7 @@ fn layout(channels: &[Channel]) -> String {
         text("column", 1),
         number("min", 0),
         number("max", 0),
-        text("unit", 0),
+        text("unit", 1),
         number("smallest step", 4),
         number("rate Hz", 6),
         number("missing %", 2),

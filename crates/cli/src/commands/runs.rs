@@ -135,7 +135,7 @@ fn page(runs: &[Run<'_>]) -> String {
         number("estimated", 1),
         number("refused", 1),
         number("errors", 0),
-        number("not reached", 0),
+        number("not reached", 1),
     ];
     let cells = |run: &Run<'_>| {
         let counts =
