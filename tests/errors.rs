@@ -4,8 +4,11 @@
 
 use std::fmt::Write;
 use std::fs;
+use std::path::{Path, PathBuf};
 
-use crate::bench::{Bench, top};
+use regex::Regex;
+
+use crate::bench::{Bench, copy, top};
 
 const LOG: &str = "sample-data/logs/N412FP/20260910T130719Z_N412FP-0001.parquet";
 const TABLE: &str = "sample-data/installations.csv";
@@ -141,6 +144,96 @@ fn spoilt(bench: &Bench) {
     fs::write(bench.path("file-store.toml"), toml.replace("\"results\"", "\"pipeline.toml\"")).unwrap();
 }
 
+/// Something wrong with a store that was sound: what it is called, what is done to it, and what is typed.
+type Spoil = (&'static str, fn(&Bench), &'static [&'static str]);
+
+const STORES: &[Spoil] = &[
+    ("a store held by another process", |_| {}, &["run"]),
+    (
+        "a store of a newer release",
+        |bench| fs::write(bench.path("results/store.json"), "{\"freeplay_store\":9}").unwrap(),
+        &["query", "tail", "N412FP"],
+    ),
+    (
+        "a store whose mark is torn",
+        |bench| fs::write(bench.path("results/store.json"), "{\"freepl").unwrap(),
+        &["store", "info"],
+    ),
+    (
+        "a folder that is no store",
+        |bench| fs::rename(bench.path("results/store.json"), bench.path("results/notes.txt")).unwrap(),
+        &["store", "info"],
+    ),
+    (
+        "a table whose log is torn",
+        |bench| tear(&newest(bench, "results/gaps/_delta_log/*.json")),
+        &["query", "tail", "N412FP"],
+    ),
+    (
+        "a data file with a flipped byte",
+        |bench| flip(&newest(bench, "results/gaps/*.parquet")),
+        &["query", "tail", "N412FP"],
+    ),
+    (
+        "a data file that was deleted",
+        |bench| fs::remove_file(newest(bench, "results/gaps/*.parquet")).unwrap(),
+        &["query", "tail", "N412FP"],
+    ),
+    (
+        "a store that looks damaged",
+        |bench| fs::remove_file(newest(bench, "results/gaps/*.parquet")).unwrap(),
+        &["store", "verify"],
+    ),
+    ("an answer into a folder that is not there", |_| {}, &["store", "export", "--output", "none/gaps.csv"]),
+    ("a flight that is not stored", |_| {}, &["explain", "N412FP-9999", "aileron_left"]),
+    ("a position that is not stored", |_| {}, &["explain", "N412FP-0007", "aileron_lft"]),
+    ("a report of nothing", |_| {}, &["report", "--output", "report", "--tail", "N000FP"]),
+    ("a report over something else", |_| {}, &["report", "--output", "sample-data"]),
+];
+
+/// The newest file that fits a pattern.
+fn newest(bench: &Bench, pattern: &str) -> PathBuf {
+    glob::glob(bench.path(pattern).to_str().unwrap()).unwrap().flatten().max().unwrap()
+}
+
+fn tear(file: &Path) {
+    let whole = fs::read(file).unwrap();
+    fs::write(file, &whole[..whole.len() / 2]).unwrap();
+}
+
+fn flip(file: &Path) {
+    let mut whole = fs::read(file).unwrap();
+    let middle = whole.len() / 2;
+    whole[middle] ^= 1;
+    fs::write(file, whole).unwrap();
+}
+
+/// What a spoilt store makes the program say, without what differs from run to run: holder and digests.
+fn stores(told: &mut String) {
+    let bench = Bench::sample();
+    bench.well(&["run", "--limit", "2"]);
+    let sound = tempfile::tempdir().unwrap();
+    copy(&bench.path("results"), sound.path());
+    let lock = fs::File::options().write(true).open(bench.path("results/lock")).unwrap();
+    lock.lock().unwrap();
+    let mut said_of_stores = String::new();
+    for (name, spoil, args) in STORES {
+        spoil(&bench);
+        said(&bench, name, args, &mut said_of_stores);
+        fs::remove_dir_all(bench.path("results")).unwrap();
+        copy(sound.path(), &bench.path("results"));
+    }
+    for (differs, word) in [
+        (r"pid \d+ on \S+ since [^\n]+ UTC", "pid 8812 on HOST since THEN"),
+        (r"\d{12}-[0-9a-f]{64}", "DATA-FILE"),
+        (r"[0-9a-f]{12}…", "DIGEST…"),
+        (r" at line \d+ column \d+", ""),
+    ] {
+        said_of_stores = Regex::new(differs).unwrap().replace_all(&said_of_stores, word).into_owned();
+    }
+    told.push_str(&said_of_stores);
+}
+
 #[test]
 fn errors_read_as_they_were_last_read_by_a_person() {
     let bench = Bench::sample();
@@ -152,11 +245,17 @@ fn errors_read_as_they_were_last_read_by_a_person() {
         said(&bench, name, args, &mut told);
     }
     assert!(!bench.path("results").exists(), "an error stores nothing");
+    stores(&mut told);
     let kept = top().join("tests/data/errors.txt");
     if std::env::var_os("FREEPLAY_BLESS").is_some() {
         fs::write(&kept, &told).unwrap();
     }
     let kept = fs::read_to_string(kept).unwrap();
+    let codes = Regex::new(r"error\[(\w+)\]").unwrap();
+    let page = fs::read_to_string(top().join("docs/errors.md")).unwrap();
+    for code in codes.captures_iter(&told).map(|found| format!("`{}`", &found[1])) {
+        assert!(page.contains(&code), "{code} is not explained in docs/errors.md");
+    }
     for (now, before) in told.split("## ").zip(kept.split("## ")) {
         assert_eq!(now, before);
     }

@@ -59,10 +59,16 @@ fn shared() -> tempfile::Builder<'static, 'static> {
 }
 
 fn not_written(file: &std::path::Path, error: &io::Error) -> Failure {
-    let what = format!("the answer cannot be written: {error}");
-    Failure::failed(
-        Complaint::new("output_failed", what).in_file(file.display()).hint("does the folder exist?"),
-    )
+    let (why, hint) = match error.kind() {
+        io::ErrorKind::NotFound => ("there is no such folder".to_owned(), "make the folder first"),
+        io::ErrorKind::PermissionDenied => {
+            ("this user may not write there".to_owned(), "name another folder")
+        }
+        io::ErrorKind::StorageFull => ("the disk is full".to_owned(), "make room, or name another folder"),
+        _ => (error.to_string(), "can a file be written there?"),
+    };
+    let what = format!("the answer cannot be written: {why}");
+    Failure::failed(Complaint::new("output_failed", what).in_file(file.display()).hint(hint))
 }
 
 fn write(batch: &RecordBatch, format: Format, out: &mut (impl Write + Send)) -> Result<(), Failure> {

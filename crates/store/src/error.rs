@@ -1,5 +1,6 @@
 //! What can be wrong with a store, and what to do about it.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use deltalake::DeltaTableError;
@@ -18,9 +19,12 @@ pub enum Error {
     /// Delta Lake takes a percent sign and two hexadecimal digits in a path for another character.
     #[error("{} cannot hold a store: Delta Lake takes `{found}` in its path for another character", dir.display())]
     Name { dir: PathBuf, found: String },
-    /// The folder was written by another release, or its `store.json` is torn.
+    /// The folder was written by another release.
     #[error("{} has format {found}, and this release knows format {known}", file.display())]
     Format { file: PathBuf, found: String, known: u32 },
+    /// The file that says which format the folder has cannot be read.
+    #[error("{} is torn: it holds `{found}`", file.display())]
+    Torn { file: PathBuf, found: String },
     /// Another process writes.
     #[error("the store is {holder}")]
     Held { holder: String },
@@ -31,10 +35,10 @@ pub enum Error {
     #[error("{} cannot be {verb}: {source}", path.display())]
     Io { path: PathBuf, verb: &'static str, source: std::io::Error },
     /// The Delta table could not be read or committed to.
-    #[error("table `{table}` cannot be {verb}: {source}")]
+    #[error("table `{table}` cannot be {verb}: {}", first_line(source))]
     Table { table: &'static str, verb: &'static str, source: Box<DeltaTableError> },
     /// A data file is not the one that was committed.
-    #[error("{} is damaged: its content has digest {found}, and {wanted} was committed", path.display())]
+    #[error("a data file is damaged: its digest is {}…, and {}… was committed", short(found), short(wanted))]
     Damaged { path: PathBuf, found: String, wanted: String },
     /// A column is not there or has another type.
     #[error("column `{column}` {problem}")]
@@ -68,7 +72,7 @@ impl Error {
         match self {
             Self::Missing { .. } => "store_missing",
             Self::Foreign { .. } | Self::Name { .. } => "store_foreign",
-            Self::Format { .. } => "store_format",
+            Self::Format { .. } | Self::Torn { .. } => "store_format",
             Self::Held { .. } => "store_held",
             Self::Itself { .. } => "store_itself",
             Self::Io { .. } => "store_io",
@@ -85,7 +89,7 @@ impl Error {
             | Self::Foreign { dir, .. }
             | Self::Name { dir, .. }
             | Self::Itself { dir } => Some(dir),
-            Self::Format { file, .. } => Some(file),
+            Self::Format { file, .. } | Self::Torn { file, .. } => Some(file),
             Self::Io { path, .. } | Self::Damaged { path, .. } => Some(path),
             _ => None,
         }
@@ -98,14 +102,17 @@ impl Error {
             }
             Self::Foreign { .. } => "name a new or an empty folder as `store` in the configuration",
             Self::Name { .. } => "name a folder without a percent sign as `store` in the configuration",
-            Self::Format { .. } => {
-                "read it with the release that wrote it, or restore `store.json` from a backup"
-            }
+            Self::Format { .. } => "read it with the release that wrote it",
+            Self::Torn { .. } => "restore this file from a backup; docs/store.md says what it holds",
             Self::Held { .. } => "wait for it with `--wait 20m`; readers need not wait",
             Self::Itself { .. } => {
                 "name the store of the trial, and let the configuration name the one that takes it over"
             }
-            Self::Io { .. } => "is the disk full, or the folder not ours to write?",
+            Self::Io { source, .. } => io_remedy(source.kind()),
+            Self::Table { verb: "read", .. } => {
+                "its log (`_delta_log` in the table's folder) may be torn: restore the store from a backup; without \
+                 one, remove it and run its logs again"
+            }
             Self::Table { .. } => "is the disk full, or does another program write into this table?",
             Self::Damaged { .. } => {
                 "restore this file from a backup; without one, remove the store and run its logs again"
@@ -121,4 +128,32 @@ impl Error {
         let path = path.into();
         move |source| Self::Io { path, verb, source }
     }
+}
+
+/// What to do when the system refuses.
+fn io_remedy(kind: ErrorKind) -> &'static str {
+    match kind {
+        ErrorKind::NotFound => {
+            "was a file of the store deleted? `freeplay store verify` names all that are missing; restore them from a \
+             backup"
+        }
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            "this user may not write there: see the owner and mode of the folder, or name another one under `[store]`"
+        }
+        ErrorKind::NotADirectory => "name a folder, not a file, as `path` under `[store]`",
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            "make room and run again: what was stored before is whole"
+        }
+        _ => "is the disk full, or the folder not ours to write?",
+    }
+}
+
+/// The libraries underneath add where in their code it happened, which helps nobody here.
+fn first_line(error: &DeltaTableError) -> String {
+    error.to_string().lines().next().unwrap_or_default().to_owned()
+}
+
+/// As much of a digest as tells it from another.
+fn short(digest: &str) -> &str {
+    digest.get(..12).unwrap_or(digest)
 }

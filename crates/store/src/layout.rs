@@ -188,6 +188,6 @@ fn check_mark(dir: &Path, found: &str) -> Result<u32, Error> {
     match serde_json::from_str::<Mark>(&text) {
         Ok(Mark { freeplay_store: format @ 1..=FORMAT }) => Ok(format),
         Ok(mark) => Err(Error::Format { file, found: mark.freeplay_store.to_string(), known: FORMAT }),
-        Err(_) => Err(Error::Format { file, found: format!("`{}`", text.trim()), known: FORMAT }),
+        Err(_) => Err(Error::Torn { file, found: text.trim().chars().take(40).collect() }),
     }
 }

@@ -57,7 +57,8 @@ fn find(args: &ExplainArgs, store: &Store) -> Result<GapRecord, Failure> {
         1 => Ok(found.remove(0)),
         0 => {
             let what = format!("no record of {} in flight {}", args.position, args.flight);
-            Err(Failure::usage("no_such_record", what, "`freeplay query flight ID` lists what there is"))
+            let hint = format!("`freeplay query flight {}` lists what there is", args.flight);
+            Err(Failure::usage("no_such_record", what, &hint))
         }
         _ => {
             let tails: Vec<String> = found.iter().map(|r| r.flight.tail_number.to_string()).collect();
@@ -222,12 +223,13 @@ fn page(
             p.processed_utc.strftime("%Y-%m-%d %H:%M UTC")
         ),
     );
-    line("replay", &format!("{verdict}: freeplay estimate {}", config.path(&p.log_path).display()));
+    line("replay", &verdict.to_string());
+    line("by hand", &format!("freeplay estimate {}", config.path(&p.log_path).display()));
     if let Some(part) = config.document.part.get(record.part_number.as_str()) {
         let settings = serde_json::to_value(part).unwrap_or_default();
-        let pairs: Vec<String> =
-            flat("", &settings).into_iter().map(|(key, value)| format!("{key} = {value}")).collect();
-        line("part", &pairs.join(", "));
+        for (at, (key, value)) in flat("", &settings).into_iter().enumerate() {
+            line(if at == 0 { "part" } else { "" }, &format!("{key} = {value}"));
+        }
     }
     if let Ok(Replay { channels: Some(channels), .. }) = replayed {
         page.push('\n');
