@@ -60,6 +60,27 @@ fn init_writes_a_configuration_that_is_good_and_never_overwrites() {
     assert!(silent.err.contains("error[no_log_matched]"), "{}", silent.err);
 }
 
+/// Logs that say nothing of themselves but by their path: what `init` proposes is checked and run as it stands.
+#[test]
+fn what_init_proposes_for_foreign_logs_runs_as_it_stands() {
+    let bench = Bench::sample();
+    for (log, tail) in bench.logs().iter().zip(["TC-JRA", "TC-JRB"]) {
+        let folder = bench.path("qar").join(tail);
+        std::fs::create_dir_all(&folder).unwrap();
+        let named = folder.join("FLT_2026-09-10_1307.parquet");
+        crate::bench::rewrite(log, &named, &Vec::new(), |_| true, |_| true);
+    }
+    bench.well(&["init", "fleet", "--from", "qar"]);
+    let stays = std::fs::read_to_string(bench.path("fleet/installations.csv")).unwrap();
+    assert_eq!(stays.lines().filter(|line| line.starts_with("TC-JR")).count(), 8, "{stays}");
+    let checked = bench.well(&["check", "--config", "fleet/pipeline.toml"]);
+    assert!(checked.contains("2 logs: 0 in error"), "{checked}");
+    let account = bench.well(&["run", "--config", "fleet/pipeline.toml"]);
+    assert!(account.contains("8 records of 2 flights"), "{account}");
+    let records = bench.well(&["query", "tail", "TC-JRB", "--config", "fleet/pipeline.toml"]);
+    assert!(records.contains("2026-09-10 13:07"), "{records}");
+}
+
 #[test]
 fn usage_and_configuration_errors_are_code_2_and_run_nothing() {
     let bench = Bench::sample();

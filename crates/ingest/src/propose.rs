@@ -26,8 +26,34 @@ pub struct Proposal {
     pub positions: BTreeSet<String>,
     /// Facts that the footer's metadata holds: fact → key.
     pub metadata: BTreeMap<Fact, String>,
+    /// The tail that the footer names.
+    pub tail: Option<String>,
     /// Columns that hold numbers and were not understood.
     pub others: Vec<String>,
+}
+
+/// How a departure may stand in a file's name, and its `strftime` pattern; the longest first.
+const DEPARTURES: [(&str, &str); 9] = [
+    (r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d", "%Y-%m-%dT%H-%M-%S"),
+    (r"\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d", "%Y-%m-%d_%H-%M-%S"),
+    (r"\d{4}-\d\d-\d\d_\d{6}", "%Y-%m-%d_%H%M%S"),
+    (r"\d{4}-\d\d-\d\d_\d{4}", "%Y-%m-%d_%H%M"),
+    (r"\d{8}T\d{6}Z", "%Y%m%dT%H%M%SZ"),
+    (r"\d{8}T\d{6}", "%Y%m%dT%H%M%S"),
+    (r"\d{8}_\d{6}", "%Y%m%d_%H%M%S"),
+    (r"\d{8}_\d{4}", "%Y%m%d_%H%M"),
+    (r"\d{14}", "%Y%m%d%H%M%S"),
+];
+
+/// An expression and a departure format for logs that lie as `TAIL/…departure….parquet`, if this one seems to.
+pub fn path_identity(path: &Path) -> Option<(String, &'static str)> {
+    let name = path.file_name()?.to_str()?;
+    let fits = |form: &str| {
+        let alone = format!(r"^(?:.*\D)?{form}(?:\D.*)?$");
+        regex::Regex::new(&alone).is_ok_and(|regex| regex.is_match(name))
+    };
+    let (form, format) = DEPARTURES.iter().find(|(form, _)| fits(form))?;
+    Some((format!(r"(?<tail_number>[^/]+)/[^/]*?(?<departure_utc>{form})[^/]*\.parquet$"), format))
 }
 
 /// Looks at one log.
@@ -54,7 +80,9 @@ pub fn propose(path: &Path) -> Result<Proposal, Error> {
             || channels.values().any(|(pattern, _)| pattern == *name)
     };
     let others = names.iter().filter(|n| !is_clock(n) && !mapped(n)).map(|n| (*n).to_owned()).collect();
-    Ok(Proposal { clock, channels, positions, metadata: metadata(&file), others })
+    let metadata = metadata(&file);
+    let tail = metadata.get(&Fact::TailNumber).and_then(|key| file.metadata(key)).map(str::to_owned);
+    Ok(Proposal { clock, channels, positions, metadata, tail, others })
 }
 
 /// A name's words: cut at what is no letter or digit, and where a capital follows a small letter.
@@ -244,6 +272,22 @@ mod tests {
     }
 
     #[test]
+    fn a_departure_in_a_name_is_found_with_its_form() {
+        for (path, departure, format) in [
+            ("d/N412FP/FLT_2026-09-10_1307.parquet", "2026-09-10_1307", "%Y-%m-%d_%H%M"),
+            ("d/TC-JRA/20261119T041300Z_0413.parquet", "20261119T041300Z", "%Y%m%dT%H%M%SZ"),
+            ("d/TC-JRA/QAR20261119_041300.parquet", "20261119_041300", "%Y%m%d_%H%M%S"),
+        ] {
+            let (expression, found) = path_identity(Path::new(path)).unwrap();
+            let regex = regex::Regex::new(&expression).unwrap();
+            let facts = regex.captures(path).unwrap();
+            assert_eq!((&facts["departure_utc"], found), (departure, format), "{expression}");
+            assert_eq!(&facts["tail_number"], path.split('/').nth(1).unwrap());
+        }
+        assert_eq!(path_identity(Path::new("d/N412FP/flight 7.parquet")), None);
+    }
+
+    #[test]
     fn the_sample_fleet_is_understood_whole() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sample-data/logs/N412FP");
         let log = std::fs::read_dir(folder).unwrap().flatten().next().unwrap().path();
@@ -253,5 +297,6 @@ mod tests {
         let positions: Vec<&str> = found.positions.iter().map(String::as_str).collect();
         assert_eq!(positions, ["aileron_left", "aileron_right", "elevator_left", "elevator_right"]);
         assert_eq!((found.metadata.len(), found.others.len()), (5, 0));
+        assert_eq!(found.tail.as_deref(), Some("N412FP"));
     }
 }

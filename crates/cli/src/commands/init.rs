@@ -1,11 +1,13 @@
 //! `init`: a commented configuration, its schema and an example table, never over something that is there.
 
+use std::collections::BTreeSet;
 use std::fs::{self, OpenOptions};
 use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ingest::Role;
-use ingest::propose::{Proposal, propose};
+use ingest::propose::{Proposal, path_identity, propose};
+use ingest::schema::Fact;
 
 use crate::args::InitArgs;
 use crate::exit::{Code, Failure};
@@ -20,6 +22,16 @@ const FILES: [(&str, &str); 2] =
 
 /// What an editor needs to complete and to check the configuration; its first line points here.
 const SCHEMA: &str = "pipeline.schema.json";
+
+/// So many logs are asked for their tails at most.
+const MOST_LOGS: usize = 5000;
+
+const STAYS: &str = "\
+# Proposed: a row for each tail and position found, each with one unit named after its place, since ever.
+# Put the real part and serial numbers and dates in: a trend belongs to the unit, and goes with it when it moves.
+# An empty removed_utc: it still sits there. A date alone is midnight UTC.
+tail_number,position,part_number,serial_number,installed_utc,removed_utc
+";
 
 /// What a newcomer does next.
 const NEXT: &str = "next: say in pipeline.toml where your logs are and what their columns are called, and in \
@@ -37,11 +49,16 @@ pub(crate) fn init(args: &InitArgs, talk: &Talk) -> Result<Code, Failure> {
     if let Some(path) = there {
         return Err(exists(&path));
     }
-    let proposed = args.from.as_deref().map(|folder| proposed(folder, &args.dir)).transpose()?;
+    let [mut toml, mut table] = FILES.map(|(_, text)| text.to_owned());
+    if let Some(folder) = &args.from {
+        let logs = logs(folder)?;
+        let offer = propose(&logs[0]).map_err(|e| Failure::Refused(vec![e.complaint()]))?;
+        toml = proposed(folder, &args.dir, &logs[0], &offer)?;
+        table = stays(&logs, &offer).unwrap_or(table);
+    }
     fs::create_dir_all(&args.dir)?;
-    for (name, text) in FILES {
-        let text = proposed.as_deref().filter(|_| name == "pipeline.toml").unwrap_or(text);
-        write(&args.dir.join(name), text, talk)?;
+    for ((name, _), text) in FILES.iter().zip([toml, table]) {
+        write(&args.dir.join(name), &text, talk)?;
     }
     write(&args.dir.join(SCHEMA), &format!("{:#}\n", job::config::Document::schema()), talk)?;
     talk.note(if args.from.is_some() { NEXT_OF_PROPOSAL } else { NEXT });
@@ -58,26 +75,48 @@ fn write(path: &Path, text: &str, talk: &Talk) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The template with what the logs below a folder seem to offer; a person confirms it with `check`.
-fn proposed(folder: &Path, dir: &Path) -> Result<String, Failure> {
+/// Every Parquet file below a folder, one at least.
+fn logs(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let pattern = glob::Pattern::escape(&folder.to_string_lossy());
-    let found = glob::glob(&format!("{pattern}/**/*.parquet")).ok();
-    let Some(log) = found.and_then(|mut paths| paths.find_map(Result::ok)) else {
+    let found: Vec<PathBuf> =
+        glob::glob(&format!("{pattern}/**/*.parquet")).into_iter().flatten().flatten().collect();
+    if found.is_empty() {
         let what = format!("no Parquet log lies below {}", shown(folder));
         return Err(Failure::usage("no_log_matched", what, "name the folder that holds your logs"));
+    }
+    Ok(found)
+}
+
+/// A table with one unit in each position of each tail, named after its place, if logs tell of both.
+fn stays(logs: &[PathBuf], offer: &Proposal) -> Option<String> {
+    let by_folder = |log: &PathBuf| {
+        path_identity(log)?;
+        Some(log.parent()?.file_name()?.to_str()?.to_owned())
     };
-    let offer = propose(&log).map_err(|e| Failure::Refused(vec![e.complaint()]))?;
+    let named = offer.metadata.contains_key(&Fact::TailNumber);
+    let tail = |log: &PathBuf| if named { propose(log).ok()?.tail } else { by_folder(log) };
+    let is_plain = |name: &String| !name.contains(['"', ',', '#', '\n']);
+    let tails: BTreeSet<String> = logs.iter().take(MOST_LOGS).filter_map(tail).filter(is_plain).collect();
+    let positions = || offer.positions.iter().filter(|name| is_plain(name));
+    let row =
+        |tail: &String, position| format!("{tail},{position},EMA-27-1040,{tail} {position},1970-01-01,\n");
+    let rows: Vec<String> = tails.iter().flat_map(|t| positions().map(move |p| row(t, p))).collect();
+    (!rows.is_empty()).then(|| format!("{STAYS}{}", rows.concat()))
+}
+
+/// The template with what the logs below a folder seem to offer; a person confirms it with `check`.
+fn proposed(folder: &Path, dir: &Path, log: &Path, offer: &Proposal) -> Result<String, Failure> {
     let (head, rest) = TEMPLATE.split_once("# Which flight a log is.").unwrap_or((TEMPLATE, ""));
     let (_, tail) = rest.split_once("[estimate]").unwrap_or(("", rest));
     let here = dir == Path::new(".") || folder.is_absolute();
     let folder = if here { folder.to_owned() } else { std::path::absolute(folder)? };
     let files = format!("files = [{:?}]", format!("{}/**/*.parquet", shown(&folder)));
     let head = head.replace("files = [\"logs/**/*.parquet\"]", &files);
-    Ok(format!("{head}{}[estimate]{tail}", mapping(&offer, &shown(&log))))
+    Ok(format!("{head}{}[estimate]{tail}", mapping(offer, log)))
 }
 
 /// The part of a configuration that a proposal fills; what it could not tell is left to be said.
-fn mapping(offer: &Proposal, log: &str) -> String {
+fn mapping(offer: &Proposal, log: &Path) -> String {
     let positions: Vec<&str> = offer.positions.iter().map(String::as_str).collect();
     let positions = if positions.is_empty() { "none".to_owned() } else { positions.join(", ") };
     let others: Vec<&str> = offer.others.iter().take(12).map(String::as_str).collect();
@@ -89,8 +128,11 @@ fn mapping(offer: &Proposal, log: &str) -> String {
     let channels =
         channels.map(|(role, name, usual)| format!("\n[channel.{name}]\n{}", channel(offer, role, usual)));
     [
-        format!("# Proposed from {log}: names, units and signs are guesses until `freeplay check` agrees.\n"),
-        format!("# Positions found: {positions}.\n\n[identity]\n{}", identity(offer)),
+        format!(
+            "# Proposed from {}: names, units and signs are guesses until `freeplay check` agrees.\n",
+            shown(log)
+        ),
+        format!("# Positions found: {positions}.\n\n[identity]\n{}", identity(offer, log)),
         "# The zone of departures that do not name one.\ntime_zone = \"UTC\"\n".to_owned(),
         format!("\n[clock]\n{}", clock(offer)),
         channels.concat(),
@@ -103,12 +145,20 @@ fn mapping(offer: &Proposal, log: &str) -> String {
     .concat()
 }
 
-fn identity(offer: &Proposal) -> String {
+fn identity(offer: &Proposal, log: &Path) -> String {
     if offer.metadata.is_empty() {
-        return "# The footer says nothing of the flight: from the path, folders or columns?\n\
-                path = '(?<tail_number>[^/]+)/(?<departure_utc>\\d{8}T\\d{6}Z)[^/]*\\.parquet$'\n\
-                departure_format = \"%Y%m%dT%H%M%SZ\"\n"
-            .to_owned();
+        let found = path_identity(log);
+        let remark = match found {
+            Some(_) => "# The footer says nothing of the flight; the path seems to.\n",
+            None => "# Neither footer nor path says which flight it is: another path, folders or columns?\n",
+        };
+        let (path, format) = found.unwrap_or_else(|| {
+            (
+                r"(?<tail_number>[^/]+)/(?<departure_utc>\d{8}T\d{6}Z)[^/]*\.parquet$".to_owned(),
+                "%Y%m%dT%H%M%SZ",
+            )
+        });
+        return format!("{remark}path = '{path}'\ndeparture_format = \"{format}\"\n");
     }
     let facts: Vec<String> =
         offer.metadata.iter().map(|(fact, key)| format!("{} = {key:?}", fact.as_str())).collect();
