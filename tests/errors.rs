@@ -56,6 +56,15 @@ const CONFIGURATION: &[Slip] = &[
         "{ tail_nr = \"tail_number\", tail_number =",
         &["check"],
     ),
+    ("a store without a folder", "pipeline.toml", "path = \"results\"", "path = \"\"", &["run"]),
+    ("text without quotes", "pipeline.toml", "\"contact\"", "contact", &["check"]),
+    (
+        "a folder for a table",
+        "pipeline.toml",
+        "\"sample-data/installations.csv\"",
+        "\"sample-data\"",
+        &["check", LOG],
+    ),
     ("no installations", "pipeline.toml", "installations.csv", "installs.csv", &["check", LOG]),
 ];
 
@@ -70,6 +79,21 @@ const LOGS_AND_TABLES: &[Slip] = &[
         "tail_number = \"ac_reg\"",
         &["check", LOG],
     ),
+    (
+        "a departure in another form",
+        "pipeline.toml",
+        "departure_utc = \"departure_utc\"",
+        "departure_utc = \"flight_id\"",
+        &["check", LOG],
+    ),
+    (
+        "a departure that does not fit its form",
+        "pipeline.toml",
+        "[identity]",
+        "[identity]\ndeparture_format = \"%d.%m.%Y\"",
+        &["check", LOG],
+    ),
+    ("another word for the place", "pipeline.toml", "{position}_load_n", "{pos}_load_n", &["check", LOG]),
     ("part unknown", TABLE, "EMA-27-1040,1040-0005", "EMA-27-1041,1040-0005", &["check", LOG]),
     (
         "overlapping installations",
@@ -105,6 +129,8 @@ const ARGUMENTS: &[(&str, &[&str])] = &[
     ("no store to compare", &["diff", "results", "results-trial"]),
     ("no log of that name", &["check", "sample-data/logs/N412FP/1.parquet"]),
     ("a log cut short", &["check", "cut.parquet"]),
+    ("a folder for a log", &["check", "sample-data/logs"]),
+    ("a folder for the configuration", &["check", "--config", "sample-data"]),
     ("an empty log", &["check", "empty.parquet"]),
     ("a log that is no Parquet file", &["estimate", "text.parquet"]),
     ("init over something", &["init", "."]),

@@ -239,6 +239,9 @@ impl Fault {
                 "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`"
             }
             Self::Normalized { .. } => "make it again from the recorder's log: `freeplay normalize`",
+            Self::NoPosition { pattern, .. } if pattern.contains('{') && !pattern.contains(PLACEHOLDER) => {
+                return format!("the word that stands for a place is {PLACEHOLDER}");
+            }
             Self::NoPosition { pattern, columns } => {
                 let meant = columns.iter().map(|c| (strsim::jaro_winkler(pattern, c), c));
                 return match meant.max_by(|a, b| a.0.total_cmp(&b.0)) {
@@ -277,6 +280,7 @@ fn unreadable(source: &std::io::Error) -> String {
     match source.kind() {
         ErrorKind::NotFound => "there is no such file".into(),
         ErrorKind::PermissionDenied => "this user may not read the file".into(),
+        ErrorKind::IsADirectory => "this is a folder, not a file".into(),
         _ => format!("the file cannot be read: {source}"),
     }
 }
@@ -285,7 +289,8 @@ fn missing_remedy(source: &std::io::Error) -> String {
     match source.kind() {
         ErrorKind::NotFound => "is the name right, and the disk or share there?",
         ErrorKind::PermissionDenied => "who runs this command needs to read it: see its owner and mode",
-        _ => "is it a file, and the disk sound?",
+        ErrorKind::IsADirectory => "name the file, or the files in it: `FOLDER/*.parquet`",
+        _ => "is the disk sound?",
     }
     .into()
 }

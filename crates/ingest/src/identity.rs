@@ -127,15 +127,21 @@ pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp
         |detail: String| Fault::IdentityInvalid { fact: "departure_utc", found: text.to_owned(), detail };
     let local = match &mapping.departure_format {
         Some(format) => {
-            let parsed = jiff::fmt::strtime::parse(format, text).map_err(|e| invalid(e.to_string()))?;
+            let other = |_| invalid(format!("it does not fit `departure_format` = \"{format}\""));
+            let parsed = jiff::fmt::strtime::parse(format, text).map_err(other)?;
             if let Ok(instant) = parsed.to_timestamp() {
                 return Ok(instant);
             }
-            parsed.to_datetime().map_err(|e| invalid(e.to_string()))?
+            parsed.to_datetime().map_err(other)?
         }
         None => match text.parse::<Timestamp>() {
             Ok(instant) => return Ok(instant),
-            Err(_) => text.parse::<civil::DateTime>().map_err(|e| invalid(e.to_string()))?,
+            Err(_) => text.parse::<civil::DateTime>().map_err(|_| {
+                invalid(
+                    "it is no time such as 2026-11-19T04:13:00Z; `departure_format` says how others are read"
+                        .into(),
+                )
+            })?,
         },
     };
     let name = mapping.time_zone.as_deref();

@@ -23,6 +23,11 @@ use super::{booked, shown};
 /// How far the slope of screw on motor may be off 1 before it is called a mapping error.
 const SLOPE_TOLERANCE: f64 = 0.02;
 
+/// Rates at which actuators are logged; one beyond is more often a wrong unit of time.
+const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=20e3;
+/// A gap of which nobody speaks, m: a limit beyond it was given in another unit.
+const UNHEARD_OF_M: f64 = 0.01;
+
 /// What stands for the table of channels where no actuator could be looked at.
 const NOTHING: &str = "  no actuator could be looked at: see the errors\n";
 
@@ -32,6 +37,7 @@ const NOTHING: &str = "  no actuator could be looked at: see the errors\n";
 /// When configuration or tables are wrong. Logs in error make the code 1.
 pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
     let (config, installations) = booked(global)?;
+    doubt_limits(&config, talk);
     let logs = logs(args, &config, talk)?;
     let (mut channels, mut complaints, mut page) = (Vec::new(), Vec::new(), String::new());
     let mut schemas = Schemas::default();
@@ -62,6 +68,18 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
     }
     talk.complain_all(&complaints);
     Ok(if complaints.is_empty() { Code::Well } else { Code::LogsInError })
+}
+
+/// Asks after limits that were given in another unit.
+fn doubt_limits(config: &Config, talk: &Talk) {
+    for (number, part) in &config.document.part {
+        for (key, limit_m) in [("limit_m", part.limit_m), ("watch_m", part.watch_m)] {
+            if let Some(limit_m) = limit_m.filter(|limit_m| *limit_m > UNHEARD_OF_M) {
+                let meant = "keys are in metres: 150 µm is 150e-6";
+                talk.note(&format!("part {number}: is `{key}` = {limit_m} meant in another unit? {meant}"));
+            }
+        }
+    }
 }
 
 fn logs(args: &CheckArgs, config: &Config, talk: &Talk) -> Result<Vec<(Files, String)>, Failure> {
@@ -191,7 +209,9 @@ fn clock(a: &Actuator) -> String {
         .map(|(count, what)| format!("{count} {what}"))
         .collect();
     let mended = if mended.is_empty() { String::new() } else { format!("; mended: {}", mended.join(", ")) };
-    format!("{:.3} Hz, {stretches}{mended}", a.step_s.recip())
+    let rate_hz = a.step_s.recip();
+    let doubt = if USUAL_RATES_HZ.contains(&rate_hz) { "" } else { " (is `clock.unit` right?)" };
+    format!("{rate_hz:.3} Hz{doubt}, {stretches}{mended}")
 }
 
 fn actuator(

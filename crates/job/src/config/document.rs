@@ -226,6 +226,10 @@ impl Document {
                 .hint("files = [\"logs/**/*.parquet\"]");
             found.push(source.at(&["logs", "files"], c));
         }
+        if matches!(self.store.path.trim(), "" | ".") {
+            let c = Complaint::new("empty_name", "`store.path` names no folder of its own");
+            found.push(source.at(&["store", "path"], c.hint("path = \"results\"")));
+        }
         channel::check(&self.channel, &self.layout, &self.group, &["channel"], source, &mut found);
         check_clock(&self.clock, &["clock"], source, &mut found);
         check_layout(&self.layout, &["layout"], source, &mut found);

@@ -8,6 +8,7 @@ mod unknown;
 mod variant;
 
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -60,7 +61,13 @@ impl Config {
         let read = |file: &PathBuf| {
             let shown = file.display().to_string();
             let text = std::fs::read_to_string(file).map_err(|e| {
-                let what = format!("the configuration cannot be read: {e}");
+                let why = match e.kind() {
+                    ErrorKind::NotFound => "there is no such file".to_owned(),
+                    ErrorKind::IsADirectory => "this is a folder, not a file".to_owned(),
+                    ErrorKind::InvalidData => "it is no UTF-8 text".to_owned(),
+                    _ => e.to_string(),
+                };
+                let what = format!("the configuration cannot be read: {why}");
                 let hint = "`freeplay init` writes one; `--config FILE` or FREEPLAY_CONFIG names another";
                 vec![Complaint::new("config_unreadable", what).in_file(&shown).hint(hint)]
             })?;
