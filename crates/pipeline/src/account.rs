@@ -6,6 +6,7 @@ use fleet::{Complaint, GapRecord, Status};
 use jiff::Timestamp;
 use store::{LogAccount, Outcome, RunAccount};
 
+use crate::changed::Changed;
 use crate::innovations::Unlike;
 use crate::plan::{Plan, Work};
 use crate::recorder::Moved;
@@ -110,6 +111,8 @@ pub struct Report {
     pub workers: usize,
     /// Units whose records changed, with the statement made of each.
     pub trends: Vec<TrendRow>,
+    /// Those of them of which something else is said than without this run's records.
+    pub changed: Vec<Changed>,
     /// What came of each log; the last word on it counts, whoever was faster.
     #[serde(skip)]
     logs: BTreeMap<String, Counted>,
@@ -148,6 +151,7 @@ impl Report {
             took_s: 0.0,
             workers,
             trends: Vec::new(),
+            changed: Vec::new(),
             logs: BTreeMap::new(),
         }
     }

@@ -11,6 +11,7 @@ mod book;
 mod budget;
 pub mod bundle;
 pub mod elsewhere;
+pub mod changed;
 pub mod estimates;
 pub mod event;
 pub mod innovations;

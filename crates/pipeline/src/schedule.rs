@@ -112,7 +112,8 @@ pub(crate) fn night(
     let touched = work(&shop, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
-    report.trends = trends::of_units(config, &installations, &store, &touched)?;
+    (report.trends, report.changed) =
+        trends::of_units(config, &installations, &store, &touched, &report.run_id)?;
     (report.skew_moved, report.innovations_unlike) = look_back(&store, &report.trends)?;
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));

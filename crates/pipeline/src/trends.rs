@@ -11,6 +11,7 @@ use serde::Serialize;
 use store::{Query, Store};
 use trend::{Axis, FleetPrior, Observation, Series, Trend, Usage, classic};
 
+use crate::changed::{Changed, changed};
 use crate::error::Error;
 use crate::maintenance;
 use crate::unlogged::Unlogged;
@@ -80,6 +81,12 @@ pub struct TrendRow {
     pub sketch_m: Vec<f64>,
 }
 
+impl TrendRow {
+    pub(crate) fn name(&self) -> HistoryName {
+        (self.part_number.clone(), self.serial_number.clone())
+    }
+}
+
 /// A unit and a day.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AsOf {
@@ -132,7 +139,8 @@ pub fn of_store(
     of_histories(config, installations, &histories(flown), ask)
 }
 
-/// States what is known of units whose records changed, on the newest day in the store.
+/// States what is known of units whose records a run changed, on the newest day in the store, and what is
+/// otherwise than without that run's records. Where the store holds no others, nothing is.
 ///
 /// # Errors
 /// As [`of_store`].
@@ -141,15 +149,47 @@ pub fn of_units(
     installations: &Installations,
     store: &Store,
     units: &[Unit],
-) -> Result<Vec<TrendRow>, Error> {
+    run_id: &str,
+) -> Result<(Vec<TrendRow>, Vec<Changed>), Error> {
     if units.is_empty() {
-        return Ok(Vec::new());
+        return Ok(Default::default());
     }
-    let wanted: BTreeSet<(Option<&str>, &str)> =
-        units.iter().map(|(p, s)| (Some(p.as_str()), s.as_str())).collect();
-    let mut rows = of_store(config, installations, store, &Ask::default())?;
-    rows.retain(|row| wanted.contains(&(row.part_number.as_deref(), row.serial_number.as_str())));
-    Ok(rows)
+    let records = store.records(&Query::default())?.into_iter();
+    let (tonight, earlier): (Vec<GapRecord>, Vec<GapRecord>) =
+        records.partition(|r| r.provenance.run_id == run_id);
+    let flown = |records: Vec<GapRecord>| records.into_iter().map(|r| Flown::of(r, installations)).collect();
+    of_night(config, installations, flown(earlier), flown(tonight), units)
+}
+
+/// The same of flights that were known before a night, and those of the night.
+///
+/// # Errors
+/// As [`of_flown`].
+pub fn of_night(
+    config: &Config,
+    installations: &Installations,
+    earlier: Vec<Flown>,
+    tonight: Vec<Flown>,
+    units: &[Unit],
+) -> Result<(Vec<TrendRow>, Vec<Changed>), Error> {
+    let names: BTreeSet<HistoryName> =
+        units.iter().map(|(part, serial)| (Some(part.to_string()), serial.to_string())).collect();
+    let newest = |flown: &[Flown]| flown.iter().map(|f| f.departure_utc).max();
+    let before_utc = newest(&earlier);
+    let Some(as_of) = before_utc.max(newest(&tonight)) else { return Ok(Default::default()) };
+    let all = histories(earlier.iter().cloned().chain(tonight).collect());
+    let days: Vec<Timestamp> = before_utc.into_iter().chain([as_of]).collect();
+    let fleet = Fleet::new(config, installations, &all, &days)?;
+    let mut now = fleet.statements(names.iter(), as_of)?;
+    now.retain(|row| row.flights > 0);
+    let Some(before_utc) = before_utc else { return Ok((now, Vec::new())) };
+    let earlier: BTreeMap<HistoryName, Vec<Flown>> =
+        histories(earlier).into_iter().filter(|(name, _)| names.contains(name)).collect();
+    let fleet = Fleet { priors: fleet.priors, ..Fleet::read(config, installations, &earlier)? };
+    let before = fleet.statements(earlier.keys(), before_utc)?;
+    let before = before.into_iter().map(|row| (row.name(), row)).collect();
+    let news = changed(&before, &now);
+    Ok((now, news))
 }
 
 /// States what is known of the asked units of an estimates table made elsewhere.
@@ -338,6 +378,24 @@ impl<'a> Fleet<'a> {
         histories: &'a BTreeMap<HistoryName, Vec<Flown>>,
         days: &[Timestamp],
     ) -> Result<Self, Error> {
+        let mut fleet = Self::read(config, installations, histories)?;
+        let parts: BTreeSet<Option<&str>> = fleet.units.keys().map(|name| name.0.as_deref()).collect();
+        let months: BTreeSet<i64> = days.iter().map(|day| month_us(*day)).collect();
+        let taught: Vec<_> = months.par_iter().map(|month| (*month, fleet.taught(*month, &parts))).collect();
+        for (month, groups) in taught {
+            for (parts, prior) in groups {
+                fleet.priors.extend(parts.into_iter().map(|part| ((month, part), prior.clone())));
+            }
+        }
+        Ok(fleet)
+    }
+
+    /// Reads all histories and learns nothing.
+    fn read(
+        config: &'a Config,
+        installations: &Installations,
+        histories: &'a BTreeMap<HistoryName, Vec<Flown>>,
+    ) -> Result<Self, Error> {
         let file = config.document.logs.maintenance.as_ref();
         let book = file.map(|file| maintenance::read(&config.path(file))).transpose()?.unwrap_or_default();
         let unlogged = Unlogged::of_table(&config.flights);
@@ -353,16 +411,7 @@ impl<'a> Fleet<'a> {
             Ok((name, (flown, series)))
         };
         let units = histories.par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        let mut fleet = Self { config, units: units.into_iter().collect(), priors: BTreeMap::new() };
-        let parts: BTreeSet<Option<&str>> = fleet.units.keys().map(|name| name.0.as_deref()).collect();
-        let months: BTreeSet<i64> = days.iter().map(|day| month_us(*day)).collect();
-        let taught: Vec<_> = months.par_iter().map(|month| (*month, fleet.taught(*month, &parts))).collect();
-        for (month, groups) in taught {
-            for (parts, prior) in groups {
-                fleet.priors.extend(parts.into_iter().map(|part| ((month, part), prior.clone())));
-            }
-        }
-        Ok(fleet)
+        Ok(Self { config, units: units.into_iter().collect(), priors: BTreeMap::new() })
     }
 
     /// What the parts had taught by a month, those alike together.

@@ -189,3 +189,28 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
         assert!(without.rate_m_per_hour.unwrap() > 1.5 * truth);
     }
 }
+
+/// S03 wears on and nothing is new of it; S05 falls by 12 µm with the first flight of the last four weeks.
+#[test]
+fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
+    let nobody = Installations::new(Vec::new()).unwrap();
+    let mut all = flown(228);
+    for flight in all.iter_mut().filter(|f| f.serial_number == "S05" && f.departure_utc >= day(200)) {
+        flight.gap_m = flight.gap_m.map(|gap| gap - 12e-6);
+    }
+    let name = |serial: &str| {
+        (fleet::PartNumber::new("EMA-27-1040").unwrap(), fleet::SerialNumber::new(serial).unwrap())
+    };
+    let units = [name("S03"), name("S05")];
+    let (earlier, tonight): (Vec<Flown>, Vec<Flown>) =
+        all.iter().cloned().partition(|f| f.departure_utc < day(200));
+    let (now, news) = trends::of_night(&config(), &nobody, earlier, tonight, &units).unwrap();
+    assert_eq!(now.len(), 2);
+    let serials: Vec<&str> = news.iter().map(|unit| unit.serial_number.as_str()).collect();
+    assert_eq!(serials, ["S05"]);
+    assert_eq!(news[0].new_events.len(), 1, "{news:?}");
+    assert_eq!(news[0].new_events[0].departure_utc, day(200));
+    assert!(news[0].cleared_events.is_empty());
+    assert_eq!((news[0].from, news[0].to), (Some("normal"), Some("watch")));
+    assert!(trends::of_night(&config(), &nobody, Vec::new(), all, &units).unwrap().1.is_empty());
+}

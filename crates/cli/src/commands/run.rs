@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use fleet::{SerialNumber, TailNumber};
+use pipeline::changed::Changed;
 use pipeline::schedule::{self, Context};
 use pipeline::trends::{Ask, TrendRow};
 use pipeline::{Event, Plan, Report, Request};
@@ -21,6 +22,9 @@ use super::{VERSION, config, metrics};
 
 /// Flights with unlike innovations that are named in the account.
 const UNLIKE_SHOWN: usize = 5;
+
+/// Units of which something changed that are named in the account.
+const CHANGED_SHOWN: usize = 20;
 
 /// Runs the night's work.
 ///
@@ -248,6 +252,7 @@ fn account(report: &Report, config: &str, code: Code) -> String {
         );
     }
     page.push_str(&attention(&report.trends));
+    page.push_str(&news(&report.changed));
     if code == Code::LogsInError {
         page.push_str("exit 1: some logs are in error. After mending: `freeplay run --retry`\n");
     }
@@ -311,6 +316,37 @@ fn attention(rows: &[TrendRow]) -> String {
         page.push_str(&table::layout(&columns, &urgent.iter().map(cells).collect::<Vec<_>>()));
     }
     page
+}
+
+/// What tonight's flights changed, unit by unit.
+fn news(changed: &[Changed]) -> String {
+    if changed.is_empty() {
+        return String::new();
+    }
+    let mut page = format!("\nchanged by tonight's flights: {}\n", count(changed.len(), "unit"));
+    for unit in changed.iter().take(CHANGED_SHOWN) {
+        let part = unit.part_number.as_deref().unwrap_or("–");
+        let _ = writeln!(page, "  {} / {}: {}", escape(part), escape(&unit.serial_number), told(unit));
+    }
+    if let Some(more @ 1..) = changed.len().checked_sub(CHANGED_SHOWN) {
+        let _ = writeln!(page, "  and {more} more, all in `freeplay run --json`");
+    }
+    page
+}
+
+/// A unit's news in words.
+fn told(unit: &Changed) -> String {
+    let word = |state: Option<&'static str>| state.unwrap_or("no state");
+    let mut told = Vec::new();
+    if unit.from != unit.to {
+        let why = unit.reason.as_deref().map(|why| format!(" ({why})")).unwrap_or_default();
+        told.push(format!("{} → {}{why}", word(unit.from), word(unit.to)));
+    }
+    for (events, what) in [(&unit.new_events, "new"), (&unit.cleared_events, "cleared")] {
+        let day = |at: jiff::Timestamp| at.strftime("%Y-%m-%d").to_string();
+        told.extend(events.iter().map(|e| format!("{what}: {} of {}", e.kind, day(e.departure_utc))));
+    }
+    told.join("; ")
 }
 
 fn dry_run(config: &job::Config, request: &Request, talk: &Talk) -> Result<Code, Failure> {
