@@ -43,6 +43,7 @@ pub fn trends() -> SchemaRef {
             text("kind"),
             real("step_m"),
             real("step_se_m"),
+            real("certainty"),
         ]
         .into(),
     );

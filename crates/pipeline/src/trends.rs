@@ -32,6 +32,8 @@ pub struct ChangePoint {
     pub step_m: f64,
     /// Standard error of its size, m.
     pub step_se_m: f64,
+    /// Probability that it is one; 1 where the books say so.
+    pub certainty: f64,
 }
 
 /// One unit's statement, as the contract names its columns.
@@ -673,6 +675,7 @@ fn change_point(change: &trend::Change, flown: &[&Flown]) -> Option<ChangePoint>
         },
         step_m: change.step_m,
         step_se_m: change.se_m,
+        certainty: change.certainty,
     })
 }
 

@@ -2,6 +2,7 @@
 
 use crate::clean::{Clean, Estimate, clean};
 use crate::jump::{Jump, jumps};
+use crate::normal;
 use crate::posterior::Segment;
 use crate::prior::FleetPrior;
 use crate::series::{Booked, Flight};
@@ -73,7 +74,11 @@ impl History {
             ChangeKind::Step
         };
         let departure_us = flights[flight].departure_us;
-        self.changes.push(Change { departure_us, kind, step_m: jump.step_m, se_m: jump.se_m });
+        let certainty = match kind {
+            ChangeKind::Recorded => 1.0,
+            _ => normal::cdf(jump.step_m.abs() / jump.se_m),
+        };
+        self.changes.push(Change { departure_us, kind, step_m: jump.step_m, se_m: jump.se_m, certainty });
         let renewed = entries.any(|entry| entry.renews) && jump.step_m < 0.0;
         if kind == ChangeKind::Reset || renewed {
             self.begins.push(jump.at);
@@ -132,7 +137,7 @@ fn unseen<'a>(
     book.iter().filter(move |entry| !shown(entry)).filter_map(|entry| {
         let first = flights.get(flights.partition_point(|f| f.departure_us < entry.utc_us))?;
         let departure_us = first.departure_us;
-        Some(Change { departure_us, kind: ChangeKind::Recorded, step_m: 0.0, se_m: 0.0 })
+        Some(Change { departure_us, kind: ChangeKind::Recorded, step_m: 0.0, se_m: 0.0, certainty: 1.0 })
     })
 }
 

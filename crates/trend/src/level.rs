@@ -38,14 +38,15 @@ pub(crate) fn growth_probability(posterior: &Posterior) -> f64 {
     posterior.nodes.iter().map(|n| n.weight * normal::cdf((grown_m(n) - VISIBLE_M) / sd_m)).sum()
 }
 
-/// When wear began, in usage since the segment's begin, where most of the belief is in an onset.
-pub(crate) fn onset(posterior: &Posterior) -> Option<f64> {
+/// When wear began, in usage since the segment's begin, and the share of the belief that is in an onset,
+/// where that is most of it.
+pub(crate) fn onset(posterior: &Posterior) -> Option<(f64, f64)> {
     let starts = posterior.nodes.iter().filter_map(|n| match n.law {
         Law::Onset { start } => Some((start, n.weight)),
         _ => None,
     });
     let starts = Weighted::new(starts);
-    (starts.total > 0.5).then(|| starts.quantile(0.5))
+    (starts.total > 0.5).then(|| (starts.quantile(0.5), starts.total.min(1.0)))
 }
 
 /// The law most believed in, and how much.

@@ -144,6 +144,9 @@ pub struct Change {
     pub step_m: f64,
     /// Standard error of its size, metres; zero for an onset.
     pub se_m: f64,
+    /// Probability that it is one: of a step that it has the sign it is said to have, of an onset that
+    /// wear began at all, one where the books say so.
+    pub certainty: f64,
 }
 
 /// Kinds of change.
@@ -241,10 +244,11 @@ fn onset(
     flights: &[Flight],
     prior: &FleetPrior,
 ) -> Option<Change> {
-    let start = segment.begin + level::onset(posterior)?;
+    let (after, certainty) = level::onset(posterior)?;
+    let start = segment.begin + after;
     let first = flights.partition_point(|flight| prior.usage(flight) < start);
     let departure_us = flights.get(first)?.departure_us;
-    Some(Change { departure_us, kind: ChangeKind::Onset, step_m: 0.0, se_m: 0.0 })
+    Some(Change { departure_us, kind: ChangeKind::Onset, step_m: 0.0, se_m: 0.0, certainty })
 }
 
 fn wear(growth_probability: Option<f64>) -> Wear {

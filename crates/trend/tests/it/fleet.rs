@@ -215,6 +215,7 @@ fn wear_that_begins_late_is_an_onset_and_no_step() {
     let [change] = found[..] else { panic!("{found:?}") };
     assert_eq!(change.kind, ChangeKind::Onset);
     assert!((change.departure_us - 125 * DAY_US).abs() < 20 * DAY_US, "{change:?}");
+    assert!(change.certainty > 0.5 && change.certainty <= 1.0, "{change:?}");
 }
 
 #[test]
