@@ -64,6 +64,9 @@ impl From<pipeline::Error> for Failure {
         match error {
             pipeline::Error::Refused(complaints) => Self::Refused(complaints),
             pipeline::Error::Store(error) => error.into(),
+            pipeline::Error::Objects(error) => {
+                Self::failed(Complaint::new(error.code(), &error).hint(error.remedy()))
+            }
             other => Self::failed(Complaint::new("run_failed", other)),
         }
     }

@@ -39,6 +39,9 @@ pub enum Fault {
         #[source]
         source: std::io::Error,
     },
+    /// It lies in an object store, which does not give it.
+    #[error(transparent)]
+    Object(#[from] objects::Error),
     /// It has no bytes, or no rows.
     #[error("the log holds no rows")]
     Empty,
@@ -115,6 +118,7 @@ impl Fault {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Unreadable { .. } => "unreadable",
+            Self::Object(source) => source.code(),
             Self::Empty => "empty_log",
             Self::NotParquet { .. } => "not_parquet",
             Self::Decode { .. } => "decode_failed",
@@ -210,6 +214,7 @@ impl Fault {
     fn remedy(&self) -> String {
         let text = match self {
             Self::Unreadable { source } => return missing_remedy(source),
+            Self::Object(source) => return source.remedy().into(),
             Self::Empty => {
                 "was the recorder on? Such a file can be deleted or left; it is not tried again until it changes"
             }

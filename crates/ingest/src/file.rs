@@ -1,6 +1,8 @@
 //! One Parquet file: its leaves by name, their values in batches, checked against the footer.
 
 use std::fs::File;
+use std::iter::once;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use arrow::array::ArrayRef;
@@ -17,19 +19,24 @@ use crate::leaf::{self, Leaf};
 use crate::page;
 use crate::pattern::nearest;
 use crate::positioned::{self, Positioned};
+use crate::source::Source;
 
 /// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
 const BATCH_ROWS: usize = 8192;
 
+/// So much of an object's end is fetched at first: most footers are shorter.
+const USUAL_FOOTER: u64 = 64 << 10;
+
 /// Why a footer could not be read: what the file begins with tells more than where its reader gave up.
-fn torn(file: &File, error: &ParquetError) -> String {
+fn torn(source: &Source, error: &ParquetError) -> String {
     let mut head = [0; 4];
-    match (positioned::read_at(file, &mut head, 0), &head) {
-        (Ok(4), b"PAR1") => {
+    let length = source.want(once(0..4)).map(|()| positioned::read_at(source.file(), &mut head, 0));
+    match (length, &head) {
+        (Ok(Ok(4)), b"PAR1") => {
             let detail = error.to_string();
             format!("its end is torn ({})", detail.trim_start_matches("Parquet error: "))
         }
-        (Ok(4), b"PARE") => "it is encrypted".into(),
+        (Ok(Ok(4)), b"PARE") => "it is encrypted".into(),
         _ => "it does not begin as one".into(),
     }
 }
@@ -38,7 +45,7 @@ fn torn(file: &File, error: &ParquetError) -> String {
 #[derive(Debug)]
 pub(crate) struct LogFile {
     path: PathBuf,
-    file: File,
+    source: Source,
     footer: ArrowReaderMetadata,
     leaves: Vec<Leaf>,
 }
@@ -46,7 +53,8 @@ pub(crate) struct LogFile {
 impl LogFile {
     pub(crate) fn open(path: &Path) -> Result<Self, Error> {
         let fail = |fault| Error::new(path, fault);
-        let file = File::open(path).map_err(|source| fail(Fault::Unreadable { source }))?;
+        let source = Source::open(path).map_err(fail)?;
+        let file = source.file();
         let length = file.metadata().map_err(|source| fail(Fault::Unreadable { source }))?;
         if length.is_dir() {
             let source = std::io::Error::from(std::io::ErrorKind::IsADirectory);
@@ -55,12 +63,13 @@ impl LogFile {
         if length.len() == 0 {
             return Err(fail(Fault::Empty));
         }
+        want_footer(&source, length.len()).map_err(fail)?;
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let footer = ArrowReaderMetadata::load(&file, options)
-            .map_err(|e| fail(Fault::NotParquet { detail: torn(&file, &e) }))?;
+        let footer = ArrowReaderMetadata::load(file, options)
+            .map_err(|e| fail(Fault::NotParquet { detail: torn(&source, &e) }))?;
         let leaves = leaf::leaves(footer.schema().fields());
-        let opened = Self { path: path.to_owned(), file, footer, leaves };
+        let opened = Self { path: path.to_owned(), source, footer, leaves };
         if opened.rows() == 0 {
             return Err(opened.error(Fault::Empty));
         }
@@ -138,6 +147,7 @@ impl LogFile {
         mut take: impl FnMut(&[&str], Vec<leaf::Flat>) -> Result<(), Fault>,
     ) -> Result<(), Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
+        self.want(&leaves)?;
         let mut rows = 0;
         for group in 0..self.footer.metadata().num_row_groups() {
             self.check_pages(group, &leaves)?;
@@ -185,7 +195,8 @@ impl LogFile {
     }
 
     fn column(&self, group: usize, leaf: &Leaf) -> Result<Batches, Error> {
-        let file = self.file.try_clone().map_err(|source| self.error(Fault::Unreadable { source }))?;
+        let file =
+            self.source.file().try_clone().map_err(|source| self.error(Fault::Unreadable { source }))?;
         let builder =
             ParquetRecordBatchReaderBuilder::new_with_metadata(Positioned(file), self.footer.clone());
         let mask = ProjectionMask::leaves(builder.parquet_schema(), [leaf.index]);
@@ -196,7 +207,7 @@ impl LogFile {
     fn check_pages(&self, group: usize, leaves: &[&Leaf]) -> Result<(), Error> {
         let rows = self.footer.metadata().row_group(group).num_rows();
         for leaf in leaves {
-            page::bounded(&self.file, self.chunk(group, leaf), rows)
+            page::bounded(self.source.file(), self.chunk(group, leaf), rows)
                 .map_err(|detail| self.decode(leaf, group, detail))?;
         }
         Ok(())
@@ -205,10 +216,11 @@ impl LogFile {
     /// Whether every page of these leaves carries a checksum.
     pub(crate) fn is_checked(&self, names: &[&str]) -> Result<bool, Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
+        self.want(&leaves)?;
         for group in 0..self.footer.metadata().num_row_groups() {
             let rows = self.footer.metadata().row_group(group).num_rows();
             for leaf in &leaves {
-                let checked = page::bounded(&self.file, self.chunk(group, leaf), rows);
+                let checked = page::bounded(self.source.file(), self.chunk(group, leaf), rows);
                 if !checked.map_err(|detail| self.decode(leaf, group, detail))? {
                     return Ok(false);
                 }
@@ -219,6 +231,13 @@ impl LogFile {
 
     fn chunk(&self, group: usize, leaf: &Leaf) -> &ColumnChunkMetaData {
         self.footer.metadata().row_group(group).column(leaf.index)
+    }
+
+    /// Has every chunk of these leaves at hand.
+    fn want(&self, leaves: &[&Leaf]) -> Result<(), Error> {
+        let groups = 0..self.footer.metadata().num_row_groups();
+        let chunks = groups.flat_map(|group| leaves.iter().map(move |leaf| self.chunk(group, leaf)));
+        self.source.want(chunks.map(range_of)).map_err(|fault| self.error(fault))
     }
 
     fn decode(&self, leaf: &Leaf, group: usize, detail: String) -> Error {
@@ -232,10 +251,11 @@ impl LogFile {
     /// whatever else was added to it.
     pub(crate) fn feed(&self, names: &[&str], hash: &mut blake3::Hasher) -> Result<(), Error> {
         let unreadable = |source| self.error(Fault::Unreadable { source });
-        let file = &self.file;
+        let file = self.source.file();
         let length = file.metadata().map_err(unreadable)?.len();
         let mut buffer = Vec::new();
         let wanted: Vec<&Leaf> = self.leaves.iter().filter(|l| names.contains(&l.name.as_str())).collect();
+        self.want(&wanted)?;
         for group in 0..self.footer.metadata().num_row_groups() {
             for leaf in &wanted {
                 let (start, bytes) = self.chunk(group, leaf).byte_range();
@@ -249,6 +269,22 @@ impl LogFile {
 }
 
 type Batches = parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+
+/// Where a chunk's pages lie, as its footer has it.
+fn range_of(chunk: &ColumnChunkMetaData) -> Range<u64> {
+    let (start, bytes) = chunk.byte_range();
+    start..start.saturating_add(bytes)
+}
+
+/// Has the footer at hand, however long it is.
+fn want_footer(source: &Source, length: u64) -> Result<(), Fault> {
+    source.want(once(length.saturating_sub(USUAL_FOOTER)..length))?;
+    match footer_bytes(source.file(), length) {
+        Ok(footer) => source.want(once(length - footer..length)),
+        // Shorter than a trailer: what reads the footer says so.
+        Err(_) => Ok(()),
+    }
+}
 
 /// Metadata length, which its own trailer states, plus the eight bytes of that trailer.
 fn footer_bytes(file: &File, length: u64) -> std::io::Result<u64> {

@@ -121,8 +121,7 @@ impl Flights {
 
     /// The row whose path the log's own path ends in, folder by folder.
     fn of_path(&self, path: &Path) -> Option<usize> {
-        let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        let text = whole.to_string_lossy().replace('\\', "/");
+        let text = crate::identity::absolute(path).to_string_lossy().replace('\\', "/");
         let mut rest = text.as_str();
         loop {
             if let Some(&row) = self.by_path.get(rest) {

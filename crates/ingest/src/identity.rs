@@ -1,7 +1,7 @@
 //! Which flight a log is: from its metadata, its constant columns or its path, in that order.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use fleet::{FlightId, Position, TailNumber};
 use jiff::{Timestamp, civil, tz::TimeZone};
@@ -41,16 +41,24 @@ pub(crate) fn from_path(path: &Path, expression: &str) -> Result<Facts, Fault> {
         detail: e.to_string(),
     })?;
     // The same log must be the same flight wherever the command was typed, and on whichever system.
-    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let whole = absolute(path);
     let text = whole.to_string_lossy().replace('\\', "/");
     let Some(groups) = regex.captures(&text) else { return Ok(Facts::new()) };
     let named = |fact: &Fact| Some((*fact, groups.name(fact.as_str())?.as_str().to_owned()));
     Ok(Fact::ALL.iter().filter_map(named).collect())
 }
 
+/// The whole path; an address is whole as it is.
+pub(crate) fn absolute(path: &Path) -> PathBuf {
+    if objects::is_address(path) {
+        return path.to_owned();
+    }
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
 /// The facts that folders called `name=value` hold, as Hive partitions are; the innermost wins.
 pub(crate) fn from_folders(path: &Path, folders: &BTreeMap<Fact, String>) -> Facts {
-    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let whole = absolute(path);
     let named: BTreeMap<String, String> = whole
         .parent()
         .into_iter()

@@ -33,6 +33,7 @@ mod scan;
 pub mod schema;
 pub mod screw;
 mod sheet;
+mod source;
 pub mod tables;
 pub mod unit;
 pub mod write;

@@ -1,6 +1,7 @@
 //! The tables a user gives beside the logs: read as text from CSV or Parquet, then checked cell by cell.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -13,6 +14,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::error::{Error, Fault};
 use crate::pattern::nearest;
+use crate::source::whole;
 
 /// A small table, every cell text; an empty cell is none.
 #[derive(Debug, Clone, PartialEq)]
@@ -257,7 +259,8 @@ fn read_csv(file: &Path) -> Result<Cells, Fault> {
         let row = e.position().map(csv::Position::record);
         Fault::Table { row, column: None, detail: e.to_string() }
     };
-    let text = std::fs::read(file).map_err(|source| Fault::Unreadable { source })?;
+    let mut text = Vec::new();
+    whole(file)?.read_to_end(&mut text).map_err(|source| Fault::Unreadable { source })?;
     // Spreadsheets open their UTF-8 with a byte order mark.
     let text = text.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&text);
     let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text);
@@ -272,8 +275,7 @@ fn read_csv(file: &Path) -> Result<Cells, Fault> {
 
 fn read_parquet(file: &Path) -> Result<Cells, Fault> {
     let torn = |e: String| Fault::NotParquet { detail: e };
-    let open = std::fs::File::open(file).map_err(|source| Fault::Unreadable { source })?;
-    let reader = ParquetRecordBatchReaderBuilder::try_new(open).map_err(|e| torn(e.to_string()))?;
+    let reader = ParquetRecordBatchReaderBuilder::try_new(whole(file)?).map_err(|e| torn(e.to_string()))?;
     let header: Vec<String> = reader.schema().fields().iter().map(|f| f.name().clone()).collect();
     let mut rows: Vec<Vec<Option<String>>> = Vec::new();
     for batch in reader.build().map_err(|e| torn(e.to_string()))? {

@@ -10,6 +10,7 @@ use job::flight::{identify, identify_companion};
 use rayon::prelude::*;
 
 use crate::error::Error;
+use crate::remote::{self, Seen};
 
 /// The logs that fit the patterns.
 #[derive(Debug, Clone, Default)]
@@ -20,6 +21,8 @@ pub struct Found {
     pub faulty: BTreeMap<String, (PathBuf, Complaint)>,
     /// Files of groups whose flight has no main log.
     pub strays: Vec<String>,
+    /// What listings of object stores told of them, by address.
+    pub(crate) seen: Seen,
 }
 
 /// Every log that fits the patterns, by the shown name of its first file.
@@ -27,16 +30,18 @@ pub struct Found {
 /// # Errors
 /// [`Error::Refused`] when a pattern fits no file, or is no pattern.
 pub fn find(config: &Config) -> Result<Found, Error> {
-    let main = matching(config, &config.document.logs.files)?;
+    let mut seen = Seen::new();
+    let main = matching(config, &config.document.logs.files, &mut seen)?;
     let mut companions = Vec::new();
     for (name, group) in &config.document.group {
-        companions.extend(matching(config, &group.files)?.into_iter().map(|file| (name.as_str(), file)));
+        companions
+            .extend(matching(config, &group.files, &mut seen)?.into_iter().map(|file| (name.as_str(), file)));
     }
     if companions.is_empty() && !config.document.logs.pieces {
         let logs = main.into_iter().map(|(shown, path)| (shown, Files::one(path))).collect();
-        return Ok(Found { logs, ..Found::default() });
+        return Ok(Found { logs, seen, ..Found::default() });
     }
-    Ok(join(config, main, companions))
+    Ok(Found { seen, ..join(config, main, companions) })
 }
 
 /// The whole log that a file given by hand belongs to.
@@ -47,7 +52,10 @@ pub fn around(config: &Config, path: &Path) -> Result<Files, Error> {
     if config.document.group.is_empty() && !config.document.logs.pieces {
         return Ok(Files::one(path));
     }
-    let same = |other: &PathBuf| std::fs::canonicalize(other).ok() == std::fs::canonicalize(path).ok();
+    let same = |other: &PathBuf| {
+        let whole = |path: &Path| std::fs::canonicalize(path).ok();
+        other == path || whole(other).is_some_and(|other| Some(other) == whole(path))
+    };
     let found = find(config)?.logs.into_values().find(|files| files.all().any(same));
     Ok(found.unwrap_or_else(|| Files::one(path)))
 }
@@ -115,7 +123,7 @@ fn belongs((flight, position): &Who, (main, main_position): &Who) -> bool {
 }
 
 /// Files that fit some patterns, each by its shown name, in order of it.
-fn matching(config: &Config, patterns: &[String]) -> Result<Vec<(String, PathBuf)>, Error> {
+fn matching(config: &Config, patterns: &[String], seen: &mut Seen) -> Result<Vec<(String, PathBuf)>, Error> {
     let mut found = BTreeMap::new();
     let mut silent = BTreeSet::new();
     // `**` reaches our own results and tables, which are no logs.
@@ -123,15 +131,30 @@ fn matching(config: &Config, patterns: &[String]) -> Result<Vec<(String, PathBuf
     let tables: Vec<PathBuf> =
         std::iter::once(&logs.installations).chain(&logs.flights).map(|table| config.path(table)).collect();
     let store = config.store();
+    let ours = |path: &PathBuf| path.starts_with(&store) || tables.contains(path);
+    let invalid = |pattern: &str, e: &dyn std::fmt::Display| {
+        let what = format!("`{pattern}` is no pattern of files: {e}");
+        Error::refused(config.at(pattern, Complaint::new("bad_pattern", what)))
+    };
     for pattern in patterns {
+        if objects::is_address(pattern) {
+            let before = found.len();
+            let listed = remote::each(pattern, |entry| {
+                if !ours(&entry.path) {
+                    found.insert(shown(config, &entry.path), entry.path.clone());
+                    seen.insert(entry.path.clone(), entry.into());
+                }
+            })?;
+            listed.map_err(|e| invalid(pattern, &e))?;
+            if found.len() == before {
+                silent.insert(pattern.as_str());
+            }
+            continue;
+        }
         // The folder's own name may hold brackets; only what the user wrote is a pattern.
         let folder = glob::Pattern::escape(&config.folder.to_string_lossy());
         let full = Path::new(&folder).join(pattern);
-        let paths = glob::glob(&full.to_string_lossy()).map_err(|e| {
-            let what = format!("`{pattern}` is no pattern of files: {}", e.msg);
-            Error::refused(config.at(pattern, Complaint::new("bad_pattern", what)))
-        })?;
-        let ours = |path: &PathBuf| path.starts_with(&store) || tables.contains(path);
+        let paths = glob::glob(&full.to_string_lossy()).map_err(|e| invalid(pattern, &e.msg))?;
         let files: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file() && !ours(path)).collect();
         if files.is_empty() {
             silent.insert(pattern.as_str());

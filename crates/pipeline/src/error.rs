@@ -11,6 +11,9 @@ pub enum Error {
     /// The store cannot be read or written: what was stored before is intact.
     #[error(transparent)]
     Store(#[from] store::Error),
+    /// An object store does not answer.
+    #[error(transparent)]
+    Objects(#[from] objects::Error),
     /// A history or a limit cannot be judged.
     #[error("a trend cannot be stated: {0}")]
     Trend(#[from] trend::Error),

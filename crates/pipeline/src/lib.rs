@@ -20,6 +20,7 @@ pub mod normalize;
 pub mod pages;
 pub mod plan;
 pub mod recorder;
+mod remote;
 pub mod report;
 pub mod rows;
 pub mod schedule;

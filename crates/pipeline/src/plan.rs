@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use store::{LogAccount, Outcome, RecordKey};
 
 use crate::bundle::Found;
+use crate::remote::Seen;
 
 /// What is asked of a run.
 #[derive(Debug, Clone, Default)]
@@ -70,6 +71,8 @@ pub enum Why {
     OwnerGone,
     /// It was in error, and `--retry` asks for it.
     Retry,
+    /// It could not be fetched from its object store before.
+    Unfetched,
     /// `--redo` asks for it.
     Asked,
     /// `--verify-content` asks whether it is still what was read.
@@ -85,6 +88,7 @@ impl Why {
             Self::SettingChanged => "setting changed",
             Self::OwnerGone => "its flight has no other log now",
             Self::Retry => "in error, asked again",
+            Self::Unfetched => "could not be fetched before",
             Self::Asked => "asked again",
             Self::Verify => "content to be compared",
         }
@@ -98,12 +102,15 @@ pub struct FileStat {
     pub size_bytes: i64,
     /// Nanoseconds since 1970 UTC.
     pub modified_utc_ns: i64,
-    /// Device and inode where the system has them.
+    /// Device and inode where the system has them; an object's e-tag.
     pub file_id: String,
 }
 
 impl FileStat {
-    fn of(path: &Path) -> Option<Self> {
+    fn of(path: &Path, seen: &Seen) -> Option<Self> {
+        if objects::is_address(path) {
+            return seen.get(path).cloned();
+        }
         let data = std::fs::metadata(path).ok()?;
         let modified = data.modified().ok().and_then(|m| m.duration_since(std::time::UNIX_EPOCH).ok());
         Some(Self {
@@ -114,8 +121,8 @@ impl FileStat {
     }
 
     /// Of all files of a log: one that differs makes the whole differ.
-    fn of_log(files: &Files) -> Option<Self> {
-        let mut stats = files.all().map(|path| Self::of(path));
+    fn of_log(files: &Files, seen: &Seen) -> Option<Self> {
+        let mut stats = files.all().map(|path| Self::of(path, seen));
         let first = stats.next()??;
         stats.try_fold(first, |whole, next| {
             let next = next?;
@@ -198,7 +205,7 @@ pub fn plan(
     accounts: Vec<LogAccount>,
     request: &Request,
 ) -> Plan {
-    let strays = found.strays;
+    let (strays, seen) = (found.strays, found.seen);
     let mut logs: BTreeMap<String, (Files, Option<Complaint>)> =
         found.logs.into_iter().map(|(shown, files)| (shown, (files, None))).collect();
     let faulty = |(shown, (path, complaint)): (String, (PathBuf, Complaint))| {
@@ -211,7 +218,8 @@ pub fn plan(
     let accounts: BTreeMap<String, LogAccount> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
     let owned: HashSet<RecordKey> = accounts.values().flat_map(LogAccount::owned).collect();
     let unidentified = job::flight::unidentified_digest(config, installations);
-    let judge = Judge { config, installations, request, owned: &owned, unidentified: &unidentified };
+    let judge =
+        Judge { config, installations, request, owned: &owned, unidentified: &unidentified, seen: &seen };
     let verdicts: Vec<Verdict> =
         found.par_iter().map(|(shown, log)| judge.judge(shown, log, accounts.get(shown))).collect();
     let not_asked = verdicts.iter().filter(|v| matches!(v, Verdict::NotAsked)).count();
@@ -270,6 +278,7 @@ struct Judge<'a> {
     request: &'a Request,
     owned: &'a HashSet<RecordKey>,
     unidentified: &'a str,
+    seen: &'a Seen,
 }
 
 impl Judge<'_> {
@@ -279,7 +288,7 @@ impl Judge<'_> {
         (files, fault): &(Files, Option<Complaint>),
         before: Option<&LogAccount>,
     ) -> Verdict {
-        let stat = FileStat::of_log(files);
+        let stat = FileStat::of_log(files, self.seen);
         let Some(why) = self.reason(before, stat.as_ref()) else { return Verdict::Known };
         // A log that cannot be identified is done whatever was asked, or its fault would never be told.
         let flight = || {
@@ -313,6 +322,8 @@ impl Judge<'_> {
             Some(Why::SettingChanged)
         } else if self.is_orphan(account) {
             Some(Why::OwnerGone)
+        } else if account.error_code.as_deref().is_some_and(objects::Error::is_passing) {
+            Some(Why::Unfetched)
         } else if self.request.retry && account.outcome == Outcome::Error {
             Some(Why::Retry)
         } else if self.request.verify_content && account.outcome.is_well() {

@@ -65,8 +65,10 @@ pub fn installations(config: &Config) -> Result<Installations, Error> {
 /// # Errors
 /// As [`run`], except that no store is needed.
 pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
-    let accounts =
-        if config.store().exists() { Store::open(config.store())?.accounts()? } else { Vec::new() };
+    let accounts = match Store::open(config.store()) {
+        Err(store::Error::Missing { .. }) => Vec::new(),
+        store => store?.accounts()?,
+    };
     Ok(plan::plan(config, &installations(config)?, bundle::find(config)?, accounts, request))
 }
 

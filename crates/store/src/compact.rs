@@ -118,7 +118,7 @@ impl Plan {
             let rows = self.rows(&files, schema, &slice)?;
             for first in (0..rows.num_rows()).step_by(FILE_ROWS) {
                 let part = rows.slice(first, FILE_ROWS.min(rows.num_rows() - first));
-                change.add.push(datafile::write(table.dir(), snapshot.version + 1, &part, false)?);
+                change.add.push(datafile::write(&table.place, snapshot.version + 1, &part, false)?);
             }
         }
         Ok(change)

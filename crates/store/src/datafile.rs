@@ -12,8 +12,8 @@ use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::properties::WriterProperties;
 
-use crate::durable;
 use crate::error::Error;
+use crate::place::Place;
 use crate::stats;
 
 /// Rows of a row group: small enough that one tail's history decodes little of a big file.
@@ -26,16 +26,16 @@ const DIGEST_DIGITS: usize = 64;
 ///
 /// The version the file is made for stands first in its name: the same content written again later
 /// is another file, since Delta cannot remove and add one name in one commit.
-pub(crate) fn write(dir: &Path, version: u64, batch: &RecordBatch, data_change: bool) -> Result<Add, Error> {
+pub(crate) fn write(
+    place: &Place,
+    version: u64,
+    batch: &RecordBatch,
+    data_change: bool,
+) -> Result<Add, Error> {
     let content = encode(batch)?;
     let name = format!("{version:012}-{}.parquet", blake3::hash(&content).to_hex());
-    let path = dir.join(&name);
-    match durable::create(&path, &content) {
-        Ok(()) => {}
-        // An attempt that was cut short left the same content under the same name.
-        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
-        Err(e) => return Err(Error::io(path, "written")(e)),
-    }
+    // An attempt that was cut short may have left the same content under the same name.
+    place.create(&place.dir().join(&name), &content)?;
     Ok(Add {
         path: name,
         size: content.len() as i64,

@@ -40,6 +40,9 @@ pub enum Error {
     /// A data file is not the one that was committed.
     #[error("a data file is damaged: its digest is {}…, and {}… was committed", short(found), short(wanted))]
     Damaged { path: PathBuf, found: String, wanted: String },
+    /// The bucket it lies in does not give or take a file.
+    #[error(transparent)]
+    Object(#[from] objects::Error),
     /// A column is not there or has another type.
     #[error("column `{column}` {problem}")]
     Column { column: String, problem: String },
@@ -78,6 +81,7 @@ impl Error {
             Self::Io { .. } => "store_io",
             Self::Table { .. } => "store_table",
             Self::Damaged { .. } => "store_damaged",
+            Self::Object(error) => error.code(),
             Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) => "store_value",
             Self::Frame(_) | Self::Parquet(_) => "store_unreadable",
         }
@@ -114,6 +118,7 @@ impl Error {
                  one, remove it and run its logs again"
             }
             Self::Table { .. } => "is the disk full, or does another program write into this table?",
+            Self::Object(error) => error.remedy(),
             Self::Damaged { .. } => {
                 "restore this file from a backup; without one, remove the store and run its logs again"
             }

@@ -7,12 +7,12 @@ use std::time::Duration;
 
 use fleet::GapRecord;
 use serde::{Deserialize, Serialize};
-use tokio::runtime::{Builder, Runtime};
 
 use crate::account::{LogAccount, RunAccount};
 use crate::error::Error;
 use crate::lock::{Holder, Lock};
 use crate::numbered;
+use crate::place::Place;
 use crate::table::Table;
 use crate::writer::Writer;
 use crate::{datafile, durable, tabled};
@@ -35,7 +35,8 @@ struct Mark {
 /// A store, open for reading.
 #[derive(Debug, Clone)]
 pub struct Store {
-    dir: PathBuf,
+    pub(crate) place: Place,
+    named: PathBuf,
     pub(crate) gaps: Table,
     pub(crate) logs: Table,
     pub(crate) runs: Table,
@@ -52,13 +53,21 @@ impl Store {
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, Error> {
         let dir = dir.as_ref();
         let missing = || Error::Missing { dir: dir.to_owned() };
-        match first_entry(dir)? {
-            None => return Err(missing()),
-            Some(found) => drop(check_mark(dir, &found)?),
+        if !objects::is_address(dir) && !is_there(dir)? {
+            return Err(missing());
         }
-        let store = Self::at(dir)?;
-        let whole = store.tables().iter().all(|table| table.exists());
-        if whole { Ok(store) } else { Err(missing()) }
+        let place = Place::at(check_name(dir)?)?;
+        match first_entry(&place)? {
+            None => return Err(missing()),
+            Some(found) => drop(check_mark(&place, &found)?),
+        }
+        let store = Self::at(place);
+        for table in store.tables() {
+            if !table.exists()? {
+                return Err(missing());
+            }
+        }
+        Ok(store)
     }
 
     /// Opens a store, and makes it where the folder is missing or empty.
@@ -67,51 +76,57 @@ impl Store {
     /// As [`Store::open`], except that a missing store is made; [`Error::Io`] when it cannot be.
     pub fn create_or_open(dir: impl AsRef<Path>) -> Result<Self, Error> {
         let dir = dir.as_ref();
-        match first_entry(dir)? {
-            None => make_mark(dir)?,
-            Some(found) => drop(check_mark(dir, &found)?),
+        check_name(dir)?;
+        if !objects::is_address(dir) {
+            make_folder(dir)?;
         }
-        let store = Self::at(dir)?;
+        let place = Place::at(dir)?;
+        match first_entry(&place)? {
+            None => write_mark(&place)?,
+            Some(found) => drop(check_mark(&place, &found)?),
+        }
+        let store = Self::at(place);
         for table in store.tables() {
-            if table.exists() {
+            if table.exists()? {
                 table.renew()?;
             } else {
                 table.create()?;
             }
         }
-        durable::sync_dir(&store.dir).map_err(Error::io(&store.dir, "synced"))?;
+        store.place.sync()?;
         Ok(store)
     }
 
     /// Takes the store for writing, and waits for another writer as long as is allowed.
     ///
+    /// A bucket has no lock: there every commit is refused that another one came before, and is planned anew.
+    ///
     /// # Errors
     /// [`Error::Held`] names who holds it; [`Error::Io`] when the folder cannot be written.
     pub fn lock(&self, holder: &Holder, wait: Option<Duration>) -> Result<Writer, Error> {
-        let lock = Lock::take(&self.lock_file(), holder, wait)?;
-        if check_mark(&self.dir, MARK)? < FORMAT {
-            write_mark(&self.dir)?;
+        let lock = self.lock_file().map(|file| Lock::take(&file, holder, wait)).transpose()?;
+        if check_mark(&self.place, MARK)? < FORMAT {
+            write_mark(&self.place)?;
         }
         Ok(Writer::new(self.clone(), lock))
     }
 
-    pub(crate) fn lock_file(&self) -> PathBuf {
-        self.dir.join(LOCK)
+    /// The lock's file; none in a bucket.
+    pub(crate) fn lock_file(&self) -> Option<PathBuf> {
+        (!self.place.is_bucket()).then(|| self.place.dir().join(LOCK))
     }
 
-    /// The folder.
+    /// The folder, or the address.
     pub fn dir(&self) -> &Path {
-        &self.dir
+        &self.named
     }
 
-    fn at(dir: &Path) -> Result<Self, Error> {
-        let dir = std::fs::canonicalize(dir).map_err(Error::io(dir, "opened"))?;
-        let runtime = Arc::new(runtime().map_err(Error::io(&dir, "opened"))?);
-        let table = |name, schema| Table::new(&dir, name, schema, Arc::clone(&runtime));
+    fn at(place: Place) -> Self {
+        let table = |name, schema| Table::new(&place, name, schema);
         let gaps = table("gaps", tabled::schema::<GapRecord>());
         let logs = table("logs", numbered::schema::<LogAccount>());
         let runs = table("runs", numbered::schema::<RunAccount>());
-        Ok(Self { gaps, logs, runs, sound: Arc::default(), dir })
+        Self { gaps, logs, runs, sound: Arc::default(), named: place.named(place.dir()), place }
     }
 
     /// Every table.
@@ -129,6 +144,7 @@ impl Store {
         let mut sound = self.sound.lock().unwrap_or_else(PoisonError::into_inner);
         for file in files {
             if !sound.contains(file) {
+                self.place.bring(file)?;
                 datafile::check(file)?;
                 sound.insert(file.clone());
             }
@@ -143,48 +159,64 @@ fn percent_code(path: &str) -> Option<&str> {
     codes.into_iter().find(|code| code.bytes().skip(1).all(|digit| digit.is_ascii_hexdigit()))
 }
 
-/// Delta's library is asynchronous; one worker beside the caller's thread serves it.
-fn runtime() -> std::io::Result<Runtime> {
-    Builder::new_multi_thread().worker_threads(1).thread_name("store").enable_all().build()
+/// Refuses names that Delta's library cannot take.
+fn check_name(dir: &Path) -> Result<&Path, Error> {
+    let path = if objects::is_address(dir) {
+        dir.to_owned()
+    } else {
+        std::path::absolute(dir).map_err(Error::io(dir, "opened"))?
+    };
+    match percent_code(&path.to_string_lossy()) {
+        Some(found) => Err(Error::Name { found: found.to_owned(), dir: dir.to_owned() }),
+        None => Ok(dir),
+    }
 }
 
-/// Something that lies in the folder, our mark before anything else; nothing when it is missing or empty.
-fn first_entry(dir: &Path) -> Result<Option<String>, Error> {
-    let path = std::path::absolute(dir).map_err(Error::io(dir, "opened"))?;
-    if let Some(found) = percent_code(&path.to_string_lossy()) {
-        return Err(Error::Name { found: found.to_owned(), dir: dir.to_owned() });
+/// Something that lies in the folder, our mark before anything else; nothing when it is empty.
+fn first_entry(place: &Place) -> Result<Option<String>, Error> {
+    if place.is_bucket() {
+        return Ok(place.has(MARK)?.then(|| MARK.to_owned()));
     }
-    let entries = match std::fs::read_dir(dir) {
-        Ok(entries) => entries,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(e) => return Err(Error::io(dir, "opened")(e)),
-    };
+    let dir = place.dir();
+    let entries = std::fs::read_dir(dir).map_err(Error::io(dir, "opened"))?;
     let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
     let mut names: Vec<String> = names.filter(|name| !name.starts_with(&format!("{MARK}#"))).collect();
     names.sort_by_key(|name| name != MARK);
     Ok(names.into_iter().next())
 }
 
-fn write_mark(dir: &Path) -> Result<(), Error> {
+fn write_mark(place: &Place) -> Result<(), Error> {
     let mark = serde_json::json!(Mark { freeplay_store: FORMAT }).to_string();
-    let path = dir.join(MARK);
-    durable::replace(&path, mark.as_bytes()).map_err(Error::io(path, "written"))
+    place.replace(MARK, mark.as_bytes())
 }
 
-fn make_mark(dir: &Path) -> Result<(), Error> {
-    write_mark(dir)?;
+/// Whether the folder is there; something else of its name is an error.
+fn is_there(dir: &Path) -> Result<bool, Error> {
+    match std::fs::read_dir(dir) {
+        Ok(_) => Ok(true),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(false),
+        Err(e) => Err(Error::io(dir, "opened")(e)),
+    }
+}
+
+/// Makes the folder where it is not there, and its name last.
+fn make_folder(dir: &Path) -> Result<(), Error> {
+    if is_there(dir)? {
+        return Ok(());
+    }
+    std::fs::create_dir_all(dir).map_err(Error::io(dir, "created"))?;
     // A bare name such as `results` has an empty parent, which is the current folder.
     let parent = dir.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
     parent.map_or(Ok(()), |parent| durable::sync_dir(parent).map_err(Error::io(parent, "synced")))
 }
 
 /// The format of the folder, when it is ours and known.
-fn check_mark(dir: &Path, found: &str) -> Result<u32, Error> {
-    let file = dir.join(MARK);
+fn check_mark(place: &Place, found: &str) -> Result<u32, Error> {
+    let file = place.named(&place.dir().join(MARK));
     if found != MARK {
-        return Err(Error::Foreign { dir: dir.to_owned(), found: found.to_owned() });
+        return Err(Error::Foreign { dir: place.named(place.dir()), found: found.to_owned() });
     }
-    let text = std::fs::read_to_string(&file).map_err(Error::io(&file, "read"))?;
+    let text = place.read(MARK)?;
     match serde_json::from_str::<Mark>(&text) {
         Ok(Mark { freeplay_store: format @ 1..=FORMAT }) => Ok(format),
         Ok(mark) => Err(Error::Format { file, found: mark.freeplay_store.to_string(), known: FORMAT }),

@@ -11,6 +11,8 @@
 //!   runs/        one row when a run begins and one when it ends
 //! ```
 //!
+//! A prefix of a bucket holds the same, but for the lock: `docs/store.md` says what that means.
+//!
 //! One process writes at a time ([`Store::lock`]); any number read meanwhile, and each answer is made
 //! from one version of a table, so it shows whole commits only. A commit is on disk when it returns.
 //! The choice of Delta Lake, its layout and its guarantees are told in `docs/store.md`.
@@ -28,6 +30,7 @@ mod info;
 mod layout;
 mod lock;
 mod numbered;
+mod place;
 mod query;
 mod read;
 mod runs;

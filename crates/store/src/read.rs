@@ -63,7 +63,7 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn serials(&self) -> Result<Vec<(PartNumber, SerialNumber)>, Error> {
-        let files = self.files()?;
+        let files = files_of(&self.gaps)?;
         self.check(&files)?;
         let schema = frame::only(&columns::schema(), &["part_number", "serial_number"])?;
         let units = Read { files: &files, schema, condition: None, order: &[], last: None }.collect()?;
@@ -95,7 +95,7 @@ impl Store {
     /// # Errors
     /// [`Error::Table`] when the log cannot be read.
     pub fn files(&self) -> Result<Vec<PathBuf>, Error> {
-        files_of(&self.gaps)
+        self.named_files(&self.gaps)
     }
 
     /// The same of the accounts of logs.
@@ -103,7 +103,7 @@ impl Store {
     /// # Errors
     /// As [`Store::files`].
     pub fn log_files(&self) -> Result<Vec<PathBuf>, Error> {
-        files_of(&self.logs)
+        self.named_files(&self.logs)
     }
 
     /// The same of the accounts of runs.
@@ -111,7 +111,11 @@ impl Store {
     /// # Errors
     /// As [`Store::files`].
     pub fn run_files(&self) -> Result<Vec<PathBuf>, Error> {
-        files_of(&self.runs)
+        self.named_files(&self.runs)
+    }
+
+    fn named_files(&self, table: &Table) -> Result<Vec<PathBuf>, Error> {
+        Ok(files_of(table)?.iter().map(|file| self.place.named(file)).collect())
     }
 
     pub(crate) fn select(
@@ -161,6 +165,6 @@ fn months(snapshot: &Snapshot) -> Vec<(Option<Timestamp>, Option<Timestamp>)> {
     (first..=last).step_by(MONTH_US as usize).map(|from| (edge(from), edge(from + MONTH_US))).collect()
 }
 
-fn files_of(table: &Table) -> Result<Vec<PathBuf>, Error> {
+pub(crate) fn files_of(table: &Table) -> Result<Vec<PathBuf>, Error> {
     Ok(table.snapshot()?.files.into_iter().map(|file| file.path).collect())
 }

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::slice;
 
 use fleet::{GapRecord, Status};
+use jiff::{SignedDuration, Timestamp};
 use polars::prelude::{col, lit};
 
 use crate::account::{LogAccount, Outcome, RunAccount};
@@ -16,6 +17,9 @@ use crate::layout::Store;
 use crate::lock::Lock;
 use crate::query::Query;
 use crate::writer::{self, Writer};
+
+/// A run in a bucket that gave no sign of life for so long was killed: it stores each log as it is finished.
+const SILENT: SignedDuration = SignedDuration::from_hours(1);
 
 impl Store {
     /// What became of each log of a run, by name.
@@ -57,12 +61,25 @@ impl Store {
         Ok(runs)
     }
 
-    /// Whether somebody writes just now.
+    /// Whether somebody writes just now; in a bucket, whether a run without an end gave a sign of life lately.
     ///
     /// # Errors
     /// [`Error::Io`] when the lock cannot be looked at.
     pub fn is_held(&self) -> Result<bool, Error> {
-        Lock::is_held(&self.lock_file())
+        match self.lock_file() {
+            Some(file) => Lock::is_held(&file),
+            None => Ok(self.runs()?.iter().any(|run| self.may_live(run))),
+        }
+    }
+
+    /// Whether a run without an end may still go, where no lock says so.
+    fn may_live(&self, run: &RunAccount) -> bool {
+        let signs =
+            || self.run_logs(&run.run_id).unwrap_or_default().into_iter().map(|log| log.processed_utc);
+        let is_late = |at: Timestamp| Timestamp::now().duration_since(at) < SILENT;
+        self.place.is_bucket()
+            && !run.has_ended()
+            && (is_late(run.started_utc) || signs().max().is_some_and(is_late))
     }
 }
 
@@ -86,13 +103,15 @@ impl Writer {
         writer::account(&self.store().runs, slice::from_ref(run))
     }
 
-    /// Finishes the accounts of runs that were killed: who writes holds the lock, so none of them lives.
+    /// Finishes the accounts of runs that were killed: who writes holds the lock, so none of them lives. In a
+    /// bucket, where there is none, runs that gave a sign of life within the hour are left to themselves.
     ///
     /// # Errors
     /// As [`Writer::commit`].
     pub fn close_killed_runs(&mut self) -> Result<Vec<RunAccount>, Error> {
         let runs = self.store().runs()?;
-        let mut killed: Vec<RunAccount> = runs.into_iter().filter(|run| !run.has_ended()).collect();
+        let is_killed = |run: &RunAccount| !run.has_ended() && !self.store().may_live(run);
+        let mut killed: Vec<RunAccount> = runs.into_iter().filter(is_killed).collect();
         for run in &mut killed {
             let logs = self.store().run_logs(&run.run_id)?;
             let reached = logs.iter().filter(|log| log.outcome != Outcome::NotReached);

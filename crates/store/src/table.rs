@@ -12,19 +12,21 @@ use deltalake::kernel::transaction::{CommitBuilder, CommitProperties, Transactio
 use deltalake::kernel::{Action, Add, LogicalFileView, MetadataExt, StructType, TombstoneView, Transaction};
 use deltalake::operations::create::CreateBuilder;
 use deltalake::protocol::{DeltaOperation, SaveMode};
-use deltalake::{DeltaTable, DeltaTableBuilder, DeltaTableError, TableProperty};
+use deltalake::{DeltaTable, DeltaTableError, TableProperty};
 use futures::TryStreamExt;
 use jiff::Timestamp;
-use tokio::runtime::Runtime;
-use url::Url;
 
 use crate::datafile;
-use crate::durable::DurableFiles;
 use crate::error::Error;
+use crate::place::Place;
 use crate::stats::Stats;
 
 /// Attempts at a change before its error is told, each from a fresh snapshot.
 const ATTEMPTS: u32 = 5;
+/// The same in a bucket, where no lock keeps others away.
+const ATTEMPTS_WITHOUT_LOCK: u32 = 30;
+/// The longest pause.
+const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// The pause after the first attempt; it doubles.
 const PAUSE: Duration = Duration::from_millis(50);
 
@@ -42,8 +44,7 @@ const REWRITE: &str = "freeplay.rewrite";
 pub(crate) struct Table {
     pub(crate) name: &'static str,
     pub(crate) schema: SchemaRef,
-    dir: PathBuf,
-    runtime: Arc<Runtime>,
+    pub(crate) place: Place,
 }
 
 /// A table as of one version.
@@ -86,17 +87,13 @@ pub(crate) struct Change<'a> {
 }
 
 impl Table {
-    pub(crate) fn new(store: &Path, name: &'static str, schema: SchemaRef, runtime: Arc<Runtime>) -> Self {
-        Self { name, schema, dir: store.join(name), runtime }
+    pub(crate) fn new(store: &Place, name: &'static str, schema: SchemaRef) -> Self {
+        Self { name, schema, place: store.below(name) }
     }
 
-    pub(crate) fn dir(&self) -> &Path {
-        &self.dir
-    }
-
-    pub(crate) fn exists(&self) -> bool {
-        self.dir.join("_delta_log").join(format!("{:020}.json", 0)).exists()
-            || self.dir.join("_delta_log/_last_checkpoint").exists()
+    pub(crate) fn exists(&self) -> Result<bool, Error> {
+        let first = format!("_delta_log/{:020}.json", 0);
+        Ok(self.place.has(&first)? || self.place.has("_delta_log/_last_checkpoint")?)
     }
 
     fn failed(&self, verb: &'static str) -> impl FnOnce(DeltaTableError) -> Error {
@@ -104,24 +101,17 @@ impl Table {
         move |source| Error::Table { table, verb, source: Box::new(source) }
     }
 
-    fn builder(&self) -> Result<DeltaTableBuilder, DeltaTableError> {
-        let invalid = || DeltaTableError::InvalidTableLocation(self.dir.display().to_string());
-        let url = Url::from_directory_path(&self.dir).map_err(|()| invalid())?;
-        let builder = DeltaTableBuilder::from_url(url.clone())?;
-        Ok(builder.with_storage_backend(Arc::new(DurableFiles::default()), url))
-    }
-
     /// Makes the table with the lowest protocol there is: no feature of Delta is needed to read it.
     ///
     /// Its first commit brings a file without rows: an engine that is handed the list of files, as DuckDB
     /// is, fails on an empty one.
     pub(crate) fn create(&self) -> Result<(), Error> {
-        std::fs::create_dir_all(&self.dir).map_err(Error::io(&self.dir, "created"))?;
+        self.place.make()?;
         let empty = Action::Add(self.empty(0)?);
-        let made = self.runtime.block_on(async {
+        let made = self.place.block_on(async {
             let columns: StructType =
                 self.schema.as_ref().try_into_kernel().map_err(DeltaTableError::from)?;
-            let log_store = self.builder()?.build_storage()?;
+            let log_store = self.place.log_store()?;
             let create = CreateBuilder::new().with_log_store(log_store).with_table_name(self.name);
             let create =
                 create.with_configuration_property(TableProperty::CheckpointInterval, Some(CHECKPOINT));
@@ -129,14 +119,14 @@ impl Table {
         });
         match made {
             // Somebody else made it in the meantime.
-            Err(_) if self.exists() => Ok(()),
+            Err(_) if self.exists()? => Ok(()),
             made => made.map(drop).map_err(self.failed("created")),
         }
     }
 
     /// A file without rows.
     fn empty(&self, version: u64) -> Result<Add, Error> {
-        datafile::write(&self.dir, version, &RecordBatch::new_empty(Arc::clone(&self.schema)), true)
+        datafile::write(&self.place, version, &RecordBatch::new_empty(Arc::clone(&self.schema)), true)
     }
 
     /// Brings a table of an earlier release up to this one: a file without rows where it has none, and the
@@ -169,16 +159,17 @@ impl Table {
     /// The table as it is now.
     pub(crate) fn snapshot(&self) -> Result<Snapshot, Error> {
         let load = async {
-            let delta = self.builder()?.load().await?;
+            let mut delta = DeltaTable::new(self.place.log_store()?);
+            delta.load().await?;
             let files = delta.snapshot()?.log_data().iter().map(|view| self.file(view)).collect();
             Ok(Snapshot { version: delta.version().unwrap_or_default(), files, delta })
         };
-        self.runtime.block_on(load).map_err(self.failed("read"))
+        self.place.block_on(load).map_err(self.failed("read"))
     }
 
     fn file(&self, view: LogicalFileView) -> DataFile {
         DataFile {
-            path: self.dir.join(view.path().as_ref()),
+            path: self.place.dir().join(view.path().as_ref()),
             size_bytes: u64::try_from(view.size()).unwrap_or_default(),
             stats: Stats::parse(view.stats().as_deref()),
             view,
@@ -205,17 +196,22 @@ impl Table {
             }
             match self.commit(&snapshot, change) {
                 Ok(()) => break,
-                Err(error) if attempt < ATTEMPTS && is_conflict(&error) => std::thread::sleep(pause),
+                Err(error) if attempt < self.attempts() && is_conflict(&error) => std::thread::sleep(pause),
                 Err(error) => return Err(self.failed("committed to")(error)),
             }
-            pause *= 2;
+            pause = (pause * 2).min(LONGEST_PAUSE);
         }
         Ok(())
     }
 
+    fn attempts(&self) -> u32 {
+        if self.place.is_bucket() { ATTEMPTS_WITHOUT_LOCK } else { ATTEMPTS }
+    }
+
     fn commit(&self, snapshot: &Snapshot, change: Change<'_>) -> Result<(), DeltaTableError> {
         let mut properties = CommitProperties::default();
-        if !change.remove.is_empty() {
+        // Without a lock, two who add the same flight must not both land either.
+        if !change.remove.is_empty() || self.place.is_bucket() {
             let now = Timestamp::now().as_millisecond();
             let guard = Transaction::new_with_last_update(REWRITE, snapshot.version as i64, Some(now));
             properties = properties.with_application_transaction(guard);
@@ -229,7 +225,7 @@ impl Table {
         } else {
             DeltaOperation::Write { mode: SaveMode::Append, partition_by: None, predicate: None }
         };
-        self.runtime.block_on(async {
+        self.place.block_on(async {
             let builder = CommitBuilder::from(properties).with_actions(actions);
             let state = snapshot.delta.snapshot()?;
             builder.build(Some(state), snapshot.delta.log_store(), operation).await.map(drop)
@@ -245,10 +241,10 @@ impl Table {
         let superseded = self.superseded(&snapshot).map_err(self.failed("read"))?;
         let horizon = SystemTime::now().checked_sub(kept).unwrap_or(SystemTime::UNIX_EPOCH);
         let mut deleted = 0;
-        for path in data_files(&self.dir).map_err(Error::io(&self.dir, "read"))? {
-            let since = superseded.get(&path).copied().or_else(|| written(&path));
-            if !active.contains(path.as_path()) && since.is_some_and(|since| since <= horizon) {
-                std::fs::remove_file(&path).map_err(Error::io(path, "deleted"))?;
+        for (path, written) in self.place.entries()?.into_iter().filter(|(path, _)| is_data(path)) {
+            let since = superseded.get(&path).copied().unwrap_or(written);
+            if !active.contains(path.as_path()) && since <= horizon {
+                self.place.delete(&path)?;
                 deleted += 1;
             }
         }
@@ -257,26 +253,21 @@ impl Table {
 
     /// When each file that the log still remembers was superseded.
     fn superseded(&self, snapshot: &Snapshot) -> Result<HashMap<PathBuf, SystemTime>, DeltaTableError> {
-        let tombstones: Vec<TombstoneView> = self.runtime.block_on(async {
+        let tombstones: Vec<TombstoneView> = self.place.block_on(async {
             let log_store = snapshot.delta.log_store();
             snapshot.delta.snapshot()?.all_tombstones(&log_store).try_collect().await
         })?;
         let since = |ms: i64| UNIX_EPOCH + Duration::from_millis(u64::try_from(ms).unwrap_or_default());
-        let entry =
-            |t: &TombstoneView| Some((self.dir.join(t.path().as_ref()), since(t.deletion_timestamp()?)));
+        let entry = |t: &TombstoneView| {
+            Some((self.place.dir().join(t.path().as_ref()), since(t.deletion_timestamp()?)))
+        };
         Ok(tombstones.iter().filter_map(entry).collect())
     }
 }
 
-/// Data files in a folder, those half written included.
-fn data_files(dir: &Path) -> std::io::Result<Vec<PathBuf>> {
-    let paths = std::fs::read_dir(dir)?.map(|entry| Ok(entry?.path()));
-    let is_data = |path: &PathBuf| path.to_str().is_some_and(|path| path.contains(".parquet"));
-    paths.filter(|path| path.as_ref().map_or(true, is_data)).collect()
-}
-
-fn written(path: &Path) -> Option<SystemTime> {
-    std::fs::metadata(path).and_then(|data| data.modified()).ok()
+/// Whether a file is a data file, or one half written.
+fn is_data(path: &Path) -> bool {
+    path.to_str().is_some_and(|path| path.contains(".parquet"))
 }
 
 /// Whether a fresh plan may succeed where this one failed.
@@ -306,9 +297,7 @@ mod tests {
     }
 
     fn table(dir: &Path) -> Table {
-        let runtime =
-            tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
-        let table = Table::new(&std::fs::canonicalize(dir).unwrap(), "numbers", schema(), Arc::new(runtime));
+        let table = Table::new(&Place::at(dir).unwrap(), "numbers", schema());
         table.create().unwrap();
         table
     }
@@ -321,12 +310,12 @@ mod tests {
 
     fn append(table: &Table, n: i64) {
         let write =
-            |snapshot: &Snapshot| datafile::write(&table.dir, snapshot.version + 1, &batch(vec![n]), true);
+            |snapshot: &Snapshot| datafile::write(&table.place, snapshot.version + 1, &batch(vec![n]), true);
         table.change(|snapshot| Ok(Change { add: vec![write(snapshot)?], ..Change::default() })).unwrap();
     }
 
     fn merged<'a>(table: &Table, snapshot: &'a Snapshot, name: u64) -> Change<'a> {
-        let add = datafile::write(&table.dir, name, &batch(vec![1, 2]), false).unwrap();
+        let add = datafile::write(&table.place, name, &batch(vec![1, 2]), false).unwrap();
         Change {
             add: vec![add],
             remove: snapshot.files.iter().collect(),
@@ -371,7 +360,7 @@ mod tests {
         for n in 1..25 {
             append(&table, n);
         }
-        assert!(table.dir.join("_delta_log/_last_checkpoint").exists());
+        assert!(table.place.has("_delta_log/_last_checkpoint").unwrap());
         assert_eq!(rows(&table), 24);
         let snapshot = table.snapshot().unwrap();
         let filled: Vec<&DataFile> = snapshot.files.iter().filter(|file| file.has_rows()).collect();

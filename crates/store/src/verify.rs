@@ -12,6 +12,7 @@ use crate::error::Error;
 use crate::frame::{self, Read};
 use crate::layout::Store;
 use crate::query::RecordKey;
+use crate::read::files_of;
 use crate::table::{DataFile, Table};
 use crate::writer::keys;
 
@@ -25,7 +26,7 @@ impl Store {
     /// many rows; and no record may be there twice.
     pub fn verify(&self) -> Vec<Complaint> {
         let tables = self.tables();
-        let mut findings: Vec<Complaint> = tables.into_iter().flat_map(files_of).collect();
+        let mut findings: Vec<Complaint> = tables.into_iter().flat_map(wrong_in).collect();
         if findings.is_empty() {
             findings.extend(self.duplicates().unwrap_or_else(|error| vec![error.complaint()]));
         }
@@ -33,7 +34,7 @@ impl Store {
     }
 
     fn duplicates(&self) -> Result<Vec<Complaint>, Error> {
-        let files: Vec<PathBuf> = self.files()?;
+        let files: Vec<PathBuf> = files_of(&self.gaps)?;
         let schema = frame::only(&columns::schema(), &RecordKey::COLUMNS)?;
         let order = &RecordKey::COLUMNS;
         let batch = Read { files: &files, schema, condition: None, order, last: None }.collect()?;
@@ -54,25 +55,30 @@ fn duplicate(key: &RecordKey) -> Complaint {
         .hint("did another program compact the table while a run was writing? `freeplay run --redo` mends it")
 }
 
-fn files_of(table: &Table) -> Vec<Complaint> {
+fn wrong_in(table: &Table) -> Vec<Complaint> {
     match table.snapshot() {
-        Ok(snapshot) => snapshot.files.iter().filter_map(wrong_with).collect(),
+        Ok(snapshot) => snapshot.files.iter().filter_map(|file| wrong_with(table, file)).collect(),
         Err(error) => vec![error.complaint()],
     }
 }
 
-fn wrong_with(file: &DataFile) -> Option<Complaint> {
-    let complaint = |code: &str, what: &str| Complaint::new(code, what).in_file(file.path.display());
-    let Ok(data) = std::fs::metadata(&file.path) else {
-        let what = "a data file that was committed is not there";
-        return Some(complaint("store_file_missing", what).hint("restore it from a backup of the store"));
+fn wrong_with(table: &Table, file: &DataFile) -> Option<Complaint> {
+    let complaint =
+        |code: &str, what: &str| Complaint::new(code, what).in_file(table.place.named(&file.path).display());
+    let length = match table.place.length(&file.path) {
+        Ok(Some(length)) => length,
+        Ok(None) => {
+            let what = "a data file that was committed is not there";
+            return Some(complaint("store_file_missing", what).hint("restore it from a backup of the store"));
+        }
+        Err(error) => return Some(error.complaint()),
     };
-    if let Err(error) = datafile::check(&file.path) {
+    if let Err(error) = table.place.bring(&file.path).and_then(|()| datafile::check(&file.path)) {
         return Some(error.complaint());
     }
-    if data.len() != file.size_bytes {
+    if length != file.size_bytes {
         let mut wrong = complaint("store_damaged", "a data file has another length than was committed");
-        (wrong.found, wrong.wanted) = (Some(bytes(data.len())), Some(bytes(file.size_bytes)));
+        (wrong.found, wrong.wanted) = (Some(bytes(length)), Some(bytes(file.size_bytes)));
         return Some(wrong.hint("restore it from a backup of the store"));
     }
     let rows = match rows(file) {

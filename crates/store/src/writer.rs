@@ -34,14 +34,14 @@ pub struct LogResult {
 #[derive(Debug)]
 pub struct Writer {
     store: Store,
-    _lock: Lock,
+    _lock: Option<Lock>,
 }
 
 /// What becomes of each record named: a new one, or none.
 type Verdicts<'a> = BTreeMap<RecordKey, Option<&'a GapRecord>>;
 
 impl Writer {
-    pub(crate) fn new(store: Store, lock: Lock) -> Self {
+    pub(crate) fn new(store: Store, lock: Option<Lock>) -> Self {
         Self { store, _lock: lock }
     }
 
@@ -72,18 +72,18 @@ impl Writer {
 
     fn supersede<'a>(&self, snapshot: &'a Snapshot, verdicts: &Verdicts<'_>) -> Result<Change<'a>, Error> {
         let mut change = Change::default();
-        let (dir, version) = (self.store.gaps.dir(), snapshot.version + 1);
+        let (place, version) = (&self.store.gaps.place, snapshot.version + 1);
         for file in snapshot.files.iter().filter(|file| file.has_rows() && may_hold_any(file, verdicts)) {
             if let Some(rest) = self.without(file, verdicts)? {
                 change.remove.push(file);
                 if rest.num_rows() > 0 {
-                    change.add.push(datafile::write(dir, version, &rest, true)?);
+                    change.add.push(datafile::write(place, version, &rest, true)?);
                 }
             }
         }
         let new: Vec<GapRecord> = verdicts.values().copied().flatten().cloned().collect();
         if !new.is_empty() {
-            change.add.push(datafile::write(dir, version, &columns::to_batch(&new)?, true)?);
+            change.add.push(datafile::write(place, version, &columns::to_batch(&new)?, true)?);
         }
         Ok(change)
     }
@@ -105,7 +105,7 @@ impl Writer {
 pub(crate) fn account<R: Tabled>(table: &Table, rows: &[R]) -> Result<(), Error> {
     table.change(|snapshot| {
         let version = snapshot.version + 1;
-        let add = datafile::write(table.dir(), version, &numbered::to_batch(rows, version)?, true)?;
+        let add = datafile::write(&table.place, version, &numbered::to_batch(rows, version)?, true)?;
         Ok(Change { add: vec![add], ..Change::default() })
     })
 }

@@ -1,6 +1,7 @@
 //! What `pipeline.toml` may say, as it is written.
 
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 use fleet::Complaint;
 use ingest::identity::zone;
@@ -28,6 +29,9 @@ pub struct Document {
     /// What a run may use of the machine.
     #[serde(default)]
     pub run: RunSettings,
+    /// How patiently object stores are asked.
+    #[serde(default)]
+    pub objects: ObjectSettings,
     /// Where a log says which flight it is.
     #[serde(default)]
     pub identity: IdentityMapping,
@@ -62,7 +66,8 @@ pub struct Document {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LogSettings {
-    /// Patterns of log files, from the folder of this file: `*` within a name, `**` across folders.
+    /// Patterns of log files, from the folder of this file, or `s3://`, `gs://`, `az://`: `*` within a name,
+    /// `**` across folders.
     pub files: Vec<String>,
     /// The installations table, CSV or Parquet.
     pub installations: String,
@@ -117,7 +122,7 @@ pub struct Override {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StoreSettings {
-    /// Folder of the results. Default `results`.
+    /// Folder of the results, or `s3://`, `gs://`, `az://` and a prefix. Default `results`.
     pub path: String,
 }
 
@@ -135,6 +140,34 @@ pub struct RunSettings {
     /// in. No limit by default.
     #[serde(default)]
     pub memory_mib: Option<u64>,
+}
+
+/// `[objects]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ObjectSettings {
+    /// A request to an object store without a whole answer is given up after this long, s, and made again.
+    /// Default 30.
+    pub timeout_s: f64,
+    /// After this long, s, it is not made again, and the log is in error. Default 180.
+    pub give_up_s: f64,
+}
+
+impl Default for ObjectSettings {
+    fn default() -> Self {
+        let objects::Settings { timeout, give_up } = objects::Settings::DEFAULT;
+        Self { timeout_s: timeout.as_secs_f64(), give_up_s: give_up.as_secs_f64() }
+    }
+}
+
+impl ObjectSettings {
+    /// The same for those who ask; nobody waits longer than a day.
+    pub(super) fn patience(&self) -> objects::Settings {
+        const DAY_S: f64 = 86_400.0;
+        let [timeout, give_up] =
+            [self.timeout_s, self.give_up_s].map(|s| Duration::from_secs_f64(s.clamp(1e-3, DAY_S)));
+        objects::Settings { timeout, give_up }
+    }
 }
 
 /// Which estimator fills `gap_m`.
@@ -242,6 +275,9 @@ impl Document {
             ("next_check_hours", self.trend.next_check_hours),
         ] {
             found.extend(positive(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
+        }
+        for (key, seconds) in [("timeout_s", self.objects.timeout_s), ("give_up_s", self.objects.give_up_s)] {
+            found.extend(positive(key, Some(seconds)).map(|c| source.at(&["objects", key], c)));
         }
         found
     }

@@ -78,6 +78,8 @@ impl Config {
         let shown: Vec<&str> = texts.iter().map(|(shown, _)| shown.as_str()).collect();
         let file = PathBuf::from(shown.join(" + "));
         let mut config = Self::layered(Layer::stack(texts), &file, &folder)?;
+        // Before the first table is read: it may lie in an object store.
+        objects::configure(config.document.objects.patience());
         if let Some(table) = &config.document.logs.flights {
             let names = &config.document.columns.flights;
             let read = Flights::read(&config.path(table), names, &config.document.identity);
@@ -132,7 +134,7 @@ impl Config {
 
     /// A path of the configuration, seen from the current folder.
     pub fn path(&self, relative: &str) -> PathBuf {
-        self.folder.join(relative)
+        if objects::is_address(relative) { relative.into() } else { self.folder.join(relative) }
     }
 
     /// Where the results are.

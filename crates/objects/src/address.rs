@@ -1,0 +1,118 @@
+//! Addresses: a scheme, a bucket, and a key in it.
+
+use std::path::Path;
+
+use crate::error::Error;
+
+/// Who keeps the bucket.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Scheme {
+    S3,
+    Gs,
+    Az,
+}
+
+impl Scheme {
+    const ALL: [(Self, &'static str); 3] = [(Self::S3, "s3://"), (Self::Gs, "gs://"), (Self::Az, "az://")];
+
+    fn prefix(self) -> &'static str {
+        Self::ALL.iter().find(|(scheme, _)| *scheme == self).map_or("", |(_, prefix)| prefix)
+    }
+}
+
+/// Whether a path is an address in an object store.
+pub fn is_address(path: impl AsRef<Path>) -> bool {
+    path.as_ref().to_str().is_some_and(|text| Scheme::ALL.iter().any(|(_, prefix)| text.starts_with(prefix)))
+}
+
+/// An address, taken apart.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Address {
+    pub(crate) scheme: Scheme,
+    pub(crate) bucket: String,
+    key: String,
+}
+
+impl Address {
+    /// Takes an address apart; `None` when the path is none.
+    ///
+    /// # Errors
+    /// [`Error::Address`] when it names no bucket.
+    pub fn of(path: impl AsRef<Path>) -> Result<Option<Self>, Error> {
+        let Some(text) = path.as_ref().to_str() else { return Ok(None) };
+        let scheme = Scheme::ALL.iter().find_map(|(s, prefix)| Some((*s, text.strip_prefix(prefix)?)));
+        let Some((scheme, rest)) = scheme else { return Ok(None) };
+        let (bucket, key) = rest.split_once('/').unwrap_or((rest, ""));
+        if bucket.is_empty() {
+            return Err(Error::Address { text: text.to_owned(), detail: "it names no bucket".to_owned() });
+        }
+        Ok(Some(Self { scheme, bucket: bucket.to_owned(), key: key.trim_end_matches('/').to_owned() }))
+    }
+
+    /// As [`Address::of`], where nothing but an address will do.
+    ///
+    /// # Errors
+    /// [`Error::Address`] when it is none, or names no bucket.
+    pub fn must(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let path = path.as_ref();
+        let none = || Error::Address {
+            text: path.display().to_string(),
+            detail: "it begins with none of s3://, gs:// and az://".to_owned(),
+        };
+        Self::of(path)?.ok_or_else(none)
+    }
+
+    /// The key: the text behind the bucket, without a slash at its end.
+    pub fn key(&self) -> &str {
+        &self.key
+    }
+
+    /// The key as the library takes it.
+    ///
+    /// # Errors
+    /// [`Error::Address`] for a key it cannot: one with `//`, `.` or `..` as a folder.
+    pub fn location(&self) -> Result<object_store::path::Path, Error> {
+        object_store::path::Path::parse(&self.key)
+            .map_err(|e| Error::Address { text: self.to_string(), detail: e.to_string() })
+    }
+
+    /// The address of another key of this bucket.
+    #[must_use]
+    pub fn with_key(&self, key: &str) -> Self {
+        Self { key: key.to_owned(), ..self.clone() }
+    }
+
+    /// The bucket as an address, with a slash at its end.
+    pub fn root(&self) -> String {
+        format!("{}{}/", self.scheme.prefix(), self.bucket)
+    }
+}
+
+impl std::fmt::Display for Address {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}{}", self.root(), self.key)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_is_told_from_a_path_and_taken_apart() {
+        for path in ["logs/a.parquet", "/s3/a", "s3:/bucket/a", "https://host/a"] {
+            assert!(!is_address(path), "{path}");
+            assert_eq!(Address::of(path).unwrap(), None);
+        }
+        let address = Address::must("s3://fleet/logs/N1/a b.parquet").unwrap();
+        assert_eq!((address.bucket.as_str(), address.key()), ("fleet", "logs/N1/a b.parquet"));
+        assert_eq!(address.to_string(), "s3://fleet/logs/N1/a b.parquet");
+        assert_eq!(Address::must("gs://fleet").unwrap().root(), "gs://fleet/");
+    }
+
+    #[test]
+    fn an_address_without_a_bucket_or_with_an_empty_folder_is_refused() {
+        assert!(Address::of("az:///logs").unwrap_err().to_string().contains("no bucket"));
+        assert!(Address::must("s3://fleet/logs//a").unwrap().location().is_err());
+    }
+}

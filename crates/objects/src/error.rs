@@ -1,0 +1,103 @@
+//! Why an object cannot be had: one variant for each thing its owner would do differently.
+
+use std::path::PathBuf;
+
+/// An object store's trouble; each variant names the address.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
+pub enum Error {
+    /// The address cannot be one.
+    #[error("`{text}` is no address of an object: {detail}")]
+    Address { text: String, detail: String },
+    /// Credentials or an endpoint are missing or cannot be read.
+    #[error("{place} cannot be asked: {detail}")]
+    Settings { place: String, detail: String },
+    /// There is no such object or bucket.
+    #[error("{address} is not there")]
+    Missing { address: String },
+    /// The store knows us not, or lets us not.
+    #[error("{address} may not be read or written by these credentials: {detail}")]
+    Denied { address: String, detail: String },
+    /// The object was replaced while it was read.
+    #[error("{address} was replaced while it was read")]
+    Changed { address: String },
+    /// Somebody else has written this name already.
+    #[error("{address} is there already")]
+    Exists { address: String },
+    /// No whole answer, however often it was asked.
+    #[error("{address} cannot be reached, tried for {tried_s:.0} s: {detail}")]
+    Unreachable { address: String, tried_s: f64, detail: String },
+    /// What was fetched has no room on this machine.
+    #[error("what is fetched of {address} cannot be kept in {}: {source}", folder.display())]
+    Spool { address: String, folder: PathBuf, source: std::io::Error },
+}
+
+impl Error {
+    /// The stable code; `docs/errors.md` has a paragraph for each.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Address { .. } => "object_address",
+            Self::Settings { .. } => "object_settings",
+            Self::Missing { .. } => "object_missing",
+            Self::Denied { .. } => "object_denied",
+            Self::Changed { .. } => "object_changed",
+            Self::Exists { .. } => "object_exists",
+            Self::Unreachable { .. } => "object_unreachable",
+            Self::Spool { .. } => "object_spool",
+        }
+    }
+
+    /// What to do.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Address { .. } => "write it as s3://bucket/key, gs://bucket/key or az://container/key",
+            Self::Settings { .. } => "docs/objects.md says which variables and profiles are read",
+            Self::Missing { .. } => "are bucket, key and region right? `aws s3 ls` shows what is there",
+            Self::Denied { .. } => {
+                "are the credentials of the right account, not expired, and allowed to list and read here?"
+            }
+            Self::Changed { .. } => "is it still being uploaded? The next run reads it anew",
+            Self::Exists { .. } => "does another run write into this store?",
+            Self::Unreachable { .. } => {
+                "is the network up, and the endpoint right? The next run tries again; `[objects]` sets how long"
+            }
+            Self::Spool { .. } => "make room there, or name another folder in TMPDIR",
+        }
+    }
+
+    /// Whether the same request may succeed on another day with nothing changed here.
+    pub fn is_passing(code: &str) -> bool {
+        matches!(
+            code,
+            "object_unreachable" | "object_changed" | "object_denied" | "object_settings" | "object_spool"
+        )
+    }
+
+    /// Reads the library's error about an address.
+    pub fn of(address: &impl ToString, tried_s: f64, error: &object_store::Error) -> Self {
+        use object_store::Error as Of;
+        let (address, detail) = (address.to_string(), told(error));
+        match error {
+            Of::NotFound { .. } => Self::Missing { address },
+            Of::PermissionDenied { .. } | Of::Unauthenticated { .. } => Self::Denied { address, detail },
+            Of::Precondition { .. } => Self::Changed { address },
+            Of::AlreadyExists { .. } => Self::Exists { address },
+            Of::InvalidPath { .. } => Self::Address { text: address, detail },
+            Of::NotSupported { .. } | Of::NotImplemented { .. } | Of::UnknownConfigurationKey { .. } => {
+                Self::Settings { place: address, detail }
+            }
+            _ => Self::Unreachable { address, tried_s, detail },
+        }
+    }
+}
+
+/// The last cause of an error: the ones above it repeat the address and the library's own words.
+fn told(error: &object_store::Error) -> String {
+    let mut cause: &dyn std::error::Error = error;
+    while let Some(next) = cause.source() {
+        cause = next;
+    }
+    let text = cause.to_string();
+    let line: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    line.chars().take(300).collect()
+}

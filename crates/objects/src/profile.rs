@@ -1,0 +1,130 @@
+//! AWS profiles: the keys, region and endpoint of `~/.aws/credentials` and `~/.aws/config`.
+//!
+//! The library underneath reads the environment only. Profiles that name a role, a single sign-on or a program
+//! to be asked are refused by name, and never taken for a machine without credentials.
+
+use std::path::PathBuf;
+
+use configparser::ini::Ini;
+use object_store::aws::AmazonS3ConfigKey as Key;
+
+/// What a profile may say that is understood.
+const READ: [(&str, Key); 5] = [
+    ("aws_access_key_id", Key::AccessKeyId),
+    ("aws_secret_access_key", Key::SecretAccessKey),
+    ("aws_session_token", Key::Token),
+    ("region", Key::Region),
+    ("endpoint_url", Key::Endpoint),
+];
+/// What would bring credentials in ways that are not.
+const NOT_READ: [&str; 5] =
+    ["role_arn", "sso_session", "sso_start_url", "credential_process", "source_profile"];
+
+/// Variables that say where profiles lie and which one is meant.
+#[derive(Debug, Default)]
+pub(crate) struct Where {
+    profile: Option<String>,
+    credentials: Option<PathBuf>,
+    config: Option<PathBuf>,
+}
+
+impl Where {
+    /// As the AWS tools do.
+    pub(crate) fn from_env() -> Self {
+        let variable = |name| std::env::var_os(name).filter(|value| !value.is_empty());
+        let home = variable("HOME").or_else(|| variable("USERPROFILE")).map(PathBuf::from);
+        let file = |name, usual| {
+            variable(name).map(PathBuf::from).or_else(|| Some(home.as_ref()?.join(".aws").join(usual)))
+        };
+        Self {
+            profile: std::env::var("AWS_PROFILE").ok().filter(|name| !name.is_empty()),
+            credentials: file("AWS_SHARED_CREDENTIALS_FILE", "credentials"),
+            config: file("AWS_CONFIG_FILE", "config"),
+        }
+    }
+
+    /// What the profile says; nothing when none is asked for and there is no default.
+    ///
+    /// # Errors
+    /// In words: a profile that was named is not there, a file cannot be read, or the profile brings its
+    /// credentials in a way that is not understood.
+    pub(crate) fn read(&self) -> Result<Vec<(Key, String)>, String> {
+        let name = self.profile.as_deref().unwrap_or("default");
+        let section = if name == "default" { name.to_owned() } else { format!("profile {name}") };
+        let sources = [(&self.config, section.as_str()), (&self.credentials, name)];
+        let (mut found, mut is_there, mut other) = (Vec::new(), false, None);
+        for (file, section) in sources {
+            let Some(ini) = file.as_ref().map(load).transpose()?.flatten() else { continue };
+            is_there |= ini.sections().iter().any(|known| known == section);
+            found.extend(READ.iter().filter_map(|(name, key)| Some((*key, ini.get(section, name)?))));
+            other = other.or_else(|| NOT_READ.into_iter().find(|key| ini.get(section, key).is_some()));
+        }
+        match other {
+            _ if !is_there && self.profile.is_some() => Err(format!("there is no profile `{name}`")),
+            Some(key) if !found.iter().any(|(key, _)| *key == Key::AccessKeyId) => Err(format!(
+                "profile `{name}` has `{key}`, which is not read: \
+                 `aws configure export-credentials --profile {name} --format env` makes variables of it"
+            )),
+            _ => Ok(found),
+        }
+    }
+}
+
+fn load(file: &PathBuf) -> Result<Option<Ini>, String> {
+    let text = match std::fs::read_to_string(file) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(format!("{} cannot be read: {e}", file.display())),
+    };
+    // Names of profiles are told apart by case.
+    let mut ini = Ini::new_cs();
+    ini.read(text).map_err(|e| format!("{} is no profile file: {e}", file.display()))?;
+    Ok(Some(ini))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CREDENTIALS: &str = "[default]\naws_access_key_id = AKIDEFAULT\naws_secret_access_key = s1\n\n[Night]\n\
+                               aws_access_key_id=AKINIGHT\naws_secret_access_key=s2\naws_session_token=t2\n";
+    const CONFIG: &str = "[default]\nregion = eu-central-1\n[profile Night]\nregion = eu-west-1\n\
+                          endpoint_url = https://store.example.com\ns3 =\n  max_concurrent_requests = 4\n\
+                          [profile sso]\nsso_session = hangar\nregion = eu-west-1\n";
+
+    fn read(profile: Option<&str>) -> Result<Vec<(Key, String)>, String> {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = dir.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            Some(path)
+        };
+        let profile = profile.map(str::to_owned);
+        let (credentials, config) = (file("credentials", CREDENTIALS), file("config", CONFIG));
+        Where { profile, credentials, config }.read()
+    }
+
+    fn value(found: &[(Key, String)], wanted: Key) -> Option<&str> {
+        found.iter().find(|(key, _)| *key == wanted).map(|(_, value)| value.as_str())
+    }
+
+    #[test]
+    fn a_profile_brings_keys_region_and_endpoint_out_of_both_files() {
+        let found = read(Some("Night")).unwrap();
+        assert_eq!(value(&found, Key::AccessKeyId), Some("AKINIGHT"));
+        assert_eq!(value(&found, Key::Token), Some("t2"));
+        assert_eq!(value(&found, Key::Region), Some("eu-west-1"));
+        assert_eq!(value(&found, Key::Endpoint), Some("https://store.example.com"));
+        let usual = read(None).unwrap();
+        assert_eq!(value(&usual, Key::AccessKeyId), Some("AKIDEFAULT"));
+        assert_eq!(value(&usual, Key::Region), Some("eu-central-1"));
+    }
+
+    #[test]
+    fn a_profile_that_cannot_be_followed_is_told_by_name() {
+        assert!(read(Some("sso")).unwrap_err().contains("`sso_session`, which is not read"));
+        assert!(read(Some("gone")).unwrap_err().contains("no profile `gone`"));
+        let none = Where { profile: None, credentials: Some("/nowhere/c".into()), config: None };
+        assert!(none.read().unwrap().is_empty());
+    }
+}

@@ -1,0 +1,100 @@
+//! Ranges of bytes: which are still wanted, and which are fetched together.
+
+use std::ops::Range;
+
+/// Holes up to this size are fetched along: a request costs as much time as a mebibyte.
+const HOLE: u64 = 1 << 20;
+/// One request brings so much at most: a broken one is made again, and several go at once.
+const LARGEST: u64 = 8 << 20;
+
+/// Ranges that are had, in order and apart.
+#[derive(Debug, Default)]
+pub(crate) struct Ranges(Vec<Range<u64>>);
+
+impl Ranges {
+    /// What of the wanted ranges is not had yet, brought together where they lie close, and cut into requests.
+    pub(crate) fn lacking(&self, wanted: &[Range<u64>]) -> Vec<Range<u64>> {
+        let mut wanted: Vec<Range<u64>> = wanted.iter().flat_map(|range| self.rest(range.clone())).collect();
+        wanted.sort_by_key(|range| range.start);
+        let mut joined: Vec<Range<u64>> = Vec::new();
+        for range in wanted {
+            match joined.last_mut() {
+                Some(last) if range.start <= last.end.saturating_add(HOLE) => {
+                    last.end = last.end.max(range.end);
+                }
+                _ => joined.push(range),
+            }
+        }
+        joined.into_iter().flat_map(cut).collect()
+    }
+
+    /// The parts of a range that are not had.
+    fn rest(&self, range: Range<u64>) -> Vec<Range<u64>> {
+        let (mut rest, mut at) = (Vec::new(), range.start);
+        for had in self.0.iter().filter(|had| had.start < range.end && had.end > range.start) {
+            if had.start > at {
+                rest.push(at..had.start);
+            }
+            at = at.max(had.end);
+        }
+        if at < range.end {
+            rest.push(at..range.end);
+        }
+        rest
+    }
+
+    /// A range is had from now on.
+    pub(crate) fn add(&mut self, range: Range<u64>) {
+        let (mut new, mut apart) = (range, Vec::with_capacity(self.0.len() + 1));
+        for had in self.0.drain(..) {
+            if had.end < new.start || had.start > new.end {
+                apart.push(had);
+            } else {
+                new = new.start.min(had.start)..new.end.max(had.end);
+            }
+        }
+        apart.push(new);
+        apart.sort_by_key(|range| range.start);
+        self.0 = apart;
+    }
+}
+
+fn cut(range: Range<u64>) -> impl Iterator<Item = Range<u64>> {
+    let Range { start, end } = range;
+    let pieces = (end - start).div_ceil(LARGEST);
+    (0..pieces).map(move |piece| start + piece * LARGEST..(start + (piece + 1) * LARGEST).min(end))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::slice;
+
+    use super::*;
+
+    const MIB: u64 = 1 << 20;
+
+    fn lacking(had: &Ranges, wanted: Range<u64>) -> Vec<Range<u64>> {
+        had.lacking(slice::from_ref(&wanted))
+    }
+
+    #[test]
+    fn neighbours_are_fetched_together_and_long_ones_in_pieces() {
+        let none = Ranges::default();
+        let near = [10 * MIB..11 * MIB, 0..MIB, 2 * MIB..3 * MIB];
+        assert_eq!(none.lacking(&near), [0..3 * MIB, 10 * MIB..11 * MIB]);
+        assert_eq!(lacking(&none, 5..5), []);
+        assert_eq!(lacking(&none, 0..17 * MIB), [0..8 * MIB, 8 * MIB..16 * MIB, 16 * MIB..17 * MIB]);
+    }
+
+    #[test]
+    fn what_is_had_is_not_fetched_again() {
+        let mut had = Ranges::default();
+        had.add(0..10 * MIB);
+        had.add(20 * MIB..30 * MIB);
+        assert_eq!(lacking(&had, 5 * MIB..9 * MIB), []);
+        let wanted = [25 * MIB..31 * MIB, 8 * MIB..12 * MIB];
+        assert_eq!(had.lacking(&wanted), [10 * MIB..12 * MIB, 30 * MIB..31 * MIB]);
+        had.add(9 * MIB..21 * MIB);
+        assert_eq!(lacking(&had, 0..30 * MIB), []);
+    }
+}

@@ -1,0 +1,126 @@
+//! One object as a file: the ranges that are asked for, in a nameless temporary file at their own offsets.
+//!
+//! The file is as long as the object and has holes where nothing was asked for, so it takes as much disk as was
+//! fetched; it has no name, and is gone with the process. Whoever reads it has asked for those bytes before.
+
+use std::fs::File;
+use std::iter::once;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use bytes::Bytes;
+use futures::{StreamExt, stream};
+use object_store::{GetOptions, GetRange, ObjectMeta, ObjectStore, ObjectStoreExt};
+
+use crate::address::Address;
+use crate::client::{Client, block_on};
+use crate::error::Error;
+use crate::range::Ranges;
+
+/// Requests in flight at once, for one object.
+const AT_ONCE: usize = 4;
+
+/// An object, and what was fetched of it.
+#[derive(Debug)]
+pub struct Spool {
+    address: Address,
+    client: Client,
+    meta: ObjectMeta,
+    file: File,
+    had: Mutex<Ranges>,
+}
+
+impl Spool {
+    /// Finds the object; nothing of its content is fetched yet.
+    ///
+    /// # Errors
+    /// [`Error::Missing`], [`Error::Denied`], [`Error::Unreachable`]; [`Error::Spool`] when there is no room
+    /// for a temporary file.
+    pub fn open(address: &Address) -> Result<Self, Error> {
+        let (client, location, clock) = (address.client()?, address.location()?, Instant::now());
+        let meta = block_on(client.head(&location))?;
+        let meta = meta.map_err(|e| Error::of(address, clock.elapsed().as_secs_f64(), &e))?;
+        let file = tempfile::tempfile().map_err(|e| no_room(address, e))?;
+        file.set_len(meta.size).map_err(|e| no_room(address, e))?;
+        Ok(Self { address: address.clone(), client, meta, file, had: Mutex::default() })
+    }
+
+    /// The file: as long as the object, whole where it was [wanted](Spool::want).
+    pub fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Brings ranges of the object into the file, unless they are there; ends beyond the object's are cut.
+    ///
+    /// # Errors
+    /// [`Error::Changed`] when the object is no longer the one that was opened, [`Error::Unreachable`] when no
+    /// whole answer came in the time allowed, [`Error::Spool`] when it has no room here.
+    pub fn want(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> Result<(), Error> {
+        let clip = |range: Range<u64>| range.start.min(self.meta.size)..range.end.min(self.meta.size);
+        let wanted: Vec<Range<u64>> =
+            ranges.into_iter().map(clip).filter(|range| !range.is_empty()).collect();
+        // Held while it is fetched: two actuators that want the same column fetch it once.
+        let mut had = self.had.lock().unwrap_or_else(PoisonError::into_inner);
+        let lacking = had.lacking(&wanted);
+        if lacking.is_empty() {
+            return Ok(());
+        }
+        block_on(async {
+            let pieces = lacking.into_iter().map(|range| async { (range.clone(), self.fetch(range).await) });
+            let mut pieces = stream::iter(pieces).buffer_unordered(AT_ONCE);
+            while let Some((range, bytes)) = pieces.next().await {
+                write_at(&self.file, &bytes?, range.start).map_err(|e| no_room(&self.address, e))?;
+                had.add(range);
+            }
+            Ok(())
+        })?
+    }
+
+    async fn fetch(&self, range: Range<u64>) -> Result<Bytes, Error> {
+        let clock = Instant::now();
+        let options = GetOptions {
+            if_match: self.meta.e_tag.clone(),
+            range: Some(GetRange::Bounded(range.clone())),
+            ..GetOptions::default()
+        };
+        let failed = |e| Error::of(&self.address, clock.elapsed().as_secs_f64(), &e);
+        let answer = self.client.get_opts(&self.meta.location, options).await.map_err(failed)?;
+        let given = answer.range.clone();
+        let bytes = answer.bytes().await.map_err(failed)?;
+        if given == range {
+            return Ok(bytes);
+        }
+        let detail = format!("bytes {given:?} came where {range:?} were asked for");
+        Err(Error::Unreachable { address: self.address.to_string(), tried_s: 0.0, detail })
+    }
+}
+
+/// Fetches a whole object into a nameless file and opens that at its beginning.
+///
+/// # Errors
+/// As [`Spool::open`] and [`Spool::want`].
+pub fn whole(path: &Path) -> Result<File, Error> {
+    let spool = Spool::open(&Address::must(path)?)?;
+    spool.want(once(0..spool.meta.size))?;
+    Ok(spool.file)
+}
+
+fn no_room(address: &Address, source: std::io::Error) -> Error {
+    Error::Spool { address: address.to_string(), folder: std::env::temp_dir(), source }
+}
+
+#[cfg(unix)]
+fn write_at(file: &File, bytes: &[u8], at: u64) -> std::io::Result<()> {
+    std::os::unix::fs::FileExt::write_all_at(file, bytes, at)
+}
+
+#[cfg(windows)]
+fn write_at(file: &File, mut bytes: &[u8], mut at: u64) -> std::io::Result<()> {
+    while !bytes.is_empty() {
+        let count = std::os::windows::fs::FileExt::seek_write(file, bytes, at)?;
+        (bytes, at) = (&bytes[count..], at + count as u64);
+    }
+    Ok(())
+}

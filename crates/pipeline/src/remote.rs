@@ -1,0 +1,61 @@
+//! Logs in an object store: which keys fit a pattern, and what a listing tells of them.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use objects::{Address, Entry};
+
+use crate::error::Error;
+use crate::plan::FileStat;
+
+/// What listings told of the objects that fit: a million keys are not asked for once more, one by one.
+pub(crate) type Seen = HashMap<PathBuf, FileStat>;
+
+/// Keys are matched as files are: `*` stays within a folder, `**` does not.
+const AS_FILES: glob::MatchOptions = glob::MatchOptions {
+    case_sensitive: true,
+    require_literal_separator: true,
+    require_literal_leading_dot: false,
+};
+
+/// Hands over every object that fits a pattern. Only the folder before its first wildcard is listed, and what
+/// does not fit is not kept.
+///
+/// # Errors
+/// [`Error::Objects`] when the store does not answer; the text of what is wrong with the pattern.
+pub(crate) fn each(pattern: &str, mut take: impl FnMut(Entry)) -> Result<Result<(), String>, Error> {
+    let address = Address::must(pattern)?;
+    let wanted = match glob::Pattern::new(address.key()) {
+        Ok(wanted) => wanted,
+        Err(e) => return Ok(Err(e.to_string())),
+    };
+    let Some(first) = address.key().find(['*', '?', '[']) else {
+        return match objects::look(Path::new(pattern)) {
+            Ok(entry) => {
+                take(entry);
+                Ok(Ok(()))
+            }
+            Err(objects::Error::Missing { .. }) => Ok(Ok(())),
+            Err(error) => Err(error.into()),
+        };
+    };
+    let folder = address.key()[..first].rsplit_once('/').map_or("", |(folder, _)| folder);
+    let root = address.root();
+    objects::list(&address.with_key(folder), |entry| {
+        let key = entry.path.to_str().and_then(|text| text.strip_prefix(&root));
+        if key.is_some_and(|key| wanted.matches_with(key, AS_FILES)) {
+            take(entry);
+        }
+    })?;
+    Ok(Ok(()))
+}
+
+impl From<Entry> for FileStat {
+    fn from(entry: Entry) -> Self {
+        Self {
+            size_bytes: entry.size_bytes as i64,
+            modified_utc_ns: entry.modified_utc_ns,
+            file_id: entry.e_tag,
+        }
+    }
+}

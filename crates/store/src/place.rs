@@ -1,0 +1,260 @@
+//! Where a store lies: a folder, or a prefix of a bucket of which copies lie in a folder of this process.
+//!
+//! Files go by the same path in both: for a bucket it is where the copy lies once the file was
+//! [brought](Place::bring). Data files never change under their names, so a copy is as good as the object; it is
+//! compared with its digest like any file.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use deltalake::logstore::object_store::prefix::PrefixStore;
+use deltalake::logstore::object_store::{self, ObjectStore, ObjectStoreExt, PutMode, PutOptions, PutPayload};
+use deltalake::logstore::{LogStoreRef, StorageConfig, default_logstore};
+use deltalake::{DeltaTableBuilder, DeltaTableError};
+use objects::{Address, Client, block_on};
+use tokio::runtime::{Builder, Handle, Runtime};
+use url::Url;
+
+use crate::durable::{self, DurableFiles};
+use crate::error::Error;
+
+/// A store's or a table's place.
+#[derive(Debug, Clone)]
+pub(crate) struct Place {
+    /// The folder itself, or where copies lie.
+    dir: PathBuf,
+    bucket: Option<Bucket>,
+    runtime: Arc<Threads>,
+}
+
+#[derive(Debug, Clone)]
+struct Bucket {
+    address: Address,
+    client: Client,
+    /// Deleted with the last who reads from it.
+    _copies: Arc<tempfile::TempDir>,
+}
+
+/// What runs Delta's asynchronous library: threads of our own, or those that serve the bucket's connections.
+#[derive(Debug)]
+enum Threads {
+    Own(Runtime),
+    Shared(Handle),
+}
+
+impl Place {
+    /// A folder that exists, or an address.
+    pub(crate) fn at(path: &Path) -> Result<Self, Error> {
+        let Some(address) = Address::of(path)? else { return Self::folder(path) };
+        let copies = tempfile::tempdir().map_err(Error::io(std::env::temp_dir(), "written"))?;
+        let runtime = Arc::new(Threads::Shared(objects::handle()?));
+        let (dir, client) = (copies.path().to_owned(), address.client()?);
+        let bucket = Some(Bucket { address, client, _copies: Arc::new(copies) });
+        Ok(Self { dir, bucket, runtime })
+    }
+
+    /// A folder that exists. Delta's library is asynchronous; one worker beside the caller's thread serves it.
+    fn folder(path: &Path) -> Result<Self, Error> {
+        let dir = std::fs::canonicalize(path).map_err(Error::io(path, "opened"))?;
+        let own = Builder::new_multi_thread().worker_threads(1).thread_name("store").enable_all().build();
+        let runtime = Arc::new(Threads::Own(own.map_err(Error::io(&dir, "opened"))?));
+        Ok(Self { dir, bucket: None, runtime })
+    }
+
+    /// A folder of this place.
+    pub(crate) fn below(&self, name: &str) -> Self {
+        let deeper = |bucket: &Bucket| Bucket {
+            address: bucket.address.with_key(&joined(bucket.address.key(), name)),
+            ..bucket.clone()
+        };
+        let bucket = self.bucket.as_ref().map(deeper);
+        Self { dir: self.dir.join(name), bucket, runtime: Arc::clone(&self.runtime) }
+    }
+
+    /// The folder, or where copies lie.
+    pub(crate) fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    pub(crate) fn is_bucket(&self) -> bool {
+        self.bucket.is_some()
+    }
+
+    /// A file's name for people and for other programs.
+    pub(crate) fn named(&self, path: &Path) -> PathBuf {
+        match &self.bucket {
+            Some(bucket) => bucket.address.with_key(&self.key(bucket, path)).to_string().into(),
+            None => path.to_owned(),
+        }
+    }
+
+    pub(crate) fn block_on<F: Future>(&self, work: F) -> F::Output {
+        match self.runtime.as_ref() {
+            Threads::Own(runtime) => runtime.block_on(work),
+            Threads::Shared(handle) => handle.block_on(work),
+        }
+    }
+
+    /// Delta's view of this folder.
+    pub(crate) fn log_store(&self) -> Result<LogStoreRef, DeltaTableError> {
+        let invalid = || DeltaTableError::InvalidTableLocation(self.dir.display().to_string());
+        let Some(bucket) = &self.bucket else {
+            let url = Url::from_directory_path(&self.dir).map_err(|()| invalid())?;
+            let builder = DeltaTableBuilder::from_url(url.clone())?;
+            return builder.with_storage_backend(Arc::new(DurableFiles::default()), url).build_storage();
+        };
+        let url = Url::parse(&bucket.address.to_string()).map_err(|_| invalid())?;
+        let below = Arc::new(PrefixStore::new(Arc::clone(&bucket.client), bucket.address.key()));
+        Ok(default_logstore(below, Arc::clone(&bucket.client), &url, &StorageConfig::default()))
+    }
+
+    /// Makes room for files: a folder where this is one, or where copies lie.
+    pub(crate) fn make(&self) -> Result<(), Error> {
+        std::fs::create_dir_all(&self.dir).map_err(Error::io(&self.dir, "created"))
+    }
+
+    /// Makes the names of new files last; a bucket's do when their writing returns.
+    pub(crate) fn sync(&self) -> Result<(), Error> {
+        if self.is_bucket() {
+            return Ok(());
+        }
+        durable::sync_dir(&self.dir).map_err(Error::io(&self.dir, "synced"))
+    }
+
+    /// Whether a file is there.
+    pub(crate) fn has(&self, name: &str) -> Result<bool, Error> {
+        let path = self.dir.join(name);
+        match &self.bucket {
+            Some(bucket) => Ok(self.size(bucket, &path)?.is_some()),
+            None => Ok(path.exists()),
+        }
+    }
+
+    /// A file's bytes as it is there; nothing when it is not.
+    pub(crate) fn length(&self, path: &Path) -> Result<Option<u64>, Error> {
+        match &self.bucket {
+            Some(bucket) => self.size(bucket, path),
+            None => Ok(std::fs::metadata(path).ok().map(|data| data.len())),
+        }
+    }
+
+    fn size(&self, bucket: &Bucket, path: &Path) -> Result<Option<u64>, Error> {
+        match bucket.ask(&self.key(bucket, path), async |location| bucket.client.head(location).await) {
+            Ok(meta) => Ok(Some(meta.size)),
+            Err(objects::Error::Missing { .. }) => Ok(None),
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// A small file's content.
+    pub(crate) fn read(&self, name: &str) -> Result<String, Error> {
+        let path = self.dir.join(name);
+        self.bring(&path)?;
+        std::fs::read_to_string(&path).map_err(Error::io(path, "read"))
+    }
+
+    /// Has a file at hand under its path: one in a bucket is copied there.
+    pub(crate) fn bring(&self, path: &Path) -> Result<(), Error> {
+        let Some(bucket) = &self.bucket else { return Ok(()) };
+        let content = bucket.ask(&self.key(bucket, path), async |location| {
+            bucket.client.get(location).await?.bytes().await
+        })?;
+        let folder = path.parent().unwrap_or(&self.dir);
+        let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(path, content));
+        written.map_err(Error::io(path, "copied"))
+    }
+
+    /// Writes a whole file under a new name; one of that name is left as it is, and not told of.
+    pub(crate) fn create(&self, path: &Path, content: &[u8]) -> Result<(), Error> {
+        let Some(bucket) = &self.bucket else {
+            return match durable::create(path, content) {
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => Ok(()),
+                done => done.map_err(Error::io(path, "written")),
+            };
+        };
+        match self.put(bucket, path, content, PutMode::Create) {
+            Err(objects::Error::Exists { .. }) => Ok(()),
+            done => Ok(done?),
+        }
+    }
+
+    /// Writes a whole file, in place of one of the same name.
+    pub(crate) fn replace(&self, name: &str, content: &[u8]) -> Result<(), Error> {
+        let path = self.dir.join(name);
+        match &self.bucket {
+            Some(bucket) => Ok(self.put(bucket, &path, content, PutMode::Overwrite)?),
+            None => durable::replace(&path, content).map_err(Error::io(path, "written")),
+        }
+    }
+
+    fn put(&self, bucket: &Bucket, path: &Path, content: &[u8], mode: PutMode) -> Result<(), objects::Error> {
+        let payload = PutPayload::from(content.to_vec());
+        let options = PutOptions { mode, ..PutOptions::default() };
+        bucket.ask(&self.key(bucket, path), async |location| {
+            bucket.client.put_opts(location, payload, options).await.map(drop)
+        })
+    }
+
+    /// Deletes a file.
+    pub(crate) fn delete(&self, path: &Path) -> Result<(), Error> {
+        match &self.bucket {
+            Some(bucket) => {
+                Ok(bucket
+                    .ask(&self.key(bucket, path), async |location| bucket.client.delete(location).await)?)
+            }
+            None => std::fs::remove_file(path).map_err(Error::io(path, "deleted")),
+        }
+    }
+
+    /// The files right here, and when they were written.
+    pub(crate) fn entries(&self) -> Result<Vec<(PathBuf, SystemTime)>, Error> {
+        let Some(bucket) = &self.bucket else {
+            return local(&self.dir).map_err(Error::io(&self.dir, "read"));
+        };
+        let (prefix, mut found) = (joined(bucket.address.key(), ""), Vec::new());
+        objects::list(&bucket.address, |entry| {
+            let name = Address::must(&entry.path).ok();
+            let name = name.as_ref().and_then(|address| address.key().strip_prefix(&prefix));
+            let written =
+                UNIX_EPOCH + Duration::from_nanos(u64::try_from(entry.modified_utc_ns).unwrap_or_default());
+            found.extend(name.filter(|n| !n.contains('/')).map(|name| (self.dir.join(name), written)));
+        })?;
+        Ok(found)
+    }
+
+    /// The key of a file that goes by this path.
+    fn key(&self, bucket: &Bucket, path: &Path) -> String {
+        let below = path.strip_prefix(&self.dir).unwrap_or(path).to_string_lossy().replace('\\', "/");
+        if below.is_empty() { bucket.address.key().to_owned() } else { joined(bucket.address.key(), &below) }
+    }
+}
+
+impl Bucket {
+    /// Asks for one key.
+    fn ask<T>(
+        &self,
+        key: &str,
+        question: impl AsyncFnOnce(&object_store::path::Path) -> object_store::Result<T>,
+    ) -> Result<T, objects::Error> {
+        let address = self.address.with_key(key);
+        let (location, clock) = (address.location()?, std::time::Instant::now());
+        let answer = block_on(question(&location))?;
+        answer.map_err(|e| objects::Error::of(&address, clock.elapsed().as_secs_f64(), &e))
+    }
+}
+
+fn joined(folder: &str, name: &str) -> String {
+    if folder.is_empty() { name.to_owned() } else { format!("{folder}/{name}") }
+}
+
+fn local(dir: &Path) -> std::io::Result<Vec<(PathBuf, SystemTime)>> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(dir)? {
+        let path = entry?.path();
+        // One that is gone by now needs no more care.
+        let written = std::fs::metadata(&path).and_then(|data| data.modified());
+        found.extend(written.ok().map(|written| (path, written)));
+    }
+    Ok(found)
+}
