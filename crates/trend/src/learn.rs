@@ -60,16 +60,11 @@ fn likeliest(lessons: impl Iterator<Item = Lesson>) -> Option<Lesson> {
 struct Known<'a> {
     flights: &'a [Flight],
     book: &'a [Booked],
-    unit_hours_at_start: Option<f64>,
 }
 
 impl<'a> Known<'a> {
     fn on(series: &'a Series, as_of_us: i64) -> Self {
-        Self {
-            flights: series.until(as_of_us),
-            book: series.book_until(as_of_us),
-            unit_hours_at_start: series.unit_hours_at_start(),
-        }
+        Self { flights: series.until(as_of_us), book: series.book_until(as_of_us) }
     }
 }
 
@@ -108,7 +103,9 @@ impl Lesson {
             return None;
         }
         let mut assumed = FleetPrior { axis, hours_per_unit, ..FleetPrior::vague(limit_m) };
-        let read = |u: &Known<'_>| history::read(u.flights, u.book, u.unit_hours_at_start, &assumed);
+        // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
+        // their first hour on teach a fleet that never wears.
+        let read = |u: &Known<'_>| history::read(u.flights, u.book, None, &assumed);
         let histories: Vec<History> = fleet.iter().map(read).collect();
         assumed.bias_sd_m = bias(&histories, assumed.bias_sd_m);
         let swings: Vec<Swing> = histories
