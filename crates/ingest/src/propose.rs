@@ -117,9 +117,9 @@ fn time_unit(name: &str) -> Option<&'static str> {
 }
 
 const ROLES: [(Role, &[&str]); 4] = [
-    (Role::Motor, &["motor", "mtr", "resolver", "rotor", "input", "drive"]),
+    (Role::Motor, &["motor", "mot", "mtr", "resolver", "rotor", "input", "drive"]),
     (Role::Screw, &["screw", "nut", "ram", "lvdt", "output", "stroke", "rod", "joint"]),
-    (Role::Load, &["load", "force", "torque", "loadcell"]),
+    (Role::Load, &["load", "force", "frc", "torque", "trq", "loadcell"]),
     (Role::Temperature, &["temp", "temperature"]),
 ];
 
@@ -262,6 +262,7 @@ mod tests {
                 Some(Unit::Millimetre),
             ),
             ("loadElevatorRight", Role::Load, "load{position}", place("ElevatorRight"), None),
+            ("ELV_L.MOT_POS_RAD", Role::Motor, "{position}.MOT_POS_RAD", place("ELV_L"), Some(Unit::Radian)),
             ("load_n", Role::Load, "load_n", None, Some(Unit::Newton)),
             ("resolver angle rudder", Role::Motor, "resolver angle {position}", place("rudder"), None),
         ];
