@@ -1,20 +1,21 @@
 //! The tables a user gives beside the logs: read as text from CSV or Parquet, then checked cell by cell.
+//!
+//! Long ones are read in [`Chunk`]s, column by column.
+
+mod chunk;
 
 use std::collections::BTreeMap;
-use std::io::Read;
 use std::path::Path;
 use std::str::FromStr;
 
-use arrow::array::{Array, AsArray, RecordBatch};
-use arrow::compute::cast;
-use arrow::datatypes::DataType;
+use arrow::array::RecordBatch;
 use fleet::{Installation, Installations};
 use jiff::{Timestamp, civil, tz::TimeZone};
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+pub use chunk::{Chunk, Chunks, chunks};
 
 use crate::error::{Error, Fault};
 use crate::pattern::nearest;
-use crate::source::whole;
 
 /// A small table, every cell text; an empty cell is none.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,10 +51,12 @@ impl Table {
     /// # Errors
     /// When the file cannot be read, or is not the table its name says.
     pub fn read(file: &Path) -> Result<Self, Error> {
-        let parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
-        let (header, rows) =
-            if parquet { read_parquet(file) } else { read_csv(file) }.map_err(|f| Error::new(file, f))?;
-        Ok(Self { file: file.to_owned(), header, rows, names: Names::new() })
+        let mut table =
+            Self { file: file.to_owned(), header: Vec::new(), rows: Vec::new(), names: Names::new() };
+        for chunk in chunks(file, None)? {
+            table.extend(&chunk?)?;
+        }
+        Ok(table)
     }
 
     /// The same table from memory; `name` stands for its file in complaints.
@@ -61,10 +64,19 @@ impl Table {
     /// # Errors
     /// When a column is neither text, numbers nor times.
     pub fn of_batches(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
-        let header = batches.first().map(header).unwrap_or_default();
-        let rows = batches.iter().map(texts).collect::<Result<Vec<_>, _>>();
-        let rows = rows.map_err(|f| Error::new(name, f))?.into_iter().flatten().collect();
-        Ok(Self { file: name.to_owned(), header, rows, names: Names::new() })
+        let mut table =
+            Self { file: name.to_owned(), header: Vec::new(), rows: Vec::new(), names: Names::new() };
+        batches.iter().try_for_each(|batch| table.extend(&Chunk::new(name, batch.clone(), 0)))?;
+        Ok(table)
+    }
+
+    fn extend(&mut self, chunk: &Chunk) -> Result<(), Error> {
+        self.header = chunk.header().to_vec();
+        let columns = (0..self.header.len()).map(|column| chunk.texts(Some(column)));
+        let columns = columns.collect::<Result<Vec<_>, _>>()?;
+        let row = |row| columns.iter().map(|texts| texts.get(row).map(str::to_owned)).collect();
+        self.rows.extend((0..chunk.len()).map(row));
+        Ok(())
     }
 
     /// The same table, whose columns go by a user's own names.
@@ -87,7 +99,7 @@ impl Table {
     /// Where a column stands, if it is there under one of its names.
     pub fn find(&self, names: &[&str]) -> Option<usize> {
         let theirs = |name: &str| self.names.get(name).map_or_else(|| name.to_owned(), Clone::clone);
-        names.iter().find_map(|name| self.header.iter().position(|h| h.trim() == theirs(name)))
+        names.iter().find_map(|name| position(&self.header, &theirs(name)))
     }
 
     /// Where a column stands.
@@ -95,18 +107,13 @@ impl Table {
     /// # Errors
     /// When it is not there, with the nearest name that is.
     pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
-        self.find(names).ok_or_else(|| {
-            let wanted = self.names.get(names[0]).map_or(names[0], String::as_str);
-            // A column that is one of ours already stands for what it says.
-            let others = self.header.iter().filter(|h| !KNOWN.contains(&h.trim()));
-            let nearest = nearest(wanted, others.map(String::as_str)).map(str::to_owned);
-            Error::new(&self.file, Fault::TableColumn { column: wanted.to_owned(), nearest })
-        })
+        let wanted = || self.names.get(names[0]).map_or(names[0], String::as_str);
+        self.find(names).ok_or_else(|| missing(&self.file, wanted(), &self.header))
     }
 
     /// The text of a cell.
     pub fn text(&self, row: usize, column: usize) -> Option<&str> {
-        self.rows[row].get(column)?.as_deref().map(str::trim).filter(|t| !t.is_empty())
+        self.rows[row].get(column)?.as_deref()
     }
 
     /// A cell that must hold something, read as `T`.
@@ -140,9 +147,26 @@ impl Table {
     }
 
     fn error(&self, row: usize, column: usize, detail: String) -> Error {
-        let column = self.header.get(column).cloned();
-        Error::new(&self.file, Fault::Table { row: Some(row as u64 + 1), column, detail })
+        bad_cell(&self.file, row, self.header.get(column), detail)
     }
+}
+
+/// Where a header has a name.
+fn position(header: &[String], name: &str) -> Option<usize> {
+    header.iter().position(|h| h.trim() == name)
+}
+
+/// A column that is not there, with the nearest that is.
+fn missing(file: &Path, wanted: &str, header: &[String]) -> Error {
+    // A column that is one of ours already stands for what it says.
+    let others = header.iter().filter(|h| !KNOWN.contains(&h.trim()));
+    let nearest = nearest(wanted, others.map(String::as_str)).map(str::to_owned);
+    Error::new(file, Fault::TableColumn { column: wanted.to_owned(), nearest })
+}
+
+/// A cell that is not what it should be; rows count from 0 here and from 1 for people.
+fn bad_cell(file: &Path, row: usize, column: Option<&String>, detail: String) -> Error {
+    Error::new(file, Fault::Table { row: Some(row as u64 + 1), column: column.cloned(), detail })
 }
 
 /// Reads the installations table: `tail_number, position, part_number, serial_number, installed_utc,
@@ -250,59 +274,6 @@ fn not_utc(text: &str) -> String {
         Some(day) if day.parse::<civil::Date>().is_err() => format!("there is no day `{day}`"),
         _ => format!("`{text}` is no UTC date or time such as 2026-11-19 or 2026-11-19T04:13:00Z"),
     }
-}
-
-type Cells = (Vec<String>, Vec<Vec<Option<String>>>);
-
-fn read_csv(file: &Path) -> Result<Cells, Fault> {
-    let bad = |e: &csv::Error| {
-        let row = e.position().map(csv::Position::record);
-        Fault::Table { row, column: None, detail: e.to_string() }
-    };
-    let mut text = Vec::new();
-    whole(file)?.read_to_end(&mut text).map_err(|source| Fault::Unreadable { source })?;
-    // Spreadsheets open their UTF-8 with a byte order mark.
-    let text = text.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&text);
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text);
-    let header = reader.headers().map_err(|e| bad(&e))?.iter().map(str::to_owned).collect();
-    let mut rows = Vec::new();
-    for record in reader.records() {
-        let record = record.map_err(|e| bad(&e))?;
-        rows.push(record.iter().map(|cell| (!cell.is_empty()).then(|| cell.to_owned())).collect());
-    }
-    Ok((header, rows))
-}
-
-fn read_parquet(file: &Path) -> Result<Cells, Fault> {
-    let torn = |e: String| Fault::NotParquet { detail: e };
-    let reader = ParquetRecordBatchReaderBuilder::try_new(whole(file)?).map_err(|e| torn(e.to_string()))?;
-    let header: Vec<String> = reader.schema().fields().iter().map(|f| f.name().clone()).collect();
-    let mut rows: Vec<Vec<Option<String>>> = Vec::new();
-    for batch in reader.build().map_err(|e| torn(e.to_string()))? {
-        rows.extend(texts(&batch.map_err(|e| torn(e.to_string()))?)?);
-    }
-    Ok((header, rows))
-}
-
-fn header(batch: &RecordBatch) -> Vec<String> {
-    batch.schema_ref().fields().iter().map(|f| f.name().clone()).collect()
-}
-
-/// The cells of a batch, row by row.
-fn texts(batch: &RecordBatch) -> Result<Vec<Vec<Option<String>>>, Fault> {
-    let text = |(name, array): (&String, &arrow::array::ArrayRef)| {
-        cast(array, &DataType::Utf8).map_err(|_| Fault::ColumnType {
-            column: name.clone(),
-            found: array.data_type().to_string(),
-            wanted: "text, numbers or times",
-        })
-    };
-    let columns = header(batch).iter().zip(batch.columns()).map(text).collect::<Result<Vec<_>, _>>()?;
-    let cell = |column: &arrow::array::ArrayRef, row| {
-        let column = column.as_string::<i32>();
-        column.is_valid(row).then(|| column.value(row).to_owned())
-    };
-    Ok((0..batch.num_rows()).map(|row| columns.iter().map(|c| cell(c, row)).collect()).collect())
 }
 
 #[cfg(test)]

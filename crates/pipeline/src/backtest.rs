@@ -12,7 +12,8 @@ use serde::Serialize;
 use trend::{ChangeKind, Series, Wear};
 
 use crate::error::Error;
-use crate::trends::{Fleet, Flown, HistoryName, histories};
+use crate::histories::{Histories, History, HistoryName};
+use crate::trends::Fleet;
 
 /// Shares of a unit's estimates after which it is asked.
 const CUTS: [f64; 3] = [0.3, 0.5, 0.75];
@@ -51,25 +52,23 @@ pub struct Past {
 ///
 /// # Errors
 /// When a history or a part's limits cannot be judged.
-pub fn of_flown(
+pub fn of_histories(
     config: &Config,
     installations: &Installations,
-    flown: Vec<Flown>,
+    histories: &Histories,
 ) -> Result<Vec<Past>, Error> {
-    let histories = histories(flown);
     let cuts: Vec<(&HistoryName, Timestamp)> =
-        histories.iter().flat_map(|(name, flown)| cuts(flown).map(move |day| (name, day))).collect();
+        histories.iter().flat_map(|(name, history)| cuts(history).map(move |day| (name, day))).collect();
     let days: Vec<Timestamp> = cuts.iter().map(|(_, day)| *day).collect();
-    let fleet = Fleet::new(config, installations, &histories, &days)?;
+    let fleet = Fleet::new(config, installations, histories, &days)?;
     let pasts = cuts.par_iter().map(|(name, day)| past(&fleet, name, *day));
     Ok(pasts.collect::<Result<Vec<_>, Error>>()?.into_iter().flatten().collect())
 }
 
 /// The days on which a unit is asked.
-fn cuts(flown: &[Flown]) -> impl Iterator<Item = Timestamp> {
-    let mut days: Vec<Timestamp> =
-        flown.iter().filter(|f| f.gap_m.is_some()).map(|f| f.departure_utc).collect();
-    days.sort_unstable();
+fn cuts(history: &History) -> impl Iterator<Item = Timestamp> {
+    let estimated = history.flights().iter().filter(|f| f.gap_m.is_some());
+    let days: Vec<Timestamp> = estimated.map(|f| f.departure_utc).collect();
     let asked = if days.len() < FEWEST { &CUTS[..0] } else { &CUTS[..] };
     asked.iter().map(move |share| days[(share * days.len() as f64) as usize])
 }

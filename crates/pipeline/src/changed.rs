@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 use jiff::Timestamp;
 use serde::Serialize;
 
-use crate::trends::{ChangePoint, HistoryName, TrendRow};
+use crate::histories::HistoryName;
+use crate::trends::{ChangePoint, TrendRow};
 
 /// An event of one kind is the same one when its date moved by no more than this: dates are estimates.
 const SAME_EVENT_DAYS: f64 = 60.0;

@@ -14,6 +14,7 @@ pub mod changed;
 pub mod elsewhere;
 pub mod estimates;
 pub mod event;
+pub mod histories;
 pub mod innovations;
 pub mod maintenance;
 pub mod normalize;

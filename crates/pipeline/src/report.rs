@@ -13,7 +13,8 @@ use store::{Outcome, Store};
 use trend::Outlook;
 
 use crate::error::Error;
-use crate::trends::{self, Ask, Flown, Told, TrendRow};
+use crate::histories::{Flown, Gathering, Histories, History, HistoryName as Name};
+use crate::trends::{self, Ask, Told, TrendRow};
 
 /// Days before the report of which statements are held against what came.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
@@ -22,9 +23,6 @@ const BOOKED_WITHIN_DAYS: f64 = 7.0;
 /// Estimates beside an inspection: so many at most, within so many days before it.
 const BESIDE: usize = 10;
 const BESIDE_DAYS: f64 = 30.0;
-
-/// A unit, as statements name it.
-type Name = (Option<String>, String);
 
 /// Composes the report of the asked units.
 ///
@@ -40,14 +38,14 @@ pub fn compose(
 ) -> Result<Report, Error> {
     let checks = inspections(config)?;
     let mut logs = Logs::of(store)?;
-    let Read { mut flown, mut rest, store_version } = Read::until(ask.as_of_utc, store, installations)?;
+    let Read { histories, mut rest, store_version } = Read::until(ask.as_of_utc, store)?;
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
-    let Told { now, drawn, before, priors } = trends::told(config, installations, &flown, ask, &days)?;
+    let Told { now, drawn, before, priors } = trends::told(config, installations, &histories, ask, &days)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
-    let newest_departure_utc = flown.values().flatten().map(|f| f.departure_utc).max();
-    let known = |c: &Check| flown.keys().any(|name| c.is_of(name));
+    let newest_departure_utc = histories.newest_utc();
+    let known = |c: &Check| histories.names().any(|name| c.is_of(name));
     let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
-    let mut tails = tails(flown.values().flatten());
+    let mut tails = tails(&histories);
     let compose = Compose {
         config,
         before: &by_name(before),
@@ -56,8 +54,8 @@ pub fn compose(
     };
     let unit = |(row, drawn): (&TrendRow, &Outlook)| {
         let name = name_of(row);
-        let (flown, rest) = (flown.remove(&name).unwrap_or_default(), rest.remove(&name).unwrap_or_default());
-        compose.unit(row, drawn, flown, rest)
+        let rest = rest.remove(&name).unwrap_or_default();
+        compose.unit(row, drawn, histories.get(&name).unwrap_or(&History::default()), rest)
     };
     let units: Vec<Unit> = now.iter().zip(&drawn).map(unit).collect();
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
@@ -117,7 +115,8 @@ impl Logs {
 
 /// All flights of all units, and what of them no statement needs but a page shows.
 struct Read {
-    flown: BTreeMap<Name, Vec<Flown>>,
+    histories: Histories,
+    /// In the order of arrival, which each flight's `row` counts.
     rest: BTreeMap<Name, Vec<Rest>>,
     store_version: u64,
 }
@@ -137,19 +136,18 @@ struct Rest {
 
 impl Read {
     /// Reads the store month by month and keeps what is used: records hold several times as much.
-    fn until(last: Option<Timestamp>, store: &Store, installations: &Installations) -> Result<Self, Error> {
-        let (mut flown, mut rest) = (BTreeMap::<Name, Vec<Flown>>::new(), BTreeMap::<Name, Vec<Rest>>::new());
+    fn until(last: Option<Timestamp>, store: &Store) -> Result<Self, Error> {
+        let (mut gathering, mut rest) = (Gathering::default(), BTreeMap::<Name, Vec<Rest>>::new());
         let store_version = store.visit(|mut record| {
             if last.is_none_or(|last| record.flight.departure_utc <= last) {
                 let name = (Some(record.part_number.to_string()), record.serial_number.to_string());
-                rest.entry(name.clone()).or_default().push(Rest::take(&mut record));
-                flown.entry(name).or_default().push(Flown::of(record, installations));
+                gathering.record(&record);
+                rest.entry(name).or_default().push(Rest::take(&mut record));
             }
         })?;
         // Room to grow is half as much again, and nothing grows any more.
-        flown.values_mut().for_each(Vec::shrink_to_fit);
         rest.values_mut().for_each(Vec::shrink_to_fit);
-        Ok(Self { flown, rest, store_version })
+        Ok(Self { histories: gathering.booked(), rest, store_version })
     }
 }
 
@@ -192,7 +190,8 @@ struct Compose<'a> {
 }
 
 impl Compose<'_> {
-    fn unit(&self, row: &TrendRow, drawn: &Outlook, flown: Vec<Flown>, rest: Vec<Rest>) -> Unit {
+    fn unit(&self, row: &TrendRow, drawn: &Outlook, history: &History, rest: Vec<Rest>) -> Unit {
+        let flown = history.flights();
         let name = name_of(row);
         let stays = self.stays.get(&name.1).map_or(&[][..], Vec::as_slice);
         let mine = stays.iter().filter(|(part, _)| name.0.as_ref().is_none_or(|p| p == part));
@@ -203,13 +202,13 @@ impl Compose<'_> {
                 .iter()
                 .filter_map(|(us, b)| banded(Timestamp::from_microsecond(*us).ok(), b))
                 .collect(),
-            forecast: forecast(drawn, &flown),
-            statement: self.statement(row, &flown, &name),
-            quality: quality(&flown, &rest, row.as_of_utc),
+            forecast: forecast(drawn, flown),
+            statement: self.statement(row, flown, &name),
+            quality: quality(flown, &rest, row.as_of_utc),
             events: events(row, &stays),
-            past: self.past(row, &flown, &name),
-            inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.beside(&flown)).collect(),
-            flights: flown.into_iter().zip(rest).map(|(flown, rest)| flight(flown, rest)).collect(),
+            past: self.past(row, flown, &name),
+            inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.beside(flown)).collect(),
+            flights: flown.iter().map(|flown| flight(history, flown, &rest[flown.row as usize])).collect(),
             stays,
             part_number: name.0,
             serial_number: name.1,
@@ -377,7 +376,7 @@ fn events(row: &TrendRow, stays: &[Stay]) -> Vec<Event> {
 
 fn quality(records: &[Flown], rest: &[Rest], as_of: Timestamp) -> Quality {
     let (mut reasons, mut doubts) = (BTreeMap::new(), BTreeMap::new());
-    for (flown, rest) in records.iter().zip(rest) {
+    for (flown, rest) in records.iter().map(|flown| (flown, &rest[flown.row as usize])) {
         if flown.gap_m.is_none() {
             *reasons.entry(rest.reason.clone().unwrap_or_default()).or_default() += 1;
         }
@@ -414,15 +413,18 @@ fn noise(records: &[Flown]) -> Option<f64> {
     (ratios.len() >= 5).then(|| 1.4826 * ratios[ratios.len() / 2])
 }
 
-fn flight(flown: Flown, rest: Rest) -> FlightRow {
-    let Rest { reason, flags, .. } = rest;
-    let others: Vec<String> = flags.into_iter().filter(|flag| Some(flag) != reason.as_ref()).collect();
-    let refusal = reason.map(|r| if flown.gap_m.is_none() { format!("refused: {r}") } else { r });
+fn flight(history: &History, flown: &Flown, rest: &Rest) -> FlightRow {
+    let place = history.place(flown);
+    let others = rest.flags.iter().filter(|flag| Some(*flag) != rest.reason.as_ref()).cloned();
+    let remark = |reason: &String| match flown.gap_m {
+        None => format!("refused: {reason}"),
+        Some(_) => reason.clone(),
+    };
     FlightRow {
         departure_utc: flown.departure_utc,
-        flight_id: flown.flight_id.unwrap_or_default(),
-        tail_number: flown.tail_number.unwrap_or_default(),
-        position: flown.position.unwrap_or_default(),
+        flight_id: flown.flight_id.as_deref().unwrap_or_default().to_owned(),
+        tail_number: place.tail_number.clone().unwrap_or_default(),
+        position: place.position.clone().unwrap_or_default(),
         unit_hours: rest.unit_hours,
         gap_m: flown.gap_m,
         gap_p05_m: rest.gap_p05_m,
@@ -431,14 +433,15 @@ fn flight(flown: Flown, rest: Rest) -> FlightRow {
         load_reversals: flown.load_reversals,
         load_p05_n: rest.load_p05_n,
         load_p95_n: rest.load_p95_n,
-        remarks: refusal.into_iter().chain(others).collect::<Vec<_>>().join(", "),
+        remarks: rest.reason.iter().map(remark).chain(others).collect::<Vec<_>>().join(", "),
     }
 }
 
-fn tails<'a>(flown: impl Iterator<Item = &'a Flown>) -> BTreeMap<String, Tail> {
+fn tails(histories: &Histories) -> BTreeMap<String, Tail> {
     let mut tails: BTreeMap<&str, (Tail, BTreeSet<&str>)> = BTreeMap::new();
-    for record in flown {
-        let (Some(name), Some(flight)) = (record.tail_number.as_deref(), record.flight_id.as_deref()) else {
+    let flown = histories.iter().flat_map(|(_, h)| h.flights().iter().map(|f| (h.place(f), f)));
+    for (place, record) in flown {
+        let (Some(name), Some(flight)) = (place.tail_number.as_deref(), record.flight_id.as_deref()) else {
             continue;
         };
         let (tail, flights) = tails.entry(name).or_insert_with(|| (quiet(name), BTreeSet::new()));

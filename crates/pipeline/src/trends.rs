@@ -1,8 +1,10 @@
 //! Trends of units: the store's records, per part and serial number across tails, as statements.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::Path;
 
-use fleet::{GapRecord, Installations, PartNumber, SerialNumber};
+use fleet::{Installation, Installations, PartNumber, SerialNumber};
+use ingest::tables::Chunk;
 use jiff::Timestamp;
 use job::Config;
 use job::part::WearAxis;
@@ -13,6 +15,7 @@ use trend::{Axis, FleetPrior, Observation, Series, Trend, Usage, classic};
 
 use crate::changed::{Changed, changed};
 use crate::error::Error;
+use crate::histories::{Gathering, Histories, History, HistoryName, Place};
 use crate::maintenance;
 use crate::unlogged::Unlogged;
 
@@ -137,8 +140,7 @@ pub fn of_store(
     ask: &Ask,
 ) -> Result<Vec<TrendRow>, Error> {
     // A statement leans on what the part's other units teach, so what is asked selects rows, not records.
-    let flown = flown_in_store(installations, store)?;
-    of_histories(config, installations, &histories(flown), ask)
+    of_histories(config, installations, &in_store(store)?, ask)
 }
 
 /// States what is known of units whose records a run changed, on the newest day in the store, and what is
@@ -156,55 +158,36 @@ pub fn of_units(
     if units.is_empty() {
         return Ok(Default::default());
     }
-    let records = store.records(&Query::default())?.into_iter();
-    let (tonight, earlier): (Vec<GapRecord>, Vec<GapRecord>) =
-        records.partition(|r| r.provenance.run_id == run_id);
-    let flown = |records: Vec<GapRecord>| records.into_iter().map(|r| Flown::of(r, installations)).collect();
-    of_night(config, installations, flown(earlier), flown(tonight), units)
+    let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
+    of_night(config, installations, &in_store(store)?, &gathered(store, &query)?, units)
 }
 
-/// The same of flights that were known before a night, and those of the night.
+/// The same of all flights that are known after a night, and those of the night.
 ///
 /// # Errors
-/// As [`of_flown`].
+/// As [`of_histories`].
 pub fn of_night(
     config: &Config,
     installations: &Installations,
-    earlier: Vec<Flown>,
-    tonight: Vec<Flown>,
+    all: &Histories,
+    tonight: &Histories,
     units: &[Unit],
 ) -> Result<(Vec<TrendRow>, Vec<Changed>), Error> {
     let names: BTreeSet<HistoryName> =
         units.iter().map(|(part, serial)| (Some(part.to_string()), serial.to_string())).collect();
-    let newest = |flown: &[Flown]| flown.iter().map(|f| f.departure_utc).max();
-    let before_utc = newest(&earlier);
-    let Some(as_of) = before_utc.max(newest(&tonight)) else { return Ok(Default::default()) };
-    let all = histories(earlier.iter().cloned().chain(tonight).collect());
+    let Some(as_of) = all.newest_utc() else { return Ok(Default::default()) };
+    let before_utc = all.newest_without_utc(tonight);
     let days: Vec<Timestamp> = before_utc.into_iter().chain([as_of]).collect();
-    let fleet = Fleet::new(config, installations, &all, &days)?;
+    let fleet = Fleet::new(config, installations, all, &days)?;
     let mut now = fleet.statements(names.iter(), as_of)?;
     now.retain(|row| row.flights > 0);
     let Some(before_utc) = before_utc else { return Ok((now, Vec::new())) };
-    let earlier: BTreeMap<HistoryName, Vec<Flown>> =
-        histories(earlier).into_iter().filter(|(name, _)| names.contains(name)).collect();
+    let earlier = all.without(&names, tonight);
     let fleet = Fleet { priors: fleet.priors, ..Fleet::read(config, installations, &earlier)? };
-    let before = fleet.statements(earlier.keys(), before_utc)?;
+    let before = fleet.statements(earlier.names(), before_utc)?;
     let before = before.into_iter().map(|row| (row.name(), row)).collect();
     let news = changed(&before, &now);
     Ok((now, news))
-}
-
-/// States what is known of the asked units of an estimates table made elsewhere.
-///
-/// # Errors
-/// When a history or a part's limits cannot be judged.
-pub fn of_flown(
-    config: &Config,
-    installations: &Installations,
-    flown: Vec<Flown>,
-    ask: &Ask,
-) -> Result<Vec<TrendRow>, Error> {
-    of_histories(config, installations, &histories(flown), ask)
 }
 
 /// All that a report says of the asked units.
@@ -223,21 +206,21 @@ pub(crate) struct Told {
 /// States what is known of the asked units, and what was known of them so many days before.
 ///
 /// # Errors
-/// As [`of_flown`].
+/// As [`of_histories`].
 pub(crate) fn told(
     config: &Config,
     installations: &Installations,
-    histories: &BTreeMap<HistoryName, Vec<Flown>>,
+    histories: &Histories,
     ask: &Ask,
     days_before: &[i64],
 ) -> Result<Told, Error> {
-    let newest = || histories.values().flatten().map(|f| f.departure_utc).max();
+    let newest = || histories.newest_utc();
     let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(Told::default()) };
     let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
     let fleet = Fleet::new(config, installations, histories, &days)?;
-    let now = fleet.statements(histories.keys().filter(|name| ask.names(name)), as_of)?;
+    let now = fleet.statements(histories.names().filter(|name| ask.names(name)), as_of)?;
     let now: Vec<TrendRow> = now.into_iter().filter(|row| ask.fits(row)).collect();
     let names: Vec<HistoryName> =
         now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
@@ -258,98 +241,61 @@ pub(crate) fn told(
 /// One statement for each query, from nothing later than its date.
 ///
 /// # Errors
-/// When a table cannot be read, or a part's limits cannot be judged by.
+/// When a history or a part's limits cannot be judged.
 pub fn of_queries(
     config: &Config,
     installations: &Installations,
-    flown: Vec<Flown>,
+    histories: &Histories,
     queries: &[AsOf],
 ) -> Result<Vec<TrendRow>, Error> {
-    let histories = histories(flown);
     let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
-    let fleet = Fleet::new(config, installations, &histories, &days)?;
-    let statement = |query: &AsOf| fleet.statement(&unit_of(query, &histories), query.as_of_utc);
+    let fleet = Fleet::new(config, installations, histories, &days)?;
+    let statement = |query: &AsOf| fleet.statement(&unit_of(query, histories), query.as_of_utc);
     queries.par_iter().map(statement).collect()
 }
 
 /// The unit a query means; one that never flew has a name all the same.
-fn unit_of(query: &AsOf, histories: &BTreeMap<HistoryName, Vec<Flown>>) -> HistoryName {
-    let fits = |unit: &&HistoryName| {
-        unit.1 == query.serial_number && (query.part_number.is_none() || unit.0 == query.part_number)
-    };
-    histories.keys().find(fits).cloned().unwrap_or((query.part_number.clone(), query.serial_number.clone()))
+fn unit_of(query: &AsOf, histories: &Histories) -> HistoryName {
+    let named = (query.part_number.clone(), query.serial_number.clone());
+    if query.part_number.is_some() || histories.get(&named).is_some() {
+        return named;
+    }
+    histories.names().find(|name| name.1 == query.serial_number).cloned().unwrap_or(named)
 }
 
-/// Every flight of the store, for queries of several days.
+/// Every unit's flights in the store.
 ///
 /// # Errors
 /// When the store cannot be read.
-pub fn flown_in_store(installations: &Installations, store: &Store) -> Result<Vec<Flown>, Error> {
-    Ok(store.records(&Query::default())?.into_iter().map(|record| Flown::of(record, installations)).collect())
+pub fn in_store(store: &Store) -> Result<Histories, Error> {
+    gathered(store, &Query::default())
 }
 
-/// One flight of one unit, wherever its gap was estimated.
-#[derive(Debug, Clone, PartialEq)]
-#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
-pub struct Flown {
-    pub part_number: Option<String>,
-    pub serial_number: String,
-    pub tail_number: Option<String>,
-    pub position: Option<String>,
-    pub flight_id: Option<String>,
-    pub departure_utc: Timestamp,
-    /// The stay on the tail that the flight belongs to, where the books know it.
-    pub installed_utc: Option<Timestamp>,
-    pub flight_hours: Option<f64>,
-    pub tail_hours_end: Option<f64>,
-    pub load_reversals: Option<u64>,
-    pub gap_m: Option<f64>,
-    pub gap_se_m: Option<f64>,
-}
-
-impl Flown {
-    pub(crate) fn of(record: GapRecord, installations: &Installations) -> Self {
-        let flight = record.flight;
-        let stay = installations.at(&flight.tail_number, &record.position, flight.departure_utc);
-        Self {
-            part_number: Some(record.part_number.to_string()),
-            serial_number: record.serial_number.to_string(),
-            installed_utc: stay.map(|s| s.installed_utc),
-            tail_number: Some(flight.tail_number.to_string()),
-            position: Some(record.position.to_string()),
-            flight_id: Some(flight.flight_id.to_string()),
-            departure_utc: flight.departure_utc,
-            flight_hours: flight.flight_hours,
-            tail_hours_end: flight.tail_hours_end,
-            load_reversals: u64::try_from(record.estimate.load_reversals).ok(),
-            gap_m: record.estimate.gap_m,
-            gap_se_m: record.estimate.gap_se_m,
-        }
-    }
-}
-
-/// Part number where known, and serial number.
-pub(crate) type HistoryName = (Option<String>, String);
-
-pub(crate) fn histories(flown: Vec<Flown>) -> BTreeMap<HistoryName, Vec<Flown>> {
-    let mut units: BTreeMap<HistoryName, Vec<Flown>> = BTreeMap::new();
-    for flight in flown {
-        units.entry((flight.part_number.clone(), flight.serial_number.clone())).or_default().push(flight);
-    }
-    units
+fn gathered(store: &Store, query: &Query) -> Result<Histories, Error> {
+    let stored: Vec<&str> =
+        Gathering::COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name)).collect();
+    let mut gathering = Gathering::default();
+    store.visit_columns(query, &stored, |batch| {
+        let chunk = Chunk::new(Path::new("results"), batch, 0);
+        gathering.add(&chunk).map_err(|e| Error::refused(e.complaint()))
+    })?;
+    Ok(gathering.booked())
 }
 
 /// One statement for each asked unit, by part and serial number.
-fn of_histories(
+///
+/// # Errors
+/// When a history or a part's limits cannot be judged.
+pub fn of_histories(
     config: &Config,
     installations: &Installations,
-    histories: &BTreeMap<HistoryName, Vec<Flown>>,
+    histories: &Histories,
     ask: &Ask,
 ) -> Result<Vec<TrendRow>, Error> {
-    let newest = || histories.values().flatten().map(|f| f.departure_utc).max();
+    let newest = || histories.newest_utc();
     let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(Vec::new()) };
     let fleet = Fleet::new(config, installations, histories, &[as_of])?;
-    let mut rows = fleet.statements(histories.keys().filter(|name| ask.names(name)), as_of)?;
+    let mut rows = fleet.statements(histories.names().filter(|name| ask.names(name)), as_of)?;
     rows.retain(|row| ask.fits(row));
     Ok(rows)
 }
@@ -360,7 +306,7 @@ type Parts<'a> = Vec<Option<&'a str>>;
 /// All units, and what each part's units had taught about the next by each month.
 pub(crate) struct Fleet<'a> {
     config: &'a Config,
-    units: BTreeMap<&'a HistoryName, (Vec<&'a Flown>, Series)>,
+    units: BTreeMap<&'a HistoryName, (&'a History, Series)>,
     priors: BTreeMap<(i64, Option<&'a str>), FleetPrior>,
 }
 
@@ -377,7 +323,7 @@ impl<'a> Fleet<'a> {
     pub(crate) fn new(
         config: &'a Config,
         installations: &Installations,
-        histories: &'a BTreeMap<HistoryName, Vec<Flown>>,
+        histories: &'a Histories,
         days: &[Timestamp],
     ) -> Result<Self, Error> {
         let mut fleet = Self::read(config, installations, histories)?;
@@ -396,23 +342,24 @@ impl<'a> Fleet<'a> {
     fn read(
         config: &'a Config,
         installations: &Installations,
-        histories: &'a BTreeMap<HistoryName, Vec<Flown>>,
+        histories: &'a Histories,
     ) -> Result<Self, Error> {
         let file = config.document.logs.maintenance.as_ref();
         let book = file.map(|file| maintenance::read(&config.path(file))).transpose()?.unwrap_or_default();
         let unlogged = Unlogged::of_table(&config.flights);
-        let read = |(name, flown): (&'a HistoryName, &'a Vec<Flown>)| {
-            let mut flown: Vec<&Flown> = flown.iter().collect();
-            flown.sort_by_key(|f| f.departure_utc);
-            let stays = || installations.iter().filter(|stay| is_of(stay, name));
-            let unlogged = unlogged.of_unit(stays(), &flown);
-            let first = stays().min_by_key(|stay| stay.installed_utc);
+        let stays = Stays::new(installations);
+        let read = |(name, history): (&'a HistoryName, &'a History)| {
+            let stays = stays.of(name);
+            let booked = if histories.is_booked() { &stays[..] } else { &[] };
+            let first = stays.iter().min_by_key(|stay| stay.installed_utc);
             let unit_hours_at_start = first.and_then(|stay| stay.unit_hours_at_install);
-            let series = series(flown.iter().copied().chain(&unlogged), unit_hours_at_start)?;
-            let series = series.with_book(booked(&book, name));
-            Ok((name, (flown, series)))
+            let observations = observed(history, booked, &unlogged.of_unit(history, booked));
+            let usage = Usage { unit_hours_at_start, ..Usage::default() };
+            let series = Series::new(observations, &usage)?.with_book(booked_work(&book, name));
+            Ok((name, (history, series)))
         };
-        let units = histories.par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+        let units: Vec<_> = histories.iter().collect();
+        let units = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
         Ok(Self { config, units: units.into_iter().collect(), priors: BTreeMap::new() })
     }
 
@@ -510,15 +457,14 @@ impl<'a> Fleet<'a> {
     }
 
     fn statement(&self, name: &HistoryName, as_of: Timestamp) -> Result<TrendRow, Error> {
-        let nothing = (Vec::new(), Series::new([], &Usage::default())?);
-        let (flown, series) = self.units.get(name).unwrap_or(&nothing);
-        let flown = &flown[..flown.partition_point(|f| f.departure_utc <= as_of)];
+        let nothing = (&History::default(), Series::new([], &Usage::default())?);
+        let (history, series) = self.units.get(name).unwrap_or(&nothing);
         let part = self.part(name.0.as_deref());
         let prior = self.prior(name, as_of);
         let settings = self.settings(name);
         let trend = trend::remembered(series, as_of.as_microsecond(), &settings, prior)?;
-        let usage_axis = prior.filter(|_| !flown.is_empty()).map(|prior| prior.axis().to_string());
-        let row = row(name, flown, series, part.and_then(|p| p.limit_m), &trend, as_of);
+        let row = row(name, history, series, part.and_then(|p| p.limit_m), &trend, as_of);
+        let usage_axis = prior.filter(|_| row.flights > 0).map(|prior| prior.axis().to_string());
         Ok(TrendRow { usage_axis, ..row })
     }
 
@@ -539,7 +485,7 @@ impl<'a> Fleet<'a> {
 }
 
 /// What the maintenance book says of a unit; of one whose part number is not known, nothing.
-fn booked(book: &maintenance::Book, (part, serial): &HistoryName) -> Vec<trend::Booked> {
+fn booked_work(book: &maintenance::Book, (part, serial): &HistoryName) -> Vec<trend::Booked> {
     part.clone().and_then(|part| book.get(&(part, serial.clone())).cloned()).unwrap_or_default()
 }
 
@@ -559,22 +505,38 @@ fn settings(config: &Config, part: Option<&job::Part>) -> trend::Settings {
     }
 }
 
-/// Whether a stay is this unit's; where its part number is not known, its serial number says so.
-fn is_of(stay: &fleet::Installation, (part, serial): &HistoryName) -> bool {
-    stay.serial_number.as_str() == serial
-        && part.as_deref().is_none_or(|part| stay.part_number.as_str() == part)
+/// The installations table, unit by unit.
+struct Stays<'a>(HashMap<&'a str, Vec<&'a Installation>>);
+
+impl<'a> Stays<'a> {
+    fn new(installations: &'a Installations) -> Self {
+        let mut by_serial: HashMap<&str, Vec<&Installation>> = HashMap::new();
+        for stay in installations.iter() {
+            by_serial.entry(stay.serial_number.as_str()).or_default().push(stay);
+        }
+        Self(by_serial)
+    }
+
+    /// A unit's stays; where its part number is not known, its serial number says so.
+    fn of(&self, (part, serial): &HistoryName) -> Vec<&'a Installation> {
+        let is_of =
+            |stay: &&&Installation| part.as_deref().is_none_or(|part| stay.part_number.as_str() == part);
+        self.0.get(serial.as_str()).into_iter().flatten().filter(is_of).copied().collect()
+    }
 }
 
-fn series<'a>(
-    flown: impl Iterator<Item = &'a Flown>,
-    unit_hours_at_start: Option<f64>,
-) -> Result<Series, Error> {
-    let mut stays = BTreeMap::new();
-    let observations = flown.map(|f| {
-        let count = stays.len() as u32;
+/// A unit's flights as the trend knows them, those that left no record among them.
+fn observed(
+    history: &History,
+    stays: &[&Installation],
+    unlogged: &[(&Installation, &fleet::Flight)],
+) -> Vec<Observation> {
+    let mut numbers = Numbers::default();
+    let seen = history.flights().iter().map(|f| {
+        let stay = history.stay(f, stays);
         Observation {
             departure_us: f.departure_utc.as_microsecond(),
-            installation: *stays.entry((&f.tail_number, &f.position, f.installed_utc)).or_insert(count),
+            installation: numbers.of(history.place(f), stay),
             flight_hours: f.flight_hours,
             tail_hours_end: f.tail_hours_end,
             load_reversals: f.load_reversals,
@@ -582,7 +544,33 @@ fn series<'a>(
             gap_se_m: f.gap_se_m.filter(|se| *se > 0.0),
         }
     });
-    Ok(Series::new(observations, &Usage { unit_hours_at_start, ..Usage::default() })?)
+    let mut observations: Vec<Observation> = seen.collect();
+    observations.extend(unlogged.iter().map(|(stay, flight)| Observation {
+        departure_us: flight.departure_utc.as_microsecond(),
+        installation: numbers.of(&Place::of(stay), Some(stay)),
+        flight_hours: flight.flight_hours,
+        tail_hours_end: flight.tail_hours_end,
+        load_reversals: None,
+        gap_m: None,
+        gap_se_m: None,
+    }));
+    observations
+}
+
+/// Installations of one unit, numbered as they come.
+#[derive(Default)]
+struct Numbers(Vec<(Place, Option<Timestamp>)>);
+
+impl Numbers {
+    fn of(&mut self, place: &Place, stay: Option<&Installation>) -> u32 {
+        let installed_utc = stay.map(|stay| stay.installed_utc);
+        let known = self.0.iter().rposition(|(p, at)| p == place && *at == installed_utc);
+        let number = known.unwrap_or_else(|| {
+            self.0.push((place.clone(), installed_utc));
+            self.0.len() - 1
+        });
+        number as u32
+    }
 }
 
 /// Means of neighbours, at most so many.
@@ -594,13 +582,13 @@ fn sketched(gaps_m: &[f64]) -> Vec<f64> {
 
 fn row(
     name: &HistoryName,
-    flown: &[&Flown],
+    history: &History,
     series: &Series,
     limit_m: Option<f64>,
     trend: &Trend,
     as_of: Timestamp,
 ) -> TrendRow {
-    let last = flown.iter().max_by_key(|f| f.departure_utc);
+    let last = history.until(as_of).last().map(|flown| history.place(flown));
     let (hours, gaps): (Vec<f64>, Vec<f64>) =
         series.until(trend.as_of_us).iter().filter_map(|f| Some((f.hours, f.gap?.gap_m))).unzip();
     let sen = classic::theil_sen(&hours, &gaps, 0.90).ok();
@@ -612,8 +600,8 @@ fn row(
     TrendRow {
         part_number: name.0.clone(),
         serial_number: name.1.clone(),
-        tail_number: last.and_then(|f| f.tail_number.clone()),
-        position: last.and_then(|f| f.position.clone()),
+        tail_number: last.and_then(|place| place.tail_number.clone()),
+        position: last.and_then(|place| place.position.clone()),
         as_of_utc: as_of,
         flights: trend.flights as i64,
         unit_hours: trend.unit_hours,
@@ -634,7 +622,7 @@ fn row(
         sen_rate_m_per_hour: sen.map(|s| s.slope),
         sen_low_m_per_hour: sen.map(|s| s.slope_low),
         sen_high_m_per_hour: sen.map(|s| s.slope_high),
-        change_points: trend.changes.iter().filter_map(|c| change_point(c, flown)).collect(),
+        change_points: trend.changes.iter().filter_map(|c| change_point(c, history)).collect(),
         limit_m,
         crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
         crossing_hours_p50: crossing.and_then(|c| c.p50_hours),
@@ -662,11 +650,12 @@ fn after(from: Timestamp, days: f64) -> Option<Timestamp> {
     from.checked_add(jiff::SignedDuration::try_from_secs_f64((days * DAY_S).round()).ok()?).ok()
 }
 
-fn change_point(change: &trend::Change, flown: &[&Flown]) -> Option<ChangePoint> {
-    let flight = flown.iter().find(|f| f.departure_utc.as_microsecond() == change.departure_us);
+fn change_point(change: &trend::Change, history: &History) -> Option<ChangePoint> {
+    let departure_utc = Timestamp::from_microsecond(change.departure_us).ok()?;
+    let flight = history.at(departure_utc);
     Some(ChangePoint {
-        departure_utc: Timestamp::from_microsecond(change.departure_us).ok()?,
-        flight_id: flight.and_then(|f| f.flight_id.clone()),
+        departure_utc,
+        flight_id: flight.and_then(|f| f.flight_id.as_deref().map(str::to_owned)),
         kind: match change.kind {
             trend::ChangeKind::Step => "step",
             trend::ChangeKind::Reset => "reset",

@@ -6,7 +6,7 @@ use fleet::{Flight, Installation};
 use ingest::flights::Flights;
 use jiff::{SignedDuration, Timestamp};
 
-use crate::trends::Flown;
+use crate::histories::History;
 
 /// A flight of one name within so long of a record's departure is the record's: names come back.
 const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
@@ -28,23 +28,22 @@ impl<'a> Unlogged<'a> {
         Self { by_tail }
     }
 
-    /// The flights of a unit's stays for which it has no row, as rows without a gap.
+    /// The flights of a unit's stays for which it has no row, each with its stay.
     ///
-    /// Histories made elsewhere, whose rows know no stay, are taken as they are.
+    /// Histories of which no row belongs to a stay are taken as they are.
     pub(crate) fn of_unit<'s>(
         &self,
-        stays: impl Iterator<Item = &'s Installation>,
-        flown: &[&Flown],
-    ) -> Vec<Flown> {
-        if self.by_tail.is_empty() || flown.iter().all(|f| f.installed_utc.is_none()) {
+        history: &History,
+        stays: &[&'s Installation],
+    ) -> Vec<(&'s Installation, &'a Flight)> {
+        if self.by_tail.is_empty() || history.flights().iter().all(|f| history.stay(f, stays).is_none()) {
             return Vec::new();
         }
-        let known = Known::of(flown);
-        let missing = stays.flat_map(|stay| {
+        let known = &Known::of(history);
+        let missing = stays.iter().flat_map(|&stay| {
             let flights = self.by_tail.get(stay.tail_number.as_str()).map_or(&[][..], Vec::as_slice);
-            let known = &known;
             let missing = flights.iter().filter(|f| stay.covers(f.departure_utc) && !known.holds(f));
-            missing.map(move |flight| row(stay, flight))
+            missing.map(move |&flight| (stay, flight))
         });
         missing.collect()
     }
@@ -57,36 +56,19 @@ struct Known<'a> {
 }
 
 impl<'a> Known<'a> {
-    fn of(flown: &[&'a Flown]) -> Self {
-        let departure = |f: &&'a Flown| Some((f.tail_number.as_deref()?, f.departure_utc));
-        let name =
-            |f: &&'a Flown| Some((f.tail_number.as_deref()?, f.flight_id.as_deref()?, f.departure_utc));
-        Self {
-            departures: flown.iter().filter_map(departure).collect(),
-            names: flown.iter().filter_map(name).collect(),
+    fn of(history: &'a History) -> Self {
+        let mut known = Self { departures: BTreeSet::new(), names: BTreeSet::new() };
+        for f in history.flights() {
+            let Some(tail) = history.place(f).tail_number.as_deref() else { continue };
+            known.departures.insert((tail, f.departure_utc));
+            known.names.extend(f.flight_id.as_deref().map(|id| (tail, id, f.departure_utc)));
         }
+        known
     }
 
     fn holds(&self, flight: &Flight) -> bool {
         let (tail, id, at) = (flight.tail_number.as_str(), flight.flight_id.as_str(), flight.departure_utc);
         let near = (tail, id, at - SAME_FLIGHT)..=(tail, id, at + SAME_FLIGHT);
         self.departures.contains(&(tail, at)) || self.names.range(near).next().is_some()
-    }
-}
-
-fn row(stay: &Installation, flight: &Flight) -> Flown {
-    Flown {
-        part_number: Some(stay.part_number.to_string()),
-        serial_number: stay.serial_number.to_string(),
-        tail_number: Some(stay.tail_number.to_string()),
-        position: Some(stay.position.to_string()),
-        flight_id: Some(flight.flight_id.to_string()),
-        departure_utc: flight.departure_utc,
-        installed_utc: Some(stay.installed_utc),
-        flight_hours: flight.flight_hours,
-        tail_hours_end: flight.tail_hours_end,
-        load_reversals: None,
-        gap_m: None,
-        gap_se_m: None,
     }
 }

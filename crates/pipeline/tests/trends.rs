@@ -7,7 +7,8 @@ use fleet::Installations;
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::backtest;
-use pipeline::trends::{self, Ask, Flown, TrendRow};
+use pipeline::histories::{Flown, Gathering, Histories, Who};
+use pipeline::trends::{self, Ask, TrendRow};
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;
@@ -32,46 +33,70 @@ fn scatter_um(unit: i32, day: i32) -> f64 {
     (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
+/// A flight of one of the units.
+#[derive(Clone)]
+struct Row {
+    unit: i32,
+    flown: Flown,
+}
+
+fn gathering(rows: &[Row]) -> Gathering {
+    let mut gathering = Gathering::default();
+    for Row { unit, flown } in rows {
+        let (serial, tail) = (format!("S{unit:02}"), format!("T{unit:02}"));
+        let who = Who {
+            part_number: Some("EMA-27-1040"),
+            serial_number: &serial,
+            tail_number: Some(&tail),
+            position: Some("aileron_left"),
+        };
+        gathering.put(who, flown.clone());
+    }
+    gathering
+}
+
+fn histories(rows: &[Row]) -> Histories {
+    gathering(rows).foreign()
+}
+
 /// Fourteen units, the nth of which wears by 15 + n µm in 1,000 h.
-fn flown(days: i32) -> Vec<Flown> {
+fn flown(days: i32) -> Vec<Row> {
     let flight = |unit: i32, at: i32| {
         let hours = HOURS_A_DAY * f64::from(at + 1);
         let gap_um = 20.0 + (15.0 + f64::from(unit)) * hours / 1000.0 + scatter_um(unit, at);
-        Flown {
-            part_number: Some("EMA-27-1040".into()),
-            serial_number: format!("S{unit:02}"),
-            tail_number: Some(format!("T{unit:02}")),
-            position: Some("aileron_left".into()),
-            flight_id: Some(format!("{unit}-{at}")),
+        let flown = Flown {
+            place: 0,
+            row: 0,
+            flight_id: Some(format!("{unit}-{at}").into()),
             departure_utc: day(at),
-            installed_utc: None,
             flight_hours: Some(HOURS_A_DAY),
             tail_hours_end: Some(500.0 + hours),
             load_reversals: Some(100),
             gap_m: Some(gap_um * 1e-6),
             gap_se_m: Some(1e-6),
-        }
+        };
+        Row { unit, flown }
     };
     (0..14).flat_map(|unit| (0..days).map(move |at| flight(unit, at))).collect()
 }
 
-fn said(flown: Vec<Flown>, as_of: Timestamp) -> Vec<TrendRow> {
+fn said(flown: &[Row], as_of: Timestamp) -> Vec<TrendRow> {
     let ask = Ask { as_of_utc: Some(as_of), ..Ask::default() };
-    trends::of_flown(&config(), &Installations::new(Vec::new()).unwrap(), flown, &ask).unwrap()
+    trends::of_histories(&config(), &Installations::default(), &histories(flown), &ask).unwrap()
 }
 
 #[test]
 fn neither_later_flights_nor_the_order_of_arrival_change_a_bit_of_a_statement() {
-    let known = said(flown(200), day(199));
-    assert_eq!(said(flown(330), day(199)), known);
+    let known = said(&flown(200), day(199));
+    assert_eq!(said(&flown(330), day(199)), known);
     let mut late = flown(330);
     late.reverse();
-    assert_eq!(said(late, day(199)), known);
+    assert_eq!(said(&late, day(199)), known);
 }
 
 #[test]
 fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
-    for row in said(flown(300), day(299)) {
+    for row in said(&flown(300), day(299)) {
         let hours = row.crossing_hours_p50.unwrap();
         assert!((row.crossing_flights_p50.unwrap() - hours / HOURS_A_DAY).abs() < 1e-6, "{row:?}");
         let days = (row.likely_utc.unwrap() - day(299)).total(jiff::Unit::Hour).unwrap() / 24.0;
@@ -82,7 +107,7 @@ fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
 
 #[test]
 fn a_fleet_that_no_unit_of_has_failed_is_held_against_the_levels_it_has_reached() {
-    let past = backtest::of_flown(&config(), &Installations::new(Vec::new()).unwrap(), flown(700)).unwrap();
+    let past = backtest::of_histories(&config(), &Installations::default(), &histories(&flown(700))).unwrap();
     assert!(past.len() > 30, "{} past statements", past.len());
     for statement in &past {
         let elapsed = (day(699) - statement.as_of_utc).total(jiff::Unit::Hour).unwrap() / 24.0 * HOURS_A_DAY;
@@ -104,9 +129,10 @@ fn booked(file: &str) -> Config {
 
 #[test]
 fn what_the_maintenance_book_says_is_a_change_point_once_its_day_has_come() {
-    let nobody = Installations::new(Vec::new()).unwrap();
+    let nobody = Installations::default();
     let ask = Ask { as_of_utc: Some(day(199)), ..Ask::default() };
-    let rows = trends::of_flown(&booked("maintenance.csv"), &nobody, flown(200), &ask).unwrap();
+    let rows =
+        trends::of_histories(&booked("maintenance.csv"), &nobody, &histories(&flown(200)), &ask).unwrap();
     let recorded = |row: &TrendRow| row.change_points.iter().filter(|c| c.kind == "recorded").count();
     let units: Vec<&str> =
         rows.iter().filter(|row| recorded(row) > 0).map(|row| row.serial_number.as_str()).collect();
@@ -118,8 +144,13 @@ fn what_the_maintenance_book_says_is_a_change_point_once_its_day_has_come() {
 
 #[test]
 fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
-    let nobody = Installations::new(Vec::new()).unwrap();
-    let found = trends::of_flown(&booked("maintenance_unknown.csv"), &nobody, flown(20), &Ask::default());
+    let nobody = Installations::default();
+    let found = trends::of_histories(
+        &booked("maintenance_unknown.csv"),
+        &nobody,
+        &histories(&flown(20)),
+        &Ask::default(),
+    );
     let Err(pipeline::Error::Refused(complaints)) = found else { panic!("{found:?}") };
     let text = format!("{complaints:?}");
     assert!(text.contains("painted") && text.contains("overhaul"), "{text}");
@@ -134,8 +165,8 @@ fn told(axis: &str) -> Config {
 #[test]
 fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
     let axes = |config: &Config| {
-        let nobody = Installations::new(Vec::new()).unwrap();
-        let rows = trends::of_flown(config, &nobody, flown(60), &Ask::default()).unwrap();
+        let nobody = Installations::default();
+        let rows = trends::of_histories(config, &nobody, &histories(&flown(60)), &Ask::default()).unwrap();
         rows.into_iter().map(|row| row.usage_axis).collect::<std::collections::BTreeSet<_>>()
     };
     assert_eq!(axes(&told("flights")), [Some("flights".to_owned())].into());
@@ -174,11 +205,11 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     let ask = Ask { as_of_utc: Some(day(DAYS - 1)), ..Ask::default() };
     let said = |config: &Config| {
         let mut logged = flown(DAYS);
-        logged.retain(|f| f.flight_id.as_deref().is_some_and(|id| id.ends_with(['1', '3', '5', '7', '9'])));
-        for flight in &mut logged {
-            (flight.tail_hours_end, flight.installed_utc) = (None, Some(day(-1)));
-        }
-        trends::of_flown(config, &installations, logged, &ask).unwrap()
+        logged.retain(|row| {
+            row.flown.flight_id.as_deref().is_some_and(|id| id.ends_with(['1', '3', '5', '7', '9']))
+        });
+        logged.iter_mut().for_each(|row| row.flown.tail_hours_end = None);
+        trends::of_histories(config, &installations, &gathering(&logged).booked(), &ask).unwrap()
     };
     for (unit, (with, without)) in said(&config_with).iter().zip(said(&config())).enumerate() {
         assert_eq!((with.flights, with.unit_hours), (300, Some(700.0)));
@@ -193,18 +224,18 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
 /// S03 wears on and nothing is new of it; S05 falls by 12 µm with the first flight of the last four weeks.
 #[test]
 fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
-    let nobody = Installations::new(Vec::new()).unwrap();
-    let mut all = flown(228);
-    for flight in all.iter_mut().filter(|f| f.serial_number == "S05" && f.departure_utc >= day(200)) {
-        flight.gap_m = flight.gap_m.map(|gap| gap - 12e-6);
+    let nobody = Installations::default();
+    let mut rows = flown(228);
+    for row in rows.iter_mut().filter(|row| row.unit == 5 && row.flown.departure_utc >= day(200)) {
+        row.flown.gap_m = row.flown.gap_m.map(|gap| gap - 12e-6);
     }
     let name = |serial: &str| {
         (fleet::PartNumber::new("EMA-27-1040").unwrap(), fleet::SerialNumber::new(serial).unwrap())
     };
     let units = [name("S03"), name("S05")];
-    let (earlier, tonight): (Vec<Flown>, Vec<Flown>) =
-        all.iter().cloned().partition(|f| f.departure_utc < day(200));
-    let (now, news) = trends::of_night(&config(), &nobody, earlier, tonight, &units).unwrap();
+    let all = histories(&rows);
+    let tonight: Vec<Row> = rows.iter().filter(|row| row.flown.departure_utc >= day(200)).cloned().collect();
+    let (now, news) = trends::of_night(&config(), &nobody, &all, &histories(&tonight), &units).unwrap();
     assert_eq!(now.len(), 2);
     let serials: Vec<&str> = news.iter().map(|unit| unit.serial_number.as_str()).collect();
     assert_eq!(serials, ["S05"]);
@@ -212,5 +243,5 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     assert_eq!(news[0].new_events[0].departure_utc, day(200));
     assert!(news[0].cleared_events.is_empty());
     assert_eq!((news[0].from, news[0].to), (Some("normal"), Some("watch")));
-    assert!(trends::of_night(&config(), &nobody, Vec::new(), all, &units).unwrap().1.is_empty());
+    assert!(trends::of_night(&config(), &nobody, &all, &all, &units).unwrap().1.is_empty());
 }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use arrow::array::RecordBatch;
 use fleet::{Complaint, Installations, PartNumber};
 use ingest::arrays::Arrays;
-use ingest::tables::Table as Cells;
+use ingest::tables::{Chunk, Table as Cells};
 use ingest::write::Encoding;
 use pipeline::schedule::Context;
 use pipeline::trends::{self, Ask};
@@ -125,9 +125,9 @@ pub(crate) fn trend(
     let booked = config.booked(py)?;
     let as_of_utc = instant(py, as_of)?;
     let ask = Ask { tail_number: tail, serial_number: serial, part_number, as_of_utc };
-    let given = estimates.map(|table| cells(table, "estimates")).transpose()?;
+    let given = estimates.map(capsule::batches).transpose()?;
     let days = queries.map(|table| cells(table, "queries")).transpose()?;
-    let found = py.detach(|| stated(&config.inner, booked, given.as_ref(), days.as_ref(), &ask));
+    let found = py.detach(|| stated(&config.inner, booked, given, days.as_ref(), &ask));
     let found = found.map_err(|error| failed(py, error))?;
     Ok(Table::of(rows::batch(&rows::trends(), &found).map_err(|e| broken(&e))?))
 }
@@ -140,23 +140,28 @@ fn cells(table: &Bound<'_, PyAny>, name: &str) -> PyResult<Cells> {
 fn stated(
     config: &job::Config,
     booked: &Installations,
-    given: Option<&Cells>,
+    given: Option<Vec<RecordBatch>>,
     days: Option<&Cells>,
     ask: &Ask,
 ) -> Result<Vec<trends::TrendRow>, pipeline::Error> {
-    let given = given.map(estimates::flown).transpose()?;
-    match (given, days) {
-        (Some(flown), None) => trends::of_flown(config, booked, flown, ask),
-        (None, None) => trends::of_store(config, booked, &Store::open(config.store())?, ask),
-        (given, Some(days)) => {
-            let days = estimates::asked(days)?;
-            let flown = match given {
-                Some(flown) => flown,
-                None => trends::flown_in_store(booked, &Store::open(config.store())?)?,
-            };
-            trends::of_queries(config, booked, flown, &days)
-        }
+    let histories = match given {
+        Some(batches) => estimates::gathered(chunks(batches).map(Ok))?,
+        None => trends::in_store(&Store::open(config.store())?)?,
+    };
+    match days {
+        None => trends::of_histories(config, booked, &histories, ask),
+        Some(days) => trends::of_queries(config, booked, &histories, &estimates::asked(days)?),
     }
+}
+
+/// The rows of a table from memory, counted through.
+fn chunks(batches: Vec<RecordBatch>) -> impl Iterator<Item = Chunk> {
+    let mut before = 0;
+    batches.into_iter().map(move |batch| {
+        let rows = batch.num_rows();
+        before += rows;
+        Chunk::new("estimates".as_ref(), batch, before - rows)
+    })
 }
 
 /// Stored records that fit.

@@ -29,11 +29,11 @@ const SHARES: [(f64, f64, &str); 4] = [
 /// When configuration, tables or store cannot be read.
 pub(crate) fn backtest(args: &BacktestArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
     let (config, installations) = booked(global)?;
-    let flown = match &args.estimates {
+    let histories = match &args.estimates {
         Some(file) => pipeline::estimates::read(file)?,
-        None => trends::flown_in_store(&installations, &Store::open(config.store())?)?,
+        None => trends::in_store(&Store::open(config.store())?)?,
     };
-    let found = backtest::of_flown(&config, &installations, flown)?;
+    let found = backtest::of_histories(&config, &installations, &histories)?;
     rows::answer(&args.output, talk, || rows::batch(&schema(), &found), || page(&found))?;
     Ok(Code::Well)
 }

@@ -24,19 +24,16 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Co
         part_number: args.part.clone(),
         as_of_utc: args.as_of,
     };
-    let found = match (&args.estimates, &args.queries) {
-        (Some(file), None) => {
-            trends::of_flown(&config, &installations, pipeline::estimates::read(file)?, &ask)?
-        }
-        (None, None) => trends::of_store(&config, &installations, &Store::open(config.store())?, &ask)?,
-        (estimates, Some(queries)) => {
+    let histories = match &args.estimates {
+        Some(file) => pipeline::estimates::read(file)?,
+        None => trends::in_store(&Store::open(config.store())?)?,
+    };
+    let found = match &args.queries {
+        Some(queries) => {
             let queries = pipeline::estimates::queries(queries)?;
-            let flown = match estimates {
-                Some(file) => pipeline::estimates::read(file)?,
-                None => trends::flown_in_store(&installations, &Store::open(config.store())?)?,
-            };
-            trends::of_queries(&config, &installations, flown, &queries)?
+            trends::of_queries(&config, &installations, &histories, &queries)?
         }
+        None => trends::of_histories(&config, &installations, &histories, &ask)?,
     };
     rows::answer(&args.output, talk, || rows::batch(&pipeline::rows::trends(), &found), || page(&found))?;
     Ok(Code::Well)

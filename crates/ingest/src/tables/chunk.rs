@@ -1,0 +1,356 @@
+//! Some rows of a table at a time, its columns as what they stand for: text, numbers, instants.
+//!
+//! A fleet's history has tens of millions of rows, so nothing is turned into text that is a number already.
+
+use std::io::{Cursor, Read};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow::array::{
+    Array, ArrayRef, AsArray, Float64Array, PrimitiveArray, RecordBatch, StringArray, StringBuilder,
+    TimestampMicrosecondArray, new_null_array,
+};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Float64Type, Schema, TimeUnit, TimestampMicrosecondType};
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+
+use super::{bad_cell, missing, number, position, utc};
+use crate::error::{Error, Fault};
+use crate::source::whole;
+
+/// Rows of a chunk.
+const ROWS: usize = 65_536;
+
+/// Some rows of a table.
+#[derive(Debug, Clone)]
+pub struct Chunk {
+    file: PathBuf,
+    header: Arc<[String]>,
+    batch: RecordBatch,
+    /// Rows of the table before these.
+    before: usize,
+}
+
+/// The texts of a column: trimmed, an empty one none.
+pub struct Texts(StringArray);
+
+impl Texts {
+    /// The text of a row.
+    pub fn get(&self, row: usize) -> Option<&str> {
+        let text = self.0.is_valid(row).then(|| self.0.value(row).trim())?;
+        (!text.is_empty()).then_some(text)
+    }
+}
+
+impl Chunk {
+    /// Rows from memory, so many others before them; `name` stands for their file in complaints.
+    pub fn new(name: &Path, batch: RecordBatch, before: usize) -> Self {
+        let header = batch.schema_ref().fields().iter().map(|f| f.name().clone()).collect();
+        Self { file: name.to_owned(), header, batch, before }
+    }
+
+    /// Rows in it.
+    pub fn len(&self) -> usize {
+        self.batch.num_rows()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    pub(super) fn header(&self) -> &[String] {
+        &self.header
+    }
+
+    /// Where a column stands, if it is there under one of its names.
+    pub fn find(&self, names: &[&str]) -> Option<usize> {
+        names.iter().find_map(|name| position(&self.header, name))
+    }
+
+    /// Where a column stands.
+    ///
+    /// # Errors
+    /// When it is not there, with the nearest name that is.
+    pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
+        self.find(names).ok_or_else(|| missing(&self.file, names[0], &self.header))
+    }
+
+    /// A column as text; without one, all none.
+    ///
+    /// # Errors
+    /// When it is neither text, numbers nor times.
+    pub fn texts(&self, column: Option<usize>) -> Result<Texts, Error> {
+        let texts = self.cast(column, &DataType::Utf8)?;
+        Ok(Texts(texts.as_string().clone()))
+    }
+
+    /// A column as finite numbers; without one, all none.
+    ///
+    /// # Errors
+    /// The first cell that is no number.
+    pub fn numbers(&self, column: Option<usize>) -> Result<Float64Array, Error> {
+        let wanted = DataType::Float64;
+        let Some(index) = column.filter(|c| !is_numeric(self.batch.column(*c))) else {
+            let numbers: Float64Array = self.cast(column, &wanted)?.as_primitive::<Float64Type>().clone();
+            return match numbers.iter().position(|value| value.is_some_and(|value| !value.is_finite())) {
+                Some(row) => Err(self.error(row, column, format!("`{}` is no number", numbers.value(row)))),
+                None => Ok(numbers),
+            };
+        };
+        self.parsed::<Float64Type>(index, number)
+    }
+
+    /// A column as instants, µs since 1970 UTC; without one, all none.
+    ///
+    /// # Errors
+    /// The first cell that is neither a date nor a time.
+    pub fn instants(&self, column: Option<usize>) -> Result<TimestampMicrosecondArray, Error> {
+        let wanted = DataType::Timestamp(TimeUnit::Microsecond, None);
+        match column.filter(|c| !self.batch.column(*c).data_type().is_temporal()) {
+            None => Ok(self.cast(column, &wanted)?.as_primitive().clone()),
+            Some(index) => self.parsed::<TimestampMicrosecondType>(index, |text| {
+                utc(text).map(|instant| instant.as_microsecond())
+            }),
+        }
+    }
+
+    /// A complaint about a row's cell.
+    pub fn error(&self, row: usize, column: Option<usize>, detail: String) -> Error {
+        bad_cell(&self.file, self.before + row, column.and_then(|c| self.header.get(c)), detail)
+    }
+
+    fn parsed<T: arrow::datatypes::ArrowPrimitiveType>(
+        &self,
+        column: usize,
+        read: impl Fn(&str) -> Result<T::Native, String>,
+    ) -> Result<PrimitiveArray<T>, Error> {
+        let texts = self.texts(Some(column))?;
+        let cell = |row: usize| {
+            let value = texts.get(row).map(&read).transpose();
+            value.map_err(|detail| self.error(row, Some(column), detail))
+        };
+        (0..self.len()).map(cell).collect()
+    }
+
+    fn cast(&self, column: Option<usize>, wanted: &DataType) -> Result<ArrayRef, Error> {
+        let Some(column) = column else { return Ok(new_null_array(wanted, self.len())) };
+        let array = self.batch.column(column);
+        cast(array, wanted).map_err(|_| {
+            let (column, found) = (self.header[column].clone(), array.data_type().to_string());
+            Error::new(&self.file, Fault::ColumnType { column, found, wanted: "text, numbers or times" })
+        })
+    }
+}
+
+/// Whether a column's cells need no parsing to be numbers: booleans and texts do, or are refused there.
+fn is_numeric(array: &ArrayRef) -> bool {
+    array.data_type().is_numeric()
+}
+
+/// The rows of a table, in order: a `.parquet` file as Parquet, anything else as CSV.
+///
+/// Of Parquet only the `wanted` columns are read, where some are named. There is always one chunk, so that a
+/// table without rows still shows its columns.
+///
+/// # Errors
+/// When the file cannot be opened, or is not the table its name says.
+pub fn chunks(file: &Path, wanted: Option<&[&str]>) -> Result<Chunks, Error> {
+    let parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+    let opened = if parquet { Rows::parquet(file, wanted) } else { Rows::csv(file) };
+    let (rows, schema) = opened.map_err(|fault| Error::new(file, fault))?;
+    let header = schema.fields().iter().map(|f| f.name().clone()).collect();
+    Ok(Chunks { file: file.to_owned(), header, schema, rows, before: 0, is_begun: false })
+}
+
+/// What [`chunks`] reads.
+pub struct Chunks {
+    file: PathBuf,
+    header: Arc<[String]>,
+    schema: Arc<Schema>,
+    rows: Rows,
+    before: usize,
+    is_begun: bool,
+}
+
+impl Iterator for Chunks {
+    type Item = Result<Chunk, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let next = match self.rows.next(&self.schema) {
+            Some(next) => next,
+            None if !self.is_begun => Ok(RecordBatch::new_empty(Arc::clone(&self.schema))),
+            None => return None,
+        };
+        self.is_begun = true;
+        let chunk = next.map_err(|fault| Error::new(&self.file, fault)).map(|batch| {
+            let before = self.before;
+            self.before += batch.num_rows();
+            Chunk { file: self.file.clone(), header: Arc::clone(&self.header), batch, before }
+        });
+        Some(chunk)
+    }
+}
+
+enum Rows {
+    Parquet(ParquetRecordBatchReader),
+    Csv(csv::StringRecordsIntoIter<Cursor<Vec<u8>>>),
+}
+
+impl Rows {
+    fn parquet(file: &Path, wanted: Option<&[&str]>) -> Result<(Self, Arc<Schema>), Fault> {
+        let torn = |e: parquet::errors::ParquetError| Fault::NotParquet { detail: e.to_string() };
+        let builder = ParquetRecordBatchReaderBuilder::try_new(whole(file)?).map_err(torn)?;
+        let columns = builder.parquet_schema().root_schema().get_fields().iter().enumerate();
+        let is_wanted = |name: &str| wanted.is_none_or(|wanted| wanted.contains(&name.trim()));
+        let roots: Vec<usize> = columns.filter(|(_, c)| is_wanted(c.name())).map(|(root, _)| root).collect();
+        let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
+        let reader = builder.with_projection(mask).with_batch_size(ROWS).build().map_err(torn)?;
+        let schema = arrow::array::RecordBatchReader::schema(&reader);
+        Ok((Self::Parquet(reader), schema))
+    }
+
+    fn csv(file: &Path) -> Result<(Self, Arc<Schema>), Fault> {
+        let mut text = Vec::new();
+        whole(file)?.read_to_end(&mut text).map_err(|source| Fault::Unreadable { source })?;
+        // Spreadsheets open their UTF-8 with a byte order mark.
+        let mark = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
+        let mut text = Cursor::new(text);
+        text.set_position(mark);
+        let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text);
+        let header = reader.headers().map_err(|e| bad_row(&e))?;
+        let fields: Vec<Field> = header.iter().map(|name| Field::new(name, DataType::Utf8, true)).collect();
+        Ok((Self::Csv(reader.into_records()), Arc::new(Schema::new(fields))))
+    }
+
+    fn next(&mut self, schema: &Arc<Schema>) -> Option<Result<RecordBatch, Fault>> {
+        match self {
+            Self::Parquet(reader) => {
+                let torn = |e: arrow::error::ArrowError| Fault::NotParquet { detail: e.to_string() };
+                Some(reader.next()?.map_err(torn))
+            }
+            Self::Csv(records) => texts(records, schema).transpose(),
+        }
+    }
+}
+
+/// The next rows of a CSV file; nothing at its end.
+fn texts(
+    records: &mut csv::StringRecordsIntoIter<Cursor<Vec<u8>>>,
+    schema: &Arc<Schema>,
+) -> Result<Option<RecordBatch>, Fault> {
+    let mut columns: Vec<StringBuilder> = schema.fields().iter().map(|_| StringBuilder::new()).collect();
+    let mut count = 0;
+    for record in records.take(ROWS) {
+        let record = record.map_err(|e| bad_row(&e))?;
+        for (column, cell) in columns.iter_mut().zip(&record) {
+            column.append_option((!cell.is_empty()).then_some(cell));
+        }
+        count += 1;
+    }
+    if count == 0 {
+        return Ok(None);
+    }
+    let columns: Vec<ArrayRef> =
+        columns.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef).collect();
+    let batch = RecordBatch::try_new(Arc::clone(schema), columns);
+    batch.map(Some).map_err(|e| Fault::Table { row: None, column: None, detail: e.to_string() })
+}
+
+fn bad_row(error: &csv::Error) -> Fault {
+    let row = error.position().map(csv::Position::record);
+    Fault::Table { row, column: None, detail: error.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+
+    use arrow::array::{Int64Array, TimestampSecondArray};
+    use parquet::arrow::ArrowWriter;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn batch(columns: Vec<(&str, ArrayRef)>) -> RecordBatch {
+        RecordBatch::try_from_iter(columns).unwrap()
+    }
+
+    fn parquet(batch: &RecordBatch) -> (tempfile::TempDir, PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("table.parquet");
+        let mut writer = ArrowWriter::try_new(File::create(&file).unwrap(), batch.schema(), None).unwrap();
+        writer.write(batch).unwrap();
+        writer.close().unwrap();
+        (dir, file)
+    }
+
+    /// 2026-01-01 is 1,767,225,600 s after 1970 by any calendar.
+    #[test]
+    fn an_instant_is_the_same_as_text_as_a_day_and_as_a_stamp_of_any_zone() {
+        let seconds = || TimestampSecondArray::from(vec![1_767_225_600]);
+        let columns: [ArrayRef; 5] = [
+            Arc::new(StringArray::from(vec!["2026-01-01T01:00:00+01:00"])),
+            Arc::new(StringArray::from(vec![" 2026-01-01 "])),
+            Arc::new(arrow::array::Date32Array::from(vec![20_454])),
+            Arc::new(seconds()),
+            Arc::new(seconds().with_timezone("+05:30")),
+        ];
+        for column in columns {
+            let kind = column.data_type().clone();
+            let chunk = Chunk::new("t".as_ref(), batch(vec![("at", column)]), 0);
+            assert_eq!(chunk.instants(Some(0)).unwrap().value(0), 1_767_225_600_000_000, "{kind}");
+        }
+    }
+
+    #[test]
+    fn only_columns_that_are_wanted_are_read_and_one_that_lacks_is_told() {
+        let column = |n: i64| Arc::new(Int64Array::from(vec![n])) as ArrayRef;
+        let (_dir, file) = parquet(&batch(vec![("a", column(1)), ("gap_mm", column(2)), ("c", column(3))]));
+        let chunk = chunks(&file, Some(&["c", "gap_mm"])).unwrap().next().unwrap().unwrap();
+        assert_eq!((chunk.find(&["a"]), chunk.find(&["c"])), (None, Some(1)));
+        let error = chunk.column(&["gap_m"]).unwrap_err();
+        assert!(error.complaint().hint.unwrap().starts_with("`gap_mm`?"));
+    }
+
+    #[test]
+    fn a_bad_cell_is_counted_through_all_chunks() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("table.csv");
+        let rows: String = (0..=ROWS + 7).map(|row| if row == ROWS + 4 { "x\n" } else { "1.5\n" }).collect();
+        std::fs::write(&file, format!("gap_m\n{rows}")).unwrap();
+        let errors = chunks(&file, None).unwrap().filter_map(|chunk| chunk.unwrap().numbers(Some(0)).err());
+        let places: Vec<_> = errors.map(|e| e.complaint().place().unwrap()).collect();
+        assert_eq!(places, [format!("column `gap_m`, row {}", ROWS + 5)]);
+        let not_finite = Arc::new(Float64Array::from(vec![1.0, f64::NAN])) as ArrayRef;
+        let chunk = Chunk::new("t".as_ref(), batch(vec![("gap_m", not_finite)]), 10);
+        let place = chunk.numbers(Some(0)).unwrap_err().complaint().place().unwrap();
+        assert_eq!(place, "column `gap_m`, row 12");
+    }
+
+    #[test]
+    fn a_table_without_rows_shows_its_columns() {
+        let (_dir, file) = parquet(&RecordBatch::new_empty(
+            batch(vec![("gap_m", Arc::new(Int64Array::from(vec![1])))]).schema(),
+        ));
+        let all: Vec<Chunk> = chunks(&file, None).unwrap().collect::<Result<_, _>>().unwrap();
+        assert_eq!((all.len(), all[0].len(), all[0].find(&["gap_m"])), (1, 0, Some(0)));
+    }
+
+    proptest! {
+        /// The shortest text that is a number's is that number again, so both tables hold the same.
+        #[test]
+        fn numbers_are_the_same_from_csv_and_from_parquet(
+            values in prop::collection::vec(prop::option::of(-1e300_f64..1e300), 1..50)
+        ) {
+            let (dir, file) = parquet(&batch(vec![("v", Arc::new(Float64Array::from(values.clone())))]));
+            let text: String = values.iter().map(|v| v.map_or("\"\"\n".into(), |v| format!("{v:e}\n"))).collect();
+            let csv = dir.path().join("table.csv");
+            std::fs::write(&csv, format!("v\n{text}")).unwrap();
+            let read = |file: &Path| chunks(file, None).unwrap().next().unwrap().unwrap().numbers(Some(0)).unwrap();
+            prop_assert_eq!(read(&file), Float64Array::from(values));
+            prop_assert_eq!(read(&csv), read(&file));
+        }
+    }
+}
