@@ -308,7 +308,7 @@ fn a_recorder_that_was_changed_is_told_from_wear() {
     for log in &late {
         std::fs::rename(log, bench.path("sample-data/late").join(log.file_name().unwrap())).unwrap();
     }
-    assert!(!bench.well(&["run"]).contains("skew moved"));
+    assert!(!bench.well(&["run"]).contains("not wear"));
     // Read with a latency of −4 ms, those logs are what a recorder that is 4 ms late would have written.
     bench.configure("sample-data/logs/N412FP/*.parquet", "sample-data/late/*.parquet");
     bench.configure(
@@ -317,7 +317,9 @@ fn a_recorder_that_was_changed_is_told_from_wear() {
     );
     let account = bench.well(&["run"]);
     assert!(
-        account.contains("skew moved  N412FP aileron_left, aileron_right, elevator_left, elevator_right"),
+        account.contains(
+            "recorder    N412FP all of aileron_left, aileron_right, elevator_left, elevator_right: delay"
+        ),
         "{account}"
     );
 }

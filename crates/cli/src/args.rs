@@ -402,6 +402,9 @@ pub(crate) struct TrendArgs {
     /// One row per query: `serial_number`, `as_of_utc`, optionally `part_number`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["as_of", "tail", "serial", "part"])]
     pub queries: Option<PathBuf>,
+    /// Adds Theil–Sen's slope and Hamed and Rao's test; they take longer than all the rest.
+    #[arg(long)]
+    pub statistics: bool,
     #[command(flatten)]
     pub output: Output,
 }

@@ -1,16 +1,16 @@
 //! The account of a run: every log done, refused, in error, known or not reached; nothing is missing.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use fleet::{Complaint, GapRecord, Status};
 use jiff::Timestamp;
 use store::{LogAccount, Outcome, RunAccount};
 
 use crate::changed::Changed;
-use crate::innovations::Unlike;
+use crate::innovations::{self, Unlike};
 use crate::plan::{Plan, Work};
-use crate::recorder::Moved;
-use crate::trends::TrendRow;
+use crate::recorder::{self, Moved};
+use crate::trends::{Night, TrendRow};
 
 /// One log's trouble.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -99,8 +99,9 @@ pub struct Report {
     pub not_reached_logs: Vec<String>,
     /// Aircraft whose newest departure is older than the fleet's by more than a trend may be stale.
     pub quiet: Vec<Quiet>,
-    /// Delays between the positions that moved within the last month, on the aircraft this run touched.
-    pub skew_moved: Vec<Moved>,
+    /// Delays between the positions, and stiffnesses of whole aircraft, that moved within the last month, on
+    /// the aircraft this run touched.
+    pub recorder_moved: Vec<Moved>,
     /// Flights of the last month, on those aircraft, whose innovations are unlike their unit's others.
     pub innovations_unlike: Vec<Unlike>,
     /// The slowest log and its seconds.
@@ -145,7 +146,7 @@ impl Report {
             not_reached: plan.work.len(),
             not_reached_logs: Vec::new(),
             quiet: Vec::new(),
-            skew_moved: Vec::new(),
+            recorder_moved: Vec::new(),
             innovations_unlike: Vec::new(),
             slowest: None,
             took_s: 0.0,
@@ -154,6 +155,18 @@ impl Report {
             changed: Vec::new(),
             logs: BTreeMap::new(),
         }
+    }
+
+    /// Takes what the run's units say now, and what is new on their aircraft beside their gaps.
+    pub(crate) fn look_back(&mut self, night: Night) {
+        let Night { now, changed, lately } = night;
+        let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
+        let touched = |tail: &String| tails.contains(tail.as_str());
+        self.recorder_moved =
+            recorder::moved(&lately).into_iter().filter(|m| touched(&m.tail_number)).collect();
+        self.innovations_unlike =
+            innovations::unlike(&lately).into_iter().filter(|u| touched(&u.tail_number)).collect();
+        (self.trends, self.changed) = (now, changed);
     }
 
     pub(crate) fn count(&mut self, account: &LogAccount, records: &[GapRecord], complaints: &[Complaint]) {

@@ -63,6 +63,11 @@ impl History {
         &self.flights
     }
 
+    /// The tails it was flown on.
+    pub(crate) fn tails(&self) -> impl Iterator<Item = &str> {
+        self.places.iter().filter_map(|place| place.tail_number.as_deref())
+    }
+
     /// Those that departed at or before a time.
     pub(crate) fn until(&self, as_of: Timestamp) -> &[Flown] {
         &self.flights[..self.flights.partition_point(|f| f.departure_utc <= as_of)]

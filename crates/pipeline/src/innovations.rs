@@ -3,12 +3,10 @@
 //! The tuning asks for a bandwidth, not for white innovations, so their normalised square (NIS) is not 1 even
 //! when all is well, and χ² bounds mean nothing. What a unit's own flights show is its bound.
 
-use std::collections::BTreeMap;
-
-use fleet::GapRecord;
 use jiff::Timestamp;
 use serde::Serialize;
 
+use crate::lately::{Lately, Look, Seat, newest_utc};
 use crate::recorder::median;
 
 /// A flight whose innovations are unlike those of the unit's other flights.
@@ -37,24 +35,19 @@ const FACTOR: f64 = 2.0;
 /// A flight is told of for so many days.
 const TOLD_DAYS: f64 = 30.0;
 
-/// The unlike flights of the last month of these records.
-pub fn unlike(records: &[GapRecord]) -> Vec<Unlike> {
-    let mut units: BTreeMap<(String, String), Vec<&GapRecord>> = BTreeMap::new();
-    for record in records.iter().filter(|r| r.estimate.nis.is_some_and(|nis| nis > 0.0)) {
-        let key = (record.part_number.to_string(), record.serial_number.to_string());
-        units.entry(key).or_default().push(record);
-    }
-    let newest = records.iter().map(|r| r.flight.departure_utc).max();
+/// The unlike flights of the last month of these.
+pub fn unlike(lately: &Lately) -> Vec<Unlike> {
+    let newest = newest_utc(lately);
     let recent = |at: Timestamp| {
         newest.is_some_and(|newest| newest.duration_since(at).as_secs_f64() <= TOLD_DAYS * 86_400.0)
     };
     let mut found = Vec::new();
-    for flights in units.values_mut() {
-        flights.sort_by_key(|r| r.flight.departure_utc);
-        let logs: Vec<f64> = flights.iter().filter_map(|r| r.estimate.nis).map(f64::ln).collect();
-        for (k, record) in flights.iter().enumerate().filter(|(_, r)| recent(r.flight.departure_utc)) {
+    for (seat, looks) in lately {
+        let surprised = looks.iter().filter_map(|look| Some((look, look.nis.filter(|nis| *nis > 0.0)?)));
+        let (looks, logs): (Vec<&Look>, Vec<f64>) = surprised.map(|(look, nis)| (look, nis.ln())).unzip();
+        for (k, look) in looks.iter().enumerate().filter(|(_, look)| recent(look.departure_utc)) {
             let before = &logs[k.saturating_sub(BEFORE.1)..k];
-            found.extend(usual(before, logs[k]).map(|usual| told(record, logs[k], usual)));
+            found.extend(usual(before, logs[k]).map(|usual| told(seat, look, logs[k], usual)));
         }
     }
     found.sort_by(|a, b| {
@@ -73,12 +66,12 @@ fn usual(before: &[f64], this: f64) -> Option<f64> {
     ((this - usual).abs() > (SPREADS * spread).max(FACTOR.ln())).then_some(usual)
 }
 
-fn told(record: &GapRecord, this: f64, usual: f64) -> Unlike {
+fn told(seat: &Seat, look: &Look, this: f64, usual: f64) -> Unlike {
     Unlike {
-        tail_number: record.flight.tail_number.to_string(),
-        position: record.position.to_string(),
-        flight_id: record.flight.flight_id.to_string(),
-        departure_utc: record.flight.departure_utc,
+        tail_number: seat.tail_number.clone(),
+        position: seat.position.clone(),
+        flight_id: look.flight_id.to_string(),
+        departure_utc: look.departure_utc,
         nis: this.exp(),
         usual: usual.exp(),
     }

@@ -16,6 +16,7 @@ pub mod estimates;
 pub mod event;
 pub mod histories;
 pub mod innovations;
+pub mod lately;
 pub mod maintenance;
 pub mod normalize;
 pub mod pages;
@@ -26,6 +27,7 @@ pub mod report;
 pub mod rows;
 pub mod schedule;
 pub mod simulate;
+mod tail_wide;
 pub mod trends;
 mod unlogged;
 

@@ -14,6 +14,8 @@ use trend::Outlook;
 
 use crate::error::Error;
 use crate::histories::{Flown, Gathering, Histories, History, HistoryName as Name};
+use crate::lately::lately;
+use crate::recorder;
 use crate::trends::{self, Ask, Told, TrendRow};
 
 /// Days before the report of which statements are held against what came.
@@ -39,8 +41,12 @@ pub fn compose(
     let checks = inspections(config)?;
     let mut logs = Logs::of(store)?;
     let Read { histories, mut rest, store_version } = Read::until(ask.as_of_utc, store)?;
+    let as_of = ask.as_of_utc.or_else(|| histories.newest_utc());
+    let moved = as_of.map(|day| Ok::<_, Error>(recorder::moved(&lately(store, day)?))).transpose()?;
+    let moved = moved.unwrap_or_default();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
-    let Told { now, drawn, before, priors } = trends::told(config, installations, &histories, ask, &days)?;
+    let Told { now, drawn, before, priors } =
+        trends::told(config, installations, &histories, ask, &days, moved)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     let newest_departure_utc = histories.newest_utc();
     let known = |c: &Check| histories.names().any(|name| c.is_of(name));
@@ -55,7 +61,7 @@ pub fn compose(
     let unit = |(row, drawn): (&TrendRow, &Outlook)| {
         let name = name_of(row);
         let rest = rest.remove(&name).unwrap_or_default();
-        compose.unit(row, drawn, histories.get(&name).unwrap_or(&History::default()), rest)
+        compose.unit(row, drawn, histories.get(&name).unwrap_or(&History::default()), &rest)
     };
     let units: Vec<Unit> = now.iter().zip(&drawn).map(unit).collect();
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
@@ -190,7 +196,7 @@ struct Compose<'a> {
 }
 
 impl Compose<'_> {
-    fn unit(&self, row: &TrendRow, drawn: &Outlook, history: &History, rest: Vec<Rest>) -> Unit {
+    fn unit(&self, row: &TrendRow, drawn: &Outlook, history: &History, rest: &[Rest]) -> Unit {
         let flown = history.flights();
         let name = name_of(row);
         let stays = self.stays.get(&name.1).map_or(&[][..], Vec::as_slice);
@@ -204,7 +210,7 @@ impl Compose<'_> {
                 .collect(),
             forecast: forecast(drawn, flown),
             statement: self.statement(row, flown, &name),
-            quality: quality(flown, &rest, row.as_of_utc),
+            quality: quality(flown, rest, row.as_of_utc),
             events: events(row, &stays),
             past: self.past(row, flown, &name),
             inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.beside(flown)).collect(),
@@ -248,6 +254,7 @@ impl Compose<'_> {
             law: row.wear_law.clone(),
             axis: row.usage_axis.clone(),
             mann_kendall_p: row.trend_p_value,
+            hamed_rao_p: row.hamed_rao_p_value,
             sen_rate_m_per_hour: row.sen_rate_m_per_hour,
             sen_low_m_per_hour: row.sen_low_m_per_hour,
             sen_high_m_per_hour: row.sen_high_m_per_hour,
@@ -368,6 +375,7 @@ fn events(row: &TrendRow, stays: &[Stay]) -> Vec<Event> {
         departure_utc: c.departure_utc,
         kind: c.kind.to_owned(),
         step_m: c.step_m,
+        tail_wide: c.tail_wide,
         // Wear that sets in is nothing that maintenance does.
         in_books: c.kind == "recorded" || (c.kind != "onset" && booked(c.departure_utc)),
     };

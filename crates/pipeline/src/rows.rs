@@ -44,6 +44,7 @@ pub fn trends() -> SchemaRef {
             real("step_m"),
             real("step_se_m"),
             real("certainty"),
+            Field::new("tail_wide", DataType::Boolean, true),
         ]
         .into(),
     );
@@ -72,6 +73,7 @@ pub fn trends() -> SchemaRef {
         real("sen_rate_m_per_hour"),
         real("sen_low_m_per_hour"),
         real("sen_high_m_per_hour"),
+        real("hamed_rao_p_value"),
         Field::new("change_points", DataType::List(Arc::new(Field::new("item", change, true))), true),
         real("limit_m"),
         real("crossing_hours_p05"),

@@ -15,7 +15,7 @@ use jiff::Timestamp;
 use job::flight::{Opened, caught, config_digest, unidentified_digest};
 use job::{Config, Stamp};
 use rayon::prelude::*;
-use store::{Holder, LogAccount, LogResult, Outcome, Query, Store, Writer};
+use store::{Holder, LogAccount, LogResult, Outcome, Store, Writer};
 
 use crate::account::{self, CutShort, Report};
 use crate::book::{Book, Done};
@@ -23,18 +23,13 @@ use crate::budget::Budget;
 use crate::bundle;
 use crate::error::Error;
 use crate::event::Event;
-use crate::innovations;
 use crate::plan::{self, Plan, Request, Why, Work};
-use crate::recorder;
 use crate::trends;
 
 /// Finished flights wait this long at most for company in a commit: each commit is a file and a log entry.
 const GATHER: Duration = Duration::from_millis(500);
 /// So many finished logs are committed without waiting.
 const GATHER_LOGS: usize = 256;
-
-/// So many of an aircraft's latest records tell what is usual: some months of flights.
-const LOOKED_AT: usize = 2000;
 
 /// What a run needs besides its configuration.
 pub struct Context<'a> {
@@ -114,9 +109,7 @@ pub(crate) fn night(
     let touched = work(&shop, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
-    (report.trends, report.changed) =
-        trends::of_units(config, &installations, &store, &touched, &report.run_id)?;
-    (report.skew_moved, report.innovations_unlike) = look_back(&store, &report.trends)?;
+    report.look_back(trends::of_units(config, &installations, &store, &touched, &report.run_id)?);
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
     if store.is_scattered()? {
@@ -124,24 +117,6 @@ pub(crate) fn night(
     }
     writer.end_run(&report.row(context.program_version, &config_path, Some(exit_code)))?;
     Ok(report)
-}
-
-/// What is new on the aircraft of these units beside their gaps: delays that moved, filters that were surprised.
-fn look_back(
-    store: &Store,
-    touched: &[trends::TrendRow],
-) -> Result<(Vec<recorder::Moved>, Vec<innovations::Unlike>), Error> {
-    let mut tails: Vec<&str> = touched.iter().filter_map(|row| row.tail_number.as_deref()).collect();
-    tails.sort_unstable();
-    tails.dedup();
-    let (mut moved, mut unlike) = (Vec::new(), Vec::new());
-    for tail in tails {
-        let query = Query { tail_number: Some(tail.to_owned()), last: Some(LOOKED_AT), ..Query::default() };
-        let records = store.records(&query)?;
-        moved.extend(recorder::moved(&records));
-        unlike.extend(innovations::unlike(&records));
-    }
-    Ok((moved, unlike))
 }
 
 /// The store's lock, waited for in short turns so that a signal is heard meanwhile.

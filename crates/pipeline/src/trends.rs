@@ -16,7 +16,10 @@ use trend::{Axis, FleetPrior, Observation, Series, Trend, Usage, classic};
 use crate::changed::{Changed, changed};
 use crate::error::Error;
 use crate::histories::{Gathering, Histories, History, HistoryName, Place};
+use crate::lately::{Lately, lately};
 use crate::maintenance;
+use crate::recorder::{self, Moved};
+use crate::tail_wide::TailWide;
 use crate::unlogged::Unlogged;
 
 /// A unit, by part and serial number.
@@ -37,6 +40,9 @@ pub struct ChangePoint {
     pub step_se_m: f64,
     /// Probability that it is one; 1 where the books say so.
     pub certainty: f64,
+    /// Whether the tail's other actuators changed with it, or what is fitted of all of them did: a matter of a
+    /// sensor or a recorder, not of wear.
+    pub tail_wide: bool,
 }
 
 /// One unit's statement, as the contract names its columns.
@@ -67,6 +73,7 @@ pub struct TrendRow {
     pub sen_rate_m_per_hour: Option<f64>,
     pub sen_low_m_per_hour: Option<f64>,
     pub sen_high_m_per_hour: Option<f64>,
+    pub hamed_rao_p_value: Option<f64>,
     pub change_points: Vec<ChangePoint>,
     pub limit_m: Option<f64>,
     pub crossing_hours_p05: Option<f64>,
@@ -114,6 +121,8 @@ pub struct Ask {
     pub part_number: Option<String>,
     /// The day; the newest departure in the store when not given.
     pub as_of_utc: Option<Timestamp>,
+    /// Theil–Sen and Hamed–Rao as well: their time grows with the square of a history's length.
+    pub statistics: bool,
 }
 
 impl Ask {
@@ -140,11 +149,24 @@ pub fn of_store(
     ask: &Ask,
 ) -> Result<Vec<TrendRow>, Error> {
     // A statement leans on what the part's other units teach, so what is asked selects rows, not records.
-    of_histories(config, installations, &in_store(store)?, ask)
+    let histories = in_store(store)?;
+    let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
+    let moved = recorder::moved(&lately(store, as_of)?);
+    of_asked(config, installations, &histories, ask, moved)
 }
 
-/// States what is known of units whose records a run changed, on the newest day in the store, and what is
-/// otherwise than without that run's records. Where the store holds no others, nothing is.
+/// What a run's units say.
+#[derive(Debug, Default)]
+pub struct Night {
+    /// Statements of the newest day in the store.
+    pub now: Vec<TrendRow>,
+    /// What of them is otherwise than without the run's records. Where the store holds no others, nothing is.
+    pub changed: Vec<Changed>,
+    /// What the last months say beside gaps, of all tails.
+    pub lately: Lately,
+}
+
+/// States what is known of units whose records a run changed.
 ///
 /// # Errors
 /// As [`of_store`].
@@ -154,12 +176,16 @@ pub fn of_units(
     store: &Store,
     units: &[Unit],
     run_id: &str,
-) -> Result<(Vec<TrendRow>, Vec<Changed>), Error> {
+) -> Result<Night, Error> {
     if units.is_empty() {
-        return Ok(Default::default());
+        return Ok(Night::default());
     }
     let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
-    of_night(config, installations, &in_store(store)?, &gathered(store, &query)?, units)
+    let (all, tonight) = (in_store(store)?, gathered(store, &query)?);
+    let lately = all.newest_utc().map(|newest| lately(store, newest)).transpose()?.unwrap_or_default();
+    let moved = recorder::moved(&lately);
+    let (now, changed) = of_night(config, installations, &all, &tonight, units, moved)?;
+    Ok(Night { now, changed, lately })
 }
 
 /// The same of all flights that are known after a night, and those of the night.
@@ -172,13 +198,14 @@ pub fn of_night(
     all: &Histories,
     tonight: &Histories,
     units: &[Unit],
+    moved: Vec<Moved>,
 ) -> Result<(Vec<TrendRow>, Vec<Changed>), Error> {
     let names: BTreeSet<HistoryName> =
         units.iter().map(|(part, serial)| (Some(part.to_string()), serial.to_string())).collect();
     let Some(as_of) = all.newest_utc() else { return Ok(Default::default()) };
     let before_utc = all.newest_without_utc(tonight);
     let days: Vec<Timestamp> = before_utc.into_iter().chain([as_of]).collect();
-    let fleet = Fleet::new(config, installations, all, &days)?;
+    let fleet = Fleet::new(config, installations, all, &days)?.beside(moved);
     let mut now = fleet.statements(names.iter(), as_of)?;
     now.retain(|row| row.flights > 0);
     let Some(before_utc) = before_utc else { return Ok((now, Vec::new())) };
@@ -213,14 +240,16 @@ pub(crate) fn told(
     histories: &Histories,
     ask: &Ask,
     days_before: &[i64],
+    moved: Vec<Moved>,
 ) -> Result<Told, Error> {
     let newest = || histories.newest_utc();
     let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(Told::default()) };
     let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
-    let fleet = Fleet::new(config, installations, histories, &days)?;
-    let now = fleet.statements(histories.names().filter(|name| ask.names(name)), as_of)?;
+    let fleet = Fleet::new(config, installations, histories, &days)?.beside(moved);
+    let mut now = fleet.statements(histories.names().filter(|name| ask.names(name)), as_of)?;
+    fleet.add_statistics(&mut now, ask.statistics);
     let now: Vec<TrendRow> = now.into_iter().filter(|row| ask.fits(row)).collect();
     let names: Vec<HistoryName> =
         now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
@@ -247,11 +276,14 @@ pub fn of_queries(
     installations: &Installations,
     histories: &Histories,
     queries: &[AsOf],
+    statistics: bool,
 ) -> Result<Vec<TrendRow>, Error> {
     let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
     let fleet = Fleet::new(config, installations, histories, &days)?;
     let statement = |query: &AsOf| fleet.statement(&unit_of(query, histories), query.as_of_utc);
-    queries.par_iter().map(statement).collect()
+    let mut rows: Vec<TrendRow> = queries.par_iter().map(statement).collect::<Result<_, _>>()?;
+    fleet.add_statistics(&mut rows, statistics);
+    Ok(rows)
 }
 
 /// The unit a query means; one that never flew has a name all the same.
@@ -292,11 +324,21 @@ pub fn of_histories(
     histories: &Histories,
     ask: &Ask,
 ) -> Result<Vec<TrendRow>, Error> {
-    let newest = || histories.newest_utc();
-    let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(Vec::new()) };
-    let fleet = Fleet::new(config, installations, histories, &[as_of])?;
+    of_asked(config, installations, histories, ask, Vec::new())
+}
+
+fn of_asked(
+    config: &Config,
+    installations: &Installations,
+    histories: &Histories,
+    ask: &Ask,
+    moved: Vec<Moved>,
+) -> Result<Vec<TrendRow>, Error> {
+    let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
+    let fleet = Fleet::new(config, installations, histories, &[as_of])?.beside(moved);
     let mut rows = fleet.statements(histories.names().filter(|name| ask.names(name)), as_of)?;
     rows.retain(|row| ask.fits(row));
+    fleet.add_statistics(&mut rows, ask.statistics);
     Ok(rows)
 }
 
@@ -308,6 +350,8 @@ pub(crate) struct Fleet<'a> {
     config: &'a Config,
     units: BTreeMap<&'a HistoryName, (&'a History, Series)>,
     priors: BTreeMap<(i64, Option<&'a str>), FleetPrior>,
+    /// What moved on whole aircraft beside gaps.
+    moved: Vec<Moved>,
 }
 
 /// The last month's turn by a day, microseconds since 1970 UTC: months of thirty days.
@@ -360,7 +404,7 @@ impl<'a> Fleet<'a> {
         };
         let units: Vec<_> = histories.iter().collect();
         let units = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        Ok(Self { config, units: units.into_iter().collect(), priors: BTreeMap::new() })
+        Ok(Self { config, units: units.into_iter().collect(), priors: BTreeMap::new(), moved: Vec::new() })
     }
 
     /// What the parts had taught by a month, those alike together.
@@ -447,25 +491,74 @@ impl<'a> Fleet<'a> {
         self.priors.get(&(month_us(as_of), flown.0.as_deref()))
     }
 
+    /// The same, with what moved on whole aircraft beside gaps.
+    pub(crate) fn beside(self, moved: Vec<Moved>) -> Self {
+        Self { moved, ..self }
+    }
+
     fn statements<'b>(
         &self,
         names: impl Iterator<Item = &'b HistoryName>,
         as_of: Timestamp,
     ) -> Result<Vec<TrendRow>, Error> {
-        let names: Vec<&HistoryName> = names.collect();
-        names.par_iter().map(|name| self.statement(name, as_of)).collect()
+        let names: BTreeSet<&HistoryName> = names.collect();
+        // A change is a tail's when its other units made it too, so they are judged with those asked for.
+        let judged: Vec<&HistoryName> = self.mates(&names).union(&names).copied().collect();
+        let trends: Vec<Trend> =
+            judged.par_iter().map(|name| self.trend(name, as_of)).collect::<Result<_, _>>()?;
+        let known = judged.iter().zip(&trends).filter_map(|(name, t)| Some((self.units.get(*name)?.0, t)));
+        let wide = TailWide::new(&known.collect::<Vec<_>>(), &self.moved);
+        let asked = judged.iter().zip(&trends).filter(|(name, _)| names.contains(*name));
+        Ok(asked.map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect())
     }
 
-    fn statement(&self, name: &HistoryName, as_of: Timestamp) -> Result<TrendRow, Error> {
+    /// The units that have flown on the tails of some.
+    fn mates(&self, names: &BTreeSet<&HistoryName>) -> BTreeSet<&HistoryName> {
+        let history = |name: &&HistoryName| self.units.get(*name).map(|unit| unit.0);
+        let tails: BTreeSet<&str> = names.iter().filter_map(history).flat_map(History::tails).collect();
+        let is_mate = |unit: &(&'a History, Series)| unit.0.tails().any(|tail| tails.contains(tail));
+        self.units.iter().filter(|(_, unit)| is_mate(unit)).map(|(name, _)| *name).collect()
+    }
+
+    fn trend(&self, name: &HistoryName, as_of: Timestamp) -> Result<Trend, Error> {
         let nothing = (&History::default(), Series::new([], &Usage::default())?);
-        let (history, series) = self.units.get(name).unwrap_or(&nothing);
-        let part = self.part(name.0.as_deref());
+        let (_, series) = self.units.get(name).unwrap_or(&nothing);
         let prior = self.prior(name, as_of);
-        let settings = self.settings(name);
-        let trend = trend::remembered(series, as_of.as_microsecond(), &settings, prior)?;
-        let row = row(name, history, series, part.and_then(|p| p.limit_m), &trend, as_of);
-        let usage_axis = prior.filter(|_| row.flights > 0).map(|prior| prior.axis().to_string());
-        Ok(TrendRow { usage_axis, ..row })
+        Ok(trend::remembered(series, as_of.as_microsecond(), &self.settings(name), prior)?)
+    }
+
+    /// What engineers know, and no alarm is made from.
+    fn add_statistics(&self, rows: &mut [TrendRow], are_asked: bool) {
+        let add = |row: &mut TrendRow| {
+            let Some(series) = self.series(&row.name()) else { return };
+            let known = series.until(row.as_of_utc.as_microsecond()).iter();
+            let (hours, gaps_m): (Vec<f64>, Vec<f64>) =
+                known.filter_map(|f| Some((f.hours, f.gap?.gap_m))).unzip();
+            let sen = classic::theil_sen(&hours, &gaps_m, 0.90).ok();
+            row.sen_rate_m_per_hour = sen.map(|s| s.slope);
+            row.sen_low_m_per_hour = sen.map(|s| s.slope_low);
+            row.sen_high_m_per_hour = sen.map(|s| s.slope_high);
+            row.hamed_rao_p_value = classic::hamed_rao(&gaps_m).ok().map(|test| test.p_value);
+        };
+        if are_asked {
+            rows.par_iter_mut().for_each(add);
+        }
+    }
+
+    /// One unit's statement, whatever its tail's others made.
+    fn statement(&self, name: &HistoryName, as_of: Timestamp) -> Result<TrendRow, Error> {
+        Ok(self.row(name, &self.trend(name, as_of)?, as_of, &TailWide::default()))
+    }
+
+    fn row(&self, name: &HistoryName, trend: &Trend, as_of: Timestamp, wide: &TailWide) -> TrendRow {
+        let unit = self.units.get(name);
+        let nobody = History::default();
+        let (history, series) = unit.map_or((&nobody, None), |(history, series)| (*history, Some(series)));
+        let limit_m = self.part(name.0.as_deref()).and_then(|p| p.limit_m);
+        let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
+        let usage_axis = prior.map(|prior| prior.axis().to_string());
+        let row = row(name, history, series, limit_m, trend, as_of, wide);
+        TrendRow { usage_axis, ..row }
     }
 
     /// What is drawn beside a statement: as far ahead as its crossing, within sight of what was flown.
@@ -583,18 +676,17 @@ fn sketched(gaps_m: &[f64]) -> Vec<f64> {
 fn row(
     name: &HistoryName,
     history: &History,
-    series: &Series,
+    series: Option<&Series>,
     limit_m: Option<f64>,
     trend: &Trend,
     as_of: Timestamp,
+    wide: &TailWide,
 ) -> TrendRow {
     let last = history.until(as_of).last().map(|flown| history.place(flown));
-    let (hours, gaps): (Vec<f64>, Vec<f64>) =
-        series.until(trend.as_of_us).iter().filter_map(|f| Some((f.hours, f.gap?.gap_m))).unzip();
-    let sen = classic::theil_sen(&hours, &gaps, 0.90).ok();
+    let gaps_m = series.map(|series| series.gaps_m(trend.as_of_us)).unwrap_or_default();
     let crossing = trend.crossing.filter(|_| limit_m.is_some());
     let flights = |hours: Option<f64>| Some(hours? / trend.pace?.hours_per_flight);
-    let last_flown = series.until(trend.as_of_us).last();
+    let last_flown = series.and_then(|series| series.until(trend.as_of_us).last());
     let last_flown = last_flown.and_then(|f| Timestamp::from_microsecond(f.departure_us).ok());
     let day = |hours: Option<f64>| after(last_flown?, hours? / trend.pace?.hours_per_day);
     TrendRow {
@@ -618,11 +710,12 @@ fn row(
         wear_law: trend.law.map(|(law, _)| law.to_string()),
         wear_law_probability: trend.law.map(|(_, share)| share),
         usage_axis: None,
-        trend_p_value: classic::mann_kendall(&gaps).ok().map(|test| test.p_value),
-        sen_rate_m_per_hour: sen.map(|s| s.slope),
-        sen_low_m_per_hour: sen.map(|s| s.slope_low),
-        sen_high_m_per_hour: sen.map(|s| s.slope_high),
-        change_points: trend.changes.iter().filter_map(|c| change_point(c, history)).collect(),
+        trend_p_value: classic::mann_kendall(&gaps_m).ok().map(|test| test.p_value),
+        sen_rate_m_per_hour: None,
+        sen_low_m_per_hour: None,
+        sen_high_m_per_hour: None,
+        hamed_rao_p_value: None,
+        change_points: trend.changes.iter().filter_map(|c| change_point(c, history, wide)).collect(),
         limit_m,
         crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
         crossing_hours_p50: crossing.and_then(|c| c.p50_hours),
@@ -635,12 +728,11 @@ fn row(
         not_after_utc: day(crossing.and_then(|c| c.p95_hours)),
         check_probability: trend.check_probability.filter(|_| limit_m.is_some()),
         state: trend.state.filter(|_| limit_m.is_some()).map(state_word),
-        reason: Some(if limit_m.is_some() {
-            trend.reason.to_string()
-        } else {
-            "no limit is configured".into()
+        reason: Some(match limit_m {
+            Some(_) => reason(trend, history, wide),
+            None => "no limit is configured".into(),
         }),
-        sketch_m: sketched(&gaps),
+        sketch_m: sketched(&gaps_m),
     }
 }
 
@@ -650,7 +742,27 @@ fn after(from: Timestamp, days: f64) -> Option<Timestamp> {
     from.checked_add(jiff::SignedDuration::try_from_secs_f64((days * DAY_S).round()).ok()?).ok()
 }
 
-fn change_point(change: &trend::Change, history: &History) -> Option<ChangePoint> {
+/// Why a state; a change that the tail's other units made as well is named for what it is.
+fn reason(trend: &Trend, history: &History, wide: &TailWide) -> String {
+    let unknown = trend.changes.iter().rev().find(|c| c.kind != trend::ChangeKind::Recorded);
+    match (trend.reason, unknown) {
+        (trend::Reason::Changed { kind, days }, Some(change)) => match tail_of(change, history) {
+            Some(tail) if wide.holds(Some(tail), change.departure_us) => format!(
+                "{kind} {days:.0} days ago with all actuators of {tail} at once: a sensor or recorder, not wear"
+            ),
+            _ => trend.reason.to_string(),
+        },
+        (other, _) => other.to_string(),
+    }
+}
+
+/// The tail on which a unit made a change.
+fn tail_of<'a>(change: &trend::Change, history: &'a History) -> Option<&'a str> {
+    let flown = history.at(Timestamp::from_microsecond(change.departure_us).ok()?)?;
+    history.place(flown).tail_number.as_deref()
+}
+
+fn change_point(change: &trend::Change, history: &History, wide: &TailWide) -> Option<ChangePoint> {
     let departure_utc = Timestamp::from_microsecond(change.departure_us).ok()?;
     let flight = history.at(departure_utc);
     Some(ChangePoint {
@@ -665,6 +777,7 @@ fn change_point(change: &trend::Change, history: &History) -> Option<ChangePoint
         step_m: change.step_m,
         step_se_m: change.se_m,
         certainty: change.certainty,
+        tail_wide: wide.holds(tail_of(change, history), change.departure_us),
     })
 }
 

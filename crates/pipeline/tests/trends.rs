@@ -37,18 +37,19 @@ fn scatter_um(unit: i32, day: i32) -> f64 {
 #[derive(Clone)]
 struct Row {
     unit: i32,
+    tail: String,
     flown: Flown,
 }
 
 fn gathering(rows: &[Row]) -> Gathering {
     let mut gathering = Gathering::default();
-    for Row { unit, flown } in rows {
-        let (serial, tail) = (format!("S{unit:02}"), format!("T{unit:02}"));
+    for Row { unit, tail, flown } in rows {
+        let (serial, position) = (format!("S{unit:02}"), format!("place_{unit}"));
         let who = Who {
             part_number: Some("EMA-27-1040"),
             serial_number: &serial,
-            tail_number: Some(&tail),
-            position: Some("aileron_left"),
+            tail_number: Some(tail),
+            position: Some(&position),
         };
         gathering.put(who, flown.clone());
     }
@@ -75,7 +76,7 @@ fn flown(days: i32) -> Vec<Row> {
             gap_m: Some(gap_um * 1e-6),
             gap_se_m: Some(1e-6),
         };
-        Row { unit, flown }
+        Row { unit, tail: format!("T{unit:02}"), flown }
     };
     (0..14).flat_map(|unit| (0..days).map(move |at| flight(unit, at))).collect()
 }
@@ -193,7 +194,7 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     let config_with = Config::read(&folder.path().join("pipeline.toml")).unwrap();
     let stay = |unit: i32| fleet::Installation {
         tail_number: fleet::TailNumber::new(format!("T{unit:02}")).unwrap(),
-        position: fleet::Position::new("aileron_left").unwrap(),
+        position: fleet::Position::new(format!("place_{unit}")).unwrap(),
         part_number: fleet::PartNumber::new("EMA-27-1040").unwrap(),
         serial_number: fleet::SerialNumber::new(format!("S{unit:02}")).unwrap(),
         installed_utc: day(-1),
@@ -235,7 +236,8 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     let units = [name("S03"), name("S05")];
     let all = histories(&rows);
     let tonight: Vec<Row> = rows.iter().filter(|row| row.flown.departure_utc >= day(200)).cloned().collect();
-    let (now, news) = trends::of_night(&config(), &nobody, &all, &histories(&tonight), &units).unwrap();
+    let (now, news) =
+        trends::of_night(&config(), &nobody, &all, &histories(&tonight), &units, Vec::new()).unwrap();
     assert_eq!(now.len(), 2);
     let serials: Vec<&str> = news.iter().map(|unit| unit.serial_number.as_str()).collect();
     assert_eq!(serials, ["S05"]);
@@ -243,5 +245,34 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     assert_eq!(news[0].new_events[0].departure_utc, day(200));
     assert!(news[0].cleared_events.is_empty());
     assert_eq!((news[0].from, news[0].to), (Some("normal"), Some("watch")));
-    assert!(trends::of_night(&config(), &nobody, &all, &all, &units).unwrap().1.is_empty());
+    assert!(trends::of_night(&config(), &nobody, &all, &all, &units, Vec::new()).unwrap().1.is_empty());
+}
+
+/// Four units of one tail rise by 8 µm with one flight, and so does one unit of another tail.
+#[test]
+fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
+    let mut rows = flown(228);
+    for row in &mut rows {
+        if row.unit < 4 {
+            row.tail = "T77".into();
+        }
+        if (row.unit < 4 || row.unit == 9) && row.flown.departure_utc >= day(205) {
+            row.flown.gap_m = row.flown.gap_m.map(|gap| gap + 8e-6);
+        }
+    }
+    let said = said(&rows, day(227));
+    for unit in [0, 1, 2, 3, 9] {
+        let [change] = &said[unit].change_points[..] else { panic!("{:?}", said[unit]) };
+        assert_eq!((change.kind, change.tail_wide), ("step", unit < 4), "{unit}");
+        let reason = said[unit].reason.as_deref().unwrap();
+        assert_eq!(
+            reason.contains("all actuators of T77 at once: a sensor or recorder"),
+            unit < 4,
+            "{reason}"
+        );
+    }
+    // Asked for alone, a unit is told the same.
+    let ask = Ask { as_of_utc: Some(day(227)), serial_number: Some("S02".into()), ..Ask::default() };
+    let alone = trends::of_histories(&config(), &Installations::default(), &histories(&rows), &ask).unwrap();
+    assert_eq!(alone, said[2..3]);
 }

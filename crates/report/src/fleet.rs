@@ -276,7 +276,11 @@ fn news(report: &Report) -> Vec<(String, String, String, String)> {
         for event in &unit.events {
             let age = report.as_of_utc.map(|now| days_between(event.departure_utc, now));
             if age.is_some_and(|age| age <= 30.0) {
-                let books = if event.in_books { "in the books" } else { "not in the books" };
+                let books = match (event.in_books, event.tail_wide) {
+                    (true, _) => "in the books",
+                    (false, true) => "with the whole tail: sensor or recorder",
+                    (false, false) => "not in the books",
+                };
                 say(
                     event.kind.clone(),
                     format!("{}, {} µm, {books}", date(event.departure_utc), um(event.step_m)),

@@ -135,6 +135,7 @@ pub struct Statement {
     pub law: Option<String>,
     pub axis: Option<String>,
     pub mann_kendall_p: Option<f64>,
+    pub hamed_rao_p: Option<f64>,
     pub sen_rate_m_per_hour: Option<f64>,
     pub sen_low_m_per_hour: Option<f64>,
     pub sen_high_m_per_hour: Option<f64>,
@@ -166,6 +167,8 @@ pub struct Event {
     pub step_m: f64,
     /// Whether an installation near that day explains it.
     pub in_books: bool,
+    /// Whether the tail's other actuators changed with it: a sensor or a recorder, not wear.
+    pub tail_wide: bool,
 }
 
 /// A stay on a tail.

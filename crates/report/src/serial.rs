@@ -163,7 +163,9 @@ fn picture_words(unit: &Unit) -> String {
 fn events(unit: &Unit) -> Vec<(String, String, String, &'static str)> {
     let row = |e: &crate::model::Event| {
         let size = if e.kind == "onset" { "–".to_owned() } else { um(e.step_m) };
-        (date(e.departure_utc), e.kind.clone(), size, if e.in_books { "yes" } else { "no" })
+        let kind =
+            if e.tail_wide { format!("{}, whole tail: sensor or recorder", e.kind) } else { e.kind.clone() };
+        (date(e.departure_utc), kind, size, if e.in_books { "yes" } else { "no" })
     };
     unit.events.iter().map(row).collect()
 }
@@ -235,6 +237,7 @@ fn record(unit: &Unit) -> Facts {
         ("Wear law believed in most", s.law.clone().unwrap_or_else(|| NO_DATA.to_owned())),
         ("Usage axis", s.axis.as_ref().map_or_else(|| NO_DATA.to_owned(), |axis| axis.replace('_', " "))),
         ("Mann–Kendall, two-sided p", s.mann_kendall_p.map_or_else(|| NO_DATA.to_owned(), small)),
+        ("The same, allowing for autocorrelation", s.hamed_rao_p.map_or_else(|| NO_DATA.to_owned(), small)),
         (
             "Sen's slope, µm per 1000 h",
             rates(s.sen_low_m_per_hour, s.sen_rate_m_per_hour, s.sen_high_m_per_hour),

@@ -110,7 +110,7 @@ pub(crate) fn trace(
 
 /// Trends: of the store, or of estimates made elsewhere; one row for each unit, or for each query.
 #[pyfunction]
-#[pyo3(signature = (estimates, config, tail, serial, part_number, as_of, queries))]
+#[pyo3(signature = (estimates, config, tail, serial, part_number, as_of, queries, statistics))]
 #[expect(clippy::too_many_arguments, reason = "they are Python's keywords")]
 pub(crate) fn trend(
     py: Python<'_>,
@@ -121,10 +121,11 @@ pub(crate) fn trend(
     part_number: Option<String>,
     as_of: Option<&str>,
     queries: Option<&Bound<'_, PyAny>>,
+    statistics: bool,
 ) -> PyResult<Table> {
     let booked = config.booked(py)?;
     let as_of_utc = instant(py, as_of)?;
-    let ask = Ask { tail_number: tail, serial_number: serial, part_number, as_of_utc };
+    let ask = Ask { tail_number: tail, serial_number: serial, part_number, as_of_utc, statistics };
     let given = estimates.map(capsule::batches).transpose()?;
     let days = queries.map(|table| cells(table, "queries")).transpose()?;
     let found = py.detach(|| stated(&config.inner, booked, given, days.as_ref(), &ask));
@@ -144,13 +145,16 @@ fn stated(
     days: Option<&Cells>,
     ask: &Ask,
 ) -> Result<Vec<trends::TrendRow>, pipeline::Error> {
-    let histories = match given {
-        Some(batches) => estimates::gathered(chunks(batches).map(Ok))?,
-        None => trends::in_store(&Store::open(config.store())?)?,
+    let histories = match (given, days) {
+        (None, None) => return trends::of_store(config, booked, &Store::open(config.store())?, ask),
+        (Some(batches), _) => estimates::gathered(chunks(batches).map(Ok))?,
+        (None, Some(_)) => trends::in_store(&Store::open(config.store())?)?,
     };
     match days {
         None => trends::of_histories(config, booked, &histories, ask),
-        Some(days) => trends::of_queries(config, booked, &histories, &estimates::asked(days)?),
+        Some(days) => {
+            trends::of_queries(config, booked, &histories, &estimates::asked(days)?, ask.statistics)
+        }
     }
 }
 

@@ -24,6 +24,7 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, talk: &Talk) -> Result<
         serial_number: args.serial.clone(),
         part_number: None,
         as_of_utc: args.as_of,
+        statistics: true,
     };
     let store = Store::open(config.store())?;
     let program = format!("Freeplay {VERSION}");

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use fleet::{SerialNumber, TailNumber};
 use pipeline::changed::Changed;
+use pipeline::recorder::{Moved, Quantity};
 use pipeline::schedule::{self, Context};
 use pipeline::trends::{Ask, TrendRow};
 use pipeline::{Event, Plan, Report, Request};
@@ -231,16 +232,8 @@ fn account(report: &Report, config: &str, code: Code) -> String {
             .collect();
         line(&mut page, "quiet", &format!("{}: {}", count(tails.len(), "tail"), tails.join(", ")));
     }
-    for moved in &report.skew_moved {
-        let text = format!(
-            "{} {}: {:.1} → {:.1} ms since {}; a recorder, a sensor or its wiring, not wear",
-            escape(&moved.tail_number),
-            escape(&moved.positions.join(", ")),
-            moved.from_s * 1e3,
-            moved.to_s * 1e3,
-            moved.since_utc.strftime("%Y-%m-%d")
-        );
-        line(&mut page, "skew moved", &text);
+    for moved in &report.recorder_moved {
+        line(&mut page, "recorder", &recorder_moved(moved));
     }
     unlike(report, &mut page);
     if let Some((log, seconds)) = &report.slowest {
@@ -257,6 +250,20 @@ fn account(report: &Report, config: &str, code: Code) -> String {
         page.push_str("exit 1: some logs are in error. After mending: `freeplay run --retry`\n");
     }
     page
+}
+
+fn recorder_moved(moved: &Moved) -> String {
+    let change = match moved.quantity {
+        Quantity::SkewS => format!("delay {:.1} → {:.1} ms", moved.from * 1e3, moved.to * 1e3),
+        Quantity::StiffnessNPerM => format!("stiffness {:+.0} %", (moved.to / moved.from - 1.0) * 100.0),
+    };
+    let whole = if moved.everywhere { "all of " } else { "" };
+    format!(
+        "{} {whole}{}: {change} since {}; a recorder, a sensor or its wiring, not wear",
+        escape(&moved.tail_number),
+        escape(&moved.positions.join(", ")),
+        moved.since_utc.strftime("%Y-%m-%d")
+    )
 }
 
 fn refused(report: &Report) -> String {

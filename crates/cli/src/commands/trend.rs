@@ -23,17 +23,23 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Co
         serial_number: args.serial.clone(),
         part_number: args.part.clone(),
         as_of_utc: args.as_of,
+        statistics: args.statistics,
     };
-    let histories = match &args.estimates {
-        Some(file) => pipeline::estimates::read(file)?,
-        None => trends::in_store(&Store::open(config.store())?)?,
-    };
-    let found = match &args.queries {
-        Some(queries) => {
-            let queries = pipeline::estimates::queries(queries)?;
-            trends::of_queries(&config, &installations, &histories, &queries)?
+    let found = match (&args.estimates, &args.queries) {
+        (None, None) => trends::of_store(&config, &installations, &Store::open(config.store())?, &ask)?,
+        (estimates, queries) => {
+            let histories = match estimates {
+                Some(file) => pipeline::estimates::read(file)?,
+                None => trends::in_store(&Store::open(config.store())?)?,
+            };
+            match queries {
+                Some(file) => {
+                    let queries = pipeline::estimates::queries(file)?;
+                    trends::of_queries(&config, &installations, &histories, &queries, args.statistics)?
+                }
+                None => trends::of_histories(&config, &installations, &histories, &ask)?,
+            }
         }
-        None => trends::of_histories(&config, &installations, &histories, &ask)?,
     };
     rows::answer(&args.output, talk, || rows::batch(&pipeline::rows::trends(), &found), || page(&found))?;
     Ok(Code::Well)

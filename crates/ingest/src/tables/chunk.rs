@@ -12,6 +12,7 @@ use arrow::array::{
 };
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Schema, TimeUnit, TimestampMicrosecondType};
+use jiff::Timestamp;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 
@@ -110,9 +111,8 @@ impl Chunk {
         let wanted = DataType::Timestamp(TimeUnit::Microsecond, None);
         match column.filter(|c| !self.batch.column(*c).data_type().is_temporal()) {
             None => Ok(self.cast(column, &wanted)?.as_primitive().clone()),
-            Some(index) => self.parsed::<TimestampMicrosecondType>(index, |text| {
-                utc(text).map(|instant| instant.as_microsecond())
-            }),
+            Some(index) => self
+                .parsed::<TimestampMicrosecondType>(index, |text| utc(text).map(Timestamp::as_microsecond)),
         }
     }
 

@@ -138,12 +138,14 @@ def trend(
     part: str | None = None,
     as_of: Instant | None = None,
     queries: ArrowStream | None = None,
+    statistics: bool = False,
 ) -> Table:
     """Level, rate, changes, crossing of the limit and state: one row for each unit.
 
     ``estimates`` is any Arrow table with ``serial_number`` (or ``serial``), ``departure_utc`` and ``gap_m``, such as
     that of :func:`estimate`; without it the store of the configuration is asked. ``queries`` (``serial_number``,
-    ``as_of_utc``, optional ``part_number``) asks for one row each, using nothing later than its date.
+    ``as_of_utc``, optional ``part_number``) asks for one row each, using nothing later than its date. ``statistics``
+    adds Theil-Sen's slope and Hamed and Rao's test, which take longer than all the rest.
 
     >>> import freeplay, glob, pyarrow as pa
     >>> estimates = freeplay.estimate(sorted(glob.glob("sample-data/logs/*/*.parquet")))
@@ -151,7 +153,7 @@ def trend(
     >>> [row["serial_number"] for row in rows if row["state"] == "plan"]
     ['1040-0009', '1040-0013']
     """
-    return _freeplay.trend(estimates, load(config), tail, serial, part, _text(as_of), queries)
+    return _freeplay.trend(estimates, load(config), tail, serial, part, _text(as_of), queries, statistics)
 
 
 def records(

@@ -51,6 +51,7 @@ def trend(
     part_number: str | None,
     as_of: str | None,
     queries: ArrowStream | None,
+    statistics: bool,
 ) -> Table: ...
 def records(
     config: Config,

@@ -1,0 +1,97 @@
+//! Steps that all actuators of a tail make at once: what measures them changed, not their screws.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use jiff::Timestamp;
+use trend::{ChangeKind, Trend};
+
+use crate::histories::History;
+use crate::recorder::Moved;
+
+/// Steps of one tail this close together are one, days: a step is dated to within some flights.
+const SAME_DAYS: f64 = 7.0;
+
+/// Of the units that could show it, this share at least makes the step: one may be too noisy to.
+const SHARE: f64 = 0.75;
+
+/// The changes, by tail and departure, that are a tail's and not a unit's.
+#[derive(Debug, Default)]
+pub(crate) struct TailWide(BTreeSet<(String, i64)>);
+
+/// A change of one of the judged units.
+struct Made<'a> {
+    tail_number: &'a str,
+    departure_us: i64,
+    kind: ChangeKind,
+    unit: usize,
+}
+
+impl TailWide {
+    /// Looks over units that fly together. What no book knows counts: a step of several units at once, and a
+    /// step or reset when what is fitted of all of them `moved`.
+    pub(crate) fn new(judged: &[(&History, &Trend)], moved: &[Moved]) -> Self {
+        let made: Vec<Made<'_>> =
+            judged.iter().enumerate().flat_map(|(unit, (h, t))| changes(unit, h, t)).collect();
+        let mut by_tail: BTreeMap<&str, Vec<&Made<'_>>> = BTreeMap::new();
+        for change in made.iter().filter(|change| change.kind == ChangeKind::Step) {
+            by_tail.entry(change.tail_number).or_default().push(change);
+        }
+        let is_wide = |change: &&Made<'_>| {
+            let steps = by_tail.get(change.tail_number).map_or(&[][..], Vec::as_slice);
+            is_explained(change, moved)
+                || (change.kind == ChangeKind::Step && is_of_all(change, steps, judged))
+        };
+        let wide = made.iter().filter(is_wide).map(|c| (c.tail_number.to_owned(), c.departure_us));
+        Self(wide.collect())
+    }
+
+    /// Whether a change is its tail's.
+    pub(crate) fn holds(&self, tail_number: Option<&str>, departure_us: i64) -> bool {
+        tail_number.is_some_and(|tail| self.0.contains(&(tail.to_owned(), departure_us)))
+    }
+}
+
+fn changes<'a>(unit: usize, history: &'a History, trend: &'a Trend) -> impl Iterator<Item = Made<'a>> {
+    let unbooked = trend.changes.iter().filter(|c| matches!(c.kind, ChangeKind::Step | ChangeKind::Reset));
+    unbooked.filter_map(move |change| {
+        let flown = history.at(Timestamp::from_microsecond(change.departure_us).ok()?)?;
+        let tail_number = history.place(flown).tail_number.as_deref()?;
+        Some(Made { tail_number, departure_us: change.departure_us, kind: change.kind, unit })
+    })
+}
+
+fn is_explained(change: &Made<'_>, moved: &[Moved]) -> bool {
+    let at = Timestamp::from_microsecond(change.departure_us);
+    at.is_ok_and(|at| moved.iter().any(|moved| moved.explains(change.tail_number, at)))
+}
+
+/// Whether the units that flew on the tail before and after made it together.
+fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], judged: &[(&History, &Trend)]) -> bool {
+    let near = |step: &&&Made<'_>| days(step.departure_us, change.departure_us).abs() <= SAME_DAYS;
+    let stepped: BTreeSet<usize> = steps.iter().filter(near).map(|step| step.unit).collect();
+    if stepped.len() < 2 {
+        return false;
+    }
+    let able = judged.iter().filter(|(history, _)| is_there(history, change)).count();
+    stepped.len() as f64 >= SHARE * able as f64
+}
+
+/// Whether a unit has gaps on the change's tail some time before it, and after.
+fn is_there(history: &History, change: &Made<'_>) -> bool {
+    let on_tail = history
+        .flights()
+        .iter()
+        .filter(|f| f.gap_m.is_some() && history.place(f).tail_number.as_deref() == Some(change.tail_number));
+    let away = |f: &crate::histories::Flown| days(change.departure_us, f.departure_utc.as_microsecond());
+    let (mut before, mut after) = (false, false);
+    for days in on_tail.map(away) {
+        before |= days < -SAME_DAYS;
+        after |= days >= 0.0;
+    }
+    before && after
+}
+
+fn days(from_us: i64, to_us: i64) -> f64 {
+    const DAY_US: f64 = 86_400e6;
+    (to_us - from_us) as f64 / DAY_US
+}
