@@ -220,7 +220,7 @@ fn estimates_made_elsewhere_get_statements_and_queries_see_nothing_later() {
         "serial,as_of_utc\nU1,2026-02-15T12:00:00Z\nU1,2026-02-28T12:00:00Z\n",
     )
     .unwrap();
-    let args = ["trend", "--estimates", "history.csv", "--queries", "dates.csv", "--json"];
+    let args = ["trend", "--estimates", "history.csv", "--queries", "dates.csv", "--statistics", "--json"];
     let rows: Vec<serde_json::Value> = serde_json::from_str(&bench.well(&args)).unwrap();
     assert_eq!(rows.iter().map(|r| r["flights"].as_i64().unwrap()).collect::<Vec<_>>(), [15, 28]);
     // One micrometre in two hours.

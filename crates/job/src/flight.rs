@@ -128,7 +128,7 @@ impl Opened {
             provenance: Provenance {
                 log_path: self.shown.clone(),
                 log_digest: self.digest.clone(),
-                config_digest: config.digest(&self.identity.tail_number, &stay.part_number),
+                config_digest: config.digest(&self.identity.tail_number, &stay.part_number).to_string(),
                 program_version: stamp.program_version.clone(),
                 run_id: stamp.run_id.clone(),
                 processed_utc: stamp.processed_utc,
@@ -304,8 +304,7 @@ pub fn config_digest(
             hash.update(&[0]);
         }
     }
-    let mapping = config.mapping(&flight.tail_number, None);
-    hash.update(serde_json::to_string(&*mapping).unwrap_or_default().as_bytes());
+    hash.update(config.mapping_text(&flight.tail_number).as_bytes());
     // Hours stand in the record too, and the flights table may learn them later.
     if let Some(known) = config.flights.of(flight) {
         let hours =

@@ -51,7 +51,7 @@ fn one(
     let provenance = BTreeMap::from([
         ("source_log".to_owned(), opened.shown().to_owned()),
         ("source_digest".to_owned(), opened.digest.clone()),
-        ("config_digest".to_owned(), config.digest(&id.tail_number, &stay.part_number)),
+        ("config_digest".to_owned(), config.digest(&id.tail_number, &stay.part_number).to_string()),
         ("part_number".to_owned(), stay.part_number.to_string()),
         ("serial_number".to_owned(), stay.serial_number.to_string()),
     ]);

@@ -113,7 +113,7 @@ fn booked(
                 estimate,
                 log_path: Some(shown.to_owned()),
                 log_digest: Some(opened.digest.clone()),
-                config_digest: config.digest(&flight.tail_number, &stay.part_number),
+                config_digest: config.digest(&flight.tail_number, &stay.part_number).to_string(),
                 program_version: program_version.to_owned(),
             }),
             Err(complaint) => complaints.push(complaint.in_file(shown)),

@@ -58,13 +58,16 @@ impl<'a> Book<'a> {
     pub(crate) fn of(plan: &'a Plan, config: &'a Config, installations: &'a Installations) -> Self {
         let (accounts, owners) = (HashMap::new(), HashMap::new());
         let mut book = Self { config, installations, plan, accounts, owners, touched: BTreeSet::new() };
-        plan.accounts.values().for_each(|account| book.enter(account.clone()));
+        if !plan.work.is_empty() {
+            plan.accounts.values().for_each(|account| book.enter(account.clone()));
+        }
         book
     }
 
     /// What is accounted for now.
     pub(crate) fn accounts(&self) -> impl Iterator<Item = &LogAccount> {
-        self.accounts.values()
+        let unchanged = self.plan.work.is_empty().then(|| self.plan.accounts.values());
+        self.accounts.values().chain(unchanged.into_iter().flatten())
     }
 
     fn enter(&mut self, account: LogAccount) {

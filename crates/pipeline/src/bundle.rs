@@ -1,9 +1,9 @@
 //! Which files make a log: usually one; with groups or pieces, those that say they are of one flight.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use fleet::{Complaint, Flight, Position};
+use fleet::{Complaint, Flight, Position, TailNumber};
 use ingest::Files;
 use job::Config;
 use job::flight::{identify, identify_companion};
@@ -62,21 +62,29 @@ pub fn around(config: &Config, path: &Path) -> Result<Files, Error> {
 
 type Who = (Flight, Option<Position>);
 
+/// Who the logs are, tail by tail, each with the name that its files go by.
+type Whose = HashMap<TailNumber, Vec<(Who, String)>>;
+
 fn join(config: &Config, main: Vec<(String, PathBuf)>, companions: Vec<(&str, (String, PathBuf))>) -> Found {
     let known: Vec<_> = main
         .into_par_iter()
         .map(|(shown, path)| (identify(&Files::one(&path), &shown, config).ok(), shown, path))
         .collect();
     let mut found = Found::default();
-    let mut whose: Vec<(Option<Who>, String)> = Vec::new();
+    let mut whose = Whose::new();
     for (who, shown, path) in known {
-        let before =
-            whose.iter().find(|(other, _)| config.document.logs.pieces && who.is_some() && *other == who);
-        if let Some(files) = before.and_then(|(_, first)| found.logs.get_mut(first)) {
-            files.main.push(path);
-        } else {
-            whose.push((who, shown.clone()));
+        let Some(who) = who else {
             found.logs.insert(shown, Files::one(path));
+            continue;
+        };
+        let on_tail = whose.entry(who.0.tail_number.clone()).or_default();
+        let is_piece = |(other, _): &&(Who, String)| config.document.logs.pieces && *other == who;
+        match on_tail.iter().find(is_piece).and_then(|(_, first)| found.logs.get_mut(first)) {
+            Some(files) => files.main.push(path),
+            None => {
+                on_tail.push((who, shown.clone()));
+                found.logs.insert(shown, Files::one(path));
+            }
         }
     }
     let said: Vec<_> = companions
@@ -93,16 +101,10 @@ fn join(config: &Config, main: Vec<(String, PathBuf)>, companions: Vec<(&str, (S
 }
 
 /// A file of a group goes to every main log of its flight: of its actuator only, where both name one.
-fn attach(
-    found: &mut Found,
-    whose: &[(Option<Who>, String)],
-    who: &Who,
-    group: &str,
-    shown: String,
-    path: &Path,
-) {
+fn attach(found: &mut Found, whose: &Whose, who: &Who, group: &str, shown: String, path: &Path) {
     let mut is_stray = true;
-    for (_, first) in whose.iter().filter(|(main, _)| main.as_ref().is_some_and(|main| belongs(who, main))) {
+    let on_tail = whose.get(&who.0.tail_number).map_or(&[][..], Vec::as_slice);
+    for (_, first) in on_tail.iter().filter(|(main, _)| belongs(who, main)) {
         if let Some(files) = found.logs.get_mut(first) {
             files.groups.entry(group.to_owned()).or_default().push(path.to_owned());
             is_stray = false;
@@ -119,7 +121,7 @@ fn belongs((flight, position): &Who, (main, main_position): &Who) -> bool {
         (Some(position), Some(main)) => position == main,
         _ => true,
     };
-    flight.tail_number == main.tail_number && same_flight && same_place
+    same_flight && same_place
 }
 
 /// Files that fit some patterns, each by its shown name, in order of it.

@@ -180,7 +180,7 @@ pub struct Plan {
     pub work: Vec<Work>,
     /// What is accounted for, by name, of the logs that are still there.
     pub accounts: BTreeMap<String, LogAccount>,
-    /// What was read, and under which settings, of logs that are there.
+    /// What was read, and under which settings, of logs that are there; nothing without work.
     pub here: HashSet<Digests>,
     /// The same of logs that are gone, with their records: they may be here under another name.
     pub gone: HashMap<Digests, (i64, i64)>,
@@ -190,7 +190,7 @@ pub struct Plan {
     pub left: usize,
     /// Files of groups whose flight has no main log.
     pub strays: Vec<String>,
-    /// The files of every log that was found.
+    /// The files of every log that was found; nothing without work.
     pub files: BTreeMap<String, Files>,
 }
 
@@ -216,7 +216,12 @@ pub fn plan(
     let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
     let gone = gone.iter().filter_map(|a| Some((digests(a)?, (a.estimated, a.refused)))).collect();
     let accounts: BTreeMap<String, LogAccount> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
-    let owned: HashSet<RecordKey> = accounts.values().flat_map(LogAccount::owned).collect();
+    // Names and digests of a hundred thousand logs are made only where they decide something.
+    let owned: HashSet<RecordKey> = if accounts.values().any(is_silent) {
+        accounts.values().flat_map(LogAccount::owned).collect()
+    } else {
+        HashSet::new()
+    };
     let unidentified = job::flight::unidentified_digest(config, installations);
     let judge =
         Judge { config, installations, request, owned: &owned, unidentified: &unidentified, seen: &seen };
@@ -230,9 +235,13 @@ pub fn plan(
     work.truncate(request.limit.unwrap_or(usize::MAX));
     let left = wanted - work.len();
     let known = found.len() - wanted - not_asked;
-    let here = accounts.values().filter_map(digests).collect();
-    let files = found.iter().map(|(shown, (files, _))| (shown.clone(), files.clone())).collect();
-    Plan { found: found.len(), known, work, accounts, here, gone, not_asked, left, strays, files }
+    let mut plan =
+        Plan { found: found.len(), known, work, accounts, gone, not_asked, left, strays, ..Plan::default() };
+    if !plan.work.is_empty() {
+        plan.here = plan.accounts.values().filter_map(digests).collect();
+        plan.files = found.into_iter().map(|(shown, (files, _))| (shown, files)).collect();
+    }
+    plan
 }
 
 /// What was read, and which settings touched it, of a log that went well.
@@ -335,11 +344,15 @@ impl Judge<'_> {
 
     /// A log that yielded its flight to another, which speaks for it no longer.
     fn is_orphan(&self, account: &LogAccount) -> bool {
-        let yielded = account.outcome.is_well() || account.error_code.as_deref() == Some("duplicate_flight");
-        let silent = account.estimated + account.refused == 0;
-        let keys = account.keys();
-        yielded && silent && !keys.is_empty() && keys.iter().all(|key| !self.owned.contains(key))
+        let keys = if is_silent(account) { account.keys() } else { Vec::new() };
+        !keys.is_empty() && keys.iter().all(|key| !self.owned.contains(key))
     }
+}
+
+/// Whether a sound log has no record of its own.
+fn is_silent(account: &LogAccount) -> bool {
+    let sound = account.outcome.is_well() || account.error_code.as_deref() == Some("duplicate_flight");
+    sound && account.estimated + account.refused == 0
 }
 
 fn positions_of(account: &LogAccount) -> Vec<Position> {

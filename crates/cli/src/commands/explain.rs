@@ -32,7 +32,7 @@ pub(crate) fn explain(args: &ExplainArgs, global: &Global, talk: &Talk) -> Resul
     if args.json {
         let value = json!({
             "record": record,
-            "settings": { "part": settings, "config_digest": digest, "is_current": digest == record.provenance.config_digest },
+            "settings": { "part": settings, "config_digest": &*digest, "is_current": *digest == *record.provenance.config_digest },
             "replay": { "verdict": verdict.code(), "says": verdict.to_string() },
         });
         talk.answer(&format!("{value:#}\n"))?;

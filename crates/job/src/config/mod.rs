@@ -160,8 +160,13 @@ impl Config {
     /// blake3 of every setting that can move a number of this part on this aircraft: the mapping, the
     /// method, the part and the version of the method. Limits and schedules are left out, since they move
     /// none.
-    pub fn digest(&self, tail: &TailNumber, part: &PartNumber) -> String {
-        self.digest_with(&self.mapping(tail, Some(part)), part)
+    pub fn digest(&self, tail: &TailNumber, part: &PartNumber) -> Arc<str> {
+        self.variants.told(tail, Some(part), |mapping| self.digest_with(mapping, part))
+    }
+
+    /// How the logs of an aircraft are read, as JSON.
+    pub(crate) fn mapping_text(&self, tail: &TailNumber) -> Arc<str> {
+        self.variants.told(tail, None, |mapping| serde_json::to_string(mapping).unwrap_or_default())
     }
 
     /// The same for a log that says nothing of its aircraft.

@@ -18,11 +18,20 @@ pub(super) struct Variants {
     overrides: Vec<Checked>,
     /// By the numbers of the overrides that apply.
     made: Mutex<BTreeMap<Vec<usize>, Arc<Mapping>>>,
+    /// What was told of them, by the same numbers and the part.
+    told: Mutex<Told>,
 }
+
+type Told = BTreeMap<(Vec<usize>, Option<PartNumber>), Arc<str>>;
 
 impl Clone for Variants {
     fn clone(&self) -> Self {
-        Self { base: Arc::clone(&self.base), overrides: self.overrides.clone(), made: Mutex::default() }
+        Self {
+            base: Arc::clone(&self.base),
+            overrides: self.overrides.clone(),
+            made: Mutex::default(),
+            told: Mutex::default(),
+        }
     }
 }
 
@@ -60,19 +69,41 @@ impl Variants {
         if !found.is_empty() {
             return Err(found);
         }
-        Ok(Self { base: Arc::new(base), overrides, made: Mutex::default() })
+        Ok(Self { base: Arc::new(base), overrides, made: Mutex::default(), told: Mutex::default() })
     }
 
     /// How the logs of an aircraft are read, or the channels of a part on it.
     pub(super) fn mapping(&self, tail: &TailNumber, part: Option<&PartNumber>) -> Arc<Mapping> {
-        let applies = |(number, one): (usize, &Checked)| one.is_for(tail, part).then_some(number);
-        let numbers: Vec<usize> = self.overrides.iter().enumerate().filter_map(applies).collect();
+        let numbers = self.numbers(tail, part);
         if numbers.is_empty() {
             return Arc::clone(&self.base);
         }
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         let make = || Arc::new(self.made_of(&numbers));
         Arc::clone(made.entry(numbers.clone()).or_insert_with(make))
+    }
+
+    /// A text about the same, made once: a night asks for it as often as there are logs.
+    pub(super) fn told(
+        &self,
+        tail: &TailNumber,
+        part: Option<&PartNumber>,
+        make: impl FnOnce(&Mapping) -> String,
+    ) -> Arc<str> {
+        let key = (self.numbers(tail, part), part.cloned());
+        let told = || self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = told().get(&key) {
+            return Arc::clone(known);
+        }
+        let text: Arc<str> = make(&self.mapping(tail, part)).into();
+        told().insert(key, Arc::clone(&text));
+        text
+    }
+
+    /// The overrides that apply.
+    fn numbers(&self, tail: &TailNumber, part: Option<&PartNumber>) -> Vec<usize> {
+        let applies = |(number, one): (usize, &Checked)| one.is_for(tail, part).then_some(number);
+        self.overrides.iter().enumerate().filter_map(applies).collect()
     }
 
     /// Whether anything is otherwise for a part.
