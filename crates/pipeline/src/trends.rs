@@ -210,7 +210,8 @@ pub fn of_night(
     now.retain(|row| row.flights > 0);
     let Some(before_utc) = before_utc else { return Ok((now, Vec::new())) };
     let earlier = all.without(&names, tonight);
-    let fleet = Fleet { priors: fleet.priors, ..Fleet::read(config, installations, &earlier)? };
+    let fleet =
+        Fleet { priors: fleet.priors, turns: fleet.turns, ..Fleet::read(config, installations, &earlier)? };
     let before = fleet.statements(earlier.names(), before_utc)?;
     let before = before.into_iter().map(|row| (row.name(), row)).collect();
     let news = changed(&before, &now);
@@ -259,9 +260,9 @@ pub(crate) fn told(
     let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
     let asked: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
     let taught = |part: Option<&str>| {
-        let month = month_us(as_of);
-        let prior = fleet.priors.get(&(month, part))?;
-        Some((part.map(str::to_owned), Timestamp::from_microsecond(month).ok()?, prior.clone()))
+        let turn = fleet.turns.by(as_of)?;
+        let prior = fleet.priors.get(&(turn, part))?;
+        Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = asked.into_iter().filter_map(taught).collect();
     Ok(Told { now, drawn, before, priors })
@@ -345,25 +346,39 @@ fn of_asked(
 /// Part numbers that share a prior.
 type Parts<'a> = Vec<Option<&'a str>>;
 
-/// All units, and what each part's units had taught about the next by each month.
+/// All units, and what each part's units had taught about the next by each turn.
 pub(crate) struct Fleet<'a> {
     config: &'a Config,
     units: BTreeMap<&'a HistoryName, (&'a History, Series)>,
+    turns: Turns,
     priors: BTreeMap<(i64, Option<&'a str>), FleetPrior>,
     /// What moved on whole aircraft beside gaps.
     moved: Vec<Moved>,
 }
 
-/// The last month's turn by a day, microseconds since 1970 UTC: months of thirty days.
+/// The days on which priors are learned, microseconds since 1970 UTC: every thirty days from a fleet's first
+/// departure on, and when it has grown older by a tenth.
 ///
-/// A prior moves slowly and costs as much as its fleet's statements: that of the turn serves the month.
-fn month_us(as_of: Timestamp) -> i64 {
-    const MONTH_US: i64 = 30 * 86_400_000_000;
-    as_of.as_microsecond().div_euclid(MONTH_US) * MONTH_US
+/// A prior moves slowly and costs as much as its fleet's statements: that of a turn serves until the next.
+#[derive(Debug, Clone, Default)]
+struct Turns(Vec<i64>);
+
+impl Turns {
+    fn of(first_us: i64, last_us: i64) -> Self {
+        const MONTH_US: i64 = 30 * 86_400_000_000;
+        const GROWN: i64 = 10;
+        let next = |turn: &i64| Some(turn + MONTH_US.max((turn - first_us) / GROWN));
+        Self(std::iter::successors(Some(first_us), next).take_while(|turn| *turn <= last_us).collect())
+    }
+
+    /// The last turn by a day.
+    fn by(&self, as_of: Timestamp) -> Option<i64> {
+        self.0[..self.0.partition_point(|turn| *turn <= as_of.as_microsecond())].last().copied()
+    }
 }
 
 impl<'a> Fleet<'a> {
-    /// Reads all histories and learns for every month among `days`, each from nothing later.
+    /// Reads all histories and learns by the turn before each of the `days`, each from nothing later.
     pub(crate) fn new(
         config: &'a Config,
         installations: &Installations,
@@ -372,11 +387,15 @@ impl<'a> Fleet<'a> {
     ) -> Result<Self, Error> {
         let mut fleet = Self::read(config, installations, histories)?;
         let parts: BTreeSet<Option<&str>> = fleet.units.keys().map(|name| name.0.as_deref()).collect();
-        let months: BTreeSet<i64> = days.iter().map(|day| month_us(*day)).collect();
-        let taught: Vec<_> = months.par_iter().map(|month| (*month, fleet.taught(*month, &parts))).collect();
-        for (month, groups) in taught {
+        let first = fleet.units.values().filter_map(|(_, series)| series.flights().first());
+        if let Some((first_us, last)) = first.map(|f| f.departure_us).min().zip(days.iter().max()) {
+            fleet.turns = Turns::of(first_us, last.as_microsecond());
+        }
+        let turns: BTreeSet<i64> = days.iter().filter_map(|day| fleet.turns.by(*day)).collect();
+        let taught: Vec<_> = turns.par_iter().map(|turn| (*turn, fleet.taught(*turn, &parts))).collect();
+        for (turn, groups) in taught {
             for (parts, prior) in groups {
-                fleet.priors.extend(parts.into_iter().map(|part| ((month, part), prior.clone())));
+                fleet.priors.extend(parts.into_iter().map(|part| ((turn, part), prior.clone())));
             }
         }
         Ok(fleet)
@@ -404,15 +423,16 @@ impl<'a> Fleet<'a> {
         };
         let units: Vec<_> = histories.iter().collect();
         let units = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        Ok(Self { config, units: units.into_iter().collect(), priors: BTreeMap::new(), moved: Vec::new() })
+        let units = units.into_iter().collect();
+        Ok(Self { config, units, turns: Turns::default(), priors: BTreeMap::new(), moved: Vec::new() })
     }
 
-    /// What the parts had taught by a month, those alike together.
-    fn taught(&self, month_us: i64, parts: &BTreeSet<Option<&'a str>>) -> Vec<(Parts<'a>, FleetPrior)> {
+    /// What the parts had taught by a turn, those alike together.
+    fn taught(&self, turn_us: i64, parts: &BTreeSet<Option<&'a str>>) -> Vec<(Parts<'a>, FleetPrior)> {
         let parts: Vec<Option<&str>> = parts.iter().copied().collect();
-        let alone = parts.into_par_iter().map(|part| (part, self.learn(month_us, &[part]))).collect();
+        let alone = parts.into_par_iter().map(|part| (part, self.learn(turn_us, &[part]))).collect();
         let alike = self.alike(alone);
-        alike.into_par_iter().map(|(parts, own)| self.pooled(month_us, parts, own)).collect()
+        alike.into_par_iter().map(|(parts, own)| self.pooled(turn_us, parts, own)).collect()
     }
 
     /// Parts in groups that share what they teach: of one limit, along one axis where that is configured,
@@ -443,16 +463,16 @@ impl<'a> Fleet<'a> {
     }
 
     /// What several parts teach together; one alone has said it already.
-    fn pooled<'b>(&self, month_us: i64, parts: Parts<'b>, own: FleetPrior) -> (Parts<'b>, FleetPrior) {
-        let prior = if parts.len() == 1 { own } else { self.learn(month_us, &parts) };
+    fn pooled<'b>(&self, turn_us: i64, parts: Parts<'b>, own: FleetPrior) -> (Parts<'b>, FleetPrior) {
+        let prior = if parts.len() == 1 { own } else { self.learn(turn_us, &parts) };
         (parts, prior)
     }
 
-    fn learn(&self, month_us: i64, parts: &[Option<&str>]) -> FleetPrior {
+    fn learn(&self, turn_us: i64, parts: &[Option<&str>]) -> FleetPrior {
         let of_parts = self.units.iter().filter(|(name, _)| parts.contains(&name.0.as_deref()));
         let first = parts.first().copied().flatten();
         let (limit_m, axis) = (self.limit_m(first), self.axis(first));
-        FleetPrior::learn(of_parts.map(|(_, (_, series))| series), month_us, limit_m, axis)
+        FleetPrior::learn(of_parts.map(|(_, (_, series))| series), turn_us, limit_m, axis)
     }
 
     /// What wear of a part is said to follow; nothing where its histories decide.
@@ -488,7 +508,7 @@ impl<'a> Fleet<'a> {
     /// What was known of a unit's like on a day.
     pub(crate) fn prior(&self, name: &HistoryName, as_of: Timestamp) -> Option<&FleetPrior> {
         let (flown, _) = self.units.get_key_value(name)?;
-        self.priors.get(&(month_us(as_of), flown.0.as_deref()))
+        self.priors.get(&(self.turns.by(as_of)?, flown.0.as_deref()))
     }
 
     /// The same, with what moved on whole aircraft beside gaps.
