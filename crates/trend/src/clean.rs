@@ -9,6 +9,10 @@ const OUTLIER_SIGMA: f64 = 4.0;
 /// Flights of the running median.
 const WINDOW: usize = 11;
 
+/// Standard errors are taken to lie between these, metres: their squares must be numbers to reckon with.
+const LEAST_ERROR_M: f64 = 1e-9;
+const LARGEST_ERROR_M: f64 = 1.0;
+
 /// One estimate that takes part.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Estimate {
@@ -47,7 +51,7 @@ pub(crate) fn clean(flights: &[Flight]) -> Clean {
     let smooth = running_median(&gaps);
     let mut clean = Clean { estimates: Vec::with_capacity(gaps.len()), outliers: Vec::new(), noise_factor };
     for (k, &(flight, gap)) in stated.iter().enumerate() {
-        let variance = noise_factor * errors[k] * errors[k];
+        let variance = (noise_factor * errors[k] * errors[k]).max(LEAST_ERROR_M * LEAST_ERROR_M);
         let far =
             |expected_m: f64| (gap.gap_m - expected_m).powi(2) > OUTLIER_SIGMA * OUTLIER_SIGMA * variance;
         if far(smooth[k]) && far(on_local_line(&gaps, k)) {
@@ -76,7 +80,8 @@ fn typical_error(stated: &[(usize, Gap)]) -> f64 {
 /// A stated error no smaller than half the typical one: a between-flight scatter that nobody states
 /// bounds what a single flight can be worth.
 fn error(gap: Gap, typical_m: f64) -> f64 {
-    if gap.se_m.is_finite() { gap.se_m.max(0.5 * typical_m) } else { typical_m }
+    let stated_m = if gap.se_m.is_finite() { gap.se_m.max(0.5 * typical_m) } else { typical_m };
+    stated_m.clamp(LEAST_ERROR_M, LARGEST_ERROR_M)
 }
 
 /// Found over stated variance from successive differences, drawn to one while they are few.
@@ -95,7 +100,9 @@ fn noise_factor(gaps: &[f64], errors: &[f64]) -> f64 {
     let wear = median(&mut ratios);
     ratios.iter_mut().for_each(|ratio| *ratio = (*ratio - wear).abs());
     let found = (1.4826 * median(&mut ratios)).powi(2);
-    ((found * count + PRIOR_COUNT) / (count + PRIOR_COUNT)).max(0.05)
+    // Errors stated ten times too large were not meant; that gaps repeat to the last digit says nothing.
+    let stated = if found > 0.0 { (100.0 * found).min(1.0) } else { 1.0 };
+    ((found * count + PRIOR_COUNT * stated) / (count + PRIOR_COUNT)).max(0.05 * stated)
 }
 
 /// What the flights around one say it should be, if they wear evenly: the median of their pairwise

@@ -8,7 +8,7 @@ use crate::prior::FleetPrior;
 use crate::series::{Booked, Flight};
 use crate::trend::{Change, ChangeKind};
 
-/// A fall larger than this is never a matter of rigging, metres.
+/// A step larger than this is never a matter of rigging, metres: a fall made the unit new, a rise is damage.
 const RIGGING_M: f64 = 15e-6;
 
 /// Flights from a change of installation within which a step is the books' own.
@@ -23,11 +23,20 @@ pub(crate) struct History {
     pub(crate) changes: Vec<Change>,
     /// Variance that undone offsets leave in the level, m².
     pub(crate) offset_m2: f64,
-    /// First estimate of each segment.
-    begins: Vec<usize>,
-    begin_usage: Vec<f64>,
+    begins: Vec<Begin>,
+    /// What has been taken off the last estimates, metres.
+    undone_m: f64,
     now: f64,
     known_age: Option<f64>,
+}
+
+/// Where a segment begins.
+#[derive(Debug, Clone, Copy)]
+struct Begin {
+    estimate: usize,
+    usage: f64,
+    /// As good as new.
+    fresh: bool,
 }
 
 /// Reads the flights along the axis that wear follows.
@@ -49,8 +58,8 @@ pub(crate) fn read(
         noise_factor,
         changes: Vec::new(),
         offset_m2: 0.0,
-        begins: vec![0],
-        begin_usage: vec![0.0],
+        begins: vec![Begin { estimate: 0, usage: 0.0, fresh: false }],
+        undone_m: 0.0,
         now,
         known_age,
     };
@@ -81,14 +90,29 @@ impl History {
         self.changes.push(Change { departure_us, kind, step_m: jump.step_m, se_m: jump.se_m, certainty });
         let renewed = entries.any(|entry| entry.renews) && jump.step_m < 0.0;
         if kind == ChangeKind::Reset || renewed {
-            self.begins.push(jump.at);
-            self.begin_usage.push(self.estimates[jump.at - 1].usage);
-            self.offset_m2 = 0.0;
+            self.begin(jump.at, true);
+        } else if self.undone_m + jump.step_m > RIGGING_M {
+            // To undo what may be damage would hide it.
+            let hidden_m = std::mem::take(&mut self.undone_m);
+            self.shift(jump.at, hidden_m);
+            self.begin(jump.at, false);
         } else {
-            for estimate in &mut self.estimates[jump.at..] {
-                estimate.gap_m -= jump.step_m;
-            }
+            self.undone_m += jump.step_m;
+            self.shift(jump.at, -jump.step_m);
             self.offset_m2 += jump.se_m * jump.se_m;
+        }
+    }
+
+    /// Begins a segment, which knows nothing of what was undone before.
+    fn begin(&mut self, estimate: usize, fresh: bool) {
+        self.begins.push(Begin { estimate, usage: self.estimates[estimate - 1].usage, fresh });
+        self.offset_m2 = 0.0;
+    }
+
+    /// Moves every estimate from one on.
+    fn shift(&mut self, from: usize, by_m: f64) {
+        for estimate in &mut self.estimates[from..] {
+            estimate.gap_m += by_m;
         }
     }
 
@@ -105,14 +129,14 @@ impl History {
 
     /// The segments, oldest first.
     pub(crate) fn segments(&self) -> impl Iterator<Item = Segment<'_>> {
-        (0..self.begins.len()).map(|i| {
-            let last = i + 1 == self.begins.len();
-            let end = if last { self.estimates.len() } else { self.begins[i + 1] };
+        self.begins.iter().enumerate().map(|(i, begin)| {
+            let next = self.begins.get(i + 1);
+            let end = next.map_or(self.estimates.len(), |next| next.estimate);
             Segment {
-                estimates: &self.estimates[self.begins[i]..end],
-                begin: self.begin_usage[i],
-                now: if last { self.now } else { self.begin_usage[i + 1] },
-                fresh: i > 0,
+                estimates: &self.estimates[begin.estimate..end],
+                begin: begin.usage,
+                now: next.map_or(self.now, |next| next.usage),
+                fresh: begin.fresh,
                 known_age: self.known_age.filter(|_| i == 0),
             }
         })

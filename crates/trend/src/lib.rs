@@ -24,6 +24,7 @@ mod crossing;
 mod curve;
 mod error;
 mod filter;
+mod grounded;
 mod history;
 mod jump;
 mod learn;

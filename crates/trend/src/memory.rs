@@ -47,5 +47,6 @@ fn evidence<'a>(said: &'a Trend, flights: &'a [Flight]) -> Evidence<'a> {
         level: said.level,
         crossing: said.crossing,
         changes: &said.changes,
+        unsupported: None,
     }
 }

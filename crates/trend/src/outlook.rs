@@ -3,9 +3,10 @@
 use crate::bins::{self, BINS, Bin};
 use crate::calibrate::{Calibration, foretold};
 use crate::error::Error;
+use crate::grounded::{Grounded, grounded};
 use crate::history;
 use crate::look::walk;
-use crate::posterior::{Posterior, Segment, mean_growth, posterior};
+use crate::posterior::{Posterior, Segment, mean_growth};
 use crate::prior::FleetPrior;
 use crate::series::Series;
 use crate::settings::Settings;
@@ -57,14 +58,16 @@ pub fn outlook(
     if history.estimates.len() < FEWEST_ESTIMATES {
         return Ok(Outlook::default());
     }
-    let (mut past, mut judged) = (Vec::new(), None);
+    let alone = prior.alone();
+    let (mut past, mut last) = (Vec::new(), None);
     for segment in history.segments() {
-        judged = posterior(&segment, prior);
-        past.extend(judged.iter().flat_map(|judged| levels(&segment, judged, prior)));
+        last = grounded(&segment, prior, &alone, history.offset_m2).ok();
+        past.extend(last.iter().flat_map(|on| levels(&segment, &on.posterior, on.prior)));
     }
-    let Some(judged) = judged.map(Posterior::tempered) else {
+    let Some(Grounded { posterior, prior }) = last else {
         return Ok(Outlook { past, ahead: Vec::new() });
     };
+    let judged = posterior.tempered();
     let ratio = hours_per_usage(flights, prior);
     let variance_m2 = history.offset_m2 + prior.bias_sd_m.powi(2);
     let after = |hours: f64| {

@@ -16,6 +16,9 @@ const DROP: f64 = 8.0;
 /// What a prior over lives and cells can add to a curve's bound.
 const SLACK: f64 = 3.0;
 
+/// By how much a curve's weight usually stays below its bound, at most.
+const USUAL: f64 = 20.0;
+
 /// Standard deviations within which a life may lie.
 const LIFE_REACH: f64 = 3.5;
 
@@ -214,11 +217,14 @@ fn nodes(look: &Look<'_>, bank: &Bank, tried: Lives) -> Vec<(usize, Node)> {
         let curve = &bank.curves[candidate.index];
         if curve.law == Law::None { flat(look, push) } else { lives(look, curve, candidate, tried, push) }
     };
-    let Some(top) = candidates.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) else { return Vec::new() };
+    let mut nodes = Vec::with_capacity(256);
+    let Some(top) = candidates.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) else { return nodes };
     let mut best = f64::NEG_INFINITY;
     add(top, &mut |node| best = best.max(node.weight));
-    let mut nodes = Vec::with_capacity(256);
-    for candidate in candidates.iter().filter(|c| c.bound > top.bound - DROP - SLACK) {
+    // Where the prior forbids what fits best, its bound says nothing of the others.
+    let floor = top.bound.min(best + USUAL) - DROP - SLACK;
+    let flat = bank.curves.iter().position(|curve| curve.law == Law::None);
+    for candidate in candidates.iter().filter(|c| c.bound > floor || Some(c.index) == flat) {
         add(candidate, &mut |node| {
             best = best.max(node.weight);
             if node.weight > best - DROP {

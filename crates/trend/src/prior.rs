@@ -8,8 +8,13 @@ use crate::posterior::Segment;
 use crate::season::Season;
 use crate::series::Flight;
 
-/// A unit first seen in service has used at most this share of its life.
+/// A unit first seen in service has seldom used more than this share of its life: an age beyond it is
+/// less likely by this power of how far. Forbidden outright, an overdue unit would have no curve at all.
 const WORN_SHARE: f64 = 0.9;
+const OVERDUE: f64 = 20.0;
+
+/// The gap of a new unit as a share of the limit, while nothing is known.
+const NEW_SHARE: f64 = 0.2;
 
 /// The exponential law's life in time constants: ln k is normal with this mean and spread.
 const LN_CONSTANTS: (f64, f64) = (1.1, 0.5);
@@ -92,8 +97,8 @@ impl FleetPrior {
         Self {
             axis: Axis::Hours,
             hours_per_unit: 1.0,
-            span_m: 0.8 * limit_m,
-            new_m: 0.2 * limit_m,
+            span_m: (1.0 - NEW_SHARE) * limit_m,
+            new_m: NEW_SHARE * limit_m,
             new_sd_m: 0.05 * limit_m,
             ln_life: 4000.0_f64.ln(),
             ln_life_sd: 0.8,
@@ -106,6 +111,13 @@ impl FleetPrior {
             bias_sd_m: 1.5e-6,
             calibration: Calibration::HONEST,
         }
+    }
+
+    /// What is assumed of a unit that the fleet says nothing of: the fleet's axis, and else as little as
+    /// of a part number nobody has seen.
+    pub(crate) fn alone(&self) -> Self {
+        let Self { axis, hours_per_unit, .. } = *self;
+        Self { axis, hours_per_unit, ..Self::vague(self.span_m / (1.0 - NEW_SHARE)) }
     }
 
     /// What wear follows.
@@ -203,8 +215,7 @@ impl LogPrior<'_> {
             log += self.constants - 0.5 * z * z;
         }
         match ln_age {
-            Some(ln_age) if ln_age < self.worn_share + ln_life => log - ln_life,
-            Some(_) => f64::NEG_INFINITY,
+            Some(ln_age) => log - ln_life - OVERDUE * (ln_age - self.worn_share - ln_life).max(0.0),
             None => log,
         }
     }

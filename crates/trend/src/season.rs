@@ -90,7 +90,7 @@ impl Season {
                 squares += (own - mean_m).powi(2) + share * error_m2;
                 count += 1.0;
             }
-            mean_m = if believed { sum / (count - PSEUDO_UNITS) } else { 0.0 };
+            mean_m = if believed { sum / count } else { 0.0 };
             sd_m = (squares / count).sqrt();
         }
         Self { phase, mean_m, sd_m }
@@ -98,8 +98,12 @@ impl Season {
 }
 
 /// The season in one segment, beside wear of the likeliest form; nothing where the two cannot be told
-/// apart.
+/// apart, as in less than half a year.
 pub(crate) fn swing(segment: &Segment<'_>, prior: &FleetPrior, posterior: &Posterior) -> Option<Swing> {
+    let seen_us = segment.estimates.last()?.departure_us - segment.estimates.first()?.departure_us;
+    if (seen_us as f64) < 0.5 * YEAR_US {
+        return None;
+    }
     let best = posterior.nodes.iter().max_by(|a, b| a.weight.total_cmp(&b.weight))?;
     let bins = bins::bin(segment.estimates, bins::BINS);
     let height = |b: &Bin| best.law.height(best.age_begin + b.usage - segment.begin);

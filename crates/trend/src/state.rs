@@ -37,6 +37,8 @@ pub enum Reason {
     Stale { days: f64 },
     /// Too few estimates.
     TooFew { estimates: usize },
+    /// No curve that explains the history has the gap where the last estimates are.
+    Unsupported { gap_m: f64, recent_m: f64 },
     /// The gap is at its act limit.
     AtLimit { gap_m: f64, limit_m: f64 },
     /// The early crossing lies within the planning horizon.
@@ -56,7 +58,15 @@ impl fmt::Display for Reason {
             Self::NoEstimate => write!(f, "no estimate yet"),
             Self::Stale { days } => write!(f, "last estimate is {days:.0} days old"),
             Self::TooFew { estimates } => {
-                write!(f, "only {estimates} estimates, {FEWEST_ESTIMATES} are needed")
+                let noun = if estimates == 1 { "estimate" } else { "estimates" };
+                write!(f, "only {estimates} {noun}, {FEWEST_ESTIMATES} are needed")
+            }
+            Self::Unsupported { gap_m, recent_m } => {
+                let (gap_um, recent_um) = (um(gap_m), um(recent_m));
+                write!(
+                    f,
+                    "curves through all estimates end at {gap_um:.1} µm, the last ones are near {recent_um:.1} µm"
+                )
             }
             Self::AtLimit { gap_m, limit_m } => {
                 write!(f, "gap {:.1} µm is at the limit of {:.1} µm", um(gap_m), um(limit_m))
@@ -84,6 +94,8 @@ pub(crate) struct Evidence<'a> {
     pub(crate) level: Option<Level>,
     pub(crate) crossing: Option<Crossing>,
     pub(crate) changes: &'a [Change],
+    /// The level that was not stated, and what the last estimates say.
+    pub(crate) unsupported: Option<(f64, f64)>,
 }
 
 /// The state and its reason, most urgent first; a `previous` state is left only past its margin.
@@ -101,7 +113,10 @@ pub(crate) fn judge(
         return (None, Reason::Stale { days });
     }
     let (Some(Level { gap_m, .. }), Some(crossing)) = (evidence.level, evidence.crossing) else {
-        return (None, Reason::TooFew { estimates: evidence.estimates });
+        let few = Reason::TooFew { estimates: evidence.estimates };
+        let unsupported = |(gap_m, recent_m)| Reason::Unsupported { gap_m, recent_m };
+        let enough = evidence.estimates >= FEWEST_ESTIMATES;
+        return (None, evidence.unsupported.filter(|_| enough).map_or(few, unsupported));
     };
     let Settings { limit_m, watch_m, planning_horizon_hours, .. } = *settings;
     let margin = |state: State, margin: f64| if previous >= Some(state) { margin } else { 1.0 };

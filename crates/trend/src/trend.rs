@@ -4,9 +4,10 @@ use std::fmt;
 
 use crate::crossing::Remaining;
 use crate::error::Error;
+use crate::grounded::{Grounded, Groundless, grounded};
 use crate::history::{self, History};
 use crate::level;
-use crate::posterior::{Posterior, Segment, posterior};
+use crate::posterior::{Posterior, Segment};
 use crate::prior::FleetPrior;
 use crate::series::{Flight, Series};
 use crate::settings::Settings;
@@ -193,8 +194,15 @@ pub fn trend(
     let prior = prior.unwrap_or(&vague);
     let flights = series.until(as_of_us);
     let history = history::read(flights, series.book_until(as_of_us), series.unit_hours_at_start(), prior);
-    let (changes, judged) = follow(&history, flights, prior);
-    let judged = judged.filter(|_| history.estimates.len() >= FEWEST_ESTIMATES);
+    let alone = prior.alone();
+    let (changes, judged) = follow(&history, flights, prior, &alone);
+    let unsupported = match judged {
+        Err(Groundless::Unsupported { level_m, recent_m }) => Some((level_m, recent_m)),
+        _ => None,
+    };
+    let judged = judged.ok().filter(|_| history.estimates.len() >= FEWEST_ESTIMATES);
+    let prior = judged.as_ref().map_or(prior, |judged| judged.prior);
+    let judged = judged.map(|judged| judged.posterior);
     let growth_probability = judged.as_ref().map(level::growth_probability);
     let judged = judged.map(Posterior::tempered);
     let ratio = hours_per_usage(flights, prior);
@@ -202,7 +210,7 @@ pub fn trend(
     let level = judged.as_ref().map(|p| level::level(p, prior, history.offset_m2));
     let crossing = remaining.as_ref().map(Remaining::crossing);
     let estimates = history.estimates.len();
-    let evidence = Evidence { flights, estimates, as_of_us, level, crossing, changes: &changes };
+    let evidence = Evidence { flights, estimates, as_of_us, level, crossing, changes: &changes, unsupported };
     let (state, reason) = judge(&evidence, settings, previous);
     Ok(Trend {
         as_of_us,
@@ -226,12 +234,18 @@ pub fn trend(
 }
 
 /// Changes found, onsets of every segment included, and what the last segment says.
-fn follow(history: &History, flights: &[Flight], prior: &FleetPrior) -> (Vec<Change>, Option<Posterior>) {
+fn follow<'a>(
+    history: &History,
+    flights: &[Flight],
+    prior: &'a FleetPrior,
+    alone: &'a FleetPrior,
+) -> (Vec<Change>, Result<Grounded<'a>, Groundless>) {
     let mut changes = history.changes.clone();
-    let mut judged = None;
+    let mut judged = Err(Groundless::Empty);
     for segment in history.segments() {
-        judged = posterior(&segment, prior);
-        changes.extend(judged.as_ref().and_then(|p| onset(p, &segment, flights, prior)));
+        judged = grounded(&segment, prior, alone, history.offset_m2);
+        let found = judged.as_ref().ok().and_then(|j| onset(&j.posterior, &segment, flights, prior));
+        changes.extend(found);
     }
     changes.sort_by_key(|change| change.departure_us);
     (changes, judged)

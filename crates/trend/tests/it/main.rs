@@ -7,7 +7,9 @@
 )]
 
 mod classic;
+mod degenerate;
 mod fleet;
 mod outlook;
+mod random;
 mod series;
 mod statement;

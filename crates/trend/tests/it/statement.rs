@@ -74,6 +74,7 @@ fn no_state_stands_on_old_or_on_few_estimates() {
     assert_eq!((stale.state, stale.reason.to_string().as_str()), (None, "last estimate is 101 days old"));
     let young = state_of(&series, 3);
     assert_eq!((young.state, young.reason), (None, Reason::TooFew { estimates: 4 }));
+    assert_eq!(state_of(&series, 0).reason.to_string(), "only 1 estimate, 8 are needed");
     assert_eq!(state_of(&series, -1).reason, Reason::NoEstimate);
 }
 
