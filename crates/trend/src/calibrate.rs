@@ -20,7 +20,14 @@ const FEWEST: usize = 60;
 /// Forecast growth below which a cut teaches nothing about wear, metres.
 const VISIBLE_M: f64 = 3e-6;
 
-/// Cuts that an honest forecast is worth: enough that thirty units may outvote it.
+/// How much wider than the mixture has it the future is stated, at least.
+///
+/// The true law is seldom one of the bank's, so what the gaps say for one curve and against its neighbours
+/// is worth less than the likelihood has it: plain 90 % intervals held 85 and 86 % on two simulated
+/// fleets. Weights to a power below one would hold as well, but move the middle away from the truth.
+pub(crate) const USUAL_WIDTH: f64 = 1.2;
+
+/// Cuts that the usual miss is worth: enough that thirty units may outvote it.
 const PSEUDO_CUTS: f64 = 20.0;
 
 /// Where growth really came out, in widths of the forecast: 5 %, 50 % and 95 % of all cuts.
@@ -34,17 +41,17 @@ pub(crate) struct Calibration {
 }
 
 impl Calibration {
-    /// A forecast taken at its word.
-    pub(crate) const HONEST: Self = Self { low: -1.0, middle: 0.0, high: 1.0 };
+    /// What is done to a forecast of which no past is known.
+    pub(crate) const USUAL: Self = Self { low: -USUAL_WIDTH, middle: 0.0, high: USUAL_WIDTH };
 
     /// Learns from every cut of some segments.
     pub(crate) fn learn<'a>(segments: impl Iterator<Item = Segment<'a>>, prior: &FleetPrior) -> Self {
         let misses = segments.flat_map(|segment| CUTS.map(|share| miss(&segment, share, prior)));
         let misses: Vec<(f64, f64)> = misses.flatten().map(|miss| (miss, 1.0)).collect();
-        let honest = LONG_QUANTILES.map(|z| (z, PSEUDO_CUTS / LONG_QUANTILES.len() as f64));
-        let misses = Weighted::new(misses.into_iter().chain(honest));
+        let usual = LONG_QUANTILES.map(|z| (USUAL_WIDTH * z, PSEUDO_CUTS / LONG_QUANTILES.len() as f64));
+        let misses = Weighted::new(misses.into_iter().chain(usual));
         let [low, middle, high] = [0.05, 0.5, 0.95].map(|share| misses.quantile(share));
-        Self { low: low.min(Self::HONEST.low), middle, high: high.max(Self::HONEST.high) }
+        Self { low: low.min(Self::USUAL.low), middle, high: high.max(Self::USUAL.high) }
     }
 }
 
@@ -62,7 +69,7 @@ fn miss(segment: &Segment<'_>, share: f64, prior: &FleetPrior) -> Option<f64> {
     }
     let seen = &segment.estimates[..(share * count as f64) as usize];
     let now = seen.last()?.usage;
-    let judged = posterior(&Segment { estimates: seen, now, ..*segment }, prior)?.tempered();
+    let judged = posterior(&Segment { estimates: seen, now, ..*segment }, prior)?;
     let end = bins::bin(segment.estimates, BINS).pop()?;
     let moved = f64::from(u8::from(seen.last()?.installation != end.installation));
     let variance_m2 = end.variance_m2 + 2.0 * moved * prior.bias_sd_m.powi(2);

@@ -1,5 +1,6 @@
 //! Where a unit stands now, by the mixture over its curves: gap, rate, growth, law.
 
+use crate::calibrate::USUAL_WIDTH;
 use crate::curve::Law;
 use crate::normal;
 use crate::posterior::{Node, Posterior};
@@ -20,15 +21,13 @@ pub(crate) fn level(posterior: &Posterior, prior: &FleetPrior, offset_m2: f64) -
     Level { gap_m, se_m: (between + posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2)).sqrt() }
 }
 
-/// Quantiles of the curves' rates now, per flight hour.
+/// Quantiles of the curves' rates now, per flight hour, as much wider as the future is stated.
 pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64) -> Rate {
     let of = |n: &Node| (n.amplitude_m * n.law.slope(n.age_now) / hours_per_usage, n.weight);
     let rates = Weighted::new(posterior.nodes.iter().map(of));
-    Rate {
-        p05_m_per_hour: rates.quantile(0.05),
-        m_per_hour: rates.quantile(0.5),
-        p95_m_per_hour: rates.quantile(0.95),
-    }
+    let m_per_hour = rates.quantile(0.5);
+    let at = |share: f64| m_per_hour + USUAL_WIDTH * (rates.quantile(share) - m_per_hour);
+    Rate { p05_m_per_hour: at(0.05).max(0.0), m_per_hour, p95_m_per_hour: at(0.95) }
 }
 
 /// Probability of visible growth since the segment began.

@@ -64,10 +64,9 @@ pub fn outlook(
         last = grounded(&segment, prior, &alone, history.offset_m2).ok();
         past.extend(last.iter().flat_map(|on| levels(&segment, &on.posterior, on.prior)));
     }
-    let Some(Grounded { posterior, prior }) = last else {
+    let Some(Grounded { posterior: judged, prior }) = last else {
         return Ok(Outlook { past, ahead: Vec::new() });
     };
-    let judged = posterior.tempered();
     let ratio = hours_per_usage(flights, prior);
     let variance_m2 = history.offset_m2 + prior.bias_sd_m.powi(2);
     let after = |hours: f64| {

@@ -95,25 +95,6 @@ pub(crate) struct Posterior {
     pub(crate) log_evidence: f64,
 }
 
-impl Posterior {
-    /// The mixture a little less sure of itself, for statements about the future.
-    ///
-    /// The true law is seldom one of the bank's, so what the gaps say for one curve and against its
-    /// neighbours is worth less than the likelihood has it. Weights to this power made 90 % intervals hold
-    /// 89 % where the plain ones held 85, on two simulated fleets, without moving the median.
-    pub(crate) fn tempered(mut self) -> Self {
-        const TEMPER: f64 = 0.78;
-        for node in &mut self.nodes {
-            node.weight = node.weight.powf(TEMPER);
-        }
-        let total: f64 = self.nodes.iter().map(|node| node.weight).sum();
-        for node in &mut self.nodes {
-            node.weight /= total;
-        }
-        self
-    }
-}
-
 /// Judges a segment by a prior: all curves on a few bins, the likely ones on many.
 ///
 /// The level walks by a variance proportional to the wear, so the first look assumes wear along a

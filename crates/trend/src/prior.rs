@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::calibrate::Calibration;
+use crate::calibrate::{Calibration, USUAL_WIDTH};
 use crate::curve::{Curve, FAMILIES, LINEAR, Law, POWERS};
 use crate::posterior::Segment;
 use crate::season::Season;
@@ -109,7 +109,7 @@ impl FleetPrior {
             wear_noise_m: 0.2e-6,
             drift_m2_per_hour: 1e-16,
             bias_sd_m: 1.5e-6,
-            calibration: Calibration::HONEST,
+            calibration: Calibration::USUAL,
         }
     }
 
@@ -141,10 +141,10 @@ impl FleetPrior {
         (self.new_m, self.new_sd_m)
     }
 
-    /// How much wider forecasts are stated than the curves alone have them, by what the fleet's own past
-    /// forecasts missed; one for a fleet whose past asks for nothing.
+    /// How much wider forecasts are stated than is usual, by what the fleet's own past forecasts missed; one
+    /// for a fleet whose past asks for nothing.
     pub fn widening(&self) -> f64 {
-        0.5 * (self.calibration.high - self.calibration.low)
+        0.5 * (self.calibration.high - self.calibration.low) / USUAL_WIDTH
     }
 
     /// The usage of a unit up to a flight, hours' worth.

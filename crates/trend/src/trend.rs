@@ -204,7 +204,6 @@ pub fn trend(
     let prior = judged.as_ref().map_or(prior, |judged| judged.prior);
     let judged = judged.map(|judged| judged.posterior);
     let growth_probability = judged.as_ref().map(level::growth_probability);
-    let judged = judged.map(Posterior::tempered);
     let ratio = hours_per_usage(flights, prior);
     let remaining = judged.as_ref().map(|p| Remaining::new(p, prior, settings, ratio, history.offset_m2));
     let level = judged.as_ref().map(|p| level::level(p, prior, history.offset_m2));
