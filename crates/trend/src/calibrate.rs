@@ -82,14 +82,14 @@ fn miss(segment: &Segment<'_>, share: f64, prior: &FleetPrior) -> Option<f64> {
 
 /// 5 %, 50 % and 95 % bounds of the gap after more usage, as measured with some variance.
 pub(crate) fn foretold(judged: &Posterior, usage: f64, variance_m2: f64, prior: &FleetPrior) -> [f64; 3] {
-    let mut points = Vec::with_capacity(LONG_RULE.len() * judged.nodes.len());
+    let mut points = Vec::with_capacity(LONG_RULE.len() * judged.nodes.len() / 2);
     let mut add = |node: &Node, grown_m: f64, share: f64| {
         let sd_m = (judged.level_m2 + variance_m2 + prior.wear_noise_m * grown_m).sqrt();
         let point =
             |(z, weight): (f64, f64)| (node.level_m + grown_m + z * sd_m, node.weight * share * weight);
         points.extend(LONG_RULE.map(point));
     };
-    for node in &judged.nodes {
+    for node in judged.notable() {
         if node.waits {
             let rate = prior.span_m / node.ln_life.exp();
             for wait in waits(prior) {

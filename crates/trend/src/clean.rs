@@ -129,20 +129,30 @@ fn running_median(values: &[f64]) -> Vec<f64> {
     let width = WINDOW.min(values.len());
     let mut window: Vec<f64> = values[..width].to_vec();
     window.sort_unstable_by(f64::total_cmp);
-    let middle = |window: &[f64]| window[width / 2];
     let mut smooth = Vec::with_capacity(values.len());
     let lead = width.div_ceil(2).min(values.len());
-    smooth.resize(lead, if width == 0 { 0.0 } else { middle(&window) });
+    smooth.resize(lead, if width == 0 { 0.0 } else { window[width / 2] });
     for (leaving, entering) in values.iter().zip(values.iter().skip(width)) {
-        let out = window.partition_point(|v| v.total_cmp(leaving).is_lt());
-        window.remove(out);
-        let into = window.partition_point(|v| v.total_cmp(entering).is_lt());
-        window.insert(into, *entering);
-        smooth.push(middle(&window));
+        replace(&mut window, *leaving, *entering);
+        smooth.push(window[width / 2]);
     }
     let last = smooth.last().copied().unwrap_or(0.0);
     smooth.resize(values.len(), last);
     smooth
+}
+
+/// Puts one value in the place of another that is in an ordered window, and moves it to where it belongs.
+fn replace(window: &mut [f64], leaving: f64, entering: f64) {
+    let mut at = window.iter().position(|value| *value >= leaving).unwrap_or(0);
+    while at + 1 < window.len() && window[at + 1] < entering {
+        window[at] = window[at + 1];
+        at += 1;
+    }
+    while at > 0 && window[at - 1] > entering {
+        window[at] = window[at - 1];
+        at -= 1;
+    }
+    window[at] = entering;
 }
 
 #[cfg(test)]
@@ -173,6 +183,20 @@ mod tests {
         let found = clean(&flights(&wearing(10, 3.0)));
         assert!(found.outliers.is_empty(), "{:?}", found.outliers);
         assert!(found.noise_factor < 3.0, "{}", found.noise_factor);
+    }
+
+    /// Against the definition: every window sorted anew.
+    #[test]
+    fn the_running_median_is_that_of_each_window() {
+        let values: Vec<f64> = (0..200).map(|k| f64::from(k * k * 37 % 101) - 50.0).collect();
+        let middle = |at: usize| {
+            let first = at.saturating_sub(WINDOW / 2).min(values.len() - WINDOW);
+            let mut window = values[first..first + WINDOW].to_vec();
+            window.sort_by(f64::total_cmp);
+            window[WINDOW / 2]
+        };
+        let expected: Vec<f64> = (0..values.len()).map(middle).collect();
+        assert_eq!(running_median(&values), expected);
     }
 
     #[test]

@@ -21,9 +21,6 @@ pub(crate) const LONG_RULE: [(f64, f64); 5] = [
 /// Quantiles of an exponential wait, one for each tenth.
 pub(crate) const WAIT_RULE: usize = 10;
 
-/// Weight, as a share of the largest, below which a node cannot move a quantile.
-const NEGLIGIBLE: f64 = 2e-3;
-
 /// Weight above which a node deserves the longer rule.
 const NOTABLE: f64 = 0.02;
 
@@ -41,6 +38,8 @@ pub(crate) struct Remaining {
     cells: Vec<f64>,
     over: f64,
     horizon_hours: f64,
+    /// Cells for each ln hour.
+    scale: f64,
     calibration: Calibration,
 }
 
@@ -55,13 +54,12 @@ impl Remaining {
         offset_m2: f64,
     ) -> Self {
         let Settings { limit_m, horizon_hours, .. } = *settings;
-        let mut remaining =
-            Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, calibration: prior.calibration };
+        let scale = CELLS as f64 / horizon_hours.ln();
+        let calibration = prior.calibration;
+        let mut remaining = Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, scale, calibration };
         let spread_m2 = posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2);
-        let best = posterior.nodes.iter().map(|n| n.weight).fold(0.0, f64::max);
-        let likely = || posterior.nodes.iter().filter(|n| n.weight > NEGLIGIBLE * best);
-        let kept: f64 = likely().map(|n| n.weight).sum();
-        for node in likely() {
+        let kept: f64 = posterior.notable().map(|n| n.weight).sum();
+        for node in posterior.notable() {
             let node = &Node { weight: node.weight / kept, ..*node };
             remaining.add_node(node, prior, limit_m, spread_m2, hours_per_usage);
         }
@@ -97,7 +95,7 @@ impl Remaining {
     }
 
     fn add(&mut self, hours: f64, weight: f64) {
-        let place = hours.max(1.0).ln() / self.horizon_hours.ln() * CELLS as f64;
+        let place = hours.max(1.0).ln() * self.scale;
         if let Some(cell) = self.cells.get_mut(place as usize) {
             *cell += weight;
         }
@@ -131,8 +129,8 @@ impl Remaining {
         }
         for (i, cell) in self.cells.iter().enumerate() {
             if sum + cell >= probability {
-                let place = (i as f64 + (probability - sum) / cell) / CELLS as f64;
-                return Some((place * self.horizon_hours.ln()).exp());
+                let place = i as f64 + (probability - sum) / cell;
+                return Some((place / self.scale).exp());
             }
             sum += cell;
         }
@@ -141,7 +139,7 @@ impl Remaining {
 
     /// Probability that the limit is met within some hours.
     pub(crate) fn within(&self, hours: f64) -> f64 {
-        let place = hours.max(1.0).ln() / self.horizon_hours.ln() * CELLS as f64;
+        let place = hours.max(1.0).ln() * self.scale;
         let whole = (place as usize).min(CELLS);
         let part = self.cells.get(whole).map_or(0.0, |cell| cell * (place - whole as f64));
         self.over + self.cells[..whole].iter().sum::<f64>() + part

@@ -13,8 +13,9 @@
 //! Ages are hours, or another usage brought to hours by the part number's mean. Each law is known by
 //! its *life*: the age T at which it has grown by a given span, so A = span/F(T).
 
-/// Age that a power law's amplitude refers to, hours.
+/// Age that a power law's amplitude refers to, hours, and its logarithm.
 const REFERENCE_HOURS: f64 = 1000.0;
+const LN_REFERENCE_HOURS: f64 = 6.907_755_278_982_137;
 
 /// Exponents in eighths, so that a power is a product of square roots: 0.5 to 3.
 const POWER_EIGHTHS: [u8; 14] = [4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 22, 24];
@@ -70,9 +71,12 @@ pub(crate) struct Curve {
     /// Age at first sight, hours, and its index in [`Bank::ages`].
     pub(crate) age: f64,
     age_index: usize,
-    /// Width of the cell this member of the grid stands for: of its age, and of ln τ or the start.
+    /// Width of the cell of ages this member of the grid stands for.
     pub(crate) age_cell: f64,
-    pub(crate) law_cell: f64,
+    /// Logarithms of its age, of that cell, and of the cell of ln τ or the start.
+    pub(crate) ln_age: f64,
+    pub(crate) ln_age_cell: f64,
+    pub(crate) ln_law_cell: f64,
 }
 
 impl Law {
@@ -92,11 +96,8 @@ impl Law {
     pub(crate) fn height(self, age: f64) -> f64 {
         match self {
             Self::None => 0.0,
-            Self::Onset { start } => (age - start).max(0.0) / REFERENCE_HOURS,
-            Self::Bend { knee, index } => {
-                let before = BEND_RATIOS[index];
-                (before * age + (1.0 - before) * (age - knee).max(0.0)) / REFERENCE_HOURS
-            }
+            Self::Onset { start } => bent(0.0, start, age),
+            Self::Bend { knee, index } => bent(BEND_RATIOS[index], knee, age),
             Self::Exponential { index } => (age / TIME_CONSTANTS[index]).exp_m1(),
             Self::Settling { index } => -(-age / SETTLING[index]).exp_m1(),
             Self::Power { index } => {
@@ -122,6 +123,22 @@ impl Law {
         }
     }
 
+    /// ln of the life at whose end F has this logarithm.
+    pub(crate) fn ln_life(self, ln_height: f64) -> f64 {
+        match self.exponent() {
+            Some(p) => LN_REFERENCE_HOURS + ln_height / p,
+            None => self.age_at(ln_height.exp()).ln(),
+        }
+    }
+
+    /// F at the end of a life of this logarithm.
+    pub(crate) fn height_of_ln_life(self, ln_hours: f64) -> f64 {
+        match self.exponent() {
+            Some(p) => (p * (ln_hours - LN_REFERENCE_HOURS)).exp(),
+            None => self.height(ln_hours.exp()),
+        }
+    }
+
     /// The age at which F is reached.
     pub(crate) fn age_at(self, height: f64) -> f64 {
         match self {
@@ -144,14 +161,6 @@ impl Law {
         }
     }
 
-    /// F at the end of a life of `hours`, counted from the onset where there is one.
-    pub(crate) fn height_of_life(self, hours: f64) -> f64 {
-        match self {
-            Self::Onset { .. } => hours / REFERENCE_HOURS,
-            law => law.height(hours),
-        }
-    }
-
     /// ln of the time constant, for the law that has one.
     pub(crate) fn ln_tau(self) -> Option<f64> {
         if let Self::Exponential { index } = self { Some(TIME_CONSTANTS[index].ln()) } else { None }
@@ -165,14 +174,11 @@ impl Law {
             _ => None,
         }
     }
+}
 
-    /// The life of an amplitude over a span: inverse of span/F(T).
-    pub(crate) fn life(self, height: f64) -> f64 {
-        match self {
-            Self::Onset { .. } => height * REFERENCE_HOURS,
-            law => law.age_at(height),
-        }
-    }
+/// A line of slope `before` up to a knee, then one of slope 1, per reference age.
+fn bent(before: f64, knee: f64, age: f64) -> f64 {
+    (before * age + (1.0 - before) * (age - knee).max(0.0)) * (1.0 / REFERENCE_HOURS)
 }
 
 /// x, x^½, x^¼ and x^⅛.
@@ -207,9 +213,10 @@ impl Bank {
     /// within what was seen. Starts later than now are the business of whoever asks for the future.
     pub(crate) fn new(fresh: bool, known_age: Option<f64>, span_hours: f64, starts: usize) -> Self {
         let ages = ages(fresh, known_age);
-        let at_birth = |law, law_cell| Curve { law, age: 0.0, age_index: 0, age_cell: 0.0, law_cell };
+        let at_birth = |law, law_cell: f64| Curve { law, ln_law_cell: law_cell.ln(), ..BIRTH };
         let cell = span_hours / starts as f64;
-        let mut curves = vec![at_birth(Law::None, 1.0)];
+        let mut curves = Vec::with_capacity(1000);
+        curves.push(at_birth(Law::None, 1.0));
         curves.extend((0..starts).map(|i| at_birth(Law::Onset { start: (i as f64 + 0.5) * cell }, cell)));
         let step = (TIME_CONSTANTS[TIME_CONSTANTS.len() - 1] / TIME_CONSTANTS[0]).ln()
             / (TIME_CONSTANTS.len() - 1) as f64;
@@ -218,47 +225,63 @@ impl Bank {
         let settling =
             (0..SETTLING.len()).map(|index| (Law::Settling { index }, 1.0 / SETTLING.len() as f64));
         for (law, law_cell) in exponentials.chain(settling).chain(powers) {
-            curves.extend(ages.iter().enumerate().map(|(age_index, &(age, age_cell))| Curve {
-                law,
-                age,
-                age_index,
-                age_cell,
-                law_cell,
-            }));
+            let ln_law_cell = law_cell.ln();
+            curves.extend(ages.iter().map(|age| Curve { law, ln_law_cell, ..*age }));
         }
         curves.extend(bends(&ages, span_hours));
-        Self { curves, ages: ages.into_iter().map(|(age, _)| age).collect() }
+        Self { curves, ages: ages.into_iter().map(|curve| curve.age).collect() }
     }
 }
 
+/// A curve that begins at birth; its law is still to be said.
+const BIRTH: Curve = Curve {
+    law: Law::None,
+    age: 0.0,
+    age_index: 0,
+    age_cell: 0.0,
+    ln_age: f64::NEG_INFINITY,
+    ln_age_cell: f64::NEG_INFINITY,
+    ln_law_cell: 0.0,
+};
+
 /// One line and then another, the knee within what was seen, at every few ages.
-fn bends(ages: &[(f64, f64)], span_hours: f64) -> Vec<Curve> {
+fn bends(ages: &[Curve], span_hours: f64) -> Vec<Curve> {
     let cell = span_hours / KNEES as f64;
+    let (stride, ln_law_cell) = (BEND_AGE_STRIDE as f64, -(KNEES as f64).ln());
     let mut curves = Vec::new();
-    for (age_index, &(age, width)) in ages.iter().enumerate().step_by(BEND_AGE_STRIDE) {
-        let age_cell = BEND_AGE_STRIDE as f64 * width;
+    for at in ages.iter().step_by(BEND_AGE_STRIDE) {
+        let age = Curve {
+            age_cell: stride * at.age_cell,
+            ln_age_cell: stride.ln() + at.ln_age_cell,
+            ln_law_cell,
+            ..*at
+        };
         for (knee, index) in (0..KNEES).flat_map(|k| (0..BEND_RATIOS.len()).map(move |index| (k, index))) {
-            let law = Law::Bend { knee: age + (knee as f64 + 0.5) * cell, index };
-            curves.push(Curve { law, age, age_index, age_cell, law_cell: 1.0 / KNEES as f64 });
+            let law = Law::Bend { knee: age.age + (knee as f64 + 0.5) * cell, index };
+            curves.push(Curve { law, ..age });
         }
     }
     curves
 }
 
 /// Ages at first sight and the widths of their cells; a known age is one cell without width.
-fn ages(fresh: bool, known_age: Option<f64>) -> Vec<(f64, f64)> {
+fn ages(fresh: bool, known_age: Option<f64>) -> Vec<Curve> {
     if let Some(age) = known_age {
-        return vec![(age, 0.0)];
+        return vec![Curve { age, ln_age: age.ln(), ..BIRTH }];
     }
     if fresh {
-        return vec![(0.0, 0.0)];
+        return vec![BIRTH];
     }
     let width = |i: usize| match i {
         0 => 0.0,
         i if i + 1 == AGES.len() => AGES[i] - AGES[i - 1],
         i => 0.5 * (AGES[i + 1] - AGES[i - 1]),
     };
-    AGES.iter().enumerate().map(|(i, &age)| (age, width(i))).collect()
+    let at = |(age_index, &age): (usize, &f64)| {
+        let age_cell = width(age_index);
+        Curve { age, age_index, age_cell, ln_age: age.ln(), ln_age_cell: age_cell.ln(), ..BIRTH }
+    };
+    AGES.iter().enumerate().map(at).collect()
 }
 
 /// Heights of every curve at the same usages, made of what many curves share: roots for each age,
@@ -266,34 +289,49 @@ fn ages(fresh: bool, known_age: Option<f64>) -> Vec<(f64, f64)> {
 pub(crate) struct Heights {
     usages: Vec<f64>,
     roots: Vec<Vec<[f64; 4]>>,
-    exponentials: Vec<Vec<f64>>,
+    rising: Vec<Vec<f64>>,
+    settling: Vec<Vec<f64>>,
 }
 
 impl Heights {
     /// For usages counted from the segment's begin.
     pub(crate) fn new(bank: &Bank, usages: Vec<f64>) -> Self {
         let of_age = |age: &f64| usages.iter().map(|u| roots((u + age).max(0.0) / REFERENCE_HOURS)).collect();
-        let of_tau = |tau: &f64| usages.iter().map(|u| (u / tau).exp()).collect();
-        let (roots, exponentials) =
-            (bank.ages.iter().map(of_age).collect(), TIME_CONSTANTS.iter().map(of_tau).collect());
-        Self { usages, roots, exponentials }
+        let of_tau = |tau: f64| usages.iter().map(|u| (u / tau).exp()).collect();
+        let roots = bank.ages.iter().map(of_age).collect();
+        let rising = TIME_CONSTANTS.iter().map(|&tau| of_tau(tau)).collect();
+        let settling = SETTLING.iter().map(|&tau| of_tau(-tau)).collect();
+        Self { usages, roots, rising, settling }
     }
 
-    /// Writes a curve's heights into `heights`.
-    pub(crate) fn fill(&self, curve: &Curve, heights: &mut Vec<f64>) {
-        heights.clear();
+    /// Writes a curve's heights into one lane of some that are filled together.
+    pub(crate) fn fill<const N: usize>(&self, curve: &Curve, lane: usize, lanes: &mut [[f64; N]]) {
+        let places = lanes.iter_mut().map(|lanes| &mut lanes[lane]);
         match curve.law {
-            Law::None => heights.resize(self.usages.len(), 0.0),
-            Law::Onset { .. } | Law::Bend { .. } | Law::Settling { .. } => {
-                heights.extend(self.usages.iter().map(|u| curve.law.height(u + curve.age)));
+            Law::None => places.for_each(|place| *place = 0.0),
+            Law::Onset { start: knee } | Law::Bend { knee, .. } => {
+                let before = if let Law::Bend { index, .. } = curve.law { BEND_RATIOS[index] } else { 0.0 };
+                for (place, u) in places.zip(&self.usages) {
+                    *place = bent(before, knee, u + curve.age);
+                }
             }
             Law::Exponential { index } => {
                 let before = (curve.age / TIME_CONSTANTS[index]).exp();
-                heights.extend(self.exponentials[index].iter().map(|e| before * e - 1.0));
+                for (place, e) in places.zip(&self.rising[index]) {
+                    *place = before * e - 1.0;
+                }
+            }
+            Law::Settling { index } => {
+                let before = (-curve.age / SETTLING[index]).exp();
+                for (place, e) in places.zip(&self.settling[index]) {
+                    *place = 1.0 - before * e;
+                }
             }
             Law::Power { index } => {
                 let eighths = POWER_EIGHTHS[index];
-                heights.extend(self.roots[curve.age_index].iter().map(|r| eighth_power(*r, eighths)));
+                for (place, r) in places.zip(&self.roots[curve.age_index]) {
+                    *place = eighth_power(*r, eighths);
+                }
             }
         }
     }

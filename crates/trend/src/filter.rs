@@ -91,19 +91,40 @@ impl Filter {
         Pass { weighted, square, end, start }
     }
 
-    /// Runs a curve's heights through, beside the passes of the gaps and of the season.
-    pub(crate) fn curve(&self, gaps: &Pass, season: &Pass, heights: &[f64]) -> Regression {
-        let mut sum = Regression { sff: 0.0, sfy: 0.0, sfs: 0.0, end: 0.0, start: 0.0 };
+    /// Runs the heights of some curves through at once, beside the passes of the gaps and of the season.
+    ///
+    /// Each step of a curve waits for the one before it; other curves fill the time.
+    pub(crate) fn curves<const N: usize>(
+        &self,
+        gaps: &Pass,
+        season: &Pass,
+        heights: &[[f64; N]],
+    ) -> [Regression; N] {
+        let [mut sff, mut sfy, mut sfs, mut end, mut start] = [[0.0; N]; 5];
         let others = gaps.weighted.iter().zip(&season.weighted);
-        for ((step, height), (gap, wave)) in self.steps.iter().zip(heights).zip(others) {
-            let e = height - sum.end;
-            sum.end += step.gain * e;
-            sum.start += step.to_start * e;
-            sum.sff += step.precision * e * e;
-            sum.sfy += gap * e;
-            sum.sfs += wave * e;
+        for ((step, heights), (gap, wave)) in self.steps.iter().zip(heights).zip(others) {
+            for i in 0..N {
+                let e = heights[i] - end[i];
+                end[i] += step.gain * e;
+                start[i] += step.to_start * e;
+                sff[i] += step.precision * e * e;
+                sfy[i] += gap * e;
+                sfs[i] += wave * e;
+            }
         }
-        sum
+        std::array::from_fn(|i| Regression {
+            sff: sff[i],
+            sfy: sfy[i],
+            sfs: sfs[i],
+            end: end[i],
+            start: start[i],
+        })
+    }
+
+    /// Runs one sequence through beside two others.
+    pub(crate) fn curve(&self, gaps: &Pass, season: &Pass, heights: &[f64]) -> Regression {
+        let [regression] = self.curves(gaps, season, heights.as_chunks::<1>().0);
+        regression
     }
 }
 

@@ -24,7 +24,7 @@ pub(crate) fn level(posterior: &Posterior, prior: &FleetPrior, offset_m2: f64) -
 /// Quantiles of the curves' rates now, per flight hour, as much wider as the future is stated.
 pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64) -> Rate {
     let of = |n: &Node| (n.amplitude_m * n.law.slope(n.age_now) / hours_per_usage, n.weight);
-    let rates = Weighted::new(posterior.nodes.iter().map(of));
+    let rates = Weighted::new(posterior.notable().map(of));
     let m_per_hour = rates.quantile(0.5);
     let at = |share: f64| m_per_hour + USUAL_WIDTH * (rates.quantile(share) - m_per_hour);
     Rate { p05_m_per_hour: at(0.05).max(0.0), m_per_hour, p95_m_per_hour: at(0.95) }

@@ -14,6 +14,9 @@ pub(crate) struct Look<'a> {
     pub(crate) filter: Filter,
     /// The gaps less the fleet's mean season.
     pub(crate) gaps: Pass,
+    /// Variance of the first level about a new unit's mean gap, and its logarithm.
+    pub(crate) new_m2: f64,
+    pub(crate) ln_new_m2: f64,
     /// The season's swing of unit size, and what the gaps alone say of its size.
     wave: Pass,
     wave_by_gaps: f64,
@@ -37,6 +40,7 @@ impl<'a> Look<'a> {
         let wave_information = alone.sff + prior.season.sd_m.powi(-2);
         gaps.end -= alone.sfy / wave_information * wave.end;
         gaps.start -= alone.sfy / wave_information * wave.start;
+        let new_m2 = filter.start_m2 + prior.new_sd_m.powi(2);
         Self {
             segment,
             prior,
@@ -44,31 +48,29 @@ impl<'a> Look<'a> {
             bins,
             filter,
             gaps,
+            new_m2,
+            ln_new_m2: new_m2.ln(),
             wave,
             wave_by_gaps: alone.sfy,
             wave_information,
         }
     }
 
-    /// A curve's regression with the unit's own swing, drawn to the fleet's, fitted beside it.
-    pub(crate) fn regress(&self, heights: &[f64]) -> Regression {
-        let mut pass = self.filter.curve(&self.gaps, &self.wave, heights);
-        let share = pass.sfs / self.wave_information;
-        pass.sff -= share * pass.sfs;
-        pass.sfy -= share * self.wave_by_gaps;
-        pass.end -= share * self.wave.end;
-        pass.start -= share * self.wave.start;
-        pass
+    /// Curves' regressions with the unit's own swing, drawn to the fleet's, fitted beside each.
+    pub(crate) fn regress<const N: usize>(&self, heights: &[[f64; N]]) -> [Regression; N] {
+        self.filter.curves(&self.gaps, &self.wave, heights).map(|mut pass| {
+            let share = pass.sfs / self.wave_information;
+            pass.sff -= share * pass.sfs;
+            pass.sfy -= share * self.wave_by_gaps;
+            pass.end -= share * self.wave.end;
+            pass.start -= share * self.wave.start;
+            pass
+        })
     }
 
     /// Variance of the level now, whatever the curve.
     pub(crate) fn level_m2(&self) -> f64 {
         self.filter.end_m2 + self.wave.end * self.wave.end / self.wave_information
-    }
-
-    /// Variance of the first level about a new unit's mean gap.
-    pub(crate) fn new_m2(&self) -> f64 {
-        self.filter.start_m2 + self.prior.new_sd_m.powi(2)
     }
 
     /// What every curve's likelihood shares; it matters when one usage axis is weighed against another.

@@ -10,9 +10,6 @@ use crate::prior::FleetPrior;
 /// Bins of the first look, by which most curves are dropped.
 const COARSE_BINS: usize = 12;
 
-/// Log weight below the best at which a curve is dropped.
-const DROP: f64 = 8.0;
-
 /// What a prior over lives and cells can add to a curve's bound.
 const SLACK: f64 = 3.0;
 
@@ -27,11 +24,13 @@ const LIFE_REACH: f64 = 3.5;
 struct Lives {
     count: usize,
     reach: f64,
+    /// Log weight below the best at which a curve is dropped.
+    drop: f64,
 }
 
 /// Enough to weigh a curve, and enough to state quantiles.
-const ROUGH: Lives = Lives { count: 3, reach: 1.7 };
-const THOROUGH: Lives = Lives { count: 7, reach: 3.5 };
+const ROUGH: Lives = Lives { count: 3, reach: 1.7, drop: 7.0 };
+const THOROUGH: Lives = Lives { count: 7, reach: 3.5, drop: 7.0 };
 
 /// A stretch of a unit's history without maintenance that resets it.
 #[derive(Debug, Clone, Copy)]
@@ -95,6 +94,16 @@ pub(crate) struct Posterior {
     pub(crate) log_evidence: f64,
 }
 
+impl Posterior {
+    /// The nodes that can move a quantile.
+    pub(crate) fn notable(&self) -> impl Iterator<Item = &Node> {
+        /// As a share of the largest weight.
+        const NEGLIGIBLE: f64 = 2e-3;
+        let best = self.nodes.iter().map(|n| n.weight).fold(0.0, f64::max);
+        self.nodes.iter().filter(move |n| n.weight > NEGLIGIBLE * best)
+    }
+}
+
 /// Judges a segment by a prior: all curves on a few bins, the likely ones on many.
 ///
 /// The level walks by a variance proportional to the wear, so the first look assumes wear along a
@@ -113,7 +122,7 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
         return Some(finish(&first, nodes(&first, &bank, THOROUGH)));
     }
     let mut believed = nodes(&first, &bank, ROUGH);
-    normalise(&mut believed);
+    normalise(&mut believed, ROUGH.drop);
     keep(&mut bank.curves, &believed);
     let likely = likeliest(&believed);
     let fine = bins::bin(segment.estimates, bins::BINS);
@@ -130,7 +139,7 @@ fn keep(curves: &mut Vec<Curve>, believed: &[(usize, Node)]) {
 }
 
 fn finish(look: &Look<'_>, mut believed: Vec<(usize, Node)>) -> Posterior {
-    let log_sum = normalise(&mut believed);
+    let log_sum = normalise(&mut believed, THOROUGH.drop);
     Posterior {
         nodes: believed.into_iter().map(|(_, node)| node).collect(),
         level_m2: look.level_m2(),
@@ -161,9 +170,9 @@ pub(crate) fn mean_growth(nodes: &[Node], usage: f64) -> f64 {
 
 /// Turns log weights into weights that add up to one, drops what is not believed, and returns the log
 /// of their sum.
-fn normalise(believed: &mut Vec<(usize, Node)>) -> f64 {
+fn normalise(believed: &mut Vec<(usize, Node)>, drop: f64) -> f64 {
     let best = believed.iter().map(|(_, n)| n.weight).fold(f64::NEG_INFINITY, f64::max);
-    believed.retain(|(_, n)| n.weight > best - DROP);
+    believed.retain(|(_, n)| n.weight > best - drop);
     let sum: f64 = believed.iter().map(|(_, n)| (n.weight - best).exp()).sum();
     let log_sum = best + sum.ln();
     for (_, node) in believed.iter_mut() {
@@ -181,34 +190,46 @@ struct Candidate {
     bound: f64,
 }
 
+/// Every curve of the bank against the bins, a few at a time.
+fn candidates(look: &Look<'_>, bank: &Bank) -> Vec<Candidate> {
+    const LANES: usize = 4;
+    let heights = Heights::new(bank, look.bins.iter().map(|b| b.usage - look.segment.begin).collect());
+    let mut lanes = vec![[0.0; LANES]; look.bins.len()];
+    let mut candidates = Vec::with_capacity(bank.curves.len());
+    for (group, curves) in bank.curves.chunks(LANES).enumerate() {
+        for (lane, curve) in curves.iter().enumerate() {
+            heights.fill(curve, lane, &mut lanes);
+        }
+        let passes = look.regress(&lanes);
+        candidates.extend(
+            curves
+                .iter()
+                .zip(passes)
+                .enumerate()
+                .map(|(lane, (curve, pass))| candidate(look, group * LANES + lane, curve, pass)),
+        );
+    }
+    candidates
+}
+
 /// The nodes, with log weights, of every curve that can matter.
 fn nodes(look: &Look<'_>, bank: &Bank, tried: Lives) -> Vec<(usize, Node)> {
-    let heights = Heights::new(bank, look.bins.iter().map(|b| b.usage - look.segment.begin).collect());
-    let mut buffer = Vec::with_capacity(look.bins.len());
-    let candidates: Vec<Candidate> = bank
-        .curves
-        .iter()
-        .enumerate()
-        .map(|(index, curve)| {
-            heights.fill(curve, &mut buffer);
-            candidate(look, index, curve, look.regress(&buffer))
-        })
-        .collect();
+    let candidates = candidates(look, bank);
     let add = |candidate: &Candidate, push: &mut dyn FnMut(Node)| {
         let curve = &bank.curves[candidate.index];
         if curve.law == Law::None { flat(look, push) } else { lives(look, curve, candidate, tried, push) }
     };
-    let mut nodes = Vec::with_capacity(256);
+    let mut nodes = Vec::with_capacity(1000);
     let Some(top) = candidates.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) else { return nodes };
     let mut best = f64::NEG_INFINITY;
     add(top, &mut |node| best = best.max(node.weight));
     // Where the prior forbids what fits best, its bound says nothing of the others.
-    let floor = top.bound.min(best + USUAL) - DROP - SLACK;
+    let floor = top.bound.min(best + USUAL) - tried.drop - SLACK;
     let flat = bank.curves.iter().position(|curve| curve.law == Law::None);
     for candidate in candidates.iter().filter(|c| c.bound > floor || Some(c.index) == flat) {
         add(candidate, &mut |node| {
             best = best.max(node.weight);
-            if node.weight > best - DROP {
+            if node.weight > best - tried.drop {
                 nodes.push((candidate.index, node));
             }
         });
@@ -218,7 +239,7 @@ fn nodes(look: &Look<'_>, bank: &Bank, tried: Lives) -> Vec<(usize, Node)> {
 
 /// The amplitude that fits the gaps and a new unit's gap best, were amplitudes free.
 fn candidate(look: &Look<'_>, index: usize, curve: &Curve, pass: Regression) -> Candidate {
-    let spread = look.new_m2();
+    let spread = look.new_m2;
     let off_m = look.gaps.start - look.prior.new_m;
     let information = pass.sff + pass.start * pass.start / spread;
     let best_m = if curve.law == Law::None {
@@ -227,7 +248,8 @@ fn candidate(look: &Look<'_>, index: usize, curve: &Curve, pass: Regression) -> 
         ((pass.sfy + pass.start * off_m / spread) / information).max(0.0)
     };
     let log_likelihood = best_m * pass.sfy - 0.5 * best_m * best_m * pass.sff;
-    let smear_m = best_m * curve.law.slope(curve.age) * curve.age_cell;
+    let smear_m =
+        if curve.age_cell > 0.0 { best_m * curve.law.slope(curve.age) * curve.age_cell } else { 0.0 };
     let new_m2 = spread + smear_m * smear_m / 12.0;
     let bound =
         log_likelihood - 0.5 * (off_m - best_m * pass.start).powi(2) / new_m2 + look.logs.share(curve.law);
@@ -241,8 +263,13 @@ fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, tried: Lives, pu
     let reach_m = tried.reach / information.sqrt();
     let Some((low, high)) = life_range(prior, curve.law, best_m - reach_m, best_m + reach_m) else { return };
     let step = (high - low) / (tried.count - 1) as f64;
-    let spread = look.new_m2();
-    let smear = curve.law.slope(curve.age) * curve.age_cell / 12.0_f64.sqrt();
+    let spread = look.new_m2;
+    let ln_spread = look.ln_new_m2;
+    let smear = if curve.age_cell > 0.0 {
+        curve.law.slope(curve.age) * curve.age_cell / 12.0_f64.sqrt()
+    } else {
+        0.0
+    };
     let age_now = curve.age + look.segment.now - look.segment.begin;
     let height_now = curve.law.height(age_now);
     let shared = step.ln() + look.logs.share(curve.law) + look.logs.cell(curve, look.segment);
@@ -253,22 +280,27 @@ fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, tried: Lives, pu
         _ if curve.age > 0.0 => Guess::Worn,
         _ => Guess::Fresh,
     };
-    let ln_age = (curve.age > 0.0 && !look.segment.is_of_known_age()).then(|| curve.age.ln());
+    let ln_age = (curve.age > 0.0 && !look.segment.is_of_known_age()).then_some(curve.ln_age);
     let falling = curve.law.exponent().map(|p| (-p * step).exp());
-    let mut amplitude_m = prior.span_m / curve.law.height_of_life(low.exp());
+    let mut amplitude_m = prior.span_m / curve.law.height_of_ln_life(low);
     for i in 0..tried.count {
         let ln_life = low + step * i as f64;
         if i > 0 {
             amplitude_m = match falling {
                 Some(factor) => amplitude_m * factor,
-                None => prior.span_m / curve.law.height_of_life(ln_life.exp()),
+                None => prior.span_m / curve.law.height_of_ln_life(ln_life),
             };
         }
         let new_m = look.gaps.start - amplitude_m * pass.start;
-        let new_m2 = spread + (amplitude_m * smear).powi(2);
+        let (new_m2, ln_new_m2) = if smear > 0.0 {
+            let new_m2 = spread + (amplitude_m * smear).powi(2);
+            (new_m2, new_m2.ln())
+        } else {
+            (spread, ln_spread)
+        };
         let log_likelihood = amplitude_m * pass.sfy
             - 0.5 * amplitude_m * amplitude_m * pass.sff
-            - 0.5 * ((new_m - prior.new_m).powi(2) / new_m2 + new_m2.ln());
+            - 0.5 * ((new_m - prior.new_m).powi(2) / new_m2 + ln_new_m2);
         push(Node {
             law: curve.law,
             age_begin: curve.age,
@@ -287,8 +319,8 @@ fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, tried: Lives, pu
 /// The unit that does not wear, and the one whose onset is yet to come.
 fn flat(look: &Look<'_>, push: &mut dyn FnMut(Node)) {
     let Look { prior, logs, segment, gaps, .. } = look;
-    let spread = look.new_m2();
-    let log_likelihood = -0.5 * ((gaps.start - prior.new_m).powi(2) / spread + spread.ln());
+    let spread = look.new_m2;
+    let log_likelihood = -0.5 * ((gaps.start - prior.new_m).powi(2) / spread + look.ln_new_m2);
     let usage = segment.now - segment.begin;
     let node = Node {
         law: Law::None,
@@ -310,7 +342,7 @@ fn flat(look: &Look<'_>, push: &mut dyn FnMut(Node)) {
 fn life_range(prior: &FleetPrior, law: Law, low_m: f64, high_m: f64) -> Option<(f64, f64)> {
     let reach = LIFE_REACH * prior.ln_life_sd;
     let (shortest, longest) = (prior.ln_life - reach, prior.ln_life + reach);
-    let ln_life = |amplitude_m: f64| law.life(prior.span_m / amplitude_m).ln();
+    let ln_life = |amplitude_m: f64| law.ln_life((prior.span_m / amplitude_m).ln());
     let low = ln_life(high_m).max(shortest);
     let high = if low_m > 0.0 { ln_life(low_m).min(longest) } else { longest };
     (low < high).then_some((low, high))

@@ -201,9 +201,9 @@ impl LogPrior<'_> {
             _ if segment.is_of_known_age() => 0.0,
             Law::Onset { .. } => 0.0,
             _ if curve.age == 0.0 => self.fresh,
-            _ => self.worn + curve.age_cell.ln(),
+            _ => self.worn + curve.ln_age_cell,
         };
-        law + age + curve.law_cell.ln()
+        law + age + curve.ln_law_cell
     }
 
     /// Of a life, per unit of ln life, and of a curve's age and time constant given it.
