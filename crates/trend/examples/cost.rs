@@ -1,7 +1,7 @@
-//! What a statement costs: time per serial against the length of its history, on one thread.
+//! What a statement costs: time per serial against the length of its history, on one and two threads.
 //!
-//! `cost [SERIALS]` makes wearing units of 100 to 4,000 flights and prints microseconds for the series,
-//! the statement and the prior.
+//! `cost [SERIALS]` makes wearing units of 100 to 10,000 flights and prints the time for the series, the
+//! statement and the prior: of the processor, which other programs lengthen less, and by the clock.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a developer's tool, which may fail loudly")]
 
 mod random;
@@ -36,26 +36,61 @@ fn rows(seed: u64, flights: usize) -> Vec<Observation> {
         .collect()
 }
 
+/// Time this thread has had on a processor, or, where nobody counts it, the time that went by, seconds.
+fn busy_s(began: Instant) -> f64 {
+    let counted = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let ns = counted.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
+    ns.map_or_else(|| began.elapsed().as_secs_f64(), |ns| ns * 1e-9)
+}
+
+/// What some work costs, seconds, and its result.
+fn cost<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let began = Instant::now();
+    let before_s = busy_s(began);
+    let made = work();
+    (busy_s(began) - before_s, made)
+}
+
+/// Statements of a fleet on some threads: wall seconds.
+fn stated(fleet: &[Series], as_of_us: i64, prior: &FleetPrior, threads: usize) -> f64 {
+    let settings = Settings::for_limit(LIMIT_M);
+    let state = |series: &Series| {
+        std::hint::black_box(trend(series, as_of_us, &settings, Some(prior), None).unwrap());
+    };
+    let began = Instant::now();
+    std::thread::scope(|scope| {
+        for part in fleet.chunks(fleet.len().div_ceil(threads)) {
+            scope.spawn(move || part.iter().for_each(state));
+        }
+    });
+    began.elapsed().as_secs_f64()
+}
+
 fn main() {
     let serials: u64 = std::env::args().nth(1).map_or(200, |n| n.parse().unwrap());
-    println!("flights  series µs  statement µs  prior ms");
-    for flights in [100, 300, 1000, 2000, 4000] {
+    println!("processor time of a serial, µs         of the prior, ms   wall time of a statement, µs, on");
+    println!("flights    series  statement                              1 thread  2 threads");
+    for flights in [100, 300, 1000, 3000, 10_000] {
         let rows: Vec<Vec<Observation>> = (0..serials).map(|seed| rows(seed, flights)).collect();
-        let per_serial = |began: Instant| began.elapsed().as_secs_f64() * 1e6 / serials as f64;
-        let began = Instant::now();
-        let fleet: Vec<Series> =
-            rows.into_iter().map(|rows| Series::new(rows, &Usage::default()).unwrap()).collect();
-        let series_us = per_serial(began);
+        let us = 1e6 / serials as f64;
+        let unit = |rows| Series::new(rows, &Usage::default()).unwrap();
+        let (series_s, fleet) = cost(|| rows.into_iter().map(unit).collect::<Vec<Series>>());
         let as_of_us = flights as i64 * 30_000_000_000;
-        let began = Instant::now();
-        let prior = FleetPrior::learn(&fleet, as_of_us, LIMIT_M, None);
-        let prior_ms = began.elapsed().as_secs_f64() * 1e3;
-        let began = Instant::now();
-        for series in &fleet {
-            std::hint::black_box(
-                trend(series, as_of_us, &Settings::for_limit(LIMIT_M), Some(&prior), None).unwrap(),
-            );
-        }
-        println!("{flights:7}  {series_us:9.1}  {:12.1}  {prior_ms:8.0}", per_serial(began));
+        let (prior_s, prior) = cost(|| FleetPrior::learn(&fleet, as_of_us, LIMIT_M, None));
+        let settings = Settings::for_limit(LIMIT_M);
+        let (statement_s, ()) = cost(|| {
+            for series in &fleet {
+                std::hint::black_box(trend(series, as_of_us, &settings, Some(&prior), None).unwrap());
+            }
+        });
+        let [one_s, two_s] = [1, 2].map(|threads| stated(&fleet, as_of_us, &prior, threads));
+        println!(
+            "{flights:7}  {:8.1}  {:9.1}  {:26.0}  {:10.1}  {:9.1}",
+            series_s * us,
+            statement_s * us,
+            prior_s * 1e3,
+            one_s * us,
+            two_s * us
+        );
     }
 }

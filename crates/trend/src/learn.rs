@@ -10,7 +10,7 @@ use crate::season::{Season, Swing, swing};
 use crate::series::{Booked, Flight, Series};
 
 /// Units looked at, at most: more teach nothing new and cost as much as their own statements.
-const MOST_UNITS: usize = 200;
+const MOST_UNITS: usize = 150;
 
 /// Units a prior of nothing is worth: few, so that thirty units outvote it.
 const PSEUDO_UNITS: f64 = 15.0;
@@ -30,7 +30,7 @@ impl FleetPrior {
     /// of the laws, the spread of lives, a new unit's gap, the season, and what an installation adds.
     ///
     /// The units should be of one design: a part number, or several that differ in life by a factor of
-    /// two at most, which then share what they teach. Of a large fleet every n-th unit is looked at. The
+    /// two at most, which then share what they teach. Of a large fleet 150 units are looked at. The
     /// order of the units changes no bit, and nothing later than the day is looked at; a prior of an
     /// earlier day may stand in for a later one's.
     ///
@@ -68,12 +68,12 @@ impl<'a> Known<'a> {
     }
 }
 
-/// Units with flights in an order of their own, every n-th of many.
+/// Units with flights in an order of their own; of many, as many as are looked at, evenly.
 fn sample<'a>(fleet: impl Iterator<Item = Known<'a>>) -> Vec<Known<'a>> {
     let mut fleet: Vec<Known<'_>> = fleet.filter(|unit| !unit.flights.is_empty()).collect();
     fleet.sort_by_cached_key(|unit| identity(unit.flights));
-    let stride = fleet.len().div_ceil(MOST_UNITS).max(1);
-    fleet.into_iter().step_by(stride).collect()
+    let count = fleet.len().min(MOST_UNITS);
+    (0..count).map(|i| fleet[i * fleet.len() / count]).collect()
 }
 
 /// What tells two units apart, whatever the order they came in.
@@ -139,7 +139,7 @@ impl Lesson {
     fn revised(self) -> Self {
         let segments = self.histories.iter().flat_map(History::segments);
         let units: Vec<Posterior> =
-            segments.filter_map(|segment| posterior(&segment, &self.learned)).collect();
+            segments.filter_map(|segment| Some(posterior(&segment, &self.learned)?.pruned())).collect();
         let round = |current: FleetPrior, _| step(&self.assumed, &self.learned, &current, &units);
         let learned = (0..ROUNDS).fold(self.learned.clone(), round);
         let ratio = Ratio::new(&self.learned, &learned);

@@ -97,10 +97,20 @@ pub(crate) struct Posterior {
 impl Posterior {
     /// The nodes that can move a quantile.
     pub(crate) fn notable(&self) -> impl Iterator<Item = &Node> {
-        /// As a share of the largest weight.
-        const NEGLIGIBLE: f64 = 2e-3;
-        let best = self.nodes.iter().map(|n| n.weight).fold(0.0, f64::max);
-        self.nodes.iter().filter(move |n| n.weight > NEGLIGIBLE * best)
+        let least = self.negligible();
+        self.nodes.iter().filter(move |n| n.weight > least)
+    }
+
+    /// Without the nodes that can move none.
+    pub(crate) fn pruned(mut self) -> Self {
+        let least = self.negligible();
+        self.nodes.retain(|n| n.weight > least);
+        self
+    }
+
+    /// The weight, a share of the largest, below which a node cannot move a quantile.
+    fn negligible(&self) -> f64 {
+        2e-3 * self.nodes.iter().map(|n| n.weight).fold(0.0, f64::max)
     }
 }
 
