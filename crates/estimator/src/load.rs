@@ -22,15 +22,42 @@ pub struct LoadBand {
 pub fn band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
     let [p05_n, p95_n] = quantiles(load_n, segments)?;
     let threshold = SIDE_SHARE * p05_n.abs().max(p95_n.abs());
-    let mut reversals = 0;
-    for segment in segments {
-        let mut side = 0.0;
-        for &f in load_n[segment.clone()].iter().filter(|f| f.abs() > threshold) {
-            reversals += usize::from(side * f < 0.0);
-            side = f.signum();
+    let reversals = segments.iter().map(|segment| reversals(&load_n[segment.clone()], threshold)).sum();
+    Some(LoadBand { p05_n, p95_n, reversals })
+}
+
+/// Loads that are looked at together.
+const GROUP: usize = 8;
+
+/// Changes from beyond one side of a threshold to beyond the other.
+fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
+    let mut sides = Sides { threshold_n, side: 0.0, changes: 0 };
+    let (groups, rest) = load_n.as_chunks::<GROUP>();
+    groups.iter().for_each(|group| sides.take(group));
+    sides.take(rest);
+    sides.changes
+}
+
+/// The side on which the load was last.
+struct Sides {
+    threshold_n: f64,
+    side: f64,
+    changes: usize,
+}
+
+impl Sides {
+    #[inline]
+    fn take(&mut self, group: &[f64]) {
+        // Nearly every group stays on the side where the one before it was, or between the two.
+        let against = group.iter().filter(|f| **f * self.side < 0.0).count();
+        if self.side != 0.0 && against == 0 {
+            return;
+        }
+        for &f in group.iter().filter(|f| f.abs() > self.threshold_n) {
+            self.changes += usize::from(self.side * f < 0.0);
+            self.side = f.signum();
         }
     }
-    Some(LoadBand { p05_n, p95_n, reversals })
 }
 
 /// Loads that brackets are laid by.
@@ -60,12 +87,12 @@ fn quantiles(load_n: &[f64], segments: &[Range<usize>]) -> Option<[f64; 2]> {
     let mut brackets = [0.05, 0.95].map(|share| Bracket::about(share, &looks));
     let mut count = 0;
     for segment in segments {
-        for &f in &load_n[segment.clone()] {
-            count += usize::from(!f.is_nan());
-            for bracket in &mut brackets {
-                bracket.push(f);
-            }
+        let (groups, rest) = load_n[segment.clone()].as_chunks::<GROUP>();
+        for bracket in &mut brackets {
+            groups.iter().for_each(|group| bracket.take(group));
+            bracket.take(rest);
         }
+        count += load_n[segment.clone()].iter().filter(|f| !f.is_nan()).count();
     }
     let last = count.checked_sub(1)?;
     let found = brackets.map(|bracket| bracket.quantile(last));
@@ -96,10 +123,11 @@ impl Bracket {
     }
 
     #[inline]
-    fn push(&mut self, f: f64) {
-        self.below += usize::from(f < self.least);
-        if f >= self.least && f <= self.greatest {
-            self.within.push(f);
+    fn take(&mut self, group: &[f64]) {
+        self.below += group.iter().filter(|f| **f < self.least).count();
+        let is_within = |f: &&f64| **f >= self.least && **f <= self.greatest;
+        if group.iter().filter(is_within).count() > 0 {
+            self.within.extend(group.iter().filter(is_within));
         }
     }
 
@@ -135,6 +163,23 @@ mod tests {
         check(&all.iter().map(|f| (f / 5e3).round()).collect::<Vec<_>>());
         check(&all.iter().map(|f| if *f as i64 % 7 == 0 { f64::NAN } else { *f }).collect::<Vec<_>>());
         check(&all[..77]);
+    }
+
+    /// A load that swings ever more slowly under noise, with a hole: one sample after the other, by hand.
+    #[test]
+    fn reversals_are_those_of_one_sample_after_the_other() {
+        for count in [0, 1, 7, 8, 9, 5000] {
+            let noise = |k: u32| f64::from(k.wrapping_mul(40503) % 1024) / 1024.0 - 0.5;
+            let load = |k: u32| 3.0 * f64::from(k).sqrt().sin() + noise(k);
+            let mut load_n: Vec<f64> = (0..count).map(load).collect();
+            load_n.iter_mut().skip(70).take(9).for_each(|f| *f = f64::NAN);
+            for threshold_n in [0.0, 0.4, 3.2, 9.0] {
+                let beyond: Vec<bool> =
+                    load_n.iter().filter(|f| f.abs() > threshold_n).map(|f| *f > 0.0).collect();
+                let changes = beyond.windows(2).filter(|pair| pair[0] != pair[1]).count();
+                assert_eq!(reversals(&load_n, threshold_n), changes, "{count} loads, {threshold_n} N");
+            }
+        }
     }
 
     /// Looks fall on every forty-ninth load: on none but these, which tell nothing of the rest.
