@@ -147,15 +147,23 @@ impl<'s> Sampling<'s> {
             Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
             None => values,
         };
-        let read = |samples: &Samples| self.sheet.numbers(samples);
-        let raw = read(&self.samples)?;
-        self.same_count(raw.len(), self.column())?;
-        let mut values = kept(raw);
+        let is_mended = !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
+        let read = if is_mended {
+            self.raw(&self.samples)
+        } else {
+            self.sheet.numbers(&self.samples, |raw| si.apply(raw))
+        };
+        let read = read?;
+        self.same_count(read.len(), self.column())?;
+        let mut values = kept(read);
+        if !is_mended {
+            return Ok(values);
+        }
         if !map.missing.is_empty() {
             values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
         }
         if let Some(valid) = &self.valid {
-            let marks = read(valid)?;
+            let marks = self.raw(valid)?;
             self.same_count(marks.len(), &valid.leaf)?;
             let bad = |mark: &f64| !map.valid_values.contains(mark);
             values.iter_mut().zip(kept(marks)).filter(|(_, m)| bad(m)).for_each(|(v, _)| *v = f64::NAN);
@@ -165,6 +173,10 @@ impl<'s> Sampling<'s> {
         }
         values.iter_mut().for_each(|value| *value = si.apply(*value));
         Ok(values)
+    }
+
+    fn raw(&self, samples: &Samples) -> Result<Vec<f64>, Error> {
+        self.sheet.numbers(samples, |raw| raw)
     }
 
     fn same_count(&self, found: usize, column: &str) -> Result<(), Error> {

@@ -132,6 +132,14 @@ pub fn even(rows: usize, rate_hz: f64) -> Timeline {
 /// there; [`Fault::TimeStandsStill`] when fewer than two differ; [`Fault::RateContradicts`] when they
 /// tell of another rate than was declared.
 pub fn align(stamps: &mut Stamps, clock: &ClockMapping) -> Result<Timeline, Fault> {
+    if clock.tick_s.is_none()
+        && let Some(seen) = Even::of(&stamps.seconds)
+    {
+        let step_s = believed(seen.step_s, clock, &stamps.column)?;
+        if seen.longest_s <= BREAK_STEPS * step_s {
+            return Ok(Timeline { step_s, ..even(stamps.seconds.len(), 1.0) });
+        }
+    }
     let max_back_s = clock.max_back_s.unwrap_or(MAX_BACK_S);
     let filled = clock.rate_hz.map_or(0, |rate_hz| fill(&mut stamps.seconds, rate_hz));
     let pieces = pieces(stamps, max_back_s, clock.split_at_jumps)?;
@@ -149,16 +157,73 @@ pub fn align(stamps: &mut Stamps, clock: &ClockMapping) -> Result<Timeline, Faul
         return Err(Fault::TimeStandsStill { column: stamps.column.clone(), rows: t.len() as u64 });
     }
     let seen_s = usual_step((1..count).map(step).filter(|s| *s > 0.0).collect());
-    let step_s = clock.rate_hz.map_or(seen_s, f64::recip);
-    if (seen_s / step_s - 1.0).abs() > RATE_TOLERANCE {
-        let (column, declared_hz) = (stamps.column.clone(), step_s.recip());
-        return Err(Fault::RateContradicts { column, declared_hz, seen_hz: seen_s.recip() });
-    }
+    let step_s = believed(seen_s, clock, &stamps.column)?;
     let breaks: Vec<usize> =
         (1..count).filter(|&i| step(i) > BREAK_STEPS * step_s || step(i) <= 0.0).collect();
     let unstamped = t.iter().filter(|s| s.is_nan()).count();
     let repairs = Repairs { unstamped, filled, out_of_order: falls, repeated: t.len() - unstamped - count };
     Ok(Timeline { step_s, rows: t.len(), segments: cut(count, &breaks), kept, repairs })
+}
+
+/// The declared step, where one is and the stamps do not contradict it; else the one that was seen.
+fn believed(seen_s: f64, clock: &ClockMapping, column: &str) -> Result<f64, Fault> {
+    let step_s = clock.rate_hz.map_or(seen_s, f64::recip);
+    if (seen_s / step_s - 1.0).abs() > RATE_TOLERANCE {
+        let (column, declared_hz) = (column.to_owned(), step_s.recip());
+        return Err(Fault::RateContradicts { column, declared_hz, seen_hz: seen_s.recip() });
+    }
+    Ok(step_s)
+}
+
+/// A clock that every row moves on by about the same: most clocks, for which two passes tell all there is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Even {
+    /// The usual step, as [`usual_step`] has it.
+    step_s: f64,
+    longest_s: f64,
+}
+
+impl Even {
+    /// Nothing where a stamp is missing, does not rise, or steps are not all alike.
+    fn of(seconds: &[f64]) -> Option<Self> {
+        let (mut least_s, mut longest_s, mut rising) = (f64::INFINITY, 0.0, 0);
+        for pair in seconds.windows(2) {
+            let step_s = pair[1] - pair[0];
+            rising += usize::from(step_s > 0.0);
+            least_s = if step_s < least_s { step_s } else { least_s };
+            longest_s = if step_s > longest_s { step_s } else { longest_s };
+        }
+        if rising == 0 || rising + 1 < seconds.len() || longest_s - least_s > COARSE * least_s {
+            return None;
+        }
+        Some(Self { step_s: median_step(seconds)?, longest_s })
+    }
+}
+
+/// Steps that a bracket about their median is laid by.
+const LOOKS: usize = 1024;
+/// Half width of that bracket in the order of those steps: more than five standard deviations of a rank.
+const HALF_BRACKET: usize = 100;
+
+/// The lower median of the steps; none where few steps mislead about the rest.
+fn median_step(seconds: &[f64]) -> Option<f64> {
+    let steps = || seconds.windows(2).map(|pair| pair[1] - pair[0]);
+    let middle = (seconds.len() - 2) / 2;
+    let mut looks: Vec<f64> = steps().step_by(seconds.len() / LOOKS + 1).collect();
+    looks.sort_unstable_by(f64::total_cmp);
+    let at = looks.len() / 2;
+    let low = looks[at.saturating_sub(HALF_BRACKET)];
+    let high = looks[(at + HALF_BRACKET).min(looks.len() - 1)];
+    let below = steps().filter(|step| *step < low).count();
+    let not_above = steps().filter(|step| *step <= high).count();
+    if !(below..not_above).contains(&middle) {
+        return None;
+    }
+    if low >= high {
+        return Some(low);
+    }
+    let mut within: Vec<f64> = steps().filter(|step| *step >= low && *step <= high).collect();
+    Some(*within.select_nth_unstable_by(middle - below, f64::total_cmp).1)
 }
 
 /// Gives rows without a stamp theirs where, at the declared rate, they just fill the time between their
@@ -255,13 +320,14 @@ fn ordered(t: &[f64], pieces: &[Range<usize>]) -> Vec<u32> {
     rows
 }
 
+/// Steps one tick apart, when the tick is at least this share of the step.
+const COARSE: f64 = 0.02;
+
 /// The usual step: the lower median, which is an element of the steps, so that none is invented.
 ///
 /// Where stamps are rounded to ticks that are coarse beside the step (milliseconds at 400 Hz: 2, 3, 2, 3),
 /// no element is right; then it is the mean of the steps that are no breaks.
 fn usual_step(mut steps: Vec<f64>) -> f64 {
-    /// Steps one tick apart, when the tick is at least this share of the step.
-    const COARSE: f64 = 0.02;
     /// Rounding of the stamps themselves, s.
     const SAME_S: f64 = 1e-7;
     if steps.is_empty() {
@@ -376,6 +442,29 @@ mod tests {
         assert!((holed.seconds[2] - 0.2).abs() < 1e-12);
         assert_eq!((line.repairs.filled, line.repairs.unstamped), (2, 1));
         assert_eq!(line.segments, [0..4, 4..6]);
+    }
+
+    /// Clocks of many kinds: where the quick way gives a step, it is that of the slow one, to the bit.
+    #[test]
+    fn the_quick_way_sees_the_step_that_the_slow_one_does() {
+        let jitter = |k: u32| f64::from(k.wrapping_mul(40503) % 1024) / 1024.0;
+        for rows in [3, 4, 1000, 5001] {
+            let clocks = [
+                (0..rows).map(|k| f64::from(k) * 0.002).collect::<Vec<_>>(),
+                (0..rows).map(|k| f64::from(k) * 0.1 + 1e-4 * jitter(k)).collect(),
+                (0..rows).map(|k| (f64::from(k) * 0.004 * 1e6).round() / 1e6).collect(),
+                (0..rows).map(|k| f64::from(k) * 0.5).collect(),
+            ];
+            for t in clocks {
+                let found = Even::of(&t).unwrap();
+                let steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+                assert_eq!(found.longest_s.to_bits(), steps.iter().copied().fold(0.0, f64::max).to_bits());
+                assert_eq!(found.step_s.to_bits(), usual_step(steps).to_bits(), "{rows} rows");
+            }
+        }
+        for t in [&[0.0, 1.0, 1.0, 2.0][..], &[0.0, 1.0, f64::NAN, 2.0], &[0.0, 1.0, 2.5], &[0.0], &[]] {
+            assert_eq!(Even::of(t), None);
+        }
     }
 
     proptest! {

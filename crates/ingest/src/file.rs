@@ -16,10 +16,12 @@ use parquet::file::metadata::ColumnChunkMetaData;
 
 use crate::error::{Error, Fault};
 use crate::leaf::{self, Leaf};
+use crate::numbers::append;
 use crate::page;
 use crate::pattern::nearest;
 use crate::positioned::{self, Positioned};
 use crate::source::Source;
+use crate::straight;
 
 /// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
 const BATCH_ROWS: usize = 8192;
@@ -151,29 +153,59 @@ impl LogFile {
         let mut rows = 0;
         for group in 0..self.footer.metadata().num_row_groups() {
             self.check_pages(group, &leaves)?;
-            let columns =
-                leaves.iter().map(|leaf| self.column(group, leaf)).collect::<Result<Vec<_>, _>>()?;
-            rows += self.each_row_group(columns, group, &leaves, |columns| {
+            rows += self.each_row_group(group, &leaves, |columns| {
                 take(names, columns.iter().map(leaf::descend).collect())
             })?;
         }
-        if rows != self.rows() {
-            let (found, declared) = (rows as u64, self.rows() as u64);
-            let column = names.first().copied().unwrap_or_default().to_owned();
-            return Err(self.error(Fault::RowCount { column, found, declared }));
+        self.all_rows(rows, names.first().copied().unwrap_or_default())
+    }
+
+    /// Appends the numbers of a leaf, sample by sample, as `convert` makes them; a null is NaN.
+    ///
+    /// # Errors
+    /// As [`LogFile::each_batch`], and when the leaf holds no numbers.
+    pub(crate) fn append_numbers(
+        &self,
+        name: &str,
+        convert: impl Fn(f64) -> f64 + Copy,
+        into: &mut Vec<f64>,
+    ) -> Result<(), Error> {
+        let leaf = self.leaf(name)?;
+        self.want(&[leaf])?;
+        let mut rows = 0;
+        for group in 0..self.footer.metadata().num_row_groups() {
+            self.check_pages(group, &[leaf])?;
+            let before = into.len();
+            if straight::append(self.source.file(), self.chunk(group, leaf), convert, into) {
+                rows += into.len() - before;
+                continue;
+            }
+            rows += self.each_row_group(group, &[leaf], |columns| {
+                append(name, &leaf::descend(&columns[0]).values, convert, into)
+            })?;
         }
-        Ok(())
+        self.all_rows(rows, name)
+    }
+
+    /// Whether as many rows came as were declared.
+    fn all_rows(&self, rows: usize, column: &str) -> Result<(), Error> {
+        if rows == self.rows() {
+            return Ok(());
+        }
+        let (found, declared, column) = (rows as u64, self.rows() as u64, column.to_owned());
+        Err(self.error(Fault::RowCount { column, found, declared }))
     }
 
     /// Steps through one row group's leaves, each by its own reader: two fields of one struct would
     /// otherwise come back as one column.
     fn each_row_group(
         &self,
-        mut columns: Vec<Batches>,
         group: usize,
         leaves: &[&Leaf],
         mut take: impl FnMut(&[ArrayRef]) -> Result<(), Fault>,
     ) -> Result<usize, Error> {
+        let mut columns =
+            leaves.iter().map(|leaf| self.column(group, leaf)).collect::<Result<Vec<_>, _>>()?;
         let mut rows = 0;
         loop {
             let mut batch: Vec<ArrayRef> = Vec::with_capacity(columns.len());
@@ -293,7 +325,7 @@ fn footer_bytes(file: &File, length: u64) -> std::io::Result<u64> {
     Ok((u64::from(u32::from_le_bytes(trailer)) + 8).min(length))
 }
 
-/// Reads a stretch of the file into the hash, a mebibyte at a time.
+/// Reads a stretch of the file into the hash, as much at a time as stays in the cache between the two.
 fn feed(
     hash: &mut blake3::Hasher,
     file: &File,
@@ -301,7 +333,7 @@ fn feed(
     start: u64,
     bytes: u64,
 ) -> std::io::Result<()> {
-    const CHUNK: u64 = 1 << 20;
+    const CHUNK: u64 = 1 << 17;
     let mut left = bytes;
     while left > 0 {
         buffer.resize(left.min(CHUNK) as usize, 0);

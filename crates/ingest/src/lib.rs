@@ -34,6 +34,8 @@ pub mod schema;
 pub mod screw;
 mod sheet;
 mod source;
+mod spare;
+mod straight;
 pub mod tables;
 pub mod unit;
 pub mod write;

@@ -19,9 +19,11 @@ use crate::identity::{self, Facts, Identity};
 use crate::normal::Normalized;
 use crate::pattern::Pattern;
 use crate::quality::{self, Quality};
+use crate::scan::Span;
 use crate::schema::{ChannelMapping, Channels, Fact, Mapping, Role};
 use crate::screw::Geometry;
 use crate::sheet::Sheet;
+use crate::spare;
 
 /// The files of one flight log: usually one.
 #[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -81,6 +83,13 @@ pub struct Actuator {
     pub flags: Vec<String>,
     /// What had to be mended in the clock.
     pub repairs: Repairs,
+}
+
+impl Actuator {
+    /// Leaves the memory of its channels to the next actuator that this thread reads.
+    pub fn reuse(self) {
+        [self.motor_m, self.dx_m, self.load_n].into_iter().for_each(spare::give);
+    }
 }
 
 /// An open log.
@@ -459,10 +468,12 @@ impl Log {
         geometry: Geometry,
     ) -> Result<Lead<'_, 'c>, Error> {
         let mut found: Option<Lead<'_, 'c>> = None;
-        for (k, (map, name)) in self.present_or_lacking(Role::Motor, at, channels)?.into_iter().enumerate() {
+        let choices = self.present_or_lacking(Role::Motor, at, channels)?;
+        let is_only = choices.len() == 1;
+        for (k, (map, name)) in choices.into_iter().enumerate() {
             let sampling = Sampling::new(self.sheet_of(map)?, map, &name, at.position.as_str())?;
             let values = sampling.own(map, geometry)?;
-            let lives = channel::lives(&values);
+            let lives = is_only || channel::lives(&values);
             if lives || found.is_none() {
                 found = Some((values, (sampling, map), alternative(Role::Motor, k)));
             }
@@ -486,11 +497,13 @@ impl Log {
     ) -> Result<(Vec<f64>, Vec<String>), Error> {
         let mut found: Option<(Vec<f64>, usize)> = None;
         let mut column = String::new();
-        for (k, (map, name)) in self.present_or_lacking(role, at, channels)?.into_iter().enumerate() {
+        let choices = self.present_or_lacking(role, at, channels)?;
+        let is_only = choices.len() == 1;
+        for (k, (map, name)) in choices.into_iter().enumerate() {
             let sheet = self.sheet_of(map)?;
             let one = Follower { sheet, map, name: &name, position: at.position.as_str(), role };
             let values = channel::follow(&master.0, master.1, &one, geometry)?;
-            let lives = channel::lives(&values);
+            let lives = is_only || channel::lives(&values);
             if lives || found.is_none() {
                 column = name;
                 found = Some((values, k));
@@ -594,22 +607,17 @@ pub(crate) fn finish(
     temperature_c: Option<f64>,
     mut flags: Vec<String>,
 ) -> Actuator {
-    let Read { motor: mut motor_m, screw: mut screw_m, load: mut load_n, is_relative, segments } = read;
-    let quality = [&motor_m, &screw_m, &load_n].map(|values| Quality::of(values, line.step_s));
+    let Read { motor: mut motor_m, screw: mut dx_m, load: mut load_n, is_relative, segments } = read;
+    let quality = [&motor_m, &dx_m, &load_n].map(|values| Quality::of(values, line.step_s));
     flags.extend(quality::doubts(&quality, line.step_s));
-    let mut dx_m = if is_relative {
-        screw_m
-    } else {
+    if !is_relative {
         let longest = quality[0].longest_run.max(quality[1].longest_run);
-        flags.extend(quality::thaw(&mut motor_m, &mut screw_m, longest, line.step_s));
-        screw_m.iter_mut().zip(&motor_m).for_each(|(screw, motor)| *screw -= motor);
-        screw_m
-    };
-    dx_m.iter_mut().zip(&motor_m).filter(|(_, motor)| motor.is_nan()).for_each(|(dx, _)| *dx = f64::NAN);
-    flags.extend(quality::coarse(&quality, &dx_m));
+        flags.extend(quality::thaw(&mut motor_m, &mut dx_m, longest, line.step_s));
+    }
+    let (travel_m, missing) = relative(&motor_m, &mut dx_m, is_relative);
+    flags.extend(quality::coarse(&quality, travel_m));
     flags.extend(quality::load_froze(&load_n, &motor_m, quality[2].longest_run, line.step_s));
     let segments = hold(&mut load_n, &segments, line.step_s);
-    let missing = dx_m.iter().filter(|y| y.is_nan()).count();
     Actuator {
         position,
         step_s: line.step_s,
@@ -623,6 +631,24 @@ pub(crate) fn finish(
         flags,
         repairs: line.repairs,
     }
+}
+
+/// Makes δX of the screw's position, or leaves it where it is one already; NaN where the motor's is missing. Returns its
+/// travel, m, and how many samples are missing.
+fn relative(motor_m: &[f64], screw_m: &mut [f64], is_relative: bool) -> (f64, usize) {
+    const BATCH: usize = 4096;
+    let (mut span, mut missing) = (Span::NONE, 0);
+    for (screw_m, motor_m) in screw_m.chunks_mut(BATCH).zip(motor_m.chunks(BATCH)) {
+        let pairs = screw_m.iter_mut().zip(motor_m);
+        if is_relative {
+            pairs.filter(|(_, motor)| motor.is_nan()).for_each(|(dx, _)| *dx = f64::NAN);
+        } else {
+            pairs.for_each(|(screw, motor)| *screw -= motor);
+        }
+        span.take(screw_m);
+        missing += screw_m.iter().filter(|dx| dx.is_nan()).count();
+    }
+    (span.length(), missing)
 }
 
 fn mean(values: &[f64]) -> Option<f64> {

@@ -14,10 +14,10 @@ use crate::error::{Error, Fault};
 use crate::file::LogFile;
 use crate::identity::{Facts, Identity};
 use crate::log::Actuator;
-use crate::numbers::append;
 use crate::quality::Quality;
 use crate::schema::Fact;
 use crate::screw::Geometry;
+use crate::spare;
 use crate::write::{Column, Encoding, write_encoded};
 
 const VERSION: &str = "1";
@@ -104,8 +104,8 @@ impl Normalized {
 }
 
 fn numbers(file: &LogFile, name: &str) -> Result<Vec<f64>, Error> {
-    let mut values = Vec::with_capacity(file.rows().min(1 << 26));
-    file.each_batch(&[name], |arrays| append(name, &arrays[0], &mut values))?;
+    let mut values = spare::take(file.rows().min(1 << 26));
+    file.append_numbers(name, |value| value, &mut values)?;
     Ok(values)
 }
 

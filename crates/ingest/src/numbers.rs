@@ -6,27 +6,35 @@ use arrow::datatypes::{ArrowPrimitiveType, DataType, Float32Type, Float64Type};
 
 use crate::error::Fault;
 
-/// Appends a whole array; nulls become NaN.
-pub(crate) fn append(column: &str, array: &ArrayRef, into: &mut Vec<f64>) -> Result<(), Fault> {
+/// Appends a whole array, each number as `convert` makes it; nulls become NaN.
+pub(crate) fn append(
+    column: &str,
+    array: &ArrayRef,
+    convert: impl Fn(f64) -> f64,
+    into: &mut Vec<f64>,
+) -> Result<(), Fault> {
     match array.data_type() {
-        DataType::Float64 => append_primitive(array.as_primitive::<Float64Type>(), into, |v| v),
-        DataType::Float32 => append_primitive(array.as_primitive::<Float32Type>(), into, f64::from),
-        _ => append_primitive(real(column, array)?.as_primitive::<Float64Type>(), into, |v| v),
+        DataType::Float64 => append_primitive(array.as_primitive::<Float64Type>(), into, convert),
+        DataType::Float32 => {
+            append_primitive(array.as_primitive::<Float32Type>(), into, |v: f32| convert(v.into()));
+        }
+        _ => append_primitive(real(column, array)?.as_primitive::<Float64Type>(), into, convert),
     }
     Ok(())
 }
 
-/// Appends the rows that are marked.
+/// Appends the rows that are marked, each number as `convert` makes it.
 pub(crate) fn append_where(
     column: &str,
     array: &ArrayRef,
     wanted: &[bool],
+    convert: impl Fn(f64) -> f64,
     into: &mut Vec<f64>,
 ) -> Result<(), Fault> {
     let real = real(column, array)?;
     let values = real.as_primitive::<Float64Type>();
     let marked = values.iter().zip(wanted).filter(|(_, wanted)| **wanted);
-    into.extend(marked.map(|(value, _)| value.unwrap_or(f64::NAN)));
+    into.extend(marked.map(|(value, _)| convert(value.unwrap_or(f64::NAN))));
     Ok(())
 }
 

@@ -93,6 +93,30 @@ fn runs(values: &[f64], least: usize) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
+/// Those of [`runs`] that repeat one of two values: rare, so most samples are passed over in groups.
+#[expect(clippy::float_cmp, reason = "a rail repeats its bits")]
+fn runs_at(values: &[f64], of: [f64; 2], least: usize) -> Vec<Range<usize>> {
+    const GROUP: usize = 16;
+    let is_one = |v: &f64| *v == of[0] || *v == of[1];
+    let (mut found, mut done) = (Vec::new(), 0);
+    for start in (0..values.len()).step_by(GROUP) {
+        let group = &values[start..values.len().min(start + GROUP)];
+        if group.iter().filter(|v| is_one(v)).count() == 0 {
+            continue;
+        }
+        for at in start..start + group.len() {
+            if at < done || !is_one(&values[at]) {
+                continue;
+            }
+            done = at + values[at..].iter().take_while(|v| **v == values[at]).count();
+            if done - at >= least {
+                found.push(at..done);
+            }
+        }
+    }
+    found
+}
+
 /// Samples at a rail: the channel comes to its smallest or largest value at full speed, stays there, and
 /// leaves it at full speed, more than once. A position that comes to rest slows down first.
 #[expect(clippy::float_cmp, reason = "a rail repeats its bits")]
@@ -102,16 +126,20 @@ fn saturated(values: &[f64], seen: &Scan) -> usize {
     if longest_run < LEAST_RUN {
         return 0;
     }
+    let at_rails: Vec<Range<usize>> = runs_at(values, [min, max], LEAST_RUN);
+    if at_rails.is_empty() {
+        return 0;
+    }
     let speed = 0.5 * mean_step(values);
     let mut count = [0, 0];
     let mut samples = 0;
-    for run in runs(values, LEAST_RUN) {
+    for run in at_rails {
         let at = values[run.start];
         // Two samples away, since the step that meets the rail is cut short.
         let before = run.start.checked_sub(2).map(|i| values[i]);
         let (Some(before), Some(after)) = (before, values.get(run.end + 1)) else { continue };
         let cut = (before - at).abs() >= speed && (after - at).abs() >= speed;
-        if (at == min || at == max) && cut {
+        if cut {
             count[usize::from(at == max)] += 1;
             samples += run.len();
         }
@@ -168,9 +196,9 @@ pub(crate) fn doubts(channels: &[Quality; 3], step_s: f64) -> Vec<String> {
 
 /// Positions whose smallest step is large beside what they have to show: a twentieth of all that the relative
 /// position does in the flight.
-pub(crate) fn coarse(channels: &[Quality; 3], dx_m: &[f64]) -> Vec<String> {
+pub(crate) fn coarse(channels: &[Quality; 3], travel_m: f64) -> Vec<String> {
     const LARGEST_SHARE: f64 = 0.05;
-    let most_m = LARGEST_SHARE * range(dx_m);
+    let most_m = LARGEST_SHARE * travel_m;
     let positions = channels.iter().zip(Role::NEEDED).take(2);
     let is_coarse = |q: &Quality| q.resolution.is_some_and(|step_m| step_m > most_m);
     positions.filter(|(q, _)| is_coarse(q)).map(|(_, role)| format!("{}_coarse", role.as_str())).collect()
@@ -245,7 +273,20 @@ pub fn slope(motor_m: &[f64], dx_m: &[f64]) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        /// Passing over samples in groups finds the runs at the rails that looking at each of them does.
+        #[test]
+        fn runs_at_the_rails_are_those_of_all_runs(ticks in proptest::collection::vec(-2_i32..3, 0..90)) {
+            let values: Vec<f64> =
+                ticks.iter().map(|&k| if k == 0 { f64::NAN } else { f64::from(k) }).collect();
+            let all = runs(&values, 2).filter(|run| values[run.start].abs() > 1.5);
+            prop_assert_eq!(runs_at(&values, [-2.0, 2.0], 2), all.collect::<Vec<_>>());
+        }
+    }
 
     #[test]
     fn a_channel_is_described_as_a_hand_would() {
@@ -271,8 +312,8 @@ mod tests {
     fn a_position_in_steps_as_large_as_a_gap_is_coarse() {
         let stepped: Vec<f64> = wave(0.03).iter().map(|v| (v / 2e-5).round() * 2e-5).collect();
         let channels = [&wave(0.03), &stepped, &wave(8e3)].map(|values| Quality::of(values, 0.004));
-        assert_eq!(coarse(&channels, &wave(5e-5)), ["screw_coarse"]);
-        assert!(coarse(&channels, &wave(5e-4)).is_empty());
+        assert_eq!(coarse(&channels, range(&wave(5e-5))), ["screw_coarse"]);
+        assert!(coarse(&channels, range(&wave(5e-4))).is_empty());
     }
 
     fn wave(amplitude: f64) -> Vec<f64> {

@@ -3,6 +3,8 @@
 //! Columns are longer than any cache, so each further pass would cost as much as reading memory. The pass
 //! goes in groups of samples whose figures are kept apart, since a chain of comparisons is as slow as its links.
 
+use multiversion::multiversion;
+
 /// Samples in a group.
 const LANES: usize = 8;
 
@@ -26,18 +28,26 @@ pub(crate) struct Scan {
 impl Scan {
     /// Looks at a channel.
     pub(crate) fn of(values: &[f64]) -> Self {
-        let (mut lanes, mut run, mut done) = (Lanes::new(), Run::default(), 0);
-        while let Some(group) = values[done..].first_chunk::<{ LANES + 2 }>() {
-            lanes.take(group);
-            run.take(&group[..=LANES]);
-            done += LANES;
-        }
+        let (mut lanes, mut run) = (Lanes::new(), Run::default());
+        let done = groups(values, &mut lanes, &mut run);
         let rest = &values[done..];
         let at = |k: usize| rest.get(k).copied().unwrap_or(f64::NAN);
         (0..rest.len()).for_each(|k| lanes.one(0, [at(k), at(k + 1), at(k + 2)]));
         run.take(rest);
         lanes.folded(if values.is_empty() { 0 } else { run.most + 1 })
     }
+}
+
+/// Looks at whole groups; how many samples those are. Vectors change no figure: comparisons and halves are exact in all.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn groups(values: &[f64], lanes: &mut Lanes, run: &mut Run) -> usize {
+    let mut done = 0;
+    while let Some(group) = values[done..].first_chunk::<{ LANES + 2 }>() {
+        lanes.take(group);
+        run.take(&group[..=LANES]);
+        done += LANES;
+    }
+    done
 }
 
 /// How far a sample lies from the middle of its neighbours.
@@ -59,17 +69,53 @@ fn greater(known: f64, new: f64) -> f64 {
 
 /// Largest less smallest value; minus infinity where there is none.
 pub(crate) fn range(values: &[f64]) -> f64 {
-    let (mut low, mut high) = ([f64::INFINITY; LANES], [f64::NEG_INFINITY; LANES]);
-    let (groups, rest) = values.as_chunks::<LANES>();
+    let mut span = Span::NONE;
+    span.take(values);
+    span.length()
+}
+
+/// What values span, told piece by piece.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Span {
+    low: [f64; LANES],
+    high: [f64; LANES],
+}
+
+/// Least and greatest of each lane.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn widened(
+    mut low: [f64; LANES],
+    mut high: [f64; LANES],
+    groups: &[[f64; LANES]],
+) -> ([f64; LANES], [f64; LANES]) {
     for group in groups {
         for lane in 0..LANES {
             low[lane] = lesser(low[lane], group[lane]);
             high[lane] = greater(high[lane], group[lane]);
         }
     }
-    let low = low.iter().chain(rest).copied().fold(f64::INFINITY, lesser);
-    let high = high.iter().chain(rest).copied().fold(f64::NEG_INFINITY, greater);
-    high - low
+    (low, high)
+}
+
+impl Span {
+    pub(crate) const NONE: Self = Self { low: [f64::INFINITY; LANES], high: [f64::NEG_INFINITY; LANES] };
+
+    /// Some more values.
+    #[inline]
+    pub(crate) fn take(&mut self, values: &[f64]) {
+        let (groups, rest) = values.as_chunks::<LANES>();
+        (self.low, self.high) = widened(self.low, self.high, groups);
+        for &value in rest {
+            self.low[0] = lesser(self.low[0], value);
+            self.high[0] = greater(self.high[0], value);
+        }
+    }
+
+    /// Largest less smallest value; minus infinity where there is none.
+    pub(crate) fn length(&self) -> f64 {
+        let low = self.low.iter().copied().fold(f64::INFINITY, lesser);
+        self.high.iter().copied().fold(f64::NEG_INFINITY, greater) - low
+    }
 }
 
 /// Figures of every eighth sample, eight times side by side.
@@ -142,7 +188,8 @@ impl Run {
             return;
         }
         for (a, b) in values.iter().zip(values.iter().skip(1)) {
-            self.repeats = if a == b { self.repeats + 1 } else { 0 };
+            // No branch: which samples repeat is not to be guessed.
+            self.repeats = (self.repeats + 1) * usize::from(a == b);
             self.most = self.most.max(self.repeats);
         }
     }

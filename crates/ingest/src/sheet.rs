@@ -18,6 +18,7 @@ use crate::file::LogFile;
 use crate::numbers::{append, append_where, wrong_type};
 use crate::pattern::nearest;
 use crate::schema::{ClockMapping, Epoch, Layout};
+use crate::spare;
 use crate::unit::TimeUnit;
 
 /// The files of one kind that belong to one flight.
@@ -101,17 +102,26 @@ impl Sheet {
         std::iter::once(&samples.leaf).chain(rows).chain(clock).cloned().collect()
     }
 
-    /// As numbers; a null is NaN.
+    /// As numbers, each as `convert` makes it; a null is NaN.
     ///
     /// # Errors
     /// When a leaf is missing, holds no numbers, or cannot be decoded.
-    pub(crate) fn numbers(&self, samples: &Samples) -> Result<Vec<f64>, Error> {
+    pub(crate) fn numbers(
+        &self,
+        samples: &Samples,
+        convert: impl Fn(f64) -> f64 + Copy,
+    ) -> Result<Vec<f64>, Error> {
         // The footer may lie about the rows; what it claims is a hint, not a promise.
-        let mut values =
-            Vec::with_capacity(if samples.rows.is_empty() { self.rows().min(1 << 26) } else { 0 });
+        let mut values = spare::take(if samples.rows.is_empty() { self.rows().min(1 << 26) } else { 0 });
+        if samples.rows.is_empty() {
+            for file in &self.files {
+                file.append_numbers(&samples.leaf, convert, &mut values)?;
+            }
+            return Ok(values);
+        }
         self.each(samples, &samples.leaf, |array, wanted| match wanted {
-            None => append(&samples.leaf, array, &mut values),
-            Some(wanted) => append_where(&samples.leaf, array, wanted, &mut values),
+            None => append(&samples.leaf, array, convert, &mut values),
+            Some(wanted) => append_where(&samples.leaf, array, wanted, convert, &mut values),
         })?;
         Ok(values)
     }
@@ -202,6 +212,19 @@ impl Sheet {
             return self.burst_stamps(samples, column, ticks);
         }
         let mut reader = Reader::new(column, ticks, self.rows());
+        if samples.rows.is_empty()
+            && ticks.is_real()
+            && !self.is_listed(column)
+            && !self.is_listed(&samples.leaf)
+        {
+            for file in &self.files {
+                let mut reals = spare::take(file.rows().min(1 << 26));
+                file.append_numbers(column, |tick| tick, &mut reals)?;
+                reader.append_reals(&reals);
+                spare::give(reals);
+            }
+            return Ok(reader.stamps());
+        }
         self.each(samples, column, |array, wanted| reader.append(array, wanted))?;
         Ok(reader.stamps())
     }
@@ -324,6 +347,11 @@ impl Ticks {
         Self { per_second, is_whole: true, is_text: false, origin, wraps_at: None }
     }
 
+    /// Whether they are numbers with a fraction.
+    fn is_real(self) -> bool {
+        !self.is_text && !self.is_whole
+    }
+
     /// ISO 8601 text; an offset in it is taken, and without one the time is local.
     fn text() -> Self {
         Self { per_second: 1e9, is_whole: true, is_text: true, origin: Zero::Local, wraps_at: None }
@@ -374,7 +402,7 @@ impl<'a> Reader<'a> {
                 .for_each(|(_, tick)| self.push_whole(tick));
         } else {
             let mut reals = Vec::with_capacity(array.len());
-            append(self.column, array, &mut reals)?;
+            append(self.column, array, |tick| tick, &mut reals)?;
             reals
                 .iter()
                 .enumerate()
@@ -382,6 +410,27 @@ impl<'a> Reader<'a> {
                 .for_each(|(_, &tick)| self.push_real(tick));
         }
         Ok(())
+    }
+
+    /// As [`Reader::append`], for all of many numbers.
+    fn append_reals(&mut self, reals: &[f64]) {
+        let Some(begun) = reals.iter().find(|tick| tick.is_finite()) else {
+            return self.seconds.extend(reals.iter().map(|_| f64::NAN));
+        };
+        if self.ticks.wraps_at.is_some() {
+            return reals.iter().for_each(|&tick| self.push_real(tick));
+        }
+        let (first, per_second) = (self.first_real(*begun), self.ticks.per_second);
+        let second = |tick: &f64| if tick.is_finite() { (tick - first) / per_second } else { f64::NAN };
+        self.seconds.extend(reals.iter().map(second));
+    }
+
+    /// The first tick of all, which is this one if none came before.
+    fn first_real(&mut self, tick: f64) -> f64 {
+        match *self.first.get_or_insert(First::Real(tick)) {
+            First::Real(first) => first,
+            First::Whole(first) => first as f64,
+        }
     }
 
     fn parsed(&mut self, value: &str, row: usize) -> Result<i64, Fault> {
@@ -409,10 +458,7 @@ impl<'a> Reader<'a> {
         if !tick.is_finite() {
             return self.seconds.push(f64::NAN);
         }
-        let first = match *self.first.get_or_insert(First::Real(tick)) {
-            First::Real(first) => first,
-            First::Whole(first) => first as f64,
-        };
+        let first = self.first_real(tick);
         self.push(tick - first);
     }
 

@@ -1,5 +1,7 @@
 //! One actuator's channels to its estimate: both numbers beside each other, the configured one as the gap.
 
+use std::cell::RefCell;
+
 use estimator::contact::{self, ContactGap, Outcome, Picture, Prior};
 use estimator::{Filter, MidRange, Room, Samples, Schedule, midrange};
 use fleet::{Complaint, Estimate, Status};
@@ -29,7 +31,9 @@ pub fn estimate(
     let mut estimate = if let Some(reason) = blind(channels) {
         Estimate::refused(reason)
     } else {
-        let published = match midrange::estimate_in(&samples(channels), &schedule, &mut Room::default()) {
+        let published = match in_a_room(channels.dx_m.len(), |room| {
+            midrange::estimate_in(&samples(channels), &schedule, room)
+        }) {
             Ok(found) => Some(found),
             Err(estimator::Error::Constant { .. } | estimator::Error::NothingMeasured) => None,
             Err(other) => return Err(failed(other)),
@@ -49,6 +53,19 @@ pub fn estimate(
         estimate.flags.push("bandwidth_differs".into());
     }
     Ok(estimate)
+}
+
+/// Longer flights have a room of their own, lest a thread keep it for ever: samples.
+const LONGEST_KEPT: usize = 2 << 20;
+
+thread_local! {
+    /// S of one actuator after the other.
+    static ROOM: RefCell<Room> = RefCell::default();
+}
+
+/// Does something in the room of this thread.
+fn in_a_room<T>(samples: usize, work: impl FnOnce(&mut Room) -> T) -> T {
+    if samples > LONGEST_KEPT { work(&mut Room::default()) } else { ROOM.with_borrow_mut(work) }
 }
 
 /// The filter of a part at the step of a log.

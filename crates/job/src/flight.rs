@@ -167,7 +167,9 @@ impl Opened {
             return Ok(Estimate::refused("channel_unmapped"));
         }
         let actuator = self.channels(at, part)?;
-        estimate::estimate(&actuator, part, &config.document.estimate)
+        let estimate = estimate::estimate(&actuator, part, &config.document.estimate);
+        actuator.reuse();
+        estimate
     }
 
     /// Reads the channels of one actuator of a given part.

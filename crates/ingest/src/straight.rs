@@ -1,0 +1,507 @@
+//! Chunks of plain numbers, straight from their pages into a channel.
+//!
+//! Most logs hold doubles or floats, as they are or split by bytes, compressed by zstd or not at all. These need none
+//! of what Parquet's own reader makes for each page and batch: a context, buffers, levels, an array. Whatever is of
+//! another kind, or does not hold what it claims, is left to that reader, which says what is wrong with it.
+
+use std::cell::RefCell;
+use std::fs::File;
+
+use parquet::basic::{Compression, Type};
+use parquet::file::metadata::ColumnChunkMetaData;
+use polars_parquet_format::{DataPageHeader, DataPageHeaderV2, Encoding, PageHeader, PageType};
+use zstd::bulk::Decompressor;
+
+use crate::page::{Page, Pages};
+use crate::positioned;
+
+/// Buffers above this are given back after use, bytes: pages are about a mebibyte.
+const KEPT_BYTES: usize = 4 << 20;
+/// Values that are brought together from their streams at a time.
+const TILE: usize = 16;
+
+thread_local! {
+    /// Pages come one after the other: each is read into the memory of the one before.
+    static ROOM: RefCell<Room> = RefCell::default();
+}
+
+/// What one page after the other is read into.
+#[derive(Default)]
+struct Room {
+    stored: Vec<u8>,
+    page: Vec<u8>,
+    zstd: Option<Decompressor<'static>>,
+}
+
+/// How the numbers of a chunk lie in its pages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Form {
+    is_double: bool,
+    is_zstd: bool,
+    may_miss: bool,
+}
+
+impl Form {
+    fn of(chunk: &ColumnChunkMetaData) -> Option<Self> {
+        let column = chunk.column_descr();
+        let is_double = match column.physical_type() {
+            Type::DOUBLE => true,
+            Type::FLOAT => false,
+            _ => return None,
+        };
+        let is_zstd = match chunk.compression() {
+            Compression::ZSTD(_) => true,
+            Compression::UNCOMPRESSED => false,
+            _ => return None,
+        };
+        let is_flat = column.max_rep_level() == 0 && column.max_def_level() <= 1;
+        is_flat.then_some(Self { is_double, is_zstd, may_miss: column.max_def_level() == 1 })
+    }
+
+    fn width(self) -> usize {
+        if self.is_double { 8 } else { 4 }
+    }
+}
+
+/// Appends every number of a chunk as `convert` makes it; a null is NaN. False, and nothing appended, where the chunk
+/// must be left to Parquet's own reader.
+pub(crate) fn append(
+    file: &File,
+    chunk: &ColumnChunkMetaData,
+    convert: impl Fn(f64) -> f64 + Copy,
+    into: &mut Vec<f64>,
+) -> bool {
+    let before = into.len();
+    let done = Form::of(chunk).and_then(|form| {
+        ROOM.with_borrow_mut(|room| {
+            let done = room.append(file, chunk, form, convert, into);
+            room.tidy();
+            done
+        })
+    });
+    if done.is_none() {
+        into.truncate(before);
+    }
+    done.is_some()
+}
+
+impl Room {
+    fn append(
+        &mut self,
+        file: &File,
+        chunk: &ColumnChunkMetaData,
+        form: Form,
+        convert: impl Fn(f64) -> f64 + Copy,
+        into: &mut Vec<f64>,
+    ) -> Option<()> {
+        let (start, bytes) = chunk.byte_range();
+        let mut pages = Pages::of(file, start, bytes);
+        while let Some(page) = pages.next().ok()? {
+            let data = Data::of(&page.header, form)?;
+            self.read(file, &page)?;
+            let body = self.unpacked(&page.header, data, form)?;
+            let (levels, body) = data.parted(body)?;
+            let numbers = Numbers { bytes: body, is_split: data.is_split, width: form.width() };
+            numbers.append(levels, data.values, convert, into)?;
+        }
+        Some(())
+    }
+
+    /// The bytes of a page as they are stored, if they are those that its checksum was made of.
+    fn read(&mut self, file: &File, page: &Page) -> Option<()> {
+        self.stored.resize(usize::try_from(page.header.compressed_page_size).ok()?, 0);
+        positioned::read_exact(file, &mut self.stored, page.body_start).ok()?;
+        let is_whole = |crc: i32| crc32fast::hash(&self.stored) == crc as u32;
+        page.header.crc.is_none_or(is_whole).then_some(())
+    }
+
+    /// The bytes of a page as they were before compression.
+    fn unpacked(&mut self, header: &PageHeader, data: Data, form: Form) -> Option<&[u8]> {
+        if !form.is_zstd || !data.is_compressed {
+            return Some(&self.stored);
+        }
+        let plain = self.stored.get(..data.apart)?;
+        self.page.resize(usize::try_from(header.uncompressed_page_size).ok()?, 0);
+        let (head, rest) = self.page.split_at_mut_checked(data.apart)?;
+        head.copy_from_slice(plain);
+        if self.zstd.is_none() {
+            self.zstd = Decompressor::new().ok();
+        }
+        let bytes = self.zstd.as_mut()?.decompress_to_buffer(&self.stored[data.apart..], rest).ok()?;
+        (bytes == rest.len()).then_some(&self.page)
+    }
+
+    fn tidy(&mut self) {
+        for buffer in [&mut self.stored, &mut self.page] {
+            if buffer.capacity() > KEPT_BYTES {
+                *buffer = Vec::new();
+            }
+        }
+    }
+}
+
+/// What a page's header says of the numbers in it.
+#[derive(Debug, Clone, Copy)]
+struct Data {
+    /// Numbers, missing ones included.
+    values: usize,
+    is_split: bool,
+    is_compressed: bool,
+    /// Bytes of levels that lie before what is compressed.
+    apart: usize,
+    levels: Levels,
+}
+
+/// Where the marks of missing numbers lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Levels {
+    /// Nowhere: nothing is missing.
+    None,
+    /// Before the numbers, after their own length.
+    Counted,
+    /// Before the numbers, so many bytes.
+    Bytes(usize),
+}
+
+impl Data {
+    fn of(header: &PageHeader, form: Form) -> Option<Self> {
+        match header.type_ {
+            PageType::DATA_PAGE => Self::first(header.data_page_header.as_ref()?, form),
+            PageType::DATA_PAGE_V2 => Self::second(header.data_page_header_v2.as_ref()?),
+            _ => None,
+        }
+    }
+
+    fn first(header: &DataPageHeader, form: Form) -> Option<Self> {
+        if form.may_miss && header.definition_level_encoding != Encoding::RLE {
+            return None;
+        }
+        let levels = if form.may_miss { Levels::Counted } else { Levels::None };
+        let (values, is_split) = (usize::try_from(header.num_values).ok()?, is_split(header.encoding)?);
+        Some(Self { values, is_split, is_compressed: true, apart: 0, levels })
+    }
+
+    fn second(header: &DataPageHeaderV2) -> Option<Self> {
+        let apart = usize::try_from(header.definition_levels_byte_length).ok()?;
+        if header.repetition_levels_byte_length != 0 {
+            return None;
+        }
+        let (values, is_split) = (usize::try_from(header.num_values).ok()?, is_split(header.encoding)?);
+        let is_compressed = header.is_compressed.unwrap_or(true);
+        Some(Self { values, is_split, is_compressed, apart, levels: Levels::Bytes(apart) })
+    }
+
+    /// A page's bytes, parted into levels and numbers.
+    fn parted<'p>(&self, body: &'p [u8]) -> Option<(Option<&'p [u8]>, &'p [u8])> {
+        match self.levels {
+            Levels::None | Levels::Bytes(0) => Some((None, body)),
+            Levels::Bytes(bytes) => body.split_at_checked(bytes).map(|(levels, rest)| (Some(levels), rest)),
+            Levels::Counted => {
+                let (length, rest) = body.split_first_chunk()?;
+                let (levels, rest) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
+                Some((Some(levels), rest))
+            }
+        }
+    }
+}
+
+fn is_split(encoding: Encoding) -> Option<bool> {
+    match encoding {
+        Encoding::PLAIN => Some(false),
+        Encoding::BYTE_STREAM_SPLIT => Some(true),
+        _ => None,
+    }
+}
+
+/// The numbers of a page, without the missing ones.
+#[derive(Debug, Clone, Copy)]
+struct Numbers<'p> {
+    bytes: &'p [u8],
+    is_split: bool,
+    width: usize,
+}
+
+impl Numbers<'_> {
+    fn append(
+        self,
+        levels: Option<&[u8]>,
+        values: usize,
+        convert: impl Fn(f64) -> f64 + Copy,
+        into: &mut Vec<f64>,
+    ) -> Option<()> {
+        let Some(levels) = levels else { return self.append_from(0, values, values, convert, into) };
+        let present = present(levels, values)?;
+        let count = present.iter().filter(|run| run.is_present).map(|run| run.values).sum();
+        let mut from = 0;
+        for run in present {
+            if run.is_present {
+                self.append_from(from, run.values, count, convert, into)?;
+                from += run.values;
+            } else {
+                into.extend(std::iter::repeat_n(convert(f64::NAN), run.values));
+            }
+        }
+        Some(())
+    }
+
+    /// Appends some of the page's `count` numbers.
+    fn append_from(
+        self,
+        from: usize,
+        values: usize,
+        count: usize,
+        convert: impl Fn(f64) -> f64 + Copy,
+        into: &mut Vec<f64>,
+    ) -> Option<()> {
+        if self.bytes.len() != count.checked_mul(self.width)? {
+            return None;
+        }
+        let end = from + values;
+        match (self.width, self.is_split) {
+            (8, false) => {
+                let bytes = self.bytes[8 * from..8 * end].as_chunks::<8>().0;
+                into.extend(bytes.iter().map(|b| convert(f64::from_le_bytes(*b))));
+            }
+            (_, false) => {
+                let bytes = self.bytes[4 * from..4 * end].as_chunks::<4>().0;
+                into.extend(bytes.iter().map(|b| convert(f32::from_le_bytes(*b).into())));
+            }
+            (8, true) => {
+                let streams: [&[u8]; 8] = std::array::from_fn(|k| &self.bytes[k * count + from..][..values]);
+                joined(streams, eight, |tile| {
+                    into.extend(tile.iter().map(|bits| convert(f64::from_bits(*bits))));
+                });
+            }
+            (_, true) => {
+                let streams: [&[u8]; 4] = std::array::from_fn(|k| &self.bytes[k * count + from..][..values]);
+                joined(streams, four, |tile| {
+                    into.extend(tile.iter().map(|bits| convert(f32::from_bits(*bits).into())));
+                });
+            }
+        }
+        Some(())
+    }
+}
+
+/// Brings streams of one length together, a tile of values at a time: byte k of every value lies in stream k.
+#[inline]
+fn joined<const WIDTH: usize, T>(
+    streams: [&[u8]; WIDTH],
+    join: impl Fn(&[[u8; TILE]; WIDTH]) -> [T; TILE],
+    mut take: impl FnMut(&[T]),
+) {
+    let mut tile = [[0; TILE]; WIDTH];
+    let whole = streams[0].len() / TILE * TILE;
+    for at in (0..whole).step_by(TILE) {
+        for (line, stream) in tile.iter_mut().zip(streams) {
+            line.copy_from_slice(&stream[at..at + TILE]);
+        }
+        take(&join(&tile));
+    }
+    for (line, stream) in tile.iter_mut().zip(streams) {
+        line[..stream.len() - whole].copy_from_slice(&stream[whole..]);
+    }
+    take(&join(&tile)[..streams[0].len() - whole]);
+}
+
+/// Doubles from their bytes: pairs first, then pairs of those, which vectors do for a whole tile.
+#[inline]
+fn eight([a, b, c, d, e, f, g, h]: &[[u8; TILE]; 8]) -> [u64; TILE] {
+    let (low, high) = (fours([a, b, c, d]), fours([e, f, g, h]));
+    let mut joined = [0; TILE];
+    for (k, value) in joined.iter_mut().enumerate() {
+        *value = u64::from(low[k]) | u64::from(high[k]) << 32;
+    }
+    joined
+}
+
+/// Floats from their bytes.
+#[inline]
+fn four([a, b, c, d]: &[[u8; TILE]; 4]) -> [u32; TILE] {
+    fours([a, b, c, d])
+}
+
+#[inline]
+fn fours([a, b, c, d]: [&[u8; TILE]; 4]) -> [u32; TILE] {
+    let (low, high) = (pairs(a, b), pairs(c, d));
+    let mut joined = [0; TILE];
+    for (k, value) in joined.iter_mut().enumerate() {
+        *value = u32::from(low[k]) | u32::from(high[k]) << 16;
+    }
+    joined
+}
+
+#[inline]
+fn pairs(low: &[u8; TILE], high: &[u8; TILE]) -> [u16; TILE] {
+    let mut joined = [0; TILE];
+    for (k, value) in joined.iter_mut().enumerate() {
+        *value = u16::from(low[k]) | u16::from(high[k]) << 8;
+    }
+    joined
+}
+
+/// Numbers in a row that are all there or all missing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Run {
+    is_present: bool,
+    values: usize,
+}
+
+/// The marks of a page's values, where a mark is one bit: runs, and bits in eights (the Parquet format's
+/// RLE/bit-packed hybrid). None where they end early.
+fn present(mut levels: &[u8], values: usize) -> Option<Vec<Run>> {
+    let (mut runs, mut left) = (Vec::new(), values);
+    while left > 0 {
+        let header = unsigned(&mut levels)?;
+        if header & 1 == 0 {
+            let count = usize::try_from(header >> 1).ok()?.min(left);
+            let (mark, rest) = levels.split_first()?;
+            (levels, left) = (rest, left - count);
+            extend(&mut runs, mark & 1 == 1, count);
+        } else {
+            let (bytes, rest) = levels.split_at_checked(usize::try_from(header >> 1).ok()?)?;
+            let count = bytes.len().saturating_mul(8).min(left);
+            (0..count).for_each(|k| extend(&mut runs, bytes[k / 8] >> (k % 8) & 1 == 1, 1));
+            (levels, left) = (rest, left - count);
+        }
+        if header < 2 {
+            return None;
+        }
+    }
+    Some(runs)
+}
+
+fn extend(runs: &mut Vec<Run>, is_present: bool, values: usize) {
+    match runs.last_mut() {
+        Some(run) if run.is_present == is_present => run.values += values,
+        _ => runs.push(Run { is_present, values }),
+    }
+}
+
+/// A number in sevens of bits, the lowest first.
+fn unsigned(bytes: &mut &[u8]) -> Option<u64> {
+    let mut number = 0;
+    for shift in (0..63).step_by(7) {
+        let (byte, rest) = bytes.split_first()?;
+        *bytes = rest;
+        number |= u64::from(byte & 0x7f) << shift;
+        if byte & 0x80 == 0 {
+            return Some(number);
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow::array::{ArrayRef, Float32Array, Float64Array, RecordBatch};
+    use parquet::arrow::ArrowWriter;
+    use parquet::basic::{self, ZstdLevel};
+    use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
+    use parquet::file::properties::{WriterProperties, WriterVersion};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn zstd() -> Compression {
+        Compression::ZSTD(ZstdLevel::default())
+    }
+
+    /// How a file is written.
+    #[derive(Debug, Clone, Copy)]
+    struct Written {
+        is_double: bool,
+        version: WriterVersion,
+        compression: Compression,
+        encoding: basic::Encoding,
+    }
+
+    fn properties(written: Written) -> WriterProperties {
+        WriterProperties::builder()
+            .set_writer_version(written.version)
+            .set_compression(written.compression)
+            .set_encoding(written.encoding)
+            .set_dictionary_enabled(false)
+            .set_data_page_row_count_limit(100)
+            .set_write_batch_size(50)
+            .set_max_row_group_row_count(Some(350))
+            .build()
+    }
+
+    /// Writes numbers by Parquet's own writer, and reads them straight, twice as large.
+    fn doubled(values: &[Option<f32>], written: Written) -> Option<Vec<f64>> {
+        let wide = || values.iter().map(|v| v.map(f64::from));
+        let array: ArrayRef = if written.is_double {
+            Arc::new(wide().collect::<Float64Array>())
+        } else {
+            Arc::new(values.iter().copied().collect::<Float32Array>())
+        };
+        let batch = RecordBatch::try_from_iter_with_nullable([("x", array, values.contains(&None))]).unwrap();
+        let file = tempfile::tempfile().unwrap();
+        let sink = file.try_clone().unwrap();
+        let mut writer = ArrowWriter::try_new(sink, batch.schema(), Some(properties(written))).unwrap();
+        writer.write(&batch).unwrap();
+        writer.close().unwrap();
+        let footer: ParquetMetaData = ParquetMetaDataReader::new().parse_and_finish(&file).unwrap();
+        let mut read = Vec::new();
+        let all_straight = footer.row_groups().iter().all(|group| {
+            let before = read.len();
+            let straight = append(&file, group.column(0), |value| 2.0 * value, &mut read);
+            straight || read.len() != before
+        });
+        all_straight.then_some(read)
+    }
+
+    fn bits(values: impl Iterator<Item = f64>) -> Vec<u64> {
+        values.map(|v| if v.is_nan() { u64::MAX } else { v.to_bits() }).collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        /// Pages of both versions, both widths, split or not, compressed or not, with missing values or without:
+        /// every number comes back, doubled.
+        #[test]
+        fn numbers_come_back_as_they_were_written(
+            values in proptest::collection::vec(proptest::option::weighted(0.9, -1e30_f32..1e30), 1..900),
+            whole in any::<bool>(), is_double in any::<bool>(), second in any::<bool>(), packed in any::<bool>(),
+            split in any::<bool>(),
+        ) {
+            let values: Vec<_> = values.into_iter().map(|v| if whole { v.or(Some(0.5)) } else { v }).collect();
+            let written = Written {
+                is_double,
+                version: if second { WriterVersion::PARQUET_2_0 } else { WriterVersion::PARQUET_1_0 },
+                compression: if packed { zstd() } else { Compression::UNCOMPRESSED },
+                encoding: if split { basic::Encoding::BYTE_STREAM_SPLIT } else { basic::Encoding::PLAIN },
+            };
+            let read = doubled(&values, written).unwrap();
+            let wanted = values.iter().map(|v| v.map_or(f64::NAN, |v| 2.0 * f64::from(v)));
+            prop_assert_eq!(bits(read.into_iter()), bits(wanted));
+        }
+    }
+
+    #[test]
+    fn other_kinds_are_left_to_parquets_own_reader() {
+        let usual = Written {
+            is_double: true,
+            version: WriterVersion::PARQUET_1_0,
+            compression: zstd(),
+            encoding: basic::Encoding::PLAIN,
+        };
+        let values: Vec<Option<f32>> = (0..500).map(|k| Some(k as f32)).collect();
+        assert!(doubled(&values, usual).is_some());
+        assert_eq!(doubled(&values, Written { compression: Compression::SNAPPY, ..usual }), None);
+    }
+
+    /// The Parquet format's own example of its hybrid: 3 in one byte of bits, then a run.
+    #[test]
+    fn marks_are_read_from_bits_and_from_runs() {
+        let run = |is_present, values| Run { is_present, values };
+        // One group of eight bits (1, 0, 1, 1, 1, 1, 1, 1), then four times 0.
+        let found = present(&[0b11, 0b1111_1101, 4 << 1, 0], 12);
+        assert_eq!(found, Some(vec![run(true, 1), run(false, 1), run(true, 6), run(false, 4)]));
+        assert_eq!(present(&[0b11, 0xff], 9), None);
+        assert_eq!(present(&[0, 1, 0, 1], 9), None);
+    }
+}
