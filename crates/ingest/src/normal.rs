@@ -86,12 +86,12 @@ impl Normalized {
         if self.segments.iter().any(|s| s.start > s.end || s.end > dx_m.len()) {
             return Err(file.error(Fault::Normalized { detail: "a stretch lies beyond its rows".into() }));
         }
-        let missing = dx_m.iter().filter(|y| y.is_nan()).count();
+        let quality = [&motor_m, &dx_m, &load_n].map(|values| Quality::of(values, self.step_s));
         Ok(Actuator {
             position,
             step_s: self.step_s,
-            missing_share: missing as f64 / dx_m.len().max(1) as f64,
-            quality: [&motor_m, &dx_m, &load_n].map(|values| Quality::of(values, self.step_s)),
+            missing_share: quality[1].missing_share,
+            quality,
             motor_m,
             dx_m,
             load_n,

@@ -6,7 +6,9 @@
 
 use std::cell::RefCell;
 use std::fs::File;
+use std::ops::Range;
 
+use multiversion::multiversion;
 use parquet::basic::{Compression, Type};
 use parquet::file::metadata::ColumnChunkMetaData;
 use polars_parquet_format::{DataPageHeader, DataPageHeaderV2, Encoding, PageHeader, PageType};
@@ -17,8 +19,10 @@ use crate::positioned;
 
 /// Buffers above this are given back after use, bytes: pages are about a mebibyte.
 const KEPT_BYTES: usize = 4 << 20;
-/// Values that are brought together from their streams at a time.
+/// Values that are brought together from their streams at a time, and handed over at a time.
 const TILE: usize = 16;
+/// See [`TILE`].
+const BATCH: usize = 512;
 
 thread_local! {
     /// Pages come one after the other: each is read into the memory of the one before.
@@ -266,64 +270,79 @@ impl Numbers<'_> {
                 let bytes = self.bytes[4 * from..4 * end].as_chunks::<4>().0;
                 into.extend(bytes.iter().map(|b| convert(f32::from_le_bytes(*b).into())));
             }
-            (8, true) => {
-                let streams: [&[u8]; 8] = std::array::from_fn(|k| &self.bytes[k * count + from..][..values]);
-                joined(streams, eight, |tile| {
-                    into.extend(tile.iter().map(|bits| convert(f64::from_bits(*bits))));
-                });
-            }
-            (_, true) => {
-                let streams: [&[u8]; 4] = std::array::from_fn(|k| &self.bytes[k * count + from..][..values]);
-                joined(streams, four, |tile| {
-                    into.extend(tile.iter().map(|bits| convert(f32::from_bits(*bits).into())));
-                });
-            }
+            (8, true) => self.joined(from..end, count, eights, |batch| {
+                into.extend(batch.iter().map(|bits| convert(f64::from_bits(*bits))));
+            }),
+            (_, true) => self.joined(from..end, count, fours, |batch| {
+                into.extend(batch.iter().map(|bits| convert(f32::from_bits(*bits).into())));
+            }),
         }
         Some(())
     }
-}
 
-/// Brings streams of one length together, a tile of values at a time: byte k of every value lies in stream k.
-#[inline]
-fn joined<const WIDTH: usize, T>(
-    streams: [&[u8]; WIDTH],
-    join: impl Fn(&[[u8; TILE]; WIDTH]) -> [T; TILE],
-    mut take: impl FnMut(&[T]),
-) {
-    let mut tile = [[0; TILE]; WIDTH];
-    let whole = streams[0].len() / TILE * TILE;
-    for at in (0..whole).step_by(TILE) {
-        for (line, stream) in tile.iter_mut().zip(streams) {
-            line.copy_from_slice(&stream[at..at + TILE]);
+    /// Hands over some of the page's `count` numbers, batch by batch, brought together from their streams: byte k of
+    /// every number lies in stream k.
+    fn joined<const WIDTH: usize, T: Copy + Default>(
+        self,
+        numbers: Range<usize>,
+        count: usize,
+        join: fn([&[u8]; WIDTH], &mut [T]),
+        mut take: impl FnMut(&[T]),
+    ) {
+        let mut batch = [T::default(); BATCH];
+        for start in numbers.clone().step_by(BATCH) {
+            let batch = &mut batch[..BATCH.min(numbers.end - start)];
+            join(std::array::from_fn(|k| &self.bytes[k * count + start..][..batch.len()]), batch);
+            take(batch);
         }
-        take(&join(&tile));
     }
-    for (line, stream) in tile.iter_mut().zip(streams) {
-        line[..stream.len() - whole].copy_from_slice(&stream[whole..]);
-    }
-    take(&join(&tile)[..streams[0].len() - whole]);
 }
 
-/// Doubles from their bytes: pairs first, then pairs of those, which vectors do for a whole tile.
-#[inline]
-fn eight([a, b, c, d, e, f, g, h]: &[[u8; TILE]; 8]) -> [u64; TILE] {
-    let (low, high) = (fours([a, b, c, d]), fours([e, f, g, h]));
-    let mut joined = [0; TILE];
-    for (k, value) in joined.iter_mut().enumerate() {
-        *value = u64::from(low[k]) | u64::from(high[k]) << 32;
+/// The bits of doubles from their bytes: pairs first, then pairs of those, which vectors do for a whole tile.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn eights(streams: [&[u8]; 8], joined: &mut [u64]) {
+    let whole = joined.len() / TILE * TILE;
+    for at in (0..whole).step_by(TILE) {
+        let [a, b, c, d, e, f, g, h] = tiles(&streams, at);
+        let (low, high) = (four(a, b, c, d), four(e, f, g, h));
+        for (k, value) in joined[at..at + TILE].iter_mut().enumerate() {
+            *value = u64::from(low[k]) | u64::from(high[k]) << 32;
+        }
     }
-    joined
+    for (k, value) in joined.iter_mut().enumerate().skip(whole) {
+        *value = u64::from_le_bytes(streams.map(|stream| stream[k]));
+    }
 }
 
-/// Floats from their bytes.
-#[inline]
-fn four([a, b, c, d]: &[[u8; TILE]; 4]) -> [u32; TILE] {
-    fours([a, b, c, d])
+/// The bits of floats from their bytes.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
+fn fours(streams: [&[u8]; 4], joined: &mut [u32]) {
+    let whole = joined.len() / TILE * TILE;
+    for at in (0..whole).step_by(TILE) {
+        let [a, b, c, d] = tiles(&streams, at);
+        joined[at..at + TILE].copy_from_slice(&four(a, b, c, d));
+    }
+    for (k, value) in joined.iter_mut().enumerate().skip(whole) {
+        *value = u32::from_le_bytes(streams.map(|stream| stream[k]));
+    }
 }
 
-#[inline]
-fn fours([a, b, c, d]: [&[u8; TILE]; 4]) -> [u32; TILE] {
-    let (low, high) = (pairs(a, b), pairs(c, d));
+type Tile = [u8; TILE];
+
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "compiled within each of the kinds of vectors")]
+fn tiles<const WIDTH: usize>(streams: &[&[u8]; WIDTH], at: usize) -> [Tile; WIDTH] {
+    let mut tiles = [[0; TILE]; WIDTH];
+    for (tile, stream) in tiles.iter_mut().zip(streams) {
+        tile.copy_from_slice(&stream[at..at + TILE]);
+    }
+    tiles
+}
+
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "as above")]
+fn four(a: Tile, b: Tile, c: Tile, d: Tile) -> [u32; TILE] {
+    let (low, high) = (pair(a, b), pair(c, d));
     let mut joined = [0; TILE];
     for (k, value) in joined.iter_mut().enumerate() {
         *value = u32::from(low[k]) | u32::from(high[k]) << 16;
@@ -331,8 +350,9 @@ fn fours([a, b, c, d]: [&[u8; TILE]; 4]) -> [u32; TILE] {
     joined
 }
 
-#[inline]
-fn pairs(low: &[u8; TILE], high: &[u8; TILE]) -> [u16; TILE] {
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "as above")]
+fn pair(low: Tile, high: Tile) -> [u16; TILE] {
     let mut joined = [0; TILE];
     for (k, value) in joined.iter_mut().enumerate() {
         *value = u16::from(low[k]) | u16::from(high[k]) << 8;

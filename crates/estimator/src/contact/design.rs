@@ -24,8 +24,11 @@ pub(super) const SHARE: usize = 4;
 pub(super) const SPEED: usize = 5;
 /// Drift: t and t², from −1 to 1.
 pub(super) const DRIFT: usize = 6;
+const DRIFT_SQUARE: usize = 7;
 /// Transducer error: X, X² and X³, from −1 to 1.
 pub(super) const PLACE: usize = 8;
+const PLACE_SQUARE: usize = 9;
+const PLACE_CUBE: usize = 10;
 /// Ḟ: a load channel that lags.
 pub(super) const LOAD_RATE: usize = 11;
 /// Softness at low load.
@@ -342,19 +345,23 @@ impl Ground<'_> {
         }
         // The screw's own place: its transducer's slope acts on the gap as well.
         let place = (blocks.motor_m[k] + y_m - frame.place_m.0) / frame.place_m.1;
-        let mut x = [0.0; N];
-        x[ORIGIN] = 1.0;
-        x[GAP] = 0.5 * side;
-        x[FORCE] = press.force;
-        x[DRY] = press.by_dry;
-        x[SHARE] = press.by_share;
-        x[SPEED] = speed;
-        x[DRIFT..PLACE].copy_from_slice(&[time, time * time]);
-        x[PLACE..LOAD_RATE].copy_from_slice(&[place, place * place, place * place * place]);
-        x[LOAD_RATE] = load_rate;
-        if N == CURVED {
-            x[BEND..].copy_from_slice(&bends(press.force.abs()).map(|bend| side * bend));
-        }
+        let bends = if N == CURVED { bends(press.force.abs()) } else { [0.0; CURVED - LINEAR] };
+        // Each entry by itself: an array that is filled in pieces must be read back piece by piece.
+        let x = std::array::from_fn(|column| match column {
+            ORIGIN => 1.0,
+            GAP => 0.5 * side,
+            FORCE => press.force,
+            DRY => press.by_dry,
+            SHARE => press.by_share,
+            SPEED => speed,
+            DRIFT => time,
+            DRIFT_SQUARE => time * time,
+            PLACE => place,
+            PLACE_SQUARE => place * place,
+            PLACE_CUBE => place * place * place,
+            LOAD_RATE => load_rate,
+            bend => side * bends[bend - BEND],
+        });
         Some(Row { x, y_m, blocks: 1.0, stretch: pace.stretch[k] })
     }
 }
