@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use crate::wide::widest;
-
 /// A load counts as being on a side beyond this share of its greater quantile, so noise about zero is no reversal.
 const SIDE_SHARE: f64 = 0.12;
 
@@ -90,9 +88,11 @@ fn quantiles(load_n: &[f64], segments: &[Range<usize>]) -> Option<[f64; 2]> {
     let mut count = 0;
     for segment in segments {
         let (groups, rest) = load_n[segment.clone()].as_chunks::<GROUP>();
-        count += take(groups, &mut brackets);
-        count += rest.iter().filter(|f| !f.is_nan()).count();
-        brackets.iter_mut().for_each(|bracket| bracket.take(rest));
+        for bracket in &mut brackets {
+            groups.iter().for_each(|group| bracket.take(group));
+            bracket.take(rest);
+        }
+        count += load_n[segment.clone()].iter().filter(|f| !f.is_nan()).count();
     }
     let last = count.checked_sub(1)?;
     let found = brackets.map(|bracket| bracket.quantile(last));
@@ -122,48 +122,19 @@ impl Bracket {
         Self { share, least, greatest, below: 0, within: Vec::new() }
     }
 
-    fn take(&mut self, loads_n: &[f64]) {
-        self.below += loads_n.iter().filter(|f| **f < self.least).count();
-        self.note(loads_n);
-    }
-
-    /// Keeps the loads that lie within.
-    fn note(&mut self, loads_n: &[f64]) {
-        self.within.extend(loads_n.iter().filter(|f| **f >= self.least && **f <= self.greatest));
+    #[inline]
+    fn take(&mut self, group: &[f64]) {
+        self.below += group.iter().filter(|f| **f < self.least).count();
+        let is_within = |f: &&f64| **f >= self.least && **f <= self.greatest;
+        if group.iter().filter(is_within).count() > 0 {
+            self.within.extend(group.iter().filter(is_within));
+        }
     }
 
     /// None where it lies outside.
     fn quantile(mut self, last: usize) -> Option<f64> {
         let at = rank(last, self.share).checked_sub(self.below)?;
         (at < self.within.len()).then(|| *self.within.select_nth_unstable_by(at, f64::total_cmp).1)
-    }
-}
-
-widest! {
-    /// Lets both brackets see groups of loads; how many of these are there.
-    fn take(groups: &[[f64; GROUP]], brackets: &mut [Bracket; 2]) -> usize {
-        let (mut present, mut below) = ([0_u64; GROUP], [[0_u64; GROUP]; 2]);
-        let [low, high] = brackets;
-        for group in groups {
-            let (mut in_low, mut in_high) = (0_u64, 0_u64);
-            for lane in 0..GROUP {
-                let f = group[lane];
-                present[lane] += u64::from(!f.is_nan());
-                below[0][lane] += u64::from(f < low.least);
-                below[1][lane] += u64::from(f < high.least);
-                in_low += u64::from(f >= low.least) * u64::from(f <= low.greatest);
-                in_high += u64::from(f >= high.least) * u64::from(f <= high.greatest);
-            }
-            if in_low > 0 {
-                low.note(group);
-            }
-            if in_high > 0 {
-                high.note(group);
-            }
-        }
-        low.below += below[0].iter().sum::<u64>() as usize;
-        high.below += below[1].iter().sum::<u64>() as usize;
-        present.iter().sum::<u64>() as usize
     }
 }
 

@@ -19,9 +19,7 @@ use crate::positioned;
 
 /// Buffers above this are given back after use, bytes: pages are about a mebibyte.
 const KEPT_BYTES: usize = 4 << 20;
-/// Values that are brought together from their streams at a time, and handed over at a time.
-const TILE: usize = 16;
-/// See [`TILE`].
+/// Values that are brought together from their streams at a time.
 const BATCH: usize = 512;
 
 thread_local! {
@@ -298,66 +296,29 @@ impl Numbers<'_> {
     }
 }
 
-/// The bits of doubles from their bytes: pairs first, then pairs of those, which vectors do for a whole tile.
+/// The bits of doubles from their bytes.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn eights(streams: [&[u8]; 8], joined: &mut [u64]) {
-    let whole = joined.len() / TILE * TILE;
-    for at in (0..whole).step_by(TILE) {
-        let [a, b, c, d, e, f, g, h] = tiles(&streams, at);
-        let (low, high) = (four(a, b, c, d), four(e, f, g, h));
-        for (k, value) in joined[at..at + TILE].iter_mut().enumerate() {
-            *value = u64::from(low[k]) | u64::from(high[k]) << 32;
-        }
-    }
-    for (k, value) in joined.iter_mut().enumerate().skip(whole) {
-        *value = u64::from_le_bytes(streams.map(|stream| stream[k]));
+fn eights([a, b, c, d, e, f, g, h]: [&[u8]; 8], joined: &mut [u64]) {
+    let wide = |byte: u8, place: u32| u64::from(byte) << (8 * place);
+    let count = joined.len();
+    // Slices that are known to be of one length need no look at their ends in the loop.
+    let (a, b, c, d) = (&a[..count], &b[..count], &c[..count], &d[..count]);
+    let (e, f, g, h) = (&e[..count], &f[..count], &g[..count], &h[..count]);
+    for k in 0..count {
+        let low = wide(a[k], 0) | wide(b[k], 1) | wide(c[k], 2) | wide(d[k], 3);
+        joined[k] = low | wide(e[k], 4) | wide(f[k], 5) | wide(g[k], 6) | wide(h[k], 7);
     }
 }
 
 /// The bits of floats from their bytes.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512vl", "x86_64+avx2"))]
-fn fours(streams: [&[u8]; 4], joined: &mut [u32]) {
-    let whole = joined.len() / TILE * TILE;
-    for at in (0..whole).step_by(TILE) {
-        let [a, b, c, d] = tiles(&streams, at);
-        joined[at..at + TILE].copy_from_slice(&four(a, b, c, d));
+fn fours([a, b, c, d]: [&[u8]; 4], joined: &mut [u32]) {
+    let wide = |byte: u8, place: u32| u32::from(byte) << (8 * place);
+    let count = joined.len();
+    let (a, b, c, d) = (&a[..count], &b[..count], &c[..count], &d[..count]);
+    for k in 0..count {
+        joined[k] = wide(a[k], 0) | wide(b[k], 1) | wide(c[k], 2) | wide(d[k], 3);
     }
-    for (k, value) in joined.iter_mut().enumerate().skip(whole) {
-        *value = u32::from_le_bytes(streams.map(|stream| stream[k]));
-    }
-}
-
-type Tile = [u8; TILE];
-
-#[inline(always)]
-#[allow(clippy::inline_always, reason = "compiled within each of the kinds of vectors")]
-fn tiles<const WIDTH: usize>(streams: &[&[u8]; WIDTH], at: usize) -> [Tile; WIDTH] {
-    let mut tiles = [[0; TILE]; WIDTH];
-    for (tile, stream) in tiles.iter_mut().zip(streams) {
-        tile.copy_from_slice(&stream[at..at + TILE]);
-    }
-    tiles
-}
-
-#[inline(always)]
-#[allow(clippy::inline_always, reason = "as above")]
-fn four(a: Tile, b: Tile, c: Tile, d: Tile) -> [u32; TILE] {
-    let (low, high) = (pair(a, b), pair(c, d));
-    let mut joined = [0; TILE];
-    for (k, value) in joined.iter_mut().enumerate() {
-        *value = u32::from(low[k]) | u32::from(high[k]) << 16;
-    }
-    joined
-}
-
-#[inline(always)]
-#[allow(clippy::inline_always, reason = "as above")]
-fn pair(low: Tile, high: Tile) -> [u16; TILE] {
-    let mut joined = [0; TILE];
-    for (k, value) in joined.iter_mut().enumerate() {
-        *value = u16::from(low[k]) | u16::from(high[k]) << 8;
-    }
-    joined
 }
 
 /// Numbers in a row that are all there or all missing.
