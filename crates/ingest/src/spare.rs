@@ -6,7 +6,7 @@
 use std::cell::RefCell;
 
 /// Columns that a thread keeps: an actuator has three.
-const KEPT: usize = 4;
+const KEPT: usize = 3;
 /// Longer ones are given back: a flight of two hours at 250 Hz is shorter.
 const LONGEST: usize = 2 << 20;
 
