@@ -25,7 +25,7 @@ const VISIBLE_M: f64 = 3e-6;
 /// The true law is seldom one of the bank's, so what the gaps say for one curve and against its neighbours
 /// is worth less than the likelihood has it: plain 90 % intervals held 85 and 86 % on two simulated
 /// fleets. Weights to a power below one would hold as well, but move the middle away from the truth.
-pub(crate) const USUAL_WIDTH: f64 = 1.2;
+pub(crate) const USUAL_WIDTH: f64 = 1.25;
 
 /// Cuts that the usual miss is worth: enough that thirty units may outvote it.
 const PSEUDO_CUTS: f64 = 20.0;
