@@ -43,7 +43,7 @@ pub struct Prior {
     pub life_p05_hours: f64,
     pub life_p50_hours: f64,
     pub life_p95_hours: f64,
-    /// How much wider forecasts are stated than the curves alone have them.
+    /// How much wider forecasts are stated than is usual.
     pub widening: f64,
 }
 

@@ -264,11 +264,11 @@ fn prior(report: &Report, unit: &Unit) -> String {
             let wider = if p.widening > WIDER {
                 format!(
                     "Past forecasts of this fleet missed more often than they should: its intervals are {:.1} \
-                     times as wide as the curves alone have them.",
+                     times as wide as they usually are.",
                     p.widening
                 )
             } else {
-                "Past forecasts of this fleet held: its intervals stand as the curves have them.".to_owned()
+                "Past forecasts of this fleet held: its intervals are as wide as usual.".to_owned()
             };
             format!(
                 "Learned from {part} until {}: a new unit has {} ± {} µm; from new to the act limit it takes {} h, \
