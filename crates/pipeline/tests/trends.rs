@@ -96,6 +96,16 @@ fn neither_later_flights_nor_the_order_of_arrival_change_a_bit_of_a_statement() 
 }
 
 #[test]
+fn any_number_of_threads_says_the_same_to_the_last_bit() {
+    let rows = flown(150);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| said(&rows, day(149)))
+    };
+    assert_eq!(on(1), on(3));
+}
+
+#[test]
 fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
     for row in said(&flown(300), day(299)) {
         let hours = row.crossing_hours_p50.unwrap();
