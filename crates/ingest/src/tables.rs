@@ -51,8 +51,7 @@ impl Table {
     /// # Errors
     /// When the file cannot be read, or is not the table its name says.
     pub fn read(file: &Path) -> Result<Self, Error> {
-        let mut table =
-            Self { file: file.to_owned(), header: Vec::new(), rows: Vec::new(), names: Names::new() };
+        let mut table = Self::empty(file);
         for chunk in chunks(file, None)? {
             table.extend(&chunk?)?;
         }
@@ -64,10 +63,13 @@ impl Table {
     /// # Errors
     /// When a column is neither text, numbers nor times.
     pub fn of_batches(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
-        let mut table =
-            Self { file: name.to_owned(), header: Vec::new(), rows: Vec::new(), names: Names::new() };
+        let mut table = Self::empty(name);
         batches.iter().try_for_each(|batch| table.extend(&Chunk::new(name, batch.clone(), 0)))?;
         Ok(table)
+    }
+
+    fn empty(file: &Path) -> Self {
+        Self { file: file.to_owned(), header: Vec::new(), rows: Vec::new(), names: Names::new() }
     }
 
     fn extend(&mut self, chunk: &Chunk) -> Result<(), Error> {

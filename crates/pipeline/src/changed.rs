@@ -5,9 +5,9 @@
 
 use std::collections::BTreeMap;
 
-use jiff::Timestamp;
 use serde::Serialize;
 
+use crate::calendar::days;
 use crate::histories::HistoryName;
 use crate::trends::{ChangePoint, TrendRow};
 
@@ -61,8 +61,4 @@ fn beyond(events: &[ChangePoint], others: &[ChangePoint]) -> Vec<ChangePoint> {
         a.kind == b.kind && days(a.departure_utc, b.departure_utc).abs() <= SAME_EVENT_DAYS
     };
     events.iter().filter(|event| !others.iter().any(|other| is_like(event, other))).cloned().collect()
-}
-
-fn days(from: Timestamp, to: Timestamp) -> f64 {
-    to.duration_since(from).as_secs_f64() / 86_400.0
 }

@@ -341,6 +341,7 @@ impl Gathering {
     }
 }
 
-fn at(numbers: &Float64Array, row: usize) -> Option<f64> {
+/// The number of a row.
+pub(crate) fn at(numbers: &Float64Array, row: usize) -> Option<f64> {
     numbers.is_valid(row).then(|| numbers.value(row))
 }

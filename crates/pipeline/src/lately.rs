@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use arrow::array::{Array, Float64Array};
 use ingest::tables::Chunk;
 use jiff::{SignedDuration, Timestamp};
 use store::{Query, Store};
 
 use crate::error::Error;
+use crate::histories::at;
 
 /// As far back as is looked: some months of flights.
 const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
@@ -76,7 +76,6 @@ fn add(found: &mut Lately, chunk: &Chunk) -> Result<(), ingest::Error> {
     let [skews_s, stiffnesses, surprises] = ["skew_s", "stiffness_n_per_m", "nis"].map(numbers);
     let (skews_s, stiffnesses, surprises) = (skews_s?, stiffnesses?, surprises?);
     let departures = chunk.instants(Some(chunk.column(&["departure_utc"])?))?;
-    let at = |column: &Float64Array, row| column.is_valid(row).then(|| column.value(row));
     for row in 0..chunk.len() {
         let text = |name: Option<&str>| name.unwrap_or_default().to_owned();
         let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) else { continue };

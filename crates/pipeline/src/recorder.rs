@@ -5,8 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
 use serde::Serialize;
+use store::Store;
 
-use crate::lately::{Lately, Look, newest_utc};
+use crate::calendar::days;
+use crate::error::Error;
+use crate::lately::{Lately, Look, lately, newest_utc};
 
 /// What moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -71,6 +74,14 @@ struct Bounds {
 const SKEW_S: Bounds = Bounds { least_step: 0.5e-3, least_scatter: 0.05e-3 };
 /// Of the logarithm: 4 %, which no unit's stiffness does from one flight to the next.
 const LN_STIFFNESS: Bounds = Bounds { least_step: 0.04, least_scatter: 0.005 };
+
+/// What moved within the last month before a day that the store holds.
+///
+/// # Errors
+/// When the store cannot be read.
+pub(crate) fn moved_in_store(store: &Store, as_of: Timestamp) -> Result<Vec<Moved>, Error> {
+    Ok(moved(&lately(store, as_of)?))
+}
 
 /// The delays, and the stiffnesses of whole aircraft, that moved within the last month of these flights.
 ///
@@ -161,10 +172,6 @@ fn of_quantity(tails: &Tails<'_>, quantity: Quantity, bounds: Bounds) -> Vec<Mov
 fn shows(values: &[(Timestamp, f64)], since_utc: Timestamp) -> bool {
     let before = values.partition_point(|(at, _)| *at < since_utc);
     before >= LEAST_BEFORE && values.len() - before >= LEAST_AFTER
-}
-
-fn days(from: Timestamp, to: Timestamp) -> f64 {
-    to.duration_since(from).as_secs_f64() / 86_400.0
 }
 
 /// The clearest jump of a series: when, from where, to where.

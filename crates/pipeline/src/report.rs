@@ -12,10 +12,11 @@ use job::Config;
 use store::{Outcome, Store};
 use trend::Outlook;
 
+use crate::calendar::days;
 use crate::error::Error;
 use crate::histories::{Flown, Gathering, Histories, History, HistoryName as Name};
-use crate::lately::lately;
-use crate::recorder;
+use crate::recorder::moved_in_store;
+use crate::stays::Stays;
 use crate::trends::{self, Ask, Told, TrendRow};
 
 /// Days before the report of which statements are held against what came.
@@ -41,14 +42,13 @@ pub fn compose(
     let checks = inspections(config)?;
     let mut logs = Logs::of(store)?;
     let Read { histories, mut rest, store_version } = Read::until(ask.as_of_utc, store)?;
-    let as_of = ask.as_of_utc.or_else(|| histories.newest_utc());
-    let moved = as_of.map(|day| Ok::<_, Error>(recorder::moved(&lately(store, day)?))).transpose()?;
-    let moved = moved.unwrap_or_default();
+    let newest_departure_utc = histories.newest_utc();
+    let as_of = ask.as_of_utc.or(newest_departure_utc);
+    let moved = as_of.map(|as_of| moved_in_store(store, as_of)).transpose()?.unwrap_or_default();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
     let Told { now, drawn, before, priors } =
         trends::told(config, installations, &histories, ask, &days, moved)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
-    let newest_departure_utc = histories.newest_utc();
     let known = |c: &Check| histories.names().any(|name| c.is_of(name));
     let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
     let mut tails = tails(&histories);
@@ -56,7 +56,7 @@ pub fn compose(
         config,
         before: &by_name(before),
         checks: checks.as_deref().unwrap_or(&[]),
-        stays: &stays(installations),
+        stays: &Stays::new(installations),
     };
     let unit = |(row, drawn): (&TrendRow, &Outlook)| {
         let name = name_of(row);
@@ -192,16 +192,14 @@ struct Compose<'a> {
     config: &'a Config,
     before: &'a Before,
     checks: &'a [Check],
-    stays: &'a Stays,
+    stays: &'a Stays<'a>,
 }
 
 impl Compose<'_> {
     fn unit(&self, row: &TrendRow, drawn: &Outlook, history: &History, rest: &[Rest]) -> Unit {
         let flown = history.flights();
         let name = name_of(row);
-        let stays = self.stays.get(&name.1).map_or(&[][..], Vec::as_slice);
-        let mine = stays.iter().filter(|(part, _)| name.0.as_ref().is_none_or(|p| p == part));
-        let stays: Vec<Stay> = mine.map(|(_, stay)| stay.clone()).collect();
+        let stays: Vec<Stay> = self.stays.of(&name).into_iter().map(stay).collect();
         Unit {
             level: drawn
                 .past
@@ -276,22 +274,13 @@ impl Compose<'_> {
     }
 }
 
-/// Stays by serial number, each with its part number, earliest first.
-type Stays = BTreeMap<String, Vec<(String, Stay)>>;
-
-fn stays(installations: &Installations) -> Stays {
-    let mut stays = Stays::new();
-    for s in installations.iter() {
-        let stay = Stay {
-            tail_number: s.tail_number.to_string(),
-            position: s.position.to_string(),
-            installed_utc: s.installed_utc,
-            removed_utc: s.removed_utc,
-        };
-        stays.entry(s.serial_number.to_string()).or_default().push((s.part_number.to_string(), stay));
+fn stay(of: &fleet::Installation) -> Stay {
+    Stay {
+        tail_number: of.tail_number.to_string(),
+        position: of.position.to_string(),
+        installed_utc: of.installed_utc,
+        removed_utc: of.removed_utc,
     }
-    stays.values_mut().for_each(|stays| stays.sort_by_key(|(_, s)| s.installed_utc));
-    stays
 }
 
 /// The level then, grown at the rate then over the hours since; the errors of both levels and the
@@ -353,10 +342,6 @@ fn prior((part_number, learned_until_utc, prior): (Option<String>, Timestamp, tr
         life_p95_hours,
         widening: prior.widening(),
     }
-}
-
-fn days(from: Timestamp, to: Timestamp) -> f64 {
-    to.duration_since(from).as_secs_f64() / 86_400.0
 }
 
 /// So many days after; nothing where the calendar ends.

@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
-use trend::{ChangeKind, Trend};
+use trend::{Change, ChangeKind, Trend};
 
-use crate::histories::History;
+use crate::calendar::days;
+use crate::histories::{Flown, History};
 use crate::recorder::Moved;
 
 /// Steps of one tail this close together are one, days: a step is dated to within some flights.
@@ -16,12 +17,12 @@ const SHARE: f64 = 0.75;
 
 /// The changes, by tail and departure, that are a tail's and not a unit's.
 #[derive(Debug, Default)]
-pub(crate) struct TailWide(BTreeSet<(String, i64)>);
+pub(crate) struct TailWide(BTreeSet<(String, Timestamp)>);
 
 /// A change of one of the judged units.
 struct Made<'a> {
     tail_number: &'a str,
-    departure_us: i64,
+    departure_utc: Timestamp,
     kind: ChangeKind,
     unit: usize,
 }
@@ -41,33 +42,38 @@ impl TailWide {
             is_explained(change, moved)
                 || (change.kind == ChangeKind::Step && is_of_all(change, steps, judged))
         };
-        let wide = made.iter().filter(is_wide).map(|c| (c.tail_number.to_owned(), c.departure_us));
+        let wide = made.iter().filter(is_wide).map(|c| (c.tail_number.to_owned(), c.departure_utc));
         Self(wide.collect())
     }
 
-    /// Whether a change is its tail's.
-    pub(crate) fn holds(&self, tail_number: Option<&str>, departure_us: i64) -> bool {
-        tail_number.is_some_and(|tail| self.0.contains(&(tail.to_owned(), departure_us)))
+    /// The tail whose change it is; none where it is the unit's own.
+    pub(crate) fn tail<'a>(&self, change: &Change, history: &'a History) -> Option<&'a str> {
+        let (flown, tail_number) = made_on(change, history)?;
+        self.0.contains(&(tail_number.to_owned(), flown.departure_utc)).then_some(tail_number)
     }
+}
+
+/// The first flight after a change, and its tail.
+fn made_on<'a>(change: &Change, history: &'a History) -> Option<(&'a Flown, &'a str)> {
+    let flown = history.at(Timestamp::from_microsecond(change.departure_us).ok()?)?;
+    Some((flown, history.place(flown).tail_number.as_deref()?))
 }
 
 fn changes<'a>(unit: usize, history: &'a History, trend: &'a Trend) -> impl Iterator<Item = Made<'a>> {
     let unbooked = trend.changes.iter().filter(|c| matches!(c.kind, ChangeKind::Step | ChangeKind::Reset));
     unbooked.filter_map(move |change| {
-        let flown = history.at(Timestamp::from_microsecond(change.departure_us).ok()?)?;
-        let tail_number = history.place(flown).tail_number.as_deref()?;
-        Some(Made { tail_number, departure_us: change.departure_us, kind: change.kind, unit })
+        let (flown, tail_number) = made_on(change, history)?;
+        Some(Made { tail_number, departure_utc: flown.departure_utc, kind: change.kind, unit })
     })
 }
 
 fn is_explained(change: &Made<'_>, moved: &[Moved]) -> bool {
-    let at = Timestamp::from_microsecond(change.departure_us);
-    at.is_ok_and(|at| moved.iter().any(|moved| moved.explains(change.tail_number, at)))
+    moved.iter().any(|moved| moved.explains(change.tail_number, change.departure_utc))
 }
 
 /// Whether the units that flew on the tail before and after made it together.
 fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], judged: &[(&History, &Trend)]) -> bool {
-    let near = |step: &&&Made<'_>| days(step.departure_us, change.departure_us).abs() <= SAME_DAYS;
+    let near = |step: &&&Made<'_>| days(step.departure_utc, change.departure_utc).abs() <= SAME_DAYS;
     let stepped: BTreeSet<usize> = steps.iter().filter(near).map(|step| step.unit).collect();
     if stepped.len() < 2 {
         return false;
@@ -82,16 +88,11 @@ fn is_there(history: &History, change: &Made<'_>) -> bool {
         .flights()
         .iter()
         .filter(|f| f.gap_m.is_some() && history.place(f).tail_number.as_deref() == Some(change.tail_number));
-    let away = |f: &crate::histories::Flown| days(change.departure_us, f.departure_utc.as_microsecond());
+    let away = |f: &Flown| days(change.departure_utc, f.departure_utc);
     let (mut before, mut after) = (false, false);
     for days in on_tail.map(away) {
         before |= days < -SAME_DAYS;
         after |= days >= 0.0;
     }
     before && after
-}
-
-fn days(from_us: i64, to_us: i64) -> f64 {
-    const DAY_US: f64 = 86_400e6;
-    (to_us - from_us) as f64 / DAY_US
 }

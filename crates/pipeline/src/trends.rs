@@ -1,6 +1,6 @@
 //! Trends of units: the store's records, per part and serial number across tails, as statements.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use fleet::{Installation, Installations, PartNumber, SerialNumber};
@@ -18,7 +18,8 @@ use crate::error::Error;
 use crate::histories::{Gathering, Histories, History, HistoryName, Place};
 use crate::lately::{Lately, lately};
 use crate::maintenance;
-use crate::recorder::{self, Moved};
+use crate::recorder::{Moved, moved, moved_in_store};
+use crate::stays::Stays;
 use crate::tail_wide::TailWide;
 use crate::unlogged::Unlogged;
 
@@ -151,7 +152,7 @@ pub fn of_store(
     // A statement leans on what the part's other units teach, so what is asked selects rows, not records.
     let histories = in_store(store)?;
     let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
-    let moved = recorder::moved(&lately(store, as_of)?);
+    let moved = moved_in_store(store, as_of)?;
     of_asked(config, installations, &histories, ask, moved)
 }
 
@@ -183,7 +184,7 @@ pub fn of_units(
     let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
     let (all, tonight) = (in_store(store)?, gathered(store, &query)?);
     let lately = all.newest_utc().map(|newest| lately(store, newest)).transpose()?.unwrap_or_default();
-    let moved = recorder::moved(&lately);
+    let moved = moved(&lately);
     let (now, changed) = of_night(config, installations, &all, &tonight, units, moved)?;
     Ok(Night { now, changed, lately })
 }
@@ -249,9 +250,7 @@ pub(crate) fn told(
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
     let fleet = Fleet::new(config, installations, histories, &days)?.beside(moved);
-    let mut now = fleet.statements(histories.names().filter(|name| ask.names(name)), as_of)?;
-    fleet.add_statistics(&mut now, ask.statistics);
-    let now: Vec<TrendRow> = now.into_iter().filter(|row| ask.fits(row)).collect();
+    let now = fleet.asked(histories, ask, as_of)?;
     let names: Vec<HistoryName> =
         now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
     let drawn =
@@ -337,10 +336,7 @@ fn of_asked(
 ) -> Result<Vec<TrendRow>, Error> {
     let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
     let fleet = Fleet::new(config, installations, histories, &[as_of])?.beside(moved);
-    let mut rows = fleet.statements(histories.names().filter(|name| ask.names(name)), as_of)?;
-    rows.retain(|row| ask.fits(row));
-    fleet.add_statistics(&mut rows, ask.statistics);
-    Ok(rows)
+    fleet.asked(histories, ask, as_of)
 }
 
 /// Part numbers that share a prior.
@@ -516,6 +512,14 @@ impl<'a> Fleet<'a> {
         Self { moved, ..self }
     }
 
+    /// The statements that are asked for, with the statistics if they are.
+    fn asked(&self, histories: &Histories, ask: &Ask, as_of: Timestamp) -> Result<Vec<TrendRow>, Error> {
+        let mut rows = self.statements(histories.names().filter(|name| ask.names(name)), as_of)?;
+        rows.retain(|row| ask.fits(row));
+        self.add_statistics(&mut rows, ask.statistics);
+        Ok(rows)
+    }
+
     fn statements<'b>(
         &self,
         names: impl Iterator<Item = &'b HistoryName>,
@@ -615,26 +619,6 @@ fn settings(config: &Config, part: Option<&job::Part>) -> trend::Settings {
         stale_after_days: of.stale_after_days,
         check_interval_hours: of.next_check_hours,
         ..base
-    }
-}
-
-/// The installations table, unit by unit.
-struct Stays<'a>(HashMap<&'a str, Vec<&'a Installation>>);
-
-impl<'a> Stays<'a> {
-    fn new(installations: &'a Installations) -> Self {
-        let mut by_serial: HashMap<&str, Vec<&Installation>> = HashMap::new();
-        for stay in installations.iter() {
-            by_serial.entry(stay.serial_number.as_str()).or_default().push(stay);
-        }
-        Self(by_serial)
-    }
-
-    /// A unit's stays; where its part number is not known, its serial number says so.
-    fn of(&self, (part, serial): &HistoryName) -> Vec<&'a Installation> {
-        let is_of =
-            |stay: &&&Installation| part.as_deref().is_none_or(|part| stay.part_number.as_str() == part);
-        self.0.get(serial.as_str()).into_iter().flatten().filter(is_of).copied().collect()
     }
 }
 
@@ -765,21 +749,12 @@ fn after(from: Timestamp, days: f64) -> Option<Timestamp> {
 /// Why a state; a change that the tail's other units made as well is named for what it is.
 fn reason(trend: &Trend, history: &History, wide: &TailWide) -> String {
     let unknown = trend.changes.iter().rev().find(|c| c.kind != trend::ChangeKind::Recorded);
-    match (trend.reason, unknown) {
-        (trend::Reason::Changed { kind, days }, Some(change)) => match tail_of(change, history) {
-            Some(tail) if wide.holds(Some(tail), change.departure_us) => format!(
-                "{kind} {days:.0} days ago with all actuators of {tail} at once: a sensor or recorder, not wear"
-            ),
-            _ => trend.reason.to_string(),
-        },
+    match (trend.reason, unknown.and_then(|change| wide.tail(change, history))) {
+        (trend::Reason::Changed { kind, days }, Some(tail)) => format!(
+            "{kind} {days:.0} days ago with all actuators of {tail} at once: a sensor or recorder, not wear"
+        ),
         (other, _) => other.to_string(),
     }
-}
-
-/// The tail on which a unit made a change.
-fn tail_of<'a>(change: &trend::Change, history: &'a History) -> Option<&'a str> {
-    let flown = history.at(Timestamp::from_microsecond(change.departure_us).ok()?)?;
-    history.place(flown).tail_number.as_deref()
 }
 
 fn change_point(change: &trend::Change, history: &History, wide: &TailWide) -> Option<ChangePoint> {
@@ -797,7 +772,7 @@ fn change_point(change: &trend::Change, history: &History, wide: &TailWide) -> O
         step_m: change.step_m,
         step_se_m: change.se_m,
         certainty: change.certainty,
-        tail_wide: wide.holds(tail_of(change, history), change.departure_us),
+        tail_wide: wide.tail(change, history).is_some(),
     })
 }
 
