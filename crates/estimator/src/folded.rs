@@ -10,6 +10,11 @@ use crate::filter::{Filter, Step, distance};
 /// difference leaves a share as small in S, and is forgotten.
 const NEAR: f64 = 1e-13;
 
+/// Samples whose squared innovations are added up by themselves before their sum is added to all others: the
+/// order of additions is part of a number, and this one suits vectors.
+#[cfg(feature = "std")]
+pub(crate) const TILE: usize = 8;
+
 /// Predict and correct in one, at the settled gain K: F = (I − K C) A_d, g = (I − K C) B_d, k = K.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Folded {
@@ -55,7 +60,8 @@ impl Folded {
         ([next(0), next(1), next(2)], e_m)
     }
 
-    /// Samples one after the other: the last state, and a sum with the squared innovations added.
+    /// Samples one after the other: the last state, and a sum with the squared innovations added, [`TILE`] by
+    /// [`TILE`].
     #[cfg(feature = "std")]
     #[inline]
     pub(crate) fn run(
@@ -66,12 +72,17 @@ impl Folded {
         s_m: &mut [f64],
         mut note: impl FnMut(usize, f64),
     ) -> ([f64; 3], f64) {
-        for (at, ((&y, &u), s)) in y_m.iter().zip(load_n).zip(s_m).enumerate() {
-            let e_m;
-            (x, e_m) = self.step(x, y, u);
-            *s = x[2];
-            squares_m2 += e_m * e_m;
-            note(at, e_m);
+        let tiles = y_m.chunks(TILE).zip(load_n.chunks(TILE)).zip(s_m.chunks_mut(TILE));
+        for (tile, ((y_m, load_n), s_m)) in tiles.enumerate() {
+            let mut tile_m2 = 0.0;
+            for (at, ((&y, &u), s)) in y_m.iter().zip(load_n).zip(s_m).enumerate() {
+                let e_m;
+                (x, e_m) = self.step(x, y, u);
+                *s = x[2];
+                tile_m2 += e_m * e_m;
+                note(TILE * tile + at, e_m);
+            }
+            squares_m2 += tile_m2;
         }
         (x, squares_m2)
     }

@@ -1,6 +1,7 @@
 //! The gap statistic (equations 29–31).
 
 use crate::error::Error;
+use crate::wide::widest;
 
 /// ΔS and what it is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,15 +31,7 @@ pub fn mid_range(s_m: &[f64]) -> Result<Gap, Error> {
         return Err(Error::NothingMeasured);
     }
     let mid_range_m = f64::midpoint(max, min);
-    let (mut upper_sum, mut upper, mut lower_sum, mut lower) = (0.0, 0_usize, 0.0, 0_usize);
-    for &s in s_m {
-        // Both sums at every sample, of which at least one is of nothing: no branch to guess, and NaN is in neither.
-        let (is_upper, is_lower) = (s >= mid_range_m, s < mid_range_m);
-        upper_sum += if is_upper { s - mid_range_m } else { 0.0 };
-        lower_sum += if is_lower { s - mid_range_m } else { 0.0 };
-        upper += usize::from(is_upper);
-        lower += usize::from(is_lower);
-    }
+    let Halves { upper_m: upper_sum, upper, lower_m: lower_sum, lower } = halves(s_m, mid_range_m);
     if lower == 0 {
         return Err(Error::Constant { samples: upper, s_m: max });
     }
@@ -53,19 +46,65 @@ pub fn mid_range(s_m: &[f64]) -> Result<Gap, Error> {
     })
 }
 
-/// Least and greatest, in eight chains side by side; the wrong way round where there is no sample.
-fn range(s_m: &[f64]) -> (f64, f64) {
-    let (mut least, mut greatest) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
-    let (eights, rest) = s_m.as_chunks::<8>();
-    let mut note = |lane: usize, s: f64| {
-        least[lane] = if s < least[lane] { s } else { least[lane] };
-        greatest[lane] = if s > greatest[lane] { s } else { greatest[lane] };
-    };
-    for eight in eights {
-        for (lane, s) in eight.iter().enumerate() {
-            note(lane, *s);
+/// Samples at or above a level and below it: the sums of what they differ from it, m, and how many they are.
+struct Halves {
+    upper_m: f64,
+    upper: usize,
+    lower_m: f64,
+    lower: usize,
+}
+
+/// Chains side by side: a sum waits for the addition before it, and eight wait at once. The order of additions is
+/// part of the number: sample k belongs to chain k mod 8, and the chains are added up in their order.
+const CHAINS: usize = 8;
+
+/// Both halves in one pass; NaN is in neither.
+fn halves(s_m: &[f64], level_m: f64) -> Halves {
+    let (upper_m, lower_m, counts) = sums(s_m, level_m);
+    let [upper, lower] = counts.map(|count| count.iter().sum::<u64>() as usize);
+    Halves { upper_m: upper_m.iter().sum(), upper, lower_m: lower_m.iter().sum(), lower }
+}
+
+widest! {
+    /// By chains: sums above and below, and how many samples made each.
+    fn sums(s_m: &[f64], level_m: f64) -> ([f64; CHAINS], [f64; CHAINS], [[u64; CHAINS]; 2]) {
+        let (mut upper_m, mut lower_m, mut counts) = ([0.0; CHAINS], [0.0; CHAINS], [[0; CHAINS]; 2]);
+        let (eights, rest) = s_m.as_chunks::<CHAINS>();
+        let mut last = [f64::NAN; CHAINS];
+        last[..rest.len()].copy_from_slice(rest);
+        for eight in eights.iter().chain([&last]) {
+            for (chain, &s) in eight.iter().enumerate() {
+                // Both sums at every sample, of which at least one is of nothing: no branch to guess.
+                let (is_upper, is_lower) = (s >= level_m, s < level_m);
+                upper_m[chain] += if is_upper { s - level_m } else { 0.0 };
+                lower_m[chain] += if is_lower { s - level_m } else { 0.0 };
+                counts[0][chain] += u64::from(is_upper);
+                counts[1][chain] += u64::from(is_lower);
+            }
         }
+        (upper_m, lower_m, counts)
     }
-    rest.iter().for_each(|s| note(0, *s));
+}
+
+/// Least and greatest; the wrong way round where there is no sample.
+fn range(s_m: &[f64]) -> (f64, f64) {
+    let (least, greatest) = extremes(s_m);
     (least.into_iter().fold(f64::INFINITY, f64::min), greatest.into_iter().fold(f64::NEG_INFINITY, f64::max))
+}
+
+widest! {
+    /// Least and greatest of each chain.
+    fn extremes(s_m: &[f64]) -> ([f64; CHAINS], [f64; CHAINS]) {
+        let (mut least, mut greatest) = ([f64::INFINITY; CHAINS], [f64::NEG_INFINITY; CHAINS]);
+        let (eights, rest) = s_m.as_chunks::<CHAINS>();
+        let mut last = [f64::NAN; CHAINS];
+        last[..rest.len()].copy_from_slice(rest);
+        for eight in eights.iter().chain([&last]) {
+            for (chain, &s) in eight.iter().enumerate() {
+                least[chain] = if s < least[chain] { s } else { least[chain] };
+                greatest[chain] = if s > greatest[chain] { s } else { greatest[chain] };
+            }
+        }
+        (least, greatest)
+    }
 }

@@ -11,12 +11,10 @@ use std::ops::Range;
 #[cfg(target_arch = "x86_64")]
 use crate::eight::x86::{Avx, Avx512};
 use crate::eight::{Eight, Plain};
-use crate::folded::Folded;
+use crate::folded::{Folded, TILE};
 
 /// Parts worked on side by side.
 pub(crate) const PARTS: usize = 8;
-/// Samples of a part that are brought into lanes at a time.
-const TILE: usize = 8;
 /// The longest part: what eight of them read and write stays in the second cache. No power of two, or all parts
 /// would fall on the same lines of the first.
 const LONGEST_PART: usize = 2040;
@@ -44,6 +42,11 @@ impl Cut {
         self.lead + PARTS * self.part
     }
 
+    /// Tiles that each part covers.
+    pub(crate) fn tiles(self) -> usize {
+        (self.lead + self.part) / TILE
+    }
+
     /// Where part `i` starts early.
     pub(crate) fn start(self, i: usize) -> usize {
         i * self.part
@@ -60,14 +63,14 @@ pub(crate) struct Work<'a> {
     pub(crate) y_m: &'a [f64],
     pub(crate) load_n: &'a [f64],
     pub(crate) s_m: &'a mut [f64],
-    /// Squared innovations.
-    pub(crate) squares_m2: &'a mut [f64],
+    /// Squared innovations of each tile: of all parts' first tiles, then of their second ones, and so on.
+    pub(crate) squares_m2: &'a mut [[f64; PARTS]],
 }
 
 impl Work<'_> {
-    /// Runs the parts from their states, and says up to which sample S and squares are those of the plain recursion,
-    /// and its state there.
-    pub(crate) fn run(&mut self, states: States) -> (usize, [f64; 3]) {
+    /// Runs the parts from their states, and says up to which sample S is that of the plain recursion, its state
+    /// there, and a sum with the squared innovations until then added, tile by tile.
+    pub(crate) fn run(&mut self, states: States, mut sum_m2: f64) -> (usize, [f64; 3], f64) {
         let Cut { lead, part } = self.cut;
         let arrived = self.advance(states, 0..lead);
         // A part's end is written after the early start of the next, which lies in the same place.
@@ -75,7 +78,13 @@ impl Work<'_> {
         let state = |states: &States, part: usize| states.each_ref().map(|entry| entry[part]);
         let bits = |states: &States, part: usize| state(states, part).map(f64::to_bits);
         let joined = (1..PARTS).take_while(|&i| bits(&arrived, i) == bits(&ended, i - 1)).count();
-        (lead + (joined + 1) * part, state(&ended, joined))
+        for part in 0..=joined {
+            // The early start of the first part is no guess.
+            let first = if part == 0 { 0 } else { lead / TILE };
+            sum_m2 =
+                self.squares_m2[first..self.cut.tiles()].iter().fold(sum_m2, |sum, tile| sum + tile[part]);
+        }
+        (lead + (joined + 1) * part, state(&ended, joined), sum_m2)
     }
 
     /// Takes all parts from one of their samples to another, with the widest vectors the machine has.
@@ -116,15 +125,17 @@ fn advance<E: Eight>(work: &mut Work<'_>, states: States, within: Range<usize>) 
     let mut x = [E::of(&states[0]), E::of(&states[1]), E::of(&states[2])];
     for at in within.step_by(TILE) {
         let (y, u) = (gathered::<E>(work.y_m, part, at), gathered::<E>(work.load_n, part, at));
-        let (mut s, mut squares) = (y, y);
+        let (mut s, mut squares) = (y, E::all(0.0));
         for k in 0..TILE {
             let e_m;
             (x, e_m) = map.step(x, y[k], u[k]);
             s[k] = x[2];
-            squares[k] = e_m.times(e_m);
+            squares = squares.plus(e_m.times(e_m));
         }
         scatter(s, part, at, work.s_m);
-        scatter(squares, part, at, work.squares_m2);
+        if let Some(tile) = work.squares_m2.get_mut(at / TILE) {
+            squares.put(tile);
+        }
     }
     let mut states = states;
     for (entry, x) in states.iter_mut().zip(x) {
@@ -197,18 +208,20 @@ mod tests {
     fn every_kind_of_vector_gives_the_bits_of_the_plain_recursion() {
         let (map, cut) = (map(), Cut { lead: 0, part: 96 });
         let (y_m, load_n) = channels(cut.samples());
-        let (mut wanted_m, mut wanted_m2) = (vec![0.0; cut.samples()], Vec::new());
+        let (mut wanted_m, mut wanted_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.tiles()]);
         for part in 0..PARTS {
             let within = part * 96..(part + 1) * 96;
             let (x, column) =
                 (STARTS.map(|entry| entry[part]), (&y_m[within.clone()], &load_n[within.clone()]));
-            map.run(x, 0.0, column, &mut wanted_m[within], |_, e_m| wanted_m2.push(e_m * e_m));
+            let note = |k: usize, e_m: f64| wanted_m2[k / TILE][part] += e_m * e_m;
+            map.run(x, 0.0, column, &mut wanted_m[within], note);
         }
         let run = |advance: fn(&mut Work<'_>, States, Range<usize>) -> States| {
-            let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![0.0; cut.samples()]);
+            let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.tiles()]);
             let (s_m, squares_m2) = (&mut s_m, &mut squares_m2);
             advance(&mut Work { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 }, STARTS, 0..96);
-            assert_eq!((bits(s_m), bits(squares_m2)), (bits(&wanted_m), bits(&wanted_m2)));
+            assert_eq!(bits(s_m), bits(&wanted_m));
+            assert_eq!(bits(squares_m2.as_flattened()), bits(wanted_m2.as_flattened()));
         };
         run(advance::<Plain>);
         #[allow(clippy::redundant_closure_for_method_calls, reason = "the method has a lifetime of its own")]
@@ -228,13 +241,16 @@ mod tests {
         for (lead, joins) in [(224, true), (8, false)] {
             let cut = Cut { lead, part: 96 };
             let (y_m, load_n) = channels(cut.samples());
-            let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![0.0; cut.samples()]);
+            let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.tiles()]);
             let (s_m, squares_m2) = (&mut s_m, &mut squares_m2);
-            let (done, x) = Work { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 }.run(STARTS);
+            let mut work = Work { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 };
+            let (done, x, sum_m2) = work.run(STARTS, 0.25);
             assert_eq!(done, if joins { cut.samples() } else { lead + 96 });
             let (mut wanted_m, start) = (vec![0.0; done], STARTS.map(|entry| entry[0]));
-            let (wanted_x, _) = map.run(start, 0.0, (&y_m, &load_n), &mut wanted_m, |_, _| ());
+            let plain = (&y_m[..done], &load_n[..done]);
+            let (wanted_x, wanted_m2) = map.run(start, 0.25, plain, &mut wanted_m, |_, _| ());
             assert_eq!((bits(&s_m[..done]), bits(&x)), (bits(&wanted_m), bits(&wanted_x)));
+            assert_eq!(sum_m2.to_bits(), wanted_m2.to_bits());
         }
     }
 }

@@ -38,7 +38,6 @@ mod schedule;
 pub mod stream;
 #[cfg(feature = "std")]
 mod track;
-#[cfg(feature = "std")]
 mod wide;
 
 #[cfg(feature = "std")]

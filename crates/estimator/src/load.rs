@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use crate::wide::widest;
+
 /// A load counts as being on a side beyond this share of its greater quantile, so noise about zero is no reversal.
 const SIDE_SHARE: f64 = 0.12;
 
@@ -26,15 +28,15 @@ pub fn band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
     Some(LoadBand { p05_n, p95_n, reversals })
 }
 
-/// Loads that are looked at together.
-const GROUP: usize = 8;
+/// Loads that are looked at together, and how many of them side by side.
+const BLOCK: usize = 32;
+/// See [`BLOCK`].
+const CHAINS: usize = 8;
 
 /// Changes from beyond one side of a threshold to beyond the other.
 fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
     let mut sides = Sides { threshold_n, side: 0.0, changes: 0 };
-    let (groups, rest) = load_n.as_chunks::<GROUP>();
-    groups.iter().for_each(|group| sides.take(group));
-    sides.take(rest);
+    sides.follow(load_n);
     sides.changes
 }
 
@@ -46,17 +48,39 @@ struct Sides {
 }
 
 impl Sides {
-    #[inline]
-    fn take(&mut self, group: &[f64]) {
-        // Nearly every group stays on the side where the one before it was, or between the two.
-        let against = group.iter().filter(|f| **f * self.side < 0.0).count();
-        if self.side != 0.0 && against == 0 {
-            return;
+    fn follow(&mut self, load_n: &[f64]) {
+        let mut at = 0;
+        while at < load_n.len() {
+            at += BLOCK * calm(&load_n[at..], self.side);
+            let end = load_n.len().min(at + BLOCK);
+            for &f in load_n[at..end].iter().filter(|f| f.abs() > self.threshold_n) {
+                self.changes += usize::from(self.side * f < 0.0);
+                self.side = f.signum();
+            }
+            at = end;
         }
-        for &f in group.iter().filter(|f| f.abs() > self.threshold_n) {
-            self.changes += usize::from(self.side * f < 0.0);
-            self.side = f.signum();
+    }
+}
+
+widest! {
+    /// How many blocks from here stay on a side, or between the two: nearly all.
+    fn calm(load_n: &[f64], side: f64) -> usize {
+        let (blocks, _) = load_n.as_chunks::<BLOCK>();
+        let mut count = 0;
+        for block in blocks {
+            let mut against = [0; CHAINS];
+            let (groups, _) = block.as_chunks::<CHAINS>();
+            for group in groups {
+                for (chain, &f) in group.iter().enumerate() {
+                    against[chain] += u64::from(f * side < 0.0);
+                }
+            }
+            if side == 0.0 || against != [0; CHAINS] {
+                return count;
+            }
+            count += 1;
         }
+        count
     }
 }
 
@@ -82,21 +106,39 @@ fn quantiles(load_n: &[f64], segments: &[Range<usize>]) -> Option<[f64; 2]> {
     if stride < WORTH_LOOKING {
         return in_order();
     }
-    let mut looks: Vec<f64> = present().step_by(stride).collect();
+    let every = |s: &Range<usize>| load_n[s.clone()].iter().step_by(stride).copied();
+    let mut looks: Vec<f64> = segments.iter().flat_map(every).filter(|f| !f.is_nan()).collect();
     looks.sort_unstable_by(f64::total_cmp);
     let mut brackets = [0.05, 0.95].map(|share| Bracket::about(share, &looks));
     let mut count = 0;
     for segment in segments {
-        let (groups, rest) = load_n[segment.clone()].as_chunks::<GROUP>();
-        for bracket in &mut brackets {
-            groups.iter().for_each(|group| bracket.take(group));
-            bracket.take(rest);
-        }
-        count += load_n[segment.clone()].iter().filter(|f| !f.is_nan()).count();
+        count += seen(&load_n[segment.clone()], &mut brackets);
     }
     let last = count.checked_sub(1)?;
     let found = brackets.map(|bracket| bracket.quantile(last));
     if let [Some(p05), Some(p95)] = found { Some([p05, p95]) } else { in_order() }
+}
+
+widest! {
+    /// Shows loads to both brackets, and counts those that are there.
+    fn seen(load_n: &[f64], brackets: &mut [Bracket; 2]) -> usize {
+        let (blocks, rest) = load_n.as_chunks::<BLOCK>();
+        let mut last = [f64::NAN; BLOCK];
+        last[..rest.len()].copy_from_slice(rest);
+        let mut there = [0; CHAINS];
+        for block in blocks.iter().chain([&last]) {
+            let (groups, _) = block.as_chunks::<CHAINS>();
+            for group in groups {
+                for (chain, &f) in group.iter().enumerate() {
+                    there[chain] += u64::from(!f.is_nan());
+                }
+            }
+            let [low, high] = brackets;
+            low.take(block);
+            high.take(block);
+        }
+        there.iter().sum::<u64>() as usize
+    }
 }
 
 /// Where a share of the order lies, counted from zero to the last.
@@ -110,7 +152,7 @@ struct Bracket {
     share: f64,
     least: f64,
     greatest: f64,
-    below: usize,
+    below: [u64; CHAINS],
     within: Vec<f64>,
 }
 
@@ -119,21 +161,35 @@ impl Bracket {
         let at = rank(looks.len().saturating_sub(1), share);
         let least = at.checked_sub(HALF_BRACKET).map_or(f64::NEG_INFINITY, |k| looks[k]);
         let greatest = looks.get(at + HALF_BRACKET).copied().unwrap_or(f64::INFINITY);
-        Self { share, least, greatest, below: 0, within: Vec::new() }
+        Self { share, least, greatest, below: [0; CHAINS], within: Vec::new() }
     }
 
-    #[inline]
-    fn take(&mut self, group: &[f64]) {
-        self.below += group.iter().filter(|f| **f < self.least).count();
-        let is_within = |f: &&f64| **f >= self.least && **f <= self.greatest;
-        if group.iter().filter(is_within).count() > 0 {
-            self.within.extend(group.iter().filter(is_within));
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "see `widest`")]
+    fn take(&mut self, block: &[f64; BLOCK]) {
+        let mut within = [0; CHAINS];
+        let (groups, _) = block.as_chunks::<CHAINS>();
+        for group in groups {
+            for (chain, &f) in group.iter().enumerate() {
+                self.below[chain] += u64::from(f < self.least);
+                within[chain] += u64::from(f >= self.least) & u64::from(f <= self.greatest);
+            }
         }
+        if within != [0; CHAINS] {
+            self.keep(block);
+        }
+    }
+
+    /// Few blocks have something to keep.
+    #[inline(never)]
+    fn keep(&mut self, block: &[f64; BLOCK]) {
+        self.within.extend(block.iter().filter(|f| **f >= self.least && **f <= self.greatest));
     }
 
     /// None where it lies outside.
     fn quantile(mut self, last: usize) -> Option<f64> {
-        let at = rank(last, self.share).checked_sub(self.below)?;
+        let below = self.below.iter().sum::<u64>() as usize;
+        let at = rank(last, self.share).checked_sub(below)?;
         (at < self.within.len()).then(|| *self.within.select_nth_unstable_by(at, f64::total_cmp).1)
     }
 }

@@ -15,6 +15,7 @@ use crate::filter::{Estimate, Filter};
 use crate::folded::Folded;
 use crate::lanes::{Cut, PARTS, States, Work};
 use crate::schedule::Schedule;
+use crate::wide::widest;
 
 /// S(t) of one actuator's flight, and how well the model explained it.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,8 +89,8 @@ impl Schedule {
 #[derive(Debug, Default)]
 pub struct Room {
     s_m: Vec<f64>,
-    /// Squared innovations of eight parts.
-    squares_m2: Vec<f64>,
+    /// Squared innovations of eight parts, tile by tile.
+    squares_m2: Vec<[f64; PARTS]>,
 }
 
 impl Room {
@@ -213,19 +214,18 @@ struct Stretch<'a> {
 
 impl Stretch<'_> {
     /// In eight parts at once while enough is left, then one after the other; the last state and the sum of
-    /// the squared innovations, added up in the order of the samples.
-    fn run(self, x: Vector3<f64>, room_m2: &mut Vec<f64>) -> ([f64; 3], f64) {
+    /// the squared innovations, added up in the order of the tiles.
+    fn run(self, x: Vector3<f64>, room_m2: &mut Vec<[f64; PARTS]>) -> ([f64; 3], f64) {
         let Self { schedule, map, y_m, load_n, s_m } = self;
         let (mut x, mut sum_m2, mut at) = (x.into(), 0.0, 0);
         while let Some(cut) = schedule.lead.and_then(|lead| Cut::of(y_m.len() - at, lead)) {
             let all = at..at + cut.samples();
             let (y_m, load_n) = (&y_m[all.clone()], &load_n[all.clone()]);
-            room_m2.resize(room_m2.len().max(all.len()), 0.0);
+            room_m2.resize(room_m2.len().max(cut.tiles()), [0.0; PARTS]);
             let states = starts(&schedule.filter, cut, x, y_m, load_n);
             let mut work = Work { map, cut, y_m, load_n, s_m: &mut s_m[all.clone()], squares_m2: room_m2 };
             let done;
-            (done, x) = work.run(states);
-            sum_m2 = room_m2[..done].iter().fold(sum_m2, |sum, square| sum + square);
+            (done, x, sum_m2) = work.run(states, sum_m2);
             let rest = (&y_m[done..], &load_n[done..]);
             (x, sum_m2) = map.run(x, sum_m2, rest, &mut s_m[at + done..all.end], |_, _| ());
             at = all.end;
@@ -252,14 +252,31 @@ fn held(load_n: &[f64], at: usize) -> f64 {
 
 /// How many samples from here have both a measurement and a load before it.
 fn whole_until(y_m: &[f64], load_n: &[f64]) -> usize {
-    // Blocks first: without a way out of the loop it runs in vectors.
-    let (blocks, _) = y_m.as_chunks::<64>();
-    let is_whole = |(y_m, load_n): (&[f64; 64], &[f64])| {
-        y_m.iter().zip(load_n).fold(true, |whole, (y, u)| whole & !(y + u).is_nan())
-    };
-    let whole = 64 * blocks.iter().zip(load_n.chunks(64)).take_while(|block| is_whole(*block)).count();
+    let whole = whole_blocks(y_m, load_n) * BLOCK;
     let rest = y_m[whole..].iter().zip(&load_n[whole..]);
     whole + rest.clone().position(|(y, u)| (y + u).is_nan()).unwrap_or(rest.len())
+}
+
+/// Samples that are looked at together: without a way out of the loop it runs in vectors.
+const BLOCK: usize = 64;
+
+widest! {
+    /// How many blocks from here lack nothing.
+    fn whole_blocks(y_m: &[f64], load_n: &[f64]) -> usize {
+        let (y_m, load_n) = (y_m.as_chunks::<BLOCK>().0, load_n.as_chunks::<BLOCK>().0);
+        let mut count = 0;
+        for (y_m, load_n) in y_m.iter().zip(load_n) {
+            let mut is_whole = true;
+            for (y, u) in y_m.iter().zip(load_n) {
+                is_whole &= !(y + u).is_nan();
+            }
+            if !is_whole {
+                return count;
+            }
+            count += 1;
+        }
+        count
+    }
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ macro_rules! widest {
         $seen fn $name$(<const $n: usize>)?($($arg: $is),*) $(-> $out)? {
             #[inline(always)]
             fn plain$(<const $n: usize>)?($($arg: $is),*) $(-> $out)? $body
-            #[cfg(target_arch = "x86_64")]
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
             {
                 #[target_feature(enable = "avx512f,avx512vl,avx512dq")]
                 fn with_avx512$(<const $n: usize>)?($($arg: $is),*) $(-> $out)? {
@@ -48,10 +48,12 @@ macro_rules! widest {
 pub(crate) use widest;
 
 /// Eight numbers that are computed side by side.
+#[cfg(feature = "std")]
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub(crate) struct Lanes(pub(crate) [f64; Lanes::COUNT]);
 
+#[cfg(feature = "std")]
 #[allow(clippy::inline_always, reason = "see `widest`")]
 impl Lanes {
     pub(crate) const COUNT: usize = 8;

@@ -85,10 +85,13 @@ impl Blocks {
         self.time_s.len()
     }
 
-    /// A part of a long flight, in windows spread over it, for the search to begin with; a short flight whole.
-    pub(super) fn excerpt(&self) -> Self {
-        let every = (self.len() / EXCERPT_BLOCKS).max(1);
-        let window = if every > 1 { WINDOW_BLOCKS } else { self.len().max(1) };
+    /// A part of a long flight, in windows spread over it: enough to begin a search with, and to see how far δX
+    /// travels. None of a short flight.
+    pub(super) fn excerpt(&self) -> Option<Self> {
+        let (every, window) = (self.len() / EXCERPT_BLOCKS, WINDOW_BLOCKS);
+        if every < 2 {
+            return None;
+        }
         let mut part = Self::with_capacity(self.len() / every, self.period_s);
         for (segment, &start) in self.starts.iter().enumerate() {
             let end = self.starts.get(segment + 1).copied().unwrap_or(self.len());
@@ -100,7 +103,7 @@ impl Blocks {
             }
         }
         part.logged_dx_m.clone_from(&part.dx_m);
-        part
+        Some(part)
     }
 
     /// Central difference over two blocks, per second; NaN at the ends.
@@ -174,13 +177,13 @@ impl<'a> Watch<'a> {
         let Samples { motor_m, dx_m, load_n, .. } = self.samples;
         let before = block.start.saturating_sub(1);
         let (mut last_y, mut last_f) = (dx_m[before], load_n[before]);
-        let (mut sum_y, mut sum_f, mut leap_y, mut leap_f) = (0.0, 0.0, 0.0, 0.0);
-        for (&y, &f) in dx_m[block.clone()].iter().zip(&load_n[block.clone()]) {
+        let (mut sum_x, mut sum_y, mut sum_f, mut leap_y, mut leap_f) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let (motor_m, dx_m, load_n) = (&motor_m[block.clone()], &dx_m[block.clone()], &load_n[block.clone()]);
+        for ((&x, &y), &f) in motor_m.iter().zip(dx_m).zip(load_n) {
             leap_y = greater(leap_y, (y - last_y).abs());
             leap_f = greater(leap_f, (f - last_f).abs());
-            (sum_y, sum_f, last_y, last_f) = (sum_y + y, sum_f + f, y, f);
+            (sum_x, sum_y, sum_f, last_y, last_f) = (sum_x + x, sum_y + y, sum_f + f, y, f);
         }
-        let sum_x: f64 = motor_m[block.clone()].iter().sum();
         let calm = leap_y <= self.dx.leap && leap_f <= self.load.leap && (sum_x + sum_y + sum_f).is_finite();
         let n = block.len() as f64;
         calm.then(|| [sum_x / n, sum_y / n, sum_f / n])

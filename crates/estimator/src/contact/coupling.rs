@@ -58,14 +58,32 @@ pub(super) struct Coupling {
 
 /// The coupling followed from block to block; each segment starts at rest, its friction unknown.
 #[derive(Debug)]
-pub(super) struct Walk<'a> {
-    state: &'a State,
+pub(super) struct Walk {
+    stiffness_n_per_m: f64,
+    compliance_m_per_n: f64,
+    half_gap_m: f64,
+    friction: Friction,
     screw: Option<Screw>,
 }
 
-impl<'a> Walk<'a> {
-    pub(super) fn new(state: &'a State) -> Self {
-        Self { state, screw: None }
+/// The screw between two blocks.
+#[derive(Debug, Clone, Copy)]
+struct Screw {
+    motor_m: f64,
+    /// Relative position from the middle of the gap, m.
+    relative_m: f64,
+    coupling: Coupling,
+}
+
+impl Walk {
+    pub(super) fn new(state: &State) -> Self {
+        Self {
+            stiffness_n_per_m: state.stiffness_n_per_m,
+            compliance_m_per_n: state.stiffness_n_per_m.recip(),
+            half_gap_m: 0.5 * state.gap_m,
+            friction: state.friction,
+            screw: None,
+        }
     }
 
     /// A new segment begins.
@@ -79,51 +97,34 @@ impl<'a> Walk<'a> {
         if !(motor_m + load_n).is_finite() {
             return Coupling { force_n: f64::NAN, by_dry: 0.0, by_share_n: 0.0 };
         }
-        let moved = match self.screw {
-            Some(before) => before.moved(motor_m, load_n, self.state),
-            None => Screw::resting(motor_m, load_n, self.state),
+        let (relative_m, coupling) = match self.screw {
+            Some(before) => self.moved(&before, motor_m, load_n),
+            None => (self.relative_m(load_n), Coupling { force_n: load_n, by_dry: 0.0, by_share_n: 0.0 }),
         };
-        self.screw = Some(moved);
-        moved.coupling
-    }
-}
-
-/// The screw between two blocks.
-#[derive(Debug, Clone, Copy)]
-struct Screw {
-    motor_m: f64,
-    /// Relative position from the middle of the gap, m.
-    relative_m: f64,
-    coupling: Coupling,
-}
-
-impl Screw {
-    fn resting(motor_m: f64, load_n: f64, state: &State) -> Self {
-        let coupling = Coupling { force_n: load_n, by_dry: 0.0, by_share_n: 0.0 };
-        Self { motor_m, relative_m: relative_m(load_n, state), coupling }
+        self.screw = Some(Screw { motor_m, relative_m, coupling });
+        coupling
     }
 
-    fn moved(self, motor_m: f64, load_n: f64, state: &State) -> Self {
-        let held_m = self.relative_m - (motor_m - self.motor_m);
-        let half_m = 0.5 * state.gap_m;
-        let held_n = state.stiffness_n_per_m * (held_m - held_m.clamp(-half_m, half_m));
-        let friction_n = state.friction.at_n(load_n);
+    #[inline]
+    fn moved(&self, before: &Screw, motor_m: f64, load_n: f64) -> (f64, Coupling) {
+        let held_m = before.relative_m - (motor_m - before.motor_m);
+        let held_n = self.stiffness_n_per_m * (held_m - held_m.clamp(-self.half_gap_m, self.half_gap_m));
+        let friction_n = self.friction.at_n(load_n);
         let (low_n, high_n) = (load_n - friction_n, load_n + friction_n);
         if held_n >= low_n && held_n <= high_n {
-            let touching = held_n * self.coupling.force_n > 0.0;
-            let (by_dry, by_share_n) =
-                if touching { (self.coupling.by_dry, self.coupling.by_share_n) } else { (0.0, 0.0) };
-            let coupling = Coupling { force_n: held_n, by_dry, by_share_n };
-            return Self { motor_m, relative_m: held_m, coupling };
+            let touching = held_n * before.coupling.force_n > 0.0;
+            let Coupling { by_dry, by_share_n, .. } = before.coupling;
+            let (by_dry, by_share_n) = if touching { (by_dry, by_share_n) } else { (0.0, 0.0) };
+            return (held_m, Coupling { force_n: held_n, by_dry, by_share_n });
         }
         let (force_n, by_dry) = if held_n < low_n { (low_n, -1.0) } else { (high_n, 1.0) };
-        let coupling = Coupling { force_n, by_dry, by_share_n: by_dry * load_n.abs() };
-        Self { motor_m, relative_m: relative_m(force_n, state), coupling }
+        (self.relative_m(force_n), Coupling { force_n, by_dry, by_share_n: by_dry * load_n.abs() })
     }
-}
 
-/// Where the screw stands against the motor under a force, m.
-fn relative_m(force_n: f64, state: &State) -> f64 {
-    let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
-    force_n / state.stiffness_n_per_m + 0.5 * state.gap_m * side
+    /// Where the screw stands against the motor under a force, m.
+    #[inline]
+    fn relative_m(&self, force_n: f64) -> f64 {
+        let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
+        force_n * self.compliance_m_per_n + self.half_gap_m * side
+    }
 }

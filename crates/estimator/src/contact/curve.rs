@@ -15,8 +15,8 @@ const LOOKS: usize = 4000;
 /// did by 3 % at most, with positions that freeze for seconds by 15 %; over the flights that were given a wrong
 /// gap before by 50 % and more. Of 3,000 sound flights of the study twelve are refused for it.
 const UNEXPLAINED: f64 = 0.25;
-/// Turns of the search over straight flanks, and over soft ones from there.
-const TURNS: (usize, usize) = (3, 4);
+/// Turns of the search, at most.
+const TURNS: Turns = Turns { excerpt: 3, whole: 2, soft: 4 };
 /// The low-load samples leave the straight line by this many standard errors before a curve is tried.
 const SUSPICION: f64 = 2.0;
 /// Light rows further out than this share of the wind-up are in the gap, not on a soft flank; they count no more.
@@ -31,6 +31,13 @@ const FRICTION_DOUBT: f64 = 0.012;
 /// What no flight is long enough to average out: over the wind-up, and over the gap itself. These and the
 /// doubts above make nine in ten intervals hold over the study's wide scenarios.
 const FLOOR: (f64, f64) = (3e-4, 2e-4);
+
+/// Over an excerpt of a long flight, over the whole from there, and over soft flanks from that.
+struct Turns {
+    excerpt: usize,
+    whole: usize,
+    soft: usize,
+}
 
 /// How the flanks answer, and what was found with them.
 #[derive(Debug)]
@@ -73,11 +80,15 @@ impl Contact {
 /// # Errors
 /// As [`search`], and [`Refusal::MotionUnexplained`].
 pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal> {
-    let mut excerpt = blocks.excerpt();
-    let (pace, thin) = (Pace::of(blocks, frame), Pace::of(&excerpt, frame));
-    let guess: Found<LINEAR> = search((&mut excerpt, &thin), frame, start(frame), TURNS.0)
-        .or_else(|_| search((blocks, &pace), frame, start(frame), TURNS.0))?;
-    let straight: Found<LINEAR> = search((blocks, &pace), frame, guess.state, 2)?;
+    let pace = Pace::of(blocks, frame);
+    let mut excerpt = blocks.excerpt().map(|part| (Pace::of(&part, frame), part));
+    let guess = excerpt.as_mut().and_then(|(thin, part)| {
+        let found: Found<LINEAR> = search((part, thin), frame, start(frame), TURNS.excerpt).ok()?;
+        Some(found.state)
+    });
+    let turns = if guess.is_some() { TURNS.whole } else { TURNS.excerpt + TURNS.whole };
+    let straight: Found<LINEAR> =
+        search((blocks, &pace), frame, guess.unwrap_or_else(|| start(frame)), turns)?;
     let error_m = |column: usize| straight.fit.standard_error_m(column, &straight.design.firm);
     let (line_m, line_se_m) = (straight.fit.beta[GAP], error_m(GAP));
     // Under heavy friction the forces at low load are friction's to say, not the flank's.
@@ -101,11 +112,14 @@ pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal
         curve: bent.map(|(beta, _)| beta),
         straight,
     };
-    if is_explained(Ground { blocks, pace: &pace, frame }, &contact) {
-        Ok(contact)
-    } else {
-        Err(Refusal::MotionUnexplained)
-    }
+    let is_explained = match &mut excerpt {
+        Some((pace, part)) => {
+            part.realign(contact.state.skew_s);
+            is_explained(Ground { blocks: part, pace, frame }, &contact)
+        }
+        None => is_explained(Ground { blocks, pace: &pace, frame }, &contact),
+    };
+    if is_explained { Ok(contact) } else { Err(Refusal::MotionUnexplained) }
 }
 
 /// Whether gap and wind-up travel as far as δX does. A screw that friction holds within its gap, or a load
@@ -168,7 +182,7 @@ fn soft(
     from: State,
     line_m: (f64, f64),
 ) -> Option<([f64; CURVED], f64)> {
-    let curve: Found<CURVED> = search((blocks, pace), frame, from, TURNS.1).ok()?;
+    let curve: Found<CURVED> = search((blocks, pace), frame, from, TURNS.soft).ok()?;
     let (gap_m, se_m) = (curve.fit.beta[GAP], curve.fit.standard_error_m(GAP, &curve.design.firm));
     let spread_m = (se_m.powi(2) - line_m.1.powi(2)).max(0.25 * se_m.powi(2)).sqrt();
     let change_m = line_m.0 - gap_m;

@@ -67,6 +67,9 @@ pub(super) struct Frame {
     time_s: (f64, f64),
     /// Middle and half of the stroke seen, m.
     pub(super) place_m: (f64, f64),
+    /// 1/load, 1/N, and 1/half of the stroke, 1/m: a product is a quarter of a division.
+    per_load: f64,
+    per_place: f64,
     row_blocks: f64,
 }
 
@@ -90,6 +93,8 @@ impl Frame {
             stiffness_n_per_m: prior.stiffness_n_per_m,
             time_s: middle_and_half(&blocks.time_s),
             place_m,
+            per_load: load_n.recip(),
+            per_place: place_m.1.recip(),
             row_blocks: (blocks.len() / BLOCKS_PER_ROW_BLOCK).clamp(fewest, most) as f64,
         })
     }
@@ -257,34 +262,25 @@ pub(super) fn rows<const N: usize>(ground: Ground<'_>, state: &State) -> Design<
         }
         let press = Press::of(walk.step(motor_m, load_n), frame);
         let pressed = std::mem::replace(&mut before, press);
-        let steady = keeping.push(Touch::of(press.force));
-        let row =
-            steady.and_then(|touch| Some((touch, ground.row::<N>(&pressed, next - 1, touch.flank.sign())?)));
-        match (open, &row) {
-            (Some(touch), Some((same, row)))
-                if touch == *same && sum.blocks < frame.row_blocks && sum.stretch == row.stretch =>
-            {
-                sum.add(row);
+        let steady = keeping.push(Touch::of(press.force)).filter(|_| ground.is_sound(next - 1));
+        if open.is_some() && (steady != open || !ground.joins(&sum, next - 1)) {
+            design.close(open.take(), &sum, blocks.period_s);
+        }
+        if let Some(touch) = steady {
+            if open.is_none() {
+                (open, sum) = (steady, Row { stretch: ground.pace.stretch[next - 1], ..Row::ZERO });
             }
-            (closed, row) => {
-                if let Some(touch) = closed {
-                    design.close(touch, &sum, blocks.period_s);
-                }
-                open = row.as_ref().map(|(touch, row)| {
-                    sum = *row;
-                    *touch
-                });
-            }
+            ground.add(&mut sum, &pressed, next - 1, touch.flank.sign());
         }
     }
-    if let Some(touch) = open {
-        design.close(touch, &sum, blocks.period_s);
-    }
+    design.close(open, &sum, blocks.period_s);
     design
 }
 
 impl<const N: usize> Design<N> {
-    fn close(&mut self, touch: Touch, sum: &Row<N>, period_s: f64) {
+    /// Takes in a row that is full, where one is open.
+    fn close(&mut self, touch: Option<Touch>, sum: &Row<N>, period_s: f64) {
+        let Some(touch) = touch else { return };
         if !touch.is_firm {
             self.light.push(sum.mean());
             return;
@@ -311,7 +307,11 @@ pub(super) fn every(ground: Ground<'_>, state: &State, stride: usize) -> Vec<Row
         if k % stride == 0 {
             let force_n = coupling.force_n;
             let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
-            rows.extend(ground.row(&Press::of(coupling, ground.frame), k, side));
+            if ground.is_sound(k) {
+                let mut row = Row { stretch: ground.pace.stretch[k], ..Row::ZERO };
+                ground.add(&mut row, &Press::of(coupling, ground.frame), k, side);
+                rows.push(row);
+            }
         }
     }
     rows.retain(|row| row.x[FORCE].is_finite());
@@ -330,39 +330,52 @@ impl Press {
     #[inline]
     fn of(coupling: Coupling, frame: &Frame) -> Self {
         let Coupling { force_n, by_dry, by_share_n } = coupling;
-        Self { force: force_n / frame.load_n, by_dry, by_share: by_share_n / frame.load_n }
+        Self { force: force_n * frame.per_load, by_dry, by_share: by_share_n * frame.per_load }
     }
 }
 
 impl Ground<'_> {
-    /// One block as a row; none where a channel is missing or the flight has only begun.
+    /// Whether nothing of a block is missing and the flight has more than begun.
     #[inline]
-    fn row<const N: usize>(&self, press: &Press, k: usize, side: f64) -> Option<Row<N>> {
+    fn is_sound(&self, k: usize) -> bool {
+        let Self { blocks, pace, .. } = self;
+        (blocks.dx_m[k] + pace.speed[k] + pace.load_rate[k]).is_finite()
+    }
+
+    /// Whether a block may belong to a row: one of no more blocks than a row holds, and of one stretch.
+    #[inline]
+    fn joins<const N: usize>(&self, sum: &Row<N>, k: usize) -> bool {
+        sum.blocks < self.frame.row_blocks && sum.stretch == self.pace.stretch[k]
+    }
+
+    /// Adds one sound block to the sums of a row.
+    #[inline]
+    fn add<const N: usize>(&self, sum: &mut Row<N>, press: &Press, k: usize, side: f64) {
         let Self { blocks, pace, frame } = self;
         let (time, speed, load_rate, y_m) = (pace.time[k], pace.speed[k], pace.load_rate[k], blocks.dx_m[k]);
-        if !(y_m + speed + load_rate).is_finite() {
-            return None;
-        }
         // The screw's own place: its transducer's slope acts on the gap as well.
-        let place = (blocks.motor_m[k] + y_m - frame.place_m.0) / frame.place_m.1;
+        let place = (blocks.motor_m[k] + y_m - frame.place_m.0) * frame.per_place;
         let bends = if N == CURVED { bends(press.force.abs()) } else { [0.0; CURVED - LINEAR] };
         // Each entry by itself: an array that is filled in pieces must be read back piece by piece.
-        let x = std::array::from_fn(|column| match column {
-            ORIGIN => 1.0,
-            GAP => 0.5 * side,
-            FORCE => press.force,
-            DRY => press.by_dry,
-            SHARE => press.by_share,
-            SPEED => speed,
-            DRIFT => time,
-            DRIFT_SQUARE => time * time,
-            PLACE => place,
-            PLACE_SQUARE => place * place,
-            PLACE_CUBE => place * place * place,
-            LOAD_RATE => load_rate,
-            bend => side * bends[bend - BEND],
-        });
-        Some(Row { x, y_m, blocks: 1.0, stretch: pace.stretch[k] })
+        for (column, sum) in sum.x.iter_mut().enumerate() {
+            *sum += match column {
+                ORIGIN => 1.0,
+                GAP => 0.5 * side,
+                FORCE => press.force,
+                DRY => press.by_dry,
+                SHARE => press.by_share,
+                SPEED => speed,
+                DRIFT => time,
+                DRIFT_SQUARE => time * time,
+                PLACE => place,
+                PLACE_SQUARE => place * place,
+                PLACE_CUBE => place * place * place,
+                LOAD_RATE => load_rate,
+                bend => side * bends[bend - BEND],
+            };
+        }
+        sum.y_m += y_m;
+        sum.blocks += 1.0;
     }
 }
 
@@ -376,14 +389,8 @@ pub(super) fn bends(force: f64) -> [f64; CURVED - LINEAR] {
 impl<const N: usize> Row<N> {
     const ZERO: Self = Self { x: [0.0; N], y_m: 0.0, blocks: 0.0, stretch: 0 };
 
-    #[inline]
-    fn add(&mut self, other: &Self) {
-        self.x.iter_mut().zip(other.x).for_each(|(sum, x)| *sum += x);
-        self.y_m += other.y_m;
-        self.blocks += other.blocks;
-    }
-
     fn mean(&self) -> Self {
-        Self { x: self.x.map(|x| x / self.blocks), y_m: self.y_m / self.blocks, ..*self }
+        let share = self.blocks.recip();
+        Self { x: self.x.map(|x| x * share), y_m: self.y_m * share, ..*self }
     }
 }

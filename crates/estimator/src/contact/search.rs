@@ -30,8 +30,11 @@ const STRETCH: f64 = 3.0;
 const MOST_FRICTION: f64 = 0.5;
 /// A gap wider than this many wind-ups is kept from misleading the search.
 const WIDEST: f64 = 20.0;
-/// Rounds of reweighting within a turn, and in the last.
-const ROUNDS: (usize, usize) = (4, 5);
+/// A turn that moves the state by less than this share of the gap's standard error is the last: the next one would
+/// move the gap by a fifth of that, or less.
+const SETTLED: f64 = 0.05;
+/// Rounds of reweighting within a turn.
+const ROUNDS: usize = 5;
 
 /// The last turn: rows, coefficients, and the state they were made with.
 #[derive(Debug)]
@@ -59,12 +62,31 @@ pub(super) fn search<const N: usize>(
         if N == CURVED {
             design.firm.append(&mut design.light);
         }
-        let rounds = if turn == turns { ROUNDS.1 } else { ROUNDS.0 };
-        let fit = fit(&design.firm, &beliefs(frame, &state), rounds).ok_or(Refusal::TooShort)?;
-        state = next(frame, &state, &fit);
+        let fit = fit(&design.firm, &beliefs(frame, &state), ROUNDS).ok_or(Refusal::TooShort)?;
+        let after = next(frame, &state, &fit);
+        let moved_m = frame.windup_m() * step(frame, blocks.period_s, &state, &after);
+        let is_last = turn == turns || moved_m < SETTLED * fit.standard_error_m(GAP, &design.firm);
+        state = after;
         found = Some(Found { design, fit, state });
+        if is_last {
+            break;
+        }
     }
     found.ok_or(Refusal::TooShort)
+}
+
+/// How far a turn moved the state, over what each of its numbers is about.
+fn step(frame: &Frame, period_s: f64, before: &State, after: &State) -> f64 {
+    let (was, is) = (&before.friction, &after.friction);
+    [
+        after.stiffness_n_per_m / before.stiffness_n_per_m - 1.0,
+        (after.gap_m - before.gap_m) / frame.windup_m(),
+        (is.dry_n - was.dry_n) / frame.load_n,
+        is.lost_share - was.lost_share,
+        (after.skew_s - before.skew_s) / period_s,
+    ]
+    .into_iter()
+    .fold(0.0, |most, part| part.abs().max(most))
 }
 
 /// Where a search starts: the part's stiffness, usual friction, no gap and no skew.
