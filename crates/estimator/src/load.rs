@@ -22,7 +22,7 @@ pub struct LoadBand {
 ///
 /// A reversal is a change from beyond +12 % of the greater of the two quantiles to beyond −12 %, or back.
 pub fn band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
-    let [p05_n, p95_n] = quantiles(load_n, segments)?;
+    let [p05_n, p95_n] = quantiles(load_n, segments, [0.05, 0.95])?;
     let threshold = SIDE_SHARE * p05_n.abs().max(p95_n.abs());
     let reversals = segments.iter().map(|segment| reversals(&load_n[segment.clone()], threshold)).sum();
     Some(LoadBand { p05_n, p95_n, reversals })
@@ -91,16 +91,20 @@ const WORTH_LOOKING: usize = 16;
 /// Half width of a bracket in the order of those loads: five standard deviations of a rank, or somewhat more.
 const HALF_BRACKET: usize = 50;
 
-/// 5 % and 95 % quantiles: elements, nothing between them. None when there is no load.
+/// Quantiles: elements, nothing between them. None when there is no load; NaN is none.
 ///
 /// Only what lies about each is put in order, in brackets that a few loads tell; where a bracket misses its
 /// quantile, everything is.
-fn quantiles(load_n: &[f64], segments: &[Range<usize>]) -> Option<[f64; 2]> {
-    let present = || segments.iter().flat_map(|s| &load_n[s.clone()]).copied().filter(|f| !f.is_nan());
+pub(crate) fn quantiles<const N: usize>(
+    load_n: &[f64],
+    segments: &[Range<usize>],
+    shares: [f64; N],
+) -> Option<[f64; N]> {
+    let present = |s: &Range<usize>| load_n[s.clone()].iter().copied().filter(|f| !f.is_nan());
     let in_order = || {
-        let mut all: Vec<f64> = present().collect();
+        let mut all: Vec<f64> = segments.iter().flat_map(present).collect();
         let last = all.len().checked_sub(1)?;
-        Some([0.05, 0.95].map(|share| *all.select_nth_unstable_by(rank(last, share), f64::total_cmp).1))
+        Some(shares.map(|share| *all.select_nth_unstable_by(rank(last, share), f64::total_cmp).1))
     };
     let stride = segments.iter().map(Range::len).sum::<usize>() / LOOKS + 1;
     if stride < WORTH_LOOKING {
@@ -109,19 +113,16 @@ fn quantiles(load_n: &[f64], segments: &[Range<usize>]) -> Option<[f64; 2]> {
     let every = |s: &Range<usize>| load_n[s.clone()].iter().step_by(stride).copied();
     let mut looks: Vec<f64> = segments.iter().flat_map(every).filter(|f| !f.is_nan()).collect();
     looks.sort_unstable_by(f64::total_cmp);
-    let mut brackets = [0.05, 0.95].map(|share| Bracket::about(share, &looks));
-    let mut count = 0;
-    for segment in segments {
-        count += seen(&load_n[segment.clone()], &mut brackets);
-    }
+    let mut brackets = shares.map(|share| Bracket::about(share, &looks));
+    let count: usize = segments.iter().map(|segment| seen(&load_n[segment.clone()], &mut brackets)).sum();
     let last = count.checked_sub(1)?;
     let found = brackets.map(|bracket| bracket.quantile(last));
-    if let [Some(p05), Some(p95)] = found { Some([p05, p95]) } else { in_order() }
+    if found.iter().all(Option::is_some) { Some(found.map(Option::unwrap_or_default)) } else { in_order() }
 }
 
 widest! {
-    /// Shows loads to both brackets, and counts those that are there.
-    fn seen(load_n: &[f64], brackets: &mut [Bracket; 2]) -> usize {
+    /// Shows loads to all brackets, and counts those that are there.
+    fn seen<const N: usize>(load_n: &[f64], brackets: &mut [Bracket; N]) -> usize {
         let (blocks, rest) = load_n.as_chunks::<BLOCK>();
         let mut last = [f64::NAN; BLOCK];
         last[..rest.len()].copy_from_slice(rest);
@@ -133,9 +134,9 @@ widest! {
                     there[chain] += u64::from(!f.is_nan());
                 }
             }
-            let [low, high] = brackets;
-            low.take(block);
-            high.take(block);
+            for bracket in brackets.iter_mut() {
+                bracket.take(block);
+            }
         }
         there.iter().sum::<u64>() as usize
     }

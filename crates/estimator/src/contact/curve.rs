@@ -32,7 +32,7 @@ const FRICTION_DOUBT: f64 = 0.012;
 /// doubts above make nine in ten intervals hold over the study's wide scenarios.
 const FLOOR: (f64, f64) = (3e-4, 2e-4);
 
-/// Over an excerpt of a long flight, over the whole from there, and over soft flanks from that.
+/// Over an excerpt of a long flight, and over the whole from there; soft flanks from what straight ones gave.
 struct Turns {
     excerpt: usize,
     whole: usize,
@@ -94,7 +94,8 @@ pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal
     // Under heavy friction the forces at low load are friction's to say, not the flank's.
     let heavy = straight.state.friction.is_heavy(frame.load_n);
     let bent = if !heavy && low_loads_deviate(&straight, frame) {
-        soft((blocks, &pace), frame, straight.state, (line_m, line_se_m))
+        let part = excerpt.as_mut().map(|(thin, part)| (part, &*thin));
+        soft((blocks, &pace), part, frame, straight.state, (line_m, line_se_m))
     } else {
         None
     };
@@ -177,12 +178,18 @@ fn low_loads_deviate(straight: &Found<LINEAR>, frame: &Frame) -> bool {
 /// The straight fit is the sharper one when flanks are straight, the curve right either way; so their
 /// difference has the variance of the curve less that of the line (Hausman 1978).
 fn soft(
-    (blocks, pace): (&mut Blocks, &Pace),
+    whole: (&mut Blocks, &Pace),
+    excerpt: Option<(&mut Blocks, &Pace)>,
     frame: &Frame,
     from: State,
     line_m: (f64, f64),
 ) -> Option<([f64; CURVED], f64)> {
-    let curve: Found<CURVED> = search((blocks, pace), frame, from, TURNS.soft).ok()?;
+    let guess = excerpt.and_then(|part| {
+        let found: Found<CURVED> = search(part, frame, from, TURNS.soft).ok()?;
+        Some(found.state)
+    });
+    let turns = if guess.is_some() { TURNS.whole } else { TURNS.soft };
+    let curve: Found<CURVED> = search(whole, frame, guess.unwrap_or(from), turns).ok()?;
     let (gap_m, se_m) = (curve.fit.beta[GAP], curve.fit.standard_error_m(GAP, &curve.design.firm));
     let spread_m = (se_m.powi(2) - line_m.1.powi(2)).max(0.25 * se_m.powi(2)).sqrt();
     let change_m = line_m.0 - gap_m;
