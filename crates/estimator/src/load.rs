@@ -205,7 +205,7 @@ mod tests {
         let whole = 0..load_n.len();
         let mut sorted: Vec<f64> = load_n.iter().copied().filter(|f| !f.is_nan()).collect();
         sorted.sort_unstable_by(f64::total_cmp);
-        let found = quantiles(load_n, std::slice::from_ref(&whole)).unwrap();
+        let found = quantiles(load_n, std::slice::from_ref(&whole), [0.05, 0.95]).unwrap();
         let last = (sorted.len() - 1) as f64;
         let wanted = [0.05, 0.95].map(|share| sorted[(share * last).round() as usize]);
         assert_eq!(found.map(f64::to_bits), wanted.map(f64::to_bits), "{} loads", load_n.len());

@@ -395,7 +395,7 @@ fn cube_root(x: f64) -> f64 {
     const THIRDS: u64 = 0x2a9f_7893_782d_a1ce;
     let closer = |y: f64| {
         let cube = y * y * y;
-        y * (cube + 2.0 * x) / (2.0 * cube + x)
+        y * ((cube + 2.0 * x) / (2.0 * cube + x))
     };
     closer(closer(f64::from_bits(x.to_bits() / 3 + THIRDS)))
 }
