@@ -17,40 +17,16 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from end_to_end import measured
+from end_to_end import RATE_HZ, SPEC, measured
 
 DECADES = [1, 3, 10, 30, 100, 300, 1000]
-RATE_HZ = 500
-
-SPEC = """
-seed = 9
-tails = ["N801FP"]
-flights_per_tail = {flights}
-flight_hours = {hours}
-[profile]
-duration_s = {seconds}
-sample_rate_hz = {rate}
-[sensors.motor]
-noise_rms = 1e-6
-[sensors.screw]
-noise_rms = 3e-6
-resolution = 1.9e-6
-[sensors.load]
-noise_rms = 20.0
-resolution = 1.0
-[[parts]]
-part_number = "EMA-8"
-motor_log = "angle"
-[parts.plant]
-contact = {{ stiffness_n_per_m = 5e7, damping_n_s_per_m = 2000.0 }}
-"""
 
 
 def fleet(freeplay, folder, flights, rows, actuators):
     """A simulated fleet: where its configuration is. Made once."""
     if not (folder / "pipeline.toml").exists():
         seconds = rows / RATE_HZ
-        text = SPEC.format(flights=flights, hours=seconds / 3600, seconds=seconds, rate=RATE_HZ)
+        text = SPEC.format(flights=flights, hours=seconds / 3600, duration=seconds, rate=RATE_HZ)
         for k in range(actuators):
             text += f'[[positions]]\nposition = "surface_{k}"\npart_number = "EMA-8"\n'
         folder.parent.mkdir(parents=True, exist_ok=True)
