@@ -1,6 +1,6 @@
 """How the cost of a run grows with rows, files and actuators, over three decades each.
 
-    pip install pyarrow matplotlib
+    pip install matplotlib
     cargo build --release --locked
     python benches/growth.py target/release/freeplay --picture docs/pictures/performance-growth.svg
 
@@ -36,38 +36,26 @@ def fleet(freeplay, folder, flights, rows, actuators):
     return folder
 
 
-def cpu_s(freeplay, folder, pattern):
-    """CPU seconds of one run over the logs of a fleet that a pattern names, into a new store."""
-    store = folder / "store"
-    shutil.rmtree(store, ignore_errors=True)
-    settings = (folder / "pipeline.toml").read_text()
-    config = folder / "growth.toml"
-    config.write_text(settings.replace('"logs/**/*.parquet"', f'"{pattern}"').replace('"results"', f'"{store}"'))
-    return measured([freeplay, "--config", str(config), "run", "-q", "--jobs", "1"])["cpu_s"]
+def settled_run(freeplay, folder):
+    """CPU seconds of a run over a fleet, into the store it has."""
+    return measured([freeplay, "--config", str(folder / "pipeline.toml"), "run", "-q", "--jobs", "1"])["cpu_s"]
 
 
-def series(freeplay, folder):
-    """By name: sizes, and a call for each that runs it."""
-    rows, files, actuators = {}, {}, {}
+def fresh_run(freeplay, folder):
+    """CPU seconds of a run over a fleet, into a new store."""
+    shutil.rmtree(folder / "results", ignore_errors=True)
+    return settled_run(freeplay, folder)
+
+
+def fleets(freeplay, folder):
+    """By name and size: the fleets."""
+    made = {"rows of one actuator": {}, "files of 20,000 rows": {}, "actuators of 20,000 rows in one file": {}}
+    rows, files, actuators = made.values()
     for scale in DECADES:
-        at = fleet(freeplay, folder / f"rows-{scale}", 1, 10_000 * scale, 1)
-        rows[10_000 * scale] = lambda at=at: cpu_s(freeplay, at, "logs/**/*.parquet")
-        at = fleet(freeplay, folder / f"files-{scale}", scale, 20_000, 1)
-        files[scale] = lambda at=at: cpu_s(freeplay, at, "logs/**/*.parquet")
-        at = fleet(freeplay, folder / f"actuators-{scale}", 1, 20_000, scale)
-        actuators[scale] = lambda at=at: cpu_s(freeplay, at, "logs/**/*.parquet")
-    return {
-        "rows of one actuator": rows,
-        "files of 20,000 rows": files,
-        "actuators of 20,000 rows in one file": actuators,
-    }
-
-
-def idle(freeplay, folder):
-    """A run over a log that is known already."""
-    at = fleet(freeplay, folder / "rows-1", 1, 10_000, 1)
-    cpu_s(freeplay, at, "logs/**/*.parquet")
-    return measured([freeplay, "--config", str(at / "growth.toml"), "run", "-q", "--jobs", "1"])["cpu_s"]
+        rows[10_000 * scale] = fleet(freeplay, folder / f"rows-{scale}", 1, 10_000 * scale, 1)
+        files[scale] = fleet(freeplay, folder / f"files-{scale}", scale, 20_000, 1)
+        actuators[scale] = fleet(freeplay, folder / f"actuators-{scale}", 1, 20_000, scale)
+    return made
 
 
 def exponent(costs, fixed_s):
@@ -105,14 +93,14 @@ def main():
     parser.add_argument("--picture", type=Path, help="where to draw it, as SVG")
     args = parser.parse_args()
     folder = (args.folder or Path(tempfile.mkdtemp(prefix="freeplay-growth-"))).resolve()
-    calls = series(args.freeplay, folder)
-    found = {name: {size: math.inf for size in sizes} for name, sizes in calls.items()}
+    made = fleets(args.freeplay, folder)
+    found = {name: dict.fromkeys(sizes, math.inf) for name, sizes in made.items()}
     fixed_s = math.inf
     for _ in range(args.rounds):
-        fixed_s = min(fixed_s, idle(args.freeplay, folder))
-        for name, sizes in calls.items():
-            for size, run in sizes.items():
-                found[name][size] = min(found[name][size], run())
+        for name, sizes in made.items():
+            for size, at in sizes.items():
+                found[name][size] = min(found[name][size], fresh_run(args.freeplay, at))
+        fixed_s = min(fixed_s, settled_run(args.freeplay, folder / "rows-1"))
     print(f"A run with nothing to do: {fixed_s:.3f} CPU s.\n")
     for name, costs in found.items():
         print("| " + name + " | " + " | ".join(f"{size:,}" for size in sorted(costs)) + " |")
