@@ -1,7 +1,9 @@
 //! What a statement costs: time per serial against the length of its history, on one and two threads.
 //!
 //! `cost [SERIALS]` makes wearing units of 100 to 10,000 flights and prints the time for the series, the
-//! statement and the prior: of the processor, which other programs lengthen less, and by the clock.
+//! statement and the prior: of the processor, which other programs lengthen less, and by the clock. Then
+//! each unit flies 64 times more, and from its kept state a statement is made every night: the time of
+//! that, how many of these nights asked for the history, and the size of the state.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a developer's tool, which may fail loudly")]
 
 mod random;
@@ -9,9 +11,13 @@ mod random;
 use std::time::Instant;
 
 use random::Random;
-use trend::{FleetPrior, Observation, Series, Settings, Usage, trend};
+use trend::{FleetPrior, Kept, Observation, Series, Settings, Usage, trend};
 
 const LIMIT_M: f64 = 1e-4;
+const NIGHT_US: i64 = 30_000_000_000;
+
+/// Nights over which increments are averaged: those between two checkpoints of a long history.
+const NIGHTS: usize = 64;
 
 fn rows(seed: u64, flights: usize) -> Vec<Observation> {
     let mut random = Random::new(seed);
@@ -24,7 +30,7 @@ fn rows(seed: u64, flights: usize) -> Vec<Observation> {
             let outlier = if random.uniform() < 0.02 { 30.0 } else { 0.0 };
             let gap_um = 20.0 + 80.0 * age.powf(exponent) + 3.0 * random.normal() + outlier;
             Observation {
-                departure_us: flight as i64 * 30_000_000_000,
+                departure_us: flight as i64 * NIGHT_US,
                 installation: 0,
                 flight_hours: Some(1.7),
                 tail_hours_end: Some(hours),
@@ -66,6 +72,97 @@ fn stated(fleet: &[Series], as_of_us: i64, prior: &FleetPrior, threads: usize) -
     began.elapsed().as_secs_f64()
 }
 
+/// A unit's rows, of which some have been flown, and its state then.
+struct Unit {
+    rows: Vec<Observation>,
+    flown: usize,
+    state: Vec<u8>,
+}
+
+/// What nights have asked for.
+#[derive(Default)]
+struct Asked {
+    nights: f64,
+    histories: f64,
+    history_s: f64,
+    largest: usize,
+}
+
+impl Unit {
+    fn series(&self) -> Series {
+        Series::new(self.rows[..self.flown].iter().copied(), &Usage::default()).unwrap()
+    }
+
+    /// Flies once more and says what is known then.
+    fn night(&mut self, prior: &FleetPrior, settings: &Settings, asked: &mut Asked) {
+        let row = self.rows[self.flown];
+        self.flown += 1;
+        let kept = Kept::from_bytes(&self.state, prior).unwrap().after([row]).unwrap();
+        let said = |kept: &Kept| kept.says(row.departure_us, &[], settings, prior, None).unwrap();
+        if let Some((said, kept)) = kept.and_then(|kept| Some((said(&kept)?, kept))) {
+            std::hint::black_box(said);
+            self.state = kept.to_bytes();
+        } else {
+            let (history_s, state) = cost(|| {
+                let kept = Kept::of(&self.series(), row.departure_us, prior);
+                std::hint::black_box(said(&kept).unwrap());
+                kept.to_bytes()
+            });
+            asked.histories += 1.0;
+            asked.history_s += history_s;
+            self.state = state;
+        }
+        asked.nights += 1.0;
+        asked.largest = asked.largest.max(self.state.len());
+    }
+}
+
+/// A fleet of units on some threads, each unit one night: wall seconds.
+fn flown(fleet: &mut [Unit], prior: &FleetPrior, threads: usize) -> f64 {
+    let settings = &Settings::for_limit(LIMIT_M);
+    let began = Instant::now();
+    std::thread::scope(|scope| {
+        for part in fleet.chunks_mut(fleet.len().div_ceil(threads)) {
+            scope.spawn(move || {
+                part.iter_mut().for_each(|unit| unit.night(prior, settings, &mut Asked::default()));
+            });
+        }
+    });
+    began.elapsed().as_secs_f64()
+}
+
+/// Nights of units that have flown so often.
+fn nights(serials: u64, flights: usize) {
+    let all: Vec<Vec<Observation>> = (0..serials).map(|seed| rows(seed, flights + 3 * NIGHTS)).collect();
+    let series =
+        |rows: &Vec<Observation>| Series::new(rows[..flights].iter().copied(), &Usage::default()).unwrap();
+    let histories: Vec<Series> = all.iter().map(series).collect();
+    let as_of_us = flights as i64 * NIGHT_US;
+    let prior = FleetPrior::learn(&histories, as_of_us, LIMIT_M, None);
+    let unit =
+        |(rows, series)| Unit { rows, flown: flights, state: Kept::of(series, as_of_us, &prior).to_bytes() };
+    let mut fleet: Vec<Unit> = all.into_iter().zip(&histories).map(unit).collect();
+    let bytes = fleet.iter().map(|unit| unit.state.len()).sum::<usize>() / fleet.len();
+    let (settings, mut asked) = (Settings::for_limit(LIMIT_M), Asked::default());
+    let (nights_s, ()) = cost(|| {
+        for unit in &mut fleet {
+            (0..NIGHTS).for_each(|_| unit.night(&prior, &settings, &mut asked));
+        }
+    });
+    let [one_s, two_s] =
+        [1, 2].map(|threads| (0..NIGHTS).map(|_| flown(&mut fleet, &prior, threads)).sum::<f64>());
+    let us = 1e6 / asked.nights;
+    println!(
+        "{flights:7}  {:8.1}  {:20.1}  {:9.2} %  {bytes:6} {:8}  {:11.1}  {:9.1}",
+        nights_s * us,
+        1e6 * (nights_s - asked.history_s) / (asked.nights - asked.histories),
+        100.0 * asked.histories / asked.nights,
+        asked.largest,
+        one_s * us,
+        two_s * us,
+    );
+}
+
 fn main() {
     let serials: u64 = std::env::args().nth(1).map_or(200, |n| n.parse().unwrap());
     println!("processor time of a serial, µs         of the prior, ms   wall time of a statement, µs, on");
@@ -75,7 +172,7 @@ fn main() {
         let us = 1e6 / serials as f64;
         let unit = |rows| Series::new(rows, &Usage::default()).unwrap();
         let (series_s, fleet) = cost(|| rows.into_iter().map(unit).collect::<Vec<Series>>());
-        let as_of_us = flights as i64 * 30_000_000_000;
+        let as_of_us = flights as i64 * NIGHT_US;
         let (prior_s, prior) = cost(|| FleetPrior::learn(&fleet, as_of_us, LIMIT_M, None));
         let settings = Settings::for_limit(LIMIT_M);
         let (statement_s, ()) = cost(|| {
@@ -92,5 +189,10 @@ fn main() {
             one_s * us,
             two_s * us
         );
+    }
+    println!("\na night more of a serial, µs of the processor          state, bytes    by the clock, µs, on");
+    println!("flights  in all  without the history  which it asks   mean  largest    1 thread  2 threads");
+    for flights in [100, 300, 1000, 3000, 10_000] {
+        nights(serials, flights);
     }
 }

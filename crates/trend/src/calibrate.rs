@@ -44,6 +44,11 @@ impl Calibration {
     /// What is done to a forecast of which no past is known.
     pub(crate) const USUAL: Self = Self { low: -USUAL_WIDTH, middle: 0.0, high: USUAL_WIDTH };
 
+    /// All that it is.
+    pub(crate) fn numbers(&self) -> [f64; 3] {
+        [self.low, self.middle, self.high]
+    }
+
     /// Learns from every cut of some segments.
     pub(crate) fn learn<'a>(segments: impl Iterator<Item = Segment<'a>>, prior: &FleetPrior) -> Self {
         let misses = segments.flat_map(|segment| CUTS.map(|share| miss(&segment, share, prior)));

@@ -1,5 +1,7 @@
 //! A unit's estimates made ready: outliers marked, and how large the scatter really is.
 
+use serde::{Deserialize, Serialize};
+
 use crate::classic::median;
 use crate::series::{Flight, Gap};
 
@@ -9,12 +11,15 @@ const OUTLIER_SIGMA: f64 = 4.0;
 /// Flights of the running median.
 const WINDOW: usize = 11;
 
+/// Gaps before another one that its window, or the window of one in that window, reaches back to.
+const RECENT: usize = WINDOW - 1;
+
 /// Standard errors are taken to lie between these, metres: their squares must be numbers to reckon with.
 const LEAST_ERROR_M: f64 = 1e-9;
 const LARGEST_ERROR_M: f64 = 1.0;
 
 /// One estimate that takes part.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Estimate {
     /// Index of its flight.
     pub(crate) flight: usize,
@@ -33,8 +38,27 @@ pub(crate) struct Clean {
     pub(crate) estimates: Vec<Estimate>,
     /// Flights whose gap is an outlier.
     pub(crate) outliers: Vec<usize>,
+    /// By what they were told apart.
+    pub(crate) scatter: Scatter,
+}
+
+/// How a unit's gaps scatter: enough to clean the gaps of the flights that follow.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Scatter {
     /// Variance found over variance stated.
     pub(crate) noise_factor: f64,
+    /// The stated error of a gap that states none, metres.
+    pub(crate) typical_m: f64,
+    /// The last gaps, as many as the window of another one reaches back.
+    pub(crate) recent: Vec<Seen>,
+}
+
+/// A gap that was cleaned.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Seen {
+    pub(crate) gap_m: f64,
+    pub(crate) error_m: f64,
+    pub(crate) is_outlier: bool,
 }
 
 /// Marks outliers against a running median and rescales the stated standard errors.
@@ -49,26 +73,71 @@ pub(crate) fn clean(flights: &[Flight]) -> Clean {
     let gaps: Vec<f64> = stated.iter().map(|(_, gap)| gap.gap_m).collect();
     let noise_factor = noise_factor(&gaps, &errors);
     let smooth = running_median(&gaps);
-    let mut clean = Clean { estimates: Vec::with_capacity(gaps.len()), outliers: Vec::new(), noise_factor };
-    for (k, &(flight, gap)) in stated.iter().enumerate() {
-        let variance = (noise_factor * errors[k] * errors[k]).max(LEAST_ERROR_M * LEAST_ERROR_M);
-        let far =
-            |expected_m: f64| (gap.gap_m - expected_m).powi(2) > OUTLIER_SIGMA * OUTLIER_SIGMA * variance;
-        if far(smooth[k]) && far(on_local_line(&gaps, k)) {
+    let scatter = Scatter { noise_factor, typical_m, recent: Vec::new() };
+    let mut clean = Clean { estimates: Vec::with_capacity(gaps.len()), outliers: Vec::new(), scatter };
+    for (k, &(flight, _)) in stated.iter().enumerate() {
+        let variance = clean.scatter.variance(errors[k]);
+        let is_outlier = is_outlier(&gaps, k, smooth[k], variance);
+        if is_outlier {
             clean.outliers.push(flight);
         } else {
-            let Flight { installation, departure_us, hours: usage, .. } = flights[flight];
-            clean.estimates.push(Estimate {
-                flight,
-                installation,
-                departure_us,
-                usage,
-                gap_m: gap.gap_m,
-                weight: variance.recip(),
-            });
+            clean.estimates.push(estimate(flights, flight, gaps[k], variance));
+        }
+        if stated.len() - k <= RECENT {
+            clean.scatter.recent.push(Seen { gap_m: gaps[k], error_m: errors[k], is_outlier });
         }
     }
     clean
+}
+
+impl Scatter {
+    /// The estimates and the outliers of flights that follow, counted from the first of them; nothing where
+    /// they show that one of the last gaps before was mistaken for an outlier, or for none, or where those
+    /// were too few.
+    pub(crate) fn clean(&self, flights: &[Flight]) -> Option<(Vec<Estimate>, Vec<usize>)> {
+        let stated: Vec<(usize, Gap)> =
+            flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?))).collect();
+        if stated.is_empty() {
+            return Some((Vec::new(), Vec::new()));
+        }
+        if self.recent.len() < RECENT {
+            return None;
+        }
+        let before = self.recent.iter().map(|seen| seen.gap_m);
+        let gaps: Vec<f64> = before.chain(stated.iter().map(|(_, gap)| gap.gap_m)).collect();
+        let smooth = running_median(&gaps);
+        let is_outlier = |k: usize, variance: f64| is_outlier(&gaps, k, smooth[k], variance);
+        let other = |(k, seen): (usize, &Seen)| is_outlier(k, self.variance(seen.error_m)) != seen.is_outlier;
+        if self.recent.iter().enumerate().skip(WINDOW / 2).any(other) {
+            return None;
+        }
+        let (mut estimates, mut outliers) = (Vec::with_capacity(stated.len()), Vec::new());
+        for (k, &(flight, gap)) in (RECENT..).zip(&stated) {
+            let variance = self.variance(error(gap, self.typical_m));
+            if is_outlier(k, variance) {
+                outliers.push(flight);
+            } else {
+                estimates.push(estimate(flights, flight, gap.gap_m, variance));
+            }
+        }
+        Some((estimates, outliers))
+    }
+
+    /// A gap's variance, with the scatter that was found.
+    fn variance(&self, error_m: f64) -> f64 {
+        (self.noise_factor * error_m * error_m).max(LEAST_ERROR_M * LEAST_ERROR_M)
+    }
+}
+
+/// Whether a gap lies far from what its neighbours say it is, worn or not.
+fn is_outlier(gaps: &[f64], at: usize, smooth_m: f64, variance: f64) -> bool {
+    let far = |expected_m: f64| (gaps[at] - expected_m).powi(2) > OUTLIER_SIGMA * OUTLIER_SIGMA * variance;
+    far(smooth_m) && far(on_local_line(gaps, at))
+}
+
+fn estimate(flights: &[Flight], flight: usize, gap_m: f64, variance: f64) -> Estimate {
+    let Flight { installation, departure_us, hours: usage, .. } = flights[flight];
+    Estimate { flight, installation, departure_us, usage, gap_m, weight: variance.recip() }
 }
 
 /// The median stated error; where nothing is stated, a micrometre, which the noise factor corrects.
@@ -182,7 +251,7 @@ mod tests {
     fn a_unit_that_wears_fast_is_no_row_of_outliers() {
         let found = clean(&flights(&wearing(10, 3.0)));
         assert!(found.outliers.is_empty(), "{:?}", found.outliers);
-        assert!(found.noise_factor < 3.0, "{}", found.noise_factor);
+        assert!(found.scatter.noise_factor < 3.0, "{}", found.scatter.noise_factor);
     }
 
     /// Against the definition: every window sorted anew.

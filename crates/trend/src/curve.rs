@@ -13,6 +13,8 @@
 //! Ages are hours, or another usage brought to hours by the part number's mean. Each law is known by
 //! its *life*: the age T at which it has grown by a given span, so A = span/F(T).
 
+use serde::{Deserialize, Serialize};
+
 /// Age that a power law's amplitude refers to, hours, and its logarithm.
 const REFERENCE_HOURS: f64 = 1000.0;
 const LN_REFERENCE_HOURS: f64 = 6.907_755_278_982_137;
@@ -48,7 +50,7 @@ pub(crate) const FAMILIES: usize = 4 + BEND_RATIOS.len() + POWER_EIGHTHS.len();
 pub(crate) const LINEAR: usize = FAMILIES - POWERS + 4;
 
 /// A law's form.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Law {
     /// No wear.
     None,
@@ -89,6 +91,17 @@ impl Law {
             Self::Settling { .. } => 3,
             Self::Bend { index, .. } => 4 + index,
             Self::Power { index } => FAMILIES - POWERS + index,
+        }
+    }
+
+    /// Whether it is one of the bank's.
+    pub(crate) fn is_known(self) -> bool {
+        match self {
+            Self::None | Self::Onset { .. } => true,
+            Self::Bend { index, .. } => index < BEND_RATIOS.len(),
+            Self::Exponential { index } => index < TIME_CONSTANTS.len(),
+            Self::Settling { index } => index < SETTLING.len(),
+            Self::Power { index } => index < POWERS,
         }
     }
 

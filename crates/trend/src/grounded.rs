@@ -14,10 +14,10 @@ const RECENT: usize = 12;
 /// Standard errors beyond which the level is not theirs.
 const REACH: f64 = 5.0;
 
-/// A segment's mixture, and the prior it stands on.
-pub(crate) struct Grounded<'a> {
+/// A segment's mixture, and whether it stands on the prior of a unit alone.
+pub(crate) struct Grounded {
     pub(crate) posterior: Posterior,
-    pub(crate) prior: &'a FleetPrior,
+    pub(crate) is_alone: bool,
 }
 
 /// Why a segment has no mixture.
@@ -32,37 +32,54 @@ pub(crate) enum Groundless {
 /// Judges a segment by its fleet's prior, or else by the one of a unit `alone`, as the last estimates allow.
 ///
 /// Offsets that were undone leave `offset_m2` in the level.
-pub(crate) fn grounded<'a>(
+pub(crate) fn grounded(
     segment: &Segment<'_>,
-    prior: &'a FleetPrior,
-    alone: &'a FleetPrior,
+    prior: &FleetPrior,
+    alone: &FleetPrior,
     offset_m2: f64,
-) -> Result<Grounded<'a>, Groundless> {
+) -> Result<Grounded, Groundless> {
     let mut why = Groundless::Empty;
-    for prior in [prior, alone] {
+    for (is_alone, prior) in [(false, prior), (true, alone)] {
         let Some(posterior) = posterior(segment, prior) else { return Err(Groundless::Empty) };
-        let Check { level_m, recent_m, reach_m } = check(segment, &posterior, prior, offset_m2);
-        // Also false where one of them is not a number.
-        if (level_m - recent_m).abs() <= reach_m {
-            return Ok(Grounded { posterior, prior });
+        let check = check(last(segment.estimates), segment.now, &posterior, prior, offset_m2);
+        if check.holds() {
+            return Ok(Grounded { posterior, is_alone });
         }
-        why = Groundless::Unsupported { level_m, recent_m };
+        why = Groundless::Unsupported { level_m: check.level_m, recent_m: check.recent_m };
     }
     Err(why)
 }
 
 /// What the mixture says of the last estimates, and what they say.
-struct Check {
+pub(crate) struct Check {
     level_m: f64,
     recent_m: f64,
     reach_m: f64,
 }
 
-fn check(segment: &Segment<'_>, posterior: &Posterior, prior: &FleetPrior, offset_m2: f64) -> Check {
-    let recent = &segment.estimates[segment.estimates.len().saturating_sub(RECENT)..];
+impl Check {
+    /// Whether the level is theirs; also false where a figure is not a number.
+    pub(crate) fn holds(&self) -> bool {
+        (self.level_m - self.recent_m).abs() <= self.reach_m
+    }
+}
+
+/// The last estimates, which are asked.
+pub(crate) fn last(estimates: &[Estimate]) -> &[Estimate] {
+    &estimates[estimates.len().saturating_sub(RECENT)..]
+}
+
+/// Holds the mixture's level at a usage against a segment's last estimates.
+pub(crate) fn check(
+    recent: &[Estimate],
+    now: f64,
+    posterior: &Posterior,
+    prior: &FleetPrior,
+    offset_m2: f64,
+) -> Check {
     let weight: f64 = recent.iter().map(|e| e.weight).sum();
     let mean = |of: &dyn Fn(&Estimate) -> f64| recent.iter().map(|e| e.weight * of(e)).sum::<f64>() / weight;
-    let since = segment.now - mean(&|e| e.usage);
+    let since = now - mean(&|e| e.usage);
     let season = |e: &Estimate| prior.season.mean_m * prior.season.wave(e.departure_us as f64);
     let then = |node: &Node| {
         let grown = node.law.height(node.age_now) - node.law.height(node.age_now - since);

@@ -1,6 +1,6 @@
 //! A unit's history read: outliers out, offsets of the measurement undone, cut where it was reset.
 
-use crate::clean::{Clean, Estimate, clean};
+use crate::clean::{Clean, Estimate, Scatter, clean};
 use crate::jump::{Jump, jumps};
 use crate::normal;
 use crate::posterior::Segment;
@@ -19,13 +19,15 @@ const BOOKED_FLIGHTS: usize = 3;
 pub(crate) struct History {
     pub(crate) estimates: Vec<Estimate>,
     pub(crate) outliers: Vec<usize>,
-    pub(crate) noise_factor: f64,
+    pub(crate) scatter: Scatter,
     pub(crate) changes: Vec<Change>,
     /// Variance that undone offsets leave in the level, m².
     pub(crate) offset_m2: f64,
     begins: Vec<Begin>,
     /// What has been taken off the last estimates, metres.
-    undone_m: f64,
+    pub(crate) undone_m: f64,
+    /// The first estimate after the last step.
+    pub(crate) last_step: usize,
     now: f64,
     known_age: Option<f64>,
 }
@@ -47,7 +49,7 @@ pub(crate) fn read(
     prior: &FleetPrior,
 ) -> History {
     let now = flights.last().map_or(0.0, |f| prior.usage(f));
-    let Clean { mut estimates, outliers, noise_factor } = clean(flights);
+    let Clean { mut estimates, outliers, scatter } = clean(flights);
     let found = jumps(&estimates);
     for estimate in &mut estimates {
         estimate.usage = prior.usage(&flights[estimate.flight]);
@@ -55,11 +57,12 @@ pub(crate) fn read(
     let mut history = History {
         estimates,
         outliers,
-        noise_factor,
+        scatter,
         changes: Vec::new(),
         offset_m2: 0.0,
         begins: vec![Begin { estimate: 0, usage: 0.0, fresh: false }],
         undone_m: 0.0,
+        last_step: found.last().map_or(0, |jump| jump.at),
         now,
         known_age,
     };

@@ -3,7 +3,10 @@
 use crate::clean::Estimate;
 
 /// Estimates on each side of a candidate, from a quick look to a long one.
-const REACHES: [usize; 4] = [15, 30, 60, 120];
+const REACHES: [usize; 4] = [15, 30, 60, FARTHEST];
+
+/// The longest of them.
+pub(crate) const FARTHEST: usize = 120;
 
 /// Places passed over in the first search.
 const STRIDE: usize = 3;
@@ -46,13 +49,19 @@ pub(crate) fn jumps(estimates: &[Estimate]) -> Vec<Jump> {
     let mut found = Vec::new();
     let mut open = vec![(0, estimates.len())];
     while let Some((low, high)) = open.pop() {
-        if let Some(jump) = sums.largest(low, high) {
+        if let Some(jump) = sums.largest(low, low, high) {
             open.extend([(low, jump.at), (jump.at, high)]);
             found.push(jump);
         }
     }
     found.sort_unstable_by_key(|jump| jump.at);
     found
+}
+
+/// Whether a step shows at one of the places from which the estimates from `since` on are in reach, the
+/// first estimate being the first one since the last step.
+pub(crate) fn shows_step(estimates: &[Estimate], since: usize) -> bool {
+    Sums::new(estimates).largest(0, since.saturating_sub(FARTHEST), estimates.len()).is_some()
 }
 
 /// Squared steps at changes of installation, less what their errors explain, and how many there are.
@@ -156,12 +165,12 @@ impl Sums {
         (side.xy + prior * other) / (side.xx + prior)
     }
 
-    /// The step with the largest ratio to its error, over all places and reaches.
+    /// The step with the largest ratio to its error, over all places from one on and all reaches.
     ///
     /// Every third place is looked at, then all those near one that is half way to belief.
-    fn largest(&self, low: usize, high: usize) -> Option<Jump> {
+    fn largest(&self, low: usize, from: usize, high: usize) -> Option<Jump> {
         let ratio = |jump: &Jump| (jump.step_m / jump.se_m).abs();
-        let places = low + FEWEST..(high + 1).saturating_sub(FEWEST);
+        let places = from.max(low + FEWEST)..(high + 1).saturating_sub(FEWEST);
         let at_reaches = |at: usize| {
             REACHES.map(|reach| self.jump(at.saturating_sub(reach).max(low), at, (at + reach).min(high)))
         };

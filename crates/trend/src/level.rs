@@ -40,12 +40,14 @@ pub(crate) fn growth_probability(posterior: &Posterior) -> f64 {
 /// When wear began, in usage since the segment's begin, and the share of the belief that is in an onset,
 /// where that is most of it.
 pub(crate) fn onset(posterior: &Posterior) -> Option<(f64, f64)> {
-    let starts = posterior.nodes.iter().filter_map(|n| match n.law {
-        Law::Onset { start } => Some((start, n.weight)),
-        _ => None,
-    });
+    let starts = posterior.nodes.iter().filter_map(|n| Some((onset_start(n)?, n.weight)));
     let starts = Weighted::new(starts);
     (starts.total > 0.5).then(|| (starts.quantile(0.5), starts.total.min(1.0)))
+}
+
+/// When a node's wear began, in usage since the segment's begin, if it is an onset.
+pub(crate) fn onset_start(node: &Node) -> Option<f64> {
+    if let Law::Onset { start } = node.law { Some(start) } else { None }
 }
 
 /// The law most believed in, and how much.

@@ -16,21 +16,27 @@
 //! - Maintenance that lowers the gap by less than about 5 µm: no step is found, wear is underestimated.
 //! - A fleet of fewer than some thirty units: the prior then is mostly what was assumed.
 
+mod advance;
 mod bins;
+mod bytes;
 mod calibrate;
+mod checkpoint;
 pub mod classic;
 mod clean;
 mod crossing;
 mod curve;
+mod digest;
 mod error;
 mod filter;
 mod grounded;
 mod history;
 mod jump;
+mod kept;
 mod learn;
 mod level;
 mod look;
 mod memory;
+mod mixture;
 mod normal;
 mod outlook;
 mod posterior;
@@ -39,9 +45,11 @@ mod season;
 pub mod series;
 mod settings;
 mod state;
+mod tail;
 mod trend;
 
 pub use error::Error;
+pub use kept::Kept;
 pub use memory::remembered;
 pub use outlook::{Band, Outlook, outlook};
 pub use prior::{Axis, FleetPrior};

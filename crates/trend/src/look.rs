@@ -21,6 +21,8 @@ pub(crate) struct Look<'a> {
     wave: Pass,
     wave_by_gaps: f64,
     wave_information: f64,
+    /// Variance of the unit's own swing.
+    pub(crate) swing_m2: f64,
 }
 
 impl<'a> Look<'a> {
@@ -53,6 +55,7 @@ impl<'a> Look<'a> {
             wave,
             wave_by_gaps: alone.sfy,
             wave_information,
+            swing_m2: wave_information.recip(),
         }
     }
 
@@ -70,7 +73,17 @@ impl<'a> Look<'a> {
 
     /// Variance of the level now, whatever the curve.
     pub(crate) fn level_m2(&self) -> f64 {
-        self.filter.end_m2 + self.wave.end * self.wave.end / self.wave_information
+        self.filter.end_m2 + self.wave.end * self.wave.end * self.swing_m2
+    }
+
+    /// Covariance of the level now and the unit's own swing, whatever the curve.
+    pub(crate) fn level_swing_m2(&self) -> f64 {
+        -self.wave.end * self.swing_m2
+    }
+
+    /// The unit's own swing beside a curve, of whose heights it explains a part.
+    pub(crate) fn swing_m(&self, explained: f64) -> f64 {
+        (self.wave_by_gaps - explained) * self.swing_m2
     }
 
     /// What every curve's likelihood shares; it matters when one usage axis is weighed against another.

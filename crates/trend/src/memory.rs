@@ -39,9 +39,9 @@ pub fn remembered(
 }
 
 /// What a statement's state was judged by.
-fn evidence<'a>(said: &'a Trend, flights: &'a [Flight]) -> Evidence<'a> {
+fn evidence<'a>(said: &'a Trend, flights: &[Flight]) -> Evidence<'a> {
     Evidence {
-        flights,
+        last_gap_us: flights.iter().rev().find(|f| f.gap.is_some()).map(|f| f.departure_us),
         estimates: said.estimates,
         as_of_us: said.as_of_us,
         level: said.level,

@@ -3,14 +3,15 @@
 use crate::bins::{self, BINS, Bin};
 use crate::calibrate::{Calibration, foretold};
 use crate::error::Error;
-use crate::grounded::{Grounded, grounded};
+use crate::grounded::grounded;
 use crate::history;
+use crate::kept::Kept;
 use crate::look::walk;
 use crate::posterior::{Posterior, Segment, mean_growth};
 use crate::prior::FleetPrior;
 use crate::series::Series;
 use crate::settings::Settings;
-use crate::trend::{FEWEST_ESTIMATES, hours_per_usage};
+use crate::trend::FEWEST_ESTIMATES;
 
 /// Standard deviations from the middle to a 5 or 95 % bound.
 const Z90: f64 = 1.645;
@@ -59,18 +60,28 @@ pub fn outlook(
         return Ok(Outlook::default());
     }
     let alone = prior.alone();
-    let (mut past, mut last) = (Vec::new(), None);
-    for segment in history.segments() {
-        last = grounded(&segment, prior, &alone, history.offset_m2).ok();
-        past.extend(last.iter().flat_map(|on| levels(&segment, &on.posterior, on.prior)));
+    let (kept, standing) = Kept::standing(series, as_of_us, prior);
+    let mut past = Vec::new();
+    let mut segments = history.segments().peekable();
+    while let Some(segment) = segments.next() {
+        // The last one as it was stated.
+        let judged = if segments.peek().is_none() {
+            standing.judged().map(|(posterior, is_alone)| (posterior.clone(), is_alone))
+        } else {
+            let judged = grounded(&segment, prior, &alone, history.offset_m2).ok();
+            judged.map(|judged| (judged.posterior, judged.is_alone))
+        };
+        let prior = |is_alone: bool| if is_alone { &alone } else { prior };
+        past.extend(judged.iter().flat_map(|(on, is_alone)| levels(&segment, on, prior(*is_alone))));
     }
-    let Some(Grounded { posterior: judged, prior }) = last else {
+    let Some((judged, is_alone)) = standing.judged() else {
         return Ok(Outlook { past, ahead: Vec::new() });
     };
-    let ratio = hours_per_usage(flights, prior);
+    let prior = if is_alone { &alone } else { prior };
+    let ratio = kept.hours_per_usage(prior);
     let variance_m2 = history.offset_m2 + prior.bias_sd_m.powi(2);
     let after = |hours: f64| {
-        let [p05_m, m, p95_m] = foretold(&judged, hours / ratio, variance_m2, prior);
+        let [p05_m, m, p95_m] = foretold(judged, hours / ratio, variance_m2, prior);
         let band = Band { p05_m, m, p95_m };
         (hours, if hours > 0.0 { band.calibrated(prior.calibration) } else { band })
     };

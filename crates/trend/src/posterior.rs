@@ -74,6 +74,8 @@ pub(crate) struct Node {
     pub(crate) level_m: f64,
     /// The gap of this unit when new, metres.
     pub(crate) new_m: f64,
+    /// The unit's own swing beside the fleet's mean one, metres.
+    pub(crate) swing_m: f64,
     /// What had to be guessed of its age at first sight.
     pub(crate) guess: Guess,
     /// Onset not seen yet: it comes after an exponential wait.
@@ -90,6 +92,9 @@ pub(crate) struct Posterior {
     pub(crate) level_m2: f64,
     /// Variance of every node's growth since the segment began.
     pub(crate) growth_m2: f64,
+    /// Variance of every node's swing, and its covariance with the level.
+    pub(crate) swing_m2: f64,
+    pub(crate) level_swing_m2: f64,
     /// Log of the sum of the weights before they were normalised.
     pub(crate) log_evidence: f64,
 }
@@ -154,6 +159,8 @@ fn finish(look: &Look<'_>, mut believed: Vec<(usize, Node)>) -> Posterior {
         nodes: believed.into_iter().map(|(_, node)| node).collect(),
         level_m2: look.level_m2(),
         growth_m2: look.filter.end_m2 + look.filter.start_m2,
+        swing_m2: look.swing_m2,
+        level_swing_m2: look.level_swing_m2(),
         log_evidence: log_sum + look.shared_log_likelihood(),
     }
 }
@@ -319,6 +326,7 @@ fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, tried: Lives, pu
             ln_life,
             level_m: look.gaps.end + amplitude_m * (height_now - pass.end),
             new_m,
+            swing_m: look.swing_m(amplitude_m * pass.sfs),
             guess,
             waits: false,
             weight: log_likelihood + shared + look.logs.life(ln_life, ln_age, ln_tau),
@@ -340,6 +348,7 @@ fn flat(look: &Look<'_>, push: &mut dyn FnMut(Node)) {
         ln_life: prior.ln_life,
         level_m: gaps.end,
         new_m: gaps.start,
+        swing_m: look.swing_m(0.0),
         guess: Guess::Unneeded,
         waits: false,
         weight: log_likelihood + logs.share(Law::None),

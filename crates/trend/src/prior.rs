@@ -3,7 +3,9 @@
 use std::fmt;
 
 use crate::calibrate::{Calibration, USUAL_WIDTH};
+
 use crate::curve::{Curve, FAMILIES, LINEAR, Law, POWERS};
+use crate::digest::digest;
 use crate::posterior::Segment;
 use crate::season::Season;
 use crate::series::Flight;
@@ -145,6 +147,32 @@ impl FleetPrior {
     /// for a fleet whose past asks for nothing.
     pub fn widening(&self) -> f64 {
         0.5 * (self.calibration.high - self.calibration.low) / USUAL_WIDTH
+    }
+
+    /// What tells it from another prior.
+    pub(crate) fn digest(&self) -> u64 {
+        let Self {
+            axis,
+            hours_per_unit,
+            span_m,
+            new_m,
+            new_sd_m,
+            ln_life,
+            ln_life_sd,
+            shares,
+            season,
+            fresh_share,
+            onsets_per_hour,
+            wear_noise_m,
+            drift_m2_per_hour,
+            bias_sd_m,
+            calibration,
+        } = self;
+        let numbers = [hours_per_unit, span_m, new_m, new_sd_m, ln_life, ln_life_sd, fresh_share];
+        let noises = [onsets_per_hour, wear_noise_m, drift_m2_per_hour, bias_sd_m];
+        let numbers = numbers.into_iter().chain(noises).chain(shares).copied();
+        let all = numbers.chain(season.numbers()).chain(calibration.numbers());
+        digest(all.map(f64::to_bits).chain([*axis as u64]))
     }
 
     /// The usage of a unit up to a flight, hours' worth.

@@ -1,5 +1,7 @@
 //! One serial number's flights in order, with the usage behind each gap.
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Error;
 
 /// One flight of a unit, as a caller knows it; order does not matter.
@@ -38,7 +40,7 @@ impl Default for Usage {
 }
 
 /// A gap and its stated standard error.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Gap {
     /// The gap, metres.
     pub gap_m: f64,
@@ -47,7 +49,7 @@ pub struct Gap {
 }
 
 /// One flight with the unit's usage at its end, counted from the start of its first flight here.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Flight {
     /// Departure, microseconds since 1970 UTC.
     pub departure_us: i64,
@@ -73,6 +75,13 @@ pub struct Booked {
     pub renews: bool,
 }
 
+impl Booked {
+    /// By what entries are ordered.
+    pub(crate) fn order(&self) -> (i64, bool) {
+        (self.utc_us, self.renews)
+    }
+}
+
 /// The flights of one serial number, by departure.
 ///
 /// Usage follows these rules, each of which looks backwards only, so that a series cut at a date is
@@ -91,6 +100,8 @@ pub struct Series {
     flights: Vec<Flight>,
     unit_hours_at_start: Option<f64>,
     book: Vec<Booked>,
+    /// After the last flight.
+    meter: Meter,
 }
 
 impl Series {
@@ -104,19 +115,16 @@ impl Series {
         if !(nominal.is_finite() && nominal > 0.0) {
             return Err(Error::Setting { name: "nominal_flight_hours", value: nominal });
         }
-        let mut rows: Vec<Observation> = rows.into_iter().collect();
-        rows.iter().try_for_each(check)?;
-        rows.sort_unstable_by(order);
-        rows.dedup_by_key(|row| (row.departure_us, row.installation));
+        let rows = in_order(rows)?;
         let mut meter = Meter::new(nominal);
         let flights = rows.iter().map(|row| meter.fly(row)).collect();
-        Ok(Self { flights, unit_hours_at_start: usage.unit_hours_at_start, book: Vec::new() })
+        Ok(Self { flights, unit_hours_at_start: usage.unit_hours_at_start, book: Vec::new(), meter })
     }
 
     /// The same with what the maintenance book says of the unit, in any order.
     #[must_use]
     pub fn with_book(mut self, mut book: Vec<Booked>) -> Self {
-        book.sort_unstable_by_key(|entry| (entry.utc_us, entry.renews));
+        book.sort_unstable_by_key(Booked::order);
         self.book = book;
         self
     }
@@ -146,6 +154,20 @@ impl Series {
     pub fn unit_hours_at_start(&self) -> Option<f64> {
         self.unit_hours_at_start
     }
+
+    /// The usage after the last flight, to go on from.
+    pub(crate) fn meter(&self) -> Meter {
+        self.meter
+    }
+}
+
+/// Rows in the order of the flights, each flight once.
+pub(crate) fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<Vec<Observation>, Error> {
+    let mut rows: Vec<Observation> = rows.into_iter().collect();
+    rows.iter().try_for_each(check)?;
+    rows.sort_unstable_by(order);
+    rows.dedup_by_key(|row| (row.departure_us, row.installation));
+    Ok(rows)
 }
 
 /// Numbers that would poison every sum after them are refused at the door.
@@ -177,17 +199,18 @@ fn order(a: &Observation, b: &Observation) -> std::cmp::Ordering {
 }
 
 /// The unit's usage so far, and the hour meter it was last read against.
-struct Meter {
-    nominal_flight_hours: f64,
-    hours: f64,
-    flights: f64,
-    reversals: f64,
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Meter {
+    pub(crate) nominal_flight_hours: f64,
+    pub(crate) hours: f64,
+    pub(crate) flights: f64,
+    pub(crate) reversals: f64,
     /// Reversals that were stated, and the hours they were stated for.
-    stated: (f64, f64),
+    pub(crate) stated: (f64, f64),
     /// Hours flown in rows, and how many rows.
-    rows: (f64, f64),
+    pub(crate) rows: (f64, f64),
     /// Installation, meter reading and the unit's hours at the last flight that stated one.
-    anchor: Option<(u32, f64, f64)>,
+    pub(crate) anchor: Option<(u32, f64, f64)>,
 }
 
 impl Meter {
@@ -203,7 +226,8 @@ impl Meter {
         }
     }
 
-    fn fly(&mut self, row: &Observation) -> Flight {
+    /// Adds a flight.
+    pub(crate) fn fly(&mut self, row: &Observation) -> Flight {
         let before = self.hours;
         let metered = self.metered(row);
         let own = row.flight_hours.or(metered.map(|h| h - before)).unwrap_or(self.nominal_flight_hours);

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use crate::series::Flight;
 use crate::settings::Settings;
 use crate::trend::{Change, ChangeKind, Crossing, FEWEST_ESTIMATES, Level};
 
@@ -88,7 +87,8 @@ impl fmt::Display for Reason {
 
 /// What a state is judged by.
 pub(crate) struct Evidence<'a> {
-    pub(crate) flights: &'a [Flight],
+    /// Departure of the last flight with a gap.
+    pub(crate) last_gap_us: Option<i64>,
     pub(crate) estimates: usize,
     pub(crate) as_of_us: i64,
     pub(crate) level: Option<Level>,
@@ -104,11 +104,11 @@ pub(crate) fn judge(
     settings: &Settings,
     previous: Option<State>,
 ) -> (Option<State>, Reason) {
-    let Some(last) = evidence.flights.iter().rev().find(|f| f.gap.is_some()) else {
+    let Some(last_gap_us) = evidence.last_gap_us else {
         return (None, Reason::NoEstimate);
     };
     let days_since = |departure_us: i64| (evidence.as_of_us - departure_us) as f64 / DAY_US;
-    let days = days_since(last.departure_us);
+    let days = days_since(last_gap_us);
     if days > settings.stale_after_days {
         return (None, Reason::Stale { days });
     }

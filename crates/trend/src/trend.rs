@@ -1,17 +1,15 @@
 //! The statement: what is known of one unit on one day.
 
+use serde::{Deserialize, Serialize};
+
 use std::fmt;
 
-use crate::crossing::Remaining;
 use crate::error::Error;
-use crate::grounded::{Grounded, Groundless, grounded};
-use crate::history::{self, History};
-use crate::level;
-use crate::posterior::{Posterior, Segment};
+use crate::kept::Kept;
 use crate::prior::FleetPrior;
-use crate::series::{Flight, Series};
+use crate::series::Series;
 use crate::settings::Settings;
-use crate::state::{Evidence, Reason, State, judge};
+use crate::state::{Reason, State};
 
 /// Estimates below which nothing but a level is said.
 pub const FEWEST_ESTIMATES: usize = 8;
@@ -135,7 +133,7 @@ pub enum Wear {
 }
 
 /// A change that wear does not make.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Change {
     /// The first flight after it, microseconds since 1970 UTC.
     pub departure_us: i64,
@@ -151,7 +149,7 @@ pub struct Change {
 }
 
 /// Kinds of change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ChangeKind {
     /// The measurement moved: re-rigging, another reference. The wear did not.
     Step,
@@ -192,108 +190,6 @@ pub fn trend(
     settings.check()?;
     let vague = FleetPrior::vague(settings.limit_m);
     let prior = prior.unwrap_or(&vague);
-    let flights = series.until(as_of_us);
-    let history = history::read(flights, series.book_until(as_of_us), series.unit_hours_at_start(), prior);
-    let alone = prior.alone();
-    let (changes, judged) = follow(&history, flights, prior, &alone);
-    let unsupported = match judged {
-        Err(Groundless::Unsupported { level_m, recent_m }) => Some((level_m, recent_m)),
-        _ => None,
-    };
-    let judged = judged.ok().filter(|_| history.estimates.len() >= FEWEST_ESTIMATES);
-    let prior = judged.as_ref().map_or(prior, |judged| judged.prior);
-    let judged = judged.map(|judged| judged.posterior);
-    let growth_probability = judged.as_ref().map(level::growth_probability);
-    let ratio = hours_per_usage(flights, prior);
-    let remaining = judged.as_ref().map(|p| Remaining::new(p, prior, settings, ratio, history.offset_m2));
-    let level = judged.as_ref().map(|p| level::level(p, prior, history.offset_m2));
-    let crossing = remaining.as_ref().map(Remaining::crossing);
-    let estimates = history.estimates.len();
-    let evidence = Evidence { flights, estimates, as_of_us, level, crossing, changes: &changes, unsupported };
-    let (state, reason) = judge(&evidence, settings, previous);
-    Ok(Trend {
-        as_of_us,
-        flights: flights.len(),
-        estimates,
-        unit_hours: series.unit_hours_at_start().zip(flights.last()).map(|(start, last)| start + last.hours),
-        level,
-        rate: judged.as_ref().map(|p| level::rate(p, ratio)),
-        wear: wear(growth_probability),
-        growth_probability,
-        law: judged.as_ref().and_then(level::law),
-        changes,
-        crossing,
-        check_probability: remaining.as_ref().map(|r| r.within(settings.check_interval_hours)),
-        pace: pace(flights),
-        outliers_us: history.outliers.iter().map(|&flight| flights[flight].departure_us).collect(),
-        noise_factor: history.noise_factor,
-        state,
-        reason,
-    })
-}
-
-/// Changes found, onsets of every segment included, and what the last segment says.
-fn follow<'a>(
-    history: &History,
-    flights: &[Flight],
-    prior: &'a FleetPrior,
-    alone: &'a FleetPrior,
-) -> (Vec<Change>, Result<Grounded<'a>, Groundless>) {
-    let mut changes = history.changes.clone();
-    let mut judged = Err(Groundless::Empty);
-    for segment in history.segments() {
-        judged = grounded(&segment, prior, alone, history.offset_m2);
-        let found = judged.as_ref().ok().and_then(|j| onset(&j.posterior, &segment, flights, prior));
-        changes.extend(found);
-    }
-    changes.sort_by_key(|change| change.departure_us);
-    (changes, judged)
-}
-
-/// The onset of wear in a segment as a change.
-fn onset(
-    posterior: &Posterior,
-    segment: &Segment<'_>,
-    flights: &[Flight],
-    prior: &FleetPrior,
-) -> Option<Change> {
-    let (after, certainty) = level::onset(posterior)?;
-    let start = segment.begin + after;
-    let first = flights.partition_point(|flight| prior.usage(flight) < start);
-    let departure_us = flights.get(first)?.departure_us;
-    Some(Change { departure_us, kind: ChangeKind::Onset, step_m: 0.0, se_m: 0.0, certainty })
-}
-
-fn wear(growth_probability: Option<f64>) -> Wear {
-    match growth_probability {
-        Some(probability) if probability > 0.95 => Wear::Wearing,
-        Some(_) => Wear::Steady,
-        None => Wear::Unknown,
-    }
-}
-
-/// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or
-/// over its last flights while that is young.
-pub(crate) fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
-    const YOUNG: usize = 20;
-    const LAST: usize = 300;
-    let Some(last) = flights.last() else { return 1.0 };
-    let here = flights.iter().rev().take_while(|flight| flight.installation == last.installation).count();
-    let count = if here < YOUNG { LAST } else { here.min(LAST) };
-    let first = &flights[flights.len().saturating_sub(count)];
-    let ratio = (last.hours - first.hours) / (prior.usage(last) - prior.usage(first));
-    if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
-}
-
-/// The pace of the last ninety days of flights; nothing when they show no hours.
-fn pace(flights: &[Flight]) -> Option<Pace> {
-    const DAY_US: f64 = 86_400e6;
-    let last = flights.last()?;
-    let from = flights.partition_point(|f| ((last.departure_us - f.departure_us) as f64) > 90.0 * DAY_US);
-    let first = &flights[from];
-    let (hours, days) = (last.hours - first.hours, (last.departure_us - first.departure_us) as f64 / DAY_US);
-    (hours > 0.0 && days > 0.0).then(|| Pace {
-        hours_per_day: hours / days,
-        hours_per_flight: hours / (last.flights - first.flights),
-    })
+    let (kept, standing) = Kept::standing(series, as_of_us, prior);
+    Ok(kept.statement(standing, as_of_us, series.book_until(as_of_us), settings, prior, previous))
 }

@@ -9,6 +9,7 @@
 mod classic;
 mod degenerate;
 mod fleet;
+mod kept;
 mod outlook;
 mod random;
 mod series;

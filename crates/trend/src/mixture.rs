@@ -1,0 +1,120 @@
+//! A mixture over the bank made small: of many nodes some, in single precision.
+
+use serde::{Deserialize, Serialize};
+
+use crate::curve::Law;
+use crate::posterior::{Guess, Node, Posterior};
+use crate::prior::FleetPrior;
+
+/// Nodes kept at most.
+const MOST: usize = 128;
+
+/// A node's law, its age in hours, and its numbers in metres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Point {
+    pub(crate) law: Law,
+    pub(crate) waits: bool,
+    pub(crate) age_begin: f32,
+    pub(crate) amplitude_m: f32,
+    pub(crate) level_m: f32,
+    pub(crate) new_m: f32,
+    pub(crate) swing_m: f32,
+    pub(crate) weight: f32,
+}
+
+/// What the nodes of a [`Posterior`] share, and those that stand for all.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Mixture {
+    /// Judged without the fleet.
+    pub(crate) is_alone: bool,
+    /// Usage from the segment's begin to its end.
+    pub(crate) span: f64,
+    pub(crate) level_m2: f64,
+    pub(crate) growth_m2: f64,
+    pub(crate) swing_m2: f64,
+    pub(crate) level_swing_m2: f64,
+    pub(crate) points: Vec<Point>,
+}
+
+impl Mixture {
+    /// Keeps what a posterior says at the end of its segment.
+    pub(crate) fn of(posterior: &Posterior, span: f64, is_alone: bool) -> Self {
+        let Posterior { level_m2, growth_m2, swing_m2, level_swing_m2, .. } = *posterior;
+        let points = thinned(&posterior.nodes);
+        Self { is_alone, span, level_m2, growth_m2, swing_m2, level_swing_m2, points }
+    }
+
+    /// The posterior that was kept; its evidence and its guesses, which only a fleet's lesson asks, are not.
+    pub(crate) fn posterior(&self, prior: &FleetPrior) -> Posterior {
+        let node = |point: &Point| {
+            let age_begin = f64::from(point.age_begin);
+            Node {
+                law: point.law,
+                age_begin,
+                age_now: age_begin + self.span,
+                amplitude_m: f64::from(point.amplitude_m),
+                ln_life: prior.ln_life,
+                level_m: f64::from(point.level_m),
+                new_m: f64::from(point.new_m),
+                swing_m: f64::from(point.swing_m),
+                guess: Guess::Unneeded,
+                waits: point.waits,
+                weight: f64::from(point.weight),
+            }
+        };
+        let Self { level_m2, growth_m2, swing_m2, level_swing_m2, .. } = *self;
+        let nodes = self.points.iter().map(node).collect();
+        Posterior { nodes, level_m2, growth_m2, swing_m2, level_swing_m2, log_evidence: 0.0 }
+    }
+}
+
+/// As many nodes as are kept: the heavy ones as they are, and of the light ones, which lie in the order of
+/// the bank, one at every share of their weight (Fearnhead and Clifford 2003, without its random numbers).
+fn thinned(nodes: &[Node]) -> Vec<Point> {
+    let share = light_share(nodes);
+    let (mut passed, mut due) = (0.0, 0.5 * share);
+    let mut points = Vec::with_capacity(nodes.len().min(MOST + 1));
+    for node in nodes {
+        if node.weight > share {
+            points.push(point(node, node.weight));
+            continue;
+        }
+        passed += node.weight;
+        if passed > due {
+            due += share;
+            points.push(point(node, share));
+        }
+    }
+    points
+}
+
+/// The weight that every light node is to have, below which a node is one; none where all may stay.
+fn light_share(nodes: &[Node]) -> f64 {
+    if nodes.len() <= MOST {
+        return 0.0;
+    }
+    let mut weights: Vec<f64> = nodes.iter().map(|node| node.weight).collect();
+    weights.sort_unstable_by(|a, b| b.total_cmp(a));
+    let mut left: f64 = weights.iter().sum();
+    for (heavy, weight) in weights.iter().take(MOST - 1).enumerate() {
+        let share = left / (MOST - heavy) as f64;
+        if *weight <= share {
+            return share;
+        }
+        left -= weight;
+    }
+    left
+}
+
+fn point(node: &Node, weight: f64) -> Point {
+    Point {
+        law: node.law,
+        waits: node.waits,
+        age_begin: node.age_begin as f32,
+        amplitude_m: node.amplitude_m as f32,
+        level_m: node.level_m as f32,
+        new_m: node.new_m as f32,
+        swing_m: node.swing_m as f32,
+        weight: weight as f32,
+    }
+}
