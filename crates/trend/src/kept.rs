@@ -94,6 +94,18 @@ impl Kept {
         Ok(Some(Self { tail, meter: Some(meter), ..self.clone() }))
     }
 
+    /// What was kept on an earlier day since the checkpoint; nothing for one before it.
+    pub(crate) fn until(&self, as_of_us: i64) -> Option<Self> {
+        let flown = self.tail.partition_point(|flight| flight.departure_us <= as_of_us);
+        let is_later = self.checkpoint.last.is_some_and(|last| last.departure_us <= as_of_us);
+        let count = self.checkpoint.flights + flown;
+        (is_later && checkpoint::before(count) == self.checkpoint.flights).then(|| Self {
+            tail: self.tail[..flown].to_vec(),
+            meter: None,
+            ..self.clone()
+        })
+    }
+
     /// States what is known of the unit on a day, as [`trend()`](crate::trend()) does from its whole history.
     ///
     /// `book` is all that the maintenance book says of the unit, in any order. Nothing where the history is

@@ -1,8 +1,9 @@
-//! A state that remembers: held by what the unit's own last flights said, and by nothing that is kept.
+//! A state that remembers: held by what the unit's own last flights said, and by no statement that was made.
 
 use crate::error::Error;
+use crate::kept::Kept;
 use crate::prior::FleetPrior;
-use crate::series::{Flight, Series};
+use crate::series::{Booked, Flight, Series};
 use crate::settings::Settings;
 use crate::state::{Evidence, State, judge};
 use crate::trend::{Trend, trend};
@@ -25,23 +26,88 @@ pub fn remembered(
     settings: &Settings,
     prior: Option<&FleetPrior>,
 ) -> Result<Trend, Error> {
-    let mut said = trend(series, as_of_us, settings, prior, None)?;
-    let flights = series.until(as_of_us);
-    if judge(&evidence(&said, flights), settings, Some(State::Act)).0 == said.state {
+    settings.check()?;
+    let vague = FleetPrior::vague(settings.limit_m);
+    let prior = prior.unwrap_or(&vague);
+    let (kept, standing) = Kept::standing(series, as_of_us, prior);
+    let said = kept.statement(standing, as_of_us, series.book_until(as_of_us), settings, prior, None);
+    let last_gap_us = kept.last_gap_us();
+    if !could_matter(&said, last_gap_us, settings) {
         return Ok(said);
     }
     let mut previous = None;
-    for flight in flights.iter().rev().filter(|f| f.gap.is_some()).skip(1).take(RECALLED) {
-        previous = previous.max(trend(series, flight.departure_us, settings, prior, None)?.state);
+    for departure_us in recalled(series.until(as_of_us)) {
+        let kept = kept.until(departure_us);
+        let earlier = kept.map(|kept| kept.says(departure_us, series.book(), settings, prior, None));
+        let earlier = match earlier.transpose()?.flatten() {
+            Some(earlier) => earlier,
+            None => trend(series, departure_us, settings, Some(prior), None)?,
+        };
+        previous = previous.max(earlier.state);
     }
-    (said.state, said.reason) = judge(&evidence(&said, flights), settings, previous);
-    Ok(said)
+    Ok(judged_again(said, last_gap_us, settings, previous))
+}
+
+impl Kept {
+    /// States what is known of the unit on a day as [`remembered`] does from its whole history.
+    ///
+    /// Nothing as [`Kept::says`], and where a memory could matter that goes back beyond the last checkpoint.
+    ///
+    /// # Errors
+    /// As [`trend()`].
+    pub fn remembers(
+        &self,
+        as_of_us: i64,
+        book: &[Booked],
+        settings: &Settings,
+        prior: &FleetPrior,
+    ) -> Result<Option<Trend>, Error> {
+        let Some(said) = self.says(as_of_us, book, settings, prior, None)? else { return Ok(None) };
+        if !could_matter(&said, self.last_gap_us(), settings) {
+            return Ok(Some(said));
+        }
+        let asked = recalled(&self.tail);
+        if asked.len() < RECALLED {
+            return Ok(None);
+        }
+        let mut previous = None;
+        for departure_us in asked {
+            let Some(kept) = self.until(departure_us) else { return Ok(None) };
+            let Some(earlier) = kept.says(departure_us, book, settings, prior, None)? else {
+                return Ok(None);
+            };
+            previous = previous.max(earlier.state);
+        }
+        Ok(Some(judged_again(said, self.last_gap_us(), settings, previous)))
+    }
+}
+
+/// Departures of the flights that are asked what their state was.
+fn recalled(flights: &[Flight]) -> Vec<i64> {
+    let seen = flights.iter().rev().filter(|flight| flight.gap.is_some());
+    seen.skip(1).take(RECALLED).map(|flight| flight.departure_us).collect()
+}
+
+/// Whether any previous state would change what is said.
+fn could_matter(said: &Trend, last_gap_us: Option<i64>, settings: &Settings) -> bool {
+    judge(&evidence(said, last_gap_us), settings, Some(State::Act)).0 != said.state
+}
+
+/// The same with the state that follows from the previous one.
+fn judged_again(
+    said: Trend,
+    last_gap_us: Option<i64>,
+    settings: &Settings,
+    previous: Option<State>,
+) -> Trend {
+    let (state, reason) = judge(&evidence(&said, last_gap_us), settings, previous);
+    Trend { state, reason, ..said }
 }
 
 /// What a statement's state was judged by.
-fn evidence<'a>(said: &'a Trend, flights: &[Flight]) -> Evidence<'a> {
+fn evidence(said: &Trend, last_gap_us: Option<i64>) -> Evidence<'_> {
     Evidence {
-        last_gap_us: flights.iter().rev().find(|f| f.gap.is_some()).map(|f| f.departure_us),
+        last_gap_us,
         estimates: said.estimates,
         as_of_us: said.as_of_us,
         level: said.level,

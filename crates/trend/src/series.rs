@@ -129,6 +129,11 @@ impl Series {
         self
     }
 
+    /// All entries of the book.
+    pub(crate) fn book(&self) -> &[Booked] {
+        &self.book
+    }
+
     /// The entries of the book that were made at or before a date.
     pub fn book_until(&self, as_of_us: i64) -> &[Booked] {
         &self.book[..self.book.partition_point(|entry| entry.utc_us <= as_of_us)]
