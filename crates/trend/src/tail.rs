@@ -16,6 +16,9 @@ use crate::series::Flight;
 /// A tail longer than this share of its segment's estimates is no small thing to add.
 const SHARE: usize = 8;
 
+/// Estimates after which a step's size, and what kind of a step it is, is settled.
+const SETTLED: usize = 30;
+
 /// What a tail's flights measured.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tail {
@@ -30,11 +33,11 @@ impl Tail {
         self.estimates.len()
     }
 
-    /// Reads the flights after a checkpoint; nothing where they change how those before are read: a step
-    /// shows, or an outlier turns out to be none.
+    /// Reads the flights after a checkpoint; nothing where they may change how those before are read: a step
+    /// shows or is not settled, or an outlier turns out to be none.
     pub(crate) fn read(checkpoint: &Checkpoint, flights: &[Flight], prior: &FleetPrior) -> Option<Self> {
         let (mut estimates, outliers) = checkpoint.scatter.clean(flights)?;
-        if SHARE * estimates.len() > checkpoint.in_segment {
+        if SHARE * estimates.len() > checkpoint.in_segment || checkpoint.near.len() < SETTLED {
             return None;
         }
         for estimate in &mut estimates {
