@@ -156,11 +156,12 @@ fn error(gap: Gap, typical_m: f64) -> f64 {
 /// Found over stated variance from successive differences, drawn to one while they are few.
 fn noise_factor(gaps: &[f64], errors: &[f64]) -> f64 {
     const PRIOR_COUNT: f64 = 4.0;
-    let mut ratios: Vec<f64> = gaps
-        .windows(2)
-        .zip(errors.windows(2))
-        .map(|(y, se)| (y[1] - y[0]) / (se[0] * se[0] + se[1] * se[1]).sqrt())
-        .collect();
+    let (Some((_, later)), Some((_, later_errors))) = (gaps.split_first(), errors.split_first()) else {
+        return 1.0;
+    };
+    let differences = later.iter().zip(gaps).map(|(after, before)| after - before);
+    let joint = later_errors.iter().zip(errors).map(|(a, b)| (a * a + b * b).sqrt());
+    let mut ratios: Vec<f64> = differences.zip(joint).map(|(difference, error)| difference / error).collect();
     if ratios.is_empty() {
         return 1.0;
     }
@@ -183,14 +184,24 @@ fn on_local_line(gaps: &[f64], at: usize) -> f64 {
     let width = WINDOW.min(gaps.len());
     let first = at.saturating_sub(width / 2).min(gaps.len() - width);
     let window = &gaps[first..first + width];
-    let later = |i: usize| (i + 1..width).map(move |j| (window[j] - window[i]) / (j - i) as f64);
-    let mut slopes: Vec<f64> = (0..width).flat_map(later).collect();
-    if slopes.is_empty() {
+    if width < 2 {
         return gaps[at];
     }
-    let slope = median(&mut slopes);
-    let mut levels: Vec<f64> = (first..).zip(window).map(|(k, gap)| gap - slope * k as f64).collect();
-    median(&mut levels) + slope * at as f64
+    let mut slopes = [0.0; WINDOW * (WINDOW - 1) / 2];
+    let mut count = 0;
+    for apart in 1..width {
+        let per_flight = (apart as f64).recip();
+        for (earlier, later) in window.iter().zip(&window[apart..]) {
+            slopes[count] = (later - earlier) * per_flight;
+            count += 1;
+        }
+    }
+    let slope = median(&mut slopes[..count]);
+    let mut levels = [0.0; WINDOW];
+    for (k, (level, gap)) in levels.iter_mut().zip(window).enumerate() {
+        *level = gap - slope * (first + k) as f64;
+    }
+    median(&mut levels[..width]) + slope * at as f64
 }
 
 /// Median of the eleven values around each, of the nearest eleven at the ends.

@@ -79,6 +79,8 @@ pub(crate) struct Curve {
     pub(crate) ln_age: f64,
     pub(crate) ln_age_cell: f64,
     pub(crate) ln_law_cell: f64,
+    /// The sequence its heights are a multiple of, beside a line and a constant, if they are.
+    pub(crate) part: Option<usize>,
 }
 
 impl Law {
@@ -217,6 +219,8 @@ fn eighth_power([x, half, quarter, eighth]: [f64; 4], eighths: u8) -> f64 {
 pub(crate) struct Bank {
     pub(crate) curves: Vec<Curve>,
     ages: Vec<f64>,
+    /// Usage between two knees.
+    knee_cell: f64,
 }
 
 impl Bank {
@@ -233,16 +237,20 @@ impl Bank {
         curves.extend((0..starts).map(|i| at_birth(Law::Onset { start: (i as f64 + 0.5) * cell }, cell)));
         let step = (TIME_CONSTANTS[TIME_CONSTANTS.len() - 1] / TIME_CONSTANTS[0]).ln()
             / (TIME_CONSTANTS.len() - 1) as f64;
-        let exponentials = (0..TIME_CONSTANTS.len()).map(|index| (Law::Exponential { index }, step));
-        let powers = (0..POWERS).map(|index| (Law::Power { index }, 1.0));
-        let settling =
-            (0..SETTLING.len()).map(|index| (Law::Settling { index }, 1.0 / SETTLING.len() as f64));
-        for (law, law_cell) in exponentials.chain(settling).chain(powers) {
+        let rising = |index| (Law::Exponential { index }, step, Some(KNEES + index));
+        let settling = |index| {
+            let part = KNEES + TIME_CONSTANTS.len() + index;
+            (Law::Settling { index }, 1.0 / SETTLING.len() as f64, Some(part))
+        };
+        let exponentials = (0..TIME_CONSTANTS.len()).map(rising).chain((0..SETTLING.len()).map(settling));
+        let powers = (0..POWERS).map(|index| (Law::Power { index }, 1.0, None));
+        for (law, law_cell, part) in exponentials.chain(powers) {
             let ln_law_cell = law_cell.ln();
-            curves.extend(ages.iter().map(|age| Curve { law, ln_law_cell, ..*age }));
+            curves.extend(ages.iter().map(|age| Curve { law, ln_law_cell, part, ..*age }));
         }
-        curves.extend(bends(&ages, span_hours));
-        Self { curves, ages: ages.into_iter().map(|curve| curve.age).collect() }
+        let knee_cell = span_hours / KNEES as f64;
+        curves.extend(bends(&ages, knee_cell));
+        Self { curves, ages: ages.into_iter().map(|curve| curve.age).collect(), knee_cell }
     }
 }
 
@@ -255,11 +263,11 @@ const BIRTH: Curve = Curve {
     ln_age: f64::NEG_INFINITY,
     ln_age_cell: f64::NEG_INFINITY,
     ln_law_cell: 0.0,
+    part: None,
 };
 
 /// One line and then another, the knee within what was seen, at every few ages.
-fn bends(ages: &[Curve], span_hours: f64) -> Vec<Curve> {
-    let cell = span_hours / KNEES as f64;
+fn bends(ages: &[Curve], cell: f64) -> Vec<Curve> {
     let (stride, ln_law_cell) = (BEND_AGE_STRIDE as f64, -(KNEES as f64).ln());
     let mut curves = Vec::new();
     for at in ages.iter().step_by(BEND_AGE_STRIDE) {
@@ -271,7 +279,7 @@ fn bends(ages: &[Curve], span_hours: f64) -> Vec<Curve> {
         };
         for (knee, index) in (0..KNEES).flat_map(|k| (0..BEND_RATIOS.len()).map(move |index| (k, index))) {
             let law = Law::Bend { knee: age.age + (knee as f64 + 0.5) * cell, index };
-            curves.push(Curve { law, ..age });
+            curves.push(Curve { law, part: Some(knee), ..age });
         }
     }
     curves
@@ -297,53 +305,91 @@ fn ages(fresh: bool, known_age: Option<f64>) -> Vec<Curve> {
     AGES.iter().enumerate().map(at).collect()
 }
 
-/// Heights of every curve at the same usages, made of what many curves share: roots for each age,
-/// exponentials for each time constant.
+/// Heights of curves at the same usages, made of what many curves share.
+///
+/// ```text
+/// exponential  e^((u + a)/τ) − 1 = e^(a/τ) · e^(u/τ) − 1
+/// settling     1 − e^(−(u + a)/τ) = 1 − e^(−a/τ) · e^(−u/τ)
+/// bend         s (u + a) + (1 − s) max(0, u − k)     k the knee, counted from first sight
+/// ```
+/// So each of these is one of a few sequences, its *part*, times a factor, beside a line and a constant.
 pub(crate) struct Heights {
     usages: Vec<f64>,
     roots: Vec<Vec<[f64; 4]>>,
-    rising: Vec<Vec<f64>>,
-    settling: Vec<Vec<f64>>,
+    knee_cell: f64,
+}
+
+/// Number of parts.
+pub(crate) const PARTS: usize = KNEES + TIME_CONSTANTS.len() + SETTLING.len();
+
+/// A curve's heights as multiples of its part, of the line of usage over the reference age, and of one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Factors {
+    pub(crate) part: f64,
+    pub(crate) line: f64,
+    pub(crate) one: f64,
+}
+
+impl Curve {
+    /// By what its heights are made of its part; meaningless for a law that has none.
+    pub(crate) fn factors(&self) -> Factors {
+        match self.law {
+            Law::Bend { index, .. } => {
+                let before = BEND_RATIOS[index];
+                Factors { part: 1.0 - before, line: before, one: before * self.age / REFERENCE_HOURS }
+            }
+            Law::Exponential { index } => {
+                Factors { part: (self.age / TIME_CONSTANTS[index]).exp(), line: 0.0, one: -1.0 }
+            }
+            Law::Settling { index } => {
+                Factors { part: -(-self.age / SETTLING[index]).exp(), line: 0.0, one: 1.0 }
+            }
+            Law::None | Law::Onset { .. } | Law::Power { .. } => Factors { part: 0.0, line: 0.0, one: 0.0 },
+        }
+    }
 }
 
 impl Heights {
     /// For usages counted from the segment's begin.
     pub(crate) fn new(bank: &Bank, usages: Vec<f64>) -> Self {
         let of_age = |age: &f64| usages.iter().map(|u| roots((u + age).max(0.0) / REFERENCE_HOURS)).collect();
-        let of_tau = |tau: f64| usages.iter().map(|u| (u / tau).exp()).collect();
         let roots = bank.ages.iter().map(of_age).collect();
-        let rising = TIME_CONSTANTS.iter().map(|&tau| of_tau(tau)).collect();
-        let settling = SETTLING.iter().map(|&tau| of_tau(-tau)).collect();
-        Self { usages, roots, rising, settling }
+        Self { usages, roots, knee_cell: bank.knee_cell }
     }
 
-    /// Writes a curve's heights into one lane of some that are filled together.
+    /// The line of usage over the reference age.
+    pub(crate) fn line(&self) -> impl Iterator<Item = f64> {
+        self.usages.iter().map(|u| u / REFERENCE_HOURS)
+    }
+
+    /// Writes a part into one lane of some that are filled together.
+    pub(crate) fn fill_part<const N: usize>(&self, part: usize, lane: usize, lanes: &mut [[f64; N]]) {
+        let places = lanes.iter_mut().map(|lanes| &mut lanes[lane]).zip(&self.usages);
+        let exponential = |tau: f64, (place, u): (&mut f64, &f64)| *place = (u / tau).exp();
+        if part < KNEES {
+            let knee = (part as f64 + 0.5) * self.knee_cell;
+            places.for_each(|(place, u)| *place = bent(0.0, knee, *u));
+        } else if let Some(tau) = TIME_CONSTANTS.get(part - KNEES) {
+            places.for_each(|at| exponential(*tau, at));
+        } else {
+            let tau = SETTLING[part - KNEES - TIME_CONSTANTS.len()];
+            places.for_each(|at| exponential(-tau, at));
+        }
+    }
+
+    /// Writes the heights of a curve that has no part into one lane.
     pub(crate) fn fill<const N: usize>(&self, curve: &Curve, lane: usize, lanes: &mut [[f64; N]]) {
         let places = lanes.iter_mut().map(|lanes| &mut lanes[lane]);
         match curve.law {
-            Law::None => places.for_each(|place| *place = 0.0),
-            Law::Onset { start: knee } | Law::Bend { knee, .. } => {
-                let before = if let Law::Bend { index, .. } = curve.law { BEND_RATIOS[index] } else { 0.0 };
-                for (place, u) in places.zip(&self.usages) {
-                    *place = bent(before, knee, u + curve.age);
-                }
-            }
-            Law::Exponential { index } => {
-                let before = (curve.age / TIME_CONSTANTS[index]).exp();
-                for (place, e) in places.zip(&self.rising[index]) {
-                    *place = before * e - 1.0;
-                }
-            }
-            Law::Settling { index } => {
-                let before = (-curve.age / SETTLING[index]).exp();
-                for (place, e) in places.zip(&self.settling[index]) {
-                    *place = 1.0 - before * e;
-                }
-            }
             Law::Power { index } => {
                 let eighths = POWER_EIGHTHS[index];
                 for (place, r) in places.zip(&self.roots[curve.age_index]) {
                     *place = eighth_power(*r, eighths);
+                }
+            }
+            law => {
+                for (place, u) in places.zip(&self.usages) {
+                    *place = law.height(u + curve.age);
                 }
             }
         }

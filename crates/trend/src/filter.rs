@@ -46,7 +46,7 @@ pub(crate) struct Pass {
 }
 
 /// One curve's pass, against the gaps' and the season's.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Regression {
     pub(crate) sff: f64,
     pub(crate) sfy: f64,

@@ -27,8 +27,8 @@ const SIDE: usize = 60;
 const NEAR_BELIEVED: f64 = 3.5;
 const NEAR_SHARE: f64 = 0.6;
 
-/// Spread of the wear rates the common slope is drawn to zero by, metres per hour.
-const SLOPE_SD: f64 = 5e-8;
+/// What the common slope is drawn to zero by, h²/m²: a spread of the wear rates of 5e-8 m/h.
+const SLOPE_INFORMATION: f64 = 4e14;
 
 /// Variance of the wear per metre of wear between the middles of both sides, metres: wear comes in
 /// spurts, which must not pass for steps.
@@ -87,9 +87,9 @@ const LARGEST_BIAS_M: f64 = 8e-6;
 /// Weighted sums up to each estimate, from which a line over any stretch follows at once.
 struct Sums(Vec<[f64; 5]>);
 
-/// A stretch's weight, means, and centred squares.
+/// A stretch's variance, means, and centred squares.
 struct Stretch {
-    weight: f64,
+    variance: f64,
     x: f64,
     y: f64,
     xx: f64,
@@ -115,18 +115,25 @@ impl Sums {
     fn stretch(&self, from: usize, to: usize) -> Stretch {
         let (a, b) = (&self.0[from], &self.0[to]);
         let weight = b[0] - a[0];
-        let (x, y) = ((b[1] - a[1]) / weight, (b[2] - a[2]) / weight);
-        Stretch { weight, x, y, xx: b[3] - a[3] - weight * x * x, xy: b[4] - a[4] - weight * x * y }
+        let variance = weight.recip();
+        let (x, y) = ((b[1] - a[1]) * variance, (b[2] - a[2]) * variance);
+        Stretch { variance, x, y, xx: b[3] - a[3] - weight * x * x, xy: b[4] - a[4] - weight * x * y }
     }
 
-    /// Step between the stretches around `at`, with one slope for both, and that slope.
-    fn jump(&self, low: usize, at: usize, high: usize) -> (Jump, f64) {
+    /// Step between the stretches around `at`, with one slope for both, its variance, and that slope.
+    fn step(&self, low: usize, at: usize, high: usize) -> (f64, f64, f64) {
         let (left, right) = (self.stretch(low, at), self.stretch(at, high));
-        let information = left.xx + right.xx + SLOPE_SD.powi(-2);
-        let slope = (left.xy + right.xy) / information;
+        let slope_variance = (left.xx + right.xx + SLOPE_INFORMATION).recip();
+        let slope = (left.xy + right.xy) * slope_variance;
         let apart = right.x - left.x;
-        let variance = left.weight.recip() + right.weight.recip() + apart * apart / information;
-        (Jump { at, step_m: right.y - left.y - slope * apart, se_m: variance.sqrt() }, slope)
+        let variance = left.variance + right.variance + apart * apart * slope_variance;
+        (right.y - left.y - slope * apart, variance, slope)
+    }
+
+    /// The same as a jump, and its slope.
+    fn jump(&self, low: usize, at: usize, high: usize) -> (Jump, f64) {
+        let (step_m, variance, slope) = self.step(low, at, high);
+        (Jump { at, step_m, se_m: variance.sqrt() }, slope)
     }
 
     /// Whether the step is more than the measurement's errors and a spurt of the wear explain.
@@ -150,7 +157,7 @@ impl Sums {
             |reach: usize| (jump.at + reach).min(high),
         );
         let (left, right) = (self.stretch(from(NEAR), jump.at), self.stretch(jump.at, to(NEAR)));
-        let se_m = (left.weight.recip() + right.weight.recip()).sqrt();
+        let se_m = (left.variance + right.variance).sqrt();
         let slopes = [*slope, self.slope(from(SIDE), jump.at, *slope), self.slope(jump.at, to(SIDE), *slope)];
         slopes.into_iter().all(|slope| {
             let step_m = right.y - left.y - slope * (right.x - left.x);
@@ -161,8 +168,7 @@ impl Sums {
     /// Slope of one side, drawn to another so far as it is uncertain.
     fn slope(&self, from: usize, to: usize, other: f64) -> f64 {
         let side = self.stretch(from, to);
-        let prior = SLOPE_SD.powi(-2);
-        (side.xy + prior * other) / (side.xx + prior)
+        (side.xy + SLOPE_INFORMATION * other) / (side.xx + SLOPE_INFORMATION)
     }
 
     /// The step with the largest ratio to its error, over all places from one on and all reaches.
@@ -171,10 +177,12 @@ impl Sums {
     fn largest(&self, low: usize, from: usize, high: usize) -> Option<Jump> {
         let ratio = |jump: &Jump| (jump.step_m / jump.se_m).abs();
         let places = from.max(low + FEWEST)..(high + 1).saturating_sub(FEWEST);
-        let at_reaches = |at: usize| {
-            REACHES.map(|reach| self.jump(at.saturating_sub(reach).max(low), at, (at + reach).min(high)))
+        let is_half = |at: usize, reach: usize| {
+            let (step_m, variance, _) =
+                self.step(at.saturating_sub(reach).max(low), at, (at + reach).min(high));
+            step_m * step_m > (0.6 * BELIEVED).powi(2) * variance
         };
-        let promising = |&at: &usize| at_reaches(at).iter().any(|(jump, _)| ratio(jump) > 0.6 * BELIEVED);
+        let promising = |&at: &usize| REACHES.into_iter().any(|reach| is_half(at, reach));
         let near: Vec<usize> = places.clone().step_by(STRIDE).filter(promising).collect();
         let mut all: Vec<usize> =
             near.into_iter().flat_map(|at| at.saturating_sub(STRIDE - 1)..at + STRIDE).collect();

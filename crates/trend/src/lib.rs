@@ -41,6 +41,7 @@ mod normal;
 mod outlook;
 mod posterior;
 mod prior;
+mod regressions;
 mod season;
 pub mod series;
 mod settings;

@@ -18,7 +18,7 @@ pub(crate) struct Look<'a> {
     pub(crate) new_m2: f64,
     pub(crate) ln_new_m2: f64,
     /// The season's swing of unit size, and what the gaps alone say of its size.
-    wave: Pass,
+    pub(crate) wave: Pass,
     wave_by_gaps: f64,
     wave_information: f64,
     /// Variance of the unit's own swing.
@@ -59,16 +59,14 @@ impl<'a> Look<'a> {
         }
     }
 
-    /// Curves' regressions with the unit's own swing, drawn to the fleet's, fitted beside each.
-    pub(crate) fn regress<const N: usize>(&self, heights: &[[f64; N]]) -> [Regression; N] {
-        self.filter.curves(&self.gaps, &self.wave, heights).map(|mut pass| {
-            let share = pass.sfs / self.wave_information;
-            pass.sff -= share * pass.sfs;
-            pass.sfy -= share * self.wave_by_gaps;
-            pass.end -= share * self.wave.end;
-            pass.start -= share * self.wave.start;
-            pass
-        })
+    /// A curve's regression with the unit's own swing, drawn to the fleet's, fitted beside it.
+    pub(crate) fn beside_season(&self, mut pass: Regression) -> Regression {
+        let share = pass.sfs * self.swing_m2;
+        pass.sff -= share * pass.sfs;
+        pass.sfy -= share * self.wave_by_gaps;
+        pass.end -= share * self.wave.end;
+        pass.start -= share * self.wave.start;
+        pass
     }
 
     /// Variance of the level now, whatever the curve.

@@ -2,10 +2,11 @@
 
 use crate::bins;
 use crate::clean::Estimate;
-use crate::curve::{Bank, Curve, Heights, Law};
+use crate::curve::{Bank, Curve, Law};
 use crate::filter::Regression;
 use crate::look::{Look, straight_growth};
 use crate::prior::FleetPrior;
+use crate::regressions::regressions;
 
 /// Bins of the first look, by which most curves are dropped.
 const COARSE_BINS: usize = 12;
@@ -190,12 +191,15 @@ pub(crate) fn mean_growth(nodes: &[Node], usage: f64) -> f64 {
 fn normalise(believed: &mut Vec<(usize, Node)>, drop: f64) -> f64 {
     let best = believed.iter().map(|(_, n)| n.weight).fold(f64::NEG_INFINITY, f64::max);
     believed.retain(|(_, n)| n.weight > best - drop);
-    let sum: f64 = believed.iter().map(|(_, n)| (n.weight - best).exp()).sum();
-    let log_sum = best + sum.ln();
+    let mut sum = 0.0;
     for (_, node) in believed.iter_mut() {
-        node.weight = (node.weight - log_sum).exp();
+        node.weight = (node.weight - best).exp();
+        sum += node.weight;
     }
-    log_sum
+    for (_, node) in believed.iter_mut() {
+        node.weight /= sum;
+    }
+    best + sum.ln()
 }
 
 /// A curve's regression, the amplitude it fits best, and a bound on its log weight.
@@ -207,44 +211,33 @@ struct Candidate {
     bound: f64,
 }
 
-/// Every curve of the bank against the bins, a few at a time.
+/// Every curve of the bank against the bins.
 fn candidates(look: &Look<'_>, bank: &Bank) -> Vec<Candidate> {
-    const LANES: usize = 4;
-    let heights = Heights::new(bank, look.bins.iter().map(|b| b.usage - look.segment.begin).collect());
-    let mut lanes = vec![[0.0; LANES]; look.bins.len()];
-    let mut candidates = Vec::with_capacity(bank.curves.len());
-    for (group, curves) in bank.curves.chunks(LANES).enumerate() {
-        for (lane, curve) in curves.iter().enumerate() {
-            heights.fill(curve, lane, &mut lanes);
-        }
-        let passes = look.regress(&lanes);
-        candidates.extend(
-            curves
-                .iter()
-                .zip(passes)
-                .enumerate()
-                .map(|(lane, (curve, pass))| candidate(look, group * LANES + lane, curve, pass)),
-        );
-    }
-    candidates
+    let passes = regressions(look, bank).into_iter().map(|pass| look.beside_season(pass));
+    let curves = bank.curves.iter().enumerate();
+    curves.zip(passes).map(|((index, curve), pass)| candidate(look, index, curve, pass)).collect()
 }
 
 /// The nodes, with log weights, of every curve that can matter.
 fn nodes(look: &Look<'_>, bank: &Bank, tried: Lives) -> Vec<(usize, Node)> {
     let candidates = candidates(look, bank);
-    let add = |candidate: &Candidate, push: &mut dyn FnMut(Node)| {
+    let add = |candidate: &Candidate, least: f64, push: &mut dyn FnMut(Node)| {
         let curve = &bank.curves[candidate.index];
-        if curve.law == Law::None { flat(look, push) } else { lives(look, curve, candidate, tried, push) }
+        if curve.law == Law::None {
+            flat(look, push);
+        } else {
+            lives(look, curve, candidate, (tried, least), push);
+        }
     };
     let mut nodes = Vec::with_capacity(1000);
     let Some(top) = candidates.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) else { return nodes };
     let mut best = f64::NEG_INFINITY;
-    add(top, &mut |node| best = best.max(node.weight));
+    add(top, best, &mut |node| best = best.max(node.weight));
     // Where the prior forbids what fits best, its bound says nothing of the others.
     let floor = top.bound.min(best + USUAL) - tried.drop - SLACK;
     let flat = bank.curves.iter().position(|curve| curve.law == Law::None);
     for candidate in candidates.iter().filter(|c| c.bound > floor || Some(c.index) == flat) {
-        add(candidate, &mut |node| {
+        add(candidate, best - tried.drop, &mut |node| {
             best = best.max(node.weight);
             if node.weight > best - tried.drop {
                 nodes.push((candidate.index, node));
@@ -273,15 +266,20 @@ fn candidate(look: &Look<'_>, index: usize, curve: &Curve, pass: Regression) -> 
     Candidate { index, pass, best_m, information, bound }
 }
 
-/// Nodes of one curve over the lives its amplitude may have.
-fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, tried: Lives, push: &mut dyn FnMut(Node)) {
+/// Nodes of one curve over the lives its amplitude may have, of more than the least log weight.
+fn lives(
+    look: &Look<'_>,
+    curve: &Curve,
+    candidate: &Candidate,
+    (tried, least): (Lives, f64),
+    push: &mut dyn FnMut(Node),
+) {
     let Candidate { pass, best_m, information, .. } = candidate;
     let prior = look.prior;
     let reach_m = tried.reach / information.sqrt();
     let Some((low, high)) = life_range(prior, curve.law, best_m - reach_m, best_m + reach_m) else { return };
     let step = (high - low) / (tried.count - 1) as f64;
     let spread = look.new_m2;
-    let ln_spread = look.ln_new_m2;
     let smear = if curve.age_cell > 0.0 {
         curve.law.slope(curve.age) * curve.age_cell / 12.0_f64.sqrt()
     } else {
@@ -309,15 +307,16 @@ fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, tried: Lives, pu
             };
         }
         let new_m = look.gaps.start - amplitude_m * pass.start;
-        let (new_m2, ln_new_m2) = if smear > 0.0 {
-            let new_m2 = spread + (amplitude_m * smear).powi(2);
-            (new_m2, new_m2.ln())
-        } else {
-            (spread, ln_spread)
-        };
+        let smeared = (amplitude_m * smear).powi(2) / spread;
         let log_likelihood = amplitude_m * pass.sfy
             - 0.5 * amplitude_m * amplitude_m * pass.sff
-            - 0.5 * ((new_m - prior.new_m).powi(2) / new_m2 + ln_new_m2);
+            - 0.5 * ((new_m - prior.new_m).powi(2) / (spread * (1.0 + smeared)) + look.ln_new_m2);
+        let bound = log_likelihood + shared + look.logs.life(ln_life, ln_age, ln_tau);
+        // A logarithm costs more than all the rest, and most nodes do not need it.
+        let weight = if smeared > 0.0 && bound > least { bound - 0.5 * (1.0 + smeared).ln() } else { bound };
+        if weight <= least {
+            continue;
+        }
         push(Node {
             law: curve.law,
             age_begin: curve.age,
@@ -329,7 +328,7 @@ fn lives(look: &Look<'_>, curve: &Curve, candidate: &Candidate, tried: Lives, pu
             swing_m: look.swing_m(amplitude_m * pass.sfs),
             guess,
             waits: false,
-            weight: log_likelihood + shared + look.logs.life(ln_life, ln_age, ln_tau),
+            weight,
         });
     }
 }
