@@ -135,3 +135,81 @@ impl<'a> Walked<'a> {
 fn still_m2(judged: &Posterior) -> f64 {
     judged.level_m2 - judged.level_swing_m2 * judged.level_swing_m2 / judged.swing_m2
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::Law;
+    use crate::posterior::Guess;
+
+    const HERE: Place = Place { usage: 100.0, installation: 0 };
+
+    /// Two nodes that do not wear, at 20 and 22 µm, one as likely as the other, known to 1 µm.
+    fn judged() -> Posterior {
+        let node = |level_m: f64| Node {
+            law: Law::None,
+            age_begin: 0.0,
+            age_now: 100.0,
+            amplitude_m: 0.0,
+            ln_life: 8.0,
+            level_m,
+            new_m: 20e-6,
+            swing_m: 0.0,
+            guess: Guess::Unneeded,
+            waits: false,
+            weight: 0.5,
+        };
+        Posterior {
+            nodes: vec![node(20e-6), node(22e-6)],
+            level_m2: 1e-12,
+            growth_m2: 1.5e-12,
+            swing_m2: 1e-30,
+            level_swing_m2: 0.0,
+            log_evidence: 0.0,
+        }
+    }
+
+    fn bin(gap_m: f64, installation: u32) -> Bin {
+        Bin { usage: 110.0, departure_us: 0.0, installation, gap_m, variance_m2: 3e-12 }
+    }
+
+    fn prior() -> FleetPrior {
+        FleetPrior { drift_m2_per_hour: 0.0, ..FleetPrior::vague(1e-4) }
+    }
+
+    /// Variances of 1 and 3 µm²: a gain of ¼ and ¾ µm² left; misses of 2 and 0 µm at a variance of 4 µm²
+    /// weigh as e^−½ to 1. By hand.
+    #[test]
+    fn a_bin_moves_levels_by_its_share_of_the_variance_and_weights_by_bayes() {
+        let moved = advance(judged(), HERE, &[bin(22e-6, 0)], 120.0, &prior()).unwrap();
+        let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
+        assert!(close(moved.nodes[0].level_m, 20.5e-6) && close(moved.nodes[1].level_m, 22e-6));
+        let odds = (-0.5_f64).exp();
+        assert!(close(moved.nodes[0].weight, odds / (1.0 + odds)), "{}", moved.nodes[0].weight);
+        assert!(close(moved.level_m2, 0.75e-12) && close(moved.growth_m2, 1.25e-12), "{moved:?}");
+        assert!(close(moved.nodes[0].age_now, 120.0));
+    }
+
+    /// A new installation adds its bias and leaves the old one's behind: 2 × (1.5 µm)² more, so ¹¹⁄₁₇.
+    #[test]
+    fn a_new_installation_lets_the_level_move_further() {
+        let moved = advance(judged(), HERE, &[bin(22e-6, 1)], 120.0, &prior()).unwrap();
+        assert!((moved.nodes[0].level_m - (20e-6 + 2e-6 * 11.0 / 17.0)).abs() < 1e-15, "{moved:?}");
+    }
+
+    #[test]
+    fn a_bin_far_off_is_not_explained() {
+        assert!(advance(judged(), HERE, &[bin(31e-6, 0)], 120.0, &prior()).is_none());
+        assert!(advance(judged(), HERE, &[bin(f64::NAN, 0)], 120.0, &prior()).is_none());
+    }
+
+    /// In 20 h of an onset every 2,000 h.
+    #[test]
+    fn an_onset_that_does_not_come_is_less_awaited() {
+        let mut judged = judged();
+        judged.nodes[1].waits = true;
+        let moved = advance(judged, HERE, &[], 120.0, &prior()).unwrap();
+        let odds = moved.nodes[1].weight / moved.nodes[0].weight;
+        assert!((odds - (-0.01_f64).exp()).abs() < 1e-12, "{odds}");
+    }
+}

@@ -280,6 +280,27 @@ mod tests {
     }
 
     #[test]
+    fn a_wild_estimate_among_later_flights_is_one_too() {
+        let mut gaps = wearing(60, 0.1);
+        gaps[47] += 40.0;
+        let (before, after) = gaps.split_at(40);
+        let scatter = clean(&flights(before)).scatter;
+        let (estimates, outliers) = scatter.clean(&flights(after)).unwrap();
+        assert_eq!((estimates.len(), outliers), (19, vec![7]));
+    }
+
+    /// Three flights after a step are outliers, until eight more show that it is one.
+    #[test]
+    fn later_flights_that_make_an_outlier_none_are_not_cleaned_apart() {
+        let gaps: Vec<f64> = (0..48).map(|k| wearing(48, 0.0)[k] + if k < 37 { 0.0 } else { 40.0 }).collect();
+        let (before, after) = gaps.split_at(40);
+        let known = clean(&flights(before));
+        assert_eq!(known.outliers, [37, 38, 39]);
+        assert!(known.scatter.clean(&flights(after)).is_none());
+        assert!(known.scatter.clean(&flights(&[])).is_some());
+    }
+
+    #[test]
     fn a_wild_estimate_is_one_whether_the_unit_wears_or_not() {
         for slope in [0.0, 3.0] {
             let mut gaps = wearing(20, slope);

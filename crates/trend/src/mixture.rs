@@ -118,3 +118,49 @@ fn point(node: &Node, weight: f64) -> Point {
         weight: weight as f32,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nodes(weights: impl Iterator<Item = f64>) -> Vec<Node> {
+        let node = |(k, weight): (usize, f64)| Node {
+            law: Law::None,
+            age_begin: 0.0,
+            age_now: 1.0,
+            amplitude_m: 0.0,
+            ln_life: 0.0,
+            level_m: k as f64,
+            new_m: 0.0,
+            swing_m: 0.0,
+            guess: Guess::Unneeded,
+            waits: false,
+            weight,
+        };
+        weights.enumerate().map(node).collect()
+    }
+
+    /// A heavy node among a thousand light ones, of half the weight.
+    #[test]
+    fn heavy_nodes_stay_and_light_ones_are_thinned_evenly_without_loss_of_weight() {
+        let weights = (0..1001).map(|k| if k == 400 { 0.5 } else { 0.0005 });
+        let points = thinned(&nodes(weights));
+        assert!(points.len().abs_diff(MOST) <= 1, "{}", points.len());
+        let total: f64 = points.iter().map(|p| f64::from(p.weight)).sum();
+        assert!((total - 1.0).abs() < 0.005, "{total}");
+        let heavy = points.iter().find(|p| p.level_m == 400.0).map(|p| p.weight);
+        assert_eq!(heavy, Some(0.5));
+        let steps: Vec<f32> = points.windows(2).map(|pair| pair[1].level_m - pair[0].level_m).collect();
+        assert!(steps.iter().all(|step| (1.0..=9.0).contains(step)), "{steps:?}");
+        let mean: f64 = points.iter().map(|p| f64::from(p.weight * p.level_m)).sum();
+        assert!((mean - (200.0 + 0.5 * 500.2)).abs() < 2.0, "{mean}");
+    }
+
+    #[test]
+    fn few_nodes_are_kept_as_they_are() {
+        let weights: Vec<f64> = (1..=MOST).map(|k| k as f64).collect();
+        let kept: Vec<f64> =
+            thinned(&nodes(weights.iter().copied())).iter().map(|p| f64::from(p.weight)).collect();
+        assert_eq!(kept, weights);
+    }
+}

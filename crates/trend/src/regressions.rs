@@ -114,3 +114,49 @@ impl Parts {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bins::Bin;
+    use crate::posterior::Segment;
+    use crate::prior::FleetPrior;
+
+    /// Against the filter's own pass over each curve's heights, for a unit of unknown age.
+    #[test]
+    fn a_curve_of_a_part_is_regressed_as_by_its_own_heights() {
+        let bins: Vec<Bin> = (0..48)
+            .map(|k| {
+                let k = f64::from(k);
+                Bin {
+                    usage: 20.0 + 35.0 * k,
+                    departure_us: 6e11 * k,
+                    installation: 0,
+                    gap_m: 30e-6 + 0.4e-6 * k + 1e-6 * (5.0 * k).sin(),
+                    variance_m2: 0.3e-12,
+                }
+            })
+            .collect();
+        let segment = Segment { estimates: &[], begin: 0.0, now: 1700.0, fresh: false, known_age: None };
+        let prior = FleetPrior::vague(1e-4);
+        let look = Look::new(&segment, &prior, bins, |usage| 1e-8 * usage);
+        let bank = Bank::new(false, None, 1700.0, 25);
+        for (curve, found) in bank.curves.iter().zip(regressions(&look, &bank)) {
+            let heights: Vec<f64> = look.bins.iter().map(|b| curve.law.height(curve.age + b.usage)).collect();
+            let direct = look.filter.curve(&look.gaps, &look.wave, &heights);
+            // What the largest height could make of each, to the ninth digit.
+            let height = heights.iter().copied().fold(0.0, f64::max) + 1e-3;
+            let alike = |a: f64, b: f64, scale: f64| (a - b).abs() < 1e-9 * scale;
+            let (gaps, wave) = (look.gaps.square.sqrt(), look.wave.square.sqrt());
+            let root = height * 1e7;
+            assert!(
+                alike(found.sff, direct.sff, root * root)
+                    && alike(found.sfy, direct.sfy, root * gaps)
+                    && alike(found.sfs, direct.sfs, root * wave)
+                    && alike(found.end, direct.end, height)
+                    && alike(found.start, direct.start, height),
+                "{curve:?}: {found:?}, {direct:?}"
+            );
+        }
+    }
+}
