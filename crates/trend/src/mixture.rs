@@ -148,7 +148,7 @@ mod tests {
         assert!(points.len().abs_diff(MOST) <= 1, "{}", points.len());
         let total: f64 = points.iter().map(|p| f64::from(p.weight)).sum();
         assert!((total - 1.0).abs() < 0.005, "{total}");
-        let heavy = points.iter().find(|p| p.level_m == 400.0).map(|p| p.weight);
+        let heavy = points.iter().find(|p| p.level_m as usize == 400).map(|p| p.weight);
         assert_eq!(heavy, Some(0.5));
         let steps: Vec<f32> = points.windows(2).map(|pair| pair[1].level_m - pair[0].level_m).collect();
         assert!(steps.iter().all(|step| (1.0..=9.0).contains(step)), "{steps:?}");
