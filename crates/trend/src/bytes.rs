@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::checkpoint::{self, Judged};
+use crate::checkpoint::{self, Checkpoint, Judged};
 use crate::digest::digest;
 use crate::kept::Kept;
 use crate::prior::FleetPrior;
+use crate::series::{Flight, Meter};
 
 /// The number of the form. A change of what is kept, or of how statements are made of it, asks for the
 /// next one: a state of another form is made anew.
@@ -14,11 +15,16 @@ const FORM: u8 = 1;
 /// Bytes of the digest.
 const DIGEST: usize = 8;
 
+/// What is kept, in the order of its bytes.
+type Parts = (Checkpoint, Vec<Flight>, Option<Meter>, Option<f64>, u64);
+
 impl Kept {
-    /// The state as bytes, the same on every machine: some 10 kB for a unit of 10,000 flights.
+    /// The state as bytes, of one form on every machine: some 10 kB for a unit of 10,000 flights.
     pub fn to_bytes(&self) -> Vec<u8> {
         // Only a sequence of unknown length or a failing writer can fail, and there is neither.
-        let mut bytes = postcard::to_extend(self, vec![FORM]).unwrap_or_default();
+        let Self { checkpoint, tail, meter, unit_hours_at_start, prior } = self;
+        let parts = (checkpoint, tail, meter, unit_hours_at_start, prior);
+        let mut bytes = postcard::to_extend(&parts, vec![FORM]).unwrap_or_default();
         bytes.extend(digest_of(&bytes).to_le_bytes());
         bytes
     }
@@ -30,8 +36,10 @@ impl Kept {
         if *form != FORM || u64::from_le_bytes(*digest) != digest_of(bytes) {
             return None;
         }
-        let kept: Self = postcard::from_bytes(state).ok()?;
-        (kept.prior == prior.digest() && kept.is_whole()).then_some(kept)
+        let (checkpoint, tail, meter, unit_hours_at_start, judged_by): Parts =
+            postcard::from_bytes(state).ok()?;
+        let kept = Self { checkpoint, tail, meter, unit_hours_at_start, prior: judged_by };
+        (judged_by == prior.digest() && kept.is_whole()).then_some(kept)
     }
 
     /// Whether its parts belong together.

@@ -1,7 +1,5 @@
 //! What is kept of a unit from night to night, so that a flight more does not ask for all those before.
 
-use serde::{Deserialize, Serialize};
-
 use crate::checkpoint::{self, Checkpoint, Judged, Known, Mark, PACE_DAYS, digest_of, entries_until};
 use crate::crossing::Remaining;
 use crate::error::Error;
@@ -21,7 +19,7 @@ use crate::trend::{Change, ChangeKind, FEWEST_ESTIMATES, Pace, Trend, Wear};
 /// off) it stands on the whole history. Checkpoints follow from the count of flights alone, and
 /// [`trend()`](crate::trend()) makes its statements in this way too: what is said from a state that was kept
 /// is what is said from nothing, bit for bit, whatever the nights and the order of arrival.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Kept {
     pub(crate) checkpoint: Checkpoint,
     /// The flights after it.
@@ -75,7 +73,8 @@ impl Kept {
     }
 
     /// The same with flights that were made since, in any order; nothing where the history is needed: a
-    /// flight is not later than all before, or a checkpoint has been passed.
+    /// flight is not later than all before, a checkpoint has been passed, or the state was made of a day
+    /// before the last flight that was known.
     ///
     /// # Errors
     /// [`Error::Observation`] as [`Series::new`].
