@@ -60,14 +60,19 @@ struct Walked<'a> {
 
 impl<'a> Walked<'a> {
     fn new(judged: &Posterior, at: Place, prior: &'a FleetPrior) -> Self {
+        let heights: Vec<f64> = judged.nodes.iter().map(|n| n.law.height(n.age_now)).collect();
+        // The level walks from the last bin on, and has not done so yet.
+        let grown_m = |(node, height): (&Node, &f64)| {
+            node.weight * node.amplitude_m * (height - node.law.height(node.age_now - judged.since))
+        };
         Self {
             prior,
             begin: at.usage,
             at,
-            heights: judged.nodes.iter().map(|n| n.law.height(n.age_now)).collect(),
-            grown_m: 0.0,
+            grown_m: judged.nodes.iter().zip(&heights).map(grown_m).sum(),
+            heights,
             log_weights: vec![0.0; judged.nodes.len()],
-            seen: at.usage,
+            seen: at.usage - judged.since,
             start_m2: judged.growth_m2 - still_m2(judged),
         }
     }
@@ -126,6 +131,7 @@ impl<'a> Walked<'a> {
         }
         let total: f64 = judged.nodes.iter().map(|n| n.weight).sum();
         judged.nodes.iter_mut().for_each(|n| n.weight /= total);
+        judged.since = now - self.seen;
         judged.growth_m2 = self.start_m2 + still_m2(&judged);
         judged
     }
@@ -161,6 +167,7 @@ mod tests {
         };
         Posterior {
             nodes: vec![node(20e-6), node(22e-6)],
+            since: 0.0,
             level_m2: 1e-12,
             growth_m2: 1.5e-12,
             swing_m2: 1e-30,

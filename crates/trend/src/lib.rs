@@ -6,6 +6,36 @@
 //! A [`Series`] adds up a unit's usage, a [`FleetPrior`] learns from a part number's units, and [`trend()`]
 //! weighs a bank of wear curves by both.
 //!
+//! # From night to night
+//!
+//! A [`Kept`] holds what a unit's flights said, in some 10 kB, so that a flight more costs the same however
+//! long the history is. What is said from it is what [`trend()`] says from the whole history, to the last bit:
+//!
+//! ```
+//! use trend::{FleetPrior, Kept, Observation, Series, Settings, Usage, trend};
+//!
+//! let flight = |day: i64| Observation {
+//!     departure_us: day * 86_400_000_000,
+//!     installation: 0,
+//!     flight_hours: Some(1.5),
+//!     tail_hours_end: None,
+//!     load_reversals: None,
+//!     gap_m: Some(30e-6 + 1e-8 * day as f64 + 1e-6 * (day as f64).sin()),
+//!     gap_se_m: Some(1e-6),
+//! };
+//! let (settings, prior) = (Settings::for_limit(1e-4), FleetPrior::vague(1e-4));
+//! let series = |days| Series::new((0..days).map(flight), &Usage::default());
+//! let day_us = |day: i64| day * 86_400_000_000;
+//!
+//! let bytes = Kept::of(&series(500)?, day_us(499), &prior).to_bytes();
+//! // The next night: the state, a flight, and none of those before.
+//! let kept = Kept::from_bytes(&bytes, &prior).ok_or("made anew from its history")?;
+//! let kept = kept.after([flight(500)])?.ok_or("made anew from its history")?;
+//! let said = kept.says(day_us(500), &[], &settings, &prior, None)?.ok_or("made anew from its history")?;
+//! assert_eq!(said, trend(&series(501)?, day_us(500), &settings, Some(&prior), None)?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! # What would make it wrong
 //!
 //! - A law far from every curve of the bank. Intervals widen to what the fleet's own past shows

@@ -27,8 +27,9 @@ pub(crate) struct Point {
 pub(crate) struct Mixture {
     /// Judged without the fleet.
     pub(crate) is_alone: bool,
-    /// Usage from the segment's begin to its end.
+    /// Usage from the segment's begin to its end, and from its last bin.
     pub(crate) span: f64,
+    pub(crate) since: f64,
     pub(crate) level_m2: f64,
     pub(crate) growth_m2: f64,
     pub(crate) swing_m2: f64,
@@ -39,9 +40,9 @@ pub(crate) struct Mixture {
 impl Mixture {
     /// Keeps what a posterior says at the end of its segment.
     pub(crate) fn of(posterior: &Posterior, span: f64, is_alone: bool) -> Self {
-        let Posterior { level_m2, growth_m2, swing_m2, level_swing_m2, .. } = *posterior;
+        let Posterior { since, level_m2, growth_m2, swing_m2, level_swing_m2, .. } = *posterior;
         let points = thinned(&posterior.nodes);
-        Self { is_alone, span, level_m2, growth_m2, swing_m2, level_swing_m2, points }
+        Self { is_alone, span, since, level_m2, growth_m2, swing_m2, level_swing_m2, points }
     }
 
     /// The posterior that was kept; its evidence and its guesses, which only a fleet's lesson asks, are not.
@@ -62,9 +63,9 @@ impl Mixture {
                 weight: f64::from(point.weight),
             }
         };
-        let Self { level_m2, growth_m2, swing_m2, level_swing_m2, .. } = *self;
+        let Self { since, level_m2, growth_m2, swing_m2, level_swing_m2, .. } = *self;
         let nodes = self.points.iter().map(node).collect();
-        Posterior { nodes, level_m2, growth_m2, swing_m2, level_swing_m2, log_evidence: 0.0 }
+        Posterior { nodes, since, level_m2, growth_m2, swing_m2, level_swing_m2, log_evidence: 0.0 }
     }
 }
 

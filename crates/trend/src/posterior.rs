@@ -89,6 +89,8 @@ pub(crate) struct Node {
 #[derive(Debug, Clone)]
 pub(crate) struct Posterior {
     pub(crate) nodes: Vec<Node>,
+    /// Usage since the bin whose level it is: wear has gone on, as the curves have it.
+    pub(crate) since: f64,
     /// Variance of every node's level.
     pub(crate) level_m2: f64,
     /// Variance of every node's growth since the segment began.
@@ -158,6 +160,7 @@ fn finish(look: &Look<'_>, mut believed: Vec<(usize, Node)>) -> Posterior {
     let log_sum = normalise(&mut believed, THOROUGH.drop);
     Posterior {
         nodes: believed.into_iter().map(|(_, node)| node).collect(),
+        since: look.segment.now - look.bins.last().map_or(look.segment.begin, |bin| bin.usage),
         level_m2: look.level_m2(),
         growth_m2: look.filter.end_m2 + look.filter.start_m2,
         swing_m2: look.swing_m2,
