@@ -77,6 +77,7 @@ impl Remaining {
         let left_m = limit_m - node.level_m;
         let sd_m = (spread_m2 + prior.wear_noise_m * left_m.max(0.0)).sqrt();
         let rule: &[(f64, f64)] = if node.weight > NOTABLE { &LONG_RULE } else { &SHORT_RULE };
+        let height_now = node.law.height(node.age_now);
         for &(z, share) in rule {
             let left_m = left_m + z * sd_m;
             let weight = node.weight * share;
@@ -88,7 +89,7 @@ impl Remaining {
                     self.add((wait_hours + wear_hours) * hours_per_usage, weight / WAIT_RULE as f64);
                 }
             } else if node.law != Law::None {
-                let height = node.law.height(node.age_now) + left_m / node.amplitude_m;
+                let height = height_now + left_m / node.amplitude_m;
                 self.add((node.law.age_at(height) - node.age_now) * hours_per_usage, weight);
             }
         }

@@ -170,9 +170,7 @@ impl Law {
             Self::Exponential { index } => TIME_CONSTANTS[index] * height.ln_1p(),
             Self::Settling { .. } if height >= 1.0 => f64::INFINITY,
             Self::Settling { index } => -SETTLING[index] * (-height).ln_1p(),
-            Self::Power { index } => {
-                REFERENCE_HOURS * height.max(0.0).powf(8.0 / f64::from(POWER_EIGHTHS[index]))
-            }
+            Self::Power { index } => REFERENCE_HOURS * eighth_root(height.max(0.0), POWER_EIGHTHS[index]),
         }
     }
 
@@ -213,6 +211,16 @@ fn eighth_power([x, half, quarter, eighth]: [f64; 4], eighths: u8) -> f64 {
         _ => x * x * x,
     };
     whole * factor(4, half) * factor(2, quarter) * factor(1, eighth)
+}
+
+/// What is x to the n/8: x^(8/n), at once where that is no more than a root.
+fn eighth_root(x: f64, eighths: u8) -> f64 {
+    match eighths {
+        4 => x * x,
+        8 => x,
+        16 => x.sqrt(),
+        _ => x.powf(8.0 / f64::from(eighths)),
+    }
 }
 
 /// The curves tried for a segment.

@@ -7,7 +7,7 @@ use crate::posterior::{Guess, Node, Posterior};
 use crate::prior::FleetPrior;
 
 /// Nodes kept at most.
-const MOST: usize = 128;
+const MOST: usize = 96;
 
 /// A node's law, its age in hours, and its numbers in metres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -152,7 +152,8 @@ mod tests {
         let heavy = points.iter().find(|p| p.level_m as usize == 400).map(|p| p.weight);
         assert_eq!(heavy, Some(0.5));
         let steps: Vec<f32> = points.windows(2).map(|pair| pair[1].level_m - pair[0].level_m).collect();
-        assert!(steps.iter().all(|step| (1.0..=9.0).contains(step)), "{steps:?}");
+        let farthest = (1000_f32 / (MOST - 1) as f32).ceil();
+        assert!(steps.iter().all(|step| (1.0..=farthest).contains(step)), "{steps:?}");
         let mean: f64 = points.iter().map(|p| f64::from(p.weight * p.level_m)).sum();
         assert!((mean - (200.0 + 0.5 * 500.2)).abs() < 2.0, "{mean}");
     }
