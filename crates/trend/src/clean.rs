@@ -61,7 +61,7 @@ pub(crate) struct Seen {
     pub(crate) is_outlier: bool,
 }
 
-/// Marks outliers against a running median and rescales the stated standard errors.
+/// Marks outliers against the median of their neighbours and rescales the stated standard errors.
 ///
 /// The factor is that of [`classic::dispersion`](crate::classic::dispersion); errors that were not
 /// stated, or stated far too small for their neighbours, count as the unit's median one.
@@ -72,12 +72,11 @@ pub(crate) fn clean(flights: &[Flight]) -> Clean {
     let errors: Vec<f64> = stated.iter().map(|(_, gap)| error(*gap, typical_m)).collect();
     let gaps: Vec<f64> = stated.iter().map(|(_, gap)| gap.gap_m).collect();
     let noise_factor = noise_factor(&gaps, &errors);
-    let smooth = running_median(&gaps);
     let scatter = Scatter { noise_factor, typical_m, recent: Vec::new() };
     let mut clean = Clean { estimates: Vec::with_capacity(gaps.len()), outliers: Vec::new(), scatter };
     for (k, &(flight, _)) in stated.iter().enumerate() {
         let variance = clean.scatter.variance(errors[k]);
-        let is_outlier = is_outlier(&gaps, k, smooth[k], variance);
+        let is_outlier = is_outlier(&gaps, k, variance);
         if is_outlier {
             clean.outliers.push(flight);
         } else {
@@ -105,16 +104,15 @@ impl Scatter {
         }
         let before = self.recent.iter().map(|seen| seen.gap_m);
         let gaps: Vec<f64> = before.chain(stated.iter().map(|(_, gap)| gap.gap_m)).collect();
-        let smooth = running_median(&gaps);
-        let is_outlier = |k: usize, variance: f64| is_outlier(&gaps, k, smooth[k], variance);
-        let other = |(k, seen): (usize, &Seen)| is_outlier(k, self.variance(seen.error_m)) != seen.is_outlier;
+        let other =
+            |(k, seen): (usize, &Seen)| is_outlier(&gaps, k, self.variance(seen.error_m)) != seen.is_outlier;
         if self.recent.iter().enumerate().skip(WINDOW / 2).any(other) {
             return None;
         }
         let (mut estimates, mut outliers) = (Vec::with_capacity(stated.len()), Vec::new());
         for (k, &(flight, gap)) in (RECENT..).zip(&stated) {
             let variance = self.variance(error(gap, self.typical_m));
-            if is_outlier(k, variance) {
+            if is_outlier(&gaps, k, variance) {
                 outliers.push(flight);
             } else {
                 estimates.push(estimate(flights, flight, gap.gap_m, variance));
@@ -130,9 +128,29 @@ impl Scatter {
 }
 
 /// Whether a gap lies far from what its neighbours say it is, worn or not.
-fn is_outlier(gaps: &[f64], at: usize, smooth_m: f64, variance: f64) -> bool {
-    let far = |expected_m: f64| (gaps[at] - expected_m).powi(2) > OUTLIER_SIGMA * OUTLIER_SIGMA * variance;
-    far(smooth_m) && far(on_local_line(gaps, at))
+fn is_outlier(gaps: &[f64], at: usize, variance: f64) -> bool {
+    let reach_m = OUTLIER_SIGMA * variance.sqrt();
+    is_far_from_median(gaps, at, reach_m) && (gaps[at] - on_local_line(gaps, at)).abs() > reach_m
+}
+
+/// Whether a value lies further than this from the median of the eleven around it, of the nearest eleven at
+/// the ends: most of them lie further below it, or above. To count them costs less than to order them.
+fn is_far_from_median(values: &[f64], at: usize, reach: f64) -> bool {
+    let (_, window) = window(values, at);
+    let (low, high) = (values[at] - reach, values[at] + reach);
+    let (mut below, mut above) = (0, 0);
+    for value in window {
+        below += usize::from(*value < low);
+        above += usize::from(*value > high);
+    }
+    below > window.len() / 2 || above >= window.len().div_ceil(2)
+}
+
+/// The eleven values around one, the nearest eleven at the ends, and the place of their first.
+fn window(values: &[f64], at: usize) -> (usize, &[f64]) {
+    let width = WINDOW.min(values.len());
+    let first = at.saturating_sub(width / 2).min(values.len() - width);
+    (first, &values[first..first + width])
 }
 
 fn estimate(flights: &[Flight], flight: usize, gap_m: f64, variance: f64) -> Estimate {
@@ -181,9 +199,8 @@ fn noise_factor(gaps: &[f64], errors: &[f64]) -> f64 {
 /// A running median lags behind a unit that wears fast, most of all at the ends of its history, and
 /// would call its wear a row of outliers. Only where it does is this looked at.
 fn on_local_line(gaps: &[f64], at: usize) -> f64 {
-    let width = WINDOW.min(gaps.len());
-    let first = at.saturating_sub(width / 2).min(gaps.len() - width);
-    let window = &gaps[first..first + width];
+    let (first, window) = window(gaps, at);
+    let width = window.len();
     if width < 2 {
         return gaps[at];
     }
@@ -202,37 +219,6 @@ fn on_local_line(gaps: &[f64], at: usize) -> f64 {
         *level = gap - slope * (first + k) as f64;
     }
     median(&mut levels[..width]) + slope * at as f64
-}
-
-/// Median of the eleven values around each, of the nearest eleven at the ends.
-fn running_median(values: &[f64]) -> Vec<f64> {
-    let width = WINDOW.min(values.len());
-    let mut window: Vec<f64> = values[..width].to_vec();
-    window.sort_unstable_by(f64::total_cmp);
-    let mut smooth = Vec::with_capacity(values.len());
-    let lead = width.div_ceil(2).min(values.len());
-    smooth.resize(lead, if width == 0 { 0.0 } else { window[width / 2] });
-    for (leaving, entering) in values.iter().zip(values.iter().skip(width)) {
-        replace(&mut window, *leaving, *entering);
-        smooth.push(window[width / 2]);
-    }
-    let last = smooth.last().copied().unwrap_or(0.0);
-    smooth.resize(values.len(), last);
-    smooth
-}
-
-/// Puts one value in the place of another that is in an ordered window, and moves it to where it belongs.
-fn replace(window: &mut [f64], leaving: f64, entering: f64) {
-    let mut at = window.iter().position(|value| *value >= leaving).unwrap_or(0);
-    while at + 1 < window.len() && window[at + 1] < entering {
-        window[at] = window[at + 1];
-        at += 1;
-    }
-    while at > 0 && window[at - 1] > entering {
-        window[at] = window[at - 1];
-        at -= 1;
-    }
-    window[at] = entering;
 }
 
 #[cfg(test)]
@@ -265,18 +251,22 @@ mod tests {
         assert!(found.scatter.noise_factor < 3.0, "{}", found.scatter.noise_factor);
     }
 
-    /// Against the definition: every window sorted anew.
+    /// Against the definition: every window sorted.
     #[test]
-    fn the_running_median_is_that_of_each_window() {
-        let values: Vec<f64> = (0..200).map(|k| f64::from(k * k * 37 % 101) - 50.0).collect();
-        let middle = |at: usize| {
-            let first = at.saturating_sub(WINDOW / 2).min(values.len() - WINDOW);
-            let mut window = values[first..first + WINDOW].to_vec();
-            window.sort_by(f64::total_cmp);
-            window[WINDOW / 2]
-        };
-        let expected: Vec<f64> = (0..values.len()).map(middle).collect();
-        assert_eq!(running_median(&values), expected);
+    fn a_value_is_far_from_the_median_as_the_sorted_window_has_it() {
+        for length in [1, 2, 7, 10, 11, 200] {
+            let values: Vec<f64> = (0..length).map(|k| f64::from(k * k * 37 % 101) - 50.0).collect();
+            for at in 0..values.len() {
+                let width = WINDOW.min(values.len());
+                let first = at.saturating_sub(width / 2).min(values.len() - width);
+                let mut window = values[first..first + width].to_vec();
+                window.sort_by(f64::total_cmp);
+                let apart = (values[at] - window[width / 2]).abs();
+                for reach in [5.5, 20.5, 45.5] {
+                    assert_eq!(is_far_from_median(&values, at, reach), apart > reach, "{at} of {length}");
+                }
+            }
+        }
     }
 
     #[test]
