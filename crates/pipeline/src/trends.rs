@@ -11,7 +11,7 @@ use job::part::WearAxis;
 use rayon::prelude::*;
 use serde::Serialize;
 use store::{Query, Store};
-use trend::{Axis, FleetPrior, Observation, Series, Trend, Usage, classic};
+use trend::{Axis, Each, FleetPrior, Observation, Series, Trend, Usage, classic};
 
 use crate::changed::{Changed, changed};
 use crate::error::Error;
@@ -22,6 +22,15 @@ use crate::recorder::{Moved, moved, moved_in_store};
 use crate::stays::Stays;
 use crate::tail_wide::TailWide;
 use crate::unlogged::Unlogged;
+
+/// What a prior asks of each unit, done by all workers.
+struct AtOnce;
+
+impl Each for AtOnce {
+    fn each<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+        things.par_iter().map(work).collect()
+    }
+}
 
 /// A unit, by part and serial number.
 pub type Unit = (PartNumber, SerialNumber);
@@ -468,7 +477,7 @@ impl<'a> Fleet<'a> {
         let of_parts = self.units.iter().filter(|(name, _)| parts.contains(&name.0.as_deref()));
         let first = parts.first().copied().flatten();
         let (limit_m, axis) = (self.limit_m(first), self.axis(first));
-        FleetPrior::learn(of_parts.map(|(_, (_, series))| series), turn_us, limit_m, axis)
+        FleetPrior::learn_by(of_parts.map(|(_, (_, series))| series), turn_us, limit_m, axis, &AtOnce)
     }
 
     /// What wear of a part is said to follow; nothing where its histories decide.

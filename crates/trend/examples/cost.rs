@@ -11,7 +11,7 @@ mod random;
 use std::time::Instant;
 
 use random::Random;
-use trend::{FleetPrior, Kept, Observation, Series, Settings, Usage, trend};
+use trend::{Each, FleetPrior, Kept, Observation, Series, Settings, Usage, trend};
 
 const LIMIT_M: f64 = 1e-4;
 const NIGHT_US: i64 = 30_000_000_000;
@@ -55,6 +55,27 @@ fn cost<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let before_s = busy_s(began);
     let made = work();
     (busy_s(began) - before_s, made)
+}
+
+/// Some threads, each with its share.
+struct Threads(usize);
+
+impl Each for Threads {
+    fn each<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+        let (count, work) = (things.len().div_ceil(self.0).max(1), &work);
+        std::thread::scope(|scope| {
+            let of_part = |part| scope.spawn(move || <[T]>::iter(part).map(work).collect::<Vec<R>>());
+            let parts: Vec<_> = things.chunks(count).map(of_part).collect();
+            parts.into_iter().flat_map(|part| part.join().unwrap()).collect()
+        })
+    }
+}
+
+/// The prior of a fleet by some threads: wall seconds.
+fn learned(fleet: &[Series], as_of_us: i64, threads: usize) -> f64 {
+    let began = Instant::now();
+    std::hint::black_box(FleetPrior::learn_by(fleet, as_of_us, LIMIT_M, None, &Threads(threads)));
+    began.elapsed().as_secs_f64()
 }
 
 /// Statements of a fleet on some threads: wall seconds.
@@ -165,29 +186,31 @@ fn nights(serials: u64, flights: usize) {
 
 fn main() {
     let serials: u64 = std::env::args().nth(1).map_or(200, |n| n.parse().unwrap());
-    println!("processor time of a serial, µs         of the prior, ms   wall time of a statement, µs, on");
-    println!("flights    series  statement                              1 thread  2 threads");
+    println!("processor time of a serial, µs    by the clock, a statement, µs, on    the prior, ms, on");
+    println!("flights    series  statement             1 thread  2 threads         1 thread  2 threads");
     for flights in [100, 300, 1000, 3000, 10_000] {
         let rows: Vec<Vec<Observation>> = (0..serials).map(|seed| rows(seed, flights)).collect();
         let us = 1e6 / serials as f64;
         let unit = |rows| Series::new(rows, &Usage::default()).unwrap();
         let (series_s, fleet) = cost(|| rows.into_iter().map(unit).collect::<Vec<Series>>());
         let as_of_us = flights as i64 * NIGHT_US;
-        let (prior_s, prior) = cost(|| FleetPrior::learn(&fleet, as_of_us, LIMIT_M, None));
+        let prior = FleetPrior::learn(&fleet, as_of_us, LIMIT_M, None);
         let settings = Settings::for_limit(LIMIT_M);
         let (statement_s, ()) = cost(|| {
             for series in &fleet {
                 std::hint::black_box(trend(series, as_of_us, &settings, Some(&prior), None).unwrap());
             }
         });
-        let [one_s, two_s] = [1, 2].map(|threads| stated(&fleet, as_of_us, &prior, threads));
+        let stated_s = [1, 2].map(|threads| stated(&fleet, as_of_us, &prior, threads) * us);
+        let learned_s = [1, 2].map(|threads| learned(&fleet, as_of_us, threads) * 1e3);
         println!(
-            "{flights:7}  {:8.1}  {:9.1}  {:26.0}  {:10.1}  {:9.1}",
+            "{flights:7}  {:8.1}  {:9.1}  {:19.1}  {:9.1}  {:15.0}  {:9.0}",
             series_s * us,
             statement_s * us,
-            prior_s * 1e3,
-            one_s * us,
-            two_s * us
+            stated_s[0],
+            stated_s[1],
+            learned_s[0],
+            learned_s[1]
         );
     }
     println!("\na night more of a serial, µs of the processor          state, bytes    by the clock, µs, on");

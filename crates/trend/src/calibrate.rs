@@ -7,6 +7,7 @@
 
 use crate::bins::{self, BINS};
 use crate::crossing::{LONG_RULE, WAIT_RULE, waits};
+use crate::each::Each;
 use crate::level::Weighted;
 use crate::posterior::{Node, Posterior, Segment, posterior};
 use crate::prior::FleetPrior;
@@ -50,11 +51,11 @@ impl Calibration {
     }
 
     /// Learns from every cut of some segments.
-    pub(crate) fn learn<'a>(segments: impl Iterator<Item = Segment<'a>>, prior: &FleetPrior) -> Self {
-        let misses = segments.flat_map(|segment| CUTS.map(|share| miss(&segment, share, prior)));
-        let misses: Vec<(f64, f64)> = misses.flatten().map(|miss| (miss, 1.0)).collect();
+    pub(crate) fn learn(segments: &[Segment<'_>], prior: &FleetPrior, each: &impl Each) -> Self {
+        let misses = each.each(segments, |segment| CUTS.map(|share| miss(segment, share, prior)));
+        let misses = misses.into_iter().flatten().flatten().map(|miss| (miss, 1.0));
         let usual = LONG_QUANTILES.map(|z| (USUAL_WIDTH * z, PSEUDO_CUTS / LONG_QUANTILES.len() as f64));
-        let misses = Weighted::new(misses.into_iter().chain(usual));
+        let misses = Weighted::new(misses.chain(usual));
         let [low, middle, high] = [0.05, 0.5, 0.95].map(|share| misses.quantile(share));
         Self { low: low.min(Self::USUAL.low), middle, high: high.max(Self::USUAL.high) }
     }

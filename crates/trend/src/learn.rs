@@ -2,9 +2,10 @@
 
 use crate::calibrate::Calibration;
 use crate::curve::{FAMILIES, Law};
+use crate::each::{Each, InTurn};
 use crate::history::{self, History};
 use crate::jump::installation_steps;
-use crate::posterior::{Guess, Node, Posterior, posterior};
+use crate::posterior::{Guess, Node, Posterior, Segment, posterior};
 use crate::prior::{Axis, FleetPrior};
 use crate::season::{Season, Swing, swing};
 use crate::series::{Booked, Flight, Series};
@@ -41,12 +42,23 @@ impl FleetPrior {
         limit_m: f64,
         axis: Option<Axis>,
     ) -> Self {
+        Self::learn_by(fleet, as_of_us, limit_m, axis, &InTurn)
+    }
+
+    /// As [`FleetPrior::learn`], with the work on each unit done by whoever has threads: the same bits.
+    pub fn learn_by<'a>(
+        fleet: impl IntoIterator<Item = &'a Series>,
+        as_of_us: i64,
+        limit_m: f64,
+        axis: Option<Axis>,
+        each: &impl Each,
+    ) -> Self {
         let fleet = sample(fleet.into_iter().map(|series| Known::on(series, as_of_us)));
-        let along = |axis| Lesson::along(&fleet, axis, limit_m);
+        let along = |axis| Lesson::along(&fleet, axis, limit_m, each);
         let lesson = axis.and_then(along).or_else(|| likeliest(Axis::ALL.into_iter().filter_map(along)));
         let Some(lesson) = lesson else { return Self::vague(limit_m) };
-        let noises = WEAR_NOISES.into_iter().map(|factor| lesson.with_wear_noise(factor).revised());
-        likeliest(noises).unwrap_or(lesson).revised().calibrated()
+        let noises = WEAR_NOISES.into_iter().map(|factor| lesson.with_wear_noise(factor).revised(each));
+        likeliest(noises).unwrap_or(lesson).revised(each).calibrated(each)
     }
 }
 
@@ -95,7 +107,7 @@ struct Lesson {
 }
 
 impl Lesson {
-    fn along(fleet: &[Known<'_>], axis: Axis, limit_m: f64) -> Option<Self> {
+    fn along(fleet: &[Known<'_>], axis: Axis, limit_m: f64, each: &impl Each) -> Option<Self> {
         let last = |unit: &Known<'_>| unit.flights.last().copied();
         let total = |of: &dyn Fn(&Flight) -> f64| fleet.iter().filter_map(last).map(|f| of(&f)).sum::<f64>();
         let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
@@ -106,16 +118,14 @@ impl Lesson {
         // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
         // their first hour on teach a fleet that never wears.
         let read = |u: &Known<'_>| history::read(u.flights, u.book, None, &assumed);
-        let histories: Vec<History> = fleet.iter().map(read).collect();
+        let histories: Vec<History> = each.each(fleet, read);
         assumed.bias_sd_m = bias(&histories, assumed.bias_sd_m);
-        let swings: Vec<Swing> = histories
-            .iter()
-            .flat_map(History::segments)
-            .filter_map(|s| swing(&s, &assumed, &posterior(&s, &assumed)?))
-            .collect();
+        let of_segment = |s: &Segment<'_>| swing(s, &assumed, &posterior(s, &assumed)?);
+        let swings = each.each(&segments(&histories), of_segment);
+        let swings: Vec<Swing> = swings.into_iter().flatten().collect();
         assumed.season = Season::learn(&swings);
         let learned = assumed.clone();
-        Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.revised())
+        Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.revised(each))
     }
 
     /// The same with another noise of wear.
@@ -127,19 +137,19 @@ impl Lesson {
     }
 
     /// What was learned, with what its own forecasts of the fleet's past were worth.
-    fn calibrated(self) -> FleetPrior {
-        let segments = self.histories.iter().flat_map(History::segments);
-        FleetPrior { calibration: Calibration::learn(segments, &self.learned), ..self.learned }
+    fn calibrated(self, each: &impl Each) -> FleetPrior {
+        let calibration = Calibration::learn(&segments(&self.histories), &self.learned, each);
+        FleetPrior { calibration, ..self.learned }
     }
 
     /// Judges every segment by what was learned and learns again, by expectation–maximisation.
     ///
     /// Within a revision the weights of the laws and lives move; that a new unit's gap is known better
     /// than was assumed only tells in the next.
-    fn revised(self) -> Self {
-        let segments = self.histories.iter().flat_map(History::segments);
+    fn revised(self, each: &impl Each) -> Self {
+        let judged = |segment: &Segment<'_>| Some(posterior(segment, &self.learned)?.pruned());
         let units: Vec<Posterior> =
-            segments.filter_map(|segment| Some(posterior(&segment, &self.learned)?.pruned())).collect();
+            each.each(&segments(&self.histories), judged).into_iter().flatten().collect();
         let round = |current: FleetPrior, _| step(&self.assumed, &self.learned, &current, &units);
         let learned = (0..ROUNDS).fold(self.learned.clone(), round);
         let ratio = Ratio::new(&self.learned, &learned);
@@ -147,6 +157,11 @@ impl Lesson {
         let evidence = units.iter().map(|unit| unit.log_evidence + change(unit)).sum();
         Self { learned, evidence, ..self }
     }
+}
+
+/// The segments of all units.
+fn segments(histories: &[History]) -> Vec<Segment<'_>> {
+    histories.iter().flat_map(History::segments).collect()
 }
 
 /// Spread of what an installation adds: half the mean square of the steps between installations.

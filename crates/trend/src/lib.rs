@@ -56,6 +56,7 @@ mod clean;
 mod crossing;
 mod curve;
 mod digest;
+mod each;
 mod error;
 mod filter;
 mod grounded;
@@ -79,6 +80,7 @@ mod state;
 mod tail;
 mod trend;
 
+pub use each::{Each, InTurn};
 pub use error::Error;
 pub use kept::Kept;
 pub use memory::remembered;

@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use trend::{
-    Axis, Booked, Change, ChangeKind, FleetPrior, Observation, Series, Settings, State, Trend, Usage, Wear,
-    trend,
+    Axis, Booked, Change, ChangeKind, Each, FleetPrior, Observation, Series, Settings, State, Trend, Usage,
+    Wear, trend,
 };
 
 use crate::random::Random;
@@ -231,6 +231,31 @@ fn a_prior_looks_at_nothing_later_than_its_day_and_not_at_the_order_of_its_units
     let short: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 401)).collect();
     let cut = FleetPrior::learn(short.iter().map(|u| &u.series), day, LIMIT_M, None);
     assert_eq!(format!("{whole:?}"), format!("{cut:?}"));
+}
+
+/// The last first, each on a thread of its own.
+struct Backwards;
+
+impl Each for Backwards {
+    fn each<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+        let work = &work;
+        let mut results: Vec<R> = std::thread::scope(|scope| {
+            let threads: Vec<_> = things.iter().rev().map(|thing| scope.spawn(move || work(thing))).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+        });
+        results.reverse();
+        results
+    }
+}
+
+#[test]
+fn a_prior_is_the_same_to_the_last_bit_whoever_does_the_work() {
+    let fleet: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 400)).collect();
+    let series = || fleet.iter().map(|u| &u.series);
+    let day = 200 * DAY_US;
+    let in_turn = FleetPrior::learn(series(), day, LIMIT_M, None);
+    let apart = FleetPrior::learn_by(series(), day, LIMIT_M, None, &Backwards);
+    assert_eq!(format!("{in_turn:?}"), format!("{apart:?}"));
 }
 
 proptest! {
