@@ -92,7 +92,7 @@ fn two_hundred_kills_lose_nothing_and_double_nothing() {
         bench.well(&["run", "--jobs", "1"]);
         started.elapsed()
     };
-    let longest = (0..3).map(took).min().unwrap();
+    let mut longest = (0..3).map(took).min().unwrap();
     let seed = std::env::var("FREEPLAY_KILL_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(412_u64);
     tell(&format!("killing {KILLS} runs of up to {longest:?}, seed {seed} (FREEPLAY_KILL_SEED)"));
     let mut chance = Chance(seed);
@@ -105,9 +105,11 @@ fn two_hundred_kills_lose_nothing_and_double_nothing() {
         child.wait().unwrap();
         let now = whole_flights(&bench);
         assert!(now >= kept, "{kept} records were kept, now {now}");
-        partly += usize::from(now > 0 && now < 40);
+        partly += usize::from(now > 0 && !over);
         struck += usize::from(!over);
         kept = now;
+        // However fast the machine is just now, about one run in six is to be over before its kill.
+        longest = longest.mul_f64(if over { 0.9 } else { 1.02 });
         if over {
             assert_eq!(bench.exported(), wanted, "after kills, the finished store is another one");
             (bench, finished, kept) = (small(), finished + 1, 0);
@@ -115,7 +117,7 @@ fn two_hundred_kills_lose_nothing_and_double_nothing() {
     }
     bench.well(&["run"]);
     assert_eq!(bench.exported(), wanted);
-    tell(&format!("{struck} runs were struck, {partly} stores found half full, {finished} finished between"));
+    tell(&format!("{struck} runs were struck, {partly} with records stored, {finished} over before"));
     assert!(partly > 0, "no kill came between two commits");
 }
 

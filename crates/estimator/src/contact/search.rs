@@ -31,7 +31,7 @@ const MOST_FRICTION: f64 = 0.5;
 /// A gap wider than this many wind-ups is kept from misleading the search.
 const WIDEST: f64 = 20.0;
 /// A turn that moves the state by less than this share of the gap's standard error is the last: the next one would
-/// move the gap by a fifth of that, or less.
+/// seldom move the gap by more than a fifth of that.
 const SETTLED: f64 = 0.05;
 /// Rounds of reweighting within a turn.
 const ROUNDS: usize = 5;
