@@ -1,7 +1,7 @@
 //! The gap statistic (equations 29–31).
 
 use crate::error::Error;
-use crate::wide::widest;
+use crate::wide::{filled_up, widest};
 
 /// ΔS and what it is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +31,9 @@ pub fn mid_range(s_m: &[f64]) -> Result<Gap, Error> {
         return Err(Error::NothingMeasured);
     }
     let mid_range_m = f64::midpoint(max, min);
-    let Halves { upper_m: upper_sum, upper, lower_m: lower_sum, lower } = halves(s_m, mid_range_m);
+    let (sums_m, counts) = halves(s_m, mid_range_m);
+    let [upper_sum, lower_sum] = sums_m.map(|chains| chains.iter().sum::<f64>());
+    let [upper, lower] = counts.map(|chains| chains.iter().sum::<u64>() as usize);
     if lower == 0 {
         return Err(Error::Constant { samples: upper, s_m: max });
     }
@@ -46,33 +48,17 @@ pub fn mid_range(s_m: &[f64]) -> Result<Gap, Error> {
     })
 }
 
-/// Samples at or above a level and below it: the sums of what they differ from it, m, and how many they are.
-struct Halves {
-    upper_m: f64,
-    upper: usize,
-    lower_m: f64,
-    lower: usize,
-}
-
 /// Chains side by side: a sum waits for the addition before it, and eight wait at once. The order of additions is
 /// part of the number: sample k belongs to chain k mod 8, and the chains are added up in their order.
 const CHAINS: usize = 8;
 
-/// Both halves in one pass; NaN is in neither.
-fn halves(s_m: &[f64], level_m: f64) -> Halves {
-    let (upper_m, lower_m, counts) = sums(s_m, level_m);
-    let [upper, lower] = counts.map(|count| count.iter().sum::<u64>() as usize);
-    Halves { upper_m: upper_m.iter().sum(), upper, lower_m: lower_m.iter().sum(), lower }
-}
-
 widest! {
-    /// By chains: sums above and below, and how many samples made each.
-    fn sums(s_m: &[f64], level_m: f64) -> ([f64; CHAINS], [f64; CHAINS], [[u64; CHAINS]; 2]) {
-        let (mut upper_m, mut lower_m, mut counts) = ([0.0; CHAINS], [0.0; CHAINS], [[0; CHAINS]; 2]);
+    /// Samples at or above a level and below it, by chains: the sums of what they differ from it, m, and how many
+    /// they are. NaN is neither.
+    fn halves(s_m: &[f64], level_m: f64) -> ([[f64; CHAINS]; 2], [[u64; CHAINS]; 2]) {
+        let ([mut upper_m, mut lower_m], mut counts) = ([[0.0; CHAINS]; 2], [[0; CHAINS]; 2]);
         let (eights, rest) = s_m.as_chunks::<CHAINS>();
-        let mut last = [f64::NAN; CHAINS];
-        last[..rest.len()].copy_from_slice(rest);
-        for eight in eights.iter().chain([&last]) {
+        for eight in eights.iter().chain([&filled_up(rest)]) {
             for (chain, &s) in eight.iter().enumerate() {
                 // Both sums at every sample, of which at least one is of nothing: no branch to guess.
                 let (is_upper, is_lower) = (s >= level_m, s < level_m);
@@ -82,7 +68,7 @@ widest! {
                 counts[1][chain] += u64::from(is_lower);
             }
         }
-        (upper_m, lower_m, counts)
+        ([upper_m, lower_m], counts)
     }
 }
 
@@ -97,9 +83,7 @@ widest! {
     fn extremes(s_m: &[f64]) -> ([f64; CHAINS], [f64; CHAINS]) {
         let (mut least, mut greatest) = ([f64::INFINITY; CHAINS], [f64::NEG_INFINITY; CHAINS]);
         let (eights, rest) = s_m.as_chunks::<CHAINS>();
-        let mut last = [f64::NAN; CHAINS];
-        last[..rest.len()].copy_from_slice(rest);
-        for eight in eights.iter().chain([&last]) {
+        for eight in eights.iter().chain([&filled_up(rest)]) {
             for (chain, &s) in eight.iter().enumerate() {
                 least[chain] = if s < least[chain] { s } else { least[chain] };
                 greatest[chain] = if s > greatest[chain] { s } else { greatest[chain] };

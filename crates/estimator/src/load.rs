@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::wide::widest;
+use crate::wide::{filled_up, widest};
 
 /// A load counts as being on a side beyond this share of its greater quantile, so noise about zero is no reversal.
 const SIDE_SHARE: f64 = 0.12;
@@ -35,31 +35,17 @@ const CHAINS: usize = 8;
 
 /// Changes from beyond one side of a threshold to beyond the other.
 fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
-    let mut sides = Sides { threshold_n, side: 0.0, changes: 0 };
-    sides.follow(load_n);
-    sides.changes
-}
-
-/// The side on which the load was last.
-struct Sides {
-    threshold_n: f64,
-    side: f64,
-    changes: usize,
-}
-
-impl Sides {
-    fn follow(&mut self, load_n: &[f64]) {
-        let mut at = 0;
-        while at < load_n.len() {
-            at += BLOCK * calm(&load_n[at..], self.side);
-            let end = load_n.len().min(at + BLOCK);
-            for &f in load_n[at..end].iter().filter(|f| f.abs() > self.threshold_n) {
-                self.changes += usize::from(self.side * f < 0.0);
-                self.side = f.signum();
-            }
-            at = end;
+    let (mut side, mut changes, mut at) = (0.0, 0, 0);
+    while at < load_n.len() {
+        at += BLOCK * calm(&load_n[at..], side);
+        let end = load_n.len().min(at + BLOCK);
+        for &f in load_n[at..end].iter().filter(|f| f.abs() > threshold_n) {
+            changes += usize::from(side * f < 0.0);
+            side = f.signum();
         }
+        at = end;
     }
+    changes
 }
 
 widest! {
@@ -124,10 +110,8 @@ widest! {
     /// Shows loads to all brackets, and counts those that are there.
     fn seen<const N: usize>(load_n: &[f64], brackets: &mut [Bracket; N]) -> usize {
         let (blocks, rest) = load_n.as_chunks::<BLOCK>();
-        let mut last = [f64::NAN; BLOCK];
-        last[..rest.len()].copy_from_slice(rest);
         let mut there = [0; CHAINS];
-        for block in blocks.iter().chain([&last]) {
+        for block in blocks.iter().chain([&filled_up(rest)]) {
             let (groups, _) = block.as_chunks::<CHAINS>();
             for group in groups {
                 for (chain, &f) in group.iter().enumerate() {

@@ -47,6 +47,15 @@ macro_rules! widest {
 
 pub(crate) use widest;
 
+/// Up to `N` numbers, filled up with NaN, which no sum, count or extreme takes in.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "see `widest`")]
+pub(crate) fn filled_up<const N: usize>(values: &[f64]) -> [f64; N] {
+    let mut all = [f64::NAN; N];
+    all[..values.len()].copy_from_slice(values);
+    all
+}
+
 /// Eight numbers that are computed side by side.
 #[cfg(feature = "std")]
 #[derive(Debug, Clone, Copy)]

@@ -30,7 +30,7 @@ const YOUNG: usize = 20;
 const LAST: usize = 300;
 
 /// A day, microseconds, and the days of the pace.
-const DAY_US: i64 = 86_400_000_000;
+pub(crate) const DAY_US: i64 = 86_400_000_000;
 pub(crate) const PACE_DAYS: i64 = 90;
 
 /// Days of which one flight is kept for the pace.

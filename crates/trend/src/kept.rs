@@ -1,6 +1,6 @@
 //! What is kept of a unit from night to night, so that a flight more does not ask for all those before.
 
-use crate::checkpoint::{self, Checkpoint, Judged, Known, Mark, PACE_DAYS, digest_of, entries_until};
+use crate::checkpoint::{self, Checkpoint, DAY_US, Judged, Known, Mark, PACE_DAYS, digest_of, entries_until};
 use crate::crossing::Remaining;
 use crate::error::Error;
 use crate::level;
@@ -226,10 +226,9 @@ impl Kept {
 
     /// The pace of the last ninety days of flights; nothing when they show no hours.
     fn pace(&self) -> Option<Pace> {
-        const DAY_US: f64 = 86_400e6;
         let last = Mark::of(self.last()?);
         let marks = self.checkpoint.days.iter().copied().chain(self.tail.iter().map(Mark::of));
-        let days = |mark: &Mark| (last.departure_us - mark.departure_us) as f64 / DAY_US;
+        let days = |mark: &Mark| (last.departure_us - mark.departure_us) as f64 / DAY_US as f64;
         let first = marks.into_iter().find(|mark| days(mark) <= PACE_DAYS as f64)?;
         let (hours, days) = (last.hours - first.hours, days(&first));
         (hours > 0.0 && days > 0.0).then(|| Pace {

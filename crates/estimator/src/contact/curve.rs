@@ -15,8 +15,10 @@ const LOOKS: usize = 4000;
 /// did by 3 % at most, with positions that freeze for seconds by 15 %; over the flights that were given a wrong
 /// gap before by 50 % and more. Of 3,000 sound flights of the study twelve are refused for it.
 const UNEXPLAINED: f64 = 0.25;
-/// Turns of the search, at most.
-const TURNS: Turns = Turns { excerpt: 3, whole: 2, soft: 4 };
+/// Turns of the search over straight flanks, and over soft ones from there.
+const STRAIGHT: Turns = Turns { excerpt: 3, whole: 2, alone: 5 };
+/// See [`STRAIGHT`].
+const BENT: Turns = Turns { excerpt: 4, whole: 2, alone: 4 };
 /// The low-load samples leave the straight line by this many standard errors before a curve is tried.
 const SUSPICION: f64 = 2.0;
 /// Light rows further out than this share of the wind-up are in the gap, not on a soft flank; they count no more.
@@ -32,11 +34,12 @@ const FRICTION_DOUBT: f64 = 0.012;
 /// doubts above make nine in ten intervals hold over the study's wide scenarios.
 const FLOOR: (f64, f64) = (3e-4, 2e-4);
 
-/// Over an excerpt of a long flight, and over the whole from there; soft flanks from what straight ones gave.
+/// Turns of a search, at most: over an excerpt of a long flight, over the whole from there, and over a whole flight
+/// of which no excerpt told anything.
 struct Turns {
     excerpt: usize,
     whole: usize,
-    soft: usize,
+    alone: usize,
 }
 
 /// How the flanks answer, and what was found with them.
@@ -81,21 +84,19 @@ impl Contact {
 /// As [`search`], and [`Refusal::MotionUnexplained`].
 pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal> {
     let pace = Pace::of(blocks, frame);
-    let mut excerpt = blocks.excerpt().map(|part| (Pace::of(&part, frame), part));
-    let guess = excerpt.as_mut().and_then(|(thin, part)| {
-        let found: Found<LINEAR> = search((part, thin), frame, start(frame), TURNS.excerpt).ok()?;
-        Some(found.state)
+    let mut excerpt = blocks.excerpt().map(|part| {
+        let pace = Pace::of(&part, frame);
+        (part, pace)
     });
-    let turns = if guess.is_some() { TURNS.whole } else { TURNS.excerpt + TURNS.whole };
     let straight: Found<LINEAR> =
-        search((blocks, &pace), frame, guess.unwrap_or_else(|| start(frame)), turns)?;
+        coarse_to_fine((blocks, &pace), excerpt.as_mut(), frame, start(frame), &STRAIGHT)?;
     let error_m = |column: usize| straight.fit.standard_error_m(column, &straight.design.firm);
     let (line_m, line_se_m) = (straight.fit.beta[GAP], error_m(GAP));
     // Under heavy friction the forces at low load are friction's to say, not the flank's.
     let heavy = straight.state.friction.is_heavy(frame.load_n);
     let bent = if !heavy && low_loads_deviate(&straight, frame) {
-        let part = excerpt.as_mut().map(|(thin, part)| (part, &*thin));
-        soft((blocks, &pace), part, frame, straight.state, (line_m, line_se_m))
+        let curve = coarse_to_fine((blocks, &pace), excerpt.as_mut(), frame, straight.state, &BENT);
+        curve.ok().and_then(|curve| soft(&curve, (line_m, line_se_m)))
     } else {
         None
     };
@@ -113,14 +114,32 @@ pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal
         curve: bent.map(|(beta, _)| beta),
         straight,
     };
-    let is_explained = match &mut excerpt {
-        Some((pace, part)) => {
+    let ground = match &mut excerpt {
+        Some((part, pace)) => {
             part.realign(contact.state.skew_s);
-            is_explained(Ground { blocks: part, pace, frame }, &contact)
+            Ground { blocks: part, pace, frame }
         }
-        None => is_explained(Ground { blocks, pace: &pace, frame }, &contact),
+        None => Ground { blocks, pace: &pace, frame },
     };
-    if is_explained { Ok(contact) } else { Err(Refusal::MotionUnexplained) }
+    if is_explained(ground, &contact) { Ok(contact) } else { Err(Refusal::MotionUnexplained) }
+}
+
+/// Turns from a state over an excerpt, where the flight is long enough for one, and from there over the whole.
+fn coarse_to_fine<const N: usize>(
+    whole: (&mut Blocks, &Pace),
+    excerpt: Option<&mut (Blocks, Pace)>,
+    frame: &Frame,
+    from: State,
+    turns: &Turns,
+) -> Result<Found<N>, Refusal> {
+    let guess = excerpt.and_then(|(part, pace)| {
+        let found: Found<N> = search((part, pace), frame, from, turns.excerpt).ok()?;
+        Some(found.state)
+    });
+    match guess {
+        Some(state) => search(whole, frame, state, turns.whole),
+        None => search(whole, frame, from, turns.alone),
+    }
 }
 
 /// Whether gap and wind-up travel as far as δX does. A screw that friction holds within its gap, or a load
@@ -177,19 +196,7 @@ fn low_loads_deviate(straight: &Found<LINEAR>, frame: &Frame) -> bool {
 ///
 /// The straight fit is the sharper one when flanks are straight, the curve right either way; so their
 /// difference has the variance of the curve less that of the line (Hausman 1978).
-fn soft(
-    whole: (&mut Blocks, &Pace),
-    excerpt: Option<(&mut Blocks, &Pace)>,
-    frame: &Frame,
-    from: State,
-    line_m: (f64, f64),
-) -> Option<([f64; CURVED], f64)> {
-    let guess = excerpt.and_then(|part| {
-        let found: Found<CURVED> = search(part, frame, from, TURNS.soft).ok()?;
-        Some(found.state)
-    });
-    let turns = if guess.is_some() { TURNS.whole } else { TURNS.soft };
-    let curve: Found<CURVED> = search(whole, frame, guess.unwrap_or(from), turns).ok()?;
+fn soft(curve: &Found<CURVED>, line_m: (f64, f64)) -> Option<([f64; CURVED], f64)> {
     let (gap_m, se_m) = (curve.fit.beta[GAP], curve.fit.standard_error_m(GAP, &curve.design.firm));
     let spread_m = (se_m.powi(2) - line_m.1.powi(2)).max(0.25 * se_m.powi(2)).sqrt();
     let change_m = line_m.0 - gap_m;
