@@ -1,6 +1,6 @@
 //! Fleets that wear by laws the bank does not contain, judged: how wrong, and how honest about it.
 //!
-//! `foreign [SERIALS] [SEED]` makes six fleets, asks each unit thrice, and scores what was said of the
+//! `foreign [SERIALS] [SEED]` makes nine fleets, asks each unit thrice, and scores what was said of the
 //! hours left. Wear walks about its law (Wiener, not gamma), stated errors are wrong by a factor of up to
 //! 1.6, gaps swing with the season by up to 2 µm, tails add a bias, and a tenth of the units is replaced
 //! without a word.
@@ -27,6 +27,9 @@ enum Foreign {
     Bathtub { early: f64 },
     Hyperbolic { q: f64 },
     Knees { rates: [f64; 3], at: [f64; 2] },
+    Gompertz { b: f64, c: f64 },
+    Bursts { count: f64, share: f64 },
+    Logarithm { k: f64 },
     Line,
     Nothing,
 }
@@ -52,6 +55,16 @@ impl Foreign {
                 };
                 to(x) / to(1.0)
             }
+            Self::Gompertz { b, c } => {
+                let g = |x: f64| (-b * (-c * x).exp()).exp();
+                (g(x) - g(0.0)) / (g(1.0) - g(0.0))
+            }
+            Self::Bursts { count, share } => {
+                let turn = std::f64::consts::TAU * count;
+                let g = |x: f64| x - share * (turn * x).sin() / turn;
+                g(x) / g(1.0)
+            }
+            Self::Logarithm { k } => (k * x).ln_1p() / k.ln_1p(),
             Self::Line => x,
             Self::Nothing => 0.0,
         }
@@ -67,6 +80,9 @@ impl Foreign {
             2 => Self::Logistic { k: random.between(4.0, 8.0) },
             3 => Self::Bathtub { early: random.between(0.2, 0.5) },
             4 => Self::Hyperbolic { q: random.between(0.6, 0.9) },
+            6 => Self::Gompertz { b: random.between(3.0, 6.0), c: random.between(3.0, 6.0) },
+            7 => Self::Bursts { count: random.between(1.5, 4.0), share: random.between(0.5, 0.9) },
+            8 => Self::Logarithm { k: random.between(3.0, 20.0) },
             _ => {
                 let first = random.between(0.15, 0.45);
                 Self::Knees {
@@ -78,7 +94,17 @@ impl Foreign {
     }
 }
 
-const FLEETS: [&str; 6] = ["run-in", "saturating", "logistic", "bathtub", "hyperbolic", "two knees"];
+const FLEETS: [&str; 9] = [
+    "run-in",
+    "saturating",
+    "logistic",
+    "bathtub",
+    "hyperbolic",
+    "two knees",
+    "Gompertz",
+    "bursts",
+    "logarithm",
+];
 
 /// A day on which a unit is asked about, and what came true.
 struct Question {

@@ -8,12 +8,17 @@
 //! settling     F(t) = 1 − e^(−t/τ)
 //! onset        F(t) = max(0, t − o)/1000    flat, then a line
 //! bend         F(t) = (s t + (1 − s) max(0, t − o))/1000    one line, then another; s the ratio of rates
+//! course       F(t) = G(t/T)    turns at shares of a life T, see `course`
 //! none         F(t) = 0
 //! ```
 //! Ages are hours, or another usage brought to hours by the part number's mean. Each law is known by
 //! its *life*: the age T at which it has grown by a given span, so A = span/F(T).
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
+
+use crate::course::{self, Course};
 
 /// Age that a power law's amplitude refers to, hours, and its logarithm.
 const REFERENCE_HOURS: f64 = 1000.0;
@@ -36,6 +41,9 @@ const BEND_RATIOS: [f64; 5] = [0.2, 0.45, 2.2, 5.0, 12.0];
 const KNEES: usize = 10;
 const BEND_AGE_STRIDE: usize = 4;
 
+/// The same for courses.
+const COURSE_AGE_STRIDE: usize = 2;
+
 /// Ages at first sight, hours.
 const AGES: [f64; 14] =
     [0.0, 75.0, 150.0, 250.0, 400.0, 600.0, 850.0, 1150.0, 1500.0, 2000.0, 2600.0, 3400.0, 4500.0, 6000.0];
@@ -44,7 +52,11 @@ const AGES: [f64; 14] =
 pub(crate) const POWERS: usize = POWER_EIGHTHS.len();
 
 /// Number of [`Law::family`] values: every exponent is one, the other laws are one each.
-pub(crate) const FAMILIES: usize = 4 + BEND_RATIOS.len() + POWER_EIGHTHS.len();
+pub(crate) const FAMILIES: usize = COURSES.end + POWER_EIGHTHS.len();
+
+/// The families of bends and of courses.
+pub(crate) const BENDS: Range<usize> = 4..4 + BEND_RATIOS.len();
+pub(crate) const COURSES: Range<usize> = BENDS.end..BENDS.end + course::COUNT;
 
 /// The family of wear that is proportional to usage.
 pub(crate) const LINEAR: usize = FAMILIES - POWERS + 4;
@@ -62,6 +74,8 @@ pub(crate) enum Law {
     Exponential { index: usize },
     /// Index into the constants of settling.
     Settling { index: usize },
+    /// Indices into the courses and their lives.
+    Course { course: usize, life: usize },
     /// Index into the exponents.
     Power { index: usize },
 }
@@ -91,7 +105,8 @@ impl Law {
             Self::Onset { .. } => 1,
             Self::Exponential { .. } => 2,
             Self::Settling { .. } => 3,
-            Self::Bend { index, .. } => 4 + index,
+            Self::Bend { index, .. } => BENDS.start + index,
+            Self::Course { course, .. } => COURSES.start + course,
             Self::Power { index } => FAMILIES - POWERS + index,
         }
     }
@@ -103,6 +118,7 @@ impl Law {
             Self::Bend { index, .. } => index < BEND_RATIOS.len(),
             Self::Exponential { index } => index < TIME_CONSTANTS.len(),
             Self::Settling { index } => index < SETTLING.len(),
+            Self::Course { course, life } => course < course::COUNT && life < course::LIVES.len(),
             Self::Power { index } => index < POWERS,
         }
     }
@@ -115,6 +131,7 @@ impl Law {
             Self::Bend { knee, index } => bent(BEND_RATIOS[index], knee, age),
             Self::Exponential { index } => (age / TIME_CONSTANTS[index]).exp_m1(),
             Self::Settling { index } => -(-age / SETTLING[index]).exp_m1(),
+            Self::Course { course, life } => Course::new(course, life).height(age),
             Self::Power { index } => {
                 eighth_power(roots((age / REFERENCE_HOURS).max(0.0)), POWER_EIGHTHS[index])
             }
@@ -131,6 +148,7 @@ impl Law {
             }
             Self::Exponential { index } => (age / TIME_CONSTANTS[index]).exp() / TIME_CONSTANTS[index],
             Self::Settling { index } => (-age / SETTLING[index]).exp() / SETTLING[index],
+            Self::Course { course, life } => Course::new(course, life).slope(age),
             Self::Power { index } => {
                 let age = age.max(1.0);
                 0.125 * f64::from(POWER_EIGHTHS[index]) * self.height(age) / age
@@ -170,13 +188,18 @@ impl Law {
             Self::Exponential { index } => TIME_CONSTANTS[index] * height.ln_1p(),
             Self::Settling { .. } if height >= 1.0 => f64::INFINITY,
             Self::Settling { index } => -SETTLING[index] * (-height).ln_1p(),
+            Self::Course { course, life } => Course::new(course, life).age_at(height),
             Self::Power { index } => REFERENCE_HOURS * eighth_root(height.max(0.0), POWER_EIGHTHS[index]),
         }
     }
 
-    /// ln of the time constant, for the law that has one.
-    pub(crate) fn ln_tau(self) -> Option<f64> {
-        if let Self::Exponential { index } = self { Some(TIME_CONSTANTS[index].ln()) } else { None }
+    /// The time by which a law runs, hours, for one whose life has to do with it.
+    pub(crate) fn own_hours(self) -> Option<f64> {
+        match self {
+            Self::Exponential { index } => Some(TIME_CONSTANTS[index]),
+            Self::Course { life, .. } => Some(course::LIVES[life]),
+            _ => None,
+        }
     }
 
     /// How fast an amplitude falls with ln life where that is a power: d ln A/d ln T = −p.
@@ -258,6 +281,7 @@ impl Bank {
         }
         let knee_cell = span_hours / KNEES as f64;
         curves.extend(bends(&ages, knee_cell));
+        curves.extend(courses(&ages));
         Self { curves, ages: ages.into_iter().map(|curve| curve.age).collect(), knee_cell }
     }
 }
@@ -276,21 +300,27 @@ const BIRTH: Curve = Curve {
 
 /// One line and then another, the knee within what was seen, at every few ages.
 fn bends(ages: &[Curve], cell: f64) -> Vec<Curve> {
-    let (stride, ln_law_cell) = (BEND_AGE_STRIDE as f64, -(KNEES as f64).ln());
+    let ln_law_cell = -(KNEES as f64).ln();
     let mut curves = Vec::new();
     for at in ages.iter().step_by(BEND_AGE_STRIDE) {
-        let age = Curve {
-            age_cell: stride * at.age_cell,
-            ln_age_cell: stride.ln() + at.ln_age_cell,
-            ln_law_cell,
-            ..*at
-        };
+        let age = at.standing_for(BEND_AGE_STRIDE, ln_law_cell);
         for (knee, index) in (0..KNEES).flat_map(|k| (0..BEND_RATIOS.len()).map(move |index| (k, index))) {
             let law = Law::Bend { knee: age.age + (knee as f64 + 0.5) * cell, index };
             curves.push(Curve { law, part: Some(knee), ..age });
         }
     }
     curves
+}
+
+/// Every course over every life, at every other age.
+fn courses(ages: &[Curve]) -> impl Iterator<Item = Curve> {
+    let all =
+        || (0..course::COUNT).flat_map(|course| (0..course::LIVES.len()).map(move |life| (course, life)));
+    let at = move |at: &Curve| {
+        let age = at.standing_for(COURSE_AGE_STRIDE, course::LN_LIFE_CELL.ln());
+        all().map(move |(course, life)| Curve { law: Law::Course { course, life }, ..age })
+    };
+    ages.iter().step_by(COURSE_AGE_STRIDE).flat_map(at)
 }
 
 /// Ages at first sight and the widths of their cells; a known age is one cell without width.
@@ -339,6 +369,17 @@ pub(crate) struct Factors {
 }
 
 impl Curve {
+    /// The same for as many of the grid's ages.
+    fn standing_for(&self, ages: usize, ln_law_cell: f64) -> Self {
+        let ages = ages as f64;
+        Self {
+            age_cell: ages * self.age_cell,
+            ln_age_cell: ages.ln() + self.ln_age_cell,
+            ln_law_cell,
+            ..*self
+        }
+    }
+
     /// By what its heights are made of its part; meaningless for a law that has none.
     pub(crate) fn factors(&self) -> Factors {
         match self.law {
@@ -352,7 +393,9 @@ impl Curve {
             Law::Settling { index } => {
                 Factors { part: -(-self.age / SETTLING[index]).exp(), line: 0.0, one: 1.0 }
             }
-            Law::None | Law::Onset { .. } | Law::Power { .. } => Factors { part: 0.0, line: 0.0, one: 0.0 },
+            Law::None | Law::Onset { .. } | Law::Course { .. } | Law::Power { .. } => {
+                Factors { part: 0.0, line: 0.0, one: 0.0 }
+            }
         }
     }
 }

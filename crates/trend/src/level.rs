@@ -1,6 +1,7 @@
 //! Where a unit stands now, by the mixture over its curves: gap, rate, growth, law.
 
 use crate::calibrate::USUAL_WIDTH;
+use crate::course::Course;
 use crate::curve::Law;
 use crate::normal;
 use crate::posterior::{Node, Posterior};
@@ -10,7 +11,7 @@ use crate::trend::{Level, Rate, WearLaw};
 /// Growth that counts as visible, metres.
 const VISIBLE_M: f64 = 2e-6;
 
-/// Exponents up to this slow down, and from that speed up.
+/// Exponents up to this slow down, and from that speed up; so does a course, by its next tenth's rate over this.
 const SLOWING: f64 = 0.9;
 const SPEEDING: f64 = 1.2;
 
@@ -76,6 +77,11 @@ fn name(node: &Node) -> WearLaw {
                 WearLaw::Slowing
             }
         }
+        Law::Course { course, life } => match Course::new(course, life).quickening(node.age_now) {
+            ratio if ratio < SLOWING => WearLaw::Slowing,
+            ratio if ratio > SPEEDING => WearLaw::Accelerating,
+            _ => WearLaw::Linear,
+        },
         law @ Law::Power { .. } => match law.exponent() {
             Some(p) if p < SLOWING => WearLaw::Slowing,
             Some(p) if p > SPEEDING => WearLaw::Accelerating,

@@ -53,6 +53,7 @@ mod calibrate;
 mod checkpoint;
 pub mod classic;
 mod clean;
+mod course;
 mod crossing;
 mod curve;
 mod digest;

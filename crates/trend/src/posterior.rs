@@ -133,6 +133,7 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
     }
     let starts = segment.estimates.len().clamp(1, bins::BINS) / 2 + 1;
     let mut bank = Bank::new(segment.fresh, segment.known_age, span, starts);
+    bank.curves.retain(|curve| prior.tries(curve.law));
     let coarse = bins::bin(segment.estimates, COARSE_BINS);
     let grown_m = straight_growth(&coarse);
     let first = Look::new(segment, prior, coarse, |usage| grown_m * usage / span);
@@ -291,7 +292,7 @@ fn lives(
     let age_now = curve.age + look.segment.now - look.segment.begin;
     let height_now = curve.law.height(age_now);
     let shared = step.ln() + look.logs.share(curve.law) + look.logs.cell(curve, look.segment);
-    let ln_tau = curve.law.ln_tau();
+    let own = look.logs.own_time(curve.law);
     let guess = match curve.law {
         _ if look.segment.is_of_known_age() => Guess::Unneeded,
         Law::Onset { .. } => Guess::Unneeded,
@@ -314,7 +315,7 @@ fn lives(
         let log_likelihood = amplitude_m * pass.sfy
             - 0.5 * amplitude_m * amplitude_m * pass.sff
             - 0.5 * ((new_m - prior.new_m).powi(2) / (spread * (1.0 + smeared)) + look.ln_new_m2);
-        let bound = log_likelihood + shared + look.logs.life(ln_life, ln_age, ln_tau);
+        let bound = log_likelihood + shared + look.logs.life(ln_life, ln_age, own);
         // A logarithm costs more than all the rest, and most nodes do not need it.
         let weight = if smeared > 0.0 && bound > least { bound - 0.5 * (1.0 + smeared).ln() } else { bound };
         if weight <= least {

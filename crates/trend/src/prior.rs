@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::calibrate::{Calibration, USUAL_WIDTH};
 
-use crate::curve::{Curve, FAMILIES, LINEAR, Law, POWERS};
+use crate::curve::{BENDS, COURSES, Curve, FAMILIES, LINEAR, Law, POWERS};
 use crate::digest::digest;
 use crate::posterior::Segment;
 use crate::season::Season;
@@ -18,8 +18,14 @@ const OVERDUE: f64 = 20.0;
 /// The gap of a new unit as a share of the limit, while nothing is known.
 const NEW_SHARE: f64 = 0.2;
 
-/// The exponential law's life in time constants: ln k is normal with this mean and spread.
+/// A life over the time by which its law runs: its logarithm is normal with this mean and spread. Of the
+/// exponential law, whose time constant it is, and of a course, whose nominal life.
 const LN_CONSTANTS: (f64, f64) = (1.1, 0.5);
+const LN_COURSES: (f64, f64) = (0.0, 0.2);
+
+/// Share of the fleet below which a family of laws is not tried: a unit that needs it is judged without the
+/// fleet.
+const RULED_OUT: f64 = 0.003;
 
 /// What wear of a part number follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -92,10 +98,11 @@ impl FleetPrior {
     /// What is assumed of a part number nobody has seen: a new gap of a fifth of the limit, lives around
     /// 4,000 h within a factor of ten, any law.
     pub fn vague(limit_m: f64) -> Self {
-        let mut shares = [0.3 / POWERS as f64; FAMILIES];
-        shares[LINEAR] += 0.1;
-        shares[..4].copy_from_slice(&[0.18, 0.17, 0.12, 0.05]);
-        shares[4..FAMILIES - POWERS].fill(0.08 / (FAMILIES - POWERS - 4) as f64);
+        let mut shares = [0.28 / POWERS as f64; FAMILIES];
+        shares[LINEAR] += 0.09;
+        shares[..BENDS.start].copy_from_slice(&[0.17, 0.16, 0.11, 0.05]);
+        shares[BENDS].fill(0.07 / BENDS.len() as f64);
+        shares[COURSES].fill(0.07 / COURSES.len() as f64);
         Self {
             axis: Axis::Hours,
             hours_per_unit: 1.0,
@@ -190,8 +197,13 @@ impl FleetPrior {
             worn: ((1.0 - self.fresh_share) / WORN_SHARE).ln(),
             worn_share: WORN_SHARE.ln(),
             onset: self.onsets_per_hour.ln(),
-            constants: -LN_CONSTANTS.1.ln() - LN_ROOT_TAU,
         }
+    }
+
+    /// Whether a law is to be tried on a unit of the fleet. None and an onset always are: they are what is
+    /// found, or not found yet.
+    pub(crate) fn tries(&self, law: Law) -> bool {
+        matches!(law, Law::None | Law::Onset { .. }) || self.shares[law.family()] >= RULED_OUT
     }
 }
 
@@ -204,7 +216,14 @@ pub(crate) struct LogPrior<'a> {
     worn: f64,
     worn_share: f64,
     onset: f64,
-    constants: f64,
+}
+
+/// What a law's own time says of a life: the density of ln life.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OwnTime {
+    ln_life: f64,
+    sd: f64,
+    log: f64,
 }
 
 impl LogPrior<'_> {
@@ -234,13 +253,20 @@ impl LogPrior<'_> {
         law + age + curve.ln_law_cell
     }
 
-    /// Of a life, per unit of ln life, and of a curve's age and time constant given it.
-    pub(crate) fn life(&self, ln_life: f64, ln_age: Option<f64>, ln_tau: Option<f64>) -> f64 {
+    /// What is expected of the lives of a law that runs by a time of its own.
+    pub(crate) fn own_time(&self, law: Law) -> Option<OwnTime> {
+        let (ln_ratio, sd) = if let Law::Course { .. } = law { LN_COURSES } else { LN_CONSTANTS };
+        let ln_life = law.own_hours()?.ln() + ln_ratio;
+        Some(OwnTime { ln_life, sd, log: -sd.ln() - LN_ROOT_TAU })
+    }
+
+    /// Of a life, per unit of ln life, and of a curve's age and own time given it.
+    pub(crate) fn life(&self, ln_life: f64, ln_age: Option<f64>, own: Option<OwnTime>) -> f64 {
         let z = (ln_life - self.prior.ln_life) / self.prior.ln_life_sd;
         let mut log = self.life - 0.5 * z * z;
-        if let Some(ln_tau) = ln_tau {
-            let z = (ln_life - ln_tau - LN_CONSTANTS.0) / LN_CONSTANTS.1;
-            log += self.constants - 0.5 * z * z;
+        if let Some(own) = own {
+            let z = (ln_life - own.ln_life) / own.sd;
+            log += own.log - 0.5 * z * z;
         }
         match ln_age {
             Some(ln_age) => log - ln_life - OVERDUE * (ln_age - self.worn_share - ln_life).max(0.0),
