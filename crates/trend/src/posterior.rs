@@ -5,7 +5,7 @@ use crate::clean::Estimate;
 use crate::curve::{Bank, Curve, Law};
 use crate::filter::Regression;
 use crate::look::{Look, straight_growth};
-use crate::prior::FleetPrior;
+use crate::prior::{FleetPrior, OwnTime};
 use crate::regressions::regressions;
 
 /// Bins of the first look, by which most curves are dropped.
@@ -292,7 +292,7 @@ fn lives(
     let age_now = curve.age + look.segment.now - look.segment.begin;
     let height_now = curve.law.height(age_now);
     let shared = step.ln() + look.logs.share(curve.law) + look.logs.cell(curve, look.segment);
-    let own = look.logs.own_time(curve.law);
+    let own = OwnTime::of(curve.law);
     let guess = match curve.law {
         _ if look.segment.is_of_known_age() => Guess::Unneeded,
         Law::Onset { .. } => Guess::Unneeded,

@@ -226,6 +226,15 @@ pub(crate) struct OwnTime {
     log: f64,
 }
 
+impl OwnTime {
+    /// Nothing of a law that runs by none.
+    pub(crate) fn of(law: Law) -> Option<Self> {
+        let (ln_ratio, sd) = if let Law::Course { .. } = law { LN_COURSES } else { LN_CONSTANTS };
+        let ln_life = law.own_hours()?.ln() + ln_ratio;
+        Some(Self { ln_life, sd, log: -sd.ln() - LN_ROOT_TAU })
+    }
+}
+
 impl LogPrior<'_> {
     /// Of a law's family.
     pub(crate) fn share(&self, law: Law) -> f64 {
@@ -251,13 +260,6 @@ impl LogPrior<'_> {
             _ => self.worn + curve.ln_age_cell,
         };
         law + age + curve.ln_law_cell
-    }
-
-    /// What is expected of the lives of a law that runs by a time of its own.
-    pub(crate) fn own_time(&self, law: Law) -> Option<OwnTime> {
-        let (ln_ratio, sd) = if let Law::Course { .. } = law { LN_COURSES } else { LN_CONSTANTS };
-        let ln_life = law.own_hours()?.ln() + ln_ratio;
-        Some(OwnTime { ln_life, sd, log: -sd.ln() - LN_ROOT_TAU })
     }
 
     /// Of a life, per unit of ln life, and of a curve's age and own time given it.
