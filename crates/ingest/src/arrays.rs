@@ -44,7 +44,7 @@ impl Arrays<'_> {
         let seconds = self.time_s.iter().map(|s| s - first_s).collect();
         let mut stamps = Stamps { column: "time_s".into(), seconds, origin: Origin::Counted(first_s) };
         let line = clock::align(&mut stamps, &ClockMapping::default()).map_err(fail)?;
-        let [motor, screw, load] = named.map(|(_, values)| on(values, line.kept.as_deref()));
+        let [motor, screw, load] = named.map(|(_, values)| on(values, line.kept.as_deref()).into());
         let read = Read { motor, screw, load, is_relative: false, segments: line.segments.clone() };
         Ok(finish(position, read, &line, None, Vec::new()))
     }

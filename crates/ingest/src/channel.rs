@@ -9,9 +9,11 @@ use crate::clock::{self, BREAK_STEPS, Stamps, Timeline};
 use crate::error::{Error, Fault};
 use crate::pattern::Pattern;
 use crate::resample::{Between, Sampled, own_rows, place};
+use crate::scan::Scan;
 use crate::schema::{ChannelMapping, ClockMapping, Role};
 use crate::screw::{Geometry, to_si, unwrap_turns};
 use crate::sheet::{Samples, Sheet};
+use crate::spare;
 
 /// The least share of samples that a redundant channel must hold to be called alive.
 const ALIVE_SHARE: f64 = 0.5;
@@ -22,6 +24,19 @@ pub(crate) fn lives(values: &[f64]) -> bool {
     let present = || values.iter().copied().filter(|v| v.is_finite());
     let first = present().next();
     present().take(needed).count() == needed && present().any(|v| Some(v) != first)
+}
+
+/// A channel in SI, and what was seen of it while it was read, where it is still as it was then.
+#[derive(Debug)]
+pub(crate) struct Channel {
+    pub(crate) values: Vec<f64>,
+    pub(crate) seen: Option<Scan>,
+}
+
+impl From<Vec<f64>> for Channel {
+    fn from(values: Vec<f64>) -> Self {
+        Self { values, seen: None }
+    }
 }
 
 /// How the samples of a channel lie in time.
@@ -105,7 +120,8 @@ impl<'s> Sampling<'s> {
         if let Some(known) = self.sheet.line.get() {
             return Ok(known.clone());
         }
-        let line = self.read_line(map)?.1;
+        let (stamps, line) = self.read_line(map)?;
+        spare::give(stamps.map(|stamps| stamps.seconds).unwrap_or_default());
         Ok(self.sheet.line.get_or_init(|| line).clone())
     }
 
@@ -141,24 +157,22 @@ impl<'s> Sampling<'s> {
     }
 
     /// The channel in SI at its own rows.
-    fn readings(&self, map: &ChannelMapping, geometry: Geometry) -> Result<Vec<f64>, Error> {
+    fn readings(&self, map: &ChannelMapping, geometry: Geometry) -> Result<Channel, Error> {
         let si = to_si(self.column(), map, geometry).map_err(|f| self.sheet.error(f))?;
         let kept = |values: Vec<f64>| match &self.line.kept {
             Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
             None => values,
         };
         let is_mended = !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
-        let read = if is_mended {
-            self.raw(&self.samples)
-        } else {
-            self.sheet.numbers(&self.samples, |raw| si.apply(raw))
-        };
-        let read = read?;
+        if !is_mended {
+            let (values, seen) = self.sheet.numbers(&self.samples, |raw| si.apply(raw))?;
+            self.same_count(values.len(), self.column())?;
+            let seen = self.line.kept.is_none().then_some(seen);
+            return Ok(Channel { values: kept(values), seen });
+        }
+        let read = self.raw(&self.samples)?;
         self.same_count(read.len(), self.column())?;
         let mut values = kept(read);
-        if !is_mended {
-            return Ok(values);
-        }
         if !map.missing.is_empty() {
             values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
         }
@@ -172,11 +186,11 @@ impl<'s> Sampling<'s> {
             unwrap_turns(&mut values, turn);
         }
         values.iter_mut().for_each(|value| *value = si.apply(*value));
-        Ok(values)
+        Ok(values.into())
     }
 
     fn raw(&self, samples: &Samples) -> Result<Vec<f64>, Error> {
-        self.sheet.numbers(samples, |raw| raw)
+        self.sheet.numbers(samples, |raw| raw).map(|(values, _)| values)
     }
 
     fn same_count(&self, found: usize, column: &str) -> Result<(), Error> {
@@ -191,15 +205,15 @@ impl<'s> Sampling<'s> {
     ///
     /// # Errors
     /// When a column is missing, holds no numbers, cannot be decoded or is in an impossible unit.
-    pub(crate) fn own(&self, map: &ChannelMapping, geometry: Geometry) -> Result<Vec<f64>, Error> {
-        let values = self.readings(map, geometry)?;
+    pub(crate) fn own(&self, map: &ChannelMapping, geometry: Geometry) -> Result<Channel, Error> {
+        let read = self.readings(map, geometry)?;
         if self.every == 1 {
-            return Ok(values);
+            return Ok(read);
         }
         let (_, instants) = self.instants(map)?;
-        let (at_s, values) = thinned(&instants, &values, self.every);
+        let (at_s, values) = thinned(&instants, &read.values, self.every);
         let step_s = self.line.step_s * self.every as f64;
-        Ok(place(Sampled { at_s: &at_s, values: &values, step_s }, &instants, Between::Line))
+        Ok(place(Sampled { at_s: &at_s, values: &values, step_s }, &instants, Between::Line).into())
     }
 }
 
@@ -230,7 +244,7 @@ pub(crate) fn follow(
     motor: &ChannelMapping,
     channel: &Follower<'_, '_>,
     geometry: Geometry,
-) -> Result<Vec<f64>, Error> {
+) -> Result<Channel, Error> {
     let &Follower { sheet, map, name, position, role } = channel;
     let mut own = Sampling::unread(sheet, map, name, position);
     let shared = own.shares_rows(master);
@@ -240,7 +254,7 @@ pub(crate) fn follow(
     if shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load) {
         return own.readings(map, geometry);
     }
-    let values = own.readings(map, geometry)?;
+    let Channel { values, .. } = own.readings(map, geometry)?;
     let (stamps, at_s) = own.instants(map)?;
     let (at_s, values) = if own.every == 1 { (at_s, values) } else { thinned(&at_s, &values, own.every) };
     let (lead, mut instants) = master.instants(motor)?;
@@ -251,7 +265,7 @@ pub(crate) fn follow(
     let step_s = own.line.step_s * own.every as f64;
     let is_slow = step_s > BREAK_STEPS * master.line.step_s;
     let between = if role == Role::Load && is_slow { Between::First } else { Between::Line };
-    Ok(place(Sampled { at_s: &at_s, values: &values, step_s }, &instants, between))
+    Ok(place(Sampled { at_s: &at_s, values: &values, step_s }, &instants, between).into())
 }
 
 /// A nanosecond is no shift.

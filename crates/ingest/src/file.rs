@@ -15,6 +15,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::ColumnChunkMetaData;
 
 use crate::error::{Error, Fault};
+use crate::growing::Growing;
 use crate::leaf::{self, Leaf};
 use crate::numbers::append;
 use crate::page;
@@ -168,7 +169,7 @@ impl LogFile {
         &self,
         name: &str,
         convert: impl Fn(f64) -> f64 + Copy,
-        into: &mut Vec<f64>,
+        into: &mut Growing,
     ) -> Result<(), Error> {
         let leaf = self.leaf(name)?;
         self.want(&[leaf])?;

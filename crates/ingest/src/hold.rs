@@ -12,7 +12,7 @@ const HOLD_S: f64 = 0.2;
 /// died, and the segment ends where it was last known.
 pub(crate) fn hold(load_n: &mut [f64], segments: &[Range<usize>], step_s: f64) -> Vec<Range<usize>> {
     if !load_n.iter().any(|f| f.is_nan()) {
-        return segments.iter().filter(|segment| !segment.is_empty()).cloned().collect();
+        return with_samples(segments);
     }
     let longest = ((HOLD_S / step_s).ceil() as usize).max(HOLD_STEPS * usual_step(load_n));
     let mut loaded = Vec::with_capacity(segments.len());
@@ -42,6 +42,11 @@ pub(crate) fn hold(load_n: &mut [f64], segments: &[Range<usize>], step_s: f64) -
         }
     }
     loaded
+}
+
+/// The segments that hold a sample.
+pub(crate) fn with_samples(segments: &[Range<usize>]) -> Vec<Range<usize>> {
+    segments.iter().filter(|segment| !segment.is_empty()).cloned().collect()
 }
 
 /// Samples from one known load to the next, as the median has it.

@@ -16,6 +16,7 @@ mod condition;
 pub mod error;
 mod file;
 pub mod flights;
+mod growing;
 mod hold;
 pub mod identity;
 mod leaf;

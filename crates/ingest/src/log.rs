@@ -9,17 +9,17 @@ use std::sync::OnceLock;
 use fleet::Position;
 use jiff::Timestamp;
 
-use crate::channel::{self, Follower, Sampling};
+use crate::channel::{self, Channel, Follower, Sampling};
 use crate::clock::{Origin, Repairs, Timeline};
 use crate::condition::Condition;
 use crate::error::{Error, Fault};
 use crate::file::LogFile;
-use crate::hold::hold;
+use crate::hold::{hold, with_samples};
 use crate::identity::{self, Facts, Identity};
 use crate::normal::Normalized;
 use crate::pattern::Pattern;
 use crate::quality::{self, Quality};
-use crate::scan::Span;
+use crate::scan::{Scan, Span};
 use crate::schema::{ChannelMapping, Channels, Fact, Mapping, Role};
 use crate::screw::Geometry;
 use crate::sheet::Sheet;
@@ -430,7 +430,7 @@ impl Log {
         let line = &master.0.line;
         let segments = self.selected(at, channels, geometry, &master)?;
         let read = Read { motor, screw, load, is_relative: channels.is_relative(), segments };
-        Ok(finish(at.position.clone(), read, line, temperature.and_then(|t| mean(&t.0)), flags))
+        Ok(finish(at.position.clone(), read, line, temperature.and_then(|t| mean(&t.0.values)), flags))
     }
 
     /// The stretches of the motor's clock in which every condition holds.
@@ -453,7 +453,7 @@ impl Log {
             // A state stands until the next one comes, as a slow load does.
             let position = at.position.as_str();
             let one = Follower { sheet, map: &map, name: &name, position, role: Role::Load };
-            let mut values = channel::follow(&master.0, master.1, &one, geometry)?;
+            let Channel { mut values, .. } = channel::follow(&master.0, master.1, &one, geometry)?;
             hold(&mut values, &line.segments, line.step_s);
             segments = condition.within(&values, &segments, line.step_s);
         }
@@ -472,17 +472,17 @@ impl Log {
         let is_only = choices.len() == 1;
         for (k, (map, name)) in choices.into_iter().enumerate() {
             let sampling = Sampling::new(self.sheet_of(map)?, map, &name, at.position.as_str())?;
-            let values = sampling.own(map, geometry)?;
-            let lives = is_only || channel::lives(&values);
+            let read = sampling.own(map, geometry)?;
+            let lives = is_only || channel::lives(&read.values);
             if lives || found.is_none() {
-                found = Some((values, (sampling, map), alternative(Role::Motor, k)));
+                found = Some((read, (sampling, map), alternative(Role::Motor, k)));
             }
             if lives {
                 break;
             }
         }
         let lead = found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
-        self.not_empty(&lead.0, lead.1.0.column())?;
+        self.not_empty(&lead.0.values, lead.1.0.column())?;
         Ok(lead)
     }
 
@@ -494,27 +494,27 @@ impl Log {
         channels: &Channels,
         geometry: Geometry,
         master: &(Sampling<'_>, &ChannelMapping),
-    ) -> Result<(Vec<f64>, Vec<String>), Error> {
-        let mut found: Option<(Vec<f64>, usize)> = None;
+    ) -> Result<(Channel, Vec<String>), Error> {
+        let mut found: Option<(Channel, usize)> = None;
         let mut column = String::new();
         let choices = self.present_or_lacking(role, at, channels)?;
         let is_only = choices.len() == 1;
         for (k, (map, name)) in choices.into_iter().enumerate() {
             let sheet = self.sheet_of(map)?;
             let one = Follower { sheet, map, name: &name, position: at.position.as_str(), role };
-            let values = channel::follow(&master.0, master.1, &one, geometry)?;
-            let lives = is_only || channel::lives(&values);
+            let read = channel::follow(&master.0, master.1, &one, geometry)?;
+            let lives = is_only || channel::lives(&read.values);
             if lives || found.is_none() {
                 column = name;
-                found = Some((values, k));
+                found = Some((read, k));
             }
             if lives {
                 break;
             }
         }
-        let (values, k) = found.unwrap_or_default();
-        self.not_empty(&values, &column)?;
-        Ok((values, alternative(role, k)))
+        let (read, k) = found.unwrap_or_else(|| (Vec::new().into(), 0));
+        self.not_empty(&read.values, &column)?;
+        Ok((read, alternative(role, k)))
     }
 
     fn present_or_lacking<'c>(
@@ -548,7 +548,7 @@ impl Log {
 }
 
 /// The motor position's values, how they lie in time and by which mapping, and doubts about them.
-type Lead<'s, 'c> = (Vec<f64>, (Sampling<'s>, &'c ChannelMapping), Vec<String>);
+type Lead<'s, 'c> = (Channel, (Sampling<'s>, &'c ChannelMapping), Vec<String>);
 
 /// What a sheet's files say of their flight.
 fn facts(sheet: &Sheet, map: &crate::schema::IdentityMapping) -> Result<Facts, Error> {
@@ -591,9 +591,9 @@ fn alternative(role: Role, choice: usize) -> Vec<String> {
 
 /// Channels as read, on one clock.
 pub(crate) struct Read {
-    pub(crate) motor: Vec<f64>,
-    pub(crate) screw: Vec<f64>,
-    pub(crate) load: Vec<f64>,
+    pub(crate) motor: Channel,
+    pub(crate) screw: Channel,
+    pub(crate) load: Channel,
     pub(crate) is_relative: bool,
     /// The stretches that count.
     pub(crate) segments: Vec<Range<usize>>,
@@ -607,8 +607,12 @@ pub(crate) fn finish(
     temperature_c: Option<f64>,
     mut flags: Vec<String>,
 ) -> Actuator {
-    let Read { motor: mut motor_m, screw: mut dx_m, load: mut load_n, is_relative, segments } = read;
-    let quality = [&motor_m, &dx_m, &load_n].map(|values| Quality::of(values, line.step_s));
+    let Read { motor, screw, load, is_relative, segments } = read;
+    let quality = [&motor, &screw, &load].map(|read| {
+        let seen = read.seen.unwrap_or_else(|| Scan::of(&read.values));
+        Quality::seen(&read.values, &seen, line.step_s)
+    });
+    let (mut motor_m, mut dx_m, mut load_n) = (motor.values, screw.values, load.values);
     flags.extend(quality::doubts(&quality, line.step_s));
     if !is_relative {
         let longest = quality[0].longest_run.max(quality[1].longest_run);
@@ -617,7 +621,8 @@ pub(crate) fn finish(
     let (travel_m, missing) = relative(&motor_m, &mut dx_m, is_relative);
     flags.extend(quality::coarse(&quality, travel_m));
     flags.extend(quality::load_froze(&load_n, &motor_m, quality[2].longest_run, line.step_s));
-    let segments = hold(&mut load_n, &segments, line.step_s);
+    let is_whole = quality[2].missing_share == 0.0;
+    let segments = if is_whole { with_samples(&segments) } else { hold(&mut load_n, &segments, line.step_s) };
     Actuator {
         position,
         step_s: line.step_s,

@@ -12,12 +12,13 @@ use fleet::Position;
 use crate::clock::Repairs;
 use crate::error::{Error, Fault};
 use crate::file::LogFile;
+use crate::growing::Growing;
 use crate::identity::{Facts, Identity};
 use crate::log::Actuator;
 use crate::quality::Quality;
+use crate::scan::Scan;
 use crate::schema::Fact;
 use crate::screw::Geometry;
-use crate::spare;
 use crate::write::{Column, Encoding, write_encoded};
 
 const VERSION: &str = "1";
@@ -81,12 +82,13 @@ impl Normalized {
             let detail = format!("with {}, where the part has {}", said(then), said(now));
             return Err(file.error(Fault::Normalized { detail }));
         }
-        let [motor_m, dx_m, load_n] = ["motor_m", "dx_m", "load_n"].map(|name| numbers(file, name));
-        let (motor_m, dx_m, load_n) = (motor_m?, dx_m?, load_n?);
+        let [motor, dx, load] = ["motor_m", "dx_m", "load_n"].map(|name| numbers(file, name));
+        let read = [motor?, dx?, load?];
+        let quality = read.each_ref().map(|(values, seen)| Quality::seen(values, seen, self.step_s));
+        let [motor_m, dx_m, load_n] = read.map(|(values, _)| values);
         if self.segments.iter().any(|s| s.start > s.end || s.end > dx_m.len()) {
             return Err(file.error(Fault::Normalized { detail: "a stretch lies beyond its rows".into() }));
         }
-        let quality = [&motor_m, &dx_m, &load_n].map(|values| Quality::of(values, self.step_s));
         Ok(Actuator {
             position,
             step_s: self.step_s,
@@ -103,10 +105,10 @@ impl Normalized {
     }
 }
 
-fn numbers(file: &LogFile, name: &str) -> Result<Vec<f64>, Error> {
-    let mut values = spare::take(file.rows().min(1 << 26));
+fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, Scan), Error> {
+    let mut values = Growing::with_room(file.rows().min(1 << 26));
     file.append_numbers(name, |value| value, &mut values)?;
-    Ok(values)
+    Ok(values.whole())
 }
 
 fn segments_from(text: &str) -> Option<Vec<Range<usize>>> {

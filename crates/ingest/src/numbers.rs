@@ -11,7 +11,7 @@ pub(crate) fn append(
     column: &str,
     array: &ArrayRef,
     convert: impl Fn(f64) -> f64,
-    into: &mut Vec<f64>,
+    into: &mut impl Extend<f64>,
 ) -> Result<(), Fault> {
     match array.data_type() {
         DataType::Float64 => append_primitive(array.as_primitive::<Float64Type>(), into, convert),
@@ -29,7 +29,7 @@ pub(crate) fn append_where(
     array: &ArrayRef,
     wanted: &[bool],
     convert: impl Fn(f64) -> f64,
-    into: &mut Vec<f64>,
+    into: &mut impl Extend<f64>,
 ) -> Result<(), Fault> {
     let real = real(column, array)?;
     let values = real.as_primitive::<Float64Type>();
@@ -54,7 +54,7 @@ pub(crate) fn wrong_type(column: &str, array: &ArrayRef, wanted: &'static str) -
 
 fn append_primitive<T: ArrowPrimitiveType>(
     array: &PrimitiveArray<T>,
-    into: &mut Vec<f64>,
+    into: &mut impl Extend<f64>,
     convert: impl Fn(T::Native) -> f64,
 ) {
     if array.null_count() == 0 {

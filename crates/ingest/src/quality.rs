@@ -35,10 +35,14 @@ pub struct Quality {
 impl Quality {
     /// Describes a channel; missing samples are NaN.
     pub fn of(values: &[f64], step_s: f64) -> Self {
+        Self::seen(values, &Scan::of(values), step_s)
+    }
+
+    /// As [`Quality::of`], of a channel that was looked at already.
+    pub(crate) fn seen(values: &[f64], seen: &Scan, step_s: f64) -> Self {
         let samples = values.len();
         let share = |count: usize| count as f64 / samples.max(1) as f64;
-        let seen = Scan::of(values);
-        let resolution = resolution(values, &seen);
+        let resolution = resolution(values, seen);
         Self {
             samples,
             missing_share: share(seen.missing),
@@ -48,7 +52,7 @@ impl Quality {
             longest_run: seen.longest_run,
             frozen_share: share(seen.longest_run),
             rate_hz: (step_s * if seen.missing == 0 { 1 } else { usual_step(values) } as f64).recip(),
-            saturated_share: share(saturated(values, &seen)),
+            saturated_share: share(saturated(values, seen)),
             spikes: spikes(values, resolution, seen.largest_leap),
         }
     }

@@ -1,7 +1,7 @@
 //! What can be seen of a channel in one pass over it: sound channels need no other.
 //!
-//! Columns are longer than any cache, so each further pass would cost as much as reading memory. The pass
-//! goes in groups of samples whose figures are kept apart, since a chain of comparisons is as slow as its links.
+//! Columns are longer than any cache, so each further pass would cost as much as reading memory; where it can, this one
+//! follows what reads the column. The pass goes in groups of samples whose figures are kept apart, since a chain of comparisons is as slow as its links.
 
 use multiversion::multiversion;
 
@@ -28,8 +28,33 @@ pub(crate) struct Scan {
 impl Scan {
     /// Looks at a channel.
     pub(crate) fn of(values: &[f64]) -> Self {
-        let (mut lanes, mut run) = (Lanes::new(), Run::default());
-        let done = groups(values, &mut lanes, &mut run);
+        Scanner::new().end(values)
+    }
+}
+
+/// Looks at a channel that grows, at what is new of it.
+#[derive(Debug, Clone)]
+pub(crate) struct Scanner {
+    lanes: Lanes,
+    run: Run,
+    /// Samples that were looked at; the last ones wait for what follows them.
+    done: usize,
+}
+
+impl Scanner {
+    pub(crate) fn new() -> Self {
+        Self { lanes: Lanes::new(), run: Run::default(), done: 0 }
+    }
+
+    /// The channel as far as it is known by now, from its first sample on.
+    pub(crate) fn advance(&mut self, values: &[f64]) {
+        self.done += groups(&values[self.done..], &mut self.lanes, &mut self.run);
+    }
+
+    /// What was seen of the whole channel.
+    pub(crate) fn end(mut self, values: &[f64]) -> Scan {
+        self.advance(values);
+        let Self { mut lanes, mut run, done } = self;
         let rest = &values[done..];
         let at = |k: usize| rest.get(k).copied().unwrap_or(f64::NAN);
         (0..rest.len()).for_each(|k| lanes.one(0, [at(k), at(k + 1), at(k + 2)]));
@@ -119,6 +144,7 @@ impl Span {
 }
 
 /// Figures of every eighth sample, eight times side by side.
+#[derive(Debug, Clone)]
 struct Lanes {
     min: [f64; LANES],
     max: [f64; LANES],
@@ -169,7 +195,7 @@ impl Lanes {
 }
 
 /// Follows samples that repeat the one before.
-#[derive(Default)]
+#[derive(Debug, Clone, Default)]
 struct Run {
     /// Repeats up to here.
     repeats: usize,
@@ -219,6 +245,18 @@ mod tests {
             prop_assert_eq!(seen.largest_leap.to_bits(), leaps.fold(0.0, f64::max).to_bits());
             let run = values.chunk_by(|a, b| a == b).map(<[f64]>::len).max();
             prop_assert_eq!(seen.longest_run, run.unwrap_or(0));
+        }
+
+        /// However a channel grows, what is seen of it is the same.
+        #[test]
+        fn a_channel_that_grows_is_seen_as_one_that_is_there(
+            ticks in proptest::collection::vec(-3_i32..4, 0..200), step in 1_usize..70,
+        ) {
+            let values: Vec<f64> =
+                ticks.iter().map(|&k| if k == -3 { f64::NAN } else { f64::from(k) * 0.5 }).collect();
+            let mut scanner = Scanner::new();
+            (0..values.len()).step_by(step).for_each(|end| scanner.advance(&values[..end]));
+            prop_assert_eq!(scanner.end(&values), Scan::of(&values));
         }
     }
 }

@@ -15,8 +15,10 @@ use jiff::Timestamp;
 use crate::clock::{Origin, Stamps, Timeline};
 use crate::error::{Error, Fault};
 use crate::file::LogFile;
+use crate::growing::Growing;
 use crate::numbers::{append, append_where, wrong_type};
 use crate::pattern::nearest;
+use crate::scan::Scan;
 use crate::schema::{ClockMapping, Epoch, Layout};
 use crate::spare;
 use crate::unit::TimeUnit;
@@ -102,7 +104,7 @@ impl Sheet {
         std::iter::once(&samples.leaf).chain(rows).chain(clock).cloned().collect()
     }
 
-    /// As numbers, each as `convert` makes it; a null is NaN.
+    /// As numbers, each as `convert` makes it, and what was seen of them; a null is NaN.
     ///
     /// # Errors
     /// When a leaf is missing, holds no numbers, or cannot be decoded.
@@ -110,20 +112,21 @@ impl Sheet {
         &self,
         samples: &Samples,
         convert: impl Fn(f64) -> f64 + Copy,
-    ) -> Result<Vec<f64>, Error> {
+    ) -> Result<(Vec<f64>, Scan), Error> {
         // The footer may lie about the rows; what it claims is a hint, not a promise.
-        let mut values = spare::take(if samples.rows.is_empty() { self.rows().min(1 << 26) } else { 0 });
+        let mut values =
+            Growing::with_room(if samples.rows.is_empty() { self.rows().min(1 << 26) } else { 0 });
         if samples.rows.is_empty() {
             for file in &self.files {
                 file.append_numbers(&samples.leaf, convert, &mut values)?;
             }
-            return Ok(values);
+            return Ok(values.whole());
         }
         self.each(samples, &samples.leaf, |array, wanted| match wanted {
             None => append(&samples.leaf, array, convert, &mut values),
             Some(wanted) => append_where(&samples.leaf, array, wanted, convert, &mut values),
         })?;
-        Ok(values)
+        Ok(values.whole())
     }
 
     /// Hands over one leaf of the rows meant, batch by batch, with a mark for each that is.
@@ -211,20 +214,18 @@ impl Sheet {
         if samples.rows.is_empty() && self.files.iter().any(lists) {
             return self.burst_stamps(samples, column, ticks);
         }
-        let mut reader = Reader::new(column, ticks, self.rows());
         if samples.rows.is_empty()
             && ticks.is_real()
             && !self.is_listed(column)
             && !self.is_listed(&samples.leaf)
         {
-            for file in &self.files {
-                let mut reals = spare::take(file.rows().min(1 << 26));
-                file.append_numbers(column, |tick| tick, &mut reals)?;
-                reader.append_reals(&reals);
-                spare::give(reals);
-            }
+            let mut reals = Growing::with_room(self.rows().min(1 << 26));
+            self.files.iter().try_for_each(|file| file.append_numbers(column, |tick| tick, &mut reals))?;
+            let mut reader = Reader::new(column, ticks, 0);
+            reader.take_reals(reals.whole().0);
             return Ok(reader.stamps());
         }
+        let mut reader = Reader::new(column, ticks, self.rows());
         self.each(samples, column, |array, wanted| reader.append(array, wanted))?;
         Ok(reader.stamps())
     }
@@ -412,17 +413,18 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// As [`Reader::append`], for all of many numbers.
-    fn append_reals(&mut self, reals: &[f64]) {
-        let Some(begun) = reals.iter().find(|tick| tick.is_finite()) else {
-            return self.seconds.extend(reals.iter().map(|_| f64::NAN));
-        };
+    /// As [`Reader::append`], for all there is, in its place.
+    fn take_reals(&mut self, mut reals: Vec<f64>) {
         if self.ticks.wraps_at.is_some() {
-            return reals.iter().for_each(|&tick| self.push_real(tick));
+            reals.iter().for_each(|&tick| self.push_real(tick));
+            return spare::give(reals);
         }
-        let (first, per_second) = (self.first_real(*begun), self.ticks.per_second);
-        let second = |tick: &f64| if tick.is_finite() { (tick - first) / per_second } else { f64::NAN };
-        self.seconds.extend(reals.iter().map(second));
+        let (begun, per_second) = (reals.iter().find(|tick| tick.is_finite()), self.ticks.per_second);
+        let first = begun.map_or(f64::NAN, |&begun| self.first_real(begun));
+        for tick in &mut reals {
+            *tick = if tick.is_finite() { (*tick - first) / per_second } else { f64::NAN };
+        }
+        self.seconds = reals;
     }
 
     /// The first tick of all, which is this one if none came before.

@@ -14,13 +14,14 @@ use parquet::file::metadata::ColumnChunkMetaData;
 use polars_parquet_format::{DataPageHeader, DataPageHeaderV2, Encoding, PageHeader, PageType};
 use zstd::bulk::Decompressor;
 
+use crate::growing::{BATCH, Growing};
 use crate::page::{Page, Pages};
 use crate::positioned;
 
 /// Buffers above this are given back after use, bytes: pages are about a mebibyte.
 const KEPT_BYTES: usize = 4 << 20;
 /// Values that are brought together from their streams at a time.
-const BATCH: usize = 512;
+const JOINED: usize = 512;
 
 thread_local! {
     /// Pages come one after the other: each is read into the memory of the one before.
@@ -71,9 +72,9 @@ pub(crate) fn append(
     file: &File,
     chunk: &ColumnChunkMetaData,
     convert: impl Fn(f64) -> f64 + Copy,
-    into: &mut Vec<f64>,
+    into: &mut Growing,
 ) -> bool {
-    let before = into.len();
+    let before = into.mark();
     let done = Form::of(chunk).and_then(|form| {
         ROOM.with_borrow_mut(|room| {
             let done = room.append(file, chunk, form, convert, into);
@@ -82,7 +83,7 @@ pub(crate) fn append(
         })
     });
     if done.is_none() {
-        into.truncate(before);
+        into.back_to(before);
     }
     done.is_some()
 }
@@ -94,7 +95,7 @@ impl Room {
         chunk: &ColumnChunkMetaData,
         form: Form,
         convert: impl Fn(f64) -> f64 + Copy,
-        into: &mut Vec<f64>,
+        into: &mut Growing,
     ) -> Option<()> {
         let (start, bytes) = chunk.byte_range();
         let mut pages = Pages::of(file, start, bytes);
@@ -229,7 +230,7 @@ impl Numbers<'_> {
         levels: Option<&[u8]>,
         values: usize,
         convert: impl Fn(f64) -> f64 + Copy,
-        into: &mut Vec<f64>,
+        into: &mut Growing,
     ) -> Option<()> {
         let Some(levels) = levels else { return self.append_from(0, values, values, convert, into) };
         let present = present(levels, values)?;
@@ -253,7 +254,7 @@ impl Numbers<'_> {
         values: usize,
         count: usize,
         convert: impl Fn(f64) -> f64 + Copy,
-        into: &mut Vec<f64>,
+        into: &mut Growing,
     ) -> Option<()> {
         if self.bytes.len() != count.checked_mul(self.width)? {
             return None;
@@ -261,12 +262,14 @@ impl Numbers<'_> {
         let end = from + values;
         match (self.width, self.is_split) {
             (8, false) => {
-                let bytes = self.bytes[8 * from..8 * end].as_chunks::<8>().0;
-                into.extend(bytes.iter().map(|b| convert(f64::from_le_bytes(*b))));
+                for bytes in self.bytes[8 * from..8 * end].as_chunks::<8>().0.chunks(BATCH) {
+                    into.extend(bytes.iter().map(|b| convert(f64::from_le_bytes(*b))));
+                }
             }
             (_, false) => {
-                let bytes = self.bytes[4 * from..4 * end].as_chunks::<4>().0;
-                into.extend(bytes.iter().map(|b| convert(f32::from_le_bytes(*b).into())));
+                for bytes in self.bytes[4 * from..4 * end].as_chunks::<4>().0.chunks(BATCH) {
+                    into.extend(bytes.iter().map(|b| convert(f32::from_le_bytes(*b).into())));
+                }
             }
             (8, true) => self.joined(from..end, count, eights, |batch| {
                 into.extend(batch.iter().map(|bits| convert(f64::from_bits(*bits))));
@@ -287,9 +290,9 @@ impl Numbers<'_> {
         join: fn([&[u8]; WIDTH], &mut [T]),
         mut take: impl FnMut(&[T]),
     ) {
-        let mut batch = [T::default(); BATCH];
-        for start in numbers.clone().step_by(BATCH) {
-            let batch = &mut batch[..BATCH.min(numbers.end - start)];
+        let mut batch = [T::default(); JOINED];
+        for start in numbers.clone().step_by(JOINED) {
+            let batch = &mut batch[..JOINED.min(numbers.end - start)];
             join(std::array::from_fn(|k| &self.bytes[k * count + start..][..batch.len()]), batch);
             take(batch);
         }
@@ -426,13 +429,13 @@ mod tests {
         writer.write(&batch).unwrap();
         writer.close().unwrap();
         let footer: ParquetMetaData = ParquetMetaDataReader::new().parse_and_finish(&file).unwrap();
-        let mut read = Vec::new();
+        let mut read = Growing::with_room(0);
         let all_straight = footer.row_groups().iter().all(|group| {
             let before = read.len();
             let straight = append(&file, group.column(0), |value| 2.0 * value, &mut read);
             straight || read.len() != before
         });
-        all_straight.then_some(read)
+        all_straight.then(|| read.whole().0)
     }
 
     fn bits(values: impl Iterator<Item = f64>) -> Vec<u64> {

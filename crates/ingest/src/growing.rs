@@ -1,0 +1,72 @@
+//! A column while it is read: its numbers, and what was seen of them while they were in the cache.
+
+use crate::scan::{Scan, Scanner};
+use crate::spare;
+
+/// Numbers that are brought in between two looks: few enough to stay in the first cache.
+pub(crate) const BATCH: usize = 2048;
+
+/// A column that more numbers are added to.
+#[derive(Debug)]
+pub(crate) struct Growing {
+    values: Vec<f64>,
+    scanner: Scanner,
+}
+
+/// How far a column was, to come back to.
+#[derive(Debug)]
+pub(crate) struct Mark {
+    values: usize,
+    scanner: Scanner,
+}
+
+impl Growing {
+    /// An empty column with room for so many values.
+    pub(crate) fn with_room(values: usize) -> Self {
+        Self { values: spare::take(values), scanner: Scanner::new() }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    pub(crate) fn mark(&self) -> Mark {
+        Mark { values: self.values.len(), scanner: self.scanner.clone() }
+    }
+
+    /// Forgets what was added since.
+    pub(crate) fn back_to(&mut self, mark: Mark) {
+        self.values.truncate(mark.values);
+        self.scanner = mark.scanner;
+    }
+
+    /// The numbers, and what was seen of them.
+    pub(crate) fn whole(self) -> (Vec<f64>, Scan) {
+        let seen = self.scanner.end(&self.values);
+        (self.values, seen)
+    }
+}
+
+impl Extend<f64> for Growing {
+    fn extend<T: IntoIterator<Item = f64>>(&mut self, numbers: T) {
+        self.values.extend(numbers);
+        self.scanner.advance(&self.values);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_taken_back_was_never_seen() {
+        let mut column = Growing::with_room(4);
+        column.extend((0..50).map(f64::from));
+        let mark = column.mark();
+        column.extend([f64::NAN, 1e9, f64::NAN].into_iter().cycle().take(40));
+        column.back_to(mark);
+        column.extend((50..99).map(f64::from));
+        let wanted: Vec<f64> = (0..99).map(f64::from).collect();
+        assert_eq!(column.whole(), (wanted.clone(), Scan::of(&wanted)));
+    }
+}
