@@ -80,7 +80,7 @@ fn range(s_m: &[f64]) -> (f64, f64) {
 
 widest! {
     /// Least and greatest of each chain.
-    fn extremes(s_m: &[f64]) -> ([f64; CHAINS], [f64; CHAINS]) {
+    pub(crate) fn extremes(s_m: &[f64]) -> ([f64; CHAINS], [f64; CHAINS]) {
         let (mut least, mut greatest) = ([f64::INFINITY; CHAINS], [f64::NEG_INFINITY; CHAINS]);
         let (eights, rest) = s_m.as_chunks::<CHAINS>();
         for eight in eights.iter().chain([&filled_up(rest)]) {

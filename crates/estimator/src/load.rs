@@ -28,10 +28,8 @@ pub fn band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
     Some(LoadBand { p05_n, p95_n, reversals })
 }
 
-/// Loads that are looked at together, and how many of them side by side.
-const BLOCK: usize = 32;
-/// See [`BLOCK`].
-const CHAINS: usize = 8;
+/// Loads that are looked at together. Plain counts over more than a few become vectors as wide as there are.
+const BLOCK: usize = 64;
 
 /// Changes from beyond one side of a threshold to beyond the other.
 fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
@@ -54,14 +52,11 @@ widest! {
         let (blocks, _) = load_n.as_chunks::<BLOCK>();
         let mut count = 0;
         for block in blocks {
-            let mut against = [0; CHAINS];
-            let (groups, _) = block.as_chunks::<CHAINS>();
-            for group in groups {
-                for (chain, &f) in group.iter().enumerate() {
-                    against[chain] += u64::from(f * side < 0.0);
-                }
+            let mut against = 0_u64;
+            for f in block {
+                against += u64::from(f * side < 0.0);
             }
-            if side == 0.0 || against != [0; CHAINS] {
+            if side == 0.0 || against != 0 {
                 return count;
             }
             count += 1;
@@ -110,19 +105,16 @@ widest! {
     /// Shows loads to all brackets, and counts those that are there.
     fn seen<const N: usize>(load_n: &[f64], brackets: &mut [Bracket; N]) -> usize {
         let (blocks, rest) = load_n.as_chunks::<BLOCK>();
-        let mut there = [0; CHAINS];
+        let mut there = 0_u64;
         for block in blocks.iter().chain([&filled_up(rest)]) {
-            let (groups, _) = block.as_chunks::<CHAINS>();
-            for group in groups {
-                for (chain, &f) in group.iter().enumerate() {
-                    there[chain] += u64::from(!f.is_nan());
-                }
+            for f in block {
+                there += u64::from(!f.is_nan());
             }
             for bracket in brackets.iter_mut() {
                 bracket.take(block);
             }
         }
-        there.iter().sum::<u64>() as usize
+        there as usize
     }
 }
 
@@ -137,7 +129,7 @@ struct Bracket {
     share: f64,
     least: f64,
     greatest: f64,
-    below: [u64; CHAINS],
+    below: u64,
     within: Vec<f64>,
 }
 
@@ -146,21 +138,19 @@ impl Bracket {
         let at = rank(looks.len().saturating_sub(1), share);
         let least = at.checked_sub(HALF_BRACKET).map_or(f64::NEG_INFINITY, |k| looks[k]);
         let greatest = looks.get(at + HALF_BRACKET).copied().unwrap_or(f64::INFINITY);
-        Self { share, least, greatest, below: [0; CHAINS], within: Vec::new() }
+        Self { share, least, greatest, below: 0, within: Vec::new() }
     }
 
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "see `widest`")]
     fn take(&mut self, block: &[f64; BLOCK]) {
-        let mut within = [0; CHAINS];
-        let (groups, _) = block.as_chunks::<CHAINS>();
-        for group in groups {
-            for (chain, &f) in group.iter().enumerate() {
-                self.below[chain] += u64::from(f < self.least);
-                within[chain] += u64::from(f >= self.least) & u64::from(f <= self.greatest);
-            }
+        let (mut below, mut not_above) = (0_u64, 0_u64);
+        for &f in block {
+            below += u64::from(f < self.least);
+            not_above += u64::from(f <= self.greatest);
         }
-        if within != [0; CHAINS] {
+        self.below += below;
+        if not_above > below {
             self.keep(block);
         }
     }
@@ -173,8 +163,7 @@ impl Bracket {
 
     /// None where it lies outside.
     fn quantile(mut self, last: usize) -> Option<f64> {
-        let below = self.below.iter().sum::<u64>() as usize;
-        let at = rank(last, self.share).checked_sub(below)?;
+        let at = rank(last, self.share).checked_sub(self.below as usize)?;
         (at < self.within.len()).then(|| *self.within.select_nth_unstable_by(at, f64::total_cmp).1)
     }
 }

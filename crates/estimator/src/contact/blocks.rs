@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::Samples;
+use crate::wide::{Lanes, widest};
 
 use super::SHORTEST_S;
 use super::design::middle_and_half;
@@ -47,9 +48,19 @@ impl Blocks {
         let mut blocks = Self::with_capacity(samples.dx_m.len() / each, each as f64 * samples.step_s);
         for segment in samples.segments {
             blocks.starts.push(blocks.len());
-            for start in segment.clone().step_by(each).take(segment.len() / each) {
-                let middle_s = (start as f64 + 0.5 * (each as f64 - 1.0)) * samples.step_s;
-                blocks.push(middle_s, watch.mean(&(start..start + each), segment));
+            let middle_s = |start: usize| (start as f64 + 0.5 * (each as f64 - 1.0)) * samples.step_s;
+            let end = segment.start + segment.len() / each * each;
+            let mut start = segment.start;
+            while start < end {
+                if let Some(means) = watch.calm_means(start, each, end) {
+                    for [motor_m, dx_m, load_n] in means {
+                        blocks.push(middle_s(start), Some([motor_m, dx_m, load_n]));
+                        start += each;
+                    }
+                } else {
+                    blocks.push(middle_s(start), watch.mean(&(start..start + each), segment));
+                    start += each;
+                }
             }
         }
         blocks.logged_dx_m.clone_from(&blocks.dx_m);
@@ -114,6 +125,15 @@ impl Blocks {
         (values[at + 1] - values[at - 1]) / (2.0 * self.period_s)
     }
 
+    /// As [`Blocks::rate`], of every block.
+    pub(super) fn rates(&self, values: &[f64]) -> Vec<f64> {
+        let mut rates = vec![f64::NAN; values.len()];
+        for (rate, around) in rates.iter_mut().skip(1).zip(values.windows(3)) {
+            *rate = (around[2] - around[0]) / (2.0 * self.period_s);
+        }
+        rates
+    }
+
     /// Reads the screw's channel τ later, by a cubic through four blocks (Catmull–Rom), so that δX is
     /// the difference of two positions of one moment.
     pub(super) fn realign(&mut self, skew_s: f64) {
@@ -133,6 +153,39 @@ impl Blocks {
             self.dx_m[k] = read_m(0) + read_m(1) + read_m(2) + read_m(3) - self.motor_m[k];
         }
     }
+}
+
+widest! {
+    /// The furthest that a value lies from the one before it; a missing one lies nowhere.
+    fn furthest_leap(values: &[f64]) -> f64 {
+        let (mut furthest, mut done) = (Lanes::ZERO, 0);
+        while let Some(group) = values[done..].first_chunk::<{ Lanes::COUNT + 1 }>() {
+            for lane in 0..Lanes::COUNT {
+                furthest.0[lane] = greater(furthest.0[lane], (group[lane + 1] - group[lane]).abs());
+            }
+            done += Lanes::COUNT;
+        }
+        let mut all = 0.0;
+        for lane in furthest.0 {
+            all = greater(all, lane);
+        }
+        for pair in values[done..].windows(2) {
+            all = greater(all, (pair[1] - pair[0]).abs());
+        }
+        all
+    }
+}
+
+/// Sums of eight blocks, each in its own order, side by side.
+fn sums(values: &[f64], each: usize) -> [f64; Lanes::COUNT] {
+    let blocks: [&[f64]; Lanes::COUNT] = std::array::from_fn(|k| &values[k * each..][..each]);
+    let mut sums = [0.0; Lanes::COUNT];
+    for k in 0..each {
+        for (sum, block) in sums.iter_mut().zip(&blocks) {
+            *sum += block[k];
+        }
+    }
+    sums
 }
 
 /// The greater; the first where the second is no number. One instruction, unlike [`f64::max`].
@@ -165,6 +218,26 @@ impl<'a> Watch<'a> {
         let of = |channel: &[f64]| Neighbours::of(channel).ok_or(Refusal::ChannelConstant);
         of(samples.motor_m)?;
         Ok(Self { samples, dx: of(samples.dx_m)?, load: of(samples.load_n)? })
+    }
+
+    /// Means over several blocks from a sample on, which is not the first, in all of which nothing is missing and
+    /// nothing leaps: as nearly everywhere.
+    fn calm_means(&self, start: usize, each: usize, end: usize) -> Option<[[f64; 3]; Lanes::COUNT]> {
+        let Samples { motor_m, dx_m, load_n, .. } = self.samples;
+        let all = start..start + each * Lanes::COUNT;
+        if start == 0 || all.end > end {
+            return None;
+        }
+        let with_before = start - 1..all.end;
+        let is_calm = furthest_leap(&dx_m[with_before.clone()]) <= self.dx.leap
+            && furthest_leap(&load_n[with_before]) <= self.load.leap;
+        if !is_calm {
+            return None;
+        }
+        let (motor, dx) = (sums(&motor_m[all.clone()], each), sums(&dx_m[all.clone()], each));
+        let (load, n) = (sums(&load_n[all], each), each as f64);
+        let is_whole = (0..Lanes::COUNT).all(|k| (motor[k] + dx[k] + load[k]).is_finite());
+        is_whole.then(|| std::array::from_fn(|k| [motor[k] / n, dx[k] / n, load[k] / n]))
     }
 
     /// Means of motor, δX and load over a block; none where fewer than half of its samples are sound.

@@ -1,9 +1,12 @@
 //! Blocks in contact as rows of a regression: averaged over stretches that stay on one flank.
 
 use super::Prior;
+use std::ops::Range;
+
 use super::blocks::Blocks;
 use super::coupling::{Coupling, State, Walk};
 use super::refusal::Refusal;
+use crate::gap::extremes;
 use crate::load::quantiles;
 
 /// Columns while the flanks are straight.
@@ -71,7 +74,7 @@ pub(super) struct Frame {
     /// 1/load, 1/N, and 1/half of the stroke, 1/m: a product is a quarter of a division.
     per_load: f64,
     per_place: f64,
-    row_blocks: f64,
+    row_blocks: usize,
 }
 
 impl Frame {
@@ -96,7 +99,7 @@ impl Frame {
             place_m,
             per_load: load_n.recip(),
             per_place: place_m.1.recip(),
-            row_blocks: (blocks.len() / BLOCKS_PER_ROW_BLOCK).clamp(fewest, most) as f64,
+            row_blocks: (blocks.len() / BLOCKS_PER_ROW_BLOCK).clamp(fewest, most),
         })
     }
 
@@ -113,8 +116,9 @@ impl Frame {
 
 /// Middle and half length of what values span; a negative length where there are none.
 pub(super) fn middle_and_half(values: &[f64]) -> (f64, f64) {
-    let (low, high) =
-        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    let (low, high) = extremes(values);
+    let low = low.into_iter().fold(f64::INFINITY, f64::min);
+    let high = high.into_iter().fold(f64::NEG_INFINITY, f64::max);
     (0.5 * (low + high), 0.5 * (high - low))
 }
 
@@ -227,13 +231,16 @@ pub(super) struct Pace {
 
 impl Pace {
     pub(super) fn of(blocks: &Blocks, frame: &Frame) -> Self {
-        let all = 0..blocks.len();
-        let begun = |k: usize| blocks.time_s[k] > START_S;
-        let load_rate = |k| blocks.rate(&blocks.load_n, k) * LATE_S / frame.load_n;
+        let mut speed = blocks.rates(&blocks.motor_m);
+        speed.iter_mut().for_each(|speed| *speed /= SPEED_M_PER_S);
+        let mut load_rate = blocks.rates(&blocks.load_n);
+        for (rate, &time_s) in load_rate.iter_mut().zip(&blocks.time_s) {
+            *rate = if time_s > START_S { *rate * LATE_S / frame.load_n } else { f64::NAN };
+        }
         Self {
             time: blocks.time_s.iter().map(|t| (t - frame.time_s.0) / frame.time_s.1).collect(),
-            speed: all.clone().map(|k| blocks.rate(&blocks.motor_m, k) / SPEED_M_PER_S).collect(),
-            load_rate: all.map(|k| if begun(k) { load_rate(k) } else { f64::NAN }).collect(),
+            speed,
+            load_rate,
             stretch: blocks.time_s.iter().map(|t| (t / STRETCH_S) as u32).collect(),
         }
     }
@@ -253,8 +260,8 @@ pub(super) fn rows<const N: usize>(ground: Ground<'_>, state: &State) -> Design<
     let Ground { blocks, frame, .. } = ground;
     let mut design = Design { firm: Vec::new(), light: Vec::new(), touched_s: (0.0, 0.0) };
     let (mut walk, mut keeping) = (Walk::new(state), Keeping::default());
-    let mut before = Press::default();
-    let (mut open, mut sum) = (None, Row::<N>::ZERO);
+    let mut presses = Presses::default();
+    let mut open: Option<(Touch, usize)> = None;
     let mut starts = blocks.starts.iter().copied().peekable();
     for (next, (&motor_m, &load_n)) in blocks.motor_m.iter().zip(&blocks.load_n).enumerate() {
         if starts.next_if_eq(&next).is_some() {
@@ -262,26 +269,26 @@ pub(super) fn rows<const N: usize>(ground: Ground<'_>, state: &State) -> Design<
             keeping = Keeping::default();
         }
         let press = Press::of(walk.step(motor_m, load_n), frame);
-        let pressed = std::mem::replace(&mut before, press);
+        presses.put(next, press);
         let steady = keeping.push(Touch::of(press.force)).filter(|_| ground.is_sound(next - 1));
-        if open.is_some() && (steady != open || !ground.joins(&sum, next - 1)) {
-            design.close(open.take(), &sum, blocks.period_s);
+        if let Some((touch, first)) = open
+            && (steady != Some(touch) || !ground.joins(first, next - 1))
+        {
+            design.close(touch, &ground.sum(&presses, first..next - 1, touch.flank.sign()), blocks.period_s);
+            open = None;
         }
-        if let Some(touch) = steady {
-            if open.is_none() {
-                (open, sum) = (steady, Row { stretch: ground.pace.stretch[next - 1], ..Row::ZERO });
-            }
-            ground.add(&mut sum, &pressed, next - 1, touch.flank.sign());
-        }
+        open = open.or(steady.map(|touch| (touch, next - 1)));
     }
-    design.close(open, &sum, blocks.period_s);
+    if let Some((touch, first)) = open {
+        let row = ground.sum(&presses, first..blocks.len() - 1, touch.flank.sign());
+        design.close(touch, &row, blocks.period_s);
+    }
     design
 }
 
 impl<const N: usize> Design<N> {
-    /// Takes in a row that is full, where one is open.
-    fn close(&mut self, touch: Option<Touch>, sum: &Row<N>, period_s: f64) {
-        let Some(touch) = touch else { return };
+    /// Takes in a row that is full.
+    fn close(&mut self, touch: Touch, sum: &Row<N>, period_s: f64) {
         if !touch.is_firm {
             self.light.push(sum.mean());
             return;
@@ -300,6 +307,7 @@ pub(super) fn every(ground: Ground<'_>, state: &State, stride: usize) -> Vec<Row
     let mut walk = Walk::new(state);
     let mut starts = blocks.starts.iter().copied().peekable();
     let mut rows = Vec::with_capacity(blocks.len() / stride + 1);
+    let mut presses = Presses::default();
     for (k, (&motor_m, &load_n)) in blocks.motor_m.iter().zip(&blocks.load_n).enumerate() {
         if starts.next_if_eq(&k).is_some() {
             walk.restart();
@@ -309,9 +317,8 @@ pub(super) fn every(ground: Ground<'_>, state: &State, stride: usize) -> Vec<Row
             let force_n = coupling.force_n;
             let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
             if ground.is_sound(k) {
-                let mut row = Row { stretch: ground.pace.stretch[k], ..Row::ZERO };
-                ground.add(&mut row, &Press::of(coupling, ground.frame), k, side);
-                rows.push(row);
+                presses.put(k, Press::of(coupling, ground.frame));
+                rows.push(ground.sum(&presses, k..k + 1, side));
             }
         }
     }
@@ -335,6 +342,24 @@ impl Press {
     }
 }
 
+/// The couplings of the latest blocks: of as many at least as belong to a row.
+#[derive(Debug, Default)]
+struct Presses([Press; Self::KEPT]);
+
+impl Presses {
+    const KEPT: usize = 32;
+
+    #[inline]
+    fn put(&mut self, k: usize, press: Press) {
+        self.0[k % Self::KEPT] = press;
+    }
+
+    #[inline]
+    fn of(&self, k: usize) -> &Press {
+        &self.0[k % Self::KEPT]
+    }
+}
+
 impl Ground<'_> {
     /// Whether nothing of a block is missing and the flight has more than begun.
     #[inline]
@@ -343,22 +368,47 @@ impl Ground<'_> {
         (blocks.dx_m[k] + pace.speed[k] + pace.load_rate[k]).is_finite()
     }
 
-    /// Whether a block may belong to a row: one of no more blocks than a row holds, and of one stretch.
+    /// Whether a block may belong to a row from another on: one of no more blocks than a row holds, and of one stretch.
     #[inline]
-    fn joins<const N: usize>(&self, sum: &Row<N>, k: usize) -> bool {
-        sum.blocks < self.frame.row_blocks && sum.stretch == self.pace.stretch[k]
+    fn joins(&self, first: usize, k: usize) -> bool {
+        k - first < self.frame.row_blocks && self.pace.stretch[first] == self.pace.stretch[k]
     }
 
-    /// Adds one sound block to the sums of a row.
-    #[inline]
-    fn add<const N: usize>(&self, sum: &mut Row<N>, press: &Press, k: usize, side: f64) {
+    /// The sums of a row of sound blocks.
+    fn sum<const N: usize>(&self, presses: &Presses, within: Range<usize>, side: f64) -> Row<N> {
         let Self { blocks, pace, frame } = self;
-        let (time, speed, load_rate, y_m) = (pace.time[k], pace.speed[k], pace.load_rate[k], blocks.dx_m[k]);
-        // The screw's own place: its transducer's slope acts on the gap as well.
-        let place = (blocks.motor_m[k] + y_m - frame.place_m.0) * frame.per_place;
+        let stretch = pace.stretch[within.start];
+        let mut sum = Row { stretch, blocks: within.len() as f64, ..Row::ZERO };
+        let channels = blocks.motor_m[within.clone()].iter().zip(&blocks.dx_m[within.clone()]);
+        let paces = pace.time[within.clone()].iter().zip(&pace.speed[within.clone()]);
+        let paces = paces.zip(&pace.load_rate[within.clone()]);
+        for ((k, (&motor_m, &dx_m)), ((&time, &speed), &load_rate)) in within.zip(channels).zip(paces) {
+            let place = (motor_m + dx_m - frame.place_m.0) * frame.per_place;
+            let moment = Moment { time, speed, load_rate, place };
+            moment.add(&mut sum.x, presses.of(k), side);
+            sum.y_m += dx_m;
+        }
+        sum
+    }
+}
+
+/// What a sound block adds to a row beside its coupling.
+struct Moment {
+    time: f64,
+    speed: f64,
+    load_rate: f64,
+    /// The screw's own: its transducer's slope acts on the gap as well.
+    place: f64,
+}
+
+impl Moment {
+    /// Adds a block to the sums of a row.
+    #[inline]
+    fn add<const N: usize>(&self, sums: &mut [f64; N], press: &Press, side: f64) {
+        let &Self { time, speed, load_rate, place } = self;
         let bends = if N == CURVED { bends(press.force.abs()) } else { [0.0; CURVED - LINEAR] };
         // Each entry by itself: an array that is filled in pieces must be read back piece by piece.
-        for (column, sum) in sum.x.iter_mut().enumerate() {
+        for (column, sum) in sums.iter_mut().enumerate() {
             *sum += match column {
                 ORIGIN => 1.0,
                 GAP => 0.5 * side,
@@ -375,8 +425,6 @@ impl Ground<'_> {
                 bend => side * bends[bend - BEND],
             };
         }
-        sum.y_m += y_m;
-        sum.blocks += 1.0;
     }
 }
 

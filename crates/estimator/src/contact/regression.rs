@@ -101,40 +101,52 @@ fn variance_of_a_row<const N: usize>(rows: &[Row<N>], weights: &[f64], residuals
     (size / total).max(LEAST_SPREAD_M * LEAST_SPREAD_M) * inflation
 }
 
+/// Σ w x xᵀ on and below the diagonal, which is all that a Cholesky decomposition reads; and Σ w x y.
+fn normal_equations<const N: usize>(rows: &[Row<N>], weights: &[f64]) -> ([[f64; N]; N], [f64; N]) {
+    let Products { squares, right } = products(rows, weights);
+    let (mut normal, mut side) = ([[0.0; N]; N], [0.0; N]);
+    for (i, line) in normal.iter_mut().enumerate() {
+        side[i] = right[i / Lanes::COUNT].0[i % Lanes::COUNT];
+        for (j, entry) in line.iter_mut().enumerate().take(i + 1) {
+            let square = &squares[i / Lanes::COUNT + j / Lanes::COUNT];
+            *entry = square[i % Lanes::COUNT].0[j % Lanes::COUNT];
+        }
+    }
+    (normal, side)
+}
+
+/// Sums over rows: Σ w x xᵀ in squares of eight by eight, filled up with zeros: upper left, lower left, lower right; and
+/// Σ w x y.
+struct Products {
+    squares: [[Lanes; Lanes::COUNT]; 3],
+    right: [Lanes; 2],
+}
+
 widest! {
-    /// Σ w x xᵀ on and below the diagonal, which is all that a Cholesky decomposition reads; and Σ w x y.
-    fn normal_equations<const N: usize>(rows: &[Row<N>], weights: &[f64]) -> ([[f64; N]; N], [f64; N]) {
-        // The matrix in squares of eight by eight, filled up with zeros: upper left, lower left, lower right.
+    /// Whole squares: what is above the diagonal comes for nothing, and would come apart if it were left out.
+    fn products<const N: usize>(rows: &[Row<N>], weights: &[f64]) -> Products {
         let mut squares = [[Lanes::ZERO; Lanes::COUNT]; 3];
         let mut right = [Lanes::ZERO; 2];
         for (row, &w) in rows.iter().zip(weights) {
-            let x = [Lanes::of(&row.x[..N.min(Lanes::COUNT)]), Lanes::of(&row.x[N.min(Lanes::COUNT)..])];
+            let x = [Lanes::of(&row.x, 0), Lanes::of(&row.x, Lanes::COUNT)];
             let (w, y_m) = (Lanes::all(w), Lanes::all(row.y_m));
             let wx = [w.times(x[0]), w.times(x[1])];
             right = [right[0].plus(wx[0].times(y_m)), right[1].plus(wx[1].times(y_m))];
-            add_products(&mut squares[0], wx[0], x[0]);
+            add_products(&mut squares[0], N.min(Lanes::COUNT), wx[0], x[0]);
             if N > Lanes::COUNT {
-                add_products(&mut squares[1], wx[1], x[0]);
-                add_products(&mut squares[2], wx[1], x[1]);
+                add_products(&mut squares[1], N - Lanes::COUNT, wx[1], x[0]);
+                add_products(&mut squares[2], N - Lanes::COUNT, wx[1], x[1]);
             }
         }
-        let (mut normal, mut side) = ([[0.0; N]; N], [0.0; N]);
-        for (i, line) in normal.iter_mut().enumerate() {
-            side[i] = right[i / Lanes::COUNT].0[i % Lanes::COUNT];
-            for (j, entry) in line.iter_mut().enumerate().take(i + 1) {
-                let square = &squares[i / Lanes::COUNT + j / Lanes::COUNT];
-                *entry = square[i % Lanes::COUNT].0[j % Lanes::COUNT];
-            }
-        }
-        (normal, side)
+        Products { squares, right }
     }
 }
 
-/// Adds a product to each entry of a square: lines by columns.
+/// Adds a product to each entry of a square's first lines: lines by columns.
 #[inline(always)]
 #[allow(clippy::inline_always, reason = "see `widest`")]
-fn add_products(square: &mut [Lanes; Lanes::COUNT], lines: Lanes, columns: Lanes) {
-    for (sum, line) in square.iter_mut().zip(lines.0) {
+fn add_products(square: &mut [Lanes; Lanes::COUNT], count: usize, lines: Lanes, columns: Lanes) {
+    for (sum, line) in square.iter_mut().zip(lines.0).take(count) {
         *sum = sum.plus(Lanes::all(line).times(columns));
     }
 }
