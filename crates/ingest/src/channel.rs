@@ -165,7 +165,7 @@ impl<'s> Sampling<'s> {
         };
         let is_mended = !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
         if !is_mended {
-            let (values, seen) = self.sheet.numbers(&self.samples, |raw| si.apply(raw))?;
+            let (values, seen) = self.sheet.numbers(&self.samples, Some(si))?;
             self.same_count(values.len(), self.column())?;
             let seen = self.line.kept.is_none().then_some(seen);
             return Ok(Channel { values: kept(values), seen });
@@ -185,12 +185,12 @@ impl<'s> Sampling<'s> {
         if let Some(turn) = map.wraps_at {
             unwrap_turns(&mut values, turn);
         }
-        values.iter_mut().for_each(|value| *value = si.apply(*value));
+        si.apply_to_all(&mut values);
         Ok(values.into())
     }
 
     fn raw(&self, samples: &Samples) -> Result<Vec<f64>, Error> {
-        self.sheet.numbers(samples, |raw| raw).map(|(values, _)| values)
+        self.sheet.numbers(samples, None).map(|(values, _)| values)
     }
 
     fn same_count(&self, found: usize, column: &str) -> Result<(), Error> {

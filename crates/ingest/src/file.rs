@@ -161,28 +161,23 @@ impl LogFile {
         self.all_rows(rows, names.first().copied().unwrap_or_default())
     }
 
-    /// Appends the numbers of a leaf, sample by sample, as `convert` makes them; a null is NaN.
+    /// Appends the numbers of a leaf, sample by sample; a null is NaN.
     ///
     /// # Errors
     /// As [`LogFile::each_batch`], and when the leaf holds no numbers.
-    pub(crate) fn append_numbers(
-        &self,
-        name: &str,
-        convert: impl Fn(f64) -> f64 + Copy,
-        into: &mut Growing,
-    ) -> Result<(), Error> {
+    pub(crate) fn append_numbers(&self, name: &str, into: &mut Growing) -> Result<(), Error> {
         let leaf = self.leaf(name)?;
         self.want(&[leaf])?;
         let mut rows = 0;
         for group in 0..self.footer.metadata().num_row_groups() {
             self.check_pages(group, &[leaf])?;
             let before = into.len();
-            if straight::append(self.source.file(), self.chunk(group, leaf), convert, into) {
+            if straight::append(self.source.file(), self.chunk(group, leaf), into) {
                 rows += into.len() - before;
                 continue;
             }
             rows += self.each_row_group(group, &[leaf], |columns| {
-                append(name, &leaf::descend(&columns[0]).values, convert, into)
+                append(name, &leaf::descend(&columns[0]).values, into)
             })?;
         }
         self.all_rows(rows, name)

@@ -1,14 +1,16 @@
-//! A column while it is read: its numbers, and what was seen of them while they were in the cache.
+//! A column while it is read: its numbers, brought to SI and looked at while they are in the cache.
 
 use crate::scan::{Scan, Scanner};
+use crate::screw::ToSi;
 use crate::spare;
 
 /// Numbers that are brought in between two looks: few enough to stay in the first cache.
 pub(crate) const BATCH: usize = 2048;
 
-/// A column that more numbers are added to.
+/// A column that more raw numbers are added to.
 #[derive(Debug)]
 pub(crate) struct Growing {
+    to_si: Option<ToSi>,
     values: Vec<f64>,
     scanner: Scanner,
 }
@@ -21,9 +23,9 @@ pub(crate) struct Mark {
 }
 
 impl Growing {
-    /// An empty column with room for so many values.
-    pub(crate) fn with_room(values: usize) -> Self {
-        Self { values: spare::take(values), scanner: Scanner::new() }
+    /// An empty column with room for so many values, which become SI or stay raw.
+    pub(crate) fn with_room(values: usize, to_si: Option<ToSi>) -> Self {
+        Self { to_si, values: spare::take(values), scanner: Scanner::new() }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -49,7 +51,11 @@ impl Growing {
 
 impl Extend<f64> for Growing {
     fn extend<T: IntoIterator<Item = f64>>(&mut self, numbers: T) {
+        let before = self.values.len();
         self.values.extend(numbers);
+        if let Some(to_si) = self.to_si {
+            to_si.apply_to_all(&mut self.values[before..]);
+        }
         self.scanner.advance(&self.values);
     }
 }
@@ -60,7 +66,7 @@ mod tests {
 
     #[test]
     fn what_is_taken_back_was_never_seen() {
-        let mut column = Growing::with_room(4);
+        let mut column = Growing::with_room(4, None);
         column.extend((0..50).map(f64::from));
         let mark = column.mark();
         column.extend([f64::NAN, 1e9, f64::NAN].into_iter().cycle().take(40));

@@ -106,8 +106,8 @@ impl Normalized {
 }
 
 fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, Scan), Error> {
-    let mut values = Growing::with_room(file.rows().min(1 << 26));
-    file.append_numbers(name, |value| value, &mut values)?;
+    let mut values = Growing::with_room(file.rows().min(1 << 26), None);
+    file.append_numbers(name, &mut values)?;
     Ok(values.whole())
 }
 

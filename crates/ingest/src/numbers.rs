@@ -6,35 +6,27 @@ use arrow::datatypes::{ArrowPrimitiveType, DataType, Float32Type, Float64Type};
 
 use crate::error::Fault;
 
-/// Appends a whole array, each number as `convert` makes it; nulls become NaN.
-pub(crate) fn append(
-    column: &str,
-    array: &ArrayRef,
-    convert: impl Fn(f64) -> f64,
-    into: &mut impl Extend<f64>,
-) -> Result<(), Fault> {
+/// Appends a whole array; nulls become NaN.
+pub(crate) fn append(column: &str, array: &ArrayRef, into: &mut impl Extend<f64>) -> Result<(), Fault> {
     match array.data_type() {
-        DataType::Float64 => append_primitive(array.as_primitive::<Float64Type>(), into, convert),
-        DataType::Float32 => {
-            append_primitive(array.as_primitive::<Float32Type>(), into, |v: f32| convert(v.into()));
-        }
-        _ => append_primitive(real(column, array)?.as_primitive::<Float64Type>(), into, convert),
+        DataType::Float64 => append_primitive(array.as_primitive::<Float64Type>(), into),
+        DataType::Float32 => append_primitive(array.as_primitive::<Float32Type>(), into),
+        _ => append_primitive(real(column, array)?.as_primitive::<Float64Type>(), into),
     }
     Ok(())
 }
 
-/// Appends the rows that are marked, each number as `convert` makes it.
+/// Appends the rows that are marked.
 pub(crate) fn append_where(
     column: &str,
     array: &ArrayRef,
     wanted: &[bool],
-    convert: impl Fn(f64) -> f64,
     into: &mut impl Extend<f64>,
 ) -> Result<(), Fault> {
     let real = real(column, array)?;
     let values = real.as_primitive::<Float64Type>();
     let marked = values.iter().zip(wanted).filter(|(_, wanted)| **wanted);
-    into.extend(marked.map(|(value, _)| convert(value.unwrap_or(f64::NAN))));
+    into.extend(marked.map(|(value, _)| value.unwrap_or(f64::NAN)));
     Ok(())
 }
 
@@ -52,14 +44,13 @@ pub(crate) fn wrong_type(column: &str, array: &ArrayRef, wanted: &'static str) -
     Fault::ColumnType { column: column.to_owned(), found: array.data_type().to_string(), wanted }
 }
 
-fn append_primitive<T: ArrowPrimitiveType>(
-    array: &PrimitiveArray<T>,
-    into: &mut impl Extend<f64>,
-    convert: impl Fn(T::Native) -> f64,
-) {
+fn append_primitive<T: ArrowPrimitiveType>(array: &PrimitiveArray<T>, into: &mut impl Extend<f64>)
+where
+    T::Native: Into<f64>,
+{
     if array.null_count() == 0 {
-        into.extend(array.values().iter().map(|&v| convert(v)));
+        into.extend(array.values().iter().map(|&v| v.into()));
     } else {
-        into.extend(array.iter().map(|v| v.map_or(f64::NAN, &convert)));
+        into.extend(array.iter().map(|v| v.map_or(f64::NAN, Into::into)));
     }
 }

@@ -58,7 +58,7 @@ impl Scanner {
         let rest = &values[done..];
         let at = |k: usize| rest.get(k).copied().unwrap_or(f64::NAN);
         (0..rest.len()).for_each(|k| lanes.one(0, [at(k), at(k + 1), at(k + 2)]));
-        run.take(rest);
+        run.take_rest(rest);
         lanes.folded(if values.is_empty() { 0 } else { run.most + 1 })
     }
 }
@@ -69,7 +69,7 @@ fn groups(values: &[f64], lanes: &mut Lanes, run: &mut Run) -> usize {
     let mut done = 0;
     while let Some(group) = values[done..].first_chunk::<{ LANES + 2 }>() {
         lanes.take(group);
-        run.take(&group[..=LANES]);
+        run.take(group);
         done += LANES;
     }
     done
@@ -203,23 +203,42 @@ struct Run {
 }
 
 impl Run {
-    /// Some samples, of which the first was the last of those before.
+    /// A group and the sample after it: which of the eight after the first repeat the one before, a bit each.
     #[inline]
     #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
-    fn take(&mut self, values: &[f64]) {
-        let same = values.iter().zip(values.iter().skip(1)).filter(|(a, b)| a == b).count();
-        if same == 0 {
-            // Nearly always.
-            self.repeats = 0;
-            return;
+    fn take(&mut self, group: &[f64; LANES + 2]) {
+        let mut same = 0_u8;
+        for lane in 0..LANES {
+            same |= u8::from(group[lane] == group[lane + 1]) << lane;
         }
+        let joined = self.repeats + same.trailing_ones() as usize;
+        self.most = self.most.max(joined).max(LONGEST[usize::from(same)].into());
+        self.repeats = if same == u8::MAX { joined } else { same.leading_ones() as usize };
+    }
+
+    /// Some samples, of which the first was the last of those before.
+    #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
+    fn take_rest(&mut self, values: &[f64]) {
         for (a, b) in values.iter().zip(values.iter().skip(1)) {
-            // No branch: which samples repeat is not to be guessed.
             self.repeats = (self.repeats + 1) * usize::from(a == b);
             self.most = self.most.max(self.repeats);
         }
     }
 }
+
+/// The longest row of ones in each byte.
+const LONGEST: [u8; 256] = {
+    let (mut longest, mut byte) = ([0; 256], 0);
+    while byte < 256 {
+        let mut left = byte;
+        while left > 0 {
+            left &= left << 1;
+            longest[byte] += 1;
+        }
+        byte += 1;
+    }
+    longest
+};
 
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "a repeat is one to the bit")]

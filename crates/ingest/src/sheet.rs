@@ -20,6 +20,7 @@ use crate::numbers::{append, append_where, wrong_type};
 use crate::pattern::nearest;
 use crate::scan::Scan;
 use crate::schema::{ClockMapping, Epoch, Layout};
+use crate::screw::ToSi;
 use crate::spare;
 use crate::unit::TimeUnit;
 
@@ -104,27 +105,23 @@ impl Sheet {
         std::iter::once(&samples.leaf).chain(rows).chain(clock).cloned().collect()
     }
 
-    /// As numbers, each as `convert` makes it, and what was seen of them; a null is NaN.
+    /// As numbers, brought to SI or raw, and what was seen of them; a null is NaN.
     ///
     /// # Errors
     /// When a leaf is missing, holds no numbers, or cannot be decoded.
-    pub(crate) fn numbers(
-        &self,
-        samples: &Samples,
-        convert: impl Fn(f64) -> f64 + Copy,
-    ) -> Result<(Vec<f64>, Scan), Error> {
+    pub(crate) fn numbers(&self, samples: &Samples, to_si: Option<ToSi>) -> Result<(Vec<f64>, Scan), Error> {
         // The footer may lie about the rows; what it claims is a hint, not a promise.
-        let mut values =
-            Growing::with_room(if samples.rows.is_empty() { self.rows().min(1 << 26) } else { 0 });
+        let room = if samples.rows.is_empty() { self.rows().min(1 << 26) } else { 0 };
+        let mut values = Growing::with_room(room, to_si);
         if samples.rows.is_empty() {
             for file in &self.files {
-                file.append_numbers(&samples.leaf, convert, &mut values)?;
+                file.append_numbers(&samples.leaf, &mut values)?;
             }
             return Ok(values.whole());
         }
         self.each(samples, &samples.leaf, |array, wanted| match wanted {
-            None => append(&samples.leaf, array, convert, &mut values),
-            Some(wanted) => append_where(&samples.leaf, array, wanted, convert, &mut values),
+            None => append(&samples.leaf, array, &mut values),
+            Some(wanted) => append_where(&samples.leaf, array, wanted, &mut values),
         })?;
         Ok(values.whole())
     }
@@ -219,8 +216,8 @@ impl Sheet {
             && !self.is_listed(column)
             && !self.is_listed(&samples.leaf)
         {
-            let mut reals = Growing::with_room(self.rows().min(1 << 26));
-            self.files.iter().try_for_each(|file| file.append_numbers(column, |tick| tick, &mut reals))?;
+            let mut reals = Growing::with_room(self.rows().min(1 << 26), None);
+            self.files.iter().try_for_each(|file| file.append_numbers(column, &mut reals))?;
             let mut reader = Reader::new(column, ticks, 0);
             reader.take_reals(reals.whole().0);
             return Ok(reader.stamps());
@@ -403,7 +400,7 @@ impl<'a> Reader<'a> {
                 .for_each(|(_, tick)| self.push_whole(tick));
         } else {
             let mut reals = Vec::with_capacity(array.len());
-            append(self.column, array, |tick| tick, &mut reals)?;
+            append(self.column, array, &mut reals)?;
             reals
                 .iter()
                 .enumerate()

@@ -66,18 +66,13 @@ impl Form {
     }
 }
 
-/// Appends every number of a chunk as `convert` makes it; a null is NaN. False, and nothing appended, where the chunk
+/// Appends every number of a chunk; a null is NaN. False, and nothing appended, where the chunk
 /// must be left to Parquet's own reader.
-pub(crate) fn append(
-    file: &File,
-    chunk: &ColumnChunkMetaData,
-    convert: impl Fn(f64) -> f64 + Copy,
-    into: &mut Growing,
-) -> bool {
+pub(crate) fn append(file: &File, chunk: &ColumnChunkMetaData, into: &mut Growing) -> bool {
     let before = into.mark();
     let done = Form::of(chunk).and_then(|form| {
         ROOM.with_borrow_mut(|room| {
-            let done = room.append(file, chunk, form, convert, into);
+            let done = room.append(file, chunk, form, into);
             room.tidy();
             done
         })
@@ -94,7 +89,6 @@ impl Room {
         file: &File,
         chunk: &ColumnChunkMetaData,
         form: Form,
-        convert: impl Fn(f64) -> f64 + Copy,
         into: &mut Growing,
     ) -> Option<()> {
         let (start, bytes) = chunk.byte_range();
@@ -105,7 +99,7 @@ impl Room {
             let body = self.unpacked(&page.header, data, form)?;
             let (levels, body) = data.parted(body)?;
             let numbers = Numbers { bytes: body, is_split: data.is_split, width: form.width() };
-            numbers.append(levels, data.values, convert, into)?;
+            numbers.append(levels, data.values, into)?;
         }
         Some(())
     }
@@ -225,37 +219,24 @@ struct Numbers<'p> {
 }
 
 impl Numbers<'_> {
-    fn append(
-        self,
-        levels: Option<&[u8]>,
-        values: usize,
-        convert: impl Fn(f64) -> f64 + Copy,
-        into: &mut Growing,
-    ) -> Option<()> {
-        let Some(levels) = levels else { return self.append_from(0, values, values, convert, into) };
+    fn append(self, levels: Option<&[u8]>, values: usize, into: &mut Growing) -> Option<()> {
+        let Some(levels) = levels else { return self.append_from(0, values, values, into) };
         let present = present(levels, values)?;
         let count = present.iter().filter(|run| run.is_present).map(|run| run.values).sum();
         let mut from = 0;
         for run in present {
             if run.is_present {
-                self.append_from(from, run.values, count, convert, into)?;
+                self.append_from(from, run.values, count, into)?;
                 from += run.values;
             } else {
-                into.extend(std::iter::repeat_n(convert(f64::NAN), run.values));
+                into.extend(std::iter::repeat_n(f64::NAN, run.values));
             }
         }
         Some(())
     }
 
     /// Appends some of the page's `count` numbers.
-    fn append_from(
-        self,
-        from: usize,
-        values: usize,
-        count: usize,
-        convert: impl Fn(f64) -> f64 + Copy,
-        into: &mut Growing,
-    ) -> Option<()> {
+    fn append_from(self, from: usize, values: usize, count: usize, into: &mut Growing) -> Option<()> {
         if self.bytes.len() != count.checked_mul(self.width)? {
             return None;
         }
@@ -263,19 +244,19 @@ impl Numbers<'_> {
         match (self.width, self.is_split) {
             (8, false) => {
                 for bytes in self.bytes[8 * from..8 * end].as_chunks::<8>().0.chunks(BATCH) {
-                    into.extend(bytes.iter().map(|b| convert(f64::from_le_bytes(*b))));
+                    into.extend(bytes.iter().map(|b| f64::from_le_bytes(*b)));
                 }
             }
             (_, false) => {
                 for bytes in self.bytes[4 * from..4 * end].as_chunks::<4>().0.chunks(BATCH) {
-                    into.extend(bytes.iter().map(|b| convert(f32::from_le_bytes(*b).into())));
+                    into.extend(bytes.iter().map(|b| f32::from_le_bytes(*b).into()));
                 }
             }
             (8, true) => self.joined(from..end, count, eights, |batch| {
-                into.extend(batch.iter().map(|bits| convert(f64::from_bits(*bits))));
+                into.extend(batch.iter().map(|bits| f64::from_bits(*bits)));
             }),
             (_, true) => self.joined(from..end, count, fours, |batch| {
-                into.extend(batch.iter().map(|bits| convert(f32::from_bits(*bits).into())));
+                into.extend(batch.iter().map(|bits| f32::from_bits(*bits).into()));
             }),
         }
         Some(())
@@ -414,8 +395,8 @@ mod tests {
             .build()
     }
 
-    /// Writes numbers by Parquet's own writer, and reads them straight, twice as large.
-    fn doubled(values: &[Option<f32>], written: Written) -> Option<Vec<f64>> {
+    /// Writes numbers by Parquet's own writer, and reads them straight.
+    fn read_back(values: &[Option<f32>], written: Written) -> Option<Vec<f64>> {
         let wide = || values.iter().map(|v| v.map(f64::from));
         let array: ArrayRef = if written.is_double {
             Arc::new(wide().collect::<Float64Array>())
@@ -429,10 +410,10 @@ mod tests {
         writer.write(&batch).unwrap();
         writer.close().unwrap();
         let footer: ParquetMetaData = ParquetMetaDataReader::new().parse_and_finish(&file).unwrap();
-        let mut read = Growing::with_room(0);
+        let mut read = Growing::with_room(0, None);
         let all_straight = footer.row_groups().iter().all(|group| {
             let before = read.len();
-            let straight = append(&file, group.column(0), |value| 2.0 * value, &mut read);
+            let straight = append(&file, group.column(0), &mut read);
             straight || read.len() != before
         });
         all_straight.then(|| read.whole().0)
@@ -445,7 +426,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
         /// Pages of both versions, both widths, split or not, compressed or not, with missing values or without:
-        /// every number comes back, doubled.
+        /// every number comes back.
         #[test]
         fn numbers_come_back_as_they_were_written(
             values in proptest::collection::vec(proptest::option::weighted(0.9, -1e30_f32..1e30), 1..900),
@@ -459,8 +440,8 @@ mod tests {
                 compression: if packed { zstd() } else { Compression::UNCOMPRESSED },
                 encoding: if split { basic::Encoding::BYTE_STREAM_SPLIT } else { basic::Encoding::PLAIN },
             };
-            let read = doubled(&values, written).unwrap();
-            let wanted = values.iter().map(|v| v.map_or(f64::NAN, |v| 2.0 * f64::from(v)));
+            let read = read_back(&values, written).unwrap();
+            let wanted = values.iter().map(|v| v.map_or(f64::NAN, f64::from));
             prop_assert_eq!(bits(read.into_iter()), bits(wanted));
         }
     }
@@ -474,8 +455,8 @@ mod tests {
             encoding: basic::Encoding::PLAIN,
         };
         let values: Vec<Option<f32>> = (0..500).map(|k| Some(k as f32)).collect();
-        assert!(doubled(&values, usual).is_some());
-        assert_eq!(doubled(&values, Written { compression: Compression::SNAPPY, ..usual }), None);
+        assert!(read_back(&values, usual).is_some());
+        assert_eq!(read_back(&values, Written { compression: Compression::SNAPPY, ..usual }), None);
     }
 
     /// The Parquet format's own example of its hybrid: 3 in one byte of bits, then a run.
