@@ -12,7 +12,7 @@ use serde::Serialize;
 use trend::{ChangeKind, Series, Wear};
 
 use crate::error::Error;
-use crate::histories::{Histories, History, HistoryName};
+use crate::histories::{Flown, Histories, History, HistoryName};
 use crate::trends::Fleet;
 
 /// Shares of a unit's estimates after which it is asked.
@@ -67,8 +67,8 @@ pub fn of_histories(
 
 /// The days on which a unit is asked.
 fn cuts(history: &History) -> impl Iterator<Item = Timestamp> {
-    let estimated = history.flights().iter().filter(|f| f.gap_m.is_some());
-    let days: Vec<Timestamp> = estimated.map(|f| f.departure_utc).collect();
+    let estimated = history.flights().iter().filter(|f| f.gap_m().is_some());
+    let days: Vec<Timestamp> = estimated.map(Flown::departure_utc).collect();
     let asked = if days.len() < FEWEST { &CUTS[..0] } else { &CUTS[..] };
     asked.iter().map(move |share| days[(share * days.len() as f64) as usize])
 }

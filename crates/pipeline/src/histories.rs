@@ -1,35 +1,19 @@
-//! Every unit's flights as statements need them, gathered from tables of any length.
+//! Every unit's flights as statements need them.
 //!
 //! A fleet's store holds tens of millions of records of some fifty columns; of each flight this keeps what a
 //! trend is made from, and names once for each unit.
 
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
-use arrow::array::{Array, Float64Array};
-use fleet::{GapRecord, Installation};
-use ingest::tables::Chunk;
+use fleet::Installation;
 use jiff::Timestamp;
+
+pub use crate::flown::{Flown, Row};
+pub use crate::gathering::{Gathering, Who};
 
 /// Part number where known, and serial number.
 pub type HistoryName = (Option<String>, String);
-
-/// One flight of one unit, wherever its gap was estimated.
-#[derive(Debug, Clone, PartialEq)]
-#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
-pub struct Flown {
-    /// Which of its unit's places it was flown in.
-    pub place: u32,
-    /// How many of its unit's rows came before it, in the order of arrival.
-    pub row: u32,
-    pub flight_id: Option<Box<str>>,
-    pub departure_utc: Timestamp,
-    pub flight_hours: Option<f64>,
-    pub tail_hours_end: Option<f64>,
-    pub load_reversals: Option<u64>,
-    pub gap_m: Option<f64>,
-    pub gap_se_m: Option<f64>,
-}
 
 /// Where a unit sat, as far as its rows say.
 #[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,10 +35,12 @@ impl Place {
 }
 
 /// A unit's flights, by departure.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct History {
     places: Vec<Place>,
     flights: Vec<Flown>,
+    /// The flights' names, one after the other.
+    names: String,
 }
 
 impl History {
@@ -70,13 +56,18 @@ impl History {
 
     /// Those that departed at or before a time.
     pub(crate) fn until(&self, as_of: Timestamp) -> &[Flown] {
-        &self.flights[..self.flights.partition_point(|f| f.departure_utc <= as_of)]
+        &self.flights[..self.flights.partition_point(|f| f.departure_utc() <= as_of)]
     }
 
     /// The one that departed then.
     pub(crate) fn at(&self, departure_utc: Timestamp) -> Option<&Flown> {
-        let first = self.flights.partition_point(|f| f.departure_utc < departure_utc);
-        self.flights.get(first).filter(|f| f.departure_utc == departure_utc)
+        let first = self.flights.partition_point(|f| f.departure_utc() < departure_utc);
+        self.flights.get(first).filter(|f| f.departure_utc() == departure_utc)
+    }
+
+    /// The name of one of them.
+    pub fn flight_id(&self, flown: &Flown) -> Option<&str> {
+        flown.name_in(&self.names)
     }
 
     /// Where one of them was flown.
@@ -90,16 +81,23 @@ impl History {
         let is_here = |stay: &&&Installation| {
             tail_number.as_deref() == Some(stay.tail_number.as_str())
                 && position.as_deref() == Some(stay.position.as_str())
-                && stay.covers(flown.departure_utc)
+                && stay.covers(flown.departure_utc())
         };
         stays.iter().find(is_here).copied()
     }
 
-    fn key<'a>(&'a self, flown: &'a Flown) -> Key<'a> {
-        (flown.departure_utc, self.place(flown), flown.flight_id.as_deref())
+    fn key<'a>(&'a self, flown: &Flown) -> Key<'a> {
+        (flown.departure_us(), self.place(flown), self.flight_id(flown))
     }
 
-    fn place_of(&mut self, tail_number: Option<&str>, position: Option<&str>) -> u32 {
+    /// Puts down a flight behind the others.
+    pub(crate) fn put(&mut self, place: u32, row: &Row<'_>) {
+        let flown = Flown::new(row, place, self.flights.len() as u32, &mut self.names);
+        self.flights.push(flown);
+    }
+
+    /// The number of a place.
+    pub(crate) fn place_of(&mut self, tail_number: Option<&str>, position: Option<&str>) -> u32 {
         // A unit sits where it sat in the row before, or in one of a handful of places.
         let known = self.places.iter().rposition(|place| place.is(tail_number, position));
         let at = known.unwrap_or_else(|| {
@@ -110,13 +108,15 @@ impl History {
         at as u32
     }
 
-    /// The same whatever order the rows came in.
-    fn sort(&mut self) {
-        let places = &self.places;
+    /// The same whatever order the rows came in; nothing grows any more.
+    pub(crate) fn finish(&mut self) {
+        self.flights.shrink_to_fit();
+        self.names.shrink_to_fit();
+        let (places, names) = (&self.places, &self.names);
         let place = |flown: &Flown| &places[flown.place as usize];
         let order = |a: &Flown, b: &Flown| {
-            let names = || place(a).cmp(place(b)).then_with(|| a.flight_id.cmp(&b.flight_id));
-            a.departure_utc.cmp(&b.departure_utc).then_with(names)
+            let rest = || place(a).cmp(place(b)).then_with(|| a.name_in(names).cmp(&b.name_in(names)));
+            a.departure_us().cmp(&b.departure_us()).then_with(rest)
         };
         if !self.flights.is_sorted_by(|a, b| order(a, b) != Ordering::Greater) {
             self.flights.sort_by(order);
@@ -125,13 +125,17 @@ impl History {
 }
 
 /// All units' flights.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct Histories {
     units: BTreeMap<HistoryName, History>,
     is_booked: bool,
 }
 
 impl Histories {
+    pub(crate) fn new(units: BTreeMap<HistoryName, History>, is_booked: bool) -> Self {
+        Self { units, is_booked }
+    }
+
     /// Whether these are the store's own, whose flights belong to stays of the installations table.
     ///
     /// Those of a table made elsewhere may be of other aircraft under the same names.
@@ -156,14 +160,14 @@ impl Histories {
 
     /// The last departure of all.
     pub fn newest_utc(&self) -> Option<Timestamp> {
-        self.units.values().filter_map(|history| history.flights.last()).map(|f| f.departure_utc).max()
+        self.units.values().filter_map(|history| history.flights.last()).map(Flown::departure_utc).max()
     }
 
     /// The last departure of all but the flights that others hold.
     pub(crate) fn newest_without_utc(&self, others: &Self) -> Option<Timestamp> {
         let last = |(name, history): (&HistoryName, &History)| {
             let held = others.held(name);
-            history.flights.iter().rev().find(|f| !held.contains(&history.key(f))).map(|f| f.departure_utc)
+            history.flights.iter().rev().find(|f| !held.contains(&history.key(f))).map(Flown::departure_utc)
         };
         self.units.iter().filter_map(last).max()
     }
@@ -173,7 +177,11 @@ impl Histories {
         let left = |name: &HistoryName| {
             let (history, held) = (self.get(name)?, others.held(name));
             let flights = history.flights.iter().filter(|f| !held.contains(&history.key(f)));
-            let left = History { places: history.places.clone(), flights: flights.cloned().collect() };
+            let left = History {
+                places: history.places.clone(),
+                flights: flights.copied().collect(),
+                names: history.names.clone(),
+            };
             (!left.flights.is_empty()).then(|| (name.clone(), left))
         };
         Self { units: names.iter().filter_map(left).collect(), is_booked: self.is_booked }
@@ -186,162 +194,4 @@ impl Histories {
 }
 
 /// By what a unit's flight is known.
-type Key<'a> = (Timestamp, &'a Place, Option<&'a str>);
-
-/// Who flew, and where.
-#[derive(Debug, Clone, Copy)]
-#[expect(missing_docs, reason = "each field is named for the contract's column")]
-pub struct Who<'a> {
-    pub part_number: Option<&'a str>,
-    pub serial_number: &'a str,
-    pub tail_number: Option<&'a str>,
-    pub position: Option<&'a str>,
-}
-
-/// Histories while their rows come in.
-#[derive(Debug, Default)]
-pub struct Gathering {
-    /// Units by serial number; a serial number is unique only with its part number.
-    by_serial: HashMap<String, Vec<usize>>,
-    units: Vec<(HistoryName, History)>,
-    last: usize,
-}
-
-impl Gathering {
-    /// The columns a chunk may bring; `serial_number`, `departure_utc` and `gap_m` it must.
-    pub const COLUMNS: [&'static str; 13] = [
-        "serial_number",
-        "serial",
-        "part_number",
-        "tail_number",
-        "tail",
-        "position",
-        "flight_id",
-        "departure_utc",
-        "flight_hours",
-        "tail_hours_end",
-        "load_reversals",
-        "gap_m",
-        "gap_se_m",
-    ];
-
-    /// Puts down the rows of a chunk.
-    ///
-    /// # Errors
-    /// When a column that must be there is not, and the first cell that cannot be read.
-    pub fn add(&mut self, chunk: &Chunk) -> Result<(), ingest::Error> {
-        let column = |names: &[&str]| chunk.column(names).map(Some);
-        let (serial, departure) = (column(&["serial_number", "serial"])?, column(&["departure_utc"])?);
-        let gaps_m = chunk.numbers(column(&["gap_m"])?)?;
-        let (serials, departures) = (chunk.texts(serial)?, chunk.instants(departure)?);
-        let text = |names: &[&str]| chunk.texts(chunk.find(names));
-        let [parts, tails, positions, flights] =
-            [&["part_number"][..], &["tail_number", "tail"], &["position"], &["flight_id"]].map(text);
-        let (parts, tails, positions, flights) = (parts?, tails?, positions?, flights?);
-        let [hours, meters, reversals, errors_m] =
-            ["flight_hours", "tail_hours_end", "load_reversals", "gap_se_m"]
-                .map(|name| chunk.numbers(chunk.find(&[name])));
-        let (hours, meters, reversals, errors_m) = (hours?, meters?, reversals?, errors_m?);
-        for row in 0..chunk.len() {
-            let empty = |column| chunk.error(row, column, "it is empty".into());
-            let serial_number = serials.get(row).ok_or_else(|| empty(serial))?;
-            let departure_us = departures.is_valid(row).then(|| departures.value(row));
-            let departure_utc = departure_us.ok_or_else(|| empty(departure))?;
-            let departure_utc = Timestamp::from_microsecond(departure_utc)
-                .map_err(|e| chunk.error(row, departure, e.to_string()))?;
-            let who = Who {
-                part_number: parts.get(row),
-                serial_number,
-                tail_number: tails.get(row),
-                position: positions.get(row),
-            };
-            let flown = Flown {
-                place: 0,
-                row: 0,
-                flight_id: flights.get(row).map(Box::from),
-                departure_utc,
-                flight_hours: at(&hours, row),
-                tail_hours_end: at(&meters, row),
-                load_reversals: at(&reversals, row).map(|n| n as u64),
-                gap_m: at(&gaps_m, row),
-                gap_se_m: at(&errors_m, row),
-            };
-            self.put(who, flown);
-        }
-        Ok(())
-    }
-
-    /// Puts down a flight, whose place and row are found here.
-    pub fn put(&mut self, who: Who<'_>, flown: Flown) {
-        let unit = self.unit(who.part_number, who.serial_number);
-        let history = &mut self.units[unit].1;
-        let (place, row) = (history.place_of(who.tail_number, who.position), history.flights.len() as u32);
-        history.flights.push(Flown { place, row, ..flown });
-    }
-
-    /// Puts down what a record says.
-    pub(crate) fn record(&mut self, record: &GapRecord) {
-        let GapRecord { flight, estimate, .. } = record;
-        let who = Who {
-            part_number: Some(record.part_number.as_str()),
-            serial_number: record.serial_number.as_str(),
-            tail_number: Some(flight.tail_number.as_str()),
-            position: Some(record.position.as_str()),
-        };
-        let flown = Flown {
-            place: 0,
-            row: 0,
-            flight_id: Some(flight.flight_id.as_str().into()),
-            departure_utc: flight.departure_utc,
-            flight_hours: flight.flight_hours,
-            tail_hours_end: flight.tail_hours_end,
-            load_reversals: u64::try_from(estimate.load_reversals).ok(),
-            gap_m: estimate.gap_m,
-            gap_se_m: estimate.gap_se_m,
-        };
-        self.put(who, flown);
-    }
-
-    /// Where a unit is kept. Most tables have one unit's rows together, or one flight's.
-    fn unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
-        let is = |(part, serial): &HistoryName| serial == serial_number && part.as_deref() == part_number;
-        if self.units.get(self.last).is_some_and(|(name, _)| is(name)) {
-            return self.last;
-        }
-        let units = &self.units;
-        let known = self.by_serial.get(serial_number);
-        let known = known.and_then(|all| all.iter().copied().find(|&unit| is(&units[unit].0)));
-        self.last = known.unwrap_or_else(|| {
-            let name = (part_number.map(str::to_owned), serial_number.to_owned());
-            self.by_serial.entry(name.1.clone()).or_default().push(self.units.len());
-            self.units.push((name, History::default()));
-            self.units.len() - 1
-        });
-        self.last
-    }
-
-    /// The histories of a table made elsewhere.
-    pub fn foreign(self) -> Histories {
-        self.finish(false)
-    }
-
-    /// The histories of the store, whose flights belong to stays of the installations table.
-    pub fn booked(self) -> Histories {
-        self.finish(true)
-    }
-
-    fn finish(self, is_booked: bool) -> Histories {
-        let sorted = |(name, mut history): (HistoryName, History)| {
-            // Room to grow is half as much again, and nothing grows any more.
-            history.flights.shrink_to_fit();
-            history.sort();
-            (name, history)
-        };
-        Histories { units: self.units.into_iter().map(sorted).collect(), is_booked }
-    }
-}
-
-/// The number of a row.
-pub(crate) fn at(numbers: &Float64Array, row: usize) -> Option<f64> {
-    numbers.is_valid(row).then(|| numbers.value(row))
-}
+type Key<'a> = (i64, &'a Place, Option<&'a str>);

@@ -8,7 +8,8 @@ use jiff::{SignedDuration, Timestamp};
 use store::{Query, Store};
 
 use crate::error::Error;
-use crate::histories::at;
+use crate::gathering::at;
+use crate::parts::read_each;
 
 /// As far back as is looked: some months of flights.
 const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
@@ -57,10 +58,8 @@ pub fn lately(store: &Store, until: Timestamp) -> Result<Lately, Error> {
     let until_utc = until.checked_add(SignedDuration::from_micros(1)).ok();
     let query = Query { since_utc, until_utc, ..Query::default() };
     let mut found = Lately::new();
-    store.visit_columns(&query, &COLUMNS, |batch| {
-        add(&mut found, &Chunk::new(Path::new("results"), batch, 0))
-            .map_err(|e| Error::refused(e.complaint()))
-    })?;
+    let parts = store.parts(&query, &COLUMNS)?;
+    read_each(&parts, |batch| add(&mut found, &Chunk::new(Path::new("results"), batch.clone(), 0)))?;
     for looks in found.values_mut() {
         looks.sort_by(|a, b| (a.departure_utc, &a.flight_id).cmp(&(b.departure_utc, &b.flight_id)));
     }

@@ -225,7 +225,7 @@ impl Compose<'_> {
         let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
         let part = part.and_then(|part| self.config.parts.get(&part));
         let pace = pace(records);
-        let last = records.last().map_or(row.as_of_utc, |r| r.departure_utc);
+        let last = records.last().map_or(row.as_of_utc, Flown::departure_utc);
         let at = |hours: Option<f64>| date(last, hours? / pace?.0);
         Statement {
             state: row.state.map(str::to_owned),
@@ -304,23 +304,23 @@ fn foreseen(then: &TrendRow, now: &TrendRow, hours: f64, days_ago: i64) -> Optio
 
 /// Hours flown after a day; nothing when a flight does not say its length.
 fn flown_hours(records: &[Flown], after: Timestamp) -> Option<f64> {
-    records.iter().filter(|r| r.departure_utc > after).map(|r| r.flight_hours).sum()
+    records.iter().filter(|r| r.departure_utc() > after).map(Flown::flight_hours).sum()
 }
 
 /// Hours a day and hours a flight over the last ninety days of flights.
 fn pace(records: &[Flown]) -> Option<(f64, f64)> {
-    let last = records.last()?.departure_utc;
-    let from = records.partition_point(|r| days(r.departure_utc, last) > 90.0);
+    let last = records.last()?.departure_utc();
+    let from = records.partition_point(|r| days(r.departure_utc(), last) > 90.0);
     let (first, since) = records[from..].split_first()?;
-    let hours: f64 = since.iter().map(|r| r.flight_hours).sum::<Option<f64>>()?;
-    let days = days(first.departure_utc, last);
+    let hours: f64 = since.iter().map(Flown::flight_hours).sum::<Option<f64>>()?;
+    let days = days(first.departure_utc(), last);
     (hours > 0.0 && days > 0.0).then(|| (hours / days, hours / since.len() as f64))
 }
 
 /// The fan on the calendar, at this unit's use; nothing where that is not known.
 fn forecast(drawn: &Outlook, flown: &[Flown]) -> Vec<Banded> {
     let Some((last, (hours_per_day, _))) = flown.last().zip(pace(flown)) else { return Vec::new() };
-    let at = |hours: f64| date(last.departure_utc, hours / hours_per_day);
+    let at = |hours: f64| date(last.departure_utc(), hours / hours_per_day);
     drawn.ahead.iter().filter_map(|(hours, band)| banded(at(*hours), band)).collect()
 }
 
@@ -370,15 +370,15 @@ fn events(row: &TrendRow, stays: &[Stay]) -> Vec<Event> {
 fn quality(records: &[Flown], rest: &[Rest], as_of: Timestamp) -> Quality {
     let (mut reasons, mut doubts) = (BTreeMap::new(), BTreeMap::new());
     for (flown, rest) in records.iter().map(|flown| (flown, &rest[flown.row as usize])) {
-        if flown.gap_m.is_none() {
+        if flown.gap_m().is_none() {
             *reasons.entry(rest.reason.clone().unwrap_or_default()).or_default() += 1;
         }
         for flag in &rest.flags {
             *doubts.entry(flag.clone()).or_default() += 1;
         }
     }
-    let estimated = records.iter().filter(|r| r.gap_m.is_some());
-    let last = estimated.clone().next_back().map(|r| r.departure_utc);
+    let estimated = records.iter().filter(|r| r.gap_m().is_some());
+    let last = estimated.clone().next_back().map(Flown::departure_utc);
     let count = estimated.count();
     Quality {
         estimated: count,
@@ -399,7 +399,7 @@ fn ranked(counts: BTreeMap<String, usize>) -> Vec<(String, usize)> {
 
 /// The spread of neighbouring flights' differences, by the median, over the joint standard error.
 fn noise(records: &[Flown]) -> Option<f64> {
-    let gaps: Vec<(f64, f64)> = records.iter().filter_map(|r| Some((r.gap_m?, r.gap_se_m?))).collect();
+    let gaps: Vec<(f64, f64)> = records.iter().filter_map(|r| Some((r.gap_m()?, r.gap_se_m()?))).collect();
     let ratio = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0).abs() / pair[0].1.hypot(pair[1].1);
     let mut ratios: Vec<f64> = gaps.windows(2).map(ratio).filter(|r| r.is_finite()).collect();
     ratios.sort_by(f64::total_cmp);
@@ -409,21 +409,21 @@ fn noise(records: &[Flown]) -> Option<f64> {
 fn flight(history: &History, flown: &Flown, rest: &Rest) -> FlightRow {
     let place = history.place(flown);
     let others = rest.flags.iter().filter(|flag| Some(*flag) != rest.reason.as_ref()).cloned();
-    let remark = |reason: &String| match flown.gap_m {
+    let remark = |reason: &String| match flown.gap_m() {
         None => format!("refused: {reason}"),
         Some(_) => reason.clone(),
     };
     FlightRow {
-        departure_utc: flown.departure_utc,
-        flight_id: flown.flight_id.as_deref().unwrap_or_default().to_owned(),
+        departure_utc: flown.departure_utc(),
+        flight_id: history.flight_id(flown).unwrap_or_default().to_owned(),
         tail_number: place.tail_number.clone().unwrap_or_default(),
         position: place.position.clone().unwrap_or_default(),
         unit_hours: rest.unit_hours,
-        gap_m: flown.gap_m,
+        gap_m: flown.gap_m(),
         gap_p05_m: rest.gap_p05_m,
         gap_p95_m: rest.gap_p95_m,
         gap_midrange_m: rest.gap_midrange_m,
-        load_reversals: flown.load_reversals,
+        load_reversals: flown.load_reversals(),
         load_p05_n: rest.load_p05_n,
         load_p95_n: rest.load_p95_n,
         remarks: rest.reason.iter().map(remark).chain(others).collect::<Vec<_>>().join(", "),
@@ -432,17 +432,19 @@ fn flight(history: &History, flown: &Flown, rest: &Rest) -> FlightRow {
 
 fn tails(histories: &Histories) -> BTreeMap<String, Tail> {
     let mut tails: BTreeMap<&str, (Tail, BTreeSet<&str>)> = BTreeMap::new();
-    let flown = histories.iter().flat_map(|(_, h)| h.flights().iter().map(|f| (h.place(f), f)));
-    for (place, record) in flown {
-        let (Some(name), Some(flight)) = (place.tail_number.as_deref(), record.flight_id.as_deref()) else {
+    let flown = histories.iter().flat_map(|(_, h)| h.flights().iter().map(move |f| (h, f)));
+    for (history, record) in flown {
+        let (Some(name), Some(flight)) =
+            (history.place(record).tail_number.as_deref(), history.flight_id(record))
+        else {
             continue;
         };
         let (tail, flights) = tails.entry(name).or_insert_with(|| (quiet(name), BTreeSet::new()));
         flights.insert(flight);
         tail.records += 1;
-        tail.last_departure_utc = tail.last_departure_utc.max(Some(record.departure_utc));
-        if record.gap_m.is_some() {
-            tail.last_estimate_utc = tail.last_estimate_utc.max(Some(record.departure_utc));
+        tail.last_departure_utc = tail.last_departure_utc.max(Some(record.departure_utc()));
+        if record.gap_m().is_some() {
+            tail.last_estimate_utc = tail.last_estimate_utc.max(Some(record.departure_utc()));
         } else {
             tail.refused += 1;
         }
@@ -493,8 +495,8 @@ impl Check {
         let near = records
             .iter()
             .rev()
-            .filter(|r| (0.0..=BESIDE_DAYS).contains(&days(r.departure_utc, self.date_utc)));
-        let mut gaps: Vec<f64> = near.filter_map(|r| r.gap_m).take(BESIDE).collect();
+            .filter(|r| (0.0..=BESIDE_DAYS).contains(&days(r.departure_utc(), self.date_utc)));
+        let mut gaps: Vec<f64> = near.filter_map(Flown::gap_m).take(BESIDE).collect();
         gaps.sort_by(f64::total_cmp);
         let middle = gaps.len() / 2;
         let median = gaps

@@ -49,7 +49,7 @@ impl TailWide {
     /// The tail whose change it is; none where it is the unit's own.
     pub(crate) fn tail<'a>(&self, change: &Change, history: &'a History) -> Option<&'a str> {
         let (flown, tail_number) = made_on(change, history)?;
-        self.0.contains(&(tail_number.to_owned(), flown.departure_utc)).then_some(tail_number)
+        self.0.contains(&(tail_number.to_owned(), flown.departure_utc())).then_some(tail_number)
     }
 }
 
@@ -63,7 +63,7 @@ fn changes<'a>(unit: usize, history: &'a History, trend: &'a Trend) -> impl Iter
     let unbooked = trend.changes.iter().filter(|c| matches!(c.kind, ChangeKind::Step | ChangeKind::Reset));
     unbooked.filter_map(move |change| {
         let (flown, tail_number) = made_on(change, history)?;
-        Some(Made { tail_number, departure_utc: flown.departure_utc, kind: change.kind, unit })
+        Some(Made { tail_number, departure_utc: flown.departure_utc(), kind: change.kind, unit })
     })
 }
 
@@ -84,11 +84,10 @@ fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], judged: &[(&History, &Trend
 
 /// Whether a unit has gaps on the change's tail some time before it, and after.
 fn is_there(history: &History, change: &Made<'_>) -> bool {
-    let on_tail = history
-        .flights()
-        .iter()
-        .filter(|f| f.gap_m.is_some() && history.place(f).tail_number.as_deref() == Some(change.tail_number));
-    let away = |f: &Flown| days(change.departure_utc, f.departure_utc);
+    let on_tail = history.flights().iter().filter(|f| {
+        f.gap_m().is_some() && history.place(f).tail_number.as_deref() == Some(change.tail_number)
+    });
+    let away = |f: &Flown| days(change.departure_utc, f.departure_utc());
     let (mut before, mut after) = (false, false);
     for days in on_tail.map(away) {
         before |= days < -SAME_DAYS;

@@ -1,10 +1,8 @@
 //! Trends of units: the store's records, per part and serial number across tails, as statements.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use fleet::{Installation, Installations, PartNumber, SerialNumber};
-use ingest::tables::Chunk;
 use jiff::Timestamp;
 use job::Config;
 use job::part::WearAxis;
@@ -15,9 +13,10 @@ use trend::{Axis, Each, FleetPrior, Observation, Series, Trend, Usage, classic};
 
 use crate::changed::{Changed, changed};
 use crate::error::Error;
-use crate::histories::{Gathering, Histories, History, HistoryName, Place};
+use crate::histories::{Flown, Gathering, Histories, History, HistoryName, Place};
 use crate::lately::{Lately, lately};
 use crate::maintenance;
+use crate::parts::read_each;
 use crate::recorder::{Moved, moved, moved_in_store};
 use crate::stays::Stays;
 use crate::tail_wide::TailWide;
@@ -316,10 +315,7 @@ fn gathered(store: &Store, query: &Query) -> Result<Histories, Error> {
     let stored: Vec<&str> =
         Gathering::COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name)).collect();
     let mut gathering = Gathering::default();
-    store.visit_columns(query, &stored, |batch| {
-        let chunk = Chunk::new(Path::new("results"), batch, 0);
-        gathering.add(&chunk).map_err(|e| Error::refused(e.complaint()))
-    })?;
+    read_each(&store.parts(query, &stored)?, |batch| gathering.add_stored(batch))?;
     Ok(gathering.booked())
 }
 
@@ -638,17 +634,14 @@ fn observed(
     unlogged: &[(&Installation, &fleet::Flight)],
 ) -> Vec<Observation> {
     let mut numbers = Numbers::default();
-    let seen = history.flights().iter().map(|f| {
-        let stay = history.stay(f, stays);
-        Observation {
-            departure_us: f.departure_utc.as_microsecond(),
-            installation: numbers.of(history.place(f), stay),
-            flight_hours: f.flight_hours,
-            tail_hours_end: f.tail_hours_end,
-            load_reversals: f.load_reversals,
-            gap_m: f.gap_m,
-            gap_se_m: f.gap_se_m.filter(|se| *se > 0.0),
-        }
+    let seen = history.flights().iter().map(|f| Observation {
+        departure_us: f.departure_us(),
+        installation: numbers.of_flown(f, history, stays),
+        flight_hours: f.flight_hours(),
+        tail_hours_end: f.tail_hours_end(),
+        load_reversals: f.load_reversals(),
+        gap_m: f.gap_m(),
+        gap_se_m: f.gap_se_m().filter(|se| *se > 0.0),
     });
     let mut observations: Vec<Observation> = seen.collect();
     observations.extend(unlogged.iter().map(|(stay, flight)| Observation {
@@ -665,15 +658,32 @@ fn observed(
 
 /// Installations of one unit, numbered as they come.
 #[derive(Default)]
-struct Numbers(Vec<(Place, Option<Timestamp>)>);
+struct Numbers<'a> {
+    known: Vec<(Place, Option<Timestamp>)>,
+    /// Place and stay of the flight before, and their number.
+    last: Option<(u32, &'a Installation, u32)>,
+}
 
-impl Numbers {
+impl<'a> Numbers<'a> {
+    /// That of a flight. Stays of one place do not overlap, so most flights are of the stay of the one before.
+    fn of_flown(&mut self, flown: &Flown, history: &History, stays: &[&'a Installation]) -> u32 {
+        let is_here =
+            |last: &(u32, &Installation, u32)| last.0 == flown.place && last.1.covers(flown.departure_utc());
+        if let Some((_, _, number)) = self.last.filter(is_here) {
+            return number;
+        }
+        let stay = history.stay(flown, stays);
+        let number = self.of(history.place(flown), stay);
+        self.last = stay.map(|stay| (flown.place, stay, number));
+        number
+    }
+
     fn of(&mut self, place: &Place, stay: Option<&Installation>) -> u32 {
         let installed_utc = stay.map(|stay| stay.installed_utc);
-        let known = self.0.iter().rposition(|(p, at)| p == place && *at == installed_utc);
+        let known = self.known.iter().rposition(|(p, at)| p == place && *at == installed_utc);
         let number = known.unwrap_or_else(|| {
-            self.0.push((place.clone(), installed_utc));
-            self.0.len() - 1
+            self.known.push((place.clone(), installed_utc));
+            self.known.len() - 1
         });
         number as u32
     }
@@ -771,7 +781,7 @@ fn change_point(change: &trend::Change, history: &History, wide: &TailWide) -> O
     let flight = history.at(departure_utc);
     Some(ChangePoint {
         departure_utc,
-        flight_id: flight.and_then(|f| f.flight_id.as_deref().map(str::to_owned)),
+        flight_id: flight.and_then(|f| history.flight_id(f)).map(str::to_owned),
         kind: match change.kind {
             trend::ChangeKind::Step => "step",
             trend::ChangeKind::Reset => "reset",

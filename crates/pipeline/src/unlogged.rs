@@ -60,8 +60,8 @@ impl<'a> Known<'a> {
         let mut known = Self { departures: BTreeSet::new(), names: BTreeSet::new() };
         for f in history.flights() {
             let Some(tail) = history.place(f).tail_number.as_deref() else { continue };
-            known.departures.insert((tail, f.departure_utc));
-            known.names.extend(f.flight_id.as_deref().map(|id| (tail, id, f.departure_utc)));
+            known.departures.insert((tail, f.departure_utc()));
+            known.names.extend(history.flight_id(f).map(|id| (tail, id, f.departure_utc())));
         }
         known
     }

@@ -17,7 +17,7 @@ use crate::place::Place;
 use crate::stats;
 
 /// Rows of a row group: small enough that one tail's history decodes little of a big file.
-const GROUP_ROWS: usize = 16_384;
+pub(crate) const GROUP_ROWS: usize = 16_384;
 
 /// Hexadecimal digits of a blake3 digest.
 const DIGEST_DIGITS: usize = 64;

@@ -141,12 +141,14 @@ impl Store {
     /// # Errors
     /// [`Error::Damaged`] for the first that differs.
     pub(crate) fn check(&self, files: &[PathBuf]) -> Result<(), Error> {
-        let mut sound = self.sound.lock().unwrap_or_else(PoisonError::into_inner);
+        let sound = || self.sound.lock().unwrap_or_else(PoisonError::into_inner);
         for file in files {
-            if !sound.contains(file) {
+            // Not held meanwhile: those who read side by side compare side by side.
+            let is_known = sound().contains(file);
+            if !is_known {
                 self.place.bring(file)?;
                 datafile::check(file)?;
-                sound.insert(file.clone());
+                sound().insert(file.clone());
             }
         }
         Ok(())

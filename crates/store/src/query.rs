@@ -1,5 +1,10 @@
 //! What is asked of the records, and by what a record is known.
 
+use arrow::array::{BooleanArray, RecordBatch, StringArray, TimestampMicrosecondArray};
+use arrow::compute::cast;
+use arrow::compute::kernels::cmp::{eq, gt_eq, lt};
+use arrow::datatypes::{DataType, TimeUnit as ArrowUnit};
+use arrow::error::ArrowError;
 use fleet::GapRecord;
 use jiff::Timestamp;
 use polars::prelude::{Expr, Scalar, TimeUnit, TimeZone, col, lit};
@@ -90,6 +95,30 @@ impl Query {
         let until = self.until_utc.map(|until| departure().lt(time(until_us(until))));
         texts.chain(since).chain(until).reduce(Expr::and)
     }
+
+    /// The columns by which rows are told to fit.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = &'static str> {
+        let is_timed = self.since_utc.or(self.until_utc).is_some();
+        self.texts().map(|(column, _)| column).chain(is_timed.then_some("departure_utc"))
+    }
+
+    /// The same condition on the rows of a batch that has these columns, one answer for each part of it.
+    pub(crate) fn fits(&self, batch: &RecordBatch) -> impl Iterator<Item = Result<BooleanArray, ArrowError>> {
+        let column = |name: &str| batch.schema_ref().index_of(name).map(|at| batch.column(at));
+        let texts = self.texts().map(move |(name, value)| eq(column(name)?, &StringArray::new_scalar(value)));
+        let departures = move || cast(column("departure_utc")?, &micros());
+        let bound = |time: Timestamp| {
+            let bound = TimestampMicrosecondArray::from(vec![until_us(time)]).with_timezone("UTC");
+            arrow::array::Scalar::new(bound)
+        };
+        let since = self.since_utc.map(|since| gt_eq(&departures()?, &bound(since)));
+        let until = self.until_utc.map(|until| lt(&departures()?, &bound(until)));
+        texts.chain(since).chain(until)
+    }
+}
+
+fn micros() -> DataType {
+    DataType::Timestamp(ArrowUnit::Microsecond, Some("UTC".into()))
 }
 
 /// The first whole microsecond at or after a time.

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::SchemaRef;
@@ -19,9 +18,6 @@ use crate::stats::Stats;
 use crate::table::{Snapshot, Table};
 use crate::tabled::Tabled;
 use crate::{columns, numbered, tabled};
-
-/// Files read together by [`Store::visit_columns`]: enough to read them side by side.
-const FILES_AT_ONCE: usize = 16;
 
 impl Store {
     /// The records that fit, as columns, by departure, tail, flight and position.
@@ -60,28 +56,6 @@ impl Store {
                 .for_each(&mut take);
         }
         Ok(snapshot.version)
-    }
-
-    /// Hands over some columns of the records that fit, some files at a time, in no order.
-    ///
-    /// What is held at once is a few files' columns, so a whole fleet's take no more memory than what the
-    /// caller keeps of them. `query.last` asks for an order and is not heard.
-    ///
-    /// # Errors
-    /// As [`Store::scan`], for a name that no column has, and what the caller cannot take.
-    pub fn visit_columns<E: From<Error>>(
-        &self,
-        query: &Query,
-        names: &[&str],
-        mut take: impl FnMut(RecordBatch) -> Result<(), E>,
-    ) -> Result<(), E> {
-        let schema = frame::only(&columns::schema(), names)?;
-        for files in Self::holders(&self.gaps.snapshot()?, query).chunks(FILES_AT_ONCE) {
-            self.check(files)?;
-            let (schema, condition) = (Arc::clone(&schema), query.condition());
-            take(Read { files, schema, condition, order: &[], last: None }.collect()?)?;
-        }
-        Ok(())
     }
 
     /// Every unit with a record, by part and serial number.
@@ -157,7 +131,7 @@ impl Store {
     }
 
     /// The files that may hold an answer.
-    fn holders(snapshot: &Snapshot, query: &Query) -> Vec<PathBuf> {
+    pub(crate) fn holders(snapshot: &Snapshot, query: &Query) -> Vec<PathBuf> {
         let files = snapshot.files.iter().filter(|file| file.has_rows() && query.may_be_in(&file.stats));
         files.map(|file| file.path.clone()).collect()
     }

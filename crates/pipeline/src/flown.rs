@@ -1,0 +1,100 @@
+//! One flight of one unit in as few bytes as its numbers take: a fleet has tens of millions of them.
+
+use jiff::Timestamp;
+
+/// What a row says of one flight of one unit, wherever its gap was estimated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
+pub struct Row<'a> {
+    pub flight_id: Option<&'a str>,
+    pub departure_utc: Timestamp,
+    pub flight_hours: Option<f64>,
+    pub tail_hours_end: Option<f64>,
+    pub load_reversals: Option<u64>,
+    pub gap_m: Option<f64>,
+    pub gap_se_m: Option<f64>,
+}
+
+/// A flight as a unit's history keeps it, in 64 bytes; its name lies with the names of the unit's others.
+#[derive(Debug, Clone, Copy)]
+pub struct Flown {
+    departure_us: i64,
+    /// Numbers; `NaN` where the row says none.
+    flight_hours: f64,
+    tail_hours_end: f64,
+    gap_m: f64,
+    gap_se_m: f64,
+    /// The largest number where the row says none.
+    load_reversals: u64,
+    /// Which of its unit's places it was flown in.
+    pub(crate) place: u32,
+    /// How many of its unit's rows came before it, in the order of arrival.
+    pub(crate) row: u32,
+    /// Where its name begins and ends among its unit's names; at one place where it has none.
+    name: [u32; 2],
+}
+
+impl Flown {
+    /// Puts down a flight, and its name behind those of its unit's others.
+    pub(crate) fn new(row: &Row<'_>, place: u32, before: u32, names: &mut String) -> Self {
+        let begin = names.len() as u32;
+        names.push_str(row.flight_id.unwrap_or_default());
+        Self {
+            departure_us: row.departure_utc.as_microsecond(),
+            flight_hours: row.flight_hours.unwrap_or(f64::NAN),
+            tail_hours_end: row.tail_hours_end.unwrap_or(f64::NAN),
+            gap_m: row.gap_m.unwrap_or(f64::NAN),
+            gap_se_m: row.gap_se_m.unwrap_or(f64::NAN),
+            load_reversals: row.load_reversals.unwrap_or(u64::MAX),
+            place,
+            row: before,
+            name: [begin, names.len() as u32],
+        }
+    }
+
+    /// Its name among those of its unit's flights.
+    pub(crate) fn name_in<'a>(&self, names: &'a str) -> Option<&'a str> {
+        let name = &names[self.name[0] as usize..self.name[1] as usize];
+        (!name.is_empty()).then_some(name)
+    }
+
+    /// Departure, µs since 1970 UTC.
+    pub fn departure_us(&self) -> i64 {
+        self.departure_us
+    }
+
+    /// Departure, to the microsecond.
+    pub fn departure_utc(&self) -> Timestamp {
+        // It was an instant when it was put down, so it is one now.
+        Timestamp::from_microsecond(self.departure_us).unwrap_or_default()
+    }
+
+    /// Its length, hours.
+    pub fn flight_hours(&self) -> Option<f64> {
+        known(self.flight_hours)
+    }
+
+    /// The tail's hours after it.
+    pub fn tail_hours_end(&self) -> Option<f64> {
+        known(self.tail_hours_end)
+    }
+
+    /// Load reversals in it.
+    pub fn load_reversals(&self) -> Option<u64> {
+        (self.load_reversals != u64::MAX).then_some(self.load_reversals)
+    }
+
+    /// The gap, m; none of a refused flight.
+    pub fn gap_m(&self) -> Option<f64> {
+        known(self.gap_m)
+    }
+
+    /// Its standard error, m.
+    pub fn gap_se_m(&self) -> Option<f64> {
+        known(self.gap_se_m)
+    }
+}
+
+fn known(number: f64) -> Option<f64> {
+    (!number.is_nan()).then_some(number)
+}

@@ -1,0 +1,139 @@
+//! Some columns of the records, file by file: for those who go over all of them.
+//!
+//! A whole fleet's records are tens of millions of rows whose names repeat, so texts stay dictionaries as they lie
+//! in the files, numbers are not copied, and whoever has threads may read several files at once.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, BooleanArray, RecordBatch, new_null_array};
+use arrow::compute::{and, cast};
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use arrow::error::ArrowError;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{
+    ArrowPredicateFn, ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowFilter,
+};
+
+use crate::datafile::GROUP_ROWS;
+use crate::error::Error;
+use crate::layout::Store;
+use crate::query::Query;
+use crate::{columns, frame};
+
+/// Files that may hold records that fit, of one version of the table.
+#[derive(Debug)]
+pub struct Parts {
+    store: Store,
+    files: Vec<PathBuf>,
+    query: Query,
+    schema: SchemaRef,
+}
+
+impl Store {
+    /// Some columns of the records that fit, in parts of a file each.
+    ///
+    /// `query.last` asks for an order and is not heard.
+    ///
+    /// # Errors
+    /// [`Error::Table`] when the log cannot be read, and for a name that no column has.
+    pub fn parts(&self, query: &Query, names: &[&str]) -> Result<Parts, Error> {
+        let wanted = frame::only(&columns::schema(), names)?;
+        let schema = Arc::new(Schema::new(wanted.fields().iter().map(|f| coded(f)).collect::<Vec<_>>()));
+        let files = Self::holders(&self.gaps.snapshot()?, query);
+        Ok(Parts { store: self.clone(), files, query: query.clone(), schema })
+    }
+}
+
+impl Parts {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.files.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.files.is_empty()
+    }
+
+    /// The rows of one that fit, as they are stored: times in µs UTC, texts as dictionaries of `Int32` keys.
+    ///
+    /// # Errors
+    /// [`Error::Damaged`] when the file is not the one that was committed, [`Error::Io`], [`Error::Parquet`] and
+    /// [`Error::Arrow`] when it cannot be read.
+    pub fn read(&self, part: usize) -> Result<Vec<RecordBatch>, Error> {
+        let path = &self.files[part];
+        self.store.check(std::slice::from_ref(path))?;
+        let mut builder = opened(path)?;
+        if let Some(filter) = self.filter(&builder)? {
+            builder = builder.with_row_filter(filter);
+        }
+        let mask = mask(&builder, self.schema.fields().iter().map(|field| field.name().as_str()));
+        // A group's dictionary serves its rows alone.
+        let rows = builder.with_projection(mask).with_batch_size(GROUP_ROWS).build()?;
+        rows.map(|batch| self.wanted(&batch?)).collect()
+    }
+
+    /// The rows that fit, told by the columns that are asked for.
+    fn filter(&self, builder: &ParquetRecordBatchReaderBuilder<File>) -> Result<Option<RowFilter>, Error> {
+        let asked: Vec<&str> = self.query.columns().collect();
+        if asked.is_empty() {
+            return Ok(None);
+        }
+        let has = builder.schema();
+        asked.iter().try_for_each(|name| has.index_of(name).map(drop))?;
+        let query = self.query.clone();
+        let fits = ArrowPredicateFn::new(mask(builder, asked.into_iter()), move |batch| fits(&query, &batch));
+        Ok(Some(RowFilter::new(vec![Box::new(fits)])))
+    }
+
+    /// The wanted columns of a batch: one that came with a later release is empty.
+    fn wanted(&self, batch: &RecordBatch) -> Result<RecordBatch, Error> {
+        let column = |field: &Arc<Field>| match batch.column_by_name(field.name()) {
+            Some(column) if column.data_type() == field.data_type() => Ok(Arc::clone(column)),
+            Some(column) => cast(column, field.data_type()),
+            None => Ok(new_null_array(field.data_type(), batch.num_rows())),
+        };
+        let columns = self.schema.fields().iter().map(column).collect::<Result<Vec<ArrayRef>, _>>()?;
+        Ok(RecordBatch::try_new(Arc::clone(&self.schema), columns)?)
+    }
+}
+
+/// A column's form in a part.
+fn coded(field: &Field) -> Field {
+    match field.data_type() {
+        DataType::Utf8 => field.clone().with_data_type(dictionary()),
+        _ => field.clone(),
+    }
+}
+
+fn dictionary() -> DataType {
+    DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
+}
+
+/// A file whose texts are to stay dictionaries.
+fn opened(path: &Path) -> Result<ParquetRecordBatchReaderBuilder<File>, Error> {
+    let file = File::open(path).map_err(Error::io(path, "opened"))?;
+    let found = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())?;
+    let fields: Vec<Field> = found.schema().fields().iter().map(|field| coded(field)).collect();
+    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields)));
+    let read_so = ArrowReaderMetadata::try_new(Arc::clone(found.metadata()), options)?;
+    Ok(ParquetRecordBatchReaderBuilder::new_with_metadata(file, read_so))
+}
+
+fn mask<'a>(
+    builder: &ParquetRecordBatchReaderBuilder<File>,
+    names: impl Iterator<Item = &'a str>,
+) -> ProjectionMask {
+    let roots: Vec<usize> = names.filter_map(|name| builder.schema().index_of(name).ok()).collect();
+    ProjectionMask::roots(builder.parquet_schema(), roots)
+}
+
+fn fits(query: &Query, batch: &RecordBatch) -> Result<BooleanArray, ArrowError> {
+    let mut all = BooleanArray::from(vec![true; batch.num_rows()]);
+    for one in query.fits(batch) {
+        all = and(&all, &one?)?;
+    }
+    Ok(all)
+}
