@@ -15,17 +15,12 @@ pub struct Row<'a> {
     pub gap_se_m: Option<f64>,
 }
 
-/// A flight as a unit's history keeps it, in 64 bytes; its name lies with the names of the unit's others.
+/// A flight as a unit's history keeps it, in 32 bytes.
 #[derive(Debug, Clone, Copy)]
 pub struct Flown {
     departure_us: i64,
-    /// Numbers; `NaN` where the row says none.
-    flight_hours: f64,
-    tail_hours_end: f64,
+    /// `NaN` for none.
     gap_m: f64,
-    gap_se_m: f64,
-    /// The largest number where the row says none.
-    load_reversals: u64,
     /// Which of its unit's places it was flown in.
     pub(crate) place: u32,
     /// How many of its unit's rows came before it, in the order of arrival.
@@ -35,21 +30,22 @@ pub struct Flown {
 }
 
 impl Flown {
-    /// Puts down a flight, and its name behind those of its unit's others.
-    pub(crate) fn new(row: &Row<'_>, place: u32, before: u32, names: &mut String) -> Self {
-        let begin = names.len() as u32;
-        names.push_str(row.flight_id.unwrap_or_default());
+    /// A flight whose name is not known yet.
+    pub(crate) fn new(row: &Row<'_>, place: u32, before: u32) -> Self {
         Self {
             departure_us: row.departure_utc.as_microsecond(),
-            flight_hours: row.flight_hours.unwrap_or(f64::NAN),
-            tail_hours_end: row.tail_hours_end.unwrap_or(f64::NAN),
             gap_m: row.gap_m.unwrap_or(f64::NAN),
-            gap_se_m: row.gap_se_m.unwrap_or(f64::NAN),
-            load_reversals: row.load_reversals.unwrap_or(u64::MAX),
             place,
             row: before,
-            name: [begin, names.len() as u32],
+            name: [0, 0],
         }
+    }
+
+    /// The same with its name, which is put down behind those of its unit's others.
+    pub(crate) fn named(self, name: &str, names: &mut String) -> Self {
+        let begin = names.len() as u32;
+        names.push_str(name);
+        Self { name: [begin, names.len() as u32], ..self }
     }
 
     /// Its name among those of its unit's flights.
@@ -69,7 +65,45 @@ impl Flown {
         Timestamp::from_microsecond(self.departure_us).unwrap_or_default()
     }
 
-    /// Its length, hours.
+    /// The gap, m; none of a refused flight.
+    pub fn gap_m(&self) -> Option<f64> {
+        known(self.gap_m)
+    }
+}
+
+/// What else a row says of a flight, in 32 bytes: a statement needs it only until usage is added up.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside {
+    /// Numbers; `NaN` for none.
+    flight_hours: f64,
+    tail_hours_end: f64,
+    gap_se_m: f64,
+    /// The largest number for none.
+    load_reversals: u64,
+}
+
+impl Default for Beside {
+    fn default() -> Self {
+        Self {
+            flight_hours: f64::NAN,
+            tail_hours_end: f64::NAN,
+            gap_se_m: f64::NAN,
+            load_reversals: u64::MAX,
+        }
+    }
+}
+
+impl Beside {
+    pub(crate) fn of(row: &Row<'_>) -> Self {
+        Self {
+            flight_hours: row.flight_hours.unwrap_or(f64::NAN),
+            tail_hours_end: row.tail_hours_end.unwrap_or(f64::NAN),
+            gap_se_m: row.gap_se_m.unwrap_or(f64::NAN),
+            load_reversals: row.load_reversals.unwrap_or(u64::MAX),
+        }
+    }
+
+    /// The flight's length, hours.
     pub fn flight_hours(&self) -> Option<f64> {
         known(self.flight_hours)
     }
@@ -84,12 +118,7 @@ impl Flown {
         (self.load_reversals != u64::MAX).then_some(self.load_reversals)
     }
 
-    /// The gap, m; none of a refused flight.
-    pub fn gap_m(&self) -> Option<f64> {
-        known(self.gap_m)
-    }
-
-    /// Its standard error, m.
+    /// The gap's standard error, m.
     pub fn gap_se_m(&self) -> Option<f64> {
         known(self.gap_se_m)
     }

@@ -3,32 +3,51 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use arrow::array::{Array, ArrayRef, AsArray, DictionaryArray, Float64Array, RecordBatch, StringArray};
-use arrow::datatypes::Int32Type;
+use arrow::array::{Array, Float64Array, RecordBatch};
 use fleet::GapRecord;
-use ingest::tables::{Chunk, Texts};
+use ingest::tables::Chunk;
 use jiff::Timestamp;
 
-use crate::flown::Row;
-use crate::histories::{Histories, History, HistoryName};
+use crate::flown::{Beside, Flown, Row};
+use crate::histories::{Histories, History, HistoryName, Places};
+use crate::seats::{Names, Seats, Seen, Who};
+use crate::shelf::Shelves;
 
-/// Who flew, and where.
-#[derive(Debug, Clone, Copy)]
-#[expect(missing_docs, reason = "each field is named for the contract's column")]
-pub struct Who<'a> {
-    pub part_number: Option<&'a str>,
-    pub serial_number: &'a str,
-    pub tail_number: Option<&'a str>,
-    pub position: Option<&'a str>,
-}
+/// Rows of a block: its 36 MiB are more than what any allocator keeps to itself once they are given up.
+const BLOCK_ROWS: usize = 1 << 19;
 
 /// Histories while their rows come in.
+///
+/// Most rows are of another unit than the row before. So they are put down in the order of arrival, and each unit's
+/// are brought together at the end, when it is known how many there are: nothing grows, and no row is moved twice.
 #[derive(Debug, Default)]
 pub struct Gathering {
     /// Units by serial number; a serial number is unique only with its part number.
     by_serial: HashMap<String, Vec<usize>>,
-    units: Vec<(HistoryName, History)>,
+    units: Vec<(HistoryName, Places)>,
+    /// Rows of each unit, and bytes of its flights' names.
+    counts: Vec<(u32, usize)>,
     last: usize,
+    /// The unit that came after each the last time.
+    follows: Vec<usize>,
+    blocks: Vec<Block>,
+}
+
+/// Rows in the order of arrival, and their flights' names one after the other.
+#[derive(Debug, Default)]
+struct Block {
+    rows: Vec<Put>,
+    names: String,
+}
+
+/// A row that was put down.
+#[derive(Debug)]
+struct Put {
+    unit: u32,
+    /// Where its flight's name ends in the block.
+    name_end: u32,
+    flown: Flown,
+    beside: Beside,
 }
 
 impl Gathering {
@@ -55,20 +74,7 @@ impl Gathering {
     /// When a column that must be there is not, and the first cell that cannot be read.
     pub fn add(&mut self, chunk: &Chunk) -> Result<(), ingest::Error> {
         chunk.column(&["serial_number", "serial"])?;
-        let columns: [&[&str]; 5] = [
-            &["serial_number", "serial"],
-            &["part_number"],
-            &["tail_number", "tail"],
-            &["position"],
-            &["flight_id"],
-        ];
-        let [serials, parts, tails, positions, flights] =
-            columns.map(|names| chunk.texts(chunk.find(names)).map(Names::Plain));
-        self.rows(
-            chunk,
-            &Seats { serials: serials?, parts: parts?, tails: tails?, positions: positions? },
-            &flights?,
-        )
+        self.rows(chunk, &Seats::of_chunk(chunk)?, &Names::plain(chunk, &["flight_id"])?)
     }
 
     /// Puts down rows of the store, whose texts are dictionaries.
@@ -77,17 +83,8 @@ impl Gathering {
     /// The first cell that cannot be read.
     pub(crate) fn add_stored(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
         let chunk = Chunk::new(Path::new("results"), batch.clone(), 0);
-        let names = |name: &str| {
-            let coded = batch.column_by_name(name).and_then(Names::coded);
-            coded.map_or_else(|| Ok(Names::Plain(chunk.texts(chunk.find(&[name]))?)), Ok)
-        };
-        let [serials, parts, tails, positions, flights] =
-            ["serial_number", "part_number", "tail_number", "position", "flight_id"].map(names);
-        self.rows(
-            &chunk,
-            &Seats { serials: serials?, parts: parts?, tails: tails?, positions: positions? },
-            &flights?,
-        )
+        let flights = Names::stored(batch, &chunk, "flight_id")?;
+        self.rows(&chunk, &Seats::stored(batch, &chunk)?, &flights)
     }
 
     fn rows(&mut self, chunk: &Chunk, seats: &Seats, flights: &Names) -> Result<(), ingest::Error> {
@@ -102,12 +99,12 @@ impl Gathering {
         let mut seen = Seen::default();
         for row in 0..chunk.len() {
             let empty = |column| chunk.error(row, column, "it is empty".into());
-            let serial_number = seats.serials.get(row).ok_or_else(|| empty(serial))?;
+            let serial_number = seats.serial(row).ok_or_else(|| empty(serial))?;
             let departure_us = departures.is_valid(row).then(|| departures.value(row));
             let departure_utc = departure_us.ok_or_else(|| empty(departure))?;
             let departure_utc = Timestamp::from_microsecond(departure_utc)
                 .map_err(|e| chunk.error(row, departure, e.to_string()))?;
-            let seat = seen.seat(seats, row).unwrap_or_else(|| {
+            let seat = seen.get(seats, row).unwrap_or_else(|| {
                 let seat = self.seat(seats.who(row, serial_number));
                 seen.put(seats, row, seat);
                 seat
@@ -121,7 +118,7 @@ impl Gathering {
                 gap_m: at(&gaps_m, row),
                 gap_se_m: at(&errors_m, row),
             };
-            self.units[seat.unit].1.put(seat.place, &said);
+            self.put_down(seat, &said);
         }
         Ok(())
     }
@@ -129,7 +126,26 @@ impl Gathering {
     /// Puts down a flight.
     pub fn put(&mut self, who: Who<'_>, row: &Row<'_>) {
         let seat = self.seat(who);
-        self.units[seat.unit].1.put(seat.place, row);
+        self.put_down(seat, row);
+    }
+
+    fn put_down(&mut self, seat: Seat, row: &Row<'_>) {
+        if self.blocks.last().is_none_or(|block| block.rows.len() == BLOCK_ROWS) {
+            self.blocks.push(Block { rows: Vec::with_capacity(BLOCK_ROWS), names: String::new() });
+        }
+        let last = self.blocks.len() - 1;
+        let block = &mut self.blocks[last];
+        let (rows, bytes) = &mut self.counts[seat.unit];
+        let name = row.flight_id.unwrap_or_default();
+        block.names.push_str(name);
+        block.rows.push(Put {
+            unit: seat.unit as u32,
+            name_end: block.names.len() as u32,
+            flown: Flown::new(row, seat.place, *rows),
+            beside: Beside::of(row),
+        });
+        *rows += 1;
+        *bytes += name.len();
     }
 
     /// Puts down what a record says.
@@ -155,25 +171,34 @@ impl Gathering {
 
     fn seat(&mut self, who: Who<'_>) -> Seat {
         let unit = self.unit(who.part_number, who.serial_number);
-        Seat { unit, place: self.units[unit].1.place_of(who.tail_number, who.position) }
+        Seat { unit, place: self.units[unit].1.number(who.tail_number, who.position) }
     }
 
-    /// Where a unit is kept. Most tables have one unit's rows together, or one flight's.
+    /// Where a unit is kept. Most tables have one unit's rows together, or the units in one order every night.
     fn unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
         let is = |(part, serial): &HistoryName| serial == serial_number && part.as_deref() == part_number;
-        if self.units.get(self.last).is_some_and(|(name, _)| is(name)) {
-            return self.last;
-        }
         let units = &self.units;
+        let follows = self.follows.get(self.last).copied();
+        let expected = [Some(self.last), follows].into_iter().flatten();
+        if let Some(unit) = expected.into_iter().find(|unit| units.get(*unit).is_some_and(|(n, _)| is(n))) {
+            self.last = unit;
+            return unit;
+        }
         let known = self.by_serial.get(serial_number);
         let known = known.and_then(|all| all.iter().copied().find(|&unit| is(&units[unit].0)));
-        self.last = known.unwrap_or_else(|| {
-            let name = (part_number.map(str::to_owned), serial_number.to_owned());
-            self.by_serial.entry(name.1.clone()).or_default().push(self.units.len());
-            self.units.push((name, History::default()));
-            self.units.len() - 1
-        });
-        self.last
+        let unit = known.unwrap_or_else(|| self.new_unit(part_number, serial_number));
+        self.follows[self.last] = unit;
+        self.last = unit;
+        unit
+    }
+
+    fn new_unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
+        let (unit, name) = (self.units.len(), (part_number.map(str::to_owned), serial_number.to_owned()));
+        self.by_serial.entry(name.1.clone()).or_default().push(unit);
+        self.units.push((name, Places::default()));
+        self.counts.push((0, 0));
+        self.follows.push(0);
+        unit
     }
 
     /// The histories of a table made elsewhere.
@@ -186,9 +211,27 @@ impl Gathering {
         self.finish(true)
     }
 
-    fn finish(mut self, is_booked: bool) -> Histories {
-        self.units.iter_mut().for_each(|(_, history)| history.finish());
-        Histories::new(self.units.into_iter().collect(), is_booked)
+    fn finish(self, is_booked: bool) -> Histories {
+        let mut in_order: Vec<usize> = (0..self.units.len()).collect();
+        in_order.sort_by_key(|unit| &self.units[*unit].0);
+        let rows: Vec<usize> = self.counts.iter().map(|(rows, _)| *rows as usize).collect();
+        let mut shelves = Shelves::with_room(&rows, in_order.into_iter());
+        let rooms = self.units.into_iter().zip(self.counts);
+        let room = |((name, places), (rows, bytes))| (name, History::with_room(places, rows as usize, bytes));
+        let mut units: Vec<(HistoryName, History)> = rooms.map(room).collect();
+        // Each block is given up before the next is read.
+        for Block { rows, names } in self.blocks {
+            let mut begin = 0;
+            for Put { unit, name_end, flown, beside } in rows {
+                let (unit, name) = (unit as usize, &names[begin..name_end as usize]);
+                shelves.put(unit, flown.row, beside);
+                units[unit].1.put(flown, name);
+                begin = name_end as usize;
+            }
+        }
+        let full = units.into_iter().zip(shelves.of_units());
+        let full = full.map(|((name, history), beside)| (name, history.finish(beside)));
+        Histories::new(full.collect(), is_booked)
     }
 }
 
@@ -197,95 +240,6 @@ impl Gathering {
 struct Seat {
     unit: usize,
     place: u32,
-}
-
-/// Who flew and where, row by row.
-struct Seats {
-    serials: Names,
-    parts: Names,
-    tails: Names,
-    positions: Names,
-}
-
-impl Seats {
-    fn who<'a>(&'a self, row: usize, serial_number: &'a str) -> Who<'a> {
-        Who {
-            part_number: self.parts.get(row),
-            serial_number,
-            tail_number: self.tails.get(row),
-            position: self.positions.get(row),
-        }
-    }
-
-    /// Whether two rows are of one unit in one place.
-    fn are_same(&self, a: usize, b: usize) -> bool {
-        [&self.serials, &self.positions, &self.tails, &self.parts].iter().all(|names| names.are_same(a, b))
-    }
-}
-
-/// Seats of the rows before: the last one, and the last one of each serial number where these have codes.
-#[derive(Default)]
-struct Seen {
-    last: Option<(usize, Seat)>,
-    by_code: Vec<Option<(usize, Seat)>>,
-}
-
-impl Seen {
-    fn seat(&self, seats: &Seats, row: usize) -> Option<Seat> {
-        let of_code = match seats.serials.code(row) {
-            Some(code) => self.by_code.get(code).copied().flatten(),
-            None => self.last,
-        };
-        of_code.filter(|(before, _)| seats.are_same(*before, row)).map(|(_, seat)| seat)
-    }
-
-    fn put(&mut self, seats: &Seats, row: usize, seat: Seat) {
-        self.last = Some((row, seat));
-        let Some(code) = seats.serials.code(row) else { return };
-        if self.by_code.len() <= code {
-            self.by_code.resize(code + 1, None);
-        }
-        self.by_code[code] = self.last;
-    }
-}
-
-/// Texts of a column: each by itself, or as a code for one of a few.
-enum Names {
-    Plain(Texts),
-    Coded(DictionaryArray<Int32Type>, StringArray),
-}
-
-impl Names {
-    fn coded(column: &ArrayRef) -> Option<Self> {
-        let coded = column.as_dictionary_opt::<Int32Type>()?;
-        Some(Self::Coded(coded.clone(), coded.values().as_string_opt::<i32>()?.clone()))
-    }
-
-    /// The text of a row, trimmed; an empty one is none.
-    fn get(&self, row: usize) -> Option<&str> {
-        match self {
-            Self::Plain(texts) => texts.get(row),
-            Self::Coded(_, texts) => {
-                let code = self.code(row)?;
-                let text = texts.is_valid(code).then(|| texts.value(code).trim())?;
-                (!text.is_empty()).then_some(text)
-            }
-        }
-    }
-
-    fn code(&self, row: usize) -> Option<usize> {
-        match self {
-            Self::Plain(_) => None,
-            Self::Coded(coded, _) => coded.key(row),
-        }
-    }
-
-    fn are_same(&self, a: usize, b: usize) -> bool {
-        match self {
-            Self::Plain(texts) => texts.get(a) == texts.get(b),
-            Self::Coded(..) => self.code(a) == self.code(b),
-        }
-    }
 }
 
 /// The number of a row.

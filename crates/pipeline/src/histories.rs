@@ -9,8 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use fleet::Installation;
 use jiff::Timestamp;
 
-pub use crate::flown::{Flown, Row};
-pub use crate::gathering::{Gathering, Who};
+pub use crate::flown::{Beside, Flown, Row};
+pub use crate::gathering::Gathering;
+pub use crate::seats::Who;
+use crate::shelf::Shelved;
 
 /// Part number where known, and serial number.
 pub type HistoryName = (Option<String>, String);
@@ -34,11 +36,31 @@ impl Place {
     }
 }
 
+/// A unit's places, as they come.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Places(Vec<Place>);
+
+impl Places {
+    /// The number of a place.
+    pub(crate) fn number(&mut self, tail_number: Option<&str>, position: Option<&str>) -> u32 {
+        // A unit sits where it sat in the row before, or in one of a handful of places.
+        let known = self.0.iter().rposition(|place| place.is(tail_number, position));
+        let at = known.unwrap_or_else(|| {
+            let owned = |name: Option<&str>| name.map(str::to_owned);
+            self.0.push(Place { tail_number: owned(tail_number), position: owned(position) });
+            self.0.len() - 1
+        });
+        at as u32
+    }
+}
+
 /// A unit's flights, by departure.
 #[derive(Debug, Clone, Default)]
 pub struct History {
     places: Vec<Place>,
     flights: Vec<Flown>,
+    /// What else their rows say; nothing once it was [forgotten](History::forget).
+    beside: Shelved,
     /// The flights' names, one after the other.
     names: String,
 }
@@ -70,6 +92,16 @@ impl History {
         flown.name_in(&self.names)
     }
 
+    /// What else the row of one of them says.
+    pub fn beside(&self, flown: &Flown) -> &Beside {
+        self.beside.row(flown.row)
+    }
+
+    /// Makes room: from now on nobody asks what else the rows say.
+    pub(crate) fn forget(&mut self) {
+        self.beside = Shelved::default();
+    }
+
     /// Where one of them was flown.
     pub fn place(&self, flown: &Flown) -> &Place {
         &self.places[flown.place as usize]
@@ -90,28 +122,24 @@ impl History {
         (flown.departure_us(), self.place(flown), self.flight_id(flown))
     }
 
+    /// One with places, and room for so many flights and so many bytes of their names.
+    pub(crate) fn with_room(places: Places, flights: usize, names: usize) -> Self {
+        Self {
+            places: places.0,
+            flights: Vec::with_capacity(flights),
+            beside: Shelved::default(),
+            names: String::with_capacity(names),
+        }
+    }
+
     /// Puts down a flight behind the others.
-    pub(crate) fn put(&mut self, place: u32, row: &Row<'_>) {
-        let flown = Flown::new(row, place, self.flights.len() as u32, &mut self.names);
-        self.flights.push(flown);
+    pub(crate) fn put(&mut self, flown: Flown, name: &str) {
+        self.flights.push(flown.named(name, &mut self.names));
     }
 
-    /// The number of a place.
-    pub(crate) fn place_of(&mut self, tail_number: Option<&str>, position: Option<&str>) -> u32 {
-        // A unit sits where it sat in the row before, or in one of a handful of places.
-        let known = self.places.iter().rposition(|place| place.is(tail_number, position));
-        let at = known.unwrap_or_else(|| {
-            let owned = |name: Option<&str>| name.map(str::to_owned);
-            self.places.push(Place { tail_number: owned(tail_number), position: owned(position) });
-            self.places.len() - 1
-        });
-        at as u32
-    }
-
-    /// The same whatever order the rows came in; nothing grows any more.
-    pub(crate) fn finish(&mut self) {
-        self.flights.shrink_to_fit();
-        self.names.shrink_to_fit();
+    /// With what else the rows say, and the same whatever order they came in.
+    pub(crate) fn finish(mut self, beside: Shelved) -> Self {
+        self.beside = beside;
         let (places, names) = (&self.places, &self.names);
         let place = |flown: &Flown| &places[flown.place as usize];
         let order = |a: &Flown, b: &Flown| {
@@ -121,6 +149,7 @@ impl History {
         if !self.flights.is_sorted_by(|a, b| order(a, b) != Ordering::Greater) {
             self.flights.sort_by(order);
         }
+        self
     }
 }
 
@@ -141,6 +170,11 @@ impl Histories {
     /// Those of a table made elsewhere may be of other aircraft under the same names.
     pub(crate) fn is_booked(&self) -> bool {
         self.is_booked
+    }
+
+    /// Every unit and its flights, by name, to be changed.
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (&HistoryName, &mut History)> {
+        self.units.iter_mut()
     }
 
     /// Every unit and its flights, by name.
@@ -180,11 +214,18 @@ impl Histories {
             let left = History {
                 places: history.places.clone(),
                 flights: flights.copied().collect(),
+                beside: history.beside.clone(),
                 names: history.names.clone(),
             };
             (!left.flights.is_empty()).then(|| (name.clone(), left))
         };
         Self { units: names.iter().filter_map(left).collect(), is_booked: self.is_booked }
+    }
+
+    /// Whether all flights of these are later than a time.
+    pub(crate) fn are_later(&self, time: Timestamp) -> bool {
+        let first = |history: &History| history.flights.first().is_none_or(|f| f.departure_utc() > time);
+        self.units.values().all(first)
     }
 
     fn held(&self, name: &HistoryName) -> BTreeSet<Key<'_>> {

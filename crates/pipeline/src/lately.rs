@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use arrow::array::RecordBatch;
 use ingest::tables::Chunk;
 use jiff::{SignedDuration, Timestamp};
 use store::{Query, Store};
@@ -10,6 +11,7 @@ use store::{Query, Store};
 use crate::error::Error;
 use crate::gathering::at;
 use crate::parts::read_each;
+use crate::seats::{Names, Seats, Seen, Who};
 
 /// As far back as is looked: some months of flights.
 const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
@@ -57,42 +59,68 @@ pub fn lately(store: &Store, until: Timestamp) -> Result<Lately, Error> {
     let since_utc = until.checked_sub(LOOKED_BACK).ok();
     let until_utc = until.checked_add(SignedDuration::from_micros(1)).ok();
     let query = Query { since_utc, until_utc, ..Query::default() };
-    let mut found = Lately::new();
-    let parts = store.parts(&query, &COLUMNS)?;
-    read_each(&parts, |batch| add(&mut found, &Chunk::new(Path::new("results"), batch.clone(), 0)))?;
-    for looks in found.values_mut() {
-        looks.sort_by(|a, b| (a.departure_utc, &a.flight_id).cmp(&(b.departure_utc, &b.flight_id)));
-    }
-    Ok(found)
+    let mut found = Found::default();
+    read_each(&store.parts(&query, &COLUMNS)?, |batch| found.add(batch))?;
+    Ok(found.in_order())
 }
 
-fn add(found: &mut Lately, chunk: &Chunk) -> Result<(), ingest::Error> {
-    let texts = |name: &str| chunk.texts(Some(chunk.column(&[name])?));
-    let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
-    let [tails, positions, parts, serials, flights] =
-        ["tail_number", "position", "part_number", "serial_number", "flight_id"].map(texts);
-    let (tails, positions, parts, serials, flights) = (tails?, positions?, parts?, serials?, flights?);
-    let [skews_s, stiffnesses, surprises] = ["skew_s", "stiffness_n_per_m", "nis"].map(numbers);
-    let (skews_s, stiffnesses, surprises) = (skews_s?, stiffnesses?, surprises?);
-    let departures = chunk.instants(Some(chunk.column(&["departure_utc"])?))?;
-    for row in 0..chunk.len() {
-        let text = |name: Option<&str>| name.unwrap_or_default().to_owned();
-        let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) else { continue };
-        let seat = Seat {
-            tail_number: text(tails.get(row)),
-            position: text(positions.get(row)),
-            part_number: text(parts.get(row)),
-            serial_number: text(serials.get(row)),
-        };
-        found.entry(seat).or_default().push(Look {
-            departure_utc,
-            flight_id: flights.get(row).unwrap_or_default().into(),
-            skew_s: at(&skews_s, row),
-            stiffness_n_per_m: at(&stiffnesses, row),
-            nis: at(&surprises, row),
-        });
+/// Looks while their rows come in.
+#[derive(Default)]
+struct Found {
+    by_seat: BTreeMap<Seat, usize>,
+    looks: Vec<Vec<Look>>,
+}
+
+impl Found {
+    fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
+        let chunk = Chunk::new(Path::new("results"), batch.clone(), 0);
+        let (seats, flights) = (Seats::stored(batch, &chunk)?, Names::stored(batch, &chunk, "flight_id")?);
+        let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
+        let [skews_s, stiffnesses, surprises] = ["skew_s", "stiffness_n_per_m", "nis"].map(numbers);
+        let (skews_s, stiffnesses, surprises) = (skews_s?, stiffnesses?, surprises?);
+        let departures = chunk.instants(Some(chunk.column(&["departure_utc"])?))?;
+        let mut seen = Seen::default();
+        for row in 0..chunk.len() {
+            let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) else { continue };
+            let of_seat = seen.get(&seats, row).unwrap_or_else(|| {
+                let found = self.of_seat(seats.who(row, seats.serial(row).unwrap_or_default()));
+                seen.put(&seats, row, found);
+                found
+            });
+            self.looks[of_seat].push(Look {
+                departure_utc,
+                flight_id: flights.get(row).unwrap_or_default().into(),
+                skew_s: at(&skews_s, row),
+                stiffness_n_per_m: at(&stiffnesses, row),
+                nis: at(&surprises, row),
+            });
+        }
+        Ok(())
     }
-    Ok(())
+
+    fn of_seat(&mut self, who: Who<'_>) -> usize {
+        let text = |name: Option<&str>| name.unwrap_or_default().to_owned();
+        let seat = Seat {
+            tail_number: text(who.tail_number),
+            position: text(who.position),
+            part_number: text(who.part_number),
+            serial_number: who.serial_number.to_owned(),
+        };
+        let looks = &mut self.looks;
+        *self.by_seat.entry(seat).or_insert_with(|| {
+            looks.push(Vec::new());
+            looks.len() - 1
+        })
+    }
+
+    fn in_order(mut self) -> Lately {
+        let in_order = |(seat, of_seat): (Seat, usize)| {
+            let mut looks = std::mem::take(&mut self.looks[of_seat]);
+            looks.sort_by(|a, b| (a.departure_utc, &a.flight_id).cmp(&(b.departure_utc, &b.flight_id)));
+            (seat, looks)
+        };
+        self.by_seat.into_iter().map(in_order).collect()
+    }
 }
 
 /// The newest departure of all.

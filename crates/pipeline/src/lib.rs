@@ -30,6 +30,8 @@ mod remote;
 pub mod report;
 pub mod rows;
 pub mod schedule;
+mod seats;
+mod shelf;
 pub mod simulate;
 mod stays;
 mod tail_wide;

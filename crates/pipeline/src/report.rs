@@ -206,11 +206,11 @@ impl Compose<'_> {
                 .iter()
                 .filter_map(|(us, b)| banded(Timestamp::from_microsecond(*us).ok(), b))
                 .collect(),
-            forecast: forecast(drawn, flown),
-            statement: self.statement(row, flown, &name),
-            quality: quality(flown, rest, row.as_of_utc),
+            forecast: forecast(drawn, history),
+            statement: self.statement(row, history, &name),
+            quality: quality(history, rest, row.as_of_utc),
             events: events(row, &stays),
-            past: self.past(row, flown, &name),
+            past: self.past(row, history, &name),
             inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.beside(flown)).collect(),
             flights: flown.iter().map(|flown| flight(history, flown, &rest[flown.row as usize])).collect(),
             stays,
@@ -221,10 +221,11 @@ impl Compose<'_> {
         }
     }
 
-    fn statement(&self, row: &TrendRow, records: &[Flown], name: &Name) -> Statement {
+    fn statement(&self, row: &TrendRow, history: &History, name: &Name) -> Statement {
         let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
         let part = part.and_then(|part| self.config.parts.get(&part));
-        let pace = pace(records);
+        let records = history.flights();
+        let pace = pace(history);
         let last = records.last().map_or(row.as_of_utc, Flown::departure_utc);
         let at = |hours: Option<f64>| date(last, hours? / pace?.0);
         Statement {
@@ -265,10 +266,10 @@ impl Compose<'_> {
     }
 
     /// What was foreseen for today, and what is found.
-    fn past(&self, row: &TrendRow, records: &[Flown], name: &Name) -> Vec<Past> {
+    fn past(&self, row: &TrendRow, history: &History, name: &Name) -> Vec<Past> {
         let of_day = |days: &i64| {
             let then = self.before.get(days)?.get(name)?;
-            foreseen(then, row, flown_hours(records, then.as_of_utc)?, *days)
+            foreseen(then, row, flown_hours(history, then.as_of_utc)?, *days)
         };
         LOOK_BACK_DAYS.iter().filter_map(of_day).collect()
     }
@@ -303,23 +304,26 @@ fn foreseen(then: &TrendRow, now: &TrendRow, hours: f64, days_ago: i64) -> Optio
 }
 
 /// Hours flown after a day; nothing when a flight does not say its length.
-fn flown_hours(records: &[Flown], after: Timestamp) -> Option<f64> {
-    records.iter().filter(|r| r.departure_utc() > after).map(Flown::flight_hours).sum()
+fn flown_hours(history: &History, after: Timestamp) -> Option<f64> {
+    let since = history.flights().iter().filter(|r| r.departure_utc() > after);
+    since.map(|r| history.beside(r).flight_hours()).sum()
 }
 
 /// Hours a day and hours a flight over the last ninety days of flights.
-fn pace(records: &[Flown]) -> Option<(f64, f64)> {
+fn pace(history: &History) -> Option<(f64, f64)> {
+    let records = history.flights();
     let last = records.last()?.departure_utc();
     let from = records.partition_point(|r| days(r.departure_utc(), last) > 90.0);
     let (first, since) = records[from..].split_first()?;
-    let hours: f64 = since.iter().map(Flown::flight_hours).sum::<Option<f64>>()?;
+    let hours: f64 = since.iter().map(|r| history.beside(r).flight_hours()).sum::<Option<f64>>()?;
     let days = days(first.departure_utc(), last);
     (hours > 0.0 && days > 0.0).then(|| (hours / days, hours / since.len() as f64))
 }
 
 /// The fan on the calendar, at this unit's use; nothing where that is not known.
-fn forecast(drawn: &Outlook, flown: &[Flown]) -> Vec<Banded> {
-    let Some((last, (hours_per_day, _))) = flown.last().zip(pace(flown)) else { return Vec::new() };
+fn forecast(drawn: &Outlook, history: &History) -> Vec<Banded> {
+    let last = history.flights().last();
+    let Some((last, (hours_per_day, _))) = last.zip(pace(history)) else { return Vec::new() };
     let at = |hours: f64| date(last.departure_utc(), hours / hours_per_day);
     drawn.ahead.iter().filter_map(|(hours, band)| banded(at(*hours), band)).collect()
 }
@@ -367,7 +371,8 @@ fn events(row: &TrendRow, stays: &[Stay]) -> Vec<Event> {
     row.change_points.iter().map(event).collect()
 }
 
-fn quality(records: &[Flown], rest: &[Rest], as_of: Timestamp) -> Quality {
+fn quality(history: &History, rest: &[Rest], as_of: Timestamp) -> Quality {
+    let records = history.flights();
     let (mut reasons, mut doubts) = (BTreeMap::new(), BTreeMap::new());
     for (flown, rest) in records.iter().map(|flown| (flown, &rest[flown.row as usize])) {
         if flown.gap_m().is_none() {
@@ -387,7 +392,7 @@ fn quality(records: &[Flown], rest: &[Rest], as_of: Timestamp) -> Quality {
         doubts: ranked(doubts),
         last_estimate_utc: last,
         days_since_estimate: last.map(|last| days(last, as_of)),
-        noise_found_over_stated: noise(records),
+        noise_found_over_stated: noise(history),
     }
 }
 
@@ -398,8 +403,9 @@ fn ranked(counts: BTreeMap<String, usize>) -> Vec<(String, usize)> {
 }
 
 /// The spread of neighbouring flights' differences, by the median, over the joint standard error.
-fn noise(records: &[Flown]) -> Option<f64> {
-    let gaps: Vec<(f64, f64)> = records.iter().filter_map(|r| Some((r.gap_m()?, r.gap_se_m()?))).collect();
+fn noise(history: &History) -> Option<f64> {
+    let gap = |r: &Flown| Some((r.gap_m()?, history.beside(r).gap_se_m()?));
+    let gaps: Vec<(f64, f64)> = history.flights().iter().filter_map(gap).collect();
     let ratio = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0).abs() / pair[0].1.hypot(pair[1].1);
     let mut ratios: Vec<f64> = gaps.windows(2).map(ratio).filter(|r| r.is_finite()).collect();
     ratios.sort_by(f64::total_cmp);
@@ -423,7 +429,7 @@ fn flight(history: &History, flown: &Flown, rest: &Rest) -> FlightRow {
         gap_p05_m: rest.gap_p05_m,
         gap_p95_m: rest.gap_p95_m,
         gap_midrange_m: rest.gap_midrange_m,
-        load_reversals: flown.load_reversals(),
+        load_reversals: history.beside(flown).load_reversals(),
         load_p05_n: rest.load_p05_n,
         load_p95_n: rest.load_p95_n,
         remarks: rest.reason.iter().map(remark).chain(others).collect::<Vec<_>>().join(", "),

@@ -78,13 +78,14 @@ fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], judged: &[(&History, &Trend
     if stepped.len() < 2 {
         return false;
     }
-    let able = judged.iter().filter(|(history, _)| is_there(history, change)).count();
+    let able = judged.iter().filter(|(history, trend)| is_there(history, trend.as_of_us, change)).count();
     stepped.len() as f64 >= SHARE * able as f64
 }
 
-/// Whether a unit has gaps on the change's tail some time before it, and after.
-fn is_there(history: &History, change: &Made<'_>) -> bool {
-    let on_tail = history.flights().iter().filter(|f| {
+/// Whether a unit has gaps on the change's tail some time before it, and after, by a day.
+fn is_there(history: &History, as_of_us: i64, change: &Made<'_>) -> bool {
+    let known = history.flights().iter().take_while(|f| f.departure_us() <= as_of_us);
+    let on_tail = known.filter(|f| {
         f.gap_m().is_some() && history.place(f).tail_number.as_deref() == Some(change.tail_number)
     });
     let away = |f: &Flown| days(change.departure_utc, f.departure_utc());

@@ -158,10 +158,11 @@ pub fn of_store(
     ask: &Ask,
 ) -> Result<Vec<TrendRow>, Error> {
     // A statement leans on what the part's other units teach, so what is asked selects rows, not records.
-    let histories = in_store(store)?;
+    let mut histories = in_store(store)?;
     let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
     let moved = moved_in_store(store, as_of)?;
-    of_asked(config, installations, &histories, ask, moved)
+    let fleet = Fleet::alone(config, installations, &mut histories, &[as_of])?.beside(moved);
+    fleet.asked(ask, as_of)
 }
 
 /// What a run's units say.
@@ -193,7 +194,7 @@ pub fn of_units(
     let (all, tonight) = (in_store(store)?, gathered(store, &query)?);
     let lately = all.newest_utc().map(|newest| lately(store, newest)).transpose()?.unwrap_or_default();
     let moved = moved(&lately);
-    let (now, changed) = of_night(config, installations, &all, &tonight, units, moved)?;
+    let (now, changed) = of_night(config, installations, all, &tonight, units, moved)?;
     Ok(Night { now, changed, lately })
 }
 
@@ -204,7 +205,7 @@ pub fn of_units(
 pub fn of_night(
     config: &Config,
     installations: &Installations,
-    all: &Histories,
+    mut all: Histories,
     tonight: &Histories,
     units: &[Unit],
     moved: Vec<Moved>,
@@ -214,15 +215,23 @@ pub fn of_night(
     let Some(as_of) = all.newest_utc() else { return Ok(Default::default()) };
     let before_utc = all.newest_without_utc(tonight);
     let days: Vec<Timestamp> = before_utc.into_iter().chain([as_of]).collect();
-    let fleet = Fleet::new(config, installations, all, &days)?.beside(moved);
+    // Flights later than all others change nothing of what is said of a day before them; but where a flights
+    // table is given, those without a row are counted from a unit's rows.
+    let is_later =
+        config.flights.iter().next().is_none() && before_utc.is_none_or(|before| tonight.are_later(before));
+    let earlier = if is_later { Histories::default() } else { all.without(&names, tonight) };
+    let fleet = Fleet::alone(config, installations, &mut all, &days)?.beside(moved);
     let mut now = fleet.statements(names.iter(), as_of)?;
     now.retain(|row| row.flights > 0);
     let Some(before_utc) = before_utc else { return Ok((now, Vec::new())) };
-    let earlier = all.without(&names, tonight);
-    let fleet =
-        Fleet { priors: fleet.priors, turns: fleet.turns, ..Fleet::read(config, installations, &earlier)? };
-    let before = fleet.statements(earlier.names(), before_utc)?;
-    let before = before.into_iter().map(|row| (row.name(), row)).collect();
+    let before = if is_later {
+        fleet.statements(names.iter(), before_utc)?
+    } else {
+        let read = Fleet::read(config, installations, &earlier)?;
+        let fleet = Fleet { priors: fleet.priors, turns: fleet.turns, ..read };
+        fleet.statements(earlier.names(), before_utc)?
+    };
+    let before = before.into_iter().filter(|row| row.flights > 0).map(|row| (row.name(), row)).collect();
     let news = changed(&before, &now);
     Ok((now, news))
 }
@@ -258,7 +267,7 @@ pub(crate) fn told(
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
     let fleet = Fleet::new(config, installations, histories, &days)?.beside(moved);
-    let now = fleet.asked(histories, ask, as_of)?;
+    let now = fleet.asked(ask, as_of)?;
     let names: Vec<HistoryName> =
         now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
     let drawn =
@@ -329,19 +338,8 @@ pub fn of_histories(
     histories: &Histories,
     ask: &Ask,
 ) -> Result<Vec<TrendRow>, Error> {
-    of_asked(config, installations, histories, ask, Vec::new())
-}
-
-fn of_asked(
-    config: &Config,
-    installations: &Installations,
-    histories: &Histories,
-    ask: &Ask,
-    moved: Vec<Moved>,
-) -> Result<Vec<TrendRow>, Error> {
     let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
-    let fleet = Fleet::new(config, installations, histories, &[as_of])?.beside(moved);
-    fleet.asked(histories, ask, as_of)
+    Fleet::new(config, installations, histories, &[as_of])?.asked(ask, as_of)
 }
 
 /// Part numbers that share a prior.
@@ -386,20 +384,26 @@ impl<'a> Fleet<'a> {
         histories: &'a Histories,
         days: &[Timestamp],
     ) -> Result<Self, Error> {
-        let mut fleet = Self::read(config, installations, histories)?;
-        let parts: BTreeSet<Option<&str>> = fleet.units.keys().map(|name| name.0.as_deref()).collect();
-        let first = fleet.units.values().filter_map(|(_, series)| series.flights().first());
-        if let Some((first_us, last)) = first.map(|f| f.departure_us).min().zip(days.iter().max()) {
-            fleet.turns = Turns::of(first_us, last.as_microsecond());
-        }
-        let turns: BTreeSet<i64> = days.iter().filter_map(|day| fleet.turns.by(*day)).collect();
-        let taught: Vec<_> = turns.par_iter().map(|turn| (*turn, fleet.taught(*turn, &parts))).collect();
-        for (turn, groups) in taught {
-            for (parts, prior) in groups {
-                fleet.priors.extend(parts.into_iter().map(|part| ((turn, part), prior.clone())));
-            }
-        }
-        Ok(fleet)
+        Ok(Self::read(config, installations, histories)?.taught_by(days))
+    }
+
+    /// The same where nobody else needs the histories: of each flight what is in its series is forgotten.
+    fn alone(
+        config: &'a Config,
+        installations: &Installations,
+        histories: &'a mut Histories,
+        days: &[Timestamp],
+    ) -> Result<Self, Error> {
+        let books = Books::read(config, installations)?;
+        let is_booked = histories.is_booked();
+        let read = |(name, history): (&HistoryName, &mut History)| {
+            let series = books.series(name, history, is_booked)?;
+            history.forget();
+            Ok(series)
+        };
+        let units: Vec<_> = histories.iter_mut().collect();
+        let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+        Ok(Self::of(config, histories, series).taught_by(days))
     }
 
     /// Reads all histories and learns nothing.
@@ -408,24 +412,36 @@ impl<'a> Fleet<'a> {
         installations: &Installations,
         histories: &'a Histories,
     ) -> Result<Self, Error> {
-        let file = config.document.logs.maintenance.as_ref();
-        let book = file.map(|file| maintenance::read(&config.path(file))).transpose()?.unwrap_or_default();
-        let unlogged = Unlogged::of_table(&config.flights);
-        let stays = Stays::new(installations);
-        let read = |(name, history): (&'a HistoryName, &'a History)| {
-            let stays = stays.of(name);
-            let booked = if histories.is_booked() { &stays[..] } else { &[] };
-            let first = stays.iter().min_by_key(|stay| stay.installed_utc);
-            let unit_hours_at_start = first.and_then(|stay| stay.unit_hours_at_install);
-            let observations = observed(history, booked, &unlogged.of_unit(history, booked));
-            let usage = Usage { unit_hours_at_start, ..Usage::default() };
-            let series = Series::new(observations, &usage)?.with_book(booked_work(&book, name));
-            Ok((name, (history, series)))
-        };
+        let books = Books::read(config, installations)?;
+        let is_booked = histories.is_booked();
         let units: Vec<_> = histories.iter().collect();
-        let units = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        let units = units.into_iter().collect();
-        Ok(Self { config, units, turns: Turns::default(), priors: BTreeMap::new(), moved: Vec::new() })
+        let read = |(name, history)| books.series(name, history, is_booked);
+        let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+        Ok(Self::of(config, histories, series))
+    }
+
+    /// Histories, and what each adds up to.
+    fn of(config: &'a Config, histories: &'a Histories, series: Vec<Series>) -> Self {
+        let units = histories.iter().zip(series);
+        let units = units.map(|((name, history), series)| (name, (history, series))).collect();
+        Self { config, units, turns: Turns::default(), priors: BTreeMap::new(), moved: Vec::new() }
+    }
+
+    /// The same with what was learned by the turn before each of the days.
+    fn taught_by(mut self, days: &[Timestamp]) -> Self {
+        let parts: BTreeSet<Option<&str>> = self.units.keys().map(|name| name.0.as_deref()).collect();
+        let first = self.units.values().filter_map(|(_, series)| series.flights().first());
+        if let Some((first_us, last)) = first.map(|f| f.departure_us).min().zip(days.iter().max()) {
+            self.turns = Turns::of(first_us, last.as_microsecond());
+        }
+        let turns: BTreeSet<i64> = days.iter().filter_map(|day| self.turns.by(*day)).collect();
+        let taught: Vec<_> = turns.par_iter().map(|turn| (*turn, self.taught(*turn, &parts))).collect();
+        for (turn, groups) in taught {
+            for (parts, prior) in groups {
+                self.priors.extend(parts.into_iter().map(|part| ((turn, part), prior.clone())));
+            }
+        }
+        self
     }
 
     /// What the parts had taught by a turn, those alike together.
@@ -518,8 +534,9 @@ impl<'a> Fleet<'a> {
     }
 
     /// The statements that are asked for, with the statistics if they are.
-    fn asked(&self, histories: &Histories, ask: &Ask, as_of: Timestamp) -> Result<Vec<TrendRow>, Error> {
-        let mut rows = self.statements(histories.names().filter(|name| ask.names(name)), as_of)?;
+    fn asked(&self, ask: &Ask, as_of: Timestamp) -> Result<Vec<TrendRow>, Error> {
+        let names = self.units.keys().copied();
+        let mut rows = self.statements(names.filter(|name| ask.names(name)), as_of)?;
         rows.retain(|row| ask.fits(row));
         self.add_statistics(&mut rows, ask.statistics);
         Ok(rows)
@@ -606,6 +623,36 @@ impl<'a> Fleet<'a> {
     }
 }
 
+/// What the books say of units beside their rows.
+struct Books<'a> {
+    maintenance: maintenance::Book,
+    unlogged: Unlogged<'a>,
+    stays: Stays<'a>,
+}
+
+impl<'a> Books<'a> {
+    fn read(config: &'a Config, installations: &'a Installations) -> Result<Self, Error> {
+        let file = config.document.logs.maintenance.as_ref();
+        let maintenance = file.map(|file| maintenance::read(&config.path(file))).transpose()?;
+        Ok(Self {
+            maintenance: maintenance.unwrap_or_default(),
+            unlogged: Unlogged::of_table(&config.flights),
+            stays: Stays::new(installations),
+        })
+    }
+
+    /// A unit's flights, added up.
+    fn series(&self, name: &HistoryName, history: &History, is_booked: bool) -> Result<Series, Error> {
+        let stays = self.stays.of(name);
+        let booked = if is_booked { &stays[..] } else { &[] };
+        let first = stays.iter().min_by_key(|stay| stay.installed_utc);
+        let unit_hours_at_start = first.and_then(|stay| stay.unit_hours_at_install);
+        let observations = observed(history, booked, &self.unlogged.of_unit(history, booked));
+        let usage = Usage { unit_hours_at_start, ..Usage::default() };
+        Ok(Series::new(observations, &usage)?.with_book(booked_work(&self.maintenance, name)))
+    }
+}
+
 /// What the maintenance book says of a unit; of one whose part number is not known, nothing.
 fn booked_work(book: &maintenance::Book, (part, serial): &HistoryName) -> Vec<trend::Booked> {
     part.clone().and_then(|part| book.get(&(part, serial.clone())).cloned()).unwrap_or_default()
@@ -634,14 +681,17 @@ fn observed(
     unlogged: &[(&Installation, &fleet::Flight)],
 ) -> Vec<Observation> {
     let mut numbers = Numbers::default();
-    let seen = history.flights().iter().map(|f| Observation {
-        departure_us: f.departure_us(),
-        installation: numbers.of_flown(f, history, stays),
-        flight_hours: f.flight_hours(),
-        tail_hours_end: f.tail_hours_end(),
-        load_reversals: f.load_reversals(),
-        gap_m: f.gap_m(),
-        gap_se_m: f.gap_se_m().filter(|se| *se > 0.0),
+    let seen = history.flights().iter().map(|f| {
+        let beside = history.beside(f);
+        Observation {
+            departure_us: f.departure_us(),
+            installation: numbers.of_flown(f, history, stays),
+            flight_hours: beside.flight_hours(),
+            tail_hours_end: beside.tail_hours_end(),
+            load_reversals: beside.load_reversals(),
+            gap_m: f.gap_m(),
+            gap_se_m: beside.gap_se_m().filter(|se| *se > 0.0),
+        }
     });
     let mut observations: Vec<Observation> = seen.collect();
     observations.extend(unlogged.iter().map(|(stay, flight)| Observation {

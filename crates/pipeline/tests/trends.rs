@@ -248,10 +248,12 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
         (fleet::PartNumber::new("EMA-27-1040").unwrap(), fleet::SerialNumber::new(serial).unwrap())
     };
     let units = [name("S03"), name("S05")];
-    let all = histories(&rows);
+    let all = || histories(&rows);
     let tonight: Vec<Row> = rows.iter().filter(|row| row.said.departure_utc >= day(200)).cloned().collect();
-    let (now, news) =
-        trends::of_night(&config(), &nobody, &all, &histories(&tonight), &units, Vec::new()).unwrap();
+    let of_night = |tonight: &Histories| {
+        trends::of_night(&config(), &nobody, all(), tonight, &units, Vec::new()).unwrap()
+    };
+    let (now, news) = of_night(&histories(&tonight));
     assert_eq!(now.len(), 2);
     let serials: Vec<&str> = news.iter().map(|unit| unit.serial_number.as_str()).collect();
     assert_eq!(serials, ["S05"]);
@@ -259,7 +261,11 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     assert_eq!(news[0].new_events[0].departure_utc, day(200));
     assert!(news[0].cleared_events.is_empty());
     assert_eq!((news[0].from, news[0].to), (Some("normal"), Some("watch")));
-    assert!(trends::of_night(&config(), &nobody, &all, &all, &units, Vec::new()).unwrap().1.is_empty());
+    // A flight of another unit that arrives late has the days before read from what was known then.
+    let late = rows.iter().find(|row| row.unit == 9 && row.said.departure_utc == day(100)).unwrap();
+    let with_late = histories(&[&tonight[..], std::slice::from_ref(late)].concat());
+    assert_eq!(of_night(&with_late), (now, news));
+    assert!(of_night(&all()).1.is_empty());
 }
 
 /// Four units of one tail rise by 8 µm with one flight, and so does one unit of another tail.

@@ -1,5 +1,7 @@
 //! Queries: the right rows, from the right files.
 
+use arrow::array::{Array, AsArray};
+use arrow::datatypes::{Float64Type, Int32Type, TimestampMicrosecondType};
 use fleet::GapRecord;
 use jiff::SignedDuration;
 use proptest::prelude::*;
@@ -71,6 +73,67 @@ fn a_query_answers_what_asking_every_row_would() {
         let first = fitting.len() - query.last.unwrap_or(usize::MAX).min(fitting.len());
         prop_assert_eq!(writer.store().records(&query).unwrap(), &fitting[first..]);
     });
+}
+
+/// Departure, serial number and gap of the rows of all parts, in order.
+fn parted(store: &Store, query: &Query) -> Vec<(i64, String, Option<u64>)> {
+    let parts = store.parts(query, &["gap_m", "serial_number", "departure_utc"]).unwrap();
+    let mut rows = Vec::new();
+    for batch in (0..parts.len()).flat_map(|part| parts.read(part).unwrap()) {
+        let gaps_m = batch.column(0).as_primitive::<Float64Type>();
+        let coded = batch.column(1).as_dictionary::<Int32Type>();
+        let serials = coded.values().as_string::<i32>();
+        let departures = batch.column(2).as_primitive::<TimestampMicrosecondType>();
+        rows.extend((0..batch.num_rows()).map(|row| {
+            let serial = serials.value(coded.key(row).unwrap()).to_owned();
+            (departures.value(row), serial, gaps_m.is_valid(row).then(|| gaps_m.value(row).to_bits()))
+        }));
+    }
+    rows.sort();
+    rows
+}
+
+#[test]
+fn parts_hold_the_rows_that_a_scan_holds() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = filled(dir.path());
+    let all = writer.store().records(&Query::default()).unwrap();
+    let wanted = |query: &Query| {
+        let row = |r: &GapRecord| {
+            let at = r.flight.departure_utc.as_microsecond();
+            (at, r.serial_number.to_string(), r.estimate.gap_m.map(f64::to_bits))
+        };
+        let mut rows: Vec<_> = all.iter().filter(|record| fits(query, record)).map(row).collect();
+        rows.sort();
+        rows
+    };
+    let config = || ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) };
+    proptest!(config(), |(query in questions())| {
+        prop_assert_eq!(parted(writer.store(), &query), wanted(&query));
+    });
+    // Nor does it matter whether a night's rows lie together, or a unit's.
+    writer.compact().unwrap();
+    let store = Store::open(dir.path()).unwrap();
+    assert_eq!(store.parts(&Query::default(), &["gap_m"]).unwrap().len(), 1);
+    proptest!(config(), |(query in questions())| {
+        prop_assert_eq!(parted(&store, &query), wanted(&query));
+    });
+}
+
+#[test]
+fn a_part_with_a_flipped_byte_is_an_error_and_a_column_that_none_has_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let writer = filled(dir.path());
+    let file = writer.store().files().unwrap().remove(0);
+    let mut content = std::fs::read(&file).unwrap();
+    content[100] ^= 1;
+    std::fs::write(&file, content).unwrap();
+    let store = Store::open(dir.path()).unwrap();
+    let parts = store.parts(&Query::default(), &["gap_m"]).unwrap();
+    let damaged = (0..parts.len()).filter_map(|part| parts.read(part).err());
+    let codes: Vec<_> = damaged.map(|error| error.complaint().code).collect();
+    assert_eq!(codes, ["store_damaged"]);
+    assert!(store.parts(&Query::default(), &["gap_mm"]).is_err());
 }
 
 #[test]

@@ -1,0 +1,142 @@
+//! Who flew and where, row by row, found once for the many rows that say the same.
+
+use arrow::array::{Array, AsArray, DictionaryArray, RecordBatch, StringArray};
+use arrow::datatypes::Int32Type;
+use ingest::tables::{Chunk, Texts};
+
+/// Who flew, and where.
+#[derive(Debug, Clone, Copy)]
+#[expect(missing_docs, reason = "each field is named for the contract's column")]
+pub struct Who<'a> {
+    pub part_number: Option<&'a str>,
+    pub serial_number: &'a str,
+    pub tail_number: Option<&'a str>,
+    pub position: Option<&'a str>,
+}
+
+/// Who flew and where, row by row.
+pub(crate) struct Seats {
+    serials: Names,
+    parts: Names,
+    tails: Names,
+    positions: Names,
+}
+
+impl Seats {
+    /// Those of a table made elsewhere.
+    pub(crate) fn of_chunk(chunk: &Chunk) -> Result<Self, ingest::Error> {
+        let names: [&[&str]; 4] =
+            [&["serial_number", "serial"], &["part_number"], &["tail_number", "tail"], &["position"]];
+        let [serials, parts, tails, positions] = names.map(|names| Names::plain(chunk, names));
+        Ok(Self { serials: serials?, parts: parts?, tails: tails?, positions: positions? })
+    }
+
+    /// Those of the store.
+    pub(crate) fn stored(batch: &RecordBatch, chunk: &Chunk) -> Result<Self, ingest::Error> {
+        let names = ["serial_number", "part_number", "tail_number", "position"];
+        let [serials, parts, tails, positions] = names.map(|name| Names::stored(batch, chunk, name));
+        Ok(Self { serials: serials?, parts: parts?, tails: tails?, positions: positions? })
+    }
+
+    /// The serial number of a row; none where the cell is empty.
+    pub(crate) fn serial(&self, row: usize) -> Option<&str> {
+        self.serials.get(row)
+    }
+
+    /// Who flew in a row.
+    pub(crate) fn who<'a>(&'a self, row: usize, serial_number: &'a str) -> Who<'a> {
+        Who {
+            part_number: self.parts.get(row),
+            serial_number,
+            tail_number: self.tails.get(row),
+            position: self.positions.get(row),
+        }
+    }
+
+    /// Whether two rows are of one unit in one place.
+    fn are_same(&self, a: usize, b: usize) -> bool {
+        [&self.serials, &self.positions, &self.tails, &self.parts].iter().all(|names| names.are_same(a, b))
+    }
+}
+
+/// What was found for the seats of the rows before: of the last one, and of the last one of each serial number where these have codes.
+pub(crate) struct Seen<T> {
+    last: Option<(usize, T)>,
+    by_code: Vec<Option<(usize, T)>>,
+}
+
+impl<T> Default for Seen<T> {
+    fn default() -> Self {
+        Self { last: None, by_code: Vec::new() }
+    }
+}
+
+impl<T: Copy> Seen<T> {
+    /// What was found for a row's seat.
+    pub(crate) fn get(&self, seats: &Seats, row: usize) -> Option<T> {
+        let of_code = match seats.serials.code(row) {
+            Some(code) => self.by_code.get(code).copied().flatten(),
+            None => self.last,
+        };
+        of_code.filter(|(before, _)| seats.are_same(*before, row)).map(|(_, found)| found)
+    }
+
+    /// Keeps what was found for a row's seat.
+    pub(crate) fn put(&mut self, seats: &Seats, row: usize, found: T) {
+        self.last = Some((row, found));
+        let Some(code) = seats.serials.code(row) else { return };
+        if self.by_code.len() <= code {
+            self.by_code.resize(code + 1, None);
+        }
+        self.by_code[code] = self.last;
+    }
+}
+
+/// Texts of a column: each by itself, or as a code for one of a few.
+pub(crate) enum Names {
+    Plain(Texts),
+    Coded(DictionaryArray<Int32Type>, StringArray),
+}
+
+impl Names {
+    /// Those of a table made elsewhere, under one of their names; all none where it has none.
+    pub(crate) fn plain(chunk: &Chunk, names: &[&str]) -> Result<Self, ingest::Error> {
+        Ok(Self::Plain(chunk.texts(chunk.find(names))?))
+    }
+
+    /// Those of the store, which are dictionaries.
+    pub(crate) fn stored(batch: &RecordBatch, chunk: &Chunk, name: &str) -> Result<Self, ingest::Error> {
+        let coded = batch.column_by_name(name).and_then(|column| column.as_dictionary_opt::<Int32Type>());
+        let texts = coded.and_then(|coded| coded.values().as_string_opt::<i32>());
+        match coded.zip(texts) {
+            Some((coded, texts)) => Ok(Self::Coded(coded.clone(), texts.clone())),
+            None => Self::plain(chunk, &[name]),
+        }
+    }
+
+    /// The text of a row, trimmed; an empty one is none.
+    pub(crate) fn get(&self, row: usize) -> Option<&str> {
+        match self {
+            Self::Plain(texts) => texts.get(row),
+            Self::Coded(_, texts) => {
+                let code = self.code(row)?;
+                let text = texts.is_valid(code).then(|| texts.value(code).trim())?;
+                (!text.is_empty()).then_some(text)
+            }
+        }
+    }
+
+    fn code(&self, row: usize) -> Option<usize> {
+        match self {
+            Self::Plain(_) => None,
+            Self::Coded(coded, _) => coded.key(row),
+        }
+    }
+
+    fn are_same(&self, a: usize, b: usize) -> bool {
+        match self {
+            Self::Plain(texts) => texts.get(a) == texts.get(b),
+            Self::Coded(..) => self.code(a) == self.code(b),
+        }
+    }
+}
