@@ -39,10 +39,8 @@ impl Store {
     /// # Errors
     /// [`Error::Table`] when the log cannot be read, and for a name that no column has.
     pub fn parts(&self, query: &Query, names: &[&str]) -> Result<Parts, Error> {
-        let wanted = frame::only(&columns::schema(), names)?;
-        let schema = Arc::new(Schema::new(wanted.fields().iter().map(|f| coded(f)).collect::<Vec<_>>()));
         let files = Self::holders(&self.gaps.snapshot()?, query);
-        Ok(Parts { store: self.clone(), files, query: query.clone(), schema })
+        Ok(Parts { store: self.clone(), files, query: query.clone(), schema: schema_of(names)? })
     }
 }
 
@@ -72,7 +70,7 @@ impl Parts {
         let mask = mask(&builder, self.schema.fields().iter().map(|field| field.name().as_str()));
         // A group's dictionary serves its rows alone.
         let rows = builder.with_projection(mask).with_batch_size(GROUP_ROWS).build()?;
-        rows.map(|batch| self.wanted(&batch?)).collect()
+        rows.map(|batch| Ok(formed(&batch?, &self.schema)?)).collect()
     }
 
     /// The rows that fit, told by the columns that are asked for.
@@ -81,23 +79,28 @@ impl Parts {
         if asked.is_empty() {
             return Ok(None);
         }
-        let has = builder.schema();
-        asked.iter().try_for_each(|name| has.index_of(name).map(drop))?;
-        let query = self.query.clone();
-        let fits = ArrowPredicateFn::new(mask(builder, asked.into_iter()), move |batch| fits(&query, &batch));
+        let (query, schema) = (self.query.clone(), schema_of(&asked)?);
+        let fits = ArrowPredicateFn::new(mask(builder, asked.into_iter()), move |batch| {
+            fits(&query, &formed(&batch, &schema)?)
+        });
         Ok(Some(RowFilter::new(vec![Box::new(fits)])))
     }
+}
 
-    /// The wanted columns of a batch: one that came with a later release is empty.
-    fn wanted(&self, batch: &RecordBatch) -> Result<RecordBatch, Error> {
-        let column = |field: &Arc<Field>| match batch.column_by_name(field.name()) {
-            Some(column) if column.data_type() == field.data_type() => Ok(Arc::clone(column)),
-            Some(column) => cast(column, field.data_type()),
-            None => Ok(new_null_array(field.data_type(), batch.num_rows())),
-        };
-        let columns = self.schema.fields().iter().map(column).collect::<Result<Vec<ArrayRef>, _>>()?;
-        Ok(RecordBatch::try_new(Arc::clone(&self.schema), columns)?)
-    }
+/// Some columns of the records, in the form they have in a part.
+fn schema_of(names: &[&str]) -> Result<SchemaRef, Error> {
+    let wanted = frame::only(&columns::schema(), names)?;
+    Ok(Arc::new(Schema::new(wanted.fields().iter().map(|field| coded(field)).collect::<Vec<_>>())))
+}
+
+/// A batch's columns in the form wanted: one that came with a later release is empty.
+fn formed(batch: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
+    let column = |field: &Arc<Field>| match batch.column_by_name(field.name()) {
+        Some(column) => cast(column, field.data_type()),
+        None => Ok(new_null_array(field.data_type(), batch.num_rows())),
+    };
+    let columns = schema.fields().iter().map(column).collect::<Result<Vec<ArrayRef>, _>>()?;
+    RecordBatch::try_new(Arc::clone(schema), columns)
 }
 
 /// A column's form in a part.
@@ -136,4 +139,32 @@ fn fits(query: &Query, batch: &RecordBatch) -> Result<BooleanArray, ArrowError> 
         all = and(&all, &one?)?;
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use arrow::array::{LargeStringArray, TimestampNanosecondArray};
+    use jiff::Timestamp;
+
+    use super::*;
+
+    /// Files that another program wrote may hold long texts and nanoseconds, and lack what came later.
+    #[test]
+    fn a_column_is_asked_and_handed_over_in_one_form_whatever_form_a_file_has() {
+        let texts: ArrayRef = Arc::new(LargeStringArray::from(vec!["N1", "N2", "N1"]));
+        let times = TimestampNanosecondArray::from(vec![1_000_000_000, 2_000_000_000, 3_000_000_000]);
+        let times: ArrayRef = Arc::new(times.with_timezone("UTC"));
+        let batch = RecordBatch::try_from_iter([("tail_number", texts), ("departure_utc", times)]).unwrap();
+        let found =
+            formed(&batch, &schema_of(&["departure_utc", "tail_number", "skew_se_s"]).unwrap()).unwrap();
+        assert_eq!(found.column(1).data_type(), &dictionary());
+        assert_eq!(found.column(2).null_count(), 3);
+        let query = Query {
+            tail_number: Some("N1".into()),
+            since_utc: Some(Timestamp::from_second(2).unwrap()),
+            ..Query::default()
+        };
+        assert_eq!(fits(&query, &found).unwrap(), BooleanArray::from(vec![false, false, true]));
+        assert!(formed(&batch, &schema_of(&["serial_number"]).unwrap()).is_err());
+    }
 }

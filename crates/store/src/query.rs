@@ -1,9 +1,7 @@
 //! What is asked of the records, and by what a record is known.
 
 use arrow::array::{BooleanArray, RecordBatch, StringArray, TimestampMicrosecondArray};
-use arrow::compute::cast;
 use arrow::compute::kernels::cmp::{eq, gt_eq, lt};
-use arrow::datatypes::{DataType, TimeUnit as ArrowUnit};
 use arrow::error::ArrowError;
 use fleet::GapRecord;
 use jiff::Timestamp;
@@ -102,23 +100,18 @@ impl Query {
         self.texts().map(|(column, _)| column).chain(is_timed.then_some("departure_utc"))
     }
 
-    /// The same condition on the rows of a batch that has these columns, one answer for each part of it.
+    /// The same condition on the rows of a batch of these columns, times in µs, one answer for each part of it.
     pub(crate) fn fits(&self, batch: &RecordBatch) -> impl Iterator<Item = Result<BooleanArray, ArrowError>> {
         let column = |name: &str| batch.schema_ref().index_of(name).map(|at| batch.column(at));
         let texts = self.texts().map(move |(name, value)| eq(column(name)?, &StringArray::new_scalar(value)));
-        let departures = move || cast(column("departure_utc")?, &micros());
         let bound = |time: Timestamp| {
             let bound = TimestampMicrosecondArray::from(vec![until_us(time)]).with_timezone("UTC");
             arrow::array::Scalar::new(bound)
         };
-        let since = self.since_utc.map(|since| gt_eq(&departures()?, &bound(since)));
-        let until = self.until_utc.map(|until| lt(&departures()?, &bound(until)));
+        let since = self.since_utc.map(|since| gt_eq(column("departure_utc")?, &bound(since)));
+        let until = self.until_utc.map(|until| lt(column("departure_utc")?, &bound(until)));
         texts.chain(since).chain(until)
     }
-}
-
-fn micros() -> DataType {
-    DataType::Timestamp(ArrowUnit::Microsecond, Some("UTC".into()))
 }
 
 /// The first whole microsecond at or after a time.
