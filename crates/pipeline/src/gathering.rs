@@ -246,3 +246,106 @@ struct Seat {
 pub(crate) fn at(numbers: &Float64Array, row: usize) -> Option<f64> {
     numbers.is_valid(row).then(|| numbers.value(row))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow::array::{ArrayRef, Int64Array, StringArray, TimestampMicrosecondArray};
+    use arrow::compute::cast;
+    use arrow::datatypes::DataType;
+
+    use super::*;
+
+    /// Whole numbers below a bound that look like chance.
+    fn chances() -> impl FnMut(u64) -> u64 {
+        let mut state = 7_u64;
+        move |bound| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % bound
+        }
+    }
+
+    /// A row's texts (part, serial number, tail, position, flight), its departure and its gap.
+    type Cells = ([Option<String>; 5], i64, Option<f64>);
+
+    /// Serial numbers of two parts, units that move about, names with a blank, and flights that arrive late.
+    fn rows() -> Vec<Cells> {
+        let mut chance = chances();
+        let mut row = |at: i64| {
+            let mut text = |name: &str, count| (chance(9) > 0).then(|| format!("{name}{}", chance(count)));
+            let (part, tail, position, flight) =
+                (text("P", 2), text("T", 3), text("place ", 2), text(" F", 40));
+            let serial = Some(format!("S{}", chance(4)));
+            let departure_us = 1_000_000 * (at - chance(20) as i64);
+            ([part, serial, tail, position, flight], departure_us, (chance(5) > 0).then(|| chance(90) as f64))
+        };
+        (0..600).map(&mut row).collect()
+    }
+
+    fn batch(rows: &[Cells], texts: &DataType) -> RecordBatch {
+        let names = ["part_number", "serial_number", "tail_number", "position", "flight_id"];
+        let text = |column: usize| {
+            let plain: StringArray = rows.iter().map(|(texts, ..)| texts[column].as_deref()).collect();
+            cast(&plain, texts).unwrap()
+        };
+        let departures: TimestampMicrosecondArray = rows.iter().map(|row| Some(row.1)).collect();
+        let gaps_m: Float64Array = rows.iter().map(|row| row.2).collect();
+        let reversals: Int64Array = rows.iter().map(|row| row.2.map(|gap| gap as i64)).collect();
+        let numbers: [(&str, ArrayRef); 3] = [
+            ("departure_utc", Arc::new(departures)),
+            ("gap_m", Arc::new(gaps_m)),
+            ("load_reversals", Arc::new(reversals)),
+        ];
+        let texts = names.into_iter().enumerate().map(|(column, name)| (name, text(column)));
+        RecordBatch::try_from_iter(texts.chain(numbers)).unwrap()
+    }
+
+    /// Each row by itself, as the tables mean it.
+    fn one_by_one(rows: &[Cells]) -> Histories {
+        let mut gathering = Gathering::default();
+        for ([part, serial, tail, position, flight], departure_us, gap_m) in rows {
+            let who = Who {
+                part_number: part.as_deref(),
+                serial_number: serial.as_deref().unwrap(),
+                tail_number: tail.as_deref(),
+                position: position.as_deref(),
+            };
+            let row = Row {
+                flight_id: flight.as_deref().map(str::trim),
+                departure_utc: Timestamp::from_microsecond(*departure_us).unwrap(),
+                flight_hours: None,
+                tail_hours_end: None,
+                load_reversals: gap_m.map(|gap| gap as u64),
+                gap_m: *gap_m,
+                gap_se_m: None,
+            };
+            gathering.put(who, &row);
+        }
+        gathering.booked()
+    }
+
+    #[test]
+    fn rows_of_the_store_and_of_a_foreign_table_are_what_each_of_them_is_by_itself() {
+        let rows = rows();
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let (mut stored, mut plain) = (Gathering::default(), Gathering::default());
+        // In other parts names have other codes.
+        for some in rows.chunks(230) {
+            stored.add_stored(&batch(some, &coded)).unwrap();
+            plain.add(&Chunk::new("table".as_ref(), batch(some, &DataType::Utf8), 0)).unwrap();
+        }
+        let expected = format!("{:?}", one_by_one(&rows));
+        assert_eq!(format!("{:?}", stored.booked()), expected);
+        assert_eq!(format!("{:?}", plain.booked()), expected);
+    }
+
+    #[test]
+    fn a_row_without_a_serial_number_is_told_by_its_number() {
+        let mut rows = rows();
+        rows[17].0[1] = Some("  ".into());
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let error = Gathering::default().add_stored(&batch(&rows, &coded)).unwrap_err();
+        assert_eq!(error.complaint().place().unwrap(), "column `serial_number`, row 18");
+    }
+}
