@@ -268,6 +268,24 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     assert!(of_night(&all()).1.is_empty());
 }
 
+/// Four units of a tail step together; two more on it measure nothing around the step, and do again after the day.
+#[test]
+fn who_flies_on_after_a_day_does_not_decide_whether_a_step_is_a_tails() {
+    let mut rows = flown(228);
+    for row in rows.iter_mut().filter(|row| row.unit < 6) {
+        let at = row.said.departure_utc;
+        row.tail = "T77".into();
+        row.said.gap_m = match row.unit {
+            4.. => row.said.gap_m.filter(|_| at < day(200) || at > day(215)),
+            _ => row.said.gap_m.map(|gap| if at >= day(203) { gap + 8e-6 } else { gap }),
+        };
+    }
+    let known: Vec<Row> = rows.iter().filter(|row| row.said.departure_utc <= day(215)).cloned().collect();
+    let said_then = said(&known, day(215));
+    assert!(said_then[0].change_points.iter().any(|change| change.tail_wide), "{:?}", said_then[0]);
+    assert_eq!(said(&rows, day(215)), said_then);
+}
+
 /// Four units of one tail rise by 8 µm with one flight, and so does one unit of another tail.
 #[test]
 fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
