@@ -18,7 +18,7 @@ use crate::error::{Error, Fault};
 use crate::growing::Growing;
 use crate::leaf::{self, Leaf};
 use crate::numbers::append;
-use crate::page;
+use crate::page::{self, Page};
 use crate::pattern::nearest;
 use crate::positioned::{self, Positioned};
 use crate::source::Source;
@@ -153,7 +153,7 @@ impl LogFile {
         self.want(&leaves)?;
         let mut rows = 0;
         for group in 0..self.footer.metadata().num_row_groups() {
-            self.check_pages(group, &leaves)?;
+            leaves.iter().try_for_each(|leaf| self.pages(group, leaf).map(drop))?;
             rows += self.each_row_group(group, &leaves, |columns| {
                 take(names, columns.iter().map(leaf::descend).collect())
             })?;
@@ -170,9 +170,8 @@ impl LogFile {
         self.want(&[leaf])?;
         let mut rows = 0;
         for group in 0..self.footer.metadata().num_row_groups() {
-            self.check_pages(group, &[leaf])?;
-            let before = into.len();
-            if straight::append(self.source.file(), self.chunk(group, leaf), into) {
+            let (pages, before) = (self.pages(group, leaf)?, into.len());
+            if straight::append(self.source.file(), self.chunk(group, leaf), &pages, into) {
                 rows += into.len() - before;
                 continue;
             }
@@ -232,13 +231,11 @@ impl LogFile {
         reader.build().map_err(|e| self.decode(leaf, group, e.to_string()))
     }
 
-    fn check_pages(&self, group: usize, leaves: &[&Leaf]) -> Result<(), Error> {
+    /// The pages of a chunk, none of which claims what cannot be.
+    fn pages(&self, group: usize, leaf: &Leaf) -> Result<Vec<Page>, Error> {
         let rows = self.footer.metadata().row_group(group).num_rows();
-        for leaf in leaves {
-            page::bounded(self.source.file(), self.chunk(group, leaf), rows)
-                .map_err(|detail| self.decode(leaf, group, detail))?;
-        }
-        Ok(())
+        page::bounded(self.source.file(), self.chunk(group, leaf), rows)
+            .map_err(|detail| self.decode(leaf, group, detail))
     }
 
     /// Whether every page of these leaves carries a checksum.
@@ -246,10 +243,8 @@ impl LogFile {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
         self.want(&leaves)?;
         for group in 0..self.footer.metadata().num_row_groups() {
-            let rows = self.footer.metadata().row_group(group).num_rows();
             for leaf in &leaves {
-                let checked = page::bounded(self.source.file(), self.chunk(group, leaf), rows);
-                if !checked.map_err(|detail| self.decode(leaf, group, detail))? {
+                if self.pages(group, leaf)?.iter().any(|page| page.header.crc.is_none()) {
                     return Ok(false);
                 }
             }

@@ -30,6 +30,7 @@ pub(crate) struct Pages<'f> {
 }
 
 /// A page's header and where its body lies.
+#[derive(Debug)]
 pub(crate) struct Page {
     pub(crate) header: PageHeader,
     /// Bytes of the header as written.
@@ -77,32 +78,32 @@ impl<'f> Pages<'f> {
     }
 }
 
-/// Whether every page of a chunk carries a checksum.
+/// The pages of a chunk.
 ///
 /// # Errors
 /// What a header claims that cannot be.
-pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Result<bool, String> {
+pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Result<Vec<Page>, String> {
     let (start, bytes) = chunk.byte_range();
     let length = file.metadata().map_err(|e| e.to_string())?.len();
     if start.checked_add(bytes).is_none_or(|end| end > length) {
         return Err(format!("its pages would end at byte {start} + {bytes} of a file of {length}"));
     }
     let is_flat = chunk.column_descr().max_rep_level() == 0;
-    let (mut values, mut is_checked) = (0_i64, true);
+    let (mut values, mut found) = (0_i64, Vec::new());
     let mut pages = Pages::of(file, start, bytes);
     while let Some(page) = pages.next()? {
         let count = claimed(&page.header)?;
         check_size(&page.header, chunk, count)?;
-        is_checked &= page.header.crc.is_some();
         if page.header.type_ != PageType::DICTIONARY_PAGE {
             values = values.saturating_add(count);
         }
+        found.push(page);
     }
     if values != chunk.num_values() || (is_flat && values != rows) {
         let declared = if is_flat { rows } else { chunk.num_values() };
         return Err(format!("its pages hold {values} values where {declared} are declared"));
     }
-    Ok(is_checked)
+    Ok(found)
 }
 
 /// The number of values that a page claims.

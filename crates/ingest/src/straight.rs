@@ -15,7 +15,7 @@ use polars_parquet_format::{DataPageHeader, DataPageHeaderV2, Encoding, PageHead
 use zstd::bulk::Decompressor;
 
 use crate::growing::{BATCH, Growing};
-use crate::page::{Page, Pages};
+use crate::page::Page;
 use crate::positioned;
 
 /// Buffers above this are given back after use, bytes: pages are about a mebibyte.
@@ -66,13 +66,13 @@ impl Form {
     }
 }
 
-/// Appends every number of a chunk; a null is NaN. False, and nothing appended, where the chunk
-/// must be left to Parquet's own reader.
-pub(crate) fn append(file: &File, chunk: &ColumnChunkMetaData, into: &mut Growing) -> bool {
+/// Appends every number of a chunk, of which these are the pages; a null is NaN. False, and nothing appended, where
+/// the chunk must be left to Parquet's own reader.
+pub(crate) fn append(file: &File, chunk: &ColumnChunkMetaData, pages: &[Page], into: &mut Growing) -> bool {
     let before = into.mark();
     let done = Form::of(chunk).and_then(|form| {
         ROOM.with_borrow_mut(|room| {
-            let done = room.append(file, chunk, form, into);
+            let done = room.append(file, pages, form, into);
             room.tidy();
             done
         })
@@ -84,18 +84,10 @@ pub(crate) fn append(file: &File, chunk: &ColumnChunkMetaData, into: &mut Growin
 }
 
 impl Room {
-    fn append(
-        &mut self,
-        file: &File,
-        chunk: &ColumnChunkMetaData,
-        form: Form,
-        into: &mut Growing,
-    ) -> Option<()> {
-        let (start, bytes) = chunk.byte_range();
-        let mut pages = Pages::of(file, start, bytes);
-        while let Some(page) = pages.next().ok()? {
+    fn append(&mut self, file: &File, pages: &[Page], form: Form, into: &mut Growing) -> Option<()> {
+        for page in pages {
             let data = Data::of(&page.header, form)?;
-            self.read(file, &page)?;
+            self.read(file, page)?;
             let body = self.unpacked(&page.header, data, form)?;
             let (levels, body) = data.parted(body)?;
             let numbers = Numbers { bytes: body, is_split: data.is_split, width: form.width() };
@@ -369,6 +361,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::page::bounded;
 
     fn zstd() -> Compression {
         Compression::ZSTD(ZstdLevel::default())
@@ -413,7 +406,8 @@ mod tests {
         let mut read = Growing::with_room(0, None);
         let all_straight = footer.row_groups().iter().all(|group| {
             let before = read.len();
-            let straight = append(&file, group.column(0), &mut read);
+            let pages = bounded(&file, group.column(0), group.num_rows()).unwrap();
+            let straight = append(&file, group.column(0), &pages, &mut read);
             straight || read.len() != before
         });
         all_straight.then(|| read.whole().0)
