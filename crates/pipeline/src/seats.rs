@@ -59,7 +59,8 @@ impl Seats {
     }
 }
 
-/// What was found for the seats of the rows before: of the last one, and of the last one of each serial number where these have codes.
+/// What was found for the seats of the rows before: of the last one, and of the last one of each serial number
+/// where these have codes.
 pub(crate) struct Seen<T> {
     last: Option<(usize, T)>,
     by_code: Vec<Option<(usize, T)>>,

@@ -120,14 +120,20 @@ fn parts_hold_the_rows_that_a_scan_holds() {
     });
 }
 
-#[test]
-fn a_part_with_a_flipped_byte_is_an_error_and_a_column_that_none_has_too() {
+/// A store of which one byte of one file is another.
+fn flipped() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let writer = filled(dir.path());
     let file = writer.store().files().unwrap().remove(0);
     let mut content = std::fs::read(&file).unwrap();
     content[100] ^= 1;
     std::fs::write(&file, content).unwrap();
+    dir
+}
+
+#[test]
+fn a_part_with_a_flipped_byte_is_an_error_and_a_column_that_none_has_too() {
+    let dir = flipped();
     let store = Store::open(dir.path()).unwrap();
     let parts = store.parts(&Query::default(), &["gap_m"]).unwrap();
     let damaged = (0..parts.len()).filter_map(|part| parts.read(part).err());
@@ -194,12 +200,7 @@ fn every_unit_is_listed_once() {
 
 #[test]
 fn a_flipped_byte_is_an_error_and_not_a_number() {
-    let dir = tempfile::tempdir().unwrap();
-    let writer = filled(dir.path());
-    let file = writer.store().files().unwrap().remove(0);
-    let mut content = std::fs::read(&file).unwrap();
-    content[100] ^= 1;
-    std::fs::write(&file, content).unwrap();
+    let dir = flipped();
     let error = Store::open(dir.path()).unwrap().records(&Query::default()).unwrap_err();
     assert!(matches!(error, store::Error::Damaged { .. }), "{error}");
 }
