@@ -1,7 +1,8 @@
 //! What can be seen of a channel in one pass over it: sound channels need no other.
 //!
 //! Columns are longer than any cache, so each further pass would cost as much as reading memory; where it can, this one
-//! follows what reads the column. The pass goes in groups of samples whose figures are kept apart, since a chain of comparisons is as slow as its links.
+//! follows what reads the column. The pass goes in groups of samples whose figures are kept apart, since a chain of
+//! comparisons is as slow as its links.
 
 use multiversion::multiversion;
 

@@ -3,7 +3,8 @@
 //! A power or an exponential says nothing of a turn to come, and a bend only of one that was seen. These tell
 //! a fleet whose units all wear out late from one whose units do not: the share of each is learned, and a unit
 //! that still wears evenly is foretold what became of the others. Wear in three stages is the textbook's
-//! (running in, steady wear, wearing out); the heights were drawn by hand and fitted to no fleet.
+//! (running in, steady wear, wearing out). The heights were drawn by hand; which of them stay was decided by how simulated
+//! fleets scored (docs/prognostics.md).
 
 /// Heights at every tenth of a life, as shares of the growth in it; further on in a line.
 const COURSES: [[f64; TENTHS + 1]; COUNT] = [

@@ -122,16 +122,22 @@ impl Blocks {
         if at == 0 || at + 1 >= values.len() {
             return f64::NAN;
         }
-        (values[at + 1] - values[at - 1]) / (2.0 * self.period_s)
+        self.rate_between(values[at - 1], values[at + 1])
     }
 
     /// As [`Blocks::rate`], of every block.
     pub(super) fn rates(&self, values: &[f64]) -> Vec<f64> {
         let mut rates = vec![f64::NAN; values.len()];
         for (rate, around) in rates.iter_mut().skip(1).zip(values.windows(3)) {
-            *rate = (around[2] - around[0]) / (2.0 * self.period_s);
+            *rate = self.rate_between(around[0], around[2]);
         }
         rates
+    }
+
+    /// Of the blocks before and after one.
+    #[inline]
+    fn rate_between(&self, before: f64, after: f64) -> f64 {
+        (after - before) / (2.0 * self.period_s)
     }
 
     /// Reads the screw's channel τ later, by a cubic through four blocks (Catmull–Rom), so that δX is
