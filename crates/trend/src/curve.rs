@@ -15,6 +15,7 @@
 //! its *life*: the age T at which it has grown by a given span, so A = span/F(T).
 
 use std::ops::Range;
+use std::sync::LazyLock;
 
 use serde::{Deserialize, Serialize};
 
@@ -88,13 +89,17 @@ pub(crate) struct Curve {
     pub(crate) age: f64,
     age_index: usize,
     /// Width of the cell of ages this member of the grid stands for.
-    pub(crate) age_cell: f64,
+    age_cell: f64,
     /// Logarithms of its age, of that cell, and of the cell of ln τ or the start.
     pub(crate) ln_age: f64,
     pub(crate) ln_age_cell: f64,
     pub(crate) ln_law_cell: f64,
+    /// Standard deviation of the height at first sight within the cell of ages.
+    pub(crate) smear: f64,
+    /// ln of the time by which its law runs, where its life has to do with that.
+    pub(crate) ln_own_hours: Option<f64>,
     /// The sequence its heights are a multiple of, beside a line and a constant, if they are.
-    pub(crate) part: Option<usize>,
+    pub(crate) part: Option<(usize, Factors)>,
 }
 
 impl Law {
@@ -156,11 +161,11 @@ impl Law {
         }
     }
 
-    /// ln of the life at whose end F has this logarithm.
-    pub(crate) fn ln_life(self, ln_height: f64) -> f64 {
+    /// ln of the life at whose end F is this.
+    pub(crate) fn ln_life(self, height: f64) -> f64 {
         match self.exponent() {
-            Some(p) => LN_REFERENCE_HOURS + ln_height / p,
-            None => self.age_at(ln_height.exp()).ln(),
+            Some(p) => LN_REFERENCE_HOURS + height.ln() / p,
+            None => self.age_at(height).ln(),
         }
     }
 
@@ -255,34 +260,72 @@ pub(crate) struct Bank {
 }
 
 impl Bank {
-    /// The bank for a unit seen from `fresh` (new, or just reset) over `span_hours` of usage.
+    /// The bank for a unit seen from `fresh` (new, or just reset) over `span_hours` of usage: of all its laws
+    /// those that are to be tried.
     ///
     /// A unit that may have worn before gets every age of the grid; onsets lie on a grid of starts
     /// within what was seen. Starts later than now are the business of whoever asks for the future.
-    pub(crate) fn new(fresh: bool, known_age: Option<f64>, span_hours: f64, starts: usize) -> Self {
-        let ages = ages(fresh, known_age);
-        let at_birth = |law, law_cell: f64| Curve { law, ln_law_cell: law_cell.ln(), ..BIRTH };
+    pub(crate) fn new(
+        fresh: bool,
+        known_age: Option<f64>,
+        span_hours: f64,
+        starts: usize,
+        is_tried: impl Fn(Law) -> bool,
+    ) -> Self {
+        /// What of it asks for no span, of new units and of others.
+        static FRESH: LazyLock<Spanless> = LazyLock::new(|| Spanless::of(&[BIRTH]));
+        static WORN: LazyLock<Spanless> = LazyLock::new(|| Spanless::of(&grid()));
+        let of_known_age;
+        let Spanless { ages, first, last } = match known_age {
+            Some(age) => {
+                // A known age is one cell without width.
+                of_known_age = Spanless::of(&[Curve { age, ln_age: age.ln(), ..BIRTH }]);
+                &of_known_age
+            }
+            None if fresh => &FRESH,
+            None => &WORN,
+        };
+        let at_birth = |law, ln_law_cell| Curve { law, ln_law_cell, ..BIRTH };
         let cell = span_hours / starts as f64;
-        let mut curves = Vec::with_capacity(1000);
-        curves.push(at_birth(Law::None, 1.0));
-        curves.extend((0..starts).map(|i| at_birth(Law::Onset { start: (i as f64 + 0.5) * cell }, cell)));
+        let ln_cell = cell.ln();
+        let onsets = (0..starts).map(|i| at_birth(Law::Onset { start: (i as f64 + 0.5) * cell }, ln_cell));
+        let knee_cell = span_hours / KNEES as f64;
+        let is_tried = |curve: &Curve| is_tried(curve.law);
+        let mut curves = Vec::with_capacity(1 + starts + first.len() + last.len() + BENDS.len() * KNEES * 4);
+        curves.push(at_birth(Law::None, 0.0));
+        curves.extend(onsets);
+        curves.extend(first.iter().filter(|curve| is_tried(curve)));
+        curves.extend(bends(ages, knee_cell).filter(is_tried));
+        curves.extend(last.iter().filter(|curve| is_tried(curve)));
+        Self { curves, ages: ages.iter().map(|curve| curve.age).collect(), knee_cell }
+    }
+}
+
+/// The curves that are the same whatever the usage that was seen.
+struct Spanless {
+    ages: Vec<Curve>,
+    /// Those before the bends, and those after.
+    first: Vec<Curve>,
+    last: Vec<Curve>,
+}
+
+impl Spanless {
+    fn of(ages: &[Curve]) -> Self {
         let step = (TIME_CONSTANTS[TIME_CONSTANTS.len() - 1] / TIME_CONSTANTS[0]).ln()
             / (TIME_CONSTANTS.len() - 1) as f64;
-        let rising = |index| (Law::Exponential { index }, step, Some(KNEES + index));
-        let settling = |index| {
-            let part = KNEES + TIME_CONSTANTS.len() + index;
-            (Law::Settling { index }, 1.0 / SETTLING.len() as f64, Some(part))
-        };
-        let exponentials = (0..TIME_CONSTANTS.len()).map(rising).chain((0..SETTLING.len()).map(settling));
-        let powers = (0..POWERS).map(|index| (Law::Power { index }, 1.0, None));
-        for (law, law_cell, part) in exponentials.chain(powers) {
+        let rising = |index| (Law::Exponential { index }, step);
+        let settling = |index| (Law::Settling { index }, 1.0 / SETTLING.len() as f64);
+        let powers = (0..POWERS).map(|index| (Law::Power { index }, 1.0));
+        let laws = (0..TIME_CONSTANTS.len()).map(rising).chain((0..SETTLING.len()).map(settling));
+        let at_ages = |(law, law_cell): (Law, f64)| {
             let ln_law_cell = law_cell.ln();
-            curves.extend(ages.iter().map(|age| Curve { law, ln_law_cell, part, ..*age }));
+            ages.iter().map(move |age| Curve { ln_law_cell, ..*age }.of(law))
+        };
+        Self {
+            ages: ages.to_vec(),
+            first: laws.chain(powers).flat_map(at_ages).collect(),
+            last: courses(ages).collect(),
         }
-        let knee_cell = span_hours / KNEES as f64;
-        curves.extend(bends(&ages, knee_cell));
-        curves.extend(courses(&ages));
-        Self { curves, ages: ages.into_iter().map(|curve| curve.age).collect(), knee_cell }
     }
 }
 
@@ -295,21 +338,23 @@ const BIRTH: Curve = Curve {
     ln_age: f64::NEG_INFINITY,
     ln_age_cell: f64::NEG_INFINITY,
     ln_law_cell: 0.0,
+    smear: 0.0,
+    ln_own_hours: None,
     part: None,
 };
 
 /// One line and then another, the knee within what was seen, at every few ages.
-fn bends(ages: &[Curve], cell: f64) -> Vec<Curve> {
+fn bends(ages: &[Curve], cell: f64) -> impl Iterator<Item = Curve> {
     let ln_law_cell = -(KNEES as f64).ln();
-    let mut curves = Vec::new();
-    for at in ages.iter().step_by(BEND_AGE_STRIDE) {
+    let of_age = move |at: &Curve| {
         let age = at.standing_for(BEND_AGE_STRIDE, ln_law_cell);
-        for (knee, index) in (0..KNEES).flat_map(|k| (0..BEND_RATIOS.len()).map(move |index| (k, index))) {
-            let law = Law::Bend { knee: age.age + (knee as f64 + 0.5) * cell, index };
-            curves.push(Curve { law, part: Some(knee), ..age });
-        }
-    }
-    curves
+        let all = (0..KNEES).flat_map(|knee| (0..BEND_RATIOS.len()).map(move |index| (knee, index)));
+        all.map(move |(knee, index)| {
+            let bend = age.of(Law::Bend { knee: age.age + (knee as f64 + 0.5) * cell, index });
+            Curve { part: bend.part.map(|(_, factors)| (knee, factors)), ..bend }
+        })
+    };
+    ages.iter().step_by(BEND_AGE_STRIDE).flat_map(of_age)
 }
 
 /// Every course over every life, at every other age.
@@ -318,19 +363,13 @@ fn courses(ages: &[Curve]) -> impl Iterator<Item = Curve> {
         || (0..course::COUNT).flat_map(|course| (0..course::LIVES.len()).map(move |life| (course, life)));
     let at = move |at: &Curve| {
         let age = at.standing_for(COURSE_AGE_STRIDE, course::LN_LIFE_CELL.ln());
-        all().map(move |(course, life)| Curve { law: Law::Course { course, life }, ..age })
+        all().map(move |(course, life)| age.of(Law::Course { course, life }))
     };
     ages.iter().step_by(COURSE_AGE_STRIDE).flat_map(at)
 }
 
-/// Ages at first sight and the widths of their cells; a known age is one cell without width.
-fn ages(fresh: bool, known_age: Option<f64>) -> Vec<Curve> {
-    if let Some(age) = known_age {
-        return vec![Curve { age, ln_age: age.ln(), ..BIRTH }];
-    }
-    if fresh {
-        return vec![BIRTH];
-    }
+/// Ages at first sight and the widths of their cells.
+fn grid() -> Vec<Curve> {
     let width = |i: usize| match i {
         0 => 0.0,
         i if i + 1 == AGES.len() => AGES[i] - AGES[i - 1],
@@ -361,7 +400,7 @@ pub(crate) struct Heights {
 pub(crate) const PARTS: usize = KNEES + TIME_CONSTANTS.len() + SETTLING.len();
 
 /// A curve's heights as multiples of its part, of the line of usage over the reference age, and of one.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Factors {
     pub(crate) part: f64,
     pub(crate) line: f64,
@@ -380,22 +419,33 @@ impl Curve {
         }
     }
 
-    /// By what its heights are made of its part; meaningless for a law that has none.
-    pub(crate) fn factors(&self) -> Factors {
-        match self.law {
-            Law::Bend { index, .. } => {
+    /// The same with a law.
+    fn of(self, law: Law) -> Self {
+        let smear =
+            if self.age_cell > 0.0 { law.slope(self.age) * self.age_cell / 12.0_f64.sqrt() } else { 0.0 };
+        Self { law, smear, ln_own_hours: law.own_hours().map(f64::ln), part: law.part(self.age), ..self }
+    }
+}
+
+impl Law {
+    /// The part that its heights are a multiple of, from an age on; of a bend the first of the knees.
+    fn part(self, age: f64) -> Option<(usize, Factors)> {
+        match self {
+            Self::Bend { index, .. } => {
                 let before = BEND_RATIOS[index];
-                Factors { part: 1.0 - before, line: before, one: before * self.age / REFERENCE_HOURS }
+                let factors =
+                    Factors { part: 1.0 - before, line: before, one: before * age / REFERENCE_HOURS };
+                Some((0, factors))
             }
-            Law::Exponential { index } => {
-                Factors { part: (self.age / TIME_CONSTANTS[index]).exp(), line: 0.0, one: -1.0 }
+            Self::Exponential { index } => {
+                let factors = Factors { part: (age / TIME_CONSTANTS[index]).exp(), line: 0.0, one: -1.0 };
+                Some((KNEES + index, factors))
             }
-            Law::Settling { index } => {
-                Factors { part: -(-self.age / SETTLING[index]).exp(), line: 0.0, one: 1.0 }
+            Self::Settling { index } => {
+                let factors = Factors { part: -(-age / SETTLING[index]).exp(), line: 0.0, one: 1.0 };
+                Some((KNEES + TIME_CONSTANTS.len() + index, factors))
             }
-            Law::None | Law::Onset { .. } | Law::Course { .. } | Law::Power { .. } => {
-                Factors { part: 0.0, line: 0.0, one: 0.0 }
-            }
+            Self::None | Self::Onset { .. } | Self::Course { .. } | Self::Power { .. } => None,
         }
     }
 }

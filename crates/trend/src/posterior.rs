@@ -5,7 +5,7 @@ use crate::clean::Estimate;
 use crate::curve::{Bank, Curve, Law};
 use crate::filter::Regression;
 use crate::look::{Look, straight_growth};
-use crate::prior::{FleetPrior, OwnTime};
+use crate::prior::FleetPrior;
 use crate::regressions::regressions;
 
 /// Bins of the first look, by which most curves are dropped.
@@ -132,8 +132,7 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
         return None;
     }
     let starts = segment.estimates.len().clamp(1, bins::BINS) / 2 + 1;
-    let mut bank = Bank::new(segment.fresh, segment.known_age, span, starts);
-    bank.curves.retain(|curve| prior.tries(curve.law));
+    let mut bank = Bank::new(segment.fresh, segment.known_age, span, starts, |law| prior.tries(law));
     let coarse = bins::bin(segment.estimates, COARSE_BINS);
     let grown_m = straight_growth(&coarse);
     let first = Look::new(segment, prior, coarse, |usage| grown_m * usage / span);
@@ -262,9 +261,7 @@ fn candidate(look: &Look<'_>, index: usize, curve: &Curve, pass: Regression) -> 
         ((pass.sfy + pass.start * off_m / spread) / information).max(0.0)
     };
     let log_likelihood = best_m * pass.sfy - 0.5 * best_m * best_m * pass.sff;
-    let smear_m =
-        if curve.age_cell > 0.0 { best_m * curve.law.slope(curve.age) * curve.age_cell } else { 0.0 };
-    let new_m2 = spread + smear_m * smear_m / 12.0;
+    let new_m2 = spread + (best_m * curve.smear).powi(2);
     let bound =
         log_likelihood - 0.5 * (off_m - best_m * pass.start).powi(2) / new_m2 + look.logs.share(curve.law);
     Candidate { index, pass, best_m, information, bound }
@@ -284,15 +281,10 @@ fn lives(
     let Some((low, high)) = life_range(prior, curve.law, best_m - reach_m, best_m + reach_m) else { return };
     let step = (high - low) / (tried.count - 1) as f64;
     let spread = look.new_m2;
-    let smear = if curve.age_cell > 0.0 {
-        curve.law.slope(curve.age) * curve.age_cell / 12.0_f64.sqrt()
-    } else {
-        0.0
-    };
     let age_now = curve.age + look.segment.now - look.segment.begin;
-    let height_now = curve.law.height(age_now);
+    let mut height_now = None;
     let shared = step.ln() + look.logs.share(curve.law) + look.logs.cell(curve, look.segment);
-    let own = OwnTime::of(curve.law);
+    let own = look.logs.own_time(curve);
     let guess = match curve.law {
         _ if look.segment.is_of_known_age() => Guess::Unneeded,
         Law::Onset { .. } => Guess::Unneeded,
@@ -300,18 +292,11 @@ fn lives(
         _ => Guess::Fresh,
     };
     let ln_age = (curve.age > 0.0 && !look.segment.is_of_known_age()).then_some(curve.ln_age);
-    let falling = curve.law.exponent().map(|p| (-p * step).exp());
-    let mut amplitude_m = prior.span_m / curve.law.height_of_ln_life(low);
+    let mut amplitudes = Amplitudes::new(curve.law, prior.span_m, low, step);
     for i in 0..tried.count {
-        let ln_life = low + step * i as f64;
-        if i > 0 {
-            amplitude_m = match falling {
-                Some(factor) => amplitude_m * factor,
-                None => prior.span_m / curve.law.height_of_ln_life(ln_life),
-            };
-        }
+        let (ln_life, amplitude_m) = (low + step * i as f64, amplitudes.next());
         let new_m = look.gaps.start - amplitude_m * pass.start;
-        let smeared = (amplitude_m * smear).powi(2) / spread;
+        let smeared = (amplitude_m * curve.smear).powi(2) / spread;
         let log_likelihood = amplitude_m * pass.sfy
             - 0.5 * amplitude_m * amplitude_m * pass.sff
             - 0.5 * ((new_m - prior.new_m).powi(2) / (spread * (1.0 + smeared)) + look.ln_new_m2);
@@ -321,6 +306,7 @@ fn lives(
         if weight <= least {
             continue;
         }
+        let height_now = *height_now.get_or_insert_with(|| curve.law.height(age_now));
         push(Node {
             law: curve.law,
             age_begin: curve.age,
@@ -334,6 +320,36 @@ fn lives(
             waits: false,
             weight,
         });
+    }
+}
+
+/// A law's amplitudes at lives that grow by one factor.
+struct Amplitudes {
+    law: Law,
+    span_m: f64,
+    /// Of the next life: its length in hours, and the amplitude where that is a power of it.
+    life: f64,
+    amplitude_m: f64,
+    /// What the next but one is to the next.
+    longer: f64,
+    falling: Option<f64>,
+}
+
+impl Amplitudes {
+    fn new(law: Law, span_m: f64, ln_life: f64, step: f64) -> Self {
+        let (life, longer) = (ln_life.exp(), step.exp());
+        let falling = law.exponent().map(|p| (-p * step).exp());
+        Self { law, span_m, life, amplitude_m: span_m / law.height_of_ln_life(ln_life), longer, falling }
+    }
+
+    fn next(&mut self) -> f64 {
+        let amplitude_m = self.amplitude_m;
+        self.life *= self.longer;
+        self.amplitude_m = match self.falling {
+            Some(factor) => amplitude_m * factor,
+            None => self.span_m / self.law.height(self.life),
+        };
+        amplitude_m
     }
 }
 
@@ -364,7 +380,7 @@ fn flat(look: &Look<'_>, push: &mut dyn FnMut(Node)) {
 fn life_range(prior: &FleetPrior, law: Law, low_m: f64, high_m: f64) -> Option<(f64, f64)> {
     let reach = LIFE_REACH * prior.ln_life_sd;
     let (shortest, longest) = (prior.ln_life - reach, prior.ln_life + reach);
-    let ln_life = |amplitude_m: f64| law.ln_life((prior.span_m / amplitude_m).ln());
+    let ln_life = |amplitude_m: f64| law.ln_life(prior.span_m / amplitude_m);
     let low = ln_life(high_m).max(shortest);
     let high = if low_m > 0.0 { ln_life(low_m).min(longest) } else { longest };
     (low < high).then_some((low, high))

@@ -192,11 +192,13 @@ impl FleetPrior {
         LogPrior {
             prior: self,
             shares: self.shares.map(f64::ln),
-            life: -self.ln_life_sd.ln() - LN_ROOT_TAU,
+            life: log_of(self.ln_life_sd),
             fresh: self.fresh_share.ln(),
             worn: ((1.0 - self.fresh_share) / WORN_SHARE).ln(),
             worn_share: WORN_SHARE.ln(),
             onset: self.onsets_per_hour.ln(),
+            constant: log_of(LN_CONSTANTS.1),
+            course: log_of(LN_COURSES.1),
         }
     }
 
@@ -216,6 +218,9 @@ pub(crate) struct LogPrior<'a> {
     worn: f64,
     worn_share: f64,
     onset: f64,
+    /// Of a law's own time at its likeliest.
+    constant: f64,
+    course: f64,
 }
 
 /// What a law's own time says of a life: the density of ln life.
@@ -226,19 +231,19 @@ pub(crate) struct OwnTime {
     log: f64,
 }
 
-impl OwnTime {
-    /// Nothing of a law that runs by none.
-    pub(crate) fn of(law: Law) -> Option<Self> {
-        let (ln_ratio, sd) = if let Law::Course { .. } = law { LN_COURSES } else { LN_CONSTANTS };
-        let ln_life = law.own_hours()?.ln() + ln_ratio;
-        Some(Self { ln_life, sd, log: -sd.ln() - LN_ROOT_TAU })
-    }
-}
-
 impl LogPrior<'_> {
     /// Of a law's family.
     pub(crate) fn share(&self, law: Law) -> f64 {
         self.shares[law.family()]
+    }
+
+    /// Of the time by which a curve's law runs; nothing of a law that runs by none.
+    pub(crate) fn own_time(&self, curve: &Curve) -> Option<OwnTime> {
+        let ((ln_ratio, sd), log) = match curve.law {
+            Law::Course { .. } => (LN_COURSES, self.course),
+            _ => (LN_CONSTANTS, self.constant),
+        };
+        Some(OwnTime { ln_life: curve.ln_own_hours? + ln_ratio, sd, log })
     }
 
     /// Of an onset that has not come in some hours.
@@ -275,6 +280,11 @@ impl LogPrior<'_> {
             None => log,
         }
     }
+}
+
+/// Log density of a normal distribution at its middle.
+fn log_of(sd: f64) -> f64 {
+    -sd.ln() - LN_ROOT_TAU
 }
 
 /// ln √(2π).

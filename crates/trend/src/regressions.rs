@@ -23,8 +23,8 @@ pub(crate) fn regressions(look: &Look<'_>, bank: &Bank) -> Vec<Regression> {
     }
     let parts = passes.parts(bank);
     for (regression, curve) in regressions.iter_mut().zip(&bank.curves) {
-        if let Some(part) = curve.part {
-            *regression = parts.combined(part, &curve.factors());
+        if let Some((part, factors)) = &curve.part {
+            *regression = parts.combined(*part, factors);
         }
     }
     regressions
@@ -61,7 +61,7 @@ impl Passes<'_> {
             parts: [Part::default(); PARTS],
         };
         let mut used = [false; PARTS];
-        bank.curves.iter().filter_map(|curve| curve.part).for_each(|part| used[part] = true);
+        bank.curves.iter().filter_map(|curve| curve.part).for_each(|(part, _)| used[part] = true);
         let used: Vec<usize> = (0..PARTS).filter(|&part| used[part]).collect();
         for group in used.chunks(LANES) {
             for (&part, found) in group.iter().zip(self.of_parts(group, &line, &one)) {
@@ -140,7 +140,7 @@ mod tests {
         let segment = Segment { estimates: &[], begin: 0.0, now: 1700.0, fresh: false, known_age: None };
         let prior = FleetPrior::vague(1e-4);
         let look = Look::new(&segment, &prior, bins, |usage| 1e-8 * usage);
-        let bank = Bank::new(false, None, 1700.0, 25);
+        let bank = Bank::new(false, None, 1700.0, 25, |_| true);
         for (curve, found) in bank.curves.iter().zip(regressions(&look, &bank)) {
             let heights: Vec<f64> = look.bins.iter().map(|b| curve.law.height(curve.age + b.usage)).collect();
             let direct = look.filter.curve(&look.gaps, &look.wave, &heights);
