@@ -10,7 +10,8 @@ use crate::changed::Changed;
 use crate::innovations::{self, Unlike};
 use crate::plan::{Plan, Work};
 use crate::recorder::{self, Moved};
-use crate::trends::{Night, TrendRow};
+use crate::statement::TrendRow;
+use crate::trends::Night;
 
 /// One log's trouble.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

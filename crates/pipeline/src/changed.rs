@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::calendar::days;
 use crate::histories::HistoryName;
-use crate::trends::{ChangePoint, TrendRow};
+use crate::statement::{ChangePoint, TrendRow};
 
 /// An event of one kind is the same one when its date moved by no more than this: dates are estimates.
 const SAME_EVENT_DAYS: f64 = 60.0;

@@ -20,6 +20,7 @@ mod gathering;
 pub mod histories;
 pub mod innovations;
 pub mod lately;
+mod limits;
 pub mod maintenance;
 pub mod normalize;
 pub mod pages;
@@ -33,10 +34,13 @@ pub mod schedule;
 mod seats;
 mod shelf;
 pub mod simulate;
+pub mod statement;
 mod stays;
 mod tail_wide;
+mod taught;
 pub mod trends;
 mod unlogged;
+mod usage;
 
 mod error;
 

@@ -16,8 +16,9 @@ use crate::calendar::days;
 use crate::error::Error;
 use crate::histories::{Flown, Gathering, Histories, History, HistoryName as Name};
 use crate::recorder::moved_in_store;
+use crate::statement::{ChangePoint, TrendRow};
 use crate::stays::Stays;
-use crate::trends::{self, Ask, Told, TrendRow};
+use crate::trends::{self, Ask, Told};
 
 /// Days before the report of which statements are held against what came.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
@@ -360,7 +361,7 @@ fn events(row: &TrendRow, stays: &[Stay]) -> Vec<Event> {
             ends.into_iter().flatten().any(|end| days(end, at).abs() <= BOOKED_WITHIN_DAYS)
         })
     };
-    let event = |c: &trends::ChangePoint| Event {
+    let event = |c: &ChangePoint| Event {
         departure_utc: c.departure_utc,
         kind: c.kind.to_owned(),
         step_m: c.step_m,

@@ -2,111 +2,27 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fleet::{Installation, Installations, PartNumber, SerialNumber};
+use fleet::{Installations, PartNumber, SerialNumber};
 use jiff::Timestamp;
 use job::Config;
-use job::part::WearAxis;
 use rayon::prelude::*;
-use serde::Serialize;
 use store::{Query, Store};
-use trend::{Axis, Each, FleetPrior, Observation, Series, Trend, Usage, classic};
+use trend::{FleetPrior, Series, Trend, Usage, classic};
 
 use crate::changed::{Changed, changed};
 use crate::error::Error;
-use crate::histories::{Flown, Gathering, Histories, History, HistoryName, Place};
+use crate::histories::{Gathering, Histories, History, HistoryName};
 use crate::lately::{Lately, lately};
-use crate::maintenance;
+use crate::limits::Limits;
 use crate::parts::read_each;
 use crate::recorder::{Moved, moved, moved_in_store};
-use crate::stays::Stays;
+use crate::statement::{self, TrendRow};
 use crate::tail_wide::TailWide;
-use crate::unlogged::Unlogged;
-
-/// What a prior asks of each unit, done by all workers.
-struct AtOnce;
-
-impl Each for AtOnce {
-    fn each<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
-        things.par_iter().map(work).collect()
-    }
-}
+use crate::taught::Taught;
+use crate::usage::Books;
 
 /// A unit, by part and serial number.
 pub type Unit = (PartNumber, SerialNumber);
-
-/// A change point, as the contract names its fields.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ChangePoint {
-    /// The first flight after it.
-    pub departure_utc: Timestamp,
-    /// That flight.
-    pub flight_id: Option<String>,
-    /// `step`, `reset`, `onset` or `recorded`.
-    pub kind: &'static str,
-    /// Its size, m.
-    pub step_m: f64,
-    /// Standard error of its size, m.
-    pub step_se_m: f64,
-    /// Probability that it is one; 1 where the books say so.
-    pub certainty: f64,
-    /// Whether the tail's other actuators changed with it, or what is fitted of all of them did: a matter of a
-    /// sensor or a recorder, not of wear.
-    pub tail_wide: bool,
-}
-
-/// One unit's statement, as the contract names its columns.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
-pub struct TrendRow {
-    pub part_number: Option<String>,
-    pub serial_number: String,
-    pub tail_number: Option<String>,
-    pub position: Option<String>,
-    pub as_of_utc: Timestamp,
-    pub flights: i64,
-    pub unit_hours: Option<f64>,
-    pub gap_m: Option<f64>,
-    pub gap_se_m: Option<f64>,
-    pub estimates: i64,
-    pub outliers: i64,
-    pub noise_factor: f64,
-    pub rate_m_per_hour: Option<f64>,
-    pub rate_p05_m_per_hour: Option<f64>,
-    pub rate_p95_m_per_hour: Option<f64>,
-    pub trend: &'static str,
-    pub growth_probability: Option<f64>,
-    pub wear_law: Option<String>,
-    pub wear_law_probability: Option<f64>,
-    pub usage_axis: Option<String>,
-    pub trend_p_value: Option<f64>,
-    pub sen_rate_m_per_hour: Option<f64>,
-    pub sen_low_m_per_hour: Option<f64>,
-    pub sen_high_m_per_hour: Option<f64>,
-    pub hamed_rao_p_value: Option<f64>,
-    pub change_points: Vec<ChangePoint>,
-    pub limit_m: Option<f64>,
-    pub crossing_hours_p05: Option<f64>,
-    pub crossing_hours_p50: Option<f64>,
-    pub crossing_hours_p95: Option<f64>,
-    pub crossing_flights_p05: Option<f64>,
-    pub crossing_flights_p50: Option<f64>,
-    pub crossing_flights_p95: Option<f64>,
-    pub not_before_utc: Option<Timestamp>,
-    pub likely_utc: Option<Timestamp>,
-    pub not_after_utc: Option<Timestamp>,
-    pub check_probability: Option<f64>,
-    pub state: Option<&'static str>,
-    pub reason: Option<String>,
-    /// The estimated gaps in order of flights, at most a hundred means of neighbours, m: a sketch for people.
-    #[serde(skip)]
-    pub sketch_m: Vec<f64>,
-}
-
-impl TrendRow {
-    pub(crate) fn name(&self) -> HistoryName {
-        (self.part_number.clone(), self.serial_number.clone())
-    }
-}
 
 /// A unit and a day.
 #[derive(Debug, Clone, PartialEq)]
@@ -228,7 +144,7 @@ pub fn of_night(
         fleet.statements(names.iter(), before_utc)?
     } else {
         let read = Fleet::read(config, installations, &earlier)?;
-        let fleet = Fleet { priors: fleet.priors, turns: fleet.turns, ..read };
+        let fleet = Fleet { taught: fleet.taught, ..read };
         fleet.statements(earlier.names(), before_utc)?
     };
     let before = before.into_iter().filter(|row| row.flights > 0).map(|row| (row.name(), row)).collect();
@@ -276,8 +192,7 @@ pub(crate) fn told(
     let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
     let asked: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
     let taught = |part: Option<&str>| {
-        let turn = fleet.turns.by(as_of)?;
-        let prior = fleet.priors.get(&(turn, part))?;
+        let (turn, prior) = fleet.taught.of(part, as_of)?;
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = asked.into_iter().filter_map(taught).collect();
@@ -342,38 +257,13 @@ pub fn of_histories(
     Fleet::new(config, installations, histories, &[as_of])?.asked(ask, as_of)
 }
 
-/// Part numbers that share a prior.
-type Parts<'a> = Vec<Option<&'a str>>;
-
 /// All units, and what each part's units had taught about the next by each turn.
 pub(crate) struct Fleet<'a> {
-    config: &'a Config,
+    limits: Limits<'a>,
     units: BTreeMap<&'a HistoryName, (&'a History, Series)>,
-    turns: Turns,
-    priors: BTreeMap<(i64, Option<&'a str>), FleetPrior>,
+    taught: Taught<'a>,
     /// What moved on whole aircraft beside gaps.
     moved: Vec<Moved>,
-}
-
-/// The days on which priors are learned, microseconds since 1970 UTC: every thirty days from a fleet's first
-/// departure on, and when it has grown older by a tenth.
-///
-/// A prior moves slowly and costs as much as its fleet's statements: that of a turn serves until the next.
-#[derive(Debug, Clone, Default)]
-struct Turns(Vec<i64>);
-
-impl Turns {
-    fn of(first_us: i64, last_us: i64) -> Self {
-        const MONTH_US: i64 = 30 * 86_400_000_000;
-        const GROWN: i64 = 10;
-        let next = |turn: &i64| Some(turn + MONTH_US.max((turn - first_us) / GROWN));
-        Self(std::iter::successors(Some(first_us), next).take_while(|turn| *turn <= last_us).collect())
-    }
-
-    /// The last turn by a day.
-    fn by(&self, as_of: Timestamp) -> Option<i64> {
-        self.0[..self.0.partition_point(|turn| *turn <= as_of.as_microsecond())].last().copied()
-    }
 }
 
 impl<'a> Fleet<'a> {
@@ -424,92 +314,14 @@ impl<'a> Fleet<'a> {
     fn of(config: &'a Config, histories: &'a Histories, series: Vec<Series>) -> Self {
         let units = histories.iter().zip(series);
         let units = units.map(|((name, history), series)| (name, (history, series))).collect();
-        Self { config, units, turns: Turns::default(), priors: BTreeMap::new(), moved: Vec::new() }
+        Self { limits: Limits(config), units, taught: Taught::default(), moved: Vec::new() }
     }
 
     /// The same with what was learned by the turn before each of the days.
     fn taught_by(mut self, days: &[Timestamp]) -> Self {
-        let parts: BTreeSet<Option<&str>> = self.units.keys().map(|name| name.0.as_deref()).collect();
-        let first = self.units.values().filter_map(|(_, series)| series.flights().first());
-        if let Some((first_us, last)) = first.map(|f| f.departure_us).min().zip(days.iter().max()) {
-            self.turns = Turns::of(first_us, last.as_microsecond());
-        }
-        let turns: BTreeSet<i64> = days.iter().filter_map(|day| self.turns.by(*day)).collect();
-        let taught: Vec<_> = turns.par_iter().map(|turn| (*turn, self.taught(*turn, &parts))).collect();
-        for (turn, groups) in taught {
-            for (parts, prior) in groups {
-                self.priors.extend(parts.into_iter().map(|part| ((turn, part), prior.clone())));
-            }
-        }
+        let units = self.units.iter().map(|(name, (_, series))| (name.0.as_deref(), series));
+        self.taught = Taught::by(units, self.limits, days);
         self
-    }
-
-    /// What the parts had taught by a turn, those alike together.
-    fn taught(&self, turn_us: i64, parts: &BTreeSet<Option<&'a str>>) -> Vec<(Parts<'a>, FleetPrior)> {
-        let parts: Vec<Option<&str>> = parts.iter().copied().collect();
-        let alone = parts.into_par_iter().map(|part| (part, self.learn(turn_us, &[part]))).collect();
-        let alike = self.alike(alone);
-        alike.into_par_iter().map(|(parts, own)| self.pooled(turn_us, parts, own)).collect()
-    }
-
-    /// Parts in groups that share what they teach: of one limit, along one axis where that is configured,
-    /// with lives within a factor of two.
-    ///
-    /// Two part numbers of one design have the same laws, and more units tell them better: pooling took
-    /// the median error on one simulated fleet of two designs from 23 to 21 %.
-    fn alike<'b>(&self, mut learned: Vec<(Option<&'b str>, FleetPrior)>) -> Vec<(Parts<'b>, FleetPrior)> {
-        const ALIKE: f64 = 2.0;
-        learned.sort_by(|(a, a_prior), (b, b_prior)| {
-            let lives = a_prior.median_life_hours().total_cmp(&b_prior.median_life_hours());
-            let limits = self.limit_m(*a).total_cmp(&self.limit_m(*b));
-            limits.then(self.axis(*a).cmp(&self.axis(*b))).then(lives).then(a.cmp(b))
-        });
-        let mut groups: Vec<(Parts<'b>, FleetPrior)> = Vec::new();
-        for (part, prior) in learned {
-            let fits = |(parts, first): &&mut (Parts<'b>, FleetPrior)| {
-                self.limit_m(parts[0]).to_bits() == self.limit_m(part).to_bits()
-                    && self.axis(parts[0]) == self.axis(part)
-                    && prior.median_life_hours() <= ALIKE * first.median_life_hours()
-            };
-            match groups.last_mut().filter(fits) {
-                Some((parts, _)) => parts.push(part),
-                None => groups.push((vec![part], prior)),
-            }
-        }
-        groups
-    }
-
-    /// What several parts teach together; one alone has said it already.
-    fn pooled<'b>(&self, turn_us: i64, parts: Parts<'b>, own: FleetPrior) -> (Parts<'b>, FleetPrior) {
-        let prior = if parts.len() == 1 { own } else { self.learn(turn_us, &parts) };
-        (parts, prior)
-    }
-
-    fn learn(&self, turn_us: i64, parts: &[Option<&str>]) -> FleetPrior {
-        let of_parts = self.units.iter().filter(|(name, _)| parts.contains(&name.0.as_deref()));
-        let first = parts.first().copied().flatten();
-        let (limit_m, axis) = (self.limit_m(first), self.axis(first));
-        FleetPrior::learn_by(of_parts.map(|(_, (_, series))| series), turn_us, limit_m, axis, &AtOnce)
-    }
-
-    /// What wear of a part is said to follow; nothing where its histories decide.
-    fn axis(&self, part: Option<&str>) -> Option<Axis> {
-        let configured = self.part(part).and_then(|p| p.axis).or(self.config.document.trend.axis)?;
-        Some(match configured {
-            WearAxis::Hours => Axis::Hours,
-            WearAxis::Flights => Axis::Flights,
-            WearAxis::Reversals => Axis::Reversals,
-        })
-    }
-
-    fn limit_m(&self, part: Option<&str>) -> f64 {
-        settings(self.config, self.part(part)).limit_m
-    }
-
-    fn part(&self, number: Option<&str>) -> Option<&'a job::Part> {
-        number
-            .and_then(|number| PartNumber::new(number).ok())
-            .and_then(|number| self.config.parts.get(&number))
     }
 
     /// A unit's flights.
@@ -519,13 +331,12 @@ impl<'a> Fleet<'a> {
 
     /// What a unit is judged by.
     pub(crate) fn settings(&self, name: &HistoryName) -> trend::Settings {
-        settings(self.config, self.part(name.0.as_deref()))
+        self.limits.settings(name.0.as_deref())
     }
 
     /// What was known of a unit's like on a day.
-    pub(crate) fn prior(&self, name: &HistoryName, as_of: Timestamp) -> Option<&FleetPrior> {
-        let (flown, _) = self.units.get_key_value(name)?;
-        self.priors.get(&(self.turns.by(as_of)?, flown.0.as_deref()))
+    pub(crate) fn prior<'s>(&'s self, name: &'s HistoryName, as_of: Timestamp) -> Option<&'s FleetPrior> {
+        Some(self.taught.of(name.0.as_deref(), as_of)?.1)
     }
 
     /// The same, with what moved on whole aircraft beside gaps.
@@ -600,10 +411,10 @@ impl<'a> Fleet<'a> {
         let unit = self.units.get(name);
         let nobody = History::default();
         let (history, series) = unit.map_or((&nobody, None), |(history, series)| (*history, Some(series)));
-        let limit_m = self.part(name.0.as_deref()).and_then(|p| p.limit_m);
+        let limit_m = self.limits.part(name.0.as_deref()).and_then(|p| p.limit_m);
         let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
         let usage_axis = prior.map(|prior| prior.axis().to_string());
-        let row = row(name, history, series, limit_m, trend, as_of, wide);
+        let row = statement::row(name, history, series, limit_m, trend, as_of, wide);
         TrendRow { usage_axis, ..row }
     }
 
@@ -620,244 +431,5 @@ impl<'a> Fleet<'a> {
         let steps = (0..=STEPS).map(|step| far * f64::from(step) / f64::from(STEPS));
         let prior = self.prior(name, row.as_of_utc);
         Ok(trend::outlook(series, as_of_us, &self.settings(name), prior, steps)?)
-    }
-}
-
-/// What the books say of units beside their rows.
-struct Books<'a> {
-    maintenance: maintenance::Book,
-    unlogged: Unlogged<'a>,
-    stays: Stays<'a>,
-}
-
-impl<'a> Books<'a> {
-    fn read(config: &'a Config, installations: &'a Installations) -> Result<Self, Error> {
-        let file = config.document.logs.maintenance.as_ref();
-        let maintenance = file.map(|file| maintenance::read(&config.path(file))).transpose()?;
-        Ok(Self {
-            maintenance: maintenance.unwrap_or_default(),
-            unlogged: Unlogged::of_table(&config.flights),
-            stays: Stays::new(installations),
-        })
-    }
-
-    /// A unit's flights, added up.
-    fn series(&self, name: &HistoryName, history: &History, is_booked: bool) -> Result<Series, Error> {
-        let stays = self.stays.of(name);
-        let booked = if is_booked { &stays[..] } else { &[] };
-        let first = stays.iter().min_by_key(|stay| stay.installed_utc);
-        let unit_hours_at_start = first.and_then(|stay| stay.unit_hours_at_install);
-        let observations = observed(history, booked, &self.unlogged.of_unit(history, booked));
-        let usage = Usage { unit_hours_at_start, ..Usage::default() };
-        Ok(Series::new(observations, &usage)?.with_book(booked_work(&self.maintenance, name)))
-    }
-}
-
-/// What the maintenance book says of a unit; of one whose part number is not known, nothing.
-fn booked_work(book: &maintenance::Book, (part, serial): &HistoryName) -> Vec<trend::Booked> {
-    part.clone().and_then(|part| book.get(&(part, serial.clone())).cloned()).unwrap_or_default()
-}
-
-/// Without a limit there is still a level and a rate; only crossings and states need one.
-fn settings(config: &Config, part: Option<&job::Part>) -> trend::Settings {
-    /// A gap no actuator has: a stand-in that is never met and never shown.
-    const NEVER_M: f64 = 1.0;
-    let of = &config.document.trend;
-    let base = trend::Settings::for_limit(part.and_then(|p| p.limit_m).unwrap_or(NEVER_M));
-    trend::Settings {
-        watch_m: part.and_then(|p| p.watch_m).unwrap_or(base.watch_m),
-        planning_horizon_hours: of.planning_horizon_hours,
-        horizon_hours: of.horizon_hours,
-        stale_after_days: of.stale_after_days,
-        check_interval_hours: of.next_check_hours,
-        ..base
-    }
-}
-
-/// A unit's flights as the trend knows them, those that left no record among them.
-fn observed(
-    history: &History,
-    stays: &[&Installation],
-    unlogged: &[(&Installation, &fleet::Flight)],
-) -> Vec<Observation> {
-    let mut numbers = Numbers::default();
-    let seen = history.flights().iter().map(|f| {
-        let beside = history.beside(f);
-        Observation {
-            departure_us: f.departure_us(),
-            installation: numbers.of_flown(f, history, stays),
-            flight_hours: beside.flight_hours(),
-            tail_hours_end: beside.tail_hours_end(),
-            load_reversals: beside.load_reversals(),
-            gap_m: f.gap_m(),
-            gap_se_m: beside.gap_se_m().filter(|se| *se > 0.0),
-        }
-    });
-    let mut observations: Vec<Observation> = seen.collect();
-    observations.extend(unlogged.iter().map(|(stay, flight)| Observation {
-        departure_us: flight.departure_utc.as_microsecond(),
-        installation: numbers.of(&Place::of(stay), Some(stay)),
-        flight_hours: flight.flight_hours,
-        tail_hours_end: flight.tail_hours_end,
-        load_reversals: None,
-        gap_m: None,
-        gap_se_m: None,
-    }));
-    observations
-}
-
-/// Installations of one unit, numbered as they come.
-#[derive(Default)]
-struct Numbers<'a> {
-    known: Vec<(Place, Option<Timestamp>)>,
-    /// Place and stay of the flight before, and their number.
-    last: Option<(u32, &'a Installation, u32)>,
-}
-
-impl<'a> Numbers<'a> {
-    /// That of a flight. Stays of one place do not overlap, so most flights are of the stay of the one before.
-    fn of_flown(&mut self, flown: &Flown, history: &History, stays: &[&'a Installation]) -> u32 {
-        let is_here =
-            |last: &(u32, &Installation, u32)| last.0 == flown.place && last.1.covers(flown.departure_utc());
-        if let Some((_, _, number)) = self.last.filter(is_here) {
-            return number;
-        }
-        let stay = history.stay(flown, stays);
-        let number = self.of(history.place(flown), stay);
-        self.last = stay.map(|stay| (flown.place, stay, number));
-        number
-    }
-
-    fn of(&mut self, place: &Place, stay: Option<&Installation>) -> u32 {
-        let installed_utc = stay.map(|stay| stay.installed_utc);
-        let known = self.known.iter().rposition(|(p, at)| p == place && *at == installed_utc);
-        let number = known.unwrap_or_else(|| {
-            self.known.push((place.clone(), installed_utc));
-            self.known.len() - 1
-        });
-        number as u32
-    }
-}
-
-/// Means of neighbours, at most so many.
-fn sketched(gaps_m: &[f64]) -> Vec<f64> {
-    const MOST: usize = 100;
-    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
-    gaps_m.chunks(gaps_m.len().div_ceil(MOST).max(1)).map(mean).collect()
-}
-
-fn row(
-    name: &HistoryName,
-    history: &History,
-    series: Option<&Series>,
-    limit_m: Option<f64>,
-    trend: &Trend,
-    as_of: Timestamp,
-    wide: &TailWide,
-) -> TrendRow {
-    let last = history.until(as_of).last().map(|flown| history.place(flown));
-    let gaps_m = series.map(|series| series.gaps_m(trend.as_of_us)).unwrap_or_default();
-    let crossing = trend.crossing.filter(|_| limit_m.is_some());
-    let flights = |hours: Option<f64>| Some(hours? / trend.pace?.hours_per_flight);
-    let last_flown = series.and_then(|series| series.until(trend.as_of_us).last());
-    let last_flown = last_flown.and_then(|f| Timestamp::from_microsecond(f.departure_us).ok());
-    let day = |hours: Option<f64>| after(last_flown?, hours? / trend.pace?.hours_per_day);
-    TrendRow {
-        part_number: name.0.clone(),
-        serial_number: name.1.clone(),
-        tail_number: last.and_then(|place| place.tail_number.clone()),
-        position: last.and_then(|place| place.position.clone()),
-        as_of_utc: as_of,
-        flights: trend.flights as i64,
-        unit_hours: trend.unit_hours,
-        gap_m: trend.level.map(|l| l.gap_m),
-        gap_se_m: trend.level.map(|l| l.se_m),
-        estimates: trend.estimates as i64,
-        outliers: trend.outliers_us.len() as i64,
-        noise_factor: trend.noise_factor,
-        rate_m_per_hour: trend.rate.map(|r| r.m_per_hour),
-        rate_p05_m_per_hour: trend.rate.map(|r| r.p05_m_per_hour),
-        rate_p95_m_per_hour: trend.rate.map(|r| r.p95_m_per_hour),
-        trend: wear(trend.wear),
-        growth_probability: trend.growth_probability,
-        wear_law: trend.law.map(|(law, _)| law.to_string()),
-        wear_law_probability: trend.law.map(|(_, share)| share),
-        usage_axis: None,
-        trend_p_value: classic::mann_kendall(&gaps_m).ok().map(|test| test.p_value),
-        sen_rate_m_per_hour: None,
-        sen_low_m_per_hour: None,
-        sen_high_m_per_hour: None,
-        hamed_rao_p_value: None,
-        change_points: trend.changes.iter().filter_map(|c| change_point(c, history, wide)).collect(),
-        limit_m,
-        crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
-        crossing_hours_p50: crossing.and_then(|c| c.p50_hours),
-        crossing_hours_p95: crossing.and_then(|c| c.p95_hours),
-        crossing_flights_p05: flights(crossing.and_then(|c| c.p05_hours)),
-        crossing_flights_p50: flights(crossing.and_then(|c| c.p50_hours)),
-        crossing_flights_p95: flights(crossing.and_then(|c| c.p95_hours)),
-        not_before_utc: day(crossing.and_then(|c| c.p05_hours)),
-        likely_utc: day(crossing.and_then(|c| c.p50_hours)),
-        not_after_utc: day(crossing.and_then(|c| c.p95_hours)),
-        check_probability: trend.check_probability.filter(|_| limit_m.is_some()),
-        state: trend.state.filter(|_| limit_m.is_some()).map(state_word),
-        reason: Some(match limit_m {
-            Some(_) => reason(trend, history, wide),
-            None => "no limit is configured".into(),
-        }),
-        sketch_m: sketched(&gaps_m),
-    }
-}
-
-/// A day so many days later; nothing beyond the calendar.
-fn after(from: Timestamp, days: f64) -> Option<Timestamp> {
-    const DAY_S: f64 = 86_400.0;
-    from.checked_add(jiff::SignedDuration::try_from_secs_f64((days * DAY_S).round()).ok()?).ok()
-}
-
-/// Why a state; a change that the tail's other units made as well is named for what it is.
-fn reason(trend: &Trend, history: &History, wide: &TailWide) -> String {
-    let unknown = trend.changes.iter().rev().find(|c| c.kind != trend::ChangeKind::Recorded);
-    match (trend.reason, unknown.and_then(|change| wide.tail(change, history))) {
-        (trend::Reason::Changed { kind, days }, Some(tail)) => format!(
-            "{kind} {days:.0} days ago with all actuators of {tail} at once: a sensor or recorder, not wear"
-        ),
-        (other, _) => other.to_string(),
-    }
-}
-
-fn change_point(change: &trend::Change, history: &History, wide: &TailWide) -> Option<ChangePoint> {
-    let departure_utc = Timestamp::from_microsecond(change.departure_us).ok()?;
-    let flight = history.at(departure_utc);
-    Some(ChangePoint {
-        departure_utc,
-        flight_id: flight.and_then(|f| history.flight_id(f)).map(str::to_owned),
-        kind: match change.kind {
-            trend::ChangeKind::Step => "step",
-            trend::ChangeKind::Reset => "reset",
-            trend::ChangeKind::Onset => "onset",
-            trend::ChangeKind::Recorded => "recorded",
-        },
-        step_m: change.step_m,
-        step_se_m: change.se_m,
-        certainty: change.certainty,
-        tail_wide: wide.tail(change, history).is_some(),
-    })
-}
-
-fn wear(wear: trend::Wear) -> &'static str {
-    match wear {
-        trend::Wear::Wearing => "wearing",
-        trend::Wear::Steady => "steady",
-        trend::Wear::Unknown => "unknown",
-    }
-}
-
-fn state_word(state: trend::State) -> &'static str {
-    match state {
-        trend::State::Normal => "normal",
-        trend::State::Watch => "watch",
-        trend::State::Plan => "plan",
-        trend::State::Act => "act",
     }
 }

@@ -8,7 +8,8 @@ use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::backtest;
 use pipeline::histories::{Gathering, Histories, Row as Said, Who};
-use pipeline::trends::{self, Ask, TrendRow};
+use pipeline::statement::TrendRow;
+use pipeline::trends::{self, Ask};
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;

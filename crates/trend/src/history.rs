@@ -74,6 +74,19 @@ pub(crate) fn read(
 }
 
 impl History {
+    /// The same with the usage of another axis.
+    pub(crate) fn along(&self, flights: &[Flight], prior: &FleetPrior) -> Self {
+        let mut history = self.clone();
+        for estimate in &mut history.estimates {
+            estimate.usage = prior.usage(&flights[estimate.flight]);
+        }
+        for begin in history.begins.iter_mut().skip(1) {
+            begin.usage = history.estimates[begin.estimate - 1].usage;
+        }
+        history.now = flights.last().map_or(0.0, |f| prior.usage(f));
+        history
+    }
+
     /// Names a step and undoes it, or begins a segment with it.
     fn apply(&mut self, jump: &Jump, flights: &[Flight], book: &[Booked], prior: &FleetPrior) {
         let flight = self.estimates[jump.at].flight;

@@ -1,5 +1,7 @@
 //! A fleet teaches a prior: what its units follow, how long they live, by which laws (empirical Bayes).
 
+use std::sync::Arc;
+
 use crate::calibrate::Calibration;
 use crate::curve::{FAMILIES, Law};
 use crate::each::{Each, InTurn};
@@ -23,8 +25,9 @@ const PSEUDO_CHANGES: f64 = 4.0;
 /// Rounds of expectation and maximisation.
 const ROUNDS: usize = 8;
 
-/// Noises of wear tried, as factors of the assumed one.
-const WEAR_NOISES: [f64; 4] = [0.7, 1.0, 1.5, 2.2];
+/// Noises of wear tried beside the assumed one, as factors of it.
+const LESS_WEAR_NOISE: f64 = 0.7;
+const MORE_WEAR_NOISE: [f64; 2] = [1.5, 2.2];
 
 impl FleetPrior {
     /// Learns how units wear from what was known of them on a day: which usage wear follows, the shares
@@ -53,18 +56,80 @@ impl FleetPrior {
         axis: Option<Axis>,
         each: &impl Each,
     ) -> Self {
-        let fleet = sample(fleet.into_iter().map(|series| Known::on(series, as_of_us)));
-        let along = |axis| Lesson::along(&fleet, axis, limit_m, each);
+        let units = read(fleet, as_of_us, limit_m, each);
+        let assumed = assumed(&units, limit_m, each);
+        let along = |axis| Lesson::along(&units, axis, &assumed, each);
         let lesson = axis.and_then(along).or_else(|| likeliest(Axis::ALL.into_iter().filter_map(along)));
         let Some(lesson) = lesson else { return Self::vague(limit_m) };
-        let noises = WEAR_NOISES.into_iter().map(|factor| lesson.with_wear_noise(factor).revised(each));
-        likeliest(noises).unwrap_or(lesson).revised(each).calibrated(each)
+        lesson.with_likeliest_wear_noise(each).revised(each).calibrated(each)
     }
+
+    /// The median life of units, from new to the act limit, flight hours, as their prior would have it at the
+    /// first look: enough to tell designs apart, at a fifth of what [`FleetPrior::learn_by`] costs.
+    pub fn glance_life_hours<'a>(
+        fleet: impl IntoIterator<Item = &'a Series>,
+        as_of_us: i64,
+        limit_m: f64,
+        each: &impl Each,
+    ) -> f64 {
+        let units = read(fleet, as_of_us, limit_m, each);
+        let assumed = assumed(&units, limit_m, each);
+        let lesson = Lesson::along(&units, Axis::Hours, &assumed, each);
+        lesson.map_or(assumed, |lesson| lesson.learned).median_life_hours()
+    }
+}
+
+/// A unit, and what its flights show along hours.
+type Read<'a> = (Known<'a>, History);
+
+/// The units that are looked at, and what their flights show apart from wear.
+fn read<'a>(
+    fleet: impl IntoIterator<Item = &'a Series>,
+    as_of_us: i64,
+    limit_m: f64,
+    each: &impl Each,
+) -> Vec<Read<'a>> {
+    let vague = FleetPrior::vague(limit_m);
+    let units = sample(fleet.into_iter().map(|series| Known::on(series, as_of_us)));
+    // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
+    // their first hour on teach a fleet that never wears.
+    let read = |u: &Known<'_>| history::read(u.flights, u.book, None, &vague);
+    let histories = each.each(&units, read);
+    units.into_iter().zip(histories).collect()
+}
+
+/// What is assumed of a fleet before its laws are asked: what an installation adds, and the season, which
+/// are of the measurement whatever wear follows.
+fn assumed(units: &[Read<'_>], limit_m: f64, each: &impl Each) -> FleetPrior {
+    let mut assumed = FleetPrior::vague(limit_m);
+    assumed.bias_sd_m = bias(units.iter().map(|(_, history)| history), assumed.bias_sd_m);
+    let of_unit = |(_, history): &Read<'_>| -> Vec<Swing> {
+        let of_segment = |s: Segment<'_>| swing(&s, &assumed, &posterior(&s, &assumed)?);
+        history.segments().filter_map(of_segment).collect()
+    };
+    let swings: Vec<Swing> = each.each(units, of_unit).into_iter().flatten().collect();
+    assumed.season = Season::learn(&swings);
+    assumed
+}
+
+/// The same along an axis, by the hours that its unit is worth.
+fn along(units: &[Read<'_>], axis: Axis, assumed: &FleetPrior) -> Option<FleetPrior> {
+    let total = |of: &dyn Fn(&Flight) -> f64| -> f64 {
+        units.iter().filter_map(|(unit, _)| unit.flights.last()).map(of).sum()
+    };
+    let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
+    hours_per_unit.is_finite().then(|| FleetPrior { axis, hours_per_unit, ..assumed.clone() })
 }
 
 /// The lesson with the largest evidence, the first of equals.
 fn likeliest(lessons: impl Iterator<Item = Lesson>) -> Option<Lesson> {
     lessons.reduce(|best, next| if next.evidence > best.evidence { next } else { best })
+}
+
+/// The last lesson of those that have ever more evidence, and more than something has.
+fn rising(mut evidence: f64, lessons: impl Iterator<Item = Lesson>) -> Option<Lesson> {
+    let rises = |lesson: &Lesson| std::mem::replace(&mut evidence, lesson.evidence) < lesson.evidence;
+    lessons.take_while(rises).last()
 }
 
 /// What was known of a unit on a day.
@@ -98,7 +163,7 @@ fn identity(flights: &[Flight]) -> (i64, usize, [u64; 3]) {
 /// What a fleet teaches along one axis.
 #[derive(Clone)]
 struct Lesson {
-    histories: Vec<History>,
+    histories: Arc<[History]>,
     /// Before the fleet was asked, and after.
     assumed: FleetPrior,
     learned: FleetPrior,
@@ -107,23 +172,10 @@ struct Lesson {
 }
 
 impl Lesson {
-    fn along(fleet: &[Known<'_>], axis: Axis, limit_m: f64, each: &impl Each) -> Option<Self> {
-        let last = |unit: &Known<'_>| unit.flights.last().copied();
-        let total = |of: &dyn Fn(&Flight) -> f64| fleet.iter().filter_map(last).map(|f| of(&f)).sum::<f64>();
-        let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
-        if !hours_per_unit.is_finite() {
-            return None;
-        }
-        let mut assumed = FleetPrior { axis, hours_per_unit, ..FleetPrior::vague(limit_m) };
-        // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
-        // their first hour on teach a fleet that never wears.
-        let read = |u: &Known<'_>| history::read(u.flights, u.book, None, &assumed);
-        let histories: Vec<History> = each.each(fleet, read);
-        assumed.bias_sd_m = bias(&histories, assumed.bias_sd_m);
-        let of_segment = |s: &Segment<'_>| swing(s, &assumed, &posterior(s, &assumed)?);
-        let swings = each.each(&segments(&histories), of_segment);
-        let swings: Vec<Swing> = swings.into_iter().flatten().collect();
-        assumed.season = Season::learn(&swings);
+    /// Nothing along an axis on which nobody moved.
+    fn along(units: &[Read<'_>], axis: Axis, assumed: &FleetPrior, each: &impl Each) -> Option<Self> {
+        let assumed = along(units, axis, assumed)?;
+        let histories = units.iter().map(|(unit, history)| history.along(unit.flights, &assumed)).collect();
         let learned = assumed.clone();
         Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.revised(each))
     }
@@ -134,6 +186,18 @@ impl Lesson {
         lesson.assumed.wear_noise_m *= factor;
         lesson.learned.wear_noise_m *= factor;
         lesson
+    }
+
+    /// The same with the noise of wear that has most evidence, which first rises with it and then falls.
+    fn with_likeliest_wear_noise(&self, each: &impl Each) -> Self {
+        let of = |factor: &f64| self.with_wear_noise(*factor).revised(each);
+        let assumed = of(&1.0);
+        let up = MORE_WEAR_NOISE.iter().map(of);
+        let less = || Some(of(&LESS_WEAR_NOISE)).filter(|less| less.evidence > assumed.evidence);
+        match rising(assumed.evidence, up) {
+            Some(more) => more,
+            None => less().unwrap_or(assumed),
+        }
     }
 
     /// What was learned, with what its own forecasts of the fleet's past were worth.
@@ -165,10 +229,9 @@ fn segments(histories: &[History]) -> Vec<Segment<'_>> {
 }
 
 /// Spread of what an installation adds: half the mean square of the steps between installations.
-fn bias(histories: &[History], assumed_m: f64) -> f64 {
+fn bias<'a>(histories: impl Iterator<Item = &'a History>, assumed_m: f64) -> f64 {
     let assumed = (PSEUDO_CHANGES * 2.0 * assumed_m * assumed_m, PSEUDO_CHANGES);
     let (squares, count) = histories
-        .iter()
         .map(|history| installation_steps(&history.estimates))
         .fold(assumed, |sum, found| (sum.0 + found.0, sum.1 + found.1));
     (0.5 * squares / count).max(0.0).sqrt()

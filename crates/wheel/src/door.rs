@@ -11,6 +11,7 @@ use ingest::arrays::Arrays;
 use ingest::tables::{Chunk, Table as Cells};
 use ingest::write::Encoding;
 use pipeline::schedule::Context;
+use pipeline::statement::TrendRow;
 use pipeline::trends::{self, Ask};
 use pipeline::{Request, adhoc, estimates, rows};
 use pyo3::prelude::*;
@@ -144,7 +145,7 @@ fn stated(
     given: Option<Vec<RecordBatch>>,
     days: Option<&Cells>,
     ask: &Ask,
-) -> Result<Vec<trends::TrendRow>, pipeline::Error> {
+) -> Result<Vec<TrendRow>, pipeline::Error> {
     let histories = match (given, days) {
         (None, None) => return trends::of_store(config, booked, &Store::open(config.store())?, ask),
         (Some(batches), _) => estimates::gathered(chunks(batches).map(Ok))?,

@@ -9,7 +9,8 @@ use fleet::{SerialNumber, TailNumber};
 use pipeline::changed::Changed;
 use pipeline::recorder::{Moved, Quantity};
 use pipeline::schedule::{self, Context};
-use pipeline::trends::{Ask, TrendRow};
+use pipeline::statement::TrendRow;
+use pipeline::trends::Ask;
 use pipeline::{Event, Plan, Report, Request};
 use store::Holder;
 

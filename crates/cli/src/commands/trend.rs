@@ -1,6 +1,7 @@
 //! `trend`: level, rate, crossing of the limit and state of each unit.
 
-use pipeline::trends::{self, Ask, TrendRow};
+use pipeline::statement::TrendRow;
+use pipeline::trends::{self, Ask};
 use store::Store;
 
 use crate::args::{Global, TrendArgs};

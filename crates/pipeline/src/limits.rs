@@ -1,0 +1,53 @@
+//! What units of each part number are judged by.
+
+use fleet::PartNumber;
+use job::Config;
+use job::part::WearAxis;
+use trend::Axis;
+
+/// Limits, axes and settings of part numbers, as they are configured.
+#[derive(Clone, Copy)]
+pub(crate) struct Limits<'a>(pub(crate) &'a Config);
+
+impl<'a> Limits<'a> {
+    /// What wear of a part is said to follow; nothing where its histories decide.
+    pub(crate) fn axis(self, part: Option<&str>) -> Option<Axis> {
+        let configured = self.part(part).and_then(|p| p.axis).or(self.0.document.trend.axis)?;
+        Some(match configured {
+            WearAxis::Hours => Axis::Hours,
+            WearAxis::Flights => Axis::Flights,
+            WearAxis::Reversals => Axis::Reversals,
+        })
+    }
+
+    /// The act limit, m.
+    pub(crate) fn limit_m(self, part: Option<&str>) -> f64 {
+        self.settings(part).limit_m
+    }
+
+    /// What is configured of a part.
+    pub(crate) fn part(self, number: Option<&str>) -> Option<&'a job::Part> {
+        number.and_then(|number| PartNumber::new(number).ok()).and_then(|number| self.0.parts.get(&number))
+    }
+
+    /// What a unit of a part is judged by.
+    pub(crate) fn settings(self, part: Option<&str>) -> trend::Settings {
+        settings(self.0, self.part(part))
+    }
+}
+
+/// Without a limit there is still a level and a rate; only crossings and states need one.
+fn settings(config: &Config, part: Option<&job::Part>) -> trend::Settings {
+    /// A gap no actuator has: a stand-in that is never met and never shown.
+    const NEVER_M: f64 = 1.0;
+    let of = &config.document.trend;
+    let base = trend::Settings::for_limit(part.and_then(|p| p.limit_m).unwrap_or(NEVER_M));
+    trend::Settings {
+        watch_m: part.and_then(|p| p.watch_m).unwrap_or(base.watch_m),
+        planning_horizon_hours: of.planning_horizon_hours,
+        horizon_hours: of.horizon_hours,
+        stale_after_days: of.stale_after_days,
+        check_interval_hours: of.next_check_hours,
+        ..base
+    }
+}
