@@ -2,8 +2,8 @@
 //! on the spot: the shortest chain of operations a step must wait for, a sum in the order of the samples, and
 //! memory.
 //!
-//! `batch_in_a_room` has memory for S already and the gains found; what it costs beyond the lanes is the sum of
-//! squared innovations, which keeps its order and so waits for itself.
+//! `batch_in_a_room` has memory for S already and the gains found; what it costs beyond the lanes is the early start
+//! of eight parts and what is left over, one sample after the other.
 //!
 //! `even_unsettled` restarts before the gain settles, `even` runs on long after: a step takes the same.
 
@@ -84,10 +84,16 @@ fn batch_in_a_room_out_of_cache(bencher: Bencher) {
     in_a_room(bencher, OUT_OF_CACHE);
 }
 
-/// Too few samples to be cut into parts: one after the other.
+/// Too few samples to be cut into parts: one after the other, the gains found already.
+#[divan::bench]
+fn batch_in_a_room_too_short_for_parts(bencher: Bencher) {
+    in_a_room(bencher, 1024);
+}
+
+/// As few, and the gains to be found.
 #[divan::bench]
 fn batch_too_short_for_parts(bencher: Bencher) {
-    track(bencher, 512);
+    track(bencher, 1024);
 }
 
 fn published(bencher: Bencher, count: usize) {

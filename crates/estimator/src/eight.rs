@@ -1,20 +1,43 @@
-//! Eight numbers side by side, as the vectors of each kind of machine: the same sums and products, one by one.
-//!
-//! Products are never fused with sums, so all kinds give the same bits.
+//! Eight series side by side, as the vectors of each kind of machine.
+
+use crate::series::Series;
 
 /// Eight numbers.
-pub(crate) trait Eight: Copy {
-    /// The same number eight times.
-    fn all(value: f64) -> Self;
+pub(crate) trait Eight: Series {
     /// From an array.
     fn of(values: &[f64; 8]) -> Self;
     /// Back to an array.
     fn put(self, values: &mut [f64; 8]);
-    fn plus(self, other: Self) -> Self;
-    fn less(self, other: Self) -> Self;
-    fn times(self, other: Self) -> Self;
     /// Lines to columns.
     fn turned(lines: [Self; 8]) -> [Self; 8];
+    /// Lines in memory to columns.
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "all must be compiled within one function")]
+    fn gathered(lines: [&[f64; 8]; 8]) -> [Self; 8] {
+        Self::turned(lines.map(Self::of))
+    }
+}
+
+/// Eight lines of a column, from `first` on and so far apart: looked at once whether they are all within it.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "all must be compiled within one function")]
+#[allow(unsafe_code, reason = "eight looks for each line take as long as the lines")]
+pub(crate) fn lines(column: &[f64], first: usize, apart: usize) -> [&[f64; 8]; 8] {
+    assert!(first + 7 * apart + 8 <= column.len(), "lines lie within their column");
+    // SAFETY: the last of them does, and so do those before it.
+    std::array::from_fn(|i| unsafe { &*column.as_ptr().add(first + i * apart).cast() })
+}
+
+/// As [`lines`], to be written by `put`, one after the other.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "all must be compiled within one function")]
+#[allow(unsafe_code, reason = "see `lines`")]
+pub(crate) fn put_lines<E: Eight>(lines: [E; 8], column: &mut [f64], first: usize, apart: usize) {
+    assert!(first + 7 * apart + 8 <= column.len(), "lines lie within their column");
+    for (i, line) in lines.into_iter().enumerate() {
+        // SAFETY: as above; each is given back before the next is taken.
+        line.put(unsafe { &mut *column.as_mut_ptr().add(first + i * apart).cast() });
+    }
 }
 
 /// For any machine.
@@ -22,28 +45,10 @@ pub(crate) trait Eight: Copy {
 pub(crate) struct Plain([f64; 8]);
 
 #[allow(clippy::inline_always, reason = "all must be compiled within one function")]
-impl Eight for Plain {
+impl Series for Plain {
     #[inline(always)]
     fn all(value: f64) -> Self {
         Self([value; 8])
-    }
-
-    #[inline(always)]
-    fn of(values: &[f64; 8]) -> Self {
-        Self(*values)
-    }
-
-    #[inline(always)]
-    fn put(self, values: &mut [f64; 8]) {
-        *values = self.0;
-    }
-
-    #[inline(always)]
-    fn plus(mut self, other: Self) -> Self {
-        for (a, b) in self.0.iter_mut().zip(other.0) {
-            *a += b;
-        }
-        self
     }
 
     #[inline(always)]
@@ -60,6 +65,27 @@ impl Eight for Plain {
             *a *= b;
         }
         self
+    }
+
+    #[inline(always)]
+    fn fused(mut self, factor: Self, summand: Self) -> Self {
+        for ((a, b), c) in self.0.iter_mut().zip(factor.0).zip(summand.0) {
+            *a = a.fused(b, c);
+        }
+        self
+    }
+}
+
+#[allow(clippy::inline_always, reason = "all must be compiled within one function")]
+impl Eight for Plain {
+    #[inline(always)]
+    fn of(values: &[f64; 8]) -> Self {
+        Self(*values)
+    }
+
+    #[inline(always)]
+    fn put(self, values: &mut [f64; 8]) {
+        *values = self.0;
     }
 
     #[inline(always)]
@@ -80,15 +106,16 @@ impl Eight for Plain {
 #[allow(clippy::inline_always, reason = "all must be compiled within one function, for its vectors")]
 pub(crate) mod x86 {
     use core::arch::x86_64::{
-        __m256d, __m512d, _mm256_add_pd, _mm256_loadu_pd, _mm256_mul_pd, _mm256_permute2f128_pd,
+        __m256d, __m512d, _mm256_fmadd_pd, _mm256_loadu_pd, _mm256_mul_pd, _mm256_permute2f128_pd,
         _mm256_set1_pd, _mm256_storeu_pd, _mm256_sub_pd, _mm256_unpackhi_pd, _mm256_unpacklo_pd,
-        _mm512_add_pd, _mm512_loadu_pd, _mm512_mul_pd, _mm512_set1_pd, _mm512_shuffle_f64x2,
-        _mm512_storeu_pd, _mm512_sub_pd, _mm512_unpackhi_pd, _mm512_unpacklo_pd,
+        _mm512_castpd256_pd512, _mm512_fmadd_pd, _mm512_insertf64x4, _mm512_loadu_pd, _mm512_mul_pd,
+        _mm512_set1_pd, _mm512_shuffle_f64x2, _mm512_storeu_pd, _mm512_sub_pd, _mm512_unpackhi_pd,
+        _mm512_unpacklo_pd,
     };
 
-    use super::Eight;
+    use super::{Eight, Series};
 
-    /// Two vectors of AVX; made only where the processor has it.
+    /// Two vectors of AVX; made only where the processor has AVX2 and FMA.
     #[derive(Debug, Clone, Copy)]
     pub(crate) struct Avx(__m256d, __m256d);
 
@@ -98,12 +125,34 @@ pub(crate) mod x86 {
 
     // SAFETY, for all that follows: such a vector exists only where the processor has its kind, and arrays are as
     // long as what is loaded from them or stored to them.
-    impl Eight for Avx {
+    impl Series for Avx {
         #[inline(always)]
         fn all(value: f64) -> Self {
             unsafe { Self(_mm256_set1_pd(value), _mm256_set1_pd(value)) }
         }
 
+        #[inline(always)]
+        fn less(self, other: Self) -> Self {
+            unsafe { Self(_mm256_sub_pd(self.0, other.0), _mm256_sub_pd(self.1, other.1)) }
+        }
+
+        #[inline(always)]
+        fn times(self, other: Self) -> Self {
+            unsafe { Self(_mm256_mul_pd(self.0, other.0), _mm256_mul_pd(self.1, other.1)) }
+        }
+
+        #[inline(always)]
+        fn fused(self, factor: Self, summand: Self) -> Self {
+            unsafe {
+                Self(
+                    _mm256_fmadd_pd(self.0, factor.0, summand.0),
+                    _mm256_fmadd_pd(self.1, factor.1, summand.1),
+                )
+            }
+        }
+    }
+
+    impl Eight for Avx {
         #[inline(always)]
         fn of(values: &[f64; 8]) -> Self {
             unsafe { Self(_mm256_loadu_pd(values.as_ptr()), _mm256_loadu_pd(values.as_ptr().add(4))) }
@@ -115,21 +164,6 @@ pub(crate) mod x86 {
                 _mm256_storeu_pd(values.as_mut_ptr(), self.0);
                 _mm256_storeu_pd(values.as_mut_ptr().add(4), self.1);
             }
-        }
-
-        #[inline(always)]
-        fn plus(self, other: Self) -> Self {
-            unsafe { Self(_mm256_add_pd(self.0, other.0), _mm256_add_pd(self.1, other.1)) }
-        }
-
-        #[inline(always)]
-        fn less(self, other: Self) -> Self {
-            unsafe { Self(_mm256_sub_pd(self.0, other.0), _mm256_sub_pd(self.1, other.1)) }
-        }
-
-        #[inline(always)]
-        fn times(self, other: Self) -> Self {
-            unsafe { Self(_mm256_mul_pd(self.0, other.0), _mm256_mul_pd(self.1, other.1)) }
         }
 
         /// Four squares of four by four, each to its mirrored place.
@@ -158,25 +192,10 @@ pub(crate) mod x86 {
         }
     }
 
-    impl Eight for Avx512 {
+    impl Series for Avx512 {
         #[inline(always)]
         fn all(value: f64) -> Self {
             unsafe { Self(_mm512_set1_pd(value)) }
-        }
-
-        #[inline(always)]
-        fn of(values: &[f64; 8]) -> Self {
-            unsafe { Self(_mm512_loadu_pd(values.as_ptr())) }
-        }
-
-        #[inline(always)]
-        fn put(self, values: &mut [f64; 8]) {
-            unsafe { _mm512_storeu_pd(values.as_mut_ptr(), self.0) }
-        }
-
-        #[inline(always)]
-        fn plus(self, other: Self) -> Self {
-            unsafe { Self(_mm512_add_pd(self.0, other.0)) }
         }
 
         #[inline(always)]
@@ -189,12 +208,58 @@ pub(crate) mod x86 {
             unsafe { Self(_mm512_mul_pd(self.0, other.0)) }
         }
 
+        #[inline(always)]
+        fn fused(self, factor: Self, summand: Self) -> Self {
+            unsafe { Self(_mm512_fmadd_pd(self.0, factor.0, summand.0)) }
+        }
+    }
+
+    impl Eight for Avx512 {
+        #[inline(always)]
+        fn of(values: &[f64; 8]) -> Self {
+            unsafe { Self(_mm512_loadu_pd(values.as_ptr())) }
+        }
+
+        #[inline(always)]
+        fn put(self, values: &mut [f64; 8]) {
+            unsafe { _mm512_storeu_pd(values.as_mut_ptr(), self.0) }
+        }
+
+        /// Halves as they are loaded, then pairs, then pairs of pairs: a third fewer turns than [`Eight::turned`].
+        #[inline(always)]
+        fn gathered([a, b, c, d, e, f, g, h]: [&[f64; 8]; 8]) -> [Self; 8] {
+            let [p, q, r, s] = half::<0>([a, b, c, d, e, f, g, h]);
+            let [t, u, v, w] = half::<4>([a, b, c, d, e, f, g, h]);
+            [p, q, r, s, t, u, v, w]
+        }
+
         /// Pairs, then pairs of pairs, then halves.
         #[inline(always)]
         fn turned([a, b, c, d, e, f, g, h]: [Self; 8]) -> [Self; 8] {
             let [p, r, t, v] = even([a, b, c, d, e, f, g, h]);
             let [q, s, u, w] = odd([a, b, c, d, e, f, g, h]);
             [p, q, r, s, t, u, v, w]
+        }
+    }
+
+    /// Four columns from some number on.
+    #[inline(always)]
+    fn half<const FROM: usize>([a, b, c, d, e, f, g, h]: [&[f64; 8]; 8]) -> [Avx512; 4] {
+        // SAFETY: as above.
+        unsafe {
+            let two = |near: &[f64; 8], far: &[f64; 8]| {
+                let near = _mm512_castpd256_pd512(_mm256_loadu_pd(near.as_ptr().add(FROM)));
+                _mm512_insertf64x4::<1>(near, _mm256_loadu_pd(far.as_ptr().add(FROM)))
+            };
+            let (ac, bd, eg, fh) = (two(a, c), two(b, d), two(e, g), two(f, h));
+            let (even_near, odd_near) = (_mm512_unpacklo_pd(ac, bd), _mm512_unpackhi_pd(ac, bd));
+            let (even_far, odd_far) = (_mm512_unpacklo_pd(eg, fh), _mm512_unpackhi_pd(eg, fh));
+            [
+                Avx512(_mm512_shuffle_f64x2::<0x88>(even_near, even_far)),
+                Avx512(_mm512_shuffle_f64x2::<0x88>(odd_near, odd_far)),
+                Avx512(_mm512_shuffle_f64x2::<0xdd>(even_near, even_far)),
+                Avx512(_mm512_shuffle_f64x2::<0xdd>(odd_near, odd_far)),
+            ]
         }
     }
 
@@ -266,7 +331,7 @@ mod tests {
         check::<Plain>();
         #[cfg(target_arch = "x86_64")]
         {
-            if is_x86_feature_detected!("avx2") {
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
                 check::<x86::Avx>();
             }
             if is_x86_feature_detected!("avx512f") {

@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-#[cfg(feature = "std")]
-use crate::eight::Eight;
 use crate::filter::{Filter, Step, distance};
+use crate::series::Series;
+use crate::wide::widest;
 
 /// The folded map takes over when the covariance is this near to its limit, as a share of itself. The
 /// difference leaves a share as small in S, and is forgotten.
@@ -13,33 +13,77 @@ const NEAR: f64 = 1e-13;
 /// Samples whose squared innovations are added up by themselves before their sum is added to all others: the
 /// order of additions is part of a number, and this one suits vectors.
 #[cfg(feature = "std")]
-pub(crate) const TILE: usize = 8;
+pub(crate) const GROUP: usize = 32;
 
-/// Predict and correct in one, at the settled gain K: F = (I − K C) A_d, g = (I − K C) B_d, k = K.
+/// The state in the coordinates of the folded map, m: z = δX − S, what is bent and not backlash; v = a₀₁ δẊ, what the
+/// speed adds to that in a step; and S.
+pub(crate) type Bent = [f64; 3];
+
+/// Predict and correct in one, at the settled gain K.
+///
+/// With the entries a of A_d, whose last row is [0 0 1] and which leaves [1 0 1] as it is (the model sees δX and S by
+/// their difference alone), and with κ = k₀ − k₂ and λ = a₀₁ k₁:
+///
+/// ```text
+/// w = y − b₀ u        n = w − S        p = a₀₀ z + v        e = n − p
+/// z = (1 − κ) p + (κ n + b₀ u)
+/// v = λ n + ((a₁₁ − λ) v + (a₀₁ a₁₀ − λ a₀₀) z + a₀₁ b₁ u)
+/// S = −k₂ p + ((1 − k₂) S + k₂ w)
+/// ```
+/// So there are eleven products where (I − K C) A_d has nine alone. Fewer would do, in coordinates that make e one
+/// difference, or if S were moved by k₂ e; but then a difference of the last bit would live on for long, and
+/// `lanes` needs that starts are forgotten wholly. Each product is fused with its sum, on any machine.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Folded {
-    f: [[f64; 3]; 3],
-    g: [f64; 3],
-    k: [f64; 3],
-    /// First rows of A_d and B_d, which predict y.
-    a: [f64; 3],
-    b: f64,
+    coefficients: Coefficients<f64>,
     #[cfg(feature = "std")]
     pub(crate) variance_m2: f64,
+    /// a₀₁, s.
+    speed_to_way_s: f64,
+    /// Its reciprocal; zero where it has none.
+    way_to_speed_per_s: f64,
     p: Matrix3<f64>,
+}
+
+/// See [`Folded`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Coefficients<E> {
+    b: E,
+    a: E,
+    kappa: E,
+    less_kappa: E,
+    lambda: E,
+    v_by_v: E,
+    v_by_z: E,
+    v_by_u: E,
+    k: E,
+    minus_k: E,
+    less_k: E,
 }
 
 impl Folded {
     pub(crate) fn new(filter: &Filter, gain: &Vector3<f64>, p: &Matrix3<f64>) -> Self {
-        let (a_d, b_d) = (&filter.discrete().a_d, &filter.discrete().b_d);
+        let (a, b) = (&filter.discrete().a_d, &filter.discrete().b_d);
+        let (kappa, lambda) = (gain[0] - gain[2], a[(0, 1)] * gain[1]);
+        let coefficients = Coefficients {
+            b: b[0],
+            a: a[(0, 0)],
+            kappa,
+            less_kappa: 1.0 - kappa,
+            lambda,
+            v_by_v: a[(1, 1)] - lambda,
+            v_by_z: a[(0, 1)] * a[(1, 0)] - lambda * a[(0, 0)],
+            v_by_u: a[(0, 1)] * b[1],
+            k: gain[2],
+            minus_k: -gain[2],
+            less_k: 1.0 - gain[2],
+        };
         Self {
-            f: core::array::from_fn(|i| core::array::from_fn(|j| a_d[(i, j)] - gain[i] * a_d[(0, j)])),
-            g: core::array::from_fn(|i| b_d[i] - gain[i] * b_d[0]),
-            k: core::array::from_fn(|i| gain[i]),
-            a: core::array::from_fn(|j| a_d[(0, j)]),
-            b: b_d[0],
+            coefficients,
             #[cfg(feature = "std")]
             variance_m2: p[(0, 0)] + filter.noise().v_d_m2,
+            speed_to_way_s: a[(0, 1)],
+            way_to_speed_per_s: if a[(0, 1)].is_normal() { a[(0, 1)].recip() } else { 0.0 },
             p: *p,
         }
     }
@@ -49,86 +93,91 @@ impl Folded {
         !step.innovation_m.is_nan() && distance(&self.p, &step.prior.p) <= NEAR
     }
 
-    /// One sample: the state after it, and its innovation.
+    /// From the state after a sample.
+    pub(crate) fn bent(&self, x: &Vector3<f64>) -> Bent {
+        [x[0] - x[2], self.speed_to_way_s * x[1], x[2]]
+    }
+
+    /// Back to the state. A speed that does not outlast a step moves nothing, and is told as zero.
+    pub(crate) fn state(&self, [z_m, v_m, s_m]: Bent) -> Vector3<f64> {
+        Vector3::new(z_m + s_m, v_m * self.way_to_speed_per_s, s_m)
+    }
+
+    /// The same map for eight series side by side, or for one.
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "must be compiled within each of its shells")]
+    pub(crate) fn wide<E: Series>(&self) -> Coefficients<E> {
+        let of = &self.coefficients;
+        Coefficients {
+            b: E::all(of.b),
+            a: E::all(of.a),
+            kappa: E::all(of.kappa),
+            less_kappa: E::all(of.less_kappa),
+            lambda: E::all(of.lambda),
+            v_by_v: E::all(of.v_by_v),
+            v_by_z: E::all(of.v_by_z),
+            v_by_u: E::all(of.v_by_u),
+            k: E::all(of.k),
+            minus_k: E::all(of.minus_k),
+            less_k: E::all(of.less_k),
+        }
+    }
+}
+
+impl<E: Series> Coefficients<E> {
+    /// One sample of each series: the state after it, and its innovation.
     ///
-    /// Sums are taken as trees, or each sample would wait for eight additions in a row.
-    #[inline]
-    pub(crate) fn step(&self, [x0, x1, x2]: [f64; 3], y_m: f64, load_n: f64) -> ([f64; 3], f64) {
-        let Self { f, g, k, a, b, .. } = self;
-        let e_m = (y_m - b * load_n) - (a[0] * x0 + (a[1] * x1 + a[2] * x2));
-        let next = |i: usize| ((g[i] * load_n + k[i] * y_m) + f[i][0] * x0) + (f[i][1] * x1 + f[i][2] * x2);
-        ([next(0), next(1), next(2)], e_m)
+    /// What comes latest is added last: a state waits ten cycles for the one before it where a sum takes three and a
+    /// fused product four.
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "must be compiled within each of its shells")]
+    pub(crate) fn step(&self, [z_m, v_m, s_m]: [E; 3], y_m: E, load_n: E) -> ([E; 3], E) {
+        let pushed_m = self.b.times(load_n);
+        let w_m = y_m.less(pushed_m);
+        let n_m = w_m.less(s_m);
+        let p_m = self.a.fused(z_m, v_m);
+        let next_z_m = self.less_kappa.fused(p_m, self.kappa.fused(n_m, pushed_m));
+        let moved_m = self.v_by_v.fused(v_m, self.v_by_z.fused(z_m, self.v_by_u.times(load_n)));
+        let next_s_m = self.minus_k.fused(p_m, self.less_k.fused(s_m, self.k.times(w_m)));
+        ([next_z_m, self.lambda.fused(n_m, moved_m), next_s_m], n_m.less(p_m))
     }
+}
 
-    /// Samples one after the other: the last state, and a sum with the squared innovations added, [`TILE`] by
-    /// [`TILE`].
-    #[cfg(feature = "std")]
-    #[inline]
+widest! {
+    /// One sample; see [`Coefficients::step`].
+    pub(crate) fn step(map: &Folded, x: &mut Bent, y_m: f64, load_n: f64) {
+        *x = map.wide::<f64>().step(*x, y_m, load_n).0;
+    }
+}
+
+#[cfg(feature = "std")]
+widest! {
+    /// Samples one after the other: the last state, and a sum with the squared innovations added, [`GROUP`] by
+    /// [`GROUP`]. The innovations are handed out as far as there is room for them.
     pub(crate) fn run(
-        &self,
-        mut x: [f64; 3],
-        mut squares_m2: f64,
-        (y_m, load_n): (&[f64], &[f64]),
+        map: &Folded,
+        from: Bent,
+        sum_m2: f64,
+        columns: (&[f64], &[f64]),
         s_m: &mut [f64],
-        mut note: impl FnMut(usize, f64),
-    ) -> ([f64; 3], f64) {
-        let tiles = y_m.chunks(TILE).zip(load_n.chunks(TILE)).zip(s_m.chunks_mut(TILE));
-        for (tile, ((y_m, load_n), s_m)) in tiles.enumerate() {
-            let mut tile_m2 = 0.0;
-            for (at, ((&y, &u), s)) in y_m.iter().zip(load_n).zip(s_m).enumerate() {
+        innovation_m: &mut [f64],
+    ) -> (Bent, f64) {
+        let (coefficients, mut x, mut sum_m2) = (map.wide::<f64>(), from, sum_m2);
+        let mut room = innovation_m.iter_mut();
+        let groups = columns.0.chunks(GROUP).zip(columns.1.chunks(GROUP)).zip(s_m.chunks_mut(GROUP));
+        for ((y_m, load_n), s_m) in groups {
+            let mut group_m2 = 0.0;
+            for ((&y, &u), s) in y_m.iter().zip(load_n).zip(s_m) {
                 let e_m;
-                (x, e_m) = self.step(x, y, u);
+                (x, e_m) = coefficients.step(x, y, u);
                 *s = x[2];
-                tile_m2 += e_m * e_m;
-                note(TILE * tile + at, e_m);
+                group_m2 = e_m.fused(e_m, group_m2);
+                if let Some(out) = room.next() {
+                    *out = e_m;
+                }
             }
-            squares_m2 += tile_m2;
+            sum_m2 += group_m2;
         }
-        (x, squares_m2)
-    }
-
-    /// The same map for eight series side by side.
-    #[cfg(feature = "std")]
-    #[inline(always)]
-    #[allow(clippy::inline_always, reason = "see `eight`")]
-    pub(crate) fn wide<E: Eight>(&self) -> Wide<E> {
-        let Self { f: [p, q, r], g, k, a, b, .. } = self;
-        Wide { f: [three(p), three(q), three(r)], g: three(g), k: three(k), a: three(a), b: E::all(*b) }
-    }
-}
-
-#[cfg(feature = "std")]
-#[inline(always)]
-#[allow(clippy::inline_always, reason = "see `eight`")]
-fn three<E: Eight>(v: &[f64; 3]) -> [E; 3] {
-    [E::all(v[0]), E::all(v[1]), E::all(v[2])]
-}
-
-/// [`Folded`] for eight series at a time.
-#[cfg(feature = "std")]
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Wide<E> {
-    f: [[E; 3]; 3],
-    g: [E; 3],
-    k: [E; 3],
-    a: [E; 3],
-    b: E,
-}
-
-#[cfg(feature = "std")]
-impl<E: Eight> Wide<E> {
-    /// [`Folded::step`], operation by operation: each series has the bits it would have alone.
-    #[inline(always)]
-    #[allow(clippy::inline_always, reason = "see `eight`")]
-    pub(crate) fn step(&self, [x0, x1, x2]: [E; 3], y_m: E, load_n: E) -> ([E; 3], E) {
-        let Self { f, g, k, a, b } = self;
-        let seen_m = a[0].times(x0).plus(a[1].times(x1).plus(a[2].times(x2)));
-        let e_m = y_m.less(b.times(load_n)).less(seen_m);
-        let mut next = [x0; 3];
-        for i in 0..3 {
-            let pushed = g[i].times(load_n).plus(k[i].times(y_m)).plus(f[i][0].times(x0));
-            next[i] = pushed.plus(f[i][1].times(x1).plus(f[i][2].times(x2)));
-        }
-        (next, e_m)
+        (x, sum_m2)
     }
 }

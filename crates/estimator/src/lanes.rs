@@ -4,22 +4,29 @@
 //! the same bits, since rounding leaves nothing between neighbouring numbers for a difference to live on. So
 //! each part starts early, from a guess. Where the state in which it arrives at its own first sample is, bit
 //! for bit, the one in which the part before it ended, it goes on as the plain recursion would have; where
-//! it is not, the plain recursion does the rest itself.
+//! it is not, the plain recursion goes on until it meets the part at one of a few marks, or does all of it.
 
+#[cfg(target_arch = "x86_64")]
+use core::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
+use std::hint::black_box;
 use std::ops::Range;
 
 #[cfg(target_arch = "x86_64")]
 use crate::eight::x86::{Avx, Avx512};
-use crate::eight::{Eight, Plain};
-use crate::folded::{Folded, TILE};
+use crate::eight::{Eight, Plain, lines, put_lines};
+use crate::folded::{self, Bent, Folded, GROUP};
 
 /// Parts worked on side by side.
 pub(crate) const PARTS: usize = 8;
-/// The longest part: what eight of them read and write stays in the second cache. No power of two, or all parts
-/// would fall on the same lines of the first.
-const LONGEST_PART: usize = 2040;
+/// The longest part: what eight of them read and write stays in the second cache. An odd number of groups, or all
+/// parts would fall on the same lines of the first.
+const LONGEST_PART: usize = 63 * GROUP;
 /// A part no longer than this share of its early start gains too little.
 const SHORTEST_SHARE: f64 = 0.5;
+/// Places of a part at which its states are kept, the last at its end.
+const MARKS: usize = 4;
+/// Samples of a part that are loaded and turned at once.
+const TILE: usize = 8;
 
 /// How a stretch is cut: part `i` covers `lead + part` samples from `i·part`; the first `lead` of them are its
 /// early start, but for the first part, whose state is known.
@@ -32,8 +39,8 @@ pub(crate) struct Cut {
 impl Cut {
     /// Of up to so many samples; none where they are too few. `lead` is how long it takes to forget a start.
     pub(crate) fn of(samples: usize, lead: usize) -> Option<Self> {
-        let lead = lead.div_ceil(TILE) * TILE;
-        let part = (samples.checked_sub(lead)? / PARTS).min(LONGEST_PART.max(4 * lead)) / TILE * TILE;
+        let lead = lead.div_ceil(GROUP) * GROUP;
+        let part = (samples.checked_sub(lead)? / PARTS).min(LONGEST_PART.max(4 * lead)) / GROUP * GROUP;
         (part > 0 && part as f64 >= SHORTEST_SHARE * lead as f64).then_some(Self { lead, part })
     }
 
@@ -42,49 +49,100 @@ impl Cut {
         self.lead + PARTS * self.part
     }
 
-    /// Tiles that each part covers.
-    pub(crate) fn tiles(self) -> usize {
-        (self.lead + self.part) / TILE
+    /// Groups that each part covers.
+    pub(crate) fn groups(self) -> usize {
+        (self.lead + self.part) / GROUP
     }
 
     /// Where part `i` starts early.
     pub(crate) fn start(self, i: usize) -> usize {
         i * self.part
     }
+
+    /// The samples of a part between two marks.
+    fn between(self, mark: usize) -> Range<usize> {
+        let at = |mark: usize| self.lead + self.part / GROUP * mark / MARKS * GROUP;
+        at(mark)..at(mark + 1)
+    }
 }
 
 /// The states of eight parts: eight numbers for each entry of the state.
 pub(crate) type States = [[f64; PARTS]; 3];
 
-/// What the parts read and write.
+/// The state of one part.
+fn state(states: &States, part: usize) -> Bent {
+    states.each_ref().map(|entry| entry[part])
+}
+
+fn same(a: Bent, b: Bent) -> bool {
+    a.map(f64::to_bits) == b.map(f64::to_bits)
+}
+
+/// What the parts read and write. Columns may go on behind the last part: what the next eight will need is fetched
+/// meanwhile, since memory is quickest line after line.
 pub(crate) struct Work<'a> {
     pub(crate) map: &'a Folded,
     pub(crate) cut: Cut,
     pub(crate) y_m: &'a [f64],
     pub(crate) load_n: &'a [f64],
     pub(crate) s_m: &'a mut [f64],
-    /// Squared innovations of each tile: of all parts' first tiles, then of their second ones, and so on.
+    /// Squared innovations of each group: of all parts' first groups, then of their second ones, and so on.
     pub(crate) squares_m2: &'a mut [[f64; PARTS]],
 }
 
 impl Work<'_> {
-    /// Runs the parts from their states, and says up to which sample S is that of the plain recursion, its state
-    /// there, and a sum with the squared innovations until then added, tile by tile.
-    pub(crate) fn run(&mut self, states: States, mut sum_m2: f64) -> (usize, [f64; 3], f64) {
-        let Cut { lead, part } = self.cut;
-        let arrived = self.advance(states, 0..lead);
-        // A part's end is written after the early start of the next, which lies in the same place.
-        let ended = self.advance(arrived, lead..lead + part);
-        let state = |states: &States, part: usize| states.each_ref().map(|entry| entry[part]);
-        let bits = |states: &States, part: usize| state(states, part).map(f64::to_bits);
-        let joined = (1..PARTS).take_while(|&i| bits(&arrived, i) == bits(&ended, i - 1)).count();
-        for part in 0..=joined {
-            // The early start of the first part is no guess.
-            let first = if part == 0 { 0 } else { lead / TILE };
-            sum_m2 =
-                self.squares_m2[first..self.cut.tiles()].iter().fold(sum_m2, |sum, tile| sum + tile[part]);
+    /// Runs the parts from their states: the last state of the plain recursion, and a sum with its squared
+    /// innovations added, group by group. None where a sample is missing, which leaves no state behind it a number.
+    pub(crate) fn run(&mut self, states: States, mut sum_m2: f64) -> Option<(Bent, f64)> {
+        let arrived = self.advance(states, 0..self.cut.lead);
+        let mut marks = [arrived; MARKS];
+        let mut reached = arrived;
+        for (mark, states) in marks.iter_mut().enumerate() {
+            // A part's end is written after the early start of the next, which lies in the same place.
+            reached = self.advance(reached, self.cut.between(mark));
+            *states = reached;
         }
-        (lead + (joined + 1) * part, state(&ended, joined), sum_m2)
+        if reached.as_flattened().iter().any(|entry| !entry.is_finite()) {
+            return None;
+        }
+        // The early start of the first part is no guess.
+        sum_m2 = self.added(sum_m2, 0, 0);
+        let mut last = state(&reached, 0);
+        for part in 1..PARTS {
+            (last, sum_m2) = if same(state(&arrived, part), last) {
+                (state(&reached, part), self.added(sum_m2, part, self.cut.lead))
+            } else {
+                self.catch_up(part, last, sum_m2, &marks)
+            };
+        }
+        Some((last, sum_m2))
+    }
+
+    /// A part from the state it should have arrived in, until it is in one that it was in.
+    #[cold]
+    fn catch_up(
+        &mut self,
+        part: usize,
+        mut x: Bent,
+        mut sum_m2: f64,
+        marks: &[States; MARKS],
+    ) -> (Bent, f64) {
+        for (mark, states) in marks.iter().enumerate() {
+            let Range { start, end } = self.cut.between(mark);
+            let all = self.cut.start(part) + start..self.cut.start(part) + end;
+            let columns = (&self.y_m[all.clone()], &self.load_n[all.clone()]);
+            (x, sum_m2) = folded::run(self.map, x, sum_m2, columns, &mut self.s_m[all], &mut []);
+            if same(x, state(states, part)) {
+                return (state(&marks[MARKS - 1], part), self.added(sum_m2, part, end));
+            }
+        }
+        (x, sum_m2)
+    }
+
+    /// A sum with the squared innovations of a part added from one of its samples on.
+    fn added(&self, sum_m2: f64, part: usize, from: usize) -> f64 {
+        let groups = &self.squares_m2[from / GROUP..self.cut.groups()];
+        groups.iter().fold(sum_m2, |sum, group| sum + group[part])
     }
 
     /// Takes all parts from one of their samples to another, with the widest vectors the machine has.
@@ -96,7 +154,7 @@ impl Work<'_> {
                 #[allow(unsafe_code, reason = "see `eight`")]
                 return unsafe { advance_avx512(self, states, within) };
             }
-            if is_x86_feature_detected!("avx2") {
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
                 // SAFETY: as above.
                 #[allow(unsafe_code, reason = "see `eight`")]
                 return unsafe { advance_avx2(self, states, within) };
@@ -113,9 +171,24 @@ fn advance_avx512(work: &mut Work<'_>, states: States, within: Range<usize>) -> 
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 fn advance_avx2(work: &mut Work<'_>, states: States, within: Range<usize>) -> States {
     advance::<Avx>(work, states, within)
+}
+
+/// Tells the processor that numbers will be needed.
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "see `eight`")]
+#[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables, reason = "no way to tell"))]
+fn fetch(numbers: &[f64]) {
+    #[cfg(target_arch = "x86_64")]
+    for line in numbers.iter().step_by(TILE) {
+        // SAFETY: it reads nothing that could be seen.
+        #[allow(unsafe_code, reason = "see `eight`")]
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T1>(std::ptr::from_ref(line).cast());
+        }
+    }
 }
 
 #[inline(always)]
@@ -123,18 +196,29 @@ fn advance_avx2(work: &mut Work<'_>, states: States, within: Range<usize>) -> St
 fn advance<E: Eight>(work: &mut Work<'_>, states: States, within: Range<usize>) -> States {
     let (map, part) = (work.map.wide::<E>(), work.cut.part);
     let mut x = [E::of(&states[0]), E::of(&states[1]), E::of(&states[2])];
-    for at in within.step_by(TILE) {
-        let (y, u) = (gathered::<E>(work.y_m, part, at), gathered::<E>(work.load_n, part, at));
-        let (mut s, mut squares) = (y, E::all(0.0));
-        for k in 0..TILE {
-            let e_m;
-            (x, e_m) = map.step(x, y[k], u[k]);
-            s[k] = x[2];
-            squares = squares.plus(e_m.times(e_m));
+    for group in within.step_by(GROUP) {
+        let mut squares = E::all(0.0);
+        for at in (group..group + GROUP).step_by(TILE) {
+            // Hidden, or each of the 24 places would be kept in a register, of which there are not enough.
+            let part = black_box(part);
+            let next = work.cut.samples() + PARTS * at;
+            for column in [work.y_m, work.load_n, work.s_m] {
+                if let Some(tiles) = column.get(next..next + PARTS * TILE) {
+                    fetch(tiles);
+                }
+            }
+            let (y, u) = (E::gathered(lines(work.y_m, at, part)), E::gathered(lines(work.load_n, at, part)));
+            let mut s = y;
+            for k in 0..TILE {
+                let e_m;
+                (x, e_m) = map.step(x, y[k], u[k]);
+                s[k] = x[2];
+                squares = e_m.fused(e_m, squares);
+            }
+            put_lines(E::turned(s), work.s_m, at, part);
         }
-        scatter(s, part, at, work.s_m);
-        if let Some(tile) = work.squares_m2.get_mut(at / TILE) {
-            squares.put(tile);
+        if let Some(group) = work.squares_m2.get_mut(group / GROUP) {
+            squares.put(group);
         }
     }
     let mut states = states;
@@ -144,49 +228,35 @@ fn advance<E: Eight>(work: &mut Work<'_>, states: States, within: Range<usize>) 
     states
 }
 
-/// Samples from `at` of all parts: a vector of parts for each.
-#[inline(always)]
-#[allow(clippy::inline_always, reason = "see `eight`")]
-fn gathered<E: Eight>(column: &[f64], part: usize, at: usize) -> [E; TILE] {
-    let mut parts = [E::all(0.0); PARTS];
-    for (i, samples) in parts.iter_mut().enumerate() {
-        if let Some(tile) = column.get(i * part + at..).and_then(<[f64]>::first_chunk) {
-            *samples = E::of(tile);
-        }
-    }
-    E::turned(parts)
-}
-
-/// Back to where [`gathered`] found them.
-#[inline(always)]
-#[allow(clippy::inline_always, reason = "see `eight`")]
-fn scatter<E: Eight>(samples: [E; TILE], part: usize, at: usize, column: &mut [f64]) {
-    for (i, samples) in E::turned(samples).into_iter().enumerate() {
-        if let Some(tile) = column.get_mut(i * part + at..).and_then(<[f64]>::first_chunk_mut) {
-            samples.put(tile);
-        }
-    }
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
     use super::*;
     use crate::noise::{Noise, Sensors};
-    use crate::{Actuator, Filter};
+    use crate::{Actuator, Filter, Schedule};
 
-    fn map() -> Folded {
+    fn filter((stiffness, damping, mass): (f64, f64, f64), rate_hz: f64, bandwidth_hz: f64) -> Filter {
         let noise = Noise::Sensors(Sensors {
             screw_rms_m: 3e-6,
             screw_resolution_m: 2.3e-6,
             motor_rms_m: 1e-6,
             motor_resolution_m: 3e-7,
             unknown_force_n: 200.0,
-            bandwidth_hz: 10.0,
+            bandwidth_hz,
         });
-        let filter = Filter::new(&Actuator::linear(5e7, 2000.0, 8.0).unwrap(), 0.004, &noise).unwrap();
+        Filter::new(&Actuator::linear(stiffness, damping, mass).unwrap(), rate_hz.recip(), &noise).unwrap()
+    }
+
+    fn folded_of(filter: &Filter) -> Folded {
         let (gain, p) = filter.settled().unwrap();
-        Folded::new(&filter, &gain, &p)
+        Folded::new(filter, &gain, &p)
+    }
+
+    fn map() -> Folded {
+        folded_of(&filter((5e7, 2000.0, 8.0), 250.0, 10.0))
     }
 
     /// A load that swings, and positions that jump about what it makes of them.
@@ -203,54 +273,124 @@ mod tests {
         values.iter().map(|v| v.to_bits()).collect()
     }
 
-    /// The arithmetic alone: each part by itself, from its start, as the plain recursion does it.
-    #[test]
-    fn every_kind_of_vector_gives_the_bits_of_the_plain_recursion() {
-        let (map, cut) = (map(), Cut { lead: 0, part: 96 });
-        let (y_m, load_n) = channels(cut.samples());
-        let (mut wanted_m, mut wanted_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.tiles()]);
+    type Advance = fn(&mut Work<'_>, States, Range<usize>) -> States;
+
+    /// S and the sums of squares of eight parts of 96 samples, by one kind of vector.
+    fn advanced(map: &Folded, y_m: &[f64], load_n: &[f64], advance: Advance) -> (Vec<u64>, Vec<u64>) {
+        let cut = Cut { lead: 0, part: 96 };
+        let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.groups()]);
+        advance(
+            &mut Work { map, cut, y_m, load_n, s_m: &mut s_m, squares_m2: &mut squares_m2 },
+            STARTS,
+            0..96,
+        );
+        (bits(&s_m), bits(squares_m2.as_flattened()))
+    }
+
+    /// Each part by itself, from its start, as the plain recursion does it.
+    fn one_by_one(map: &Folded, y_m: &[f64], load_n: &[f64]) -> (Vec<u64>, Vec<u64>) {
+        let (mut s_m, mut squares_m2) = (vec![0.0; y_m.len()], vec![[0.0; PARTS]; 96 / GROUP]);
         for part in 0..PARTS {
             let within = part * 96..(part + 1) * 96;
-            let (x, column) =
-                (STARTS.map(|entry| entry[part]), (&y_m[within.clone()], &load_n[within.clone()]));
-            let note = |k: usize, e_m: f64| wanted_m2[k / TILE][part] += e_m * e_m;
-            map.run(x, 0.0, column, &mut wanted_m[within], note);
+            let columns = (&y_m[within.clone()], &load_n[within.clone()]);
+            let mut e_m = [0.0; 96];
+            folded::run(map, state(&STARTS, part), 0.0, columns, &mut s_m[within], &mut e_m);
+            for (squares_m2, e_m) in squares_m2.iter_mut().zip(e_m.chunks(GROUP)) {
+                squares_m2[part] = e_m.iter().fold(0.0, |sum, e: &f64| e.mul_add(*e, sum));
+            }
         }
-        let run = |advance: fn(&mut Work<'_>, States, Range<usize>) -> States| {
-            let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.tiles()]);
-            let (s_m, squares_m2) = (&mut s_m, &mut squares_m2);
-            advance(&mut Work { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 }, STARTS, 0..96);
-            assert_eq!(bits(s_m), bits(&wanted_m));
-            assert_eq!(bits(squares_m2.as_flattened()), bits(wanted_m2.as_flattened()));
-        };
-        run(advance::<Plain>);
-        #[allow(clippy::redundant_closure_for_method_calls, reason = "the method has a lifetime of its own")]
-        run(|work, states, within| work.advance(states, within));
+        (bits(&s_m), bits(squares_m2.as_flattened()))
+    }
+
+    /// The first without the processor's own fused products, where it could do without.
+    fn kinds() -> Vec<Advance> {
+        let mut kinds: Vec<Advance> =
+            vec![advance::<Plain>, |work, states, within| work.advance(states, within)];
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has it.
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: the processor has them.
             #[allow(unsafe_code, reason = "see `eight`")]
-            run(|work, states, within| unsafe { advance_avx2(work, states, within) });
+            kinds.push(|work, states, within| unsafe { advance_avx2(work, states, within) });
+        }
+        kinds
+    }
+
+    proptest! {
+        /// The arithmetic alone, of any actuator, over any samples; a few are missing.
+        #[test]
+        fn every_kind_of_vector_gives_the_bits_of_the_plain_recursion(
+            (stiffness, damping, mass) in (6.0..9.5_f64, 1.0..5.0_f64, 0.0..3.0_f64),
+            (rate_hz, bandwidth_hz) in (1.5..3.7_f64, 0.0..1.5_f64),
+            y_m in vec(prop_oneof![300 => (-1e-3..1e-3).boxed(), 1 => Just(f64::NAN).boxed()], 8 * 96),
+            load_n in vec(-8e3..8e3, 8 * 96),
+        ) {
+            let ten = |power: f64| 10_f64.powf(power);
+            let plant = (ten(stiffness), ten(damping), ten(mass));
+            let map = folded_of(&filter(plant, ten(rate_hz), ten(bandwidth_hz)));
+            let wanted = one_by_one(&map, &y_m, &load_n);
+            for advance in kinds() {
+                prop_assert!(advanced(&map, &y_m, &load_n, advance) == wanted);
+            }
         }
     }
 
-    /// Long leads join all parts; a lead of one tile joins none, and says so.
+    /// The lead is long enough for nearly all: of starts that are wrong by a tenth of a millimetre, under tunings from 50
+    /// to 1000 Hz, at most one in fifty is remembered.
     #[test]
-    fn only_parts_that_have_forgotten_their_start_are_joined() {
+    fn starts_are_forgotten_to_the_last_bit() {
+        let (mut starts, mut remembered) = (0, 0);
+        for rate_hz in [50.0, 125.0, 250.0, 1000.0] {
+            for bandwidth_hz in [3.0, 10.0] {
+                for plant in [(5e7, 2000.0, 8.0), (2e7, 3000.0, 40.0), (3e8, 20_000.0, 5.0)] {
+                    let filter = filter(plant, rate_hz, bandwidth_hz);
+                    let (map, lead) = (folded_of(&filter), Schedule::new(&filter).lead.unwrap());
+                    let (y_m, load_n) = channels(lead + 100);
+                    for from in (0..100).step_by(5) {
+                        let columns = (&y_m[from..from + lead], &load_n[from..from + lead]);
+                        let ended =
+                            |x: Bent| folded::run(&map, x, 0.0, columns, &mut vec![0.0; lead], &mut []).0;
+                        let start = map.bent(&filter.start(y_m[from], load_n[from]).x);
+                        starts += 1;
+                        remembered += u32::from(!same(ended(start), ended([1e-4, 1e-5, -1e-4])));
+                    }
+                }
+            }
+        }
+        assert!(50 * remembered <= starts, "{remembered} of {starts} starts are remembered");
+    }
+
+    /// Long leads join all parts; where a lead is too short, the plain recursion catches up with the part.
+    #[test]
+    fn parts_that_have_not_forgotten_their_start_are_caught_up_with() {
         let map = map();
-        for (lead, joins) in [(224, true), (8, false)] {
-            let cut = Cut { lead, part: 96 };
+        for (lead, part) in [(224, 96), (32, 512), (32, 32), (0, 96)] {
+            let cut = Cut { lead, part };
             let (y_m, load_n) = channels(cut.samples());
-            let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.tiles()]);
+            let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.groups()]);
             let (s_m, squares_m2) = (&mut s_m, &mut squares_m2);
             let mut work = Work { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 };
-            let (done, x, sum_m2) = work.run(STARTS, 0.25);
-            assert_eq!(done, if joins { cut.samples() } else { lead + 96 });
-            let (mut wanted_m, start) = (vec![0.0; done], STARTS.map(|entry| entry[0]));
-            let plain = (&y_m[..done], &load_n[..done]);
-            let (wanted_x, wanted_m2) = map.run(start, 0.25, plain, &mut wanted_m, |_, _| ());
-            assert_eq!((bits(&s_m[..done]), bits(&x)), (bits(&wanted_m), bits(&wanted_x)));
-            assert_eq!(sum_m2.to_bits(), wanted_m2.to_bits());
+            let (x, sum_m2) = work.run(STARTS, 0.25).unwrap();
+            let (mut wanted_m, start) = (vec![0.0; cut.samples()], STARTS.map(|entry| entry[0]));
+            let (wanted_x, wanted_m2) =
+                folded::run(&map, start, 0.25, (&y_m, &load_n), &mut wanted_m, &mut []);
+            assert_eq!((bits(s_m), bits(&x)), (bits(&wanted_m), bits(&wanted_x)), "{cut:?}");
+            assert_eq!(sum_m2.to_bits(), wanted_m2.to_bits(), "{cut:?}");
+        }
+    }
+
+    /// Wherever one is missing, the first and the last among them.
+    #[test]
+    fn a_missing_sample_is_noticed() {
+        let (map, cut) = (map(), Cut { lead: 64, part: 96 });
+        for at in [0, 63, 64, 159, 160, 500, cut.samples() - 1] {
+            for is_load in [false, true] {
+                let (mut y_m, mut load_n) = channels(cut.samples());
+                (if is_load { &mut load_n } else { &mut y_m })[at] = f64::NAN;
+                let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.groups()]);
+                let (s_m, squares_m2) = (&mut s_m, &mut squares_m2);
+                let mut work = Work { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 };
+                assert!(work.run(STARTS, 0.0).is_none(), "sample {at} is missing");
+            }
         }
     }
 }

@@ -35,6 +35,7 @@ pub mod noise;
 pub mod running;
 #[cfg(feature = "std")]
 mod schedule;
+mod series;
 pub mod stream;
 #[cfg(feature = "std")]
 mod track;

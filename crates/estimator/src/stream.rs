@@ -8,7 +8,7 @@
 
 use crate::error::Error;
 use crate::filter::{Estimate, Filter};
-use crate::folded::Folded;
+use crate::folded::{self, Bent, Folded};
 
 /// A filter under way.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +18,8 @@ pub struct Stream {
     state: Option<Estimate>,
     /// Whether the covariance has come to that of the folded map.
     settled: bool,
+    /// The state as the folded map has it, once it has taken a sample and while it takes all.
+    bent: Option<Bent>,
     /// Load of the last sample, N; NaN where it was missing.
     last_load_n: f64,
     /// The last load that was there, N.
@@ -30,7 +32,8 @@ impl Stream {
     /// Differs from the batch by less than 1e-12 of the peak of S.
     pub fn even(filter: &Filter) -> Self {
         let (filter, nan) = (*filter, f64::NAN);
-        Self { filter, folded: None, state: None, settled: false, last_load_n: nan, held_load_n: 0.0 }
+        let (folded, state, bent) = (None, None, None);
+        Self { filter, folded, state, settled: false, bent, last_load_n: nan, held_load_n: 0.0 }
     }
 
     /// The batch's bits: the whole recursion until the gain has settled, one constant map from there.
@@ -57,10 +60,12 @@ impl Stream {
         let Some(state) = &mut self.state else { return self.start(y_m) };
         let whole = self.settled && !(y_m + before_n).is_nan();
         if let Some(folded) = self.folded.as_ref().filter(|_| whole) {
-            let (x, _) = folded.step(state.x.into(), y_m, before_n);
-            state.x = x.into();
-            return Ok(x[2]);
+            let bent = self.bent.get_or_insert_with(|| folded.bent(&state.x));
+            folded::step(folded, bent, y_m, before_n);
+            state.x = folded.state(*bent);
+            return Ok(bent[2]);
         }
+        self.bent = None;
         let prior = self.filter.predict(state, held_before_n);
         self.correct(prior, y_m)
     }

@@ -1,9 +1,8 @@
 //! The filter over whole flights: S(t) of every segment.
 //!
 //! The covariance depends on no measurement, so while every sample is measured the gain settles. From
-//! there predict and correct fold into one map with constant coefficients, three chains of products that
-//! the processor runs side by side, for eight parts of the flight at a time. A missing sample sets the covariance moving again, and the plain
-//! recursion runs until it is back.
+//! there predict and correct fold into one map with constant coefficients, for eight parts of the flight at a
+//! time. A missing sample sets the covariance moving again, and the plain recursion runs until it is back.
 
 use std::ops::Range;
 
@@ -12,7 +11,7 @@ use nalgebra::Vector3;
 use crate::Samples;
 use crate::error::Error;
 use crate::filter::{Estimate, Filter};
-use crate::folded::Folded;
+use crate::folded::{self, Bent, Folded};
 use crate::lanes::{Cut, PARTS, States, Work};
 use crate::schedule::Schedule;
 use crate::wide::widest;
@@ -75,7 +74,7 @@ impl Schedule {
         // What no segment covers is NaN; all else will be written.
         room.s_m.resize(count, 0.0);
         outside(samples.segments, count, |gap| room.s_m[gap].fill(f64::NAN));
-        let mut pass = Pass { schedule: self, innovations, room, nis: 0.0, measured: 0 };
+        let mut pass = Pass { schedule: self, innovations, room, nis: 0.0, measured: 0, doubtful_until: 0 };
         for segment in samples.segments {
             let (y_m, load_n) = (&samples.dx_m[segment.clone()], &samples.load_n[segment.clone()]);
             pass.segment(y_m, load_n, segment.start)?;
@@ -89,7 +88,7 @@ impl Schedule {
 #[derive(Debug, Default)]
 pub struct Room {
     s_m: Vec<f64>,
-    /// Squared innovations of eight parts, tile by tile.
+    /// Squared innovations of eight parts, group by group.
     squares_m2: Vec<[f64; PARTS]>,
 }
 
@@ -119,6 +118,8 @@ struct Pass<'f> {
     room: &'f mut Room,
     nis: f64,
     measured: usize,
+    /// Samples are missing somewhere before this one.
+    doubtful_until: usize,
 }
 
 impl Pass<'_> {
@@ -133,9 +134,8 @@ impl Pass<'_> {
         let mut settled = k == self.schedule.openings.len() && self.schedule.settles;
         while k < y_m.len() {
             if let Some(folded) = folded.as_ref().filter(|_| settled) {
-                let end = k + whole_until(&y_m[k..], &load_n[k - 1..]);
-                state.x = self.stretch(folded, state.x, &y_m[k..end], &load_n[k - 1..end - 1], offset + k);
-                (k, settled) = (end, false);
+                k += self.stretch(folded, &mut state.x, &y_m[k..], &load_n[k - 1..], offset + k);
+                settled = false;
                 continue;
             }
             if k > 0 {
@@ -177,69 +177,97 @@ impl Pass<'_> {
         }
     }
 
-    /// Samples without a gap, under a settled gain: x⁺ = F x + g u + k y.
+    /// Samples until the first that lacks something, under a settled gain; how many. Each goes with the load before
+    /// it.
     fn stretch(
         &mut self,
         map: &Folded,
-        x: Vector3<f64>,
+        x: &mut Vector3<f64>,
         y_m: &[f64],
         load_n: &[f64],
         at: usize,
-    ) -> Vector3<f64> {
+    ) -> usize {
+        let (from, load_n) = (map.bent(x), &load_n[..y_m.len()]);
         let s_m = &mut self.room.s_m[at..at + y_m.len()];
-        let (x, squares_m2) = match self.innovations.as_deref_mut() {
+        let (done, last, squares_m2) = match self.innovations.as_deref_mut() {
             None => {
-                Stretch { schedule: self.schedule, map, y_m, load_n, s_m }.run(x, &mut self.room.squares_m2)
+                let doubt = self.doubtful_until.saturating_sub(at);
+                let mut stretch = Stretch { schedule: self.schedule, map, y_m, load_n, s_m, doubt };
+                let found = stretch.run(from, &mut self.room.squares_m2);
+                self.doubtful_until = at + stretch.doubt;
+                found
             }
             Some(out) => {
-                out.variance_m2[at..at + y_m.len()].fill(map.variance_m2);
-                let innovation_m = &mut out.innovation_m[at..at + y_m.len()];
-                map.run(x.into(), 0.0, (y_m, load_n), s_m, |k, e_m| innovation_m[k] = e_m)
+                let done = whole_until(y_m, load_n);
+                out.variance_m2[at..at + done].fill(map.variance_m2);
+                let innovation_m = &mut out.innovation_m[at..at + done];
+                let columns = (&y_m[..done], &load_n[..done]);
+                let (last, squares_m2) = folded::run(map, from, 0.0, columns, &mut s_m[..done], innovation_m);
+                (done, last, squares_m2)
             }
         };
+        if done > 0 {
+            *x = map.state(last);
+        }
         self.nis += squares_m2 / map.variance_m2;
-        self.measured += y_m.len();
-        x.into()
+        self.measured += done;
+        done
     }
 }
 
-/// Samples without a gap, and the room for their S.
+/// Samples under a settled gain, and the room for their S.
 struct Stretch<'a> {
     schedule: &'a Schedule,
     map: &'a Folded,
     y_m: &'a [f64],
     load_n: &'a [f64],
     s_m: &'a mut [f64],
+    /// So many from the first on are looked at before they are worked on, since some are missing.
+    doubt: usize,
 }
 
 impl Stretch<'_> {
-    /// In eight parts at once while enough is left, then one after the other; the last state and the sum of
-    /// the squared innovations, added up in the order of the tiles.
-    fn run(self, x: Vector3<f64>, room_m2: &mut Vec<[f64; PARTS]>) -> ([f64; 3], f64) {
-        let Self { schedule, map, y_m, load_n, s_m } = self;
-        let (mut x, mut sum_m2, mut at) = (x.into(), 0.0, 0);
-        while let Some(cut) = schedule.lead.and_then(|lead| Cut::of(y_m.len() - at, lead)) {
-            let all = at..at + cut.samples();
-            let (y_m, load_n) = (&y_m[all.clone()], &load_n[all.clone()]);
-            room_m2.resize(room_m2.len().max(cut.tiles()), [0.0; PARTS]);
-            let states = starts(&schedule.filter, cut, x, y_m, load_n);
-            let mut work = Work { map, cut, y_m, load_n, s_m: &mut s_m[all.clone()], squares_m2: room_m2 };
-            let done;
-            (done, x, sum_m2) = work.run(states, sum_m2);
-            let rest = (&y_m[done..], &load_n[done..]);
-            (x, sum_m2) = map.run(x, sum_m2, rest, &mut s_m[at + done..all.end], |_, _| ());
-            at = all.end;
+    /// In eight parts at once while enough is left, then one after the other, until a sample is missing: how many,
+    /// the last state, and the sum of the squared innovations, added up in the order of the groups.
+    ///
+    /// Whether one is missing is seen by what the parts came to, which costs less than to look before.
+    fn run(&mut self, from: Bent, room_m2: &mut Vec<[f64; PARTS]>) -> (usize, Bent, f64) {
+        let Self { schedule, map, y_m, load_n, .. } = *self;
+        let (mut x, mut sum_m2, mut at, mut end) = (from, 0.0, 0, y_m.len());
+        if self.doubt > 0 {
+            end = whole_until(y_m, load_n);
         }
-        map.run(x, sum_m2, (&y_m[at..], &load_n[at..]), &mut s_m[at..], |_, _| ())
+        while let Some(cut) = schedule.lead.and_then(|lead| Cut::of(end - at, lead)) {
+            let all = at..at + cut.samples();
+            let (y_m, load_n) = (&y_m[at..], &load_n[at..]);
+            room_m2.resize(room_m2.len().max(cut.groups()), [0.0; PARTS]);
+            let states = starts((&schedule.filter, map), cut, x, y_m, load_n);
+            let mut work = Work { map, cut, y_m, load_n, s_m: &mut self.s_m[at..], squares_m2: room_m2 };
+            if let Some(found) = work.run(states, sum_m2) {
+                (x, sum_m2) = found;
+                at = all.end;
+                continue;
+            }
+            self.doubt = all.end;
+            let whole = whole_until(&y_m[..cut.samples()], &load_n[..cut.samples()]);
+            if whole == cut.samples() {
+                break; // Nothing is missing, and something not finite.
+            }
+            end = at + whole;
+        }
+        end = at + whole_until(&y_m[at..end], &load_n[at..end]);
+        (x, sum_m2) =
+            folded::run(map, x, sum_m2, (&y_m[at..end], &load_n[at..end]), &mut self.s_m[at..end], &mut []);
+        (end, x, sum_m2)
     }
 }
 
 /// The state before each part: known for the first, guessed from the sample before for the others.
-fn starts(filter: &Filter, cut: Cut, x: [f64; 3], y_m: &[f64], load_n: &[f64]) -> States {
+fn starts((filter, map): (&Filter, &Folded), cut: Cut, x: Bent, y_m: &[f64], load_n: &[f64]) -> States {
     let mut states = x.map(|entry| [entry; PARTS]);
     for part in 1..PARTS {
         let before = cut.start(part) - 1;
-        let guess = filter.start(y_m[before], load_n[before]).x;
+        let guess = map.bent(&filter.start(y_m[before], load_n[before]).x);
         states.iter_mut().zip(&guess).for_each(|(entry, guess)| entry[part] = *guess);
     }
     states

@@ -1,11 +1,11 @@
 //! One body compiled several times, for the widest vectors that the machine turns out to have.
 //!
-//! Vectors change no result: lanes run the same operations in the same order as one number would, and
-//! products are never fused with sums. So every machine gives the same bits, and no record has to say
-//! which of the bodies it came from. Machines without such extensions, and those whose vectors need none
-//! (NEON), run the plain body.
+//! Vectors change no result: lanes run the same operations in the same order as one number would, and a product is
+//! fused with a sum where the body says so, on every machine, and nowhere else. So every machine gives the same bits,
+//! and no record has to say which of the bodies it came from. Machines without such extensions, and those whose
+//! vectors need none (NEON), run the plain body.
 
-/// Defines a function whose body runs with AVX-512 or AVX2 where the processor has it.
+/// Defines a function whose body runs with AVX-512 or AVX2, and fused products, where the processor has them.
 ///
 /// A body must hold no closure: one would be compiled without the wider vectors.
 macro_rules! widest {
@@ -18,23 +18,24 @@ macro_rules! widest {
             fn plain$(<const $n: usize>)?($($arg: $is),*) $(-> $out)? $body
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             {
-                #[target_feature(enable = "avx512f,avx512vl,avx512dq")]
+                #[target_feature(enable = "avx512f,avx512vl,avx512dq,fma")]
                 fn with_avx512$(<const $n: usize>)?($($arg: $is),*) $(-> $out)? {
                     plain($($arg),*)
                 }
-                #[target_feature(enable = "avx2")]
+                #[target_feature(enable = "avx2,fma")]
                 fn with_avx2$(<const $n: usize>)?($($arg: $is),*) $(-> $out)? {
                     plain($($arg),*)
                 }
                 if is_x86_feature_detected!("avx512f")
                     && is_x86_feature_detected!("avx512vl")
                     && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("fma")
                 {
                     // SAFETY: the processor has what the function was compiled for.
                     #[allow(unsafe_code, reason = "the one door to wider vectors")]
                     return unsafe { with_avx512($($arg),*) };
                 }
-                if is_x86_feature_detected!("avx2") {
+                if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
                     // SAFETY: as above.
                     #[allow(unsafe_code, reason = "the one door to wider vectors")]
                     return unsafe { with_avx2($($arg),*) };
