@@ -6,7 +6,10 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 
 fn filter(step_s: f64, bandwidth_hz: f64) -> Filter {
-    let actuator = Actuator::linear(5e7, 2000.0, 8.0).unwrap();
+    filter_of(&Actuator::linear(5e7, 2000.0, 8.0).unwrap(), step_s, bandwidth_hz)
+}
+
+fn filter_of(actuator: &Actuator, step_s: f64, bandwidth_hz: f64) -> Filter {
     let noise = Noise::Sensors(Sensors {
         screw_rms_m: 3e-6,
         screw_resolution_m: 2.3e-6,
@@ -15,7 +18,7 @@ fn filter(step_s: f64, bandwidth_hz: f64) -> Filter {
         unknown_force_n: 200.0,
         bandwidth_hz,
     });
-    Filter::new(&actuator, step_s, &noise).unwrap()
+    Filter::new(actuator, step_s, &noise).unwrap()
 }
 
 fn track(filter: &Filter, dx_m: &[f64], load_n: &[f64], segments: &[std::ops::Range<usize>]) -> Vec<f64> {
@@ -113,15 +116,7 @@ proptest! {
     ) {
         let ten = |power: f64| 10_f64.powf(power);
         let actuator = Actuator::linear(ten(stiffness), ten(damping), ten(mass)).unwrap();
-        let noise = Noise::Sensors(Sensors {
-            screw_rms_m: 3e-6,
-            screw_resolution_m: 2.3e-6,
-            motor_rms_m: 1e-6,
-            motor_resolution_m: 3e-7,
-            unknown_force_n: 200.0,
-            bandwidth_hz: ten(bandwidth_hz),
-        });
-        let f = Filter::new(&actuator, ten(-rate_hz), &noise).unwrap();
+        let f = filter_of(&actuator, ten(-rate_hz), ten(bandwidth_hz));
         let load: Vec<f64> = (0..jumps.len()).map(|k| 5e3 * (0.01 * k as f64).sin()).collect();
         let dx: Vec<f64> =
             load.iter().zip(&jumps).map(|(u, jump)| u / ten(stiffness) + 50e-6 * u.signum() + jump).collect();
