@@ -154,7 +154,8 @@ pub fn run(
     at_a_time: usize,
     engine: &mut Engine<'_>,
 ) -> Result<Report, Error> {
-    night(config, request, context, 0, |shop, writer, report| {
+    night(config, request, context, 0, |shop, intent, writer, report| {
+        intent.state(writer)?;
         let mut book = Book::of(shop.plan, shop.config, shop.installations);
         report.not_reached = 0;
         for works in shop.plan.work.chunks(at_a_time.max(1)) {

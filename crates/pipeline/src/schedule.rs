@@ -15,7 +15,7 @@ use jiff::Timestamp;
 use job::flight::{Opened, caught, config_digest, unidentified_digest};
 use job::{Config, Stamp};
 use rayon::prelude::*;
-use store::{Holder, LogAccount, LogResult, Outcome, Store, Writer};
+use store::{Holder, LogAccount, LogResult, Outcome, RunAccount, Store, Writer};
 
 use crate::account::{self, CutShort, Report};
 use crate::book::{Book, Done};
@@ -74,7 +74,9 @@ pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
 /// what was committed before is intact, and the rest runs next time.
 pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<Report, Error> {
     let workers = workers(request);
-    night(config, request, context, workers, |shop, writer, report| shop.work(workers, writer, report))
+    night(config, request, context, workers, |shop, intent, writer, report| {
+        shop.work(workers, intent, writer, report)
+    })
 }
 
 /// A run from plan to account, whoever does the logs between.
@@ -83,7 +85,7 @@ pub(crate) fn night(
     request: &Request,
     context: &Context<'_>,
     workers: usize,
-    work: impl FnOnce(&Shop<'_>, &mut Writer, &mut Report) -> Result<Vec<trends::Unit>, Error>,
+    work: impl FnOnce(&Shop<'_>, &Intent, &mut Writer, &mut Report) -> Result<Vec<trends::Unit>, Error>,
 ) -> Result<Report, Error> {
     let clock = Instant::now();
     let installations = installations(config)?;
@@ -99,14 +101,14 @@ pub(crate) fn night(
     let config_path = config.file.display().to_string();
     let to_do: Vec<LogAccount> =
         plan.work.iter().map(|work| account::not_reached(work, &report.run_id)).collect();
-    writer.begin_run(&report.row(context.program_version, &config_path, None), &to_do)?;
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
 
     let run_id = report.run_id.clone();
     let budget = Budget::new(config.document.run.memory_mib);
+    let intent = Intent { run: report.row(context.program_version, &config_path, None), to_do };
     let shop = Shop { config, installations: &installations, context, plan: &plan, run_id: &run_id, budget };
-    let touched = work(&shop, &mut writer, &mut report)?;
+    let touched = work(&shop, &intent, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
     report.look_back(trends::of_units(config, &installations, &store, &touched, &report.run_id)?);
@@ -154,6 +156,19 @@ fn run_id(started_utc: Timestamp) -> String {
     format!("{}-{:08x}", started_utc.strftime("%Y%m%dT%H%M%S%3fZ"), std::process::id())
 }
 
+/// What a run means to do, which stands in the store before anything of it is done there.
+pub(crate) struct Intent {
+    run: RunAccount,
+    to_do: Vec<LogAccount>,
+}
+
+impl Intent {
+    /// Writes it down: before any other commit.
+    pub(crate) fn state(&self, writer: &mut Writer) -> Result<(), Error> {
+        Ok(writer.begin_run(&self.run, &self.to_do)?)
+    }
+}
+
 /// Everything a worker may look at.
 pub(crate) struct Shop<'a> {
     pub(crate) config: &'a Config,
@@ -169,6 +184,7 @@ impl Shop<'_> {
     fn work(
         &self,
         workers: usize,
+        intent: &Intent,
         writer: &mut Writer,
         report: &mut Report,
     ) -> Result<Vec<trends::Unit>, Error> {
@@ -186,7 +202,8 @@ impl Shop<'_> {
                     }
                 });
             });
-            let written = self.write(&receiver, writer, report);
+            // The workers read meanwhile; what they bring waits.
+            let written = intent.state(writer).and_then(|()| self.write(&receiver, writer, report));
             // A store that fails must not keep the workers reading through the night.
             halt.store(written.is_err(), Ordering::Relaxed);
             drop(receiver);
