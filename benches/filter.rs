@@ -87,13 +87,13 @@ fn batch_in_a_room_out_of_cache(bencher: Bencher) {
 /// Too few samples to be cut into parts: one after the other, the gains found already.
 #[divan::bench]
 fn batch_in_a_room_too_short_for_parts(bencher: Bencher) {
-    in_a_room(bencher, 1024);
+    in_a_room(bencher, 512);
 }
 
 /// As few, and the gains to be found.
 #[divan::bench]
 fn batch_too_short_for_parts(bencher: Bencher) {
-    track(bencher, 1024);
+    track(bencher, 512);
 }
 
 fn published(bencher: Bencher, count: usize) {

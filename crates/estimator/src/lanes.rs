@@ -22,7 +22,7 @@ pub(crate) const PARTS: usize = 8;
 /// parts would fall on the same lines of the first.
 const LONGEST_PART: usize = 63 * GROUP;
 /// A part no longer than this share of its early start gains too little.
-const SHORTEST_SHARE: f64 = 0.5;
+const SHORTEST_SHARE: f64 = 0.2;
 /// Places of a part at which its states are kept, the last at its end.
 const MARKS: usize = 4;
 /// Samples of a part that are loaded and turned at once.
