@@ -11,6 +11,7 @@ mod random;
 use std::time::Instant;
 
 use random::Random;
+use rayon::prelude::*;
 use trend::{Each, FleetPrior, Kept, Observation, Series, Settings, Usage, trend};
 
 const LIMIT_M: f64 = 1e-4;
@@ -57,39 +58,36 @@ fn cost<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (busy_s(began) - before_s, made)
 }
 
-/// Some threads, each with its share.
-struct Threads(usize);
+/// Workers that share what there is to do, as a night's do.
+struct Threads(rayon::ThreadPool);
+
+impl Threads {
+    fn new(count: usize) -> Self {
+        Self(rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap())
+    }
+}
 
 impl Each for Threads {
     fn each<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
-        let (count, work) = (things.len().div_ceil(self.0).max(1), &work);
-        std::thread::scope(|scope| {
-            let of_part = |part| scope.spawn(move || <[T]>::iter(part).map(work).collect::<Vec<R>>());
-            let parts: Vec<_> = things.chunks(count).map(of_part).collect();
-            parts.into_iter().flat_map(|part| part.join().unwrap()).collect()
-        })
+        self.0.install(|| things.par_iter().map(work).collect())
     }
 }
 
 /// The prior of a fleet by some threads: wall seconds.
-fn learned(fleet: &[Series], as_of_us: i64, threads: usize) -> f64 {
+fn learned(fleet: &[Series], as_of_us: i64, threads: &Threads) -> f64 {
     let began = Instant::now();
-    std::hint::black_box(FleetPrior::learn_by(fleet, as_of_us, LIMIT_M, None, &Threads(threads)));
+    std::hint::black_box(FleetPrior::learn_by(fleet, as_of_us, LIMIT_M, None, threads));
     began.elapsed().as_secs_f64()
 }
 
 /// Statements of a fleet on some threads: wall seconds.
-fn stated(fleet: &[Series], as_of_us: i64, prior: &FleetPrior, threads: usize) -> f64 {
+fn stated(fleet: &[Series], as_of_us: i64, prior: &FleetPrior, threads: &Threads) -> f64 {
     let settings = Settings::for_limit(LIMIT_M);
     let state = |series: &Series| {
         std::hint::black_box(trend(series, as_of_us, &settings, Some(prior), None).unwrap());
     };
     let began = Instant::now();
-    std::thread::scope(|scope| {
-        for part in fleet.chunks(fleet.len().div_ceil(threads)) {
-            scope.spawn(move || part.iter().for_each(state));
-        }
-    });
+    threads.0.install(|| fleet.par_iter().for_each(state));
     began.elapsed().as_secs_f64()
 }
 
@@ -139,21 +137,16 @@ impl Unit {
 }
 
 /// A fleet of units on some threads, each unit one night: wall seconds.
-fn flown(fleet: &mut [Unit], prior: &FleetPrior, threads: usize) -> f64 {
+fn flown(fleet: &mut [Unit], prior: &FleetPrior, threads: &Threads) -> f64 {
     let settings = &Settings::for_limit(LIMIT_M);
     let began = Instant::now();
-    std::thread::scope(|scope| {
-        for part in fleet.chunks_mut(fleet.len().div_ceil(threads)) {
-            scope.spawn(move || {
-                part.iter_mut().for_each(|unit| unit.night(prior, settings, &mut Asked::default()));
-            });
-        }
-    });
+    let night = |unit: &mut Unit| unit.night(prior, settings, &mut Asked::default());
+    threads.0.install(|| fleet.par_iter_mut().for_each(night));
     began.elapsed().as_secs_f64()
 }
 
 /// Nights of units that have flown so often.
-fn nights(serials: u64, flights: usize) {
+fn nights(serials: u64, flights: usize, threads: &[Threads; 2]) {
     let all: Vec<Vec<Observation>> = (0..serials).map(|seed| rows(seed, flights + 3 * NIGHTS)).collect();
     let series =
         |rows: &Vec<Observation>| Series::new(rows[..flights].iter().copied(), &Usage::default()).unwrap();
@@ -170,8 +163,9 @@ fn nights(serials: u64, flights: usize) {
             (0..NIGHTS).for_each(|_| unit.night(&prior, &settings, &mut asked));
         }
     });
-    let [one_s, two_s] =
-        [1, 2].map(|threads| (0..NIGHTS).map(|_| flown(&mut fleet, &prior, threads)).sum::<f64>());
+    let [one_s, two_s] = threads
+        .each_ref()
+        .map(|threads| (0..NIGHTS).map(|_| flown(&mut fleet, &prior, threads)).sum::<f64>());
     let us = 1e6 / asked.nights;
     println!(
         "{flights:7}  {:8.1}  {:20.1}  {:9.2} %  {bytes:6} {:8}  {:11.1}  {:9.1}",
@@ -186,6 +180,7 @@ fn nights(serials: u64, flights: usize) {
 
 fn main() {
     let serials: u64 = std::env::args().nth(1).map_or(200, |n| n.parse().unwrap());
+    let threads = [1, 2].map(Threads::new);
     println!("processor time of a serial, µs    by the clock, a statement, µs, on    the prior, ms, on");
     println!("flights    series  statement             1 thread  2 threads         1 thread  2 threads");
     for flights in [100, 300, 1000, 3000, 10_000] {
@@ -201,8 +196,8 @@ fn main() {
                 std::hint::black_box(trend(series, as_of_us, &settings, Some(&prior), None).unwrap());
             }
         });
-        let stated_s = [1, 2].map(|threads| stated(&fleet, as_of_us, &prior, threads) * us);
-        let learned_s = [1, 2].map(|threads| learned(&fleet, as_of_us, threads) * 1e3);
+        let stated_s = threads.each_ref().map(|threads| stated(&fleet, as_of_us, &prior, threads) * us);
+        let learned_s = threads.each_ref().map(|threads| learned(&fleet, as_of_us, threads) * 1e3);
         println!(
             "{flights:7}  {:8.1}  {:9.1}  {:19.1}  {:9.1}  {:15.0}  {:9.0}",
             series_s * us,
@@ -216,6 +211,6 @@ fn main() {
     println!("\na night more of a serial, µs of the processor          state, bytes    by the clock, µs, on");
     println!("flights  in all  without the history  which it asks   mean  largest    1 thread  2 threads");
     for flights in [100, 300, 1000, 3000, 10_000] {
-        nights(serials, flights);
+        nights(serials, flights, &threads);
     }
 }

@@ -56,9 +56,9 @@ impl FleetPrior {
         axis: Option<Axis>,
         each: &impl Each,
     ) -> Self {
-        let units = read(fleet, as_of_us, limit_m, each);
-        let assumed = assumed(&units, limit_m, each);
-        let along = |axis| Lesson::along(&units, axis, &assumed, each);
+        let read = Read::of(fleet, as_of_us, limit_m, each);
+        let assumed = assumed(&read, limit_m, each);
+        let along = |axis| Lesson::along(&read, axis, &assumed, each);
         let lesson = axis.and_then(along).or_else(|| likeliest(Axis::ALL.into_iter().filter_map(along)));
         let Some(lesson) = lesson else { return Self::vague(limit_m) };
         lesson.with_likeliest_wear_noise(each).revised(each).calibrated(each)
@@ -72,50 +72,61 @@ impl FleetPrior {
         limit_m: f64,
         each: &impl Each,
     ) -> f64 {
-        let units = read(fleet, as_of_us, limit_m, each);
-        let assumed = assumed(&units, limit_m, each);
-        let lesson = Lesson::along(&units, Axis::Hours, &assumed, each);
+        let read = Read::of(fleet, as_of_us, limit_m, each);
+        let assumed = assumed(&read, limit_m, each);
+        let lesson = Lesson::along(&read, Axis::Hours, &assumed, each);
         lesson.map_or(assumed, |lesson| lesson.learned).median_life_hours()
     }
 }
 
-/// A unit, and what its flights show along hours.
-type Read<'a> = (Known<'a>, History);
+/// The units that are looked at, and what the flights of each show apart from wear, along hours.
+struct Read<'a> {
+    units: Vec<Known<'a>>,
+    histories: Arc<[History]>,
+}
 
-/// The units that are looked at, and what their flights show apart from wear.
-fn read<'a>(
-    fleet: impl IntoIterator<Item = &'a Series>,
-    as_of_us: i64,
-    limit_m: f64,
-    each: &impl Each,
-) -> Vec<Read<'a>> {
-    let vague = FleetPrior::vague(limit_m);
-    let units = sample(fleet.into_iter().map(|series| Known::on(series, as_of_us)));
-    // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
-    // their first hour on teach a fleet that never wears.
-    let read = |u: &Known<'_>| history::read(u.flights, u.book, None, &vague);
-    let histories = each.each(&units, read);
-    units.into_iter().zip(histories).collect()
+impl<'a> Read<'a> {
+    fn of(
+        fleet: impl IntoIterator<Item = &'a Series>,
+        as_of_us: i64,
+        limit_m: f64,
+        each: &impl Each,
+    ) -> Self {
+        let vague = FleetPrior::vague(limit_m);
+        let units = sample(fleet.into_iter().map(|series| Known::on(series, as_of_us)));
+        // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
+        // their first hour on teach a fleet that never wears.
+        let read = |u: &Known<'_>| history::read(u.flights, u.book, None, &vague);
+        let histories = each.each(&units, read).into();
+        Self { units, histories }
+    }
+
+    /// What the flights show along the axis of a prior.
+    fn along(&self, prior: &FleetPrior, each: &impl Each) -> Arc<[History]> {
+        if prior.axis == Axis::Hours {
+            return Arc::clone(&self.histories);
+        }
+        let both: Vec<(&Known<'_>, &History)> = self.units.iter().zip(&*self.histories).collect();
+        each.each(&both, |(unit, history)| history.along(unit.flights, prior)).into()
+    }
 }
 
 /// What is assumed of a fleet before its laws are asked: what an installation adds, and the season, which
 /// are of the measurement whatever wear follows.
-fn assumed(units: &[Read<'_>], limit_m: f64, each: &impl Each) -> FleetPrior {
+fn assumed(read: &Read<'_>, limit_m: f64, each: &impl Each) -> FleetPrior {
     let mut assumed = FleetPrior::vague(limit_m);
-    assumed.bias_sd_m = bias(units.iter().map(|(_, history)| history), assumed.bias_sd_m);
-    let of_unit = |(_, history): &Read<'_>| -> Vec<Swing> {
-        let of_segment = |s: Segment<'_>| swing(&s, &assumed, &posterior(&s, &assumed)?);
-        history.segments().filter_map(of_segment).collect()
-    };
-    let swings: Vec<Swing> = each.each(units, of_unit).into_iter().flatten().collect();
+    assumed.bias_sd_m = bias(&read.histories, assumed.bias_sd_m);
+    let of_segment = |s: &Segment<'_>| swing(s, &assumed, &posterior(s, &assumed)?);
+    let swings = each.each(&segments(&read.histories), of_segment);
+    let swings: Vec<Swing> = swings.into_iter().flatten().collect();
     assumed.season = Season::learn(&swings);
     assumed
 }
 
 /// The same along an axis, by the hours that its unit is worth.
-fn along(units: &[Read<'_>], axis: Axis, assumed: &FleetPrior) -> Option<FleetPrior> {
+fn along(read: &Read<'_>, axis: Axis, assumed: &FleetPrior) -> Option<FleetPrior> {
     let total = |of: &dyn Fn(&Flight) -> f64| -> f64 {
-        units.iter().filter_map(|(unit, _)| unit.flights.last()).map(of).sum()
+        read.units.iter().filter_map(|unit| unit.flights.last()).map(of).sum()
     };
     let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
     hours_per_unit.is_finite().then(|| FleetPrior { axis, hours_per_unit, ..assumed.clone() })
@@ -173,9 +184,9 @@ struct Lesson {
 
 impl Lesson {
     /// Nothing along an axis on which nobody moved.
-    fn along(units: &[Read<'_>], axis: Axis, assumed: &FleetPrior, each: &impl Each) -> Option<Self> {
-        let assumed = along(units, axis, assumed)?;
-        let histories = units.iter().map(|(unit, history)| history.along(unit.flights, &assumed)).collect();
+    fn along(read: &Read<'_>, axis: Axis, assumed: &FleetPrior, each: &impl Each) -> Option<Self> {
+        let assumed = along(read, axis, assumed)?;
+        let histories = read.along(&assumed, each);
         let learned = assumed.clone();
         Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.revised(each))
     }
@@ -229,9 +240,10 @@ fn segments(histories: &[History]) -> Vec<Segment<'_>> {
 }
 
 /// Spread of what an installation adds: half the mean square of the steps between installations.
-fn bias<'a>(histories: impl Iterator<Item = &'a History>, assumed_m: f64) -> f64 {
+fn bias(histories: &[History], assumed_m: f64) -> f64 {
     let assumed = (PSEUDO_CHANGES * 2.0 * assumed_m * assumed_m, PSEUDO_CHANGES);
     let (squares, count) = histories
+        .iter()
         .map(|history| installation_steps(&history.estimates))
         .fold(assumed, |sum, found| (sum.0 + found.0, sum.1 + found.1));
     (0.5 * squares / count).max(0.0).sqrt()
