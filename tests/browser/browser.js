@@ -26,7 +26,11 @@ export async function open(browser, file, { viewport = DESKTOP, colorScheme = "l
   page.on("pageerror", (e) => faults.push(`exception: ${e.message}`));
   page.on("dialog", (d) => { faults.push(`dialog: ${d.message()}`); d.dismiss(); });
   page.on("request", (r) => /^(file|data):/.test(r.url()) || faults.push(`request: ${r.url()}`));
-  page.on("requestfailed", (r) => faults.push(`failed: ${r.url()}`));
+  page.on("requestfailed", (r) => {
+    const why = r.failure()?.errorText ?? "";
+    // What a reader left behind by going on is no fault of the page; a file that is not there is another error.
+    if (why !== "net::ERR_ABORTED") faults.push(`failed: ${r.url()} ${why}`);
+  });
   await visit(page, file);
   return { page, faults, close: () => context.close() };
 }
