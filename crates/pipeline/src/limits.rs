@@ -20,7 +20,7 @@ impl<'a> Limits<'a> {
         })
     }
 
-    /// The act limit, m.
+    /// The act limit, m, or its stand-in.
     pub(crate) fn limit_m(self, part: Option<&str>) -> f64 {
         self.settings(part).limit_m
     }
@@ -30,24 +30,20 @@ impl<'a> Limits<'a> {
         number.and_then(|number| PartNumber::new(number).ok()).and_then(|number| self.0.parts.get(&number))
     }
 
-    /// What a unit of a part is judged by.
+    /// What a unit of a part is judged by. Without a limit there is still a level and a rate; only crossings and
+    /// states need one.
     pub(crate) fn settings(self, part: Option<&str>) -> trend::Settings {
-        settings(self.0, self.part(part))
-    }
-}
-
-/// Without a limit there is still a level and a rate; only crossings and states need one.
-fn settings(config: &Config, part: Option<&job::Part>) -> trend::Settings {
-    /// A gap no actuator has: a stand-in that is never met and never shown.
-    const NEVER_M: f64 = 1.0;
-    let of = &config.document.trend;
-    let base = trend::Settings::for_limit(part.and_then(|p| p.limit_m).unwrap_or(NEVER_M));
-    trend::Settings {
-        watch_m: part.and_then(|p| p.watch_m).unwrap_or(base.watch_m),
-        planning_horizon_hours: of.planning_horizon_hours,
-        horizon_hours: of.horizon_hours,
-        stale_after_days: of.stale_after_days,
-        check_interval_hours: of.next_check_hours,
-        ..base
+        /// A gap no actuator has: a stand-in that is never met and never shown.
+        const NEVER_M: f64 = 1.0;
+        let (of, part) = (&self.0.document.trend, self.part(part));
+        let base = trend::Settings::for_limit(part.and_then(|p| p.limit_m).unwrap_or(NEVER_M));
+        trend::Settings {
+            watch_m: part.and_then(|p| p.watch_m).unwrap_or(base.watch_m),
+            planning_horizon_hours: of.planning_horizon_hours,
+            horizon_hours: of.horizon_hours,
+            stale_after_days: of.stale_after_days,
+            check_interval_hours: of.next_check_hours,
+            ..base
+        }
     }
 }

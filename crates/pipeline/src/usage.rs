@@ -1,7 +1,6 @@
 //! What a unit's flights add up to: its rows, those that left none, and what the books say.
 
-use fleet::Installation;
-use fleet::Installations;
+use fleet::{Installation, Installations};
 use jiff::Timestamp;
 use job::Config;
 use trend::{Observation, Series, Usage};

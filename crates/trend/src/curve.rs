@@ -169,14 +169,6 @@ impl Law {
         }
     }
 
-    /// F at the end of a life of this logarithm.
-    pub(crate) fn height_of_ln_life(self, ln_hours: f64) -> f64 {
-        match self.exponent() {
-            Some(p) => (p * (ln_hours - LN_REFERENCE_HOURS)).exp(),
-            None => self.height(ln_hours.exp()),
-        }
-    }
-
     /// The age at which F is reached.
     pub(crate) fn age_at(self, height: f64) -> f64 {
         match self {
@@ -215,6 +207,11 @@ impl Law {
             _ => None,
         }
     }
+}
+
+/// F of a law that is a power at the end of a life of this logarithm.
+pub(crate) fn power_of_ln_life(exponent: f64, ln_hours: f64) -> f64 {
+    (exponent * (ln_hours - LN_REFERENCE_HOURS)).exp()
 }
 
 /// A line of slope `before` up to a knee, then one of slope 1, per reference age.
@@ -291,7 +288,8 @@ impl Bank {
         let onsets = (0..starts).map(|i| at_birth(Law::Onset { start: (i as f64 + 0.5) * cell }, ln_cell));
         let knee_cell = span_hours / KNEES as f64;
         let is_tried = |curve: &Curve| is_tried(curve.law);
-        let mut curves = Vec::with_capacity(1 + starts + first.len() + last.len() + BENDS.len() * KNEES * 4);
+        let bends_at_most = ages.len().div_ceil(BEND_AGE_STRIDE) * KNEES * BENDS.len();
+        let mut curves = Vec::with_capacity(1 + starts + first.len() + bends_at_most + last.len());
         curves.push(at_birth(Law::None, 0.0));
         curves.extend(onsets);
         curves.extend(first.iter().filter(|curve| is_tried(curve)));

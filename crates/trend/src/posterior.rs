@@ -2,7 +2,7 @@
 
 use crate::bins;
 use crate::clean::Estimate;
-use crate::curve::{Bank, Curve, Law};
+use crate::curve::{Bank, Curve, Law, power_of_ln_life};
 use crate::filter::Regression;
 use crate::look::{Look, straight_growth};
 use crate::prior::FleetPrior;
@@ -324,32 +324,35 @@ fn lives(
 }
 
 /// A law's amplitudes at lives that grow by one factor.
-struct Amplitudes {
-    law: Law,
-    span_m: f64,
-    /// Of the next life: its length in hours, and the amplitude where that is a power of it.
-    life: f64,
-    amplitude_m: f64,
-    /// What the next but one is to the next.
-    longer: f64,
-    falling: Option<f64>,
+enum Amplitudes {
+    /// They fall by one factor, too.
+    Falling { next_m: f64, factor: f64 },
+    /// The law is asked for its growth in the next life, hours, which is so much longer than the one before.
+    Asked { law: Law, span_m: f64, life: f64, longer: f64 },
 }
 
 impl Amplitudes {
     fn new(law: Law, span_m: f64, ln_life: f64, step: f64) -> Self {
-        let (life, longer) = (ln_life.exp(), step.exp());
-        let falling = law.exponent().map(|p| (-p * step).exp());
-        Self { law, span_m, life, amplitude_m: span_m / law.height_of_ln_life(ln_life), longer, falling }
+        match law.exponent() {
+            Some(p) => {
+                Self::Falling { next_m: span_m / power_of_ln_life(p, ln_life), factor: (-p * step).exp() }
+            }
+            None => Self::Asked { law, span_m, life: ln_life.exp(), longer: step.exp() },
+        }
     }
 
     fn next(&mut self) -> f64 {
-        let amplitude_m = self.amplitude_m;
-        self.life *= self.longer;
-        self.amplitude_m = match self.falling {
-            Some(factor) => amplitude_m * factor,
-            None => self.span_m / self.law.height(self.life),
-        };
-        amplitude_m
+        match self {
+            Self::Falling { next_m, factor } => {
+                let falls_m = *next_m * *factor;
+                std::mem::replace(next_m, falls_m)
+            }
+            Self::Asked { law, span_m, life, longer } => {
+                let amplitude_m = *span_m / law.height(*life);
+                *life *= *longer;
+                amplitude_m
+            }
+        }
     }
 }
 
