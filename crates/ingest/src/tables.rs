@@ -12,7 +12,7 @@ use arrow::array::RecordBatch;
 use fleet::{Installation, Installations};
 use jiff::{Timestamp, civil, tz::TimeZone};
 
-pub use chunk::{Chunk, Chunks, Texts, chunks};
+pub use chunk::{Chunk, Chunks, Parted, Texts, chunks, trimmed};
 
 use crate::error::{Error, Fault};
 use crate::pattern::nearest;

@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
-use ingest::tables::{Chunk, Table, chunks, name, utc};
+use ingest::tables::{Chunk, Parted, Table, name, utc};
 
 use crate::error::Error;
+use crate::gathering::of_parts;
 use crate::histories::{Gathering, Histories};
+use crate::seats::Seats;
 use crate::trends::AsOf;
 
 /// Reads an estimates table: `serial_number` (or `serial`), `departure_utc`, `gap_m`, and what else the
@@ -14,19 +16,21 @@ use crate::trends::AsOf;
 /// # Errors
 /// When the table cannot be read, lacks one of these, or holds a cell that cannot be read.
 pub fn read(file: &Path) -> Result<Histories, Error> {
-    gathered(chunks(file, Some(&Gathering::COLUMNS)).map_err(bad)?)
+    let table = Parted::open(file, Some(&Gathering::COLUMNS), &Seats::COLUMNS).map_err(bad)?;
+    of_parts(table.len(), false, |gathering, some| {
+        let mut chunks = table.chunks(some).map_err(bad)?;
+        chunks.try_for_each(|chunk| gathering.add(&chunk?)).map_err(bad)
+    })
 }
 
-/// The histories of an estimates table.
+/// The histories of an estimates table in memory.
 ///
 /// # Errors
 /// As [`read`].
-pub fn gathered(chunks: impl Iterator<Item = Result<Chunk, ingest::Error>>) -> Result<Histories, Error> {
-    let mut gathering = Gathering::default();
-    for chunk in chunks {
-        gathering.add(&chunk.map_err(bad)?).map_err(bad)?;
-    }
-    Ok(gathering.foreign())
+pub fn gathered(chunks: &[Chunk]) -> Result<Histories, Error> {
+    of_parts(chunks.len(), false, |gathering, some| {
+        chunks[some].iter().try_for_each(|chunk| gathering.add(chunk)).map_err(bad)
+    })
 }
 
 /// Reads a table of queries: `serial_number` (or `serial`), `as_of_utc`, optionally `part_number`.

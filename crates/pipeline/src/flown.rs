@@ -30,15 +30,9 @@ pub struct Flown {
 }
 
 impl Flown {
-    /// A flight whose name is not known yet.
-    pub(crate) fn new(row: &Row<'_>, place: u32, before: u32) -> Self {
-        Self {
-            departure_us: row.departure_utc.as_microsecond(),
-            gap_m: row.gap_m.unwrap_or(f64::NAN),
-            place,
-            row: before,
-            name: [0, 0],
-        }
+    /// A flight whose name is not known yet: the gap `NaN` for none, and how many of its unit's rows came before it.
+    pub(crate) fn new(departure_us: i64, gap_m: f64, place: u32, row: u32) -> Self {
+        Self { departure_us, gap_m, place, row, name: [0, 0] }
     }
 
     /// The same with its name, which is put down behind those of its unit's others.
@@ -82,17 +76,6 @@ pub struct Beside {
     load_reversals: u64,
 }
 
-impl Default for Beside {
-    fn default() -> Self {
-        Self {
-            flight_hours: f64::NAN,
-            tail_hours_end: f64::NAN,
-            gap_se_m: f64::NAN,
-            load_reversals: u64::MAX,
-        }
-    }
-}
-
 impl Beside {
     pub(crate) fn of(row: &Row<'_>) -> Self {
         Self {
@@ -100,6 +83,20 @@ impl Beside {
             tail_hours_end: row.tail_hours_end.unwrap_or(f64::NAN),
             gap_se_m: row.gap_se_m.unwrap_or(f64::NAN),
             load_reversals: row.load_reversals.unwrap_or(u64::MAX),
+        }
+    }
+
+    pub(crate) fn to_bits(self) -> [u64; 4] {
+        let Self { flight_hours, tail_hours_end, gap_se_m, load_reversals } = self;
+        [flight_hours.to_bits(), tail_hours_end.to_bits(), gap_se_m.to_bits(), load_reversals]
+    }
+
+    pub(crate) fn from_bits([flight_hours, tail_hours_end, gap_se_m, load_reversals]: [u64; 4]) -> Self {
+        Self {
+            flight_hours: f64::from_bits(flight_hours),
+            tail_hours_end: f64::from_bits(tail_hours_end),
+            gap_se_m: f64::from_bits(gap_se_m),
+            load_reversals,
         }
     }
 

@@ -1,20 +1,26 @@
 //! Histories while their rows come in, from tables of any length.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::path::Path;
 
 use arrow::array::{Array, Float64Array, RecordBatch};
 use fleet::GapRecord;
 use ingest::tables::Chunk;
 use jiff::Timestamp;
+use rayon::prelude::*;
 
-use crate::flown::{Beside, Flown, Row};
-use crate::histories::{Histories, History, HistoryName, Places};
+use crate::error::Error;
+use crate::flown::{Beside, Row};
+use crate::histories::{Histories, HistoryName, Places};
+use crate::joined::joined;
 use crate::seats::{Names, Seats, Seen, Who};
-use crate::shelf::Shelves;
 
-/// Rows of a block: its 36 MiB are more than what any allocator keeps to itself once they are given up.
+/// Rows of a block: its 32 MiB are more than what any allocator keeps to itself once they are given up.
 const BLOCK_ROWS: usize = 1 << 19;
+
+/// Shares of a table that a worker is given: the slower one leaves some of its own to the others.
+const SHARES: usize = 4;
 
 /// Histories while their rows come in.
 ///
@@ -24,30 +30,42 @@ const BLOCK_ROWS: usize = 1 << 19;
 pub struct Gathering {
     /// Units by serial number; a serial number is unique only with its part number.
     by_serial: HashMap<String, Vec<usize>>,
-    units: Vec<(HistoryName, Places)>,
-    /// Rows of each unit, and bytes of its flights' names.
-    counts: Vec<(u32, usize)>,
+    pub(crate) units: Vec<Counted>,
     last: usize,
     /// The unit that came after each the last time.
     follows: Vec<usize>,
-    blocks: Vec<Block>,
+    pub(crate) blocks: Vec<Block>,
+}
+
+/// A unit, and how much was put down of it.
+#[derive(Debug)]
+pub(crate) struct Counted {
+    pub(crate) name: HistoryName,
+    pub(crate) places: Places,
+    pub(crate) rows: usize,
+    /// Of its flights' names.
+    pub(crate) bytes: usize,
 }
 
 /// Rows in the order of arrival, and their flights' names one after the other.
 #[derive(Debug, Default)]
-struct Block {
-    rows: Vec<Put>,
-    names: String,
+pub(crate) struct Block {
+    pub(crate) rows: Vec<Put>,
+    pub(crate) names: String,
 }
 
 /// A row that was put down.
 #[derive(Debug)]
-struct Put {
-    unit: u32,
+pub(crate) struct Put {
+    pub(crate) unit: u32,
+    /// Which of its unit's places it was flown in.
+    pub(crate) place: u32,
     /// Where its flight's name ends in the block.
-    name_end: u32,
-    flown: Flown,
-    beside: Beside,
+    pub(crate) name_end: u32,
+    pub(crate) departure_us: i64,
+    /// `NaN` for none.
+    pub(crate) gap_m: f64,
+    pub(crate) beside: Beside,
 }
 
 impl Gathering {
@@ -74,17 +92,15 @@ impl Gathering {
     /// When a column that must be there is not, and the first cell that cannot be read.
     pub fn add(&mut self, chunk: &Chunk) -> Result<(), ingest::Error> {
         chunk.column(&["serial_number", "serial"])?;
-        self.rows(chunk, &Seats::of_chunk(chunk)?, &Names::plain(chunk, &["flight_id"])?)
+        self.rows(chunk, &Seats::of(chunk)?, &Names::of(chunk, &["flight_id"])?)
     }
 
-    /// Puts down rows of the store, whose texts are dictionaries.
+    /// Puts down rows of the store.
     ///
     /// # Errors
     /// The first cell that cannot be read.
-    pub(crate) fn add_stored(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        let chunk = Chunk::new(Path::new("results"), batch.clone(), 0);
-        let flights = Names::stored(batch, &chunk, "flight_id")?;
-        self.rows(&chunk, &Seats::stored(batch, &chunk)?, &flights)
+    pub(crate) fn add_stored(&mut self, batch: RecordBatch) -> Result<(), ingest::Error> {
+        self.add(&Chunk::new(Path::new("results"), batch, 0))
     }
 
     fn rows(&mut self, chunk: &Chunk, seats: &Seats, flights: &Names) -> Result<(), ingest::Error> {
@@ -99,16 +115,18 @@ impl Gathering {
         let mut seen = Seen::default();
         for row in 0..chunk.len() {
             let empty = |column| chunk.error(row, column, "it is empty".into());
-            let serial_number = seats.serial(row).ok_or_else(|| empty(serial))?;
+            let seat = match seen.get(seats, row) {
+                Some(seat) => seat,
+                None => {
+                    let seat = self.seat(seats.who(row).ok_or_else(|| empty(serial))?);
+                    seen.put(seats, row, seat);
+                    seat
+                }
+            };
             let departure_us = departures.is_valid(row).then(|| departures.value(row));
             let departure_utc = departure_us.ok_or_else(|| empty(departure))?;
             let departure_utc = Timestamp::from_microsecond(departure_utc)
                 .map_err(|e| chunk.error(row, departure, e.to_string()))?;
-            let seat = seen.get(seats, row).unwrap_or_else(|| {
-                let seat = self.seat(seats.who(row, serial_number));
-                seen.put(seats, row, seat);
-                seat
-            });
             let said = Row {
                 flight_id: flights.get(row),
                 departure_utc,
@@ -134,18 +152,19 @@ impl Gathering {
             self.blocks.push(Block { rows: Vec::with_capacity(BLOCK_ROWS), names: String::new() });
         }
         let last = self.blocks.len() - 1;
-        let block = &mut self.blocks[last];
-        let (rows, bytes) = &mut self.counts[seat.unit];
+        let (block, unit) = (&mut self.blocks[last], &mut self.units[seat.unit]);
         let name = row.flight_id.unwrap_or_default();
         block.names.push_str(name);
         block.rows.push(Put {
             unit: seat.unit as u32,
+            place: seat.place,
             name_end: block.names.len() as u32,
-            flown: Flown::new(row, seat.place, *rows),
+            departure_us: row.departure_utc.as_microsecond(),
+            gap_m: row.gap_m.unwrap_or(f64::NAN),
             beside: Beside::of(row),
         });
-        *rows += 1;
-        *bytes += name.len();
+        unit.rows += 1;
+        unit.bytes += name.len();
     }
 
     /// Puts down what a record says.
@@ -171,7 +190,7 @@ impl Gathering {
 
     fn seat(&mut self, who: Who<'_>) -> Seat {
         let unit = self.unit(who.part_number, who.serial_number);
-        Seat { unit, place: self.units[unit].1.number(who.tail_number, who.position) }
+        Seat { unit, place: self.units[unit].places.number(who.tail_number, who.position) }
     }
 
     /// Where a unit is kept. Most tables have one unit's rows together, or the units in one order every night.
@@ -180,12 +199,12 @@ impl Gathering {
         let units = &self.units;
         let follows = self.follows.get(self.last).copied();
         let expected = [Some(self.last), follows].into_iter().flatten();
-        if let Some(unit) = expected.into_iter().find(|unit| units.get(*unit).is_some_and(|(n, _)| is(n))) {
+        if let Some(unit) = expected.into_iter().find(|unit| units.get(*unit).is_some_and(|u| is(&u.name))) {
             self.last = unit;
             return unit;
         }
         let known = self.by_serial.get(serial_number);
-        let known = known.and_then(|all| all.iter().copied().find(|&unit| is(&units[unit].0)));
+        let known = known.and_then(|all| all.iter().copied().find(|&unit| is(&units[unit].name)));
         let unit = known.unwrap_or_else(|| self.new_unit(part_number, serial_number));
         self.follows[self.last] = unit;
         self.last = unit;
@@ -195,44 +214,41 @@ impl Gathering {
     fn new_unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
         let (unit, name) = (self.units.len(), (part_number.map(str::to_owned), serial_number.to_owned()));
         self.by_serial.entry(name.1.clone()).or_default().push(unit);
-        self.units.push((name, Places::default()));
-        self.counts.push((0, 0));
+        self.units.push(Counted { name, places: Places::default(), rows: 0, bytes: 0 });
         self.follows.push(0);
         unit
     }
 
     /// The histories of a table made elsewhere.
     pub fn foreign(self) -> Histories {
-        self.finish(false)
+        joined(vec![self], false)
     }
 
     /// The histories of the store, whose flights belong to stays of the installations table.
     pub fn booked(self) -> Histories {
-        self.finish(true)
+        joined(vec![self], true)
     }
+}
 
-    fn finish(self, is_booked: bool) -> Histories {
-        let mut in_order: Vec<usize> = (0..self.units.len()).collect();
-        in_order.sort_by_key(|unit| &self.units[*unit].0);
-        let rows: Vec<usize> = self.counts.iter().map(|(rows, _)| *rows as usize).collect();
-        let mut shelves = Shelves::with_room(&rows, in_order.into_iter());
-        let rooms = self.units.into_iter().zip(self.counts);
-        let room = |((name, places), (rows, bytes))| (name, History::with_room(places, rows as usize, bytes));
-        let mut units: Vec<(HistoryName, History)> = rooms.map(room).collect();
-        // Each block is given up before the next is read.
-        for Block { rows, names } in self.blocks {
-            let mut begin = 0;
-            for Put { unit, name_end, flown, beside } in rows {
-                let (unit, name) = (unit as usize, &names[begin..name_end as usize]);
-                shelves.put(unit, flown.row, beside);
-                units[unit].1.put(flown, name);
-                begin = name_end as usize;
-            }
-        }
-        let full = units.into_iter().zip(shelves.of_units());
-        let full = full.map(|((name, history), beside)| (name, history.finish(beside)));
-        Histories::new(full.collect(), is_booked)
-    }
+/// The histories of a table in so many parts, `put` down in shares by all workers: the same as if one had put down
+/// all of them in order.
+///
+/// # Errors
+/// The first of the parts' errors.
+pub(crate) fn of_parts(
+    parts: usize,
+    is_booked: bool,
+    put: impl Fn(&mut Gathering, Range<usize>) -> Result<(), Error> + Sync,
+) -> Result<Histories, Error> {
+    let share = parts.div_ceil(SHARES * rayon::current_num_threads()).max(1);
+    let shares: Vec<usize> = (0..parts).step_by(share).collect();
+    let gathered = |first: &usize| {
+        let mut gathering = Gathering::default();
+        put(&mut gathering, *first..parts.min(first + share))?;
+        Ok(gathering)
+    };
+    let gathered: Vec<Result<Gathering, Error>> = shares.par_iter().map(gathered).collect();
+    Ok(joined(gathered.into_iter().collect::<Result<_, _>>()?, is_booked))
 }
 
 /// A unit, and one of its places.
@@ -332,7 +348,7 @@ mod tests {
         let (mut stored, mut plain) = (Gathering::default(), Gathering::default());
         // In other parts names have other codes.
         for some in rows.chunks(230) {
-            stored.add_stored(&batch(some, &coded)).unwrap();
+            stored.add_stored(batch(some, &coded)).unwrap();
             plain.add(&Chunk::new("table".as_ref(), batch(some, &DataType::Utf8), 0)).unwrap();
         }
         let expected = format!("{:?}", one_by_one(&rows));
@@ -345,7 +361,7 @@ mod tests {
         let mut rows = rows();
         rows[17].0[1] = Some("  ".into());
         let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
-        let error = Gathering::default().add_stored(&batch(&rows, &coded)).unwrap_err();
+        let error = Gathering::default().add_stored(batch(&rows, &coded)).unwrap_err();
         assert_eq!(error.complaint().place().unwrap(), "column `serial_number`, row 18");
     }
 }

@@ -52,6 +52,12 @@ impl Places {
         });
         at as u32
     }
+
+    /// The numbers of others.
+    pub(crate) fn numbers(&mut self, others: &Self) -> Vec<u32> {
+        let number = |place: &Place| self.number(place.tail_number.as_deref(), place.position.as_deref());
+        others.0.iter().map(number).collect()
+    }
 }
 
 /// A unit's flights, by departure.
@@ -93,7 +99,7 @@ impl History {
     }
 
     /// What else the row of one of them says.
-    pub fn beside(&self, flown: &Flown) -> &Beside {
+    pub fn beside(&self, flown: &Flown) -> Beside {
         self.beside.row(flown.row)
     }
 

@@ -74,7 +74,7 @@ struct Found {
 impl Found {
     fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
         let chunk = Chunk::new(Path::new("results"), batch.clone(), 0);
-        let (seats, flights) = (Seats::stored(batch, &chunk)?, Names::stored(batch, &chunk, "flight_id")?);
+        let (seats, flights) = (Seats::of(&chunk)?, Names::of(&chunk, &["flight_id"])?);
         let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
         let [skews_s, stiffnesses, surprises] = ["skew_s", "stiffness_n_per_m", "nis"].map(numbers);
         let (skews_s, stiffnesses, surprises) = (skews_s?, stiffnesses?, surprises?);
@@ -82,8 +82,9 @@ impl Found {
         let mut seen = Seen::default();
         for row in 0..chunk.len() {
             let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) else { continue };
+            let Some(who) = seats.who(row) else { continue };
             let of_seat = seen.get(&seats, row).unwrap_or_else(|| {
-                let found = self.of_seat(seats.who(row, seats.serial(row).unwrap_or_default()));
+                let found = self.of_seat(who);
                 seen.put(&seats, row, found);
                 found
             });

@@ -19,6 +19,7 @@ mod flown;
 mod gathering;
 pub mod histories;
 pub mod innovations;
+mod joined;
 pub mod lately;
 mod limits;
 pub mod maintenance;

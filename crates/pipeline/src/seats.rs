@@ -1,8 +1,8 @@
 //! Who flew and where, row by row, found once for the many rows that say the same.
 
-use arrow::array::{Array, AsArray, DictionaryArray, RecordBatch, StringArray};
+use arrow::array::{Array, AsArray, DictionaryArray, StringArray};
 use arrow::datatypes::Int32Type;
-use ingest::tables::{Chunk, Texts};
+use ingest::tables::{Chunk, Texts, trimmed};
 
 /// Who flew, and where.
 #[derive(Debug, Clone, Copy)]
@@ -23,34 +23,26 @@ pub(crate) struct Seats {
 }
 
 impl Seats {
-    /// Those of a table made elsewhere.
-    pub(crate) fn of_chunk(chunk: &Chunk) -> Result<Self, ingest::Error> {
+    /// The columns of names that repeat, under all their names.
+    pub(crate) const COLUMNS: [&'static str; 6] =
+        ["serial_number", "serial", "part_number", "tail_number", "tail", "position"];
+
+    /// Those of some rows of a table.
+    pub(crate) fn of(chunk: &Chunk) -> Result<Self, ingest::Error> {
         let names: [&[&str]; 4] =
             [&["serial_number", "serial"], &["part_number"], &["tail_number", "tail"], &["position"]];
-        let [serials, parts, tails, positions] = names.map(|names| Names::plain(chunk, names));
+        let [serials, parts, tails, positions] = names.map(|names| Names::of(chunk, names));
         Ok(Self { serials: serials?, parts: parts?, tails: tails?, positions: positions? })
     }
 
-    /// Those of the store.
-    pub(crate) fn stored(batch: &RecordBatch, chunk: &Chunk) -> Result<Self, ingest::Error> {
-        let names = ["serial_number", "part_number", "tail_number", "position"];
-        let [serials, parts, tails, positions] = names.map(|name| Names::stored(batch, chunk, name));
-        Ok(Self { serials: serials?, parts: parts?, tails: tails?, positions: positions? })
-    }
-
-    /// The serial number of a row; none where the cell is empty.
-    pub(crate) fn serial(&self, row: usize) -> Option<&str> {
-        self.serials.get(row)
-    }
-
-    /// Who flew in a row.
-    pub(crate) fn who<'a>(&'a self, row: usize, serial_number: &'a str) -> Who<'a> {
-        Who {
+    /// Who flew in a row; none where the cell of the serial number is empty.
+    pub(crate) fn who(&self, row: usize) -> Option<Who<'_>> {
+        Some(Who {
             part_number: self.parts.get(row),
-            serial_number,
+            serial_number: self.serials.get(row)?,
             tail_number: self.tails.get(row),
             position: self.positions.get(row),
-        }
+        })
     }
 
     /// Whether two rows are of one unit in one place.
@@ -100,18 +92,14 @@ pub(crate) enum Names {
 }
 
 impl Names {
-    /// Those of a table made elsewhere, under one of their names; all none where it has none.
-    pub(crate) fn plain(chunk: &Chunk, names: &[&str]) -> Result<Self, ingest::Error> {
-        Ok(Self::Plain(chunk.texts(chunk.find(names))?))
-    }
-
-    /// Those of the store, which are dictionaries.
-    pub(crate) fn stored(batch: &RecordBatch, chunk: &Chunk, name: &str) -> Result<Self, ingest::Error> {
-        let coded = batch.column_by_name(name).and_then(|column| column.as_dictionary_opt::<Int32Type>());
+    /// Those of a column under one of its names; all none where there is no such column.
+    pub(crate) fn of(chunk: &Chunk, names: &[&str]) -> Result<Self, ingest::Error> {
+        let column = chunk.find(names);
+        let coded = column.and_then(|column| chunk.coded(column));
         let texts = coded.and_then(|coded| coded.values().as_string_opt::<i32>());
         match coded.zip(texts) {
             Some((coded, texts)) => Ok(Self::Coded(coded.clone(), texts.clone())),
-            None => Self::plain(chunk, &[name]),
+            None => Ok(Self::Plain(chunk.texts(column)?)),
         }
     }
 
@@ -121,7 +109,7 @@ impl Names {
             Self::Plain(texts) => texts.get(row),
             Self::Coded(_, texts) => {
                 let code = self.code(row)?;
-                let text = texts.is_valid(code).then(|| texts.value(code).trim())?;
+                let text = texts.is_valid(code).then(|| trimmed(texts.value(code)))?;
                 (!text.is_empty()).then_some(text)
             }
         }

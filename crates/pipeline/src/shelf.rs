@@ -8,9 +8,12 @@ use crate::flown::Beside;
 /// Rows of a full shelf: its 32 MiB are more than what any allocator keeps to itself.
 const SHELF_ROWS: usize = 1 << 20;
 
+/// What a row says, as bits: a shelf of nothing but zeros is had from the system for nothing.
+type Bits = [u64; 4];
+
 /// Shelves while rows are put on them.
 pub(crate) struct Shelves {
-    shelves: Vec<Vec<Beside>>,
+    shelves: Vec<Vec<Bits>>,
     /// Shelf and first row of each unit.
     units: Vec<(usize, usize)>,
 }
@@ -18,15 +21,15 @@ pub(crate) struct Shelves {
 /// The rows of one unit, in the order of arrival.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Shelved {
-    shelf: Arc<Vec<Beside>>,
+    shelf: Arc<Vec<Bits>>,
     first: usize,
 }
 
 impl Shelves {
-    /// Room for so many rows of each unit; units that are named one after the other stand side by side.
-    pub(crate) fn with_room(rows: &[usize], in_order: impl Iterator<Item = usize>) -> Self {
-        let (mut lengths, mut units): (Vec<usize>, _) = (Vec::new(), vec![(0, 0); rows.len()]);
-        for unit in in_order {
+    /// Room for so many rows of each unit.
+    pub(crate) fn with_room(rows: impl Iterator<Item = usize>) -> Self {
+        let (mut lengths, mut units): (Vec<usize>, _) = (Vec::new(), Vec::new());
+        for rows in rows {
             let shelf = match lengths.last() {
                 Some(length) if *length < SHELF_ROWS => lengths.len() - 1,
                 _ => {
@@ -34,21 +37,21 @@ impl Shelves {
                     lengths.len() - 1
                 }
             };
-            units[unit] = (shelf, lengths[shelf]);
-            lengths[shelf] += rows[unit];
+            units.push((shelf, lengths[shelf]));
+            lengths[shelf] += rows;
         }
-        Self { shelves: lengths.into_iter().map(|rows| vec![Beside::default(); rows]).collect(), units }
+        Self { shelves: lengths.into_iter().map(|rows| vec![[0; 4]; rows]).collect(), units }
     }
 
     /// Puts down a unit's row of that number.
     pub(crate) fn put(&mut self, unit: usize, row: u32, beside: Beside) {
         let (shelf, first) = self.units[unit];
-        self.shelves[shelf][first + row as usize] = beside;
+        self.shelves[shelf][first + row as usize] = beside.to_bits();
     }
 
     /// The rows of each unit.
     pub(crate) fn of_units(self) -> impl Iterator<Item = Shelved> {
-        let shelves: Vec<Arc<Vec<Beside>>> = self.shelves.into_iter().map(Arc::new).collect();
+        let shelves: Vec<Arc<Vec<Bits>>> = self.shelves.into_iter().map(Arc::new).collect();
         self.units
             .into_iter()
             .map(move |(shelf, first)| Shelved { shelf: Arc::clone(&shelves[shelf]), first })
@@ -57,8 +60,8 @@ impl Shelves {
 
 impl Shelved {
     /// The row of that number.
-    pub(crate) fn row(&self, row: u32) -> &Beside {
-        &self.shelf[self.first + row as usize]
+    pub(crate) fn row(&self, row: u32) -> Beside {
+        Beside::from_bits(self.shelf[self.first + row as usize])
     }
 }
 
@@ -81,11 +84,11 @@ mod tests {
         })
     }
 
-    /// Three units, of which the first alone fills a shelf, and whose names go backwards.
+    /// Three units, of which the first alone fills a shelf.
     #[test]
     fn every_unit_finds_its_own_rows_in_whatever_order_they_were_put_down() {
         let rows = [SHELF_ROWS + 1, 3, 2];
-        let mut shelves = Shelves::with_room(&rows, [2, 1, 0].into_iter());
+        let mut shelves = Shelves::with_room(rows.into_iter());
         for unit in [1, 0, 2] {
             for row in (0..rows[unit]).rev() {
                 shelves.put(unit, row as u32, beside((10_000_000 * unit + row) as f64));

@@ -11,10 +11,10 @@ use trend::{FleetPrior, Series, Trend, Usage, classic};
 
 use crate::changed::{Changed, changed};
 use crate::error::Error;
+use crate::gathering;
 use crate::histories::{Gathering, Histories, History, HistoryName};
 use crate::lately::{Lately, lately};
 use crate::limits::Limits;
-use crate::parts::read_each;
 use crate::recorder::{Moved, moved, moved_in_store};
 use crate::statement::{self, TrendRow};
 use crate::tail_wide::TailWide;
@@ -206,14 +206,15 @@ pub(crate) fn told(
 pub fn of_queries(
     config: &Config,
     installations: &Installations,
-    histories: &Histories,
+    mut histories: Histories,
     queries: &[AsOf],
     statistics: bool,
 ) -> Result<Vec<TrendRow>, Error> {
     let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
-    let fleet = Fleet::new(config, installations, histories, &days)?;
-    let statement = |query: &AsOf| fleet.statement(&unit_of(query, histories), query.as_of_utc);
-    let mut rows: Vec<TrendRow> = queries.par_iter().map(statement).collect::<Result<_, _>>()?;
+    let asked: Vec<HistoryName> = queries.iter().map(|query| unit_of(query, &histories)).collect();
+    let fleet = Fleet::alone(config, installations, &mut histories, &days)?;
+    let statement = |(query, unit): (&AsOf, &HistoryName)| fleet.statement(unit, query.as_of_utc);
+    let mut rows: Vec<TrendRow> = queries.par_iter().zip(&asked).map(statement).collect::<Result<_, _>>()?;
     fleet.add_statistics(&mut rows, statistics);
     Ok(rows)
 }
@@ -238,9 +239,15 @@ pub fn in_store(store: &Store) -> Result<Histories, Error> {
 fn gathered(store: &Store, query: &Query) -> Result<Histories, Error> {
     let stored: Vec<&str> =
         Gathering::COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name)).collect();
-    let mut gathering = Gathering::default();
-    read_each(&store.parts(query, &stored)?, |batch| gathering.add_stored(batch))?;
-    Ok(gathering.booked())
+    let parts = store.parts(query, &stored)?;
+    gathering::of_parts(parts.len(), true, |gathering, some| {
+        for part in some {
+            let mut batches = parts.read(part)?.into_iter();
+            let put = batches.try_for_each(|batch| gathering.add_stored(batch));
+            put.map_err(|e| Error::refused(e.complaint()))?;
+        }
+        Ok(())
+    })
 }
 
 /// One statement for each asked unit, by part and serial number.
@@ -250,11 +257,11 @@ fn gathered(store: &Store, query: &Query) -> Result<Histories, Error> {
 pub fn of_histories(
     config: &Config,
     installations: &Installations,
-    histories: &Histories,
+    mut histories: Histories,
     ask: &Ask,
 ) -> Result<Vec<TrendRow>, Error> {
     let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
-    Fleet::new(config, installations, histories, &[as_of])?.asked(ask, as_of)
+    Fleet::alone(config, installations, &mut histories, &[as_of])?.asked(ask, as_of)
 }
 
 /// All units, and what each part's units had taught about the next by each turn.
@@ -365,8 +372,8 @@ impl<'a> Fleet<'a> {
             judged.par_iter().map(|name| self.trend(name, as_of)).collect::<Result<_, _>>()?;
         let known = judged.iter().zip(&trends).filter_map(|(name, t)| Some((self.units.get(*name)?.0, t)));
         let wide = TailWide::new(&known.collect::<Vec<_>>(), &self.moved);
-        let asked = judged.iter().zip(&trends).filter(|(name, _)| names.contains(*name));
-        Ok(asked.map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect())
+        let asked: Vec<_> = judged.iter().zip(&trends).filter(|(name, _)| names.contains(*name)).collect();
+        Ok(asked.into_par_iter().map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect())
     }
 
     /// The units that have flown on the tails of some.

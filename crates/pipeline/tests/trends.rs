@@ -84,7 +84,7 @@ fn flown(days: i32) -> Vec<Row> {
 
 fn said(flown: &[Row], as_of: Timestamp) -> Vec<TrendRow> {
     let ask = Ask { as_of_utc: Some(as_of), ..Ask::default() };
-    trends::of_histories(&config(), &Installations::default(), &histories(flown), &ask).unwrap()
+    trends::of_histories(&config(), &Installations::default(), histories(flown), &ask).unwrap()
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
 
 #[test]
 fn a_fleet_that_no_unit_of_has_failed_is_held_against_the_levels_it_has_reached() {
-    let past = backtest::of_histories(&config(), &Installations::default(), &histories(&flown(700))).unwrap();
+    let past = backtest::of_histories(&config(), &Installations::default(), histories(&flown(700))).unwrap();
     assert!(past.len() > 30, "{} past statements", past.len());
     for statement in &past {
         let elapsed = (day(699) - statement.as_of_utc).total(jiff::Unit::Hour).unwrap() / 24.0 * HOURS_A_DAY;
@@ -144,7 +144,7 @@ fn what_the_maintenance_book_says_is_a_change_point_once_its_day_has_come() {
     let nobody = Installations::default();
     let ask = Ask { as_of_utc: Some(day(199)), ..Ask::default() };
     let rows =
-        trends::of_histories(&booked("maintenance.csv"), &nobody, &histories(&flown(200)), &ask).unwrap();
+        trends::of_histories(&booked("maintenance.csv"), &nobody, histories(&flown(200)), &ask).unwrap();
     let recorded = |row: &TrendRow| row.change_points.iter().filter(|c| c.kind == "recorded").count();
     let units: Vec<&str> =
         rows.iter().filter(|row| recorded(row) > 0).map(|row| row.serial_number.as_str()).collect();
@@ -160,7 +160,7 @@ fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
     let found = trends::of_histories(
         &booked("maintenance_unknown.csv"),
         &nobody,
-        &histories(&flown(20)),
+        histories(&flown(20)),
         &Ask::default(),
     );
     let Err(pipeline::Error::Refused(complaints)) = found else { panic!("{found:?}") };
@@ -178,7 +178,7 @@ fn told(axis: &str) -> Config {
 fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
     let axes = |config: &Config| {
         let nobody = Installations::default();
-        let rows = trends::of_histories(config, &nobody, &histories(&flown(60)), &Ask::default()).unwrap();
+        let rows = trends::of_histories(config, &nobody, histories(&flown(60)), &Ask::default()).unwrap();
         rows.into_iter().map(|row| row.usage_axis).collect::<std::collections::BTreeSet<_>>()
     };
     assert_eq!(axes(&told("flights")), [Some("flights".to_owned())].into());
@@ -219,7 +219,7 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
         let mut logged = flown(DAYS);
         logged.retain(|row| row.flight_id.ends_with(['1', '3', '5', '7', '9']));
         logged.iter_mut().for_each(|row| row.said.tail_hours_end = None);
-        trends::of_histories(config, &installations, &gathering(&logged).booked(), &ask).unwrap()
+        trends::of_histories(config, &installations, gathering(&logged).booked(), &ask).unwrap()
     };
     let mut ratios = 0.0;
     for (unit, (with, without)) in said(&config_with).iter().zip(said(&config())).enumerate() {
@@ -312,6 +312,6 @@ fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
     }
     // Asked for alone, a unit is told the same.
     let ask = Ask { as_of_utc: Some(day(227)), serial_number: Some("S02".into()), ..Ask::default() };
-    let alone = trends::of_histories(&config(), &Installations::default(), &histories(&rows), &ask).unwrap();
+    let alone = trends::of_histories(&config(), &Installations::default(), histories(&rows), &ask).unwrap();
     assert_eq!(alone, said[2..3]);
 }

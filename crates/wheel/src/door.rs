@@ -148,25 +148,24 @@ fn stated(
 ) -> Result<Vec<TrendRow>, pipeline::Error> {
     let histories = match (given, days) {
         (None, None) => return trends::of_store(config, booked, &Store::open(config.store())?, ask),
-        (Some(batches), _) => estimates::gathered(chunks(batches).map(Ok))?,
+        (Some(batches), _) => estimates::gathered(&chunks(batches))?,
         (None, Some(_)) => trends::in_store(&Store::open(config.store())?)?,
     };
     match days {
-        None => trends::of_histories(config, booked, &histories, ask),
-        Some(days) => {
-            trends::of_queries(config, booked, &histories, &estimates::asked(days)?, ask.statistics)
-        }
+        None => trends::of_histories(config, booked, histories, ask),
+        Some(days) => trends::of_queries(config, booked, histories, &estimates::asked(days)?, ask.statistics),
     }
 }
 
 /// The rows of a table from memory, counted through.
-fn chunks(batches: Vec<RecordBatch>) -> impl Iterator<Item = Chunk> {
+fn chunks(batches: Vec<RecordBatch>) -> Vec<Chunk> {
     let mut before = 0;
-    batches.into_iter().map(move |batch| {
+    let chunk = |batch: RecordBatch| {
         let rows = batch.num_rows();
         before += rows;
         Chunk::new("estimates".as_ref(), batch, before - rows)
-    })
+    };
+    batches.into_iter().map(chunk).collect()
 }
 
 /// Stored records that fit.

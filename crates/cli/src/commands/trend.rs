@@ -36,9 +36,9 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Co
             match queries {
                 Some(file) => {
                     let queries = pipeline::estimates::queries(file)?;
-                    trends::of_queries(&config, &installations, &histories, &queries, args.statistics)?
+                    trends::of_queries(&config, &installations, histories, &queries, args.statistics)?
                 }
-                None => trends::of_histories(&config, &installations, &histories, &ask)?,
+                None => trends::of_histories(&config, &installations, histories, &ask)?,
             }
         }
     };

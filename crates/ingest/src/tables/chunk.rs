@@ -2,22 +2,28 @@
 //!
 //! A fleet's history has tens of millions of rows, so nothing is turned into text that is a number already.
 
+use std::fs::File;
 use std::io::{Cursor, Read};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{
-    Array, ArrayRef, AsArray, Float64Array, PrimitiveArray, RecordBatch, StringArray, StringBuilder,
-    TimestampMicrosecondArray, new_null_array,
+    Array, ArrayRef, AsArray, DictionaryArray, Float64Array, PrimitiveArray, RecordBatch, StringArray,
+    StringBuilder, TimestampMicrosecondArray, new_null_array,
 };
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Float64Type, Schema, TimeUnit, TimestampMicrosecondType};
+use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema, TimeUnit, TimestampMicrosecondType};
 use jiff::Timestamp;
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
+};
+use parquet::errors::ParquetError;
 
 use super::{bad_cell, missing, number, position, utc};
 use crate::error::{Error, Fault};
+use crate::positioned::Positioned;
 use crate::source::whole;
 
 /// Rows of a chunk.
@@ -39,9 +45,15 @@ pub struct Texts(StringArray);
 impl Texts {
     /// The text of a row.
     pub fn get(&self, row: usize) -> Option<&str> {
-        let text = self.0.is_valid(row).then(|| self.0.value(row).trim())?;
+        let text = self.0.is_valid(row).then(|| trimmed(self.0.value(row)))?;
         (!text.is_empty()).then_some(text)
     }
+}
+
+/// A text without the blanks around it, of which most have none.
+pub fn trimmed(text: &str) -> &str {
+    let is_bare = |end: Option<&u8>| end.is_some_and(u8::is_ascii_graphic);
+    if is_bare(text.as_bytes().first()) && is_bare(text.as_bytes().last()) { text } else { text.trim() }
 }
 
 impl Chunk {
@@ -87,6 +99,11 @@ impl Chunk {
         Ok(Texts(texts.as_string().clone()))
     }
 
+    /// A column of texts as the codes that it is stored as; none where it is not.
+    pub fn coded(&self, column: usize) -> Option<&DictionaryArray<Int32Type>> {
+        self.batch.column(column).as_dictionary_opt()
+    }
+
     /// A column as finite numbers; without one, all none.
     ///
     /// # Errors
@@ -95,6 +112,10 @@ impl Chunk {
         let wanted = DataType::Float64;
         let Some(index) = column.filter(|c| !is_numeric(self.batch.column(*c))) else {
             let numbers: Float64Array = self.cast(column, &wanted)?.as_primitive::<Float64Type>().clone();
+            // What lies under an empty cell may be anything.
+            if numbers.values().iter().all(|value| value.is_finite()) {
+                return Ok(numbers);
+            }
             return match numbers.iter().position(|value| value.is_some_and(|value| !value.is_finite())) {
                 Some(row) => Err(self.error(row, column, format!("`{}` is no number", numbers.value(row)))),
                 None => Ok(numbers),
@@ -149,22 +170,115 @@ fn is_numeric(array: &ArrayRef) -> bool {
     array.data_type().is_numeric()
 }
 
-/// The rows of a table, in order: a `.parquet` file as Parquet, anything else as CSV.
-///
-/// Of Parquet only the `wanted` columns are read, where some are named. There is always one chunk, so that a
-/// table without rows still shows its columns.
+/// The rows of a table, in order, as [`Parted`] knows it.
 ///
 /// # Errors
-/// When the file cannot be opened, or is not the table its name says.
+/// As [`Parted::open`].
 pub fn chunks(file: &Path, wanted: Option<&[&str]>) -> Result<Chunks, Error> {
-    let parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
-    let opened = if parquet { Rows::parquet(file, wanted) } else { Rows::csv(file) };
-    let (rows, schema) = opened.map_err(|fault| Error::new(file, fault))?;
-    let header = schema.fields().iter().map(|f| f.name().clone()).collect();
-    Ok(Chunks { file: file.to_owned(), header, schema, rows, before: 0, is_begun: false })
+    let table = Parted::open(file, wanted, &[])?;
+    table.chunks(0..table.len())
 }
 
-/// What [`chunks`] reads.
+/// A table in parts that several may read at a time: a `.parquet` file as Parquet in its row groups, anything else
+/// as CSV in one.
+pub struct Parted {
+    file: PathBuf,
+    /// Of Parquet: the file, what its footer says in the form wanted, and the columns.
+    parquet: Option<(File, ArrowReaderMetadata, ProjectionMask)>,
+}
+
+impl Parted {
+    /// Opens a table. Of Parquet only the `wanted` columns are read, where some are named; texts of the `coded`
+    /// ones, which repeat, stay codes.
+    ///
+    /// # Errors
+    /// When the file cannot be opened, or is not the table its name says.
+    pub fn open(file: &Path, wanted: Option<&[&str]>, coded: &[&str]) -> Result<Self, Error> {
+        let is_parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+        let parquet = is_parquet.then(|| parquet(file, wanted, coded)).transpose();
+        Ok(Self { file: file.to_owned(), parquet: parquet.map_err(|fault| Error::new(file, fault))? })
+    }
+
+    /// How many parts there are: one at least.
+    #[expect(clippy::len_without_is_empty, reason = "there is no table without a part")]
+    pub fn len(&self) -> usize {
+        self.parquet.as_ref().map_or(1, |(_, footer, _)| footer.metadata().num_row_groups().max(1))
+    }
+
+    /// The rows of some parts, in order.
+    ///
+    /// There is always one chunk, so that a table without rows still shows its columns.
+    ///
+    /// # Errors
+    /// As [`Parted::open`].
+    pub fn chunks(&self, parts: Range<usize>) -> Result<Chunks, Error> {
+        let opened = match &self.parquet {
+            Some((file, footer, mask)) => groups(file, footer, mask.clone(), parts),
+            None => Rows::csv(&self.file).map(|(rows, schema)| (rows, schema, 0)),
+        };
+        let (rows, schema, before) = opened.map_err(|fault| Error::new(&self.file, fault))?;
+        let header = schema.fields().iter().map(|f| f.name().clone()).collect();
+        Ok(Chunks { file: self.file.clone(), header, schema, rows, before, is_begun: false })
+    }
+}
+
+fn torn(error: &ParquetError) -> Fault {
+    Fault::NotParquet { detail: error.to_string() }
+}
+
+fn parquet(
+    file: &Path,
+    wanted: Option<&[&str]>,
+    coded: &[&str],
+) -> Result<(File, ArrowReaderMetadata, ProjectionMask), Fault> {
+    let opened = whole(file)?;
+    let clone = opened.try_clone().map_err(|source| Fault::Unreadable { source })?;
+    let found = ArrowReaderMetadata::load(&Positioned(clone), ArrowReaderOptions::new());
+    let found = found.map_err(|e| torn(&e))?;
+    let footer = if coded.is_empty() { found } else { with_codes(found, coded) };
+    let columns = footer.parquet_schema().root_schema().get_fields().iter().enumerate();
+    let is_wanted = |name: &str| wanted.is_none_or(|wanted| wanted.contains(&name.trim()));
+    let roots: Vec<usize> = columns.filter(|(_, c)| is_wanted(c.name())).map(|(root, _)| root).collect();
+    let mask = ProjectionMask::roots(footer.parquet_schema(), roots);
+    Ok((opened, footer, mask))
+}
+
+/// The same file, whose texts in some columns are read as codes, where they can be.
+fn with_codes(found: ArrowReaderMetadata, names: &[&str]) -> ArrowReaderMetadata {
+    let field = |field: &Arc<Field>| {
+        let is_text = matches!(field.data_type(), DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View);
+        let codes = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let name = field.name().trim();
+        if is_text && names.contains(&name) {
+            field.as_ref().clone().with_data_type(codes())
+        } else {
+            field.as_ref().clone()
+        }
+    };
+    let fields: Vec<Field> = found.schema().fields().iter().map(field).collect();
+    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields)));
+    ArrowReaderMetadata::try_new(Arc::clone(found.metadata()), options).unwrap_or(found)
+}
+
+/// The rows of some row groups, their columns, and how many rows of the file are before them.
+fn groups(
+    file: &File,
+    footer: &ArrowReaderMetadata,
+    mask: ProjectionMask,
+    groups: Range<usize>,
+) -> Result<(Rows, Arc<Schema>, usize), Fault> {
+    let clone = file.try_clone().map_err(|source| Fault::Unreadable { source })?;
+    let some = footer.metadata().row_groups();
+    let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();
+    let groups = groups.start..groups.end.min(some.len());
+    let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(Positioned(clone), footer.clone());
+    let builder = builder.with_projection(mask).with_row_groups(groups.collect()).with_batch_size(ROWS);
+    let reader = builder.build().map_err(|e| torn(&e))?;
+    let schema = arrow::array::RecordBatchReader::schema(&reader);
+    Ok((Rows::Parquet(reader), schema, before))
+}
+
+/// What [`Parted`] reads.
 pub struct Chunks {
     file: PathBuf,
     header: Arc<[String]>,
@@ -199,18 +313,6 @@ enum Rows {
 }
 
 impl Rows {
-    fn parquet(file: &Path, wanted: Option<&[&str]>) -> Result<(Self, Arc<Schema>), Fault> {
-        let torn = |e: parquet::errors::ParquetError| Fault::NotParquet { detail: e.to_string() };
-        let builder = ParquetRecordBatchReaderBuilder::try_new(whole(file)?).map_err(torn)?;
-        let columns = builder.parquet_schema().root_schema().get_fields().iter().enumerate();
-        let is_wanted = |name: &str| wanted.is_none_or(|wanted| wanted.contains(&name.trim()));
-        let roots: Vec<usize> = columns.filter(|(_, c)| is_wanted(c.name())).map(|(root, _)| root).collect();
-        let mask = ProjectionMask::roots(builder.parquet_schema(), roots);
-        let reader = builder.with_projection(mask).with_batch_size(ROWS).build().map_err(torn)?;
-        let schema = arrow::array::RecordBatchReader::schema(&reader);
-        Ok((Self::Parquet(reader), schema))
-    }
-
     fn csv(file: &Path) -> Result<(Self, Arc<Schema>), Fault> {
         let mut text = Vec::new();
         whole(file)?.read_to_end(&mut text).map_err(|source| Fault::Unreadable { source })?;

@@ -66,20 +66,16 @@ pub fn trend_free_pre_whitening(y: &[f64]) -> Result<MannKendall, Error> {
 /// The test, with its variance multiplied by `inflation`.
 fn test(y: &[f64], inflation: f64) -> MannKendall {
     let n = y.len() as f64;
-    let s = score(y);
+    let (mut sorted, mut spare) = (y.to_vec(), y.to_vec());
+    let inversions = inversions(&mut sorted, &mut spare) as f64;
+    let ties: Vec<f64> = sizes_of_equals(&sorted).collect();
+    let tied: f64 = ties.iter().map(|k| 0.5 * k * (k - 1.0)).sum();
+    // Pairs less ties less twice the inversions, which a merge sort counts (Knight 1966).
+    let s = 0.5 * n * (n - 1.0) - tied - 2.0 * inversions;
     let term = |k: f64| k * (k - 1.0) * (2.0 * k + 5.0);
-    let variance = inflation * (term(n) - tie_sizes(y).map(term).sum::<f64>()) / 18.0;
+    let variance = inflation * (term(n) - ties.into_iter().map(term).sum::<f64>()) / 18.0;
     let z = if s == 0.0 { 0.0 } else { (s - s.signum()) / variance.sqrt() };
     MannKendall { s, variance, z, p_value: two_sided(z), tau: s / (0.5 * n * (n - 1.0)) }
-}
-
-/// S: pairs less ties less twice the inversions, which a merge sort counts (Knight 1966).
-fn score(y: &[f64]) -> f64 {
-    let n = y.len() as f64;
-    let tied: f64 = tie_sizes(y).map(|k| 0.5 * k * (k - 1.0)).sum();
-    let mut values = y.to_vec();
-    let mut spare = y.to_vec();
-    0.5 * n * (n - 1.0) - tied - 2.0 * inversions(&mut values, &mut spare) as f64
 }
 
 /// Sorts the values and counts the pairs that stood strictly in falling order.
@@ -91,17 +87,17 @@ fn inversions(values: &mut [f64], spare: &mut [f64]) -> u64 {
     let (left, right) = values.split_at_mut(half);
     let mut count = inversions(left, &mut spare[..half]) + inversions(right, &mut spare[half..]);
     let (mut i, mut j) = (0, 0);
-    for slot in spare.iter_mut() {
-        let from_left = j == right.len() || (i < left.len() && left[i] <= right[j]);
-        *slot = if from_left {
-            i += 1;
-            left[i - 1]
-        } else {
-            count += (left.len() - i) as u64;
-            j += 1;
-            right[j - 1]
-        };
+    // Which half goes on is chance: it is computed with, since a branch would be guessed wrong every other time.
+    while i < left.len() && j < right.len() {
+        let (of_left, of_right) = (left[i], right[j]);
+        let falls = of_right < of_left;
+        spare[i + j] = if falls { of_right } else { of_left };
+        count += u64::from(falls) * (left.len() - i) as u64;
+        i += usize::from(!falls);
+        j += usize::from(falls);
     }
+    spare[i + j..left.len() + j].copy_from_slice(&left[i..]);
+    spare[left.len() + j..].copy_from_slice(&right[j..]);
     values.copy_from_slice(spare);
     count
 }
@@ -110,8 +106,11 @@ fn inversions(values: &mut [f64], spare: &mut [f64]) -> u64 {
 pub(super) fn tie_sizes(y: &[f64]) -> impl Iterator<Item = f64> {
     let mut sorted = y.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
-    let sizes: Vec<f64> = sorted.chunk_by(|a, b| a == b).map(|group| group.len() as f64).collect();
-    sizes.into_iter()
+    sizes_of_equals(&sorted).collect::<Vec<f64>>().into_iter()
+}
+
+fn sizes_of_equals(sorted: &[f64]) -> impl Iterator<Item = f64> {
+    sorted.chunk_by(|a, b| a == b).map(|group| group.len() as f64)
 }
 
 /// The series less its Sen slope by index counted from one, and that slope.
