@@ -272,6 +272,8 @@ mod tests {
     use arrow::datatypes::DataType;
 
     use super::*;
+    use crate::flown::Flown;
+    use crate::histories::History;
 
     /// Whole numbers below a bound that look like chance.
     fn chances() -> impl FnMut(u64) -> u64 {
@@ -351,9 +353,60 @@ mod tests {
             stored.add_stored(batch(some, &coded)).unwrap();
             plain.add(&Chunk::new("table".as_ref(), batch(some, &DataType::Utf8), 0)).unwrap();
         }
-        let expected = format!("{:?}", one_by_one(&rows));
-        assert_eq!(format!("{:?}", stored.booked()), expected);
-        assert_eq!(format!("{:?}", plain.booked()), expected);
+        let expected = told(&one_by_one(&rows));
+        assert_eq!(told(&stored.booked()), expected);
+        assert_eq!(told(&plain.booked()), expected);
+    }
+
+    /// All that is known of all units.
+    fn told(histories: &Histories) -> Vec<String> {
+        let of_unit = |(name, history): (&HistoryName, &History)| {
+            let flight = |f: &Flown| {
+                format!("{f:?} {:?} {:?} {:?}", history.place(f), history.flight_id(f), history.beside(f))
+            };
+            format!("{name:?} {:?}", history.flights().iter().map(flight).collect::<Vec<_>>())
+        };
+        histories.iter().map(of_unit).collect()
+    }
+
+    /// The order of parts decides, not that of the workers, of whom there may be more than parts or units.
+    #[test]
+    fn any_number_of_workers_brings_together_what_one_does() {
+        let rows = rows();
+        let expected = told(&one_by_one(&rows));
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        for (rows_of_part, workers) in [(600, 1), (600, 7), (90, 2), (41, 3), (7, 5)] {
+            let parts: Vec<RecordBatch> = rows.chunks(rows_of_part).map(|some| batch(some, &coded)).collect();
+            let put = |gathering: &mut Gathering, some: Range<usize>| {
+                let mut some = parts[some].iter().cloned();
+                some.try_for_each(|batch| gathering.add_stored(batch)).unwrap();
+                Ok(())
+            };
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build().unwrap();
+            let found = pool.install(|| of_parts(parts.len(), true, put)).unwrap();
+            assert!(told(&found) == expected, "{rows_of_part} rows a part, {workers} workers");
+        }
+        assert_eq!(of_parts(0, true, |_, _| Ok(())).unwrap().names().count(), 0);
+    }
+
+    /// Whoever is first, it is the table's first error that is told.
+    #[test]
+    fn of_several_errors_the_first_is_told() {
+        let refuse = |_: &mut Gathering, some: Range<usize>| match some.start {
+            0 => Ok(()),
+            first => Err(Error::refused(
+                Chunk::new(
+                    "t".as_ref(),
+                    RecordBatch::new_empty(Arc::new(arrow::datatypes::Schema::empty())),
+                    first,
+                )
+                .error(0, None, "bad".into())
+                .complaint(),
+            )),
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let error = pool.install(|| of_parts(24, true, refuse)).unwrap_err();
+        assert!(format!("{error:?}").contains("row: Some(3)"), "{error:?}");
     }
 
     #[test]

@@ -119,7 +119,7 @@ fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
 
 #[test]
 fn a_fleet_that_no_unit_of_has_failed_is_held_against_the_levels_it_has_reached() {
-    let past = backtest::of_histories(&config(), &Installations::default(), histories(&flown(700))).unwrap();
+    let past = backtest::of_histories(&config(), &Installations::default(), &histories(&flown(700))).unwrap();
     assert!(past.len() > 30, "{} past statements", past.len());
     for statement in &past {
         let elapsed = (day(699) - statement.as_of_utc).total(jiff::Unit::Hour).unwrap() / 24.0 * HOURS_A_DAY;

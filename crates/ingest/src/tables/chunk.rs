@@ -431,6 +431,48 @@ mod tests {
         assert_eq!(place, "column `gap_m`, row 12");
     }
 
+    /// Seven rows in groups of three, some texts as codes, whatever form of text the file's writer prefers.
+    #[test]
+    fn parts_of_a_table_are_its_rows_in_order_and_know_how_many_are_before_them() {
+        let serials: Vec<String> = (0..7).map(|row| format!(" S{} ", row / 4)).collect();
+        let texts: [ArrayRef; 3] = [
+            Arc::new(StringArray::from(serials.clone())),
+            Arc::new(arrow::array::LargeStringArray::from(serials.clone())),
+            Arc::new(arrow::array::StringViewArray::from_iter_values(serials)),
+        ];
+        let gaps = Float64Array::from(vec![0.0, 1.0, 2.0, 3.0, 4.0, f64::INFINITY, 6.0]);
+        for serials in texts {
+            let kind = serials.data_type().clone();
+            let table = batch(vec![("serial", serials), ("gap_m", Arc::new(gaps.clone()))]);
+            let dir = tempfile::tempdir().unwrap();
+            let file = dir.path().join("table.parquet");
+            let small = parquet::file::properties::WriterProperties::builder()
+                .set_max_row_group_row_count(Some(3))
+                .build();
+            let mut writer =
+                ArrowWriter::try_new(File::create(&file).unwrap(), table.schema(), Some(small)).unwrap();
+            writer.write(&table).unwrap();
+            writer.close().unwrap();
+            let parted = Parted::open(&file, None, &["serial"]).unwrap();
+            assert_eq!(parted.len(), 3);
+            let rows = |parts: Range<usize>| parted.chunks(parts).unwrap().map(Result::unwrap);
+            assert_eq!(rows(1..3).map(|chunk| chunk.len()).sum::<usize>(), 4, "{kind}");
+            let last = rows(2..3).next().unwrap();
+            let codes = last.coded(0).unwrap();
+            assert_eq!(codes.values().as_string::<i32>().value(codes.key(0).unwrap()), " S1 ");
+            assert_eq!(last.numbers(Some(1)).unwrap().value(0), 6.0);
+            let bad = rows(1..2).next().unwrap().numbers(Some(1)).unwrap_err();
+            assert_eq!(bad.complaint().place().unwrap(), "column `gap_m`, row 6", "{kind}");
+        }
+    }
+
+    #[test]
+    fn a_text_is_trimmed_as_the_standard_library_does() {
+        for text in ["", " ", "a", " a", "a\u{a0}", "\u{2003}é \n", "ab c", "\u{85}"] {
+            assert_eq!(trimmed(text), text.trim());
+        }
+    }
+
     #[test]
     fn a_table_without_rows_shows_its_columns() {
         let (_dir, file) = parquet(&RecordBatch::new_empty(
