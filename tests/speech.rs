@@ -233,6 +233,58 @@ fn estimates_made_elsewhere_get_statements_and_queries_see_nothing_later() {
     assert_eq!(early[0], rows[0], "what came later changed what was known");
 }
 
+/// Twenty micrometres and half a micrometre more each day, in a folder without a configuration: 100 µm are met a
+/// hundred and twenty days after the fortieth, at an hour a day.
+#[test]
+fn a_table_made_elsewhere_is_judged_without_a_configuration() {
+    let bench = Bench::empty();
+    let row = |day: i64| {
+        let departure = "2026-01-01T06:00:00Z".parse::<jiff::Timestamp>().unwrap();
+        let departure = departure + jiff::SignedDuration::from_hours(24 * day);
+        format!("U1,{departure},{:e},1.0\n", 20e-6 + 0.5e-6 * day as f64 + 1e-8 * f64::from(day % 3 == 0))
+    };
+    let header = "serial_number,departure_utc,gap_m,flight_hours\n".to_owned();
+    let table: String = std::iter::once(header).chain((0..=40).map(row)).collect();
+    std::fs::write(bench.path("history.csv"), table).unwrap();
+    let judged = |more: &[&str]| {
+        let ended = bench.freeplay(&[&["trend", "--estimates", "history.csv", "--json"], more].concat());
+        assert_eq!(ended.code, Some(0), "{ended:?}");
+        let rows: Vec<serde_json::Value> = serde_json::from_str(&ended.out).unwrap();
+        (rows[0].clone(), ended.err)
+    };
+    let (without, said) = judged(&[]);
+    assert!(without["state"].is_null() && without["rate_m_per_hour"].as_f64().unwrap() > 0.4e-6, "{without}");
+    assert!(said.contains("--limit-m"), "{said}");
+    let (with, said) = judged(&["--limit-m", "100e-6"]);
+    let hours = |name: &str| with[name].as_f64().unwrap();
+    assert!((hours("crossing_hours_p05")..=hours("crossing_hours_p95")).contains(&120.0), "{with}");
+    assert_eq!((with["state"].as_str(), said.as_str()), (Some("plan"), ""));
+    // In micrometres nobody would ever hear of it.
+    let ended = bench.freeplay(&["trend", "--estimates", "history.csv", "--limit-m", "100"]);
+    assert_eq!(ended.code, Some(2), "{ended:?}");
+    assert!(ended.err.contains("150e-6"), "{}", ended.err);
+    // A configuration that is named must be there.
+    let named = bench.freeplay(&["trend", "--estimates", "history.csv", "--config", "fleet.toml"]);
+    assert_eq!(named.code, Some(2), "{named:?}");
+}
+
+/// A part's own limit goes before everybody's.
+#[test]
+fn a_limit_for_all_parts_serves_those_that_state_none() {
+    let bench = Bench::sample();
+    let config = std::fs::read_to_string(bench.path("pipeline.toml")).unwrap();
+    let without = config.replacen("limit_m = 150e-6\n", "", 1).replacen("watch_m = 110e-6\n", "", 1);
+    let with = without.replacen("[trend]\n", "[trend]\nlimit_m = 200e-6\n", 1);
+    std::fs::write(bench.path("pipeline.toml"), with).unwrap();
+    bench.well(&["run"]);
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&bench.well(&["trend", "--json"])).unwrap();
+    for row in &rows {
+        let own = if row["part_number"] == "EMA-27-1060" { 180e-6 } else { 200e-6 };
+        assert_eq!(row["limit_m"].as_f64(), Some(own), "{row}");
+    }
+    assert_eq!(rows.len(), 12);
+}
+
 #[test]
 fn the_store_tells_what_it_holds_and_whether_it_is_fed() {
     let bench = Bench::sample();

@@ -25,6 +25,9 @@ pub(crate) struct Args {
     pub command: Command,
 }
 
+/// The configuration where no other is named.
+pub(crate) const CONFIG: &str = "pipeline.toml";
+
 /// Options of every command.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Global {
@@ -33,7 +36,7 @@ pub(crate) struct Global {
         long,
         global = true,
         env = "FREEPLAY_CONFIG",
-        default_value = "pipeline.toml",
+        default_value = CONFIG,
         value_name = "FILE"
     )]
     pub config: Vec<PathBuf>,
@@ -396,9 +399,8 @@ pub(crate) struct TrendArgs {
     /// The day of the statement; by default that of the newest record. Nothing later is looked at.
     #[arg(long, value_parser = parse_utc, value_name = "UTC")]
     pub as_of: Option<Timestamp>,
-    /// An estimates table made elsewhere, instead of the store.
-    #[arg(long, value_name = "FILE")]
-    pub estimates: Option<PathBuf>,
+    #[command(flatten)]
+    pub foreign: Foreign,
     /// One row per query: `serial_number`, `as_of_utc`, optionally `part_number`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["as_of", "tail", "serial", "part"])]
     pub queries: Option<PathBuf>,
@@ -409,12 +411,22 @@ pub(crate) struct TrendArgs {
     pub output: Output,
 }
 
+/// Histories that were estimated elsewhere.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Foreign {
+    /// An estimates table made elsewhere, instead of the store; it needs no configuration.
+    #[arg(long, value_name = "FILE")]
+    pub estimates: Option<PathBuf>,
+    /// The gap that grounds, m, of parts for which the configuration states none: 150e-6 is 150 µm.
+    #[arg(long, value_name = "M", value_parser = parse_limit)]
+    pub limit_m: Option<f64>,
+}
+
 /// `backtest`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BacktestArgs {
-    /// An estimates table made elsewhere, instead of the store.
-    #[arg(long, value_name = "FILE")]
-    pub estimates: Option<PathBuf>,
+    #[command(flatten)]
+    pub foreign: Foreign,
     #[command(flatten)]
     pub output: Output,
 }
@@ -526,6 +538,17 @@ pub(crate) struct CompletionsArgs {
 
 fn parse_utc(text: &str) -> Result<Timestamp, String> {
     ingest::tables::utc(text)
+}
+
+/// A gap that may ground an aircraft: above zero, and less than a centimetre, or it was meant in another unit.
+fn parse_limit(text: &str) -> Result<f64, String> {
+    const UNHEARD_OF_M: f64 = 0.01;
+    let limit_m: f64 = text.parse().map_err(|_| format!("`{text}` is no number of metres such as 150e-6"))?;
+    if limit_m > 0.0 && limit_m <= UNHEARD_OF_M {
+        Ok(limit_m)
+    } else {
+        Err(format!("{text} m is no limit of free play: 150 µm is 150e-6"))
+    }
 }
 
 fn parse_span(text: &str) -> Result<std::time::Duration, String> {

@@ -20,13 +20,18 @@ impl<'a> Limits<'a> {
         })
     }
 
+    /// The act limit, m; none where neither the part nor the configuration states one.
+    pub(crate) fn stated_m(self, part: Option<&str>) -> Option<f64> {
+        self.part(part).and_then(|p| p.limit_m).or(self.0.document.trend.limit_m)
+    }
+
     /// The act limit, m, or its stand-in.
     pub(crate) fn limit_m(self, part: Option<&str>) -> f64 {
         self.settings(part).limit_m
     }
 
     /// What is configured of a part.
-    pub(crate) fn part(self, number: Option<&str>) -> Option<&'a job::Part> {
+    fn part(self, number: Option<&str>) -> Option<&'a job::Part> {
         number.and_then(|number| PartNumber::new(number).ok()).and_then(|number| self.0.parts.get(&number))
     }
 
@@ -35,10 +40,12 @@ impl<'a> Limits<'a> {
     pub(crate) fn settings(self, part: Option<&str>) -> trend::Settings {
         /// A gap no actuator has: a stand-in that is never met and never shown.
         const NEVER_M: f64 = 1.0;
-        let (of, part) = (&self.0.document.trend, self.part(part));
-        let base = trend::Settings::for_limit(part.and_then(|p| p.limit_m).unwrap_or(NEVER_M));
+        let of = &self.0.document.trend;
+        let base = trend::Settings::for_limit(self.stated_m(part).unwrap_or(NEVER_M));
+        let watch_m = self.part(part).and_then(|p| p.watch_m).unwrap_or(base.watch_m);
         trend::Settings {
-            watch_m: part.and_then(|p| p.watch_m).unwrap_or(base.watch_m),
+            // A part's own may lie above a limit that is everybody's.
+            watch_m: watch_m.min(base.limit_m),
             planning_horizon_hours: of.planning_horizon_hours,
             horizon_hours: of.horizon_hours,
             stale_after_days: of.stale_after_days,

@@ -418,7 +418,7 @@ impl<'a> Fleet<'a> {
         let unit = self.units.get(name);
         let nobody = History::default();
         let (history, series) = unit.map_or((&nobody, None), |(history, series)| (*history, Some(series)));
-        let limit_m = self.limits.part(name.0.as_deref()).and_then(|p| p.limit_m);
+        let limit_m = self.limits.stated_m(name.0.as_deref());
         let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
         let usage_axis = prior.map(|prior| prior.axis().to_string());
         let row = statement::row(name, history, series, limit_m, trend, as_of, wide);

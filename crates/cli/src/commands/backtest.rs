@@ -13,7 +13,7 @@ use crate::rows;
 use crate::table::{self, number, text};
 use crate::talk::Talk;
 
-use super::booked;
+use super::judging;
 
 /// Bounds of the shares, and what they are called.
 const SHARES: [(f64, f64, &str); 4] = [
@@ -28,8 +28,8 @@ const SHARES: [(f64, f64, &str); 4] = [
 /// # Errors
 /// When configuration, tables or store cannot be read.
 pub(crate) fn backtest(args: &BacktestArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
-    let (config, installations) = booked(global)?;
-    let histories = match &args.estimates {
+    let (config, installations) = judging(&args.foreign, global, talk)?;
+    let histories = match &args.foreign.estimates {
         Some(file) => pipeline::estimates::read(file)?,
         None => trends::in_store(&Store::open(config.store())?)?,
     };

@@ -72,12 +72,15 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
 
 /// Asks after limits that were given in another unit.
 fn doubt_limits(config: &Config, talk: &Talk) {
-    for (number, part) in &config.document.part {
-        for (key, limit_m) in [("limit_m", part.limit_m), ("watch_m", part.watch_m)] {
-            if let Some(limit_m) = limit_m.filter(|limit_m| *limit_m > UNHEARD_OF_M) {
-                let meant = "keys are in metres: 150 µm is 150e-6";
-                talk.note(&format!("part {number}: is `{key}` = {limit_m} meant in another unit? {meant}"));
-            }
+    let of_part = |(number, part): (&String, &job::part::PartSettings)| {
+        [("limit_m", part.limit_m), ("watch_m", part.watch_m)]
+            .map(|(key, m)| (format!("part {number}"), key, m))
+    };
+    let of_all = ("trend".to_owned(), "limit_m", config.document.trend.limit_m);
+    for (whose, key, limit_m) in config.document.part.iter().flat_map(of_part).chain([of_all]) {
+        if let Some(limit_m) = limit_m.filter(|limit_m| *limit_m > UNHEARD_OF_M) {
+            let meant = "keys are in metres: 150 µm is 150e-6";
+            talk.note(&format!("{whose}: is `{key}` = {limit_m} meant in another unit? {meant}"));
         }
     }
 }

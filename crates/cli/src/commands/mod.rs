@@ -23,8 +23,9 @@ use std::path::Path;
 use fleet::Installations;
 use job::Config;
 
-use crate::args::Global;
+use crate::args::{CONFIG, Foreign, Global};
 use crate::exit::Failure;
+use crate::talk::Talk;
 
 /// The version written into every record.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -38,6 +39,26 @@ pub(crate) fn config(global: &Global) -> Result<Config, Failure> {
 pub(crate) fn booked(global: &Global) -> Result<(Config, Installations), Failure> {
     let config = config(global)?;
     let installations = pipeline::schedule::installations(&config)?;
+    Ok((config, installations))
+}
+
+/// What statements need of a configuration and its installations table. For a table of estimates made elsewhere
+/// there need not be one.
+pub(crate) fn judging(
+    foreign: &Foreign,
+    global: &Global,
+    talk: &Talk,
+) -> Result<(Config, Installations), Failure> {
+    let is_none_named = matches!(&global.config[..], [file] if file.as_os_str() == CONFIG && !file.exists());
+    let (mut config, installations) = if foreign.estimates.is_some() && is_none_named {
+        if foreign.limit_m.is_none() {
+            talk.note("no pipeline.toml here: judged without a limit, so without states; `--limit-m 150e-6` gives one");
+        }
+        (Config::of_no_logs(), Installations::default())
+    } else {
+        booked(global)?
+    };
+    config.document.trend.limit_m = foreign.limit_m.or(config.document.trend.limit_m);
     Ok((config, installations))
 }
 

@@ -11,14 +11,14 @@ use crate::spark::spark;
 use crate::table::{self, count, number, state_mark, text};
 use crate::talk::Talk;
 
-use super::booked;
+use super::judging;
 
 /// Answers with one row for each unit, or for each query.
 ///
 /// # Errors
 /// When configuration, tables or store cannot be read.
 pub(crate) fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Code, Failure> {
-    let (config, installations) = booked(global)?;
+    let (config, installations) = judging(&args.foreign, global, talk)?;
     let ask = Ask {
         tail_number: args.tail.clone(),
         serial_number: args.serial.clone(),
@@ -26,7 +26,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, talk: &Talk) -> Result<Co
         as_of_utc: args.as_of,
         statistics: args.statistics,
     };
-    let found = match (&args.estimates, &args.queries) {
+    let found = match (&args.foreign.estimates, &args.queries) {
         (None, None) => trends::of_store(&config, &installations, &Store::open(config.store())?, &ask)?,
         (estimates, queries) => {
             let histories = match estimates {

@@ -460,7 +460,7 @@ mod tests {
             let last = rows(2..3).next().unwrap();
             let codes = last.coded(0).unwrap();
             assert_eq!(codes.values().as_string::<i32>().value(codes.key(0).unwrap()), " S1 ");
-            assert_eq!(last.numbers(Some(1)).unwrap().value(0), 6.0);
+            assert_eq!(last.numbers(Some(1)).unwrap(), Float64Array::from(vec![6.0]));
             let bad = rows(1..2).next().unwrap().numbers(Some(1)).unwrap_err();
             assert_eq!(bad.complaint().place().unwrap(), "column `gap_m`, row 6", "{kind}");
         }

@@ -18,7 +18,7 @@ use crate::part::{PartSettings, WearAxis};
 use crate::value::positive;
 
 /// The whole file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Document {
     /// Which logs, and which tables beside them.
@@ -215,6 +215,9 @@ pub struct TrendSettings {
     /// histories speak for. A part's `axis` goes before it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<WearAxis>,
+    /// The gap that grounds, m, of parts that state none themselves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit_m: Option<f64>,
 }
 
 impl Default for TrendSettings {
@@ -225,6 +228,7 @@ impl Default for TrendSettings {
             stale_after_days: 30.0,
             next_check_hours: 300.0,
             axis: None,
+            limit_m: None,
         }
     }
 }
@@ -276,6 +280,7 @@ impl Document {
         ] {
             found.extend(positive(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
         }
+        found.extend(positive("limit_m", self.trend.limit_m).map(|c| source.at(&["trend", "limit_m"], c)));
         for (key, seconds) in [("timeout_s", self.objects.timeout_s), ("give_up_s", self.objects.give_up_s)] {
             found.extend(positive(key, Some(seconds)).map(|c| source.at(&["objects", key], c)));
         }

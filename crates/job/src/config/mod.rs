@@ -51,6 +51,19 @@ impl Config {
         Self::read_layers(&[file.to_owned()])
     }
 
+    /// That of nobody's logs: defaults, to judge tables that were made elsewhere.
+    pub fn of_no_logs() -> Self {
+        Self {
+            file: PathBuf::new(),
+            folder: PathBuf::new(),
+            document: Document::default(),
+            parts: BTreeMap::new(),
+            flights: Flights::default(),
+            variants: Variants::none(),
+            layers: Arc::default(),
+        }
+    }
+
     /// Reads files, each laid over those before it, checks the whole, and reads the flights table that it
     /// names. Relative paths start from the first file's folder.
     ///

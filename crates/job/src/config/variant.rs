@@ -53,6 +53,11 @@ impl Checked {
 }
 
 impl Variants {
+    /// None.
+    pub(super) fn none() -> Self {
+        Self { base: Arc::default(), overrides: Vec::new(), made: Mutex::default(), told: Mutex::default() }
+    }
+
     /// Reads the overrides and tries each alone on the rest of the configuration.
     pub(super) fn check(document: &Document, source: &Source<'_>) -> Result<Self, Vec<Complaint>> {
         let base = document.mapping();
