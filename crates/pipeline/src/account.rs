@@ -115,6 +115,9 @@ pub struct Report {
     pub trends: Vec<TrendRow>,
     /// Those of them of which something else is said than without this run's records.
     pub changed: Vec<Changed>,
+    /// How many units of the whole fleet are in which state, where that was asked.
+    #[serde(skip)]
+    pub states: BTreeMap<&'static str, usize>,
     /// What came of each log; the last word on it counts, whoever was faster.
     #[serde(skip)]
     logs: BTreeMap<String, Counted>,
@@ -154,20 +157,21 @@ impl Report {
             workers,
             trends: Vec::new(),
             changed: Vec::new(),
+            states: BTreeMap::new(),
             logs: BTreeMap::new(),
         }
     }
 
     /// Takes what the run's units say now, and what is new on their aircraft beside their gaps.
     pub(crate) fn look_back(&mut self, night: Night) {
-        let Night { now, changed, lately } = night;
+        let Night { now, changed, lately, states } = night;
         let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
         let touched = |tail: &String| tails.contains(tail.as_str());
         self.recorder_moved =
             recorder::moved(&lately).into_iter().filter(|m| touched(&m.tail_number)).collect();
         self.innovations_unlike =
             innovations::unlike(&lately).into_iter().filter(|u| touched(&u.tail_number)).collect();
-        (self.trends, self.changed) = (now, changed);
+        (self.trends, self.changed, self.states) = (now, changed, states);
     }
 
     pub(crate) fn count(&mut self, account: &LogAccount, records: &[GapRecord], complaints: &[Complaint]) {

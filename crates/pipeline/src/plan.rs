@@ -15,6 +15,7 @@ use crate::remote::Seen;
 
 /// What is asked of a run.
 #[derive(Debug, Clone, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option of the command, free of the others")]
 pub struct Request {
     /// Departures from then on.
     pub since_utc: Option<Timestamp>,
@@ -34,6 +35,8 @@ pub struct Request {
     pub redo: bool,
     /// The content of known logs too, though nothing about their files has changed.
     pub verify_content: bool,
+    /// The states of the whole fleet, counted.
+    pub counts_all: bool,
 }
 
 impl Request {

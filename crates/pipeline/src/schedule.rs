@@ -111,7 +111,9 @@ pub(crate) fn night(
     let touched = work(&shop, &intent, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
-    report.look_back(trends::of_units(config, &installations, &store, &touched, &report.run_id)?);
+    let (run_id, counts_all) = (&report.run_id, request.counts_all);
+    let night = trends::of_units(config, &installations, &store, &touched, run_id, counts_all)?;
+    report.look_back(night);
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
     if store.is_scattered()? {

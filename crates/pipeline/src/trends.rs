@@ -90,9 +90,11 @@ pub struct Night {
     pub changed: Vec<Changed>,
     /// What the last months say beside gaps, of all tails.
     pub lately: Lately,
+    /// How many units of the whole fleet are in which state, where that was asked.
+    pub states: BTreeMap<&'static str, usize>,
 }
 
-/// States what is known of units whose records a run changed.
+/// States what is known of units whose records a run changed; with `counts_all`, counts the states of all.
 ///
 /// # Errors
 /// As [`of_store`].
@@ -102,16 +104,17 @@ pub fn of_units(
     store: &Store,
     units: &[Unit],
     run_id: &str,
+    counts_all: bool,
 ) -> Result<Night, Error> {
-    if units.is_empty() {
+    if units.is_empty() && !counts_all {
         return Ok(Night::default());
     }
     let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
     let (all, tonight) = (in_store(store)?, gathered(store, &query)?);
     let lately = all.newest_utc().map(|newest| lately(store, newest)).transpose()?.unwrap_or_default();
     let moved = moved(&lately);
-    let (now, changed) = of_night(config, installations, all, &tonight, units, moved)?;
-    Ok(Night { now, changed, lately })
+    let night = of_night(config, installations, all, &tonight, units, moved, counts_all)?;
+    Ok(Night { lately, ..night })
 }
 
 /// The same of all flights that are known after a night, and those of the night.
@@ -125,10 +128,11 @@ pub fn of_night(
     tonight: &Histories,
     units: &[Unit],
     moved: Vec<Moved>,
-) -> Result<(Vec<TrendRow>, Vec<Changed>), Error> {
+    counts_all: bool,
+) -> Result<Night, Error> {
     let names: BTreeSet<HistoryName> =
         units.iter().map(|(part, serial)| (Some(part.to_string()), serial.to_string())).collect();
-    let Some(as_of) = all.newest_utc() else { return Ok(Default::default()) };
+    let Some(as_of) = all.newest_utc() else { return Ok(Night::default()) };
     let before_utc = all.newest_without_utc(tonight);
     let days: Vec<Timestamp> = before_utc.into_iter().chain([as_of]).collect();
     // Flights later than all others change nothing of what is said of a day before them; but where a flights
@@ -137,9 +141,17 @@ pub fn of_night(
         config.flights.iter().next().is_none() && before_utc.is_none_or(|before| tonight.are_later(before));
     let earlier = if is_later { Histories::default() } else { all.without(&names, tonight) };
     let fleet = Fleet::alone(config, installations, &mut all, &days)?.beside(moved);
-    let mut now = fleet.statements(names.iter(), as_of)?;
+    let stated: BTreeSet<&HistoryName> =
+        if counts_all { fleet.units.keys().copied().chain(&names).collect() } else { names.iter().collect() };
+    let mut now = fleet.statements(stated.into_iter(), as_of)?;
     now.retain(|row| row.flights > 0);
-    let Some(before_utc) = before_utc else { return Ok((now, Vec::new())) };
+    let mut night = Night::default();
+    if counts_all {
+        let states = now.iter().filter_map(|row| row.state);
+        states.for_each(|state| *night.states.entry(state).or_default() += 1);
+        now.retain(|row| names.contains(&row.name()));
+    }
+    let Some(before_utc) = before_utc else { return Ok(Night { now, ..night }) };
     let before = if is_later {
         fleet.statements(names.iter(), before_utc)?
     } else {
@@ -148,8 +160,8 @@ pub fn of_night(
         fleet.statements(earlier.names(), before_utc)?
     };
     let before = before.into_iter().filter(|row| row.flights > 0).map(|row| (row.name(), row)).collect();
-    let news = changed(&before, &now);
-    Ok((now, news))
+    let changed = changed(&before, &now);
+    Ok(Night { now, changed, ..night })
 }
 
 /// All that a report says of the asked units.

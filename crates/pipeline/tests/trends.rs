@@ -251,10 +251,22 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     let units = [name("S03"), name("S05")];
     let all = || histories(&rows);
     let tonight: Vec<Row> = rows.iter().filter(|row| row.said.departure_utc >= day(200)).cloned().collect();
+    let night = |tonight: &Histories, counts_all| {
+        trends::of_night(&config(), &nobody, all(), tonight, &units, Vec::new(), counts_all).unwrap()
+    };
     let of_night = |tonight: &Histories| {
-        trends::of_night(&config(), &nobody, all(), tonight, &units, Vec::new()).unwrap()
+        let night = night(tonight, false);
+        (night.now, night.changed)
     };
     let (now, news) = of_night(&histories(&tonight));
+    // Counting the whole fleet changes nothing of what is said of the night's units.
+    let counted = night(&histories(&tonight), true);
+    assert_eq!((&counted.now, &counted.changed), (&now, &news));
+    let mut states = std::collections::BTreeMap::new();
+    for row in trends::of_histories(&config(), &nobody, all(), &Ask::default()).unwrap() {
+        row.state.into_iter().for_each(|state| *states.entry(state).or_default() += 1);
+    }
+    assert_eq!((states.values().sum::<usize>(), &counted.states), (14, &states));
     assert_eq!(now.len(), 2);
     let serials: Vec<&str> = news.iter().map(|unit| unit.serial_number.as_str()).collect();
     assert_eq!(serials, ["S05"]);

@@ -10,7 +10,6 @@ use pipeline::changed::Changed;
 use pipeline::recorder::{Moved, Quantity};
 use pipeline::schedule::{self, Context};
 use pipeline::statement::TrendRow;
-use pipeline::trends::Ask;
 use pipeline::{Event, Plan, Report, Request};
 use store::Holder;
 
@@ -62,7 +61,7 @@ pub(crate) fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, 
     }
     let report = report?;
     talk.complain_all(report.errors.iter().map(|e| &e.complaint));
-    let reached = args.fail_on.map_or(Ok(false), |least| is_reached(&config, least))?;
+    let reached = args.fail_on.is_some_and(|least| is_reached(&report, least));
     let code = code(&report, reached, stop.load(Ordering::Relaxed));
     if let Some(file) = &args.metrics {
         metrics::write(file, &report, code)?;
@@ -89,6 +88,7 @@ fn request(args: &RunArgs) -> Result<Request, Failure> {
         retry: args.retry,
         redo: args.redo,
         verify_content: args.verify_content,
+        counts_all: args.fail_on.is_some(),
     })
 }
 
@@ -114,17 +114,13 @@ fn follow(event: &Event, progress: &Progress<'_>) {
 }
 
 /// Whether any unit of the store, touched tonight or not, is at or past a state.
-fn is_reached(config: &job::Config, least: FailOn) -> Result<bool, Failure> {
-    let store = store::Store::open(config.store())?;
-    let installations = schedule::installations(config)?;
-    let rows = pipeline::trends::of_store(config, &installations, &store, &Ask::default())?;
-    let at = |row: &TrendRow| match row.state {
-        Some("watch") => Some(FailOn::Watch),
-        Some("plan") => Some(FailOn::Plan),
-        Some("act") => Some(FailOn::Act),
-        _ => None,
+fn is_reached(report: &Report, least: FailOn) -> bool {
+    let at_or_past: &[&str] = match least {
+        FailOn::Watch => &["watch", "plan", "act"],
+        FailOn::Plan => &["plan", "act"],
+        FailOn::Act => &["act"],
     };
-    Ok(rows.iter().any(|row| at(row) >= Some(least)))
+    at_or_past.iter().any(|state| report.states.contains_key(state))
 }
 
 fn code(report: &Report, reached: bool, stopped: bool) -> Code {
