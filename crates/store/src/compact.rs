@@ -43,7 +43,8 @@ impl Store {
     /// [`Error::Table`] when a table's log cannot be read.
     pub fn is_scattered(&self) -> Result<bool, Error> {
         for table in self.tables() {
-            let files = table.snapshot()?.files;
+            let snapshot = table.snapshot()?;
+            let files = &snapshot.files;
             let rows: i64 = files.iter().filter_map(|file| file.stats.num_records).sum();
             if files.len() > MANY_FILES + 2 * (rows.max(0) as usize).div_ceil(FILE_ROWS) {
                 return Ok(true);

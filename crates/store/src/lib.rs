@@ -27,6 +27,7 @@ mod error;
 mod export;
 mod frame;
 mod info;
+mod latest;
 mod layout;
 mod lock;
 mod numbered;

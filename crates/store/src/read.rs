@@ -144,9 +144,9 @@ impl Store {
         may_hold: impl Fn(&Stats) -> bool,
         name: impl Fn(&R) -> String,
     ) -> Result<Vec<R>, Error> {
-        let files = table.snapshot()?.files.into_iter();
-        let files = files.filter(|file| file.has_rows() && may_hold(&file.stats));
-        let files: Vec<PathBuf> = files.map(|file| file.path).collect();
+        let snapshot = table.snapshot()?;
+        let files = snapshot.files.iter().filter(|file| file.has_rows() && may_hold(&file.stats));
+        let files: Vec<PathBuf> = files.map(|file| file.path.clone()).collect();
         self.check(&files)?;
         let (schema, order) = (numbered::schema::<R>(), &[numbered::COMMIT][..]);
         let batch = Read { files: &files, schema, condition, order, last: None }.collect()?;
@@ -171,5 +171,5 @@ fn months(snapshot: &Snapshot) -> Vec<(Option<Timestamp>, Option<Timestamp>)> {
 }
 
 pub(crate) fn files_of(table: &Table) -> Result<Vec<PathBuf>, Error> {
-    Ok(table.snapshot()?.files.into_iter().map(|file| file.path).collect())
+    Ok(table.snapshot()?.files.iter().map(|file| file.path.clone()).collect())
 }

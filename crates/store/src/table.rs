@@ -18,6 +18,7 @@ use jiff::Timestamp;
 
 use crate::datafile;
 use crate::error::Error;
+use crate::latest::{Latest, commit_file};
 use crate::place::Place;
 use crate::stats::Stats;
 
@@ -45,12 +46,14 @@ pub(crate) struct Table {
     pub(crate) name: &'static str,
     pub(crate) schema: SchemaRef,
     pub(crate) place: Place,
+    latest: Latest,
 }
 
-/// A table as of one version.
+/// A table as of one version; a clone costs nothing.
+#[derive(Clone)]
 pub(crate) struct Snapshot {
     pub(crate) version: u64,
-    pub(crate) files: Vec<DataFile>,
+    pub(crate) files: Arc<[DataFile]>,
     delta: DeltaTable,
 }
 
@@ -88,12 +91,11 @@ pub(crate) struct Change<'a> {
 
 impl Table {
     pub(crate) fn new(store: &Place, name: &'static str, schema: SchemaRef) -> Self {
-        Self { name, schema, place: store.below(name) }
+        Self { name, schema, place: store.below(name), latest: Latest::default() }
     }
 
     pub(crate) fn exists(&self) -> Result<bool, Error> {
-        let first = format!("_delta_log/{:020}.json", 0);
-        Ok(self.place.has(&first)? || self.place.has("_delta_log/_last_checkpoint")?)
+        Ok(self.place.has(&commit_file(0))? || self.place.has("_delta_log/_last_checkpoint")?)
     }
 
     fn failed(&self, verb: &'static str) -> impl FnOnce(DeltaTableError) -> Error {
@@ -158,13 +160,23 @@ impl Table {
 
     /// The table as it is now.
     pub(crate) fn snapshot(&self) -> Result<Snapshot, Error> {
+        if let Some(newest) = self.latest.get(&self.place) {
+            return Ok(newest);
+        }
         let load = async {
             let mut delta = DeltaTable::new(self.place.log_store()?);
             delta.load().await?;
-            let files = delta.snapshot()?.log_data().iter().map(|view| self.file(view)).collect();
-            Ok(Snapshot { version: delta.version().unwrap_or_default(), files, delta })
+            self.keep(delta)
         };
         self.place.block_on(load).map_err(self.failed("read"))
+    }
+
+    /// What a loaded table says, kept for those who ask next.
+    fn keep(&self, delta: DeltaTable) -> Result<Snapshot, DeltaTableError> {
+        let files = delta.snapshot()?.log_data().iter().map(|view| self.file(view)).collect();
+        let snapshot = Snapshot { version: delta.version().unwrap_or_default(), files, delta };
+        self.latest.keep(&self.place, &snapshot);
+        Ok(snapshot)
     }
 
     fn file(&self, view: LogicalFileView) -> DataFile {
@@ -228,7 +240,10 @@ impl Table {
         self.place.block_on(async {
             let builder = CommitBuilder::from(properties).with_actions(actions);
             let state = snapshot.delta.snapshot()?;
-            builder.build(Some(state), snapshot.delta.log_store(), operation).await.map(drop)
+            let done = builder.build(Some(state), snapshot.delta.log_store(), operation).await?;
+            let mut delta = snapshot.delta.clone();
+            delta.state = Some(done.snapshot);
+            self.keep(delta).map(drop)
         })
     }
 }
@@ -351,6 +366,66 @@ mod tests {
         append(&table, 3);
         table.commit(&snapshot, merged(&table, &snapshot, 9)).unwrap();
         assert_eq!(rows(&table), 3);
+    }
+
+    /// What a table says of its files: names, sizes and statistics, in order.
+    fn told(snapshot: &Snapshot) -> Vec<String> {
+        let file = |file: &DataFile| format!("{:?} {} {:?}", file.path, file.size_bytes, file.stats);
+        snapshot.files.iter().map(file).collect()
+    }
+
+    #[test]
+    fn what_is_kept_of_a_table_says_what_its_log_says_after_every_commit() {
+        let dir = tempfile::tempdir().unwrap();
+        let (own, place) = (table(dir.path()), Place::at(dir.path()).unwrap());
+        // Past two checkpoints, with files that come and go.
+        for n in 1..=45 {
+            append(&own, n);
+            if n % 7 == 0 {
+                own.change(|snapshot| Ok(merged(&own, snapshot, 1000 + n as u64))).unwrap();
+            }
+            let (kept, read) =
+                (own.snapshot().unwrap(), Table::new(&place, "numbers", schema()).snapshot().unwrap());
+            assert_eq!(kept.version, read.version);
+            assert_eq!(told(&kept), told(&read), "after {n}");
+        }
+        let (one, another) = (own.snapshot().unwrap(), own.snapshot().unwrap());
+        assert!(Arc::ptr_eq(&one.files, &another.files), "what is known was read again");
+    }
+
+    #[test]
+    fn a_commit_of_somebody_else_is_seen_at_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let own = table(dir.path());
+        let other = Table::new(&Place::at(dir.path()).unwrap(), "numbers", schema());
+        append(&own, 1);
+        assert_eq!(rows(&other), 1);
+        append(&own, 2);
+        assert_eq!(rows(&other), 2);
+        append(&other, 3);
+        assert_eq!(rows(&own), 3);
+    }
+
+    #[test]
+    fn a_log_that_is_torn_while_it_is_kept_is_an_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let own = table(dir.path());
+        (1..=3).for_each(|n| append(&own, n));
+        let first = dir.path().join("numbers").join(commit_file(1));
+        std::fs::write(&first, &std::fs::read(&first).unwrap()[..40]).unwrap();
+        assert!(own.snapshot().is_err());
+    }
+
+    #[test]
+    fn a_table_that_was_put_in_the_place_of_another_is_read_anew() {
+        let dir = tempfile::tempdir().unwrap();
+        let own = table(dir.path());
+        (1..=3).for_each(|n| append(&own, n));
+        std::fs::remove_dir_all(dir.path().join("numbers")).unwrap();
+        (4..=5).for_each(|n| append(&table(dir.path()), n));
+        assert_eq!(rows(&own), 2);
+        std::fs::remove_dir_all(dir.path().join("numbers")).unwrap();
+        assert!(own.snapshot().is_err());
     }
 
     #[test]
