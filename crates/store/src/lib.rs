@@ -30,6 +30,7 @@ mod info;
 mod latest;
 mod layout;
 mod lock;
+mod newest;
 mod numbered;
 mod parts;
 mod place;

@@ -1,23 +1,23 @@
 //! Answers: each is made from one version of a table, so it shows whole commits only.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::SchemaRef;
 use fleet::{GapRecord, PartNumber, SerialNumber};
 use jiff::Timestamp;
-use polars::prelude::{Expr, col, lit};
 
 use crate::account::{LogAccount, Outcome};
+use crate::columns;
 use crate::error::Error;
 use crate::frame::{self, Read};
 use crate::layout::Store;
+use crate::newest::{Newest, Wanted};
 use crate::query::{Query, RecordKey};
 use crate::stats::Stats;
 use crate::table::{Snapshot, Table};
 use crate::tabled::Tabled;
-use crate::{columns, numbered, tabled};
 
 impl Store {
     /// The records that fit, as columns, by departure, tail, flight and position.
@@ -78,11 +78,10 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn accounts(&self) -> Result<Vec<LogAccount>, Error> {
-        let open = |outcome: Outcome| col("outcome").neq(lit(outcome.as_str()));
-        let condition = Outcome::OPEN.into_iter().map(open).reduce(Expr::and);
+        let is_settled = |outcome: &str| Outcome::OPEN.iter().all(|open| open.as_str() != outcome);
         self.newest(
             &self.logs,
-            condition,
+            Some(Wanted { column: "outcome", is_wanted: &is_settled }),
             |stats| !Outcome::OPEN.iter().any(|outcome| stats.holds_only("outcome", outcome.as_str())),
             |account: &LogAccount| account.log_path.clone(),
         )
@@ -140,7 +139,7 @@ impl Store {
     pub(crate) fn newest<R: Tabled>(
         &self,
         table: &Table,
-        condition: Option<Expr>,
+        wanted: Option<Wanted<'_>>,
         may_hold: impl Fn(&Stats) -> bool,
         name: impl Fn(&R) -> String,
     ) -> Result<Vec<R>, Error> {
@@ -148,11 +147,9 @@ impl Store {
         let files = snapshot.files.iter().filter(|file| file.has_rows() && may_hold(&file.stats));
         let files: Vec<PathBuf> = files.map(|file| file.path.clone()).collect();
         self.check(&files)?;
-        let (schema, order) = (numbered::schema::<R>(), &[numbered::COMMIT][..]);
-        let batch = Read { files: &files, schema, condition, order, last: None }.collect()?;
-        let rows = tabled::from_batch::<R>(&batch)?;
-        let newest: BTreeMap<String, R> = rows.into_iter().map(|row| (name(&row), row)).collect();
-        Ok(newest.into_values().collect())
+        let mut newest = Newest::new();
+        files.iter().try_for_each(|file| newest.take(file, wanted, &name))?;
+        Ok(newest.into_rows())
     }
 }
 

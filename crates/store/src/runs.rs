@@ -9,12 +9,12 @@ use std::slice;
 
 use fleet::{GapRecord, Status};
 use jiff::{SignedDuration, Timestamp};
-use polars::prelude::{col, lit};
 
 use crate::account::{LogAccount, Outcome, RunAccount};
 use crate::error::Error;
 use crate::layout::Store;
 use crate::lock::Lock;
+use crate::newest::Wanted;
 use crate::query::Query;
 use crate::writer::{self, Writer};
 
@@ -27,10 +27,9 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn run_logs(&self, run_id: &str) -> Result<Vec<LogAccount>, Error> {
-        let is_of_run = col("run_id").eq(lit(run_id.to_owned()));
         let logs = self.newest(
             &self.logs,
-            Some(is_of_run),
+            Some(Wanted { column: "run_id", is_wanted: &|id| id == run_id }),
             |stats| stats.may_hold("run_id", run_id),
             |account: &LogAccount| account.log_path.clone(),
         )?;
