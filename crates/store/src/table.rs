@@ -117,7 +117,8 @@ impl Table {
             let create = CreateBuilder::new().with_log_store(log_store).with_table_name(self.name);
             let create =
                 create.with_configuration_property(TableProperty::CheckpointInterval, Some(CHECKPOINT));
-            create.with_columns(columns.fields().cloned()).with_actions([empty]).await
+            let made = create.with_columns(columns.fields().cloned()).with_actions([empty]).await?;
+            self.keep(made)
         });
         match made {
             // Somebody else made it in the meantime.
