@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from datetime import datetime
 from pathlib import Path
 
 import duckdb
@@ -55,6 +56,25 @@ def test_trends_are_the_commands_from_store_table_and_queries(fleet: Path, comma
     Path("asked.csv").write_text("serial_number,as_of_utc\n1040-0013,2026-10-20\n1040-0009,2026-10-01\n")
     command("trend", "--queries", "asked.csv", "--format", "parquet", "--output", "of-days.parquet")
     assert differing(pa.table(freeplay.trend(queries=asked)), pq.read_table("of-days.parquet")) == []
+
+
+def test_a_table_made_elsewhere_is_judged_without_a_configuration_as_the_command_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    days = pl.datetime_range(datetime(2026, 1, 1), datetime(2026, 2, 10), "1d", eager=True, time_zone="UTC")
+    gaps = [20e-6 + 0.5e-6 * day + 1e-8 * (day % 3 == 0) for day in range(len(days))]
+    history = pl.DataFrame({"serial_number": "U1", "departure_utc": days, "gap_m": gaps, "flight_hours": 1.0})
+    history.write_parquet("history.parquet")
+    for limit, option in [(None, []), (100e-6, ["--limit-m", "100e-6"])]:
+        command("trend", "--estimates", "history.parquet", *option, "--format", "parquet", "--output", "told.parquet")
+        ours = pa.table(freeplay.trend(history, limit_m=limit))
+        assert differing(ours, pq.read_table("told.parquet")) == []
+        assert ours["limit_m"].to_pylist() == [limit]
+    with pytest.raises(ValueError, match="150e-6"):
+        freeplay.trend(history, limit_m=100.0)
+    with pytest.raises(freeplay.ConfigError):
+        freeplay.trend(history, "nowhere.toml")
 
 
 def test_normalized_logs_are_the_commands_byte_for_byte(logs: list[str], command: Command) -> None:

@@ -40,6 +40,13 @@ impl Config {
         Ok(Self { inner, files: Vec::new(), installations: OnceLock::new() })
     }
 
+    /// That of nobody's logs: defaults, to judge tables that were made elsewhere.
+    #[staticmethod]
+    fn of_no_logs() -> Self {
+        let installations = OnceLock::from(Installations::default());
+        Self { inner: job::Config::of_no_logs(), files: Vec::new(), installations }
+    }
+
     /// The files it was read from, absolute; none when it was read from a text.
     #[getter]
     fn files(&self) -> Vec<PathBuf> {
@@ -58,9 +65,9 @@ impl Config {
         self.inner.parts.keys().map(ToString::to_string).collect()
     }
 
-    /// The same with other logs or another store.
-    #[pyo3(signature = (logs=None, store=None))]
-    fn replaced(&self, logs: Option<Vec<String>>, store: Option<String>) -> Self {
+    /// The same with other logs, another store, or another limit, m, of parts that state none.
+    #[pyo3(signature = (logs=None, store=None, limit_m=None))]
+    fn replaced(&self, logs: Option<Vec<String>>, store: Option<String>, limit_m: Option<f64>) -> Self {
         let mut inner = self.inner.clone();
         if let Some(logs) = logs {
             inner.document.logs.files = logs;
@@ -68,7 +75,8 @@ impl Config {
         if let Some(store) = store {
             inner.document.store.path = store;
         }
-        Self { inner, files: self.files.clone(), installations: OnceLock::new() }
+        inner.document.trend.limit_m = limit_m.or(inner.document.trend.limit_m);
+        Self { inner, files: self.files.clone(), installations: self.installations.clone() }
     }
 
     /// blake3 of everything that an estimate elsewhere must have in common with one here: this program's version,

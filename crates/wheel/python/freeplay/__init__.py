@@ -14,6 +14,7 @@ import json
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from os import PathLike, fspath
+from os.path import exists
 from typing import Any, TypeAlias, TypeVar
 
 from freeplay import _freeplay
@@ -139,13 +140,16 @@ def trend(
     as_of: Instant | None = None,
     queries: ArrowStream | None = None,
     statistics: bool = False,
+    limit_m: float | None = None,
 ) -> Table:
     """Level, rate, changes, crossing of the limit and state: one row for each unit.
 
     ``estimates`` is any Arrow table with ``serial_number`` (or ``serial``), ``departure_utc`` and ``gap_m``, such as
     that of :func:`estimate`; without it the store of the configuration is asked. ``queries`` (``serial_number``,
     ``as_of_utc``, optional ``part_number``) asks for one row each, using nothing later than its date. ``statistics``
-    adds Theil-Sen's slope and Hamed and Rao's test, which take longer than all the rest.
+    adds Theil-Sen's slope and Hamed and Rao's test, which take longer than all the rest. ``limit_m`` is the gap that
+    grounds, m, for parts of which the configuration states none; where no configuration is named and there is no
+    ``pipeline.toml``, ``estimates`` are judged by it alone.
 
     >>> import freeplay, glob, pyarrow as pa
     >>> estimates = freeplay.estimate(sorted(glob.glob("sample-data/logs/*/*.parquet")))
@@ -153,7 +157,13 @@ def trend(
     >>> [row["serial_number"] for row in rows if row["state"] == "plan"]
     ['1040-0009', '1040-0013']
     """
-    return _freeplay.trend(estimates, load(config), tail, serial, part, _text(as_of), queries, statistics)
+    is_foreign = estimates is not None and config is _USUAL and not exists(_USUAL)
+    judging = Config.of_no_logs() if is_foreign else load(config)
+    if limit_m is not None:
+        if not 0.0 < limit_m <= 0.01:
+            raise ValueError(f"limit_m is {limit_m} m, which is no limit of free play: 150 um is 150e-6")
+        judging = judging.replaced(limit_m=limit_m)
+    return _freeplay.trend(estimates, judging, tail, serial, part, _text(as_of), queries, statistics)
 
 
 def records(
