@@ -281,6 +281,9 @@ fn a_limit_for_all_parts_serves_those_that_state_none() {
     for row in &rows {
         let own = if row["part_number"] == "EMA-27-1060" { 180e-6 } else { 200e-6 };
         assert_eq!(row["limit_m"].as_f64(), Some(own), "{row}");
+        for name in ["growth_probability", "wear_law_probability", "check_probability"] {
+            assert!((0.0..=1.0).contains(&row[name].as_f64().unwrap()), "{name} of {row}");
+        }
     }
     assert_eq!(rows.len(), 12);
 }

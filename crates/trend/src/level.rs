@@ -35,7 +35,13 @@ pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64) -> Rate {
 pub(crate) fn growth_probability(posterior: &Posterior) -> f64 {
     let sd_m = posterior.growth_m2.sqrt();
     let grown_m = |n: &Node| n.level_m - n.new_m - n.amplitude_m * n.law.height(n.age_begin);
-    posterior.nodes.iter().map(|n| n.weight * normal::cdf((grown_m(n) - VISIBLE_M) / sd_m)).sum()
+    let grown = |n: &Node| n.weight * normal::cdf((grown_m(n) - VISIBLE_M) / sd_m);
+    probability(posterior.nodes.iter().map(grown).sum())
+}
+
+/// Weights come back from what is kept in single precision, so that together they may be a little more than one.
+fn probability(sum: f64) -> f64 {
+    sum.min(1.0)
 }
 
 /// When wear began, in usage since the segment's begin, and the share of the belief that is in an onset,
@@ -43,7 +49,7 @@ pub(crate) fn growth_probability(posterior: &Posterior) -> f64 {
 pub(crate) fn onset(posterior: &Posterior) -> Option<(f64, f64)> {
     let starts = posterior.nodes.iter().filter_map(|n| Some((onset_start(n)?, n.weight)));
     let starts = Weighted::new(starts);
-    (starts.total > 0.5).then(|| (starts.quantile(0.5), starts.total.min(1.0)))
+    (starts.total > 0.5).then(|| (starts.quantile(0.5), probability(starts.total)))
 }
 
 /// When a node's wear began, in usage since the segment's begin, if it is an onset.
@@ -61,7 +67,8 @@ pub(crate) fn law(posterior: &Posterior) -> Option<(WearLaw, f64)> {
             None => shares.push((law, node.weight)),
         }
     }
-    shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))
+    let likeliest = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    likeliest.map(|(law, share)| (law, probability(share)))
 }
 
 fn name(node: &Node) -> WearLaw {
