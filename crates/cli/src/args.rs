@@ -540,15 +540,9 @@ fn parse_utc(text: &str) -> Result<Timestamp, String> {
     ingest::tables::utc(text)
 }
 
-/// A gap that may ground an aircraft: above zero, and less than a centimetre, or it was meant in another unit.
 fn parse_limit(text: &str) -> Result<f64, String> {
-    const UNHEARD_OF_M: f64 = 0.01;
-    let limit_m: f64 = text.parse().map_err(|_| format!("`{text}` is no number of metres such as 150e-6"))?;
-    if limit_m > 0.0 && limit_m <= UNHEARD_OF_M {
-        Ok(limit_m)
-    } else {
-        Err(format!("{text} m is no limit of free play: 150 µm is 150e-6"))
-    }
+    let limit_m = text.parse().map_err(|_| format!("`{text}` is no number of metres such as 150e-6"))?;
+    job::value::plausible_limit_m(limit_m)
 }
 
 fn parse_span(text: &str) -> Result<std::time::Duration, String> {

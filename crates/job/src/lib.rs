@@ -12,7 +12,7 @@ pub mod normalize;
 pub mod part;
 pub mod schedules;
 pub mod trace;
-mod value;
+pub mod value;
 
 pub use config::Config;
 pub use flight::{Opened, Stamp};

@@ -141,8 +141,8 @@ pub fn of_night(
         config.flights.iter().next().is_none() && before_utc.is_none_or(|before| tonight.are_later(before));
     let earlier = if is_later { Histories::default() } else { all.without(&names, tonight) };
     let fleet = Fleet::alone(config, installations, &mut all, &days)?.beside(moved);
-    let stated: BTreeSet<&HistoryName> =
-        if counts_all { fleet.units.keys().copied().chain(&names).collect() } else { names.iter().collect() };
+    let stated: Vec<&HistoryName> =
+        if counts_all { fleet.units.keys().copied().collect() } else { names.iter().collect() };
     let mut now = fleet.statements(stated.into_iter(), as_of)?;
     now.retain(|row| row.flights > 0);
     let mut night = Night::default();
@@ -384,8 +384,8 @@ impl<'a> Fleet<'a> {
             judged.par_iter().map(|name| self.trend(name, as_of)).collect::<Result<_, _>>()?;
         let known = judged.iter().zip(&trends).filter_map(|(name, t)| Some((self.units.get(*name)?.0, t)));
         let wide = TailWide::new(&known.collect::<Vec<_>>(), &self.moved);
-        let asked: Vec<_> = judged.iter().zip(&trends).filter(|(name, _)| names.contains(*name)).collect();
-        Ok(asked.into_par_iter().map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect())
+        let asked = judged.par_iter().zip(&trends).filter(|(name, _)| names.contains(*name));
+        Ok(asked.map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect())
     }
 
     /// The units that have flown on the tails of some.

@@ -6,17 +6,16 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
-use std::sync::Arc;
 
-use arrow::array::{ArrayRef, AsArray, BooleanArray, RecordBatch, new_null_array};
-use arrow::compute::{cast, filter_record_batch};
+use arrow::array::{AsArray, BooleanArray, RecordBatch};
+use arrow::compute::filter_record_batch;
 use arrow::datatypes::{Int64Type, SchemaRef};
-use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 
 use crate::datafile::GROUP_ROWS;
 use crate::error::Error;
 use crate::numbered;
+use crate::parts::{formed, mask};
 use crate::tabled::{self, Tabled};
 
 /// Rows in which a text column holds what is wanted; one that is empty there is not.
@@ -83,25 +82,15 @@ impl Wanted<'_> {
 fn opened(path: &Path, schema: &SchemaRef) -> Result<ParquetRecordBatchReader, Error> {
     let file = File::open(path).map_err(Error::io(path, "opened"))?;
     let builder = ParquetRecordBatchReaderBuilder::try_new(file)?;
-    let wanted = schema.fields().iter().filter_map(|field| builder.schema().index_of(field.name()).ok());
-    let mask = ProjectionMask::roots(builder.parquet_schema(), wanted.collect::<Vec<_>>());
+    let mask = mask(&builder, schema.fields().iter().map(|field| field.name().as_str()));
     Ok(builder.with_projection(mask).with_batch_size(GROUP_ROWS).build()?)
-}
-
-/// A batch's columns in the form wanted, whatever form another program gave them: one that came with a later release
-/// is empty.
-fn formed(batch: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, Error> {
-    let column = |name: &str, kind| match batch.column_by_name(name) {
-        Some(column) => cast(column, kind),
-        None => Ok(new_null_array(kind, batch.num_rows())),
-    };
-    let columns = schema.fields().iter().map(|field| column(field.name(), field.data_type()));
-    Ok(RecordBatch::try_new(Arc::clone(schema), columns.collect::<Result<Vec<ArrayRef>, _>>()?)?)
 }
 
 #[cfg(test)]
 mod tests {
-    use arrow::array::{Int64Array, LargeStringArray, TimestampNanosecondArray};
+    use std::sync::Arc;
+
+    use arrow::array::{ArrayRef, Int64Array, LargeStringArray, TimestampNanosecondArray};
     use parquet::arrow::ArrowWriter;
 
     use super::*;

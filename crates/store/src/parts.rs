@@ -93,8 +93,9 @@ fn schema_of(names: &[&str]) -> Result<SchemaRef, Error> {
     Ok(Arc::new(Schema::new(wanted.fields().iter().map(|field| coded(field)).collect::<Vec<_>>())))
 }
 
-/// A batch's columns in the form wanted: one that came with a later release is empty.
-fn formed(batch: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
+/// A batch's columns in the form wanted, whatever form another program gave them: one that came with a later release
+/// is empty.
+pub(crate) fn formed(batch: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
     let column = |field: &Arc<Field>| match batch.column_by_name(field.name()) {
         Some(column) => cast(column, field.data_type()),
         None => Ok(new_null_array(field.data_type(), batch.num_rows())),
@@ -125,7 +126,8 @@ fn opened(path: &Path) -> Result<ParquetRecordBatchReaderBuilder<File>, Error> {
     Ok(ParquetRecordBatchReaderBuilder::new_with_metadata(file, read_so))
 }
 
-fn mask<'a>(
+/// The columns of those names that a file has.
+pub(crate) fn mask<'a>(
     builder: &ParquetRecordBatchReaderBuilder<File>,
     names: impl Iterator<Item = &'a str>,
 ) -> ProjectionMask {

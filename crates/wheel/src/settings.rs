@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use fleet::Installations;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::VERSION;
@@ -67,7 +68,12 @@ impl Config {
 
     /// The same with other logs, another store, or another limit, m, of parts that state none.
     #[pyo3(signature = (logs=None, store=None, limit_m=None))]
-    fn replaced(&self, logs: Option<Vec<String>>, store: Option<String>, limit_m: Option<f64>) -> Self {
+    fn replaced(
+        &self,
+        logs: Option<Vec<String>>,
+        store: Option<String>,
+        limit_m: Option<f64>,
+    ) -> PyResult<Self> {
         let mut inner = self.inner.clone();
         if let Some(logs) = logs {
             inner.document.logs.files = logs;
@@ -75,8 +81,11 @@ impl Config {
         if let Some(store) = store {
             inner.document.store.path = store;
         }
-        inner.document.trend.limit_m = limit_m.or(inner.document.trend.limit_m);
-        Self { inner, files: self.files.clone(), installations: self.installations.clone() }
+        if let Some(limit_m) = limit_m {
+            let limit_m = job::value::plausible_limit_m(limit_m).map_err(PyValueError::new_err)?;
+            inner.document.trend.limit_m = Some(limit_m);
+        }
+        Ok(Self { inner, files: self.files.clone(), installations: self.installations.clone() })
     }
 
     /// blake3 of everything that an estimate elsewhere must have in common with one here: this program's version,

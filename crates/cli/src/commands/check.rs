@@ -9,6 +9,7 @@ use fleet::{Complaint, Installations, PartNumber};
 use ingest::{Actuator, Files, PositionColumns, Quality, quality};
 use job::Config;
 use job::flight::{Opened, caught};
+use job::value::UNHEARD_OF_M;
 use pipeline::bundle;
 use serde::Serialize;
 
@@ -25,8 +26,6 @@ const SLOPE_TOLERANCE: f64 = 0.02;
 
 /// Rates at which actuators are logged; one beyond is more often a wrong unit of time.
 const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=20e3;
-/// A gap of which nobody speaks, m: a limit beyond it was given in another unit.
-const UNHEARD_OF_M: f64 = 0.01;
 
 /// What stands for the table of channels where no actuator could be looked at.
 const NOTHING: &str = "  no actuator could be looked at: see the errors\n";

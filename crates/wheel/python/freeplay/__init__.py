@@ -160,8 +160,6 @@ def trend(
     is_foreign = estimates is not None and config is _USUAL and not exists(_USUAL)
     judging = Config.of_no_logs() if is_foreign else load(config)
     if limit_m is not None:
-        if not 0.0 < limit_m <= 0.01:
-            raise ValueError(f"limit_m is {limit_m} m, which is no limit of free play: 150 um is 150e-6")
         judging = judging.replaced(limit_m=limit_m)
     return _freeplay.trend(estimates, judging, tail, serial, part, _text(as_of), queries, statistics)
 
