@@ -16,6 +16,15 @@ const PERIOD_S: f64 = 0.02;
 /// A screw that moves by less than this share of the motor's travel does not move: what is left is rounding.
 const STILL: f64 = 1e-9;
 
+/// The first second is left out: offsets settle and logs start in motion, s.
+const START_S: f64 = 1.0;
+/// Residuals are taken as dependent within this time, s.
+const STRETCH_S: f64 = 2.0;
+
+/// Blocks that are looked at, and added up, together: their channels stay in the first cache between the two, and each
+/// channel is read far enough in a row to be fetched ahead.
+const SPAN: usize = 16;
+
 /// Blocks that the search begins with, in windows of this many.
 const EXCERPT_BLOCKS: usize = 6000;
 /// See [`EXCERPT_BLOCKS`]: ten seconds.
@@ -50,16 +59,12 @@ impl Blocks {
             blocks.starts.push(blocks.len());
             let middle_s = |start: usize| (start as f64 + 0.5 * (each as f64 - 1.0)) * samples.step_s;
             let end = segment.start + segment.len() / each * each;
-            let mut start = segment.start;
-            while start < end {
-                if let Some(means) = watch.calm_means(start, each, end) {
-                    for [motor_m, dx_m, load_n] in means {
-                        blocks.push(middle_s(start), Some([motor_m, dx_m, load_n]));
-                        start += each;
-                    }
-                } else {
-                    blocks.push(middle_s(start), watch.mean(&(start..start + each), segment));
-                    start += each;
+            for from in (segment.start..end).step_by(SPAN * each) {
+                let span = from..end.min(from + SPAN * each);
+                blocks.time_s.extend(span.clone().step_by(each).map(middle_s));
+                if !(watch.is_calm(&span) && blocks.push_means(samples, span.clone(), each)) {
+                    let means = span.step_by(each).map(|start| watch.mean(&(start..start + each), segment));
+                    means.for_each(|mean| blocks.push(mean));
                 }
             }
         }
@@ -77,9 +82,24 @@ impl Blocks {
         Self { period_s, starts: Vec::new(), time_s, motor_m, dx_m, load_n, logged_dx_m: Vec::new() }
     }
 
-    fn push(&mut self, middle_s: f64, mean: Option<[f64; 3]>) {
+    /// Takes the means of a span of whole blocks in which nothing leaps; none of them, and false, where something is
+    /// missing.
+    fn push_means(&mut self, samples: &Samples<'_>, span: Range<usize>, each: usize) -> bool {
+        let before = self.dx_m.len();
+        let Samples { motor_m, dx_m, load_n, .. } = samples;
+        push_means(&mut self.motor_m, &motor_m[span.clone()], each);
+        push_means(&mut self.dx_m, &dx_m[span.clone()], each);
+        push_means(&mut self.load_n, &load_n[span], each);
+        let mut pushed = [&mut self.motor_m, &mut self.dx_m, &mut self.load_n];
+        let is_whole = pushed.iter().all(|means| means[before..].iter().all(|mean| mean.is_finite()));
+        if !is_whole {
+            pushed.iter_mut().for_each(|means| means.truncate(before));
+        }
+        is_whole
+    }
+
+    fn push(&mut self, mean: Option<[f64; 3]>) {
         let [motor_m, dx_m, load_n] = mean.unwrap_or([f64::NAN; 3]);
-        self.time_s.push(middle_s);
         self.motor_m.push(motor_m);
         self.dx_m.push(dx_m);
         self.load_n.push(load_n);
@@ -96,6 +116,24 @@ impl Blocks {
         self.time_s.len()
     }
 
+    /// The blocks of each segment.
+    pub(super) fn segments(&self) -> impl Iterator<Item = Range<usize>> {
+        let ends = self.starts.iter().skip(1).copied().chain(std::iter::once(self.len()));
+        self.starts.iter().copied().zip(ends).map(|(start, end)| start..end)
+    }
+
+    /// The number of the stretch that a block lies in.
+    pub(super) fn stretch(&self, k: usize) -> u32 {
+        (self.time_s[k] / STRETCH_S) as u32
+    }
+
+    /// Whether nothing of a block or its neighbours is missing and the flight has more than begun.
+    pub(super) fn is_sound(&self, k: usize) -> bool {
+        let around = |values: &[f64]| values.get(k.wrapping_sub(1)..k + 2)?.as_array().copied();
+        let rates = around(&self.motor_m).zip(around(&self.load_n));
+        rates.is_some_and(|(motor_m, load_n)| is_sound(self.time_s[k], self.dx_m[k], &motor_m, &load_n))
+    }
+
     /// A part of a long flight, in windows spread over it: enough to begin a search with, and to see how far δX
     /// travels. None of a short flight.
     pub(super) fn excerpt(&self) -> Option<Self> {
@@ -104,12 +142,12 @@ impl Blocks {
             return None;
         }
         let mut part = Self::with_capacity(self.len() / every, self.period_s);
-        for (segment, &start) in self.starts.iter().enumerate() {
-            let end = self.starts.get(segment + 1).copied().unwrap_or(self.len());
-            for from in (start..end).step_by(every * window) {
+        for segment in self.segments() {
+            for from in segment.clone().step_by(every * window) {
                 part.starts.push(part.len());
-                for k in from..(from + window).min(end) {
-                    part.push(self.time_s[k], Some([self.motor_m[k], self.logged_dx_m[k], self.load_n[k]]));
+                for k in from..(from + window).min(segment.end) {
+                    part.time_s.push(self.time_s[k]);
+                    part.push(Some([self.motor_m[k], self.logged_dx_m[k], self.load_n[k]]));
                 }
             }
         }
@@ -122,22 +160,7 @@ impl Blocks {
         if at == 0 || at + 1 >= values.len() {
             return f64::NAN;
         }
-        self.rate_between(values[at - 1], values[at + 1])
-    }
-
-    /// As [`Blocks::rate`], of every block.
-    pub(super) fn rates(&self, values: &[f64]) -> Vec<f64> {
-        let mut rates = vec![f64::NAN; values.len()];
-        for (rate, around) in rates.iter_mut().skip(1).zip(values.windows(3)) {
-            *rate = self.rate_between(around[0], around[2]);
-        }
-        rates
-    }
-
-    /// Of the blocks before and after one.
-    #[inline]
-    fn rate_between(&self, before: f64, after: f64) -> f64 {
-        (after - before) / (2.0 * self.period_s)
+        (values[at + 1] - values[at - 1]) / (2.0 * self.period_s)
     }
 
     /// Reads the screw's channel τ later, by a cubic through four blocks (Catmull–Rom), so that δX is
@@ -161,6 +184,13 @@ impl Blocks {
     }
 }
 
+/// Whether δX of a block and the rates of the other two channels are known, and the flight has more than begun.
+#[inline]
+pub(super) fn is_sound(time_s: f64, dx_m: f64, motor_m: &[f64; 3], load_n: &[f64; 3]) -> bool {
+    let all = dx_m + (motor_m[2] - motor_m[0]) + (load_n[2] - load_n[0]);
+    (time_s > START_S) & (all.abs() < f64::INFINITY)
+}
+
 widest! {
     /// The furthest that a value lies from the one before it; a missing one lies nowhere.
     fn furthest_leap(values: &[f64]) -> f64 {
@@ -182,7 +212,17 @@ widest! {
     }
 }
 
-/// Sums of eight blocks, each in its own order, side by side.
+/// Appends the mean of each block, summed in its own order, eight side by side.
+fn push_means(means: &mut Vec<f64>, values: &[f64], each: usize) {
+    let n = each as f64;
+    let eights = values.chunks_exact(Lanes::COUNT * each);
+    let rest = eights.remainder().chunks_exact(each);
+    for eight in eights {
+        means.extend(sums(eight, each).map(|sum| sum / n));
+    }
+    means.extend(rest.map(|block| block.iter().sum::<f64>() / n));
+}
+
 fn sums(values: &[f64], each: usize) -> [f64; Lanes::COUNT] {
     let blocks: [&[f64]; Lanes::COUNT] = std::array::from_fn(|k| &values[k * each..][..each]);
     let mut sums = [0.0; Lanes::COUNT];
@@ -226,24 +266,15 @@ impl<'a> Watch<'a> {
         Ok(Self { samples, dx: of(samples.dx_m)?, load: of(samples.load_n)? })
     }
 
-    /// Means over several blocks from a sample on, which is not the first, in all of which nothing is missing and
-    /// nothing leaps: as nearly everywhere.
-    fn calm_means(&self, start: usize, each: usize, end: usize) -> Option<[[f64; 3]; Lanes::COUNT]> {
-        let Samples { motor_m, dx_m, load_n, .. } = self.samples;
-        let all = start..start + each * Lanes::COUNT;
-        if start == 0 || all.end > end {
-            return None;
+    /// Whether nothing leaps within a span, nor from the sample before it; the first span of a log is left to be
+    /// looked at block by block.
+    fn is_calm(&self, span: &Range<usize>) -> bool {
+        if span.start == 0 {
+            return false;
         }
-        let with_before = start - 1..all.end;
-        let is_calm = furthest_leap(&dx_m[with_before.clone()]) <= self.dx.leap
-            && furthest_leap(&load_n[with_before]) <= self.load.leap;
-        if !is_calm {
-            return None;
-        }
-        let (motor, dx) = (sums(&motor_m[all.clone()], each), sums(&dx_m[all.clone()], each));
-        let (load, n) = (sums(&load_n[all], each), each as f64);
-        let is_whole = (0..Lanes::COUNT).all(|k| (motor[k] + dx[k] + load[k]).is_finite());
-        is_whole.then(|| std::array::from_fn(|k| [motor[k] / n, dx[k] / n, load[k] / n]))
+        let with_before = span.start - 1..span.end;
+        furthest_leap(&self.samples.dx_m[with_before.clone()]) <= self.dx.leap
+            && furthest_leap(&self.samples.load_n[with_before]) <= self.load.leap
     }
 
     /// Means of motor, δX and load over a block; none where fewer than half of its samples are sound.

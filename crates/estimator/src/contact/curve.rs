@@ -3,8 +3,8 @@
 use super::blocks::Blocks;
 use super::coupling::State;
 use super::design::{
-    self, BEND, CURVED, FIRM_SHARE, FORCE, Frame, GAP, Ground, LINEAR, ORIGIN, Pace, Row, SPEED,
-    SPEED_M_PER_S, bends,
+    self, BEND, CURVED, FIRM_SHARE, FORCE, Frame, GAP, Ground, LINEAR, ORIGIN, Row, SPEED, SPEED_M_PER_S,
+    bends,
 };
 use super::refusal::Refusal;
 use super::search::{Found, search, start};
@@ -83,19 +83,14 @@ impl Contact {
 /// # Errors
 /// As [`search`], and [`Refusal::MotionUnexplained`].
 pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal> {
-    let pace = Pace::of(blocks, frame);
-    let mut excerpt = blocks.excerpt().map(|part| {
-        let pace = Pace::of(&part, frame);
-        (part, pace)
-    });
-    let straight: Found<LINEAR> =
-        coarse_to_fine((blocks, &pace), excerpt.as_mut(), frame, start(frame), &STRAIGHT)?;
+    let mut excerpt = blocks.excerpt();
+    let straight: Found<LINEAR> = coarse_to_fine(blocks, excerpt.as_mut(), frame, start(frame), &STRAIGHT)?;
     let error_m = |column: usize| straight.fit.standard_error_m(column, &straight.design.firm);
     let (line_m, line_se_m) = (straight.fit.beta[GAP], error_m(GAP));
     // Under heavy friction the forces at low load are friction's to say, not the flank's.
     let heavy = straight.state.friction.is_heavy(frame.load_n);
     let bent = if !heavy && low_loads_deviate(&straight, frame) {
-        let curve = coarse_to_fine((blocks, &pace), excerpt.as_mut(), frame, straight.state, &BENT);
+        let curve = coarse_to_fine(blocks, excerpt.as_mut(), frame, straight.state, &BENT);
         curve.ok().and_then(|curve| soft(&curve, (line_m, line_se_m)))
     } else {
         None
@@ -115,25 +110,25 @@ pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal
         straight,
     };
     let ground = match &mut excerpt {
-        Some((part, pace)) => {
+        Some(part) => {
             part.realign(contact.state.skew_s);
-            Ground { blocks: part, pace, frame }
+            Ground { blocks: part, frame }
         }
-        None => Ground { blocks, pace: &pace, frame },
+        None => Ground { blocks, frame },
     };
     if is_explained(ground, &contact) { Ok(contact) } else { Err(Refusal::MotionUnexplained) }
 }
 
 /// Turns from a state over an excerpt, where the flight is long enough for one, and from there over the whole.
 fn coarse_to_fine<const N: usize>(
-    whole: (&mut Blocks, &Pace),
-    excerpt: Option<&mut (Blocks, Pace)>,
+    whole: &mut Blocks,
+    excerpt: Option<&mut Blocks>,
     frame: &Frame,
     from: State,
     turns: &Turns,
 ) -> Result<Found<N>, Refusal> {
-    let guess = excerpt.and_then(|(part, pace)| {
-        let found: Found<N> = search((part, pace), frame, from, turns.excerpt).ok()?;
+    let guess = excerpt.and_then(|part| {
+        let found: Found<N> = search(part, frame, from, turns.excerpt).ok()?;
         Some(found.state)
     });
     match guess {

@@ -4,7 +4,8 @@ use super::Prior;
 use std::ops::Range;
 
 use super::blocks::Blocks;
-use super::coupling::{Coupling, State, Walk};
+use super::coupling::State;
+use super::course::{Course, Touch};
 use super::refusal::Refusal;
 use crate::gap::extremes;
 use crate::load::quantiles;
@@ -46,12 +47,6 @@ pub(super) const FIRM_SHARE: f64 = 0.12;
 pub(super) const SPEED_M_PER_S: f64 = 0.02;
 /// Time that scales the load rate's column, s.
 pub(super) const LATE_S: f64 = 0.01;
-/// The first second is left out: offsets settle and logs start in motion, s.
-const START_S: f64 = 1.0;
-/// Residuals are taken as dependent within this time, s.
-const STRETCH_S: f64 = 2.0;
-/// Blocks around one that must keep its flank, itself among them: two before and one after.
-const KEPT_BLOCKS: u32 = 4;
 /// Blocks in a row, at least and at most; long flights need no finer rows.
 const ROW_BLOCKS: (usize, usize) = (6, 25);
 /// The 95 % load must exceed the force the model does not know by this factor, or friction alone may hold the
@@ -74,6 +69,10 @@ pub(super) struct Frame {
     /// 1/load, 1/N, and 1/half of the stroke, 1/m: a product is a quarter of a division.
     per_load: f64,
     per_place: f64,
+    per_time: f64,
+    /// What brings a difference over two blocks to the column of the speed, 1/m, and of the load's rate, 1/N.
+    per_speed: f64,
+    per_load_rate: f64,
     row_blocks: usize,
 }
 
@@ -92,13 +91,17 @@ impl Frame {
             return Err(Refusal::TravelTooSmall);
         }
         let (fewest, most) = ROW_BLOCKS;
+        let (time_s, two_blocks_s) = (middle_and_half(&blocks.time_s), 2.0 * blocks.period_s);
         Ok(Self {
             load_n,
             stiffness_n_per_m: prior.stiffness_n_per_m,
-            time_s: middle_and_half(&blocks.time_s),
+            time_s,
             place_m,
             per_load: load_n.recip(),
             per_place: place_m.1.recip(),
+            per_time: time_s.1.recip(),
+            per_speed: (two_blocks_s * SPEED_M_PER_S).recip(),
+            per_load_rate: LATE_S / (two_blocks_s * load_n),
             row_blocks: (blocks.len() / BLOCKS_PER_ROW_BLOCK).clamp(fewest, most),
         })
     }
@@ -165,123 +168,25 @@ impl Flank {
     }
 }
 
-/// Which flank a block presses, and whether firmly.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Touch {
-    flank: Flank,
-    is_firm: bool,
-}
-
-impl Touch {
-    /// None in the gap, or where the force is unknown.
-    fn of(force: f64) -> Option<Self> {
-        let flank = if force > 0.0 {
-            Flank::Upper
-        } else if force < 0.0 {
-            Flank::Lower
-        } else {
-            return None;
-        };
-        Some(Self { flank, is_firm: force.abs() > FIRM_SHARE })
-    }
-}
-
-/// For how many blocks a flank has been kept.
-#[derive(Debug, Default)]
-struct Keeping {
-    last: Option<Touch>,
-    /// Blocks on the flank of the last one, and how many of the latest were firm without a break.
-    blocks: u32,
-    firm_blocks: u32,
-}
-
-impl Keeping {
-    /// Takes the next block. Gives the touch of the one before it where flank and firmness were kept for
-    /// two blocks before that and are kept in this one.
-    #[inline]
-    fn push(&mut self, next: Option<Touch>) -> Option<Touch> {
-        let before = std::mem::replace(&mut self.last, next);
-        let Some(touch) = next else {
-            (self.blocks, self.firm_blocks) = (0, 0);
-            return None;
-        };
-        if before.is_none_or(|before| before.flank != touch.flank) {
-            (self.blocks, self.firm_blocks) = (0, 0);
-        }
-        self.blocks += 1;
-        self.firm_blocks = if touch.is_firm { self.firm_blocks + 1 } else { 0 };
-        before.filter(|before| {
-            let kept = if before.is_firm { self.firm_blocks } else { self.blocks };
-            kept >= KEPT_BLOCKS
-        })
-    }
-}
-
-/// What a block's row holds whatever the state: found once, used in every turn.
-#[derive(Debug)]
-pub(super) struct Pace {
-    /// t, from −1 to 1.
-    time: Vec<f64>,
-    /// Ẋ₁ over its scale.
-    speed: Vec<f64>,
-    /// Ḟ over its scale; NaN where the flight has only begun.
-    load_rate: Vec<f64>,
-    stretch: Vec<u32>,
-}
-
-impl Pace {
-    pub(super) fn of(blocks: &Blocks, frame: &Frame) -> Self {
-        let mut speed = blocks.rates(&blocks.motor_m);
-        speed.iter_mut().for_each(|speed| *speed /= SPEED_M_PER_S);
-        let mut load_rate = blocks.rates(&blocks.load_n);
-        for (rate, &time_s) in load_rate.iter_mut().zip(&blocks.time_s) {
-            *rate = if time_s > START_S { *rate * LATE_S / frame.load_n } else { f64::NAN };
-        }
-        Self {
-            time: blocks.time_s.iter().map(|t| (t - frame.time_s.0) / frame.time_s.1).collect(),
-            speed,
-            load_rate,
-            stretch: blocks.time_s.iter().map(|t| (t / STRETCH_S) as u32).collect(),
-        }
-    }
-}
-
-/// Where rows are made from: blocks, what they hold whatever the state, and the scales.
+/// Where rows are made from: blocks and the scales.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ground<'a> {
     pub(super) blocks: &'a Blocks,
-    pub(super) pace: &'a Pace,
     pub(super) frame: &'a Frame,
 }
 
-/// Rows of all blocks that have kept their flank for two blocks before and one after, and their
-/// firmness as well, so that no row mixes flank and gap.
-pub(super) fn rows<const N: usize>(ground: Ground<'_>, state: &State) -> Design<N> {
-    let Ground { blocks, frame, .. } = ground;
+/// Rows of all blocks that keep their flank, none of which mixes flank and gap.
+pub(super) fn rows<const N: usize>(ground: Ground<'_>, state: &State, course: &mut Course) -> Design<N> {
+    let Ground { blocks, frame } = ground;
+    course.follow(blocks, state);
+    course.keep(blocks, frame);
     let mut design = Design { firm: Vec::new(), light: Vec::new(), touched_s: (0.0, 0.0) };
-    let (mut walk, mut keeping) = (Walk::new(state), Keeping::default());
-    let mut presses = Presses::default();
-    let mut open: Option<(Touch, usize)> = None;
-    let mut starts = blocks.starts.iter().copied().peekable();
-    for (next, (&motor_m, &load_n)) in blocks.motor_m.iter().zip(&blocks.load_n).enumerate() {
-        if starts.next_if_eq(&next).is_some() {
-            walk.restart();
-            keeping = Keeping::default();
+    for segment in blocks.segments() {
+        let mut first = segment.start;
+        while let Some((touch, row)) = course.next_kept(blocks, first..segment.end, frame.row_blocks) {
+            first = row.end;
+            design.close(touch, &ground.sum(course, row, touch.flank().sign()), blocks.period_s);
         }
-        let press = Press::of(walk.step(motor_m, load_n), frame);
-        presses.put(next, press);
-        let steady = keeping.push(Touch::of(press.force)).filter(|_| ground.is_sound(next - 1));
-        if let Some((touch, first)) = open
-            && (steady != Some(touch) || !ground.joins(first, next - 1))
-        {
-            design.close(touch, &ground.sum(&presses, first..next - 1, touch.flank.sign()), blocks.period_s);
-            open = None;
-        }
-        open = open.or(steady.map(|touch| (touch, next - 1)));
-    }
-    if let Some((touch, first)) = open {
-        let row = ground.sum(&presses, first..blocks.len() - 1, touch.flank.sign());
-        design.close(touch, &row, blocks.period_s);
     }
     design
 }
@@ -289,11 +194,11 @@ pub(super) fn rows<const N: usize>(ground: Ground<'_>, state: &State) -> Design<
 impl<const N: usize> Design<N> {
     /// Takes in a row that is full.
     fn close(&mut self, touch: Touch, sum: &Row<N>, period_s: f64) {
-        if !touch.is_firm {
+        if !touch.is_firm() {
             self.light.push(sum.mean());
             return;
         }
-        match touch.flank {
+        match touch.flank() {
             Flank::Upper => self.touched_s.0 += sum.blocks * period_s,
             Flank::Lower => self.touched_s.1 += sum.blocks * period_s,
         }
@@ -303,128 +208,54 @@ impl<const N: usize> Design<N> {
 
 /// Single blocks as rows, every so many, whether in contact or in the gap.
 pub(super) fn every(ground: Ground<'_>, state: &State, stride: usize) -> Vec<Row<LINEAR>> {
-    let blocks = ground.blocks;
-    let mut walk = Walk::new(state);
-    let mut starts = blocks.starts.iter().copied().peekable();
-    let mut rows = Vec::with_capacity(blocks.len() / stride + 1);
-    let mut presses = Presses::default();
-    for (k, (&motor_m, &load_n)) in blocks.motor_m.iter().zip(&blocks.load_n).enumerate() {
-        if starts.next_if_eq(&k).is_some() {
-            walk.restart();
-        }
-        let coupling = walk.step(motor_m, load_n);
-        if k % stride == 0 {
-            let force_n = coupling.force_n;
-            let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
-            if ground.is_sound(k) {
-                presses.put(k, Press::of(coupling, ground.frame));
-                rows.push(ground.sum(&presses, k..k + 1, side));
-            }
-        }
-    }
-    rows.retain(|row| row.x[FORCE].is_finite());
-    rows
-}
-
-/// The coupling of a block over the 95 % load.
-#[derive(Debug, Clone, Copy, Default)]
-struct Press {
-    force: f64,
-    by_dry: f64,
-    by_share: f64,
-}
-
-impl Press {
-    #[inline]
-    fn of(coupling: Coupling, frame: &Frame) -> Self {
-        let Coupling { force_n, by_dry, by_share_n } = coupling;
-        Self { force: force_n * frame.per_load, by_dry, by_share: by_share_n * frame.per_load }
-    }
-}
-
-/// The couplings of the latest blocks: of as many at least as belong to a row.
-#[derive(Debug, Default)]
-struct Presses([Press; Self::KEPT]);
-
-impl Presses {
-    const KEPT: usize = 32;
-
-    #[inline]
-    fn put(&mut self, k: usize, press: Press) {
-        self.0[k % Self::KEPT] = press;
-    }
-
-    #[inline]
-    fn of(&self, k: usize) -> &Press {
-        &self.0[k % Self::KEPT]
-    }
+    let mut course = Course::default();
+    course.follow(ground.blocks, state);
+    let sound = (0..ground.blocks.len()).step_by(stride).filter(|&k| ground.blocks.is_sound(k));
+    let row = |k: usize| {
+        let force_n = course.force_n[k];
+        let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
+        ground.sum(&course, k..k + 1, side)
+    };
+    sound.map(row).filter(|row| row.x[FORCE].is_finite()).collect()
 }
 
 impl Ground<'_> {
-    /// Whether nothing of a block is missing and the flight has more than begun.
-    #[inline]
-    fn is_sound(&self, k: usize) -> bool {
-        let Self { blocks, pace, .. } = self;
-        (blocks.dx_m[k] + pace.speed[k] + pace.load_rate[k]).is_finite()
-    }
-
-    /// Whether a block may belong to a row from another on: one of no more blocks than a row holds, and of one stretch.
-    #[inline]
-    fn joins(&self, first: usize, k: usize) -> bool {
-        k - first < self.frame.row_blocks && self.pace.stretch[first] == self.pace.stretch[k]
-    }
-
     /// The sums of a row of sound blocks.
-    fn sum<const N: usize>(&self, presses: &Presses, within: Range<usize>, side: f64) -> Row<N> {
-        let Self { blocks, pace, frame } = self;
-        let stretch = pace.stretch[within.start];
-        let mut sum = Row { stretch, blocks: within.len() as f64, ..Row::ZERO };
+    fn sum<const N: usize>(&self, course: &Course, within: Range<usize>, side: f64) -> Row<N> {
+        let Self { blocks, frame } = self;
+        let (first, end) = (within.start, within.end);
+        let mut sum = Row { stretch: blocks.stretch(first), blocks: within.len() as f64, ..Row::ZERO };
+        // Central differences of neighbours: all but the first and last two cancel.
+        let change = |values: &[f64]| values[end] + values[end - 1] - values[first] - values[first - 1];
+        sum.x[ORIGIN] = sum.blocks;
+        sum.x[GAP] = 0.5 * side * sum.blocks;
+        sum.x[SPEED] = change(&blocks.motor_m) * frame.per_speed;
+        sum.x[LOAD_RATE] = change(&blocks.load_n) * frame.per_load_rate;
         let channels = blocks.motor_m[within.clone()].iter().zip(&blocks.dx_m[within.clone()]);
-        let paces = pace.time[within.clone()].iter().zip(&pace.speed[within.clone()]);
-        let paces = paces.zip(&pace.load_rate[within.clone()]);
-        for ((k, (&motor_m, &dx_m)), ((&time, &speed), &load_rate)) in within.zip(channels).zip(paces) {
+        let coupling = course.force_n[within.clone()].iter().zip(&course.by_dry[within.clone()]);
+        let coupling = coupling.zip(&course.by_share_n[within.clone()]);
+        let all = channels.zip(coupling).zip(&blocks.time_s[within]);
+        for (((&motor_m, &dx_m), ((&force_n, &by_dry), &by_share_n)), &time_s) in all {
+            let time = (time_s - frame.time_s.0) * frame.per_time;
+            let force = force_n * frame.per_load;
+            // The screw's own: its transducer's slope acts on the gap as well.
             let place = (motor_m + dx_m - frame.place_m.0) * frame.per_place;
-            let moment = Moment { time, speed, load_rate, place };
-            moment.add(&mut sum.x, presses.of(k), side);
             sum.y_m += dx_m;
+            sum.x[FORCE] += force;
+            sum.x[DRY] += by_dry;
+            sum.x[SHARE] += by_share_n * frame.per_load;
+            sum.x[DRIFT] += time;
+            sum.x[DRIFT_SQUARE] += time * time;
+            sum.x[PLACE] += place;
+            sum.x[PLACE_SQUARE] += place * place;
+            sum.x[PLACE_CUBE] += place * place * place;
+            if N == CURVED {
+                for (sum, bend) in sum.x.iter_mut().skip(BEND).zip(bends(force.abs())) {
+                    *sum += side * bend;
+                }
+            }
         }
         sum
-    }
-}
-
-/// What a sound block adds to a row beside its coupling.
-struct Moment {
-    time: f64,
-    speed: f64,
-    load_rate: f64,
-    /// The screw's own: its transducer's slope acts on the gap as well.
-    place: f64,
-}
-
-impl Moment {
-    /// Adds a block to the sums of a row.
-    #[inline]
-    fn add<const N: usize>(&self, sums: &mut [f64; N], press: &Press, side: f64) {
-        let &Self { time, speed, load_rate, place } = self;
-        let bends = if N == CURVED { bends(press.force.abs()) } else { [0.0; CURVED - LINEAR] };
-        // Each entry by itself: an array that is filled in pieces must be read back piece by piece.
-        for (column, sum) in sums.iter_mut().enumerate() {
-            *sum += match column {
-                ORIGIN => 1.0,
-                GAP => 0.5 * side,
-                FORCE => press.force,
-                DRY => press.by_dry,
-                SHARE => press.by_share,
-                SPEED => speed,
-                DRIFT => time,
-                DRIFT_SQUARE => time * time,
-                PLACE => place,
-                PLACE_SQUARE => place * place,
-                PLACE_CUBE => place * place * place,
-                LOAD_RATE => load_rate,
-                bend => side * bends[bend - BEND],
-            };
-        }
     }
 }
 

@@ -16,6 +16,7 @@
 
 mod blocks;
 mod coupling;
+mod course;
 mod curve;
 mod design;
 mod orientation;

@@ -5,8 +5,10 @@ use super::design::{Frame, Row, SPEED_M_PER_S};
 use super::refusal::Refusal;
 use super::regression::{Belief, fit};
 
-/// Every so many blocks are looked at.
+/// Every fourth block is looked at, and of long flights some so many: a sign needs no more.
 const STRIDE: usize = 4;
+/// See [`STRIDE`].
+const LOOKS: usize = 4000;
 /// Slower than this the screw may stick, m/s.
 const SLIP_M_PER_S: f64 = 1e-3;
 /// The wind-up may be no less than this share of the part's against its sign before it counts as flipped.
@@ -34,8 +36,9 @@ const COLUMNS: usize = 6;
 /// # Errors
 /// [`Refusal::PositionRatio`], [`Refusal::LoadSignFlipped`], [`Refusal::PositionsSwapped`].
 pub(super) fn check(blocks: &Blocks, frame: &Frame) -> Result<(), Refusal> {
+    let stride = STRIDE.max(blocks.len() / LOOKS);
     let rows: Vec<Row<COLUMNS>> =
-        (1..blocks.len()).step_by(STRIDE).filter_map(|k| row(blocks, frame, k)).collect();
+        (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, frame, k)).collect();
     let Some(found) = fit(&rows, &[Belief::NONE; COLUMNS], ROUNDS) else { return Ok(()) };
     let beta = &found.beta;
     if beta[PLACE].abs() > (RATIO * frame.place_m.1).max(TRANSDUCER_M) {

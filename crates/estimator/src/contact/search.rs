@@ -2,9 +2,10 @@
 
 use super::blocks::Blocks;
 use super::coupling::{Friction, State};
+use super::course::Course;
 use super::design::{
     self, BEND, CURVED, DRIFT, DRY, Design, FORCE, Frame, GAP, Ground, LATE_S, LOAD_RATE, ORIGIN, PLACE,
-    Pace, SHARE, SPEED, SPEED_M_PER_S,
+    SHARE, SPEED, SPEED_M_PER_S,
 };
 use super::refusal::Refusal;
 use super::regression::{Belief, Fit, fit};
@@ -49,15 +50,15 @@ pub(super) struct Found<const N: usize> {
 /// # Errors
 /// [`Refusal::NoLoadReversal`], [`Refusal::OneSideBrief`], [`Refusal::TooShort`].
 pub(super) fn search<const N: usize>(
-    (blocks, pace): (&mut Blocks, &Pace),
+    blocks: &mut Blocks,
     frame: &Frame,
     mut state: State,
     turns: usize,
 ) -> Result<Found<N>, Refusal> {
-    let mut found = None;
+    let (mut found, mut course) = (None, Course::default());
     for turn in 1..=turns {
         blocks.realign(state.skew_s);
-        let mut design = design::rows(Ground { blocks, pace, frame }, &state);
+        let mut design = design::rows(Ground { blocks, frame }, &state, &mut course);
         touched(&design)?;
         if N == CURVED {
             design.firm.append(&mut design.light);

@@ -32,6 +32,11 @@ impl Neighbours {
     /// Whether a sample stands apart; a step from one level to another does not.
     pub(super) fn is_wild(self, values: &[f64], at: usize, segment: &Range<usize>) -> bool {
         let around = at.saturating_sub(REACH).max(segment.start)..(at + REACH + 1).min(segment.end);
+        // Where most lie near, so does the median: nothing need be put in order.
+        let near = values[around.clone()].iter().filter(|v| (values[at] - **v).abs() <= self.leap).count();
+        if 2 * near > around.len() {
+            return false;
+        }
         let (mut sorted, mut count) = ([0.0; 2 * REACH + 1], 0);
         for &v in values[around].iter().filter(|v| v.is_finite()) {
             sorted[count] = v;
