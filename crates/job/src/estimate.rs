@@ -31,15 +31,16 @@ pub fn estimate(
     let mut estimate = if let Some(reason) = blind(channels) {
         Estimate::refused(reason)
     } else {
-        let published = match in_a_room(channels.dx_m.len(), |room| {
-            midrange::estimate_in(&samples(channels), &schedule, room)
-        }) {
-            Ok(found) => Some(found),
-            Err(estimator::Error::Constant { .. } | estimator::Error::NothingMeasured) => None,
-            Err(other) => return Err(failed(other)),
-        };
-        let outcome = contact::estimate(&samples(channels), &prior).map_err(failed)?;
-        judged(published.as_ref(), &outcome, &prior, settings.method)
+        in_rooms(channels.dx_m.len(), |rooms| {
+            let published = match midrange::estimate_in(&samples(channels), &schedule, &mut rooms.published) {
+                Ok(found) => Some(found),
+                Err(estimator::Error::Constant { .. } | estimator::Error::NothingMeasured) => None,
+                Err(other) => return Err(failed(other)),
+            };
+            let outcome =
+                contact::estimate_in(&samples(channels), &prior, &mut rooms.contact).map_err(failed)?;
+            Ok(judged(published.as_ref(), &outcome, &prior, settings.method))
+        })?
     };
     estimate.temperature_c = channels.temperature_c;
     if let Geometry::Rotary { reference_radius_m } = part.geometry {
@@ -55,17 +56,23 @@ pub fn estimate(
     Ok(estimate)
 }
 
-/// Longer flights have a room of their own, lest a thread keep it for ever: samples.
+/// Longer flights have rooms of their own, lest a thread keep them for ever: samples.
 const LONGEST_KEPT: usize = 2 << 20;
 
-thread_local! {
-    /// S of one actuator after the other.
-    static ROOM: RefCell<Room> = RefCell::default();
+/// What the estimates of one actuator after the other are made in.
+#[derive(Debug, Default)]
+struct Rooms {
+    published: Room,
+    contact: contact::Room,
 }
 
-/// Does something in the room of this thread.
-fn in_a_room<T>(samples: usize, work: impl FnOnce(&mut Room) -> T) -> T {
-    if samples > LONGEST_KEPT { work(&mut Room::default()) } else { ROOM.with_borrow_mut(work) }
+thread_local! {
+    static ROOMS: RefCell<Rooms> = RefCell::default();
+}
+
+/// Does something in the rooms of this thread.
+fn in_rooms<T>(samples: usize, work: impl FnOnce(&mut Rooms) -> T) -> T {
+    if samples > LONGEST_KEPT { work(&mut Rooms::default()) } else { ROOMS.with_borrow_mut(work) }
 }
 
 /// The filter of a part at the step of a log.

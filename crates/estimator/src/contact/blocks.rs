@@ -31,7 +31,7 @@ const EXCERPT_BLOCKS: usize = 6000;
 const WINDOW_BLOCKS: usize = 500;
 
 /// Means over blocks; NaN where fewer than half of a block's samples are sound.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Blocks {
     /// Length of a block, s.
     pub(super) period_s: f64,
@@ -41,45 +41,53 @@ pub(super) struct Blocks {
     pub(super) time_s: Vec<f64>,
     /// X₁, m.
     pub(super) motor_m: Vec<f64>,
-    /// δX once the screw's channel is brought to the motor's clock, m.
+    /// δX, m: as logged, then with the screw's channel brought to the motor's clock.
     pub(super) dx_m: Vec<f64>,
     /// F, N.
     pub(super) load_n: Vec<f64>,
-    logged_dx_m: Vec<f64>,
+    /// X₂ as it was logged, m.
+    screw_m: Vec<f64>,
 }
 
 impl Blocks {
+    /// Takes in a flight, in the memory of the one before.
+    ///
     /// # Errors
     /// [`Refusal::ChannelConstant`], [`Refusal::TooShort`].
-    pub(super) fn gather(samples: &Samples<'_>) -> Result<Self, Refusal> {
+    pub(super) fn gather(&mut self, samples: &Samples<'_>) -> Result<(), Refusal> {
         let each = ((PERIOD_S / samples.step_s).round() as usize).max(1);
         let watch = Watch::over(samples)?;
-        let mut blocks = Self::with_capacity(samples.dx_m.len() / each, each as f64 * samples.step_s);
+        self.clear(samples.dx_m.len() / each, each as f64 * samples.step_s);
         for segment in samples.segments {
-            blocks.starts.push(blocks.len());
+            self.starts.push(self.len());
             let middle_s = |start: usize| (start as f64 + 0.5 * (each as f64 - 1.0)) * samples.step_s;
             let end = segment.start + segment.len() / each * each;
             for from in (segment.start..end).step_by(SPAN * each) {
                 let span = from..end.min(from + SPAN * each);
-                blocks.time_s.extend(span.clone().step_by(each).map(middle_s));
-                if !(watch.is_calm(&span) && blocks.push_means(samples, span.clone(), each)) {
+                self.time_s.extend(span.clone().step_by(each).map(middle_s));
+                if !(watch.is_calm(&span) && self.push_means(samples, span.clone(), each)) {
                     let means = span.step_by(each).map(|start| watch.mean(&(start..start + each), segment));
-                    means.for_each(|mean| blocks.push(mean));
+                    means.for_each(|mean| self.push(mean));
                 }
             }
         }
-        blocks.logged_dx_m.clone_from(&blocks.dx_m);
-        if blocks.is_still() {
+        self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
+        if self.is_still() {
             return Err(Refusal::ChannelConstant);
         }
-        let sound = blocks.dx_m.iter().filter(|y| y.is_finite()).count();
-        if (sound as f64) * blocks.period_s < SHORTEST_S { Err(Refusal::TooShort) } else { Ok(blocks) }
+        let sound = self.dx_m.iter().filter(|y| y.is_finite()).count();
+        if (sound as f64) * self.period_s < SHORTEST_S { Err(Refusal::TooShort) } else { Ok(()) }
     }
 
-    fn with_capacity(blocks: usize, period_s: f64) -> Self {
-        let room = || Vec::with_capacity(blocks);
-        let (time_s, motor_m, dx_m, load_n) = (room(), room(), room(), room());
-        Self { period_s, starts: Vec::new(), time_s, motor_m, dx_m, load_n, logged_dx_m: Vec::new() }
+    /// No block, and room for so many.
+    fn clear(&mut self, blocks: usize, period_s: f64) {
+        let Self { starts, time_s, motor_m, screw_m, dx_m, load_n, .. } = self;
+        for column in [time_s, motor_m, screw_m, dx_m, load_n] {
+            column.clear();
+            column.reserve(blocks);
+        }
+        starts.clear();
+        self.period_s = period_s;
     }
 
     /// Takes the means of a span of whole blocks in which nothing leaps; none of them, and false, where something is
@@ -107,13 +115,16 @@ impl Blocks {
 
     /// Whether the screw's channel repeats one value while the motor's moves: a dead sensor, or a locked surface.
     fn is_still(&self) -> bool {
-        let screw: Vec<f64> = self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx).collect();
-        let (motor_m, screw_m) = (middle_and_half(&self.motor_m).1, middle_and_half(&screw).1);
+        let (motor_m, screw_m) = (middle_and_half(&self.motor_m).1, middle_and_half(&self.screw_m).1);
         (0.0..=STILL * motor_m).contains(&screw_m)
     }
 
     pub(super) fn len(&self) -> usize {
         self.time_s.len()
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
     }
 
     /// The blocks of each segment.
@@ -134,25 +145,25 @@ impl Blocks {
         rates.is_some_and(|(motor_m, load_n)| is_sound(self.time_s[k], self.dx_m[k], &motor_m, &load_n))
     }
 
-    /// A part of a long flight, in windows spread over it: enough to begin a search with, and to see how far δX
-    /// travels. None of a short flight.
-    pub(super) fn excerpt(&self) -> Option<Self> {
-        let (every, window) = (self.len() / EXCERPT_BLOCKS, WINDOW_BLOCKS);
+    /// Takes in a part of a long flight, in windows spread over it: enough to begin a search with, and to see how far
+    /// δX travels. Nothing of a short flight. δX is there once it is [realigned](Self::realign).
+    pub(super) fn cut_from(&mut self, whole: &Self) {
+        let (every, window) = (whole.len() / EXCERPT_BLOCKS, WINDOW_BLOCKS);
+        self.clear(whole.len() / every.max(1), whole.period_s);
         if every < 2 {
-            return None;
+            return;
         }
-        let mut part = Self::with_capacity(self.len() / every, self.period_s);
-        for segment in self.segments() {
+        for segment in whole.segments() {
             for from in segment.clone().step_by(every * window) {
-                part.starts.push(part.len());
-                for k in from..(from + window).min(segment.end) {
-                    part.time_s.push(self.time_s[k]);
-                    part.push(Some([self.motor_m[k], self.logged_dx_m[k], self.load_n[k]]));
-                }
+                self.starts.push(self.len());
+                let kept = from..segment.end.min(from + window);
+                self.time_s.extend_from_slice(&whole.time_s[kept.clone()]);
+                self.motor_m.extend_from_slice(&whole.motor_m[kept.clone()]);
+                self.screw_m.extend_from_slice(&whole.screw_m[kept.clone()]);
+                self.load_n.extend_from_slice(&whole.load_n[kept]);
             }
         }
-        part.logged_dx_m.clone_from(&part.dx_m);
-        Some(part)
+        self.dx_m.resize(self.len(), f64::NAN);
     }
 
     /// Central difference over two blocks, per second; NaN at the ends.
@@ -169,7 +180,6 @@ impl Blocks {
         let shift = skew_s / self.period_s;
         let (whole, part) = (shift.floor(), shift - shift.floor());
         let weights = cubic(part);
-        let screw = |k: usize| self.motor_m[k] + self.logged_dx_m[k];
         let (from, len) = ((whole as isize).saturating_sub(1), self.dx_m.len());
         // The blocks for which all four lie within the flight.
         let begin = len.min(from.saturating_neg().max(0) as usize);
@@ -178,7 +188,7 @@ impl Blocks {
         self.dx_m[end..].fill(f64::NAN);
         for k in begin..end {
             let first = k.wrapping_add_signed(from);
-            let read_m = |j: usize| weights[j] * screw(first + j);
+            let read_m = |j: usize| weights[j] * self.screw_m[first + j];
             self.dx_m[k] = read_m(0) + read_m(1) + read_m(2) + read_m(3) - self.motor_m[k];
         }
     }

@@ -1,6 +1,6 @@
 //! Straight flanks, or soft ones: which of the two the samples at low load speak for.
 
-use super::blocks::Blocks;
+use super::Room;
 use super::coupling::State;
 use super::design::{
     self, BEND, CURVED, FIRM_SHARE, FORCE, Frame, GAP, Ground, LINEAR, ORIGIN, Row, SPEED, SPEED_M_PER_S,
@@ -82,15 +82,15 @@ impl Contact {
 ///
 /// # Errors
 /// As [`search`], and [`Refusal::MotionUnexplained`].
-pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal> {
-    let mut excerpt = blocks.excerpt();
-    let straight: Found<LINEAR> = coarse_to_fine(blocks, excerpt.as_mut(), frame, start(frame), &STRAIGHT)?;
+pub(super) fn fit(room: &mut Room, frame: &Frame) -> Result<Contact, Refusal> {
+    room.excerpt.cut_from(&room.whole);
+    let straight: Found<LINEAR> = coarse_to_fine(room, frame, start(frame), &STRAIGHT)?;
     let error_m = |column: usize| straight.fit.standard_error_m(column, &straight.design.firm);
     let (line_m, line_se_m) = (straight.fit.beta[GAP], error_m(GAP));
     // Under heavy friction the forces at low load are friction's to say, not the flank's.
     let heavy = straight.state.friction.is_heavy(frame.load_n);
     let bent = if !heavy && low_loads_deviate(&straight, frame) {
-        let curve = coarse_to_fine(blocks, excerpt.as_mut(), frame, straight.state, &BENT);
+        let curve = coarse_to_fine(room, frame, straight.state, &BENT);
         curve.ok().and_then(|curve| soft(&curve, (line_m, line_se_m)))
     } else {
         None
@@ -104,43 +104,38 @@ pub(super) fn fit(blocks: &mut Blocks, frame: &Frame) -> Result<Contact, Refusal
         compliance_m_per_n: (straight.fit.beta[FORCE] / frame.load_n, error_m(FORCE) / frame.load_n),
         skew_se_s: error_m(SPEED) / SPEED_M_PER_S,
         touched_s: straight.design.touched_s,
-        period_s: blocks.period_s,
+        period_s: room.whole.period_s,
         state: straight.state,
         curve: bent.map(|(beta, _)| beta),
         straight,
     };
-    let ground = match &mut excerpt {
-        Some(part) => {
-            part.realign(contact.state.skew_s);
-            Ground { blocks: part, frame }
-        }
-        None => Ground { blocks, frame },
-    };
-    if is_explained(ground, &contact) { Ok(contact) } else { Err(Refusal::MotionUnexplained) }
+    if is_explained(room, frame, &contact) { Ok(contact) } else { Err(Refusal::MotionUnexplained) }
 }
 
 /// Turns from a state over an excerpt, where the flight is long enough for one, and from there over the whole.
 fn coarse_to_fine<const N: usize>(
-    whole: &mut Blocks,
-    excerpt: Option<&mut Blocks>,
+    room: &mut Room,
     frame: &Frame,
     from: State,
     turns: &Turns,
 ) -> Result<Found<N>, Refusal> {
-    let guess = excerpt.and_then(|part| {
-        let found: Found<N> = search(part, frame, from, turns.excerpt).ok()?;
-        Some(found.state)
-    });
+    let Room { whole, excerpt, course } = room;
+    let guess = if excerpt.is_empty() {
+        None
+    } else {
+        let found: Result<Found<N>, _> = search((excerpt, course), frame, from, turns.excerpt);
+        found.ok().map(|found| found.state)
+    };
     match guess {
-        Some(state) => search(whole, frame, state, turns.whole),
-        None => search(whole, frame, from, turns.alone),
+        Some(state) => search((whole, course), frame, state, turns.whole),
+        None => search((whole, course), frame, from, turns.alone),
     }
 }
 
 /// Whether gap and wind-up travel as far as δX does. A screw that friction holds within its gap, or a load
 /// that is another actuator's, leaves travel over that no flank accounts for.
-fn is_explained(ground: Ground<'_>, contact: &Contact) -> bool {
-    let (seen_m, expected_m, noise_m) = travels_m(ground, contact);
+fn is_explained(room: &mut Room, frame: &Frame, contact: &Contact) -> bool {
+    let (seen_m, expected_m, noise_m) = travels_m(room, frame, contact);
     // A bad fit leaves noise enough to explain anything: it may explain only so much.
     let blurred_m = expected_m.hypot(noise_m.min(0.5 * expected_m));
     seen_m - blurred_m <= UNEXPLAINED * expected_m
@@ -148,9 +143,11 @@ fn is_explained(ground: Ground<'_>, contact: &Contact) -> bool {
 
 /// How far δX travels, m: as seen once all that is beside gap and wind-up is taken off, as gap and wind-up
 /// say it should, and by noise alone; each from the 5 % to the 95 % quantile.
-fn travels_m(ground: Ground<'_>, contact: &Contact) -> (f64, f64, f64) {
-    let stride = ground.blocks.len().div_ceil(LOOKS).max(1);
-    let rows = design::every(ground, &contact.state, stride);
+fn travels_m(room: &mut Room, frame: &Frame, contact: &Contact) -> (f64, f64, f64) {
+    let blocks = if room.excerpt.is_empty() { &mut room.whole } else { &mut room.excerpt };
+    blocks.realign(contact.state.skew_s);
+    let stride = blocks.len().div_ceil(LOOKS).max(1);
+    let rows = design::every(Ground { blocks, frame }, &contact.state, &mut room.course, stride);
     let flank_m = |row: &Row<LINEAR>| contact.flank_m(2.0 * row.x[GAP], row.x[FORCE].abs());
     let seen_m = span_m(rows.iter().map(|row| row.y_m - contact.beside_m(row)).collect());
     let expected_m = span_m(rows.iter().map(flank_m).collect());

@@ -207,14 +207,18 @@ impl<const N: usize> Design<N> {
 }
 
 /// Single blocks as rows, every so many, whether in contact or in the gap.
-pub(super) fn every(ground: Ground<'_>, state: &State, stride: usize) -> Vec<Row<LINEAR>> {
-    let mut course = Course::default();
+pub(super) fn every(
+    ground: Ground<'_>,
+    state: &State,
+    course: &mut Course,
+    stride: usize,
+) -> Vec<Row<LINEAR>> {
     course.follow(ground.blocks, state);
     let sound = (0..ground.blocks.len()).step_by(stride).filter(|&k| ground.blocks.is_sound(k));
     let row = |k: usize| {
         let force_n = course.force_n[k];
         let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
-        ground.sum(&course, k..k + 1, side)
+        ground.sum(course, k..k + 1, side)
     };
     sound.map(row).filter(|row| row.x[FORCE].is_finite()).collect()
 }

@@ -34,6 +34,7 @@ pub use refusal::{Flag, Refusal};
 use crate::error::Error;
 use crate::{Samples, model};
 use blocks::Blocks;
+use course::Course;
 use curve::Contact;
 use design::Frame;
 
@@ -107,6 +108,14 @@ pub enum Outcome {
     Refused(Refusal),
 }
 
+/// Memory of a regression, to be used again for the next flight instead of being asked for anew.
+#[derive(Debug, Default)]
+pub struct Room {
+    whole: Blocks,
+    excerpt: Blocks,
+    course: Course,
+}
+
 /// Estimates the gap of one flight, over all its segments together, or says why it cannot be seen.
 ///
 /// Time is linear in the samples; memory is nine numbers for each 20 ms and a row of eighteen for each
@@ -116,8 +125,16 @@ pub enum Outcome {
 /// [`Error::Lengths`] for channels that do not fit, [`Error::Parameter`] for a stiffness, a reference
 /// load or an unknown force that is not positive.
 pub fn estimate(samples: &Samples<'_>, prior: &Prior) -> Result<Outcome, Error> {
+    estimate_in(samples, prior, &mut Room::default())
+}
+
+/// As [`estimate`], for one flight of many, in a room that they use in turn.
+///
+/// # Errors
+/// As [`estimate`].
+pub fn estimate_in(samples: &Samples<'_>, prior: &Prior, room: &mut Room) -> Result<Outcome, Error> {
     check(samples, prior)?;
-    Ok(match look(samples, prior) {
+    Ok(match look(samples, prior, room) {
         Ok((frame, contact)) => Outcome::Estimated(Box::new(report(&frame, prior, &contact))),
         Err(refusal) => Outcome::Refused(refusal),
     })
@@ -130,7 +147,7 @@ pub fn estimate(samples: &Samples<'_>, prior: &Prior) -> Result<Outcome, Error> 
 /// As [`estimate`].
 pub fn picture(samples: &Samples<'_>, prior: &Prior) -> Result<Option<Picture>, Error> {
     check(samples, prior)?;
-    Ok(look(samples, prior).ok().map(|(frame, contact)| Picture::of(&frame, &contact)))
+    Ok(look(samples, prior, &mut Room::default()).ok().map(|(frame, contact)| Picture::of(&frame, &contact)))
 }
 
 fn check(samples: &Samples<'_>, prior: &Prior) -> Result<(), Error> {
@@ -140,14 +157,14 @@ fn check(samples: &Samples<'_>, prior: &Prior) -> Result<(), Error> {
     prior.unknown_force_n.map_or(Ok(()), |force_n| model::positive("unknown_force_n", force_n))
 }
 
-fn look(samples: &Samples<'_>, prior: &Prior) -> Result<(Frame, Contact), Refusal> {
+fn look(samples: &Samples<'_>, prior: &Prior, room: &mut Room) -> Result<(Frame, Contact), Refusal> {
     if samples.step_s > LONGEST_STEP_S {
         return Err(Refusal::RateTooLow);
     }
-    let mut blocks = Blocks::gather(samples)?;
-    let frame = Frame::of(&blocks, prior)?;
-    orientation::check(&blocks, &frame)?;
-    let contact = curve::fit(&mut blocks, &frame)?;
+    room.whole.gather(samples)?;
+    let frame = Frame::of(&room.whole, prior)?;
+    orientation::check(&room.whole, &frame)?;
+    let contact = curve::fit(room, &frame)?;
     Ok((frame, contact))
 }
 

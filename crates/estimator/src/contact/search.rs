@@ -50,15 +50,15 @@ pub(super) struct Found<const N: usize> {
 /// # Errors
 /// [`Refusal::NoLoadReversal`], [`Refusal::OneSideBrief`], [`Refusal::TooShort`].
 pub(super) fn search<const N: usize>(
-    blocks: &mut Blocks,
+    (blocks, course): (&mut Blocks, &mut Course),
     frame: &Frame,
     mut state: State,
     turns: usize,
 ) -> Result<Found<N>, Refusal> {
-    let (mut found, mut course) = (None, Course::default());
+    let mut found = None;
     for turn in 1..=turns {
         blocks.realign(state.skew_s);
-        let mut design = design::rows(Ground { blocks, frame }, &state, &mut course);
+        let mut design = design::rows(Ground { blocks, frame }, &state, course);
         touched(&design)?;
         if N == CURVED {
             design.firm.append(&mut design.light);
