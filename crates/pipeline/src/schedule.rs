@@ -171,6 +171,14 @@ impl Intent {
     }
 }
 
+/// Has what an estimate frees kept for the next one. The GNU allocator gives anything of 128 KiB or more back to the
+/// system as soon as it is freed, and each page of it costs a fault when it is asked for anew, until it has seen a
+/// greater piece freed: from then on that is its bound (mallopt(3), `M_MMAP_THRESHOLD`). Elsewhere this is nothing.
+fn keep_freed_memory() {
+    const BOUND_BYTES: usize = 4 << 20;
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(BOUND_BYTES)));
+}
+
 /// Everything a worker may look at.
 pub(crate) struct Shop<'a> {
     pub(crate) config: &'a Config,
@@ -190,6 +198,7 @@ impl Shop<'_> {
         writer: &mut Writer,
         report: &mut Report,
     ) -> Result<Vec<trends::Unit>, Error> {
+        keep_freed_memory();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build()?;
         let (next, taken) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let halt = AtomicBool::new(false);
