@@ -113,6 +113,13 @@ impl Blocks {
         self.load_n.push(load_n);
     }
 
+    /// One more block, of which all is known but its time.
+    #[cfg(test)]
+    pub(super) fn put(&mut self, [motor_m, dx_m, load_n]: [f64; 3]) {
+        self.time_s.push(self.len() as f64 * PERIOD_S);
+        self.push(Some([motor_m, dx_m, load_n]));
+    }
+
     /// Whether the screw's channel repeats one value while the motor's moves: a dead sensor, or a locked surface.
     fn is_still(&self) -> bool {
         let (motor_m, screw_m) = (middle_and_half(&self.motor_m).1, middle_and_half(&self.screw_m).1);

@@ -56,75 +56,121 @@ pub(super) struct Coupling {
     pub(super) by_share_n: f64,
 }
 
-/// The coupling followed from block to block; each segment starts at rest, its friction unknown.
-#[derive(Debug)]
-pub(super) struct Walk {
+impl Coupling {
+    /// Where a channel is missing.
+    pub(super) const UNKNOWN: Self = Self { force_n: f64::NAN, by_dry: 0.0, by_share_n: 0.0 };
+}
+
+/// What a walk's steps depend on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ways {
     stiffness_n_per_m: f64,
     compliance_m_per_n: f64,
     half_gap_m: f64,
     friction: Friction,
+}
+
+/// The coupling followed from block to block; each segment starts at rest, its friction unknown.
+#[derive(Debug)]
+pub(super) struct Walk {
+    ways: Ways,
     screw: Option<Screw>,
 }
 
 /// The screw between two blocks.
 #[derive(Debug, Clone, Copy)]
-struct Screw {
-    motor_m: f64,
+pub(super) struct Screw {
+    pub(super) motor_m: f64,
     /// Relative position from the middle of the gap, m.
-    relative_m: f64,
-    coupling: Coupling,
+    pub(super) relative_m: f64,
+    pub(super) coupling: Coupling,
+    /// Whether it slipped last, so that nothing before tells what comes after.
+    pub(super) has_slipped: bool,
 }
 
-impl Walk {
+impl Ways {
     pub(super) fn new(state: &State) -> Self {
         Self {
             stiffness_n_per_m: state.stiffness_n_per_m,
             compliance_m_per_n: state.stiffness_n_per_m.recip(),
             half_gap_m: 0.5 * state.gap_m,
             friction: state.friction,
-            screw: None,
         }
     }
 
+    /// The screw a block later. Both what holds and what slips is found, and one of the two taken: so that it can be
+    /// asked of several at once.
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "see `widest`")]
+    pub(super) fn moved(&self, before: &Screw, motor_m: f64, load_n: f64) -> Screw {
+        let held_m = before.relative_m - (motor_m - before.motor_m);
+        let above_m = if held_m < -self.half_gap_m { -self.half_gap_m } else { held_m };
+        let free_m = if above_m > self.half_gap_m { self.half_gap_m } else { above_m };
+        let held_n = self.stiffness_n_per_m * (held_m - free_m);
+        let friction_n = self.friction.at_n(load_n);
+        let (low_n, high_n) = (load_n - friction_n, load_n + friction_n);
+        let (is_low, is_high) = (held_n < low_n, held_n > high_n);
+        let has_slipped = is_low | is_high;
+        let force_n = if is_low { low_n } else { held_n };
+        let force_n = if is_high { high_n } else { force_n };
+        let way = if is_low { -1.0 } else { 1.0 };
+        let is_touching = held_n * before.coupling.force_n > 0.0;
+        let held_by_dry = if is_touching { before.coupling.by_dry } else { 0.0 };
+        let held_by_share_n = if is_touching { before.coupling.by_share_n } else { 0.0 };
+        Screw {
+            motor_m,
+            relative_m: if has_slipped { self.relative_m(force_n) } else { held_m },
+            coupling: Coupling {
+                force_n,
+                by_dry: if has_slipped { way } else { held_by_dry },
+                by_share_n: if has_slipped { way * load_n.abs() } else { held_by_share_n },
+            },
+            has_slipped,
+        }
+    }
+
+    /// Where the screw stands against the motor under a force, m.
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "see `widest`")]
+    fn relative_m(&self, force_n: f64) -> f64 {
+        let above_m = if force_n > 0.0 { self.half_gap_m } else { 0.0 };
+        let flank_m = if force_n < 0.0 { -self.half_gap_m } else { above_m };
+        force_n * self.compliance_m_per_n + flank_m
+    }
+}
+
+impl Walk {
     /// A new segment begins.
-    pub(super) fn restart(&mut self) {
-        self.screw = None;
+    pub(super) fn new(ways: Ways) -> Self {
+        Self { ways, screw: None }
+    }
+
+    /// Whether the screw slipped last.
+    pub(super) fn has_slipped(&self) -> bool {
+        self.screw.is_some_and(|screw| screw.has_slipped)
+    }
+
+    /// Goes on from elsewhere.
+    pub(super) fn set(&mut self, screw: Screw) {
+        self.screw = Some(screw);
     }
 
     /// The coupling at the next block. One with a channel missing is passed over.
     #[inline]
     pub(super) fn step(&mut self, motor_m: f64, load_n: f64) -> Coupling {
         if !(motor_m + load_n).is_finite() {
-            return Coupling { force_n: f64::NAN, by_dry: 0.0, by_share_n: 0.0 };
+            return Coupling::UNKNOWN;
         }
-        let (relative_m, coupling) = match self.screw {
-            Some(before) => self.moved(&before, motor_m, load_n),
-            None => (self.relative_m(load_n), Coupling { force_n: load_n, by_dry: 0.0, by_share_n: 0.0 }),
-        };
-        self.screw = Some(Screw { motor_m, relative_m, coupling });
-        coupling
-    }
-
-    #[inline]
-    fn moved(&self, before: &Screw, motor_m: f64, load_n: f64) -> (f64, Coupling) {
-        let held_m = before.relative_m - (motor_m - before.motor_m);
-        let held_n = self.stiffness_n_per_m * (held_m - held_m.clamp(-self.half_gap_m, self.half_gap_m));
-        let friction_n = self.friction.at_n(load_n);
-        let (low_n, high_n) = (load_n - friction_n, load_n + friction_n);
-        if held_n >= low_n && held_n <= high_n {
-            let touching = held_n * before.coupling.force_n > 0.0;
-            let Coupling { by_dry, by_share_n, .. } = before.coupling;
-            let (by_dry, by_share_n) = if touching { (by_dry, by_share_n) } else { (0.0, 0.0) };
-            return (held_m, Coupling { force_n: held_n, by_dry, by_share_n });
-        }
-        let (force_n, by_dry) = if held_n < low_n { (low_n, -1.0) } else { (high_n, 1.0) };
-        (self.relative_m(force_n), Coupling { force_n, by_dry, by_share_n: by_dry * load_n.abs() })
-    }
-
-    /// Where the screw stands against the motor under a force, m.
-    #[inline]
-    fn relative_m(&self, force_n: f64) -> f64 {
-        let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
-        force_n * self.compliance_m_per_n + self.half_gap_m * side
+        let screw = self.screw.map_or_else(
+            || Screw {
+                motor_m,
+                relative_m: self.ways.relative_m(load_n),
+                coupling: Coupling { force_n: load_n, by_dry: 0.0, by_share_n: 0.0 },
+                has_slipped: false,
+            },
+            |before| self.ways.moved(&before, motor_m, load_n),
+        );
+        self.screw = Some(screw);
+        screw.coupling
     }
 }

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::blocks::{Blocks, is_sound};
-use super::coupling::{State, Walk};
+use super::coupling::{Coupling, Screw, State, Walk, Ways};
 use super::design::{FIRM_SHARE, Flank, Frame};
-use crate::wide::widest;
+use crate::wide::{Lanes, widest};
 
 /// Blocks before one that must keep its flank and firmness; one after it must as well.
 const BEFORE: usize = 2;
@@ -51,16 +51,31 @@ impl Course {
         for column in [&mut self.force_n, &mut self.by_dry, &mut self.by_share_n] {
             column.resize(blocks.len(), f64::NAN);
         }
+        let ways = Ways::new(state);
         for segment in blocks.segments() {
-            let mut walk = Walk::new(state);
-            let channels = blocks.motor_m[segment.clone()].iter().zip(&blocks.load_n[segment.clone()]);
-            let friction = self.by_dry[segment.clone()].iter_mut().zip(&mut self.by_share_n[segment.clone()]);
-            let coupling = self.force_n[segment].iter_mut().zip(friction);
-            for ((&motor_m, &load_n), (force_n, (by_dry, by_share_n))) in channels.zip(coupling) {
-                let here = walk.step(motor_m, load_n);
-                (*force_n, *by_dry, *by_share_n) = (here.force_n, here.by_dry, here.by_share_n);
+            self.follow_segment(blocks, ways, segment);
+        }
+    }
+
+    /// Eight parts abreast, each from where nothing is known; then from the true beginning into each, until the walk
+    /// is on what was found there.
+    fn follow_segment(&mut self, blocks: &Blocks, ways: Ways, segment: Range<usize>) {
+        let (motor_m, load_n) = (&blocks.motor_m[segment.clone()], &blocks.load_n[segment.clone()]);
+        let mut found = Found {
+            force_n: &mut self.force_n[segment.clone()],
+            by_dry: &mut self.by_dry[segment.clone()],
+            by_share_n: &mut self.by_share_n[segment.clone()],
+        };
+        let part = segment.len() / Lanes::COUNT;
+        let ends = abreast(ways, (motor_m, load_n), part, &mut found);
+        let mut walk = Walk::new(ways);
+        for number in 0..Lanes::COUNT {
+            let part = number * part..(number + 1) * part;
+            if found.catch_up(&mut walk, (motor_m, load_n), part) {
+                walk.set(ends.get(number));
             }
         }
+        found.catch_up(&mut walk, (motor_m, load_n), Lanes::COUNT * part..segment.len());
     }
 
     /// Finds the blocks that keep flank and firmness, so that no row mixes flank and gap.
@@ -91,6 +106,100 @@ impl Course {
             end += 1;
         }
         Some((touch, start..end))
+    }
+}
+
+/// What was found of a segment.
+struct Found<'a> {
+    force_n: &'a mut [f64],
+    by_dry: &'a mut [f64],
+    by_share_n: &'a mut [f64],
+}
+
+impl Found<'_> {
+    /// Walks through a part until all that follows is there already: where the screw has slipped, its force tells all
+    /// of its state. False where it has walked to the end.
+    fn catch_up(&mut self, walk: &mut Walk, (motor_m, load_n): (&[f64], &[f64]), part: Range<usize>) -> bool {
+        for k in part {
+            let here = walk.step(motor_m[k], load_n[k]);
+            let is_there = self.force_n[k].to_bits() == here.force_n.to_bits()
+                && self.by_dry[k].to_bits() == here.by_dry.to_bits();
+            if is_there && here.force_n.is_finite() && walk.has_slipped() {
+                return true;
+            }
+            (self.force_n[k], self.by_dry[k], self.by_share_n[k]) =
+                (here.force_n, here.by_dry, here.by_share_n);
+        }
+        false
+    }
+}
+
+/// Eight screws side by side: number k of each array is the k-th's.
+struct Screws {
+    motor_m: [f64; Lanes::COUNT],
+    relative_m: [f64; Lanes::COUNT],
+    force_n: [f64; Lanes::COUNT],
+    by_dry: [f64; Lanes::COUNT],
+    by_share_n: [f64; Lanes::COUNT],
+}
+
+#[allow(clippy::inline_always, reason = "see `widest`")]
+impl Screws {
+    const NOWHERE: Self = Self {
+        motor_m: [0.0; Lanes::COUNT],
+        relative_m: [0.0; Lanes::COUNT],
+        force_n: [0.0; Lanes::COUNT],
+        by_dry: [0.0; Lanes::COUNT],
+        by_share_n: [0.0; Lanes::COUNT],
+    };
+
+    #[inline(always)]
+    fn get(&self, lane: usize) -> Screw {
+        let coupling = Coupling {
+            force_n: self.force_n[lane],
+            by_dry: self.by_dry[lane],
+            by_share_n: self.by_share_n[lane],
+        };
+        Screw { motor_m: self.motor_m[lane], relative_m: self.relative_m[lane], coupling, has_slipped: false }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, is_known: bool, screw: Screw) {
+        let Screw { motor_m, relative_m, coupling, .. } = screw;
+        let Coupling { force_n, by_dry, by_share_n } = coupling;
+        self.motor_m[lane] = if is_known { motor_m } else { self.motor_m[lane] };
+        self.relative_m[lane] = if is_known { relative_m } else { self.relative_m[lane] };
+        self.force_n[lane] = if is_known { force_n } else { self.force_n[lane] };
+        self.by_dry[lane] = if is_known { by_dry } else { self.by_dry[lane] };
+        self.by_share_n[lane] = if is_known { by_share_n } else { self.by_share_n[lane] };
+    }
+}
+
+widest! {
+    /// Eight parts of a segment, all of one length, each walked from nowhere; where the walks end.
+    fn abreast(ways: Ways, channels: (&[f64], &[f64]), part: usize, found: &mut Found<'_>) -> Screws {
+        let (motor_m, load_n) = channels;
+        let mut screws = Screws::NOWHERE;
+        for k in 0..part {
+            let (mut motor, mut load) = ([0.0; Lanes::COUNT], [0.0; Lanes::COUNT]);
+            for lane in 0..Lanes::COUNT {
+                motor[lane] = motor_m[lane * part + k];
+                load[lane] = load_n[lane * part + k];
+            }
+            let mut is_known = [false; Lanes::COUNT];
+            for lane in 0..Lanes::COUNT {
+                is_known[lane] = (motor[lane] + load[lane]).abs() < f64::INFINITY;
+                let screw = ways.moved(&screws.get(lane), motor[lane], load[lane]);
+                screws.set(lane, is_known[lane], screw);
+            }
+            for lane in 0..Lanes::COUNT {
+                let at = lane * part + k;
+                found.force_n[at] = if is_known[lane] { screws.force_n[lane] } else { f64::NAN };
+                found.by_dry[at] = if is_known[lane] { screws.by_dry[lane] } else { 0.0 };
+                found.by_share_n[at] = if is_known[lane] { screws.by_share_n[lane] } else { 0.0 };
+            }
+        }
+        screws
     }
 }
 
@@ -125,6 +234,51 @@ widest! {
         for (((motor_m, load_n), (time_s, dx_m)), kept) in rates.zip(time_s.iter().zip(dx_m)).zip(&mut kept[inner])
         {
             *kept = Touch(kept.0 * u8::from(is_sound(*time_s, *dx_m, motor_m, load_n)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::coupling::Friction;
+    use super::*;
+
+    proptest! {
+        /// However a flight is cut, and whatever is missing of it, eight walks abreast are one walk, bit for bit. Motors
+        /// that rest leave the screw stuck for long; so does friction beyond any load.
+        #[test]
+        fn walks_abreast_are_one_walk(
+            steps in proptest::collection::vec((-3_i32..4, -40_i32..41, 0_u8..30), 1..400),
+            cuts in proptest::collection::vec(0.0_f64..1.0, 0..4),
+            gap_m in 0.0_f64..1e-4, dry_n in prop_oneof![0.0_f64..300.0, Just(1e5)], lost_share in 0.0_f64..0.2,
+        ) {
+            let mut place_m = 0.0;
+            let mut blocks = Blocks::default();
+            for &(step, load, chance) in &steps {
+                place_m += f64::from(step) * 1.3e-5;
+                let missing = |which: u8| if chance == which { f64::NAN } else { 0.0 };
+                blocks.put([place_m + missing(0), 0.0, f64::from(load) * 51.7 + missing(1)]);
+            }
+            let mut starts: Vec<usize> = cuts.iter().map(|cut| (cut * steps.len() as f64) as usize).collect();
+            starts.push(0);
+            starts.sort_unstable();
+            starts.dedup();
+            blocks.starts = starts;
+            let friction = Friction { dry_n, lost_share };
+            let state = State { stiffness_n_per_m: 5e7, gap_m, friction, skew_s: 0.0 };
+            let mut course = Course::default();
+            course.follow(&blocks, &state);
+            for segment in blocks.segments() {
+                let mut walk = Walk::new(Ways::new(&state));
+                for k in segment {
+                    let one = walk.step(blocks.motor_m[k], blocks.load_n[k]);
+                    let wanted = [one.force_n, one.by_dry, one.by_share_n].map(f64::to_bits);
+                    let found = [course.force_n[k], course.by_dry[k], course.by_share_n[k]].map(f64::to_bits);
+                    prop_assert_eq!(found, wanted, "block {}", k);
+                }
+            }
         }
     }
 }
