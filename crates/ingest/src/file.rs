@@ -14,6 +14,7 @@ use parquet::arrow::arrow_reader::{
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ColumnChunkMetaData;
 
+use crate::digest::Digest;
 use crate::error::{Error, Fault};
 use crate::growing::Growing;
 use crate::leaf::{self, Leaf};
@@ -268,26 +269,25 @@ impl LogFile {
         self.error(Fault::Decode { column: leaf.name.clone(), row_group, detail })
     }
 
-    /// Feeds the footer and the chunks of the named leaves, in the order of the file, into a hash.
+    /// Feeds the footer and the chunks of the named leaves, in the order of the file, into a digest.
     ///
     /// It says that what was read is what was read before, whatever the file is called now and
     /// whatever else was added to it.
-    pub(crate) fn feed(&self, names: &[&str], hash: &mut blake3::Hasher) -> Result<(), Error> {
+    pub(crate) fn feed(&self, names: &[&str], digest: &mut Digest) -> Result<(), Error> {
         let unreadable = |source| self.error(Fault::Unreadable { source });
         let file = self.source.file();
         let length = file.metadata().map_err(unreadable)?.len();
-        let mut buffer = Vec::new();
         let wanted: Vec<&Leaf> = self.leaves.iter().filter(|l| names.contains(&l.name.as_str())).collect();
         self.want(&wanted)?;
         for group in 0..self.footer.metadata().num_row_groups() {
             for leaf in &wanted {
                 let (start, bytes) = self.chunk(group, leaf).byte_range();
-                feed(hash, file, &mut buffer, start, bytes.min(length.saturating_sub(start)))
-                    .map_err(unreadable)?;
+                let end = length.min(start.saturating_add(bytes));
+                digest.take(file, start..end).map_err(unreadable)?;
             }
         }
         let start = length.saturating_sub(footer_bytes(file, length).map_err(unreadable)?);
-        feed(hash, file, &mut buffer, start, length - start).map_err(unreadable)
+        digest.take(file, start..length).map_err(unreadable)
     }
 }
 
@@ -314,23 +314,4 @@ fn footer_bytes(file: &File, length: u64) -> std::io::Result<u64> {
     let mut trailer = [0; 4];
     positioned::read_exact(file, &mut trailer, length.saturating_sub(8))?;
     Ok((u64::from(u32::from_le_bytes(trailer)) + 8).min(length))
-}
-
-/// Reads a stretch of the file into the hash, as much at a time as stays in the cache between the two.
-fn feed(
-    hash: &mut blake3::Hasher,
-    file: &File,
-    buffer: &mut Vec<u8>,
-    start: u64,
-    bytes: u64,
-) -> std::io::Result<()> {
-    const CHUNK: u64 = 1 << 17;
-    let mut left = bytes;
-    while left > 0 {
-        buffer.resize(left.min(CHUNK) as usize, 0);
-        positioned::read_exact(file, buffer, start + bytes - left)?;
-        hash.update(buffer);
-        left -= buffer.len() as u64;
-    }
-    Ok(())
 }

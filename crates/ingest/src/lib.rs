@@ -13,6 +13,7 @@ mod channel;
 mod checksum;
 pub mod clock;
 mod condition;
+mod digest;
 pub mod error;
 mod file;
 pub mod flights;

@@ -12,6 +12,7 @@ use jiff::Timestamp;
 use crate::channel::{self, Channel, Follower, Sampling};
 use crate::clock::{Origin, Repairs, Timeline};
 use crate::condition::Condition;
+use crate::digest::Digest;
 use crate::error::{Error, Fault};
 use crate::file::LogFile;
 use crate::hold::{hold, with_samples};
@@ -393,7 +394,7 @@ impl Log {
     /// # Errors
     /// When a file cannot be read.
     pub fn digest(&self, used: &[(&Channels, &PositionColumns)]) -> Result<String, Error> {
-        let mut hash = blake3::Hasher::new();
+        let mut digest = Digest::new();
         for (sheet, mut leaves) in self.leaves(used) {
             leaves.extend(self.mapping.identity.columns.values().cloned());
             if self.normalized.is_some() {
@@ -401,10 +402,10 @@ impl Log {
             }
             let names: Vec<&str> = leaves.iter().map(String::as_str).collect();
             for file in &sheet.files {
-                file.feed(&names, &mut hash)?;
+                file.feed(&names, &mut digest)?;
             }
         }
-        Ok(hash.finalize().to_hex().to_string())
+        Ok(digest.end())
     }
 
     /// Reads the channels of one actuator.

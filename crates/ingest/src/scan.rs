@@ -8,6 +8,8 @@ use multiversion::multiversion;
 
 /// Samples in a group.
 const LANES: usize = 8;
+/// Samples whose repeats are looked at together.
+const BLOCK: usize = 64;
 
 /// Figures of a channel; missing samples are NaN, and compare as nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,10 +70,15 @@ impl Scanner {
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
 fn groups(values: &[f64], lanes: &mut Lanes, run: &mut Run) -> usize {
     let mut done = 0;
-    while let Some(group) = values[done..].first_chunk::<{ LANES + 2 }>() {
-        lanes.take(group);
-        run.take(group);
-        done += LANES;
+    while let Some(block) = values[done..].first_chunk::<{ BLOCK + 2 }>() {
+        let mut same = 0_u64;
+        for k in (0..BLOCK).step_by(LANES) {
+            let Some(group) = block[k..].first_chunk::<{ LANES + 2 }>() else { continue };
+            lanes.take(group);
+            same |= u64::from(repeats(group)) << k;
+        }
+        run.take(same);
+        done += BLOCK;
     }
     done
 }
@@ -204,17 +211,15 @@ struct Run {
 }
 
 impl Run {
-    /// A group and the sample after it: which of the eight after the first repeat the one before, a bit each.
+    /// Which samples of a block are repeated by the one after them, a bit each.
     #[inline]
-    #[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
-    fn take(&mut self, group: &[f64; LANES + 2]) {
-        let mut same = 0_u8;
-        for lane in 0..LANES {
-            same |= u8::from(group[lane] == group[lane + 1]) << lane;
-        }
+    fn take(&mut self, same: u64) {
         let joined = self.repeats + same.trailing_ones() as usize;
-        self.most = self.most.max(joined).max(LONGEST[usize::from(same)].into());
-        self.repeats = if same == u8::MAX { joined } else { same.leading_ones() as usize };
+        self.repeats = if same == u64::MAX { joined } else { same.leading_ones() as usize };
+        self.most = self.most.max(joined);
+        while has_run(same, self.most + 1) {
+            self.most += 1;
+        }
     }
 
     /// Some samples, of which the first was the last of those before.
@@ -227,19 +232,31 @@ impl Run {
     }
 }
 
-/// The longest row of ones in each byte.
-const LONGEST: [u8; 256] = {
-    let (mut longest, mut byte) = ([0; 256], 0);
-    while byte < 256 {
-        let mut left = byte;
-        while left > 0 {
-            left &= left << 1;
-            longest[byte] += 1;
-        }
-        byte += 1;
+/// Which samples of a group are repeated by the one after them, a bit each.
+#[inline]
+#[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
+fn repeats(group: &[f64; LANES + 2]) -> u8 {
+    let mut same = 0;
+    for lane in 0..LANES {
+        same |= u8::from(group[lane] == group[lane + 1]) << lane;
     }
-    longest
-};
+    same
+}
+
+/// Whether so many ones stand in a row, one at least: each that ends a row of some stays where a row of some more ends.
+#[inline]
+fn has_run(bits: u64, ones: usize) -> bool {
+    if ones > BLOCK {
+        return false;
+    }
+    let (mut ends, mut known) = (bits, 1);
+    while known < ones {
+        let more = known.min(ones - known);
+        ends &= ends >> more;
+        known += more;
+    }
+    ends != 0
+}
 
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "a repeat is one to the bit")]
@@ -248,12 +265,19 @@ mod tests {
 
     use super::*;
 
+    /// A channel of few values, some of which stay for a while, with holes.
+    fn channel() -> impl Strategy<Value = Vec<f64>> {
+        let stays = prop_oneof![8 => Just(1_usize), 1 => 1_usize..12, 1 => 1_usize..200];
+        proptest::collection::vec((-3_i32..4, stays), 0..120).prop_map(|ticks| {
+            let value = |k: i32| if k == -3 { f64::NAN } else { f64::from(k) * 0.5 };
+            ticks.into_iter().flat_map(|(k, stays)| std::iter::repeat_n(value(k), stays)).collect()
+        })
+    }
+
     proptest! {
         /// One pass sees what a pass for each figure does, over channels with repeats and holes.
         #[test]
-        fn the_lanes_see_what_plain_passes_do(ticks in proptest::collection::vec(-3_i32..4, 0..60)) {
-            let values: Vec<f64> =
-                ticks.iter().map(|&k| if k == -3 { f64::NAN } else { f64::from(k) * 0.5 }).collect();
+        fn the_lanes_see_what_plain_passes_do(values in channel()) {
             let seen = Scan::of(&values);
             let known = || values.iter().copied().filter(|v| !v.is_nan());
             prop_assert_eq!(seen.min.to_bits(), known().fold(f64::INFINITY, f64::min).to_bits());
@@ -270,10 +294,8 @@ mod tests {
         /// However a channel grows, what is seen of it is the same.
         #[test]
         fn a_channel_that_grows_is_seen_as_one_that_is_there(
-            ticks in proptest::collection::vec(-3_i32..4, 0..200), step in 1_usize..70,
+            values in channel(), step in 1_usize..170,
         ) {
-            let values: Vec<f64> =
-                ticks.iter().map(|&k| if k == -3 { f64::NAN } else { f64::from(k) * 0.5 }).collect();
             let mut scanner = Scanner::new();
             (0..values.len()).step_by(step).for_each(|end| scanner.advance(&values[..end]));
             prop_assert_eq!(scanner.end(&values), Scan::of(&values));
