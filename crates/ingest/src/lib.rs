@@ -12,6 +12,7 @@ pub mod arrays;
 mod channel;
 mod checksum;
 pub mod clock;
+mod coded;
 mod condition;
 mod digest;
 pub mod error;

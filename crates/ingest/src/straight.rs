@@ -1,7 +1,7 @@
 //! Chunks of plain numbers, straight from their pages into a channel.
 //!
-//! Most logs hold doubles or floats, as they are or split by bytes, compressed by zstd or not at all. These need none
-//! of what Parquet's own reader makes for each page and batch: a context, buffers, levels, an array. Whatever is of
+//! Most logs hold doubles or floats, as they are, split by bytes or as codes of a dictionary, compressed by zstd or not
+//! at all. These need none of what Parquet's own reader makes for each page and batch: a context, buffers, levels, an array. Whatever is of
 //! another kind, or does not hold what it claims, is left to that reader, which says what is wrong with it.
 
 use std::cell::RefCell;
@@ -14,6 +14,7 @@ use parquet::file::metadata::ColumnChunkMetaData;
 use polars_parquet_format::{DataPageHeader, DataPageHeaderV2, Encoding, PageHeader, PageType};
 use zstd::bulk::Decompressor;
 
+use crate::coded::{Codes, SPARE_BYTES, unsigned};
 use crate::growing::{BATCH, Growing};
 use crate::page::Page;
 use crate::positioned;
@@ -33,6 +34,8 @@ thread_local! {
 struct Room {
     stored: Vec<u8>,
     page: Vec<u8>,
+    /// What the codes of a chunk stand for.
+    dictionary: Vec<f64>,
     zstd: Option<Decompressor<'static>>,
 }
 
@@ -85,13 +88,43 @@ pub(crate) fn append(file: &File, chunk: &ColumnChunkMetaData, pages: &[Page], i
 
 impl Room {
     fn append(&mut self, file: &File, pages: &[Page], form: Form, into: &mut Growing) -> Option<()> {
+        self.dictionary.clear();
         for page in pages {
-            let data = Data::of(&page.header, form)?;
             self.read(file, page)?;
-            let body = self.unpacked(&page.header, data, form)?;
-            let (levels, body) = data.parted(body)?;
-            let numbers = Numbers { bytes: body, is_split: data.is_split, width: form.width() };
-            numbers.append(levels, data.values, into)?;
+            if page.header.type_ == PageType::DICTIONARY_PAGE {
+                self.take_dictionary(&page.header, form)?;
+                continue;
+            }
+            let data = Data::of(&page.header, form)?;
+            self.unpack(&page.header, data.apart, form.is_zstd && data.is_compressed)?;
+            let (levels, body) = data.parted(&self.page)?;
+            if data.coding == Coding::Codes {
+                append_codes(Codes::of(body)?, levels, data.values, &self.dictionary, into)?;
+            } else {
+                let bytes = body.strip_suffix(&[0; SPARE_BYTES])?;
+                let numbers = Numbers { bytes, is_split: data.coding == Coding::Split, width: form.width() };
+                numbers.append(levels, data.values, into)?;
+            }
+        }
+        Some(())
+    }
+
+    fn take_dictionary(&mut self, header: &PageHeader, form: Form) -> Option<()> {
+        let said = header.dictionary_page_header.as_ref()?;
+        if !matches!(said.encoding, Encoding::PLAIN | Encoding::PLAIN_DICTIONARY) {
+            return None;
+        }
+        self.unpack(header, 0, form.is_zstd)?;
+        let (bytes, count) =
+            (self.page.strip_suffix(&[0; SPARE_BYTES])?, usize::try_from(said.num_values).ok()?);
+        if bytes.len() != count.checked_mul(form.width())? {
+            return None;
+        }
+        if form.is_double {
+            self.dictionary.extend(bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)));
+        } else {
+            self.dictionary
+                .extend(bytes.as_chunks::<4>().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))));
         }
         Some(())
     }
@@ -104,20 +137,25 @@ impl Room {
         page.header.crc.is_none_or(is_whole).then_some(())
     }
 
-    /// The bytes of a page as they were before compression.
-    fn unpacked(&mut self, header: &PageHeader, data: Data, form: Form) -> Option<&[u8]> {
-        if !form.is_zstd || !data.is_compressed {
-            return Some(&self.stored);
+    /// Brings the bytes of a page to what they were before compression, and a few zeros after them.
+    fn unpack(&mut self, header: &PageHeader, apart: usize, is_compressed: bool) -> Option<()> {
+        if !is_compressed {
+            std::mem::swap(&mut self.stored, &mut self.page);
+            self.page.extend([0; SPARE_BYTES]);
+            return Some(());
         }
-        let plain = self.stored.get(..data.apart)?;
-        self.page.resize(usize::try_from(header.uncompressed_page_size).ok()?, 0);
-        let (head, rest) = self.page.split_at_mut_checked(data.apart)?;
+        let bytes = usize::try_from(header.uncompressed_page_size).ok()?;
+        self.page.resize(bytes + SPARE_BYTES, 0);
+        let (page, spare) = self.page.split_at_mut(bytes);
+        spare.fill(0);
+        let (head, rest) = page.split_at_mut_checked(apart)?;
+        let (plain, packed) = self.stored.split_at_checked(apart)?;
         head.copy_from_slice(plain);
         if self.zstd.is_none() {
             self.zstd = Decompressor::new().ok();
         }
-        let bytes = self.zstd.as_mut()?.decompress_to_buffer(&self.stored[data.apart..], rest).ok()?;
-        (bytes == rest.len()).then_some(&self.page)
+        let unpacked = self.zstd.as_mut()?.decompress_to_buffer(packed, rest).ok()?;
+        (unpacked == rest.len()).then_some(())
     }
 
     fn tidy(&mut self) {
@@ -126,7 +164,20 @@ impl Room {
                 *buffer = Vec::new();
             }
         }
+        if 8 * self.dictionary.capacity() > KEPT_BYTES {
+            self.dictionary = Vec::new();
+        }
     }
+}
+
+/// How numbers are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Coding {
+    Plain,
+    /// Byte k of every number in stream k.
+    Split,
+    /// As codes of the chunk's dictionary.
+    Codes,
 }
 
 /// What a page's header says of the numbers in it.
@@ -134,7 +185,7 @@ impl Room {
 struct Data {
     /// Numbers, missing ones included.
     values: usize,
-    is_split: bool,
+    coding: Coding,
     is_compressed: bool,
     /// Bytes of levels that lie before what is compressed.
     apart: usize,
@@ -166,8 +217,8 @@ impl Data {
             return None;
         }
         let levels = if form.may_miss { Levels::Counted } else { Levels::None };
-        let (values, is_split) = (usize::try_from(header.num_values).ok()?, is_split(header.encoding)?);
-        Some(Self { values, is_split, is_compressed: true, apart: 0, levels })
+        let (values, coding) = (usize::try_from(header.num_values).ok()?, coding(header.encoding)?);
+        Some(Self { values, coding, is_compressed: true, apart: 0, levels })
     }
 
     fn second(header: &DataPageHeaderV2) -> Option<Self> {
@@ -175,9 +226,9 @@ impl Data {
         if header.repetition_levels_byte_length != 0 {
             return None;
         }
-        let (values, is_split) = (usize::try_from(header.num_values).ok()?, is_split(header.encoding)?);
+        let (values, coding) = (usize::try_from(header.num_values).ok()?, coding(header.encoding)?);
         let is_compressed = header.is_compressed.unwrap_or(true);
-        Some(Self { values, is_split, is_compressed, apart, levels: Levels::Bytes(apart) })
+        Some(Self { values, coding, is_compressed, apart, levels: Levels::Bytes(apart) })
     }
 
     /// A page's bytes, parted into levels and numbers.
@@ -194,12 +245,32 @@ impl Data {
     }
 }
 
-fn is_split(encoding: Encoding) -> Option<bool> {
+fn coding(encoding: Encoding) -> Option<Coding> {
     match encoding {
-        Encoding::PLAIN => Some(false),
-        Encoding::BYTE_STREAM_SPLIT => Some(true),
+        Encoding::PLAIN => Some(Coding::Plain),
+        Encoding::BYTE_STREAM_SPLIT => Some(Coding::Split),
+        Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY => Some(Coding::Codes),
         _ => None,
     }
+}
+
+/// Appends the numbers that codes stand for, and what is missing between them.
+fn append_codes(
+    mut codes: Codes<'_>,
+    levels: Option<&[u8]>,
+    values: usize,
+    dictionary: &[f64],
+    into: &mut Growing,
+) -> Option<()> {
+    let Some(levels) = levels else { return codes.append(values, dictionary, into) };
+    for run in present(levels, values)? {
+        if run.is_present {
+            codes.append(run.values, dictionary, into)?;
+        } else {
+            into.extend(std::iter::repeat_n(f64::NAN, run.values));
+        }
+    }
+    Some(())
 }
 
 /// The numbers of a page, without the missing ones.
@@ -335,20 +406,6 @@ fn extend(runs: &mut Vec<Run>, is_present: bool, values: usize) {
     }
 }
 
-/// A number in sevens of bits, the lowest first.
-fn unsigned(bytes: &mut &[u8]) -> Option<u64> {
-    let mut number = 0;
-    for shift in (0..63).step_by(7) {
-        let (byte, rest) = bytes.split_first()?;
-        *bytes = rest;
-        number |= u64::from(byte & 0x7f) << shift;
-        if byte & 0x80 == 0 {
-            return Some(number);
-        }
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
@@ -374,6 +431,8 @@ mod tests {
         version: WriterVersion,
         compression: Compression,
         encoding: basic::Encoding,
+        /// Codes of a dictionary, until it has grown too large.
+        is_coded: bool,
     }
 
     fn properties(written: Written) -> WriterProperties {
@@ -381,7 +440,8 @@ mod tests {
             .set_writer_version(written.version)
             .set_compression(written.compression)
             .set_encoding(written.encoding)
-            .set_dictionary_enabled(false)
+            .set_dictionary_enabled(written.is_coded)
+            .set_dictionary_page_size_limit(400)
             .set_data_page_row_count_limit(100)
             .set_write_batch_size(50)
             .set_max_row_group_row_count(Some(350))
@@ -417,15 +477,22 @@ mod tests {
         values.map(|v| if v.is_nan() { u64::MAX } else { v.to_bits() }).collect()
     }
 
+    /// Values that may be missing, some of which stay for a while.
+    fn channel(value: impl Strategy<Value = f32>) -> impl Strategy<Value = Vec<Option<f32>>> {
+        let stays = prop_oneof![4 => Just(1_usize), 1 => 1_usize..60];
+        let values = proptest::collection::vec((proptest::option::weighted(0.9, value), stays), 1..200);
+        values.prop_map(|all| all.into_iter().flat_map(|(v, stays)| std::iter::repeat_n(v, stays)).collect())
+    }
+
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(48))]
-        /// Pages of both versions, both widths, split or not, compressed or not, with missing values or without:
-        /// every number comes back.
+        #![proptest_config(ProptestConfig::with_cases(96))]
+        /// Pages of both versions, both widths, split or not, as codes or not, compressed or not, with missing values
+        /// or without: every number comes back.
         #[test]
         fn numbers_come_back_as_they_were_written(
-            values in proptest::collection::vec(proptest::option::weighted(0.9, -1e30_f32..1e30), 1..900),
+            values in prop_oneof![channel(-1e30_f32..1e30), channel((-9_i8..9).prop_map(f32::from))],
             whole in any::<bool>(), is_double in any::<bool>(), second in any::<bool>(), packed in any::<bool>(),
-            split in any::<bool>(),
+            split in any::<bool>(), is_coded in any::<bool>(),
         ) {
             let values: Vec<_> = values.into_iter().map(|v| if whole { v.or(Some(0.5)) } else { v }).collect();
             let written = Written {
@@ -433,6 +500,7 @@ mod tests {
                 version: if second { WriterVersion::PARQUET_2_0 } else { WriterVersion::PARQUET_1_0 },
                 compression: if packed { zstd() } else { Compression::UNCOMPRESSED },
                 encoding: if split { basic::Encoding::BYTE_STREAM_SPLIT } else { basic::Encoding::PLAIN },
+                is_coded,
             };
             let read = read_back(&values, written).unwrap();
             let wanted = values.iter().map(|v| v.map_or(f64::NAN, f64::from));
@@ -447,6 +515,7 @@ mod tests {
             version: WriterVersion::PARQUET_1_0,
             compression: zstd(),
             encoding: basic::Encoding::PLAIN,
+            is_coded: false,
         };
         let values: Vec<Option<f32>> = (0..500).map(|k| Some(k as f32)).collect();
         assert!(read_back(&values, usual).is_some());
