@@ -6,7 +6,7 @@ use fleet::Position;
 
 use crate::clock::{self, Origin, Stamps};
 use crate::error::{Error, Fault};
-use crate::log::{Actuator, Read, finish};
+use crate::log::{Actuator, Read, Selection, finish};
 use crate::schema::ClockMapping;
 
 /// Stamps and readings of one actuator, of one length; NaN where a reading is missing.
@@ -45,7 +45,7 @@ impl Arrays<'_> {
         let mut stamps = Stamps { column: "time_s".into(), seconds, origin: Origin::Counted(first_s) };
         let line = clock::align(&mut stamps, &ClockMapping::default()).map_err(fail)?;
         let [motor, screw, load] = named.map(|(_, values)| on(values, line.kept.as_deref()).into());
-        let read = Read { motor, screw, load, is_relative: false, segments: line.segments.clone() };
+        let read = Read { motor, screw, load, is_relative: false, selection: Selection::whole(&line) };
         Ok(finish(position, read, &line, None, Vec::new()))
     }
 }

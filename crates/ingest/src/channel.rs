@@ -14,13 +14,15 @@ use crate::schema::{ChannelMapping, ClockMapping, Role};
 use crate::screw::{Geometry, to_si, unwrap_turns};
 use crate::sheet::{Samples, Sheet};
 use crate::spare;
+use crate::wanted::Wanted;
 
 /// The least share of samples that a redundant channel must hold to be called alive.
 const ALIVE_SHARE: f64 = 0.5;
 
-/// Whether a channel can serve: at least half of its samples are there, and it moves.
-pub(crate) fn lives(values: &[f64]) -> bool {
-    let needed = (ALIVE_SHARE * values.len() as f64).ceil() as usize;
+/// Whether a channel can serve: at least half of its samples are there, but for so many that are not asked for, and it
+/// moves.
+pub(crate) fn lives(values: &[f64], apart: usize) -> bool {
+    let needed = (ALIVE_SHARE * (values.len() - apart) as f64).ceil() as usize;
     let present = || values.iter().copied().filter(|v| v.is_finite());
     let first = present().next();
     present().take(needed).count() == needed && present().any(|v| Some(v) != first)
@@ -156,8 +158,13 @@ impl<'s> Sampling<'s> {
         Ok((Stamps { seconds: Vec::new(), ..stamps }, instants))
     }
 
-    /// The channel in SI at its own rows.
-    fn readings(&self, map: &ChannelMapping, geometry: Geometry) -> Result<Channel, Error> {
+    /// The channel in SI at its own rows; those that are not wanted may be missing.
+    fn readings(
+        &self,
+        map: &ChannelMapping,
+        geometry: Geometry,
+        wanted: Wanted<'_>,
+    ) -> Result<Channel, Error> {
         let si = to_si(self.column(), map, geometry).map_err(|f| self.sheet.error(f))?;
         let kept = |values: Vec<f64>| match &self.line.kept {
             Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
@@ -165,7 +172,9 @@ impl<'s> Sampling<'s> {
         };
         let is_mended = !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
         if !is_mended {
-            let (values, seen) = self.sheet.numbers(&self.samples, Some(si))?;
+            // Rows that were put in order are not those of the file.
+            let wanted = if self.line.kept.is_none() { wanted } else { Wanted::ALL };
+            let (values, seen) = self.sheet.numbers(&self.samples, Some(si), wanted)?;
             self.same_count(values.len(), self.column())?;
             let seen = self.line.kept.is_none().then_some(seen);
             return Ok(Channel { values: kept(values), seen });
@@ -190,7 +199,7 @@ impl<'s> Sampling<'s> {
     }
 
     fn raw(&self, samples: &Samples) -> Result<Vec<f64>, Error> {
-        self.sheet.numbers(samples, None).map(|(values, _)| values)
+        self.sheet.numbers(samples, None, Wanted::ALL).map(|(values, _)| values)
     }
 
     fn same_count(&self, found: usize, column: &str) -> Result<(), Error> {
@@ -201,15 +210,20 @@ impl<'s> Sampling<'s> {
         Err(self.sheet.error(Fault::RowCount { column, found, declared }))
     }
 
-    /// The channel in SI at every row of its own that counts.
+    /// The channel in SI at every row of its own that counts; those that are not wanted may be missing.
     ///
     /// # Errors
     /// When a column is missing, holds no numbers, cannot be decoded or is in an impossible unit.
-    pub(crate) fn own(&self, map: &ChannelMapping, geometry: Geometry) -> Result<Channel, Error> {
-        let read = self.readings(map, geometry)?;
+    pub(crate) fn own(
+        &self,
+        map: &ChannelMapping,
+        geometry: Geometry,
+        wanted: Wanted<'_>,
+    ) -> Result<Channel, Error> {
         if self.every == 1 {
-            return Ok(read);
+            return self.readings(map, geometry, wanted);
         }
+        let read = self.readings(map, geometry, Wanted::ALL)?;
         let (_, instants) = self.instants(map)?;
         let (at_s, values) = thinned(&instants, &read.values, self.every);
         let step_s = self.line.step_s * self.every as f64;
@@ -235,7 +249,7 @@ pub(crate) struct Follower<'s, 'c> {
     pub(crate) role: Role,
 }
 
-/// Reads a channel in SI at the instants of the motor position.
+/// Reads a channel in SI at the instants of the motor position; those that are not wanted may be missing.
 ///
 /// # Errors
 /// As [`Sampling::own`]; [`Fault::ClocksDiffer`] when its clock and the motor's share no zero.
@@ -244,6 +258,7 @@ pub(crate) fn follow(
     motor: &ChannelMapping,
     channel: &Follower<'_, '_>,
     geometry: Geometry,
+    wanted: Wanted<'_>,
 ) -> Result<Channel, Error> {
     let &Follower { sheet, map, name, position, role } = channel;
     let mut own = Sampling::unread(sheet, map, name, position);
@@ -252,9 +267,9 @@ pub(crate) fn follow(
     own.every = own.rows_between(map);
     let is_slow_load = role == Role::Load && own.every > 1;
     if shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load) {
-        return own.readings(map, geometry);
+        return own.readings(map, geometry, wanted);
     }
-    let Channel { values, .. } = own.readings(map, geometry)?;
+    let Channel { values, .. } = own.readings(map, geometry, Wanted::ALL)?;
     let (stamps, at_s) = own.instants(map)?;
     let (at_s, values) = if own.every == 1 { (at_s, values) } else { thinned(&at_s, &values, own.every) };
     let (lead, mut instants) = master.instants(motor)?;

@@ -1,7 +1,7 @@
 //! One Parquet file: its leaves by name, their values in batches, checked against the footer.
 
 use std::fs::File;
-use std::iter::once;
+use std::iter::{once, repeat_n};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -24,6 +24,7 @@ use crate::pattern::nearest;
 use crate::positioned::{self, Positioned};
 use crate::source::Source;
 use crate::straight;
+use crate::wanted::Wanted;
 
 /// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
 const BATCH_ROWS: usize = 8192;
@@ -162,17 +163,31 @@ impl LogFile {
         self.all_rows(rows, names.first().copied().unwrap_or_default())
     }
 
-    /// Appends the numbers of a leaf, sample by sample; a null is NaN.
+    /// Appends the numbers of a leaf, sample by sample; a null is NaN. So is what is not wanted: row groups and pages
+    /// of which nothing is wanted are not read.
     ///
     /// # Errors
     /// As [`LogFile::each_batch`], and when the leaf holds no numbers.
-    pub(crate) fn append_numbers(&self, name: &str, into: &mut Growing) -> Result<(), Error> {
+    pub(crate) fn append_numbers(
+        &self,
+        name: &str,
+        wanted: Wanted<'_>,
+        into: &mut Growing,
+    ) -> Result<(), Error> {
         let leaf = self.leaf(name)?;
         self.want(&[leaf])?;
         let mut rows = 0;
+        // In a list a row is no sample.
+        let wanted = if leaf.is_listed { Wanted::ALL } else { wanted };
         for group in 0..self.footer.metadata().num_row_groups() {
+            let (declared, wanted) = (self.rows_of(group), wanted.from(rows));
+            if !wanted.any(0..declared) {
+                into.extend(repeat_n(f64::NAN, declared));
+                rows += declared;
+                continue;
+            }
             let (pages, before) = (self.pages(group, leaf)?, into.len());
-            if straight::append(self.source.file(), self.chunk(group, leaf), &pages, into) {
+            if straight::append((self.source.file(), self.chunk(group, leaf)), &pages, wanted, into) {
                 rows += into.len() - before;
                 continue;
             }
@@ -230,6 +245,11 @@ impl LogFile {
         let mask = ProjectionMask::leaves(builder.parquet_schema(), [leaf.index]);
         let reader = builder.with_projection(mask).with_row_groups(vec![group]).with_batch_size(BATCH_ROWS);
         reader.build().map_err(|e| self.decode(leaf, group, e.to_string()))
+    }
+
+    /// Rows that a row group declares.
+    fn rows_of(&self, group: usize) -> usize {
+        usize::try_from(self.footer.metadata().row_group(group).num_rows()).unwrap_or(0)
     }
 
     /// The pages of a chunk, none of which claims what cannot be.

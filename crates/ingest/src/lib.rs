@@ -41,6 +41,7 @@ mod spare;
 mod straight;
 pub mod tables;
 pub mod unit;
+mod wanted;
 pub mod write;
 
 pub use clock::Timeline;

@@ -25,6 +25,7 @@ use crate::schema::{ChannelMapping, Channels, Fact, Mapping, Role};
 use crate::screw::Geometry;
 use crate::sheet::Sheet;
 use crate::spare;
+use crate::wanted::Wanted;
 
 /// The files of one flight log: usually one.
 #[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -76,7 +77,9 @@ pub struct Actuator {
     pub segments: Vec<Range<usize>>,
     /// Mean temperature, °C.
     pub temperature_c: Option<f64>,
-    /// Share of samples without δX.
+    /// Samples that no condition leaves: NaN in every channel.
+    pub apart: usize,
+    /// Share of the other samples without δX.
     pub missing_share: f64,
     /// What each channel looked like before anything was made of it: motor, screw, load.
     pub quality: [Quality; 3],
@@ -422,16 +425,20 @@ impl Log {
         if let Some(normalized) = &self.normalized {
             return normalized.actuator(&self.main.files[0], at.position.clone(), geometry);
         }
-        let (motor, master, mut flags) = self.motor(at, channels, geometry)?;
-        let read = |role: Role| self.follower(role, at, channels, geometry, &master);
-        let (screw, screw_flags) = read(Role::Screw)?;
-        let (load, load_flags) = read(Role::Load)?;
-        let temperature = channels.temperature.as_ref().and_then(|_| read(Role::Temperature).ok());
+        let Lead { channel: motor, sampling, map, selection, mut flags } =
+            self.motor(at, channels, geometry)?;
+        let master = (sampling, map);
+        let read =
+            |role: Role, from: &Selection| self.follower(role, at, channels, geometry, (&master, from));
+        let (screw, screw_flags) = read(Role::Screw, &selection)?;
+        let (load, load_flags) = read(Role::Load, &selection)?;
+        // The mean of the flight, whatever counts of it.
+        let whole = Selection::whole(&master.0.line);
+        let temperature = channels.temperature.as_ref().and_then(|_| read(Role::Temperature, &whole).ok());
         flags.extend(screw_flags.into_iter().chain(load_flags));
-        let line = &master.0.line;
-        let segments = self.selected(at, channels, geometry, &master)?;
-        let read = Read { motor, screw, load, is_relative: channels.is_relative(), segments };
-        Ok(finish(at.position.clone(), read, line, temperature.and_then(|t| mean(&t.0.values)), flags))
+        let read = Read { motor, screw, load, is_relative: channels.is_relative(), selection };
+        let temperature_c = temperature.and_then(|(read, _)| mean(&read.values));
+        Ok(finish(at.position.clone(), read, &master.0.line, temperature_c, flags))
     }
 
     /// The stretches of the motor's clock in which every condition holds.
@@ -441,8 +448,11 @@ impl Log {
         channels: &Channels,
         geometry: Geometry,
         master: &(Sampling<'_>, &ChannelMapping),
-    ) -> Result<Vec<Range<usize>>, Error> {
+    ) -> Result<Selection, Error> {
         let line = &master.0.line;
+        if channels.when.is_empty() {
+            return Ok(Selection::whole(line));
+        }
         let mut segments = line.segments.clone();
         for condition in &channels.when {
             let map = condition.channel();
@@ -454,11 +464,12 @@ impl Log {
             // A state stands until the next one comes, as a slow load does.
             let position = at.position.as_str();
             let one = Follower { sheet, map: &map, name: &name, position, role: Role::Load };
-            let Channel { mut values, .. } = channel::follow(&master.0, master.1, &one, geometry)?;
+            let Channel { mut values, .. } =
+                channel::follow(&master.0, master.1, &one, geometry, Wanted::ALL)?;
             hold(&mut values, &line.segments, line.step_s);
             segments = condition.within(&values, &segments, line.step_s);
         }
-        Ok(segments)
+        Ok(Selection::of(segments, line))
     }
 
     /// The motor position, whose clock all other channels follow.
@@ -473,17 +484,20 @@ impl Log {
         let is_only = choices.len() == 1;
         for (k, (map, name)) in choices.into_iter().enumerate() {
             let sampling = Sampling::new(self.sheet_of(map)?, map, &name, at.position.as_str())?;
-            let read = sampling.own(map, geometry)?;
-            let lives = is_only || channel::lives(&read.values);
+            let master = (sampling, map);
+            let selection = self.selected(at, channels, geometry, &master)?;
+            let read = selection.cut(master.0.own(map, geometry, selection.wanted())?);
+            let lives = is_only || channel::lives(&read.values, selection.apart);
             if lives || found.is_none() {
-                found = Some((read, (sampling, map), alternative(Role::Motor, k)));
+                let flags = alternative(Role::Motor, k);
+                found = Some(Lead { channel: read, sampling: master.0, map, selection, flags });
             }
             if lives {
                 break;
             }
         }
         let lead = found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
-        self.not_empty(&lead.0.values, lead.1.0.column())?;
+        self.not_empty(&lead.channel.values, lead.sampling.column(), &lead.selection)?;
         Ok(lead)
     }
 
@@ -494,7 +508,7 @@ impl Log {
         at: &PositionColumns,
         channels: &Channels,
         geometry: Geometry,
-        master: &(Sampling<'_>, &ChannelMapping),
+        (master, selection): (&(Sampling<'_>, &ChannelMapping), &Selection),
     ) -> Result<(Channel, Vec<String>), Error> {
         let mut found: Option<(Channel, usize)> = None;
         let mut column = String::new();
@@ -503,8 +517,9 @@ impl Log {
         for (k, (map, name)) in choices.into_iter().enumerate() {
             let sheet = self.sheet_of(map)?;
             let one = Follower { sheet, map, name: &name, position: at.position.as_str(), role };
-            let read = channel::follow(&master.0, master.1, &one, geometry)?;
-            let lives = is_only || channel::lives(&read.values);
+            let read = channel::follow(&master.0, master.1, &one, geometry, selection.wanted())?;
+            let read = selection.cut(read);
+            let lives = is_only || channel::lives(&read.values, selection.apart);
             if lives || found.is_none() {
                 column = name;
                 found = Some((read, k));
@@ -514,7 +529,7 @@ impl Log {
             }
         }
         let (read, k) = found.unwrap_or_else(|| (Vec::new().into(), 0));
-        self.not_empty(&read.values, &column)?;
+        self.not_empty(&read.values, &column, selection)?;
         Ok((read, alternative(role, k)))
     }
 
@@ -539,8 +554,9 @@ impl Log {
         })
     }
 
-    fn not_empty(&self, values: &[f64], column: &str) -> Result<(), Error> {
-        if values.iter().any(|v| v.is_finite()) {
+    /// Whether a column holds a value. One that holds none where conditions are met may hold some elsewhere.
+    fn not_empty(&self, values: &[f64], column: &str, selection: &Selection) -> Result<(), Error> {
+        if !selection.is_whole || values.iter().any(|v| v.is_finite()) {
             return Ok(());
         }
         let (column, rows) = (column.to_owned(), values.len() as u64);
@@ -548,8 +564,56 @@ impl Log {
     }
 }
 
-/// The motor position's values, how they lie in time and by which mapping, and doubts about them.
-type Lead<'s, 'c> = (Channel, (Sampling<'s>, &'c ChannelMapping), Vec<String>);
+/// The motor position's values, how they lie in time and by which mapping, what counts of them, and doubts about them.
+struct Lead<'s, 'c> {
+    channel: Channel,
+    sampling: Sampling<'s>,
+    map: &'c ChannelMapping,
+    selection: Selection,
+    flags: Vec<String>,
+}
+
+/// The stretches of the motor's clock that count.
+#[derive(Debug)]
+pub(crate) struct Selection {
+    segments: Vec<Range<usize>>,
+    /// Samples that no condition leaves.
+    apart: usize,
+    /// Whether nothing was asked.
+    is_whole: bool,
+}
+
+impl Selection {
+    /// All that is unbroken.
+    pub(crate) fn whole(line: &Timeline) -> Self {
+        Self { segments: line.segments.clone(), apart: 0, is_whole: true }
+    }
+
+    fn of(segments: Vec<Range<usize>>, line: &Timeline) -> Self {
+        let samples = line.kept.as_ref().map_or(line.rows, Vec::len);
+        let apart = samples - segments.iter().map(Range::len).sum::<usize>();
+        Self { segments, apart, is_whole: false }
+    }
+
+    fn wanted(&self) -> Wanted<'_> {
+        if self.is_whole { Wanted::ALL } else { Wanted::of(&self.segments) }
+    }
+
+    /// Takes out what does not count, so that nothing is made of it however the file lies in pages.
+    fn cut(&self, mut channel: Channel) -> Channel {
+        if self.is_whole {
+            return channel;
+        }
+        let mut counted = 0;
+        for segment in &self.segments {
+            channel.values[counted..segment.start].fill(f64::NAN);
+            counted = segment.end;
+        }
+        channel.values[counted..].fill(f64::NAN);
+        channel.seen = None;
+        channel
+    }
+}
 
 /// What a sheet's files say of their flight.
 fn facts(sheet: &Sheet, map: &crate::schema::IdentityMapping) -> Result<Facts, Error> {
@@ -596,8 +660,7 @@ pub(crate) struct Read {
     pub(crate) screw: Channel,
     pub(crate) load: Channel,
     pub(crate) is_relative: bool,
-    /// The stretches that count.
-    pub(crate) segments: Vec<Range<usize>>,
+    pub(crate) selection: Selection,
 }
 
 /// Looks at the channels, leaves out what a frozen one claims, and makes δX.
@@ -608,10 +671,11 @@ pub(crate) fn finish(
     temperature_c: Option<f64>,
     mut flags: Vec<String>,
 ) -> Actuator {
-    let Read { motor, screw, load, is_relative, segments } = read;
+    let Read { motor, screw, load, is_relative, selection } = read;
+    let Selection { segments, apart, .. } = selection;
     let quality = [&motor, &screw, &load].map(|read| {
         let seen = read.seen.unwrap_or_else(|| Scan::of(&read.values));
-        Quality::seen(&read.values, &seen, line.step_s)
+        Quality::seen(&read.values, &seen, line.step_s, apart)
     });
     let (mut motor_m, mut dx_m, mut load_n) = (motor.values, screw.values, load.values);
     flags.extend(quality::doubts(&quality, line.step_s));
@@ -627,7 +691,8 @@ pub(crate) fn finish(
     Actuator {
         position,
         step_s: line.step_s,
-        missing_share: missing as f64 / dx_m.len().max(1) as f64,
+        missing_share: (missing - apart) as f64 / (dx_m.len() - apart).max(1) as f64,
+        apart,
         motor_m,
         dx_m,
         load_n,

@@ -19,6 +19,7 @@ use crate::quality::Quality;
 use crate::scan::Scan;
 use crate::schema::Fact;
 use crate::screw::Geometry;
+use crate::wanted::Wanted;
 use crate::write::{Column, Encoding, write_encoded};
 
 const VERSION: &str = "1";
@@ -34,6 +35,8 @@ pub(crate) struct Normalized {
     metres_per_radian: Option<f64>,
     temperature_c: Option<f64>,
     flags: Vec<String>,
+    /// Samples that no condition left.
+    apart: usize,
 }
 
 impl Normalized {
@@ -62,6 +65,7 @@ impl Normalized {
             segments: segments.ok_or_else(|| fail("its stretches cannot be read".into()))?,
             metres_per_radian: number("metres_per_radian"),
             temperature_c: number("temperature_c"),
+            apart: text("apart").and_then(|t| t.parse().ok()).unwrap_or(0),
             flags: text("flags").map(|t| t.split(' ').map(str::to_owned).collect()).unwrap_or_default(),
         }))
     }
@@ -84,7 +88,12 @@ impl Normalized {
         }
         let [motor, dx, load] = ["motor_m", "dx_m", "load_n"].map(|name| numbers(file, name));
         let read = [motor?, dx?, load?];
-        let quality = read.each_ref().map(|(values, seen)| Quality::seen(values, seen, self.step_s));
+        if read.iter().any(|(_, seen)| seen.missing < self.apart) {
+            let detail = format!("a channel lacks fewer than the {} samples that are left out", self.apart);
+            return Err(file.error(Fault::Normalized { detail }));
+        }
+        let quality =
+            read.each_ref().map(|(values, seen)| Quality::seen(values, seen, self.step_s, self.apart));
         let [motor_m, dx_m, load_n] = read.map(|(values, _)| values);
         if self.segments.iter().any(|s| s.start > s.end || s.end > dx_m.len()) {
             return Err(file.error(Fault::Normalized { detail: "a stretch lies beyond its rows".into() }));
@@ -92,6 +101,7 @@ impl Normalized {
         Ok(Actuator {
             position,
             step_s: self.step_s,
+            apart: self.apart,
             missing_share: quality[1].missing_share,
             quality,
             motor_m,
@@ -107,7 +117,7 @@ impl Normalized {
 
 fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, Scan), Error> {
     let mut values = Growing::with_room(file.rows().min(1 << 26), None);
-    file.append_numbers(name, &mut values)?;
+    file.append_numbers(name, Wanted::ALL, &mut values)?;
     Ok(values.whole())
 }
 
@@ -161,6 +171,7 @@ fn footer(
         ("segments", segments.join(" ")),
         ("metres_per_radian", number(geometry.metres_per_radian())),
         ("temperature_c", number(channels.temperature_c)),
+        ("apart", channels.apart.to_string()),
         ("flags", channels.flags.join(" ")),
         ("units", "time_s: s since the first sample; motor_m, dx_m: m at the screw; load_n: N".to_owned()),
     ];

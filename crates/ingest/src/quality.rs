@@ -10,7 +10,7 @@ use crate::schema::Role;
 /// One channel, described.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quality {
-    /// Samples, missing ones included.
+    /// Samples that count, missing ones included.
     pub samples: usize,
     /// Share of samples without a value.
     pub missing_share: f64,
@@ -35,23 +35,24 @@ pub struct Quality {
 impl Quality {
     /// Describes a channel; missing samples are NaN.
     pub fn of(values: &[f64], step_s: f64) -> Self {
-        Self::seen(values, &Scan::of(values), step_s)
+        Self::seen(values, &Scan::of(values), step_s, 0)
     }
 
-    /// As [`Quality::of`], of a channel that was looked at already.
-    pub(crate) fn seen(values: &[f64], seen: &Scan, step_s: f64) -> Self {
-        let samples = values.len();
+    /// As [`Quality::of`], of a channel that was looked at already; so many of its samples, all missing, are not asked
+    /// for.
+    pub(crate) fn seen(values: &[f64], seen: &Scan, step_s: f64, apart: usize) -> Self {
+        let (samples, missing) = (values.len() - apart, seen.missing - apart);
         let share = |count: usize| count as f64 / samples.max(1) as f64;
         let resolution = resolution(values, seen);
         Self {
             samples,
-            missing_share: share(seen.missing),
+            missing_share: share(missing),
             min: seen.min,
             max: seen.max,
             resolution,
             longest_run: seen.longest_run,
             frozen_share: share(seen.longest_run),
-            rate_hz: (step_s * if seen.missing == 0 { 1 } else { usual_step(values) } as f64).recip(),
+            rate_hz: (step_s * if missing == 0 { 1 } else { usual_step(values) } as f64).recip(),
             saturated_share: share(saturated(values, seen)),
             spikes: spikes(values, resolution, seen.largest_leap),
         }

@@ -23,6 +23,7 @@ use crate::schema::{ClockMapping, Epoch, Layout};
 use crate::screw::ToSi;
 use crate::spare;
 use crate::unit::TimeUnit;
+use crate::wanted::Wanted;
 
 /// The files of one kind that belong to one flight.
 #[derive(Debug)]
@@ -105,17 +106,25 @@ impl Sheet {
         std::iter::once(&samples.leaf).chain(rows).chain(clock).cloned().collect()
     }
 
-    /// As numbers, brought to SI or raw, and what was seen of them; a null is NaN.
+    /// As numbers, brought to SI or raw, and what was seen of them; a null is NaN. Where a sample is a row, so may be
+    /// those that are not wanted.
     ///
     /// # Errors
     /// When a leaf is missing, holds no numbers, or cannot be decoded.
-    pub(crate) fn numbers(&self, samples: &Samples, to_si: Option<ToSi>) -> Result<(Vec<f64>, Scan), Error> {
+    pub(crate) fn numbers(
+        &self,
+        samples: &Samples,
+        to_si: Option<ToSi>,
+        wanted: Wanted<'_>,
+    ) -> Result<(Vec<f64>, Scan), Error> {
         // The footer may lie about the rows; what it claims is a hint, not a promise.
         let room = if samples.rows.is_empty() { self.rows().min(1 << 26) } else { 0 };
         let mut values = Growing::with_room(room, to_si);
         if samples.rows.is_empty() {
             for file in &self.files {
-                file.append_numbers(&samples.leaf, &mut values)?;
+                let wanted =
+                    if self.is_listed(&samples.leaf) { Wanted::ALL } else { wanted.from(values.len()) };
+                file.append_numbers(&samples.leaf, wanted, &mut values)?;
             }
             return Ok(values.whole());
         }
@@ -217,7 +226,7 @@ impl Sheet {
             && !self.is_listed(&samples.leaf)
         {
             let mut reals = Growing::with_room(self.rows().min(1 << 26), None);
-            self.files.iter().try_for_each(|file| file.append_numbers(column, &mut reals))?;
+            self.files.iter().try_for_each(|file| file.append_numbers(column, Wanted::ALL, &mut reals))?;
             let mut reader = Reader::new(column, ticks, 0);
             reader.take_reals(reals.whole().0);
             return Ok(reader.stamps());

@@ -18,6 +18,7 @@ use crate::coded::{Codes, SPARE_BYTES, unsigned};
 use crate::growing::{BATCH, Growing};
 use crate::page::Page;
 use crate::positioned;
+use crate::wanted::Wanted;
 
 /// Buffers above this are given back after use, bytes: pages are about a mebibyte.
 const KEPT_BYTES: usize = 4 << 20;
@@ -69,13 +70,18 @@ impl Form {
     }
 }
 
-/// Appends every number of a chunk, of which these are the pages; a null is NaN. False, and nothing appended, where
-/// the chunk must be left to Parquet's own reader.
-pub(crate) fn append(file: &File, chunk: &ColumnChunkMetaData, pages: &[Page], into: &mut Growing) -> bool {
+/// Appends every number of a chunk, of which these are the pages; a null is NaN, and so is all of a page of which
+/// nothing is wanted. False, and nothing appended, where the chunk must be left to Parquet's own reader.
+pub(crate) fn append(
+    (file, chunk): (&File, &ColumnChunkMetaData),
+    pages: &[Page],
+    wanted: Wanted<'_>,
+    into: &mut Growing,
+) -> bool {
     let before = into.mark();
     let done = Form::of(chunk).and_then(|form| {
         ROOM.with_borrow_mut(|room| {
-            let done = room.append(file, pages, form, into);
+            let done = room.append((file, form), pages, wanted, into);
             room.tidy();
             done
         })
@@ -87,15 +93,28 @@ pub(crate) fn append(file: &File, chunk: &ColumnChunkMetaData, pages: &[Page], i
 }
 
 impl Room {
-    fn append(&mut self, file: &File, pages: &[Page], form: Form, into: &mut Growing) -> Option<()> {
+    fn append(
+        &mut self,
+        (file, form): (&File, Form),
+        pages: &[Page],
+        wanted: Wanted<'_>,
+        into: &mut Growing,
+    ) -> Option<()> {
         self.dictionary.clear();
+        let begun = into.len();
         for page in pages {
-            self.read(file, page)?;
             if page.header.type_ == PageType::DICTIONARY_PAGE {
+                self.read(file, page)?;
                 self.take_dictionary(&page.header, form)?;
                 continue;
             }
             let data = Data::of(&page.header, form)?;
+            let first = into.len() - begun;
+            if !wanted.any(first..first + data.values) {
+                into.extend(std::iter::repeat_n(f64::NAN, data.values));
+                continue;
+            }
+            self.read(file, page)?;
             self.unpack(&page.header, data.apart, form.is_zstd && data.is_compressed)?;
             let (levels, body) = data.parted(&self.page)?;
             if data.coding == Coding::Codes {
@@ -467,7 +486,7 @@ mod tests {
         let all_straight = footer.row_groups().iter().all(|group| {
             let before = read.len();
             let pages = bounded(&file, group.column(0), group.num_rows()).unwrap();
-            let straight = append(&file, group.column(0), &pages, &mut read);
+            let straight = append((&file, group.column(0)), &pages, Wanted::ALL, &mut read);
             straight || read.len() != before
         });
         all_straight.then(|| read.whole().0)

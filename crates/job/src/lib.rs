@@ -19,4 +19,4 @@ pub use flight::{Opened, Stamp};
 pub use part::Part;
 
 /// Changes with every change to the method that can move a number; part of every configuration digest.
-pub const METHOD_VERSION: u32 = 5;
+pub const METHOD_VERSION: u32 = 6;

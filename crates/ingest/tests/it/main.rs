@@ -5,4 +5,5 @@
 mod clocks;
 mod layouts;
 mod lying;
+mod selected;
 mod writers;
