@@ -41,6 +41,16 @@ impl From<Vec<f64>> for Channel {
     }
 }
 
+/// What the clock of a channel depends on: channels of one sheet that agree in it share one.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ClockKey {
+    listed_leaf: Option<String>,
+    rows: Vec<(String, String)>,
+    time_column: Option<String>,
+    shift_s: f64,
+    rate_hz: Option<f64>,
+}
+
 /// How the samples of a channel lie in time.
 #[derive(Debug)]
 pub(crate) struct Sampling<'s> {
@@ -82,6 +92,18 @@ impl<'s> Sampling<'s> {
             shift_s: map.shift_s(),
             every: 1,
             line: clock::even(0, 1.0),
+        }
+    }
+
+    /// What its clock depends on, within its sheet.
+    pub(crate) fn clock_key(&self, map: &ChannelMapping) -> ClockKey {
+        let Samples { leaf, rows } = &self.samples;
+        ClockKey {
+            listed_leaf: self.sheet.is_listed(leaf).then(|| leaf.clone()),
+            rows: rows.clone(),
+            time_column: self.time_column.clone(),
+            shift_s: self.shift_s,
+            rate_hz: map.rate_hz,
         }
     }
 
@@ -176,7 +198,7 @@ impl<'s> Sampling<'s> {
             let wanted = if self.line.kept.is_none() { wanted } else { Wanted::ALL };
             let (values, seen) = self.sheet.numbers(&self.samples, Some(si), wanted)?;
             self.same_count(values.len(), self.column())?;
-            let seen = self.line.kept.is_none().then_some(seen);
+            let seen = seen.filter(|_| self.line.kept.is_none());
             return Ok(Channel { values: kept(values), seen });
         }
         let read = self.raw(&self.samples)?;

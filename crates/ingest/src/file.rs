@@ -1,7 +1,7 @@
 //! One Parquet file: its leaves by name, their values in batches, checked against the footer.
 
 use std::fs::File;
-use std::iter::{once, repeat_n};
+use std::iter::once;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -182,7 +182,7 @@ impl LogFile {
         for group in 0..self.footer.metadata().num_row_groups() {
             let (declared, wanted) = (self.rows_of(group), wanted.from(rows));
             if !wanted.any(0..declared) {
-                into.extend(repeat_n(f64::NAN, declared));
+                into.leave_out(declared);
                 rows += declared;
                 continue;
             }

@@ -12,20 +12,26 @@ pub(crate) const BATCH: usize = 2048;
 pub(crate) struct Growing {
     to_si: Option<ToSi>,
     values: Vec<f64>,
-    scanner: Scanner,
+    /// None where nobody wants to know.
+    scanner: Option<Scanner>,
 }
 
 /// How far a column was, to come back to.
 #[derive(Debug)]
 pub(crate) struct Mark {
     values: usize,
-    scanner: Scanner,
+    scanner: Option<Scanner>,
 }
 
 impl Growing {
     /// An empty column with room for so many values, which become SI or stay raw.
     pub(crate) fn with_room(values: usize, to_si: Option<ToSi>) -> Self {
-        Self { to_si, values: spare::take(values), scanner: Scanner::new() }
+        Self { to_si, values: spare::take(values), scanner: None }
+    }
+
+    /// The same, looked at as it grows.
+    pub(crate) fn looked_at(self) -> Self {
+        Self { scanner: Some(Scanner::new()), ..self }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -36,15 +42,20 @@ impl Growing {
         Mark { values: self.values.len(), scanner: self.scanner.clone() }
     }
 
+    /// Leaves out some values: they are missing.
+    pub(crate) fn leave_out(&mut self, values: usize) {
+        self.values.resize(self.values.len() + values, f64::NAN);
+    }
+
     /// Forgets what was added since.
     pub(crate) fn back_to(&mut self, mark: Mark) {
         self.values.truncate(mark.values);
         self.scanner = mark.scanner;
     }
 
-    /// The numbers, and what was seen of them.
-    pub(crate) fn whole(self) -> (Vec<f64>, Scan) {
-        let seen = self.scanner.end(&self.values);
+    /// The numbers, and what was seen of them where they were looked at.
+    pub(crate) fn whole(self) -> (Vec<f64>, Option<Scan>) {
+        let seen = self.scanner.map(|scanner| scanner.end(&self.values));
         (self.values, seen)
     }
 }
@@ -56,7 +67,9 @@ impl Extend<f64> for Growing {
         if let Some(to_si) = self.to_si {
             to_si.apply_to_all(&mut self.values[before..]);
         }
-        self.scanner.advance(&self.values);
+        if let Some(scanner) = &mut self.scanner {
+            scanner.advance(&self.values);
+        }
     }
 }
 
@@ -66,13 +79,13 @@ mod tests {
 
     #[test]
     fn what_is_taken_back_was_never_seen() {
-        let mut column = Growing::with_room(4, None);
+        let mut column = Growing::with_room(4, None).looked_at();
         column.extend((0..50).map(f64::from));
         let mark = column.mark();
         column.extend([f64::NAN, 1e9, f64::NAN].into_iter().cycle().take(40));
         column.back_to(mark);
         column.extend((50..99).map(f64::from));
         let wanted: Vec<f64> = (0..99).map(f64::from).collect();
-        assert_eq!(column.whole(), (wanted.clone(), Scan::of(&wanted)));
+        assert_eq!(column.whole(), (wanted.clone(), Some(Scan::of(&wanted))));
     }
 }

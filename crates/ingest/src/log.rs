@@ -3,13 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use fleet::Position;
 use jiff::Timestamp;
 
-use crate::channel::{self, Channel, Follower, Sampling};
+use crate::channel::{self, Channel, ClockKey, Follower, Sampling};
 use crate::clock::{Origin, Repairs, Timeline};
 use crate::condition::Condition;
 use crate::digest::Digest;
@@ -104,6 +103,17 @@ pub struct Log {
     mapping: Arc<Mapping>,
     normalized: Option<Normalized>,
     names: OnceLock<BTreeSet<String>>,
+    /// What the conditions left of the actuator before: most ask the same of every one.
+    selected: Mutex<Option<(Asked, Selection)>>,
+}
+
+/// Conditions on columns of this log, and the clock they were asked on.
+#[derive(Debug, PartialEq)]
+struct Asked {
+    when: Vec<Condition>,
+    columns: Vec<String>,
+    group: Option<String>,
+    clock: ClockKey,
 }
 
 impl Log {
@@ -129,7 +139,8 @@ impl Log {
         };
         let normalized = Normalized::of(first)?;
         let mapping = Arc::clone(mapping);
-        let mut log = Self { main, groups, mapping, normalized, names: OnceLock::new() };
+        let (names, selected) = (OnceLock::new(), Mutex::new(None));
+        let mut log = Self { main, groups, mapping, normalized, names, selected };
         log.order_pieces()?;
         Ok(log)
     }
@@ -144,7 +155,7 @@ impl Log {
             }
         }
         self.mapping = Arc::clone(mapping);
-        self.names = OnceLock::new();
+        (self.names, self.selected) = (OnceLock::new(), Mutex::new(None));
         self
     }
 
@@ -449,10 +460,33 @@ impl Log {
         geometry: Geometry,
         master: &(Sampling<'_>, &ChannelMapping),
     ) -> Result<Selection, Error> {
-        let line = &master.0.line;
         if channels.when.is_empty() {
-            return Ok(Selection::whole(line));
+            return Ok(Selection::whole(&master.0.line));
         }
+        let column = |when: &Condition| Pattern::new(&when.column).column_for(at.position.as_str());
+        let asked = Asked {
+            when: channels.when.clone(),
+            columns: channels.when.iter().map(column).collect(),
+            group: master.1.group.clone(),
+            clock: master.0.clock_key(master.1),
+        };
+        let mut before = self.selected.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, selection)) = before.as_ref().filter(|(known, _)| *known == asked) {
+            return Ok(selection.clone());
+        }
+        let selection = self.select(at, channels, geometry, master)?;
+        *before = Some((asked, selection.clone()));
+        Ok(selection)
+    }
+
+    fn select(
+        &self,
+        at: &PositionColumns,
+        channels: &Channels,
+        geometry: Geometry,
+        master: &(Sampling<'_>, &ChannelMapping),
+    ) -> Result<Selection, Error> {
+        let line = &master.0.line;
         let mut segments = line.segments.clone();
         for condition in &channels.when {
             let map = condition.channel();
@@ -574,7 +608,7 @@ struct Lead<'s, 'c> {
 }
 
 /// The stretches of the motor's clock that count.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Selection {
     segments: Vec<Range<usize>>,
     /// Samples that no condition leaves.

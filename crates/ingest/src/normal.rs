@@ -116,9 +116,11 @@ impl Normalized {
 }
 
 fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, Scan), Error> {
-    let mut values = Growing::with_room(file.rows().min(1 << 26), None);
+    let mut values = Growing::with_room(file.rows().min(1 << 26), None).looked_at();
     file.append_numbers(name, Wanted::ALL, &mut values)?;
-    Ok(values.whole())
+    let (values, seen) = values.whole();
+    let seen = seen.unwrap_or_else(|| Scan::of(&values));
+    Ok((values, seen))
 }
 
 fn segments_from(text: &str) -> Option<Vec<Range<usize>>> {

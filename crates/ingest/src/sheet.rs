@@ -106,8 +106,8 @@ impl Sheet {
         std::iter::once(&samples.leaf).chain(rows).chain(clock).cloned().collect()
     }
 
-    /// As numbers, brought to SI or raw, and what was seen of them; a null is NaN. Where a sample is a row, so may be
-    /// those that are not wanted.
+    /// As numbers, brought to SI or raw, and what was seen of them where all are wanted; a null is NaN. Where a sample is
+    /// a row, so may be those that are not wanted.
     ///
     /// # Errors
     /// When a leaf is missing, holds no numbers, or cannot be decoded.
@@ -116,10 +116,13 @@ impl Sheet {
         samples: &Samples,
         to_si: Option<ToSi>,
         wanted: Wanted<'_>,
-    ) -> Result<(Vec<f64>, Scan), Error> {
+    ) -> Result<(Vec<f64>, Option<Scan>), Error> {
         // The footer may lie about the rows; what it claims is a hint, not a promise.
         let room = if samples.rows.is_empty() { self.rows().min(1 << 26) } else { 0 };
         let mut values = Growing::with_room(room, to_si);
+        if to_si.is_some() && wanted.are_all() {
+            values = values.looked_at();
+        }
         if samples.rows.is_empty() {
             for file in &self.files {
                 let wanted =

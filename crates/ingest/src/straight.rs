@@ -111,7 +111,7 @@ impl Room {
             let data = Data::of(&page.header, form)?;
             let first = into.len() - begun;
             if !wanted.any(first..first + data.values) {
-                into.extend(std::iter::repeat_n(f64::NAN, data.values));
+                into.leave_out(data.values);
                 continue;
             }
             self.read(file, page)?;
@@ -286,7 +286,7 @@ fn append_codes(
         if run.is_present {
             codes.append(run.values, dictionary, into)?;
         } else {
-            into.extend(std::iter::repeat_n(f64::NAN, run.values));
+            into.leave_out(run.values);
         }
     }
     Some(())
@@ -311,7 +311,7 @@ impl Numbers<'_> {
                 self.append_from(from, run.values, count, into)?;
                 from += run.values;
             } else {
-                into.extend(std::iter::repeat_n(f64::NAN, run.values));
+                into.leave_out(run.values);
             }
         }
         Some(())

@@ -23,6 +23,11 @@ impl<'a> Wanted<'a> {
         Self { stretches: Some(stretches), before: 0 }
     }
 
+    /// Whether every row is.
+    pub(crate) fn are_all(self) -> bool {
+        self.stretches.is_none()
+    }
+
     /// The same, counted from a row on.
     pub(crate) fn from(self, row: usize) -> Self {
         Self { before: self.before + row, ..self }

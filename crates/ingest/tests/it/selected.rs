@@ -171,3 +171,40 @@ fn a_condition_that_is_never_met_leaves_nothing() {
     assert!(read.segments.is_empty() && read.motor_m.len() == ROWS && read.apart == ROWS);
     assert!(read.motor_m.iter().chain(&read.dx_m).all(|v| v.is_nan()) && read.missing_share == 0.0);
 }
+
+/// Each actuator is asked its own column where the condition names one, and all the same where it does not.
+#[test]
+fn conditions_are_asked_of_each_actuator() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("N1_20261119T041300Z.parquet");
+    let column = |value: fn(usize) -> f64| -> ArrayRef {
+        Arc::new(Float64Array::from((0..100).map(value).collect::<Vec<_>>()))
+    };
+    let mut columns = vec![("t".to_owned(), column(|k| k as f64 * 0.01))];
+    for (position, mode) in [("a", column(|k| (k / 50) as f64)), ("b", column(|k| (k / 90) as f64))] {
+        for channel in ["m", "s", "f"] {
+            columns.push((format!("{position}_{channel}"), column(|k| k as f64)));
+        }
+        columns.push((format!("{position}_mode"), mode));
+    }
+    let batch = RecordBatch::try_from_iter(columns).unwrap();
+    let mut writer = ArrowWriter::try_new(File::create(&file).unwrap(), batch.schema(), None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+    let mut mapping = mapping(
+        channel("{position}_m", Unit::Metre),
+        channel("{position}_s", Unit::Metre),
+        channel("{position}_f", Unit::Newton),
+    );
+    let segments = |mapping: &Mapping| -> Vec<Vec<Range<usize>>> {
+        let log = Log::open(&Files::one(&file), &Arc::new(mapping.clone())).unwrap();
+        let positions = log.positions(&mapping.channels, None).unwrap();
+        let read = |at| log.actuator(at, &mapping.channels, Geometry::Linear { lead_m_per_rev: None });
+        positions.iter().map(|at| read(at).unwrap().segments).collect()
+    };
+    let when = |column: &str| Condition { column: column.into(), equals: vec![1.0], ..Condition::default() };
+    mapping.channels.when = vec![when("{position}_mode")];
+    assert_eq!(segments(&mapping), [vec![50..100], vec![90..100]]);
+    mapping.channels.when = vec![when("a_mode")];
+    assert_eq!(segments(&mapping), [vec![50..100], vec![50..100]]);
+}
