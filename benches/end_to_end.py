@@ -4,8 +4,8 @@
     cargo build --release --locked
     python benches/end_to_end.py target/release/freeplay
 
-Makes wide logs (eight actuators x a million rows each, plain values under zstd, the layout other programs write),
-then lets Freeplay, a reader and the strongest Python peer go over them in turn, several rounds in one session, each
+Makes wide logs (eight actuators x a million rows each, plain values under zstd, the layout other programs write, and
+the same once more as codes of dictionaries, which pyarrow writes unless told otherwise), then lets Freeplay, a reader and the strongest Python peer go over them in turn, several rounds in one session, each
 in a process of its own. CPU seconds and peak memory are the operating system's account of that process; Python's are
 less its start and imports. Prints Markdown; times on a busy machine move together, ratios less.
 """
@@ -61,7 +61,10 @@ def make(freeplay, folder, flights, rows, actuators):
     for log in logs:
         table = as_doubles(pq.read_table(log)).replace_schema_metadata(identity(log))
         pq.write_table(table, log, compression="zstd", compression_level=1, use_dictionary=False, row_group_size=131072)
-    return logs
+        # Unless told otherwise, pyarrow writes values as codes of dictionaries.
+        copy = folder / "coded" / log.name
+        copy.parent.mkdir(exist_ok=True)
+        pq.write_table(table, copy, compression="zstd")
 
 
 def identity(log):
@@ -185,6 +188,11 @@ def contestants(args, folder, logs, normalized):
         "freeplay, midrange": lambda: run(args.freeplay, folder, theirs, "midrange", 1),
         "freeplay, contact, two workers": lambda: run(args.freeplay, folder, theirs, "contact", 2),
     }
+    codes = sorted((folder / "coded").glob("*.parquet"))
+    pattern = str(folder / "coded" / "*.parquet")
+    for reader in ("polars", "pyarrow"):
+        calls[f"{reader} reads codes"] = lambda r=reader: peers(r, codes, columns, positions, 1)
+    calls["freeplay, contact, from codes"] = lambda p=pattern: run(args.freeplay, folder, p, "contact", 1)
     for encoding, ours in normalized.items():
         files = [str(log) for log in sorted(ours.rglob("*.parquet"))]
         plain = ["motor_m", "dx_m", "load_n"]

@@ -137,9 +137,10 @@ fn contact_regression(bencher: Bencher) {
     let segments = std::slice::from_ref(&whole);
     let samples = Samples { step_s: 0.004, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
     let prior = Prior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
+    let mut room = contact::Room::default();
     bencher
         .counter(ItemsCount::new(OUT_OF_CACHE))
-        .bench_local(|| contact::estimate(black_box(&samples), &prior).unwrap());
+        .bench_local(|| contact::estimate_in(black_box(&samples), &prior, &mut room).unwrap());
 }
 
 #[divan::bench(sample_count = 30)]

@@ -192,11 +192,11 @@ widest! {
                 let screw = ways.moved(&screws.get(lane), motor[lane], load[lane]);
                 screws.set(lane, is_known[lane], screw);
             }
-            for lane in 0..Lanes::COUNT {
+            for (lane, is_known) in is_known.into_iter().enumerate() {
                 let at = lane * part + k;
-                found.force_n[at] = if is_known[lane] { screws.force_n[lane] } else { f64::NAN };
-                found.by_dry[at] = if is_known[lane] { screws.by_dry[lane] } else { 0.0 };
-                found.by_share_n[at] = if is_known[lane] { screws.by_share_n[lane] } else { 0.0 };
+                found.force_n[at] = if is_known { screws.force_n[lane] } else { f64::NAN };
+                found.by_dry[at] = if is_known { screws.by_dry[lane] } else { 0.0 };
+                found.by_share_n[at] = if is_known { screws.by_share_n[lane] } else { 0.0 };
             }
         }
         screws
@@ -208,7 +208,7 @@ widest! {
         for (&force_n, touch) in force_n.iter().zip(touches) {
             let (upper, lower) = (u8::from(force_n > 0.0), u8::from(force_n < 0.0));
             let firm = u8::from(force_n.abs() > firm_n);
-            *touch = Touch(upper * Touch::UPPER | lower * Touch::LOWER | firm * Touch::FIRM);
+            *touch = Touch((upper * Touch::UPPER) | (lower * Touch::LOWER) | (firm * Touch::FIRM));
         }
     }
 }
@@ -219,7 +219,7 @@ widest! {
         for (around, kept) in touches.array_windows::<KEPT>().zip(kept.iter_mut().skip(BEFORE)) {
             let here = around[BEFORE].0;
             let all = around[0].0 & around[1].0 & here & around[3].0;
-            let is_kept = (all & (Touch::UPPER | Touch::LOWER) != 0) & (here & !all & Touch::FIRM == 0);
+            let is_kept = all & (Touch::UPPER | Touch::LOWER) != 0 && here & !all & Touch::FIRM == 0;
             *kept = Touch(here * u8::from(is_kept));
         }
     }

@@ -174,6 +174,7 @@ fn a_condition_that_is_never_met_leaves_nothing() {
 
 /// Each actuator is asked its own column where the condition names one, and all the same where it does not.
 #[test]
+#[expect(clippy::single_range_in_vec_init, reason = "one stretch is a list of one")]
 fn conditions_are_asked_of_each_actuator() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("N1_20261119T041300Z.parquet");
