@@ -89,6 +89,11 @@ pub struct Actuator {
 }
 
 impl Actuator {
+    /// What δX looks like.
+    pub fn dx_quality(&self) -> Quality {
+        Quality::seen(&self.dx_m, &Scan::of(&self.dx_m), self.step_s, self.apart)
+    }
+
     /// Leaves the memory of its channels to the next actuator that this thread reads.
     pub fn reuse(self) {
         [self.motor_m, self.dx_m, self.load_n].into_iter().for_each(spare::give);

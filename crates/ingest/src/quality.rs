@@ -44,18 +44,24 @@ impl Quality {
         let (samples, missing) = (values.len() - apart, seen.missing - apart);
         let share = |count: usize| count as f64 / samples.max(1) as f64;
         let resolution = resolution(values, seen);
+        let longest_run = seen.longest_run.min(samples - missing);
         Self {
             samples,
             missing_share: share(missing),
             min: seen.min,
             max: seen.max,
             resolution,
-            longest_run: seen.longest_run,
-            frozen_share: share(seen.longest_run),
+            longest_run,
+            frozen_share: share(longest_run),
             rate_hz: (step_s * if missing == 0 { 1 } else { usual_step(values) } as f64).recip(),
             saturated_share: share(saturated(values, seen)),
             spikes: spikes(values, resolution, seen.largest_leap),
         }
+    }
+
+    /// Smallest and largest value; none where there is no value at all.
+    pub fn span(&self) -> Option<(f64, f64)> {
+        (self.min <= self.max).then_some((self.min, self.max))
     }
 
     /// Whether the channel never moves.

@@ -213,7 +213,10 @@ fn clock(a: &Actuator) -> String {
     let mended = if mended.is_empty() { String::new() } else { format!("; mended: {}", mended.join(", ")) };
     let rate_hz = a.step_s.recip();
     let doubt = if USUAL_RATES_HZ.contains(&rate_hz) { "" } else { " (is `clock.unit` right?)" };
-    format!("{rate_hz:.3} Hz{doubt}, {stretches}{mended}")
+    let kept = 1.0 - a.apart as f64 / a.dx_m.len().max(1) as f64;
+    let selected =
+        if a.apart > 0 { format!(", {:.1} % of the rows selected", 100.0 * kept) } else { String::new() };
+    format!("{rate_hz:.3} Hz{doubt}, {stretches}{selected}{mended}")
 }
 
 fn actuator(
@@ -261,7 +264,7 @@ fn actuator(
     let mut found = vec![
         describe(base("motor_position", motor, "m"), motor_seen, &said(&a, "motor")),
         describe(base("screw_position", screw, "m"), screw_seen, &said(&a, "screw")),
-        describe(base("screw − motor", screw, "m"), Quality::of(&a.dx_m, a.step_s), &[]),
+        describe(base("screw − motor", screw, "m"), a.dx_quality(), &[]),
         describe(base("load", load, "N"), load_seen, &said(&a, "load")),
     ];
     found[2].note = found[2].note.take().or(slope);
@@ -283,7 +286,11 @@ fn slope_note(slope: f64) -> String {
 }
 
 fn describe(base: Channel, q: Quality, doubts: &[&str]) -> Channel {
-    let still = if q.is_zero() {
+    let still = if q.samples == 0 {
+        Some("no sample is selected: nothing_selected".to_owned())
+    } else if q.span().is_none() {
+        Some("holds no value where it is selected: channel_constant".to_owned())
+    } else if q.is_zero() {
         Some("is always zero: channel_zero".to_owned())
     } else {
         q.is_constant().then(|| "never moves: channel_constant".to_owned())
@@ -291,8 +298,8 @@ fn describe(base: Channel, q: Quality, doubts: &[&str]) -> Channel {
     Channel {
         samples: q.samples as i64,
         missing_share: Some(q.missing_share),
-        min: Some(q.min),
-        max: Some(q.max),
+        min: q.span().map(|span| span.0),
+        max: q.span().map(|span| span.1),
         resolution: q.resolution,
         rate_hz: Some(q.rate_hz),
         frozen_share: Some(q.frozen_share),

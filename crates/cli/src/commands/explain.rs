@@ -263,10 +263,11 @@ fn quality(channels: &Actuator) -> String {
         .iter()
         .zip(&channels.quality)
         .map(|(name, q)| {
+            let value = |v: Option<f64>| v.map_or_else(table::dash, |v| format!("{v:.6}"));
             vec![
                 (*name).to_owned(),
-                format!("{:.6}", q.min),
-                format!("{:.6}", q.max),
+                value(q.span().map(|span| span.0)),
+                value(q.span().map(|span| span.1)),
                 q.resolution.map_or_else(table::dash, |r| format!("{r:.2e}")),
                 format!("{:.1}", q.rate_hz),
                 format!("{:.2}", q.missing_share * 100.0),
