@@ -55,7 +55,7 @@ impl Quality {
             frozen_share: share(longest_run),
             rate_hz: (step_s * if missing == 0 { 1 } else { usual_step(values) } as f64).recip(),
             saturated_share: share(saturated(values, seen)),
-            spikes: spikes(values, resolution, seen.largest_leap),
+            spikes: spikes(values, samples, resolution, seen.largest_leap),
         }
     }
 
@@ -165,12 +165,12 @@ fn mean_step(values: &[f64]) -> f64 {
     sum / count.max(1) as f64
 }
 
-/// How far a sample lies from the line between its neighbours, against the usual.
-fn spikes(values: &[f64], resolution: Option<f64>, largest_leap: f64) -> usize {
+/// Samples far from the line between their neighbours, against what is usual for those that count.
+fn spikes(values: &[f64], samples: usize, resolution: Option<f64>, largest_leap: f64) -> usize {
     const FAR: f64 = 50.0;
     const THINNED: usize = 4096;
     let leap = |w: &[f64]| leap(w[0], w[1], w[2]);
-    let every = (values.len() / THINNED).max(1);
+    let every = (samples / THINNED).max(1);
     let mut usual: Vec<f64> = values.windows(3).step_by(every).map(leap).filter(|d| *d > 0.0).collect();
     if usual.is_empty() {
         return 0;

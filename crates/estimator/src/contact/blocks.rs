@@ -278,7 +278,7 @@ struct Watch<'a> {
 
 impl<'a> Watch<'a> {
     fn over(samples: &'a Samples<'a>) -> Result<Self, Refusal> {
-        let of = |channel: &[f64]| Neighbours::of(channel).ok_or(Refusal::ChannelConstant);
+        let of = |channel: &[f64]| Neighbours::of(channel, samples.segments).ok_or(Refusal::ChannelConstant);
         of(samples.motor_m)?;
         Ok(Self { samples, dx: of(samples.dx_m)?, load: of(samples.load_n)? })
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// Steps between neighbours are looked at this many times over a flight.
+/// Steps between neighbours are looked at this many times over what counts of a flight.
 const LOOKS: usize = 4000;
 /// A sample is wild beyond this many times the step that nine in ten steps stay under.
 const WILD: f64 = 8.0;
@@ -17,11 +17,11 @@ pub(super) struct Neighbours {
 }
 
 impl Neighbours {
-    /// From the steps that are not zero; none when the channel never moves.
-    pub(super) fn of(values: &[f64]) -> Option<Self> {
-        let stride = (values.len() / LOOKS).max(1);
-        let mut steps: Vec<f64> =
-            values.windows(2).step_by(stride).map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
+    /// From the steps within segments that are not zero; none when the channel never moves.
+    pub(super) fn of(values: &[f64], segments: &[Range<usize>]) -> Option<Self> {
+        let stride = (segments.iter().map(Range::len).sum::<usize>() / LOOKS).max(1);
+        let pairs = segments.iter().flat_map(|segment| values[segment.clone()].windows(2).step_by(stride));
+        let mut steps: Vec<f64> = pairs.map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
         if steps.is_empty() {
             return None;
         }
@@ -44,5 +44,25 @@ impl Neighbours {
         }
         sorted[..count].sort_unstable_by(f64::total_cmp);
         count > 0 && (values[at] - sorted[count / 2]).abs() > self.leap
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    /// However little of a long log counts, its steps are known from as many looks as those of a short one.
+    #[test]
+    fn looks_fall_within_what_counts() {
+        let wave: Vec<f64> = (0..9000).map(|k| (f64::from(k) * 0.01).sin()).collect();
+        let mut long = vec![f64::NAN; 3_000_000];
+        let counts = 1_234_567..1_234_567 + wave.len();
+        long[counts.clone()].copy_from_slice(&wave);
+        let alone = Neighbours::of(&wave, std::slice::from_ref(&(0..wave.len()))).unwrap();
+        assert_eq!(
+            Neighbours::of(&long, std::slice::from_ref(&counts)).unwrap().leap.to_bits(),
+            alone.leap.to_bits()
+        );
     }
 }
