@@ -107,6 +107,11 @@ impl<'s> Sampling<'s> {
         }
     }
 
+    /// Whether the pages of its column hold the rows that are declared, where a row is a sample.
+    pub(crate) fn check_rows(&self) -> Result<(), Error> {
+        if self.samples.rows.is_empty() { self.sheet.check_pages(&self.samples.leaf) } else { Ok(()) }
+    }
+
     /// The column of the channel.
     pub(crate) fn column(&self) -> &str {
         self.samples.rows.first().map_or(&self.samples.leaf, |(_, name)| name)

@@ -76,6 +76,9 @@ impl<'p> Codes<'p> {
             return is_whole.then_some(Run::Packed { bytes, next: 0, left: count.checked_mul(8)? });
         }
         let (code, rest) = self.rest.split_at_checked(self.bits.div_ceil(8))?;
+        if rest.len() < SPARE_BYTES {
+            return None;
+        }
         self.rest = rest;
         let code = code.iter().rev().fold(0, |code, byte| code << 8 | usize::from(*byte));
         Some(Run::Same { code, left: count })
@@ -151,6 +154,7 @@ mod tests {
         assert_eq!(read(&[4, 0b11, 0xff, 0xff, 0xff, 0xff], &[8]), None);
         assert_eq!(read(&[3, 0b101, EIGHT[0]], &[16]), None);
         assert_eq!(read(&[3, 0, 1], &[1]), None);
+        assert_eq!(read(&[3, 5 << 1], &[5]), None);
         assert_eq!(read(&[33, 2, 0, 0, 0, 0], &[1]), None);
         assert_eq!(read(&[], &[1]), None);
     }

@@ -164,7 +164,7 @@ impl LogFile {
     }
 
     /// Appends the numbers of a leaf, sample by sample; a null is NaN. So is what is not wanted: row groups and pages
-    /// of which nothing is wanted are not read.
+    /// of which nothing is wanted are not unpacked.
     ///
     /// # Errors
     /// As [`LogFile::each_batch`], and when the leaf holds no numbers.
@@ -182,6 +182,9 @@ impl LogFile {
         for group in 0..self.footer.metadata().num_row_groups() {
             let (declared, wanted) = (self.rows_of(group), wanted.from(rows));
             if !wanted.any(0..declared) {
+                if declared > self.rows().saturating_sub(rows) {
+                    return self.all_rows(rows.saturating_add(declared), name);
+                }
                 into.leave_out(declared);
                 rows += declared;
                 continue;
@@ -245,6 +248,19 @@ impl LogFile {
         let mask = ProjectionMask::leaves(builder.parquet_schema(), [leaf.index]);
         let reader = builder.with_projection(mask).with_row_groups(vec![group]).with_batch_size(BATCH_ROWS);
         reader.build().map_err(|e| self.decode(leaf, group, e.to_string()))
+    }
+
+    /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
+    ///
+    /// # Errors
+    /// When they do not, or the leaf is missing.
+    pub(crate) fn check_pages(&self, name: &str) -> Result<(), Error> {
+        let leaf = self.leaf(name)?;
+        self.want(&[leaf])?;
+        let groups = 0..self.footer.metadata().num_row_groups();
+        let rows = groups.clone().fold(0_usize, |rows, group| rows.saturating_add(self.rows_of(group)));
+        groups.into_iter().try_for_each(|group| self.pages(group, leaf).map(drop))?;
+        self.all_rows(rows, name)
     }
 
     /// Rows that a row group declares.

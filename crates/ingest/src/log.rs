@@ -22,7 +22,7 @@ use crate::quality::{self, Quality};
 use crate::scan::{Scan, Span};
 use crate::schema::{ChannelMapping, Channels, Fact, Mapping, Role};
 use crate::screw::Geometry;
-use crate::sheet::Sheet;
+use crate::sheet::{Samples, Sheet};
 use crate::spare;
 use crate::wanted::Wanted;
 
@@ -112,11 +112,11 @@ pub struct Log {
     selected: Mutex<Option<(Asked, Selection)>>,
 }
 
-/// Conditions on columns of this log, and the clock they were asked on.
+/// Conditions, which samples and stamps of this log they were asked of, and the clock they were asked on.
 #[derive(Debug, PartialEq)]
 struct Asked {
     when: Vec<Condition>,
-    columns: Vec<String>,
+    of: Vec<(Samples, Option<String>)>,
     group: Option<String>,
     clock: ClockKey,
 }
@@ -175,7 +175,7 @@ impl Log {
             for file in std::mem::take(&mut sheet.files) {
                 let (clock, layout) = (sheet.clock.clone(), sheet.layout.clone());
                 let alone = Sheet::new(vec![file], clock, layout);
-                let samples = crate::sheet::Samples { leaf: column.clone(), rows: Vec::new() };
+                let samples = Samples { leaf: column.clone(), rows: Vec::new() };
                 let stamps = alone.stamps(&samples, None)?;
                 starts.push((stamps.origin, alone.files));
             }
@@ -245,7 +245,7 @@ impl Log {
         if !self.main.files[0].has(column) {
             return Ok(None);
         }
-        let every_row = crate::sheet::Samples { leaf: column.clone(), rows: Vec::new() };
+        let every_row = Samples { leaf: column.clone(), rows: Vec::new() };
         let stamps = self.main.stamps(&every_row, None)?;
         let earliest = stamps.seconds.iter().copied().filter(|s| !s.is_nan()).fold(f64::INFINITY, f64::min);
         let later = |start: Timestamp| start.checked_add(channel::duration(earliest)).ok();
@@ -468,10 +468,15 @@ impl Log {
         if channels.when.is_empty() {
             return Ok(Selection::whole(&master.0.line));
         }
-        let column = |when: &Condition| Pattern::new(&when.column).column_for(at.position.as_str());
+        let position = at.position.as_str();
+        let named = |column: &String| Pattern::new(column).column_for(position);
+        let of = |when: &Condition| {
+            let samples = self.sheet_of(&when.channel())?.samples(&named(&when.column), position);
+            Ok((samples, when.time_column.as_ref().map(named)))
+        };
         let asked = Asked {
             when: channels.when.clone(),
-            columns: channels.when.iter().map(column).collect(),
+            of: channels.when.iter().map(of).collect::<Result<_, Error>>()?,
             group: master.1.group.clone(),
             clock: master.0.clock_key(master.1),
         };
@@ -524,6 +529,10 @@ impl Log {
         for (k, (map, name)) in choices.into_iter().enumerate() {
             let sampling = Sampling::new(self.sheet_of(map)?, map, &name, at.position.as_str())?;
             let master = (sampling, map);
+            if !channels.when.is_empty() {
+                // Conditions ask for memory by the rows that a footer declares: its pages must hold as many.
+                master.0.check_rows()?;
+            }
             let selection = self.selected(at, channels, geometry, &master)?;
             let read = selection.cut(master.0.own(map, geometry, selection.wanted())?);
             let lives = is_only || channel::lives(&read.values, selection.apart);
@@ -593,12 +602,13 @@ impl Log {
         })
     }
 
-    /// Whether a column holds a value. One that holds none where conditions are met may hold some elsewhere.
+    /// Whether a column holds a value where it counts, if it counts anywhere.
     fn not_empty(&self, values: &[f64], column: &str, selection: &Selection) -> Result<(), Error> {
-        if !selection.is_whole || values.iter().any(|v| v.is_finite()) {
+        let counted = values.len() - selection.apart;
+        if (counted == 0 && !selection.is_whole) || values.iter().any(|v| v.is_finite()) {
             return Ok(());
         }
-        let (column, rows) = (column.to_owned(), values.len() as u64);
+        let (column, rows) = (column.to_owned(), counted as u64);
         Err(self.main.error(Fault::AllMissing { column, rows }))
     }
 }

@@ -106,8 +106,8 @@ impl Sheet {
         std::iter::once(&samples.leaf).chain(rows).chain(clock).cloned().collect()
     }
 
-    /// As numbers, brought to SI or raw, and what was seen of them where all are wanted; a null is NaN. Where a sample is
-    /// a row, so may be those that are not wanted.
+    /// As numbers, raw or brought to SI, and what was seen of them where all are wanted in SI; a null is NaN. Where a
+    /// sample is a row, so may be those that are not wanted.
     ///
     /// # Errors
     /// When a leaf is missing, holds no numbers, or cannot be decoded.
@@ -136,6 +136,11 @@ impl Sheet {
             Some(wanted) => append_where(&samples.leaf, array, wanted, &mut values),
         })?;
         Ok(values.whole())
+    }
+
+    /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
+    pub(crate) fn check_pages(&self, leaf: &str) -> Result<(), Error> {
+        self.files.iter().try_for_each(|file| file.check_pages(leaf))
     }
 
     /// Hands over one leaf of the rows meant, batch by batch, with a mark for each that is.

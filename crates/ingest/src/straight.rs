@@ -130,7 +130,8 @@ impl Room {
 
     fn take_dictionary(&mut self, header: &PageHeader, form: Form) -> Option<()> {
         let said = header.dictionary_page_header.as_ref()?;
-        if !matches!(said.encoding, Encoding::PLAIN | Encoding::PLAIN_DICTIONARY) {
+        let is_second = !self.dictionary.is_empty();
+        if is_second || !matches!(said.encoding, Encoding::PLAIN | Encoding::PLAIN_DICTIONARY) {
             return None;
         }
         self.unpack(header, 0, form.is_zstd)?;

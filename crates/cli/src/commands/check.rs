@@ -289,7 +289,7 @@ fn describe(base: Channel, q: Quality, doubts: &[&str]) -> Channel {
     let still = if q.samples == 0 {
         Some("no sample is selected: nothing_selected".to_owned())
     } else if q.span().is_none() {
-        Some("holds no value where it is selected: channel_constant".to_owned())
+        Some("holds no value that counts: channel_constant".to_owned())
     } else if q.is_zero() {
         Some("is always zero: channel_zero".to_owned())
     } else {

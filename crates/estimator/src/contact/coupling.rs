@@ -140,7 +140,7 @@ impl Ways {
 }
 
 impl Walk {
-    /// A new segment begins.
+    /// At rest, where nothing is known of the friction.
     pub(super) fn new(ways: Ways) -> Self {
         Self { ways, screw: None }
     }

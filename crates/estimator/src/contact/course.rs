@@ -67,6 +67,8 @@ impl Course {
             by_share_n: &mut self.by_share_n[segment.clone()],
         };
         let part = segment.len() / Lanes::COUNT;
+        // Nobody walks here before, and what another course left is no answer.
+        found.force_n[Lanes::COUNT * part..].fill(f64::NAN);
         let ends = abreast(ways, (motor_m, load_n), part, &mut found);
         let mut walk = Walk::new(ways);
         for number in 0..Lanes::COUNT {
@@ -268,7 +270,9 @@ mod tests {
             blocks.starts = starts;
             let friction = Friction { dry_n, lost_share };
             let state = State { stiffness_n_per_m: 5e7, gap_m, friction, skew_s: 0.0 };
+            // In the memory of a course that knew another gap.
             let mut course = Course::default();
+            course.follow(&blocks, &State { gap_m: gap_m + 1e-5, stiffness_n_per_m: 4e7, ..state });
             course.follow(&blocks, &state);
             for segment in blocks.segments() {
                 let mut walk = Walk::new(Ways::new(&state));

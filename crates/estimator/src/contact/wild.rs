@@ -19,9 +19,16 @@ pub(super) struct Neighbours {
 impl Neighbours {
     /// From the steps within segments that are not zero; none when the channel never moves.
     pub(super) fn of(values: &[f64], segments: &[Range<usize>]) -> Option<Self> {
+        let steps = |stride: usize| -> Vec<f64> {
+            let pairs =
+                segments.iter().flat_map(|segment| values[segment.clone()].windows(2).step_by(stride));
+            pairs.map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect()
+        };
         let stride = (segments.iter().map(Range::len).sum::<usize>() / LOOKS).max(1);
-        let pairs = segments.iter().flat_map(|segment| values[segment.clone()].windows(2).step_by(stride));
-        let mut steps: Vec<f64> = pairs.map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect();
+        let mut steps = Some(steps(stride))
+            .filter(|some| !some.is_empty())
+            // Looks may keep step with a channel that is held, and see none of its steps.
+            .unwrap_or_else(|| steps(1));
         if steps.is_empty() {
             return None;
         }
@@ -51,6 +58,15 @@ impl Neighbours {
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
+
+    /// Ten rows for each load, and every forty-fifth step looked at: none of them is one of the load's.
+    #[test]
+    fn a_channel_that_is_held_moves() {
+        let held: Vec<f64> = (0..180_000).map(|k| (f64::from(k / 10) * 0.01).sin()).collect();
+        let found = Neighbours::of(&held, std::slice::from_ref(&(0..held.len()))).unwrap();
+        assert!((0.07..0.09).contains(&found.leap), "{found:?}");
+        assert!(Neighbours::of(&vec![3.0; 50_000], std::slice::from_ref(&(0..50_000))).is_none());
+    }
 
     /// However little of a long log counts, its steps are known from as many looks as those of a short one.
     #[test]

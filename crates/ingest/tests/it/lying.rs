@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array};
 use ingest::unit::Unit;
-use ingest::{Actuator, Error, Files, Geometry, Log, Mapping};
+use ingest::{Actuator, ClockMapping, Condition, Error, Files, Geometry, Log, Mapping};
 
 use crate::layouts::{channel, mapping, write};
 
@@ -114,7 +114,13 @@ fn a_clock_without_a_unit_is_never_guessed() {
 #[test]
 fn no_change_of_bytes_ends_the_process() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/writers");
-    let m = Arc::new(crate::writers::wide());
+    let whole = crate::writers::wide();
+    let mut selected = whole.clone();
+    let column = whole.clock.column.clone().unwrap();
+    selected.channels.when.push(Condition { column, at_least: Some(0.5), ..Condition::default() });
+    let mut unstamped = selected.clone();
+    unstamped.clock = ClockMapping { rate_hz: Some(100.0), ..ClockMapping::default() };
+    let mappings = [whole, selected, unstamped].map(Arc::new);
     let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().flatten().map(|e| e.path()).collect();
     files.retain(|f| f.extension().is_some_and(|e| e == "parquet"));
     files.sort();
@@ -136,14 +142,16 @@ fn no_change_of_bytes_ends_the_process() {
                 changed[from + next() % (bytes.len() - from)] = next() as u8;
             }
             std::fs::write(&damaged, &changed).unwrap();
-            let read = std::panic::catch_unwind(|| -> Result<usize, Error> {
-                let log = Log::open(&Files::one(&damaged), &m)?;
-                let at = log.positions(&m.channels, None)?;
-                let geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
-                Ok(log.actuator(&at[0], &m.channels, geometry)?.dx_m.len())
-            });
-            if let Ok(Ok(samples)) = read {
-                assert!(samples <= 400, "{}: {samples} samples of 400 rows", file.display());
+            for m in &mappings {
+                let read = std::panic::catch_unwind(|| -> Result<usize, Error> {
+                    let log = Log::open(&Files::one(&damaged), m)?;
+                    let at = log.positions(&m.channels, None)?;
+                    let geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
+                    Ok(log.actuator(&at[0], &m.channels, geometry)?.dx_m.len())
+                });
+                if let Ok(Ok(samples)) = read {
+                    assert!(samples <= 400, "{}: {samples} samples of 400 rows", file.display());
+                }
             }
         }
     }

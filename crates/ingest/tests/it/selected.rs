@@ -187,6 +187,9 @@ fn conditions_are_asked_of_each_actuator() {
             columns.push((format!("{position}_{channel}"), column(|k| k as f64)));
         }
         columns.push((format!("{position}_mode"), mode));
+        let own_s =
+            if position == "a" { column(|k| k as f64 * 0.01) } else { column(|k| 0.4 + k as f64 * 0.01) };
+        columns.push((format!("{position}_t"), own_s));
     }
     let batch = RecordBatch::try_from_iter(columns).unwrap();
     let mut writer = ArrowWriter::try_new(File::create(&file).unwrap(), batch.schema(), None).unwrap();
@@ -208,4 +211,8 @@ fn conditions_are_asked_of_each_actuator() {
     assert_eq!(segments(&mapping), [vec![50..100], vec![90..100]]);
     mapping.channels.when = vec![when("a_mode")];
     assert_eq!(segments(&mapping), [vec![50..100], vec![50..100]]);
+    // One column for all, on stamps of each one's own: b's come 0.4 s later.
+    let timed = Condition { time_column: Some("{position}_t".into()), ..when("a_mode") };
+    mapping.channels.when = vec![timed];
+    assert_eq!(segments(&mapping), [vec![50..100], vec![100 - 10..100]]);
 }
