@@ -108,6 +108,9 @@ proptest! {
 
     /// Soft or stiff, slow or fast beside the step, ringing or not: the settled shortcut tells what the plain recursion
     /// tells, to 1e-12 of the peak of what goes in or comes out.
+    ///
+    /// Not of a part that rings, hardly damped, at a multiple of the sample rate: it seems to stand still, so that its
+    /// motion and the backlash cannot be told apart, and what the plain covariance rounds does not die out.
     #[test]
     fn the_shortcut_agrees_with_the_plain_recursion_for_any_actuator(
         (stiffness, damping, mass) in (6.5..9.0_f64, 1.0..4.5_f64, 0.0..2.5_f64),
@@ -115,6 +118,11 @@ proptest! {
         jumps in vec(-1e-5..1e-5, 4000),
     ) {
         let ten = |power: f64| 10_f64.powf(power);
+        // Its motion turns as √(K/m) and dies as exp(−f t/2m).
+        let turns = (ten(stiffness) / ten(mass)).sqrt() / std::f64::consts::TAU / ten(rate_hz);
+        let ringing_samples = 2.0 * ten(mass) / ten(damping) * ten(rate_hz);
+        let hides = turns > 0.5 && (turns - turns.round()).abs() < 0.01 && ringing_samples > 100.0;
+        prop_assume!(!hides);
         let actuator = Actuator::linear(ten(stiffness), ten(damping), ten(mass)).unwrap();
         let f = filter_of(&actuator, ten(-rate_hz), ten(bandwidth_hz));
         let load: Vec<f64> = (0..jumps.len()).map(|k| 5e3 * (0.01 * k as f64).sin()).collect();
