@@ -5,9 +5,10 @@
     python benches/end_to_end.py target/release/freeplay
 
 Makes wide logs (eight actuators x a million rows each, plain values under zstd, the layout other programs write, and
-the same once more as codes of dictionaries, which pyarrow writes unless told otherwise), then lets Freeplay, a reader and the strongest Python peer go over them in turn, several rounds in one session, each
-in a process of its own. CPU seconds and peak memory are the operating system's account of that process; Python's are
-less its start and imports. Prints Markdown; times on a busy machine move together, ratios less.
+the same once more as codes of dictionaries, which pyarrow writes unless told otherwise), then lets Freeplay, a reader
+and the strongest Python peer go over them in turn, several rounds in one session, each in a process of its own. CPU
+seconds and peak memory are the operating system's account of that process; Python's are less its start and imports.
+Prints Markdown; times on a busy machine move together, ratios less.
 """
 
 import argparse

@@ -68,19 +68,19 @@ impl<'p> Codes<'p> {
         if count == 0 {
             return None;
         }
-        if header & 1 == 1 {
-            let bytes = self.rest;
-            self.rest = self.rest.get(count.checked_mul(self.bits)?..)?;
-            // What the last code is read with must be there as well.
-            let is_whole = self.rest.len() >= SPARE_BYTES;
-            return is_whole.then_some(Run::Packed { bytes, next: 0, left: count.checked_mul(8)? });
-        }
-        let (code, rest) = self.rest.split_at_checked(self.bits.div_ceil(8))?;
+        let is_packed = header & 1 == 1;
+        let length = if is_packed { count.checked_mul(self.bits)? } else { self.bits.div_ceil(8) };
+        let bytes = self.rest;
+        let (run, rest) = bytes.split_at_checked(length)?;
+        // The spare ones belong to no run, and must be there to read the last code with.
         if rest.len() < SPARE_BYTES {
             return None;
         }
         self.rest = rest;
-        let code = code.iter().rev().fold(0, |code, byte| code << 8 | usize::from(*byte));
+        if is_packed {
+            return Some(Run::Packed { bytes, next: 0, left: count.checked_mul(8)? });
+        }
+        let code = run.iter().rev().fold(0, |code, byte| code << 8 | usize::from(*byte));
         Some(Run::Same { code, left: count })
     }
 }

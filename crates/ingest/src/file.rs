@@ -164,7 +164,7 @@ impl LogFile {
     }
 
     /// Appends the numbers of a leaf, sample by sample; a null is NaN. So is what is not wanted: row groups and pages
-    /// of which nothing is wanted are not unpacked.
+    /// of which nothing is wanted are not unpacked. Of a leaf whose rows hold lists all must be wanted.
     ///
     /// # Errors
     /// As [`LogFile::each_batch`], and when the leaf holds no numbers.
@@ -177,8 +177,6 @@ impl LogFile {
         let leaf = self.leaf(name)?;
         self.want(&[leaf])?;
         let mut rows = 0;
-        // In a list a row is no sample.
-        let wanted = if leaf.is_listed { Wanted::ALL } else { wanted };
         for group in 0..self.footer.metadata().num_row_groups() {
             let (declared, wanted) = (self.rows_of(group), wanted.from(rows));
             if !wanted.any(0..declared) {

@@ -91,7 +91,7 @@ pub struct Actuator {
 impl Actuator {
     /// What δX looks like.
     pub fn dx_quality(&self) -> Quality {
-        Quality::seen(&self.dx_m, &Scan::of(&self.dx_m), self.step_s, self.apart)
+        Quality::of(&self.dx_m, self.step_s, self.apart)
     }
 
     /// Leaves the memory of its channels to the next actuator that this thread reads.
@@ -441,11 +441,9 @@ impl Log {
         if let Some(normalized) = &self.normalized {
             return normalized.actuator(&self.main.files[0], at.position.clone(), geometry);
         }
-        let Lead { channel: motor, sampling, map, selection, mut flags } =
-            self.motor(at, channels, geometry)?;
-        let master = (sampling, map);
-        let read =
-            |role: Role, from: &Selection| self.follower(role, at, channels, geometry, (&master, from));
+        let sought = Sought { at, channels, geometry };
+        let Lead { channel: motor, master, selection, mut flags } = self.motor(sought)?;
+        let read = |role: Role, from: &Selection| self.follower(role, sought, &master, from);
         let (screw, screw_flags) = read(Role::Screw, &selection)?;
         let (load, load_flags) = read(Role::Load, &selection)?;
         // The mean of the flight, whatever counts of it.
@@ -457,14 +455,9 @@ impl Log {
         Ok(finish(at.position.clone(), read, &master.0.line, temperature_c, flags))
     }
 
-    /// The stretches of the motor's clock in which every condition holds.
-    fn selected(
-        &self,
-        at: &PositionColumns,
-        channels: &Channels,
-        geometry: Geometry,
-        master: &(Sampling<'_>, &ChannelMapping),
-    ) -> Result<Selection, Error> {
+    /// The stretches of the motor's clock in which every condition holds; as before, where the same was asked.
+    fn selected(&self, sought: Sought<'_>, master: &Master<'_, '_>) -> Result<Selection, Error> {
+        let Sought { at, channels, .. } = sought;
         if channels.when.is_empty() {
             return Ok(Selection::whole(&master.0.line));
         }
@@ -484,18 +477,13 @@ impl Log {
         if let Some((_, selection)) = before.as_ref().filter(|(known, _)| *known == asked) {
             return Ok(selection.clone());
         }
-        let selection = self.select(at, channels, geometry, master)?;
+        let selection = self.select(sought, master)?;
         *before = Some((asked, selection.clone()));
         Ok(selection)
     }
 
-    fn select(
-        &self,
-        at: &PositionColumns,
-        channels: &Channels,
-        geometry: Geometry,
-        master: &(Sampling<'_>, &ChannelMapping),
-    ) -> Result<Selection, Error> {
+    fn select(&self, sought: Sought<'_>, master: &Master<'_, '_>) -> Result<Selection, Error> {
+        let Sought { at, channels, geometry } = sought;
         let line = &master.0.line;
         let mut segments = line.segments.clone();
         for condition in &channels.when {
@@ -517,12 +505,8 @@ impl Log {
     }
 
     /// The motor position, whose clock all other channels follow.
-    fn motor<'c>(
-        &self,
-        at: &PositionColumns,
-        channels: &'c Channels,
-        geometry: Geometry,
-    ) -> Result<Lead<'_, 'c>, Error> {
+    fn motor<'c>(&self, sought: Sought<'c>) -> Result<Lead<'_, 'c>, Error> {
+        let Sought { at, channels, geometry } = sought;
         let mut found: Option<Lead<'_, 'c>> = None;
         let choices = self.present_or_lacking(Role::Motor, at, channels)?;
         let is_only = choices.len() == 1;
@@ -533,19 +517,19 @@ impl Log {
                 // Conditions ask for memory by the rows that a footer declares: its pages must hold as many.
                 master.0.check_rows()?;
             }
-            let selection = self.selected(at, channels, geometry, &master)?;
+            let selection = self.selected(sought, &master)?;
             let read = selection.cut(master.0.own(map, geometry, selection.wanted())?);
             let lives = is_only || channel::lives(&read.values, selection.apart);
             if lives || found.is_none() {
                 let flags = alternative(Role::Motor, k);
-                found = Some(Lead { channel: read, sampling: master.0, map, selection, flags });
+                found = Some(Lead { channel: read, master, selection, flags });
             }
             if lives {
                 break;
             }
         }
         let lead = found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
-        self.not_empty(&lead.channel.values, lead.sampling.column(), &lead.selection)?;
+        self.not_empty(&lead.channel.values, lead.master.0.column(), &lead.selection)?;
         Ok(lead)
     }
 
@@ -553,11 +537,11 @@ impl Log {
     fn follower(
         &self,
         role: Role,
-        at: &PositionColumns,
-        channels: &Channels,
-        geometry: Geometry,
-        (master, selection): (&(Sampling<'_>, &ChannelMapping), &Selection),
+        sought: Sought<'_>,
+        master: &Master<'_, '_>,
+        selection: &Selection,
     ) -> Result<(Channel, Vec<String>), Error> {
+        let Sought { at, channels, geometry } = sought;
         let mut found: Option<(Channel, usize)> = None;
         let mut column = String::new();
         let choices = self.present_or_lacking(role, at, channels)?;
@@ -605,7 +589,7 @@ impl Log {
     /// Whether a column holds a value where it counts, if it counts anywhere.
     fn not_empty(&self, values: &[f64], column: &str, selection: &Selection) -> Result<(), Error> {
         let counted = values.len() - selection.apart;
-        if (counted == 0 && !selection.is_whole) || values.iter().any(|v| v.is_finite()) {
+        if (counted == 0 && selection.apart > 0) || values.iter().any(|v| v.is_finite()) {
             return Ok(());
         }
         let (column, rows) = (column.to_owned(), counted as u64);
@@ -613,11 +597,21 @@ impl Log {
     }
 }
 
-/// The motor position's values, how they lie in time and by which mapping, what counts of them, and doubts about them.
+/// The actuator that is read: its columns, how its channels are read, and what its angles turn.
+#[derive(Clone, Copy)]
+struct Sought<'c> {
+    at: &'c PositionColumns,
+    channels: &'c Channels,
+    geometry: Geometry,
+}
+
+/// How the motor position lies in time, and by which mapping it is read.
+type Master<'s, 'c> = (Sampling<'s>, &'c ChannelMapping);
+
+/// The motor position's values, how they lie in time, what counts of them, and doubts about them.
 struct Lead<'s, 'c> {
     channel: Channel,
-    sampling: Sampling<'s>,
-    map: &'c ChannelMapping,
+    master: Master<'s, 'c>,
     selection: Selection,
     flags: Vec<String>,
 }
@@ -628,29 +622,27 @@ pub(crate) struct Selection {
     segments: Vec<Range<usize>>,
     /// Samples that no condition leaves.
     apart: usize,
-    /// Whether nothing was asked.
-    is_whole: bool,
 }
 
 impl Selection {
     /// All that is unbroken.
     pub(crate) fn whole(line: &Timeline) -> Self {
-        Self { segments: line.segments.clone(), apart: 0, is_whole: true }
+        Self { segments: line.segments.clone(), apart: 0 }
     }
 
     fn of(segments: Vec<Range<usize>>, line: &Timeline) -> Self {
         let samples = line.kept.as_ref().map_or(line.rows, Vec::len);
         let apart = samples - segments.iter().map(Range::len).sum::<usize>();
-        Self { segments, apart, is_whole: false }
+        Self { segments, apart }
     }
 
     fn wanted(&self) -> Wanted<'_> {
-        if self.is_whole { Wanted::ALL } else { Wanted::of(&self.segments) }
+        if self.apart == 0 { Wanted::ALL } else { Wanted::of(&self.segments) }
     }
 
     /// Takes out what does not count, so that nothing is made of it however the file lies in pages.
     fn cut(&self, mut channel: Channel) -> Channel {
-        if self.is_whole {
+        if self.apart == 0 {
             return channel;
         }
         let mut counted = 0;

@@ -33,13 +33,12 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// Describes a channel; missing samples are NaN.
-    pub fn of(values: &[f64], step_s: f64) -> Self {
-        Self::seen(values, &Scan::of(values), step_s, 0)
+    /// Describes a channel; missing samples are NaN, and so many of them are not asked for.
+    pub(crate) fn of(values: &[f64], step_s: f64, apart: usize) -> Self {
+        Self::seen(values, &Scan::of(values), step_s, apart)
     }
 
-    /// As [`Quality::of`], of a channel that was looked at already; so many of its samples, all missing, are not asked
-    /// for.
+    /// As [`Quality::of`], of a channel that was looked at already.
     pub(crate) fn seen(values: &[f64], seen: &Scan, step_s: f64, apart: usize) -> Self {
         let (samples, missing) = (values.len() - apart, seen.missing - apart);
         let share = |count: usize| count as f64 / samples.max(1) as f64;
@@ -301,11 +300,11 @@ mod tests {
 
     #[test]
     fn a_channel_is_described_as_a_hand_would() {
-        let q = Quality::of(&[1.0, 1.0, 1.0, f64::NAN, 1.5, 1.25, 3.0, 3.0], 0.01);
+        let q = Quality::of(&[1.0, 1.0, 1.0, f64::NAN, 1.5, 1.25, 3.0, 3.0], 0.01, 0);
         assert!((q.missing_share - 0.125).abs() < 1e-15);
         assert_eq!((q.min, q.max, q.resolution), (1.0, 3.0, Some(0.25)));
         assert!((q.frozen_share - 3.0 / 8.0).abs() < 1e-15);
-        assert!(Quality::of(&[2.0; 9], 0.01).is_constant());
+        assert!(Quality::of(&[2.0; 9], 0.01, 0).is_constant());
     }
 
     #[test]
@@ -322,7 +321,7 @@ mod tests {
     #[test]
     fn a_position_in_steps_as_large_as_a_gap_is_coarse() {
         let stepped: Vec<f64> = wave(0.03).iter().map(|v| (v / 2e-5).round() * 2e-5).collect();
-        let channels = [&wave(0.03), &stepped, &wave(8e3)].map(|values| Quality::of(values, 0.004));
+        let channels = [&wave(0.03), &stepped, &wave(8e3)].map(|values| Quality::of(values, 0.004, 0));
         assert_eq!(coarse(&channels, range(&wave(5e-5))), ["screw_coarse"]);
         assert!(coarse(&channels, range(&wave(5e-4))).is_empty());
     }
@@ -336,8 +335,8 @@ mod tests {
     #[test]
     fn a_channel_cut_off_at_a_rail_is_told_from_one_that_rests() {
         let cut: Vec<f64> = wave(1.0).iter().map(|v| v.clamp(-0.8, 0.8)).collect();
-        let whole = Quality::of(&wave(1.0), 0.01);
-        assert!(Quality::of(&cut, 0.01).saturated_share > 0.2);
+        let whole = Quality::of(&wave(1.0), 0.01, 0);
+        assert!(Quality::of(&cut, 0.01, 0).saturated_share > 0.2);
         assert!(whole.saturated_share == 0.0 && whole.spikes == 0, "{whole:?}");
     }
 
@@ -347,7 +346,7 @@ mod tests {
         for at in [500, 1500, 2500] {
             values[at] += 2e-3;
         }
-        assert_eq!(Quality::of(&values, 0.004).spikes, 3);
+        assert_eq!(Quality::of(&values, 0.004, 0).spikes, 3);
     }
 
     /// The motor stands still for 1 s while the screw travels: that is a dead sensor. While the screw moves

@@ -124,10 +124,10 @@ impl Sheet {
             values = values.looked_at();
         }
         if samples.rows.is_empty() {
+            // In a list a row is no sample.
+            let wanted = if self.is_listed(&samples.leaf) { Wanted::ALL } else { wanted };
             for file in &self.files {
-                let wanted =
-                    if self.is_listed(&samples.leaf) { Wanted::ALL } else { wanted.from(values.len()) };
-                file.append_numbers(&samples.leaf, wanted, &mut values)?;
+                file.append_numbers(&samples.leaf, wanted.from(values.len()), &mut values)?;
             }
             return Ok(values.whole());
         }

@@ -117,12 +117,17 @@ impl Room {
             self.read(file, page)?;
             self.unpack(&page.header, data.apart, form.is_zstd && data.is_compressed)?;
             let (levels, body) = data.parted(&self.page)?;
+            let runs = match levels {
+                Some(levels) => present(levels, data.values)?,
+                None => vec![Run { is_present: true, values: data.values }],
+            };
             if data.coding == Coding::Codes {
-                append_codes(Codes::of(body)?, levels, data.values, &self.dictionary, into)?;
+                let mut codes = Codes::of(body)?;
+                append_runs(&runs, into, |values, into| codes.append(values, &self.dictionary, into))?;
             } else {
                 let bytes = body.strip_suffix(&[0; SPARE_BYTES])?;
                 let numbers = Numbers { bytes, is_split: data.coding == Coding::Split, width: form.width() };
-                numbers.append(levels, data.values, into)?;
+                numbers.append(&runs, into)?;
             }
         }
         Some(())
@@ -274,18 +279,15 @@ fn coding(encoding: Encoding) -> Option<Coding> {
     }
 }
 
-/// Appends the numbers that codes stand for, and what is missing between them.
-fn append_codes(
-    mut codes: Codes<'_>,
-    levels: Option<&[u8]>,
-    values: usize,
-    dictionary: &[f64],
+/// Appends so many numbers of a page after each other as are there, and leaves out what is missing between them.
+fn append_runs(
+    runs: &[Run],
     into: &mut Growing,
+    mut append: impl FnMut(usize, &mut Growing) -> Option<()>,
 ) -> Option<()> {
-    let Some(levels) = levels else { return codes.append(values, dictionary, into) };
-    for run in present(levels, values)? {
+    for run in runs {
         if run.is_present {
-            codes.append(run.values, dictionary, into)?;
+            append(run.values, into)?;
         } else {
             into.leave_out(run.values);
         }
@@ -302,28 +304,21 @@ struct Numbers<'p> {
 }
 
 impl Numbers<'_> {
-    fn append(self, levels: Option<&[u8]>, values: usize, into: &mut Growing) -> Option<()> {
-        let Some(levels) = levels else { return self.append_from(0, values, values, into) };
-        let present = present(levels, values)?;
-        let count = present.iter().filter(|run| run.is_present).map(|run| run.values).sum();
-        let mut from = 0;
-        for run in present {
-            if run.is_present {
-                self.append_from(from, run.values, count, into)?;
-                from += run.values;
-            } else {
-                into.leave_out(run.values);
-            }
-        }
-        Some(())
-    }
-
-    /// Appends some of the page's `count` numbers.
-    fn append_from(self, from: usize, values: usize, count: usize, into: &mut Growing) -> Option<()> {
+    fn append(self, runs: &[Run], into: &mut Growing) -> Option<()> {
+        let count: usize = runs.iter().filter(|run| run.is_present).map(|run| run.values).sum();
         if self.bytes.len() != count.checked_mul(self.width)? {
             return None;
         }
-        let end = from + values;
+        let mut from = 0;
+        append_runs(runs, into, |values, into| {
+            self.append_from(from..from + values, count, into);
+            from += values;
+            Some(())
+        })
+    }
+
+    /// Appends some of the page's `count` numbers.
+    fn append_from(self, Range { start: from, end }: Range<usize>, count: usize, into: &mut Growing) {
         match (self.width, self.is_split) {
             (8, false) => {
                 for bytes in self.bytes[8 * from..8 * end].as_chunks::<8>().0.chunks(BATCH) {
@@ -342,7 +337,6 @@ impl Numbers<'_> {
                 into.extend(batch.iter().map(|bits| f32::from_bits(*bits).into()));
             }),
         }
-        Some(())
     }
 
     /// Hands over some of the page's `count` numbers, batch by batch, brought together from their streams: byte k of

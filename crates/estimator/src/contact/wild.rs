@@ -25,10 +25,9 @@ impl Neighbours {
             pairs.map(|w| (w[1] - w[0]).abs()).filter(|s| *s > 0.0).collect()
         };
         let stride = (segments.iter().map(Range::len).sum::<usize>() / LOOKS).max(1);
-        let mut steps = Some(steps(stride))
-            .filter(|some| !some.is_empty())
-            // Looks may keep step with a channel that is held, and see none of its steps.
-            .unwrap_or_else(|| steps(1));
+        let looked_at = steps(stride);
+        // Looks may keep step with a channel that is held, and see none of its steps.
+        let mut steps = if looked_at.is_empty() { steps(1) } else { looked_at };
         if steps.is_empty() {
             return None;
         }
