@@ -11,7 +11,7 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use estimator::contact::{self, Prior};
+use estimator::contact::{self, PartPrior};
 use estimator::noise::Sensors;
 use estimator::{Actuator, Filter, Noise, Room, RunningGap, Samples, Schedule, Stream, gap, load, midrange};
 
@@ -136,7 +136,7 @@ fn contact_regression(bencher: Bencher) {
         .collect();
     let segments = std::slice::from_ref(&whole);
     let samples = Samples { step_s: 0.004, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
-    let prior = Prior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
+    let prior = PartPrior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
     let mut room = contact::Room::default();
     bencher
         .counter(ItemsCount::new(OUT_OF_CACHE))

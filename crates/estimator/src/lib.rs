@@ -42,7 +42,7 @@ mod track;
 mod wide;
 
 #[cfg(feature = "std")]
-pub use contact::ContactGap;
+pub use contact::ContactEstimate;
 pub use discretise::Discrete;
 pub use error::Error;
 pub use filter::{Estimate, Filter, Step};

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use estimator::contact::{self, ContactGap, Outcome, Picture, Prior};
+use estimator::contact::{self, ContactEstimate, ContactOutcome, ContactPlot, PartPrior};
 use estimator::{Filter, MidRange, Room, Samples, Schedule, midrange};
 use fleet::{Complaint, Estimate, Status};
 use ingest::{Actuator, Geometry};
@@ -38,7 +38,7 @@ pub fn estimate(
                 Err(other) => return Err(failed(other)),
             };
             let outcome =
-                contact::estimate_in(&samples(channels), &prior, &mut rooms.contact).map_err(failed)?;
+                contact::estimate_with(&samples(channels), &prior, &mut rooms.contact).map_err(failed)?;
             Ok(judged(published.as_ref(), &outcome, &prior, settings.method))
         })?
     };
@@ -63,7 +63,7 @@ const LONGEST_KEPT: usize = 2 << 20;
 #[derive(Debug, Default)]
 struct Rooms {
     published: Room,
-    contact: contact::Room,
+    contact: contact::ContactWorkspace,
 }
 
 thread_local! {
@@ -88,8 +88,8 @@ pub fn filter(channels: &Actuator, part: &Part) -> Result<Filter, Complaint> {
 ///
 /// # Errors
 /// A complaint when the settings of the part cannot be.
-pub fn picture(channels: &Actuator, part: &Part) -> Result<Option<Picture>, Complaint> {
-    contact::picture(&samples(channels), &prior(part)).map_err(|e| Complaint::new("estimate_failed", e))
+pub fn picture(channels: &Actuator, part: &Part) -> Result<Option<ContactPlot>, Complaint> {
+    contact::plot_data(&samples(channels), &prior(part)).map_err(|e| Complaint::new("estimate_failed", e))
 }
 
 /// The channels as the estimator takes them.
@@ -104,12 +104,12 @@ pub fn samples(channels: &Actuator) -> Samples<'_> {
 }
 
 /// What is known of a part before its flight is seen.
-pub fn prior(part: &Part) -> Prior {
+pub fn prior(part: &Part) -> PartPrior {
     let unknown_force_n = match part.noise {
         estimator::Noise::Sensors(sensors) => Some(sensors.unknown_force_n).filter(|force_n| *force_n > 0.0),
         _ => None,
     };
-    Prior {
+    PartPrior {
         stiffness_n_per_m: part.actuator.stiffness_n_per_m(),
         reference_load_n: part.reference_load_n,
         unknown_force_n,
@@ -133,10 +133,15 @@ fn blind(channels: &Actuator) -> Option<&'static str> {
 ///
 /// The published statistic never refuses, so under either method a flight that the regression finds
 /// blind is refused: its mid-range number is kept, and is not given as the gap.
-fn judged(published: Option<&MidRange>, outcome: &Outcome, prior: &Prior, method: Method) -> Estimate {
+fn judged(
+    published: Option<&MidRange>,
+    outcome: &ContactOutcome,
+    prior: &PartPrior,
+    method: Method,
+) -> Estimate {
     let mut estimate = match outcome {
-        Outcome::Estimated(found) => regressed(found),
-        Outcome::Refused(why) => Estimate::refused(why.code()),
+        ContactOutcome::Estimated(found) => regressed(found),
+        ContactOutcome::Refused(why) => Estimate::refused(why.code()),
     };
     let Some(published) = published else { return estimate };
     estimate.gap_midrange_m = Some(published.gap.gap_m);
@@ -147,7 +152,7 @@ fn judged(published: Option<&MidRange>, outcome: &Outcome, prior: &Prior, method
     estimate.load_p05_n = Some(published.load.p05_n);
     estimate.load_p95_n = Some(published.load.p95_n);
     estimate.nis = Some(published.nis);
-    if let Outcome::Estimated(found) = outcome {
+    if let ContactOutcome::Estimated(found) = outcome {
         if !found.explains(published.gap.gap_m, prior) {
             estimate.flags.push("estimators_disagree".into());
         }
@@ -161,7 +166,7 @@ fn judged(published: Option<&MidRange>, outcome: &Outcome, prior: &Prior, method
     estimate
 }
 
-fn regressed(found: &ContactGap) -> Estimate {
+fn regressed(found: &ContactEstimate) -> Estimate {
     let (p05_m, p95_m) = found.gap_bounds_m;
     Estimate {
         status: Status::Estimated,

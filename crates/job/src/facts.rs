@@ -2,7 +2,7 @@
 //! sheet, so that nobody has to guess a noise level.
 
 use estimator::Noise;
-use estimator::contact::{self, Outcome};
+use estimator::contact::{self, ContactOutcome};
 use ingest::{Actuator, Geometry, noise};
 
 use crate::estimate;
@@ -58,7 +58,7 @@ impl Facts {
             screw_resolution_m: screw.resolution,
             ..Self::default()
         };
-        if let Ok(Outcome::Estimated(found)) =
+        if let Ok(ContactOutcome::Estimated(found)) =
             contact::estimate(&estimate::samples(channels), &estimate::prior(part))
         {
             facts.stiffness_n_per_m = Some(found.stiffness_n_per_m);

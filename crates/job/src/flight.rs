@@ -56,7 +56,7 @@ impl Opened {
         let complain = |e: ingest::Error| e.complaint().in_file(shown);
         let log = Log::open(files, config.base_mapping()).map_err(complain)?;
         let identity = identity_of(&log, files, config).map_err(complain)?;
-        let log = log.remapped(&config.mapping(&identity.tail_number, None));
+        let log = log.with_mapping(&config.mapping(&identity.tail_number, None));
         let mapped = mapped(&log, &identity, config, installations).map_err(complain)?;
         let used: Vec<_> = mapped.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
         let digest = log.digest(&used).map_err(complain)?;
@@ -83,7 +83,7 @@ impl Opened {
     pub fn is_checked(&self) -> Result<bool, Complaint> {
         let used: Vec<_> =
             self.positions.iter().filter_map(|at| Some((self.channels_map(at)?, at))).collect();
-        self.log.is_checked(&used).map_err(|e| e.complaint().in_file(&self.shown))
+        self.log.has_page_checksums(&used).map_err(|e| e.complaint().in_file(&self.shown))
     }
 
     /// Names of the positions, in order.
@@ -168,7 +168,7 @@ impl Opened {
         }
         let actuator = self.channels(at, part)?;
         let estimate = estimate::estimate(&actuator, part, &config.document.estimate);
-        actuator.reuse();
+        actuator.recycle_buffers();
         estimate
     }
 
@@ -181,7 +181,7 @@ impl Opened {
             let what = format!("the log was not opened for {}", at.position);
             return Err(Complaint::new("no_position", what).in_file(&self.shown));
         };
-        let read = self.log.actuator(at, channels, part.geometry);
+        let read = self.log.read_actuator(at, channels, part.geometry);
         read.map_err(|e| e.complaint().in_file(&self.shown))
     }
 
@@ -230,9 +230,9 @@ pub(crate) fn each_anonymous(
     let channels = &config.base_mapping().channels;
     // A log of one actuator has no name for it here, but needs one to be asked by.
     let own = Position::new("actuator").map_err(|e| Complaint::new("empty_name", e))?;
-    let positions = log.positions(channels, Some(&own)).map_err(complain)?;
+    let positions = log.actuators(channels, Some(&own)).map_err(complain)?;
     for at in positions.iter().filter(|at| at.lacking.is_empty()) {
-        let read = log.actuator(at, channels, part.geometry).map_err(complain)?;
+        let read = log.read_actuator(at, channels, part.geometry).map_err(complain)?;
         take(&read).map_err(|complaint| complaint.in_file(shown))?;
     }
     Ok(())
@@ -378,7 +378,7 @@ fn mapped(
     installations: &Installations,
 ) -> Result<Vec<Mapped>, ingest::Error> {
     let usual = config.mapping(&id.tail_number, None);
-    let found = log.positions(&usual.channels, id.position.as_ref());
+    let found = log.actuators(&usual.channels, id.position.as_ref());
     let mut at: BTreeMap<Position, Mapped> = BTreeMap::new();
     let mut failed = None;
     match found {
@@ -387,7 +387,7 @@ fn mapped(
     }
     for part in config.own_parts() {
         let mapping = config.mapping(&id.tail_number, Some(part));
-        let Ok(found) = log.positions(&mapping.channels, id.position.as_ref()) else { continue };
+        let Ok(found) = log.actuators(&mapping.channels, id.position.as_ref()) else { continue };
         let sits = |p: &PositionColumns| {
             let stay = installations.at(&id.tail_number, &p.position, id.departure_utc);
             stay.is_some_and(|stay| stay.part_number == *part)

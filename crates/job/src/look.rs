@@ -1,6 +1,6 @@
 //! Everything one would draw of an estimate: channels, S(t), and the flanks as they were found.
 
-use estimator::contact::Picture;
+use estimator::contact::ContactPlot;
 use estimator::gap::{self, Gap};
 use fleet::{Complaint, Estimate, Installations, PartNumber, Position};
 use ingest::{Actuator, Files};
@@ -28,7 +28,7 @@ pub struct Look {
     /// The published statistic of S, where it moves.
     pub midrange: Option<Gap>,
     /// What the contact regression stands on; none where it refused.
-    pub picture: Option<Picture>,
+    pub picture: Option<ContactPlot>,
 }
 
 impl Look {

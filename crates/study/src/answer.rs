@@ -1,6 +1,6 @@
 //! What each method says of one flight, and what is true.
 
-use estimator::contact::{self, Outcome, Prior};
+use estimator::contact::{self, ContactOutcome, PartPrior};
 use estimator::noise::Sensors;
 use estimator::{Actuator, Filter, Noise, Samples, midrange};
 
@@ -41,16 +41,17 @@ pub(crate) fn answer(scenario: &Scenario, index: u64) -> Result<Answer, String> 
 
 fn judge(case: &Case, truth_m: f64, samples: &Samples<'_>) -> Result<Answer, estimator::Error> {
     let stiffness_n_per_m = case.plant.contact.stiffness_n_per_m * case.assumed;
-    let prior = Prior { stiffness_n_per_m, reference_load_n: None, unknown_force_n: Some(UNKNOWN_FORCE_N) };
+    let prior =
+        PartPrior { stiffness_n_per_m, reference_load_n: None, unknown_force_n: Some(UNKNOWN_FORCE_N) };
     let outcome = contact::estimate(samples, &prior)?;
     let filter = filter(case, samples.step_s, stiffness_n_per_m)?;
     let midrange_m = midrange::estimate(samples, &filter).map_or(f64::NAN, |found| found.gap.gap_m);
     let (contact, codes) = match &outcome {
-        Outcome::Estimated(gap) => (
+        ContactOutcome::Estimated(gap) => (
             Some((gap.gap_m, gap.gap_bounds_m.0, gap.gap_bounds_m.1)),
             gap.flags.iter().map(|flag| flag.code()).collect(),
         ),
-        Outcome::Refused(refusal) => (None, vec![refusal.code()]),
+        ContactOutcome::Refused(refusal) => (None, vec![refusal.code()]),
     };
     let ours_m = contact.map_or(f64::NAN, |(gap_m, ..)| gap_m);
     let lines_m = load_lines_m(samples.dx_m, samples.load_n);

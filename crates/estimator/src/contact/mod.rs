@@ -14,29 +14,29 @@
 //! Flanks that are soft at low load bend the line. Where the samples at low load say so, the gap is
 //! read off a curve that passes through them, and `soft_contact` is flagged.
 
-mod blocks;
-mod coupling;
-mod course;
-mod curve;
-mod design;
-mod orientation;
-mod picture;
-mod refusal;
-mod regression;
-mod search;
-mod wild;
-mod witness;
+mod acceptance;
+mod block_means;
+mod coupling_path;
+mod design_matrix;
+mod flank_fit;
+mod friction_model;
+mod gauss_newton;
+mod lost_motion;
+mod plot_data;
+mod robust_regression;
+mod sign_check;
+mod spikes;
 
-pub use coupling::Friction;
-pub use picture::{Flank, Picture, Touch};
-pub use refusal::{Flag, Refusal};
+pub use acceptance::{QualityFlag, Rejection};
+pub use friction_model::Friction;
+pub use plot_data::{ContactPlot, Flank, Touch};
 
 use crate::error::Error;
 use crate::{Samples, model};
-use blocks::Blocks;
-use course::Course;
-use curve::Contact;
-use design::Frame;
+use block_means::BlockMeans;
+use coupling_path::CouplingPath;
+use design_matrix::Scaling;
+use flank_fit::Contact;
 
 /// Blocks that span too little time to hold a flight, s.
 const SHORTEST_S: f64 = 9.0;
@@ -53,7 +53,7 @@ const DETECTION_SHARE: f64 = 0.01;
 
 /// What is known of the part before its flight is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Prior {
+pub struct PartPrior {
     /// K of the part number, N/m; believed to 15 %.
     pub stiffness_n_per_m: f64,
     /// Load between whose positive and negative value lost motion is stated, N.
@@ -65,7 +65,7 @@ pub struct Prior {
 
 /// The gap by contact regression, and what was found on the way.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ContactGap {
+pub struct ContactEstimate {
     /// ΔS, m; not clipped at zero.
     pub gap_m: f64,
     /// Its standard error, m.
@@ -96,24 +96,24 @@ pub struct ContactGap {
     /// Load magnitude that one sample in twenty exceeds, N.
     pub load_p95_n: f64,
     /// Doubts that do not forbid the number.
-    pub flags: Vec<Flag>,
+    pub flags: Vec<QualityFlag>,
 }
 
 /// What a flight had to say.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
+pub enum ContactOutcome {
     /// Its gap.
-    Estimated(Box<ContactGap>),
+    Estimated(Box<ContactEstimate>),
     /// Why it cannot show one.
-    Refused(Refusal),
+    Refused(Rejection),
 }
 
 /// Memory of a regression, to be used again for the next flight instead of being asked for anew.
 #[derive(Debug, Default)]
-pub struct Room {
-    whole: Blocks,
-    excerpt: Blocks,
-    course: Course,
+pub struct ContactWorkspace {
+    whole: BlockMeans,
+    excerpt: BlockMeans,
+    course: CouplingPath,
 }
 
 /// Estimates the gap of one flight, over all its segments together, or says why it cannot be seen.
@@ -124,19 +124,23 @@ pub struct Room {
 /// # Errors
 /// [`Error::Lengths`] for channels that do not fit, [`Error::Parameter`] for a stiffness, a reference
 /// load or an unknown force that is not positive.
-pub fn estimate(samples: &Samples<'_>, prior: &Prior) -> Result<Outcome, Error> {
-    estimate_in(samples, prior, &mut Room::default())
+pub fn estimate(samples: &Samples<'_>, prior: &PartPrior) -> Result<ContactOutcome, Error> {
+    estimate_with(samples, prior, &mut ContactWorkspace::default())
 }
 
 /// As [`estimate`], for one flight of many, in a room that they use in turn.
 ///
 /// # Errors
 /// As [`estimate`].
-pub fn estimate_in(samples: &Samples<'_>, prior: &Prior, room: &mut Room) -> Result<Outcome, Error> {
+pub fn estimate_with(
+    samples: &Samples<'_>,
+    prior: &PartPrior,
+    room: &mut ContactWorkspace,
+) -> Result<ContactOutcome, Error> {
     check(samples, prior)?;
     Ok(match look(samples, prior, room) {
-        Ok((frame, contact)) => Outcome::Estimated(Box::new(report(&frame, prior, &contact))),
-        Err(refusal) => Outcome::Refused(refusal),
+        Ok((frame, contact)) => ContactOutcome::Estimated(Box::new(report(&frame, prior, &contact))),
+        Err(refusal) => ContactOutcome::Refused(refusal),
     })
 }
 
@@ -145,36 +149,42 @@ pub fn estimate_in(samples: &Samples<'_>, prior: &Prior, room: &mut Room) -> Res
 ///
 /// # Errors
 /// As [`estimate`].
-pub fn picture(samples: &Samples<'_>, prior: &Prior) -> Result<Option<Picture>, Error> {
+pub fn plot_data(samples: &Samples<'_>, prior: &PartPrior) -> Result<Option<ContactPlot>, Error> {
     check(samples, prior)?;
-    Ok(look(samples, prior, &mut Room::default()).ok().map(|(frame, contact)| Picture::of(&frame, &contact)))
+    Ok(look(samples, prior, &mut ContactWorkspace::default())
+        .ok()
+        .map(|(frame, contact)| ContactPlot::of(&frame, &contact)))
 }
 
-fn check(samples: &Samples<'_>, prior: &Prior) -> Result<(), Error> {
+fn check(samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Error> {
     samples.check()?;
     model::positive("stiffness_n_per_m", prior.stiffness_n_per_m)?;
     prior.reference_load_n.map_or(Ok(()), |load_n| model::positive("reference_load_n", load_n))?;
     prior.unknown_force_n.map_or(Ok(()), |force_n| model::positive("unknown_force_n", force_n))
 }
 
-fn look(samples: &Samples<'_>, prior: &Prior, room: &mut Room) -> Result<(Frame, Contact), Refusal> {
+fn look(
+    samples: &Samples<'_>,
+    prior: &PartPrior,
+    room: &mut ContactWorkspace,
+) -> Result<(Scaling, Contact), Rejection> {
     if samples.step_s > LONGEST_STEP_S {
-        return Err(Refusal::RateTooLow);
+        return Err(Rejection::RateTooLow);
     }
     room.whole.gather(samples)?;
-    let frame = Frame::of(&room.whole, prior)?;
-    orientation::check(&room.whole, &frame)?;
-    let contact = curve::fit(room, &frame)?;
+    let frame = Scaling::of(&room.whole, prior)?;
+    sign_check::check(&room.whole, &frame)?;
+    let contact = flank_fit::fit(room, &frame)?;
     Ok((frame, contact))
 }
 
-fn report(frame: &Frame, prior: &Prior, contact: &Contact) -> ContactGap {
+fn report(frame: &Scaling, prior: &PartPrior, contact: &Contact) -> ContactEstimate {
     let (gap_m, gap_se_m) = contact.gap_m;
     let (compliance, compliance_se) = contact.compliance_m_per_n;
-    let loop_width = witness::loop_width_m(contact);
+    let loop_width = lost_motion::loop_width_m(contact);
     let lost_motion =
-        prior.reference_load_n.and_then(|load_n| witness::lost_motion_m(contact, frame, load_n));
-    let mut found = ContactGap {
+        prior.reference_load_n.and_then(|load_n| lost_motion::lost_motion_m(contact, frame, load_n));
+    let mut found = ContactEstimate {
         gap_m,
         gap_se_m,
         gap_bounds_m: (gap_m - NORMAL_95 * gap_se_m, gap_m + NORMAL_95 * gap_se_m),
@@ -191,11 +201,11 @@ fn report(frame: &Frame, prior: &Prior, contact: &Contact) -> ContactGap {
         load_p95_n: frame.load_n,
         flags: Vec::new(),
     };
-    found.flags = refusal::flags(&found, frame, contact.curve.is_some());
+    found.flags = acceptance::flags(&found, frame, contact.curve.is_some());
     found
 }
 
-impl ContactGap {
+impl ContactEstimate {
     /// Friction at the 95 % load, N.
     pub fn friction_n(&self) -> f64 {
         self.friction.at_n(self.load_p95_n)
@@ -206,7 +216,7 @@ impl ContactGap {
     /// A stiffness K̂ leaks about (E\[F | upper\] − E\[F | lower\])(1/K − 1/K̂) into ΔS. The means are taken as
     /// half the 95 % load each, and a quarter of what is expected, five standard errors and a fifth of
     /// the gap are allowed on top.
-    pub fn explains(&self, midrange_m: f64, prior: &Prior) -> bool {
+    pub fn explains(&self, midrange_m: f64, prior: &PartPrior) -> bool {
         let leak_m = self.load_p95_n * (self.stiffness_n_per_m.recip() - prior.stiffness_n_per_m.recip());
         let noise_m =
             5.0 * self.gap_se_m + 0.2 * self.gap_m.abs() + self.friction_n() / self.stiffness_n_per_m;

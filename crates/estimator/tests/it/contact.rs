@@ -1,6 +1,6 @@
 //! Contact regression against flights of `simulator`, which shares no equation with it.
 
-use estimator::contact::{self, ContactGap, Flag, Outcome, Prior, Refusal};
+use estimator::contact::{self, ContactEstimate, ContactOutcome, PartPrior, QualityFlag, Rejection};
 use estimator::{Error, Samples};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
@@ -35,30 +35,30 @@ impl Case {
         simulate(&self.plant, &self.profile, &self.sensors, seed).unwrap()
     }
 
-    fn outcome(&self, flight: &Flight) -> Outcome {
+    fn outcome(&self, flight: &Flight) -> ContactOutcome {
         let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
         self.look(&flight.motor_m, &dx_m, &flight.load_n)
     }
 
-    fn look(&self, motor_m: &[f64], dx_m: &[f64], load_n: &[f64]) -> Outcome {
+    fn look(&self, motor_m: &[f64], dx_m: &[f64], load_n: &[f64]) -> ContactOutcome {
         let whole = 0..dx_m.len();
         let segments = std::slice::from_ref(&whole);
         let samples =
             Samples { step_s: self.profile.sample_rate_hz.recip(), motor_m, dx_m, load_n, segments };
         let stiffness_n_per_m = self.plant.contact.stiffness_n_per_m * self.assumed_stiffness;
-        let prior = Prior { stiffness_n_per_m, reference_load_n: Some(4000.0), unknown_force_n: None };
+        let prior = PartPrior { stiffness_n_per_m, reference_load_n: Some(4000.0), unknown_force_n: None };
         contact::estimate(&samples, &prior).unwrap()
     }
 
-    fn gap(&self, seed: u64) -> Box<ContactGap> {
+    fn gap(&self, seed: u64) -> Box<ContactEstimate> {
         gap(self.outcome(&self.fly(seed)))
     }
 }
 
-fn gap(outcome: Outcome) -> Box<ContactGap> {
+fn gap(outcome: ContactOutcome) -> Box<ContactEstimate> {
     match outcome {
-        Outcome::Estimated(gap) => gap,
-        Outcome::Refused(refusal) => panic!("refused: {}", refusal.code()),
+        ContactOutcome::Estimated(gap) => gap,
+        ContactOutcome::Refused(refusal) => panic!("refused: {}", refusal.code()),
     }
 }
 
@@ -97,7 +97,7 @@ fn eightfold_friction_costs_under_one_per_cent() {
     for seed in 0..4 {
         let found = Case::with(100e-6, |c| c.plant = c.plant.with_friction_factor(8.0)).gap(seed);
         assert!((found.gap_m / 100e-6 - 1.0).abs() < 1e-2, "{found:?}");
-        assert!(found.flags.contains(&Flag::FrictionHeavy));
+        assert!(found.flags.contains(&QualityFlag::FrictionHeavy));
     }
 }
 
@@ -106,7 +106,7 @@ fn a_true_zero_is_declared_below_detection() {
     for seed in 0..4 {
         let found = Case::nominal(0.0).gap(seed);
         assert!(found.gap_m.abs() < 1.5e-6 && found.gap_bounds_m.1 < 2e-6, "{found:?}");
-        assert!(found.flags.contains(&Flag::BelowDetection));
+        assert!(found.flags.contains(&QualityFlag::BelowDetection));
     }
 }
 
@@ -131,7 +131,7 @@ fn soft_flanks_are_flagged_and_their_gap_read_off_a_curve() {
     ];
     for (law, within_m) in laws {
         let found = Case::with(100e-6, |c| c.plant.contact.law = law).gap(2);
-        assert!(found.flags.contains(&Flag::SoftContact), "{law:?}: {found:?}");
+        assert!(found.flags.contains(&QualityFlag::SoftContact), "{law:?}: {found:?}");
         assert!((found.gap_m - 100e-6).abs() < within_m, "{law:?}: {found:?}");
     }
 }
@@ -164,7 +164,7 @@ fn a_flight_in_two_segments_with_missing_samples_shows_the_same_gap() {
         load_n: &flight.load_n,
         segments: &segments,
     };
-    let prior = Prior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
+    let prior = PartPrior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
     let found = gap(contact::estimate(&samples, &prior).unwrap());
     assert!((found.gap_m / 100e-6 - 1.0).abs() < 5e-3, "{found:?}");
 }
@@ -180,15 +180,15 @@ fn channels_that_are_not_what_they_are_said_to_be_are_refused() {
     let half_lead: Vec<f64> = motor.iter().map(|m| 0.97 * m).collect();
     let still = vec![0.0; dx.len()];
     let refusals = [
-        (case.look(motor, &dx, &flipped), Refusal::LoadSignFlipped),
-        (case.look(screw, &minus(motor, screw), load), Refusal::PositionsSwapped),
-        (case.look(&half_lead, &minus(screw, &half_lead), load), Refusal::PositionRatio),
-        (case.look(&still, &dx, load), Refusal::ChannelConstant),
-        (case.look(motor, &dx, &still), Refusal::ChannelConstant),
-        (case.look(&motor[..900], &dx[..900], &load[..900]), Refusal::TooShort),
+        (case.look(motor, &dx, &flipped), Rejection::LoadSignFlipped),
+        (case.look(screw, &minus(motor, screw), load), Rejection::PositionsSwapped),
+        (case.look(&half_lead, &minus(screw, &half_lead), load), Rejection::PositionRatio),
+        (case.look(&still, &dx, load), Rejection::ChannelConstant),
+        (case.look(motor, &dx, &still), Rejection::ChannelConstant),
+        (case.look(&motor[..900], &dx[..900], &load[..900]), Rejection::TooShort),
     ];
     for (found, wanted) in refusals {
-        assert_eq!(found, Outcome::Refused(wanted));
+        assert_eq!(found, ContactOutcome::Refused(wanted));
         assert!(!wanted.remedy().is_empty());
     }
 }
@@ -198,8 +198,8 @@ fn a_flight_that_cannot_show_its_gap_is_refused() {
     let one_sided = Case::with(100e-6, |c| c.profile.no_reversal = true);
     let slow = Case::with(100e-6, |c| c.profile.sample_rate_hz = 15.0);
     let refusal = |case: &Case| case.outcome(&case.fly(6));
-    assert_eq!(refusal(&one_sided), Outcome::Refused(Refusal::NoLoadReversal));
-    assert_eq!(refusal(&slow), Outcome::Refused(Refusal::RateTooLow));
+    assert_eq!(refusal(&one_sided), ContactOutcome::Refused(Rejection::NoLoadReversal));
+    assert_eq!(refusal(&slow), ContactOutcome::Refused(Rejection::RateTooLow));
 }
 
 #[test]
@@ -232,8 +232,8 @@ proptest! {
         let segments = [0..0, 0..3, 3..4000, 4100..8000];
         let samples =
             Samples { step_s: rate_hz.recip(), motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments: &segments };
-        let prior = Prior { stiffness_n_per_m: 5e7, reference_load_n: Some(1e3), unknown_force_n: None };
-        if let Outcome::Estimated(gap) = contact::estimate(&samples, &prior).unwrap() {
+        let prior = PartPrior { stiffness_n_per_m: 5e7, reference_load_n: Some(1e3), unknown_force_n: None };
+        if let ContactOutcome::Estimated(gap) = contact::estimate(&samples, &prior).unwrap() {
             prop_assert!(gap.gap_m.is_finite() && gap.gap_se_m > 0.0 && gap.stiffness_n_per_m.is_finite());
         }
     }
@@ -242,10 +242,10 @@ proptest! {
 #[test]
 fn a_prior_that_cannot_be_is_an_error() {
     let samples = Samples { step_s: 0.01, motor_m: &[], dx_m: &[], load_n: &[], segments: &[] };
-    let prior = Prior { stiffness_n_per_m: 0.0, reference_load_n: None, unknown_force_n: None };
+    let prior = PartPrior { stiffness_n_per_m: 0.0, reference_load_n: None, unknown_force_n: None };
     assert!(matches!(contact::estimate(&samples, &prior), Err(Error::Parameter { .. })));
-    let nothing = contact::estimate(&samples, &Prior { stiffness_n_per_m: 5e7, ..prior });
-    assert_eq!(nothing, Ok(Outcome::Refused(Refusal::ChannelConstant)));
+    let nothing = contact::estimate(&samples, &PartPrior { stiffness_n_per_m: 5e7, ..prior });
+    assert_eq!(nothing, Ok(ContactOutcome::Refused(Rejection::ChannelConstant)));
 }
 
 /// The flanks meet zero force a gap apart, and the stretches the fit believes lie on them
@@ -264,8 +264,8 @@ fn a_picture_shows_the_flanks_a_gap_apart_and_the_stretches_on_them() {
         segments: std::slice::from_ref(&whole),
     };
     let stiffness_n_per_m = case.plant.contact.stiffness_n_per_m;
-    let prior = Prior { stiffness_n_per_m, reference_load_n: None, unknown_force_n: None };
-    let picture = contact::picture(&samples, &prior).unwrap().unwrap();
+    let prior = PartPrior { stiffness_n_per_m, reference_load_n: None, unknown_force_n: None };
+    let picture = contact::plot_data(&samples, &prior).unwrap().unwrap();
     let (upper, lower) = (picture.upper[0], picture.lower[0]);
     assert_eq!((upper.0, lower.0.abs()), (0.0, 0.0));
     assert!((upper.1 - lower.1 - 100e-6).abs() < 0.5e-6, "{upper:?} {lower:?}");

@@ -4,7 +4,7 @@
 use std::fs::File;
 use std::path::PathBuf;
 
-use estimator::contact::{self, ContactGap, Outcome, Prior, Refusal};
+use estimator::contact::{self, ContactEstimate, ContactOutcome, PartPrior, Rejection};
 use estimator::noise::Sensors;
 use estimator::{Actuator, Filter, Noise, Samples, midrange};
 use serde_json::Value;
@@ -66,17 +66,17 @@ impl Log {
         midrange::estimate(&self.samples(std::slice::from_ref(&whole)), &self.filter()).unwrap().gap.gap_m
     }
 
-    fn contact(&self) -> Outcome {
+    fn contact(&self) -> ContactOutcome {
         let whole = 0..self.dx_m.len();
         let stiffness_n_per_m = self.number("assumed", "stiffness_n_per_m");
-        let prior = Prior { stiffness_n_per_m, reference_load_n: Some(3000.0), unknown_force_n: None };
+        let prior = PartPrior { stiffness_n_per_m, reference_load_n: Some(3000.0), unknown_force_n: None };
         contact::estimate(&self.samples(std::slice::from_ref(&whole)), &prior).unwrap()
     }
 
-    fn gap(&self) -> Box<ContactGap> {
+    fn gap(&self) -> Box<ContactEstimate> {
         match self.contact() {
-            Outcome::Estimated(gap) => gap,
-            Outcome::Refused(refusal) => panic!("refused: {}", refusal.code()),
+            ContactOutcome::Estimated(gap) => gap,
+            ContactOutcome::Refused(refusal) => panic!("refused: {}", refusal.code()),
         }
     }
 
@@ -115,7 +115,7 @@ fn contact_regression_finds_the_true_gap() {
 
 #[test]
 fn a_load_that_never_reverses_is_refused() {
-    assert_eq!(Log::load("D_no_reversal").contact(), Outcome::Refused(Refusal::NoLoadReversal));
+    assert_eq!(Log::load("D_no_reversal").contact(), ContactOutcome::Refused(Rejection::NoLoadReversal));
 }
 
 /// The stiffness of B is assumed 15 % high, which leaks 10 % into the published gap: explained. Another
@@ -124,7 +124,7 @@ fn a_load_that_never_reverses_is_refused() {
 fn the_two_numbers_differ_by_what_the_stiffness_explains() {
     let log = Log::load("B_worn_stiffness_assumed_15pc_high");
     let (gap, midrange_m) = (log.gap(), log.midrange_m());
-    let prior = Prior {
+    let prior = PartPrior {
         stiffness_n_per_m: log.number("assumed", "stiffness_n_per_m"),
         reference_load_n: None,
         unknown_force_n: None,

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::blocks::{Blocks, is_sound};
-use super::coupling::{Coupling, Screw, State, Walk, Ways};
-use super::design::{FIRM_SHARE, Flank, Frame};
+use super::block_means::{BlockMeans, is_sound};
+use super::design_matrix::{FIRM_SHARE, Flank, Scaling};
+use super::friction_model::{CouplingForce, CouplingIntegrator, CouplingParams, FrictionState, ScrewState};
 use crate::wide::{Lanes, widest};
 
 /// Blocks before one that must keep its flank and firmness; one after it must as well.
@@ -33,7 +33,7 @@ impl Touch {
 
 /// The coupling of every block as a state has it.
 #[derive(Debug, Default)]
-pub(super) struct Course {
+pub(super) struct CouplingPath {
     /// c, N; NaN where a channel is missing.
     pub(super) force_n: Vec<f64>,
     /// ∂c/∂F_d.
@@ -45,13 +45,13 @@ pub(super) struct Course {
     kept: Vec<Touch>,
 }
 
-impl Course {
+impl CouplingPath {
     /// Follows the coupling over all segments, in the memory of the course before.
-    pub(super) fn follow(&mut self, blocks: &Blocks, state: &State) {
+    pub(super) fn follow(&mut self, blocks: &BlockMeans, state: &FrictionState) {
         for column in [&mut self.force_n, &mut self.by_dry, &mut self.by_share_n] {
             column.resize(blocks.len(), f64::NAN);
         }
-        let ways = Ways::new(state);
+        let ways = CouplingParams::new(state);
         for segment in blocks.segments() {
             self.follow_segment(blocks, ways, segment);
         }
@@ -59,7 +59,7 @@ impl Course {
 
     /// Eight parts abreast, each from where nothing is known; then from the true beginning into each, until the walk
     /// is on what was found there.
-    fn follow_segment(&mut self, blocks: &Blocks, ways: Ways, segment: Range<usize>) {
+    fn follow_segment(&mut self, blocks: &BlockMeans, ways: CouplingParams, segment: Range<usize>) {
         let (motor_m, load_n) = (&blocks.motor_m[segment.clone()], &blocks.load_n[segment.clone()]);
         let mut found = Found {
             force_n: &mut self.force_n[segment.clone()],
@@ -70,7 +70,7 @@ impl Course {
         // Nobody walks here before, and what another course left is no answer.
         found.force_n[Lanes::COUNT * part..].fill(f64::NAN);
         let ends = abreast(ways, (motor_m, load_n), part, &mut found);
-        let mut walk = Walk::new(ways);
+        let mut walk = CouplingIntegrator::new(ways);
         for number in 0..Lanes::COUNT {
             let part = number * part..(number + 1) * part;
             if found.catch_up(&mut walk, (motor_m, load_n), part) {
@@ -81,7 +81,7 @@ impl Course {
     }
 
     /// Finds the blocks that keep flank and firmness, so that no row mixes flank and gap.
-    pub(super) fn keep(&mut self, blocks: &Blocks, frame: &Frame) {
+    pub(super) fn keep(&mut self, blocks: &BlockMeans, frame: &Scaling) {
         self.touches.resize(blocks.len(), Touch::NONE);
         touches(&self.force_n, FIRM_SHARE * frame.load_n, &mut self.touches);
         self.kept.clear();
@@ -95,7 +95,7 @@ impl Course {
     /// The next blocks in a row that keep one touch, no more than so many and of one stretch.
     pub(super) fn next_kept(
         &self,
-        blocks: &Blocks,
+        blocks: &BlockMeans,
         within: Range<usize>,
         most: usize,
     ) -> Option<(Touch, Range<usize>)> {
@@ -121,7 +121,12 @@ struct Found<'a> {
 impl Found<'_> {
     /// Walks through a part until all that follows is there already: where the screw has slipped, its force tells all
     /// of its state. False where it has walked to the end.
-    fn catch_up(&mut self, walk: &mut Walk, (motor_m, load_n): (&[f64], &[f64]), part: Range<usize>) -> bool {
+    fn catch_up(
+        &mut self,
+        walk: &mut CouplingIntegrator,
+        (motor_m, load_n): (&[f64], &[f64]),
+        part: Range<usize>,
+    ) -> bool {
         for k in part {
             let here = walk.step(motor_m[k], load_n[k]);
             let is_there = self.force_n[k].to_bits() == here.force_n.to_bits()
@@ -137,7 +142,7 @@ impl Found<'_> {
 }
 
 /// Eight screws side by side: number k of each array is the k-th's.
-struct Screws {
+struct ScrewStates8 {
     motor_m: [f64; Lanes::COUNT],
     relative_m: [f64; Lanes::COUNT],
     force_n: [f64; Lanes::COUNT],
@@ -146,7 +151,7 @@ struct Screws {
 }
 
 #[allow(clippy::inline_always, reason = "see `widest`")]
-impl Screws {
+impl ScrewStates8 {
     const NOWHERE: Self = Self {
         motor_m: [0.0; Lanes::COUNT],
         relative_m: [0.0; Lanes::COUNT],
@@ -156,19 +161,24 @@ impl Screws {
     };
 
     #[inline(always)]
-    fn get(&self, lane: usize) -> Screw {
-        let coupling = Coupling {
+    fn get(&self, lane: usize) -> ScrewState {
+        let coupling = CouplingForce {
             force_n: self.force_n[lane],
             by_dry: self.by_dry[lane],
             by_share_n: self.by_share_n[lane],
         };
-        Screw { motor_m: self.motor_m[lane], relative_m: self.relative_m[lane], coupling, has_slipped: false }
+        ScrewState {
+            motor_m: self.motor_m[lane],
+            relative_m: self.relative_m[lane],
+            coupling,
+            has_slipped: false,
+        }
     }
 
     #[inline(always)]
-    fn set(&mut self, lane: usize, is_known: bool, screw: Screw) {
-        let Screw { motor_m, relative_m, coupling, .. } = screw;
-        let Coupling { force_n, by_dry, by_share_n } = coupling;
+    fn set(&mut self, lane: usize, is_known: bool, screw: ScrewState) {
+        let ScrewState { motor_m, relative_m, coupling, .. } = screw;
+        let CouplingForce { force_n, by_dry, by_share_n } = coupling;
         self.motor_m[lane] = if is_known { motor_m } else { self.motor_m[lane] };
         self.relative_m[lane] = if is_known { relative_m } else { self.relative_m[lane] };
         self.force_n[lane] = if is_known { force_n } else { self.force_n[lane] };
@@ -179,9 +189,9 @@ impl Screws {
 
 widest! {
     /// Eight parts of a segment, all of one length, each walked from nowhere; where the walks end.
-    fn abreast(ways: Ways, channels: (&[f64], &[f64]), part: usize, found: &mut Found<'_>) -> Screws {
+    fn abreast(ways: CouplingParams, channels: (&[f64], &[f64]), part: usize, found: &mut Found<'_>) -> ScrewStates8 {
         let (motor_m, load_n) = channels;
-        let mut screws = Screws::NOWHERE;
+        let mut screws = ScrewStates8::NOWHERE;
         for k in 0..part {
             let (mut motor, mut load) = ([0.0; Lanes::COUNT], [0.0; Lanes::COUNT]);
             for lane in 0..Lanes::COUNT {
@@ -229,7 +239,7 @@ widest! {
 
 widest! {
     /// Drops the blocks of which something is missing or whose neighbours do, and those at the very beginning.
-    fn drop_unsound(blocks: &Blocks, kept: &mut [Touch]) {
+    fn drop_unsound(blocks: &BlockMeans, kept: &mut [Touch]) {
         let inner = 1..kept.len().max(2) - 1;
         let (time_s, dx_m) = (&blocks.time_s[inner.clone()], &blocks.dx_m[inner.clone()]);
         let rates = blocks.motor_m.array_windows::<3>().zip(blocks.load_n.array_windows::<3>());
@@ -244,7 +254,7 @@ widest! {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::coupling::Friction;
+    use super::super::friction_model::Friction;
     use super::*;
 
     proptest! {
@@ -257,7 +267,7 @@ mod tests {
             gap_m in 0.0_f64..1e-4, dry_n in prop_oneof![0.0_f64..300.0, Just(1e5)], lost_share in 0.0_f64..0.2,
         ) {
             let mut place_m = 0.0;
-            let mut blocks = Blocks::default();
+            let mut blocks = BlockMeans::default();
             for &(step, load, chance) in &steps {
                 place_m += f64::from(step) * 1.3e-5;
                 let missing = |which: u8| if chance == which { f64::NAN } else { 0.0 };
@@ -269,13 +279,13 @@ mod tests {
             starts.dedup();
             blocks.starts = starts;
             let friction = Friction { dry_n, lost_share };
-            let state = State { stiffness_n_per_m: 5e7, gap_m, friction, skew_s: 0.0 };
+            let state = FrictionState { stiffness_n_per_m: 5e7, gap_m, friction, skew_s: 0.0 };
             // In the memory of a course that knew another gap.
-            let mut course = Course::default();
-            course.follow(&blocks, &State { gap_m: gap_m + 1e-5, stiffness_n_per_m: 4e7, ..state });
+            let mut course = CouplingPath::default();
+            course.follow(&blocks, &FrictionState { gap_m: gap_m + 1e-5, stiffness_n_per_m: 4e7, ..state });
             course.follow(&blocks, &state);
             for segment in blocks.segments() {
-                let mut walk = Walk::new(Ways::new(&state));
+                let mut walk = CouplingIntegrator::new(CouplingParams::new(&state));
                 for k in segment {
                     let one = walk.step(blocks.motor_m[k], blocks.load_n[k]);
                     let wanted = [one.force_n, one.by_dry, one.by_share_n].map(f64::to_bits);

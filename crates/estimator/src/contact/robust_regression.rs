@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
-use super::design::Row;
+use super::design_matrix::DesignRow;
 use crate::wide::{Lanes, widest};
 
 /// Residuals beyond this many times their spread lose weight (Huber).
@@ -16,32 +16,36 @@ const LEAST_SPREAD_M: f64 = 1e-12;
 
 /// What a coefficient is believed to be, m.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Belief {
+pub(super) struct GaussianPrior {
     pub(super) mean: f64,
     /// Infinite where nothing is believed.
     pub(super) sd: f64,
 }
 
-impl Belief {
+impl GaussianPrior {
     pub(super) const NONE: Self = Self { mean: 0.0, sd: f64::INFINITY };
 }
 
 /// Coefficients of the first N columns, m.
 #[derive(Debug, Clone)]
-pub(super) struct Fit<const N: usize> {
+pub(super) struct RobustFit<const N: usize> {
     pub(super) beta: [f64; N],
     inverse: SMatrix<f64, N, N>,
     weights: Vec<f64>,
     /// Precision lent by each belief, in units of the rows' weights.
     lent: [f64; N],
-    beliefs: [Belief; N],
+    beliefs: [GaussianPrior; N],
 }
 
 /// Reweighted least squares: `rounds` rounds from even weights; none where there are too few rows.
 ///
 /// A belief counts as residual variance over its own, times the factor by which dependence within
 /// stretches inflates the variance of a mean; otherwise thousands of dependent rows would talk it down.
-pub(super) fn fit<const N: usize>(rows: &[Row<N>], beliefs: &[Belief; N], rounds: usize) -> Option<Fit<N>> {
+pub(super) fn fit<const N: usize>(
+    rows: &[DesignRow<N>],
+    beliefs: &[GaussianPrior; N],
+    rounds: usize,
+) -> Option<RobustFit<N>> {
     if rows.len() <= N {
         return None;
     }
@@ -83,7 +87,7 @@ fn spread_m(residuals_m: &[f64]) -> f64 {
 }
 
 /// Residual variance of a row of weight one, inflated by dependence within stretches.
-fn variance_of_a_row<const N: usize>(rows: &[Row<N>], weights: &[f64], residuals_m: &[f64]) -> f64 {
+fn variance_of_a_row<const N: usize>(rows: &[DesignRow<N>], weights: &[f64], residuals_m: &[f64]) -> f64 {
     let (mut alone, mut together, mut sum, mut total) = (0.0, 0.0, 0.0, 0.0);
     let mut stretch = None;
     for ((row, w), e) in rows.iter().zip(weights).zip(residuals_m) {
@@ -102,8 +106,8 @@ fn variance_of_a_row<const N: usize>(rows: &[Row<N>], weights: &[f64], residuals
 }
 
 /// Σ w x xᵀ on and below the diagonal, which is all that a Cholesky decomposition reads; and Σ w x y.
-fn normal_equations<const N: usize>(rows: &[Row<N>], weights: &[f64]) -> ([[f64; N]; N], [f64; N]) {
-    let Products { squares, right } = products(rows, weights);
+fn normal_equations<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> ([[f64; N]; N], [f64; N]) {
+    let NormalEquations { squares, right } = products(rows, weights);
     let (mut normal, mut side) = ([[0.0; N]; N], [0.0; N]);
     for (i, line) in normal.iter_mut().enumerate() {
         side[i] = right[i / Lanes::COUNT].0[i % Lanes::COUNT];
@@ -117,14 +121,14 @@ fn normal_equations<const N: usize>(rows: &[Row<N>], weights: &[f64]) -> ([[f64;
 
 /// Sums over rows: Σ w x xᵀ in squares of eight by eight, filled up with zeros: upper left, lower left, lower right; and
 /// Σ w x y.
-struct Products {
+struct NormalEquations {
     squares: [[Lanes; Lanes::COUNT]; 3],
     right: [Lanes; 2],
 }
 
 widest! {
     /// Whole squares: what is above the diagonal comes for nothing, and would come apart if it were left out.
-    fn products<const N: usize>(rows: &[Row<N>], weights: &[f64]) -> Products {
+    fn products<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> NormalEquations {
         let mut squares = [[Lanes::ZERO; Lanes::COUNT]; 3];
         let mut right = [Lanes::ZERO; 2];
         for (row, &w) in rows.iter().zip(weights) {
@@ -138,7 +142,7 @@ widest! {
                 add_products(&mut squares[2], N - Lanes::COUNT, wx[1], x[1]);
             }
         }
-        Products { squares, right }
+        NormalEquations { squares, right }
     }
 }
 
@@ -152,11 +156,11 @@ fn add_products(square: &mut [Lanes; Lanes::COUNT], count: usize, lines: Lanes, 
 }
 
 fn solve<const N: usize>(
-    rows: &[Row<N>],
-    beliefs: &[Belief; N],
+    rows: &[DesignRow<N>],
+    beliefs: &[GaussianPrior; N],
     weights: Vec<f64>,
     lent: [f64; N],
-) -> Option<Fit<N>> {
+) -> Option<RobustFit<N>> {
     let (normal, right) = normal_equations(rows, &weights);
     let mut normal = SMatrix::<f64, N, N>::from_fn(|i, j| normal[i][j]);
     let mut right = SVector::<f64, N>::from(right);
@@ -170,20 +174,20 @@ fn solve<const N: usize>(
     }
     let factor: Cholesky<f64, Const<N>> = normal.cholesky()?;
     let beta = factor.solve(&right);
-    Some(Fit { beta: beta.into(), inverse: factor.inverse(), weights, lent, beliefs: *beliefs })
+    Some(RobustFit { beta: beta.into(), inverse: factor.inverse(), weights, lent, beliefs: *beliefs })
 }
 
-impl<const N: usize> Fit<N> {
+impl<const N: usize> RobustFit<N> {
     pub(super) fn predict_m(&self, x: &[f64; N]) -> f64 {
         self.beta.iter().zip(x).map(|(b, x)| b * x).sum()
     }
 
-    pub(super) fn residual_m(&self, row: &Row<N>) -> f64 {
+    pub(super) fn residual_m(&self, row: &DesignRow<N>) -> f64 {
         row.y_m - self.predict_m(&row.x)
     }
 
     /// How far each row was believed: its weight over that of a row no residual of which is large.
-    pub(super) fn trusts(&self, rows: &[Row<N>]) -> impl Iterator<Item = f64> {
+    pub(super) fn trusts(&self, rows: &[DesignRow<N>]) -> impl Iterator<Item = f64> {
         let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len() as f64;
         rows.iter().zip(&self.weights).map(move |(row, w)| w * mean_blocks / row.blocks)
     }
@@ -193,7 +197,7 @@ impl<const N: usize> Fit<N> {
     /// ```text
     /// Var β_j = Σ_stretches (Σ w e aᵀx)² · B/(B − N) + Σ_i (a_i λ_i σ_i)²      a = row j of H⁻¹
     /// ```
-    pub(super) fn standard_error_m(&self, column: usize, rows: &[Row<N>]) -> f64 {
+    pub(super) fn standard_error_m(&self, column: usize, rows: &[DesignRow<N>]) -> f64 {
         let influence: [f64; N] = self.inverse.row(column).transpose().into();
         let (mut total, mut sum, mut stretches) = (0.0, 0.0, 0_usize);
         let mut stretch = None;

@@ -38,7 +38,7 @@ const HEAVY: f64 = 3.0;
 
 /// What the screw and its coupling are thought to be.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct State {
+pub(super) struct FrictionState {
     pub(super) stiffness_n_per_m: f64,
     pub(super) gap_m: f64,
     pub(super) friction: Friction,
@@ -47,7 +47,7 @@ pub(super) struct State {
 
 /// Force in the coupling, and how it answers to friction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Coupling {
+pub(super) struct CouplingForce {
     /// c, N; NaN where a channel is missing.
     pub(super) force_n: f64,
     /// ∂c/∂F_d.
@@ -56,14 +56,14 @@ pub(super) struct Coupling {
     pub(super) by_share_n: f64,
 }
 
-impl Coupling {
+impl CouplingForce {
     /// Where a channel is missing.
     pub(super) const UNKNOWN: Self = Self { force_n: f64::NAN, by_dry: 0.0, by_share_n: 0.0 };
 }
 
 /// What a walk's steps depend on.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ways {
+pub(super) struct CouplingParams {
     stiffness_n_per_m: f64,
     compliance_m_per_n: f64,
     half_gap_m: f64,
@@ -72,24 +72,24 @@ pub(super) struct Ways {
 
 /// The coupling followed from block to block; each segment starts at rest, its friction unknown.
 #[derive(Debug)]
-pub(super) struct Walk {
-    ways: Ways,
-    screw: Option<Screw>,
+pub(super) struct CouplingIntegrator {
+    ways: CouplingParams,
+    screw: Option<ScrewState>,
 }
 
 /// The screw between two blocks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Screw {
+pub(super) struct ScrewState {
     pub(super) motor_m: f64,
     /// Relative position from the middle of the gap, m.
     pub(super) relative_m: f64,
-    pub(super) coupling: Coupling,
+    pub(super) coupling: CouplingForce,
     /// Whether it slipped last, so that nothing before tells what comes after.
     pub(super) has_slipped: bool,
 }
 
-impl Ways {
-    pub(super) fn new(state: &State) -> Self {
+impl CouplingParams {
+    pub(super) fn new(state: &FrictionState) -> Self {
         Self {
             stiffness_n_per_m: state.stiffness_n_per_m,
             compliance_m_per_n: state.stiffness_n_per_m.recip(),
@@ -102,7 +102,7 @@ impl Ways {
     /// asked of several at once.
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "see `widest`")]
-    pub(super) fn moved(&self, before: &Screw, motor_m: f64, load_n: f64) -> Screw {
+    pub(super) fn moved(&self, before: &ScrewState, motor_m: f64, load_n: f64) -> ScrewState {
         let held_m = before.relative_m - (motor_m - before.motor_m);
         let above_m = if held_m < -self.half_gap_m { -self.half_gap_m } else { held_m };
         let free_m = if above_m > self.half_gap_m { self.half_gap_m } else { above_m };
@@ -117,10 +117,10 @@ impl Ways {
         let is_touching = held_n * before.coupling.force_n > 0.0;
         let held_by_dry = if is_touching { before.coupling.by_dry } else { 0.0 };
         let held_by_share_n = if is_touching { before.coupling.by_share_n } else { 0.0 };
-        Screw {
+        ScrewState {
             motor_m,
             relative_m: if has_slipped { self.relative_m(force_n) } else { held_m },
-            coupling: Coupling {
+            coupling: CouplingForce {
                 force_n,
                 by_dry: if has_slipped { way } else { held_by_dry },
                 by_share_n: if has_slipped { way * load_n.abs() } else { held_by_share_n },
@@ -139,9 +139,9 @@ impl Ways {
     }
 }
 
-impl Walk {
+impl CouplingIntegrator {
     /// At rest, where nothing is known of the friction.
-    pub(super) fn new(ways: Ways) -> Self {
+    pub(super) fn new(ways: CouplingParams) -> Self {
         Self { ways, screw: None }
     }
 
@@ -151,21 +151,21 @@ impl Walk {
     }
 
     /// Goes on from elsewhere.
-    pub(super) fn set(&mut self, screw: Screw) {
+    pub(super) fn set(&mut self, screw: ScrewState) {
         self.screw = Some(screw);
     }
 
     /// The coupling at the next block. One with a channel missing is passed over.
     #[inline]
-    pub(super) fn step(&mut self, motor_m: f64, load_n: f64) -> Coupling {
+    pub(super) fn step(&mut self, motor_m: f64, load_n: f64) -> CouplingForce {
         if !(motor_m + load_n).is_finite() {
-            return Coupling::UNKNOWN;
+            return CouplingForce::UNKNOWN;
         }
         let screw = self.screw.map_or_else(
-            || Screw {
+            || ScrewState {
                 motor_m,
                 relative_m: self.ways.relative_m(load_n),
-                coupling: Coupling { force_n: load_n, by_dry: 0.0, by_share_n: 0.0 },
+                coupling: CouplingForce { force_n: load_n, by_dry: 0.0, by_share_n: 0.0 },
                 has_slipped: false,
             },
             |before| self.ways.moved(&before, motor_m, load_n),

@@ -1,14 +1,14 @@
 //! Gauss–Newton over what the force in the coupling depends on: friction, stiffness, gap and skew.
 
-use super::blocks::Blocks;
-use super::coupling::{Friction, State};
-use super::course::Course;
-use super::design::{
-    self, BEND, CURVED, DRIFT, DRY, Design, FORCE, Frame, GAP, Ground, LATE_S, LOAD_RATE, ORIGIN, PLACE,
-    SHARE, SPEED, SPEED_M_PER_S,
+use super::acceptance::Rejection;
+use super::block_means::BlockMeans;
+use super::coupling_path::CouplingPath;
+use super::design_matrix::{
+    self, BEND, CURVED, DRIFT, DRY, DesignMatrix, FORCE, GAP, LATE_S, LOAD_RATE, ORIGIN, PLACE, RowSource,
+    SHARE, SPEED, SPEED_M_PER_S, Scaling,
 };
-use super::refusal::Refusal;
-use super::regression::{Belief, Fit, fit};
+use super::friction_model::{Friction, FrictionState};
+use super::robust_regression::{GaussianPrior, RobustFit, fit};
 use super::{BRIEF_S, TOUCH_S};
 
 /// What the design of any actuator says: 1/K within 15 % of the part's.
@@ -40,30 +40,30 @@ const ROUNDS: usize = 5;
 /// The last turn: rows, coefficients, and the state they were made with.
 #[derive(Debug)]
 pub(super) struct Found<const N: usize> {
-    pub(super) design: Design<N>,
-    pub(super) fit: Fit<N>,
-    pub(super) state: State,
+    pub(super) design: DesignMatrix<N>,
+    pub(super) fit: RobustFit<N>,
+    pub(super) state: FrictionState,
 }
 
-/// Turns from a state: rows of that state, a fit, and the state the fit asks for.
+/// IterationLimits from a state: rows of that state, a fit, and the state the fit asks for.
 ///
 /// # Errors
-/// [`Refusal::NoLoadReversal`], [`Refusal::OneSideBrief`], [`Refusal::TooShort`].
+/// [`Rejection::NoLoadReversal`], [`Rejection::OneSideBrief`], [`Rejection::TooShort`].
 pub(super) fn search<const N: usize>(
-    (blocks, course): (&mut Blocks, &mut Course),
-    frame: &Frame,
-    mut state: State,
+    (blocks, course): (&mut BlockMeans, &mut CouplingPath),
+    frame: &Scaling,
+    mut state: FrictionState,
     turns: usize,
-) -> Result<Found<N>, Refusal> {
+) -> Result<Found<N>, Rejection> {
     let mut found = None;
     for turn in 1..=turns {
         blocks.realign(state.skew_s);
-        let mut design = design::rows(Ground { blocks, frame }, &state, course);
+        let mut design = design_matrix::rows(RowSource { blocks, frame }, &state, course);
         touched(&design)?;
         if N == CURVED {
             design.firm.append(&mut design.light);
         }
-        let fit = fit(&design.firm, &beliefs(frame, &state), ROUNDS).ok_or(Refusal::TooShort)?;
+        let fit = fit(&design.firm, &beliefs(frame, &state), ROUNDS).ok_or(Rejection::TooShort)?;
         let after = next(frame, &state, &fit);
         let moved_m = frame.windup_m() * step(frame, blocks.period_s, &state, &after);
         let is_last = turn == turns || moved_m < SETTLED * fit.standard_error_m(GAP, &design.firm);
@@ -73,11 +73,11 @@ pub(super) fn search<const N: usize>(
             break;
         }
     }
-    found.ok_or(Refusal::TooShort)
+    found.ok_or(Rejection::TooShort)
 }
 
 /// How far a turn moved the state, over what each of its numbers is about.
-fn step(frame: &Frame, period_s: f64, before: &State, after: &State) -> f64 {
+fn step(frame: &Scaling, period_s: f64, before: &FrictionState, after: &FrictionState) -> f64 {
     let (was, is) = (&before.friction, &after.friction);
     [
         after.stiffness_n_per_m / before.stiffness_n_per_m - 1.0,
@@ -91,8 +91,8 @@ fn step(frame: &Frame, period_s: f64, before: &State, after: &State) -> f64 {
 }
 
 /// Where a search starts: the part's stiffness, usual friction, no gap and no skew.
-pub(super) fn start(frame: &Frame) -> State {
-    State {
+pub(super) fn start(frame: &Scaling) -> FrictionState {
+    FrictionState {
         stiffness_n_per_m: frame.stiffness_n_per_m,
         gap_m: 0.0,
         friction: Friction { dry_n: FRICTION_DRY.0 * frame.load_n, lost_share: FRICTION_SHARE.0 },
@@ -100,32 +100,32 @@ pub(super) fn start(frame: &Frame) -> State {
     }
 }
 
-fn touched<const N: usize>(design: &Design<N>) -> Result<(), Refusal> {
+fn touched<const N: usize>(design: &DesignMatrix<N>) -> Result<(), Rejection> {
     let least_s = design.touched_s.0.min(design.touched_s.1);
     if least_s < BRIEF_S {
-        Err(Refusal::NoLoadReversal)
+        Err(Rejection::NoLoadReversal)
     } else if least_s < TOUCH_S {
-        Err(Refusal::OneSideBrief)
+        Err(Rejection::OneSideBrief)
     } else {
         Ok(())
     }
 }
 
-fn beliefs<const N: usize>(frame: &Frame, state: &State) -> [Belief; N] {
+fn beliefs<const N: usize>(frame: &Scaling, state: &FrictionState) -> [GaussianPrior; N] {
     let windup_m = frame.windup_m();
     let lack = |(usual, spread): (f64, f64), now: f64| {
         let windup_m = frame.load_n / state.stiffness_n_per_m;
-        Belief { mean: (usual - now) * windup_m, sd: spread * windup_m }
+        GaussianPrior { mean: (usual - now) * windup_m, sd: spread * windup_m }
     };
-    let zero = |sd: f64| Belief { mean: 0.0, sd };
+    let zero = |sd: f64| GaussianPrior { mean: 0.0, sd };
     let compliance = if N == CURVED { 2.0 * COMPLIANCE } else { COMPLIANCE };
     std::array::from_fn(|column| match column {
-        ORIGIN | GAP => Belief::NONE,
-        FORCE => Belief { mean: windup_m, sd: compliance * windup_m },
+        ORIGIN | GAP => GaussianPrior::NONE,
+        FORCE => GaussianPrior { mean: windup_m, sd: compliance * windup_m },
         DRY => lack(FRICTION_DRY, state.friction.dry_n / frame.load_n),
         SHARE => lack(FRICTION_SHARE, state.friction.lost_share),
         // What is left of the skew once the channels are realigned.
-        SPEED => Belief { mean: state.skew_s * SPEED_M_PER_S, sd: SKEW_S * SPEED_M_PER_S },
+        SPEED => GaussianPrior { mean: state.skew_s * SPEED_M_PER_S, sd: SKEW_S * SPEED_M_PER_S },
         LOAD_RATE => zero(SKEW_S / LATE_S * windup_m),
         _ if column < PLACE => zero(DRIFT_M[column - DRIFT]),
         _ if column < LOAD_RATE => zero(PLACE_M),
@@ -133,14 +133,14 @@ fn beliefs<const N: usize>(frame: &Frame, state: &State) -> [Belief; N] {
     })
 }
 
-fn next<const N: usize>(frame: &Frame, state: &State, fit: &Fit<N>) -> State {
+fn next<const N: usize>(frame: &Scaling, state: &FrictionState, fit: &RobustFit<N>) -> FrictionState {
     let beta = &fit.beta;
     // The secant at the 95 % load: bends included, or a soft flank would make the force too stiff.
     let secant_m: f64 =
-        beta[FORCE] + beta.iter().skip(BEND).zip(design::bends(1.0)).map(|(b, x)| b * x).sum::<f64>();
+        beta[FORCE] + beta.iter().skip(BEND).zip(design_matrix::bends(1.0)).map(|(b, x)| b * x).sum::<f64>();
     let stiffness = frame.load_n / secant_m.clamp(frame.windup_m() / STRETCH, frame.windup_m() * STRETCH);
     let lacking = |column: usize| beta[column] * stiffness / frame.load_n;
-    State {
+    FrictionState {
         stiffness_n_per_m: stiffness,
         gap_m: beta[GAP].clamp(0.0, WIDEST * frame.windup_m()),
         friction: Friction {

@@ -1,9 +1,9 @@
 //! Are the channels what they are said to be? Signs and ratios, before anything is believed.
 
-use super::blocks::Blocks;
-use super::design::{Frame, Row, SPEED_M_PER_S};
-use super::refusal::Refusal;
-use super::regression::{Belief, fit};
+use super::acceptance::Rejection;
+use super::block_means::BlockMeans;
+use super::design_matrix::{DesignRow, SPEED_M_PER_S, Scaling};
+use super::robust_regression::{GaussianPrior, fit};
 
 /// Every fourth block is looked at, and of long flights some so many: a sign needs no more.
 const STRIDE: usize = 4;
@@ -34,28 +34,28 @@ const COLUMNS: usize = 6;
 /// are swapped; friction tells which, since it opposes the motion of the screw in either case.
 ///
 /// # Errors
-/// [`Refusal::PositionRatio`], [`Refusal::LoadSignFlipped`], [`Refusal::PositionsSwapped`].
-pub(super) fn check(blocks: &Blocks, frame: &Frame) -> Result<(), Refusal> {
+/// [`Rejection::PositionRatio`], [`Rejection::LoadSignFlipped`], [`Rejection::PositionsSwapped`].
+pub(super) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<(), Rejection> {
     let stride = STRIDE.max(blocks.len() / LOOKS);
-    let rows: Vec<Row<COLUMNS>> =
+    let rows: Vec<DesignRow<COLUMNS>> =
         (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, frame, k)).collect();
-    let Some(found) = fit(&rows, &[Belief::NONE; COLUMNS], ROUNDS) else { return Ok(()) };
+    let Some(found) = fit(&rows, &[GaussianPrior::NONE; COLUMNS], ROUNDS) else { return Ok(()) };
     let beta = &found.beta;
     if beta[PLACE].abs() > (RATIO * frame.place_m.1).max(TRANSDUCER_M) {
-        return Err(Refusal::PositionRatio);
+        return Err(Rejection::PositionRatio);
     }
     if beta[SIDE] + beta[LOAD] > -FLIPPED * frame.windup_m() {
         return Ok(());
     }
     let drag_m = beta[SLIP] + beta[SPEED];
-    Err(if drag_m > 0.0 { Refusal::PositionsSwapped } else { Refusal::LoadSignFlipped })
+    Err(if drag_m > 0.0 { Rejection::PositionsSwapped } else { Rejection::LoadSignFlipped })
 }
 
-fn row(blocks: &Blocks, frame: &Frame, k: usize) -> Option<Row<COLUMNS>> {
+fn row(blocks: &BlockMeans, frame: &Scaling, k: usize) -> Option<DesignRow<COLUMNS>> {
     let (load, speed) = (blocks.load_n[k] / frame.load_n, blocks.rate(&blocks.motor_m, k));
     let place = (blocks.motor_m[k] - frame.place_m.0) / frame.place_m.1;
     let slip = if speed.abs() > SLIP_M_PER_S { speed.signum() } else { 0.0 };
     let x = [1.0, 0.5 * load.signum(), load, slip, speed / SPEED_M_PER_S, place];
-    let row = Row { x, y_m: blocks.dx_m[k], blocks: 1.0, stretch: 0 };
+    let row = DesignRow { x, y_m: blocks.dx_m[k], blocks: 1.0, stretch: 0 };
     (row.y_m + speed + load + place).is_finite().then_some(row)
 }

@@ -6,17 +6,17 @@ use std::ops::Range;
 const LOOKS: usize = 4000;
 /// A sample is wild beyond this many times the step that nine in ten steps stay under.
 const WILD: f64 = 8.0;
-/// Neighbours on either side.
+/// SpikeThreshold on either side.
 const REACH: usize = 4;
 
 /// How far a channel's neighbours lie apart.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Neighbours {
+pub(super) struct SpikeThreshold {
     /// The longest step that is not looked at twice, in the channel's unit.
     pub(super) leap: f64,
 }
 
-impl Neighbours {
+impl SpikeThreshold {
     /// From the steps within segments that are not zero; none when the channel never moves.
     pub(super) fn of(values: &[f64], segments: &[Range<usize>]) -> Option<Self> {
         let steps = |stride: usize| -> Vec<f64> {
@@ -62,9 +62,9 @@ mod tests {
     #[test]
     fn a_channel_that_is_held_moves() {
         let held: Vec<f64> = (0..180_000).map(|k| (f64::from(k / 10) * 0.01).sin()).collect();
-        let found = Neighbours::of(&held, std::slice::from_ref(&(0..held.len()))).unwrap();
+        let found = SpikeThreshold::of(&held, std::slice::from_ref(&(0..held.len()))).unwrap();
         assert!((0.07..0.09).contains(&found.leap), "{found:?}");
-        assert!(Neighbours::of(&vec![3.0; 50_000], std::slice::from_ref(&(0..50_000))).is_none());
+        assert!(SpikeThreshold::of(&vec![3.0; 50_000], std::slice::from_ref(&(0..50_000))).is_none());
     }
 
     /// However little of a long log counts, its steps are known from as many looks as those of a short one.
@@ -74,9 +74,9 @@ mod tests {
         let mut long = vec![f64::NAN; 3_000_000];
         let counts = 1_234_567..1_234_567 + wave.len();
         long[counts.clone()].copy_from_slice(&wave);
-        let alone = Neighbours::of(&wave, std::slice::from_ref(&(0..wave.len()))).unwrap();
+        let alone = SpikeThreshold::of(&wave, std::slice::from_ref(&(0..wave.len()))).unwrap();
         assert_eq!(
-            Neighbours::of(&long, std::slice::from_ref(&counts)).unwrap().leap.to_bits(),
+            SpikeThreshold::of(&long, std::slice::from_ref(&counts)).unwrap().leap.to_bits(),
             alone.leap.to_bits()
         );
     }

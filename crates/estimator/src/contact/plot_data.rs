@@ -1,8 +1,8 @@
 //! What the estimate stands on, as one would draw it: δX against the force in the coupling.
 
-use super::curve::Contact;
-pub use super::design::Flank;
-use super::design::{FORCE, Frame, GAP, LINEAR, Row};
+pub use super::design_matrix::Flank;
+use super::design_matrix::{DesignRow, FORCE, GAP, LINEAR, Scaling};
+use super::flank_fit::Contact;
 
 /// Points of a flank's line.
 const POINTS: usize = 60;
@@ -26,7 +26,7 @@ pub struct Touch {
 
 /// Stretches in contact, and the flanks fitted through them.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Picture {
+pub struct ContactPlot {
     /// In order of time on each side of the share of the load below which flanks may be soft.
     pub touches: Vec<Touch>,
     /// The upper flank as fitted, from zero to the greatest force: N, m.
@@ -35,8 +35,8 @@ pub struct Picture {
     pub lower: Vec<(f64, f64)>,
 }
 
-impl Picture {
-    pub(super) fn of(frame: &Frame, contact: &Contact) -> Self {
+impl ContactPlot {
+    pub(super) fn of(frame: &Scaling, contact: &Contact) -> Self {
         let design = &contact.straight.design;
         let firm =
             design.firm.iter().zip(contact.straight.fit.trusts(&design.firm)).map(|(r, t)| (r, Some(t)));
@@ -52,7 +52,7 @@ impl Picture {
     }
 }
 
-fn touch(frame: &Frame, contact: &Contact, row: &Row<LINEAR>, trust: Option<f64>) -> Touch {
+fn touch(frame: &Scaling, contact: &Contact, row: &DesignRow<LINEAR>, trust: Option<f64>) -> Touch {
     Touch {
         time_s: frame.moment_s(row),
         duration_s: row.blocks * contact.period_s,
@@ -64,7 +64,7 @@ fn touch(frame: &Frame, contact: &Contact, row: &Row<LINEAR>, trust: Option<f64>
 }
 
 /// δX of a flank over the force that presses it, straight or bent.
-fn line(frame: &Frame, contact: &Contact, flank: Flank, most_n: f64) -> Vec<(f64, f64)> {
+fn line(frame: &Scaling, contact: &Contact, flank: Flank, most_n: f64) -> Vec<(f64, f64)> {
     let side = flank.sign();
     let at = |k: usize| most_n * k as f64 / (POINTS - 1) as f64;
     (0..POINTS)

@@ -6,9 +6,9 @@ use crate::Samples;
 use crate::wide::{Lanes, widest};
 
 use super::SHORTEST_S;
-use super::design::middle_and_half;
-use super::refusal::Refusal;
-use super::wild::Neighbours;
+use super::acceptance::Rejection;
+use super::design_matrix::middle_and_half;
+use super::spikes::SpikeThreshold;
 
 /// Length of a block, s: short against the load's changes, long enough to calm the noise.
 const PERIOD_S: f64 = 0.02;
@@ -32,7 +32,7 @@ const WINDOW_BLOCKS: usize = 500;
 
 /// Means over blocks; NaN where fewer than half of a block's samples are sound.
 #[derive(Debug, Default)]
-pub(super) struct Blocks {
+pub(super) struct BlockMeans {
     /// Length of a block, s.
     pub(super) period_s: f64,
     /// The block at which each segment starts.
@@ -49,14 +49,14 @@ pub(super) struct Blocks {
     screw_m: Vec<f64>,
 }
 
-impl Blocks {
+impl BlockMeans {
     /// Takes in a flight, in the memory of the one before.
     ///
     /// # Errors
-    /// [`Refusal::ChannelConstant`], [`Refusal::TooShort`].
-    pub(super) fn gather(&mut self, samples: &Samples<'_>) -> Result<(), Refusal> {
+    /// [`Rejection::ChannelConstant`], [`Rejection::TooShort`].
+    pub(super) fn gather(&mut self, samples: &Samples<'_>) -> Result<(), Rejection> {
         let each = ((PERIOD_S / samples.step_s).round() as usize).max(1);
-        let watch = Watch::over(samples)?;
+        let watch = SpikeGate::over(samples)?;
         self.clear(samples.dx_m.len() / each, each as f64 * samples.step_s);
         for segment in samples.segments {
             self.starts.push(self.len());
@@ -73,10 +73,10 @@ impl Blocks {
         }
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
         if self.is_still() {
-            return Err(Refusal::ChannelConstant);
+            return Err(Rejection::ChannelConstant);
         }
         let sound = self.dx_m.iter().filter(|y| y.is_finite()).count();
-        if (sound as f64) * self.period_s < SHORTEST_S { Err(Refusal::TooShort) } else { Ok(()) }
+        if (sound as f64) * self.period_s < SHORTEST_S { Err(Rejection::TooShort) } else { Ok(()) }
     }
 
     /// No block, and room for so many.
@@ -270,15 +270,16 @@ fn cubic(u: f64) -> [f64; 4] {
 
 /// The samples, and how far neighbours of a channel may leap before they are looked at twice.
 #[derive(Debug)]
-struct Watch<'a> {
+struct SpikeGate<'a> {
     samples: &'a Samples<'a>,
-    dx: Neighbours,
-    load: Neighbours,
+    dx: SpikeThreshold,
+    load: SpikeThreshold,
 }
 
-impl<'a> Watch<'a> {
-    fn over(samples: &'a Samples<'a>) -> Result<Self, Refusal> {
-        let of = |channel: &[f64]| Neighbours::of(channel, samples.segments).ok_or(Refusal::ChannelConstant);
+impl<'a> SpikeGate<'a> {
+    fn over(samples: &'a Samples<'a>) -> Result<Self, Rejection> {
+        let of =
+            |channel: &[f64]| SpikeThreshold::of(channel, samples.segments).ok_or(Rejection::ChannelConstant);
         of(samples.motor_m)?;
         Ok(Self { samples, dx: of(samples.dx_m)?, load: of(samples.load_n)? })
     }

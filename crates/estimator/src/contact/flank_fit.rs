@@ -1,13 +1,13 @@
 //! Straight flanks, or soft ones: which of the two the samples at low load speak for.
 
-use super::Room;
-use super::coupling::State;
-use super::design::{
-    self, BEND, CURVED, FIRM_SHARE, FORCE, Frame, GAP, Ground, LINEAR, ORIGIN, Row, SPEED, SPEED_M_PER_S,
-    bends,
+use super::ContactWorkspace;
+use super::acceptance::Rejection;
+use super::design_matrix::{
+    self, BEND, CURVED, DesignRow, FIRM_SHARE, FORCE, GAP, LINEAR, ORIGIN, RowSource, SPEED, SPEED_M_PER_S,
+    Scaling, bends,
 };
-use super::refusal::Refusal;
-use super::search::{Found, search, start};
+use super::friction_model::FrictionState;
+use super::gauss_newton::{Found, search, start};
 
 /// Blocks looked at to see how far δX travels.
 const LOOKS: usize = 4000;
@@ -15,10 +15,10 @@ const LOOKS: usize = 4000;
 /// did by 3 % at most, with positions that freeze for seconds by 15 %; over the flights that were given a wrong
 /// gap before by 50 % and more. Of 3,000 sound flights of the study twelve are refused for it.
 const UNEXPLAINED: f64 = 0.25;
-/// Turns of the search over straight flanks, and over soft ones from there.
-const STRAIGHT: Turns = Turns { excerpt: 3, whole: 2, alone: 5 };
+/// IterationLimits of the search over straight flanks, and over soft ones from there.
+const STRAIGHT: IterationLimits = IterationLimits { excerpt: 3, whole: 2, alone: 5 };
 /// See [`STRAIGHT`].
-const BENT: Turns = Turns { excerpt: 4, whole: 2, alone: 4 };
+const BENT: IterationLimits = IterationLimits { excerpt: 4, whole: 2, alone: 4 };
 /// The low-load samples leave the straight line by this many standard errors before a curve is tried.
 const SUSPICION: f64 = 2.0;
 /// Light rows further out than this share of the wind-up are in the gap, not on a soft flank; they count no more.
@@ -34,9 +34,9 @@ const FRICTION_DOUBT: f64 = 0.012;
 /// doubts above make nine in ten intervals hold over the study's wide scenarios.
 const FLOOR: (f64, f64) = (3e-4, 2e-4);
 
-/// Turns of a search, at most: over an excerpt of a long flight, over the whole from there, and over a whole flight
+/// IterationLimits of a search, at most: over an excerpt of a long flight, over the whole from there, and over a whole flight
 /// of which no excerpt told anything.
-struct Turns {
+struct IterationLimits {
     excerpt: usize,
     whole: usize,
     alone: usize,
@@ -53,7 +53,7 @@ pub(super) struct Contact {
     pub(super) touched_s: (f64, f64),
     /// Length of a block, s.
     pub(super) period_s: f64,
-    pub(super) state: State,
+    pub(super) state: FrictionState,
     /// Coefficients of soft flanks, m, where low loads asked for them.
     pub(super) curve: Option<[f64; CURVED]>,
     /// The straight fit and its rows, for the witnesses.
@@ -73,7 +73,7 @@ impl Contact {
     }
 
     /// What lies in δX beside gap and wind-up, m: drift, skew, transducer error and wrong friction.
-    pub(super) fn beside_m(&self, row: &Row<LINEAR>) -> f64 {
+    pub(super) fn beside_m(&self, row: &DesignRow<LINEAR>) -> f64 {
         (FORCE + 1..LINEAR).map(|column| self.straight.fit.beta[column] * row.x[column]).sum()
     }
 }
@@ -81,8 +81,8 @@ impl Contact {
 /// Fits straight flanks, and soft ones where low loads ask for them.
 ///
 /// # Errors
-/// As [`search`], and [`Refusal::MotionUnexplained`].
-pub(super) fn fit(room: &mut Room, frame: &Frame) -> Result<Contact, Refusal> {
+/// As [`search`], and [`Rejection::MotionUnexplained`].
+pub(super) fn fit(room: &mut ContactWorkspace, frame: &Scaling) -> Result<Contact, Rejection> {
     room.excerpt.cut_from(&room.whole);
     let straight: Found<LINEAR> = coarse_to_fine(room, frame, start(frame), &STRAIGHT)?;
     let error_m = |column: usize| straight.fit.standard_error_m(column, &straight.design.firm);
@@ -109,17 +109,17 @@ pub(super) fn fit(room: &mut Room, frame: &Frame) -> Result<Contact, Refusal> {
         curve: bent.map(|(beta, _)| beta),
         straight,
     };
-    if is_explained(room, frame, &contact) { Ok(contact) } else { Err(Refusal::MotionUnexplained) }
+    if is_explained(room, frame, &contact) { Ok(contact) } else { Err(Rejection::MotionUnexplained) }
 }
 
-/// Turns from a state over an excerpt, where the flight is long enough for one, and from there over the whole.
+/// IterationLimits from a state over an excerpt, where the flight is long enough for one, and from there over the whole.
 fn coarse_to_fine<const N: usize>(
-    room: &mut Room,
-    frame: &Frame,
-    from: State,
-    turns: &Turns,
-) -> Result<Found<N>, Refusal> {
-    let Room { whole, excerpt, course } = room;
+    room: &mut ContactWorkspace,
+    frame: &Scaling,
+    from: FrictionState,
+    turns: &IterationLimits,
+) -> Result<Found<N>, Rejection> {
+    let ContactWorkspace { whole, excerpt, course } = room;
     let guess = if excerpt.is_empty() {
         None
     } else {
@@ -134,7 +134,7 @@ fn coarse_to_fine<const N: usize>(
 
 /// Whether gap and wind-up travel as far as δX does. A screw that friction holds within its gap, or a load
 /// that is another actuator's, leaves travel over that no flank accounts for.
-fn is_explained(room: &mut Room, frame: &Frame, contact: &Contact) -> bool {
+fn is_explained(room: &mut ContactWorkspace, frame: &Scaling, contact: &Contact) -> bool {
     let (seen_m, expected_m, noise_m) = travels_m(room, frame, contact);
     // A bad fit leaves noise enough to explain anything: it may explain only so much.
     let blurred_m = expected_m.hypot(noise_m.min(0.5 * expected_m));
@@ -143,12 +143,12 @@ fn is_explained(room: &mut Room, frame: &Frame, contact: &Contact) -> bool {
 
 /// How far δX travels, m: as seen once all that is beside gap and wind-up is taken off, as gap and wind-up
 /// say it should, and by noise alone; each from the 5 % to the 95 % quantile.
-fn travels_m(room: &mut Room, frame: &Frame, contact: &Contact) -> (f64, f64, f64) {
+fn travels_m(room: &mut ContactWorkspace, frame: &Scaling, contact: &Contact) -> (f64, f64, f64) {
     let blocks = if room.excerpt.is_empty() { &mut room.whole } else { &mut room.excerpt };
     blocks.realign(contact.state.skew_s);
     let stride = blocks.len().div_ceil(LOOKS).max(1);
-    let rows = design::every(Ground { blocks, frame }, &contact.state, &mut room.course, stride);
-    let flank_m = |row: &Row<LINEAR>| contact.flank_m(2.0 * row.x[GAP], row.x[FORCE].abs());
+    let rows = design_matrix::every(RowSource { blocks, frame }, &contact.state, &mut room.course, stride);
+    let flank_m = |row: &DesignRow<LINEAR>| contact.flank_m(2.0 * row.x[GAP], row.x[FORCE].abs());
     let seen_m = span_m(rows.iter().map(|row| row.y_m - contact.beside_m(row)).collect());
     let expected_m = span_m(rows.iter().map(flank_m).collect());
     let firm = &contact.straight.design.firm;
@@ -169,7 +169,7 @@ fn span_m(mut values: Vec<f64>) -> f64 {
 
 /// Whether the rows that the straight fit never saw lie inside its line, beyond the spread of their
 /// stretches; the lighter the touch the more a row counts. Friction, not softness, throws them outside.
-fn low_loads_deviate(straight: &Found<LINEAR>, frame: &Frame) -> bool {
+fn low_loads_deviate(straight: &Found<LINEAR>, frame: &Scaling) -> bool {
     let most_m = CLIP * frame.windup_m();
     let (mut total, mut squares, mut sum_m, mut stretch) = (0.0, 0.0, 0.0, None);
     for row in &straight.design.light {

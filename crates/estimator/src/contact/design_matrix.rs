@@ -1,12 +1,12 @@
 //! Blocks in contact as rows of a regression: averaged over stretches that stay on one flank.
 
-use super::Prior;
+use super::PartPrior;
 use std::ops::Range;
 
-use super::blocks::Blocks;
-use super::coupling::State;
-use super::course::{Course, Touch};
-use super::refusal::Refusal;
+use super::acceptance::Rejection;
+use super::block_means::BlockMeans;
+use super::coupling_path::{CouplingPath, Touch};
+use super::friction_model::FrictionState;
 use crate::gap::extremes;
 use crate::load::quantiles;
 
@@ -57,7 +57,7 @@ const BLOCKS_PER_ROW_BLOCK: usize = 2000;
 
 /// Scales that bring every column to about one.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
+pub(super) struct Scaling {
     /// 95 % quantile of the load's magnitude, N.
     pub(super) load_n: f64,
     /// Stiffness of the part, N/m.
@@ -76,19 +76,20 @@ pub(super) struct Frame {
     row_blocks: usize,
 }
 
-impl Frame {
+impl Scaling {
     /// # Errors
-    /// [`Refusal::TooShort`], [`Refusal::LoadTooSmall`], [`Refusal::TravelTooSmall`].
-    pub(super) fn of(blocks: &Blocks, prior: &Prior) -> Result<Self, Refusal> {
+    /// [`Rejection::TooShort`], [`Rejection::LoadTooSmall`], [`Rejection::TravelTooSmall`].
+    pub(super) fn of(blocks: &BlockMeans, prior: &PartPrior) -> Result<Self, Rejection> {
         let sizes_n: Vec<f64> = blocks.load_n.iter().map(|f| f.abs()).collect();
         let whole = 0..sizes_n.len();
-        let [load_n] = quantiles(&sizes_n, std::slice::from_ref(&whole), [0.95]).ok_or(Refusal::TooShort)?;
+        let [load_n] =
+            quantiles(&sizes_n, std::slice::from_ref(&whole), [0.95]).ok_or(Rejection::TooShort)?;
         if load_n <= prior.unknown_force_n.map_or(0.0, |force_n| LEAST_LOAD * force_n) {
-            return Err(Refusal::LoadTooSmall);
+            return Err(Rejection::LoadTooSmall);
         }
         let place_m = middle_and_half(&blocks.motor_m);
         if 2.0 * place_m.1 < load_n / prior.stiffness_n_per_m {
-            return Err(Refusal::TravelTooSmall);
+            return Err(Rejection::TravelTooSmall);
         }
         let (fewest, most) = ROW_BLOCKS;
         let (time_s, two_blocks_s) = (middle_and_half(&blocks.time_s), 2.0 * blocks.period_s);
@@ -112,7 +113,7 @@ impl Frame {
     }
 
     /// The middle of a row, s from the first sample of the log.
-    pub(super) fn moment_s(&self, row: &Row<LINEAR>) -> f64 {
+    pub(super) fn moment_s(&self, row: &DesignRow<LINEAR>) -> f64 {
         self.time_s.0 + row.x[DRIFT] * self.time_s.1
     }
 }
@@ -127,7 +128,7 @@ pub(super) fn middle_and_half(values: &[f64]) -> (f64, f64) {
 
 /// The mean of some blocks in contact on one flank.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Row<const N: usize> {
+pub(super) struct DesignRow<const N: usize> {
     /// Regressors.
     pub(super) x: [f64; N],
     /// δX, m.
@@ -140,11 +141,11 @@ pub(super) struct Row<const N: usize> {
 
 /// All rows, and how long each flank was touched.
 #[derive(Debug)]
-pub(super) struct Design<const N: usize> {
+pub(super) struct DesignMatrix<const N: usize> {
     /// Rows beyond the share of the load below which flanks may be soft.
-    pub(super) firm: Vec<Row<N>>,
+    pub(super) firm: Vec<DesignRow<N>>,
     /// Rows below it.
-    pub(super) light: Vec<Row<N>>,
+    pub(super) light: Vec<DesignRow<N>>,
     /// Time in firm contact on the upper and the lower flank, s.
     pub(super) touched_s: (f64, f64),
 }
@@ -170,17 +171,21 @@ impl Flank {
 
 /// Where rows are made from: blocks and the scales.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ground<'a> {
-    pub(super) blocks: &'a Blocks,
-    pub(super) frame: &'a Frame,
+pub(super) struct RowSource<'a> {
+    pub(super) blocks: &'a BlockMeans,
+    pub(super) frame: &'a Scaling,
 }
 
 /// Rows of all blocks that keep their flank, none of which mixes flank and gap.
-pub(super) fn rows<const N: usize>(ground: Ground<'_>, state: &State, course: &mut Course) -> Design<N> {
-    let Ground { blocks, frame } = ground;
+pub(super) fn rows<const N: usize>(
+    ground: RowSource<'_>,
+    state: &FrictionState,
+    course: &mut CouplingPath,
+) -> DesignMatrix<N> {
+    let RowSource { blocks, frame } = ground;
     course.follow(blocks, state);
     course.keep(blocks, frame);
-    let mut design = Design { firm: Vec::new(), light: Vec::new(), touched_s: (0.0, 0.0) };
+    let mut design = DesignMatrix { firm: Vec::new(), light: Vec::new(), touched_s: (0.0, 0.0) };
     for segment in blocks.segments() {
         let mut first = segment.start;
         while let Some((touch, row)) = course.next_kept(blocks, first..segment.end, frame.row_blocks) {
@@ -191,9 +196,9 @@ pub(super) fn rows<const N: usize>(ground: Ground<'_>, state: &State, course: &m
     design
 }
 
-impl<const N: usize> Design<N> {
+impl<const N: usize> DesignMatrix<N> {
     /// Takes in a row that is full.
-    fn close(&mut self, touch: Touch, sum: &Row<N>, period_s: f64) {
+    fn close(&mut self, touch: Touch, sum: &DesignRow<N>, period_s: f64) {
         if !touch.is_firm() {
             self.light.push(sum.mean());
             return;
@@ -208,11 +213,11 @@ impl<const N: usize> Design<N> {
 
 /// Single blocks as rows, every so many, whether in contact or in the gap.
 pub(super) fn every(
-    ground: Ground<'_>,
-    state: &State,
-    course: &mut Course,
+    ground: RowSource<'_>,
+    state: &FrictionState,
+    course: &mut CouplingPath,
     stride: usize,
-) -> Vec<Row<LINEAR>> {
+) -> Vec<DesignRow<LINEAR>> {
     course.follow(ground.blocks, state);
     let sound = (0..ground.blocks.len()).step_by(stride).filter(|&k| ground.blocks.is_sound(k));
     let row = |k: usize| {
@@ -223,12 +228,13 @@ pub(super) fn every(
     sound.map(row).filter(|row| row.x[FORCE].is_finite()).collect()
 }
 
-impl Ground<'_> {
+impl RowSource<'_> {
     /// The sums of a row of sound blocks.
-    fn sum<const N: usize>(&self, course: &Course, within: Range<usize>, side: f64) -> Row<N> {
+    fn sum<const N: usize>(&self, course: &CouplingPath, within: Range<usize>, side: f64) -> DesignRow<N> {
         let Self { blocks, frame } = self;
         let (first, end) = (within.start, within.end);
-        let mut sum = Row { stretch: blocks.stretch(first), blocks: within.len() as f64, ..Row::ZERO };
+        let mut sum =
+            DesignRow { stretch: blocks.stretch(first), blocks: within.len() as f64, ..DesignRow::ZERO };
         // Central differences of neighbours: all but the first and last two cancel.
         let change = |values: &[f64]| values[end] + values[end - 1] - values[first] - values[first - 1];
         sum.x[ORIGIN] = sum.blocks;
@@ -283,7 +289,7 @@ fn cube_root(x: f64) -> f64 {
     closer(closer(f64::from_bits(x.to_bits() / 3 + THIRDS)))
 }
 
-impl<const N: usize> Row<N> {
+impl<const N: usize> DesignRow<N> {
     const ZERO: Self = Self { x: [0.0; N], y_m: 0.0, blocks: 0.0, stretch: 0 };
 
     fn mean(&self) -> Self {

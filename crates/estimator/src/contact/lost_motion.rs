@@ -1,7 +1,7 @@
 //! Lost motion measured rather than extrapolated: at zero load, and at a reference load.
 
-use super::curve::Contact;
-use super::design::{FORCE, Flank, Frame, GAP, LINEAR, Row};
+use super::design_matrix::{DesignRow, FORCE, Flank, GAP, LINEAR, Scaling};
+use super::flank_fit::Contact;
 
 /// Rows this near to the reference load count, as a share of it.
 const NEAR: f64 = 0.25;
@@ -27,9 +27,9 @@ pub(super) fn loop_width_m(contact: &Contact) -> Option<(f64, f64)> {
 
 /// Relative travel between + and − a load in the coupling and its standard error, m: rows near it on either
 /// flank, drift, skew and transducer error taken off, brought to the load itself along the fitted line.
-pub(super) fn lost_motion_m(contact: &Contact, frame: &Frame, load_n: f64) -> Option<(f64, f64)> {
+pub(super) fn lost_motion_m(contact: &Contact, frame: &Scaling, load_n: f64) -> Option<(f64, f64)> {
     let load = load_n / frame.load_n;
-    let near = |row: &&Row<LINEAR>| (row.x[FORCE].abs() - load).abs() < NEAR * load;
+    let near = |row: &&DesignRow<LINEAR>| (row.x[FORCE].abs() - load).abs() < NEAR * load;
     let rows = &contact.straight.design;
     let beyond_m = |flank| beyond_m(contact, rows.firm.iter().chain(&rows.light).filter(near), flank);
     let beta = &contact.straight.fit.beta;
@@ -47,7 +47,7 @@ fn put_together(contact: &Contact, line_m: f64, upper: (f64, f64), lower: (f64, 
 /// the rows of one stretch taken as one.
 fn beyond_m<'a>(
     contact: &Contact,
-    rows: impl Iterator<Item = &'a Row<LINEAR>>,
+    rows: impl Iterator<Item = &'a DesignRow<LINEAR>>,
     flank: Flank,
 ) -> Option<(f64, f64)> {
     let (mut outward_m, mut stretches): (Vec<f64>, Vec<u32>) = rows

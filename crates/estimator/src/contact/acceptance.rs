@@ -1,7 +1,7 @@
 //! Why a sound log cannot show a gap, and what may be doubted about one that does.
 
-use super::design::Frame;
-use super::{ContactGap, DETECTION_SHARE};
+use super::design_matrix::Scaling;
+use super::{ContactEstimate, DETECTION_SHARE};
 
 /// Standard errors a gap must exceed to count as seen.
 const SEEN: f64 = 2.0;
@@ -12,7 +12,7 @@ const VAGUE: f64 = 0.1;
 
 /// Why a flight cannot show its gap. Each has a stable code and a remedy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Refusal {
+pub enum Rejection {
     /// The load presses on one flank only.
     NoLoadReversal,
     /// One flank is touched for less than a second.
@@ -37,7 +37,7 @@ pub enum Refusal {
     PositionRatio,
 }
 
-impl Refusal {
+impl Rejection {
     /// The code that records keep.
     pub fn code(self) -> &'static str {
         match self {
@@ -90,7 +90,7 @@ impl Refusal {
 
 /// A doubt that does not forbid the number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Flag {
+pub enum QualityFlag {
     /// The gap is under two standard errors, or under a hundredth of the wind-up: read the upper bound.
     BelowDetection,
     /// 1/K lies more than three spreads from the part's.
@@ -103,7 +103,7 @@ pub enum Flag {
     Imprecise,
 }
 
-impl Flag {
+impl QualityFlag {
     /// The code that records keep.
     pub fn code(self) -> &'static str {
         match self {
@@ -116,15 +116,15 @@ impl Flag {
     }
 }
 
-pub(super) fn flags(found: &ContactGap, frame: &Frame, is_curved: bool) -> Vec<Flag> {
+pub(super) fn flags(found: &ContactEstimate, frame: &Scaling, is_curved: bool) -> Vec<QualityFlag> {
     let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * frame.windup_m());
     let compliance = frame.stiffness_n_per_m / found.stiffness_n_per_m;
     let doubts = [
-        (Flag::BelowDetection, found.gap_m < least_m),
-        (Flag::StiffnessImplausible, (compliance - 1.0).abs() > IMPLAUSIBLE),
-        (Flag::FrictionHeavy, found.friction.is_heavy(found.load_p95_n)),
-        (Flag::SoftContact, is_curved),
-        (Flag::Imprecise, found.gap_se_m > VAGUE * frame.windup_m()),
+        (QualityFlag::BelowDetection, found.gap_m < least_m),
+        (QualityFlag::StiffnessImplausible, (compliance - 1.0).abs() > IMPLAUSIBLE),
+        (QualityFlag::FrictionHeavy, found.friction.is_heavy(found.load_p95_n)),
+        (QualityFlag::SoftContact, is_curved),
+        (QualityFlag::Imprecise, found.gap_se_m > VAGUE * frame.windup_m()),
     ];
     doubts.into_iter().filter_map(|(flag, holds)| holds.then_some(flag)).collect()
 }
