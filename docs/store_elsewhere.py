@@ -1,4 +1,4 @@
-"""Opens a store with every engine that is installed and compares what they count.
+"""Opens a store with every installed engine and compares the row counts.
 
     pip install polars deltalake duckdb pysail pyspark-client
     python docs/store_elsewhere.py results
