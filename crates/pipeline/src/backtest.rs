@@ -9,7 +9,7 @@ use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
 use serde::Serialize;
-use trend::{ChangeKind, Series, Wear};
+use trend::{ChangePointKind, Series, WearStatus};
 
 use crate::error::Error;
 use crate::histories::{Flown, Histories, History, HistoryName};
@@ -80,17 +80,17 @@ fn past(fleet: &Fleet<'_>, name: &HistoryName, day: Timestamp) -> Result<Option<
     let prior = fleet.prior(name, day);
     let as_of_us = day.as_microsecond();
     let last_us = series.flights().last().map_or(as_of_us, |f| f.departure_us);
-    let then = trend::trend(series, as_of_us, &settings, prior, None)?;
-    let now = trend::trend(series, last_us, &settings, prior, None)?;
-    let disturbed = |c: &trend::Change| {
-        c.departure_us > as_of_us && matches!(c.kind, ChangeKind::Step | ChangeKind::Reset)
+    let then = trend::assess(series, as_of_us, &settings, prior, None)?;
+    let now = trend::assess(series, last_us, &settings, prior, None)?;
+    let disturbed = |c: &trend::ChangePoint| {
+        c.departure_us > as_of_us && matches!(c.kind, ChangePointKind::Step | ChangePointKind::Reset)
     };
     let (Some(before), Some(after)) = (then.level, now.level) else { return Ok(None) };
     let moved = after.gap_m - before.gap_m > 2.0 * before.se_m.hypot(after.se_m);
-    if then.wear != Wear::Wearing || !moved || now.changes.iter().any(disturbed) {
+    if then.wear != WearStatus::Wearing || !moved || now.changes.iter().any(disturbed) {
         return Ok(None);
     }
-    let then_hours = series.until(as_of_us).last().map_or(0.0, |f| f.hours);
+    let then_hours = series.flights_until(as_of_us).last().map_or(0.0, |f| f.hours);
     let end_hours = series.flights().last().map_or(then_hours, |f| f.hours);
     let (target, target_m, at_hours) = match met(series, settings.limit_m) {
         Some(hours) => ("limit", settings.limit_m, hours),
@@ -98,7 +98,7 @@ fn past(fleet: &Fleet<'_>, name: &HistoryName, day: Timestamp) -> Result<Option<
     };
     let true_hours = at_hours - then_hours;
     let asked = trend::Settings { limit_m: target_m, watch_m: settings.watch_m.min(target_m), ..settings };
-    let said = trend::trend(series, as_of_us, &asked, prior, None)?;
+    let said = trend::assess(series, as_of_us, &asked, prior, None)?;
     let Some(crossing) = said.crossing.filter(|_| true_hours > 10.0) else { return Ok(None) };
     let [low, likely, high] = [crossing.p05_hours, crossing.p50_hours, crossing.p95_hours]
         .map(|hours| hours.unwrap_or(settings.horizon_hours));

@@ -3,7 +3,7 @@
 use fleet::PartNumber;
 use job::Config;
 use job::part::WearAxis;
-use trend::Axis;
+use trend::UsageAxis;
 
 /// Limits, axes and settings of part numbers, as they are configured.
 #[derive(Clone, Copy)]
@@ -11,12 +11,12 @@ pub(crate) struct Limits<'a>(pub(crate) &'a Config);
 
 impl<'a> Limits<'a> {
     /// What wear of a part is said to follow; nothing where its histories decide.
-    pub(crate) fn axis(self, part: Option<&str>) -> Option<Axis> {
+    pub(crate) fn axis(self, part: Option<&str>) -> Option<UsageAxis> {
         let configured = self.part(part).and_then(|p| p.axis).or(self.0.document.trend.axis)?;
         Some(match configured {
-            WearAxis::Hours => Axis::Hours,
-            WearAxis::Flights => Axis::Flights,
-            WearAxis::Reversals => Axis::Reversals,
+            WearAxis::Hours => UsageAxis::Hours,
+            WearAxis::Flights => UsageAxis::Flights,
+            WearAxis::Reversals => UsageAxis::Reversals,
         })
     }
 

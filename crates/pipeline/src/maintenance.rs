@@ -5,12 +5,12 @@ use std::path::Path;
 
 use fleet::{PartNumber, SerialNumber};
 use ingest::tables::{Table, name, utc};
-use trend::Booked;
+use trend::MaintenanceEvent;
 
 use crate::error::Error;
 
 /// Entries by part and serial number.
-pub type Book = BTreeMap<(String, String), Vec<Booked>>;
+pub type Book = BTreeMap<(String, String), Vec<MaintenanceEvent>>;
 
 /// Reads a maintenance table: `part_number`, `serial_number`, `utc`, `kind` (`reshim`, `rerig`, `overhaul` or
 /// `lubrication`); CSV or Parquet.
@@ -32,7 +32,7 @@ pub fn read(file: &Path) -> Result<Book, Error> {
         );
         let utc_us = table.required(row, done, utc).map_err(bad)?.as_microsecond();
         let renews = table.required(row, kind, renews).map_err(bad)?;
-        book.entry(unit).or_default().push(Booked { utc_us, renews });
+        book.entry(unit).or_default().push(MaintenanceEvent { utc_us, renews });
     }
     Ok(book)
 }

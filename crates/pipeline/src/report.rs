@@ -10,7 +10,7 @@ use ingest::tables::{Table, name, number, utc};
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use store::{Outcome, Store};
-use trend::Outlook;
+use trend::Forecast;
 
 use crate::calendar::days;
 use crate::error::Error;
@@ -59,7 +59,7 @@ pub fn compose(
         checks: checks.as_deref().unwrap_or(&[]),
         stays: &Stays::new(installations),
     };
-    let unit = |(row, drawn): (&TrendRow, &Outlook)| {
+    let unit = |(row, drawn): (&TrendRow, &Forecast)| {
         let name = name_of(row);
         let rest = rest.remove(&name).unwrap_or_default();
         compose.unit(row, drawn, histories.get(&name).unwrap_or(&History::default()), &rest)
@@ -197,7 +197,7 @@ struct Compose<'a> {
 }
 
 impl Compose<'_> {
-    fn unit(&self, row: &TrendRow, drawn: &Outlook, history: &History, rest: &[Rest]) -> Unit {
+    fn unit(&self, row: &TrendRow, drawn: &Forecast, history: &History, rest: &[Rest]) -> Unit {
         let flown = history.flights();
         let name = name_of(row);
         let stays: Vec<Stay> = self.stays.of(&name).into_iter().map(stay).collect();
@@ -322,14 +322,14 @@ fn pace(history: &History) -> Option<(f64, f64)> {
 }
 
 /// The fan on the calendar, at this unit's use; nothing where that is not known.
-fn forecast(drawn: &Outlook, history: &History) -> Vec<Banded> {
+fn forecast(drawn: &Forecast, history: &History) -> Vec<Banded> {
     let last = history.flights().last();
     let Some((last, (hours_per_day, _))) = last.zip(pace(history)) else { return Vec::new() };
     let at = |hours: f64| date(last.departure_utc(), hours / hours_per_day);
     drawn.ahead.iter().filter_map(|(hours, band)| banded(at(*hours), band)).collect()
 }
 
-fn banded(at_utc: Option<Timestamp>, band: &trend::Band) -> Option<Banded> {
+fn banded(at_utc: Option<Timestamp>, band: &trend::Interval) -> Option<Banded> {
     Some(Banded { at_utc: at_utc?, p05_m: band.p05_m, m: band.m, p95_m: band.p95_m })
 }
 
@@ -345,7 +345,7 @@ fn prior((part_number, learned_until_utc, prior): (Option<String>, Timestamp, tr
         life_p05_hours,
         life_p50_hours: prior.median_life_hours(),
         life_p95_hours,
-        widening: prior.widening(),
+        widening: prior.interval_scale(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use jiff::Timestamp;
 use serde::Serialize;
-use trend::{Series, Trend, classic};
+use trend::{Assessment, Series, classic};
 
 use crate::histories::{History, HistoryName};
 use crate::tail_wide::TailWide;
@@ -94,17 +94,17 @@ pub(crate) fn row(
     history: &History,
     series: Option<&Series>,
     limit_m: Option<f64>,
-    trend: &Trend,
+    trend: &Assessment,
     as_of: Timestamp,
     wide: &TailWide,
 ) -> TrendRow {
     let last = history.until(as_of).last().map(|flown| history.place(flown));
-    let gaps_m = series.map(|series| series.gaps_m(trend.as_of_us)).unwrap_or_default();
+    let gaps_m = series.map(|series| series.gaps_until(trend.as_of_us)).unwrap_or_default();
     let crossing = trend.crossing.filter(|_| limit_m.is_some());
-    let flights = |hours: Option<f64>| Some(hours? / trend.pace?.hours_per_flight);
-    let last_flown = series.and_then(|series| series.until(trend.as_of_us).last());
+    let flights = |hours: Option<f64>| Some(hours? / trend.utilization?.hours_per_flight);
+    let last_flown = series.and_then(|series| series.flights_until(trend.as_of_us).last());
     let last_flown = last_flown.and_then(|f| Timestamp::from_microsecond(f.departure_us).ok());
-    let day = |hours: Option<f64>| after(last_flown?, hours? / trend.pace?.hours_per_day);
+    let day = |hours: Option<f64>| after(last_flown?, hours? / trend.utilization?.hours_per_day);
     TrendRow {
         part_number: name.0.clone(),
         serial_number: name.1.clone(),
@@ -159,8 +159,8 @@ fn after(from: Timestamp, days: f64) -> Option<Timestamp> {
 }
 
 /// Why a state; a change that the tail's other units made as well is named for what it is.
-fn reason(trend: &Trend, history: &History, wide: &TailWide) -> String {
-    let unknown = trend.changes.iter().rev().find(|c| c.kind != trend::ChangeKind::Recorded);
+fn reason(trend: &Assessment, history: &History, wide: &TailWide) -> String {
+    let unknown = trend.changes.iter().rev().find(|c| c.kind != trend::ChangePointKind::Recorded);
     match (trend.reason, unknown.and_then(|change| wide.tail(change, history))) {
         (trend::Reason::Changed { kind, days }, Some(tail)) => format!(
             "{kind} {days:.0} days ago with all actuators of {tail} at once: a sensor or recorder, not wear"
@@ -169,17 +169,17 @@ fn reason(trend: &Trend, history: &History, wide: &TailWide) -> String {
     }
 }
 
-fn change_point(change: &trend::Change, history: &History, wide: &TailWide) -> Option<ChangePoint> {
+fn change_point(change: &trend::ChangePoint, history: &History, wide: &TailWide) -> Option<ChangePoint> {
     let departure_utc = Timestamp::from_microsecond(change.departure_us).ok()?;
     let flight = history.at(departure_utc);
     Some(ChangePoint {
         departure_utc,
         flight_id: flight.and_then(|f| history.flight_id(f)).map(str::to_owned),
         kind: match change.kind {
-            trend::ChangeKind::Step => "step",
-            trend::ChangeKind::Reset => "reset",
-            trend::ChangeKind::Onset => "onset",
-            trend::ChangeKind::Recorded => "recorded",
+            trend::ChangePointKind::Step => "step",
+            trend::ChangePointKind::Reset => "reset",
+            trend::ChangePointKind::Onset => "onset",
+            trend::ChangePointKind::Recorded => "recorded",
         },
         step_m: change.step_m,
         step_se_m: change.se_m,
@@ -188,11 +188,11 @@ fn change_point(change: &trend::Change, history: &History, wide: &TailWide) -> O
     })
 }
 
-fn wear(wear: trend::Wear) -> &'static str {
+fn wear(wear: trend::WearStatus) -> &'static str {
     match wear {
-        trend::Wear::Wearing => "wearing",
-        trend::Wear::Steady => "steady",
-        trend::Wear::Unknown => "unknown",
+        trend::WearStatus::Wearing => "wearing",
+        trend::WearStatus::Steady => "steady",
+        trend::WearStatus::Unknown => "unknown",
     }
 }
 

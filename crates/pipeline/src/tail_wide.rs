@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
-use trend::{Change, ChangeKind, Trend};
+use trend::{Assessment, ChangePoint, ChangePointKind};
 
 use crate::calendar::days;
 use crate::histories::{Flown, History};
@@ -23,44 +23,45 @@ pub(crate) struct TailWide(BTreeSet<(String, Timestamp)>);
 struct Made<'a> {
     tail_number: &'a str,
     departure_utc: Timestamp,
-    kind: ChangeKind,
+    kind: ChangePointKind,
     unit: usize,
 }
 
 impl TailWide {
     /// Looks over units that fly together. What no book knows counts: a step of several units at once, and a
     /// step or reset when what is fitted of all of them `moved`.
-    pub(crate) fn new(judged: &[(&History, &Trend)], moved: &[Moved]) -> Self {
+    pub(crate) fn new(judged: &[(&History, &Assessment)], moved: &[Moved]) -> Self {
         let made: Vec<Made<'_>> =
             judged.iter().enumerate().flat_map(|(unit, (h, t))| changes(unit, h, t)).collect();
         let mut by_tail: BTreeMap<&str, Vec<&Made<'_>>> = BTreeMap::new();
-        for change in made.iter().filter(|change| change.kind == ChangeKind::Step) {
+        for change in made.iter().filter(|change| change.kind == ChangePointKind::Step) {
             by_tail.entry(change.tail_number).or_default().push(change);
         }
         let is_wide = |change: &&Made<'_>| {
             let steps = by_tail.get(change.tail_number).map_or(&[][..], Vec::as_slice);
             is_explained(change, moved)
-                || (change.kind == ChangeKind::Step && is_of_all(change, steps, judged))
+                || (change.kind == ChangePointKind::Step && is_of_all(change, steps, judged))
         };
         let wide = made.iter().filter(is_wide).map(|c| (c.tail_number.to_owned(), c.departure_utc));
         Self(wide.collect())
     }
 
     /// The tail whose change it is; none where it is the unit's own.
-    pub(crate) fn tail<'a>(&self, change: &Change, history: &'a History) -> Option<&'a str> {
+    pub(crate) fn tail<'a>(&self, change: &ChangePoint, history: &'a History) -> Option<&'a str> {
         let (flown, tail_number) = made_on(change, history)?;
         self.0.contains(&(tail_number.to_owned(), flown.departure_utc())).then_some(tail_number)
     }
 }
 
 /// The first flight after a change, and its tail.
-fn made_on<'a>(change: &Change, history: &'a History) -> Option<(&'a Flown, &'a str)> {
+fn made_on<'a>(change: &ChangePoint, history: &'a History) -> Option<(&'a Flown, &'a str)> {
     let flown = history.at(Timestamp::from_microsecond(change.departure_us).ok()?)?;
     Some((flown, history.place(flown).tail_number.as_deref()?))
 }
 
-fn changes<'a>(unit: usize, history: &'a History, trend: &'a Trend) -> impl Iterator<Item = Made<'a>> {
-    let unbooked = trend.changes.iter().filter(|c| matches!(c.kind, ChangeKind::Step | ChangeKind::Reset));
+fn changes<'a>(unit: usize, history: &'a History, trend: &'a Assessment) -> impl Iterator<Item = Made<'a>> {
+    let unbooked =
+        trend.changes.iter().filter(|c| matches!(c.kind, ChangePointKind::Step | ChangePointKind::Reset));
     unbooked.filter_map(move |change| {
         let (flown, tail_number) = made_on(change, history)?;
         Some(Made { tail_number, departure_utc: flown.departure_utc(), kind: change.kind, unit })
@@ -72,7 +73,7 @@ fn is_explained(change: &Made<'_>, moved: &[Moved]) -> bool {
 }
 
 /// Whether the units that flew on the tail before and after made it together.
-fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], judged: &[(&History, &Trend)]) -> bool {
+fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], judged: &[(&History, &Assessment)]) -> bool {
     let near = |step: &&&Made<'_>| days(step.departure_utc, change.departure_utc).abs() <= SAME_DAYS;
     let stepped: BTreeSet<usize> = steps.iter().filter(near).map(|step| step.unit).collect();
     if stepped.len() < 2 {

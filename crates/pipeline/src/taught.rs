@@ -4,15 +4,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
 use rayon::prelude::*;
-use trend::{Axis, Each, FleetPrior, Series};
+use trend::{Executor, FleetPrior, Series, UsageAxis};
 
 use crate::limits::Limits;
 
 /// What a prior asks of each unit, done by all workers.
 struct AtOnce;
 
-impl Each for AtOnce {
-    fn each<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+impl Executor for AtOnce {
+    fn map<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
         things.par_iter().map(work).collect()
     }
 }
@@ -114,7 +114,7 @@ impl<'a> School<'a, '_> {
     }
 
     /// By what parts are told apart before their lives are looked at: limit, m, as bits, and axis.
-    fn kind(&self, part: Option<&str>) -> (u64, Option<Axis>) {
+    fn kind(&self, part: Option<&str>) -> (u64, Option<UsageAxis>) {
         (self.limits.limit_m(part).to_bits(), self.limits.axis(part))
     }
 
@@ -126,7 +126,8 @@ impl<'a> School<'a, '_> {
         }
         let life_hours = |part| {
             let units = self.of_parts(&[part]);
-            let hours = FleetPrior::glance_life_hours(units, turn_us, self.limits.limit_m(part), &AtOnce);
+            let hours =
+                FleetPrior::rough_median_life_hours(units, turn_us, self.limits.limit_m(part), &AtOnce);
             (hours, part)
         };
         let mut lives: Vec<(f64, Option<&str>)> = parts.par_iter().copied().map(life_hours).collect();
@@ -148,6 +149,6 @@ impl<'a> School<'a, '_> {
     fn learn(&self, turn_us: i64, parts: &[Option<&str>]) -> FleetPrior {
         let first = parts.first().copied().flatten();
         let (limit_m, axis) = (self.limits.limit_m(first), self.limits.axis(first));
-        FleetPrior::learn_by(self.of_parts(parts), turn_us, limit_m, axis, &AtOnce)
+        FleetPrior::learn_with(self.of_parts(parts), turn_us, limit_m, axis, &AtOnce)
     }
 }

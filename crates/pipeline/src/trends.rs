@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
 use store::{Query, Store};
-use trend::{FleetPrior, Series, Trend, Usage, classic};
+use trend::{Assessment, FleetPrior, Series, UsageDefaults, classic};
 
 use crate::changed::{Changed, changed};
 use crate::error::Error;
@@ -170,7 +170,7 @@ pub(crate) struct Told {
     /// Statements of the day.
     pub(crate) now: Vec<TrendRow>,
     /// What is drawn beside each of them.
-    pub(crate) drawn: Vec<trend::Outlook>,
+    pub(crate) drawn: Vec<trend::Forecast>,
     /// Statements of so many days before, by days.
     pub(crate) before: BTreeMap<i64, Vec<TrendRow>>,
     /// What each part's units had taught, and by when.
@@ -380,7 +380,7 @@ impl<'a> Fleet<'a> {
         let names: BTreeSet<&HistoryName> = names.collect();
         // A change is a tail's when its other units made it too, so they are judged with those asked for.
         let judged: Vec<&HistoryName> = self.mates(&names).union(&names).copied().collect();
-        let trends: Vec<Trend> =
+        let trends: Vec<Assessment> =
             judged.par_iter().map(|name| self.trend(name, as_of)).collect::<Result<_, _>>()?;
         let known = judged.iter().zip(&trends).filter_map(|(name, t)| Some((self.units.get(*name)?.0, t)));
         let wide = TailWide::new(&known.collect::<Vec<_>>(), &self.moved);
@@ -396,18 +396,18 @@ impl<'a> Fleet<'a> {
         self.units.iter().filter(|(_, unit)| is_mate(unit)).map(|(name, _)| *name).collect()
     }
 
-    fn trend(&self, name: &HistoryName, as_of: Timestamp) -> Result<Trend, Error> {
-        let nothing = (&History::default(), Series::new([], &Usage::default())?);
+    fn trend(&self, name: &HistoryName, as_of: Timestamp) -> Result<Assessment, Error> {
+        let nothing = (&History::default(), Series::new([], &UsageDefaults::default())?);
         let (_, series) = self.units.get(name).unwrap_or(&nothing);
         let prior = self.prior(name, as_of);
-        Ok(trend::remembered(series, as_of.as_microsecond(), &self.settings(name), prior)?)
+        Ok(trend::assess_with_hysteresis(series, as_of.as_microsecond(), &self.settings(name), prior)?)
     }
 
     /// What engineers know, and no alarm is made from.
     fn add_statistics(&self, rows: &mut [TrendRow], are_asked: bool) {
         let add = |row: &mut TrendRow| {
             let Some(series) = self.series(&row.name()) else { return };
-            let known = series.until(row.as_of_utc.as_microsecond()).iter();
+            let known = series.flights_until(row.as_of_utc.as_microsecond()).iter();
             let (hours, gaps_m): (Vec<f64>, Vec<f64>) =
                 known.filter_map(|f| Some((f.hours, f.gap?.gap_m))).unzip();
             let sen = classic::theil_sen(&hours, &gaps_m, 0.90).ok();
@@ -426,7 +426,7 @@ impl<'a> Fleet<'a> {
         Ok(self.row(name, &self.trend(name, as_of)?, as_of, &TailWide::default()))
     }
 
-    fn row(&self, name: &HistoryName, trend: &Trend, as_of: Timestamp, wide: &TailWide) -> TrendRow {
+    fn row(&self, name: &HistoryName, trend: &Assessment, as_of: Timestamp, wide: &TailWide) -> TrendRow {
         let unit = self.units.get(name);
         let nobody = History::default();
         let (history, series) = unit.map_or((&nobody, None), |(history, series)| (*history, Some(series)));
@@ -438,17 +438,17 @@ impl<'a> Fleet<'a> {
     }
 
     /// What is drawn beside a statement: as far ahead as its crossing, within sight of what was flown.
-    fn outlook(&self, name: &HistoryName, row: &TrendRow) -> Result<trend::Outlook, Error> {
+    fn outlook(&self, name: &HistoryName, row: &TrendRow) -> Result<trend::Forecast, Error> {
         const STEPS: u32 = 24;
-        let Some(series) = self.series(name) else { return Ok(trend::Outlook::default()) };
+        let Some(series) = self.series(name) else { return Ok(trend::Forecast::default()) };
         let as_of_us = row.as_of_utc.as_microsecond();
-        let flown = series.until(as_of_us);
+        let flown = series.flights_until(as_of_us);
         let span_hours = flown.first().zip(flown.last()).map_or(0.0, |(a, b)| b.hours - a.hours);
         let far = row
             .crossing_hours_p95
             .map_or(span_hours, |h| (1.1 * h).clamp(0.3 * span_hours, 2.0 * span_hours));
         let steps = (0..=STEPS).map(|step| far * f64::from(step) / f64::from(STEPS));
         let prior = self.prior(name, row.as_of_utc);
-        Ok(trend::outlook(series, as_of_us, &self.settings(name), prior, steps)?)
+        Ok(trend::forecast(series, as_of_us, &self.settings(name), prior, steps)?)
     }
 }

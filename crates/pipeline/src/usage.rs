@@ -3,7 +3,7 @@
 use fleet::{Installation, Installations};
 use jiff::Timestamp;
 use job::Config;
-use trend::{Observation, Series, Usage};
+use trend::{Observation, Series, UsageDefaults};
 
 use crate::error::Error;
 use crate::histories::{Flown, History, HistoryName, Place};
@@ -41,13 +41,13 @@ impl<'a> Books<'a> {
         let first = stays.iter().min_by_key(|stay| stay.installed_utc);
         let unit_hours_at_start = first.and_then(|stay| stay.unit_hours_at_install);
         let observations = observed(history, booked, &self.unlogged.of_unit(history, booked));
-        let usage = Usage { unit_hours_at_start, ..Usage::default() };
-        Ok(Series::new(observations, &usage)?.with_book(booked_work(&self.maintenance, name)))
+        let usage = UsageDefaults { unit_hours_at_start, ..UsageDefaults::default() };
+        Ok(Series::new(observations, &usage)?.with_maintenance(booked_work(&self.maintenance, name)))
     }
 }
 
 /// What the maintenance book says of a unit; of one whose part number is not known, nothing.
-fn booked_work(book: &maintenance::Book, (part, serial): &HistoryName) -> Vec<trend::Booked> {
+fn booked_work(book: &maintenance::Book, (part, serial): &HistoryName) -> Vec<trend::MaintenanceEvent> {
     part.clone().and_then(|part| book.get(&(part, serial.clone())).cloned()).unwrap_or_default()
 }
 

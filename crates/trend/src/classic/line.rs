@@ -2,7 +2,7 @@
 
 use super::check_pairs;
 use crate::error::Error;
-use crate::normal::student_two_sided;
+use crate::math::distributions::student_two_sided;
 
 /// A fitted line y = intercept + slope·x, in the units of y and y per x.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,6 +72,6 @@ fn fit(x: &[f64], y: &[f64], weight: impl Fn(usize) -> f64) -> Result<Line, Erro
         slope_se,
         intercept_se: (total.recip() + x_mean * x_mean / spread).sqrt(),
         chi2: sum(&|i| (y[i] - y_mean - slope * (x[i] - x_mean)).powi(2)),
-        p_value: crate::normal::two_sided(slope / slope_se),
+        p_value: crate::math::distributions::two_sided(slope / slope_se),
     })
 }

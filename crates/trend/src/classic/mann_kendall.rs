@@ -2,7 +2,7 @@
 
 use super::{check, theil_sen};
 use crate::error::Error;
-use crate::normal::{quantile, two_sided};
+use crate::math::distributions::{quantile, two_sided};
 
 /// A Mann–Kendall test.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::{check_pairs, median};
 use crate::error::Error;
-use crate::normal::quantile;
+use crate::math::distributions::quantile;
 
 /// A Theil–Sen line with rank limits of its slope.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,13 +64,13 @@ impl<'a> Pairs<'a> {
     fn new(x: &'a [f64], y: &'a [f64]) -> Self {
         let mut pairs = Self { x, y, count: 0 };
         let mut count = 0;
-        pairs.each(|_| count += 1);
+        pairs.for_each(|_| count += 1);
         pairs.count = count;
         pairs
     }
 
     /// Visits every slope once.
-    fn each(&self, mut visit: impl FnMut(f64)) {
+    fn for_each(&self, mut visit: impl FnMut(f64)) {
         for (j, (xj, yj)) in self.x.iter().zip(self.y).enumerate() {
             for (xi, yi) in self.x[..j].iter().zip(&self.y[..j]) {
                 if xi != xj {
@@ -90,7 +90,7 @@ impl<'a> Pairs<'a> {
     /// rounded data cost no memory. A bracket that missed the rank is moved, never trusted.
     fn nth_within(&self, rank: usize, low: f64, high: f64) -> f64 {
         let (mut below, mut at_low, mut inside) = (0, 0, Vec::new());
-        self.each(|slope| {
+        self.for_each(|slope| {
             if slope < low {
                 below += 1;
             } else if slope == low {

@@ -1,0 +1,307 @@
+//! A unit's estimates made ready: outliers marked, and how large the scatter really is.
+
+use serde::{Deserialize, Serialize};
+
+use crate::classic::median;
+use crate::data::series::{Flight, Gap};
+
+/// Residuals beyond this many standard deviations are outliers.
+const OUTLIER_SIGMA: f64 = 4.0;
+
+/// Flights of the running median.
+const WINDOW: usize = 11;
+
+/// Gaps before another one that its window, or the window of one in that window, reaches back to.
+const RECENT: usize = WINDOW - 1;
+
+/// Standard errors are taken to lie between these, metres: their squares must be numbers to reckon with.
+const LEAST_ERROR_M: f64 = 1e-9;
+const LARGEST_ERROR_M: f64 = 1.0;
+
+/// One estimate that takes part.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct WeightedGap {
+    /// Index of its flight.
+    pub(crate) flight: usize,
+    pub(crate) installation: u32,
+    pub(crate) departure_us: i64,
+    /// Usage at its end: hours flown, until an axis is chosen.
+    pub(crate) usage: f64,
+    pub(crate) gap_m: f64,
+    /// 1/σ², with the scatter that was found and not the one that was stated.
+    pub(crate) weight: f64,
+}
+
+/// The estimates that take part, those that do not, and the noise found.
+#[derive(Debug, Clone)]
+pub(crate) struct CleanedSeries {
+    pub(crate) estimates: Vec<WeightedGap>,
+    /// Flights whose gap is an outlier.
+    pub(crate) outliers: Vec<usize>,
+    /// By what they were told apart.
+    pub(crate) scatter: NoiseScale,
+}
+
+/// How a unit's gaps scatter: enough to clean the gaps of the flights that follow.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct NoiseScale {
+    /// Variance found over variance stated.
+    pub(crate) noise_factor: f64,
+    /// The stated error of a gap that states none, metres.
+    pub(crate) typical_m: f64,
+    /// The last gaps, as many as the window of another one reaches back.
+    pub(crate) recent: Vec<OutlierResult>,
+}
+
+/// A gap that was cleaned.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct OutlierResult {
+    pub(crate) gap_m: f64,
+    pub(crate) error_m: f64,
+    pub(crate) is_outlier: bool,
+}
+
+/// Marks outliers against the median of their neighbours and rescales the stated standard errors.
+///
+/// The factor is that of [`classic::dispersion`](crate::classic::dispersion); errors that were not
+/// stated, or stated far too small for their neighbours, count as the unit's median one.
+pub(crate) fn mark_outliers(flights: &[Flight]) -> CleanedSeries {
+    let stated: Vec<(usize, Gap)> =
+        flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?))).collect();
+    let typical_m = typical_error(&stated);
+    let errors: Vec<f64> = stated.iter().map(|(_, gap)| error(*gap, typical_m)).collect();
+    let gaps: Vec<f64> = stated.iter().map(|(_, gap)| gap.gap_m).collect();
+    let noise_factor = noise_factor(&gaps, &errors);
+    let scatter = NoiseScale { noise_factor, typical_m, recent: Vec::new() };
+    let mut mark_outliers =
+        CleanedSeries { estimates: Vec::with_capacity(gaps.len()), outliers: Vec::new(), scatter };
+    for (k, &(flight, _)) in stated.iter().enumerate() {
+        let variance = mark_outliers.scatter.variance(errors[k]);
+        let is_outlier = is_outlier(&gaps, k, variance);
+        if is_outlier {
+            mark_outliers.outliers.push(flight);
+        } else {
+            mark_outliers.estimates.push(estimate(flights, flight, gaps[k], variance));
+        }
+        if stated.len() - k <= RECENT {
+            mark_outliers.scatter.recent.push(OutlierResult {
+                gap_m: gaps[k],
+                error_m: errors[k],
+                is_outlier,
+            });
+        }
+    }
+    mark_outliers
+}
+
+impl NoiseScale {
+    /// The estimates and the outliers of flights that follow, counted from the first of them; nothing where
+    /// they show that one of the last gaps before was mistaken for an outlier, or for none, or where those
+    /// were too few.
+    pub(crate) fn mark_outliers(&self, flights: &[Flight]) -> Option<(Vec<WeightedGap>, Vec<usize>)> {
+        let stated: Vec<(usize, Gap)> =
+            flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?))).collect();
+        if stated.is_empty() {
+            return Some((Vec::new(), Vec::new()));
+        }
+        if self.recent.len() < RECENT {
+            return None;
+        }
+        let before = self.recent.iter().map(|seen| seen.gap_m);
+        let gaps: Vec<f64> = before.chain(stated.iter().map(|(_, gap)| gap.gap_m)).collect();
+        let other = |(k, seen): (usize, &OutlierResult)| {
+            is_outlier(&gaps, k, self.variance(seen.error_m)) != seen.is_outlier
+        };
+        if self.recent.iter().enumerate().skip(WINDOW / 2).any(other) {
+            return None;
+        }
+        let (mut estimates, mut outliers) = (Vec::with_capacity(stated.len()), Vec::new());
+        for (k, &(flight, gap)) in (RECENT..).zip(&stated) {
+            let variance = self.variance(error(gap, self.typical_m));
+            if is_outlier(&gaps, k, variance) {
+                outliers.push(flight);
+            } else {
+                estimates.push(estimate(flights, flight, gap.gap_m, variance));
+            }
+        }
+        Some((estimates, outliers))
+    }
+
+    /// A gap's variance, with the scatter that was found.
+    fn variance(&self, error_m: f64) -> f64 {
+        (self.noise_factor * error_m * error_m).max(LEAST_ERROR_M * LEAST_ERROR_M)
+    }
+}
+
+/// Whether a gap lies far from what its neighbours say it is, worn or not.
+fn is_outlier(gaps: &[f64], at: usize, variance: f64) -> bool {
+    let reach_m = OUTLIER_SIGMA * variance.sqrt();
+    is_far_from_median(gaps, at, reach_m) && (gaps[at] - on_local_line(gaps, at)).abs() > reach_m
+}
+
+/// Whether a value lies further than this from the median of the eleven around it, of the nearest eleven at
+/// the ends: most of them lie further below it, or above. To count them costs less than to order them.
+fn is_far_from_median(values: &[f64], at: usize, reach: f64) -> bool {
+    let (_, window) = window(values, at);
+    let (low, high) = (values[at] - reach, values[at] + reach);
+    let (mut below, mut above) = (0, 0);
+    for value in window {
+        below += usize::from(*value < low);
+        above += usize::from(*value > high);
+    }
+    below > window.len() / 2 || above >= window.len().div_ceil(2)
+}
+
+/// The eleven values around one, the nearest eleven at the ends, and the place of their first.
+fn window(values: &[f64], at: usize) -> (usize, &[f64]) {
+    let width = WINDOW.min(values.len());
+    let first = at.saturating_sub(width / 2).min(values.len() - width);
+    (first, &values[first..first + width])
+}
+
+fn estimate(flights: &[Flight], flight: usize, gap_m: f64, variance: f64) -> WeightedGap {
+    let Flight { installation, departure_us, hours: usage, .. } = flights[flight];
+    WeightedGap { flight, installation, departure_us, usage, gap_m, weight: variance.recip() }
+}
+
+/// The median stated error; where nothing is stated, a micrometre, which the noise factor corrects.
+fn typical_error(stated: &[(usize, Gap)]) -> f64 {
+    let mut errors: Vec<f64> = stated.iter().map(|(_, gap)| gap.se_m).filter(|se| se.is_finite()).collect();
+    if errors.is_empty() { 1e-6 } else { median(&mut errors) }
+}
+
+/// A stated error no smaller than half the typical one: a between-flight scatter that nobody states
+/// bounds what a single flight can be worth.
+fn error(gap: Gap, typical_m: f64) -> f64 {
+    let stated_m = if gap.se_m.is_finite() { gap.se_m.max(0.5 * typical_m) } else { typical_m };
+    stated_m.clamp(LEAST_ERROR_M, LARGEST_ERROR_M)
+}
+
+/// Found over stated variance from successive differences, drawn to one while they are few.
+fn noise_factor(gaps: &[f64], errors: &[f64]) -> f64 {
+    const PRIOR_COUNT: f64 = 4.0;
+    let (Some((_, later)), Some((_, later_errors))) = (gaps.split_first(), errors.split_first()) else {
+        return 1.0;
+    };
+    let differences = later.iter().zip(gaps).map(|(after, before)| after - before);
+    let joint = later_errors.iter().zip(errors).map(|(a, b)| (a * a + b * b).sqrt());
+    let mut ratios: Vec<f64> = differences.zip(joint).map(|(difference, error)| difference / error).collect();
+    if ratios.is_empty() {
+        return 1.0;
+    }
+    let count = ratios.len() as f64;
+    // Wear that shows from one flight to the next is no noise: it moves all differences alike.
+    let wear = median(&mut ratios);
+    ratios.iter_mut().for_each(|ratio| *ratio = (*ratio - wear).abs());
+    let found = (1.4826 * median(&mut ratios)).powi(2);
+    // Errors stated ten times too large were not meant; that gaps repeat to the last digit says nothing.
+    let stated = if found > 0.0 { (100.0 * found).min(1.0) } else { 1.0 };
+    ((found * count + PRIOR_COUNT * stated) / (count + PRIOR_COUNT)).max(0.05 * stated)
+}
+
+/// What the flights around one say it should be, if they wear evenly: the median of their pairwise
+/// slopes through the median of their levels (Theil 1950).
+///
+/// A running median lags behind a unit that wears fast, most of all at the ends of its history, and
+/// would call its wear a row of outliers. Only where it does is this looked at.
+fn on_local_line(gaps: &[f64], at: usize) -> f64 {
+    let (first, window) = window(gaps, at);
+    let width = window.len();
+    if width < 2 {
+        return gaps[at];
+    }
+    let mut slopes = [0.0; WINDOW * (WINDOW - 1) / 2];
+    let mut count = 0;
+    for apart in 1..width {
+        let per_flight = (apart as f64).recip();
+        for (earlier, later) in window.iter().zip(&window[apart..]) {
+            slopes[count] = (later - earlier) * per_flight;
+            count += 1;
+        }
+    }
+    let slope = median(&mut slopes[..count]);
+    let mut levels = [0.0; WINDOW];
+    for (k, (level, gap)) in levels.iter_mut().zip(window).enumerate() {
+        *level = gap - slope * (first + k) as f64;
+    }
+    median(&mut levels[..width]) + slope * at as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flights(gaps_um: &[f64]) -> Vec<Flight> {
+        let flight = |(k, um): (usize, &f64)| Flight {
+            departure_us: k as i64,
+            installation: 0,
+            hours: k as f64,
+            flights: k as f64,
+            reversals: 0.0,
+            gap: Some(Gap { gap_m: um * 1e-6, se_m: 0.3e-6 }),
+        };
+        gaps_um.iter().enumerate().map(flight).collect()
+    }
+
+    const WIGGLE_UM: [f64; 10] = [0.2, -0.3, 0.1, 0.3, -0.2, 0.0, -0.1, 0.3, -0.3, 0.1];
+
+    fn wearing(flights: usize, um_per_flight: f64) -> Vec<f64> {
+        (0..flights).map(|k| 60.0 + um_per_flight * k as f64 + WIGGLE_UM[k * 7 % 10]).collect()
+    }
+
+    /// Three micrometres a flight at a third of one of noise: wear, all of it.
+    #[test]
+    fn a_unit_that_wears_fast_is_no_row_of_outliers() {
+        let found = mark_outliers(&flights(&wearing(10, 3.0)));
+        assert!(found.outliers.is_empty(), "{:?}", found.outliers);
+        assert!(found.scatter.noise_factor < 3.0, "{}", found.scatter.noise_factor);
+    }
+
+    /// Against the definition: every window sorted.
+    #[test]
+    fn a_value_is_far_from_the_median_as_the_sorted_window_has_it() {
+        for length in [1, 2, 7, 10, 11, 200] {
+            let values: Vec<f64> = (0..length).map(|k| f64::from(k * k * 37 % 101) - 50.0).collect();
+            for at in 0..values.len() {
+                let width = WINDOW.min(values.len());
+                let first = at.saturating_sub(width / 2).min(values.len() - width);
+                let mut window = values[first..first + width].to_vec();
+                window.sort_by(f64::total_cmp);
+                let apart = (values[at] - window[width / 2]).abs();
+                for reach in [5.5, 20.5, 45.5] {
+                    assert_eq!(is_far_from_median(&values, at, reach), apart > reach, "{at} of {length}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_wild_estimate_among_later_flights_is_one_too() {
+        let mut gaps = wearing(60, 0.1);
+        gaps[47] += 40.0;
+        let (before, after) = gaps.split_at(40);
+        let scatter = mark_outliers(&flights(before)).scatter;
+        let (estimates, outliers) = scatter.mark_outliers(&flights(after)).unwrap();
+        assert_eq!((estimates.len(), outliers), (19, vec![7]));
+    }
+
+    /// Three flights after a step are outliers, until eight more show that it is one.
+    #[test]
+    fn later_flights_that_make_an_outlier_none_are_not_cleaned_apart() {
+        let gaps: Vec<f64> = (0..48).map(|k| wearing(48, 0.0)[k] + if k < 37 { 0.0 } else { 40.0 }).collect();
+        let (before, after) = gaps.split_at(40);
+        let known = mark_outliers(&flights(before));
+        assert_eq!(known.outliers, [37, 38, 39]);
+        assert!(known.scatter.mark_outliers(&flights(after)).is_none());
+        assert!(known.scatter.mark_outliers(&flights(&[])).is_some());
+    }
+
+    #[test]
+    fn a_wild_estimate_is_one_whether_the_unit_wears_or_not() {
+        for slope in [0.0, 3.0] {
+            let mut gaps = wearing(20, slope);
+            gaps[7] += 40.0;
+            assert_eq!(mark_outliers(&flights(&gaps)).outliers, [7]);
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! One serial number's flights in order, with the usage behind each gap.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Error;
+
+/// One flight of a unit, as a caller knows it; order does not matter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation {
+    /// Departure, microseconds since 1970 UTC.
+    pub departure_us: i64,
+    /// The installation, interned: one stay of the unit on one tail and position. A unit that was
+    /// taken off and came back to the same tail has a new one, or another unit's hours would be its.
+    pub installation: u32,
+    /// Length of the flight, hours.
+    pub flight_hours: Option<f64>,
+    /// The tail's total hours after the flight.
+    pub tail_hours_end: Option<f64>,
+    /// Load reversals of this actuator in the flight.
+    pub load_reversals: Option<u64>,
+    /// The gap, metres; `None` for a flight that was refused, which still counts as usage.
+    pub gap_m: Option<f64>,
+    /// Its standard error, metres; `None` where nothing was stated.
+    pub gap_se_m: Option<f64>,
+}
+
+/// What stands in where usage is not known, and where a unit's own hours begin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UsageDefaults {
+    /// Length of a flight that states none and has no hour meter, hours.
+    pub nominal_flight_hours: f64,
+    /// The unit's hours when its first flight here began, if known.
+    pub unit_hours_at_start: Option<f64>,
+}
+
+impl Default for UsageDefaults {
+    fn default() -> Self {
+        Self { nominal_flight_hours: 1.5, unit_hours_at_start: None }
+    }
+}
+
+/// A gap and its stated standard error.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Gap {
+    /// The gap, metres.
+    pub gap_m: f64,
+    /// Its stated standard error, metres; `NaN` where nothing was stated.
+    pub se_m: f64,
+}
+
+/// One flight with the unit's usage at its end, counted from the start of its first flight here.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Flight {
+    /// Departure, microseconds since 1970 UTC.
+    pub departure_us: i64,
+    /// The installation it was flown in.
+    pub installation: u32,
+    /// Hours flown.
+    pub hours: f64,
+    /// Flights flown, those without a row included as far as the hour meter shows them.
+    pub flights: f64,
+    /// Load reversals made.
+    pub reversals: f64,
+    /// What was measured, or nothing for a refusal.
+    pub gap: Option<Gap>,
+}
+
+/// An entry of the maintenance book.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MaintenanceEvent {
+    /// When it was done, microseconds since 1970 UTC.
+    pub utc_us: i64,
+    /// Whether a fall of the gap around it makes the unit as good as new: a re-shim or an overhaul does,
+    /// rigging and lubrication only move what is measured.
+    pub renews: bool,
+}
+
+impl MaintenanceEvent {
+    /// By what entries are ordered.
+    pub(crate) fn order(&self) -> (i64, bool) {
+        (self.utc_us, self.renews)
+    }
+}
+
+/// The flights of one serial number, by departure.
+///
+/// Usage follows these rules, each of which looks backwards only, so that a series cut at a date is
+/// the series that was known on that date:
+///
+/// 1. Between two flights of one installation that both state the tail's hours, usage is their
+///    difference: an actuator also wears in flights that left no row.
+/// 2. Where the meter is missing, or runs backwards, and on the first flight of an installation, usage
+///    is the flight's own hours, and the nominal ones where it states none.
+/// 3. Hours beyond the flight's own belong to flights without a row. They count as flights and as
+///    load reversals at the unit's mean so far. A flight that states no reversals adds that mean, too.
+/// 4. Two rows of one installation and departure are one flight: the row with a gap wins, then the
+///    smaller standard error, then the smaller numbers, whatever the order of arrival.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    flights: Vec<Flight>,
+    unit_hours_at_start: Option<f64>,
+    maintenance: Vec<MaintenanceEvent>,
+    /// After the last flight.
+    meter: UsageAccumulator,
+}
+
+impl Series {
+    /// Puts a unit's rows in order and adds up their usage.
+    ///
+    /// # Errors
+    /// [`Error::Observation`] for hours, a gap or a standard error that is not finite or is negative
+    /// (a gap may be: the estimate of a small one), [`Error::Setting`] for unusable nominal hours.
+    pub fn new(rows: impl IntoIterator<Item = Observation>, usage: &UsageDefaults) -> Result<Self, Error> {
+        let nominal = usage.nominal_flight_hours;
+        if !(nominal.is_finite() && nominal > 0.0) {
+            return Err(Error::Setting { name: "nominal_flight_hours", value: nominal });
+        }
+        let rows = in_order(rows)?;
+        let mut meter = UsageAccumulator::new(nominal);
+        let flights = rows.iter().map(|row| meter.fly(row)).collect();
+        Ok(Self { flights, unit_hours_at_start: usage.unit_hours_at_start, maintenance: Vec::new(), meter })
+    }
+
+    /// The same with what the maintenance book says of the unit, in any order.
+    #[must_use]
+    pub fn with_maintenance(mut self, mut maintenance: Vec<MaintenanceEvent>) -> Self {
+        maintenance.sort_unstable_by_key(MaintenanceEvent::order);
+        self.maintenance = maintenance;
+        self
+    }
+
+    /// All entries of the book.
+    pub(crate) fn maintenance(&self) -> &[MaintenanceEvent] {
+        &self.maintenance
+    }
+
+    /// The entries of the book that were made at or before a date.
+    pub fn maintenance_until(&self, as_of_us: i64) -> &[MaintenanceEvent] {
+        &self.maintenance[..self.maintenance.partition_point(|entry| entry.utc_us <= as_of_us)]
+    }
+
+    /// All flights.
+    pub fn flights(&self) -> &[Flight] {
+        &self.flights
+    }
+
+    /// The flights that departed at or before a date: all that may be known then.
+    pub fn flights_until(&self, as_of_us: i64) -> &[Flight] {
+        &self.flights[..self.flights.partition_point(|flight| flight.departure_us <= as_of_us)]
+    }
+
+    /// The gaps known on a day, in order of departure: what the [classic statistics](crate::classic)
+    /// are asked about.
+    pub fn gaps_until(&self, as_of_us: i64) -> Vec<f64> {
+        self.flights_until(as_of_us).iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect()
+    }
+
+    /// The unit's own hours when its first flight here began, if known.
+    pub fn unit_hours_at_start(&self) -> Option<f64> {
+        self.unit_hours_at_start
+    }
+
+    /// The usage after the last flight, to go on from.
+    pub(crate) fn meter(&self) -> UsageAccumulator {
+        self.meter
+    }
+}
+
+/// Rows in the order of the flights, each flight once.
+pub(crate) fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<Vec<Observation>, Error> {
+    let mut rows: Vec<Observation> = rows.into_iter().collect();
+    rows.iter().try_for_each(check)?;
+    rows.sort_unstable_by(order);
+    rows.dedup_by_key(|row| (row.departure_us, row.installation));
+    Ok(rows)
+}
+
+/// Numbers that would poison every sum after them are refused at the door.
+fn check(row: &Observation) -> Result<(), Error> {
+    let numbers = [
+        ("flight_hours", row.flight_hours, 0.0),
+        ("tail_hours_end", row.tail_hours_end, 0.0),
+        ("gap_m", row.gap_m, f64::MIN),
+        ("gap_se_m", row.gap_se_m, f64::MIN_POSITIVE),
+    ];
+    for (what, value, least) in numbers {
+        if let Some(value) = value.filter(|v| !v.is_finite() || *v < least) {
+            return Err(Error::Observation { what, departure_us: row.departure_us, value });
+        }
+    }
+    Ok(())
+}
+
+/// A total order, so that neither arrival nor duplicates decide anything.
+fn order(a: &Observation, b: &Observation) -> std::cmp::Ordering {
+    let number = |v: Option<f64>| v.unwrap_or(f64::INFINITY);
+    let numbers = |o: &Observation| [o.gap_se_m, o.gap_m, o.tail_hours_end, o.flight_hours].map(number);
+    let place = |o: &Observation| (o.departure_us, o.installation, o.gap_m.is_none());
+    let by_number = || numbers(a).iter().zip(numbers(b)).map(|(a, b)| a.total_cmp(&b)).find(|o| o.is_ne());
+    place(a)
+        .cmp(&place(b))
+        .then_with(|| by_number().unwrap_or(std::cmp::Ordering::Equal))
+        .then_with(|| a.load_reversals.cmp(&b.load_reversals))
+}
+
+/// The unit's usage so far, and the hour meter it was last read against.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct UsageAccumulator {
+    pub(crate) nominal_flight_hours: f64,
+    pub(crate) hours: f64,
+    pub(crate) flights: f64,
+    pub(crate) reversals: f64,
+    /// Reversals that were stated, and the hours they were stated for.
+    pub(crate) stated: (f64, f64),
+    /// Hours flown in rows, and how many rows.
+    pub(crate) rows: (f64, f64),
+    /// Installation, meter reading and the unit's hours at the last flight that stated one.
+    pub(crate) anchor: Option<(u32, f64, f64)>,
+}
+
+impl UsageAccumulator {
+    fn new(nominal_flight_hours: f64) -> Self {
+        Self {
+            nominal_flight_hours,
+            hours: 0.0,
+            flights: 0.0,
+            reversals: 0.0,
+            stated: (0.0, 0.0),
+            rows: (0.0, 0.0),
+            anchor: None,
+        }
+    }
+
+    /// Adds a flight.
+    pub(crate) fn fly(&mut self, row: &Observation) -> Flight {
+        let before = self.hours;
+        let metered = self.metered(row);
+        let own = row.flight_hours.or(metered.map(|h| h - before)).unwrap_or(self.nominal_flight_hours);
+        self.hours = metered.unwrap_or(before + own);
+        self.anchor = match row.tail_hours_end {
+            Some(end) => Some((row.installation, end, self.hours)),
+            None => self.anchor.filter(|(installation, ..)| *installation == row.installation),
+        };
+        let unseen = (self.hours - before - own).max(0.0);
+        self.count(row, own, unseen);
+        Flight {
+            departure_us: row.departure_us,
+            installation: row.installation,
+            hours: self.hours,
+            flights: self.flights,
+            reversals: self.reversals,
+            gap: row.gap_m.map(|gap_m| Gap { gap_m, se_m: row.gap_se_m.unwrap_or(f64::NAN) }),
+        }
+    }
+
+    /// The unit's hours after this flight by the tail's meter, where it can be trusted.
+    fn metered(&self, row: &Observation) -> Option<f64> {
+        let (installation, reading, hours) = self.anchor?;
+        let end = row.tail_hours_end?;
+        let after = hours + end - reading;
+        (installation == row.installation && end >= reading && after >= self.hours).then_some(after)
+    }
+
+    /// Flights and reversals of this row and of the hours that have none.
+    fn count(&mut self, row: &Observation, own: f64, unseen: f64) {
+        self.rows = (self.rows.0 + own, self.rows.1 + 1.0);
+        if self.rows.0 > 0.0 {
+            self.flights += unseen * self.rows.1 / self.rows.0;
+        }
+        self.flights += 1.0;
+        let mut unknown = unseen;
+        match row.load_reversals {
+            Some(made) => {
+                self.reversals += made as f64;
+                self.stated = (self.stated.0 + made as f64, self.stated.1 + own);
+            }
+            None => unknown += own,
+        }
+        if self.stated.1 > 0.0 {
+            self.reversals += unknown * self.stated.0 / self.stated.1;
+        }
+    }
+}

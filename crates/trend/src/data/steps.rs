@@ -1,0 +1,200 @@
+//! A step that wear cannot make, found by comparing lines on both sides of every flight.
+
+use crate::data::outliers::WeightedGap;
+
+/// Estimates on each side of a candidate, from a quick look to a long one.
+const REACHES: [usize; 4] = [15, 30, 60, FARTHEST];
+
+/// The longest of them.
+pub(crate) const FARTHEST: usize = 120;
+
+/// Places passed over in the first search.
+const STRIDE: usize = 3;
+
+/// Fewest estimates on either side.
+const MIN_ESTIMATES: usize = 6;
+
+/// A step is believed beyond this many standard errors.
+const BELIEVED: f64 = 6.5;
+
+/// Estimates on each side of the near look, which a bend of the wear cannot deceive.
+const NEAR: usize = 20;
+
+/// Estimates of one side's slope.
+const SIDE: usize = 60;
+
+/// Standard errors, and share of the step, that must be there in the near look.
+const NEAR_BELIEVED: f64 = 3.5;
+const NEAR_SHARE: f64 = 0.6;
+
+/// What the common slope is drawn to zero by, h²/m²: a spread of the wear rates of 5e-8 m/h.
+const SLOPE_INFORMATION: f64 = 4e14;
+
+/// Variance of the wear per metre of wear between the middles of both sides, metres: wear comes in
+/// spurts, which must not pass for steps.
+const WEAR_NOISE_M: f64 = 0.2e-6;
+
+/// A step of the measured gap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct StepChange {
+    /// The first estimate after it.
+    pub(crate) at: usize,
+    pub(crate) step_m: f64,
+    pub(crate) se_m: f64,
+}
+
+/// All steps of a history, by place: the largest first, then what it left on either side.
+pub(crate) fn detect_steps(estimates: &[WeightedGap]) -> Vec<StepChange> {
+    let sums = PrefixSums::new(estimates);
+    let mut found = Vec::new();
+    let mut open = vec![(0, estimates.len())];
+    while let Some((low, high)) = open.pop() {
+        if let Some(step) = sums.largest(low, low, high) {
+            open.extend([(low, step.at), (step.at, high)]);
+            found.push(step);
+        }
+    }
+    found.sort_unstable_by_key(|step| step.at);
+    found
+}
+
+/// Whether a step shows at one of the places from which the estimates from `since` on are in reach, the
+/// first estimate being the first one since the last step.
+pub(crate) fn has_step(estimates: &[WeightedGap], since: usize) -> bool {
+    PrefixSums::new(estimates).largest(0, since.saturating_sub(FARTHEST), estimates.len()).is_some()
+}
+
+/// Squared steps at changes of installation, less what their errors explain, and how many there are.
+///
+/// Half of the mean is the variance of what one installation adds to every gap measured in it.
+pub(crate) fn installation_steps(estimates: &[WeightedGap]) -> (f64, f64) {
+    const REACH: usize = 60;
+    let sums = PrefixSums::new(estimates);
+    let changes = (MIN_ESTIMATES..estimates.len().saturating_sub(MIN_ESTIMATES))
+        .filter(|&i| estimates[i].installation != estimates[i - 1].installation);
+    changes.fold((0.0, 0.0), |(squares, count), at| {
+        let (step, _) = sums.step_at(at.saturating_sub(REACH), at, (at + REACH).min(estimates.len()));
+        if step.step_m.abs() > LARGEST_BIAS_M || step.se_m > 0.5 * LARGEST_BIAS_M {
+            return (squares, count);
+        }
+        (squares + step.step_m * step.step_m - step.se_m * step.se_m, count + 1.0)
+    })
+}
+
+/// A step larger than this at a change of installation was more than the change, metres.
+const LARGEST_BIAS_M: f64 = 8e-6;
+
+/// Weighted sums up to each estimate, from which a line over any stretch follows at once.
+struct PrefixSums(Vec<[f64; 5]>);
+
+/// A stretch's variance, means, and centred squares.
+struct WindowStats {
+    variance: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+}
+
+impl PrefixSums {
+    fn new(estimates: &[WeightedGap]) -> Self {
+        let origin = estimates.first().map_or((0.0, 0.0), |e| (e.usage, e.gap_m));
+        let mut sums = Vec::with_capacity(estimates.len() + 1);
+        let mut sum = [0.0; 5];
+        sums.push(sum);
+        for e in estimates {
+            let (w, x, y) = (e.weight, e.usage - origin.0, e.gap_m - origin.1);
+            for (s, term) in sum.iter_mut().zip([w, w * x, w * y, w * x * x, w * x * y]) {
+                *s += term;
+            }
+            sums.push(sum);
+        }
+        Self(sums)
+    }
+
+    fn window_stats(&self, from: usize, to: usize) -> WindowStats {
+        let (a, b) = (&self.0[from], &self.0[to]);
+        let weight = b[0] - a[0];
+        let variance = weight.recip();
+        let (x, y) = ((b[1] - a[1]) * variance, (b[2] - a[2]) * variance);
+        WindowStats { variance, x, y, xx: b[3] - a[3] - weight * x * x, xy: b[4] - a[4] - weight * x * y }
+    }
+
+    /// Step between the stretches around `at`, with one slope for both, its variance, and that slope.
+    fn step_with_slope(&self, low: usize, at: usize, high: usize) -> (f64, f64, f64) {
+        let (left, right) = (self.window_stats(low, at), self.window_stats(at, high));
+        let slope_variance = (left.xx + right.xx + SLOPE_INFORMATION).recip();
+        let slope = (left.xy + right.xy) * slope_variance;
+        let apart = right.x - left.x;
+        let variance = left.variance + right.variance + apart * apart * slope_variance;
+        (right.y - left.y - slope * apart, variance, slope)
+    }
+
+    /// The same as a jump, and its slope.
+    fn step_at(&self, low: usize, at: usize, high: usize) -> (StepChange, f64) {
+        let (step_m, variance, slope) = self.step_with_slope(low, at, high);
+        (StepChange { at, step_m, se_m: variance.sqrt() }, slope)
+    }
+
+    /// Whether the step is more than the measurement's errors and a spurt of the wear explain.
+    fn is_beyond_wear(&self, low: usize, high: usize, (step, slope): &(StepChange, f64)) -> bool {
+        let (left, right) = (
+            self.window_stats(step.at.saturating_sub(NEAR).max(low), step.at),
+            self.window_stats(step.at, (step.at + NEAR).min(high)),
+        );
+        let worn_m = (slope * (right.x - left.x)).abs();
+        step.step_m.powi(2) > BELIEVED * BELIEVED * (step.se_m.powi(2) + WEAR_NOISE_M * worn_m)
+    }
+
+    /// Whether the step is there between the nearest flights too, whichever slope is taken off: the
+    /// common one, that of the left or that of the right.
+    ///
+    /// A bend, as at the onset of wear, makes a far line miss on one side; it does not make neighbours
+    /// differ.
+    fn is_near(&self, low: usize, high: usize, (step, slope): &(StepChange, f64)) -> bool {
+        let (from, to) = (
+            |reach: usize| step.at.saturating_sub(reach).max(low),
+            |reach: usize| (step.at + reach).min(high),
+        );
+        let (left, right) = (self.window_stats(from(NEAR), step.at), self.window_stats(step.at, to(NEAR)));
+        let se_m = (left.variance + right.variance).sqrt();
+        let slopes = [*slope, self.slope(from(SIDE), step.at, *slope), self.slope(step.at, to(SIDE), *slope)];
+        slopes.into_iter().all(|slope| {
+            let step_m = right.y - left.y - slope * (right.x - left.x);
+            step_m / step.step_m > NEAR_SHARE && step_m.abs() > NEAR_BELIEVED * se_m
+        })
+    }
+
+    /// Slope of one side, drawn to another so far as it is uncertain.
+    fn slope(&self, from: usize, to: usize, other: f64) -> f64 {
+        let side = self.window_stats(from, to);
+        (side.xy + SLOPE_INFORMATION * other) / (side.xx + SLOPE_INFORMATION)
+    }
+
+    /// The step with the largest ratio to its error, over all places from one on and all reaches.
+    ///
+    /// Every third place is looked at, then all those near one that is half way to belief.
+    fn largest(&self, low: usize, from: usize, high: usize) -> Option<StepChange> {
+        let ratio = |step: &StepChange| (step.step_m / step.se_m).abs();
+        let places = from.max(low + MIN_ESTIMATES)..(high + 1).saturating_sub(MIN_ESTIMATES);
+        let is_half = |at: usize, reach: usize| {
+            let (step_m, variance, _) =
+                self.step_with_slope(at.saturating_sub(reach).max(low), at, (at + reach).min(high));
+            step_m * step_m > (0.6 * BELIEVED).powi(2) * variance
+        };
+        let promising = |&at: &usize| REACHES.into_iter().any(|reach| is_half(at, reach));
+        let near: Vec<usize> = places.clone().step_by(STRIDE).filter(promising).collect();
+        let mut all: Vec<usize> =
+            near.into_iter().flat_map(|at| at.saturating_sub(STRIDE - 1)..at + STRIDE).collect();
+        all.dedup();
+        all.into_iter()
+            .filter(|at| places.contains(at))
+            .flat_map(|at| {
+                REACHES
+                    .map(|reach| self.step_at(at.saturating_sub(reach).max(low), at, (at + reach).min(high)))
+            })
+            .filter(|found| self.is_beyond_wear(low, high, found) && self.is_near(low, high, found))
+            .map(|(step, _)| step)
+            .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+    }
+}

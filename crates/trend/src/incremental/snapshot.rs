@@ -1,0 +1,302 @@
+//! What is kept of a unit from night to night, so that a flight more does not ask for all those before.
+
+use crate::data::series::{Flight, MaintenanceEvent, Observation, Series, UsageAccumulator, in_order};
+use crate::error::Error;
+use crate::incremental::checkpoint::{
+    self, Checkpoint, DAY_US, HistoryView, SegmentPosterior, UTILIZATION_DAYS, UsageSample, digest_of,
+    events_until,
+};
+use crate::incremental::tail::Tail;
+use crate::inference::posterior::Posterior;
+use crate::prior::fleet_prior::FleetPrior;
+use crate::settings::Settings;
+use crate::statement::assessment::Assessment;
+use crate::statement::crossing::RulDistribution;
+use crate::statement::level;
+use crate::statement::state::{Evidence, State, alert_state};
+use crate::statement::types::{ChangePoint, ChangePointKind, MIN_ESTIMATES, Utilization, WearStatus};
+
+/// A unit's flights until a checkpoint as they were judged, and those after it as they were flown.
+///
+/// A statement stands on both: the checkpoint's curves, weighed and moved on by the few estimates that
+/// follow. Where those do not go on as was foretold (a step shows, an outlier was none, they lie too far
+/// off) it stands on the whole history. Checkpoints follow from the count of flights alone, and
+/// [`assess`](crate::assess()) makes its statements in this way too: what is said from a state that was kept
+/// is what is said from nothing, bit for bit, whatever the nights and the order of arrival.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnitSnapshot {
+    pub(crate) checkpoint: Checkpoint,
+    /// The flights after it.
+    pub(crate) tail: Vec<Flight>,
+    /// The usage after the last flight; nothing where later flights were known when it was made.
+    pub(crate) meter: Option<UsageAccumulator>,
+    pub(crate) unit_hours_at_start: Option<f64>,
+    /// Of the prior it was judged by.
+    pub(crate) prior: u64,
+}
+
+/// What the last segment says now, or the level that was not stated and what the last estimates say.
+pub(crate) struct CurrentFit {
+    tail: Tail,
+    fitted: Result<(Posterior, bool), Option<(f64, f64)>>,
+}
+
+impl UnitSnapshot {
+    /// Judges a unit's flights until a day, by a prior learned from nothing later.
+    ///
+    /// For what [`assess`](crate::assess()) says without a prior it is [`FleetPrior::uninformative`] of the limit.
+    pub fn from_series(series: &Series, as_of_us: i64, prior: &FleetPrior) -> Self {
+        Self::current(series, as_of_us, prior).0
+    }
+
+    /// The same, and where the unit stands.
+    pub(crate) fn current(series: &Series, as_of_us: i64, prior: &FleetPrior) -> (Self, CurrentFit) {
+        let flights = series.flights_until(as_of_us);
+        let known = HistoryView {
+            flights,
+            maintenance: series.maintenance_until(as_of_us),
+            unit_hours_at_start: series.unit_hours_at_start(),
+        };
+        let snapshot = |checkpoint: Checkpoint| Self {
+            tail: flights[checkpoint.flights..].to_vec(),
+            checkpoint,
+            meter: (flights.len() == series.flights().len()).then(|| series.meter()),
+            unit_hours_at_start: series.unit_hours_at_start(),
+            prior: prior.digest(),
+        };
+        let count = checkpoint::before(flights.len());
+        if count < flights.len()
+            && let Some((checkpoint, current)) = fit_from_checkpoint(&known, count, prior)
+        {
+            return (snapshot(checkpoint), current);
+        }
+        let (mut checkpoint, history) = Checkpoint::read(&known.first(flights.len()), prior);
+        checkpoint.fit_segments(&history, flights, prior);
+        let current = CurrentFit::at(&checkpoint, prior);
+        (snapshot(checkpoint), current)
+    }
+
+    /// The same with flights that were made since, in any order; nothing where the history is needed: a
+    /// flight is not later than all before, a checkpoint has been passed, or the state was made of a day
+    /// before the last flight that was known.
+    ///
+    /// # Errors
+    /// [`Error::Observation`] as [`Series::new`].
+    pub fn append(&self, rows: impl IntoIterator<Item = Observation>) -> Result<Option<Self>, Error> {
+        let rows = in_order(rows)?;
+        let order = |departure_us: i64, installation: u32| (departure_us, installation);
+        let last = self.last().map(|flight| order(flight.departure_us, flight.installation));
+        let is_late = rows.first().is_some_and(|row| Some(order(row.departure_us, row.installation)) <= last);
+        let count = self.checkpoint.flights + self.tail.len() + rows.len();
+        let Some(mut meter) = self.meter.filter(|_| !is_late) else { return Ok(None) };
+        if !rows.is_empty() && checkpoint::before(count) != self.checkpoint.flights {
+            return Ok(None);
+        }
+        let mut tail = self.tail.clone();
+        tail.extend(rows.iter().map(|row| meter.fly(row)));
+        Ok(Some(Self { tail, meter: Some(meter), ..self.clone() }))
+    }
+
+    /// What was kept on an earlier day since the checkpoint; nothing for one before it.
+    pub(crate) fn truncate(&self, as_of_us: i64) -> Option<Self> {
+        let flown = self.tail.partition_point(|flight| flight.departure_us <= as_of_us);
+        let is_later = self.checkpoint.last.is_some_and(|last| last.departure_us <= as_of_us);
+        let count = self.checkpoint.flights + flown;
+        (is_later && checkpoint::before(count) == self.checkpoint.flights).then(|| Self {
+            tail: self.tail[..flown].to_vec(),
+            meter: None,
+            ..self.clone()
+        })
+    }
+
+    /// States what is known of the unit on a day, as [`assess`](crate::assess()) does from its whole history.
+    ///
+    /// `maintenance` is all that the maintenance book says of the unit, in any order. Nothing where the history is
+    /// needed: the last flights do not go on as was foretold, the day is before the last of them, or prior
+    /// or book are not those that the state was made with.
+    ///
+    /// # Errors
+    /// As [`assess`](crate::assess()).
+    pub fn assess(
+        &self,
+        as_of_us: i64,
+        maintenance: &[MaintenanceEvent],
+        settings: &Settings,
+        prior: &FleetPrior,
+        previous: Option<State>,
+    ) -> Result<Option<Assessment>, Error> {
+        settings.check()?;
+        let mut maintenance = maintenance.to_vec();
+        maintenance.sort_unstable_by_key(MaintenanceEvent::order);
+        let maintenance = events_until(&maintenance, as_of_us);
+        let is_later = self.last().is_none_or(|last| last.departure_us <= as_of_us);
+        let read = self.checkpoint.last.map_or(&[][..], |last| events_until(maintenance, last.departure_us));
+        if !is_later || self.prior != prior.digest() || self.checkpoint.maintenance != digest_of(read) {
+            return Ok(None);
+        }
+        let current = if self.tail.is_empty() {
+            Some(CurrentFit::at(&self.checkpoint, prior))
+        } else {
+            Tail::read(&self.checkpoint, &self.tail, prior)
+                .and_then(|tail| CurrentFit::after(&self.checkpoint, tail, &self.tail, prior))
+        };
+        Ok(current.map(|current| self.statement(current, as_of_us, maintenance, settings, prior, previous)))
+    }
+
+    /// What is said of where the unit stands; the book is ordered, and ends on the day.
+    pub(crate) fn statement(
+        &self,
+        current: CurrentFit,
+        as_of_us: i64,
+        maintenance: &[MaintenanceEvent],
+        settings: &Settings,
+        prior: &FleetPrior,
+        previous: Option<State>,
+    ) -> Assessment {
+        let CurrentFit { tail, fitted } = current;
+        let estimates = self.checkpoint.estimates + tail.len();
+        let offset_m2 = self.checkpoint.offset_m2;
+        let single_unit = prior.single_unit();
+        let unsupported = fitted.as_ref().err().copied().flatten();
+        let changes = self.changes(maintenance, fitted.as_ref().ok().map(|(posterior, _)| posterior));
+        let fitted = fitted.ok().filter(|_| estimates >= MIN_ESTIMATES);
+        let prior = if fitted.as_ref().is_some_and(|(_, is_single_unit)| *is_single_unit) {
+            &single_unit
+        } else {
+            prior
+        };
+        let fitted = fitted.map(|(posterior, _)| posterior);
+        let growth_probability = fitted.as_ref().map(level::growth_probability);
+        let ratio = self.hours_per_usage(prior);
+        let remaining = fitted.as_ref().map(|p| RulDistribution::new(p, prior, settings, ratio, offset_m2));
+        let level = fitted.as_ref().map(|p| level::level(p, prior, offset_m2));
+        let crossing = remaining.as_ref().map(RulDistribution::crossing);
+        let last_gap_us = self.last_gap_us();
+        let evidence =
+            Evidence { last_gap_us, estimates, as_of_us, level, crossing, changes: &changes, unsupported };
+        let (state, reason) = alert_state(&evidence, settings, previous);
+        Assessment {
+            as_of_us,
+            flights: self.checkpoint.flights + self.tail.len(),
+            estimates,
+            unit_hours: self.unit_hours_at_start.zip(self.last()).map(|(start, last)| start + last.hours),
+            level,
+            rate: fitted.as_ref().map(|p| level::rate(p, ratio)),
+            wear: wear(growth_probability),
+            growth_probability,
+            law: fitted.as_ref().and_then(level::law),
+            changes,
+            crossing,
+            check_probability: remaining.as_ref().map(|r| r.within(settings.check_interval_hours)),
+            utilization: self.utilization(),
+            outliers_us: [&self.checkpoint.outliers_us[..], &tail.outliers_us[..]].concat(),
+            noise_factor: self.checkpoint.scatter.noise_factor,
+            state,
+            reason,
+        }
+    }
+
+    /// Every change, by departure.
+    fn changes(&self, maintenance: &[MaintenanceEvent], fitted: Option<&Posterior>) -> Vec<ChangePoint> {
+        let mut changes = self.checkpoint.changes.clone();
+        changes.extend(self.recorded(maintenance));
+        changes.extend(fitted.and_then(|posterior| self.checkpoint.onset(posterior)));
+        changes.sort_by_key(|change| change.departure_us);
+        changes
+    }
+
+    /// Entries of the book in the tail, where the gap shows no step, at the first flight after each.
+    fn recorded(&self, maintenance: &[MaintenanceEvent]) -> impl Iterator<Item = ChangePoint> {
+        let known = self.checkpoint.last.map_or(0, |last| events_until(maintenance, last.departure_us).len());
+        maintenance[known..].iter().filter_map(|entry| {
+            let first = self.tail.iter().find(|flight| flight.departure_us >= entry.utc_us)?;
+            let departure_us = first.departure_us;
+            Some(ChangePoint {
+                departure_us,
+                kind: ChangePointKind::Recorded,
+                step_m: 0.0,
+                se_m: 0.0,
+                certainty: 1.0,
+            })
+        })
+    }
+
+    fn last(&self) -> Option<&Flight> {
+        self.tail.last().or(self.checkpoint.last.as_ref())
+    }
+
+    /// Departure of the last flight with a gap.
+    pub(crate) fn last_gap_us(&self) -> Option<i64> {
+        let seen = self.tail.iter().rev().find(|flight| flight.gap.is_some());
+        seen.map(|flight| flight.departure_us).or(self.checkpoint.last_gap_us)
+    }
+
+    /// Flight hours per hour's worth of usage where the unit flies now.
+    pub(crate) fn hours_per_usage(&self, prior: &FleetPrior) -> f64 {
+        let (Some(before), Some(last)) = (&self.checkpoint.last, self.last()) else { return 1.0 };
+        let moved = before.installation != last.installation;
+        self.checkpoint.used.hours_per_usage(last, &self.tail, moved, prior)
+    }
+
+    /// The pace of the last ninety days of flights; nothing when they show no hours.
+    fn utilization(&self) -> Option<Utilization> {
+        let last = UsageSample::of(self.last()?);
+        let marks = self.checkpoint.days.iter().copied().chain(self.tail.iter().map(UsageSample::of));
+        let days = |mark: &UsageSample| (last.departure_us - mark.departure_us) as f64 / DAY_US as f64;
+        let first = marks.into_iter().find(|mark| days(mark) <= UTILIZATION_DAYS as f64)?;
+        let (hours, days) = (last.hours - first.hours, days(&first));
+        (hours > 0.0 && days > 0.0).then(|| Utilization {
+            hours_per_day: hours / days,
+            hours_per_flight: hours / (last.flights - first.flights),
+        })
+    }
+}
+
+/// The checkpoint at a count of flights and where the unit stands after the rest; nothing where the rest
+/// does not go on as was foretold.
+fn fit_from_checkpoint(
+    known: &HistoryView<'_>,
+    count: usize,
+    prior: &FleetPrior,
+) -> Option<(Checkpoint, CurrentFit)> {
+    let (before, append) = known.flights.split_at(count);
+    let (mut checkpoint, history) = Checkpoint::read(&known.first(count), prior);
+    let tail = Tail::read(&checkpoint, append, prior)?;
+    checkpoint.fit_segments(&history, before, prior);
+    let current = CurrentFit::after(&checkpoint, tail, append, prior)?;
+    Some((checkpoint, current))
+}
+
+impl CurrentFit {
+    /// At a checkpoint.
+    fn at(checkpoint: &Checkpoint, prior: &FleetPrior) -> Self {
+        let fitted = match &checkpoint.fitted {
+            SegmentPosterior::Nothing => Err(None),
+            SegmentPosterior::Unsupported { level_m, recent_m } => Err(Some((*level_m, *recent_m))),
+            SegmentPosterior::By(mixture) => Ok((mixture.posterior(prior), mixture.is_single_unit)),
+        };
+        Self { tail: Tail::default(), fitted }
+    }
+
+    /// What the last segment says, and whether without the fleet.
+    pub(crate) fn fitted(&self) -> Option<(&Posterior, bool)> {
+        self.fitted.as_ref().ok().map(|(posterior, is_single_unit)| (posterior, *is_single_unit))
+    }
+
+    /// After some flights more.
+    fn after(checkpoint: &Checkpoint, tail: Tail, flights: &[Flight], prior: &FleetPrior) -> Option<Self> {
+        let SegmentPosterior::By(mixture) = &checkpoint.fitted else { return None };
+        let single_unit = prior.single_unit();
+        let prior = if mixture.is_single_unit { &single_unit } else { prior };
+        let fitted = tail.follow(checkpoint, mixture, flights, prior)?;
+        Some(Self { tail, fitted: Ok((fitted, mixture.is_single_unit)) })
+    }
+}
+
+fn wear(growth_probability: Option<f64>) -> WearStatus {
+    match growth_probability {
+        Some(probability) if probability > 0.95 => WearStatus::Wearing,
+        Some(_) => WearStatus::Steady,
+        None => WearStatus::Unknown,
+    }
+}

@@ -1,0 +1,383 @@
+//! What a segment's bins say about every curve of the bank: weights, amplitudes, levels.
+
+use crate::data::bins;
+use crate::data::segment::Segment;
+use crate::inference::bank_regression::regressions;
+use crate::inference::level_filter::Regression;
+use crate::inference::segment_fit::{SegmentFit, linear_growth};
+use crate::prior::fleet_prior::FleetPrior;
+use crate::wear::bank::{Candidate, CandidateBank, WearLaw, power_of_ln_life};
+
+/// Bins of the first look, by which most curves are dropped.
+const COARSE_BINS: usize = 12;
+
+/// What a prior over lives and cells can add to a curve's bound.
+const SLACK: f64 = 3.0;
+
+/// By how much a curve's weight usually stays below its bound, at most.
+const USUAL: f64 = 20.0;
+
+/// Standard deviations within which a life may lie.
+const LIFE_REACH: f64 = 3.5;
+
+/// How many lives are tried for each curve, over how many standard deviations of its amplitude.
+#[derive(Debug, Clone, Copy)]
+struct LifeGrid {
+    count: usize,
+    reach: f64,
+    /// Log weight below the best at which a curve is dropped.
+    drop: f64,
+}
+
+/// Enough to weigh a curve, and enough to state quantiles.
+const ROUGH: LifeGrid = LifeGrid { count: 3, reach: 1.7, drop: 7.0 };
+const THOROUGH: LifeGrid = LifeGrid { count: 7, reach: 3.5, drop: 7.0 };
+
+/// What had to be guessed of a unit's age at first sight, where the law makes a difference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum AgeAssumption {
+    NotNeeded,
+    Fresh,
+    Worn,
+}
+
+/// One law with one amplitude, and how much it is believed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Component {
+    pub(crate) law: WearLaw,
+    /// Usage at the segment's begin on the law's own clock, and at its end.
+    pub(crate) age_begin: f64,
+    pub(crate) age_now: f64,
+    /// Metres per unit of height.
+    pub(crate) amplitude_m: f64,
+    pub(crate) ln_life: f64,
+    /// The gap now, metres.
+    pub(crate) level_m: f64,
+    /// The gap of this unit when new, metres.
+    pub(crate) new_m: f64,
+    /// The unit's own swing beside the fleet's mean one, metres.
+    pub(crate) seasonal_m: f64,
+    /// What had to be guessed of its age at first sight.
+    pub(crate) age_assumption: AgeAssumption,
+    /// Onset not seen yet: it comes after an exponential wait.
+    pub(crate) onset_pending: bool,
+    /// Log weight, then (normalised) weight.
+    pub(crate) weight: f64,
+}
+
+/// A mixture over the bank.
+#[derive(Debug, Clone)]
+pub(crate) struct Posterior {
+    pub(crate) components: Vec<Component>,
+    /// Usage since the bin whose level it is: wear has gone on, as the curves have it.
+    pub(crate) since: f64,
+    /// Variance of every node's level.
+    pub(crate) level_m2: f64,
+    /// Variance of every node's growth since the segment began.
+    pub(crate) growth_m2: f64,
+    /// Variance of every node's swing, and its covariance with the level.
+    pub(crate) seasonal_m2: f64,
+    pub(crate) level_seasonal_m2: f64,
+    /// Log of the sum of the weights before they were normalised.
+    pub(crate) log_evidence: f64,
+}
+
+impl Posterior {
+    /// The nodes that can move a quantile.
+    pub(crate) fn significant_components(&self) -> impl Iterator<Item = &Component> {
+        let least = self.negligible();
+        self.components.iter().filter(move |n| n.weight > least)
+    }
+
+    /// Without the nodes that can move none.
+    pub(crate) fn drop_negligible(mut self) -> Self {
+        let least = self.negligible();
+        self.components.retain(|n| n.weight > least);
+        self
+    }
+
+    /// The weight, a share of the largest, below which a node cannot move a quantile.
+    fn negligible(&self) -> f64 {
+        2e-3 * self.components.iter().map(|n| n.weight).fold(0.0, f64::max)
+    }
+}
+
+/// Judges a segment by a prior: all curves on a few bins, the likely ones on many.
+///
+/// The level walks by a variance proportional to the wear, so the first look assumes wear along a
+/// line and the second takes it from the first.
+pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Posterior> {
+    let span = segment.now - segment.begin;
+    if segment.estimates.is_empty() || span <= 0.0 {
+        return None;
+    }
+    let starts = segment.estimates.len().clamp(1, bins::BINS) / 2 + 1;
+    let mut bank =
+        CandidateBank::new(segment.fresh, segment.known_age, span, starts, |law| prior.includes_law(law));
+    let coarse = bins::bin(segment.estimates, COARSE_BINS);
+    let grown_m = linear_growth(&coarse);
+    let first = SegmentFit::new(segment, prior, coarse, |usage| grown_m * usage / span);
+    if segment.estimates.len() <= COARSE_BINS {
+        return Some(finish(&first, components(&first, &bank, THOROUGH)));
+    }
+    let mut believed = components(&first, &bank, ROUGH);
+    normalise(&mut believed, ROUGH.drop);
+    retain(&mut bank.candidates, &believed);
+    let likely = likeliest(&believed);
+    let fine = bins::bin(segment.estimates, bins::BINS);
+    let second = SegmentFit::new(segment, prior, fine, |usage| mean_growth(&likely, usage));
+    let believed = components(&second, &bank, THOROUGH);
+    Some(finish(&second, believed))
+}
+
+/// Leaves only the curves that are believed.
+fn retain(candidates: &mut Vec<Candidate>, believed: &[(usize, Component)]) {
+    let mut kept: Vec<usize> = believed.iter().map(|(index, _)| *index).collect();
+    kept.dedup();
+    *candidates = kept.into_iter().map(|index| candidates[index]).collect();
+}
+
+fn finish(fit: &SegmentFit<'_>, mut believed: Vec<(usize, Component)>) -> Posterior {
+    let log_sum = normalise(&mut believed, THOROUGH.drop);
+    Posterior {
+        components: believed.into_iter().map(|(_, component)| component).collect(),
+        since: fit.segment.now - fit.bins.last().map_or(fit.segment.begin, |bin| bin.usage),
+        level_m2: fit.level_m2(),
+        growth_m2: fit.filter.end_m2 + fit.filter.start_m2,
+        seasonal_m2: fit.seasonal_m2,
+        level_seasonal_m2: fit.level_seasonal_m2(),
+        log_evidence: log_sum + fit.shared_log_likelihood(),
+    }
+}
+
+/// The likeliest nodes, with weights that add up to one: enough for a mean.
+fn likeliest(believed: &[(usize, Component)]) -> Vec<Component> {
+    const FEW: usize = 10;
+    let mut components: Vec<Component> = believed.iter().map(|(_, component)| *component).collect();
+    if FEW < components.len() {
+        components.select_nth_unstable_by(FEW, |a, b| b.weight.total_cmp(&a.weight));
+        components.truncate(FEW);
+    }
+    let total: f64 = components.iter().map(|n| n.weight).sum();
+    for component in &mut components {
+        component.weight /= total;
+    }
+    components
+}
+
+/// Wear up to a usage since the segment's begin, of units new at the age of zero.
+pub(crate) fn mean_growth(components: &[Component], usage: f64) -> f64 {
+    components.iter().map(|n| n.weight * n.amplitude_m * n.law.value(n.age_begin + usage)).sum()
+}
+
+/// Turns log weights into weights that add up to one, drops what is not believed, and returns the log
+/// of their sum.
+fn normalise(believed: &mut Vec<(usize, Component)>, drop: f64) -> f64 {
+    let best = believed.iter().map(|(_, n)| n.weight).fold(f64::NEG_INFINITY, f64::max);
+    believed.retain(|(_, n)| n.weight > best - drop);
+    let mut sum = 0.0;
+    for (_, component) in believed.iter_mut() {
+        component.weight = (component.weight - best).exp();
+        sum += component.weight;
+    }
+    for (_, component) in believed.iter_mut() {
+        component.weight /= sum;
+    }
+    best + sum.ln()
+}
+
+/// A curve's regression, the amplitude it fits best, and a bound on its log weight.
+struct ScoredCandidate {
+    index: usize,
+    pass: Regression,
+    best_m: f64,
+    information: f64,
+    bound: f64,
+}
+
+/// Every curve of the bank against the bins.
+fn scored_candidates(fit: &SegmentFit<'_>, bank: &CandidateBank) -> Vec<ScoredCandidate> {
+    let passes = regressions(fit, bank).into_iter().map(|pass| fit.with_season(pass));
+    let candidates = bank.candidates.iter().enumerate();
+    candidates
+        .zip(passes)
+        .map(|((index, candidate), pass)| scored_candidate(fit, index, candidate, pass))
+        .collect()
+}
+
+/// The nodes, with log weights, of every curve that can matter.
+fn components(fit: &SegmentFit<'_>, bank: &CandidateBank, tried: LifeGrid) -> Vec<(usize, Component)> {
+    let scored_candidates = scored_candidates(fit, bank);
+    let add = |scored_candidate: &ScoredCandidate, least: f64, push: &mut dyn FnMut(Component)| {
+        let candidate = &bank.candidates[scored_candidate.index];
+        if candidate.law == WearLaw::None {
+            flat(fit, push);
+        } else {
+            try_lives(fit, candidate, scored_candidate, (tried, least), push);
+        }
+    };
+    let mut components = Vec::with_capacity(1000);
+    let Some(top) = scored_candidates.iter().max_by(|a, b| a.bound.total_cmp(&b.bound)) else {
+        return components;
+    };
+    let mut best = f64::NEG_INFINITY;
+    add(top, best, &mut |component| best = best.max(component.weight));
+    // Where the prior forbids what fits best, its bound says nothing of the others.
+    let floor = top.bound.min(best + USUAL) - tried.drop - SLACK;
+    let flat = bank.candidates.iter().position(|candidate| candidate.law == WearLaw::None);
+    for scored_candidate in scored_candidates.iter().filter(|c| c.bound > floor || Some(c.index) == flat) {
+        add(scored_candidate, best - tried.drop, &mut |component| {
+            best = best.max(component.weight);
+            if component.weight > best - tried.drop {
+                components.push((scored_candidate.index, component));
+            }
+        });
+    }
+    components
+}
+
+/// The amplitude that fits the gaps and a new unit's gap best, were amplitudes free.
+fn scored_candidate(
+    fit: &SegmentFit<'_>,
+    index: usize,
+    candidate: &Candidate,
+    pass: Regression,
+) -> ScoredCandidate {
+    let spread = fit.new_m2;
+    let off_m = fit.gaps.start - fit.prior.new_m;
+    let information = pass.sff + pass.start * pass.start / spread;
+    let best_m = if candidate.law == WearLaw::None {
+        0.0
+    } else {
+        ((pass.sfy + pass.start * off_m / spread) / information).max(0.0)
+    };
+    let log_likelihood = best_m * pass.sfy - 0.5 * best_m * best_m * pass.sff;
+    let new_m2 = spread + (best_m * candidate.age_spread).powi(2);
+    let bound =
+        log_likelihood - 0.5 * (off_m - best_m * pass.start).powi(2) / new_m2 + fit.logs.share(candidate.law);
+    ScoredCandidate { index, pass, best_m, information, bound }
+}
+
+/// Nodes of one curve over the lives its amplitude may have, of more than the least log weight.
+fn try_lives(
+    fit: &SegmentFit<'_>,
+    candidate: &Candidate,
+    scored_candidate: &ScoredCandidate,
+    (tried, least): (LifeGrid, f64),
+    push: &mut dyn FnMut(Component),
+) {
+    let ScoredCandidate { pass, best_m, information, .. } = scored_candidate;
+    let prior = fit.prior;
+    let reach_m = tried.reach / information.sqrt();
+    let Some((low, high)) = life_range(prior, candidate.law, best_m - reach_m, best_m + reach_m) else {
+        return;
+    };
+    let step = (high - low) / (tried.count - 1) as f64;
+    let spread = fit.new_m2;
+    let age_now = candidate.age + fit.segment.now - fit.segment.begin;
+    let mut height_now = None;
+    let shared = step.ln() + fit.logs.share(candidate.law) + fit.logs.cell(candidate, fit.segment);
+    let own = fit.logs.time_constant_prior(candidate);
+    let age_assumption = match candidate.law {
+        _ if fit.segment.is_of_known_age() => AgeAssumption::NotNeeded,
+        WearLaw::Onset { .. } => AgeAssumption::NotNeeded,
+        _ if candidate.age > 0.0 => AgeAssumption::Worn,
+        _ => AgeAssumption::Fresh,
+    };
+    let ln_age = (candidate.age > 0.0 && !fit.segment.is_of_known_age()).then_some(candidate.ln_age);
+    let mut amplitudes = AmplitudeGrid::new(candidate.law, prior.span_m, low, step);
+    for i in 0..tried.count {
+        let (ln_life, amplitude_m) = (low + step * i as f64, amplitudes.next());
+        let new_m = fit.gaps.start - amplitude_m * pass.start;
+        let smeared = (amplitude_m * candidate.age_spread).powi(2) / spread;
+        let log_likelihood = amplitude_m * pass.sfy
+            - 0.5 * amplitude_m * amplitude_m * pass.sff
+            - 0.5 * ((new_m - prior.new_m).powi(2) / (spread * (1.0 + smeared)) + fit.ln_new_m2);
+        let bound = log_likelihood + shared + fit.logs.life(ln_life, ln_age, own);
+        // A logarithm costs more than all the rest, and most nodes do not need it.
+        let weight = if smeared > 0.0 && bound > least { bound - 0.5 * (1.0 + smeared).ln() } else { bound };
+        if weight <= least {
+            continue;
+        }
+        let height_now = *height_now.get_or_insert_with(|| candidate.law.value(age_now));
+        push(Component {
+            law: candidate.law,
+            age_begin: candidate.age,
+            age_now,
+            amplitude_m,
+            ln_life,
+            level_m: fit.gaps.end + amplitude_m * (height_now - pass.end),
+            new_m,
+            seasonal_m: fit.seasonal_m(amplitude_m * pass.sfs),
+            age_assumption,
+            onset_pending: false,
+            weight,
+        });
+    }
+}
+
+/// A law's amplitudes at lives that grow by one factor.
+enum AmplitudeGrid {
+    /// They fall by one factor, too.
+    Falling { next_m: f64, factor: f64 },
+    /// The law is asked for its growth in the next life, hours, which is so much longer than the one before.
+    Evaluated { law: WearLaw, span_m: f64, life: f64, longer: f64 },
+}
+
+impl AmplitudeGrid {
+    fn new(law: WearLaw, span_m: f64, ln_life: f64, step: f64) -> Self {
+        match law.exponent() {
+            Some(p) => {
+                Self::Falling { next_m: span_m / power_of_ln_life(p, ln_life), factor: (-p * step).exp() }
+            }
+            None => Self::Evaluated { law, span_m, life: ln_life.exp(), longer: step.exp() },
+        }
+    }
+
+    fn next(&mut self) -> f64 {
+        match self {
+            Self::Falling { next_m, factor } => {
+                let falls_m = *next_m * *factor;
+                std::mem::replace(next_m, falls_m)
+            }
+            Self::Evaluated { law, span_m, life, longer } => {
+                let amplitude_m = *span_m / law.value(*life);
+                *life *= *longer;
+                amplitude_m
+            }
+        }
+    }
+}
+
+/// The unit that does not wear, and the one whose onset is yet to come.
+fn flat(fit: &SegmentFit<'_>, push: &mut dyn FnMut(Component)) {
+    let SegmentFit { prior, logs, segment, gaps, .. } = fit;
+    let spread = fit.new_m2;
+    let log_likelihood = -0.5 * ((gaps.start - prior.new_m).powi(2) / spread + fit.ln_new_m2);
+    let usage = segment.now - segment.begin;
+    let component = Component {
+        law: WearLaw::None,
+        age_begin: 0.0,
+        age_now: usage,
+        amplitude_m: 0.0,
+        ln_life: prior.ln_life,
+        level_m: gaps.end,
+        new_m: gaps.start,
+        seasonal_m: fit.seasonal_m(0.0),
+        age_assumption: AgeAssumption::NotNeeded,
+        onset_pending: false,
+        weight: log_likelihood + logs.share(WearLaw::None),
+    };
+    push(component);
+    push(Component { onset_pending: true, weight: log_likelihood + logs.waiting(usage), ..component });
+}
+
+/// Range of ln life worth trying: where the amplitude may be, within what a life may be.
+fn life_range(prior: &FleetPrior, law: WearLaw, low_m: f64, high_m: f64) -> Option<(f64, f64)> {
+    let reach = LIFE_REACH * prior.ln_life_sd;
+    let (shortest, longest) = (prior.ln_life - reach, prior.ln_life + reach);
+    let ln_life = |amplitude_m: f64| law.ln_life(prior.span_m / amplitude_m);
+    let low = ln_life(high_m).max(shortest);
+    let high = if low_m > 0.0 { ln_life(low_m).min(longest) } else { longest };
+    (low < high).then_some((low, high))
+}

@@ -1,0 +1,385 @@
+//! A fleet teaches a prior: what its units follow, how long they live, by which laws (empirical Bayes).
+
+use std::sync::Arc;
+
+use crate::data::segment::Segment;
+use crate::data::series::{Flight, MaintenanceEvent, Series};
+use crate::data::steps::installation_steps;
+use crate::executor::{Executor, SerialExecutor};
+use crate::inference::posterior::{AgeAssumption, Component, Posterior, posterior};
+use crate::inference::season::{SeasonalFit, learn_season, seasonal_fit};
+use crate::learning::calibrate::learn_calibration;
+use crate::prior::fleet_prior::{FleetPrior, UsageAxis};
+use crate::statement::history::{self, History};
+use crate::wear::bank::{FAMILIES, WearLaw};
+
+/// Units looked at, at most: more teach nothing new and cost as much as their own statements.
+const MOST_UNITS: usize = 150;
+
+/// Units a prior of nothing is worth: few, so that thirty units outvote it.
+const PSEUDO_UNITS: f64 = 15.0;
+
+/// The same for the spread of lives, for a new unit's gap, and for changes of installation.
+const PSEUDO_LIVES: f64 = 2.0;
+const PSEUDO_CHANGES: f64 = 4.0;
+
+/// Rounds of expectation and maximisation.
+const ROUNDS: usize = 8;
+
+/// Noises of wear tried beside the assumed one, as factors of it.
+const LESS_WEAR_NOISE: f64 = 0.7;
+const MORE_WEAR_NOISE: [f64; 2] = [1.5, 2.2];
+
+impl FleetPrior {
+    /// Learns how units wear from what was known of them on a day: which usage wear follows, the shares
+    /// of the laws, the spread of lives, a new unit's gap, the season, and what an installation adds.
+    ///
+    /// The units should be of one design: a part number, or several that differ in life by a factor of
+    /// two at most, which then share what they teach. Of a large fleet 150 units are looked at. The
+    /// order of the units changes no bit, and nothing later than the day is looked at; a prior of an
+    /// earlier day may stand in for a later one's.
+    ///
+    /// Wear follows `axis` where it is given and the fleet has counted it, else the likeliest one.
+    pub fn learn<'a>(
+        fleet: impl IntoIterator<Item = &'a Series>,
+        as_of_us: i64,
+        limit_m: f64,
+        axis: Option<UsageAxis>,
+    ) -> Self {
+        Self::learn_with(fleet, as_of_us, limit_m, axis, &SerialExecutor)
+    }
+
+    /// As [`FleetPrior::learn`], with the work on each unit done by whoever has threads: the same bits.
+    pub fn learn_with<'a>(
+        fleet: impl IntoIterator<Item = &'a Series>,
+        as_of_us: i64,
+        limit_m: f64,
+        axis: Option<UsageAxis>,
+        executor: &impl Executor,
+    ) -> Self {
+        let training_set = TrainingSet::of(fleet, as_of_us, limit_m, executor);
+        let assumed = assumed(&training_set, limit_m, executor);
+        let on_axis = |axis| AxisPrior::on_axis(&training_set, axis, &assumed, executor);
+        let axis_prior = axis
+            .and_then(on_axis)
+            .or_else(|| argmax_evidence(UsageAxis::ALL.into_iter().filter_map(on_axis)));
+        let Some(axis_prior) = axis_prior else { return Self::uninformative(limit_m) };
+        axis_prior.with_likeliest_wear_noise(executor).em_iterate(executor).with_calibration(executor)
+    }
+
+    /// The median life of units, from new to the act limit, flight hours, as their prior would have it at the
+    /// first look: enough to tell designs apart, at a fifth of what [`FleetPrior::learn_with`] costs.
+    pub fn rough_median_life_hours<'a>(
+        fleet: impl IntoIterator<Item = &'a Series>,
+        as_of_us: i64,
+        limit_m: f64,
+        executor: &impl Executor,
+    ) -> f64 {
+        let training_set = TrainingSet::of(fleet, as_of_us, limit_m, executor);
+        let assumed = assumed(&training_set, limit_m, executor);
+        let axis_prior = AxisPrior::on_axis(&training_set, UsageAxis::Hours, &assumed, executor);
+        axis_prior.map_or(assumed, |axis_prior| axis_prior.learned).median_life_hours()
+    }
+}
+
+/// The units that are looked at, and what the flights of each show apart from wear, along hours.
+struct TrainingSet<'a> {
+    units: Vec<TrainingUnit<'a>>,
+    histories: Arc<[History]>,
+}
+
+impl<'a> TrainingSet<'a> {
+    fn of(
+        fleet: impl IntoIterator<Item = &'a Series>,
+        as_of_us: i64,
+        limit_m: f64,
+        executor: &impl Executor,
+    ) -> Self {
+        let uninformative = FleetPrior::uninformative(limit_m);
+        let units = sample(fleet.into_iter().map(|series| TrainingUnit::on(series, as_of_us)));
+        // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
+        // their first hour on teach a fleet that never wears.
+        let training_set =
+            |u: &TrainingUnit<'_>| history::read_history(u.flights, u.maintenance, None, &uninformative);
+        let histories = executor.map(&units, training_set).into();
+        Self { units, histories }
+    }
+
+    /// What the flights show along the axis of a prior.
+    fn on_axis(&self, prior: &FleetPrior, executor: &impl Executor) -> Arc<[History]> {
+        if prior.axis == UsageAxis::Hours {
+            return Arc::clone(&self.histories);
+        }
+        let both: Vec<(&TrainingUnit<'_>, &History)> = self.units.iter().zip(&*self.histories).collect();
+        executor.map(&both, |(unit, history)| history.on_axis(unit.flights, prior)).into()
+    }
+}
+
+/// What is assumed of a fleet before its laws are asked: what an installation adds, and the season, which
+/// are of the measurement whatever wear follows.
+fn assumed(training_set: &TrainingSet<'_>, limit_m: f64, executor: &impl Executor) -> FleetPrior {
+    let mut assumed = FleetPrior::uninformative(limit_m);
+    assumed.bias_sd_m = bias(&training_set.histories, assumed.bias_sd_m);
+    let of_segment = |s: &Segment<'_>| seasonal_fit(s, &assumed, &posterior(s, &assumed)?);
+    let seasonal_fits = executor.map(&segments(&training_set.histories), of_segment);
+    let seasonal_fits: Vec<SeasonalFit> = seasonal_fits.into_iter().flatten().collect();
+    assumed.season = learn_season(&seasonal_fits);
+    assumed
+}
+
+/// The same along an axis, by the hours that its unit is worth.
+fn on_axis(training_set: &TrainingSet<'_>, axis: UsageAxis, assumed: &FleetPrior) -> Option<FleetPrior> {
+    let total = |of: &dyn Fn(&Flight) -> f64| -> f64 {
+        training_set.units.iter().filter_map(|unit| unit.flights.last()).map(of).sum()
+    };
+    let hours_per_unit = total(&|f| f.hours) / total(&|f| axis.of(f));
+    hours_per_unit.is_finite().then(|| FleetPrior { axis, hours_per_unit, ..assumed.clone() })
+}
+
+/// The lesson with the largest evidence, the first of equals.
+fn argmax_evidence(priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior> {
+    priors.reduce(|best, next| if next.evidence > best.evidence { next } else { best })
+}
+
+/// The last lesson of those that have ever more evidence, and more than something has.
+fn ascend_evidence(mut evidence: f64, priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior> {
+    let rises =
+        |axis_prior: &AxisPrior| std::mem::replace(&mut evidence, axis_prior.evidence) < axis_prior.evidence;
+    priors.take_while(rises).last()
+}
+
+/// What was known of a unit on a day.
+#[derive(Clone, Copy)]
+struct TrainingUnit<'a> {
+    flights: &'a [Flight],
+    maintenance: &'a [MaintenanceEvent],
+}
+
+impl<'a> TrainingUnit<'a> {
+    fn on(series: &'a Series, as_of_us: i64) -> Self {
+        Self { flights: series.flights_until(as_of_us), maintenance: series.maintenance_until(as_of_us) }
+    }
+}
+
+/// Units with flights in an order of their own; of many, as many as are looked at, evenly.
+fn sample<'a>(fleet: impl Iterator<Item = TrainingUnit<'a>>) -> Vec<TrainingUnit<'a>> {
+    let mut fleet: Vec<TrainingUnit<'_>> = fleet.filter(|unit| !unit.flights.is_empty()).collect();
+    fleet.sort_by_cached_key(|unit| identity(unit.flights));
+    let count = fleet.len().min(MOST_UNITS);
+    (0..count).map(|i| fleet[i * fleet.len() / count]).collect()
+}
+
+/// What tells two units apart, whatever the order they came in.
+fn identity(flights: &[Flight]) -> (i64, usize, [u64; 3]) {
+    let last = &flights[flights.len() - 1];
+    let gaps: f64 = flights.iter().filter_map(|f| f.gap).map(|g| g.gap_m).sum();
+    (flights[0].departure_us, flights.len(), [last.hours, last.reversals, gaps].map(f64::to_bits))
+}
+
+/// What a fleet teaches along one axis.
+#[derive(Clone)]
+struct AxisPrior {
+    histories: Arc<[History]>,
+    /// Before the fleet was asked, and after.
+    assumed: FleetPrior,
+    learned: FleetPrior,
+    /// Log evidence of the fleet under what was learned.
+    evidence: f64,
+}
+
+impl AxisPrior {
+    /// Nothing along an axis on which nobody moved.
+    fn on_axis(
+        training_set: &TrainingSet<'_>,
+        axis: UsageAxis,
+        assumed: &FleetPrior,
+        executor: &impl Executor,
+    ) -> Option<Self> {
+        let assumed = on_axis(training_set, axis, assumed)?;
+        let histories = training_set.on_axis(&assumed, executor);
+        let learned = assumed.clone();
+        Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.em_iterate(executor))
+    }
+
+    /// The same with another noise of wear.
+    fn with_wear_noise(&self, factor: f64) -> Self {
+        let mut axis_prior = self.clone();
+        axis_prior.assumed.wear_noise_m *= factor;
+        axis_prior.learned.wear_noise_m *= factor;
+        axis_prior
+    }
+
+    /// The same with the noise of wear that has most evidence, which first rises with it and then falls.
+    fn with_likeliest_wear_noise(&self, executor: &impl Executor) -> Self {
+        let of = |factor: &f64| self.with_wear_noise(*factor).em_iterate(executor);
+        let assumed = of(&1.0);
+        let up = MORE_WEAR_NOISE.iter().map(of);
+        let less = || Some(of(&LESS_WEAR_NOISE)).filter(|less| less.evidence > assumed.evidence);
+        match ascend_evidence(assumed.evidence, up) {
+            Some(more) => more,
+            None => less().unwrap_or(assumed),
+        }
+    }
+
+    /// What was learned, with what its own forecasts of the fleet's past were worth.
+    fn with_calibration(self, executor: &impl Executor) -> FleetPrior {
+        let calibration = learn_calibration(&segments(&self.histories), &self.learned, executor);
+        FleetPrior { calibration, ..self.learned }
+    }
+
+    /// Judges every segment by what was learned and learns again, by expectation–maximisation.
+    ///
+    /// Within a revision the weights of the laws and lives move; that a new unit's gap is known better
+    /// than was assumed only tells in the next.
+    fn em_iterate(self, executor: &impl Executor) -> Self {
+        let fitted = |segment: &Segment<'_>| Some(posterior(segment, &self.learned)?.drop_negligible());
+        let units: Vec<Posterior> =
+            executor.map(&segments(&self.histories), fitted).into_iter().flatten().collect();
+        let round = |current: FleetPrior, _| step(&self.assumed, &self.learned, &current, &units);
+        let learned = (0..ROUNDS).fold(self.learned.clone(), round);
+        let ratio = ImportanceRatio::new(&self.learned, &learned);
+        let change = |unit: &Posterior| ratio.weights(&unit.components).iter().sum::<f64>().ln();
+        let evidence = units.iter().map(|unit| unit.log_evidence + change(unit)).sum();
+        Self { learned, evidence, ..self }
+    }
+}
+
+/// The segments of all units.
+fn segments(histories: &[History]) -> Vec<Segment<'_>> {
+    histories.iter().flat_map(History::segments).collect()
+}
+
+/// Spread of what an installation adds: half the mean square of the steps between installations.
+fn bias(histories: &[History], assumed_m: f64) -> f64 {
+    let assumed = (PSEUDO_CHANGES * 2.0 * assumed_m * assumed_m, PSEUDO_CHANGES);
+    let (squares, count) = histories
+        .iter()
+        .map(|history| installation_steps(&history.estimates))
+        .fold(assumed, |sum, found| (sum.0 + found.0, sum.1 + found.1));
+    (0.5 * squares / count).max(0.0).sqrt()
+}
+
+/// One round: weights by `current` for units judged by `base`, moments by weights, and `assumed` as the
+/// pseudo-units that keep a small fleet sane.
+fn step(assumed: &FleetPrior, base: &FleetPrior, current: &FleetPrior, units: &[Posterior]) -> FleetPrior {
+    let ratio = ImportanceRatio::new(base, current);
+    let mut shares = assumed.shares.map(|share| share * PSEUDO_UNITS);
+    let mut life = WeightedMoments::assumed(assumed.ln_life, assumed.ln_life_sd);
+    let mut new = WeightedMoments::assumed(assumed.new_m, assumed.new_sd_m);
+    let (mut fresh, mut worn) =
+        (PSEUDO_LIVES * assumed.fresh_share, PSEUDO_LIVES * (1.0 - assumed.fresh_share));
+    let (mut onsets, mut waited_hours) = (1.0, assumed.onsets_per_hour.recip());
+    for unit in units {
+        let weights = ratio.weights(&unit.components);
+        let total: f64 = weights.iter().sum();
+        for (component, weight) in unit.components.iter().zip(weights.into_iter().map(|w| w / total)) {
+            shares[family(component)] += weight;
+            if component.law != WearLaw::None {
+                life.add(component.ln_life, weight);
+            }
+            if component.age_begin == 0.0 {
+                new.add(component.new_m, weight);
+            }
+            match component.age_assumption {
+                AgeAssumption::Fresh => fresh += weight,
+                AgeAssumption::Worn => worn += weight,
+                AgeAssumption::NotNeeded => {}
+            }
+            if let WearLaw::Onset { start } = component.law {
+                onsets += weight;
+                waited_hours += weight * start;
+            } else if component.onset_pending {
+                waited_hours += weight * component.age_now;
+            }
+        }
+    }
+    let total: f64 = shares.iter().sum();
+    FleetPrior {
+        shares: shares.map(|share| share / total),
+        ln_life: life.mean,
+        ln_life_sd: life.spread(),
+        new_m: new.mean,
+        new_sd_m: new.spread(),
+        onsets_per_hour: onsets / waited_hours,
+        fresh_share: fresh / (fresh + worn),
+        ..assumed.clone()
+    }
+}
+
+/// The family whose share a node counts for: one that waits will have an onset.
+fn family(component: &Component) -> usize {
+    if component.onset_pending {
+        WearLaw::Onset { start: component.age_now }.family()
+    } else {
+        component.law.family()
+    }
+}
+
+/// How one prior's weights follow from another's.
+struct ImportanceRatio<'a> {
+    base: &'a FleetPrior,
+    current: &'a FleetPrior,
+    shares: [f64; FAMILIES],
+    life: f64,
+    onset: f64,
+}
+
+impl<'a> ImportanceRatio<'a> {
+    fn new(base: &'a FleetPrior, current: &'a FleetPrior) -> Self {
+        let mut shares = current.shares;
+        for (share, base) in shares.iter_mut().zip(&base.shares) {
+            *share = (*share / base).ln();
+        }
+        let life = (base.ln_life_sd / current.ln_life_sd).ln();
+        let onset = (current.onsets_per_hour / base.onsets_per_hour).ln();
+        Self { base, current, shares, life, onset }
+    }
+
+    /// Weights under the current prior of nodes weighted under the base; they need not add up to one.
+    fn weights(&self, components: &[Component]) -> Vec<f64> {
+        components.iter().map(|component| component.weight * self.log(component).exp()).collect()
+    }
+
+    fn log(&self, component: &Component) -> f64 {
+        let mut log = self.shares[family(component)];
+        if component.law != WearLaw::None {
+            let square = |p: &FleetPrior| ((component.ln_life - p.ln_life) / p.ln_life_sd).powi(2);
+            log += self.life - 0.5 * (square(self.current) - square(self.base));
+        }
+        log += match component.age_assumption {
+            AgeAssumption::Fresh => (self.current.fresh_share / self.base.fresh_share).ln(),
+            AgeAssumption::Worn => ((1.0 - self.current.fresh_share) / (1.0 - self.base.fresh_share)).ln(),
+            AgeAssumption::NotNeeded => 0.0,
+        };
+        let sooner = self.current.onsets_per_hour - self.base.onsets_per_hour;
+        match component.law {
+            WearLaw::Onset { start } => log + self.onset - sooner * start,
+            _ if component.onset_pending => log - sooner * component.age_now,
+            _ => log,
+        }
+    }
+}
+
+/// Weighted mean and spread.
+struct WeightedMoments {
+    count: f64,
+    mean: f64,
+    squares: f64,
+}
+
+impl WeightedMoments {
+    fn assumed(mean: f64, sd: f64) -> Self {
+        Self { count: PSEUDO_LIVES, mean, squares: PSEUDO_LIVES * sd * sd }
+    }
+
+    fn add(&mut self, value: f64, weight: f64) {
+        self.count += weight;
+        let off = value - self.mean;
+        self.mean += off * weight / self.count;
+        self.squares += weight * off * (value - self.mean);
+    }
+
+    fn spread(&self) -> f64 {
+        (self.squares / self.count).sqrt()
+    }
+}

@@ -1,0 +1,15 @@
+//! Quadrature rules.
+
+/// Three-point and five-point Gauss–Hermite rules for a standard normal variable.
+pub(crate) const GAUSS_HERMITE_3: [(f64, f64); 3] =
+    [(-1.732_050_807_568_877_2, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0)];
+pub(crate) const GAUSS_HERMITE_5: [(f64, f64); 5] = [
+    (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
+    (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (0.0, 0.533_333_333_333_333_3),
+    (1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (2.856_970_013_872_806, 0.011_257_411_327_720_69),
+];
+
+/// Quantiles of an exponential wait, one for each tenth.
+pub(crate) const WAIT_QUANTILES: usize = 10;

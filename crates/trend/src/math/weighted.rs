@@ -1,0 +1,26 @@
+//! Quantiles of weighted samples.
+
+/// Values with weights, in order.
+pub(crate) struct WeightedSamples {
+    values: Vec<(f64, f64)>,
+    pub(crate) total: f64,
+}
+
+impl WeightedSamples {
+    pub(crate) fn new(values: impl Iterator<Item = (f64, f64)>) -> Self {
+        let mut values: Vec<(f64, f64)> = values.collect();
+        values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let total = values.iter().map(|v| v.1).sum();
+        Self { values, total }
+    }
+
+    /// The first value at which this share of the weight is reached; zero of nothing.
+    pub(crate) fn quantile(&self, share: f64) -> f64 {
+        let mut sum = 0.0;
+        let reached = self.values.iter().find(|(_, weight)| {
+            sum += weight;
+            sum >= share * self.total
+        });
+        reached.or(self.values.last()).map_or(0.0, |(value, _)| *value)
+    }
+}

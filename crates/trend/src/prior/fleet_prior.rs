@@ -1,0 +1,297 @@
+//! What the units of one part number teach about the next (empirical Bayes).
+
+use std::fmt;
+
+use crate::prior::calibration_params::{CalibrationParams, USUAL_WIDTH};
+
+use crate::data::segment::Segment;
+use crate::data::series::Flight;
+use crate::math::fnv::fnv1a;
+use crate::math::quadrature::WAIT_QUANTILES;
+use crate::prior::season_params::SeasonParams;
+use crate::wear::bank::{BENDS, Candidate, FAMILIES, LIFE_CURVES, LINEAR, POWERS, WearLaw};
+
+/// A unit first seen in service has seldom used more than this share of its life: an age beyond it is
+/// less likely by this power of how far. Forbidden outright, an overdue unit would have no curve at all.
+const WORN_SHARE: f64 = 0.9;
+const OVERDUE: f64 = 20.0;
+
+/// The gap of a new unit as a share of the limit, while nothing is known.
+const NEW_SHARE: f64 = 0.2;
+
+/// A life over the time by which its law runs: its logarithm is normal with this mean and spread. Of the
+/// exponential law, whose time constant it is, and of a course, whose nominal life.
+const LN_CONSTANTS: (f64, f64) = (1.1, 0.5);
+const LN_COURSES: (f64, f64) = (0.0, 0.2);
+
+/// Share of the fleet below which a family of laws is not tried: a unit that needs it is judged without the
+/// fleet.
+const RULED_OUT: f64 = 0.003;
+
+/// What wear of a part number follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum UsageAxis {
+    /// Hours flown.
+    Hours,
+    /// Flights.
+    Flights,
+    /// Load reversals.
+    Reversals,
+}
+
+impl UsageAxis {
+    /// Every one of them.
+    pub(crate) const ALL: [Self; 3] = [Self::Hours, Self::Flights, Self::Reversals];
+
+    /// The usage of a unit up to a flight, in the axis' own unit.
+    pub(crate) fn of(self, flight: &Flight) -> f64 {
+        match self {
+            Self::Hours => flight.hours,
+            Self::Flights => flight.flights,
+            Self::Reversals => flight.reversals,
+        }
+    }
+}
+
+impl fmt::Display for UsageAxis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Hours => "flight_hours",
+            Self::Flights => "flights",
+            Self::Reversals => "load_reversals",
+        })
+    }
+}
+
+/// How units of one part number wear.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FleetPrior {
+    /// What wear follows, and the hours that one unit of it is worth in the fleet's mean.
+    pub(crate) axis: UsageAxis,
+    pub(crate) hours_per_unit: f64,
+    /// Growth that is a life: from new to the act limit, metres.
+    pub(crate) span_m: f64,
+    /// Gap of a new unit, mean and spread, metres.
+    pub(crate) new_m: f64,
+    pub(crate) new_sd_m: f64,
+    /// ln of the life in hours, mean and spread.
+    pub(crate) ln_life: f64,
+    pub(crate) ln_life_sd: f64,
+    /// Share of each family of laws.
+    pub(crate) shares: [f64; FAMILIES],
+    /// The yearly swing of what is measured.
+    pub(crate) season: SeasonParams,
+    /// Share of units first seen in service that were new then.
+    pub(crate) fresh_share: f64,
+    /// Rate at which units that will begin to wear begin, per hour.
+    pub(crate) onsets_per_hour: f64,
+    /// Variance of the wear per metre of wear, metres.
+    pub(crate) wear_noise_m: f64,
+    /// Variance of the level per hour that no law explains, m²/h.
+    pub(crate) drift_m2_per_hour: f64,
+    /// Spread of what an installation adds to every gap measured in it, metres.
+    pub(crate) bias_sd_m: f64,
+    /// How far the fleet's forecasts have missed so far.
+    pub(crate) calibration: CalibrationParams,
+}
+
+impl FleetPrior {
+    /// What is assumed of a part number nobody has seen: a new gap of a fifth of the limit, lives around
+    /// 4,000 h within a factor of ten, any law.
+    pub fn uninformative(limit_m: f64) -> Self {
+        let mut shares = [0.28 / POWERS as f64; FAMILIES];
+        shares[LINEAR] += 0.09;
+        shares[..BENDS.start].copy_from_slice(&[0.17, 0.16, 0.11, 0.05]);
+        shares[BENDS].fill(0.07 / BENDS.len() as f64);
+        shares[LIFE_CURVES].fill(0.07 / LIFE_CURVES.len() as f64);
+        Self {
+            axis: UsageAxis::Hours,
+            hours_per_unit: 1.0,
+            span_m: (1.0 - NEW_SHARE) * limit_m,
+            new_m: NEW_SHARE * limit_m,
+            new_sd_m: 0.05 * limit_m,
+            ln_life: 4000.0_f64.ln(),
+            ln_life_sd: 0.8,
+            shares,
+            season: SeasonParams::unknown(),
+            fresh_share: 0.3,
+            onsets_per_hour: 1.0 / 2000.0,
+            wear_noise_m: 0.2e-6,
+            drift_m2_per_hour: 1e-16,
+            bias_sd_m: 1.5e-6,
+            calibration: CalibrationParams::USUAL,
+        }
+    }
+
+    /// What is assumed of a unit that the fleet says nothing of: the fleet's axis, and else as little as
+    /// of a part number nobody has seen.
+    pub(crate) fn single_unit(&self) -> Self {
+        let Self { axis, hours_per_unit, .. } = *self;
+        Self { axis, hours_per_unit, ..Self::uninformative(self.span_m / (1.0 - NEW_SHARE)) }
+    }
+
+    /// What wear follows.
+    pub fn axis(&self) -> UsageAxis {
+        self.axis
+    }
+
+    /// The median life from new to the act limit, flight hours at the fleet's mean usage.
+    pub fn median_life_hours(&self) -> f64 {
+        self.ln_life.exp()
+    }
+
+    /// 5 % and 95 % of the lives it expects, flight hours at the fleet's mean usage.
+    pub fn life_range_hours(&self) -> (f64, f64) {
+        let reach = 1.645 * self.ln_life_sd;
+        ((self.ln_life - reach).exp(), (self.ln_life + reach).exp())
+    }
+
+    /// Mean and standard deviation of a new unit's gap, m.
+    pub fn new_gap_m(&self) -> (f64, f64) {
+        (self.new_m, self.new_sd_m)
+    }
+
+    /// How much wider forecasts are stated than is usual, by what the fleet's own past forecasts missed; one
+    /// for a fleet whose past asks for nothing.
+    pub fn interval_scale(&self) -> f64 {
+        0.5 * (self.calibration.high - self.calibration.low) / USUAL_WIDTH
+    }
+
+    /// What tells it from another prior.
+    pub(crate) fn digest(&self) -> u64 {
+        let Self {
+            axis,
+            hours_per_unit,
+            span_m,
+            new_m,
+            new_sd_m,
+            ln_life,
+            ln_life_sd,
+            shares,
+            season,
+            fresh_share,
+            onsets_per_hour,
+            wear_noise_m,
+            drift_m2_per_hour,
+            bias_sd_m,
+            calibration,
+        } = self;
+        let numbers = [hours_per_unit, span_m, new_m, new_sd_m, ln_life, ln_life_sd, fresh_share];
+        let noises = [onsets_per_hour, wear_noise_m, drift_m2_per_hour, bias_sd_m];
+        let numbers = numbers.into_iter().chain(noises).chain(shares).copied();
+        let all = numbers.chain(season.numbers()).chain(calibration.numbers());
+        fnv1a(all.map(f64::to_bits).chain([*axis as u64]))
+    }
+
+    /// The usage of a unit up to a flight, hours' worth.
+    pub(crate) fn usage(&self, flight: &Flight) -> f64 {
+        self.axis.of(flight) * self.hours_per_unit
+    }
+
+    /// Mid-quantiles of the exponential waiting time until an onset, hours' worth of usage.
+    pub(crate) fn onset_wait_quantiles(&self) -> [f64; WAIT_QUANTILES] {
+        std::array::from_fn(|i| -(1.0 - (i as f64 + 0.5) / WAIT_QUANTILES as f64).ln() / self.onsets_per_hour)
+    }
+
+    /// The prior's logarithms, taken once for many curves.
+    pub(crate) fn logs(&self) -> LogPrior<'_> {
+        LogPrior {
+            prior: self,
+            shares: self.shares.map(f64::ln),
+            life: log_of(self.ln_life_sd),
+            fresh: self.fresh_share.ln(),
+            worn: ((1.0 - self.fresh_share) / WORN_SHARE).ln(),
+            worn_share: WORN_SHARE.ln(),
+            onset: self.onsets_per_hour.ln(),
+            constant: log_of(LN_CONSTANTS.1),
+            shape: log_of(LN_COURSES.1),
+        }
+    }
+
+    /// Whether a law is to be tried on a unit of the fleet. None and an onset always are: they are what is
+    /// found, or not found yet.
+    pub(crate) fn includes_law(&self, law: WearLaw) -> bool {
+        matches!(law, WearLaw::None | WearLaw::Onset { .. }) || self.shares[law.family()] >= RULED_OUT
+    }
+}
+
+/// Log densities of a prior.
+pub(crate) struct LogPrior<'a> {
+    prior: &'a FleetPrior,
+    shares: [f64; FAMILIES],
+    life: f64,
+    fresh: f64,
+    worn: f64,
+    worn_share: f64,
+    onset: f64,
+    /// Of a law's own time at its likeliest.
+    constant: f64,
+    shape: f64,
+}
+
+/// What a law's own time says of a life: the density of ln life.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TimeConstantPrior {
+    ln_life: f64,
+    sd: f64,
+    log: f64,
+}
+
+impl LogPrior<'_> {
+    /// Of a law's family.
+    pub(crate) fn share(&self, law: WearLaw) -> f64 {
+        self.shares[law.family()]
+    }
+
+    /// Of the time by which a curve's law runs; nothing of a law that runs by none.
+    pub(crate) fn time_constant_prior(&self, candidate: &Candidate) -> Option<TimeConstantPrior> {
+        let ((ln_ratio, sd), log) = match candidate.law {
+            WearLaw::LifeCurve { .. } => (LN_COURSES, self.shape),
+            _ => (LN_CONSTANTS, self.constant),
+        };
+        Some(TimeConstantPrior { ln_life: candidate.ln_time_constant_hours? + ln_ratio, sd, log })
+    }
+
+    /// Of an onset that has not come in some hours.
+    pub(crate) fn waiting(&self, hours: f64) -> f64 {
+        self.share(WearLaw::Onset { start: hours }) - self.prior.onsets_per_hour * hours
+    }
+
+    /// Of a curve's cell in the onset's start or the time constant, and of its age at first sight as far
+    /// as that does not depend on its life.
+    pub(crate) fn cell(&self, candidate: &Candidate, segment: &Segment<'_>) -> f64 {
+        let law = match candidate.law {
+            WearLaw::Onset { start } => self.onset - self.prior.onsets_per_hour * start,
+            _ => 0.0,
+        };
+        let age = match candidate.law {
+            _ if segment.is_of_known_age() => 0.0,
+            WearLaw::Onset { .. } => 0.0,
+            _ if candidate.age == 0.0 => self.fresh,
+            _ => self.worn + candidate.ln_age_cell,
+        };
+        law + age + candidate.ln_law_cell
+    }
+
+    /// Of a life, per unit of ln life, and of a curve's age and own time given it.
+    pub(crate) fn life(&self, ln_life: f64, ln_age: Option<f64>, own: Option<TimeConstantPrior>) -> f64 {
+        let z = (ln_life - self.prior.ln_life) / self.prior.ln_life_sd;
+        let mut log = self.life - 0.5 * z * z;
+        if let Some(own) = own {
+            let z = (ln_life - own.ln_life) / own.sd;
+            log += own.log - 0.5 * z * z;
+        }
+        match ln_age {
+            Some(ln_age) => log - ln_life - OVERDUE * (ln_age - self.worn_share - ln_life).max(0.0),
+            None => log,
+        }
+    }
+}
+
+/// Log density of a normal distribution at its middle.
+fn log_of(sd: f64) -> f64 {
+    -sd.ln() - LN_ROOT_TAU
+}
+
+/// ln √(2π).
+const LN_ROOT_TAU: f64 = 0.918_938_533_204_672_7;

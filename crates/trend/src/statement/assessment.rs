@@ -1,0 +1,43 @@
+//! The assessment of one unit at a date.
+
+use crate::statement::state::{Reason, State};
+use crate::statement::types::{ChangePoint, Crossing, Level, Rate, Utilization, WearClass, WearStatus};
+
+/// What is known of one unit on one day.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assessment {
+    /// The day of the statement, microseconds since 1970 UTC; nothing later was looked at.
+    pub as_of_us: i64,
+    /// Flights with a row, refused ones included.
+    pub flights: usize,
+    /// Flights with a gap.
+    pub estimates: usize,
+    /// The unit's own hours, where its hours at the start are known.
+    pub unit_hours: Option<f64>,
+    /// The gap now.
+    pub level: Option<Level>,
+    /// Its growth now.
+    pub rate: Option<Rate>,
+    /// Does it wear?
+    pub wear: WearStatus,
+    /// Probability that the gap has grown by 2 µm or more since it was new here, or reset.
+    pub growth_probability: Option<f64>,
+    /// The law most believed in, and how much.
+    pub law: Option<(WearClass, f64)>,
+    /// Steps, resets and onsets, by departure.
+    pub changes: Vec<ChangePoint>,
+    /// When the act limit is met.
+    pub crossing: Option<Crossing>,
+    /// Probability that it is met before the next check ([`Settings::check_interval_hours`]).
+    pub check_probability: Option<f64>,
+    /// How the unit is used now, to turn hours into flights and days.
+    pub utilization: Option<Utilization>,
+    /// Flights whose gap was left out as an outlier, by departure.
+    pub outliers_us: Vec<i64>,
+    /// Variance found between flights over the variance stated.
+    pub noise_factor: f64,
+    /// What to do; nothing when no recent estimate supports a state.
+    pub state: Option<State>,
+    /// Why this state, or why none.
+    pub reason: Reason,
+}

@@ -1,0 +1,131 @@
+//! When the limit is met: every node's crossing, added up.
+
+use crate::inference::posterior::{Component, Posterior};
+use crate::math::quadrature::{GAUSS_HERMITE_3, GAUSS_HERMITE_5, WAIT_QUANTILES};
+use crate::prior::calibration_params::CalibrationParams;
+use crate::prior::fleet_prior::FleetPrior;
+use crate::settings::Settings;
+use crate::statement::types::Crossing;
+use crate::wear::bank::WearLaw;
+
+/// Weight above which a node deserves the longer rule.
+const NOTABLE: f64 = 0.02;
+
+/// Cells of the distribution, even in ln hours from one hour to the horizon.
+const CELLS: usize = 240;
+
+/// The distribution of the hours left.
+#[derive(Debug, Clone)]
+pub(crate) struct RulDistribution {
+    cells: Vec<f64>,
+    over: f64,
+    horizon_hours: f64,
+    /// Cells for each ln hour.
+    scale: f64,
+    calibration: CalibrationParams,
+}
+
+impl RulDistribution {
+    /// Adds up the crossings of the act limit; usage turns to hours by `hours_per_usage`, and undone
+    /// offsets leave `offset_m2` in the level.
+    pub(crate) fn new(
+        posterior: &Posterior,
+        prior: &FleetPrior,
+        settings: &Settings,
+        hours_per_usage: f64,
+        offset_m2: f64,
+    ) -> Self {
+        let Settings { limit_m, horizon_hours, .. } = *settings;
+        let scale = CELLS as f64 / horizon_hours.ln();
+        let calibration = prior.calibration;
+        let mut remaining = Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, scale, calibration };
+        let spread_m2 = posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2);
+        let kept: f64 = posterior.significant_components().map(|n| n.weight).sum();
+        for component in posterior.significant_components() {
+            let component = &Component { weight: component.weight / kept, ..*component };
+            remaining.add_component(component, prior, limit_m, spread_m2, hours_per_usage);
+        }
+        remaining
+    }
+
+    fn add_component(
+        &mut self,
+        component: &Component,
+        prior: &FleetPrior,
+        limit_m: f64,
+        spread_m2: f64,
+        hours_per_usage: f64,
+    ) {
+        let left_m = limit_m - component.level_m;
+        let sd_m = (spread_m2 + prior.wear_noise_m * left_m.max(0.0)).sqrt();
+        let rule: &[(f64, f64)] =
+            if component.weight > NOTABLE { &GAUSS_HERMITE_5 } else { &GAUSS_HERMITE_3 };
+        let height_now = component.law.value(component.age_now);
+        for &(z, share) in rule {
+            let left_m = left_m + z * sd_m;
+            let weight = component.weight * share;
+            if left_m <= 0.0 {
+                self.over += weight;
+            } else if component.onset_pending {
+                let wear_hours = component.ln_life.exp() * left_m / prior.span_m;
+                for wait_hours in prior.onset_wait_quantiles() {
+                    self.add((wait_hours + wear_hours) * hours_per_usage, weight / WAIT_QUANTILES as f64);
+                }
+            } else if component.law != WearLaw::None {
+                let value = height_now + left_m / component.amplitude_m;
+                self.add((component.law.inverse(value) - component.age_now) * hours_per_usage, weight);
+            }
+        }
+    }
+
+    fn add(&mut self, hours: f64, weight: f64) {
+        let place = hours.max(1.0).ln() * self.scale;
+        if let Some(cell) = self.cells.get_mut(place as usize) {
+            *cell += weight;
+        }
+    }
+
+    /// Its 5 %, 50 % and 95 % quantiles, after what the fleet's past says of such forecasts.
+    ///
+    /// Growth above what was foretold is time below it: the widths on the logarithm of the time are
+    /// those that growth was found to need. A limit that is likely over, or likely beyond the horizon,
+    /// has no width to be corrected.
+    pub(crate) fn crossing(&self) -> Crossing {
+        let [p05_hours, p50_hours, p95_hours] = [0.05, 0.5, 0.95].map(|p| self.quantile(p));
+        let (Some(early), Some(middle)) = (p05_hours, p50_hours.filter(|hours| *hours > 0.0)) else {
+            return Crossing { p05_hours, p50_hours, p95_hours };
+        };
+        let late = p95_hours.unwrap_or(self.horizon_hours);
+        let at = |width: f64| {
+            let bound = if width > 0.0 { early } else { late };
+            let hours = middle * (bound.max(1.0) / middle).powf(width.abs());
+            (hours < self.horizon_hours).then_some(if hours > 1.0 { hours } else { 0.0 })
+        };
+        let CalibrationParams { low, middle: shift, high } = self.calibration;
+        Crossing { p05_hours: at(high), p50_hours: at(shift), p95_hours: p95_hours.and_then(|_| at(low)) }
+    }
+
+    /// The hours by which the limit is met with this probability; nothing when that is beyond the horizon.
+    fn quantile(&self, probability: f64) -> Option<f64> {
+        let mut sum = self.over;
+        if sum >= probability {
+            return Some(0.0);
+        }
+        for (i, cell) in self.cells.iter().enumerate() {
+            if sum + cell >= probability {
+                let place = i as f64 + (probability - sum) / cell;
+                return Some((place / self.scale).exp());
+            }
+            sum += cell;
+        }
+        None
+    }
+
+    /// Probability that the limit is met within some hours.
+    pub(crate) fn within(&self, hours: f64) -> f64 {
+        let place = hours.max(1.0).ln() * self.scale;
+        let whole = (place as usize).min(CELLS);
+        let part = self.cells.get(whole).map_or(0.0, |cell| cell * (place - whole as f64));
+        self.over + self.cells[..whole].iter().sum::<f64>() + part
+    }
+}

@@ -1,0 +1,209 @@
+//! A unit's history read: outliers out, offsets of the measurement undone, cut where it was reset.
+
+use crate::data::outliers::{CleanedSeries, NoiseScale, WeightedGap, mark_outliers};
+use crate::data::segment::Segment;
+use crate::data::series::{Flight, MaintenanceEvent};
+use crate::data::steps::{StepChange, detect_steps};
+use crate::math::distributions;
+use crate::prior::fleet_prior::FleetPrior;
+use crate::statement::types::{ChangePoint, ChangePointKind};
+
+/// A step larger than this is never a matter of rigging, metres: a fall made the unit new, a rise is damage.
+const MAX_RIGGING_STEP_M: f64 = 15e-6;
+
+/// Flights from a change of installation within which a step is the books' own.
+const RECORD_FLIGHTS: usize = 3;
+
+/// What a unit's flights show, apart from wear.
+#[derive(Debug, Clone)]
+pub(crate) struct History {
+    pub(crate) estimates: Vec<WeightedGap>,
+    pub(crate) outliers: Vec<usize>,
+    pub(crate) scatter: NoiseScale,
+    pub(crate) changes: Vec<ChangePoint>,
+    /// Variance that undone offsets leave in the level, m².
+    pub(crate) offset_m2: f64,
+    begins: Vec<SegmentStart>,
+    /// What has been taken off the last estimates, metres.
+    pub(crate) undone_m: f64,
+    /// The first estimate after the last step.
+    pub(crate) last_step: usize,
+    now: f64,
+    known_age: Option<f64>,
+}
+
+/// Where a segment begins.
+#[derive(Debug, Clone, Copy)]
+struct SegmentStart {
+    estimate: usize,
+    usage: f64,
+    /// As good as new.
+    fresh: bool,
+}
+
+/// Reads the flights along the axis that wear follows.
+pub(crate) fn read_history(
+    flights: &[Flight],
+    maintenance: &[MaintenanceEvent],
+    known_age: Option<f64>,
+    prior: &FleetPrior,
+) -> History {
+    let now = flights.last().map_or(0.0, |f| prior.usage(f));
+    let CleanedSeries { mut estimates, outliers, scatter } = mark_outliers(flights);
+    let found = detect_steps(&estimates);
+    for estimate in &mut estimates {
+        estimate.usage = prior.usage(&flights[estimate.flight]);
+    }
+    let mut history = History {
+        estimates,
+        outliers,
+        scatter,
+        changes: Vec::new(),
+        offset_m2: 0.0,
+        begins: vec![SegmentStart { estimate: 0, usage: 0.0, fresh: false }],
+        undone_m: 0.0,
+        last_step: found.last().map_or(0, |step| step.at),
+        now,
+        known_age,
+    };
+    for step in &found {
+        history.apply(step, flights, maintenance, prior);
+    }
+    history.changes.extend(unseen(flights, maintenance, &found, &history.estimates));
+    history
+}
+
+impl History {
+    /// The same with the usage of another axis.
+    pub(crate) fn on_axis(&self, flights: &[Flight], prior: &FleetPrior) -> Self {
+        let mut history = self.clone();
+        for estimate in &mut history.estimates {
+            estimate.usage = prior.usage(&flights[estimate.flight]);
+        }
+        for begin in history.begins.iter_mut().skip(1) {
+            begin.usage = history.estimates[begin.estimate - 1].usage;
+        }
+        history.now = flights.last().map_or(0.0, |f| prior.usage(f));
+        history
+    }
+
+    /// Names a step and undoes it, or begins a segment with it.
+    fn apply(
+        &mut self,
+        step: &StepChange,
+        flights: &[Flight],
+        maintenance: &[MaintenanceEvent],
+        prior: &FleetPrior,
+    ) {
+        let flight = self.estimates[step.at].flight;
+        let mut entries = maintenance.iter().filter(|entry| is_near(entry, flights, flight)).peekable();
+        let kind = if entries.peek().is_some() || near_installation_change(flights, flight) {
+            ChangePointKind::Recorded
+        } else if self.is_reset(step, prior) {
+            ChangePointKind::Reset
+        } else {
+            ChangePointKind::Step
+        };
+        let departure_us = flights[flight].departure_us;
+        let certainty = match kind {
+            ChangePointKind::Recorded => 1.0,
+            _ => distributions::cdf(step.step_m.abs() / step.se_m),
+        };
+        self.changes.push(ChangePoint {
+            departure_us,
+            kind,
+            step_m: step.step_m,
+            se_m: step.se_m,
+            certainty,
+        });
+        let renewed = entries.any(|entry| entry.renews) && step.step_m < 0.0;
+        if kind == ChangePointKind::Reset || renewed {
+            self.begin(step.at, true);
+        } else if self.undone_m + step.step_m > MAX_RIGGING_STEP_M {
+            // To undo what may be damage would hide it.
+            let hidden_m = std::mem::take(&mut self.undone_m);
+            self.shift(step.at, hidden_m);
+            self.begin(step.at, false);
+        } else {
+            self.undone_m += step.step_m;
+            self.shift(step.at, -step.step_m);
+            self.offset_m2 += step.se_m * step.se_m;
+        }
+    }
+
+    /// Begins a segment, which knows nothing of what was undone before.
+    fn begin(&mut self, estimate: usize, fresh: bool) {
+        self.begins.push(SegmentStart { estimate, usage: self.estimates[estimate - 1].usage, fresh });
+        self.offset_m2 = 0.0;
+    }
+
+    /// Moves every estimate from one on.
+    fn shift(&mut self, from: usize, by_m: f64) {
+        for estimate in &mut self.estimates[from..] {
+            estimate.gap_m += by_m;
+        }
+    }
+
+    /// A fall to where a new unit's gap is likelier than one of an arbitrary size within rigging's reach.
+    fn is_reset(&self, step: &StepChange, prior: &FleetPrior) -> bool {
+        let after = &self.estimates[step.at..self.estimates.len().min(step.at + 20)];
+        let level_m = after.iter().map(|e| e.gap_m).sum::<f64>() / after.len() as f64;
+        let sd_m = prior.new_sd_m.hypot(step.se_m);
+        let z = (level_m - prior.new_m) / sd_m;
+        let new = (-0.5 * z * z).exp() / (sd_m * (2.0 * std::f64::consts::PI).sqrt());
+        let rigging = 0.5 / MAX_RIGGING_STEP_M;
+        step.step_m < 0.0 && (new > rigging || step.step_m < -MAX_RIGGING_STEP_M)
+    }
+
+    /// The segments, oldest first.
+    pub(crate) fn segments(&self) -> impl Iterator<Item = Segment<'_>> {
+        self.begins.iter().enumerate().map(|(i, begin)| {
+            let next = self.begins.get(i + 1);
+            let end = next.map_or(self.estimates.len(), |next| next.estimate);
+            Segment {
+                estimates: &self.estimates[begin.estimate..end],
+                begin: begin.usage,
+                now: next.map_or(self.now, |next| next.usage),
+                fresh: begin.fresh,
+                known_age: self.known_age.filter(|_| i == 0),
+            }
+        })
+    }
+}
+
+/// Whether an entry of the book was made within a few flights of one.
+fn is_near(entry: &MaintenanceEvent, flights: &[Flight], flight: usize) -> bool {
+    let from = flights[flight.saturating_sub(RECORD_FLIGHTS + 1)].departure_us;
+    let to = flights[(flight + RECORD_FLIGHTS).min(flights.len() - 1)].departure_us;
+    (from..=to).contains(&entry.utc_us)
+}
+
+/// Entries of the book that the gap does not show, at the first flight after each.
+fn unseen<'a>(
+    flights: &'a [Flight],
+    maintenance: &'a [MaintenanceEvent],
+    found: &'a [StepChange],
+    estimates: &'a [WeightedGap],
+) -> impl Iterator<Item = ChangePoint> + 'a {
+    let shown = |entry: &MaintenanceEvent| {
+        found.iter().any(|step| is_near(entry, flights, estimates[step.at].flight))
+    };
+    maintenance.iter().filter(move |entry| !shown(entry)).filter_map(|entry| {
+        let first = flights.get(flights.partition_point(|f| f.departure_us < entry.utc_us))?;
+        let departure_us = first.departure_us;
+        Some(ChangePoint {
+            departure_us,
+            kind: ChangePointKind::Recorded,
+            step_m: 0.0,
+            se_m: 0.0,
+            certainty: 1.0,
+        })
+    })
+}
+
+/// Whether the books know of a change of installation near this flight.
+fn near_installation_change(flights: &[Flight], flight: usize) -> bool {
+    let from = flight.saturating_sub(RECORD_FLIGHTS + 1);
+    let to = (flight + RECORD_FLIGHTS + 1).min(flights.len());
+    flights[from..to].windows(2).any(|pair| pair[0].installation != pair[1].installation)
+}

@@ -1,0 +1,100 @@
+//! Where a unit stands now, by the mixture over its curves: gap, rate, growth, law.
+
+use crate::inference::posterior::{Component, Posterior};
+use crate::math::distributions;
+use crate::math::weighted::WeightedSamples;
+use crate::prior::calibration_params::USUAL_WIDTH;
+use crate::prior::fleet_prior::FleetPrior;
+use crate::statement::types::{Level, Rate, WearClass};
+use crate::wear::bank::WearLaw;
+use crate::wear::life_curve::LifeCurve;
+
+/// Growth that counts as visible, metres.
+const VISIBLE_M: f64 = 2e-6;
+
+/// Exponents up to this slow down, and from that speed up; so does a course, by its next tenth's rate over this.
+const SLOWING: f64 = 0.9;
+const SPEEDING: f64 = 1.2;
+
+/// The mixture's mean and spread, the installation's bias and undone offsets included.
+pub(crate) fn level(posterior: &Posterior, prior: &FleetPrior, offset_m2: f64) -> Level {
+    let gap_m = posterior.components.iter().map(|n| n.weight * n.level_m).sum::<f64>();
+    let between = posterior.components.iter().map(|n| n.weight * (n.level_m - gap_m).powi(2)).sum::<f64>();
+    Level { gap_m, se_m: (between + posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2)).sqrt() }
+}
+
+/// Quantiles of the curves' rates now, per flight hour, as much wider as the future is stated.
+pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64) -> Rate {
+    let of = |n: &Component| (n.amplitude_m * n.law.derivative(n.age_now) / hours_per_usage, n.weight);
+    let rates = WeightedSamples::new(posterior.significant_components().map(of));
+    let m_per_hour = rates.quantile(0.5);
+    let at = |share: f64| m_per_hour + USUAL_WIDTH * (rates.quantile(share) - m_per_hour);
+    Rate { p05_m_per_hour: at(0.05).max(0.0), m_per_hour, p95_m_per_hour: at(0.95) }
+}
+
+/// Probability of visible growth since the segment began.
+pub(crate) fn growth_probability(posterior: &Posterior) -> f64 {
+    let sd_m = posterior.growth_m2.sqrt();
+    let grown_m = |n: &Component| n.level_m - n.new_m - n.amplitude_m * n.law.value(n.age_begin);
+    let grown = |n: &Component| n.weight * distributions::cdf((grown_m(n) - VISIBLE_M) / sd_m);
+    probability(posterior.components.iter().map(grown).sum())
+}
+
+/// Weights come back from what is kept in single precision, so that together they may be a little more than one.
+fn probability(sum: f64) -> f64 {
+    sum.min(1.0)
+}
+
+/// When wear began, in usage since the segment's begin, and the share of the belief that is in an onset,
+/// where that is most of it.
+pub(crate) fn onset(posterior: &Posterior) -> Option<(f64, f64)> {
+    let starts = posterior.components.iter().filter_map(|n| Some((onset_usage(n)?, n.weight)));
+    let starts = WeightedSamples::new(starts);
+    (starts.total > 0.5).then(|| (starts.quantile(0.5), probability(starts.total)))
+}
+
+/// When a node's wear began, in usage since the segment's begin, if it is an onset.
+pub(crate) fn onset_usage(component: &Component) -> Option<f64> {
+    if let WearLaw::Onset { start } = component.law { Some(start) } else { None }
+}
+
+/// The law most believed in, and how much.
+pub(crate) fn law(posterior: &Posterior) -> Option<(WearClass, f64)> {
+    let mut shares: Vec<(WearClass, f64)> = Vec::new();
+    for component in &posterior.components {
+        let law = name(component);
+        match shares.iter_mut().find(|(known, _)| *known == law) {
+            Some((_, share)) => *share += component.weight,
+            None => shares.push((law, component.weight)),
+        }
+    }
+    let likeliest = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    likeliest.map(|(law, share)| (law, probability(share)))
+}
+
+fn name(component: &Component) -> WearClass {
+    match component.law {
+        WearLaw::None => WearClass::None,
+        WearLaw::Onset { .. } => WearClass::Onset,
+        WearLaw::Exponential { .. } => WearClass::Accelerating,
+        WearLaw::Settling { .. } => WearClass::Slowing,
+        law @ WearLaw::Bend { .. } => {
+            if law.derivative(0.0) < law.derivative(f64::MAX) {
+                WearClass::Accelerating
+            } else {
+                WearClass::Slowing
+            }
+        }
+        WearLaw::LifeCurve { shape, life } => match LifeCurve::new(shape, life).rate_ratio(component.age_now)
+        {
+            ratio if ratio < SLOWING => WearClass::Slowing,
+            ratio if ratio > SPEEDING => WearClass::Accelerating,
+            _ => WearClass::Linear,
+        },
+        law @ WearLaw::Power { .. } => match law.exponent() {
+            Some(p) if p < SLOWING => WearClass::Slowing,
+            Some(p) if p > SPEEDING => WearClass::Accelerating,
+            _ => WearClass::Linear,
+        },
+    }
+}

@@ -1,0 +1,141 @@
+//! One word of what to do, and why.
+
+use std::fmt;
+
+use crate::settings::Settings;
+use crate::statement::types::{ChangePoint, ChangePointKind, Crossing, Level, MIN_ESTIMATES};
+
+/// A day, microseconds.
+const DAY_US: f64 = 86_400e6;
+
+/// By how much a limit must be left before the state it caused is: three per cent of a gap, fifteen of
+/// the planning horizon. Without it a unit at a limit would change its state from night to night.
+const GAP_MARGIN: f64 = 0.97;
+const HORIZON_MARGIN: f64 = 1.15;
+
+/// What to do, from least to most urgent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum State {
+    /// Nothing.
+    Normal,
+    /// Look at it.
+    Watch,
+    /// Plan the change.
+    Plan,
+    /// Change it.
+    Act,
+}
+
+/// Why a state, or none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
+pub enum Reason {
+    /// No flight before the day, or none with a gap.
+    NoEstimate,
+    /// The last estimate is too old.
+    Stale { days: f64 },
+    /// Too few estimates.
+    TooFew { estimates: usize },
+    /// No curve that explains the history has the gap where the last estimates are.
+    Unsupported { gap_m: f64, recent_m: f64 },
+    /// The gap is at its act limit.
+    AtLimit { gap_m: f64, limit_m: f64 },
+    /// The early crossing lies within the planning horizon.
+    CrossesSoon { p05_hours: f64, planning_horizon_hours: f64 },
+    /// The gap is at its watch limit.
+    AtWatch { gap_m: f64, watch_m: f64 },
+    /// Something happened lately that no book knows.
+    Changed { kind: ChangePointKind, days: f64 },
+    /// Nothing calls for anything.
+    Clear,
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let um = |m: f64| m * 1e6;
+        match *self {
+            Self::NoEstimate => write!(f, "no estimate yet"),
+            Self::Stale { days } => write!(f, "last estimate is {days:.0} days old"),
+            Self::TooFew { estimates } => {
+                let noun = if estimates == 1 { "estimate" } else { "estimates" };
+                write!(f, "only {estimates} {noun}, {MIN_ESTIMATES} are needed")
+            }
+            Self::Unsupported { gap_m, recent_m } => {
+                let (gap_um, recent_um) = (um(gap_m), um(recent_m));
+                write!(
+                    f,
+                    "curves through all estimates end at {gap_um:.1} µm, the last ones are near {recent_um:.1} µm"
+                )
+            }
+            Self::AtLimit { gap_m, limit_m } => {
+                write!(f, "gap {:.1} µm is at the limit of {:.1} µm", um(gap_m), um(limit_m))
+            }
+            Self::CrossesSoon { p05_hours, planning_horizon_hours } => {
+                write!(
+                    f,
+                    "limit may be met in {p05_hours:.0} h, within the planning horizon of {planning_horizon_hours:.0} h"
+                )
+            }
+            Self::AtWatch { gap_m, watch_m } => {
+                write!(f, "gap {:.1} µm is at the watch limit of {:.1} µm", um(gap_m), um(watch_m))
+            }
+            Self::Changed { kind, days } => write!(f, "{kind} {days:.0} days ago that no book knows"),
+            Self::Clear => write!(f, "no limit is near"),
+        }
+    }
+}
+
+/// What a state is judged by.
+pub(crate) struct Evidence<'a> {
+    /// Departure of the last flight with a gap.
+    pub(crate) last_gap_us: Option<i64>,
+    pub(crate) estimates: usize,
+    pub(crate) as_of_us: i64,
+    pub(crate) level: Option<Level>,
+    pub(crate) crossing: Option<Crossing>,
+    pub(crate) changes: &'a [ChangePoint],
+    /// The level that was not stated, and what the last estimates say.
+    pub(crate) unsupported: Option<(f64, f64)>,
+}
+
+/// The state and its reason, most urgent first; a `previous` state is left only past its margin.
+pub(crate) fn alert_state(
+    evidence: &Evidence<'_>,
+    settings: &Settings,
+    previous: Option<State>,
+) -> (Option<State>, Reason) {
+    let Some(last_gap_us) = evidence.last_gap_us else {
+        return (None, Reason::NoEstimate);
+    };
+    let days_since = |departure_us: i64| (evidence.as_of_us - departure_us) as f64 / DAY_US;
+    let days = days_since(last_gap_us);
+    if days > settings.stale_after_days {
+        return (None, Reason::Stale { days });
+    }
+    let (Some(Level { gap_m, .. }), Some(crossing)) = (evidence.level, evidence.crossing) else {
+        let few = Reason::TooFew { estimates: evidence.estimates };
+        let unsupported = |(gap_m, recent_m)| Reason::Unsupported { gap_m, recent_m };
+        let enough = evidence.estimates >= MIN_ESTIMATES;
+        return (None, evidence.unsupported.filter(|_| enough).map_or(few, unsupported));
+    };
+    let Settings { limit_m, watch_m, planning_horizon_hours, .. } = *settings;
+    let margin = |state: State, margin: f64| if previous >= Some(state) { margin } else { 1.0 };
+    if gap_m >= limit_m * margin(State::Act, GAP_MARGIN) {
+        return (Some(State::Act), Reason::AtLimit { gap_m, limit_m });
+    }
+    let horizon_hours = planning_horizon_hours * margin(State::Plan, HORIZON_MARGIN);
+    if let Some(p05_hours) = crossing.p05_hours.filter(|hours| *hours <= horizon_hours) {
+        return (Some(State::Plan), Reason::CrossesSoon { p05_hours, planning_horizon_hours });
+    }
+    if gap_m >= watch_m * margin(State::Watch, GAP_MARGIN) {
+        return (Some(State::Watch), Reason::AtWatch { gap_m, watch_m });
+    }
+    let unknown = |change: &&ChangePoint| change.kind != ChangePointKind::Recorded;
+    if let Some(change) = evidence.changes.iter().rev().find(unknown) {
+        let days = days_since(change.departure_us);
+        if days <= settings.change_watch_days {
+            return (Some(State::Watch), Reason::Changed { kind: change.kind, days });
+        }
+    }
+    (Some(State::Normal), Reason::Clear)
+}

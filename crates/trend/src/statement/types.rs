@@ -1,0 +1,127 @@
+//! Result types of an assessment.
+
+use serde::{Deserialize, Serialize};
+
+use std::fmt;
+
+/// Estimates below which nothing but a level is said.
+pub const MIN_ESTIMATES: usize = 8;
+
+/// The gap at the end of the last flight.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    /// The gap, metres.
+    pub gap_m: f64,
+    /// Its standard error, metres.
+    pub se_m: f64,
+}
+
+/// Growth in metres per flight hour, with its 90 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rate {
+    /// 5 % bound.
+    pub p05_m_per_hour: f64,
+    /// Median.
+    pub m_per_hour: f64,
+    /// 95 % bound.
+    pub p95_m_per_hour: f64,
+}
+
+/// Flight hours from the end of the last flight to the first with a gap at the act limit: zero when
+/// already over, nothing beyond the horizon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Not before.
+    pub p05_hours: Option<f64>,
+    /// Likely.
+    pub p50_hours: Option<f64>,
+    /// Not after.
+    pub p95_hours: Option<f64>,
+}
+
+/// The unit's recent use: over its last ninety days of flights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Utilization {
+    /// Flight hours a day.
+    pub hours_per_day: f64,
+    /// Flight hours a flight.
+    pub hours_per_flight: f64,
+}
+
+/// Forms of wear.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WearClass {
+    /// It does not wear.
+    None,
+    /// Flat, then a line.
+    Onset,
+    /// Ever more slowly.
+    Slowing,
+    /// As the usage.
+    Linear,
+    /// Ever faster.
+    Accelerating,
+}
+
+impl fmt::Display for WearClass {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "none",
+            Self::Onset => "onset",
+            Self::Slowing => "slowing",
+            Self::Linear => "linear",
+            Self::Accelerating => "accelerating",
+        })
+    }
+}
+
+/// Whether a unit wears.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WearStatus {
+    /// It has grown by 2 µm or more with a probability above 95 %.
+    Wearing,
+    /// That much growth is not certain.
+    Steady,
+    /// Too little is known.
+    Unknown,
+}
+
+/// A change that wear does not make.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ChangePoint {
+    /// The first flight after it, microseconds since 1970 UTC.
+    pub departure_us: i64,
+    /// What it is.
+    pub kind: ChangePointKind,
+    /// Its size, metres; zero for an onset.
+    pub step_m: f64,
+    /// Standard error of its size, metres; zero for an onset.
+    pub se_m: f64,
+    /// Probability that it is one: of a step that it has the sign it is said to have, of an onset that
+    /// wear began at all, one where the books say so.
+    pub certainty: f64,
+}
+
+/// Kinds of change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ChangePointKind {
+    /// The measurement moved: re-rigging, another reference. The wear did not.
+    Step,
+    /// The gap fell to near a new unit's: re-shimmed, overhauled or replaced.
+    Reset,
+    /// Wear began, or sped up.
+    Onset,
+    /// In the books: an installation or a maintenance entry; without a step where the gap shows none.
+    Recorded,
+}
+
+impl fmt::Display for ChangePointKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Step => "step",
+            Self::Reset => "reset",
+            Self::Onset => "onset",
+            Self::Recorded => "recorded",
+        })
+    }
+}

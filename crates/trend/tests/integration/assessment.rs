@@ -1,0 +1,114 @@
+//! Statements about units whose truth is known.
+
+use trend::{
+    Assessment, Observation, Reason, Series, Settings, State, UsageDefaults, WearStatus, assess,
+    assess_with_hysteresis,
+};
+
+const DAY_US: i64 = 86_400_000_000;
+
+/// Scatter of ± 1 µm (1 sd), the same in every run: twelve uniform numbers less six.
+fn scatter_um(day: i64) -> f64 {
+    let mut state = (day as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+}
+
+/// A unit that flies 2 h a day.
+fn unit(days: i64, gap_um: impl Fn(f64) -> f64) -> Series {
+    let rows = (0..days).map(|day| Observation {
+        departure_us: day * DAY_US,
+        installation: 0,
+        flight_hours: Some(2.0),
+        tail_hours_end: Some(2.0 * (day + 1) as f64),
+        load_reversals: Some(100),
+        gap_m: Some((gap_um(2.0 * (day + 1) as f64) + scatter_um(day)) * 1e-6),
+        gap_se_m: Some(1e-6),
+    });
+    Series::new(rows, &UsageDefaults { unit_hours_at_start: Some(0.0), ..UsageDefaults::default() }).unwrap()
+}
+
+fn state_of(series: &Series, day: i64) -> Assessment {
+    assess(series, day * DAY_US, &Settings::for_limit(1e-4), None, None).unwrap()
+}
+
+#[test]
+fn a_unit_wearing_along_a_line_is_known_by_level_rate_and_crossing() {
+    // 20 µm new, 20 µm per 1,000 h: 36 µm after 800 h, and 3,200 h from the limit of 100 µm.
+    let assessment = state_of(&unit(400, |h| 20.0 + 0.02 * h), 400);
+    let (level, rate, crossing) =
+        (assessment.level.unwrap(), assessment.rate.unwrap(), assessment.crossing.unwrap());
+    assert!((level.gap_m - 36e-6).abs() < 1e-6, "{level:?}");
+    assert!((rate.m_per_hour - 20e-9).abs() < 4e-9, "{rate:?}");
+    assert!(rate.p05_m_per_hour < 20e-9 && 20e-9 < rate.p95_m_per_hour, "{rate:?}");
+    assert!((crossing.p50_hours.unwrap() - 3200.0).abs() < 640.0, "{crossing:?}");
+    assert!(crossing.p05_hours < Some(3200.0) && crossing.p95_hours > Some(3200.0), "{crossing:?}");
+    assert_eq!(
+        (assessment.wear, assessment.state, assessment.unit_hours),
+        (WearStatus::Wearing, Some(State::Normal), Some(800.0))
+    );
+}
+
+#[test]
+fn a_unit_that_does_not_wear_is_steady_and_its_late_crossing_beyond_the_horizon() {
+    let assessment = state_of(&unit(400, |_| 20.0), 400);
+    assert_eq!(
+        (assessment.wear, assessment.state, assessment.reason),
+        (WearStatus::Steady, Some(State::Normal), Reason::Clear)
+    );
+    assert_eq!(assessment.crossing.unwrap().p95_hours, None);
+}
+
+#[test]
+fn a_unit_over_its_limit_must_act_and_has_no_hours_left() {
+    let assessment = state_of(&unit(400, |h| 40.0 + 0.08 * h), 400);
+    assert_eq!(assessment.state, Some(State::Act));
+    assert_eq!(assessment.crossing.unwrap().p50_hours, Some(0.0));
+    let text = assessment.reason.to_string();
+    assert!(text.starts_with("gap 104.") && text.ends_with(" µm is at the limit of 100.0 µm"), "{text}");
+}
+
+#[test]
+fn a_unit_that_meets_its_limit_soon_is_planned() {
+    let assessment = state_of(&unit(400, |h| 30.0 + 0.06 * h), 400);
+    assert_eq!(assessment.state, Some(State::Plan), "{assessment:?}");
+}
+
+#[test]
+fn no_state_stands_on_old_or_on_few_estimates() {
+    let series = unit(400, |h| 20.0 + 0.02 * h);
+    let stale = state_of(&series, 500);
+    assert_eq!((stale.state, stale.reason.to_string().as_str()), (None, "last estimate is 101 days old"));
+    let young = state_of(&series, 3);
+    assert_eq!((young.state, young.reason), (None, Reason::TooFew { estimates: 4 }));
+    assert_eq!(state_of(&series, 0).reason.to_string(), "only 1 estimate, 8 are needed");
+    assert_eq!(state_of(&series, -1).reason, Reason::NoEstimate);
+}
+
+#[test]
+fn nothing_later_than_the_day_is_looked_at() {
+    let long = unit(400, |h| 20.0 + 0.02 * h);
+    assert_eq!(state_of(&long, 199), state_of(&unit(200, |h| 20.0 + 0.02 * h), 199));
+}
+
+#[test]
+fn settings_nothing_can_be_judged_by_are_refused() {
+    let settings = Settings { watch_m: 2e-4, ..Settings::for_limit(1e-4) };
+    let text = assess(&unit(9, |_| 20.0), 0, &settings, None, None).unwrap_err().to_string();
+    assert_eq!(text, "watch limit is 2e-4 m and act limit 1e-4 m: watch must come first");
+}
+
+#[test]
+fn a_remembered_state_does_not_flap_around_its_limit_and_follows_from_the_flights_alone() {
+    // 20 µm per 1,000 h from 20 µm: past the watch limit of 60 µm at 2,000 h, day 1,000; ± 1 µm of scatter.
+    let series = unit(1100, |h| 20.0 + 0.02 * h);
+    let settings = Settings { watch_m: 60e-6, planning_horizon_hours: 1.0, ..Settings::for_limit(1e-4) };
+    let states: Vec<State> = (940..1060)
+        .filter_map(|day| assess_with_hysteresis(&series, day * DAY_US, &settings, None).unwrap().state)
+        .collect();
+    let changes = states.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    assert_eq!((states.first(), states.last(), changes), (Some(&State::Normal), Some(&State::Watch), 1));
+}

@@ -1,0 +1,362 @@
+//! Fleets whose truth a small simulator knows, with laws the bank does and does not contain.
+
+use proptest::prelude::*;
+use trend::{
+    Assessment, ChangePoint, ChangePointKind, Executor, FleetPrior, MaintenanceEvent, Observation, Series,
+    Settings, State, UsageAxis, UsageDefaults, WearStatus, assess,
+};
+
+use crate::random::Random;
+
+const DAY_US: i64 = 86_400_000_000;
+const LIMIT_M: f64 = 1e-4;
+
+/// Share of the life's growth at a share of the life.
+type WearLaw = fn(f64) -> f64;
+
+/// None of these is in the bank.
+const STRANGE: [WearLaw; 4] = [
+    // Running in, then a line.
+    |t| 0.15 * (1.0 - (-t / 0.05).exp()) + 0.85 * t,
+    // Slow, fast, slow again: it meets the limit on the steep part.
+    |t| ((1.0 / (1.0 + (-6.0 * (t - 0.8)).exp())) - 0.008) / (0.7685 - 0.008),
+    // Two slopes with a knee.
+    |t| if t < 0.6 { 0.6 * t } else { 0.36 + 1.6 * (t - 0.6) },
+    // A logarithm.
+    |t| (1.0 + 4.0 * t).ln() / 5.0_f64.ln(),
+];
+
+/// A unit of two flights a day at 1.7 h, four in five of which leave an estimate.
+struct Unit {
+    series: Series,
+    /// True hours at which the gap meets the limit, from the first flight.
+    crossing_hours: f64,
+    life_hours: f64,
+}
+
+fn unit(seed: u64, law: WearLaw, flights: i64) -> Unit {
+    let mut random = Random::new(seed);
+    let life_hours = 3000.0 * (0.4 * random.normal()).exp();
+    let new_um = 20.0 + 3.0 * random.normal();
+    let mut rows = Vec::new();
+    let (mut crossing_hours, mut gap_um, mut before) = (f64::INFINITY, new_um, law(0.0));
+    for flight in 0..20_000_i64 {
+        let hours = 1.7 * (flight + 1) as f64;
+        let value = law(hours / life_hours);
+        let mean_um = 80.0 * (value - before).max(0.0);
+        before = value;
+        // Wear comes in lumps: the mean at its rate, its variance 0.2 µm times the mean.
+        let lump = if mean_um > 0.0 { 0.2 } else { 1.0 };
+        gap_um += if random.uniform() < mean_um / lump { lump } else { 0.0 };
+        if gap_um >= 100.0 && crossing_hours.is_infinite() {
+            crossing_hours = hours;
+        }
+        if flight < flights && random.uniform() < 0.8 {
+            let se_um = random.between(1.5, 4.0);
+            let outlier = if random.uniform() < 0.02 { 40.0 } else { 0.0 };
+            rows.push(Observation {
+                departure_us: flight * DAY_US / 2,
+                installation: 0,
+                flight_hours: Some(1.7),
+                tail_hours_end: Some(hours),
+                load_reversals: Some(150),
+                gap_m: Some((gap_um + se_um * random.normal() + outlier) * 1e-6),
+                gap_se_m: Some(se_um * 1e-6),
+            });
+        } else if flight >= flights && crossing_hours.is_finite() {
+            break;
+        }
+    }
+    Unit { series: Series::new(rows, &UsageDefaults::default()).unwrap(), crossing_hours, life_hours }
+}
+
+fn assessment(series: &Series, as_of_us: i64, prior: Option<&FleetPrior>) -> Assessment {
+    assess(series, as_of_us, &Settings::for_limit(LIMIT_M), prior, None).unwrap()
+}
+
+/// Day on which a unit has flown some hours.
+fn day_of(hours: f64) -> i64 {
+    (hours / 3.4) as i64
+}
+
+/// Median relative error and coverage of the 90 % interval at shares of life, for a fleet of one law,
+/// each judged by a prior learned when the fleet stood at the same share.
+fn score(law: WearLaw, shares: &[f64]) -> (f64, f64) {
+    let fleet: Vec<Unit> = (0..30).map(|seed| unit(seed, law, 3000)).collect();
+    let (mut errors, mut covered) = (Vec::new(), 0.0);
+    for share in shares {
+        // Every unit cut at its own share of life, so that the prior has seen no crossing.
+        let day = |u: &Unit| day_of(share * u.crossing_hours.min(2.0 * u.life_hours));
+        let cut = |u: &Unit| {
+            let known = u.series.flights_until(day(u) * DAY_US);
+            let row = |f: &trend::series::Flight| Observation {
+                departure_us: f.departure_us,
+                installation: f.installation,
+                flight_hours: Some(1.7),
+                tail_hours_end: Some(f.hours),
+                load_reversals: Some(150),
+                gap_m: f.gap.map(|g| g.gap_m),
+                gap_se_m: f.gap.map(|g| g.se_m),
+            };
+            Series::new(known.iter().map(row), &UsageDefaults::default()).unwrap()
+        };
+        let known: Vec<Series> = fleet.iter().map(cut).collect();
+        let prior = FleetPrior::learn(&known, i64::MAX, LIMIT_M, None);
+        for (unit, series) in fleet.iter().zip(&known) {
+            let crossing = assessment(series, day(unit) * DAY_US, Some(&prior)).crossing.unwrap();
+            let left = unit.crossing_hours - 3.4 * day(unit) as f64;
+            let [low, likely, high] =
+                [crossing.p05_hours, crossing.p50_hours, crossing.p95_hours].map(|h| h.unwrap_or(20_000.0));
+            errors.push((likely - left).abs() / left);
+            covered += f64::from(u8::from(low <= left && left <= high));
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    (errors[errors.len() / 2], covered / errors.len() as f64)
+}
+
+#[test]
+fn a_fleet_on_a_line_is_forecast_within_a_tenth_and_its_intervals_hold() {
+    let (error, coverage) = score(|t| t, &[0.4, 0.7]);
+    println!("line: median error {error:.3}, coverage {coverage:.3}");
+    assert!(error < 0.12 && coverage > 0.8, "{error} {coverage}");
+}
+
+#[test]
+fn laws_the_bank_does_not_contain_are_still_forecast_with_intervals_that_mostly_hold() {
+    for (name, law) in ["running in", "sigmoid", "knee", "logarithm"].into_iter().zip(STRANGE) {
+        let (error, coverage) = score(law, &[0.5, 0.7, 0.85]);
+        println!("{name}: median error {error:.3}, coverage {coverage:.3}");
+        assert!(error < 0.6 && coverage > 0.35, "{name}: {error} {coverage}");
+    }
+}
+
+/// Rows of a unit wearing at 10 µm per 1,000 h with 2 µm noise, and what a caller does to its gaps.
+fn rows(seed: u64, change_um: impl Fn(i64, f64) -> f64) -> Vec<Observation> {
+    let mut random = Random::new(seed);
+    (0..500)
+        .map(|flight| {
+            let hours = 1.7 * (flight + 1) as f64;
+            Observation {
+                departure_us: flight * DAY_US / 2,
+                installation: 0,
+                flight_hours: Some(1.7),
+                tail_hours_end: Some(hours),
+                load_reversals: Some(150),
+                gap_m: Some((change_um(flight, 20.0 + 0.01 * hours) + 2.0 * random.normal()) * 1e-6),
+                gap_se_m: Some(2e-6),
+            }
+        })
+        .collect()
+}
+
+fn changes(rows: Vec<Observation>) -> Vec<ChangePoint> {
+    assessment(&Series::new(rows, &UsageDefaults::default()).unwrap(), 250 * DAY_US, None).changes
+}
+
+#[test]
+fn a_re_shim_is_a_reset_found_at_its_flight() {
+    let found = changes(rows(1, |flight, gap| if flight < 300 { gap + 30.0 } else { gap - 5.0 }));
+    let [change] = found[..] else { panic!("{found:?}") };
+    assert_eq!(change.kind, ChangePointKind::Reset);
+    assert!((change.departure_us - 150 * DAY_US).abs() <= DAY_US, "{change:?}");
+    assert!((change.step_m + 35e-6).abs() < 2e-6, "{change:?}");
+}
+
+#[test]
+fn a_re_rig_is_a_step_whose_offset_does_not_change_the_gap() {
+    let series = |rise_um: f64| {
+        let rows = rows(2, |flight, gap| if flight < 200 { gap } else { gap + rise_um });
+        assessment(&Series::new(rows, &UsageDefaults::default()).unwrap(), 250 * DAY_US, None)
+    };
+    let (moved, still) = (series(9.0), series(0.0));
+    assert_eq!(moved.changes.iter().map(|c| c.kind).collect::<Vec<_>>(), [ChangePointKind::Step]);
+    let off_m = moved.level.unwrap().gap_m - still.level.unwrap().gap_m;
+    assert!(off_m.abs() < 2e-6, "{off_m:e}");
+    assert!(still.changes.is_empty(), "{:?}", still.changes);
+}
+
+#[test]
+fn the_same_step_at_a_change_of_installation_is_the_books_own() {
+    let mut rows = rows(3, |flight, gap| if flight < 200 { gap } else { gap + 9.0 });
+    rows[200..].iter_mut().for_each(|row| row.installation = 1);
+    rows[200..].iter_mut().for_each(|row| row.tail_hours_end = row.tail_hours_end.map(|h| h + 5000.0));
+    assert_eq!(changes(rows).iter().map(|c| c.kind).collect::<Vec<_>>(), [ChangePointKind::Recorded]);
+}
+
+#[test]
+fn wear_that_begins_late_is_an_onset_and_no_step() {
+    let found =
+        changes(rows(4, |flight, _| 20.0 + if flight < 250 { 0.0 } else { 0.08 * (flight - 250) as f64 }));
+    let [change] = found[..] else { panic!("{found:?}") };
+    assert_eq!(change.kind, ChangePointKind::Onset);
+    assert!((change.departure_us - 125 * DAY_US).abs() < 20 * DAY_US, "{change:?}");
+    assert!(change.certainty > 0.5 && change.certainty <= 1.0, "{change:?}");
+}
+
+#[test]
+fn units_that_do_not_wear_are_seldom_called_wearing() {
+    let wearing = (0..60)
+        .filter(|&seed| {
+            let rows = rows(1000 + seed, |_, _| 20.0);
+            assessment(&Series::new(rows, &UsageDefaults::default()).unwrap(), 250 * DAY_US, None).wear
+                == WearStatus::Wearing
+        })
+        .count();
+    assert!(wearing <= 2, "{wearing} of 60");
+}
+
+#[test]
+fn a_state_once_given_is_left_only_clearly_past_its_limit() {
+    // 500 flights end at 28.5 µm; the watch limit is set a hair above the level.
+    let series = Series::new(rows(5, |_, gap| gap), &UsageDefaults::default()).unwrap();
+    let level_m = assessment(&series, 250 * DAY_US, None).level.unwrap().gap_m;
+    let settings = Settings { watch_m: 1.01 * level_m, ..Settings::for_limit(1e-3) };
+    let state = |previous| assess(&series, 250 * DAY_US, &settings, None, previous).unwrap().state;
+    assert_eq!(state(None), Some(State::Normal));
+    assert_eq!(state(Some(State::Watch)), Some(State::Watch));
+    let far = Settings { watch_m: 1.2 * level_m, ..settings };
+    assert_eq!(
+        assess(&series, 250 * DAY_US, &far, None, Some(State::Watch)).unwrap().state,
+        Some(State::Normal)
+    );
+}
+
+#[test]
+fn a_prior_looks_at_nothing_later_than_its_day_and_not_at_the_order_of_its_units() {
+    let fleet: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 800)).collect();
+    let day = 200 * DAY_US;
+    let whole = FleetPrior::learn(fleet.iter().map(|u| &u.series), day, LIMIT_M, None);
+    let reversed = FleetPrior::learn(fleet.iter().rev().map(|u| &u.series), day, LIMIT_M, None);
+    assert_eq!(format!("{whole:?}"), format!("{reversed:?}"));
+    let short: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 401)).collect();
+    let cut = FleetPrior::learn(short.iter().map(|u| &u.series), day, LIMIT_M, None);
+    assert_eq!(format!("{whole:?}"), format!("{cut:?}"));
+}
+
+/// The last first, each on a thread of its own.
+struct Backwards;
+
+impl Executor for Backwards {
+    fn map<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R> {
+        let work = &work;
+        let mut results: Vec<R> = std::thread::scope(|scope| {
+            let threads: Vec<_> = things.iter().rev().map(|thing| scope.spawn(move || work(thing))).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+        });
+        results.reverse();
+        results
+    }
+}
+
+#[test]
+fn a_prior_is_the_same_to_the_last_bit_whoever_does_the_work() {
+    let fleet: Vec<Unit> = (0..6).map(|seed| unit(seed, |t| t, 400)).collect();
+    let series = || fleet.iter().map(|u| &u.series);
+    let day = 200 * DAY_US;
+    let in_turn = FleetPrior::learn(series(), day, LIMIT_M, None);
+    let apart = FleetPrior::learn_with(series(), day, LIMIT_M, None, &Backwards);
+    assert_eq!(format!("{in_turn:?}"), format!("{apart:?}"));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Whatever gaps a log throws up, the quantiles stand in order and nothing is not a number.
+    #[test]
+    fn a_statement_is_finite_and_in_order(
+        gaps_um in prop::collection::vec(prop::option::of(-20.0..200.0), 0..120), stated in any::<bool>(),
+    ) {
+        let rows = gaps_um.iter().enumerate().map(|(i, gap_um)| Observation {
+            departure_us: i as i64 * DAY_US,
+            installation: (i / 40) as u32,
+            flight_hours: Some(2.0),
+            tail_hours_end: None,
+            load_reversals: None,
+            gap_m: gap_um.map(|um| um * 1e-6),
+            gap_se_m: stated.then_some(2e-6),
+        });
+        let assessment = assessment(&Series::new(rows, &UsageDefaults::default()).unwrap(), 120 * DAY_US, None);
+        let hours = |h: Option<f64>| h.unwrap_or(f64::INFINITY);
+        if let (Some(crossing), Some(level), Some(rate)) = (assessment.crossing, assessment.level, assessment.rate) {
+            prop_assert!(hours(crossing.p05_hours) <= hours(crossing.p50_hours));
+            prop_assert!(hours(crossing.p50_hours) <= hours(crossing.p95_hours));
+            prop_assert!(level.gap_m.is_finite() && level.se_m.is_finite() && level.se_m > 0.0);
+            prop_assert!(rate.p05_m_per_hour <= rate.m_per_hour && rate.m_per_hour <= rate.p95_m_per_hour);
+            let probability = assessment.check_probability.unwrap();
+            prop_assert!((0.0..=1.0 + 1e-9).contains(&probability));
+        }
+    }
+}
+
+#[test]
+fn a_booked_re_shim_is_the_books_own_and_begins_the_unit_anew() {
+    // A fall of 8 µm to some 25 µm above new: too small to be known for a reset without the book.
+    let at = 300;
+    let fell = rows(11, |flight, gap| if flight < at { gap + 30.0 } else { gap + 22.0 });
+    let departure_us = fell[at as usize].departure_us;
+    let assessment = |renews: Option<bool>| {
+        let maintenance = renews.map(|renews| MaintenanceEvent { utc_us: departure_us - 1, renews });
+        let series = Series::new(fell.clone(), &UsageDefaults::default())
+            .unwrap()
+            .with_maintenance(maintenance.into_iter().collect());
+        assess(&series, 250 * DAY_US, &Settings::for_limit(LIMIT_M), None, None).unwrap()
+    };
+    let kinds = |trend: &Assessment| trend.changes.iter().map(|c| c.kind).collect::<Vec<_>>();
+    let (single_unit, rigged, renewed) = (assessment(None), assessment(Some(false)), assessment(Some(true)));
+    assert!(!kinds(&single_unit).contains(&ChangePointKind::Recorded), "{:?}", single_unit.changes);
+    assert_eq!(kinds(&rigged), [ChangePointKind::Recorded]);
+    // Rigging moves the measurement, so the gap is what it was; a re-shim takes the 8 µm away.
+    let fall_um = (rigged.level.unwrap().gap_m - renewed.level.unwrap().gap_m) * 1e6;
+    assert!((fall_um - 8.0).abs() < 1.5, "{fall_um}");
+}
+
+/// Thirty units of 400 flights at 1.5 h that wear by 30 µm in 600 h from 20 µm; halfway the gap falls by 8 µm.
+fn reshimmed(is_booked: bool) -> Vec<Series> {
+    const HALF: i64 = 200;
+    let one = |seed: u64| {
+        let mut random = Random::new(seed + 500);
+        let new_um = 20.0 + 2.0 * random.normal();
+        let rows: Vec<Observation> = (0..2 * HALF)
+            .map(|flight| {
+                let hours = 1.5 * (flight + 1) as f64;
+                let shim_um = if flight < HALF { 0.0 } else { 8.0 };
+                Observation {
+                    departure_us: flight * DAY_US,
+                    installation: 0,
+                    flight_hours: Some(1.5),
+                    tail_hours_end: Some(hours),
+                    load_reversals: None,
+                    gap_m: Some((new_um + 0.05 * hours - shim_um + 1.5 * random.normal()) * 1e-6),
+                    gap_se_m: Some(1.5e-6),
+                }
+            })
+            .collect();
+        let entry = MaintenanceEvent { utc_us: HALF * DAY_US - DAY_US / 2, renews: true };
+        let maintenance = if is_booked { vec![entry] } else { Vec::new() };
+        Series::new(rows, &UsageDefaults::default()).unwrap().with_maintenance(maintenance)
+    };
+    (0..30).map(one).collect()
+}
+
+/// New units begin at 20 µm, re-shimmed ones at 20 + 15 − 8 = 27 µm: 23.5 µm in the mean. Unbooked, the
+/// fall is one of the measurement, and only the 20 µm of the new teach.
+#[test]
+fn a_fleet_learns_from_its_maintenance_book_what_a_reshimmed_gap_is() {
+    let new_um = |recorded_um| {
+        let prior = FleetPrior::learn(&reshimmed(recorded_um), i64::MAX, LIMIT_M, Some(UsageAxis::Hours));
+        prior.new_gap_m().0 * 1e6
+    };
+    let (recorded_um, unrecorded_um) = (new_um(true), new_um(false));
+    assert!((recorded_um - 23.5).abs() < 1.5, "{recorded_um} µm");
+    assert!((unrecorded_um - 20.0).abs() < 1.5, "{unrecorded_um} µm");
+}
+
+#[test]
+fn wear_follows_the_axis_it_is_told_to_unless_nobody_counted_it() {
+    let fleet = reshimmed(true);
+    let learned = |axis| FleetPrior::learn(&fleet, i64::MAX, LIMIT_M, axis);
+    assert_eq!(learned(Some(UsageAxis::Flights)).axis(), UsageAxis::Flights);
+    // No flight states its load reversals; all have one length, so hours and flights say the same.
+    assert_eq!(learned(Some(UsageAxis::Reversals)), learned(None));
+}

@@ -1,0 +1,16 @@
+//! The public door of `trend`.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    reason = "a test may fail loudly, and exact values are meant"
+)]
+
+mod assessment;
+mod classic;
+mod degenerate;
+mod fleet;
+mod forecast;
+mod incremental;
+mod random;
+mod series;

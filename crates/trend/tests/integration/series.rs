@@ -1,0 +1,109 @@
+//! Usage and order of a unit's flights.
+
+use proptest::prelude::*;
+use trend::{Observation, Series, UsageDefaults};
+
+fn row(day: i64, installation: u32, hours: Option<f64>, meter: Option<f64>) -> Observation {
+    Observation {
+        departure_us: day * 86_400_000_000,
+        installation,
+        flight_hours: hours,
+        tail_hours_end: meter,
+        load_reversals: Some(100),
+        gap_m: Some(1e-5),
+        gap_se_m: Some(1e-6),
+    }
+}
+
+fn hours(rows: &[Observation]) -> Vec<f64> {
+    Series::new(rows.iter().copied(), &UsageDefaults::default())
+        .unwrap()
+        .flights()
+        .iter()
+        .map(|f| f.hours)
+        .collect()
+}
+
+#[test]
+fn flights_without_a_row_count_through_the_hour_meter() {
+    let rows = [row(0, 1, Some(2.0), Some(102.0)), row(9, 1, Some(2.0), Some(112.0))];
+    let series = Series::new(rows, &UsageDefaults::default()).unwrap();
+    let last = series.flights()[1];
+    // 2 h, then 8 h unseen and 2 h more: four flights of 2 h, hence four times 100 reversals, went unseen.
+    assert_eq!((last.hours, last.flights, last.reversals), (12.0, 6.0, 600.0));
+}
+
+#[test]
+fn another_tail_s_meter_is_never_compared_with_the_last_one_s() {
+    let rows = [
+        row(0, 1, Some(2.0), Some(102.0)),
+        row(1, 2, Some(3.0), Some(9000.0)),
+        row(2, 2, Some(1.0), Some(9004.0)),
+    ];
+    assert_eq!(hours(&rows), [2.0, 5.0, 9.0]);
+}
+
+#[test]
+fn a_meter_that_is_missing_or_runs_backwards_leaves_the_flight_s_own_hours() {
+    let rows = [
+        row(0, 1, Some(2.0), Some(102.0)),
+        row(1, 1, Some(2.0), None),
+        row(2, 1, Some(2.0), Some(106.5)),
+        row(3, 1, Some(2.0), Some(3.0)),
+        row(4, 1, None, None),
+    ];
+    assert_eq!(hours(&rows), [2.0, 4.0, 6.5, 8.5, 10.0]);
+}
+
+#[test]
+fn a_refused_flight_is_usage() {
+    let refused = Observation { gap_m: None, gap_se_m: None, ..row(1, 1, Some(2.0), None) };
+    assert_eq!(hours(&[row(0, 1, Some(2.0), None), refused, row(2, 1, Some(2.0), None)]), [2.0, 4.0, 6.0]);
+}
+
+#[test]
+fn numbers_that_cannot_be_are_refused_by_name() {
+    let bad = Observation { gap_se_m: Some(0.0), ..row(1, 1, None, None) };
+    let text = Series::new([bad], &UsageDefaults::default()).unwrap_err().to_string();
+    assert!(text.starts_with("gap_se_m of the flight departing at 86400000000 µs is 0"), "{text}");
+}
+
+prop_compose! {
+    fn any_row()(
+        day in 0_i64..30, installation in 0_u32..3, hours in prop::option::of(0.5..4.0), meter in prop::option::of(0.0..500.0),
+        load_reversals in prop::option::of(0_u64..300), gap_m in prop::option::of(0.0..1e-4), gap_se_m in prop::option::of(1e-7..1e-5),
+    ) -> Observation {
+        Observation { load_reversals, gap_m, gap_se_m, ..row(day, installation, hours, meter) }
+    }
+}
+
+proptest! {
+    /// Late logs, and logs processed twice, must give the series that on-time ones gave.
+    #[test]
+    fn the_order_of_arrival_changes_no_bit(
+        (rows, shuffled) in prop::collection::vec(any_row(), 0..40)
+            .prop_flat_map(|rows| (Just(rows.clone()), Just(rows).prop_shuffle()))
+    ) {
+        let series = |rows: Vec<Observation>| format!("{:?}", Series::new(rows, &UsageDefaults::default()).unwrap());
+        prop_assert_eq!(series(rows), series(shuffled));
+    }
+
+    /// A backtest cuts a series; what is left must be what was known then.
+    #[test]
+    fn a_series_cut_at_a_day_is_the_series_of_that_day(rows in prop::collection::vec(any_row(), 0..40), day in 0_i64..30) {
+        let as_of_us = day * 86_400_000_000;
+        let known = rows.iter().copied().filter(|r| r.departure_us <= as_of_us);
+        let then = Series::new(known, &UsageDefaults::default()).unwrap();
+        let now = Series::new(rows.iter().copied(), &UsageDefaults::default()).unwrap();
+        prop_assert_eq!(format!("{:?}", now.flights_until(as_of_us)), format!("{:?}", then.flights()));
+    }
+
+    /// Wear does not unhappen.
+    #[test]
+    fn usage_never_falls(rows in prop::collection::vec(any_row(), 0..40)) {
+        let series = Series::new(rows, &UsageDefaults::default()).unwrap();
+        for pair in series.flights().windows(2) {
+            prop_assert!(pair[0].hours <= pair[1].hours && pair[0].flights < pair[1].flights && pair[0].reversals <= pair[1].reversals);
+        }
+    }
+}
