@@ -143,7 +143,7 @@ fn cut(disk: &mut Disk<'_>, chance: &mut Chance, preload: Option<&Path>, mid: bo
 /// had said that it did.
 fn state(bench: &Bench, promised: usize, ended: bool) -> Result<usize, String> {
     let store = match store::Store::open(bench.path("disk/results")) {
-        Err(error) if error.complaint().code == "store_missing" && promised == 0 => return Ok(0),
+        Err(error) if error.diagnostic().code == "store_missing" && promised == 0 => return Ok(0),
         opened => opened.map_err(|e| e.to_string())?,
     };
     let records = store.records(&store::Query::default()).map_err(|e| e.to_string())?;

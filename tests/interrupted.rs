@@ -137,7 +137,7 @@ pub(crate) fn whole_flights(bench: &Bench) -> usize {
     let store = match store::Store::open(bench.path("results")) {
         Ok(store) => store,
         // Killed before the store was made, or while it was.
-        Err(error) if error.complaint().code == "store_missing" => return 0,
+        Err(error) if error.diagnostic().code == "store_missing" => return 0,
         Err(error) => panic!("the store does not open: {error}"),
     };
     let records = store.records(&store::Query::default()).unwrap();

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use fleet::Complaint;
+use records::Diagnostic;
 
 /// The codes of the contract.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,9 +31,9 @@ impl From<Code> for ExitCode {
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// Configuration, tables or arguments: code 2.
-    Refused(Vec<Complaint>),
+    Refused(Vec<Diagnostic>),
     /// Store or disk: code 3.
-    Failed(Box<Complaint>),
+    Failed(Box<Diagnostic>),
     /// The reader of our answer closed its pipe; nobody is left to tell.
     PipeClosed,
 }
@@ -41,12 +41,12 @@ pub(crate) enum Failure {
 impl Failure {
     /// A wrong argument.
     pub(crate) fn usage(code: &str, what: impl std::fmt::Display, hint: &str) -> Self {
-        Self::Refused(vec![Complaint::new(code, what).hint(hint)])
+        Self::Refused(vec![Diagnostic::new(code, what).hint(hint)])
     }
 
     /// Store or disk.
-    pub(crate) fn failed(complaint: Complaint) -> Self {
-        Self::Failed(Box::new(complaint))
+    pub(crate) fn failed(diagnostic: Diagnostic) -> Self {
+        Self::Failed(Box::new(diagnostic))
     }
 
     /// Its exit code.
@@ -62,19 +62,19 @@ impl Failure {
 impl From<pipeline::Error> for Failure {
     fn from(error: pipeline::Error) -> Self {
         match error {
-            pipeline::Error::Refused(complaints) => Self::Refused(complaints),
+            pipeline::Error::Refused(diagnostics) => Self::Refused(diagnostics),
             pipeline::Error::Store(error) => error.into(),
             pipeline::Error::Objects(error) => {
-                Self::failed(Complaint::new(error.code(), &error).hint(error.remedy()))
+                Self::failed(Diagnostic::new(error.code(), &error).hint(error.remedy()))
             }
-            other => Self::failed(Complaint::new("run_failed", other)),
+            other => Self::failed(Diagnostic::new("run_failed", other)),
         }
     }
 }
 
 impl From<store::Error> for Failure {
     fn from(error: store::Error) -> Self {
-        Self::failed(error.complaint())
+        Self::failed(error.diagnostic())
     }
 }
 
@@ -83,6 +83,6 @@ impl From<std::io::Error> for Failure {
         if error.kind() == std::io::ErrorKind::BrokenPipe {
             return Self::PipeClosed;
         }
-        Self::failed(Complaint::new("output_failed", format!("the answer cannot be written: {error}")))
+        Self::failed(Diagnostic::new("output_failed", format!("the answer cannot be written: {error}")))
     }
 }

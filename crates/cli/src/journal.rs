@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use fleet::Complaint;
 use jiff::Timestamp;
 use pipeline::Event;
+use records::Diagnostic;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -33,8 +33,8 @@ pub(crate) fn note(text: &str) -> String {
 }
 
 /// What is wrong with something.
-pub(crate) fn complaint(complaint: &Complaint) -> String {
-    line("error", "complaint", serde_json::to_value(complaint).unwrap_or_default())
+pub(crate) fn diagnostic(diagnostic: &Diagnostic) -> String {
+    line("error", "complaint", serde_json::to_value(diagnostic).unwrap_or_default())
 }
 
 /// What happens while a run goes on.
@@ -42,8 +42,8 @@ pub(crate) fn event(event: &Event) -> String {
     match event {
         Event::Planned { logs, bytes } => line("info", "planned", json!({ "logs": logs, "bytes": bytes })),
         Event::Started { log } => line("debug", "log_started", json!({ "log": log })),
-        Event::Finished { log, bytes, estimated, refused, complaints } => {
-            let codes: Vec<&str> = complaints.iter().map(|complaint| complaint.code.as_str()).collect();
+        Event::Finished { log, bytes, estimated, refused, diagnostics } => {
+            let codes: Vec<&str> = diagnostics.iter().map(|diagnostic| diagnostic.code.as_str()).collect();
             let level = if codes.is_empty() { "info" } else { "error" };
             let what = json!({ "log": log, "bytes": bytes, "estimated": estimated, "refused": refused, "codes": codes });
             line(level, "log_finished", what)

@@ -1,7 +1,7 @@
 //! `freeplay`: the backlash gap of flight-control actuators, from the logs a fleet records anyway.
 //!
 //! This crate parses, calls and answers. Only it prints, exits and reads the environment: answers go
-//! to stdout, progress and complaints to stderr.
+//! to stdout, progress and diagnostics to stderr.
 
 mod args;
 mod commands;
@@ -21,7 +21,7 @@ use clap::Parser;
 
 use args::{Args, Command};
 use exit::{Code, Failure};
-use fleet::Complaint;
+use records::Diagnostic;
 use talk::Talk;
 
 fn main() -> ExitCode {
@@ -35,11 +35,11 @@ fn main() -> ExitCode {
     };
     ignore_file_size_signal();
     let talk = Talk::new(&args.global);
-    // A panic while reading a log becomes a complaint about that log; its backtrace would help nobody.
+    // A panic while reading a log becomes a diagnostic about that log; its backtrace would help nobody.
     std::panic::set_hook(Box::new(|_| {}));
     let ended = std::panic::catch_unwind(|| dispatch(&args, &talk)).unwrap_or_else(|_| {
-        let complaint = Complaint::new("panic", "the program failed in a way that should not happen");
-        Err(Failure::failed(complaint.hint("what was stored before is intact; please report the command")))
+        let diagnostic = Diagnostic::new("panic", "the program failed in a way that should not happen");
+        Err(Failure::failed(diagnostic.hint("what was stored before is intact; please report the command")))
     });
     match ended {
         Ok(code) => code.into(),

@@ -9,7 +9,7 @@ use crate::args::Args;
 
 const HEAD: &str = "# Every command\n\nWritten from the program's own parser (`FREEPLAY_BLESS=1 cargo test -p cli \
                     reference`), so it cannot drift; a test compares it.\n`freeplay help COMMAND` says the same at a \
-                    prompt. Answers go to stdout, progress and complaints to stderr;\n[exit codes](columns.md#exit-codes) are the same everywhere.\n";
+                    prompt. Answers go to stdout, progress and diagnostics to stderr;\n[exit codes](columns.md#exit-codes) are the same everywhere.\n";
 
 #[test]
 fn the_reference_of_commands_is_what_the_parser_knows() {

@@ -9,9 +9,9 @@ use arrow::compute::cast;
 use arrow::csv::WriterBuilder as CsvWriter;
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use arrow::json::writer::{JsonArray, WriterBuilder as JsonWriter};
-use fleet::Complaint;
 use parquet::arrow::ArrowWriter;
 pub(crate) use pipeline::rows::utc;
+use records::Diagnostic;
 use serde::Serialize;
 
 use crate::args::{Format, Output};
@@ -68,7 +68,7 @@ fn not_written(file: &std::path::Path, error: &io::Error) -> Failure {
         _ => (error.to_string(), "can a file be written there?"),
     };
     let what = format!("the answer cannot be written: {why}");
-    Failure::failed(Complaint::new("output_failed", what).in_file(file.display()).hint(hint))
+    Failure::failed(Diagnostic::new("output_failed", what).in_file(file.display()).hint(hint))
 }
 
 fn write(batch: &RecordBatch, format: Format, out: &mut (impl Write + Send)) -> Result<(), Failure> {
@@ -97,7 +97,7 @@ fn broken(error: &arrow::error::ArrowError) -> Failure {
     if error.to_string().contains("Broken pipe") {
         return Failure::PipeClosed;
     }
-    Failure::failed(Complaint::new("output_failed", format!("the answer cannot be written: {error}")))
+    Failure::failed(Diagnostic::new("output_failed", format!("the answer cannot be written: {error}")))
 }
 
 /// CSV has no lists: theirs become text, its items parted by semicolons, other nests JSON.

@@ -2,7 +2,7 @@
 
 use std::io::{self, IsTerminal, Write};
 
-use fleet::Complaint;
+use records::Diagnostic;
 
 use pipeline::Event;
 
@@ -10,7 +10,7 @@ use crate::args::{Color, Global, LogFormat};
 use crate::exit::{Code, Failure};
 use crate::journal;
 
-/// Of alike complaints so many are shown whole.
+/// Of alike diagnostics so many are shown whole.
 const SHOWN_WHOLE: usize = 3;
 
 /// Whether a person sits at the other end: a pipe on any side gets no bar and no colour.
@@ -82,23 +82,23 @@ impl Talk {
         }
     }
 
-    /// Shows a complaint, on stderr.
-    pub(crate) fn complain(&self, complaint: &Complaint) {
+    /// Shows a diagnostic, on stderr.
+    pub(crate) fn complain(&self, diagnostic: &Diagnostic) {
         if self.is_json() {
-            return self.err(&journal::complaint(complaint));
+            return self.err(&journal::diagnostic(diagnostic));
         }
-        let text = escape(&complaint.to_string());
+        let text = escape(&diagnostic.to_string());
         self.err(&if self.color_err { painted(&text) } else { text });
     }
 
-    /// Shows complaints: of each kind the first few whole, and how many more there are.
-    pub(crate) fn complain_all<'c>(&self, complaints: impl IntoIterator<Item = &'c Complaint>) {
+    /// Shows diagnostics: of each kind the first few whole, and how many more there are.
+    pub(crate) fn complain_all<'c>(&self, diagnostics: impl IntoIterator<Item = &'c Diagnostic>) {
         let mut seen: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
-        for complaint in complaints {
-            let count = seen.entry(&complaint.code).or_default();
+        for diagnostic in diagnostics {
+            let count = seen.entry(&diagnostic.code).or_default();
             *count += 1;
             if *count <= SHOWN_WHOLE || self.shows_all() {
-                self.complain(complaint);
+                self.complain(diagnostic);
             }
         }
         let more = seen.into_iter().filter(|(_, count)| *count > SHOWN_WHOLE && !self.shows_all());
@@ -118,11 +118,11 @@ impl Talk {
     /// Tells why a command could not answer.
     pub(crate) fn fail(&self, failure: &Failure) -> Code {
         match failure {
-            Failure::Refused(complaints) => {
-                self.complain_all(complaints);
+            Failure::Refused(diagnostics) => {
+                self.complain_all(diagnostics);
                 self.note("nothing was run");
             }
-            Failure::Failed(complaint) => self.complain(complaint),
+            Failure::Failed(diagnostic) => self.complain(diagnostic),
             Failure::PipeClosed => {}
         }
         failure.code()

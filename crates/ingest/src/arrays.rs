@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fleet::Position;
+use records::Position;
 
 use crate::clock::{self, Origin, Stamps};
 use crate::error::{Error, Fault};
@@ -81,7 +81,7 @@ mod tests {
     #[test]
     fn arrays_of_two_lengths_are_refused_by_name() {
         let short = Arrays { load_n: &[1.0], ..arrays(&[0.0, 0.1], &[1.0, 2.0]) };
-        let complaint = short.actuator(Position::new("rudder").unwrap()).unwrap_err().complaint();
-        assert!(complaint.to_string().contains("load_n"), "{complaint}");
+        let diagnostic = short.actuator(Position::new("rudder").unwrap()).unwrap_err().diagnostic();
+        assert!(diagnostic.to_string().contains("load_n"), "{diagnostic}");
     }
 }

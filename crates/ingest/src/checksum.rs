@@ -161,9 +161,9 @@ mod tests {
         write(&honest, compression, encoding);
         assert_eq!(read(&honest).unwrap(), 1000);
         rewrite(&File::open(&honest).unwrap(), &mut File::create(&lying).unwrap(), mend).unwrap();
-        let complaint = read(&lying).unwrap_err().complaint();
-        assert_eq!((complaint.code.as_str(), complaint.row_group), ("decode_failed", Some(0)));
-        complaint.what
+        let diagnostic = read(&lying).unwrap_err().diagnostic();
+        assert_eq!((diagnostic.code.as_str(), diagnostic.row_group), ("decode_failed", Some(0)));
+        diagnostic.message
     }
 
     #[test]
@@ -230,12 +230,12 @@ mod tests {
         let mut file = bytes[..(start + length) as usize].to_vec();
         ParquetMetaDataWriter::new(&mut file, &footer).finish().unwrap();
         std::fs::write(&lying, file).unwrap();
-        let complaint = read(&lying).unwrap_err().complaint();
-        assert_eq!(complaint.code, "decode_failed");
+        let diagnostic = read(&lying).unwrap_err().diagnostic();
+        assert_eq!(diagnostic.code, "decode_failed");
         assert!(
-            complaint.what.contains("1000 values where 1000000000000 are declared"),
+            diagnostic.message.contains("1000 values where 1000000000000 are declared"),
             "{}",
-            complaint.what
+            diagnostic.message
         );
     }
 }

@@ -91,7 +91,7 @@ impl Origin {
 /// The stamps of some rows: seconds since the first one; NaN where a row has none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stamps {
-    /// The column they come from, for complaints.
+    /// The column they come from, for diagnostics.
     pub column: String,
     /// Seconds since the first stamp.
     pub seconds: Vec<f64>,

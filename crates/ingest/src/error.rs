@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use fleet::Complaint;
+use records::Diagnostic;
 
 use crate::pattern::PLACEHOLDER;
 
@@ -24,8 +24,8 @@ impl Error {
     }
 
     /// The form in which people and scripts see it.
-    pub fn complaint(&self) -> Complaint {
-        self.fault.complaint().in_file(self.file.display())
+    pub fn diagnostic(&self) -> Diagnostic {
+        self.fault.diagnostic().in_file(self.file.display())
     }
 }
 
@@ -41,7 +41,7 @@ pub enum Fault {
     },
     /// It lies in an object store, which does not give it.
     #[error(transparent)]
-    Object(#[from] objects::Error),
+    Object(#[from] object_io::Error),
     /// It has no bytes, or no rows.
     #[error("the log holds no rows")]
     Empty,
@@ -144,16 +144,16 @@ impl Fault {
         }
     }
 
-    fn complaint(&self) -> Complaint {
-        let mut c = Complaint::new(self.code(), self);
+    fn diagnostic(&self) -> Diagnostic {
+        let mut c = Diagnostic::new(self.code(), self);
         self.place(&mut c);
         c.found = self.found();
-        c.wanted = self.wanted();
+        c.expected = self.expected();
         c.hint = Some(self.remedy());
         c
     }
 
-    fn place(&self, c: &mut Complaint) {
+    fn place(&self, c: &mut Diagnostic) {
         match self {
             Self::Decode { column, row_group, .. } => {
                 c.column = Some(column.clone());
@@ -197,7 +197,7 @@ impl Fault {
         }
     }
 
-    fn wanted(&self) -> Option<String> {
+    fn expected(&self) -> Option<String> {
         match self {
             Self::TimeGoesBack { max_back_s, .. } => {
                 Some(format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)"))

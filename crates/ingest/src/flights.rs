@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-use fleet::{Flight, FlightId, TailNumber};
 use jiff::Timestamp;
+use records::{Flight, FlightId, TailNumber};
 
 use crate::error::Error;
 use crate::identity::{Facts, instant};

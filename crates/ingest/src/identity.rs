@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use fleet::{FlightId, Position, TailNumber};
 use jiff::{Timestamp, civil, tz::TimeZone};
 use percent_encoding::percent_decode_str;
+use records::{FlightId, Position, TailNumber};
 
 use crate::error::Fault;
 use crate::schema::{Fact, IdentityMapping};
@@ -50,7 +50,7 @@ pub(crate) fn from_path(path: &Path, expression: &str) -> Result<Facts, Fault> {
 
 /// The whole path; an address is whole as it is.
 pub(crate) fn absolute(path: &Path) -> PathBuf {
-    if objects::is_address(path) {
+    if object_io::is_address(path) {
         return path.to_owned();
     }
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
@@ -91,7 +91,7 @@ pub(crate) fn read(
     let flight = text(Fact::FlightId)
         .map_or_else(|| departure_utc.strftime("%Y%m%dT%H%M%SZ").to_string(), str::to_owned);
     let invalid = |fact: Fact| {
-        move |e: fleet::ids::EmptyName| Fault::IdentityInvalid {
+        move |e: records::ids::EmptyIdError| Fault::IdentityInvalid {
             fact: fact.as_str(),
             found: String::new(),
             detail: e.to_string(),

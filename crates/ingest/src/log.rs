@@ -5,8 +5,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use fleet::Position;
 use jiff::Timestamp;
+use records::Position;
 
 use crate::channel::{self, Channel, ClockKey, Follower, Sampling};
 use crate::clock::{Origin, Repairs, Timeline};

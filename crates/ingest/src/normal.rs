@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use fleet::Position;
+use records::Position;
 
 use crate::clock::Repairs;
 use crate::error::{Error, Fault};

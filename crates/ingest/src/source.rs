@@ -7,7 +7,7 @@ use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
 
-use objects::{Address, Spool};
+use object_io::{Address, ObjectFile};
 
 use crate::error::Fault;
 
@@ -15,13 +15,13 @@ use crate::error::Fault;
 #[derive(Debug)]
 pub(crate) enum Source {
     Local(File),
-    Object(Box<Spool>),
+    Object(Box<ObjectFile>),
 }
 
 impl Source {
     pub(crate) fn open(path: &Path) -> Result<Self, Fault> {
-        match Address::of(path)? {
-            Some(address) => Ok(Self::Object(Box::new(Spool::open(&address)?))),
+        match Address::parse(path)? {
+            Some(address) => Ok(Self::Object(Box::new(ObjectFile::open(&address)?))),
             None => Ok(Self::Local(File::open(path).map_err(|source| Fault::Unreadable { source })?)),
         }
     }
@@ -37,15 +37,15 @@ impl Source {
     pub(crate) fn want(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> Result<(), Fault> {
         match self {
             Self::Local(_) => Ok(()),
-            Self::Object(spool) => Ok(spool.want(ranges)?),
+            Self::Object(spool) => Ok(spool.ensure_range(ranges)?),
         }
     }
 }
 
 /// A whole file, at its beginning: for tables, all of which is read.
 pub(crate) fn whole(path: &Path) -> Result<File, Fault> {
-    if objects::is_address(path) {
-        return Ok(objects::whole(path)?);
+    if object_io::is_address(path) {
+        return Ok(object_io::read_all(path)?);
     }
     File::open(path).map_err(|source| Fault::Unreadable { source })
 }

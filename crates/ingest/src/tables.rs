@@ -9,8 +9,8 @@ use std::path::Path;
 use std::str::FromStr;
 
 use arrow::array::RecordBatch;
-use fleet::{Installation, Installations};
 use jiff::{Timestamp, civil, tz::TimeZone};
+use records::{Installation, Installations};
 
 pub use chunk::{Chunk, Chunks, Parted, Texts, chunks, trimmed};
 
@@ -58,7 +58,7 @@ impl Table {
         Ok(table)
     }
 
-    /// The same table from memory; `name` stands for its file in complaints.
+    /// The same table from memory; `name` stands for its file in diagnostics.
     ///
     /// # Errors
     /// When a column is neither text, numbers nor times.
@@ -189,7 +189,7 @@ pub fn installations(file: &Path, names: &Names) -> Result<Installations, Vec<Er
     if !errors.is_empty() {
         return Err(errors);
     }
-    let contradiction = |e: fleet::installation::Error| {
+    let contradiction = |e: records::installation::Error| {
         Error::new(file, Fault::Table { row: None, column: None, detail: e.to_string() })
     };
     Installations::new(rows).map_err(|found| found.into_iter().map(contradiction).collect())
@@ -232,7 +232,7 @@ impl InstallationColumns {
 ///
 /// # Errors
 /// When it is blank.
-pub fn name<T: TryFrom<String, Error = fleet::ids::EmptyName>>(text: &str) -> Result<T, String> {
+pub fn name<T: TryFrom<String, Error = records::ids::EmptyIdError>>(text: &str) -> Result<T, String> {
     T::try_from(text.to_owned()).map_err(|e| e.to_string())
 }
 
@@ -305,7 +305,7 @@ mod tests {
         let (_dir, file) =
             table(&format!("{HEADER}N1,aileron,EMA,,2026-01-01,\nN1,elevator,EMA,18,yesterday,\n"));
         let errors = installations(&file, &Names::new()).unwrap_err();
-        let places: Vec<_> = errors.iter().map(|e| e.complaint().place().unwrap()).collect();
+        let places: Vec<_> = errors.iter().map(|e| e.diagnostic().location().unwrap()).collect();
         assert_eq!(places, ["column `serial_number`, row 1", "column `installed_utc`, row 2"]);
     }
 
@@ -313,6 +313,6 @@ mod tests {
     fn a_missing_column_is_told_with_its_neighbour() {
         let (_dir, file) = table("tail_number,position,part_number,serial_no,installed_utc\n");
         let errors = installations(&file, &Names::new()).unwrap_err();
-        assert!(errors[0].complaint().hint.unwrap().starts_with("`serial_no`?"));
+        assert!(errors[0].diagnostic().hint.unwrap().starts_with("`serial_no`?"));
     }
 }

@@ -4,8 +4,8 @@ use std::cell::RefCell;
 
 use estimator::contact::{self, ContactEstimate, ContactOutcome, ContactPlot, PartPrior};
 use estimator::{Filter, MidRange, Room, Samples, Schedule, midrange};
-use fleet::{Complaint, Estimate, Status};
 use ingest::{Actuator, Geometry};
+use records::{Diagnostic, GapEstimate, Status};
 
 use crate::config::{EstimateSettings, Method};
 use crate::part::Part;
@@ -19,17 +19,17 @@ const BANDWIDTH_TOLERANCE: f64 = 0.25;
 /// refused; what the contact regression fits beside its gap is kept whenever it gives one.
 ///
 /// # Errors
-/// A complaint when the settings of the part do not fit the step of the log.
+/// A diagnostic when the settings of the part do not fit the step of the log.
 pub fn estimate(
     channels: &Actuator,
     part: &Part,
     settings: &EstimateSettings,
-) -> Result<Estimate, Complaint> {
+) -> Result<GapEstimate, Diagnostic> {
     let schedule = part.schedules.of(&filter(channels, part)?);
     let prior = prior(part);
-    let failed = |e: estimator::Error| Complaint::new("estimate_failed", e);
+    let failed = |e: estimator::Error| Diagnostic::new("estimate_failed", e);
     let mut estimate = if let Some(reason) = blind(channels) {
-        Estimate::refused(reason)
+        GapEstimate::refused(reason)
     } else {
         in_rooms(channels.dx_m.len(), |rooms| {
             let published = match midrange::estimate_in(&samples(channels), &schedule, &mut rooms.published) {
@@ -78,18 +78,18 @@ fn in_rooms<T>(samples: usize, work: impl FnOnce(&mut Rooms) -> T) -> T {
 /// The filter of a part at the step of a log.
 ///
 /// # Errors
-/// A complaint when a noise level or the step cannot be.
-pub fn filter(channels: &Actuator, part: &Part) -> Result<Filter, Complaint> {
+/// A diagnostic when a noise level or the step cannot be.
+pub fn filter(channels: &Actuator, part: &Part) -> Result<Filter, Diagnostic> {
     Filter::new(&part.actuator, channels.step_s, &part.noise)
-        .map_err(|e| Complaint::new("bad_parameter", e).hint("see the part's settings in the configuration"))
+        .map_err(|e| Diagnostic::new("bad_parameter", e).hint("see the part's settings in the configuration"))
 }
 
 /// What the contact regression stands on, for a person who wants to look; none where it refused.
 ///
 /// # Errors
-/// A complaint when the settings of the part cannot be.
-pub fn picture(channels: &Actuator, part: &Part) -> Result<Option<ContactPlot>, Complaint> {
-    contact::plot_data(&samples(channels), &prior(part)).map_err(|e| Complaint::new("estimate_failed", e))
+/// A diagnostic when the settings of the part cannot be.
+pub fn picture(channels: &Actuator, part: &Part) -> Result<Option<ContactPlot>, Diagnostic> {
+    contact::plot_data(&samples(channels), &prior(part)).map_err(|e| Diagnostic::new("estimate_failed", e))
 }
 
 /// The channels as the estimator takes them.
@@ -138,10 +138,10 @@ fn judged(
     outcome: &ContactOutcome,
     prior: &PartPrior,
     method: Method,
-) -> Estimate {
+) -> GapEstimate {
     let mut estimate = match outcome {
         ContactOutcome::Estimated(found) => regressed(found),
-        ContactOutcome::Refused(why) => Estimate::refused(why.code()),
+        ContactOutcome::Refused(why) => GapEstimate::refused(why.code()),
     };
     let Some(published) = published else { return estimate };
     estimate.gap_midrange_m = Some(published.gap.gap_m);
@@ -166,9 +166,9 @@ fn judged(
     estimate
 }
 
-fn regressed(found: &ContactEstimate) -> Estimate {
+fn regressed(found: &ContactEstimate) -> GapEstimate {
     let (p05_m, p95_m) = found.gap_bounds_m;
-    Estimate {
+    GapEstimate {
         status: Status::Estimated,
         flags: found.flags.iter().map(|flag| flag.code().to_owned()).collect(),
         gap_m: Some(found.gap_m),
@@ -184,7 +184,7 @@ fn regressed(found: &ContactEstimate) -> Estimate {
         lost_motion_m: found.lost_motion_m,
         lost_motion_se_m: found.lost_motion_se_m,
         reason: None,
-        ..Estimate::refused("")
+        ..GapEstimate::refused("")
     }
 }
 

@@ -5,12 +5,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use fleet::{
-    Complaint, Estimate, Flight, GapRecord, Installation, Installations, PartNumber, Position, Provenance,
-};
 use ingest::identity::Facts;
 use ingest::{Actuator, Channels, Files, Identity, Log, Mapping, PositionColumns};
 use jiff::Timestamp;
+use records::{
+    Diagnostic, Flight, GapEstimate, GapRecord, Installation, Installations, PartNumber, Position, Provenance,
+};
 
 use crate::config::Config;
 use crate::estimate;
@@ -43,20 +43,20 @@ pub struct Opened {
 }
 
 impl Opened {
-    /// Opens a log; `shown` is its name in records and complaints.
+    /// Opens a log; `shown` is its name in records and diagnostics.
     ///
     /// # Errors
-    /// A complaint when the log cannot be read or identified.
+    /// A diagnostic when the log cannot be read or identified.
     pub fn open(
         files: &Files,
         shown: &str,
         config: &Config,
         installations: &Installations,
-    ) -> Result<Self, Complaint> {
-        let complain = |e: ingest::Error| e.complaint().in_file(shown);
+    ) -> Result<Self, Diagnostic> {
+        let complain = |e: ingest::Error| e.diagnostic().in_file(shown);
         let log = Log::open(files, config.base_mapping()).map_err(complain)?;
         let identity = identity_of(&log, files, config).map_err(complain)?;
-        let log = log.with_mapping(&config.mapping(&identity.tail_number, None));
+        let log = log.remapped(&config.mapping(&identity.tail_number, None));
         let mapped = mapped(&log, &identity, config, installations).map_err(complain)?;
         let used: Vec<_> = mapped.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
         let digest = log.digest(&used).map_err(complain)?;
@@ -66,7 +66,7 @@ impl Opened {
         Ok(Self { log, shown: shown.to_owned(), mappings, identity, positions, digest })
     }
 
-    /// Its name in records and complaints.
+    /// Its name in records and diagnostics.
     pub fn shown(&self) -> &str {
         &self.shown
     }
@@ -79,11 +79,11 @@ impl Opened {
     /// Whether every page that is read carries a checksum.
     ///
     /// # Errors
-    /// A complaint when a page header cannot be read.
-    pub fn is_checked(&self) -> Result<bool, Complaint> {
+    /// A diagnostic when a page header cannot be read.
+    pub fn is_checked(&self) -> Result<bool, Diagnostic> {
         let used: Vec<_> =
             self.positions.iter().filter_map(|at| Some((self.channels_map(at)?, at))).collect();
-        self.log.has_page_checksums(&used).map_err(|e| e.complaint().in_file(&self.shown))
+        self.log.is_checked(&used).map_err(|e| e.diagnostic().in_file(&self.shown))
     }
 
     /// Names of the positions, in order.
@@ -100,22 +100,23 @@ impl Opened {
     /// `battery_load` may fit a pattern without being an actuator.
     pub fn actuators(&self, installations: &Installations) -> impl Iterator<Item = &PositionColumns> {
         let id = &self.identity;
-        let booked = |at: &Position| installations.at(&id.tail_number, at, id.departure_utc).is_some();
+        let booked =
+            |at: &Position| installations.installed_at(&id.tail_number, at, id.departure_utc).is_some();
         self.positions.iter().filter(move |at| at.lacking.is_empty() || booked(&at.position))
     }
 
     /// Estimates one actuator of the log.
     ///
     /// # Errors
-    /// A complaint when the actuator cannot be used; the others of the log are not affected.
+    /// A diagnostic when the actuator cannot be used; the others of the log are not affected.
     pub fn record(
         &self,
         at: &PositionColumns,
         config: &Config,
         installations: &Installations,
         stamp: &Stamp,
-    ) -> Result<GapRecord, Complaint> {
-        let in_file = |complaint: Complaint| complaint.in_file(&self.shown);
+    ) -> Result<GapRecord, Diagnostic> {
+        let in_file = |diagnostic: Diagnostic| diagnostic.in_file(&self.shown);
         let (stay, part) = self.unit(at, config, installations).map_err(in_file)?;
         let estimate = self.estimate(at, part, config).map_err(in_file)?;
         Ok(GapRecord {
@@ -139,16 +140,16 @@ impl Opened {
     /// The unit that sat in a position that day, and the settings of its part.
     ///
     /// # Errors
-    /// A complaint when nobody is booked there, or the part is not configured.
+    /// A diagnostic when nobody is booked there, or the part is not configured.
     pub fn unit<'u>(
         &self,
         at: &PositionColumns,
         config: &'u Config,
         installations: &'u Installations,
-    ) -> Result<(&'u Installation, &'u Part), Complaint> {
+    ) -> Result<(&'u Installation, &'u Part), Diagnostic> {
         let id = &self.identity;
         let stay = installations
-            .at(&id.tail_number, &at.position, id.departure_utc)
+            .installed_at(&id.tail_number, &at.position, id.departure_utc)
             .ok_or_else(|| nobody_installed(id, &at.position, installations))?;
         Ok((stay, part_of(config, &stay.part_number)?))
     }
@@ -156,33 +157,33 @@ impl Opened {
     /// Estimates one actuator as a given part, whoever is booked there.
     ///
     /// # Errors
-    /// A complaint when its channels cannot be read.
+    /// A diagnostic when its channels cannot be read.
     pub fn estimate(
         &self,
         at: &PositionColumns,
         part: &Part,
         config: &Config,
-    ) -> Result<Estimate, Complaint> {
+    ) -> Result<GapEstimate, Diagnostic> {
         if !at.lacking.is_empty() {
-            return Ok(Estimate::refused("channel_unmapped"));
+            return Ok(GapEstimate::refused("channel_unmapped"));
         }
         let actuator = self.channels(at, part)?;
         let estimate = estimate::estimate(&actuator, part, &config.document.estimate);
-        actuator.recycle_buffers();
+        actuator.reuse();
         estimate
     }
 
     /// Reads the channels of one actuator of a given part.
     ///
     /// # Errors
-    /// A complaint when they cannot be read.
-    pub fn channels(&self, at: &PositionColumns, part: &Part) -> Result<Actuator, Complaint> {
+    /// A diagnostic when they cannot be read.
+    pub fn channels(&self, at: &PositionColumns, part: &Part) -> Result<Actuator, Diagnostic> {
         let Some(channels) = self.channels_map(at) else {
             let what = format!("the log was not opened for {}", at.position);
-            return Err(Complaint::new("no_position", what).in_file(&self.shown));
+            return Err(Diagnostic::new("no_position", what).in_file(&self.shown));
         };
-        let read = self.log.read_actuator(at, channels, part.geometry);
-        read.map_err(|e| e.complaint().in_file(&self.shown))
+        let read = self.log.actuator(at, channels, part.geometry);
+        read.map_err(|e| e.diagnostic().in_file(&self.shown))
     }
 
     /// Rows the footers declare.
@@ -199,13 +200,13 @@ impl Opened {
 /// Estimates every actuator of a log that says nothing of its flight, as one part.
 ///
 /// # Errors
-/// A complaint when the log cannot be read or put on one clock.
+/// A diagnostic when the log cannot be read or put on one clock.
 pub fn anonymous(
     files: &Files,
     shown: &str,
     config: &Config,
     part: &Part,
-) -> Result<Vec<(Position, Estimate)>, Complaint> {
+) -> Result<Vec<(Position, GapEstimate)>, Diagnostic> {
     let mut found = Vec::new();
     each_anonymous(files, shown, config, part, |channels| {
         found.push((
@@ -223,17 +224,17 @@ pub(crate) fn each_anonymous(
     shown: &str,
     config: &Config,
     part: &Part,
-    mut take: impl FnMut(&Actuator) -> Result<(), Complaint>,
-) -> Result<(), Complaint> {
-    let complain = |e: ingest::Error| e.complaint().in_file(shown);
+    mut take: impl FnMut(&Actuator) -> Result<(), Diagnostic>,
+) -> Result<(), Diagnostic> {
+    let complain = |e: ingest::Error| e.diagnostic().in_file(shown);
     let log = Log::open(files, config.base_mapping()).map_err(complain)?;
     let channels = &config.base_mapping().channels;
     // A log of one actuator has no name for it here, but needs one to be asked by.
-    let own = Position::new("actuator").map_err(|e| Complaint::new("empty_name", e))?;
-    let positions = log.actuators(channels, Some(&own)).map_err(complain)?;
+    let own = Position::new("actuator").map_err(|e| Diagnostic::new("empty_name", e))?;
+    let positions = log.positions(channels, Some(&own)).map_err(complain)?;
     for at in positions.iter().filter(|at| at.lacking.is_empty()) {
-        let read = log.read_actuator(at, channels, part.geometry).map_err(complain)?;
-        take(&read).map_err(|complaint| complaint.in_file(shown))?;
+        let read = log.actuator(at, channels, part.geometry).map_err(complain)?;
+        take(&read).map_err(|diagnostic| diagnostic.in_file(shown))?;
     }
     Ok(())
 }
@@ -241,15 +242,15 @@ pub(crate) fn each_anonymous(
 /// Hands over the channels of every actuator of a log with its part: as booked, or all as one part.
 ///
 /// # Errors
-/// A complaint when the log or an actuator in it cannot be read, or `take` complains.
+/// A diagnostic when the log or an actuator in it cannot be read, or `take` complains.
 pub(crate) fn each(
     files: &Files,
     shown: &str,
     config: &Config,
     installations: &Installations,
     part: Option<&PartNumber>,
-    mut take: impl FnMut(&Actuator, &Part) -> Result<(), Complaint>,
-) -> Result<(), Complaint> {
+    mut take: impl FnMut(&Actuator, &Part) -> Result<(), Diagnostic>,
+) -> Result<(), Diagnostic> {
     if let Some(number) = part {
         let part = part_of(config, number)?;
         return each_anonymous(files, shown, config, part, |channels| take(channels, part));
@@ -265,23 +266,23 @@ pub(crate) fn each(
 /// The settings of a part number.
 ///
 /// # Errors
-/// A complaint when the configuration does not know it.
-pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, Complaint> {
+/// A diagnostic when the configuration does not know it.
+pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, Diagnostic> {
     config.parts.get(number).ok_or_else(|| {
-        Complaint::new("part_unknown", format!("part number {number} is installed, but not configured"))
+        Diagnostic::new("part_unknown", format!("part number {number} is installed, but not configured"))
             .hint(format!("add `[part.\"{number}\"]` to {}", config.file.display()))
     })
 }
 
-fn nobody_installed(id: &Identity, position: &Position, installations: &Installations) -> Complaint {
+fn nobody_installed(id: &Identity, position: &Position, installations: &Installations) -> Diagnostic {
     let (tail, at) = (&id.tail_number, id.departure_utc);
-    if installations.knows_tail(tail) {
+    if installations.contains_tail(tail) {
         let what = format!("no unit is booked in {position} of {tail} on {at}");
-        Complaint::new("unit_unknown", what)
+        Diagnostic::new("unit_unknown", what)
             .hint("add its stay to the installations table, then `freeplay run --retry`")
     } else {
         let what = format!("the installations table does not know tail {tail}");
-        Complaint::new("tail_unknown", what)
+        Diagnostic::new("tail_unknown", what)
             .hint("is the tail spelled alike in logs and table? Then `freeplay run --retry`")
     }
 }
@@ -297,7 +298,7 @@ pub fn config_digest(
 ) -> String {
     let mut hash = blake3::Hasher::new();
     for position in positions {
-        let stay = installations.at(&flight.tail_number, position, flight.departure_utc);
+        let stay = installations.installed_at(&flight.tail_number, position, flight.departure_utc);
         // The whole stay, its hours included: they stand in the record too.
         let stay_text = stay.map(|s| serde_json::to_string(s).unwrap_or_default());
         let digest = stay.map(|s| config.digest(&flight.tail_number, &s.part_number));
@@ -330,14 +331,14 @@ pub fn unidentified_digest(config: &Config, installations: &Installations) -> St
 /// Which flight a log is, and which actuator where it holds but one, without reading its channels.
 ///
 /// # Errors
-/// A complaint when the log cannot be read, put on one clock or identified.
+/// A diagnostic when the log cannot be read, put on one clock or identified.
 pub fn identify(
     files: &Files,
     shown: &str,
     config: &Config,
-) -> Result<(Flight, Option<Position>), Complaint> {
+) -> Result<(Flight, Option<Position>), Diagnostic> {
     caught(shown, || {
-        let complain = |e: ingest::Error| e.complaint().in_file(shown);
+        let complain = |e: ingest::Error| e.diagnostic().in_file(shown);
         let log = Log::open(files, config.base_mapping()).map_err(complain)?;
         let id = identity_of(&log, files, config).map_err(complain)?;
         Ok((flight_of(&id), id.position))
@@ -347,17 +348,17 @@ pub fn identify(
 /// Which flight a file of a group belongs to.
 ///
 /// # Errors
-/// A complaint when the file cannot be read or identified.
+/// A diagnostic when the file cannot be read or identified.
 pub fn identify_companion(
     path: &Path,
     group: &str,
     shown: &str,
     config: &Config,
-) -> Result<(Flight, Option<Position>), Complaint> {
+) -> Result<(Flight, Option<Position>), Diagnostic> {
     caught(shown, || {
         let known = |said: &Facts| config.flights.facts(path, said, &config.document.identity);
         let id = ingest::log::identity_of_file(path, config.base_mapping(), group, known)
-            .map_err(|e| e.complaint().in_file(shown))?;
+            .map_err(|e| e.diagnostic().in_file(shown))?;
         Ok((flight_of(&id), id.position))
     })
 }
@@ -378,7 +379,7 @@ fn mapped(
     installations: &Installations,
 ) -> Result<Vec<Mapped>, ingest::Error> {
     let usual = config.mapping(&id.tail_number, None);
-    let found = log.actuators(&usual.channels, id.position.as_ref());
+    let found = log.positions(&usual.channels, id.position.as_ref());
     let mut at: BTreeMap<Position, Mapped> = BTreeMap::new();
     let mut failed = None;
     match found {
@@ -387,9 +388,9 @@ fn mapped(
     }
     for part in config.own_parts() {
         let mapping = config.mapping(&id.tail_number, Some(part));
-        let Ok(found) = log.actuators(&mapping.channels, id.position.as_ref()) else { continue };
+        let Ok(found) = log.positions(&mapping.channels, id.position.as_ref()) else { continue };
         let sits = |p: &PositionColumns| {
-            let stay = installations.at(&id.tail_number, &p.position, id.departure_utc);
+            let stay = installations.installed_at(&id.tail_number, &p.position, id.departure_utc);
             stay.is_some_and(|stay| stay.part_number == *part)
         };
         at.extend(found.into_iter().filter(sits).map(|p| (p.position.clone(), (p, Arc::clone(&mapping)))));
@@ -404,13 +405,13 @@ fn mapped(
 /// the same samples are the same log, however they are encoded.
 ///
 /// # Errors
-/// A complaint when a log or a channel cannot be read.
+/// A diagnostic when a log or a channel cannot be read.
 pub fn sample_digest(
     files: &Files,
     shown: &str,
     config: &Config,
     installations: &Installations,
-) -> Result<String, Complaint> {
+) -> Result<String, Diagnostic> {
     caught(shown, || {
         let opened = Opened::open(files, shown, config, installations)?;
         let mut hash = blake3::Hasher::new();
@@ -438,17 +439,17 @@ fn flight_of(id: &Identity) -> Flight {
     }
 }
 
-/// Does something with one log; a panic in it is a complaint like any other.
+/// Does something with one log; a panic in it is a diagnostic like any other.
 ///
 /// # Errors
 /// What the work complains of, or code `panic`.
-pub fn caught<T>(shown: &str, work: impl FnOnce() -> Result<T, Complaint>) -> Result<T, Complaint> {
+pub fn caught<T>(shown: &str, work: impl FnOnce() -> Result<T, Diagnostic>) -> Result<T, Diagnostic> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied();
         let text =
             text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
         let what = format!("reading this log failed in a way that should not happen: {text}");
-        Err(Complaint::new("panic", what)
+        Err(Diagnostic::new("panic", what)
             .in_file(shown)
             .hint("the file is probably damaged; please report it with the file"))
     })

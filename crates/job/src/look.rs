@@ -2,8 +2,8 @@
 
 use estimator::contact::ContactPlot;
 use estimator::gap::{self, Gap};
-use fleet::{Complaint, Estimate, Installations, PartNumber, Position};
 use ingest::{Actuator, Files};
+use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
 
 use crate::config::Config;
 use crate::estimate;
@@ -16,7 +16,7 @@ pub struct Look {
     /// Its place.
     pub position: Position,
     /// Its record, or why there is none.
-    pub estimate: Estimate,
+    pub estimate: GapEstimate,
     /// Time between samples, s.
     pub step_s: f64,
     /// δX, m; NaN where missing.
@@ -32,10 +32,10 @@ pub struct Look {
 }
 
 impl Look {
-    fn of(channels: &Actuator, part: &Part, config: &Config) -> Result<Self, Complaint> {
+    fn of(channels: &Actuator, part: &Part, config: &Config) -> Result<Self, Diagnostic> {
         let track = estimate::filter(channels, part)?
             .track(&estimate::samples(channels), None)
-            .map_err(|e| Complaint::new("estimate_failed", e))?;
+            .map_err(|e| Diagnostic::new("estimate_failed", e))?;
         Ok(Self {
             position: channels.position.clone(),
             estimate: estimate::estimate(channels, part, &config.document.estimate)?,
@@ -52,14 +52,14 @@ impl Look {
 /// Looks at every actuator of a log: as booked, or all as one part.
 ///
 /// # Errors
-/// A complaint when the log or an actuator in it cannot be read.
+/// A diagnostic when the log or an actuator in it cannot be read.
 pub fn of_log(
     files: &Files,
     shown: &str,
     config: &Config,
     installations: &Installations,
     part: Option<&PartNumber>,
-) -> Result<Vec<Look>, Complaint> {
+) -> Result<Vec<Look>, Diagnostic> {
     let mut looks = Vec::new();
     flight::each(files, shown, config, installations, part, |channels, part| {
         looks.push(Look::of(channels, part, config)?);

@@ -3,36 +3,36 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use fleet::{Complaint, Installations};
 use ingest::write::Encoding;
 use ingest::{Files, PositionColumns};
+use records::{Diagnostic, Installations};
 
 use crate::config::Config;
 use crate::flight::{Opened, caught};
 
 /// Writes the normalized logs of one log below a folder, as `TAIL/FLIGHT/POSITION.parquet`.
 ///
-/// An actuator that cannot be used becomes a complaint; the others are written.
+/// An actuator that cannot be used becomes a diagnostic; the others are written.
 ///
 /// # Errors
-/// A complaint when the log cannot be read or identified.
+/// A diagnostic when the log cannot be read or identified.
 pub fn normalize(
     files: &Files,
     shown: &str,
     config: &Config,
     installations: &Installations,
     (folder, encoding): (&Path, Encoding),
-) -> Result<(Vec<PathBuf>, Vec<Complaint>), Complaint> {
+) -> Result<(Vec<PathBuf>, Vec<Diagnostic>), Diagnostic> {
     caught(shown, || {
         let opened = Opened::open(files, shown, config, installations)?;
-        let (mut written, mut complaints) = (Vec::new(), Vec::new());
+        let (mut written, mut diagnostics) = (Vec::new(), Vec::new());
         for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
             match one(&opened, at, config, installations, (folder, encoding)) {
                 Ok(file) => written.push(file),
-                Err(complaint) => complaints.push(complaint.in_file(shown)),
+                Err(diagnostic) => diagnostics.push(diagnostic.in_file(shown)),
             }
         }
-        Ok((written, complaints))
+        Ok((written, diagnostics))
     })
 }
 
@@ -42,7 +42,7 @@ fn one(
     config: &Config,
     installations: &Installations,
     (folder, encoding): (&Path, Encoding),
-) -> Result<PathBuf, Complaint> {
+) -> Result<PathBuf, Diagnostic> {
     let (stay, part) = opened.unit(at, config, installations)?;
     let channels = opened.channels(at, part)?;
     let id = &opened.identity;
@@ -56,7 +56,7 @@ fn one(
         ("serial_number".to_owned(), stay.serial_number.to_string()),
     ]);
     ingest::normal::write(&file, &channels, id, part.geometry, &provenance, encoding)
-        .map_err(|e| e.complaint())?;
+        .map_err(|e| e.diagnostic())?;
     Ok(file)
 }
 

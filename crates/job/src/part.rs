@@ -1,8 +1,8 @@
 //! A part number's settings: whose stiffness, damping, mass, sensors and limits we use.
 
 use estimator::noise::{Noise, Sensors};
-use fleet::Complaint;
 use ingest::Geometry;
+use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -166,7 +166,7 @@ pub struct Part {
 }
 
 /// A key below the part's table, and what is wrong with it.
-pub(crate) type KeyComplaint = (&'static [&'static str], Complaint);
+pub(crate) type KeyComplaint = (&'static [&'static str], Diagnostic);
 
 impl PartSettings {
     /// The settings that can move a gap: limits and the axis of wear move none.
@@ -188,7 +188,7 @@ impl PartSettings {
             let what = format!("`watch_m` {watch} lies above `limit_m` {limit}");
             keys.complain(
                 &["watch_m"],
-                Complaint::new("limit_order", what)
+                Diagnostic::new("limit_order", what)
                     .hint("the gap that is reported comes before the one that grounds"),
             );
         }
@@ -234,7 +234,7 @@ impl PartSettings {
             let what = format!("`{}` is no key of a {kind} part", key[0]);
             keys.complain(
                 key,
-                Complaint::new("key_of_other_kind", what)
+                Diagnostic::new("key_of_other_kind", what)
                     .hint("`kind` is \"linear\" (default) or \"rotary\""),
             );
         }
@@ -265,7 +265,7 @@ impl PartSettings {
             let hint = "[part.\"…\".noise] needs screw_rms_m, motor_rms_m, unknown_force_n and bandwidth_hz; see docs/configuration.md";
             keys.complain(
                 &[],
-                Complaint::new("key_missing", "the part has no `noise`, and there are no default levels")
+                Diagnostic::new("key_missing", "the part has no `noise`, and there are no default levels")
                     .hint(hint),
             );
             return None;
@@ -322,7 +322,7 @@ impl NoiseSettings {
         keys.positive(&["noise", "bandwidth_hz"], self.bandwidth_hz);
         for level in levels.into_iter().flatten().filter(|level| !(level.is_finite() && *level >= 0.0)) {
             let what = format!("a noise level is {level}, which must be a number of at least zero");
-            keys.complain(&["noise"], Complaint::new("bad_parameter", what));
+            keys.complain(&["noise"], Diagnostic::new("bad_parameter", what));
         }
         let [screw_rms, screw_resolution, motor_rms, motor_resolution, force] = levels;
         Some(Sensors {
@@ -343,14 +343,14 @@ struct Keys {
 }
 
 impl Keys {
-    fn complain(&mut self, key: &'static [&'static str], complaint: Complaint) {
-        self.found.push((key, complaint));
+    fn complain(&mut self, key: &'static [&'static str], diagnostic: Diagnostic) {
+        self.found.push((key, diagnostic));
     }
 
     fn required<T>(&mut self, key: &'static [&'static str], value: Option<T>) -> Option<T> {
         if value.is_none() {
             let name = key.join(".");
-            self.complain(key, Complaint::new("key_missing", format!("the part does not say its `{name}`")));
+            self.complain(key, Diagnostic::new("key_missing", format!("the part does not say its `{name}`")));
         }
         value
     }
@@ -361,6 +361,6 @@ impl Keys {
     }
 
     fn made<T>(&mut self, key: &'static [&'static str], made: Result<T, estimator::Error>) -> Option<T> {
-        made.map_err(|e| self.complain(key, Complaint::new("bad_parameter", e))).ok()
+        made.map_err(|e| self.complain(key, Diagnostic::new("bad_parameter", e))).ok()
     }
 }

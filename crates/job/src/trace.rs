@@ -1,9 +1,9 @@
 //! What the filter saw, per sample: for a person who wants to look.
 
 use estimator::filter::Innovations;
-use fleet::{Complaint, Installations, PartNumber};
 use ingest::Files;
 use ingest::write::Column;
+use records::{Diagnostic, Installations, PartNumber};
 
 use crate::config::Config;
 use crate::estimate;
@@ -50,12 +50,12 @@ impl Trace {
         text.chain(numbers.map(|(name, values)| ((*name).to_owned(), Column::Real(values.clone())))).collect()
     }
 
-    fn of(log: &str, channels: &ingest::Actuator, part: &Part) -> Result<Self, Complaint> {
+    fn of(log: &str, channels: &ingest::Actuator, part: &Part) -> Result<Self, Diagnostic> {
         let filter = estimate::filter(channels, part)?;
         let mut seen = Innovations::default();
         let track = filter
             .track(&estimate::samples(channels), Some(&mut seen))
-            .map_err(|e| Complaint::new("estimate_failed", e))?;
+            .map_err(|e| Diagnostic::new("estimate_failed", e))?;
         let count = track.s_m.len();
         let time_s = (0..count).map(|k| k as f64 * channels.step_s).collect();
         Ok(Self {
@@ -76,7 +76,7 @@ impl Trace {
 }
 
 /// Which flank was pressed at each sample, as the contact regression saw it.
-fn flanks(channels: &ingest::Actuator, part: &Part, count: usize) -> Result<Vec<f64>, Complaint> {
+fn flanks(channels: &ingest::Actuator, part: &Part, count: usize) -> Result<Vec<f64>, Diagnostic> {
     let mut pressed = vec![0.0; count];
     for touch in estimate::picture(channels, part)?.iter().flat_map(|picture| &picture.touches) {
         let at = |time_s: f64| ((time_s / channels.step_s).round().max(0.0) as usize).min(count);
@@ -89,14 +89,14 @@ fn flanks(channels: &ingest::Actuator, part: &Part, count: usize) -> Result<Vec<
 /// Traces every actuator of a log: as booked, or all as one part.
 ///
 /// # Errors
-/// A complaint when the log or an actuator in it cannot be read.
+/// A diagnostic when the log or an actuator in it cannot be read.
 pub fn of_log(
     files: &Files,
     shown: &str,
     config: &Config,
     installations: &Installations,
     part: Option<&PartNumber>,
-) -> Result<Trace, Complaint> {
+) -> Result<Trace, Diagnostic> {
     let mut whole = Trace::default();
     flight::each(files, shown, config, installations, part, |channels, part| {
         whole.extend(Trace::of(shown, channels, part)?);

@@ -1,11 +1,11 @@
 //! What any setting's value must be.
 
-use fleet::Complaint;
+use records::Diagnostic;
 
 /// A value that must be above zero when it is given.
-pub(crate) fn positive(key: &str, value: Option<f64>) -> Option<Complaint> {
+pub(crate) fn positive(key: &str, value: Option<f64>) -> Option<Diagnostic> {
     let value = value.filter(|v| !(v.is_finite() && *v > 0.0))?;
-    Some(Complaint::new("not_positive", format!("`{key}` is {value}, which must be a number above zero")))
+    Some(Diagnostic::new("not_positive", format!("`{key}` is {value}, which must be a number above zero")))
 }
 
 /// A gap of which nobody speaks, m: a limit beyond it was given in another unit.

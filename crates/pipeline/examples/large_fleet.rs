@@ -10,10 +10,11 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use fleet::{
-    Estimate, Flight, FlightId, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status, TailNumber,
-};
 use jiff::{SignedDuration, Timestamp};
+use records::{
+    Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
+    TailNumber,
+};
 use store::{Holder, LogAccount, LogResult, Outcome, RunAccount, Store};
 
 type Outcomes<T> = Result<T, Box<dyn Error>>;
@@ -117,7 +118,7 @@ fn scatter(tail: usize, place: usize, flight: usize) -> f64 {
 fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<GapRecord> {
     let gap_um = unit.gap_um(flight) + 1.2 * scatter(tail_at, place, flight);
     let refused = (tail_at + 7 * place + flight).is_multiple_of(REFUSED_EVERY);
-    let estimate = Estimate {
+    let estimate = GapEstimate {
         status: Status::Estimated,
         reason: None,
         gap_m: Some(gap_um * 1e-6),
@@ -131,7 +132,7 @@ fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<
         samples_lower: 5_200,
         load_p05_n: Some(-2_300.0),
         load_p95_n: Some(2_600.0),
-        ..Estimate::refused("")
+        ..GapEstimate::refused("")
     };
     Ok(GapRecord {
         flight: Flight {
@@ -145,7 +146,7 @@ fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<
         part_number: PartNumber::new(PARTS[place / 2])?,
         serial_number: SerialNumber::new(serial(tail_at, place))?,
         unit_hours: Some(unit.age_h + HOURS * (flight + 1) as f64),
-        estimate: if refused { Estimate::refused("no_load_reversal") } else { estimate },
+        estimate: if refused { GapEstimate::refused("no_load_reversal") } else { estimate },
         provenance: Provenance {
             log_path: log(tail_at, flight),
             log_digest: "made".to_owned(),

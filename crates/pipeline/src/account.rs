@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fleet::{Complaint, GapRecord, Status};
 use jiff::Timestamp;
+use records::{Diagnostic, GapRecord, Status};
 use store::{LogAccount, Outcome, RunAccount};
 
 use crate::changed::Changed;
@@ -19,7 +19,8 @@ pub struct LogError {
     /// The log.
     pub log: String,
     /// What is wrong with it.
-    pub complaint: Complaint,
+    #[serde(rename = "diagnostic")]
+    pub diagnostic: Diagnostic,
 }
 
 /// An aircraft that sends nothing while others do.
@@ -128,7 +129,7 @@ pub struct Report {
 struct Counted {
     estimated: usize,
     refused: BTreeMap<String, usize>,
-    complaints: Vec<Complaint>,
+    diagnostics: Vec<Diagnostic>,
     duration_s: f64,
 }
 
@@ -174,9 +175,12 @@ impl Report {
         (self.trends, self.changed, self.states) = (now, changed, states);
     }
 
-    pub(crate) fn count(&mut self, account: &LogAccount, records: &[GapRecord], complaints: &[Complaint]) {
-        let mut counted =
-            Counted { complaints: complaints.to_vec(), duration_s: account.duration_s, ..Counted::default() };
+    pub(crate) fn count(&mut self, account: &LogAccount, records: &[GapRecord], diagnostics: &[Diagnostic]) {
+        let mut counted = Counted {
+            diagnostics: diagnostics.to_vec(),
+            duration_s: account.duration_s,
+            ..Counted::default()
+        };
         for record in records {
             match record.estimate.status {
                 Status::Estimated => counted.estimated += 1,
@@ -199,8 +203,9 @@ impl Report {
             for (reason, count) in &counted.refused {
                 *self.refused.entry(reason.clone()).or_default() += count;
             }
-            let error = |complaint: &Complaint| LogError { log: log.clone(), complaint: complaint.clone() };
-            self.errors.extend(counted.complaints.iter().map(error));
+            let error =
+                |diagnostic: &Diagnostic| LogError { log: log.clone(), diagnostic: diagnostic.clone() };
+            self.errors.extend(counted.diagnostics.iter().map(error));
             if self.slowest.as_ref().is_none_or(|(_, seconds)| *seconds < counted.duration_s) {
                 self.slowest = Some((log.clone(), counted.duration_s));
             }
@@ -212,7 +217,7 @@ impl Report {
         self.refused.values().sum()
     }
 
-    /// Logs in error; one log may have several complaints.
+    /// Logs in error; one log may have several diagnostics.
     pub fn logs_in_error(&self) -> usize {
         let mut logs: Vec<&str> = self.errors.iter().map(|e| e.log.as_str()).collect();
         logs.dedup();
@@ -269,11 +274,11 @@ pub(crate) fn not_reached(work: &Work, run_id: &str) -> LogAccount {
     LogAccount { outcome: Outcome::NotReached, ..of_log(work, run_id) }
 }
 
-/// Writes complaints into an account: the first one's code, all of their text.
-pub(crate) fn complain(account: &mut LogAccount, complaints: &[Complaint]) {
-    let Some(first) = complaints.first() else { return };
+/// Writes diagnostics into an account: the first one's code, all of their text.
+pub(crate) fn complain(account: &mut LogAccount, diagnostics: &[Diagnostic]) {
+    let Some(first) = diagnostics.first() else { return };
     account.outcome = Outcome::Error;
     account.error_code = Some(first.code.clone());
-    let all: Vec<String> = complaints.iter().map(ToString::to_string).collect();
+    let all: Vec<String> = diagnostics.iter().map(ToString::to_string).collect();
     account.error_detail = Some(all.join("\n"));
 }

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use fleet::{Complaint, Estimate, Installations, PartNumber, Position};
 use ingest::Files;
 use ingest::arrays::Arrays;
 use job::Config;
 use job::flight::{Opened, anonymous, caught, part_of};
+use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
 use serde::Serialize;
 
 use crate::bundle;
@@ -25,7 +25,7 @@ pub struct EstimateRow {
     pub flight_hours: Option<f64>,
     pub tail_hours_end: Option<f64>,
     #[serde(flatten)]
-    pub estimate: Estimate,
+    pub estimate: GapEstimate,
     pub log_path: Option<String>,
     pub log_digest: Option<String>,
     pub config_digest: String,
@@ -33,7 +33,7 @@ pub struct EstimateRow {
 }
 
 /// Estimates every actuator of a log: as booked, or all as one part. What is wrong with the log, or with single
-/// actuators of it, goes to `complaints`.
+/// actuators of it, goes to `diagnostics`.
 ///
 /// # Errors
 /// As [`bundle::around`].
@@ -43,18 +43,18 @@ pub fn estimate(
     installations: &Installations,
     part: Option<&PartNumber>,
     program_version: &str,
-    complaints: &mut Vec<Complaint>,
+    diagnostics: &mut Vec<Diagnostic>,
 ) -> Result<Vec<EstimateRow>, Error> {
     let shown = path.display().to_string();
     let read = match part {
         Some(number) => caught(&shown, || as_part(path, &shown, config, number, program_version)),
         None => {
             let files = bundle::around(config, path)?;
-            caught(&shown, || booked(&files, &shown, config, installations, program_version, complaints))
+            caught(&shown, || booked(&files, &shown, config, installations, program_version, diagnostics))
         }
     };
-    Ok(read.unwrap_or_else(|complaint| {
-        complaints.push(complaint);
+    Ok(read.unwrap_or_else(|diagnostic| {
+        diagnostics.push(diagnostic);
         Vec::new()
     }))
 }
@@ -65,9 +65,9 @@ fn as_part(
     config: &Config,
     number: &PartNumber,
     program_version: &str,
-) -> Result<Vec<EstimateRow>, Complaint> {
+) -> Result<Vec<EstimateRow>, Diagnostic> {
     let found = anonymous(&Files::one(path), shown, config, part_of(config, number)?)?;
-    let row = |(position, estimate): (Position, Estimate)| EstimateRow {
+    let row = |(position, estimate): (Position, GapEstimate)| EstimateRow {
         tail_number: None,
         position: Some(position.to_string()),
         part_number: Some(number.to_string()),
@@ -91,8 +91,8 @@ fn booked(
     config: &Config,
     installations: &Installations,
     program_version: &str,
-    complaints: &mut Vec<Complaint>,
-) -> Result<Vec<EstimateRow>, Complaint> {
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Result<Vec<EstimateRow>, Diagnostic> {
     let opened = Opened::open(files, shown, config, installations)?;
     let flight = opened.flight();
     let mut rows = Vec::new();
@@ -116,7 +116,7 @@ fn booked(
                 config_digest: config.digest(&flight.tail_number, &stay.part_number).to_string(),
                 program_version: program_version.to_owned(),
             }),
-            Err(complaint) => complaints.push(complaint.in_file(shown)),
+            Err(diagnostic) => diagnostics.push(diagnostic.in_file(shown)),
         }
     }
     Ok(rows)
@@ -125,17 +125,17 @@ fn booked(
 /// Estimates channels that somebody holds in memory, as a part.
 ///
 /// # Errors
-/// A complaint when the part is not configured, or the arrays are no channels.
+/// A diagnostic when the part is not configured, or the arrays are no channels.
 pub fn of_arrays(
     arrays: &Arrays<'_>,
     config: &Config,
     number: &PartNumber,
     program_version: &str,
-) -> Result<EstimateRow, Complaint> {
+) -> Result<EstimateRow, Diagnostic> {
     let part = part_of(config, number)?;
     // A position is part of a log's identity, which arrays have none of.
-    let own = Position::new("arrays").map_err(|e| Complaint::new("empty_name", e))?;
-    let channels = arrays.actuator(own).map_err(|e| e.complaint())?;
+    let own = Position::new("arrays").map_err(|e| Diagnostic::new("empty_name", e))?;
+    let channels = arrays.actuator(own).map_err(|e| e.diagnostic())?;
     let estimate = job::estimate::estimate(&channels, part, &config.document.estimate)?;
     Ok(EstimateRow {
         tail_number: None,

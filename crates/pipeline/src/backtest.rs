@@ -4,10 +4,10 @@
 //! Where a unit met its limit that is the question; where none has, yet, it is the level it stands at now,
 //! so that a fleet is calibrated before its first failure.
 
-use fleet::Installations;
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
+use records::Installations;
 use serde::Serialize;
 use trend::{ChangePointKind, Series, WearStatus};
 

@@ -5,9 +5,9 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use fleet::{Complaint, GapRecord, Installations};
 use job::Config;
 use job::flight::sample_digest;
+use records::{Diagnostic, GapRecord, Installations};
 use store::{LogAccount, LogResult, Outcome, RecordKey};
 
 use crate::account::{self, Report};
@@ -26,20 +26,20 @@ pub(crate) enum Done {
         /// Its records.
         records: Vec<GapRecord>,
         /// What is wrong with it.
-        complaints: Vec<Complaint>,
+        diagnostics: Vec<Diagnostic>,
     },
 }
 
 impl Done {
     pub(crate) fn event(&self, work: &Work) -> Event {
         let (log, bytes) = (work.shown.clone(), work.stat.as_ref().map_or(0, |s| s.size_bytes as u64));
-        let (estimated, refused, complaints) = match self {
-            Self::Read { account, complaints, .. } => {
-                (account.estimated as usize, account.refused as usize, complaints.clone())
+        let (estimated, refused, diagnostics) = match self {
+            Self::Read { account, diagnostics, .. } => {
+                (account.estimated as usize, account.refused as usize, diagnostics.clone())
             }
             Self::Same(_) => (0, 0, Vec::new()),
         };
-        Event::Finished { log, bytes, estimated, refused, complaints }
+        Event::Finished { log, bytes, estimated, refused, diagnostics }
     }
 }
 
@@ -84,7 +84,9 @@ impl<'a> Book<'a> {
                 self.enter((*account).clone());
                 vec![LogResult { account: *account, records: Vec::new(), retires: Vec::new() }]
             }
-            Done::Read { account, records, complaints } => self.read(*account, records, &complaints, report),
+            Done::Read { account, records, diagnostics } => {
+                self.read(*account, records, &diagnostics, report)
+            }
         }
     }
 
@@ -92,20 +94,20 @@ impl<'a> Book<'a> {
         &mut self,
         account: LogAccount,
         records: Vec<GapRecord>,
-        complaints: &[Complaint],
+        diagnostics: &[Diagnostic],
         report: &mut Report,
     ) -> Vec<LogResult> {
         let Some(rival) = self.rival(&account, &records) else {
-            return vec![self.store(account, records, complaints, report)];
+            return vec![self.store(account, records, diagnostics, report)];
         };
         let same = account.log_digest == rival.log_digest || self.holds_the_same(&account, &rival);
         if rival.log_path < account.log_path {
-            let (account, complaints) = yielded(account, &rival, same);
-            return vec![self.store(account, Vec::new(), &complaints, report)];
+            let (account, diagnostics) = yielded(account, &rival, same);
+            return vec![self.store(account, Vec::new(), &diagnostics, report)];
         }
-        let first = self.store(account, records, complaints, report);
-        let (loser, complaints) = yielded(rival, &first.account, same);
-        vec![first, self.store(loser, Vec::new(), &complaints, report)]
+        let first = self.store(account, records, diagnostics, report);
+        let (loser, diagnostics) = yielded(rival, &first.account, same);
+        vec![first, self.store(loser, Vec::new(), &diagnostics, report)]
     }
 
     /// Whether two logs hold the same samples in another encoding. Rare, so it is found out by reading both.
@@ -128,10 +130,10 @@ impl<'a> Book<'a> {
         &mut self,
         account: LogAccount,
         records: Vec<GapRecord>,
-        complaints: &[Complaint],
+        diagnostics: &[Diagnostic],
         report: &mut Report,
     ) -> LogResult {
-        report.count(&account, &records, complaints);
+        report.count(&account, &records, diagnostics);
         let unit = |r: &GapRecord| (r.part_number.clone(), r.serial_number.clone());
         self.touched.extend(records.iter().map(unit));
         let retires = self.outdated(&account, &records);
@@ -154,18 +156,18 @@ impl<'a> Book<'a> {
 }
 
 /// The account of a log whose flight belongs to another.
-fn yielded(mut account: LogAccount, owner: &LogAccount, is_same: bool) -> (LogAccount, Vec<Complaint>) {
+fn yielded(mut account: LogAccount, owner: &LogAccount, is_same: bool) -> (LogAccount, Vec<Diagnostic>) {
     (account.estimated, account.refused) = (0, 0);
     account.outcome = Outcome::Done;
     if is_same {
         return (account, Vec::new());
     }
-    let complaint = Complaint::new(
+    let diagnostic = Diagnostic::new(
         "duplicate_flight",
         format!("another log holds the same flight: {}", owner.log_path),
     )
     .in_file(&account.log_path)
     .hint("the log whose name sorts first is used; remove one of them, or map what tells the flights apart");
-    account::complain(&mut account, std::slice::from_ref(&complaint));
-    (account, vec![complaint])
+    account::complain(&mut account, std::slice::from_ref(&diagnostic));
+    (account, vec![diagnostic])
 }

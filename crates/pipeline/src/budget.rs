@@ -107,8 +107,8 @@ mod tests {
             let nothing: &[f64] = &[];
             Ok(nothing[std::hint::black_box(3)])
         });
-        let complaint = ended.unwrap_err();
-        assert_eq!((complaint.code.as_str(), complaint.file.as_deref()), ("panic", Some("a.parquet")));
+        let diagnostic = ended.unwrap_err();
+        assert_eq!((diagnostic.code.as_str(), diagnostic.file.as_deref()), ("panic", Some("a.parquet")));
         assert_eq!(*budget.in_use_bytes.lock().unwrap(), 0);
     }
 }

@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use fleet::{Complaint, Flight, Position, TailNumber};
 use ingest::Files;
 use job::Config;
 use job::flight::{identify, identify_companion};
 use rayon::prelude::*;
+use records::{Diagnostic, Flight, Position, TailNumber};
 
 use crate::error::Error;
 use crate::remote::{self, Seen};
@@ -18,7 +18,7 @@ pub struct Found {
     /// Their files, by the name of the first.
     pub logs: BTreeMap<String, Files>,
     /// Files of groups that cannot be read, and why.
-    pub faulty: BTreeMap<String, (PathBuf, Complaint)>,
+    pub faulty: BTreeMap<String, (PathBuf, Diagnostic)>,
     /// Files of groups whose flight has no main log.
     pub strays: Vec<String>,
     /// What listings of object stores told of them, by address.
@@ -93,7 +93,7 @@ fn join(config: &Config, main: Vec<(String, PathBuf)>, companions: Vec<(&str, (S
         .collect();
     for (who, group, shown, path) in said {
         match who {
-            Err(complaint) => drop(found.faulty.insert(shown, (path, complaint))),
+            Err(diagnostic) => drop(found.faulty.insert(shown, (path, diagnostic))),
             Ok(who) => attach(&mut found, &whose, &who, group, shown, &path),
         }
     }
@@ -136,10 +136,10 @@ fn matching(config: &Config, patterns: &[String], seen: &mut Seen) -> Result<Vec
     let ours = |path: &PathBuf| path.starts_with(&store) || tables.contains(path);
     let invalid = |pattern: &str, e: &dyn std::fmt::Display| {
         let what = format!("`{pattern}` is no pattern of files: {e}");
-        Error::refused(config.at(pattern, Complaint::new("bad_pattern", what)))
+        Error::refused(config.at(pattern, Diagnostic::new("bad_pattern", what)))
     };
     for pattern in patterns {
-        if objects::is_address(pattern) {
+        if object_io::is_address(pattern) {
             let before = found.len();
             let listed = remote::each(pattern, |entry| {
                 if !ours(&entry.path) {
@@ -171,12 +171,12 @@ fn matching(config: &Config, patterns: &[String], seen: &mut Seen) -> Result<Vec
     }
 }
 
-fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Complaint {
+fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
     let patterns = silent.iter().map(|p| format!("`{p}`")).collect::<Vec<_>>().join(", ");
     let folder = if config.folder.as_os_str().is_empty() { Path::new(".") } else { &config.folder };
-    let complaint = Complaint::new("no_log_matched", format!("no log fits {patterns}"))
+    let diagnostic = Diagnostic::new("no_log_matched", format!("no log fits {patterns}"))
         .hint(format!("patterns start from {}; are the logs there tonight?", folder.display()));
-    config.at(silent.first().copied().unwrap_or_default(), complaint)
+    config.at(silent.first().copied().unwrap_or_default(), diagnostic)
 }
 
 fn shown(config: &Config, path: &Path) -> String {

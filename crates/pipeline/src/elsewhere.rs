@@ -13,10 +13,10 @@ use std::sync::atomic::AtomicBool;
 use arrow::array::{Array, ArrayRef, AsArray, RecordBatch, StringArray, new_null_array};
 use arrow::compute::{cast, concat_batches, filter_record_batch, is_null};
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
-use fleet::{Complaint, GapRecord, Installations};
 use ingest::Files;
 use jiff::Timestamp;
 use job::Config;
+use records::{Diagnostic, GapRecord, Installations};
 use serde::{Deserialize, Serialize};
 use store::{Holder, LogAccount, LogResult, Outcome, RecordKey, Writer};
 
@@ -58,7 +58,8 @@ struct Said {
     refused: i64,
     duration_s: f64,
     processed_utc: Timestamp,
-    complaints: Vec<Complaint>,
+    #[serde(rename = "diagnostics")]
+    diagnostics: Vec<Diagnostic>,
 }
 
 /// The columns of an answer: those of a record, and three more. Each log has one row that says what became of
@@ -95,7 +96,7 @@ pub fn answer(
     let work = Work { files, fault: None, shown, stat: None, why: Why::New, before: None };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     match pool.install(|| shop.one(&work)) {
-        Done::Read { account, records, complaints } => told(&account, &records, complaints),
+        Done::Read { account, records, diagnostics } => told(&account, &records, diagnostics),
         // Content can be known only to a plan that has accounts, and this one has none.
         Done::Same(account) => told(&account, &[], Vec::new()),
     }
@@ -105,7 +106,7 @@ pub fn answer(
 fn told(
     account: &LogAccount,
     records: &[GapRecord],
-    complaints: Vec<Complaint>,
+    diagnostics: Vec<Diagnostic>,
 ) -> Result<RecordBatch, Error> {
     let said = Said {
         log_digest: account.log_digest.clone(),
@@ -118,7 +119,7 @@ fn told(
         refused: account.refused,
         duration_s: account.duration_s,
         processed_utc: account.processed_utc,
-        complaints,
+        diagnostics,
     };
     let said = serde_json::to_string(&said).map_err(|e| Error::Engine(e.to_string()))?;
     let schema = schema();
@@ -226,8 +227,8 @@ fn judged(shop: &Shop<'_>, work: &Work, said: Said, records: Vec<GapRecord>) -> 
         let known = LogAccount { outcome: Outcome::Known, estimated, refused, ..account };
         return Done::Same(Box::new(known));
     }
-    account::complain(&mut account, &said.complaints);
-    Done::Read { account: Box::new(account), records, complaints: said.complaints }
+    account::complain(&mut account, &said.diagnostics);
+    Done::Read { account: Box::new(account), records, diagnostics: said.diagnostics }
 }
 
 type Answers = HashMap<String, (Said, Vec<GapRecord>)>;

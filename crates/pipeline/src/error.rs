@@ -1,19 +1,19 @@
 //! Why a run could not be made at all; what is wrong with single logs is in its account.
 
-use fleet::Complaint;
+use records::Diagnostic;
 
 /// What ends a run before or in the middle of its work.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// Configuration, tables or the request are wrong: nothing was run.
     #[error("{} complaints about configuration or tables", .0.len())]
-    Refused(Vec<Complaint>),
+    Refused(Vec<Diagnostic>),
     /// The store cannot be read or written: what was stored before is intact.
     #[error(transparent)]
     Store(#[from] store::Error),
     /// An object store does not answer.
     #[error(transparent)]
-    Objects(#[from] objects::Error),
+    Objects(#[from] object_io::Error),
     /// A history or a limit cannot be judged.
     #[error("a trend cannot be stated: {0}")]
     Trend(#[from] trend::Error),
@@ -40,7 +40,7 @@ pub enum Error {
 }
 
 impl Error {
-    pub(crate) fn refused(complaint: Complaint) -> Self {
-        Self::Refused(vec![complaint])
+    pub(crate) fn refused(diagnostic: Diagnostic) -> Self {
+        Self::Refused(vec![diagnostic])
     }
 }

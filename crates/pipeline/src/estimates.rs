@@ -54,7 +54,7 @@ pub fn asked(table: &Table) -> Result<Vec<AsOf>, Error> {
             Ok(AsOf {
                 part_number: part.and_then(|c| table.text(row, c)).map(str::to_owned),
                 serial_number: table
-                    .required(row, serial, name::<fleet::SerialNumber>)
+                    .required(row, serial, name::<records::SerialNumber>)
                     .map_err(bad)?
                     .to_string(),
                 as_of_utc: table.required(row, as_of, utc).map_err(bad)?,
@@ -65,5 +65,5 @@ pub fn asked(table: &Table) -> Result<Vec<AsOf>, Error> {
 
 #[expect(clippy::needless_pass_by_value, reason = "it is what `map_err` hands over")]
 fn bad(error: ingest::Error) -> Error {
-    Error::refused(error.complaint())
+    Error::refused(error.diagnostic())
 }

@@ -1,6 +1,6 @@
 //! What happens while a run goes on, for whoever wants to watch.
 
-use fleet::Complaint;
+use records::Diagnostic;
 
 /// One thing that happened. Events of different logs may come in any order.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +28,7 @@ pub enum Event {
         /// Sound logs that cannot show one.
         refused: usize,
         /// What is wrong with it.
-        complaints: Vec<Complaint>,
+        diagnostics: Vec<Diagnostic>,
     },
     /// So many logs are now safe in the store.
     Stored {

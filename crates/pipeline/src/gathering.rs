@@ -5,10 +5,10 @@ use std::ops::Range;
 use std::path::Path;
 
 use arrow::array::{Array, Float64Array, RecordBatch};
-use fleet::GapRecord;
 use ingest::tables::Chunk;
 use jiff::Timestamp;
 use rayon::prelude::*;
+use records::GapRecord;
 
 use crate::error::Error;
 use crate::flown::{Beside, Row};
@@ -401,7 +401,7 @@ mod tests {
                     first,
                 )
                 .error(0, None, "bad".into())
-                .complaint(),
+                .diagnostic(),
             )),
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
@@ -415,6 +415,6 @@ mod tests {
         rows[17].0[1] = Some("  ".into());
         let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
         let error = Gathering::default().add_stored(batch(&rows, &coded)).unwrap_err();
-        assert_eq!(error.complaint().place().unwrap(), "column `serial_number`, row 18");
+        assert_eq!(error.diagnostic().location().unwrap(), "column `serial_number`, row 18");
     }
 }

@@ -6,8 +6,8 @@
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
-use fleet::Installation;
 use jiff::Timestamp;
+use records::Installation;
 
 pub use crate::flown::{Beside, Flown, Row};
 pub use crate::gathering::Gathering;

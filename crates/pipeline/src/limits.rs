@@ -1,8 +1,8 @@
 //! What units of each part number are judged by.
 
-use fleet::PartNumber;
 use job::Config;
 use job::part::WearAxis;
+use records::PartNumber;
 use trend::UsageAxis;
 
 /// Limits, axes and settings of part numbers, as they are configured.

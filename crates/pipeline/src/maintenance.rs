@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use fleet::{PartNumber, SerialNumber};
 use ingest::tables::{Table, name, utc};
+use records::{PartNumber, SerialNumber};
 use trend::MaintenanceEvent;
 
 use crate::error::Error;
@@ -18,7 +18,7 @@ pub type Book = BTreeMap<(String, String), Vec<MaintenanceEvent>>;
 /// # Errors
 /// When the table cannot be read, lacks a column, or holds a cell that cannot be read.
 pub fn read(file: &Path) -> Result<Book, Error> {
-    let bad = |e: ingest::Error| Error::Refused(vec![e.complaint()]);
+    let bad = |e: ingest::Error| Error::Refused(vec![e.diagnostic()]);
     let table = Table::read(file).map_err(bad)?;
     let [part, serial, done, kind] =
         ["part_number", "serial_number", "utc", "kind"].map(|n| table.column(&[n]));

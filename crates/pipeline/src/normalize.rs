@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use fleet::{Complaint, Installations};
 use ingest::Files;
 use ingest::write::Encoding;
 use job::Config;
 use rayon::prelude::*;
+use records::{Diagnostic, Installations};
 
 use crate::error::Error;
 use crate::event::Event;
@@ -17,13 +17,13 @@ pub struct Normalized {
     /// The files written, in order of the logs.
     pub written: Vec<PathBuf>,
     /// What could not be.
-    pub complaints: Vec<Complaint>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 /// Writes the normalized logs of some logs below a folder.
 ///
 /// # Errors
-/// When workers cannot be started. Logs in error are complaints.
+/// When workers cannot be started. Logs in error are diagnostics.
 pub fn normalize(
     config: &Config,
     installations: &Installations,
@@ -36,16 +36,16 @@ pub fn normalize(
     watch(Event::Planned { logs: logs.len(), bytes: 0 });
     let one = |(files, shown): &(Files, String)| {
         let done = job::normalize::normalize(files, shown, config, installations, (folder, encoding));
-        let done = done.unwrap_or_else(|complaint| (Vec::new(), vec![complaint]));
-        let (log, complaints) = (shown.clone(), done.1.clone());
-        watch(Event::Finished { log, bytes: 0, estimated: done.0.len(), refused: 0, complaints });
+        let done = done.unwrap_or_else(|diagnostic| (Vec::new(), vec![diagnostic]));
+        let (log, diagnostics) = (shown.clone(), done.1.clone());
+        watch(Event::Finished { log, bytes: 0, estimated: done.0.len(), refused: 0, diagnostics });
         done
     };
     let done: Vec<_> = pool.install(|| logs.par_iter().map(one).collect());
     let mut all = Normalized::default();
-    for (written, complaints) in done {
+    for (written, diagnostics) in done {
         all.written.extend(written);
-        all.complaints.extend(complaints);
+        all.diagnostics.extend(diagnostics);
     }
     Ok(all)
 }

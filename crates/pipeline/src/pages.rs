@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use fleet::Complaint;
 use rayon::prelude::*;
+use records::Diagnostic;
 use report::{Page, Report};
 
 use crate::error::Error;
@@ -52,9 +52,9 @@ fn refuse_foreign(dir: &Path) -> Result<(), Error> {
         return Ok(());
     }
     let what = format!("{} holds files that are no report", dir.display());
-    let complaint = Complaint::new("would_overwrite", what)
+    let diagnostic = Diagnostic::new("would_overwrite", what)
         .hint("name an empty folder, or one that a report was written to");
-    Err(Error::refused(complaint))
+    Err(Error::refused(diagnostic))
 }
 
 fn all(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<Written, Error> {
@@ -74,7 +74,7 @@ fn all(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<W
         let log = page.path.clone();
         let bytes = page.body.len() as u64;
         put(page)?;
-        watch(Event::Finished { log, bytes, estimated: 0, refused: 0, complaints: Vec::new() });
+        watch(Event::Finished { log, bytes, estimated: 0, refused: 0, diagnostics: Vec::new() });
         Ok::<(), Error>(())
     };
     report::assets().into_iter().try_for_each(put)?;

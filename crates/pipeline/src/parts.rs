@@ -18,7 +18,7 @@ pub(crate) fn read_each(
     for some in all.chunks(rayon::current_num_threads()) {
         let read: Vec<_> = some.par_iter().map(|part| parts.read(*part)).collect::<Result<_, _>>()?;
         for batch in read.iter().flatten() {
-            take(batch).map_err(|e| Error::refused(e.complaint()))?;
+            take(batch).map_err(|e| Error::refused(e.diagnostic()))?;
         }
     }
     Ok(())

@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use fleet::{Complaint, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
 use ingest::Files;
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
+use records::{Diagnostic, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
 use store::{LogAccount, Outcome, RecordKey};
 
 use crate::bundle::Found;
@@ -52,7 +52,7 @@ impl Request {
     pub fn wants(&self, flight: &Flight, installations: &Installations) -> bool {
         let at = flight.departure_utc;
         let flew = |serial: &SerialNumber| {
-            installations.on_tail(&flight.tail_number, at).any(|stay| stay.serial_number == *serial)
+            installations.units_on_tail(&flight.tail_number, at).any(|stay| stay.serial_number == *serial)
         };
         self.since_utc.is_none_or(|since| since <= at)
             && self.until_utc.is_none_or(|until| at < until)
@@ -111,7 +111,7 @@ pub struct FileStat {
 
 impl FileStat {
     fn of(path: &Path, seen: &Seen) -> Option<Self> {
-        if objects::is_address(path) {
+        if object_io::is_address(path) {
             return seen.get(path).cloned();
         }
         let data = std::fs::metadata(path).ok()?;
@@ -161,7 +161,7 @@ pub struct Work {
     /// Its files.
     pub files: Files,
     /// Why it cannot be read, where that is known already.
-    pub fault: Option<Complaint>,
+    pub fault: Option<Diagnostic>,
     /// Its name in records and messages: relative to the configuration where it lies below it.
     pub shown: String,
     /// What tells its file apart; none when it vanished since it was found.
@@ -209,10 +209,10 @@ pub fn plan(
     request: &Request,
 ) -> Plan {
     let (strays, seen) = (found.strays, found.seen);
-    let mut logs: BTreeMap<String, (Files, Option<Complaint>)> =
+    let mut logs: BTreeMap<String, (Files, Option<Diagnostic>)> =
         found.logs.into_iter().map(|(shown, files)| (shown, (files, None))).collect();
-    let faulty = |(shown, (path, complaint)): (String, (PathBuf, Complaint))| {
-        (shown, (Files::one(path), Some(complaint)))
+    let faulty = |(shown, (path, diagnostic)): (String, (PathBuf, Diagnostic))| {
+        (shown, (Files::one(path), Some(diagnostic)))
     };
     logs.extend(found.faulty.into_iter().map(faulty));
     let found = logs;
@@ -297,7 +297,7 @@ impl Judge<'_> {
     fn judge(
         &self,
         shown: &str,
-        (files, fault): &(Files, Option<Complaint>),
+        (files, fault): &(Files, Option<Diagnostic>),
         before: Option<&LogAccount>,
     ) -> Verdict {
         let stat = FileStat::of_log(files, self.seen);
@@ -334,7 +334,7 @@ impl Judge<'_> {
             Some(Why::SettingChanged)
         } else if self.is_orphan(account) {
             Some(Why::OwnerGone)
-        } else if account.error_code.as_deref().is_some_and(objects::Error::is_passing) {
+        } else if account.error_code.as_deref().is_some_and(object_io::Error::is_passing) {
             Some(Why::Unfetched)
         } else if self.request.retry && account.outcome == Outcome::Error {
             Some(Why::Retry)

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use objects::{Address, Entry};
+use object_io::{Address, ListEntry};
 
 use crate::error::Error;
 use crate::plan::FileStat;
@@ -23,25 +23,25 @@ const AS_FILES: glob::MatchOptions = glob::MatchOptions {
 ///
 /// # Errors
 /// [`Error::Objects`] when the store does not answer; the text of what is wrong with the pattern.
-pub(crate) fn each(pattern: &str, mut take: impl FnMut(Entry)) -> Result<Result<(), String>, Error> {
-    let address = Address::must(pattern)?;
+pub(crate) fn each(pattern: &str, mut take: impl FnMut(ListEntry)) -> Result<Result<(), String>, Error> {
+    let address = Address::parse_required(pattern)?;
     let wanted = match glob::Pattern::new(address.key()) {
         Ok(wanted) => wanted,
         Err(e) => return Ok(Err(e.to_string())),
     };
     let Some(first) = address.key().find(['*', '?', '[']) else {
-        return match objects::look(Path::new(pattern)) {
+        return match object_io::head(Path::new(pattern)) {
             Ok(entry) => {
                 take(entry);
                 Ok(Ok(()))
             }
-            Err(objects::Error::Missing { .. }) => Ok(Ok(())),
+            Err(object_io::Error::Missing { .. }) => Ok(Ok(())),
             Err(error) => Err(error.into()),
         };
     };
     let folder = address.key()[..first].rsplit_once('/').map_or("", |(folder, _)| folder);
-    let root = address.root();
-    objects::list(&address.with_key(folder), |entry| {
+    let root = address.bucket_url();
+    object_io::list(&address.with_key(folder), |entry| {
         let key = entry.path.to_str().and_then(|text| text.strip_prefix(&root));
         if key.is_some_and(|key| wanted.matches_with(key, AS_FILES)) {
             take(entry);
@@ -50,8 +50,8 @@ pub(crate) fn each(pattern: &str, mut take: impl FnMut(Entry)) -> Result<Result<
     Ok(Ok(()))
 }
 
-impl From<Entry> for FileStat {
-    fn from(entry: Entry) -> Self {
+impl From<ListEntry> for FileStat {
+    fn from(entry: ListEntry) -> Self {
         Self {
             size_bytes: entry.size_bytes as i64,
             modified_utc_ns: entry.modified_utc_ns,

@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use ::report::{
     Banded, Event, FlightRow, Inspection, LogFault, Past, Prior, Quality, Report, Statement, Stay, Tail, Unit,
 };
-use fleet::{GapRecord, Installations, PartNumber, SerialNumber};
 use ingest::tables::{Table, name, number, utc};
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
+use records::{GapRecord, Installations, PartNumber, SerialNumber};
 use store::{Outcome, Store};
 use trend::Forecast;
 
@@ -276,7 +276,7 @@ impl Compose<'_> {
     }
 }
 
-fn stay(of: &fleet::Installation) -> Stay {
+fn stay(of: &records::Installation) -> Stay {
     Stay {
         tail_number: of.tail_number.to_string(),
         position: of.position.to_string(),
@@ -523,7 +523,7 @@ impl Check {
 /// The configured table of hangar checks.
 fn inspections(config: &Config) -> Result<Option<Vec<Check>>, Error> {
     let Some(file) = &config.document.logs.inspections else { return Ok(None) };
-    let bad = |e: ingest::Error| Error::refused(e.complaint());
+    let bad = |e: ingest::Error| Error::refused(e.diagnostic());
     let table = Table::read(&config.path(file)).map_err(bad)?;
     let serial = table.column(&["serial_number", "serial"]).map_err(bad)?;
     let date = table.column(&["date_utc", "date"]).map_err(bad)?;

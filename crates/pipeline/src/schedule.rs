@@ -9,12 +9,12 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-use fleet::{Complaint, GapRecord, Installations, Status};
 use ingest::PositionColumns;
 use jiff::Timestamp;
 use job::flight::{Opened, caught, config_digest, unidentified_digest};
 use job::{Config, Stamp};
 use rayon::prelude::*;
+use records::{Diagnostic, GapRecord, Installations, Status};
 use store::{Holder, LogAccount, LogResult, Outcome, RunAccount, Store, Writer};
 
 use crate::account::{self, CutShort, Report};
@@ -48,11 +48,11 @@ pub struct Context<'a> {
 /// Reads the installations table that the configuration names.
 ///
 /// # Errors
-/// [`Error::Refused`] with every complaint about it.
+/// [`Error::Refused`] with every diagnostic about it.
 pub fn installations(config: &Config) -> Result<Installations, Error> {
     let file = config.path(&config.document.logs.installations);
     ingest::tables::installations(&file, &config.document.columns.installations)
-        .map_err(|found| Error::Refused(found.iter().map(ingest::Error::complaint).collect()))
+        .map_err(|found| Error::Refused(found.iter().map(ingest::Error::diagnostic).collect()))
 }
 
 /// Says what a run would do, and does nothing.
@@ -245,21 +245,21 @@ impl Shop<'_> {
     pub(crate) fn one(&self, work: &Work) -> Done {
         let clock = Instant::now();
         let done = caught(&work.shown, || Ok(self.open(work)));
-        let done = done.unwrap_or_else(|complaint| self.failed(work, complaint));
+        let done = done.unwrap_or_else(|diagnostic| self.failed(work, diagnostic));
         match done {
-            Done::Read { mut account, records, complaints } => {
+            Done::Read { mut account, records, diagnostics } => {
                 account.duration_s = clock.elapsed().as_secs_f64();
-                Done::Read { account, records, complaints }
+                Done::Read { account, records, diagnostics }
             }
             same @ Done::Same(_) => same,
         }
     }
 
-    fn failed(&self, work: &Work, complaint: Complaint) -> Done {
+    fn failed(&self, work: &Work, diagnostic: Diagnostic) -> Done {
         let mut account = account::of_log(work, self.run_id);
         account.config_digest = Some(unidentified_digest(self.config, self.installations));
-        account::complain(&mut account, std::slice::from_ref(&complaint));
-        Done::Read { account: Box::new(account), records: Vec::new(), complaints: vec![complaint] }
+        account::complain(&mut account, std::slice::from_ref(&diagnostic));
+        Done::Read { account: Box::new(account), records: Vec::new(), diagnostics: vec![diagnostic] }
     }
 
     fn open(&self, work: &Work) -> Done {
@@ -268,7 +268,7 @@ impl Shop<'_> {
         }
         let opened = match Opened::open(&work.files, &work.shown, self.config, self.installations) {
             Ok(opened) => opened,
-            Err(complaint) => return self.failed(work, complaint),
+            Err(diagnostic) => return self.failed(work, diagnostic),
         };
         let flight = opened.flight();
         let names = opened.position_names();
@@ -306,30 +306,30 @@ impl Shop<'_> {
             program_version: self.context.program_version.to_owned(),
             processed_utc: Timestamp::now(),
         };
-        let (records, complaints) = self.records(opened, &stamp);
+        let (records, diagnostics) = self.records(opened, &stamp);
         let refused = records.iter().filter(|r| r.estimate.status == Status::Refused).count();
         account.refused = refused as i64;
         account.estimated = (records.len() - refused) as i64;
-        account::complain(&mut account, &complaints);
-        Done::Read { account: Box::new(account), records, complaints }
+        account::complain(&mut account, &diagnostics);
+        Done::Read { account: Box::new(account), records, diagnostics }
     }
 
     /// The records of a log: its actuators are spread over workers that have no log left to take.
-    fn records(&self, opened: &Opened, stamp: &Stamp) -> (Vec<GapRecord>, Vec<Complaint>) {
+    fn records(&self, opened: &Opened, stamp: &Stamp) -> (Vec<GapRecord>, Vec<Diagnostic>) {
         let actuators: Vec<_> = opened.actuators(self.installations).collect();
         let bytes = Budget::actuator_bytes(opened.rows());
         let one = |at: &&PositionColumns| {
             let _held = self.budget.take(bytes);
             opened.record(at, self.config, self.installations, stamp)
         };
-        let (mut records, mut complaints) = (Vec::new(), Vec::new());
+        let (mut records, mut diagnostics) = (Vec::new(), Vec::new());
         for done in actuators.par_iter().with_max_len(1).map(one).collect::<Vec<_>>() {
             match done {
                 Ok(record) => records.push(record),
-                Err(complaint) => complaints.push(complaint),
+                Err(diagnostic) => diagnostics.push(diagnostic),
             }
         }
-        (records, complaints)
+        (records, diagnostics)
     }
 
     /// The writer's side: gathers, settles who owns a flight, commits.

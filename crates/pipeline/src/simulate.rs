@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use fleet::Complaint;
 use ingest::write::{Column, write_parquet};
 use jiff::Timestamp;
 use rayon::prelude::*;
+use records::Diagnostic;
 use simulator::plan::Unit;
 use simulator::spec::MotorLog;
 use simulator::{ActuatorLog, Plan, PlannedFlight, Spec};
@@ -24,12 +24,14 @@ pub fn spec(file: Option<&Path>, seed: Option<u64>) -> Result<Spec, Error> {
         None => simulator::SAMPLE_SPEC.to_owned(),
         Some(file) => std::fs::read_to_string(file).map_err(|e| {
             let what = format!("the spec cannot be read: {e}");
-            Error::refused(Complaint::new("spec_unreadable", what).in_file(&shown))
+            Error::refused(Diagnostic::new("spec_unreadable", what).in_file(&shown))
         })?,
     };
     let mut spec: Spec = toml::from_str(&text).map_err(|e| {
         Error::refused(
-            Complaint::new("bad_spec", e.message()).in_file(&shown).hint("docs/simulator.md lists every key"),
+            Diagnostic::new("bad_spec", e.message())
+                .in_file(&shown)
+                .hint("docs/simulator.md lists every key"),
         )
     })?;
     spec.seed = seed.unwrap_or(spec.seed);
@@ -48,19 +50,19 @@ pub fn simulate(
     jobs: Option<usize>,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<usize, Error> {
-    let plan = Plan::new(spec).map_err(|e| Error::refused(Complaint::new("bad_spec", e)))?;
+    let plan = Plan::new(spec).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
     watch(Event::Planned { logs: plan.flights.len(), bytes: 0 });
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
     pool.install(|| {
         (0..plan.flights.len()).into_par_iter().try_for_each(|index| {
             let name = fly(&plan, index, folder)?;
-            watch(Event::Finished { log: name, bytes: 0, estimated: 0, refused: 0, complaints: Vec::new() });
+            watch(Event::Finished { log: name, bytes: 0, estimated: 0, refused: 0, diagnostics: Vec::new() });
             Ok::<(), Error>(())
         })
     })?;
     text(&folder.join("installations.csv"), &installations(&plan))?;
     write_parquet(&folder.join("truth.parquet"), &truth(&plan), &[])
-        .map_err(|e| Error::refused(e.complaint()))?;
+        .map_err(|e| Error::refused(e.diagnostic()))?;
     text(&folder.join("pipeline.toml"), &configuration(spec))?;
     Ok(plan.flights.len())
 }
@@ -68,14 +70,14 @@ pub fn simulate(
 /// Flies one flight and writes its log: a column for each channel of each actuator.
 fn fly(plan: &Plan, index: usize, folder: &Path) -> Result<String, Error> {
     let planned = &plan.flights[index];
-    let flight = plan.fly(index).map_err(|e| Error::refused(Complaint::new("bad_spec", e)))?;
+    let flight = plan.fly(index).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
     let mut columns = vec![("time_s".to_owned(), Column::Real(flight.time_s))];
     for actuator in flight.actuators {
         columns.extend(channels(actuator));
     }
     let name = log_name(planned);
     let file = folder.join("logs").join(&name);
-    write_parquet(&file, &columns, &facts(planned)).map_err(|e| Error::refused(e.complaint()))?;
+    write_parquet(&file, &columns, &facts(planned)).map_err(|e| Error::refused(e.diagnostic()))?;
     Ok(name)
 }
 
@@ -280,6 +282,6 @@ fn instant(us: i64) -> Timestamp {
 fn text(file: &Path, text: &str) -> Result<(), Error> {
     std::fs::write(file, text).map_err(|e| {
         let what = format!("the file cannot be written: {e}");
-        Error::refused(Complaint::new("output_failed", what).in_file(file.display()))
+        Error::refused(Diagnostic::new("output_failed", what).in_file(file.display()))
     })
 }

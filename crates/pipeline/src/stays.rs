@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use fleet::{Installation, Installations};
+use records::{Installation, Installations};
 
 use crate::histories::HistoryName;
 

@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fleet::{Installations, PartNumber, SerialNumber};
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
+use records::{Installations, PartNumber, SerialNumber};
 use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series, UsageDefaults, classic};
 
@@ -256,7 +256,7 @@ fn gathered(store: &Store, query: &Query) -> Result<Histories, Error> {
         for part in some {
             let mut batches = parts.read(part)?.into_iter();
             let put = batches.try_for_each(|batch| gathering.add_stored(batch));
-            put.map_err(|e| Error::refused(e.complaint()))?;
+            put.map_err(|e| Error::refused(e.diagnostic()))?;
         }
         Ok(())
     })

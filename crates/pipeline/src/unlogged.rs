@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fleet::{Flight, Installation};
 use ingest::flights::Flights;
 use jiff::{SignedDuration, Timestamp};
+use records::{Flight, Installation};
 
 use crate::histories::History;
 

@@ -1,8 +1,8 @@
 //! What a unit's flights add up to: its rows, those that left none, and what the books say.
 
-use fleet::{Installation, Installations};
 use jiff::Timestamp;
 use job::Config;
+use records::{Installation, Installations};
 use trend::{Observation, Series, UsageDefaults};
 
 use crate::error::Error;
@@ -55,7 +55,7 @@ fn booked_work(book: &maintenance::Book, (part, serial): &HistoryName) -> Vec<tr
 fn observed(
     history: &History,
     stays: &[&Installation],
-    unlogged: &[(&Installation, &fleet::Flight)],
+    unlogged: &[(&Installation, &records::Flight)],
 ) -> Vec<Observation> {
     let mut numbers = Numbers::default();
     let seen = history.flights().iter().map(|f| {

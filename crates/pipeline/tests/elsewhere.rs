@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use arrow::array::RecordBatch;
-use fleet::GapRecord;
 use job::Config;
 use pipeline::elsewhere::{self, Task};
 use pipeline::schedule::{self, Context};
 use pipeline::{Error, Report, Request};
+use records::GapRecord;
 use store::{Holder, Query, Store};
 use tempfile::TempDir;
 
@@ -131,7 +131,7 @@ fn a_broken_log_is_an_answer() {
     let bytes = std::fs::read(&log).unwrap();
     std::fs::write(&log, &bytes[..bytes.len() / 2]).unwrap();
     let report = run(&config, 10, Ok).unwrap();
-    let codes: Vec<&str> = report.errors.iter().map(|error| error.complaint.code.as_str()).collect();
+    let codes: Vec<&str> = report.errors.iter().map(|error| error.diagnostic.code.as_str()).collect();
     assert_eq!((report.done, codes), (6, vec!["not_parquet"]));
     let accounts = Store::open(config.store()).unwrap().accounts().unwrap();
     let in_error = accounts.iter().filter(|account| account.error_code.is_some()).count();

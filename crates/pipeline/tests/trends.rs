@@ -3,13 +3,13 @@
 
 use std::path::Path;
 
-use fleet::Installations;
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::backtest;
 use pipeline::histories::{Gathering, Histories, Row as Said, Who};
 use pipeline::statement::TrendRow;
 use pipeline::trends::{self, Ask};
+use records::Installations;
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;
@@ -163,8 +163,8 @@ fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
         histories(&flown(20)),
         &Ask::default(),
     );
-    let Err(pipeline::Error::Refused(complaints)) = found else { panic!("{found:?}") };
-    let text = format!("{complaints:?}");
+    let Err(pipeline::Error::Refused(diagnostics)) = found else { panic!("{found:?}") };
+    let text = format!("{diagnostics:?}");
     assert!(text.contains("painted") && text.contains("overhaul"), "{text}");
 }
 
@@ -203,11 +203,11 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     let head = "tail_number,flight_id,departure_utc,flight_hours\n".to_owned();
     std::fs::write(folder.path().join("flights.csv"), rows.fold(head, |all, row| all + &row)).unwrap();
     let config_with = Config::read(&folder.path().join("pipeline.toml")).unwrap();
-    let stay = |unit: i32| fleet::Installation {
-        tail_number: fleet::TailNumber::new(format!("T{unit:02}")).unwrap(),
-        position: fleet::Position::new(format!("place_{unit}")).unwrap(),
-        part_number: fleet::PartNumber::new("EMA-27-1040").unwrap(),
-        serial_number: fleet::SerialNumber::new(format!("S{unit:02}")).unwrap(),
+    let stay = |unit: i32| records::Installation {
+        tail_number: records::TailNumber::new(format!("T{unit:02}")).unwrap(),
+        position: records::Position::new(format!("place_{unit}")).unwrap(),
+        part_number: records::PartNumber::new("EMA-27-1040").unwrap(),
+        serial_number: records::SerialNumber::new(format!("S{unit:02}")).unwrap(),
         installed_utc: day(-1),
         removed_utc: None,
         unit_hours_at_install: Some(100.0),
@@ -246,7 +246,7 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
         row.said.gap_m = row.said.gap_m.map(|gap| gap - 12e-6);
     }
     let name = |serial: &str| {
-        (fleet::PartNumber::new("EMA-27-1040").unwrap(), fleet::SerialNumber::new(serial).unwrap())
+        (records::PartNumber::new("EMA-27-1040").unwrap(), records::SerialNumber::new(serial).unwrap())
     };
     let units = [name("S03"), name("S05")];
     let all = || histories(&rows);

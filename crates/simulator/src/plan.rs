@@ -143,7 +143,7 @@ impl Plan {
     /// Lays out the calendar of a fleet and the truth of each of its actuators.
     ///
     /// # Errors
-    /// Any variant but [`Error::NoSuchFlight`]: the first complaint about the spec.
+    /// Any variant but [`Error::NoSuchFlight`]: the first diagnostic about the spec.
     pub fn new(spec: &Spec) -> Result<Self, Error> {
         spec.check()?;
         Planner::new(spec)?.plan()

@@ -244,7 +244,7 @@ impl Spec {
     /// Says whether this fleet can be planned: every number in its range, every name declared once.
     ///
     /// # Errors
-    /// The first complaint, any variant but [`Error::NoSuchFlight`] and [`Error::Misfit`].
+    /// The first diagnostic, any variant but [`Error::NoSuchFlight`] and [`Error::Misfit`].
     pub fn check(&self) -> Result<(), Error> {
         midnight_us(&self.start_date)?;
         self.check_names()?;

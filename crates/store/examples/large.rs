@@ -14,10 +14,11 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use fleet::{
-    Estimate, Flight, FlightId, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status, TailNumber,
-};
 use jiff::{SignedDuration, Timestamp};
+use records::{
+    Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
+    TailNumber,
+};
 use store::{Holder, LogAccount, LogResult, Outcome, Query, Store};
 
 type Maybe<T> = Result<T, Box<dyn Error>>;
@@ -113,7 +114,7 @@ fn record(flight: &Flight, at: usize, serial: &str, stamp: &Provenance) -> Maybe
     let seed = flight.departure_utc.as_second() as f64 + at as f64 * 0.37;
     let noise = |scale: f64| scale * (seed * scale.ln().abs()).sin();
     let gap_m = 40e-6 + noise(1e-6);
-    let estimate = Estimate {
+    let estimate = GapEstimate {
         status: Status::Estimated,
         reason: None,
         flags: if noise(1.3) > 1.25 { vec!["soft_contact".into()] } else { Vec::new() },
@@ -133,7 +134,7 @@ fn record(flight: &Flight, at: usize, serial: &str, stamp: &Provenance) -> Maybe
         load_p95_n: Some(8e3 + noise(700.0)),
         temperature_c: Some(12.0 + noise(9.0)),
         nis: Some(1.0 + noise(0.1)),
-        ..Estimate::refused("none")
+        ..GapEstimate::refused("none")
     };
     Ok(GapRecord {
         flight: flight.clone(),

@@ -2,8 +2,9 @@
 
 use arrow::array::RecordBatch;
 use arrow::datatypes::SchemaRef;
-use fleet::{
-    Estimate, Flight, FlightId, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status, TailNumber,
+use records::{
+    Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
+    TailNumber,
 };
 
 use crate::error::Error;
@@ -98,13 +99,13 @@ impl Tabled for GapRecord {
         let unit_hours = cells.number();
         let (estimate, provenance) = (estimate(cells)?, provenance(cells)?);
         let [skew_se_s, loop_width_se_m, lost_motion_se_m] = [cells.number(), cells.number(), cells.number()];
-        let estimate = Estimate { skew_se_s, loop_width_se_m, lost_motion_se_m, ..estimate };
+        let estimate = GapEstimate { skew_se_s, loop_width_se_m, lost_motion_se_m, ..estimate };
         Ok(Self { flight, position, part_number, serial_number, unit_hours, estimate, provenance })
     }
 }
 
-fn estimate(cells: &mut Cells<'_>) -> Result<Estimate, Error> {
-    Ok(Estimate {
+fn estimate(cells: &mut Cells<'_>) -> Result<GapEstimate, Error> {
+    Ok(GapEstimate {
         status: cells.parse(status)?,
         reason: cells.owned_or_none(),
         flags: cells.texts(),

@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::path::PathBuf;
 
 use deltalake::DeltaTableError;
-use fleet::Complaint;
+use records::Diagnostic;
 
 /// Why the store could not be opened, read or written.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +42,7 @@ pub enum Error {
     Damaged { path: PathBuf, found: String, wanted: String },
     /// The bucket it lies in does not give or take a file.
     #[error(transparent)]
-    Object(#[from] objects::Error),
+    Object(#[from] object_io::Error),
     /// A column is not there or has another type.
     #[error("column `{column}` {problem}")]
     Column { column: String, problem: String },
@@ -62,13 +62,13 @@ pub enum Error {
 
 impl Error {
     /// The error as a person meets it: with its stable code, its file and a remedy.
-    pub fn complaint(&self) -> Complaint {
-        let complaint = Complaint::new(self.code(), self);
-        let complaint = match self.file() {
-            Some(file) => complaint.in_file(file.display()),
-            None => complaint,
+    pub fn diagnostic(&self) -> Diagnostic {
+        let diagnostic = Diagnostic::new(self.code(), self);
+        let diagnostic = match self.file() {
+            Some(file) => diagnostic.in_file(file.display()),
+            None => diagnostic,
         };
-        complaint.hint(self.remedy())
+        diagnostic.hint(self.remedy())
     }
 
     fn code(&self) -> &'static str {

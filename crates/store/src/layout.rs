@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use fleet::GapRecord;
+use records::GapRecord;
 use serde::{Deserialize, Serialize};
 
 use crate::account::{LogAccount, RunAccount};
@@ -53,7 +53,7 @@ impl Store {
     pub fn open(dir: impl AsRef<Path>) -> Result<Self, Error> {
         let dir = dir.as_ref();
         let missing = || Error::Missing { dir: dir.to_owned() };
-        if !objects::is_address(dir) && !is_there(dir)? {
+        if !object_io::is_address(dir) && !is_there(dir)? {
             return Err(missing());
         }
         let place = Place::at(check_name(dir)?)?;
@@ -77,7 +77,7 @@ impl Store {
     pub fn create_or_open(dir: impl AsRef<Path>) -> Result<Self, Error> {
         let dir = dir.as_ref();
         check_name(dir)?;
-        if !objects::is_address(dir) {
+        if !object_io::is_address(dir) {
             make_folder(dir)?;
         }
         let place = Place::at(dir)?;
@@ -163,7 +163,7 @@ fn percent_code(path: &str) -> Option<&str> {
 
 /// Refuses names that Delta's library cannot take.
 fn check_name(dir: &Path) -> Result<&Path, Error> {
-    let path = if objects::is_address(dir) {
+    let path = if object_io::is_address(dir) {
         dir.to_owned()
     } else {
         std::path::absolute(dir).map_err(Error::io(dir, "opened"))?

@@ -12,7 +12,7 @@ use deltalake::logstore::object_store::prefix::PrefixStore;
 use deltalake::logstore::object_store::{self, ObjectStore, ObjectStoreExt, PutMode, PutOptions, PutPayload};
 use deltalake::logstore::{LogStoreRef, StorageConfig, default_logstore};
 use deltalake::{DeltaTableBuilder, DeltaTableError};
-use objects::{Address, Client, block_on};
+use object_io::{Address, Client, block_on};
 use tokio::runtime::{Builder, Handle, Runtime};
 use url::Url;
 
@@ -46,9 +46,9 @@ enum Threads {
 impl Place {
     /// A folder that exists, or an address.
     pub(crate) fn at(path: &Path) -> Result<Self, Error> {
-        let Some(address) = Address::of(path)? else { return Self::folder(path) };
+        let Some(address) = Address::parse(path)? else { return Self::folder(path) };
         let copies = tempfile::tempdir().map_err(Error::io(std::env::temp_dir(), "written"))?;
-        let runtime = Arc::new(Threads::Shared(objects::handle()?));
+        let runtime = Arc::new(Threads::Shared(object_io::handle()?));
         let (dir, client) = (copies.path().to_owned(), address.client()?);
         let bucket = Some(Bucket { address, client, _copies: Arc::new(copies) });
         Ok(Self { dir, bucket, runtime })
@@ -142,7 +142,7 @@ impl Place {
     fn size(&self, bucket: &Bucket, path: &Path) -> Result<Option<u64>, Error> {
         match bucket.ask(&self.key(bucket, path), async |location| bucket.client.head(location).await) {
             Ok(meta) => Ok(Some(meta.size)),
-            Err(objects::Error::Missing { .. }) => Ok(None),
+            Err(object_io::Error::Missing { .. }) => Ok(None),
             Err(error) => Err(error.into()),
         }
     }
@@ -174,7 +174,7 @@ impl Place {
             };
         };
         match self.put(bucket, path, content, PutMode::Create) {
-            Err(objects::Error::Exists { .. }) => Ok(()),
+            Err(object_io::Error::Exists { .. }) => Ok(()),
             done => Ok(done?),
         }
     }
@@ -188,7 +188,13 @@ impl Place {
         }
     }
 
-    fn put(&self, bucket: &Bucket, path: &Path, content: &[u8], mode: PutMode) -> Result<(), objects::Error> {
+    fn put(
+        &self,
+        bucket: &Bucket,
+        path: &Path,
+        content: &[u8],
+        mode: PutMode,
+    ) -> Result<(), object_io::Error> {
         let payload = PutPayload::from(content.to_vec());
         let options = PutOptions { mode, ..PutOptions::default() };
         bucket.ask(&self.key(bucket, path), async |location| {
@@ -213,8 +219,8 @@ impl Place {
             return local(&self.dir).map_err(Error::io(&self.dir, "read"));
         };
         let (prefix, mut found) = (joined(bucket.address.key(), ""), Vec::new());
-        objects::list(&bucket.address, |entry| {
-            let name = Address::must(&entry.path).ok();
+        object_io::list(&bucket.address, |entry| {
+            let name = Address::parse_required(&entry.path).ok();
             let name = name.as_ref().and_then(|address| address.key().strip_prefix(&prefix));
             let written =
                 UNIX_EPOCH + Duration::from_nanos(u64::try_from(entry.modified_utc_ns).unwrap_or_default());
@@ -236,11 +242,11 @@ impl Bucket {
         &self,
         key: &str,
         question: impl AsyncFnOnce(&object_store::path::Path) -> object_store::Result<T>,
-    ) -> Result<T, objects::Error> {
+    ) -> Result<T, object_io::Error> {
         let address = self.address.with_key(key);
         let (location, clock) = (address.location()?, std::time::Instant::now());
         let answer = block_on(question(&location))?;
-        answer.map_err(|e| objects::Error::of(&address, clock.elapsed().as_secs_f64(), &e))
+        answer.map_err(|e| object_io::Error::of(&address, clock.elapsed().as_secs_f64(), &e))
     }
 }
 

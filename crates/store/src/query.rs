@@ -3,9 +3,9 @@
 use arrow::array::{BooleanArray, RecordBatch, StringArray, TimestampMicrosecondArray};
 use arrow::compute::kernels::cmp::{eq, gt_eq, lt};
 use arrow::error::ArrowError;
-use fleet::GapRecord;
 use jiff::Timestamp;
 use polars::prelude::{Expr, Scalar, TimeUnit, TimeZone, col, lit};
+use records::GapRecord;
 
 use crate::stats::Stats;
 

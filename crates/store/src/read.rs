@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::SchemaRef;
-use fleet::{GapRecord, PartNumber, SerialNumber};
 use jiff::Timestamp;
+use records::{GapRecord, PartNumber, SerialNumber};
 
 use crate::account::{LogAccount, Outcome};
 use crate::columns;

@@ -7,8 +7,8 @@
 use std::collections::BTreeMap;
 use std::slice;
 
-use fleet::{GapRecord, Status};
 use jiff::{SignedDuration, Timestamp};
+use records::{GapRecord, Status};
 
 use crate::account::{LogAccount, Outcome, RunAccount};
 use crate::error::Error;

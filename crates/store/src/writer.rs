@@ -7,7 +7,7 @@ use std::slice;
 use arrow::array::{AsArray, BooleanArray, RecordBatch};
 use arrow::compute::filter_record_batch;
 use arrow::datatypes::{SchemaRef, TimestampMicrosecondType};
-use fleet::GapRecord;
+use records::GapRecord;
 
 use crate::account::LogAccount;
 use crate::error::Error;

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use fleet::{Installations, PartNumber};
 use ingest::Files;
 use job::Config;
 use job::look::Look;
+use records::{Installations, PartNumber};
 
 use crate::answer::{load_lines_m, spread_m};
 
@@ -34,8 +34,8 @@ pub(crate) fn robot(folder: &Path) -> Result<Vec<RealRow>, String> {
     Ok(rows)
 }
 
-fn told(complaints: &[fleet::Complaint]) -> String {
-    complaints.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+fn told(diagnostics: &[records::Diagnostic]) -> String {
+    diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
 fn looked(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<RealRow>, String> {
@@ -43,7 +43,7 @@ fn looked(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<RealRow>, S
     let number = PartNumber::new(part).map_err(|e| format!("{part}: {e}"))?;
     let none = Installations::default();
     let looks = job::look::of_log(&Files::one(path), &name, config, &none, Some(&number))
-        .map_err(|complaint| complaint.to_string())?;
+        .map_err(|diagnostic| diagnostic.to_string())?;
     Ok(looks.iter().map(|look| row(&name, look)).collect())
 }
 

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use ::records::{Diagnostic, Installations, PartNumber};
 use arrow::array::RecordBatch;
-use fleet::{Complaint, Installations, PartNumber};
 use ingest::arrays::Arrays;
 use ingest::tables::{Chunk, Table as Cells};
 use ingest::write::Encoding;
@@ -27,21 +27,21 @@ use crate::table::Table;
 /// A table, and what was wrong with some of the logs: an exception to be raised, or none.
 type Partly = (Table, Option<Py<PyAny>>);
 
-fn partly(py: Python<'_>, batch: RecordBatch, complaints: &[Complaint]) -> Partly {
+fn partly(py: Python<'_>, batch: RecordBatch, diagnostics: &[Diagnostic]) -> Partly {
     let trouble =
-        (!complaints.is_empty()).then(|| raised(py, Class::Log, complaints).into_value(py).into_any());
+        (!diagnostics.is_empty()).then(|| raised(py, Class::Log, diagnostics).into_value(py).into_any());
     (Table::of(batch), trouble)
 }
 
 fn part(py: Python<'_>, config: &Config, number: &str) -> PyResult<PartNumber> {
-    let named = PartNumber::new(number).map_err(|e| refused(py, Complaint::new("empty_name", e)))?;
-    job::flight::part_of(&config.inner, &named).map_err(|complaint| refused(py, complaint))?;
+    let named = PartNumber::new(number).map_err(|e| refused(py, Diagnostic::new("empty_name", e)))?;
+    job::flight::part_of(&config.inner, &named).map_err(|diagnostic| refused(py, diagnostic))?;
     Ok(named)
 }
 
 fn instant(py: Python<'_>, text: Option<&str>) -> PyResult<Option<jiff::Timestamp>> {
     let read = text.map(ingest::tables::utc).transpose();
-    read.map_err(|what| refused(py, Complaint::new("bad_time", what)))
+    read.map_err(|what| refused(py, Diagnostic::new("bad_time", what)))
 }
 
 /// Estimates logs: as booked, or all as one part.
@@ -56,16 +56,16 @@ pub(crate) fn estimate(
     let nobody = Installations::default();
     let number = part_number.map(|number| part(py, config, number)).transpose()?;
     let booked = if number.is_some() { &nobody } else { config.booked(py)? };
-    let (mut found, mut complaints) = (Vec::new(), Vec::new());
+    let (mut found, mut diagnostics) = (Vec::new(), Vec::new());
     for log in &logs {
         py.check_signals()?;
         let number = number.as_ref();
         let read =
-            py.detach(|| adhoc::estimate(log, &config.inner, booked, number, VERSION, &mut complaints));
+            py.detach(|| adhoc::estimate(log, &config.inner, booked, number, VERSION, &mut diagnostics));
         found.extend(read.map_err(|error| failed(py, error))?);
     }
     let batch = rows::batch(&rows::estimates(), &found).map_err(|e| broken(&e))?;
-    Ok(partly(py, batch, &complaints))
+    Ok(partly(py, batch, &diagnostics))
 }
 
 /// Estimates channels held in memory.
@@ -86,7 +86,7 @@ pub(crate) fn estimate_arrays(
         let arrays = Arrays { time_s: &time_s, motor_m: &motor_m, screw_m: &screw_m, load_n: &load_n };
         adhoc::of_arrays(&arrays, &config.inner, &number, VERSION)
     });
-    let found = found.map_err(|complaint| raised(py, Class::Log, &[complaint]))?;
+    let found = found.map_err(|diagnostic| raised(py, Class::Log, &[diagnostic]))?;
     Ok(Table::of(rows::batch(&rows::estimates(), &[found]).map_err(|e| broken(&e))?))
 }
 
@@ -105,7 +105,7 @@ pub(crate) fn trace(
     let files = pipeline::bundle::around(&config.inner, &log).map_err(|error| failed(py, error))?;
     let shown = log.display().to_string();
     let seen = py.detach(|| job::trace::of_log(&files, &shown, &config.inner, booked, number.as_ref()));
-    let columns = seen.map_err(|complaint| raised(py, Class::Log, &[complaint]))?.columns();
+    let columns = seen.map_err(|diagnostic| raised(py, Class::Log, &[diagnostic]))?.columns();
     Ok(Table::of(ingest::write::batch(&columns).map_err(|e| broken(&e))?))
 }
 
@@ -136,7 +136,7 @@ pub(crate) fn trend(
 
 fn cells(table: &Bound<'_, PyAny>, name: &str) -> PyResult<Cells> {
     let read = Cells::of_batches(name.as_ref(), &capsule::batches(table)?);
-    read.map_err(|error| refused(table.py(), error.complaint()))
+    read.map_err(|error| refused(table.py(), error.diagnostic()))
 }
 
 fn stated(
@@ -217,8 +217,8 @@ pub(crate) fn normalize(
         pipeline::normalize::normalize(&config.inner, booked, &logs, place, jobs, &|_| {})
     });
     let done = done.map_err(|error| failed(py, error))?;
-    let trouble = (!done.complaints.is_empty())
-        .then(|| raised(py, Class::Log, &done.complaints).into_value(py).into_any());
+    let trouble = (!done.diagnostics.is_empty())
+        .then(|| raised(py, Class::Log, &done.diagnostics).into_value(py).into_any());
     Ok((done.written, trouble))
 }
 
@@ -245,5 +245,5 @@ pub(crate) fn run(
 /// What a run did, as JSON.
 pub(crate) fn account(py: Python<'_>, report: Result<pipeline::Report, pipeline::Error>) -> PyResult<String> {
     let report = report.map_err(|error| failed(py, error))?;
-    serde_json::to_string(&report).map_err(|e| raised(py, Class::Run, &[Complaint::new("run_failed", e)]))
+    serde_json::to_string(&report).map_err(|e| raised(py, Class::Run, &[Diagnostic::new("run_failed", e)]))
 }

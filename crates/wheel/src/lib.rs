@@ -1,7 +1,7 @@
 //! The Python module `freeplay._freeplay`: the command's own rows, through Arrow's C interface.
 //!
 //! Nothing is computed here. Settings, logs and tables go to the floors below, whose answers become tables and
-//! whose complaints become exceptions; work is done without Python's lock.
+//! whose diagnostics become exceptions; work is done without Python's lock.
 
 mod capsule;
 mod door;

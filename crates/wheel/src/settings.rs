@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use fleet::Installations;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use records::Installations;
 
 use crate::VERSION;
 use crate::error::{Class, failed, raised};
@@ -29,7 +29,7 @@ impl Config {
         let whole: Vec<PathBuf> = files.iter().map(absolute).collect();
         let inner = py
             .detach(|| job::Config::read_layers(&files))
-            .map_err(|complaints| raised(py, Class::Config, &complaints))?;
+            .map_err(|diagnostics| raised(py, Class::Config, &diagnostics))?;
         Ok(Self { inner, files: whole, installations: OnceLock::new() })
     }
 
@@ -37,7 +37,7 @@ impl Config {
     #[staticmethod]
     fn parse(py: Python<'_>, text: &str, folder: PathBuf) -> PyResult<Self> {
         let inner = job::Config::parse(text, Path::new("configuration"), &folder)
-            .map_err(|complaints| raised(py, Class::Config, &complaints))?;
+            .map_err(|diagnostics| raised(py, Class::Config, &diagnostics))?;
         Ok(Self { inner, files: Vec::new(), installations: OnceLock::new() })
     }
 

@@ -5,11 +5,11 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use arrow::array::RecordBatch;
-use fleet::Complaint;
 use pipeline::Request;
 use pipeline::elsewhere::{self, Task};
 use pipeline::schedule::Context;
 use pyo3::prelude::*;
+use records::Diagnostic;
 use store::Holder;
 
 use crate::VERSION;
@@ -22,8 +22,8 @@ use crate::table::Table;
 /// Does one log of a run that is kept elsewhere; its fault, if it has one, is among the rows.
 #[pyfunction]
 pub(crate) fn answer(py: Python<'_>, config: &Config, task: &str) -> PyResult<Table> {
-    let task: Task =
-        serde_json::from_str(task).map_err(|e| raised(py, Class::Run, &[Complaint::new("run_failed", e)]))?;
+    let task: Task = serde_json::from_str(task)
+        .map_err(|e| raised(py, Class::Run, &[Diagnostic::new("run_failed", e)]))?;
     let booked = config.booked(py)?;
     let rows = py.detach(|| elsewhere::answer(&config.inner, booked, &task, VERSION));
     Ok(Table::of(rows.map_err(|error| failed(py, error))?))

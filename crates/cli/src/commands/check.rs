@@ -5,12 +5,12 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
-use fleet::{Complaint, Installations, PartNumber};
 use ingest::{Actuator, Files, PositionColumns, Quality, quality};
 use job::Config;
 use job::flight::{Opened, caught};
 use job::value::UNHEARD_OF_M;
 use pipeline::bundle;
+use records::{Diagnostic, Installations, PartNumber};
 use serde::Serialize;
 
 use crate::args::{CheckArgs, Format, Global};
@@ -38,7 +38,7 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
     let (config, installations) = booked(global)?;
     doubt_limits(&config, talk);
     let logs = logs(args, &config, talk)?;
-    let (mut channels, mut complaints, mut page) = (Vec::new(), Vec::new(), String::new());
+    let (mut channels, mut diagnostics, mut page) = (Vec::new(), Vec::new(), String::new());
     let mut schemas = Schemas::default();
     let mut facts = Facts::new();
     for (files, name) in &logs {
@@ -50,23 +50,28 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
                 name,
                 &config,
                 &installations,
-                &mut Seen { channels: &mut channels, facts: &mut facts, complaints: &mut complaints },
+                &mut Seen { channels: &mut channels, facts: &mut facts, diagnostics: &mut diagnostics },
                 &mut page,
             );
             Ok(())
         });
-        complaints.extend(looked.err());
+        diagnostics.extend(looked.err());
     }
     let table = || {
-        format!("{page}{}{}{}", schemas.drift(), proposals(&facts, &config), summary(logs.len(), &complaints))
+        format!(
+            "{page}{}{}{}",
+            schemas.drift(),
+            proposals(&facts, &config),
+            summary(logs.len(), &diagnostics)
+        )
     };
     if args.output.format() == Format::Table && args.output.output.is_none() {
         talk.answer(&table())?;
     } else {
         rows::answer(&args.output, talk, || rows::batch(&schema(), &channels), table)?;
     }
-    talk.complain_all(&complaints);
-    Ok(if complaints.is_empty() { Code::Well } else { Code::LogsInError })
+    talk.complain_all(&diagnostics);
+    Ok(if diagnostics.is_empty() { Code::Well } else { Code::LogsInError })
 }
 
 /// Asks after limits that were given in another unit.
@@ -129,7 +134,7 @@ struct Channel {
 struct Seen<'s> {
     channels: &'s mut Vec<Channel>,
     facts: &'s mut Facts,
-    complaints: &'s mut Vec<Complaint>,
+    diagnostics: &'s mut Vec<Diagnostic>,
 }
 
 /// What actuators say of their part numbers.
@@ -151,7 +156,7 @@ fn one(
     page: &mut String,
 ) {
     let id = &opened.identity;
-    let Seen { channels, facts, complaints } = seen;
+    let Seen { channels, facts, diagnostics } = seen;
     let (first, mut clocks) = (channels.len(), Vec::new());
     for at in opened.actuators(installations) {
         match actuator(opened, name, at, config, installations) {
@@ -163,10 +168,10 @@ fn one(
                 }
             }
             // What is wrong with the log as a whole is wrong with each of its actuators.
-            Err(complaint) => {
-                let complaint = complaint.in_file(name);
-                if !complaints.contains(&complaint) {
-                    complaints.push(complaint);
+            Err(diagnostic) => {
+                let diagnostic = diagnostic.in_file(name);
+                if !diagnostics.contains(&diagnostic) {
+                    diagnostics.push(diagnostic);
                 }
             }
         }
@@ -225,7 +230,7 @@ fn actuator(
     at: &PositionColumns,
     config: &Config,
     installations: &Installations,
-) -> Result<Looked, Complaint> {
+) -> Result<Looked, Diagnostic> {
     let id = &opened.identity;
     let (stay, part) = opened.unit(at, config, installations)?;
     let base = |channel: &'static str, column: &Option<String>, unit: &'static str| Channel {
@@ -427,8 +432,8 @@ fn proposals(facts: &Facts, config: &Config) -> String {
     page
 }
 
-fn summary(logs: usize, complaints: &[Complaint]) -> String {
-    let mut files: Vec<&str> = complaints.iter().filter_map(|c| c.file.as_deref()).collect();
+fn summary(logs: usize, diagnostics: &[Diagnostic]) -> String {
+    let mut files: Vec<&str> = diagnostics.iter().filter_map(|c| c.file.as_deref()).collect();
     files.sort_unstable();
     files.dedup();
     format!("{}: {} in error; nothing was computed or written\n", table::count(logs, "log"), files.len())

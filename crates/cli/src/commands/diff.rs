@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow::datatypes::{DataType, Field, Schema};
-use fleet::{Estimate, GapRecord};
+use records::{GapEstimate, GapRecord};
 use serde::Serialize;
 use store::{Query, Store};
 
@@ -93,7 +93,8 @@ fn page(
     after: &BTreeMap<Key, GapRecord>,
 ) -> String {
     let said = |all: &BTreeMap<Key, GapRecord>| {
-        let told: Vec<&Estimate> = all.values().map(|r| &r.estimate).filter(|e| e.gap_m.is_some()).collect();
+        let told: Vec<&GapEstimate> =
+            all.values().map(|r| &r.estimate).filter(|e| e.gap_m.is_some()).collect();
         format!("{} with {}", count(all.len(), "record"), count(told.len(), "gap"))
     };
     let mut changes: Vec<f64> = rows.iter().filter_map(|r| r.gap_change_m).map(f64::abs).collect();

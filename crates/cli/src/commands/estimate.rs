@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use fleet::{Installations, PartNumber};
 use job::Config;
 use job::flight::part_of;
 use pipeline::adhoc::{self, EstimateRow};
+use records::{Installations, PartNumber};
 
 use crate::args::{EstimateArgs, Global};
 use crate::exit::{Code, Failure};
@@ -26,10 +26,10 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, talk: &Talk) -> Res
         None => booked(global)?,
     };
     let part = args.part.as_ref().map(|number| configured(&config, number)).transpose()?;
-    let (mut found, mut complaints) = (Vec::new(), Vec::new());
+    let (mut found, mut diagnostics) = (Vec::new(), Vec::new());
     for path in &args.logs {
         let part = part.as_ref();
-        found.extend(adhoc::estimate(path, &config, &installations, part, VERSION, &mut complaints)?);
+        found.extend(adhoc::estimate(path, &config, &installations, part, VERSION, &mut diagnostics)?);
     }
     if let Some(file) = &args.trace {
         trace(file, &args.logs, &config, &installations, part.as_ref(), talk)?;
@@ -39,8 +39,8 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, talk: &Talk) -> Res
     }
     let batch = || rows::batch(&pipeline::rows::estimates(), &found);
     rows::answer(&args.output, talk, batch, || page(&found))?;
-    talk.complain_all(&complaints);
-    Ok(if complaints.is_empty() { Code::Well } else { Code::LogsInError })
+    talk.complain_all(&diagnostics);
+    Ok(if diagnostics.is_empty() { Code::Well } else { Code::LogsInError })
 }
 
 fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
@@ -48,7 +48,7 @@ fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
         .map_err(|e| Failure::usage("empty_name", e, "name one that the configuration has"))?;
     match part_of(config, &name) {
         Ok(_) => Ok(name),
-        Err(complaint) => Err(Failure::Refused(vec![complaint])),
+        Err(diagnostic) => Err(Failure::Refused(vec![diagnostic])),
     }
 }
 
@@ -113,7 +113,7 @@ fn trace(
         all.extend(opened);
     }
     let columns = all.columns();
-    ingest::write::write_parquet(file, &columns, &[]).map_err(|e| Failure::failed(e.complaint()))?;
+    ingest::write::write_parquet(file, &columns, &[]).map_err(|e| Failure::failed(e.diagnostic()))?;
     talk.note(&format!("wrote {} samples to {}", all.len(), shown(file)));
     Ok(())
 }

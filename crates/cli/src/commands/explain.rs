@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use fleet::{Complaint, GapRecord};
 use ingest::{Actuator, Files};
 use job::flight::{Opened, caught};
 use job::{Config, estimate};
 use pipeline::bundle;
+use records::{Diagnostic, GapRecord};
 use serde_json::{Value, json};
 use store::{Query, Store};
 
@@ -39,8 +39,8 @@ pub(crate) fn explain(args: &ExplainArgs, global: &Global, talk: &Talk) -> Resul
     } else {
         talk.answer(&page(&record, &config, &replayed, &verdict))?;
     }
-    if let Err(complaint) = &replayed {
-        talk.complain(complaint);
+    if let Err(diagnostic) = &replayed {
+        talk.complain(diagnostic);
     }
     Ok(if matches!(verdict, Verdict::Same | Verdict::OtherSettings) { Code::Well } else { Code::LogsInError })
 }
@@ -72,21 +72,21 @@ fn find(args: &ExplainArgs, store: &Store) -> Result<GapRecord, Failure> {
 struct Replay {
     digest: String,
     channels: Option<Actuator>,
-    estimate: fleet::Estimate,
+    estimate: records::GapEstimate,
 }
 
 fn replay(
     record: &GapRecord,
     config: &Config,
-    installations: &fleet::Installations,
-) -> Result<Replay, Complaint> {
+    installations: &records::Installations,
+) -> Result<Replay, Diagnostic> {
     let shown = &record.provenance.log_path;
     let path = config.path(shown);
     let files = bundle::around(config, &path).unwrap_or_else(|_| Files::one(path));
     caught(shown, || {
         let opened = Opened::open(&files, shown, config, installations)?;
         let at = opened.positions.iter().find(|at| at.position == record.position).ok_or_else(|| {
-            Complaint::new("no_position", format!("the log holds no {} any more", record.position))
+            Diagnostic::new("no_position", format!("the log holds no {} any more", record.position))
                 .in_file(shown)
         })?;
         let (_, part) = opened.unit(at, config, installations)?;
@@ -110,7 +110,7 @@ enum Verdict {
 }
 
 impl Verdict {
-    fn of(record: &GapRecord, replayed: &Result<Replay, Complaint>, digest: &str) -> Self {
+    fn of(record: &GapRecord, replayed: &Result<Replay, Diagnostic>, digest: &str) -> Self {
         let Ok(replayed) = replayed else { return Self::NotReplayed };
         if replayed.digest != record.provenance.log_digest {
             Self::OtherLog
@@ -147,14 +147,14 @@ impl std::fmt::Display for Verdict {
 }
 
 /// Numbers are written in the shortest form that reads back to the same bits.
-fn in_bits(estimate: &fleet::Estimate) -> Value {
+fn in_bits(estimate: &records::GapEstimate) -> Value {
     serde_json::to_value(estimate).unwrap_or_default()
 }
 
 fn page(
     record: &GapRecord,
     config: &Config,
-    replayed: &Result<Replay, Complaint>,
+    replayed: &Result<Replay, Diagnostic>,
     verdict: &Verdict,
 ) -> String {
     let (flight, p, e) = (&record.flight, &record.provenance, &record.estimate);

@@ -52,7 +52,7 @@ pub(crate) fn init(args: &InitArgs, talk: &Talk) -> Result<Code, Failure> {
     let [mut toml, mut table] = FILES.map(|(_, text)| text.to_owned());
     if let Some(folder) = &args.from {
         let logs = logs(folder)?;
-        let offer = propose(&logs[0]).map_err(|e| Failure::Refused(vec![e.complaint()]))?;
+        let offer = propose(&logs[0]).map_err(|e| Failure::Refused(vec![e.diagnostic()]))?;
         toml = proposed(folder, &args.dir, &logs[0], &offer)?;
         table = stays(&logs, &offer).unwrap_or(table);
     }

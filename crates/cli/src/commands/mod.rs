@@ -20,8 +20,8 @@ pub(crate) mod trend;
 
 use std::path::Path;
 
-use fleet::Installations;
 use job::Config;
+use records::Installations;
 
 use crate::args::{CONFIG, Foreign, Global};
 use crate::exit::Failure;

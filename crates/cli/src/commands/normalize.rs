@@ -26,7 +26,7 @@ pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, talk: &Talk) -> R
     let progress = Progress::new("normalize", talk);
     let watch = |event: Event| match event {
         Event::Planned { logs, .. } => progress.total(logs),
-        Event::Finished { log, complaints, .. } => progress.finished(&log, 0, complaints.len()),
+        Event::Finished { log, diagnostics, .. } => progress.finished(&log, 0, diagnostics.len()),
         _ => {}
     };
     let place = (args.output.as_path(), args.encoding.into());
@@ -46,6 +46,6 @@ pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, talk: &Talk) -> R
         count(logs.len(), "log"),
         shown(&args.output)
     ))?;
-    talk.complain_all(&done.complaints);
-    Ok(if done.complaints.is_empty() { Code::Well } else { Code::LogsInError })
+    talk.complain_all(&done.diagnostics);
+    Ok(if done.diagnostics.is_empty() { Code::Well } else { Code::LogsInError })
 }

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use fleet::{Installations, PartNumber};
 use job::Config;
 use job::look::Look;
+use records::{Installations, PartNumber};
 use report::{Stretch, look_html, look_png, look_svg};
 
 use crate::exit::Failure;
@@ -39,7 +39,7 @@ pub(super) fn plot(
         return Ok(());
     }
     let failed = |what: &dyn std::fmt::Display| {
-        Failure::failed(fleet::Complaint::new("cannot_write", format!("{}: {what}", shown(file))))
+        Failure::failed(records::Diagnostic::new("cannot_write", format!("{}: {what}", shown(file))))
     };
     let picture = draw(&looks).map_err(|e| failed(&e))?;
     std::fs::write(file, picture).map_err(|e| failed(&e))?;
@@ -88,7 +88,7 @@ fn drawn(log: &str, look: Look) -> report::Look {
     }
 }
 
-fn words(e: &fleet::Estimate) -> String {
+fn words(e: &records::GapEstimate) -> String {
     let mut words = Vec::new();
     let mut say = |name: &str, value: Option<f64>, unit: &str| {
         words.extend(value.map(|v| format!("{name} {v:.1} {unit}")));

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use fleet::GapRecord;
+use records::GapRecord;
 use store::{Query, Store};
 
 use crate::args::{By, Global, QueryArgs};
@@ -121,15 +121,15 @@ fn sketches(records: &[GapRecord]) -> String {
 }
 
 /// The load band a number stands on.
-pub(crate) fn load(e: &fleet::Estimate) -> String {
+pub(crate) fn load(e: &records::GapEstimate) -> String {
     e.load_p05_n.zip(e.load_p95_n).map_or_else(table::dash, |(low, high)| format!("{low:.0}…{high:.0}"))
 }
 
 /// Why refused, or what is doubted.
-pub(crate) fn doubts(e: &fleet::Estimate) -> String {
+pub(crate) fn doubts(e: &records::GapEstimate) -> String {
     let reason = e.reason.iter().map(|reason| match e.status {
-        fleet::Status::Refused => format!("refused: {reason}"),
-        fleet::Status::Estimated => reason.clone(),
+        records::Status::Refused => format!("refused: {reason}"),
+        records::Status::Estimated => reason.clone(),
     });
     let others = e.flags.iter().filter(|flag| Some(*flag) != e.reason.as_ref()).cloned();
     reason.chain(others).collect::<Vec<_>>().join(", ")

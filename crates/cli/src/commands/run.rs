@@ -5,12 +5,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use fleet::{SerialNumber, TailNumber};
 use pipeline::changed::Changed;
 use pipeline::recorder::{Moved, Quantity};
 use pipeline::schedule::{self, Context};
 use pipeline::statement::TrendRow;
 use pipeline::{Event, Plan, Report, Request};
+use records::{SerialNumber, TailNumber};
 use store::Holder;
 
 use crate::args::{FailOn, Global, RunArgs};
@@ -60,7 +60,7 @@ pub(crate) fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, 
         return Ok(Code::Interrupted);
     }
     let report = report?;
-    talk.complain_all(report.errors.iter().map(|e| &e.complaint));
+    talk.complain_all(report.errors.iter().map(|e| &e.diagnostic));
     let reached = args.fail_on.is_some_and(|least| is_reached(&report, least));
     let code = code(&report, reached, stop.load(Ordering::Relaxed));
     if let Some(file) = &args.metrics {
@@ -76,8 +76,9 @@ pub(crate) fn run(args: &RunArgs, global: &Global, talk: &Talk) -> Result<Code, 
 }
 
 fn request(args: &RunArgs) -> Result<Request, Failure> {
-    let empty =
-        |e: fleet::ids::EmptyName| Failure::usage("empty_name", e, "leave the option out to ask for all");
+    let empty = |e: records::ids::EmptyIdError| {
+        Failure::usage("empty_name", e, "leave the option out to ask for all")
+    };
     Ok(Request {
         since_utc: args.since,
         until_utc: args.until,
@@ -106,8 +107,8 @@ fn follow(event: &Event, progress: &Progress<'_>) {
     match event {
         Event::Planned { logs, .. } => progress.total(*logs),
         Event::Started { log } => progress.started(log),
-        Event::Finished { log, refused, complaints, .. } => {
-            progress.finished(log, *refused, complaints.len());
+        Event::Finished { log, refused, diagnostics, .. } => {
+            progress.finished(log, *refused, diagnostics.len());
         }
         Event::Stored { .. } | Event::Trends { .. } => {}
     }
@@ -196,8 +197,8 @@ fn account(report: &Report, config: &str, code: Code) -> String {
         );
     }
     for error in report.errors.iter().take(10) {
-        let place = error.complaint.place().map(|p| format!("  {p}")).unwrap_or_default();
-        line(&mut page, "", &format!("{}  {}{place}", escape(&error.log), error.complaint.code));
+        let place = error.diagnostic.location().map(|p| format!("  {p}")).unwrap_or_default();
+        line(&mut page, "", &format!("{}  {}{place}", escape(&error.log), error.diagnostic.code));
     }
     if report.errors.len() > 10 {
         line(&mut page, "", &format!("and {} more, all in `freeplay run --json`", report.errors.len() - 10));

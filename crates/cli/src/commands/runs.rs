@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
-use fleet::Status;
 use jiff::Timestamp;
+use records::Status;
 use serde::Serialize;
 use store::{LogAccount, Outcome, Query, RunAccount, Store};
 

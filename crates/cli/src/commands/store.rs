@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Duration;
 
-use fleet::Complaint;
 use jiff::Timestamp;
+use records::Diagnostic;
 use serde_json::json;
 use store::{Holder, Info, Query, RunAccount, Store};
 
@@ -62,7 +62,7 @@ fn info(store: &Store, max_age: Option<Duration>, as_json: bool, talk: &Talk) ->
         None => "no run was ever completed".to_owned(),
     };
     talk.complain(
-        &Complaint::new("run_overdue", what)
+        &Diagnostic::new("run_overdue", what)
             .hint("did the timer start `freeplay run`, and did it end with code 0 or 1?"),
     );
     Ok(Code::LogsInError)

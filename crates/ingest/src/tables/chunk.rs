@@ -57,7 +57,7 @@ pub fn trimmed(text: &str) -> &str {
 }
 
 impl Chunk {
-    /// Rows from memory, so many others before them; `name` stands for their file in complaints.
+    /// Rows from memory, so many others before them; `name` stands for their file in diagnostics.
     pub fn new(name: &Path, batch: RecordBatch, before: usize) -> Self {
         let header = batch.schema_ref().fields().iter().map(|f| f.name().clone()).collect();
         Self { file: name.to_owned(), header, batch, before }
@@ -137,7 +137,7 @@ impl Chunk {
         }
     }
 
-    /// A complaint about a row's cell.
+    /// A diagnostic about a row's cell.
     pub fn error(&self, row: usize, column: Option<usize>, detail: String) -> Error {
         bad_cell(&self.file, self.before + row, column.and_then(|c| self.header.get(c)), detail)
     }
@@ -413,7 +413,7 @@ mod tests {
         let chunk = chunks(&file, Some(&["c", "gap_mm"])).unwrap().next().unwrap().unwrap();
         assert_eq!((chunk.find(&["a"]), chunk.find(&["c"])), (None, Some(1)));
         let error = chunk.column(&["gap_m"]).unwrap_err();
-        assert!(error.complaint().hint.unwrap().starts_with("`gap_mm`?"));
+        assert!(error.diagnostic().hint.unwrap().starts_with("`gap_mm`?"));
     }
 
     #[test]
@@ -423,11 +423,11 @@ mod tests {
         let rows: String = (0..=ROWS + 7).map(|row| if row == ROWS + 4 { "x\n" } else { "1.5\n" }).collect();
         std::fs::write(&file, format!("gap_m\n{rows}")).unwrap();
         let errors = chunks(&file, None).unwrap().filter_map(|chunk| chunk.unwrap().numbers(Some(0)).err());
-        let places: Vec<_> = errors.map(|e| e.complaint().place().unwrap()).collect();
+        let places: Vec<_> = errors.map(|e| e.diagnostic().location().unwrap()).collect();
         assert_eq!(places, [format!("column `gap_m`, row {}", ROWS + 5)]);
         let not_finite = Arc::new(Float64Array::from(vec![1.0, f64::NAN])) as ArrayRef;
         let chunk = Chunk::new("t".as_ref(), batch(vec![("gap_m", not_finite)]), 10);
-        let place = chunk.numbers(Some(0)).unwrap_err().complaint().place().unwrap();
+        let place = chunk.numbers(Some(0)).unwrap_err().diagnostic().location().unwrap();
         assert_eq!(place, "column `gap_m`, row 12");
     }
 
@@ -462,7 +462,7 @@ mod tests {
             assert_eq!(codes.values().as_string::<i32>().value(codes.key(0).unwrap()), " S1 ");
             assert_eq!(last.numbers(Some(1)).unwrap(), Float64Array::from(vec![6.0]));
             let bad = rows(1..2).next().unwrap().numbers(Some(1)).unwrap_err();
-            assert_eq!(bad.complaint().place().unwrap(), "column `gap_m`, row 6", "{kind}");
+            assert_eq!(bad.diagnostic().location().unwrap(), "column `gap_m`, row 6", "{kind}");
         }
     }
 

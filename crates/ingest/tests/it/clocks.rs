@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray, UInt16Array};
-use fleet::Position;
 use ingest::schema::Epoch;
 use ingest::unit::{TimeUnit, Unit};
 use ingest::{Actuator, ChannelMapping, Error, Files, Geometry, Log, Mapping};
+use records::Position;
 
 use crate::layouts::{channel, mapping, write};
 
@@ -207,7 +207,7 @@ fn clocks_without_a_common_zero_are_refused() {
     m.channels.screw_position =
         Some(ChannelMapping { time_column: Some("ts".into()), ..channel("s", Unit::Metre) });
     let error = read(&m, &with(columns(), "ts", instants)).unwrap_err();
-    assert_eq!(error.complaint().code, "clocks_differ");
+    assert_eq!(error.diagnostic().code, "clocks_differ");
 }
 
 #[test]

@@ -9,12 +9,12 @@ use arrow::array::{
     Int32Array, Int64Array, RecordBatch, StringArray, TimestampMillisecondArray, TimestampNanosecondArray,
 };
 use arrow::datatypes::{Int32Type, Schema};
-use fleet::Position;
 use ingest::identity::Facts;
 use ingest::schema::{Fact, IdentityMapping};
 use ingest::unit::{TimeUnit, Unit};
 use ingest::{Actuator, ChannelMapping, Channels, ClockMapping, Files, Geometry, Log, Mapping};
 use parquet::arrow::ArrowWriter;
+use records::Position;
 
 /// Writes columns with the plain writer of the Arrow library.
 pub(crate) fn write(file: &Path, columns: &[(&str, ArrayRef)]) {
@@ -302,8 +302,8 @@ fn text_where_numbers_should_stand_is_refused_by_name() {
     let log = Log::open(&Files::one(&file), &Arc::new(m.clone())).unwrap();
     let positions = log.positions(&m.channels, Some(&Position::new("a").unwrap())).unwrap();
     let error = log.actuator(&positions[0], &m.channels, LINEAR).unwrap_err();
-    assert_eq!(error.complaint().code, "column_type");
-    assert_eq!(error.complaint().column.as_deref(), Some("m"));
+    assert_eq!(error.diagnostic().code, "column_type");
+    assert_eq!(error.diagnostic().column.as_deref(), Some("m"));
 }
 
 /// `SYSTEM.CHANNEL` is an ordinary name in flight logs, not a path into a nest.

@@ -23,12 +23,12 @@ fn sound(file: &Path) {
 
 fn read(file: &Path, m: &Mapping) -> Result<Actuator, Error> {
     let log = Log::open(&Files::one(file), &Arc::new(m.clone()))?;
-    let at = log.positions(&m.channels, Some(&fleet::Position::new("a").unwrap()))?;
+    let at = log.positions(&m.channels, Some(&records::Position::new("a").unwrap()))?;
     log.actuator(&at[0], &m.channels, Geometry::Linear { lead_m_per_rev: None })
 }
 
 fn code(result: Result<Log, Error>) -> String {
-    result.err().map(|e| e.complaint().code).unwrap_or_default()
+    result.err().map(|e| e.diagnostic().code).unwrap_or_default()
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn a_flipped_byte_changes_the_digest() {
     let m = plain();
     let digest = |file: &Path| {
         let log = Log::open(&Files::one(file), &Arc::new(m.clone())).unwrap();
-        let positions = log.positions(&m.channels, Some(&fleet::Position::new("a").unwrap())).unwrap();
+        let positions = log.positions(&m.channels, Some(&records::Position::new("a").unwrap())).unwrap();
         log.digest(&[(&m.channels, &positions[0])]).unwrap()
     };
     let before = digest(&file);
@@ -103,10 +103,10 @@ fn a_clock_without_a_unit_is_never_guessed() {
     let mut m = plain();
     m.clock.unit = None;
     let error = read(&file, &m).unwrap_err();
-    assert_eq!(error.complaint().code, "time_unit_unknown");
+    assert_eq!(error.diagnostic().code, "time_unit_unknown");
     m.clock.column = None;
     let error = read(&file, &m).unwrap_err();
-    assert_eq!(error.complaint().code, "no_clock");
+    assert_eq!(error.diagnostic().code, "no_clock");
 }
 
 /// Bytes changed anywhere in files of every writer: a number or a reason comes back, and never the end of

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, RecordBatch};
-use fleet::Position;
 use ingest::unit::Unit;
 use ingest::{Actuator, Condition, Error, Files, Geometry, Log, Mapping};
 use parquet::arrow::ArrowWriter;
@@ -14,6 +13,7 @@ use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
 use parquet::file::properties::WriterProperties;
 use proptest::prelude::*;
+use records::Position;
 
 use crate::layouts::{channel, mapping};
 

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use fleet::Position;
 use ingest::identity::Facts;
 use ingest::schema::{Fact, IdentityMapping};
 use ingest::unit::{TimeUnit, Unit};
 use ingest::{
     Actuator, ChannelMapping, Channels, ClockMapping, Files, Geometry, GroupMapping, Layout, Log, Mapping,
 };
+use records::Position;
 
 use crate::layouts::channel;
 
@@ -178,5 +178,5 @@ fn loads_in_a_file_of_their_own_at_their_own_rate_are_held() {
     assert_is_the_flight(&actuators(&files, &m), "groups", 0.0, 2);
     let log = Log::open(&Files::one(file("group_positions.parquet")), &Arc::new(m.clone())).unwrap();
     let error = log.positions(&m.channels, None).unwrap_err();
-    assert_eq!(error.complaint().code, "no_position");
+    assert_eq!(error.diagnostic().code, "no_position");
 }

@@ -2,30 +2,30 @@
 
 use std::collections::BTreeMap;
 
-use fleet::Complaint;
 use ingest::pattern::{PLACEHOLDER, nearest};
 use ingest::unit::Dimension;
 use ingest::{ChannelMapping, Channels, Condition, GroupMapping, Layout};
+use records::Diagnostic;
 
 use super::source::Source;
 use crate::value::positive;
 
-/// Every complaint about the channels, each at its key.
+/// Every diagnostic about the channels, each at its key.
 pub(super) fn check(
     channels: &Channels,
     layout: &Layout,
     groups: &BTreeMap<String, GroupMapping>,
     path: &[&str],
     source: &Source<'_>,
-    found: &mut Vec<Complaint>,
+    found: &mut Vec<Diagnostic>,
 ) {
-    let mut complain = |keys: &[&str], c: Complaint| {
+    let mut complain = |keys: &[&str], c: Diagnostic| {
         let whole: Vec<&str> = path.iter().chain(keys).copied().collect();
         found.push(source.at(&whole, c));
     };
     let mut columns: BTreeMap<(&str, Option<&str>), &str> = BTreeMap::new();
     for (name, channel, wanted) in named(channels) {
-        for (key, c) in complaints(name, channel, wanted, layout, groups) {
+        for (key, c) in diagnostics(name, channel, wanted, layout, groups) {
             complain(&[name, key], c);
         }
         for choice in channel.choices() {
@@ -36,7 +36,7 @@ pub(super) fn check(
                 } else {
                     what
                 };
-                let c = Complaint::new("column_twice", what).hint("two channels cannot share a column");
+                let c = Diagnostic::new("column_twice", what).hint("two channels cannot share a column");
                 complain(&[name, "column"], c);
             }
         }
@@ -49,11 +49,11 @@ pub(super) fn check(
     match (&channels.screw_position, &channels.relative_position) {
         (None, None) => {
             let what = "neither `screw_position` nor `relative_position` is mapped";
-            complain(&[], Complaint::new("key_missing", what).hint("[channel.screw_position]"));
+            complain(&[], Diagnostic::new("key_missing", what).hint("[channel.screw_position]"));
         }
         (Some(_), Some(_)) => {
             let what = "both `screw_position` and `relative_position` are mapped";
-            let c = Complaint::new("key_of_other_kind", what)
+            let c = Diagnostic::new("key_of_other_kind", what)
                 .hint("the relative position is screw − motor: map one of them");
             complain(&["relative_position"], c);
         }
@@ -74,20 +74,20 @@ fn named(channels: &Channels) -> impl Iterator<Item = (&'static str, &ChannelMap
     .filter_map(|(name, channel, wanted)| Some((name, channel?, wanted)))
 }
 
-fn complaints(
+fn diagnostics(
     name: &str,
     channel: &ChannelMapping,
     wanted: [Dimension; 2],
     layout: &Layout,
     groups: &BTreeMap<String, GroupMapping>,
-) -> Vec<(&'static str, Complaint)> {
+) -> Vec<(&'static str, Diagnostic)> {
     let mut found: Vec<_> =
         channel.choices().flat_map(|choice| one(name, choice, wanted, layout, groups)).collect();
     if channel.alternatives.iter().any(|a| !a.alternatives.is_empty()) {
         let what = format!("an alternative of `channel.{name}` has alternatives of its own");
         found.push((
             "alternatives",
-            Complaint::new("bad_pattern", what).hint("list them all in one row, best first"),
+            Diagnostic::new("bad_pattern", what).hint("list them all in one row, best first"),
         ));
     }
     found
@@ -99,30 +99,30 @@ fn one(
     wanted: [Dimension; 2],
     layout: &Layout,
     groups: &BTreeMap<String, GroupMapping>,
-) -> Vec<(&'static str, Complaint)> {
+) -> Vec<(&'static str, Diagnostic)> {
     let mut found = Vec::new();
     found.extend(wrong_unit(name, channel, wanted).map(|c| ("unit", c)));
     if channel.column.trim().is_empty() {
-        found.push(("column", Complaint::new("empty_name", format!("`channel.{name}` names no column"))));
+        found.push(("column", Diagnostic::new("empty_name", format!("`channel.{name}` names no column"))));
     }
     if channel.column.matches(PLACEHOLDER).count() > 1 {
         let what = format!("`{}` holds {PLACEHOLDER} more than once", channel.column);
-        found.push(("column", Complaint::new("bad_pattern", what)));
+        found.push(("column", Diagnostic::new("bad_pattern", what)));
     }
     if layout.position_column.is_some() && channel.group.is_none() && channel.column.contains(PLACEHOLDER) {
         let what = format!(
             "`{}` speaks of {PLACEHOLDER}, which `layout.position_column` already tells",
             channel.column
         );
-        found.push(("column", Complaint::new("bad_pattern", what)));
+        found.push(("column", Diagnostic::new("bad_pattern", what)));
     }
     if !matches!(channel.sign, 1 | -1) {
         let what = format!("`sign` is {}, which must be 1 or -1", channel.sign);
-        found.push(("sign", Complaint::new("bad_sign", what)));
+        found.push(("sign", Diagnostic::new("bad_sign", what)));
     }
     if channel.scale == 0.0 || !channel.scale.is_finite() {
         let what = format!("`scale` is {}, which would make every value the same", channel.scale);
-        found.push(("scale", Complaint::new("bad_scale", what)));
+        found.push(("scale", Diagnostic::new("bad_scale", what)));
     }
     for (key, value) in [
         ("gear_ratio", Some(channel.gear_ratio)),
@@ -137,7 +137,7 @@ fn one(
         if !value.is_finite() {
             found.push((
                 key,
-                Complaint::new("bad_parameter", format!("`{key}` is {value}, which is no number")),
+                Diagnostic::new("bad_parameter", format!("`{key}` is {value}, which is no number")),
             ));
         }
     }
@@ -145,7 +145,7 @@ fn one(
     found
 }
 
-fn wrong_unit(name: &str, channel: &ChannelMapping, wanted: [Dimension; 2]) -> Option<Complaint> {
+fn wrong_unit(name: &str, channel: &ChannelMapping, wanted: [Dimension; 2]) -> Option<Diagnostic> {
     let dimension = channel.unit.dimension();
     if wanted.contains(&dimension) {
         return None;
@@ -156,29 +156,29 @@ fn wrong_unit(name: &str, channel: &ChannelMapping, wanted: [Dimension; 2]) -> O
         wanted.map(Dimension::as_str).to_vec()
     };
     let what = format!("`channel.{name}` is in {}, a unit of {}", channel.unit.as_str(), dimension.as_str());
-    Some(Complaint::new("unit_contradicts", what).hint(format!("it needs a unit of {}", words.join(" or "))))
+    Some(Diagnostic::new("unit_contradicts", what).hint(format!("it needs a unit of {}", words.join(" or "))))
 }
 
 /// What a condition asks and cannot mean.
-fn conditions(condition: &Condition, groups: &BTreeMap<String, GroupMapping>) -> Vec<Complaint> {
+fn conditions(condition: &Condition, groups: &BTreeMap<String, GroupMapping>) -> Vec<Diagnostic> {
     let column = &condition.column;
     let mut found = Vec::new();
     if column.trim().is_empty() {
-        found.push(Complaint::new("empty_name", "a condition of `channel.when` names no column"));
+        found.push(Diagnostic::new("empty_name", "a condition of `channel.when` names no column"));
     }
     if !condition.asks() {
         let what = format!("the condition on `{column}` asks nothing of it");
-        found.push(Complaint::new("key_missing", what).hint("equals = [1]"));
+        found.push(Diagnostic::new("key_missing", what).hint("equals = [1]"));
     }
     if let Some((least, most)) =
         condition.at_least.zip(condition.at_most).filter(|(least, most)| least > most)
     {
         let what = format!("`at_least` {least} lies above `at_most` {most}: no value of `{column}` will do");
-        found.push(Complaint::new("bad_parameter", what));
+        found.push(Diagnostic::new("bad_parameter", what));
     }
     if let Some(margin_s) = condition.margin_s.filter(|s| !(s.is_finite() && *s >= 0.0)) {
         let what = format!("`margin_s` of the condition on `{column}` is {margin_s}");
-        found.push(Complaint::new("bad_parameter", what).hint("seconds, zero or more"));
+        found.push(Diagnostic::new("bad_parameter", what).hint("seconds, zero or more"));
     }
     found.extend(positive("rate_hz", condition.rate_hz));
     let map = ChannelMapping { group: condition.group.clone(), ..ChannelMapping::default() };
@@ -190,9 +190,9 @@ fn unknown_group(
     name: &str,
     channel: &ChannelMapping,
     groups: &BTreeMap<String, GroupMapping>,
-) -> Option<Complaint> {
+) -> Option<Diagnostic> {
     let group = channel.group.as_ref().filter(|group| !groups.contains_key(*group))?;
-    let c = Complaint::new(
+    let c = Diagnostic::new(
         "unknown_key",
         format!("`channel.{name}` lies in `{group}`, and there is no `[group.{group}]`"),
     );

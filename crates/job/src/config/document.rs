@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use fleet::Complaint;
 use ingest::identity::zone;
 use ingest::pattern::nearest;
 use ingest::schema::Fact;
 use ingest::unit::TimeUnit;
 use ingest::{Channels, ClockMapping, GroupMapping, IdentityMapping, Layout, Mapping};
+use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -155,18 +155,18 @@ pub struct ObjectSettings {
 
 impl Default for ObjectSettings {
     fn default() -> Self {
-        let objects::Settings { timeout, give_up } = objects::Settings::DEFAULT;
+        let object_io::Settings { timeout, give_up } = object_io::Settings::DEFAULT;
         Self { timeout_s: timeout.as_secs_f64(), give_up_s: give_up.as_secs_f64() }
     }
 }
 
 impl ObjectSettings {
     /// The same for those who ask; nobody waits longer than a day.
-    pub(super) fn patience(&self) -> objects::Settings {
+    pub(super) fn patience(&self) -> object_io::Settings {
         const DAY_S: f64 = 86_400.0;
         let [timeout, give_up] =
             [self.timeout_s, self.give_up_s].map(|s| Duration::from_secs_f64(s.clamp(1e-3, DAY_S)));
-        objects::Settings { timeout, give_up }
+        object_io::Settings { timeout, give_up }
     }
 }
 
@@ -256,15 +256,15 @@ impl Document {
     }
 
     /// Everything that reads well but cannot be meant.
-    pub(super) fn check(&self, source: &Source<'_>) -> Vec<Complaint> {
+    pub(super) fn check(&self, source: &Source<'_>) -> Vec<Diagnostic> {
         let mut found = Vec::new();
         if self.logs.files.is_empty() {
-            let c = Complaint::new("no_logs", "`logs.files` names no log")
+            let c = Diagnostic::new("no_logs", "`logs.files` names no log")
                 .hint("files = [\"logs/**/*.parquet\"]");
             found.push(source.at(&["logs", "files"], c));
         }
         if matches!(self.store.path.trim(), "" | ".") {
-            let c = Complaint::new("empty_name", "`store.path` names no folder of its own");
+            let c = Diagnostic::new("empty_name", "`store.path` names no folder of its own");
             found.push(source.at(&["store", "path"], c.hint("path = \"results\"")));
         }
         channel::check(&self.channel, &self.layout, &self.group, &["channel"], source, &mut found);
@@ -287,14 +287,14 @@ impl Document {
         found
     }
 
-    fn check_identity(&self, source: &Source<'_>, found: &mut Vec<Complaint>) {
+    fn check_identity(&self, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
         match self.identity.path.as_ref().map(|p| regex::Regex::new(p)) {
             Some(Err(e)) => {
                 // The reader draws the expression over several lines; the last of them says what is wrong.
                 let e = e.to_string();
                 let why = e.lines().last().unwrap_or_default().trim_start_matches("error: ");
                 let what = format!("`identity.path` is no regular expression: {why}");
-                let c = Complaint::new("bad_pattern", what)
+                let c = Diagnostic::new("bad_pattern", what)
                     .hint("such as '(?<tail_number>N\\w+)/(?<departure_utc>\\d{8}T\\d{6}Z)\\.parquet$'");
                 found.push(source.at(&["identity", "path"], c));
             }
@@ -303,7 +303,7 @@ impl Document {
                 for group in
                     regex.capture_names().flatten().filter(|group| !facts().any(|fact| fact == *group))
                 {
-                    let c = Complaint::new(
+                    let c = Diagnostic::new(
                         "unknown_key",
                         format!("`{group}` in `identity.path` is no fact of a flight"),
                     );
@@ -321,11 +321,11 @@ impl Document {
         }
     }
 
-    fn check_groups(&self, source: &Source<'_>, found: &mut Vec<Complaint>) {
+    fn check_groups(&self, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
         for (name, group) in &self.group {
             let path = ["group", name.as_str()];
             if group.files.is_empty() {
-                let c = Complaint::new("no_logs", format!("`group.{name}.files` names no file"));
+                let c = Diagnostic::new("no_logs", format!("`group.{name}.files` names no file"));
                 found.push(source.at(&path, c.hint("files = [\"loads/**/*.parquet\"]")));
             }
             check_layout(&group.layout, &path, source, found);
@@ -337,18 +337,18 @@ impl Document {
 }
 
 /// A zone that nobody knows, with the one that was probably meant.
-fn no_zone(name: &str) -> Complaint {
+fn no_zone(name: &str) -> Diagnostic {
     let known: Vec<String> = jiff::tz::db().available().map(|zone| zone.to_string()).collect();
-    let complaint = Complaint::new("bad_zone", format!("no time zone is called `{name}`"));
+    let diagnostic = Diagnostic::new("bad_zone", format!("no time zone is called `{name}`"));
     match nearest(name, known.iter().map(String::as_str)) {
-        Some(near) => complaint.hint(format!("`{near}`?")),
-        None => complaint.hint("names such as `UTC`, `Europe/Istanbul`, `America/New_York`"),
+        Some(near) => diagnostic.hint(format!("`{near}`?")),
+        None => diagnostic.hint("names such as `UTC`, `Europe/Istanbul`, `America/New_York`"),
     }
 }
 
-fn check_layout(layout: &Layout, path: &[&str], source: &Source<'_>, found: &mut Vec<Complaint>) {
+fn check_layout(layout: &Layout, path: &[&str], source: &Source<'_>, found: &mut Vec<Diagnostic>) {
     if layout.name_column.is_some() != layout.value_column.is_some() {
-        let c = Complaint::new("key_missing", "`name_column` and `value_column` go together")
+        let c = Diagnostic::new("key_missing", "`name_column` and `value_column` go together")
             .hint("name_column = \"parameter\"\nvalue_column = \"value\"");
         found.push(source.at(path, c));
     }
@@ -359,16 +359,16 @@ pub(super) fn check_clock(
     clock: &ClockMapping,
     path: &[&str],
     source: &Source<'_>,
-    found: &mut Vec<Complaint>,
+    found: &mut Vec<Diagnostic>,
 ) {
     let at = |key| path.iter().copied().chain(std::iter::once(key)).collect::<Vec<_>>();
     if clock.column.is_none() && clock.rate_hz.is_none() {
-        let c = Complaint::new("no_clock", "neither `clock.column` nor `clock.rate_hz` is given")
+        let c = Diagnostic::new("no_clock", "neither `clock.column` nor `clock.rate_hz` is given")
             .hint("[clock]\ncolumn = \"time_s\"\nunit = \"s\"");
         found.push(source.at(path, c));
     }
     if clock.unit == Some(TimeUnit::Count) && clock.rate_hz.is_none() {
-        let c = Complaint::new("no_clock", "a clock in `count` needs `rate_hz`: how fast does it count?");
+        let c = Diagnostic::new("no_clock", "a clock in `count` needs `rate_hz`: how fast does it count?");
         found.push(source.at(&at("unit"), c));
     }
     for (key, value) in [

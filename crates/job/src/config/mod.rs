@@ -12,8 +12,8 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use fleet::{Complaint, PartNumber, TailNumber};
 use ingest::{Flights, Mapping};
+use records::{Diagnostic, PartNumber, TailNumber};
 use serde::Serialize;
 
 pub use document::{
@@ -47,7 +47,7 @@ impl Config {
     ///
     /// # Errors
     /// As [`Config::read_layers`].
-    pub fn read(file: &Path) -> Result<Self, Vec<Complaint>> {
+    pub fn read(file: &Path) -> Result<Self, Vec<Diagnostic>> {
         Self::read_layers(&[file.to_owned()])
     }
 
@@ -68,9 +68,9 @@ impl Config {
     /// names. Relative paths start from the first file's folder.
     ///
     /// # Errors
-    /// All complaints at once: an unreadable file or broken TOML alone, else every unknown key, else
+    /// All diagnostics at once: an unreadable file or broken TOML alone, else every unknown key, else
     /// the first key of a wrong type, else every value that cannot be meant.
-    pub fn read_layers(files: &[PathBuf]) -> Result<Self, Vec<Complaint>> {
+    pub fn read_layers(files: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
         let read = |file: &PathBuf| {
             let shown = file.display().to_string();
             let text = std::fs::read_to_string(file).map_err(|e| {
@@ -82,21 +82,21 @@ impl Config {
                 };
                 let what = format!("the configuration cannot be read: {why}");
                 let hint = "`freeplay init` writes one; `--config FILE` or FREEPLAY_CONFIG names another";
-                vec![Complaint::new("config_unreadable", what).in_file(&shown).hint(hint)]
+                vec![Diagnostic::new("config_unreadable", what).in_file(&shown).hint(hint)]
             })?;
             Ok((shown, text))
         };
-        let texts = files.iter().map(read).collect::<Result<Vec<_>, Vec<Complaint>>>()?;
+        let texts = files.iter().map(read).collect::<Result<Vec<_>, Vec<Diagnostic>>>()?;
         let folder = files.first().and_then(|f| f.parent()).map_or_else(PathBuf::new, Path::to_path_buf);
         let shown: Vec<&str> = texts.iter().map(|(shown, _)| shown.as_str()).collect();
         let file = PathBuf::from(shown.join(" + "));
         let mut config = Self::layered(Layer::stack(texts), &file, &folder)?;
         // Before the first table is read: it may lie in an object store.
-        objects::configure(config.document.objects.patience());
+        object_io::configure(config.document.objects.patience());
         if let Some(table) = &config.document.logs.flights {
             let names = &config.document.columns.flights;
             let read = Flights::read(&config.path(table), names, &config.document.identity);
-            config.flights = read.map_err(|e| e.iter().map(ingest::Error::complaint).collect::<Vec<_>>())?;
+            config.flights = read.map_err(|e| e.iter().map(ingest::Error::diagnostic).collect::<Vec<_>>())?;
         }
         Ok(config)
     }
@@ -105,49 +105,49 @@ impl Config {
     ///
     /// # Errors
     /// As [`Config::read_layers`].
-    pub fn parse(text: &str, file: &Path, folder: &Path) -> Result<Self, Vec<Complaint>> {
+    pub fn parse(text: &str, file: &Path, folder: &Path) -> Result<Self, Vec<Diagnostic>> {
         let shown = file.display().to_string();
         Self::layered(Layer::stack([(shown, text.to_owned())]), file, folder)
     }
 
-    fn layered(layers: Vec<Layer>, file: &Path, folder: &Path) -> Result<Self, Vec<Complaint>> {
-        let source = Source::parse(&layers).map_err(|complaint| vec![*complaint])?;
+    fn layered(layers: Vec<Layer>, file: &Path, folder: &Path) -> Result<Self, Vec<Diagnostic>> {
+        let source = Source::parse(&layers).map_err(|diagnostic| vec![*diagnostic])?;
         let unknown = unknown::keys(&source, &Document::schema());
         if !unknown.is_empty() {
             return Err(unknown);
         }
-        let document: Document = source.document().map_err(|complaint| vec![complaint])?;
-        let mut complaints = document.check(&source);
+        let document: Document = source.document().map_err(|diagnostic| vec![diagnostic])?;
+        let mut diagnostics = document.check(&source);
         let mut parts = BTreeMap::new();
         for (number, settings) in &document.part {
             match (PartNumber::new(number), settings.check()) {
                 (Ok(number), Ok(part)) => drop(parts.insert(number, part)),
-                (Err(e), _) => complaints.push(source.at(&["part"], Complaint::new("empty_name", e))),
-                (_, Err(found)) => complaints.extend(found.into_iter().map(|(key, complaint)| {
+                (Err(e), _) => diagnostics.push(source.at(&["part"], Diagnostic::new("empty_name", e))),
+                (_, Err(found)) => diagnostics.extend(found.into_iter().map(|(key, diagnostic)| {
                     let path: Vec<&str> = ["part", number].into_iter().chain(key.iter().copied()).collect();
-                    source.at(&path, complaint)
+                    source.at(&path, diagnostic)
                 })),
             }
         }
         let variants = Variants::check(&document, &source);
         match variants {
-            Ok(variants) if complaints.is_empty() => {
+            Ok(variants) if diagnostics.is_empty() => {
                 let (file, folder, flights) = (file.to_owned(), folder.to_owned(), Flights::default());
                 Ok(Self { file, folder, document, parts, flights, variants, layers: layers.into() })
             }
-            Ok(_) => Err(complaints),
-            Err(found) => Err(complaints.into_iter().chain(found).collect()),
+            Ok(_) => Err(diagnostics),
+            Err(found) => Err(diagnostics.into_iter().chain(found).collect()),
         }
     }
 
-    /// Names the line on which a text stands in the configuration, in a complaint about it.
-    pub fn at(&self, text: &str, complaint: Complaint) -> Complaint {
-        source::at_text(&self.layers, text, complaint)
+    /// Names the line on which a text stands in the configuration, in a diagnostic about it.
+    pub fn at(&self, text: &str, diagnostic: Diagnostic) -> Diagnostic {
+        source::at_text(&self.layers, text, diagnostic)
     }
 
     /// A path of the configuration, seen from the current folder.
     pub fn path(&self, relative: &str) -> PathBuf {
-        if objects::is_address(relative) { relative.into() } else { self.folder.join(relative) }
+        if object_io::is_address(relative) { relative.into() } else { self.folder.join(relative) }
     }
 
     /// Where the results are.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use fleet::Complaint;
+use records::Diagnostic;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -40,7 +40,7 @@ pub(super) struct Source<'t> {
 
 impl<'t> Source<'t> {
     /// Keys of a later layer replace those before; tables are laid over key by key, lists are replaced.
-    pub(super) fn parse(layers: &'t [Layer]) -> Result<Self, Box<Complaint>> {
+    pub(super) fn parse(layers: &'t [Layer]) -> Result<Self, Box<Diagnostic>> {
         let mut whole: Option<Spanned<DeTable<'t>>> = None;
         for layer in layers {
             let table = DeTable::parse(&layer.text).map_err(|e| Box::new(from_toml(layers, &e)))?;
@@ -57,19 +57,19 @@ impl<'t> Source<'t> {
     }
 
     /// The whole as a type.
-    pub(super) fn document<T: DeserializeOwned>(&self) -> Result<T, Complaint> {
+    pub(super) fn document<T: DeserializeOwned>(&self) -> Result<T, Diagnostic> {
         T::deserialize(toml::de::Deserializer::from(self.table.clone()))
             .map_err(|e| from_toml(self.layers, &e))
     }
 
-    /// Gives a complaint the line of a key, or of the nearest table above it that is written.
-    pub(super) fn at(&self, path: &[&str], complaint: Complaint) -> Complaint {
+    /// Gives a diagnostic the line of a key, or of the nearest table above it that is written.
+    pub(super) fn at(&self, path: &[&str], diagnostic: Diagnostic) -> Diagnostic {
         let span = self.locate(path).unwrap_or(0..0);
-        self.at_span(span, complaint)
+        self.at_span(span, diagnostic)
     }
 
-    pub(super) fn at_span(&self, span: Range<usize>, complaint: Complaint) -> Complaint {
-        place(self.layers, &span, complaint)
+    pub(super) fn at_span(&self, span: Range<usize>, diagnostic: Diagnostic) -> Diagnostic {
+        place(self.layers, &span, diagnostic)
     }
 
     fn locate(&self, path: &[&str]) -> Option<Range<usize>> {
@@ -104,27 +104,27 @@ fn lay_over<'t>(below: &mut DeTable<'t>, over: DeTable<'t>) {
 }
 
 /// Names the line on which a text value stands, or else the file.
-pub(super) fn at_text(layers: &[Layer], value: &str, complaint: Complaint) -> Complaint {
+pub(super) fn at_text(layers: &[Layer], value: &str, diagnostic: Diagnostic) -> Diagnostic {
     let quoted = [format!("\"{value}\""), format!("'{value}'")];
     let found = layers.iter().rev().find_map(|layer| quoted.iter().find_map(|text| layer.text.find(text)));
     match (found, layers.first()) {
-        (Some(start), _) => place(layers, &(start..start), complaint),
-        (None, Some(layer)) => complaint.in_file(&layer.file),
-        (None, None) => complaint,
+        (Some(start), _) => place(layers, &(start..start), diagnostic),
+        (None, Some(layer)) => diagnostic.in_file(&layer.file),
+        (None, None) => diagnostic,
     }
 }
 
-fn from_toml(layers: &[Layer], error: &toml::de::Error) -> Complaint {
-    place(layers, &error.span().unwrap_or(0..0), meant::complaint(error.message()))
+fn from_toml(layers: &[Layer], error: &toml::de::Error) -> Diagnostic {
+    place(layers, &error.span().unwrap_or(0..0), meant::diagnostic(error.message()))
 }
 
-fn place(layers: &[Layer], span: &Range<usize>, complaint: Complaint) -> Complaint {
-    let Some(layer) = layers.iter().rfind(|layer| layer.start <= span.start) else { return complaint };
+fn place(layers: &[Layer], span: &Range<usize>, diagnostic: Diagnostic) -> Diagnostic {
+    let Some(layer) = layers.iter().rfind(|layer| layer.start <= span.start) else { return diagnostic };
     let text = &layer.text[layer.start..];
     let before = &text[..(span.start - layer.start).min(text.len())];
     let line_start = before.rfind('\n').map_or(0, |i| i + 1);
     let line = before.matches('\n').count() + 1;
     let column = before[line_start..].chars().count() + 1;
     let content = text[line_start..].lines().next().unwrap_or_default().to_owned();
-    Complaint { line: Some((line, column)), text: Some(content), ..complaint.in_file(&layer.file) }
+    Diagnostic { line: Some((line, column)), text: Some(content), ..diagnostic.in_file(&layer.file) }
 }

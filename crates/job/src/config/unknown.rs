@@ -2,15 +2,15 @@
 //!
 //! The types themselves say which keys exist, through their JSON Schema, so this list cannot drift.
 
-use fleet::Complaint;
 use ingest::pattern::nearest;
+use records::Diagnostic;
 use serde_json::Value;
 use toml::de::{DeTable, DeValue};
 
 use super::source::Source;
 
 /// Every unknown key of the source.
-pub(super) fn keys(source: &Source<'_>, schema: &Value) -> Vec<Complaint> {
+pub(super) fn keys(source: &Source<'_>, schema: &Value) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     let types = Types(schema);
     types.walk(source, source.table(), schema, "", &mut found);
@@ -28,7 +28,7 @@ impl Types<'_> {
         table: &DeTable<'_>,
         schema: &Value,
         above: &str,
-        found: &mut Vec<Complaint>,
+        found: &mut Vec<Diagnostic>,
     ) {
         let Some(shape) = self.object_shape(schema) else { return };
         let known = shape.get("properties").and_then(Value::as_object);
@@ -42,7 +42,7 @@ impl Types<'_> {
                 }
                 None => {
                     let names = known.into_iter().flat_map(|k| k.keys().map(String::as_str));
-                    found.push(source.at_span(key.span(), complaint(name, above, names)));
+                    found.push(source.at_span(key.span(), diagnostic(name, above, names)));
                 }
             }
         }
@@ -71,14 +71,14 @@ fn each_table<'t, 'i>(value: &'t DeValue<'i>, visit: &mut impl FnMut(&'t DeTable
     }
 }
 
-fn complaint<'n>(name: &str, above: &str, known: impl Iterator<Item = &'n str> + Clone) -> Complaint {
+fn diagnostic<'n>(name: &str, above: &str, known: impl Iterator<Item = &'n str> + Clone) -> Diagnostic {
     let place = if above.is_empty() { "the configuration".to_owned() } else { format!("`[{above}]`") };
-    let complaint = Complaint::new("unknown_key", format!("`{name}` is no key of {place}"));
+    let diagnostic = Diagnostic::new("unknown_key", format!("`{name}` is no key of {place}"));
     match nearest(name, known.clone()) {
-        Some(near) => complaint.hint(format!("`{near}`?")),
+        Some(near) => diagnostic.hint(format!("`{near}`?")),
         None => {
             let names: Vec<&str> = known.collect();
-            complaint.hint(format!("its keys are {}", names.join(", ")))
+            diagnostic.hint(format!("its keys are {}", names.join(", ")))
         }
     }
 }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use fleet::{Complaint, PartNumber, TailNumber};
 use ingest::{Channels, ClockMapping, Mapping};
+use records::{Diagnostic, PartNumber, TailNumber};
 use serde::de::DeserializeOwned;
 
 use super::channel;
@@ -59,7 +59,7 @@ impl Variants {
     }
 
     /// Reads the overrides and tries each alone on the rest of the configuration.
-    pub(super) fn check(document: &Document, source: &Source<'_>) -> Result<Self, Vec<Complaint>> {
+    pub(super) fn check(document: &Document, source: &Source<'_>) -> Result<Self, Vec<Diagnostic>> {
         let base = document.mapping();
         let (mut overrides, mut found) = (Vec::new(), Vec::new());
         for (number, settings) in document.overrides.iter().enumerate() {
@@ -137,19 +137,19 @@ impl Variants {
     }
 }
 
-fn checked(settings: &Override) -> Result<Checked, Complaint> {
+fn checked(settings: &Override) -> Result<Checked, Diagnostic> {
     let pattern = |text: &String| {
         glob::Pattern::new(text)
-            .map_err(|e| Complaint::new("bad_pattern", format!("`{text}` is no pattern of names: {e}")))
+            .map_err(|e| Diagnostic::new("bad_pattern", format!("`{text}` is no pattern of names: {e}")))
     };
     let patterns = |texts: &[String]| texts.iter().map(pattern).collect::<Result<Vec<_>, _>>();
     if settings.clock.is_some() && !settings.parts.is_empty() {
         let what = "an override for parts gives a `clock`, but a log has one clock for all its actuators";
-        return Err(Complaint::new("key_of_other_kind", what).hint("give it under `tails` alone"));
+        return Err(Diagnostic::new("key_of_other_kind", what).hint("give it under `tails` alone"));
     }
     if settings.clock.is_none() && settings.channel.is_none() {
         let what = "an override changes nothing";
-        return Err(Complaint::new("key_missing", what).hint("[override.channel.load]\nsign = -1"));
+        return Err(Diagnostic::new("key_missing", what).hint("[override.channel.load]\nsign = -1"));
     }
     Ok(Checked {
         tails: patterns(&settings.tails)?,
@@ -165,11 +165,11 @@ fn try_alone(
     document: &Document,
     base: &Mapping,
     source: &Source<'_>,
-) -> Vec<Complaint> {
+) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     let at = |key: &'static str, e: String| {
         let what = format!("`{key}` of override {} cannot be laid over `[{key}]`: {e}", number + 1);
-        source.at(&["override"], Complaint::new("bad_toml", what))
+        source.at(&["override"], Diagnostic::new("bad_toml", what))
     };
     match laid_over::<Channels>(&base.channels, &one.channel) {
         Ok(channels) => {

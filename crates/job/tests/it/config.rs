@@ -1,9 +1,9 @@
-//! A configuration is checked whole: every complaint at once, each with its line and a remedy.
+//! A configuration is checked whole: every diagnostic at once, each with its line and a remedy.
 
 use std::path::Path;
 
-use fleet::{Complaint, PartNumber};
 use job::Config;
+use records::{Diagnostic, PartNumber};
 
 const GOOD: &str = r#"
 [logs]
@@ -40,12 +40,12 @@ unknown_force_n = 200.0
 bandwidth_hz = 10.0
 "#;
 
-fn parse(text: &str) -> Result<Config, Vec<Complaint>> {
+fn parse(text: &str) -> Result<Config, Vec<Diagnostic>> {
     Config::parse(text, Path::new("pipeline.toml"), Path::new("fleet"))
 }
 
 /// The complaints about the good text with one of its lines replaced.
-fn complaints(line: &str, by: &str) -> Vec<(String, usize, String)> {
+fn diagnostics(line: &str, by: &str) -> Vec<(String, usize, String)> {
     assert!(GOOD.contains(line), "{line} is not in the text");
     let found = parse(&GOOD.replacen(line, by, 1)).unwrap_err();
     found.into_iter().map(|c| (c.code, c.line.map_or(0, |l| l.0), c.hint.unwrap_or_default())).collect()
@@ -64,7 +64,7 @@ fn a_good_configuration_is_taken_and_its_paths_start_from_its_folder() {
 
 #[test]
 fn a_misspelled_key_is_named_with_its_line_and_neighbour() {
-    let found = complaints("stiffness_n_per_m = 5.0e7", "stifness_n_per_m = 5.0e7");
+    let found = diagnostics("stiffness_n_per_m = 5.0e7", "stifness_n_per_m = 5.0e7");
     assert_eq!(
         found,
         [("unknown_key".to_owned(), line_of("stiffness_n_per_m = 5.0e7"), "`stiffness_n_per_m`?".to_owned())]
@@ -103,7 +103,7 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
         ("column = \"t\"", "column = \"t\"\nrate_hz = 0.0", "not_positive"),
     ];
     for (line, by, code) in cases {
-        let found = complaints(line, by);
+        let found = diagnostics(line, by);
         assert_eq!(found.iter().map(|c| c.0.as_str()).collect::<Vec<_>>(), [code], "{by}: {found:?}");
     }
 }

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use fleet::PartNumber;
 use ingest::Files;
 use job::facts::Facts;
 use job::{Config, Opened, flight};
+use records::PartNumber;
 
 fn flights() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights")

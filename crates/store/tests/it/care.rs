@@ -130,8 +130,8 @@ fn verify_finds_records_that_are_there_twice() {
     fs::write(log.join("00000000000000000007.json"), add.replace(name, &copy)).unwrap();
     let findings = writer.store().verify();
     assert_eq!(findings.len(), 4);
-    assert_eq!(findings[0].what, "N1 F0005 aileron_left is stored twice");
-    assert_eq!(findings[3].what, "3 more records are stored twice");
+    assert_eq!(findings[0].message, "N1 F0005 aileron_left is stored twice");
+    assert_eq!(findings[3].message, "3 more records are stored twice");
 }
 
 #[test]

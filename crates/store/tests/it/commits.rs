@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use fleet::GapRecord;
 use proptest::prelude::*;
+use records::GapRecord;
 use store::{LogResult, Outcome, Query, RecordKey, Store};
 
 use crate::made::{POSITIONS, account, record, result, time, writer};

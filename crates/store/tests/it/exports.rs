@@ -4,8 +4,8 @@ use std::io::Write;
 
 use arrow::array::RecordBatch;
 use arrow::compute::concat_batches;
-use fleet::GapRecord;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use records::GapRecord;
 use store::{Format, Query, columns};
 
 use crate::made::{record, result, writer};

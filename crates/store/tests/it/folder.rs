@@ -12,7 +12,7 @@ fn a_missing_and_an_empty_folder_are_no_store_and_the_remedy_is_told() {
     for place in [dir.path().join("nowhere"), dir.path().to_owned()] {
         let error = Store::open(&place).unwrap_err();
         assert!(matches!(error, Error::Missing { .. }), "{error}");
-        assert!(error.complaint().hint.unwrap().contains("freeplay run"));
+        assert!(error.diagnostic().hint.unwrap().contains("freeplay run"));
     }
 }
 

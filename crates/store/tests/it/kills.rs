@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use fleet::GapRecord;
+use records::GapRecord;
 use store::{Holder, Query, Store};
 
 use crate::made::{POSITIONS, result, writer};

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use fleet::{
-    Estimate, Flight, FlightId, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status, TailNumber,
-};
 use jiff::{SignedDuration, Timestamp};
+use records::{
+    Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
+    TailNumber,
+};
 use store::{Holder, LogAccount, LogResult, Outcome, RunAccount, Store, Writer};
 
 pub(crate) const POSITIONS: [&str; 3] = ["aileron_left", "aileron_right", "elevator"];
@@ -21,12 +22,12 @@ pub(crate) fn departure(flight: i64) -> Timestamp {
 
 /// A record of tail `N<tail>`'s flight of that number, estimated to be `gap_m`.
 pub(crate) fn record(tail: usize, flight: i64, position: &str, gap_m: f64) -> GapRecord {
-    let estimate = Estimate {
+    let estimate = GapEstimate {
         status: Status::Estimated,
         gap_m: Some(gap_m),
         samples: 30_000,
         flags: vec!["soft_contact".into(), "drift".into()],
-        ..Estimate::refused("below_detection")
+        ..GapEstimate::refused("below_detection")
     };
     GapRecord {
         flight: Flight {

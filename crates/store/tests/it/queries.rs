@@ -2,9 +2,9 @@
 
 use arrow::array::{Array, AsArray};
 use arrow::datatypes::{Float64Type, Int32Type, TimestampMicrosecondType};
-use fleet::GapRecord;
 use jiff::SignedDuration;
 use proptest::prelude::*;
+use records::GapRecord;
 use store::{Query, Store, Writer};
 
 use crate::made::{POSITIONS, departure, result, writer};
@@ -137,7 +137,7 @@ fn a_part_with_a_flipped_byte_is_an_error_and_a_column_that_none_has_too() {
     let store = Store::open(dir.path()).unwrap();
     let parts = store.parts(&Query::default(), &["gap_m"]).unwrap();
     let damaged = (0..parts.len()).filter_map(|part| parts.read(part).err());
-    let codes: Vec<_> = damaged.map(|error| error.complaint().code).collect();
+    let codes: Vec<_> = damaged.map(|error| error.diagnostic().code).collect();
     assert_eq!(codes, ["store_damaged"]);
     assert!(store.parts(&Query::default(), &["gap_mm"]).is_err());
 }
@@ -169,7 +169,7 @@ fn a_units_life_opens_only_files_that_hold_it_also_after_a_checkpoint() {
         let mut result = result(tail, 0, 30e-6);
         for (position, record) in result.records.iter_mut().enumerate() {
             let number = (tail * 7 + position * 40) % 100;
-            record.serial_number = fleet::SerialNumber::new(format!("{number:02}")).unwrap();
+            record.serial_number = records::SerialNumber::new(format!("{number:02}")).unwrap();
         }
         writer.commit(&[result]).unwrap();
     }

@@ -1,10 +1,11 @@
 //! Every column comes back as it went in, through Parquet, Delta and Polars.
 
-use fleet::{
-    Estimate, Flight, FlightId, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status, TailNumber,
-};
 use jiff::Timestamp;
 use proptest::prelude::*;
+use records::{
+    Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
+    TailNumber,
+};
 use store::{LogResult, Query, columns};
 
 use crate::made::{account, record, writer};
@@ -40,9 +41,9 @@ prop_compose! {
         flags in prop::collection::vec(text(), 0..4),
         n in prop::array::uniform18(number()),
         counts in prop::array::uniform4(any::<i64>()),
-    ) -> Estimate {
+    ) -> GapEstimate {
         let [load_reversals, samples, samples_upper, samples_lower] = counts;
-        Estimate {
+        GapEstimate {
             status, reason, flags,
             gap_m: n[0], gap_se_m: n[1], gap_p05_m: n[2], gap_p95_m: n[3], gap_midrange_m: n[4],
             stiffness_n_per_m: n[5], stiffness_se_n_per_m: n[6], skew_s: n[7], loop_width_m: n[8],

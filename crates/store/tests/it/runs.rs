@@ -1,6 +1,6 @@
 //! What a run did is known at any instant, also when it was killed before it could say so.
 
-use fleet::Status;
+use records::Status;
 use store::{Holder, LogAccount, Outcome, Query, RunAccount, Store, Writer};
 
 use crate::made::{account, record, result, run, writer};

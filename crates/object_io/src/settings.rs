@@ -1,19 +1,19 @@
-//! How patiently a store is asked.
+//! Timeouts of object-store requests.
 
 use std::sync::{PoisonError, RwLock};
 use std::time::Duration;
 
-/// Patience with object stores, the same for the whole process.
+/// Timeouts of object-store requests, process-wide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
-    /// A request without a whole answer is given up after this long, and made again.
+    /// Time after which an incomplete request is aborted and repeated.
     pub timeout: Duration,
-    /// After this long no request is made again.
+    /// Time after which a request is no longer repeated.
     pub give_up: Duration,
 }
 
 impl Settings {
-    /// What holds where nothing is said.
+    /// Default timeouts.
     pub const DEFAULT: Self = Self { timeout: Duration::from_secs(30), give_up: Duration::from_mins(3) };
 }
 
@@ -25,7 +25,7 @@ impl Default for Settings {
 
 static SETTINGS: RwLock<Settings> = RwLock::new(Settings::DEFAULT);
 
-/// Says how stores that are not yet known are asked from now on.
+/// Sets the timeouts of clients that are created from now on.
 pub fn configure(settings: Settings) {
     *SETTINGS.write().unwrap_or_else(PoisonError::into_inner) = settings;
 }

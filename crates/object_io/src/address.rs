@@ -1,10 +1,10 @@
-//! Addresses: a scheme, a bucket, and a key in it.
+//! Object address: scheme, bucket and key.
 
 use std::path::Path;
 
 use crate::error::Error;
 
-/// Who keeps the bucket.
+/// Kind of object store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Scheme {
     S3,
@@ -20,12 +20,12 @@ impl Scheme {
     }
 }
 
-/// Whether a path is an address in an object store.
+/// Whether a path is an object address.
 pub fn is_address(path: impl AsRef<Path>) -> bool {
     path.as_ref().to_str().is_some_and(|text| Scheme::ALL.iter().any(|(_, prefix)| text.starts_with(prefix)))
 }
 
-/// An address, taken apart.
+/// Parsed object address.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Address {
     pub(crate) scheme: Scheme,
@@ -34,11 +34,11 @@ pub struct Address {
 }
 
 impl Address {
-    /// Takes an address apart; `None` when the path is none.
+    /// Parses an address; `None` when the path is not one.
     ///
     /// # Errors
     /// [`Error::Address`] when it names no bucket.
-    pub fn of(path: impl AsRef<Path>) -> Result<Option<Self>, Error> {
+    pub fn parse(path: impl AsRef<Path>) -> Result<Option<Self>, Error> {
         let Some(text) = path.as_ref().to_str() else { return Ok(None) };
         let scheme = Scheme::ALL.iter().find_map(|(s, prefix)| Some((*s, text.strip_prefix(prefix)?)));
         let Some((scheme, rest)) = scheme else { return Ok(None) };
@@ -49,28 +49,28 @@ impl Address {
         Ok(Some(Self { scheme, bucket: bucket.to_owned(), key: key.trim_end_matches('/').to_owned() }))
     }
 
-    /// As [`Address::of`], where nothing but an address will do.
+    /// As [`Address::parse`], for a path that must be an address.
     ///
     /// # Errors
-    /// [`Error::Address`] when it is none, or names no bucket.
-    pub fn must(path: impl AsRef<Path>) -> Result<Self, Error> {
+    /// [`Error::Address`] when it is not an address or names no bucket.
+    pub fn parse_required(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
         let none = || Error::Address {
             text: path.display().to_string(),
             detail: "it begins with none of s3://, gs:// and az://".to_owned(),
         };
-        Self::of(path)?.ok_or_else(none)
+        Self::parse(path)?.ok_or_else(none)
     }
 
-    /// The key: the text behind the bucket, without a slash at its end.
+    /// The key: the text after the bucket, without a trailing slash.
     pub fn key(&self) -> &str {
         &self.key
     }
 
-    /// The key as the library takes it.
+    /// The key as an `object_store` path.
     ///
     /// # Errors
-    /// [`Error::Address`] for a key it cannot: one with `//`, `.` or `..` as a folder.
+    /// [`Error::Address`] for a key with `//`, `.` or `..` as a folder.
     pub fn location(&self) -> Result<object_store::path::Path, Error> {
         object_store::path::Path::parse(&self.key)
             .map_err(|e| Error::Address { text: self.to_string(), detail: e.to_string() })
@@ -82,15 +82,15 @@ impl Address {
         Self { key: key.to_owned(), ..self.clone() }
     }
 
-    /// The bucket as an address, with a slash at its end.
-    pub fn root(&self) -> String {
+    /// The bucket as an address, with a trailing slash.
+    pub fn bucket_url(&self) -> String {
         format!("{}{}/", self.scheme.prefix(), self.bucket)
     }
 }
 
 impl std::fmt::Display for Address {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}{}", self.root(), self.key)
+        write!(f, "{}{}", self.bucket_url(), self.key)
     }
 }
 
@@ -99,20 +99,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_address_is_told_from_a_path_and_taken_apart() {
+    fn an_address_is_distinguished_from_a_path_and_parsed() {
         for path in ["logs/a.parquet", "/s3/a", "s3:/bucket/a", "https://host/a"] {
             assert!(!is_address(path), "{path}");
-            assert_eq!(Address::of(path).unwrap(), None);
+            assert_eq!(Address::parse(path).unwrap(), None);
         }
-        let address = Address::must("s3://fleet/logs/N1/a b.parquet").unwrap();
+        let address = Address::parse_required("s3://fleet/logs/N1/a b.parquet").unwrap();
         assert_eq!((address.bucket.as_str(), address.key()), ("fleet", "logs/N1/a b.parquet"));
         assert_eq!(address.to_string(), "s3://fleet/logs/N1/a b.parquet");
-        assert_eq!(Address::must("gs://fleet").unwrap().root(), "gs://fleet/");
+        assert_eq!(Address::parse_required("gs://fleet").unwrap().bucket_url(), "gs://fleet/");
     }
 
     #[test]
     fn an_address_without_a_bucket_or_with_an_empty_folder_is_refused() {
-        assert!(Address::of("az:///logs").unwrap_err().to_string().contains("no bucket"));
-        assert!(Address::must("s3://fleet/logs//a").unwrap().location().is_err());
+        assert!(Address::parse("az:///logs").unwrap_err().to_string().contains("no bucket"));
+        assert!(Address::parse_required("s3://fleet/logs//a").unwrap().location().is_err());
     }
 }

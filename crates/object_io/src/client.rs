@@ -1,4 +1,4 @@
-//! One client for each bucket, and the runtime that serves them all.
+//! One client per bucket, and the shared asynchronous runtime.
 
 use std::collections::HashMap;
 use std::future::Future;
@@ -11,17 +11,17 @@ use object_store::{ClientOptions, ObjectStore, RetryConfig};
 use tokio::runtime::{Builder, Handle, Runtime};
 
 use crate::address::{Address, Scheme};
+use crate::aws_profile::AwsProfileSource;
 use crate::error::Error;
-use crate::patient::Patient;
-use crate::profile::Where;
+use crate::retry::RetryingStore;
 use crate::settings::settings;
 
-/// A bucket's client, shared by all who ask for that bucket.
+/// Client of a bucket, shared by all requests to that bucket.
 pub type Client = Arc<dyn ObjectStore>;
 
 static CLIENTS: LazyLock<Mutex<HashMap<(Scheme, String), Client>>> = LazyLock::new(Mutex::default);
 
-/// Runs the library's work to its end on the one runtime there is; callers block and may be many.
+/// Runs a future to completion on the shared runtime; the caller's thread blocks.
 ///
 /// # Errors
 /// [`Error::Settings`] when the system gives no threads.
@@ -29,7 +29,7 @@ pub fn block_on<F: Future>(work: F) -> Result<F::Output, Error> {
     Ok(handle()?.block_on(work))
 }
 
-/// That runtime, for whoever brings such work of its own: connections live as long as it does.
+/// Handle of the shared runtime, for other asynchronous work: connections live as long as the runtime.
 ///
 /// # Errors
 /// [`Error::Settings`] when the system gives no threads.
@@ -54,13 +54,13 @@ impl Address {
         if let Some(known) = clients.get(&name) {
             return Ok(Arc::clone(known));
         }
-        let detail = |detail: String| Error::Settings { place: self.root(), detail };
+        let detail = |detail: String| Error::Settings { place: self.bucket_url(), detail };
         let built = match self.scheme {
             Scheme::S3 => s3(&self.bucket).map_err(detail)?,
             Scheme::Gs => gs(&self.bucket).map_err(|e| detail(e.to_string()))?,
             Scheme::Az => az(&self.bucket).map_err(|e| detail(e.to_string()))?,
         };
-        let built: Client = Arc::new(Patient::new(built, settings().give_up));
+        let built: Client = Arc::new(RetryingStore::new(built, settings().give_up));
         clients.insert(name, Arc::clone(&built));
         Ok(built)
     }
@@ -69,9 +69,9 @@ impl Address {
 fn s3(bucket: &str) -> Result<Client, String> {
     let mut builder = AmazonS3Builder::from_env();
     let given = |builder: &AmazonS3Builder, key| builder.get_config_value(&key).is_some();
-    // Keys go together: a token of one source is of no use to a key of another.
+    // Keys are taken from one source only: a token does not belong to the key of another source.
     let has_key = given(&builder, AmazonS3ConfigKey::AccessKeyId);
-    for (key, value) in Where::from_env().read()? {
+    for (key, value) in AwsProfileSource::from_env().read()? {
         let is_key = !matches!(key, AmazonS3ConfigKey::Region | AmazonS3ConfigKey::Endpoint);
         let is_given = if is_key { has_key } else { given(&builder, key) };
         if !is_given {
@@ -80,7 +80,7 @@ fn s3(bucket: &str) -> Result<Client, String> {
     }
     let endpoint = [AmazonS3ConfigKey::S3Endpoint, AmazonS3ConfigKey::Endpoint];
     let endpoint = endpoint.iter().find_map(|key| builder.get_config_value(key));
-    // Whoever writes http:// means it: the AWS tools ask for no second word either.
+    // An explicit http:// endpoint is used as it is, as the AWS tools do.
     let is_plain = endpoint.is_some_and(|url| url.starts_with("http://"));
     let built =
         builder.with_bucket_name(bucket).with_client_options(options(is_plain)).with_retry(retry()).build();

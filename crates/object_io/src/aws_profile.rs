@@ -1,35 +1,35 @@
-//! AWS profiles: the keys, region and endpoint of `~/.aws/credentials` and `~/.aws/config`.
+//! AWS profile reader: keys, region and endpoint of `~/.aws/credentials` and `~/.aws/config`.
 //!
-//! The library underneath reads the environment only. Profiles that name a role, a single sign-on or a program
-//! to be asked are refused by name, and never taken for a machine without credentials.
+//! `object_store` reads the environment only. Profiles that use a role, single sign-on or a credential process
+//! are rejected by name, never treated as absent.
 
 use std::path::PathBuf;
 
 use configparser::ini::Ini;
 use object_store::aws::AmazonS3ConfigKey as Key;
 
-/// What a profile may say that is understood.
-const READ: [(&str, Key); 5] = [
+/// Supported profile keys.
+const SUPPORTED: [(&str, Key); 5] = [
     ("aws_access_key_id", Key::AccessKeyId),
     ("aws_secret_access_key", Key::SecretAccessKey),
     ("aws_session_token", Key::Token),
     ("region", Key::Region),
     ("endpoint_url", Key::Endpoint),
 ];
-/// What would bring credentials in ways that are not.
-const NOT_READ: [&str; 5] =
+/// Profile keys of unsupported credential sources.
+const UNSUPPORTED: [&str; 5] =
     ["role_arn", "sso_session", "sso_start_url", "credential_process", "source_profile"];
 
-/// Variables that say where profiles lie and which one is meant.
+/// Selected profile and paths of the profile files, from the environment.
 #[derive(Debug, Default)]
-pub(crate) struct Where {
+pub(crate) struct AwsProfileSource {
     profile: Option<String>,
     credentials: Option<PathBuf>,
     config: Option<PathBuf>,
 }
 
-impl Where {
-    /// As the AWS tools do.
+impl AwsProfileSource {
+    /// Reads the same variables as the AWS tools.
     pub(crate) fn from_env() -> Self {
         let variable = |name| std::env::var_os(name).filter(|value| !value.is_empty());
         let home = variable("HOME").or_else(|| variable("USERPROFILE")).map(PathBuf::from);
@@ -43,11 +43,11 @@ impl Where {
         }
     }
 
-    /// What the profile says; nothing when none is asked for and there is no default.
+    /// Supported settings of the profile; empty when no profile is selected and there is no default.
     ///
     /// # Errors
-    /// In words: a profile that was named is not there, a file cannot be read, or the profile brings its
-    /// credentials in a way that is not understood.
+    /// As text: the selected profile does not exist, a file cannot be read, or the credential source of the profile
+    /// is not supported.
     pub(crate) fn read(&self) -> Result<Vec<(Key, String)>, String> {
         let name = self.profile.as_deref().unwrap_or("default");
         let section = if name == "default" { name.to_owned() } else { format!("profile {name}") };
@@ -56,8 +56,8 @@ impl Where {
         for (file, section) in sources {
             let Some(ini) = file.as_ref().map(load).transpose()?.flatten() else { continue };
             is_there |= ini.sections().iter().any(|known| known == section);
-            found.extend(READ.iter().filter_map(|(name, key)| Some((*key, ini.get(section, name)?))));
-            other = other.or_else(|| NOT_READ.into_iter().find(|key| ini.get(section, key).is_some()));
+            found.extend(SUPPORTED.iter().filter_map(|(name, key)| Some((*key, ini.get(section, name)?))));
+            other = other.or_else(|| UNSUPPORTED.into_iter().find(|key| ini.get(section, key).is_some()));
         }
         match other {
             _ if !is_there && self.profile.is_some() => Err(format!("there is no profile `{name}`")),
@@ -76,7 +76,7 @@ fn load(file: &PathBuf) -> Result<Option<Ini>, String> {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(format!("{} cannot be read: {e}", file.display())),
     };
-    // Names of profiles are told apart by case.
+    // Profile names are case-sensitive.
     let mut ini = Ini::new_cs();
     ini.read(text).map_err(|e| format!("{} is no profile file: {e}", file.display()))?;
     Ok(Some(ini))
@@ -101,7 +101,7 @@ mod tests {
         };
         let profile = profile.map(str::to_owned);
         let (credentials, config) = (file("credentials", CREDENTIALS), file("config", CONFIG));
-        Where { profile, credentials, config }.read()
+        AwsProfileSource { profile, credentials, config }.read()
     }
 
     fn value(found: &[(Key, String)], wanted: Key) -> Option<&str> {
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn a_profile_brings_keys_region_and_endpoint_out_of_both_files() {
+    fn keys_region_and_endpoint_are_read_from_both_files() {
         let found = read(Some("Night")).unwrap();
         assert_eq!(value(&found, Key::AccessKeyId), Some("AKINIGHT"));
         assert_eq!(value(&found, Key::Token), Some("t2"));
@@ -121,10 +121,10 @@ mod tests {
     }
 
     #[test]
-    fn a_profile_that_cannot_be_followed_is_told_by_name() {
+    fn an_unsupported_profile_is_rejected_by_name() {
         assert!(read(Some("sso")).unwrap_err().contains("`sso_session`, which is not read"));
         assert!(read(Some("gone")).unwrap_err().contains("no profile `gone`"));
-        let none = Where { profile: None, credentials: Some("/nowhere/c".into()), config: None };
+        let none = AwsProfileSource { profile: None, credentials: Some("/nowhere/c".into()), config: None };
         assert!(none.read().unwrap().is_empty());
     }
 }

@@ -1,39 +1,39 @@
-//! Why an object cannot be had: one variant for each thing its owner would do differently.
+//! Errors of object access: one variant per remedy.
 
 use std::path::PathBuf;
 
-/// An object store's trouble; each variant names the address.
+/// Error of an object store; each variant names the address.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each field is named for what it holds")]
 pub enum Error {
-    /// The address cannot be one.
+    /// The address is invalid.
     #[error("`{text}` is no address of an object: {detail}")]
     Address { text: String, detail: String },
     /// Credentials or an endpoint are missing or cannot be read.
     #[error("{place} cannot be asked: {detail}")]
     Settings { place: String, detail: String },
-    /// There is no such object or bucket.
+    /// The object or bucket does not exist.
     #[error("{address} is not there")]
     Missing { address: String },
-    /// The store knows us not, or lets us not.
+    /// Authentication failed or access is denied.
     #[error("{address} may not be read or written by these credentials: {detail}")]
     Denied { address: String, detail: String },
     /// The object was replaced while it was read.
     #[error("{address} was replaced while it was read")]
     Changed { address: String },
-    /// Somebody else has written this name already.
+    /// The object already exists.
     #[error("{address} is there already")]
     Exists { address: String },
-    /// No whole answer, however often it was asked.
+    /// No complete response within the retry time.
     #[error("{address} cannot be reached, tried for {tried_s:.0} s: {detail}")]
     Unreachable { address: String, tried_s: f64, detail: String },
-    /// What was fetched has no room on this machine.
+    /// The temporary file of the fetched ranges cannot be written.
     #[error("what is fetched of {address} cannot be kept in {}: {source}", folder.display())]
     Spool { address: String, folder: PathBuf, source: std::io::Error },
 }
 
 impl Error {
-    /// The stable code; `docs/errors.md` has a paragraph for each.
+    /// Stable error code, documented in `docs/errors.md`.
     pub fn code(&self) -> &'static str {
         match self {
             Self::Address { .. } => "object_address",
@@ -47,7 +47,7 @@ impl Error {
         }
     }
 
-    /// What to do.
+    /// Instruction that resolves the error.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Address { .. } => "write it as s3://bucket/key, gs://bucket/key or az://container/key",
@@ -65,7 +65,7 @@ impl Error {
         }
     }
 
-    /// Whether the same request may succeed on another day with nothing changed here.
+    /// Whether the same request may succeed later although nothing is changed here.
     pub fn is_passing(code: &str) -> bool {
         matches!(
             code,
@@ -73,10 +73,10 @@ impl Error {
         )
     }
 
-    /// Reads the library's error about an address.
+    /// Converts an `object_store` error about an address.
     pub fn of(address: &impl ToString, tried_s: f64, error: &object_store::Error) -> Self {
         use object_store::Error as Of;
-        let (address, detail) = (address.to_string(), told(error));
+        let (address, detail) = (address.to_string(), root_cause(error));
         match error {
             Of::NotFound { .. } => Self::Missing { address },
             Of::PermissionDenied { .. } | Of::Unauthenticated { .. } => Self::Denied { address, detail },
@@ -91,8 +91,8 @@ impl Error {
     }
 }
 
-/// The last cause of an error: the ones above it repeat the address and the library's own words.
-fn told(error: &object_store::Error) -> String {
+/// Message of the innermost cause: the outer ones repeat the address.
+fn root_cause(error: &object_store::Error) -> String {
     let mut cause: &dyn std::error::Error = error;
     while let Some(next) = cause.source() {
         cause = next;

@@ -1,7 +1,7 @@
-//! One object as a file: the ranges that are asked for, in a nameless temporary file at their own offsets.
+//! Sparse temporary file that mirrors the requested byte ranges of one object.
 //!
-//! The file is as long as the object and has holes where nothing was asked for, so it takes as much disk as was
-//! fetched; it has no name, and is gone with the process. Whoever reads it has asked for those bytes before.
+//! The file is as long as the object and sparse where no range was requested, so it occupies as much disk as was
+//! fetched. It has no name and is deleted when the process ends. Readers must request a range before reading it.
 
 use std::fs::File;
 use std::iter::once;
@@ -15,63 +15,63 @@ use futures::{StreamExt, stream};
 use object_store::{GetOptions, GetRange, ObjectMeta, ObjectStore, ObjectStoreExt};
 
 use crate::address::Address;
+use crate::byte_ranges::RangeSet;
 use crate::client::{Client, block_on};
 use crate::error::Error;
-use crate::range::Ranges;
 
 /// Requests in flight at once, for one object.
 const AT_ONCE: usize = 4;
 
-/// An object, and what was fetched of it.
+/// An object and its fetched byte ranges.
 #[derive(Debug)]
-pub struct Spool {
+pub struct ObjectFile {
     address: Address,
     client: Client,
     meta: ObjectMeta,
     file: File,
-    had: Mutex<Ranges>,
+    had: Mutex<RangeSet>,
 }
 
-impl Spool {
-    /// Finds the object; nothing of its content is fetched yet.
+impl ObjectFile {
+    /// Opens the object; no content is fetched yet.
     ///
     /// # Errors
-    /// [`Error::Missing`], [`Error::Denied`], [`Error::Unreachable`]; [`Error::Spool`] when there is no room
-    /// for a temporary file.
+    /// [`Error::Missing`], [`Error::Denied`], [`Error::Unreachable`]; [`Error::Spool`] when the
+    /// temporary file cannot be created.
     pub fn open(address: &Address) -> Result<Self, Error> {
         let (client, location, clock) = (address.client()?, address.location()?, Instant::now());
         let meta = block_on(client.head(&location))?;
         let meta = meta.map_err(|e| Error::of(address, clock.elapsed().as_secs_f64(), &e))?;
-        let file = tempfile::tempfile().map_err(|e| no_room(address, e))?;
-        file.set_len(meta.size).map_err(|e| no_room(address, e))?;
+        let file = tempfile::tempfile().map_err(|e| spool_error(address, e))?;
+        file.set_len(meta.size).map_err(|e| spool_error(address, e))?;
         Ok(Self { address: address.clone(), client, meta, file, had: Mutex::default() })
     }
 
-    /// The file: as long as the object, whole where it was [wanted](Spool::want).
+    /// The file: as long as the object, with content in the ranges that were [fetched](ObjectFile::ensure_range).
     pub fn file(&self) -> &File {
         &self.file
     }
 
-    /// Brings ranges of the object into the file, unless they are there; ends beyond the object's are cut.
+    /// Fetches the ranges that are not in the file yet; ranges are clipped to the object's length.
     ///
     /// # Errors
     /// [`Error::Changed`] when the object is no longer the one that was opened, [`Error::Unreachable`] when no
-    /// whole answer came in the time allowed, [`Error::Spool`] when it has no room here.
-    pub fn want(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> Result<(), Error> {
+    /// complete response came in time, [`Error::Spool`] when the disk is full.
+    pub fn ensure_range(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> Result<(), Error> {
         let clip = |range: Range<u64>| range.start.min(self.meta.size)..range.end.min(self.meta.size);
         let wanted: Vec<Range<u64>> =
             ranges.into_iter().map(clip).filter(|range| !range.is_empty()).collect();
         // Held while it is fetched: two actuators that want the same column fetch it once.
         let mut had = self.had.lock().unwrap_or_else(PoisonError::into_inner);
-        let lacking = had.lacking(&wanted);
-        if lacking.is_empty() {
+        let missing = had.missing(&wanted);
+        if missing.is_empty() {
             return Ok(());
         }
         block_on(async {
-            let pieces = lacking.into_iter().map(|range| async { (range.clone(), self.fetch(range).await) });
+            let pieces = missing.into_iter().map(|range| async { (range.clone(), self.fetch(range).await) });
             let mut pieces = stream::iter(pieces).buffer_unordered(AT_ONCE);
             while let Some((range, bytes)) = pieces.next().await {
-                write_at(&self.file, &bytes?, range.start).map_err(|e| no_room(&self.address, e))?;
+                write_at(&self.file, &bytes?, range.start).map_err(|e| spool_error(&self.address, e))?;
                 had.add(range);
             }
             Ok(())
@@ -97,17 +97,17 @@ impl Spool {
     }
 }
 
-/// Fetches a whole object into a nameless file and opens that at its beginning.
+/// Fetches a whole object into an unnamed file, positioned at its start.
 ///
 /// # Errors
-/// As [`Spool::open`] and [`Spool::want`].
-pub fn whole(path: &Path) -> Result<File, Error> {
-    let spool = Spool::open(&Address::must(path)?)?;
-    spool.want(once(0..spool.meta.size))?;
-    Ok(spool.file)
+/// As [`ObjectFile::open`] and [`ObjectFile::ensure_range`].
+pub fn read_all(path: &Path) -> Result<File, Error> {
+    let object = ObjectFile::open(&Address::parse_required(path)?)?;
+    object.ensure_range(once(0..object.meta.size))?;
+    Ok(object.file)
 }
 
-fn no_room(address: &Address, source: std::io::Error) -> Error {
+fn spool_error(address: &Address, source: std::io::Error) -> Error {
     Error::Spool { address: address.to_string(), folder: std::env::temp_dir(), source }
 }
 

@@ -1,7 +1,7 @@
-//! Which serial number sat in which position of which tail, from when to when.
+//! Installations table: which unit was installed in which position of which tail, and when.
 //!
-//! Logs know positions, not serial numbers; this table is the only bridge between the two, so it is
-//! checked whole before it is used: a unit cannot sit in two places, nor two units in one.
+//! Logs identify actuators by position, not by serial number; this table maps one to the other. The whole table
+//! is validated first: a unit cannot be in two positions at once, nor two units in one position.
 
 use std::collections::BTreeMap;
 
@@ -10,34 +10,34 @@ use serde::{Deserialize, Serialize};
 
 use crate::ids::{PartNumber, Position, SerialNumber, TailNumber};
 
-/// One stay of one unit in one position: `[installed_utc, removed_utc)`.
+/// Installation of one unit in one position during `[installed_utc, removed_utc)`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Installation {
     /// The aircraft.
     pub tail_number: TailNumber,
-    /// The place on it.
+    /// Position on the aircraft.
     pub position: Position,
-    /// The design of the unit.
+    /// Part number of the unit.
     pub part_number: PartNumber,
     /// The unit.
     pub serial_number: SerialNumber,
-    /// First instant of the stay.
+    /// First instant of the installation.
     pub installed_utc: Timestamp,
-    /// First instant after the stay; none while the unit still sits there.
+    /// First instant after the installation; `None` while the unit is still installed.
     pub removed_utc: Option<Timestamp>,
-    /// Age of the unit when it was installed, hours, where the books say so.
+    /// Age of the unit at installation, hours, if recorded.
     pub unit_hours_at_install: Option<f64>,
-    /// The tail's total hours when it was installed, where the books say so.
+    /// Total hours of the tail at installation, if recorded.
     pub tail_hours_at_install: Option<f64>,
 }
 
 impl Installation {
-    /// The unit's own age when the tail's meter reads `tail_hours`, where the books allow it.
+    /// Age of the unit when the tail has `tail_hours` total hours, if the installation records both hours.
     pub fn unit_hours(&self, tail_hours: Option<f64>) -> Option<f64> {
         Some(self.unit_hours_at_install? + (tail_hours? - self.tail_hours_at_install?).max(0.0))
     }
 
-    /// Whether the unit sat there at that instant.
+    /// Whether the unit was installed at that instant.
     pub fn covers(&self, at: Timestamp) -> bool {
         self.installed_utc <= at && self.removed_utc.is_none_or(|removed| at < removed)
     }
@@ -47,11 +47,11 @@ impl Installation {
     }
 }
 
-/// Why a table of installations cannot be true.
+/// A contradiction in the installations table.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "each field is named for what it holds; rows count from 1, header excluded")]
 pub enum Error {
-    /// A stay ends before it begins.
+    /// An installation ends before it begins.
     #[error("row {row}: {serial} is removed at {removed} before it is installed at {installed}")]
     Reversed { row: usize, serial: SerialNumber, installed: Timestamp, removed: Timestamp },
     /// Two units in one position at once.
@@ -66,17 +66,17 @@ pub enum Error {
     UnitTwice { row: usize, other: usize, part: PartNumber, serial: SerialNumber, at: Timestamp },
 }
 
-/// The whole table, checked, and quick to ask.
+/// The validated installations table, indexed by tail and position.
 #[derive(Debug, Clone, Default)]
 pub struct Installations {
     by_place: BTreeMap<TailNumber, BTreeMap<Position, Vec<Installation>>>,
 }
 
 impl Installations {
-    /// Takes the rows in any order and checks them against each other.
+    /// Builds the table from rows in any order, and validates them against each other.
     ///
     /// # Errors
-    /// Every contradiction found, in row order: see [`Error`].
+    /// Every contradiction, in row order: see [`Error`].
     pub fn new(rows: Vec<Installation>) -> Result<Self, Vec<Error>> {
         let mut errors: Vec<Error> =
             rows.iter().enumerate().filter_map(|(i, r)| reversed(i + 1, r)).collect();
@@ -118,23 +118,28 @@ impl Installations {
         Ok(table)
     }
 
-    /// The unit that sat in that position at that instant.
-    pub fn at(&self, tail: &TailNumber, position: &Position, at: Timestamp) -> Option<&Installation> {
+    /// The unit installed in that position at that instant.
+    pub fn installed_at(
+        &self,
+        tail: &TailNumber,
+        position: &Position,
+        at: Timestamp,
+    ) -> Option<&Installation> {
         self.by_place.get(tail)?.get(position)?.iter().find(|stay| stay.covers(at))
     }
 
-    /// Every unit on that tail at that instant, by position.
-    pub fn on_tail(&self, tail: &TailNumber, at: Timestamp) -> impl Iterator<Item = &Installation> {
+    /// Every unit installed on that tail at that instant, by position.
+    pub fn units_on_tail(&self, tail: &TailNumber, at: Timestamp) -> impl Iterator<Item = &Installation> {
         let places = self.by_place.get(tail).into_iter().flat_map(BTreeMap::values);
         places.filter_map(move |stays| stays.iter().find(|stay| stay.covers(at)))
     }
 
-    /// Whether the table has ever heard of the tail.
-    pub fn knows_tail(&self, tail: &TailNumber) -> bool {
+    /// Whether the table has an installation on that tail.
+    pub fn contains_tail(&self, tail: &TailNumber) -> bool {
         self.by_place.contains_key(tail)
     }
 
-    /// Every stay, by tail, position and date.
+    /// Every installation, by tail, position and date.
     pub fn iter(&self) -> impl Iterator<Item = &Installation> {
         self.by_place.values().flat_map(BTreeMap::values).flatten()
     }
@@ -194,7 +199,8 @@ mod tests {
         let table = Installations::new(rows).unwrap();
         let tail = TailNumber::new("N1").unwrap();
         let place = Position::new("aileron").unwrap();
-        let at = |t: &str| table.at(&tail, &place, t.parse().unwrap()).map(|s| s.serial_number.as_str());
+        let at =
+            |t: &str| table.installed_at(&tail, &place, t.parse().unwrap()).map(|s| s.serial_number.as_str());
         assert_eq!(at(JAN), Some("A"));
         assert_eq!(at(FEB), Some("B"));
         assert_eq!(at("2025-12-31T23:59:59Z"), None);
@@ -232,7 +238,7 @@ mod tests {
             let (one, other) = (Installations::new(rows).unwrap(), Installations::new(shuffled).unwrap());
             let at = JAN.parse::<Timestamp>().unwrap() + jiff::SignedDuration::from_hours(24 * day);
             let (tail, place) = (TailNumber::new("N1").unwrap(), Position::new("aileron").unwrap());
-            prop_assert_eq!(one.at(&tail, &place, at), other.at(&tail, &place, at));
+            prop_assert_eq!(one.installed_at(&tail, &place, at), other.installed_at(&tail, &place, at));
         }
     }
 }

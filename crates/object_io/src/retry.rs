@@ -1,9 +1,8 @@
-//! A store that is asked again: whole answers, or an error after all patience.
+//! `ObjectStore` wrapper that retries requests and checks the length of each body.
 //!
-//! The library's own clients try again until an answer's first line; a body that breaks off after it, or is
-//! shorter than its own head says, they hand on. Here a body is read whole and measured before anybody sees it,
-//! a listing goes on behind the last key that came, and a name that is taken is compared with what was to be
-//! written under it: the answer to a write that had arrived may have been lost.
+//! The wrapped clients retry until the response header. This wrapper also reads each body completely and checks
+//! its length before returning it, resumes a listing after the last received key, and compares an existing object
+//! with the content to be written: the response to a successful write may have been lost.
 
 use std::fmt;
 use std::future::Future;
@@ -22,59 +21,59 @@ use object_store::{
     Result,
 };
 
-/// The first pause; it doubles.
-const PAUSE: Duration = Duration::from_millis(100);
-const LONGEST_PAUSE: Duration = Duration::from_secs(15);
+/// The first delay; each retry doubles it.
+const FIRST_DELAY: Duration = Duration::from_millis(100);
+const MAX_DELAY: Duration = Duration::from_secs(15);
 
-/// A store, and for how long it is asked again.
+/// Object store whose requests are retried for at most `give_up`.
 #[derive(Debug, Clone)]
-pub(crate) struct Patient {
+pub(crate) struct RetryingStore {
     inner: Arc<dyn ObjectStore>,
     give_up: Duration,
 }
 
-/// How long something was tried, and when it is tried again.
-struct Patience {
+/// Retry deadline and exponential backoff of one request.
+struct Backoff {
     begun: Instant,
-    pause: Duration,
+    delay: Duration,
     give_up: Duration,
 }
 
-impl Patience {
-    /// Waits before the next attempt; hands the error back when it would not help, or time is up.
-    async fn after(&mut self, error: Error) -> Result<()> {
+impl Backoff {
+    /// Waits before the next attempt; returns the error if it is permanent or the deadline has passed.
+    async fn wait_after(&mut self, error: Error) -> Result<()> {
         let is_passing = matches!(error, Error::Generic { .. } | Error::JoinError { .. });
-        if !is_passing || self.begun.elapsed() + self.pause > self.give_up {
+        if !is_passing || self.begun.elapsed() + self.delay > self.give_up {
             return Err(error);
         }
-        tokio::time::sleep(self.pause).await;
-        self.pause = (self.pause * 2).min(LONGEST_PAUSE);
+        tokio::time::sleep(self.delay).await;
+        self.delay = (self.delay * 2).min(MAX_DELAY);
         Ok(())
     }
 }
 
-impl Patient {
+impl RetryingStore {
     pub(crate) fn new(inner: Arc<dyn ObjectStore>, give_up: Duration) -> Self {
         Self { inner, give_up }
     }
 
-    fn patience(&self) -> Patience {
-        Patience { begun: Instant::now(), pause: PAUSE, give_up: self.give_up }
+    fn backoff(&self) -> Backoff {
+        Backoff { begun: Instant::now(), delay: FIRST_DELAY, give_up: self.give_up }
     }
 
-    /// Asks until there is an answer, or no patience left.
-    async fn again<T, F: Future<Output = Result<T>>>(&self, mut ask: impl FnMut() -> F) -> Result<T> {
-        let mut patience = self.patience();
+    /// Repeats a request until it succeeds, fails permanently or the deadline passes.
+    async fn with_retry<T, F: Future<Output = Result<T>>>(&self, mut ask: impl FnMut() -> F) -> Result<T> {
+        let mut backoff = self.backoff();
         loop {
             match ask().await {
                 Ok(answer) => return Ok(answer),
-                Err(error) => patience.after(error).await?,
+                Err(error) => backoff.wait_after(error).await?,
             }
         }
     }
 
-    /// An object from its first byte on: as a range, since only a range's answer tells how long the whole is,
-    /// and a body cut short together with its own length would pass for the object.
+    /// A whole object, requested as a range: only a range response states the length of the whole object, so
+    /// that a body truncated together with its `Content-Length` is detected.
     async fn without_range(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
         let ranged = GetOptions { range: Some(GetRange::Offset(0)), ..options.clone() };
         match self.whole(location, ranged).await {
@@ -87,7 +86,7 @@ impl Patient {
         }
     }
 
-    /// One answer with its whole body.
+    /// One response with its complete body, length checked.
     async fn whole(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
         let is_head = options.head;
         let answer = self.inner.get_opts(location, options).await?;
@@ -96,19 +95,23 @@ impl Patient {
         }
         let (meta, range, attributes) =
             (answer.meta.clone(), answer.range.clone(), answer.attributes.clone());
-        let bytes = measured(answer.bytes().await?, &range)?;
+        let bytes = check_length(answer.bytes().await?, &range)?;
         let payload = GetResultPayload::Stream(stream::once(async { Ok(bytes) }).boxed());
         Ok(GetResult { payload, meta, range, attributes })
     }
 
-    /// Whether an object holds just this.
-    async fn holds(&self, location: &Path, payload: &PutPayload) -> Result<bool> {
+    /// Whether an object has exactly this content.
+    async fn content_equals(&self, location: &Path, payload: &PutPayload) -> Result<bool> {
         let there = self.get(location).await?.bytes().await?;
         Ok(there.len() == payload.content_length() && there == Bytes::from(payload.clone()))
     }
 
-    /// What is left of a listing, behind a key.
-    fn rest(&self, prefix: Option<&Path>, last: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
+    /// ResumableList of the keys after `last`.
+    fn resume_list(
+        &self,
+        prefix: Option<&Path>,
+        last: Option<&Path>,
+    ) -> BoxStream<'static, Result<ObjectMeta>> {
         match last {
             Some(last) => self.inner.list_with_offset(prefix, last),
             None => self.inner.list(prefix),
@@ -116,27 +119,27 @@ impl Patient {
     }
 }
 
-fn measured(bytes: Bytes, range: &Range<u64>) -> Result<Bytes> {
+fn check_length(bytes: Bytes, range: &Range<u64>) -> Result<Bytes> {
     if bytes.len() as u64 == range.end - range.start {
         return Ok(bytes);
     }
-    let source = format!("{} bytes came where {} were told of", bytes.len(), range.end - range.start);
+    let source = format!("{} bytes were received instead of {}", bytes.len(), range.end - range.start);
     Err(Error::Generic { store: "object", source: source.into() })
 }
 
-impl fmt::Display for Patient {
+impl fmt::Display for RetryingStore {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "patient {}", self.inner)
+        write!(f, "retrying {}", self.inner)
     }
 }
 
 #[async_trait]
-impl ObjectStore for Patient {
+impl ObjectStore for RetryingStore {
     async fn put_opts(&self, location: &Path, payload: PutPayload, options: PutOptions) -> Result<PutResult> {
         let is_new = options.mode == PutMode::Create;
-        let put = self.again(|| self.inner.put_opts(location, payload.clone(), options.clone())).await;
+        let put = self.with_retry(|| self.inner.put_opts(location, payload.clone(), options.clone())).await;
         match put {
-            Err(Error::AlreadyExists { .. }) if is_new && self.holds(location, &payload).await? => {
+            Err(Error::AlreadyExists { .. }) if is_new && self.content_equals(location, &payload).await? => {
                 Ok(PutResult { e_tag: None, version: None })
             }
             put => put,
@@ -153,9 +156,9 @@ impl ObjectStore for Patient {
 
     async fn get_opts(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
         if options.range.is_none() && !options.head {
-            return self.again(|| self.without_range(location, options.clone())).await;
+            return self.with_retry(|| self.without_range(location, options.clone())).await;
         }
-        self.again(|| self.whole(location, options.clone())).await
+        self.with_retry(|| self.whole(location, options.clone())).await
     }
 
     fn delete_stream(&self, locations: BoxStream<'static, Result<Path>>) -> BoxStream<'static, Result<Path>> {
@@ -163,7 +166,7 @@ impl ObjectStore for Patient {
     }
 
     fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
-        self.listed(prefix.cloned(), None)
+        self.resumable_list(prefix.cloned(), None)
     }
 
     fn list_with_offset(
@@ -171,39 +174,39 @@ impl ObjectStore for Patient {
         prefix: Option<&Path>,
         offset: &Path,
     ) -> BoxStream<'static, Result<ObjectMeta>> {
-        self.listed(prefix.cloned(), Some(offset.clone()))
+        self.resumable_list(prefix.cloned(), Some(offset.clone()))
     }
 
     async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
-        self.again(|| self.inner.list_with_delimiter(prefix)).await
+        self.with_retry(|| self.inner.list_with_delimiter(prefix)).await
     }
 
     async fn copy_opts(&self, from: &Path, to: &Path, options: CopyOptions) -> Result<()> {
-        self.again(|| self.inner.copy_opts(from, to, options.clone())).await
+        self.with_retry(|| self.inner.copy_opts(from, to, options.clone())).await
     }
 }
 
-/// A listing under way.
-struct Listing {
-    store: Patient,
+/// ResumableList that resumes after the last received key.
+struct ResumableList {
+    store: RetryingStore,
     prefix: Option<Path>,
     last: Option<Path>,
     open: BoxStream<'static, Result<ObjectMeta>>,
-    patience: Patience,
+    backoff: Backoff,
     has_failed: bool,
 }
 
-impl Listing {
+impl ResumableList {
     async fn next(mut self) -> Option<(Result<ObjectMeta>, Self)> {
         while !self.has_failed {
             match self.open.next().await? {
                 Ok(meta) => {
                     self.last = Some(meta.location.clone());
-                    self.patience = self.store.patience();
+                    self.backoff = self.store.backoff();
                     return Some((Ok(meta), self));
                 }
-                Err(error) => match self.patience.after(error).await {
-                    Ok(()) => self.open = self.store.rest(self.prefix.as_ref(), self.last.as_ref()),
+                Err(error) => match self.backoff.wait_after(error).await {
+                    Ok(()) => self.open = self.store.resume_list(self.prefix.as_ref(), self.last.as_ref()),
                     Err(error) => {
                         self.has_failed = true;
                         return Some((Err(error), self));
@@ -215,10 +218,14 @@ impl Listing {
     }
 }
 
-impl Patient {
-    fn listed(&self, prefix: Option<Path>, last: Option<Path>) -> BoxStream<'static, Result<ObjectMeta>> {
-        let (open, patience) = (self.rest(prefix.as_ref(), last.as_ref()), self.patience());
-        let listing = Listing { store: self.clone(), prefix, last, open, patience, has_failed: false };
+impl RetryingStore {
+    fn resumable_list(
+        &self,
+        prefix: Option<Path>,
+        last: Option<Path>,
+    ) -> BoxStream<'static, Result<ObjectMeta>> {
+        let (open, backoff) = (self.resume_list(prefix.as_ref(), last.as_ref()), self.backoff());
+        let listing = ResumableList { store: self.clone(), prefix, last, open, backoff, has_failed: false };
         stream::unfold(listing, |listing| listing.next().boxed()).boxed()
     }
 }

@@ -1,4 +1,4 @@
-//! What lies below an address, handed over page by page.
+//! Object listing, page by page, and metadata of one object.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -10,20 +10,20 @@ use crate::address::Address;
 use crate::client::block_on;
 use crate::error::Error;
 
-/// An object as a listing tells of it.
+/// ResumableList entry: address, size, modification time and entity tag of an object.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Entry {
+pub struct ListEntry {
     /// Its address.
     pub path: PathBuf,
     /// Bytes.
     pub size_bytes: u64,
     /// Nanoseconds since 1970 UTC.
     pub modified_utc_ns: i64,
-    /// The store's own mark of this content; empty where it has none.
+    /// Entity tag (ETag) of the content; empty if the store has none.
     pub e_tag: String,
 }
 
-impl Entry {
+impl ListEntry {
     fn of(folder: &Address, meta: ObjectMeta) -> Self {
         Self {
             path: folder.with_key(meta.location.as_ref()).to_string().into(),
@@ -34,29 +34,29 @@ impl Entry {
     }
 }
 
-/// Hands over every object below a folder; a page of a thousand is held at a time.
+/// Passes every object below a folder to `take`; one page (1000 objects) is held in memory at a time.
 ///
 /// # Errors
-/// What a request fails with; objects handed over before are sound.
-pub fn list(folder: &Address, mut take: impl FnMut(Entry)) -> Result<(), Error> {
+/// The error of the failed request; entries passed before it are valid.
+pub fn list(folder: &Address, mut take: impl FnMut(ListEntry)) -> Result<(), Error> {
     let (client, location, clock) = (folder.client()?, folder.location()?, Instant::now());
     block_on(async {
         let mut found = client.list(Some(&location));
         while let Some(meta) = found.next().await {
             let failed = |e| Error::of(folder, clock.elapsed().as_secs_f64(), &e);
-            take(Entry::of(folder, meta.map_err(failed)?));
+            take(ListEntry::of(folder, meta.map_err(failed)?));
         }
         Ok(())
     })?
 }
 
-/// One object, without its content.
+/// Metadata of one object.
 ///
 /// # Errors
-/// [`Error::Missing`] when it is not there; what the request fails with.
-pub fn look(path: &Path) -> Result<Entry, Error> {
-    let address = Address::must(path)?;
+/// [`Error::Missing`] when the object does not exist, else the error of the request.
+pub fn head(path: &Path) -> Result<ListEntry, Error> {
+    let address = Address::parse_required(path)?;
     let (client, location, clock) = (address.client()?, address.location()?, Instant::now());
     let meta = block_on(client.head(&location))?;
-    Ok(Entry::of(&address, meta.map_err(|e| Error::of(&address, clock.elapsed().as_secs_f64(), &e))?))
+    Ok(ListEntry::of(&address, meta.map_err(|e| Error::of(&address, clock.elapsed().as_secs_f64(), &e))?))
 }

@@ -1,18 +1,18 @@
-//! Names that are all text, kept apart by type: mixing them would compile, run and ruin a trend.
+//! Identifier types: distinct types for text identifiers, so that they cannot be interchanged.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// A name was empty or blank.
+/// An identifier was empty or blank.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("a {what} must not be empty")]
-pub struct EmptyName {
-    /// Which kind of name it was, e.g. `tail number`.
+pub struct EmptyIdError {
+    /// Kind of the identifier, e.g. `tail number`.
     pub what: &'static str,
 }
 
-macro_rules! name {
+macro_rules! identifier {
     ($(#[$doc:meta])* $name:ident, $what:literal) => {
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -20,19 +20,19 @@ macro_rules! name {
         pub struct $name(String);
 
         impl $name {
-            /// Takes the text without the white space around it.
+            /// Creates the identifier from text; surrounding white space is removed.
             ///
             /// # Errors
-            /// [`EmptyName`] when nothing is left.
-            pub fn new(text: impl AsRef<str>) -> Result<Self, EmptyName> {
+            /// [`EmptyIdError`] when the text is blank.
+            pub fn new(text: impl AsRef<str>) -> Result<Self, EmptyIdError> {
                 let text = text.as_ref().trim();
                 if text.is_empty() {
-                    return Err(EmptyName { what: $what });
+                    return Err(EmptyIdError { what: $what });
                 }
                 Ok(Self(text.to_owned()))
             }
 
-            /// The name as it was logged.
+            /// The identifier as logged.
             pub fn as_str(&self) -> &str {
                 &self.0
             }
@@ -51,8 +51,8 @@ macro_rules! name {
         }
 
         impl TryFrom<String> for $name {
-            type Error = EmptyName;
-            fn try_from(text: String) -> Result<Self, EmptyName> {
+            type Error = EmptyIdError;
+            fn try_from(text: String) -> Result<Self, EmptyIdError> {
                 Self::new(text)
             }
         }
@@ -65,27 +65,27 @@ macro_rules! name {
     };
 }
 
-name!(
-    /// The aircraft: where an actuator flies today.
+identifier!(
+    /// Aircraft: the tail on which an actuator is installed.
     TailNumber,
     "tail number"
 );
-name!(
-    /// The place on the aircraft, e.g. `aileron_left`: what a log knows.
+identifier!(
+    /// Position on the aircraft, e.g. `aileron_left`. Logs identify actuators by position.
     Position,
     "position"
 );
-name!(
-    /// The design: whose stiffness, damping and mass we use.
+identifier!(
+    /// Part number: the design, which determines stiffness, damping and mass.
     PartNumber,
     "part number"
 );
-name!(
-    /// The unit that wears and the owner of a trend; unique only with its part number.
+identifier!(
+    /// Serial number: the unit that wears and has a trend; unique only together with its part number.
     SerialNumber,
     "serial number"
 );
-name!(
+identifier!(
     /// One flight of one tail.
     FlightId,
     "flight id"

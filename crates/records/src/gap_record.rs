@@ -1,4 +1,4 @@
-//! The record: what one actuator's flight says about its gap, and how that came to be said.
+//! Gap record: the estimated gap of one actuator in one flight, and its provenance.
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -6,18 +6,18 @@ use serde::{Deserialize, Serialize};
 use crate::flight::Flight;
 use crate::ids::{PartNumber, Position, SerialNumber};
 
-/// Whether the flight could show a gap.
+/// Whether the flight allows an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// `gap_m` holds a number.
     Estimated,
-    /// A sound log that cannot show a gap; `reason` says why.
+    /// The log is readable, but allows no estimate; `reason` holds the rejection code.
     Refused,
 }
 
 impl Status {
-    /// The word stored in the `status` column.
+    /// Value of the `status` column.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Estimated => "estimated",
@@ -26,33 +26,33 @@ impl Status {
     }
 }
 
-/// What is needed to make the number again, bit for bit.
+/// Everything needed to reproduce the estimate bitwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
-    /// The log as it was found; relative to the configuration file where it lies below it.
+    /// Path of the log; relative to the configuration file if the log is stored below it.
     pub log_path: String,
     /// blake3 of the footer and of the column chunks that were read, hexadecimal.
     pub log_digest: String,
-    /// blake3 of every setting that can change this number, hexadecimal.
+    /// blake3 of every setting that affects the estimate, hexadecimal.
     pub config_digest: String,
-    /// The version of Freeplay that made it.
+    /// Version of Freeplay that computed the estimate.
     pub program_version: String,
-    /// The run that made it.
+    /// The run that computed the estimate.
     pub run_id: String,
-    /// When it was made.
+    /// Time of computation, UTC.
     pub processed_utc: Timestamp,
 }
 
-/// What one actuator's channels in one flight say: the gap, or why there is none, and what it stands on.
+/// GapEstimate of one actuator in one flight: the gap or the rejection reason, with its diagnostics.
 ///
-/// It needs no identity: the same numbers come out of a log nobody has booked.
+/// It holds no identity: an unidentified log gives the same numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
+pub struct GapEstimate {
     /// Whether `gap_m` holds a number.
     pub status: Status,
-    /// Stable code: why the flight was refused, or the gravest doubt about its number.
+    /// Stable code: the rejection reason, or the most severe quality flag.
     pub reason: Option<String>,
-    /// Stable codes of doubts that do not forbid the number.
+    /// Stable codes of quality flags that do not reject the estimate.
     pub flags: Vec<String>,
     /// ΔS by the configured method, m.
     pub gap_m: Option<f64>,
@@ -62,13 +62,13 @@ pub struct Estimate {
     pub gap_p05_m: Option<f64>,
     /// Its 95 % bound, m.
     pub gap_p95_m: Option<f64>,
-    /// ΔS exactly as equations 29–31 have it, m.
+    /// ΔS by equations 29–31, m.
     pub gap_midrange_m: Option<f64>,
     /// Stiffness fitted in this flight, N/m.
     pub stiffness_n_per_m: Option<f64>,
     /// Its standard error, N/m.
     pub stiffness_se_n_per_m: Option<f64>,
-    /// Delay of the screw channel against the motor's found and allowed for, s.
+    /// Estimated and corrected delay of the screw channel relative to the motor channel, s.
     pub skew_s: Option<f64>,
     /// Its standard error, s.
     pub skew_se_s: Option<f64>,
@@ -80,11 +80,11 @@ pub struct Estimate {
     pub lost_motion_m: Option<f64>,
     /// Its standard error, m.
     pub lost_motion_se_m: Option<f64>,
-    /// For a purely rotary part: metres of gap to a radian, m/rad.
+    /// Reference radius of a purely rotary part: metres of gap per radian, m/rad.
     pub reference_radius_m: Option<f64>,
-    /// How often the load changed sides.
+    /// Number of load reversals.
     pub load_reversals: i64,
-    /// Samples the number stands on.
+    /// Number of samples used.
     pub samples: i64,
     /// Samples in the upper set of equation 30.
     pub samples_upper: i64,
@@ -96,12 +96,12 @@ pub struct Estimate {
     pub load_p95_n: Option<f64>,
     /// Mean temperature, °C, where a channel is mapped.
     pub temperature_c: Option<f64>,
-    /// Mean normalised innovation squared; a diagnostic to hold against the unit's own history.
+    /// Mean normalised innovation squared (NIS), to compare with the unit's own history.
     pub nis: Option<f64>,
 }
 
-impl Estimate {
-    /// A sound log that cannot show a gap, and why.
+impl GapEstimate {
+    /// The estimate of a rejected flight, with its rejection code.
     pub fn refused(reason: &str) -> Self {
         Self {
             status: Status::Refused,
@@ -136,29 +136,29 @@ impl Estimate {
 /// One row of the results: one actuator, one flight. The flattened field names are the column names.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GapRecord {
-    /// Which tail, which flight, when, how long.
+    /// Tail, flight, departure and duration.
     #[serde(flatten)]
     pub flight: Flight,
-    /// The place on the aircraft.
+    /// Position on the aircraft.
     pub position: Position,
-    /// The design of the unit that sat there.
+    /// Part number of the installed unit.
     pub part_number: PartNumber,
-    /// The unit that sat there.
+    /// The installed unit.
     pub serial_number: SerialNumber,
-    /// The unit's own age after this flight, hours, where it is known.
+    /// Age of the unit after this flight, hours, if known.
     pub unit_hours: Option<f64>,
-    /// What its channels say.
+    /// The estimate.
     #[serde(flatten)]
-    pub estimate: Estimate,
-    /// Where the number comes from.
+    pub estimate: GapEstimate,
+    /// Provenance of the estimate.
     #[serde(flatten)]
     pub provenance: Provenance,
 }
 
 impl GapRecord {
-    /// The order in which records are shown and exported: by departure, then tail, flight and position.
+    /// Sort key of shown and exported records: departure, then tail, flight and position.
     ///
-    /// It depends on nothing but the flights themselves, so one worker or many give the same table.
+    /// The key depends only on the flights, so the table does not depend on the number of workers.
     pub fn canonical_key(&self) -> impl Ord + use<> {
         let f = &self.flight;
         (f.departure_utc, f.tail_number.clone(), f.flight_id.clone(), self.position.clone())

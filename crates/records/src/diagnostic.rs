@@ -1,19 +1,20 @@
-//! A complaint: what went wrong, where, what was found, what was wanted and what to do about it.
+//! Structured error for users: code, message, location, found and expected value, and a hint.
 //!
-//! Every crate has its own error enum; this is the one form in which an error reaches a person, the
-//! account of a run and a script, so that all three tell the same story.
+//! Every crate has its own error enum. [`Diagnostic`] is the one form in which an error reaches the terminal,
+//! the run summary and a script, so that all three report the same.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// One thing wrong with one file, in words its owner can act on.
+/// One error in one file, with a hint that its owner can act on.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Complaint {
+pub struct Diagnostic {
     /// Stable, lower case; scripts match on it.
     pub code: String,
     /// One sentence without blame and without a full stop.
-    pub what: String,
+    #[serde(rename = "what")]
+    pub message: String,
     /// The file: a log, a table, the configuration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
@@ -32,39 +33,39 @@ pub struct Complaint {
     /// The row group of a Parquet file, from 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_group: Option<u64>,
-    /// What stands there.
+    /// The value that was found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub found: Option<String>,
-    /// What should stand there.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub wanted: Option<String>,
-    /// What to do.
+    /// The value that was expected.
+    #[serde(rename = "wanted", skip_serializing_if = "Option::is_none")]
+    pub expected: Option<String>,
+    /// Instruction that resolves the error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hint: Option<String>,
 }
 
-impl Complaint {
-    /// A complaint with nothing but its code and its sentence.
-    pub fn new(code: impl Into<String>, what: impl fmt::Display) -> Self {
-        Self { code: code.into(), what: what.to_string(), ..Self::default() }
+impl Diagnostic {
+    /// A diagnostic with its code and message only.
+    pub fn new(code: impl Into<String>, message: impl fmt::Display) -> Self {
+        Self { code: code.into(), message: message.to_string(), ..Self::default() }
     }
 
-    /// Names the file.
+    /// Sets the file.
     #[must_use]
     pub fn in_file(mut self, file: impl fmt::Display) -> Self {
         self.file = Some(file.to_string());
         self
     }
 
-    /// Says what to do.
+    /// Sets the hint.
     #[must_use]
     pub fn hint(mut self, hint: impl fmt::Display) -> Self {
         self.hint = Some(hint.to_string());
         self
     }
 
-    /// Column, row and row group in one phrase; nothing when none is known.
-    pub fn place(&self) -> Option<String> {
+    /// Column, row and row group as one phrase; `None` when none is known.
+    pub fn location(&self) -> Option<String> {
         let parts: Vec<String> = [
             self.column.as_ref().map(|c| format!("column `{c}`")),
             self.row.map(|r| format!("row {r}")),
@@ -77,10 +78,10 @@ impl Complaint {
     }
 }
 
-/// The anatomy of `docs/errors.md`, without colour: the first line is the error, the rest is indented.
-impl fmt::Display for Complaint {
+/// The layout of `docs/errors.md`, without colour: the first line is the error, the other lines are indented.
+impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "error[{}]: {}", self.code, self.what)?;
+        write!(f, "error[{}]: {}", self.code, self.message)?;
         if let (Some(file), Some((line, column))) = (&self.file, self.line) {
             write!(f, "\n  {file}:{line}:{column}")?;
             if let Some(text) = &self.text {
@@ -89,10 +90,10 @@ impl fmt::Display for Complaint {
         } else if let Some(file) = &self.file {
             write!(f, "\n  file    {file}")?;
         }
-        if let Some(place) = self.place() {
-            write!(f, "\n  at      {place}")?;
+        if let Some(location) = self.location() {
+            write!(f, "\n  at      {location}")?;
         }
-        for (label, value) in [("found ", &self.found), ("wanted", &self.wanted)] {
+        for (label, value) in [("found ", &self.found), ("wanted", &self.expected)] {
             if let Some(value) = value {
                 write!(f, "\n  {label}  {value}")?;
             }
@@ -110,11 +111,11 @@ mod tests {
 
     #[test]
     fn a_complaint_reads_from_what_to_remedy() {
-        let c = Complaint {
+        let c = Diagnostic {
             column: Some("t_ns".into()),
             row: Some(9),
             found: Some("12:04:07 after 12:04:09".into()),
-            ..Complaint::new("time_goes_back", "the clock runs backwards")
+            ..Diagnostic::new("time_goes_back", "the clock runs backwards")
                 .in_file("a.parquet")
                 .hint("sort it")
         };

@@ -1,0 +1,26 @@
+//! Blocking access to object stores: `s3://`, `gs://` and `az://` addresses in place of paths.
+//!
+//! An address is stored as a path, so that code that only passes names on needs no second type; [`is_address`]
+//! distinguishes the two. [`ObjectFile`] reads one object: it copies the requested byte ranges into an unnamed
+//! temporary file at their own offsets, which is then read like a local file. [`list`] lists a folder page by page.
+//!
+//! `object_store` is asynchronous. The first request starts a runtime of two threads; a process that reads only
+//! local files never starts it. Credentials come from the environment and from AWS profile files
+//! (`docs/objects.md`).
+
+mod address;
+mod aws_profile;
+mod byte_ranges;
+mod client;
+mod error;
+mod listing;
+mod object_file;
+mod retry;
+mod settings;
+
+pub use address::{Address, is_address};
+pub use client::{Client, block_on, handle};
+pub use error::Error;
+pub use listing::{ListEntry, head, list};
+pub use object_file::{ObjectFile, read_all};
+pub use settings::{Settings, configure};
