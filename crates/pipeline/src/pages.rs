@@ -78,8 +78,8 @@ fn all(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<W
         Ok::<(), Error>(())
     };
     report::assets().into_iter().try_for_each(put)?;
-    let spreads = report::Spreads::of(report);
-    report.units.par_iter().try_for_each(|unit| done(report::serial_page(report, &spreads, unit)?))?;
+    let spreads = report::RateSpreads::of(report);
+    report.units.par_iter().try_for_each(|unit| done(report::unit_page(report, &spreads, unit)?))?;
     report.tails.par_iter().try_for_each(|tail| done(report::tail_page(report, tail)?))?;
     report::fleet_pages(report)?.into_iter().try_for_each(put)?;
     Ok(Written { files: files.into_inner(), bytes: bytes.into_inner() })

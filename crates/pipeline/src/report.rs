@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use ::report::{
-    Banded, Event, FlightRow, Inspection, LogFault, Past, Prior, Quality, Report, Statement, Stay, Tail, Unit,
+    Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
+    Report, Tail, TimedInterval, UnitView,
 };
 use ingest::tables::{Table, name, number, utc};
 use jiff::{SignedDuration, Timestamp};
@@ -64,7 +65,7 @@ pub fn compose(
         let rest = rest.remove(&name).unwrap_or_default();
         compose.unit(row, drawn, histories.get(&name).unwrap_or(&History::default()), &rest)
     };
-    let units: Vec<Unit> = now.iter().zip(&drawn).map(unit).collect();
+    let units: Vec<UnitView> = now.iter().zip(&drawn).map(unit).collect();
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
     let narrowed = ask.tail_number.is_some() || ask.serial_number.is_some();
     let wanted = |tail: Option<&str>| !narrowed || tail.is_some_and(|tail| shown.contains(tail));
@@ -80,7 +81,7 @@ pub fn compose(
         newest_departure_utc,
         logs_known: logs.known.iter().filter(|(tail, _)| wanted(tail.as_deref())).map(|(_, n)| n).sum(),
         check_interval_hours: config.document.trend.next_check_hours,
-        log_faults: logs.faults,
+        log_errors: logs.faults,
         priors: priors.into_iter().map(prior).collect(),
         tails,
         inspections_given: checks.is_some(),
@@ -99,7 +100,7 @@ fn scope(ask: &Ask) -> Option<String> {
 /// What became of all logs: how many of each tail, and those in error.
 struct Logs {
     known: BTreeMap<Option<String>, usize>,
-    faults: Vec<LogFault>,
+    faults: Vec<LogError>,
 }
 
 impl Logs {
@@ -108,7 +109,7 @@ impl Logs {
         for account in store.accounts()? {
             *known.entry(account.tail_number.clone()).or_default() += 1;
             if account.outcome == Outcome::Error {
-                faults.push(LogFault {
+                faults.push(LogError {
                     log_path: account.log_path,
                     tail_number: account.tail_number,
                     code: account.error_code.unwrap_or_default(),
@@ -197,24 +198,24 @@ struct Compose<'a> {
 }
 
 impl Compose<'_> {
-    fn unit(&self, row: &TrendRow, drawn: &Forecast, history: &History, rest: &[Rest]) -> Unit {
+    fn unit(&self, row: &TrendRow, drawn: &Forecast, history: &History, rest: &[Rest]) -> UnitView {
         let flown = history.flights();
         let name = name_of(row);
-        let stays: Vec<Stay> = self.stays.of(&name).into_iter().map(stay).collect();
-        Unit {
+        let stays: Vec<Installation> = self.stays.of(&name).into_iter().map(stay).collect();
+        UnitView {
             level: drawn
                 .past
                 .iter()
                 .filter_map(|(us, b)| banded(Timestamp::from_microsecond(*us).ok(), b))
                 .collect(),
             forecast: forecast(drawn, history),
-            statement: self.statement(row, history, &name),
+            assessment: self.statement(row, history, &name),
             quality: quality(history, rest, row.as_of_utc),
             events: events(row, &stays),
-            past: self.past(row, history, &name),
+            past_forecasts: self.past(row, history, &name),
             inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.beside(flown)).collect(),
             flights: flown.iter().map(|flown| flight(history, flown, &rest[flown.row as usize])).collect(),
-            stays,
+            installations: stays,
             part_number: name.0,
             serial_number: name.1,
             tail_number: row.tail_number.clone(),
@@ -222,14 +223,14 @@ impl Compose<'_> {
         }
     }
 
-    fn statement(&self, row: &TrendRow, history: &History, name: &Name) -> Statement {
+    fn statement(&self, row: &TrendRow, history: &History, name: &Name) -> Assessment {
         let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
         let part = part.and_then(|part| self.config.parts.get(&part));
         let records = history.flights();
         let pace = pace(history);
         let last = records.last().map_or(row.as_of_utc, Flown::departure_utc);
         let at = |hours: Option<f64>| date(last, hours? / pace?.0);
-        Statement {
+        Assessment {
             state: row.state.map(str::to_owned),
             reason: row.reason.clone(),
             flights: records.len(),
@@ -267,7 +268,7 @@ impl Compose<'_> {
     }
 
     /// What was foreseen for today, and what is found.
-    fn past(&self, row: &TrendRow, history: &History, name: &Name) -> Vec<Past> {
+    fn past(&self, row: &TrendRow, history: &History, name: &Name) -> Vec<PastForecast> {
         let of_day = |days: &i64| {
             let then = self.before.get(days)?.get(name)?;
             foreseen(then, row, flown_hours(history, then.as_of_utc)?, *days)
@@ -276,8 +277,8 @@ impl Compose<'_> {
     }
 }
 
-fn stay(of: &records::Installation) -> Stay {
-    Stay {
+fn stay(of: &records::Installation) -> Installation {
+    Installation {
         tail_number: of.tail_number.to_string(),
         position: of.position.to_string(),
         installed_utc: of.installed_utc,
@@ -287,19 +288,19 @@ fn stay(of: &records::Installation) -> Stay {
 
 /// The level then, grown at the rate then over the hours since; the errors of both levels and the
 /// interval of the rate are independent of each other.
-fn foreseen(then: &TrendRow, now: &TrendRow, hours: f64, days_ago: i64) -> Option<Past> {
+fn foreseen(then: &TrendRow, now: &TrendRow, hours: f64, days_ago: i64) -> Option<PastForecast> {
     let gap_m = then.gap_m?;
     let rate = then.rate_m_per_hour?;
     let level = 1.645 * then.gap_se_m?.hypot(now.gap_se_m?);
     let foreseen_m = gap_m + rate * hours;
-    Some(Past {
+    Some(PastForecast {
         as_of_utc: then.as_of_utc,
         days_ago,
         state: then.state.map(str::to_owned),
         gap_m,
-        foreseen_low_m: foreseen_m - level.hypot((rate - then.rate_p05_m_per_hour?) * hours),
-        foreseen_m,
-        foreseen_high_m: foreseen_m + level.hypot((then.rate_p95_m_per_hour? - rate) * hours),
+        predicted_low_m: foreseen_m - level.hypot((rate - then.rate_p05_m_per_hour?) * hours),
+        predicted_m: foreseen_m,
+        predicted_high_m: foreseen_m + level.hypot((then.rate_p95_m_per_hour? - rate) * hours),
         found_m: now.gap_m?,
     })
 }
@@ -322,21 +323,23 @@ fn pace(history: &History) -> Option<(f64, f64)> {
 }
 
 /// The fan on the calendar, at this unit's use; nothing where that is not known.
-fn forecast(drawn: &Forecast, history: &History) -> Vec<Banded> {
+fn forecast(drawn: &Forecast, history: &History) -> Vec<TimedInterval> {
     let last = history.flights().last();
     let Some((last, (hours_per_day, _))) = last.zip(pace(history)) else { return Vec::new() };
     let at = |hours: f64| date(last.departure_utc(), hours / hours_per_day);
     drawn.ahead.iter().filter_map(|(hours, band)| banded(at(*hours), band)).collect()
 }
 
-fn banded(at_utc: Option<Timestamp>, band: &trend::Interval) -> Option<Banded> {
-    Some(Banded { at_utc: at_utc?, p05_m: band.p05_m, m: band.m, p95_m: band.p95_m })
+fn banded(at_utc: Option<Timestamp>, band: &trend::Interval) -> Option<TimedInterval> {
+    Some(TimedInterval { at_utc: at_utc?, p05_m: band.p05_m, m: band.m, p95_m: band.p95_m })
 }
 
-fn prior((part_number, learned_until_utc, prior): (Option<String>, Timestamp, trend::FleetPrior)) -> Prior {
+fn prior(
+    (part_number, learned_until_utc, prior): (Option<String>, Timestamp, trend::FleetPrior),
+) -> FleetPriorView {
     let (new_m, new_sd_m) = prior.new_gap_m();
     let (life_p05_hours, life_p95_hours) = prior.life_range_hours();
-    Prior {
+    FleetPriorView {
         part_number,
         learned_until_utc,
         axis: prior.axis().to_string(),
@@ -354,7 +357,7 @@ fn date(from: Timestamp, days: f64) -> Option<Timestamp> {
     from.checked_add(SignedDuration::try_from_secs_f64(days * 86_400.0).ok()?).ok()
 }
 
-fn events(row: &TrendRow, stays: &[Stay]) -> Vec<Event> {
+fn events(row: &TrendRow, stays: &[Installation]) -> Vec<Event> {
     let booked = |at: Timestamp| {
         stays.iter().any(|s| {
             let ends = [Some(s.installed_utc), s.removed_utc];
@@ -365,9 +368,9 @@ fn events(row: &TrendRow, stays: &[Stay]) -> Vec<Event> {
         departure_utc: c.departure_utc,
         kind: c.kind.to_owned(),
         step_m: c.step_m,
-        tail_wide: c.tail_wide,
+        is_tail_wide: c.tail_wide,
         // Wear that sets in is nothing that maintenance does.
-        in_books: c.kind == "recorded" || (c.kind != "onset" && booked(c.departure_utc)),
+        is_on_record: c.kind == "recorded" || (c.kind != "onset" && booked(c.departure_utc)),
     };
     row.change_points.iter().map(event).collect()
 }
@@ -390,10 +393,10 @@ fn quality(history: &History, rest: &[Rest], as_of: Timestamp) -> Quality {
         estimated: count,
         refused: records.len() - count,
         reasons: ranked(reasons),
-        doubts: ranked(doubts),
+        flags: ranked(doubts),
         last_estimate_utc: last,
         days_since_estimate: last.map(|last| days(last, as_of)),
-        noise_found_over_stated: noise(history),
+        noise_ratio: noise(history),
     }
 }
 
@@ -463,7 +466,7 @@ fn tails(histories: &Histories) -> BTreeMap<String, Tail> {
 }
 
 /// Adds each tail's logs in error, of tails that never had a good one too.
-fn blame(tails: &mut BTreeMap<String, Tail>, faults: &[LogFault]) {
+fn blame(tails: &mut BTreeMap<String, Tail>, faults: &[LogError]) {
     for name in faults.iter().filter_map(|fault| fault.tail_number.as_deref()) {
         tails.entry(name.to_owned()).or_insert_with(|| quiet(name)).logs_in_error += 1;
     }

@@ -1,6 +1,6 @@
-//! What all pages share: the style, the chart library (uPlot, MIT) and our lines that use it.
+//! Files shared by all pages: style sheet, chart library (uPlot, MIT) and the script that uses it.
 
-use crate::Page;
+use crate::page::Page;
 
 /// The shared files of a report.
 pub fn assets() -> Vec<Page> {

@@ -1,41 +1,42 @@
-//! What a report knows: plain values in SI, composed elsewhere.
+//! View model of a report: plain values in SI, composed by `pipeline`.
 
 use jiff::Timestamp;
 use serde::Serialize;
 
-use crate::standing::Standing;
+use crate::state_badge::StateBadge;
 
-/// Everything a report says. Serialised, it is the machine-readable twin of the pages.
+/// Content of a report. Serialised, it is `report.json`; field names there follow the first version.
 #[derive(Debug, Clone, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct Report {
     pub made_utc: Timestamp,
     pub program: String,
     pub store_version: Option<u64>,
-    /// What the report was narrowed to; nothing for the whole fleet.
+    /// Selection the report is limited to; `None` for the whole fleet.
     pub scope: Option<String>,
-    /// The day of the statements; nothing later was looked at.
+    /// Date of the assessments; later data are ignored.
     pub as_of_utc: Option<Timestamp>,
     pub newest_departure_utc: Option<Timestamp>,
     pub logs_known: usize,
-    /// Hours until the next check, for the probability to meet the limit before it.
+    /// Hours until the next check, for the probability of reaching the limit before it.
     pub check_interval_hours: f64,
-    pub log_faults: Vec<LogFault>,
-    pub priors: Vec<Prior>,
+    #[serde(rename = "log_faults")]
+    pub log_errors: Vec<LogError>,
+    pub priors: Vec<FleetPriorView>,
     pub tails: Vec<Tail>,
-    pub units: Vec<Unit>,
-    /// Whether a table of inspections was given at all.
+    pub units: Vec<UnitView>,
+    /// Whether a table of inspections is configured.
     pub inspections_given: bool,
-    /// Inspections of units that the records do not know.
+    /// Inspections of units without records.
     pub inspections_unmatched: usize,
 }
 
-/// What a part number's units had taught about the next one.
+/// Fleet prior of a part number, as learned before a cut-off date.
 #[derive(Debug, Clone, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct Prior {
+pub struct FleetPriorView {
     pub part_number: Option<String>,
-    /// Nothing later was learned from.
+    /// Training cut-off.
     pub learned_until_utc: Timestamp,
     pub axis: String,
     pub new_m: f64,
@@ -43,14 +44,14 @@ pub struct Prior {
     pub life_p05_hours: f64,
     pub life_p50_hours: f64,
     pub life_p95_hours: f64,
-    /// How much wider forecasts are stated than is usual.
+    /// Calibration factor of the forecast intervals; 1 is the model's own width.
     pub widening: f64,
 }
 
-/// A gap and its 90 % interval at a time.
+/// Gap and its 90 % interval at a time.
 #[derive(Debug, Clone, Copy)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct Banded {
+pub struct TimedInterval {
     pub at_utc: Timestamp,
     pub p05_m: f64,
     pub m: f64,
@@ -60,14 +61,14 @@ pub struct Banded {
 /// A log that could not be read.
 #[derive(Debug, Clone, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds")]
-pub struct LogFault {
+pub struct LogError {
     pub log_path: String,
     pub tail_number: Option<String>,
     pub code: String,
     pub processed_utc: Timestamp,
 }
 
-/// What is known of an aircraft's data.
+/// Data of one aircraft.
 #[derive(Debug, Clone, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct Tail {
@@ -80,35 +81,38 @@ pub struct Tail {
     pub last_estimate_utc: Option<Timestamp>,
 }
 
-/// One unit: its statement, and what it stands on.
+/// One unit: its assessment and the data behind it.
 #[derive(Debug, Clone, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct Unit {
+pub struct UnitView {
     pub part_number: Option<String>,
     pub serial_number: String,
     pub tail_number: Option<String>,
     pub position: Option<String>,
-    pub statement: Statement,
+    #[serde(rename = "statement")]
+    pub assessment: Assessment,
     pub quality: Quality,
     pub events: Vec<Event>,
-    pub stays: Vec<Stay>,
-    pub past: Vec<Past>,
+    #[serde(rename = "stays")]
+    pub installations: Vec<Installation>,
+    #[serde(rename = "past")]
+    pub past_forecasts: Vec<PastForecast>,
     pub inspections: Vec<Inspection>,
-    /// The smoothed level through its flights; drawn, not repeated in the twin.
+    /// Smoothed level over past flights; plotted, not part of `report.json`.
     #[serde(skip)]
-    pub level: Vec<Banded>,
-    /// The gap to come, from now on; drawn, not repeated in the twin.
+    pub level: Vec<TimedInterval>,
+    /// Forecast from the report date on; plotted, not part of `report.json`.
     #[serde(skip)]
-    pub forecast: Vec<Banded>,
-    /// In the pages and in the store, not repeated in the twin.
+    pub forecast: Vec<TimedInterval>,
+    /// Shown on the page and in the store, not part of `report.json`.
     #[serde(skip)]
     pub flights: Vec<FlightRow>,
 }
 
-/// What is said of a unit on the day of the report.
+/// Assessment of a unit on the date of the report.
 #[derive(Debug, Clone, Default, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct Statement {
+pub struct Assessment {
     pub state: Option<String>,
     pub reason: Option<String>,
     pub flights: usize,
@@ -127,10 +131,10 @@ pub struct Statement {
     pub not_before_utc: Option<Timestamp>,
     pub likely_utc: Option<Timestamp>,
     pub not_after_utc: Option<Timestamp>,
-    /// How the unit is used now.
+    /// Recent utilisation.
     pub hours_per_day: Option<f64>,
     pub hours_per_flight: Option<f64>,
-    /// Probability to meet the limit before the next check.
+    /// Probability of reaching the limit before the next check.
     pub check_probability: Option<f64>,
     pub law: Option<String>,
     pub axis: Option<String>,
@@ -139,72 +143,79 @@ pub struct Statement {
     pub sen_rate_m_per_hour: Option<f64>,
     pub sen_low_m_per_hour: Option<f64>,
     pub sen_high_m_per_hour: Option<f64>,
-    /// The state a day earlier: the outer nothing when the unit was not known then.
+    /// State one day earlier; the outer `None` if the unit had no record then.
     pub state_day_before: Option<Option<String>>,
 }
 
-/// How good the data under a statement are.
+/// Quality of the data behind an assessment.
 #[derive(Debug, Clone, Default, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct Quality {
     pub estimated: usize,
     pub refused: usize,
-    /// Why flights were refused, and how many; most frequent first.
+    /// Rejection reasons and their counts, most frequent first.
     pub reasons: Vec<(String, usize)>,
-    pub doubts: Vec<(String, usize)>,
+    #[serde(rename = "doubts")]
+    pub flags: Vec<(String, usize)>,
     pub last_estimate_utc: Option<Timestamp>,
     pub days_since_estimate: Option<f64>,
-    /// Standard deviation found between neighbouring flights over the one stated.
-    pub noise_found_over_stated: Option<f64>,
+    /// Standard deviation between successive flights divided by the reported standard error.
+    #[serde(rename = "noise_found_over_stated")]
+    pub noise_ratio: Option<f64>,
 }
 
-/// A change that wear does not make.
+/// A change point of the gap that wear does not explain, or the onset of wear.
 #[derive(Debug, Clone, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct Event {
     pub departure_utc: Timestamp,
     pub kind: String,
     pub step_m: f64,
-    /// Whether an installation near that day explains it.
-    pub in_books: bool,
-    /// Whether the tail's other actuators changed with it: a sensor or a recorder, not wear.
-    pub tail_wide: bool,
+    /// Whether an installation or maintenance entry near that date explains it.
+    #[serde(rename = "in_books")]
+    pub is_on_record: bool,
+    /// Whether other actuators of the tail changed at the same time, which points to a sensor or recorder.
+    #[serde(rename = "tail_wide")]
+    pub is_tail_wide: bool,
 }
 
-/// A stay on a tail.
+/// An installation of the unit on a tail.
 #[derive(Debug, Clone, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct Stay {
+pub struct Installation {
     pub tail_number: String,
     pub position: String,
     pub installed_utc: Timestamp,
     pub removed_utc: Option<Timestamp>,
 }
 
-/// A statement made earlier, and what came of it.
+/// A past forecast and the level found later.
 #[derive(Debug, Clone, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
-pub struct Past {
+pub struct PastForecast {
     pub as_of_utc: Timestamp,
     pub days_ago: i64,
     pub state: Option<String>,
     pub gap_m: f64,
-    /// What was then foreseen for the day of the report, with its 90 % interval.
-    pub foreseen_low_m: f64,
-    pub foreseen_m: f64,
-    pub foreseen_high_m: f64,
-    /// What is found on the day of the report.
+    /// Forecast for the date of the report, with its 90 % interval.
+    #[serde(rename = "foreseen_low_m")]
+    pub predicted_low_m: f64,
+    #[serde(rename = "foreseen_m")]
+    pub predicted_m: f64,
+    #[serde(rename = "foreseen_high_m")]
+    pub predicted_high_m: f64,
+    /// Level found on the date of the report.
     pub found_m: f64,
 }
 
-impl Past {
-    /// Whether the interval held.
+impl PastForecast {
+    /// Whether the level found lies within the forecast interval.
     pub fn held(&self) -> bool {
-        (self.foreseen_low_m..=self.foreseen_high_m).contains(&self.found_m)
+        (self.predicted_low_m..=self.predicted_high_m).contains(&self.found_m)
     }
 }
 
-/// A hangar check, and the estimate that stands beside it.
+/// A hangar inspection and the estimate to compare with it.
 #[derive(Debug, Clone, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct Inspection {
@@ -212,7 +223,7 @@ pub struct Inspection {
     pub play_m: f64,
     pub instrument: Option<String>,
     pub force_n: Option<f64>,
-    /// Median of the last estimates before the check; nothing when there was none near.
+    /// Median of the last estimates before the inspection; `None` if there is no recent one.
     pub estimate_m: Option<f64>,
     pub estimates: usize,
 }
@@ -233,17 +244,17 @@ pub struct FlightRow {
     pub load_reversals: Option<u64>,
     pub load_p05_n: Option<f64>,
     pub load_p95_n: Option<f64>,
-    /// Why refused, or what is doubted.
+    /// Rejection reason or quality flags.
     pub remarks: String,
 }
 
-impl Unit {
-    /// Where it stands.
-    pub fn standing(&self) -> Standing {
-        Standing::of(self.statement.state.as_deref())
+impl UnitView {
+    /// State to show.
+    pub fn badge(&self) -> StateBadge {
+        StateBadge::from_state(self.assessment.state.as_deref())
     }
 
-    /// Part and serial number as people say them.
+    /// Part and serial number, `PART / SERIAL`.
     pub fn name(&self) -> String {
         match &self.part_number {
             Some(part) => format!("{part} / {}", self.serial_number),

@@ -1,28 +1,28 @@
-//! The public door: hostile names, missing data, and numbers that stand in the page.
+//! Public API: hostile names, missing data, and numbers that must be in the page.
 #![expect(clippy::unwrap_used, reason = "a test may fail")]
 
 use report::{
-    Quality, Report, Spreads, Statement, Tail, Unit, fleet_pages, serial_page, serial_path, tail_page,
+    Assessment, Quality, RateSpreads, Report, Tail, UnitView, fleet_pages, tail_page, unit_page, unit_path,
 };
 
 const HOSTILE: &str = "<script>alert(1)</script>";
 
-fn unit(serial: &str, state: Option<&str>) -> Unit {
-    Unit {
+fn unit(serial: &str, state: Option<&str>) -> UnitView {
+    UnitView {
         part_number: Some("EMA".to_owned()),
         serial_number: serial.to_owned(),
         tail_number: Some(HOSTILE.to_owned()),
         position: Some("aileron".to_owned()),
-        statement: Statement {
+        assessment: Assessment {
             state: state.map(str::to_owned),
             gap_m: state.map(|_| 118.04e-6),
             limit_m: state.map(|_| 150e-6),
-            ..Statement::default()
+            ..Assessment::default()
         },
         quality: Quality::default(),
         events: Vec::new(),
-        stays: Vec::new(),
-        past: Vec::new(),
+        installations: Vec::new(),
+        past_forecasts: Vec::new(),
         inspections: Vec::new(),
         level: Vec::new(),
         forecast: Vec::new(),
@@ -30,7 +30,7 @@ fn unit(serial: &str, state: Option<&str>) -> Unit {
     }
 }
 
-fn report(units: Vec<Unit>) -> Report {
+fn report(units: Vec<UnitView>) -> Report {
     Report {
         made_utc: "2026-11-20T02:09:00Z".parse().unwrap(),
         program: "Freeplay".to_owned(),
@@ -40,7 +40,7 @@ fn report(units: Vec<Unit>) -> Report {
         newest_departure_utc: None,
         logs_known: 0,
         check_interval_hours: 300.0,
-        log_faults: Vec::new(),
+        log_errors: Vec::new(),
         priors: Vec::new(),
         tails: vec![Tail {
             tail_number: HOSTILE.to_owned(),
@@ -65,7 +65,7 @@ fn text(page: &report::Page) -> String {
 fn a_hostile_name_is_shown_and_not_run() {
     let report = report(vec![unit(HOSTILE, Some("plan"))]);
     let mut pages = fleet_pages(&report).unwrap();
-    pages.push(serial_page(&report, &Spreads::of(&report), &report.units[0]).unwrap());
+    pages.push(unit_page(&report, &RateSpreads::of(&report), &report.units[0]).unwrap());
     pages.push(tail_page(&report, &report.tails[0]).unwrap());
     for page in pages.iter().filter(|p| p.path != "report.json") {
         let html = text(page);
@@ -77,7 +77,7 @@ fn a_hostile_name_is_shown_and_not_run() {
 #[test]
 fn a_unit_without_a_statement_is_never_called_normal() {
     let report = report(vec![unit("A", None)]);
-    let html = text(&serial_page(&report, &Spreads::of(&report), &report.units[0]).unwrap());
+    let html = text(&unit_page(&report, &RateSpreads::of(&report), &report.units[0]).unwrap());
     assert!(html.contains("without a statement") && html.contains("no data") && !html.contains("normal"));
 }
 
@@ -88,16 +88,16 @@ fn the_gap_and_its_share_of_the_limit_stand_in_the_page_as_text() {
     let index = pages.iter().find(|p| p.path == "index.html").map(text).unwrap();
     // 118.04 of 150 µm is 78.7 %, by hand.
     assert!(index.contains("118.0 µm") && index.contains("79 %"), "{index}");
-    assert!(index.contains(&serial_path(&report.units[0])));
+    assert!(index.contains(&unit_path(&report.units[0])));
 }
 
 #[test]
 fn a_large_fleet_is_split_and_every_unit_keeps_a_link() {
-    let units: Vec<Unit> = (0..350).map(|k| unit(&format!("S{k:04}"), Some("plan"))).collect();
+    let units: Vec<UnitView> = (0..350).map(|k| unit(&format!("S{k:04}"), Some("plan"))).collect();
     let report = report(units);
     let pages = fleet_pages(&report).unwrap();
     assert_eq!(pages.iter().filter(|p| p.path.starts_with("work-")).count(), 4);
     let all: String =
         pages.iter().filter(|p| p.path.starts_with("work-") || p.path == "index.html").map(text).collect();
-    assert!(report.units.iter().all(|u| all.contains(&serial_path(u))));
+    assert!(report.units.iter().all(|u| all.contains(&unit_path(u))));
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use job::Config;
 use job::look::Look;
 use records::{Installations, PartNumber};
-use report::{Stretch, look_html, look_png, look_svg};
+use report::{ContactInterval, estimate_plot_html, estimate_plot_png, estimate_plot_svg};
 
 use crate::exit::Failure;
 use crate::table;
@@ -47,14 +47,14 @@ pub(super) fn plot(
     Ok(())
 }
 
-type Drawer = fn(&[report::Look]) -> Result<Vec<u8>, report::Error>;
+type Drawer = fn(&[report::EstimatePlot]) -> Result<Vec<u8>, report::Error>;
 
 fn drawer(file: &Path) -> Result<Drawer, Failure> {
     let ending = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
     match ending.as_str() {
-        "svg" => Ok(|looks| look_svg(looks).map(String::into_bytes)),
-        "png" => Ok(look_png),
-        "html" | "htm" => Ok(|looks| look_html(looks).map(String::into_bytes)),
+        "svg" => Ok(|looks| estimate_plot_svg(looks).map(String::into_bytes)),
+        "png" => Ok(estimate_plot_png),
+        "html" | "htm" => Ok(|looks| estimate_plot_html(looks).map(String::into_bytes)),
         _ => Err(Failure::usage(
             "unknown_ending",
             format!("{} has no ending that says what to draw", shown(file)),
@@ -63,23 +63,23 @@ fn drawer(file: &Path) -> Result<Drawer, Failure> {
     }
 }
 
-fn drawn(log: &str, look: Look) -> report::Look {
+fn drawn(log: &str, look: Look) -> report::EstimatePlot {
     let (upper, lower, touches) = match look.picture {
         Some(picture) => (picture.upper, picture.lower, picture.touches),
         None => Default::default(),
     };
-    let stretches = touches.into_iter().map(|touch| Stretch {
+    let stretches = touches.into_iter().map(|touch| ContactInterval {
         time_s: touch.time_s,
         is_upper: touch.flank.sign() > 0.0,
         is_used: touch.trust.is_some_and(|trust| trust > 0.0),
         force_n: touch.force_n,
         dx_m: touch.dx_m,
     });
-    report::Look {
+    report::EstimatePlot {
         title: format!("{} in {log}", look.position),
-        words: words(&look.estimate),
+        summary: words(&look.estimate),
         step_s: look.step_s,
-        stretches: stretches.collect(),
+        contacts: stretches.collect(),
         bounds_m: look.midrange.map(|gap| (gap.upper_m, gap.lower_m)),
         flanks: [upper, lower],
         dx_m: look.dx_m,

@@ -1,31 +1,31 @@
-//! The fleet: what needs a decision, where it flies, what to expect, and how far to believe it.
+//! Fleet page: work list, changes, map of tails and positions, removal forecast, forecast accuracy, data quality.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use askama::Template;
 
-use crate::agreement::Agreement;
-use crate::model::{Report, Unit};
-use crate::rates::spreads;
-use crate::removals::removals;
-use crate::scatter::scatter;
-use crate::standing::Standing;
-use crate::words::{
-    NO_DATA, count, counted, date, date_or, days_between, hours, level, minute_or, percent, rate, um,
+use crate::charts::agreement_plot::agreement_plot;
+use crate::format::{
+    NO_DATA, count, counted, date, date_or, days_between, hours, level, micrometres, minute_or, percent, rate,
 };
-use crate::{Error, Page, serial_path, tail_path};
+use crate::model::{Report, UnitView};
+use crate::page::{Error, Page, tail_path, unit_path};
+use crate::state_badge::StateBadge;
+use crate::stats::agreement::Agreement;
+use crate::stats::rate_spread::spreads;
+use crate::stats::removal_forecast::removal_forecast;
 
-/// Rows of the work list on one page.
+/// Maximum number of work-list rows on one page.
 const WORK_ROWS: usize = 100;
-/// Tails on one page.
+/// Maximum number of tails on one page.
 const TAIL_ROWS: usize = 100;
-/// Entries of the shorter lists.
+/// Maximum number of entries in the short lists.
 const FEW: usize = 40;
 
 /// A unit as a row of a table.
 #[derive(Debug, Clone)]
 pub(crate) struct Row {
-    pub(crate) standing: Standing,
+    pub(crate) badge: StateBadge,
     pub(crate) link: String,
     pub(crate) name: String,
     pub(crate) position: String,
@@ -37,11 +37,11 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    pub(crate) fn of(unit: &Unit, root: &str) -> Self {
-        let s = &unit.statement;
+    pub(crate) fn of(unit: &UnitView, root: &str) -> Self {
+        let s = &unit.assessment;
         Self {
-            standing: unit.standing(),
-            link: format!("{root}{}", serial_path(unit)),
+            badge: unit.badge(),
+            link: format!("{root}{}", unit_path(unit)),
             name: unit.name(),
             position: unit.position.clone().unwrap_or_else(|| NO_DATA.to_owned()),
             gap: level(s.gap_m, s.gap_se_m),
@@ -53,14 +53,14 @@ impl Row {
     }
 }
 
-/// Gap over limit.
-pub(crate) fn share(unit: &Unit) -> Option<f64> {
-    Some(unit.statement.gap_m? / unit.statement.limit_m?)
+/// Gap divided by limit.
+pub(crate) fn share(unit: &UnitView) -> Option<f64> {
+    Some(unit.assessment.gap_m? / unit.assessment.limit_m?)
 }
 
-/// Hours and date of a crossing, or why there is none.
-pub(crate) fn when(h: Option<f64>, at: Option<jiff::Timestamp>, unit: &Unit) -> String {
-    let s = &unit.statement;
+/// Date and hours of a crossing, or why there is none.
+pub(crate) fn when(h: Option<f64>, at: Option<jiff::Timestamp>, unit: &UnitView) -> String {
+    let s = &unit.assessment;
     match (h, at) {
         (Some(h), _) if h <= 0.0 => "now".to_owned(),
         (Some(h), Some(at)) => format!("{} ({} h)", date(at), hours(h)),
@@ -70,10 +70,10 @@ pub(crate) fn when(h: Option<f64>, at: Option<jiff::Timestamp>, unit: &Unit) -> 
     }
 }
 
-/// Who made the report, when, from what.
-pub(crate) fn foot(report: &Report) -> String {
+/// Footer: time, program and store version.
+pub(crate) fn footer(report: &Report) -> String {
     let version = report.store_version.map_or_else(String::new, |v| format!(" from store version {v}"));
-    format!("Made {} UTC by {}{version}.", crate::words::minute(report.made_utc), report.program)
+    format!("Made {} UTC by {}{version}.", crate::format::minute(report.made_utc), report.program)
 }
 
 /// Part, units, 5 %, median, 95 %, and the outlying units' pages.
@@ -86,23 +86,23 @@ type Group = (String, String, Vec<Row>);
 struct FleetView {
     root: &'static str,
     title: String,
-    foot: String,
+    footer: String,
     lead: String,
-    counts: Vec<(Standing, String)>,
-    account: String,
+    counts: Vec<(StateBadge, String)>,
+    data_summary: String,
     groups: Vec<Group>,
     more_work: Vec<String>,
     label: &'static str,
-    news: Vec<(String, String, String, String)>,
+    changes: Vec<(String, String, String, String)>,
     map: Map,
     tail_pages: Vec<String>,
     months: Vec<(String, String, String, u32)>,
     undated: usize,
     spreads: Vec<SpreadRow>,
     gaps: Vec<(String, String, String, String, String, String)>,
-    faults: Vec<(String, String)>,
-    more_faults: usize,
-    calibration: Vec<(String, String, String)>,
+    log_errors: Vec<(String, String)>,
+    more_log_errors: usize,
+    forecast_accuracy: Vec<(String, String, String)>,
     inspections: String,
     scatter: String,
     pairs: Vec<(String, String, String, String, String, String)>,
@@ -113,7 +113,7 @@ struct FleetView {
 struct WorkView {
     root: &'static str,
     title: String,
-    foot: String,
+    footer: String,
     groups: Vec<Group>,
     label: &'static str,
 }
@@ -123,7 +123,7 @@ struct WorkView {
 struct TailsView {
     root: &'static str,
     title: String,
-    foot: String,
+    footer: String,
     map: Map,
 }
 
@@ -136,12 +136,12 @@ struct Map {
 /// One unit in the map.
 struct Cell {
     link: String,
-    standing: Standing,
+    badge: StateBadge,
     name: String,
     text: String,
 }
 
-/// Makes the fleet page, the pages it goes on on, and the machine-readable twin.
+/// Renders the fleet page, its continuation pages and `report.json`.
 ///
 /// # Errors
 /// When a template cannot be filled.
@@ -154,7 +154,7 @@ pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
         let path = format!("work-{}.html", k + 2);
         let title = format!("Work list, page {} · actuator free play", k + 2);
         let groups = grouped(chunk);
-        let view = WorkView { root: "", title, foot: foot(report), groups, label: "Work list" };
+        let view = WorkView { root: "", title, footer: footer(report), groups, label: "Work list" };
         pages.push(Page::html(path.clone(), &view.render()?));
         more_work.push(path);
     }
@@ -164,69 +164,69 @@ pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
         for (k, chunk) in tails.chunks(TAIL_ROWS).enumerate() {
             let path = format!("tails-{}.html", k + 1);
             let title = format!("All tails, page {} · actuator free play", k + 1);
-            let view = TailsView { root: "", title, foot: foot(report), map: map(report, chunk) };
+            let view = TailsView { root: "", title, footer: footer(report), map: map(report, chunk) };
             pages.push(Page::html(path.clone(), &view.render()?));
             tail_pages.push(path);
         }
     }
-    let view = front(report, grouped(&work), more_work, tail_pages)?;
+    let view = index_page(report, grouped(&work), more_work, tail_pages)?;
     pages.push(Page::html("index.html".to_owned(), &view.render()?));
     pages.push(Page { path: "report.json".to_owned(), body: serde_json::to_vec(report)? });
     Ok(pages)
 }
 
-fn front(
+fn index_page(
     report: &Report,
     groups: Vec<Group>,
     more_work: Vec<String>,
     tail_pages: Vec<String>,
 ) -> Result<FleetView, Error> {
-    let number = |s: Standing| report.units.iter().filter(|u| u.standing() == s).count();
-    let worst = worst_tails(report);
-    let faults = report.log_faults.iter().map(|f| (f.log_path.clone(), f.code.clone()));
-    let (inspections, pairs) = inspected(report);
+    let number = |s: StateBadge| report.units.iter().filter(|u| u.badge() == s).count();
+    let worst = most_urgent_tails(report);
+    let log_errors = report.log_errors.iter().map(|f| (f.log_path.clone(), f.code.clone()));
+    let (inspections, pairs) = inspection_agreement(report);
     Ok(FleetView {
         root: "",
         title: "Actuator free play".to_owned(),
-        foot: foot(report),
+        footer: footer(report),
         lead: format!(
             "{} · flights to {} · statements of {}",
             report.scope.as_deref().unwrap_or("Whole fleet"),
             minute_or(report.newest_departure_utc),
             minute_or(report.as_of_utc),
         ),
-        counts: Standing::ALL.map(|s| (s, count(number(s)))).into(),
-        account: format!(
+        counts: StateBadge::ALL.map(|s| (s, count(number(s)))).into(),
+        data_summary: format!(
             "{} read · {} in error · {} · {}",
             counted(report.logs_known, "log"),
-            counted(report.log_faults.len(), "log"),
+            counted(report.log_errors.len(), "log"),
             counted(report.tails.len(), "tail"),
             counted(report.units.len(), "unit"),
         ),
         groups,
         more_work,
         label: "Work list",
-        news: news(report),
+        changes: changes(report),
         map: map(report, &worst),
         tail_pages,
         months: months(report),
-        undated: report.units.iter().filter(|u| u.statement.hours_per_day.is_none()).count(),
+        undated: report.units.iter().filter(|u| u.assessment.hours_per_day.is_none()).count(),
         spreads: spread_rows(report),
         gaps: gap_rows(report),
-        more_faults: report.log_faults.len().saturating_sub(FEW),
-        faults: faults.take(FEW).collect(),
-        calibration: calibration(report),
+        more_log_errors: report.log_errors.len().saturating_sub(FEW),
+        log_errors: log_errors.take(FEW).collect(),
+        forecast_accuracy: forecast_accuracy(report),
         inspections,
-        scatter: scatter(&compared(report))?,
+        scatter: agreement_plot(&inspection_pairs(report))?,
         pairs,
     })
 }
 
-/// Units that call for a decision, by the day before which nothing happens.
-fn work(report: &Report) -> Vec<&Unit> {
-    let mut units: Vec<&Unit> = report.units.iter().filter(|u| u.standing().calls()).collect();
+/// Units that need action, by earliest date.
+fn work(report: &Report) -> Vec<&UnitView> {
+    let mut units: Vec<&UnitView> = report.units.iter().filter(|u| u.badge().needs_action()).collect();
     units.sort_by(|a, b| urgency(a).partial_cmp(&urgency(b)).unwrap_or(std::cmp::Ordering::Equal));
-    // One hangar visit serves a tail: its units follow its most urgent one.
+    // Units of one tail are grouped for one maintenance visit, after the tail's most urgent unit.
     let mut first: BTreeMap<Option<&str>, usize> = BTreeMap::new();
     for (rank, unit) in units.iter().enumerate() {
         first.entry(unit.tail_number.as_deref()).or_insert(rank);
@@ -235,16 +235,12 @@ fn work(report: &Report) -> Vec<&Unit> {
     units
 }
 
-fn urgency(unit: &Unit) -> (f64, Standing, String) {
-    let days = unit.statement.not_before_utc.map(|t| t.as_second() as f64);
-    (
-        if unit.standing() == Standing::Act { 0.0 } else { days.unwrap_or(f64::MAX) },
-        unit.standing(),
-        unit.name(),
-    )
+fn urgency(unit: &UnitView) -> (f64, StateBadge, String) {
+    let days = unit.assessment.not_before_utc.map(|t| t.as_second() as f64);
+    (if unit.badge() == StateBadge::Act { 0.0 } else { days.unwrap_or(f64::MAX) }, unit.badge(), unit.name())
 }
 
-fn grouped(units: &[&Unit]) -> Vec<Group> {
+fn grouped(units: &[&UnitView]) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     for unit in units {
         let tail = unit.tail_number.as_deref().unwrap_or("tail not known");
@@ -258,17 +254,16 @@ fn grouped(units: &[&Unit]) -> Vec<Group> {
     groups
 }
 
-/// States that changed since the day before, and events of the last thirty days.
-fn news(report: &Report) -> Vec<(String, String, String, String)> {
+/// State changes since the day before, and events of the last 30 days.
+fn changes(report: &Report) -> Vec<(String, String, String, String)> {
     let mut found = Vec::new();
     for unit in &report.units {
-        let s = &unit.statement;
-        let mut say =
-            |what: String, detail: String| found.push((serial_path(unit), unit.name(), what, detail));
+        let s = &unit.assessment;
+        let mut add = |what: String, detail: String| found.push((unit_path(unit), unit.name(), what, detail));
         if let Some(before) = s.state_day_before.as_ref().filter(|before| **before != s.state) {
-            let was = Standing::of(before.as_deref());
-            let now = unit.standing();
-            say(
+            let was = StateBadge::from_state(before.as_deref());
+            let now = unit.badge();
+            add(
                 if now < was { "worse" } else { "cleared" }.to_owned(),
                 format!("{} → {}", was.word(), now.word()),
             );
@@ -276,14 +271,14 @@ fn news(report: &Report) -> Vec<(String, String, String, String)> {
         for event in &unit.events {
             let age = report.as_of_utc.map(|now| days_between(event.departure_utc, now));
             if age.is_some_and(|age| age <= 30.0) {
-                let books = match (event.in_books, event.tail_wide) {
+                let books = match (event.is_on_record, event.is_tail_wide) {
                     (true, _) => "in the books",
                     (false, true) => "with the whole tail: sensor or recorder",
                     (false, false) => "not in the books",
                 };
-                say(
+                add(
                     event.kind.clone(),
-                    format!("{}, {} µm, {books}", date(event.departure_utc), um(event.step_m)),
+                    format!("{}, {} µm, {books}", date(event.departure_utc), micrometres(event.step_m)),
                 );
             }
         }
@@ -292,14 +287,14 @@ fn news(report: &Report) -> Vec<(String, String, String, String)> {
     found
 }
 
-fn worst_tails(report: &Report) -> Vec<&str> {
-    let mut worst: BTreeMap<&str, Standing> = BTreeMap::new();
+fn most_urgent_tails(report: &Report) -> Vec<&str> {
+    let mut worst: BTreeMap<&str, StateBadge> = BTreeMap::new();
     for unit in &report.units {
         let Some(tail) = unit.tail_number.as_deref() else { continue };
-        let standing = worst.entry(tail).or_insert(Standing::Normal);
-        *standing = unit.standing().min(*standing);
+        let badge = worst.entry(tail).or_insert(StateBadge::Normal);
+        *badge = unit.badge().min(*badge);
     }
-    let mut tails: Vec<(Standing, &str)> = worst.into_iter().map(|(tail, s)| (s, tail)).collect();
+    let mut tails: Vec<(StateBadge, &str)> = worst.into_iter().map(|(tail, s)| (s, tail)).collect();
     tails.sort_unstable();
     tails.into_iter().take(FEW).map(|(_, tail)| tail).collect()
 }
@@ -313,8 +308,8 @@ fn map(report: &Report, tails: &[&str]) -> Map {
         };
         positions.insert(position);
         cells.entry((tail, position)).or_default().push(Cell {
-            link: serial_path(unit),
-            standing: unit.standing(),
+            link: unit_path(unit),
+            badge: unit.badge(),
             name: unit.name(),
             text: share(unit).map_or_else(|| NO_DATA.to_owned(), percent),
         });
@@ -328,9 +323,9 @@ fn map(report: &Report, tails: &[&str]) -> Map {
 }
 
 fn months(report: &Report) -> Vec<(String, String, String, u32)> {
-    let months = removals(report);
+    let months = removal_forecast(report);
     let most = months.iter().map(|m| m.high).fold(1.0, f64::max);
-    let row = |m: &crate::removals::Month| {
+    let row = |m: &crate::stats::removal_forecast::Month| {
         let interval = format!("{:.1} to {:.1}", m.low, m.high);
         (m.name.clone(), format!("{:.1}", m.expected), interval, (100.0 * m.expected / most) as u32)
     };
@@ -338,11 +333,11 @@ fn months(report: &Report) -> Vec<(String, String, String, u32)> {
 }
 
 fn spread_rows(report: &Report) -> Vec<SpreadRow> {
-    let row = |s: crate::rates::Spread<'_>| {
-        let outlying = s.outlying.iter().take(10);
+    let row = |s: crate::stats::rate_spread::RateSpread<'_>| {
+        let outlying = s.outliers.iter().take(10);
         let outlying = outlying.map(|u| {
-            let speed = u.statement.rate_m_per_hour.map_or_else(|| NO_DATA.to_owned(), rate);
-            (serial_path(u), format!("{} ({speed})", u.serial_number))
+            let speed = u.assessment.rate_m_per_hour.map_or_else(|| NO_DATA.to_owned(), rate);
+            (unit_path(u), format!("{} ({speed})", u.serial_number))
         });
         (s.part.to_owned(), count(s.units), rate(s.low), rate(s.median), rate(s.high), outlying.collect())
     };
@@ -368,10 +363,10 @@ fn gap_rows(report: &Report) -> Vec<(String, String, String, String, String, Str
     tails.into_iter().take(FEW).map(row).collect()
 }
 
-/// Of the intervals stated so many days ago, how many held.
-fn calibration(report: &Report) -> Vec<(String, String, String)> {
+/// Coverage of the 90 % forecast intervals by forecast lead.
+fn forecast_accuracy(report: &Report) -> Vec<(String, String, String)> {
     let mut ages: BTreeMap<i64, (usize, usize)> = BTreeMap::new();
-    for past in report.units.iter().flat_map(|u| &u.past) {
+    for past in report.units.iter().flat_map(|u| &u.past_forecasts) {
         let (held, all) = ages.entry(past.days_ago).or_default();
         *held += usize::from(past.held());
         *all += 1;
@@ -388,14 +383,14 @@ fn calibration(report: &Report) -> Vec<(String, String, String)> {
 
 type Pairs = Vec<(String, String, String, String, String, String)>;
 
-/// Estimates and hangar checks that stand beside each other, m.
-fn compared(report: &Report) -> Vec<(f64, f64)> {
+/// Pairs of estimate and hangar inspection, m.
+fn inspection_pairs(report: &Report) -> Vec<(f64, f64)> {
     let checks = report.units.iter().flat_map(|u| &u.inspections);
     checks.filter_map(|i| Some((i.estimate_m?, i.play_m))).collect()
 }
 
-/// How estimates agree with hangar checks, in words and pair by pair.
-fn inspected(report: &Report) -> (String, Pairs) {
+/// Agreement of estimates with hangar inspections: summary and pairs.
+fn inspection_agreement(report: &Report) -> (String, Pairs) {
     if !report.inspections_given {
         return (
             "No data: no table of inspections is configured (`logs.inspections`).".to_owned(),
@@ -403,15 +398,15 @@ fn inspected(report: &Report) -> (String, Pairs) {
         );
     }
     let checks = || report.units.iter().flat_map(|u| u.inspections.iter().map(move |i| (u, i)));
-    let pairs = compared(report);
+    let pairs = inspection_pairs(report);
     let words = match Agreement::of(&pairs) {
         Some(a) => format!(
             "Estimate minus inspection over {}: bias {} ± {} µm (95 %), limits of agreement {} to {} µm.",
             counted(a.pairs, "pair"),
-            um(a.bias_m),
-            um(a.bias_half_width_m),
-            um(a.lower_m),
-            um(a.upper_m)
+            micrometres(a.bias_m),
+            micrometres(a.bias_half_width_m),
+            micrometres(a.lower_m),
+            micrometres(a.upper_m)
         ),
         None => format!("{}: at least 3 are needed to state a bias.", counted(pairs.len(), "pair")),
     };
@@ -421,14 +416,14 @@ fn inspected(report: &Report) -> (String, Pairs) {
     } else {
         format!("{words} {} of units without records.", counted(unmatched, "check"))
     };
-    let row = |(u, i): (&Unit, &crate::model::Inspection)| {
-        let difference = i.estimate_m.map_or_else(|| NO_DATA.to_owned(), |e| um(e - i.play_m));
+    let row = |(u, i): (&UnitView, &crate::model::Inspection)| {
+        let difference = i.estimate_m.map_or_else(|| NO_DATA.to_owned(), |e| micrometres(e - i.play_m));
         (
-            serial_path(u),
+            unit_path(u),
             u.name(),
             date(i.date_utc),
-            um(i.play_m),
-            crate::words::um_or(i.estimate_m),
+            micrometres(i.play_m),
+            crate::format::micrometres_or(i.estimate_m),
             difference,
         )
     };

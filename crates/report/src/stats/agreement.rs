@@ -1,6 +1,6 @@
-//! Estimate against inspection: bias and limits of agreement (Bland and Altman 1986).
+//! Bias and limits of agreement between estimate and inspection (Bland and Altman 1986).
 
-/// How well two ways of measuring the same gap agree.
+/// Bias and limits of agreement of two measurements of the same gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Agreement {
     /// Pairs.
@@ -16,7 +16,7 @@ pub struct Agreement {
 }
 
 impl Agreement {
-    /// From pairs of estimate and inspection, metres; three are needed for a spread worth stating.
+    /// Computes the agreement from pairs of estimate and inspection, m; `None` for fewer than three pairs.
     pub fn of(pairs: &[(f64, f64)]) -> Option<Self> {
         if pairs.len() < 3 {
             return None;

@@ -1,10 +1,10 @@
-//! Removals to expect each month: the sum of the units' chances, and the spread of that sum.
+//! Expected removals per month: sum of the units' crossing probabilities, with its 90 % interval.
 
-use crate::crossing::chance_within;
+use crate::format::{days_between, month, month_name};
 use crate::model::Report;
-use crate::words::{days_between, month, month_name};
+use crate::stats::crossing_probability::probability_within;
 
-/// One month.
+/// Expected removals in one month.
 #[derive(Debug, Clone)]
 pub(crate) struct Month {
     pub name: String,
@@ -13,16 +13,17 @@ pub(crate) struct Month {
     pub high: f64,
 }
 
-/// Twelve months from that of the report; units whose use is not known cannot be dated.
-pub(crate) fn removals(report: &Report) -> Vec<Month> {
+/// Twelve months from that of the report; units without known utilisation are left out.
+pub(crate) fn removal_forecast(report: &Report) -> Vec<Month> {
     let Some(now) = report.as_of_utc else { return Vec::new() };
     let mut months = Vec::new();
     for k in 0..12 {
         let (Some(from), Some(to)) = (month(now, k), month(now, k + 1)) else { break };
         let (mut expected, mut variance) = (0.0, 0.0);
-        for statement in report.units.iter().map(|u| &u.statement) {
-            let Some(pace) = statement.hours_per_day else { continue };
-            let until = |t| chance_within(statement, days_between(now, t) * pace).unwrap_or(0.0);
+        for assessment in report.units.iter().map(|u| &u.assessment) {
+            let Some(hours_per_day) = assessment.hours_per_day else { continue };
+            let until =
+                |t| probability_within(assessment, days_between(now, t) * hours_per_day).unwrap_or(0.0);
             let chance = if k == 0 { until(to) } else { until(to) - until(from) };
             expected += chance;
             variance += chance * (1.0 - chance);

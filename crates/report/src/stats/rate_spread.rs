@@ -1,64 +1,64 @@
-//! The spread of rates within each part number, and the units that stand out of it.
+//! Distribution of wear rates by part number, and its outliers.
 
 use std::collections::BTreeMap;
 
-use crate::model::{Report, Unit};
+use crate::model::{Report, UnitView};
 
-/// The rates of one part number's units, m/h.
+/// Wear rates of one part number's units, m/h.
 #[derive(Debug)]
-pub(crate) struct Spread<'a> {
+pub(crate) struct RateSpread<'a> {
     pub part: &'a str,
     pub units: usize,
     pub low: f64,
     pub median: f64,
     pub high: f64,
-    /// Above the upper quartile by more than one and a half of the quartiles' distance, fastest first.
-    pub outlying: Vec<&'a Unit>,
+    /// Units above the upper quartile by more than 1.5 interquartile ranges (Tukey's fence), fastest first.
+    pub outliers: Vec<&'a UnitView>,
 }
 
-/// The rates of every part number's units, compared once for all pages.
+/// Wear-rate distributions of all part numbers, computed once for all pages.
 #[derive(Debug)]
-pub struct Spreads<'a>(Vec<Spread<'a>>);
+pub struct RateSpreads<'a>(Vec<RateSpread<'a>>);
 
-impl<'a> Spreads<'a> {
-    /// Of all units of a report.
+impl<'a> RateSpreads<'a> {
+    /// Computes the distributions of all units of a report.
     pub fn of(report: &'a Report) -> Self {
         Self(spreads(report))
     }
 
-    /// Of one part number, where any of its units has a rate.
-    pub(crate) fn part(&self, number: &str) -> Option<&Spread<'a>> {
+    /// Distribution of one part number, if any of its units has a rate.
+    pub(crate) fn part(&self, number: &str) -> Option<&RateSpread<'a>> {
         self.0.iter().find(|spread| spread.part == number)
     }
 }
 
-/// By part number.
-pub(crate) fn spreads(report: &Report) -> Vec<Spread<'_>> {
-    let mut parts: BTreeMap<&str, Vec<(f64, &Unit)>> = BTreeMap::new();
+/// Distributions by part number.
+pub(crate) fn spreads(report: &Report) -> Vec<RateSpread<'_>> {
+    let mut parts: BTreeMap<&str, Vec<(f64, &UnitView)>> = BTreeMap::new();
     for unit in &report.units {
-        if let Some(rate) = unit.statement.rate_m_per_hour {
+        if let Some(rate) = unit.assessment.rate_m_per_hour {
             parts.entry(unit.part_number.as_deref().unwrap_or("–")).or_default().push((rate, unit));
         }
     }
     parts.into_iter().map(|(part, units)| spread(part, units)).collect()
 }
 
-fn spread<'a>(part: &'a str, mut units: Vec<(f64, &'a Unit)>) -> Spread<'a> {
+fn spread<'a>(part: &'a str, mut units: Vec<(f64, &'a UnitView)>) -> RateSpread<'a> {
     units.sort_by(|a, b| a.0.total_cmp(&b.0));
     let rates: Vec<f64> = units.iter().map(|(rate, _)| *rate).collect();
     let (lower, upper) = (quantile(&rates, 0.25), quantile(&rates, 0.75));
     let fence = upper + 1.5 * (upper - lower);
-    Spread {
+    RateSpread {
         part,
         units: rates.len(),
         low: quantile(&rates, 0.05),
         median: quantile(&rates, 0.5),
         high: quantile(&rates, 0.95),
-        outlying: units.iter().rev().take_while(|(rate, _)| *rate > fence).map(|(_, u)| *u).collect(),
+        outliers: units.iter().rev().take_while(|(rate, _)| *rate > fence).map(|(_, u)| *u).collect(),
     }
 }
 
-/// Where the ascending values have that share below them, between neighbours in a straight line.
+/// Quantile of ascending values with linear interpolation (Hyndman and Fan 1996, type 7).
 pub(crate) fn quantile(sorted: &[f64], share: f64) -> f64 {
     let place = share * (sorted.len().max(1) - 1) as f64;
     let below = place.floor() as usize;

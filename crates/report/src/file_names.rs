@@ -1,13 +1,13 @@
-//! File names made of foreign names: safe on every file system, and different for different names.
+//! Safe, unique file names from tail, part and serial numbers.
 
-/// Longest readable part of a file name, bytes.
+/// Maximum length of the readable part of a file name, bytes.
 const READABLE: usize = 60;
 
-/// A file name's stem for a kind of page and the names it is about.
+/// File stem for a kind of page and the names it describes.
 ///
-/// Capital letters, digits and `-` stay; when anything else occurs, a digest of the whole is added, so
-/// that two names never share a file, not even where a file system does not tell capitals apart.
-pub(crate) fn stem(kind: &str, names: &[&str]) -> String {
+/// Capital letters, digits and `-` are kept. If any other character occurs, a digest of all names is appended,
+/// so that two names never share a file, even on a case-insensitive file system.
+pub(crate) fn file_stem(kind: &str, names: &[&str]) -> String {
     let plain = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '-';
     let whole = names.join("_");
     let clean = names.iter().all(|name| name.chars().all(plain)) && whole.len() <= READABLE;
@@ -22,7 +22,7 @@ pub(crate) fn stem(kind: &str, names: &[&str]) -> String {
     format!("{kind}-{shown}.{:016x}", digest(names))
 }
 
-/// FNV-1a with a mark between names, so that `a`, `bc` is not `ab`, `c`.
+/// FNV-1a with a separator between names, so that `a`, `bc` differs from `ab`, `c`.
 fn digest(names: &[&str]) -> u64 {
     let bytes = names.iter().flat_map(|name| name.bytes().chain([0xff]));
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
@@ -36,12 +36,12 @@ mod tests {
 
     #[test]
     fn a_plain_name_stays_readable() {
-        assert_eq!(stem("unit", &["EMA-27-1040", "00317"]), "unit-EMA-27-1040_00317");
+        assert_eq!(file_stem("unit", &["EMA-27-1040", "00317"]), "unit-EMA-27-1040_00317");
     }
 
     #[test]
     fn a_name_cannot_leave_its_folder() {
-        let name = stem("tail", &["../../etc/passwd"]);
+        let name = file_stem("tail", &["../../etc/passwd"]);
         assert!(!name.contains('/') && !name.contains(".."), "{name}");
     }
 
@@ -49,12 +49,12 @@ mod tests {
         #[test]
         fn different_names_have_different_files_even_without_capitals(a in ".{0,80}", b in ".{0,80}") {
             prop_assume!(a != b);
-            prop_assert_ne!(stem("tail", &[&a]).to_lowercase(), stem("tail", &[&b]).to_lowercase());
+            prop_assert_ne!(file_stem("tail", &[&a]).to_lowercase(), file_stem("tail", &[&b]).to_lowercase());
         }
 
         #[test]
         fn a_file_name_is_plain_ascii_and_short(a in ".{0,300}") {
-            let name = stem("unit", &["P", &a]);
+            let name = file_stem("unit", &["P", &a]);
             prop_assert!(name.len() < 100);
             prop_assert!(name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)), "{}", name);
         }

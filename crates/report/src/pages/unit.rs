@@ -1,40 +1,42 @@
-//! The page of one unit: its statement, the evidence, and how good that is.
+//! Unit page: assessment, history, events, data quality and past forecasts of one unit.
 
 use askama::Template;
 
-use crate::crossing::chance_in_words;
-use crate::fleet::{share, when};
-use crate::model::{FlightRow, Report, Unit};
-use crate::rates::Spreads;
-use crate::standing::Standing;
-use crate::words::{
-    NO_DATA, count, counted, date, date_or, hours, level, minute, percent, rate, um, um_cell, um_or,
+use crate::charts::history::history;
+use crate::format::{
+    NO_DATA, count, counted, date, date_or, hours, level, micrometres, micrometres_cell, micrometres_or,
+    minute, percent, rate,
 };
-use crate::{Error, Page, chart, serial_path, tail_path};
+use crate::model::{FlightRow, Report, UnitView};
+use crate::page::{Error, Page, tail_path, unit_path};
+use crate::pages::fleet::{share, when};
+use crate::state_badge::StateBadge;
+use crate::stats::crossing_probability::probability_text;
+use crate::stats::rate_spread::RateSpreads;
 
 #[derive(Template)]
-#[template(path = "serial.html")]
+#[template(path = "unit.html")]
 struct View {
     root: &'static str,
     title: String,
-    foot: String,
+    footer: String,
     name: String,
     place: Option<(String, String, String)>,
-    standing: Standing,
+    badge: StateBadge,
     reason: String,
     now: Facts,
     remaining: Facts,
-    picture: String,
-    picture_words: String,
+    plot: String,
+    plot_description: String,
     limit: String,
     watch: String,
     forecast: Vec<(&'static str, String)>,
     events: Vec<(String, String, String, &'static str)>,
-    stays: Vec<(String, String, String, String, String)>,
+    installations: Vec<(String, String, String, String, String)>,
     quality: Facts,
-    past: Vec<(String, String, String, String, String, &'static str)>,
-    checks: Vec<(String, String, String, String, String)>,
-    record: Facts,
+    past_forecasts: Vec<(String, String, String, String, String, &'static str)>,
+    inspections: Vec<(String, String, String, String, String)>,
+    statistics: Facts,
     prior: String,
     band: Vec<(String, &'static str, String, String, String)>,
     flights: Vec<Flight>,
@@ -57,46 +59,46 @@ struct Flight {
     remarks: String,
 }
 
-/// Makes the page of a unit.
+/// Renders the page of a unit.
 ///
 /// # Errors
-/// When the picture cannot be drawn or the template not be filled.
-pub fn serial_page(report: &Report, spreads: &Spreads<'_>, unit: &Unit) -> Result<Page, Error> {
-    let s = &unit.statement;
+/// If the plot cannot be drawn or the template cannot be rendered.
+pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) -> Result<Page, Error> {
+    let s = &unit.assessment;
     let forecast =
         [("not before", s.not_before_utc), ("likely", s.likely_utc), ("not after", s.not_after_utc)];
     let view = View {
         root: "../",
         title: format!("{} · actuator free play", unit.name()),
-        foot: crate::fleet::foot(report),
+        footer: crate::pages::fleet::footer(report),
         name: unit.name(),
         place: unit.tail_number.as_ref().map(|tail| {
             (format!("../{}", tail_path(tail)), tail.clone(), unit.position.clone().unwrap_or_default())
         }),
-        standing: unit.standing(),
+        badge: unit.badge(),
         reason: s.reason.clone().unwrap_or_else(|| NO_DATA.to_owned()),
         now: now(spreads, unit),
         remaining: remaining(report, unit),
-        picture: chart::history(unit)?,
-        picture_words: picture_words(unit),
-        limit: um_cell(s.limit_m),
-        watch: um_cell(s.watch_m),
+        plot: history(unit)?,
+        plot_description: plot_description(unit),
+        limit: micrometres_cell(s.limit_m),
+        watch: micrometres_cell(s.watch_m),
         forecast: forecast.into_iter().filter_map(|(word, t)| Some((word, date(t?)))).collect(),
         events: events(unit),
-        stays: stays(unit),
+        installations: installations(unit),
         quality: quality(unit),
-        past: past(unit),
-        checks: checks(unit),
-        record: record(unit),
+        past_forecasts: past_forecasts(unit),
+        inspections: inspections(unit),
+        statistics: statistics(unit),
         prior: prior(report, unit),
         band: band(unit),
         flights: unit.flights.iter().map(flight).collect(),
     };
-    Ok(Page::html(serial_path(unit), &view.render()?))
+    Ok(Page::html(unit_path(unit), &view.render()?))
 }
 
-fn now(spreads: &Spreads<'_>, unit: &Unit) -> Facts {
-    let s = &unit.statement;
+fn now(spreads: &RateSpreads<'_>, unit: &UnitView) -> Facts {
+    let s = &unit.assessment;
     let fleet = unit.part_number.as_deref().and_then(|part| spreads.part(part));
     let fleet = fleet.map_or_else(
         || NO_DATA.to_owned(),
@@ -112,7 +114,7 @@ fn now(spreads: &Spreads<'_>, unit: &Unit) -> Facts {
     );
     vec![
         ("Gap now", level(s.gap_m, s.gap_se_m)),
-        ("Act limit", s.limit_m.map_or_else(|| NO_DATA.to_owned(), |l| format!("{} µm", um(l)))),
+        ("Act limit", s.limit_m.map_or_else(|| NO_DATA.to_owned(), |l| format!("{} µm", micrometres(l)))),
         ("Share of limit", share(unit).map_or_else(|| NO_DATA.to_owned(), percent)),
         ("Rate, µm per 1000 h", rates(s.rate_p05_m_per_hour, s.rate_m_per_hour, s.rate_p95_m_per_hour)),
         ("Rate of this part's fleet", fleet),
@@ -129,8 +131,8 @@ fn rates(low: Option<f64>, middle: Option<f64>, high: Option<f64>) -> String {
     }
 }
 
-fn remaining(report: &Report, unit: &Unit) -> Facts {
-    let s = &unit.statement;
+fn remaining(report: &Report, unit: &UnitView) -> Facts {
+    let s = &unit.assessment;
     let flights = s.crossing_hours_p50.zip(s.hours_per_flight).map(|(h, per)| h / per);
     let pace = s.hours_per_day.map_or_else(|| NO_DATA.to_owned(), |h| format!("{h:.1} h a day"));
     vec![
@@ -138,12 +140,12 @@ fn remaining(report: &Report, unit: &Unit) -> Facts {
         ("Likely", when(s.crossing_hours_p50, s.likely_utc, unit)),
         ("Not after", when(s.crossing_hours_p95, s.not_after_utc, unit)),
         ("Likely, in flights", flights.map_or_else(|| NO_DATA.to_owned(), |n| count(n.round() as usize))),
-        ("Limit met before the next check", chance_in_words(s, report.check_interval_hours)),
+        ("Limit met before the next check", probability_text(s, report.check_interval_hours)),
         ("Use in the last 90 days", pace),
     ]
 }
 
-fn picture_words(unit: &Unit) -> String {
+fn plot_description(unit: &UnitView) -> String {
     let estimated = unit.flights.iter().filter(|f| f.gap_m.is_some());
     let (first, last) = (estimated.clone().next(), estimated.clone().next_back());
     match (first, last) {
@@ -153,25 +155,28 @@ fn picture_words(unit: &Unit) -> String {
             counted(estimated.count(), "estimate"),
             date(first.departure_utc),
             date(last.departure_utc),
-            level(unit.statement.gap_m, unit.statement.gap_se_m),
-            um_or(unit.statement.limit_m),
+            level(unit.assessment.gap_m, unit.assessment.gap_se_m),
+            micrometres_or(unit.assessment.limit_m),
         ),
         _ => "No estimate yet".to_owned(),
     }
 }
 
-fn events(unit: &Unit) -> Vec<(String, String, String, &'static str)> {
+fn events(unit: &UnitView) -> Vec<(String, String, String, &'static str)> {
     let row = |e: &crate::model::Event| {
-        let size = if e.kind == "onset" { "–".to_owned() } else { um(e.step_m) };
-        let kind =
-            if e.tail_wide { format!("{}, whole tail: sensor or recorder", e.kind) } else { e.kind.clone() };
-        (date(e.departure_utc), kind, size, if e.in_books { "yes" } else { "no" })
+        let size = if e.kind == "onset" { "–".to_owned() } else { micrometres(e.step_m) };
+        let kind = if e.is_tail_wide {
+            format!("{}, whole tail: sensor or recorder", e.kind)
+        } else {
+            e.kind.clone()
+        };
+        (date(e.departure_utc), kind, size, if e.is_on_record { "yes" } else { "no" })
     };
     unit.events.iter().map(row).collect()
 }
 
-fn stays(unit: &Unit) -> Vec<(String, String, String, String, String)> {
-    let row = |s: &crate::model::Stay| {
+fn installations(unit: &UnitView) -> Vec<(String, String, String, String, String)> {
+    let row = |s: &crate::model::Installation| {
         let until = s.removed_utc.map_or_else(|| "still there".to_owned(), date);
         (
             format!("../{}", tail_path(&s.tail_number)),
@@ -181,10 +186,10 @@ fn stays(unit: &Unit) -> Vec<(String, String, String, String, String)> {
             until,
         )
     };
-    unit.stays.iter().map(row).collect()
+    unit.installations.iter().map(row).collect()
 }
 
-fn quality(unit: &Unit) -> Facts {
+fn quality(unit: &UnitView) -> Facts {
     let q = &unit.quality;
     let list = |of: &[(String, usize)]| {
         let words: Vec<String> = of.iter().map(|(word, n)| format!("{word} {}", count(*n))).collect();
@@ -194,50 +199,51 @@ fn quality(unit: &Unit) -> Facts {
         ("Flights used", count(q.estimated)),
         ("Flights refused", count(q.refused)),
         ("Why refused", list(&q.reasons)),
-        ("Doubts", list(&q.doubts)),
+        ("Doubts", list(&q.flags)),
         ("Last estimate", date_or(q.last_estimate_utc)),
         ("Days since", q.days_since_estimate.map_or_else(|| NO_DATA.to_owned(), |d| format!("{d:.0}"))),
-        (
-            "Noise found over stated",
-            q.noise_found_over_stated.map_or_else(|| NO_DATA.to_owned(), |r| format!("{r:.2}")),
-        ),
+        ("Noise found over stated", q.noise_ratio.map_or_else(|| NO_DATA.to_owned(), |r| format!("{r:.2}"))),
     ]
 }
 
-fn past(unit: &Unit) -> Vec<(String, String, String, String, String, &'static str)> {
-    let row = |p: &crate::model::Past| {
-        let interval =
-            format!("{} ({} to {})", um(p.foreseen_m), um(p.foreseen_low_m), um(p.foreseen_high_m));
-        let state = Standing::of(p.state.as_deref()).word().to_owned();
+fn past_forecasts(unit: &UnitView) -> Vec<(String, String, String, String, String, &'static str)> {
+    let row = |p: &crate::model::PastForecast| {
+        let interval = format!(
+            "{} ({} to {})",
+            micrometres(p.predicted_m),
+            micrometres(p.predicted_low_m),
+            micrometres(p.predicted_high_m)
+        );
+        let state = StateBadge::from_state(p.state.as_deref()).word().to_owned();
         (
             date(p.as_of_utc),
             state,
-            um(p.gap_m),
+            micrometres(p.gap_m),
             interval,
-            um(p.found_m),
+            micrometres(p.found_m),
             if p.held() { "held" } else { "missed" },
         )
     };
-    unit.past.iter().map(row).collect()
+    unit.past_forecasts.iter().map(row).collect()
 }
 
-fn checks(unit: &Unit) -> Vec<(String, String, String, String, String)> {
+fn inspections(unit: &UnitView) -> Vec<(String, String, String, String, String)> {
     let row = |i: &crate::model::Inspection| {
         let force = i.force_n.map_or_else(|| NO_DATA.to_owned(), |f| format!("{f:.0}"));
         let instrument = i.instrument.clone().unwrap_or_else(|| NO_DATA.to_owned());
-        (date(i.date_utc), um(i.play_m), um_or(i.estimate_m), instrument, force)
+        (date(i.date_utc), micrometres(i.play_m), micrometres_or(i.estimate_m), instrument, force)
     };
     unit.inspections.iter().map(row).collect()
 }
 
-fn record(unit: &Unit) -> Facts {
-    let s = &unit.statement;
+fn statistics(unit: &UnitView) -> Facts {
+    let s = &unit.assessment;
     vec![
-        ("Unit hours", s.unit_hours.map_or_else(|| NO_DATA.to_owned(), hours)),
+        ("UnitView hours", s.unit_hours.map_or_else(|| NO_DATA.to_owned(), hours)),
         ("Wear law believed in most", s.law.clone().unwrap_or_else(|| NO_DATA.to_owned())),
         ("Usage axis", s.axis.as_ref().map_or_else(|| NO_DATA.to_owned(), |axis| axis.replace('_', " "))),
-        ("Mann–Kendall, two-sided p", s.mann_kendall_p.map_or_else(|| NO_DATA.to_owned(), small)),
-        ("The same, allowing for autocorrelation", s.hamed_rao_p.map_or_else(|| NO_DATA.to_owned(), small)),
+        ("Mann–Kendall, two-sided p", s.mann_kendall_p.map_or_else(|| NO_DATA.to_owned(), p_value)),
+        ("The same, allowing for autocorrelation", s.hamed_rao_p.map_or_else(|| NO_DATA.to_owned(), p_value)),
         (
             "Sen's slope, µm per 1000 h",
             rates(s.sen_low_m_per_hour, s.sen_rate_m_per_hour, s.sen_high_m_per_hour),
@@ -245,37 +251,37 @@ fn record(unit: &Unit) -> Facts {
         (
             "State the day before",
             match &s.state_day_before {
-                Some(before) => Standing::of(before.as_deref()).word().to_owned(),
+                Some(before) => StateBadge::from_state(before.as_deref()).word().to_owned(),
                 None => NO_DATA.to_owned(),
             },
         ),
     ]
 }
 
-/// Widening worth a word: less comes of counting few past forecasts.
+/// Smallest widening that is reported: smaller values arise by chance from few past forecasts.
 const WIDER: f64 = 1.15;
 
-/// What was believed of a unit like this one before its own flights were looked at.
-fn prior(report: &Report, unit: &Unit) -> String {
+/// Fleet prior of the unit's part number, as text.
+fn prior(report: &Report, unit: &UnitView) -> String {
     report.priors.iter().find(|p| p.part_number == unit.part_number).map_or_else(
         || NO_DATA.to_owned(),
         |p| {
             let part = p.part_number.as_deref().unwrap_or("units without a part number");
             let wider = if p.widening > WIDER {
                 format!(
-                    "Past forecasts of this fleet missed more often than they should: its intervals are {:.1} \
+                    "PastForecast forecasts of this fleet missed more often than they should: its intervals are {:.1} \
                      times as wide as they usually are.",
                     p.widening
                 )
             } else {
-                "Past forecasts of this fleet held: its intervals are as wide as usual.".to_owned()
+                "PastForecast forecasts of this fleet held: its intervals are as wide as usual.".to_owned()
             };
             format!(
                 "Learned from {part} until {}: a new unit has {} ± {} µm; from new to the act limit it takes {} h, \
                  90 % of units between {} and {} h; wear follows {}. {wider}",
                 date(p.learned_until_utc),
-                um(p.new_m),
-                um(1.645 * p.new_sd_m),
+                micrometres(p.new_m),
+                micrometres(1.645 * p.new_sd_m),
                 hours(p.life_p50_hours),
                 hours(p.life_p05_hours),
                 hours(p.life_p95_hours),
@@ -285,16 +291,18 @@ fn prior(report: &Report, unit: &Unit) -> String {
     )
 }
 
-/// The level through past flights and the fan ahead, as rows.
-fn band(unit: &Unit) -> Vec<(String, &'static str, String, String, String)> {
+/// Smoothed level and forecast as table rows.
+fn band(unit: &UnitView) -> Vec<(String, &'static str, String, String, String)> {
     let row = |what: &'static str| {
-        move |b: &crate::model::Banded| (minute(b.at_utc), what, um(b.m), um(b.p05_m), um(b.p95_m))
+        move |b: &crate::model::TimedInterval| {
+            (minute(b.at_utc), what, micrometres(b.m), micrometres(b.p05_m), micrometres(b.p95_m))
+        }
     };
     unit.level.iter().map(row("level")).chain(unit.forecast.iter().map(row("forecast"))).collect()
 }
 
-/// A probability; one too small for three places is never shown as none.
-fn small(p: f64) -> String {
+/// A probability; one too p_value for three places is never shown as none.
+fn p_value(p: f64) -> String {
     if p < 0.001 { "below 0.001".to_owned() } else { format!("{p:.3}") }
 }
 
@@ -305,10 +313,10 @@ fn flight(f: &FlightRow) -> Flight {
         id: f.flight_id.clone(),
         place: format!("{} {}", f.tail_number, f.position),
         hours: f.unit_hours.map(|h| format!("{h:.1}")).unwrap_or_default(),
-        gap: um_cell(f.gap_m),
-        low: um_cell(f.gap_p05_m),
-        high: um_cell(f.gap_p95_m),
-        midrange: um_cell(f.gap_midrange_m),
+        gap: micrometres_cell(f.gap_m),
+        low: micrometres_cell(f.gap_p05_m),
+        high: micrometres_cell(f.gap_p95_m),
+        midrange: micrometres_cell(f.gap_midrange_m),
         reversals: f.load_reversals.map(|n| n.to_string()).unwrap_or_default(),
         load: load.unwrap_or_default(),
         remarks: f.remarks.clone(),

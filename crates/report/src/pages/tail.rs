@@ -1,26 +1,26 @@
-//! The page of one tail: what sits on it, and how good its data are.
+//! Tail page: actuators of one aircraft, its flights and failed logs.
 
 use askama::Template;
 
-use crate::fleet::Row;
+use crate::format::{count, minute_or};
 use crate::model::{Report, Tail};
-use crate::words::{count, minute_or};
-use crate::{Error, Page, tail_path};
+use crate::page::{Error, Page, tail_path};
+use crate::pages::fleet::Row;
 
 #[derive(Template)]
 #[template(path = "tail.html")]
 struct View<'a> {
     root: &'static str,
     title: String,
-    foot: String,
+    footer: String,
     tail: &'a str,
     facts: Vec<(&'static str, String)>,
     label: &'static str,
     groups: Vec<(String, String, Vec<Row>)>,
-    faults: Vec<(String, String, String)>,
+    log_errors: Vec<(String, String, String)>,
 }
 
-/// Makes the page of a tail.
+/// Renders the page of a tail.
 ///
 /// # Errors
 /// When the template cannot be filled.
@@ -29,11 +29,11 @@ pub fn tail_page(report: &Report, tail: &Tail) -> Result<Page, Error> {
     let mine = report.units.iter().filter(|u| u.tail_number.as_deref() == Some(name));
     let mut rows: Vec<Row> = mine.map(|u| Row::of(u, "../")).collect();
     rows.sort_by(|a, b| a.position.cmp(&b.position).then_with(|| a.name.cmp(&b.name)));
-    let faults = report.log_faults.iter().filter(|f| f.tail_number.as_deref() == Some(name));
+    let log_errors = report.log_errors.iter().filter(|f| f.tail_number.as_deref() == Some(name));
     let view = View {
         root: "../",
         title: format!("{name} · actuator free play"),
-        foot: crate::fleet::foot(report),
+        footer: crate::pages::fleet::footer(report),
         tail: name,
         facts: vec![
             ("Flights in the store", count(tail.flights)),
@@ -44,8 +44,8 @@ pub fn tail_page(report: &Report, tail: &Tail) -> Result<Page, Error> {
         ],
         label: "Actuators of this tail",
         groups: if rows.is_empty() { Vec::new() } else { vec![(String::new(), String::new(), rows)] },
-        faults: faults
-            .map(|f| (f.log_path.clone(), f.code.clone(), crate::words::minute(f.processed_utc)))
+        log_errors: log_errors
+            .map(|f| (f.log_path.clone(), f.code.clone(), crate::format::minute(f.processed_utc)))
             .collect(),
     };
     Ok(Page::html(tail_path(name), &view.render()?))

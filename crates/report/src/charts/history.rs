@@ -1,13 +1,13 @@
-//! Static pictures, for readers without scripts and for paper; the style sheet recolours them in the dark.
+//! Static plot of a unit's history, for readers without scripts and for print; CSS recolours it in dark mode.
 
 use jiff::Timestamp;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use crate::Error;
-use crate::model::{Banded, Unit};
+use crate::model::{TimedInterval, UnitView};
+use crate::page::Error;
 
-/// The colours of the style sheet, which swaps them by these very values.
+/// Colours of the style sheet, which replaces exactly these values in dark mode.
 pub(crate) const INK: RGBColor = RGBColor(0x1C, 0x25, 0x30);
 pub(crate) const GRID: RGBColor = RGBColor(0xE1, 0xE6, 0xEB);
 pub(crate) const DATA: RGBColor = RGBColor(0x5B, 0x8F, 0xB9);
@@ -15,24 +15,24 @@ const WATCH: RGBColor = RGBColor(0xD9, 0xA9, 0x00);
 pub(crate) const PLAN: RGBColor = RGBColor(0xC8, 0x52, 0x00);
 const ACT: RGBColor = RGBColor(0x7A, 0x00, 0x44);
 
-/// Marks a static picture shows at most; beyond it each mark is the mean of neighbours.
-const MARKS: usize = 120;
+/// Maximum number of points in the plot; above it, each point is the mean of neighbouring flights.
+const MAX_POINTS: usize = 120;
 
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+type DrawResult = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
-/// A day, and low, middle and high of a gap in µm.
-type Mark = (f64, f64, f64, f64);
+/// Day, and 5 %, median and 95 % of a gap, µm.
+type BandPoint = (f64, f64, f64, f64);
 
-/// Gap against date: flights with error bars, the level through them, limits, the fan and events.
-pub(crate) fn history(unit: &Unit) -> Result<String, Error> {
-    let points = thinned(unit);
+/// Draws gap against date: flights with error bars, smoothed level, limits, forecast band and events.
+pub(crate) fn history(unit: &UnitView) -> Result<String, Error> {
+    let points = downsampled(unit);
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Ok(String::new()) };
     let span = (last.0 - first.0).max(10.0);
     let end = unit.forecast.last().map_or(last.0, |f| day(f.at_utc)).max(last.0);
     let ahead = unit.forecast.iter().map(|f| f.p95_m * 1e6);
-    let limit = unit.statement.limit_m.map(|l| l * 1e6);
-    // A fan far beyond the limit would press the flights to the floor.
+    let limit = unit.assessment.limit_m.map(|l| l * 1e6);
+    // A forecast far above the limit would squeeze the flights into the bottom of the plot.
     let ahead = ahead.fold(0.0, f64::max).min(limit.map_or(f64::INFINITY, |l| 1.15 * l));
     let top = points.iter().map(|p| p.3).chain(limit).fold(ahead.max(1.0), f64::max) * 1.04;
     let lowest = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
@@ -42,15 +42,21 @@ pub(crate) fn history(unit: &Unit) -> Result<String, Error> {
     Ok(svg)
 }
 
-fn draw(svg: &mut String, unit: &Unit, points: &[Mark], x: (f64, f64), y: (f64, f64)) -> Result<(), Error> {
-    let lift = |e: DrawingAreaErrorKind<std::io::Error>| Error::Picture(e.to_string());
+fn draw(
+    svg: &mut String,
+    unit: &UnitView,
+    points: &[BandPoint],
+    x: (f64, f64),
+    y: (f64, f64),
+) -> Result<(), Error> {
+    let plot_error = |e: DrawingAreaErrorKind<std::io::Error>| Error::Plot(e.to_string());
     let root = SVGBackend::with_string(svg, (860, 340)).into_drawing_area();
     let mut chart = ChartBuilder::on(&root)
         .margin(8)
         .x_label_area_size(28)
         .y_label_area_size(48)
         .build_cartesian_2d(x.0..x.1, y.0..y.1)
-        .map_err(lift)?;
+        .map_err(plot_error)?;
     chart
         .configure_mesh()
         .disable_x_mesh()
@@ -62,22 +68,28 @@ fn draw(svg: &mut String, unit: &Unit, points: &[Mark], x: (f64, f64), y: (f64, 
         .x_label_formatter(&|d| date_of(*d))
         .y_desc("gap µm")
         .draw()
-        .map_err(lift)?;
-    flights(&mut chart, points).map_err(lift)?;
-    ribbon(&mut chart, &marks(&unit.level), y, INK, false).map_err(lift)?;
-    ribbon(&mut chart, &marks(&unit.forecast), y, PLAN, true).map_err(lift)?;
-    lines(&mut chart, unit, x, y).map_err(lift)?;
-    root.present().map_err(lift)
+        .map_err(plot_error)?;
+    draw_flights(&mut chart, points).map_err(plot_error)?;
+    draw_band(&mut chart, &band_points(&unit.level), y, INK, false).map_err(plot_error)?;
+    draw_band(&mut chart, &band_points(&unit.forecast), y, PLAN, true).map_err(plot_error)?;
+    draw_lines(&mut chart, unit, x, y).map_err(plot_error)?;
+    root.present().map_err(plot_error)
 }
 
-fn flights(chart: &mut Chart<'_, '_>, points: &[Mark]) -> Drawn {
+fn draw_flights(chart: &mut Chart<'_, '_>, points: &[BandPoint]) -> DrawResult {
     let bars = points.iter().map(|p| PathElement::new(vec![(p.0, p.1), (p.0, p.3)], DATA));
     chart.draw_series(bars)?;
     chart.draw_series(points.iter().map(|p| Circle::new((p.0, p.2), 3, DATA.filled()))).map(|_| ())
 }
 
-/// A band and its middle, cut at the picture's edges.
-fn ribbon(chart: &mut Chart<'_, '_>, band: &[Mark], y: (f64, f64), colour: RGBColor, dashed: bool) -> Drawn {
+/// Draws a band and its median, clipped to the plot.
+fn draw_band(
+    chart: &mut Chart<'_, '_>,
+    band: &[BandPoint],
+    y: (f64, f64),
+    colour: RGBColor,
+    dashed: bool,
+) -> DrawResult {
     let edge = band.iter().map(|p| (p.0, p.3)).chain(band.iter().rev().map(|p| (p.0, p.1)));
     let edge: Vec<(f64, f64)> = edge.map(|(d, gap)| (d, gap.clamp(y.0, y.1))).collect();
     chart.draw_series([Polygon::new(edge, colour.mix(0.18))])?;
@@ -89,11 +101,11 @@ fn ribbon(chart: &mut Chart<'_, '_>, band: &[Mark], y: (f64, f64), colour: RGBCo
     }
 }
 
-/// Limits across the picture, and events up and down.
-fn lines(chart: &mut Chart<'_, '_>, unit: &Unit, x: (f64, f64), y: (f64, f64)) -> Drawn {
-    let s = &unit.statement;
+/// Draws limits as horizontal and events as vertical lines.
+fn draw_lines(chart: &mut Chart<'_, '_>, unit: &UnitView, x: (f64, f64), y: (f64, f64)) -> DrawResult {
+    let s = &unit.assessment;
     for (limit, colour) in [(s.watch_m, WATCH), (s.limit_m, ACT)] {
-        // What lies outside would be drawn along the edge.
+        // A level outside the plot would be drawn along its edge.
         let level = limit.map(|l| l * 1e6).filter(|l| (y.0..y.1).contains(l));
         let line = level.map(|l| LineSeries::new([(x.0, l), (x.1, l)], colour.stroke_width(2)));
         line.map(|line| chart.draw_series(line)).transpose()?;
@@ -104,13 +116,13 @@ fn lines(chart: &mut Chart<'_, '_>, unit: &Unit, x: (f64, f64), y: (f64, f64)) -
     Ok(())
 }
 
-fn marks(band: &[Banded]) -> Vec<Mark> {
+fn band_points(band: &[TimedInterval]) -> Vec<BandPoint> {
     band.iter().map(|b| (day(b.at_utc), b.p05_m * 1e6, b.m * 1e6, b.p95_m * 1e6)).collect()
 }
 
-/// The estimated flights, means of neighbours when they are many.
-fn thinned(unit: &Unit) -> Vec<Mark> {
-    let all: Vec<Mark> = unit
+/// Estimated flights, averaged in groups of neighbours to at most [`MAX_POINTS`].
+fn downsampled(unit: &UnitView) -> Vec<BandPoint> {
+    let all: Vec<BandPoint> = unit
         .flights
         .iter()
         .filter_map(|f| {
@@ -119,8 +131,8 @@ fn thinned(unit: &Unit) -> Vec<Mark> {
             Some((day(f.departure_utc), low * 1e6, gap * 1e6, high * 1e6))
         })
         .collect();
-    let size = all.len().div_ceil(MARKS).max(1);
-    let mean = |c: &[Mark]| {
+    let size = all.len().div_ceil(MAX_POINTS).max(1);
+    let mean = |c: &[BandPoint]| {
         let n = c.len() as f64;
         let sum = c.iter().fold((0.0, 0.0, 0.0, 0.0), |a, p| (a.0 + p.0, a.1 + p.1, a.2 + p.2, a.3 + p.3));
         (sum.0 / n, sum.1 / n, sum.2 / n, sum.3 / n)
@@ -133,5 +145,5 @@ fn day(t: Timestamp) -> f64 {
 }
 
 fn date_of(day: f64) -> String {
-    Timestamp::from_second((day * 86_400.0) as i64).map(crate::words::date).unwrap_or_default()
+    Timestamp::from_second((day * 86_400.0) as i64).map(crate::format::date).unwrap_or_default()
 }

@@ -1,13 +1,13 @@
-//! Estimate against inspection as a picture: pairs, where both are equal, bias and limits of agreement.
+//! Plot of estimate against inspection: pairs, line of equality, bias and limits of agreement.
 
 use plotters::prelude::*;
 
-use crate::Error;
-use crate::agreement::Agreement;
-use crate::chart::{DATA, GRID, INK, PLAN};
+use crate::charts::history::{DATA, GRID, INK, PLAN};
+use crate::page::Error;
+use crate::stats::agreement::Agreement;
 
-/// Draws pairs of estimate and inspection, metres; nothing without a pair.
-pub(crate) fn scatter(pairs: &[(f64, f64)]) -> Result<String, Error> {
+/// Draws pairs of estimate and inspection, m; an empty string without a pair.
+pub(crate) fn agreement_plot(pairs: &[(f64, f64)]) -> Result<String, Error> {
     let um: Vec<(f64, f64)> = pairs.iter().map(|(estimate, play)| (play * 1e6, estimate * 1e6)).collect();
     if um.is_empty() {
         return Ok(String::new());
@@ -15,7 +15,7 @@ pub(crate) fn scatter(pairs: &[(f64, f64)]) -> Result<String, Error> {
     let all = || um.iter().flat_map(|(play, estimate)| [*play, *estimate]);
     let (low, high) = (all().fold(0.0, f64::min), all().fold(1.0, f64::max) * 1.08);
     let mut svg = String::new();
-    draw(&mut svg, &um, Agreement::of(pairs), (low, high)).map_err(|e| Error::Picture(e.to_string()))?;
+    draw(&mut svg, &um, Agreement::of(pairs), (low, high)).map_err(|e| Error::Plot(e.to_string()))?;
     Ok(svg)
 }
 
@@ -53,7 +53,7 @@ fn draw(
     root.present()
 }
 
-/// Where a line of slope one that lies so much above the diagonal leaves the picture.
+/// Upper end of a line of slope 1 that is `by_um` above the diagonal.
 fn upper(high: f64, by_um: f64) -> (f64, f64) {
     if by_um > 0.0 { (high - by_um, high) } else { (high, high + by_um) }
 }
@@ -63,14 +63,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_pair_is_a_mark_and_no_pair_is_no_picture() {
+    fn each_pair_is_a_mark_and_no_pair_is_no_plot() {
         let pairs = [(30e-6, 33e-6), (40e-6, 42e-6), (50e-6, 51e-6)];
-        assert_eq!(scatter(&pairs).unwrap().matches("<circle").count(), 3);
-        assert_eq!(scatter(&[]).unwrap(), "");
+        assert_eq!(agreement_plot(&pairs).unwrap().matches("<circle").count(), 3);
+        assert_eq!(agreement_plot(&[]).unwrap(), "");
     }
 
     #[test]
-    fn a_line_leaves_the_picture_at_its_corner() {
+    fn a_line_leaves_the_plot_at_its_corner() {
         assert_eq!(upper(100.0, 10.0), (90.0, 100.0));
         assert_eq!(upper(100.0, -10.0), (100.0, 90.0));
     }

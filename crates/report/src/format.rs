@@ -1,37 +1,37 @@
-//! Numbers and dates as people read them; what is not known says so.
+//! Number and date formatting; missing values are shown as "no data".
 
 use std::fmt::Write as _;
 
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 
-/// What stands where nothing is known.
+/// Text for a missing value.
 pub(crate) const NO_DATA: &str = "no data";
 
-pub(crate) fn um(m: f64) -> String {
+pub(crate) fn micrometres(m: f64) -> String {
     let text = format!("{:.1}", m * 1e6);
     if text == "-0.0" { "0.0".to_owned() } else { text }
 }
 
-pub(crate) fn um_or(m: Option<f64>) -> String {
-    m.map_or_else(|| NO_DATA.to_owned(), um)
+pub(crate) fn micrometres_or(m: Option<f64>) -> String {
+    m.map_or_else(|| NO_DATA.to_owned(), micrometres)
 }
 
-/// A cell of a long table: empty where nothing is known, since the caption says so.
-pub(crate) fn um_cell(m: Option<f64>) -> String {
-    m.map(um).unwrap_or_default()
+/// Cell of a long table: empty if the value is missing, as the table's caption explains.
+pub(crate) fn micrometres_cell(m: Option<f64>) -> String {
+    m.map(micrometres).unwrap_or_default()
 }
 
-/// `118.0 ± 4.1 µm`, the interval at 90 %.
+/// `118.0 ± 4.1 µm`; the interval is half of the 90 % interval.
 pub(crate) fn level(gap_m: Option<f64>, se_m: Option<f64>) -> String {
     match (gap_m, se_m) {
-        (Some(gap), Some(se)) => format!("{} ± {} µm", um(gap), um(1.645 * se)),
-        (Some(gap), None) => format!("{} µm", um(gap)),
+        (Some(gap), Some(se)) => format!("{} ± {} µm", micrometres(gap), micrometres(1.645 * se)),
+        (Some(gap), None) => format!("{} µm", micrometres(gap)),
         _ => NO_DATA.to_owned(),
     }
 }
 
-/// Metres per hour as µm per 1,000 h.
+/// Converts metres per hour to µm per 1,000 h.
 pub(crate) fn rate(m_per_hour: f64) -> String {
     let text = format!("{:.1}", m_per_hour * 1e9);
     if text == "-0.0" { "0.0".to_owned() } else { text }
@@ -76,7 +76,7 @@ pub(crate) fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
 }
 
-/// The first instant of the month, so many months on.
+/// First instant of the month `months` after that of `from`.
 pub(crate) fn month(from: Timestamp, months: i32) -> Option<Timestamp> {
     let day = from.to_zoned(TimeZone::UTC).date().first_of_month();
     let day = day.checked_add(jiff::Span::new().months(months)).ok()?;
@@ -88,11 +88,10 @@ pub(crate) fn month_name(t: Timestamp) -> String {
     t.strftime("%Y-%m").to_string()
 }
 
-/// Names the characters that show nothing and change how their neighbours are read: controls, marks and
-/// overrides of direction, widths of zero.
+/// Replaces invisible characters by their code points: controls, direction marks and overrides, zero widths.
 ///
-/// A serial number that turns round the text after it makes 47 µm read as 74.
-pub(crate) fn visible(text: &str) -> String {
+/// Otherwise a serial number with a right-to-left override would display 47 µm as 74.
+pub(crate) fn escape_invisible(text: &str) -> String {
     let unseen = |c: char| {
         (c.is_control() && !matches!(c, '\n' | '\t'))
             || matches!(c, '\u{61c}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{feff}')
@@ -110,7 +109,7 @@ pub(crate) fn visible(text: &str) -> String {
     shown
 }
 
-/// Days from one instant to another.
+/// Days between two instants.
 pub(crate) fn days_between(from: Timestamp, to: Timestamp) -> f64 {
     to.duration_since(from).as_secs_f64() / 86_400.0
 }
@@ -127,16 +126,16 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_says_so() {
+    fn a_missing_value_reads_no_data() {
         assert_eq!(level(None, Some(1e-6)), "no data");
-        assert_eq!(um_or(None), "no data");
+        assert_eq!(micrometres_or(None), "no data");
     }
 
     /// U+202E is RIGHT-TO-LEFT OVERRIDE (Unicode Standard Annex 9).
     #[test]
-    fn a_name_cannot_turn_round_what_stands_after_it() {
-        assert_eq!(visible("S1\u{202e} (47.1)\n"), "S1[U+202E] (47.1)\n");
-        assert_eq!(visible("1\u{202f}205 µm 🛩"), "1\u{202f}205 µm 🛩");
+    fn a_name_cannot_reverse_the_text_after_it() {
+        assert_eq!(escape_invisible("S1\u{202e} (47.1)\n"), "S1[U+202E] (47.1)\n");
+        assert_eq!(escape_invisible("1\u{202f}205 µm 🛩"), "1\u{202f}205 µm 🛩");
     }
 
     #[test]

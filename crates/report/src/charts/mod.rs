@@ -1,0 +1,5 @@
+//! Static plots (SVG, PNG, HTML).
+
+pub(crate) mod agreement_plot;
+pub(crate) mod estimate_plot;
+pub(crate) mod history;

@@ -1,0 +1,46 @@
+//! One file of a report: its path, its content, and the errors of writing it.
+
+use crate::file_names::file_stem;
+use crate::format::escape_invisible;
+use crate::model::UnitView;
+
+/// One file of a report.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Page {
+    /// Path relative to the report folder.
+    pub path: String,
+    /// Content of the file.
+    pub body: Vec<u8>,
+}
+
+impl Page {
+    /// Makes an HTML page; invisible characters are escaped so that no name can disguise itself as another.
+    pub(crate) fn html(path: String, html: &str) -> Self {
+        Self { path, body: escape_invisible(html).into_bytes() }
+    }
+}
+
+/// Why a page could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A template could not be rendered.
+    #[error("a page cannot be written: {0}")]
+    Template(#[from] askama::Error),
+    /// `report.json` could not be serialised.
+    #[error("the machine-readable twin cannot be written: {0}")]
+    Json(#[from] serde_json::Error),
+    /// A plot could not be drawn.
+    #[error("a picture cannot be drawn: {0}")]
+    Plot(String),
+}
+
+/// Path of a unit's page, relative to the report folder.
+pub fn unit_path(unit: &UnitView) -> String {
+    let part = unit.part_number.as_deref().unwrap_or("");
+    format!("serial/{}.html", file_stem("unit", &[part, &unit.serial_number]))
+}
+
+/// Path of a tail's page, relative to the report folder.
+pub fn tail_path(tail_number: &str) -> String {
+    format!("tail/{}.html", file_stem("tail", &[tail_number]))
+}

@@ -1,0 +1,5 @@
+//! The HTML pages of a report, one module per kind of page.
+
+pub(crate) mod fleet;
+pub(crate) mod tail;
+pub(crate) mod unit;
