@@ -15,7 +15,7 @@ use records::{
     Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
     TailNumber,
 };
-use store::{Holder, LogAccount, LogResult, Outcome, RunAccount, Store};
+use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store};
 
 type Outcomes<T> = Result<T, Box<dyn Error>>;
 
@@ -168,7 +168,7 @@ fn result(tail_at: usize, flight: usize, units: &[Unit]) -> Outcomes<LogResult> 
     let records: Vec<GapRecord> =
         places.map(|(place, unit)| record(tail_at, place, flight, unit)).collect::<Outcomes<_>>()?;
     let refused = records.iter().filter(|r| r.estimate.status == Status::Refused).count() as i64;
-    let account = LogAccount {
+    let account = LogRecord {
         log_path: log(tail_at, flight),
         size_bytes: 1_000,
         modified_utc_ns: 0,
@@ -179,7 +179,7 @@ fn result(tail_at: usize, flight: usize, units: &[Unit]) -> Outcomes<LogResult> 
         flight_id: Some(format!("{tail_at}-{flight:04}")),
         departure_utc: Some(departure(flight)?),
         positions: POSITIONS.map(str::to_owned).to_vec(),
-        outcome: if bad { Outcome::Error } else { Outcome::Done },
+        outcome: if bad { LogOutcome::Error } else { LogOutcome::Done },
         estimated: if bad { 0 } else { records.len() as i64 - refused },
         refused: if bad { 0 } else { refused },
         error_code: bad.then(|| "time_goes_back".to_owned()),
@@ -205,7 +205,7 @@ fn fill(store: &Path, tails: usize, flights: usize) -> Outcomes<()> {
         }
     }
     let done = (tails * flights) as i64;
-    writer.end_run(&RunAccount {
+    writer.end_run(&RunRecord {
         run_id: "made".to_owned(),
         started_utc: departure(flights)?,
         finished_utc: Some(departure(flights)?),

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
 use records::{Diagnostic, GapRecord, Status};
-use store::{LogAccount, Outcome, RunAccount};
+use store::{LogOutcome, LogRecord, RunRecord};
 
 use crate::changed::Changed;
 use crate::innovations::{self, Unlike};
@@ -33,7 +33,7 @@ pub struct Quiet {
 }
 
 /// The aircraft that have been silent for longer than `days` before the fleet's newest departure.
-pub(crate) fn quiet<'a>(accounts: impl Iterator<Item = &'a LogAccount>, days: f64) -> Vec<Quiet> {
+pub(crate) fn quiet<'a>(accounts: impl Iterator<Item = &'a LogRecord>, days: f64) -> Vec<Quiet> {
     let mut newest: BTreeMap<&str, Timestamp> = BTreeMap::new();
     for (tail, at) in accounts.filter_map(|a| Some((a.tail_number.as_deref()?, a.departure_utc?))) {
         newest.entry(tail).and_modify(|known| *known = (*known).max(at)).or_insert(at);
@@ -57,8 +57,8 @@ pub struct CutShort {
     pub not_reached: i64,
 }
 
-impl From<RunAccount> for CutShort {
-    fn from(run: RunAccount) -> Self {
+impl From<RunRecord> for CutShort {
+    fn from(run: RunRecord) -> Self {
         Self {
             run_id: run.run_id,
             started_utc: run.started_utc,
@@ -175,7 +175,7 @@ impl Report {
         (self.trends, self.changed, self.states) = (now, changed, states);
     }
 
-    pub(crate) fn count(&mut self, account: &LogAccount, records: &[GapRecord], diagnostics: &[Diagnostic]) {
+    pub(crate) fn count(&mut self, account: &LogRecord, records: &[GapRecord], diagnostics: &[Diagnostic]) {
         let mut counted = Counted {
             diagnostics: diagnostics.to_vec(),
             duration_s: account.duration_s,
@@ -225,8 +225,8 @@ impl Report {
     }
 
     /// The row kept in the store.
-    pub(crate) fn row(&self, program_version: &str, config_path: &str, exit_code: Option<i64>) -> RunAccount {
-        RunAccount {
+    pub(crate) fn row(&self, program_version: &str, config_path: &str, exit_code: Option<i64>) -> RunRecord {
+        RunRecord {
             run_id: self.run_id.clone(),
             started_utc: self.started_utc,
             finished_utc: exit_code.map(|_| Timestamp::now()),
@@ -245,9 +245,9 @@ impl Report {
 }
 
 /// The account of one log, before anything is known of its flight.
-pub(crate) fn of_log(work: &Work, run_id: &str) -> LogAccount {
+pub(crate) fn of_log(work: &Work, run_id: &str) -> LogRecord {
     let stat = work.stat.as_ref();
-    LogAccount {
+    LogRecord {
         log_path: work.shown.clone(),
         size_bytes: stat.map_or(0, |s| s.size_bytes),
         modified_utc_ns: stat.map_or(0, |s| s.modified_utc_ns),
@@ -258,7 +258,7 @@ pub(crate) fn of_log(work: &Work, run_id: &str) -> LogAccount {
         flight_id: None,
         departure_utc: None,
         positions: Vec::new(),
-        outcome: Outcome::Done,
+        outcome: LogOutcome::Done,
         estimated: 0,
         refused: 0,
         error_code: None,
@@ -270,14 +270,14 @@ pub(crate) fn of_log(work: &Work, run_id: &str) -> LogAccount {
 }
 
 /// The account of a log that a run means to do.
-pub(crate) fn not_reached(work: &Work, run_id: &str) -> LogAccount {
-    LogAccount { outcome: Outcome::NotReached, ..of_log(work, run_id) }
+pub(crate) fn not_reached(work: &Work, run_id: &str) -> LogRecord {
+    LogRecord { outcome: LogOutcome::NotReached, ..of_log(work, run_id) }
 }
 
 /// Writes diagnostics into an account: the first one's code, all of their text.
-pub(crate) fn complain(account: &mut LogAccount, diagnostics: &[Diagnostic]) {
+pub(crate) fn complain(account: &mut LogRecord, diagnostics: &[Diagnostic]) {
     let Some(first) = diagnostics.first() else { return };
-    account.outcome = Outcome::Error;
+    account.outcome = LogOutcome::Error;
     account.error_code = Some(first.code.clone());
     let all: Vec<String> = diagnostics.iter().map(ToString::to_string).collect();
     account.error_detail = Some(all.join("\n"));

@@ -8,7 +8,7 @@ use std::collections::{BTreeSet, HashMap};
 use job::Config;
 use job::flight::sample_digest;
 use records::{Diagnostic, GapRecord, Installations};
-use store::{LogAccount, LogResult, Outcome, RecordKey};
+use store::{LogOutcome, LogRecord, LogResult, RecordKey};
 
 use crate::account::{self, Report};
 use crate::event::Event;
@@ -18,11 +18,11 @@ use crate::trends::Unit;
 /// What came of one log.
 pub(crate) enum Done {
     /// Its content is known; only its name or date is new.
-    Same(Box<LogAccount>),
+    Same(Box<LogRecord>),
     /// It was read.
     Read {
         /// Its account.
-        account: Box<LogAccount>,
+        account: Box<LogRecord>,
         /// Its records.
         records: Vec<GapRecord>,
         /// What is wrong with it.
@@ -48,7 +48,7 @@ pub(crate) struct Book<'a> {
     config: &'a Config,
     installations: &'a Installations,
     plan: &'a Plan,
-    accounts: HashMap<String, LogAccount>,
+    accounts: HashMap<String, LogRecord>,
     owners: HashMap<RecordKey, String>,
     /// Units whose records changed.
     pub(crate) touched: BTreeSet<Unit>,
@@ -65,13 +65,13 @@ impl<'a> Book<'a> {
     }
 
     /// What is accounted for now.
-    pub(crate) fn accounts(&self) -> impl Iterator<Item = &LogAccount> {
+    pub(crate) fn accounts(&self) -> impl Iterator<Item = &LogRecord> {
         let unchanged = self.plan.work.is_empty().then(|| self.plan.accounts.values());
         self.accounts.values().chain(unchanged.into_iter().flatten())
     }
 
-    fn enter(&mut self, account: LogAccount) {
-        let names = account.owned();
+    fn enter(&mut self, account: LogRecord) {
+        let names = account.record_keys();
         self.owners.extend(names.into_iter().map(|name| (name, account.log_path.clone())));
         self.accounts.insert(account.log_path.clone(), account);
     }
@@ -92,7 +92,7 @@ impl<'a> Book<'a> {
 
     fn read(
         &mut self,
-        account: LogAccount,
+        account: LogRecord,
         records: Vec<GapRecord>,
         diagnostics: &[Diagnostic],
         report: &mut Report,
@@ -111,8 +111,8 @@ impl<'a> Book<'a> {
     }
 
     /// Whether two logs hold the same samples in another encoding. Rare, so it is found out by reading both.
-    fn holds_the_same(&self, one: &LogAccount, other: &LogAccount) -> bool {
-        let digest = |account: &LogAccount| {
+    fn holds_the_same(&self, one: &LogRecord, other: &LogRecord) -> bool {
+        let digest = |account: &LogRecord| {
             let files = self.plan.files.get(&account.log_path)?;
             sample_digest(files, &account.log_path, self.config, self.installations).ok()
         };
@@ -120,7 +120,7 @@ impl<'a> Book<'a> {
     }
 
     /// Another log that speaks for one of these flights.
-    fn rival(&self, account: &LogAccount, records: &[GapRecord]) -> Option<LogAccount> {
+    fn rival(&self, account: &LogRecord, records: &[GapRecord]) -> Option<LogRecord> {
         let owner = |r: &GapRecord| self.owners.get(&RecordKey::of(r));
         let other = records.iter().filter_map(owner).find(|path| **path != account.log_path)?;
         self.accounts.get(other).cloned()
@@ -128,7 +128,7 @@ impl<'a> Book<'a> {
 
     fn store(
         &mut self,
-        account: LogAccount,
+        account: LogRecord,
         records: Vec<GapRecord>,
         diagnostics: &[Diagnostic],
         report: &mut Report,
@@ -142,12 +142,12 @@ impl<'a> Book<'a> {
     }
 
     /// Records this log made under another identity or for positions it no longer speaks for.
-    fn outdated(&mut self, account: &LogAccount, records: &[GapRecord]) -> Vec<RecordKey> {
+    fn outdated(&mut self, account: &LogRecord, records: &[GapRecord]) -> Vec<RecordKey> {
         let Some(before) = self.accounts.get(&account.log_path) else { return Vec::new() };
         let now: BTreeSet<RecordKey> = records.iter().map(RecordKey::of).collect();
         let mine = |name: &RecordKey| self.owners.get(name) == Some(&account.log_path);
         let gone: Vec<RecordKey> =
-            before.owned().into_iter().filter(|n| mine(n) && !now.contains(n)).collect();
+            before.record_keys().into_iter().filter(|n| mine(n) && !now.contains(n)).collect();
         for name in &gone {
             self.owners.remove(name);
         }
@@ -156,9 +156,9 @@ impl<'a> Book<'a> {
 }
 
 /// The account of a log whose flight belongs to another.
-fn yielded(mut account: LogAccount, owner: &LogAccount, is_same: bool) -> (LogAccount, Vec<Diagnostic>) {
+fn yielded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> (LogRecord, Vec<Diagnostic>) {
     (account.estimated, account.refused) = (0, 0);
-    account.outcome = Outcome::Done;
+    account.outcome = LogOutcome::Done;
     if is_same {
         return (account, Vec::new());
     }

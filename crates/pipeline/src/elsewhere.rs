@@ -18,7 +18,7 @@ use jiff::Timestamp;
 use job::Config;
 use records::{Diagnostic, GapRecord, Installations};
 use serde::{Deserialize, Serialize};
-use store::{Holder, LogAccount, LogResult, Outcome, RecordKey, Writer};
+use store::{Holder, LogOutcome, LogRecord, LogResult, RecordKey, Writer};
 
 use crate::account::{self, Report};
 use crate::book::{Book, Done};
@@ -104,7 +104,7 @@ pub fn answer(
 
 /// One log's answer as rows: what became of it first, then its records.
 fn told(
-    account: &LogAccount,
+    account: &LogRecord,
     records: &[GapRecord],
     diagnostics: Vec<Diagnostic>,
 ) -> Result<RecordBatch, Error> {
@@ -210,7 +210,7 @@ fn task(work: &Work, run_id: &str) -> Task {
 
 /// What came of a log, as if it had been read here.
 fn judged(shop: &Shop<'_>, work: &Work, said: Said, records: Vec<GapRecord>) -> Done {
-    let mut account = LogAccount {
+    let mut account = LogRecord {
         log_digest: said.log_digest,
         config_digest: said.config_digest,
         tail_number: said.tail_number,
@@ -224,7 +224,7 @@ fn judged(shop: &Shop<'_>, work: &Work, said: Said, records: Vec<GapRecord>) -> 
         ..account::of_log(work, shop.run_id)
     };
     if let Some((estimated, refused)) = shop.known(work, &account) {
-        let known = LogAccount { outcome: Outcome::Known, estimated, refused, ..account };
+        let known = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account };
         return Done::Same(Box::new(known));
     }
     account::complain(&mut account, &said.diagnostics);

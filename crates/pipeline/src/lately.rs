@@ -60,7 +60,7 @@ pub fn lately(store: &Store, until: Timestamp) -> Result<Lately, Error> {
     let until_utc = until.checked_add(SignedDuration::from_micros(1)).ok();
     let query = Query { since_utc, until_utc, ..Query::default() };
     let mut found = Found::default();
-    read_each(&store.parts(&query, &COLUMNS)?, |batch| found.add(batch))?;
+    read_each(&store.scan_columns(&query, &COLUMNS)?, |batch| found.add(batch))?;
     Ok(found.in_order())
 }
 

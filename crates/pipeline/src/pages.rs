@@ -108,7 +108,7 @@ mod tests {
             newest_departure_utc: None,
             logs_known: 0,
             check_interval_hours: 300.0,
-            log_faults: Vec::new(),
+            log_errors: Vec::new(),
             priors: Vec::new(),
             tails: Vec::new(),
             units: Vec::new(),

@@ -1,8 +1,8 @@
-//! Parts of the records, read by all workers and handed over one by one.
+//! ColumnScan of the records, read by all workers and handed over one by one.
 
 use arrow::array::RecordBatch;
 use rayon::prelude::*;
-use store::Parts;
+use store::ColumnScan;
 
 use crate::error::Error;
 
@@ -11,7 +11,7 @@ use crate::error::Error;
 /// # Errors
 /// When a part cannot be read, and what the caller cannot take.
 pub(crate) fn read_each(
-    parts: &Parts,
+    parts: &ColumnScan,
     mut take: impl FnMut(&RecordBatch) -> Result<(), ingest::Error>,
 ) -> Result<(), Error> {
     let all: Vec<usize> = (0..parts.len()).collect();

@@ -8,7 +8,7 @@ use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
-use store::{LogAccount, Outcome, RecordKey};
+use store::{LogOutcome, LogRecord, RecordKey};
 
 use crate::bundle::Found;
 use crate::remote::Seen;
@@ -137,7 +137,7 @@ impl FileStat {
         })
     }
 
-    fn is_of(&self, account: &LogAccount) -> bool {
+    fn is_of(&self, account: &LogRecord) -> bool {
         self.size_bytes == account.size_bytes
             && self.modified_utc_ns == account.modified_utc_ns
             && self.file_id == account.file_id
@@ -169,7 +169,7 @@ pub struct Work {
     /// Why it is done.
     pub why: Why,
     /// What was accounted for before under this name.
-    pub before: Option<LogAccount>,
+    pub before: Option<LogRecord>,
 }
 
 /// The night's plan.
@@ -182,7 +182,7 @@ pub struct Plan {
     /// Those to be done, longest first.
     pub work: Vec<Work>,
     /// What is accounted for, by name, of the logs that are still there.
-    pub accounts: BTreeMap<String, LogAccount>,
+    pub accounts: BTreeMap<String, LogRecord>,
     /// What was read, and under which settings, of logs that are there; nothing without work.
     pub here: HashSet<Digests>,
     /// The same of logs that are gone, with their records: they may be here under another name.
@@ -205,7 +205,7 @@ pub fn plan(
     config: &Config,
     installations: &Installations,
     found: Found,
-    accounts: Vec<LogAccount>,
+    accounts: Vec<LogRecord>,
     request: &Request,
 ) -> Plan {
     let (strays, seen) = (found.strays, found.seen);
@@ -218,10 +218,10 @@ pub fn plan(
     let found = logs;
     let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
     let gone = gone.iter().filter_map(|a| Some((digests(a)?, (a.estimated, a.refused)))).collect();
-    let accounts: BTreeMap<String, LogAccount> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
+    let accounts: BTreeMap<String, LogRecord> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
     // Names and digests of a hundred thousand logs are made only where they decide something.
     let owned: HashSet<RecordKey> = if accounts.values().any(is_silent) {
-        accounts.values().flat_map(LogAccount::owned).collect()
+        accounts.values().flat_map(LogRecord::record_keys).collect()
     } else {
         HashSet::new()
     };
@@ -248,16 +248,16 @@ pub fn plan(
 }
 
 /// What was read, and which settings touched it, of a log that went well.
-pub fn digests(account: &LogAccount) -> Option<(String, String)> {
+pub fn digests(account: &LogRecord) -> Option<(String, String)> {
     account
         .outcome
-        .is_well()
+        .is_success()
         .then(|| Some((account.log_digest.clone()?, account.config_digest.clone()?)))
         .flatten()
 }
 
 /// The flight an account speaks of, where its log was identified.
-pub fn flight_of(account: &LogAccount) -> Option<Flight> {
+pub fn flight_of(account: &LogRecord) -> Option<Flight> {
     Some(Flight {
         tail_number: TailNumber::new(account.tail_number.as_ref()?).ok()?,
         flight_id: FlightId::new(account.flight_id.as_ref()?).ok()?,
@@ -298,7 +298,7 @@ impl Judge<'_> {
         &self,
         shown: &str,
         (files, fault): &(Files, Option<Diagnostic>),
-        before: Option<&LogAccount>,
+        before: Option<&LogRecord>,
     ) -> Verdict {
         let stat = FileStat::of_log(files, self.seen);
         let Some(why) = self.reason(before, stat.as_ref()) else { return Verdict::Known };
@@ -318,7 +318,7 @@ impl Judge<'_> {
     }
 
     /// Why this log is done tonight, or nothing when it is accounted for.
-    fn reason(&self, account: Option<&LogAccount>, stat: Option<&FileStat>) -> Option<Why> {
+    fn reason(&self, account: Option<&LogRecord>, stat: Option<&FileStat>) -> Option<Why> {
         let Some(account) = account else { return Some(Why::New) };
         let settings = flight_of(account).map_or_else(
             || self.unidentified.to_owned(),
@@ -336,9 +336,9 @@ impl Judge<'_> {
             Some(Why::OwnerGone)
         } else if account.error_code.as_deref().is_some_and(object_io::Error::is_passing) {
             Some(Why::Unfetched)
-        } else if self.request.retry && account.outcome == Outcome::Error {
+        } else if self.request.retry && account.outcome == LogOutcome::Error {
             Some(Why::Retry)
-        } else if self.request.verify_content && account.outcome.is_well() {
+        } else if self.request.verify_content && account.outcome.is_success() {
             Some(Why::Verify)
         } else {
             None
@@ -346,18 +346,18 @@ impl Judge<'_> {
     }
 
     /// A log that yielded its flight to another, which speaks for it no longer.
-    fn is_orphan(&self, account: &LogAccount) -> bool {
+    fn is_orphan(&self, account: &LogRecord) -> bool {
         let keys = if is_silent(account) { account.keys() } else { Vec::new() };
         !keys.is_empty() && keys.iter().all(|key| !self.owned.contains(key))
     }
 }
 
 /// Whether a sound log has no record of its own.
-fn is_silent(account: &LogAccount) -> bool {
-    let sound = account.outcome.is_well() || account.error_code.as_deref() == Some("duplicate_flight");
+fn is_silent(account: &LogRecord) -> bool {
+    let sound = account.outcome.is_success() || account.error_code.as_deref() == Some("duplicate_flight");
     sound && account.estimated + account.refused == 0
 }
 
-fn positions_of(account: &LogAccount) -> Vec<Position> {
+fn positions_of(account: &LogRecord) -> Vec<Position> {
     account.positions.iter().filter_map(|p| Position::new(p).ok()).collect()
 }

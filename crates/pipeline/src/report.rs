@@ -10,7 +10,7 @@ use ingest::tables::{Table, name, number, utc};
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use records::{GapRecord, Installations, PartNumber, SerialNumber};
-use store::{Outcome, Store};
+use store::{LogOutcome, Store};
 use trend::Forecast;
 
 use crate::calendar::days;
@@ -108,7 +108,7 @@ impl Logs {
         let (mut known, mut faults) = (BTreeMap::new(), Vec::new());
         for account in store.accounts()? {
             *known.entry(account.tail_number.clone()).or_default() += 1;
-            if account.outcome == Outcome::Error {
+            if account.outcome == LogOutcome::Error {
                 faults.push(LogError {
                     log_path: account.log_path,
                     tail_number: account.tail_number,
@@ -146,7 +146,7 @@ impl Read {
     /// Reads the store month by month and keeps what is used: records hold several times as much.
     fn until(last: Option<Timestamp>, store: &Store) -> Result<Self, Error> {
         let (mut gathering, mut rest) = (Gathering::default(), BTreeMap::<Name, Vec<Rest>>::new());
-        let store_version = store.visit(|mut record| {
+        let store_version = store.for_each_record(|mut record| {
             if last.is_none_or(|last| record.flight.departure_utc <= last) {
                 let name = (Some(record.part_number.to_string()), record.serial_number.to_string());
                 gathering.record(&record);

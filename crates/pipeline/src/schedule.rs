@@ -15,7 +15,7 @@ use job::flight::{Opened, caught, config_digest, unidentified_digest};
 use job::{Config, Stamp};
 use rayon::prelude::*;
 use records::{Diagnostic, GapRecord, Installations, Status};
-use store::{Holder, LogAccount, LogResult, Outcome, RunAccount, Store, Writer};
+use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
 
 use crate::account::{self, CutShort, Report};
 use crate::book::{Book, Done};
@@ -99,7 +99,7 @@ pub(crate) fn night(
     let mut report = Report::begin(run_id(started_utc), started_utc, &plan, workers);
     report.cut_short = killed.into_iter().map(CutShort::from).collect();
     let config_path = config.file.display().to_string();
-    let to_do: Vec<LogAccount> =
+    let to_do: Vec<LogRecord> =
         plan.work.iter().map(|work| account::not_reached(work, &report.run_id)).collect();
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
@@ -116,7 +116,7 @@ pub(crate) fn night(
     report.look_back(night);
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
-    if store.is_scattered()? {
+    if store.needs_compaction()? {
         writer.compact()?;
     }
     writer.end_run(&report.row(context.program_version, &config_path, Some(exit_code)))?;
@@ -160,8 +160,8 @@ fn run_id(started_utc: Timestamp) -> String {
 
 /// What a run means to do, which stands in the store before anything of it is done there.
 pub(crate) struct Intent {
-    run: RunAccount,
-    to_do: Vec<LogAccount>,
+    run: RunRecord,
+    to_do: Vec<LogRecord>,
 }
 
 impl Intent {
@@ -281,7 +281,7 @@ impl Shop<'_> {
         account.positions = names.iter().map(ToString::to_string).collect();
         if let Some(known) = self.known(work, &account) {
             (account.estimated, account.refused) = known;
-            account.outcome = Outcome::Known;
+            account.outcome = LogOutcome::Known;
             return Done::Same(Box::new(account));
         }
         self.read(&opened, account)
@@ -289,7 +289,7 @@ impl Shop<'_> {
 
     /// The records that are known of this content under these settings: its own, those of a log that
     /// is gone, whose place it takes, or none, when another log that is there speaks for them.
-    pub(crate) fn known(&self, work: &Work, account: &LogAccount) -> Option<(i64, i64)> {
+    pub(crate) fn known(&self, work: &Work, account: &LogRecord) -> Option<(i64, i64)> {
         let digests = plan::digests(account)?;
         if matches!(work.why, Why::Asked | Why::OwnerGone) {
             return None;
@@ -300,7 +300,7 @@ impl Shop<'_> {
             .or_else(|| self.plan.gone.get(&digests).copied())
     }
 
-    fn read(&self, opened: &Opened, mut account: LogAccount) -> Done {
+    fn read(&self, opened: &Opened, mut account: LogRecord) -> Done {
         let stamp = Stamp {
             run_id: self.run_id.to_owned(),
             program_version: self.context.program_version.to_owned(),

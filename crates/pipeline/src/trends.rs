@@ -251,7 +251,7 @@ pub fn in_store(store: &Store) -> Result<Histories, Error> {
 fn gathered(store: &Store, query: &Query) -> Result<Histories, Error> {
     let stored: Vec<&str> =
         Gathering::COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name)).collect();
-    let parts = store.parts(query, &stored)?;
+    let parts = store.scan_columns(query, &stored)?;
     gathering::of_parts(parts.len(), true, |gathering, some| {
         for part in some {
             let mut batches = parts.read(part)?.into_iter();

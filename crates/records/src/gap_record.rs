@@ -164,3 +164,33 @@ impl GapRecord {
         (f.departure_utc, f.tail_number.clone(), f.flight_id.clone(), self.position.clone())
     }
 }
+
+/// Key of a record: one actuator has one record per flight.
+///
+/// Its order is the order in which records are shown and exported.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct RecordKey {
+    /// Departure, µs since 1970 UTC.
+    pub departure_us: i64,
+    /// The aircraft.
+    pub tail_number: String,
+    /// The flight.
+    pub flight_id: String,
+    /// Position on the aircraft.
+    pub position: String,
+}
+
+impl RecordKey {
+    /// The key columns, in the order of the fields.
+    pub const COLUMNS: [&'static str; 4] = ["departure_utc", "tail_number", "flight_id", "position"];
+
+    /// The key of a record.
+    pub fn of(record: &GapRecord) -> Self {
+        Self {
+            departure_us: record.flight.departure_utc.as_microsecond(),
+            tail_number: record.flight.tail_number.to_string(),
+            flight_id: record.flight.flight_id.to_string(),
+            position: record.position.to_string(),
+        }
+    }
+}

@@ -11,6 +11,6 @@ pub mod installation;
 
 pub use diagnostic::Diagnostic;
 pub use flight::Flight;
-pub use gap_record::{GapEstimate, GapRecord, Provenance, Status};
+pub use gap_record::{GapEstimate, GapRecord, Provenance, RecordKey, Status};
 pub use ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 pub use installation::{Installation, Installations};

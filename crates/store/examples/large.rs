@@ -19,7 +19,7 @@ use records::{
     Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
     TailNumber,
 };
-use store::{Holder, LogAccount, LogResult, Outcome, Query, Store};
+use store::{Holder, LogOutcome, LogRecord, LogResult, Query, Store};
 
 type Maybe<T> = Result<T, Box<dyn Error>>;
 
@@ -147,8 +147,8 @@ fn record(flight: &Flight, at: usize, serial: &str, stamp: &Provenance) -> Maybe
     })
 }
 
-fn account(flight: &Flight, stamp: &Provenance) -> LogAccount {
-    LogAccount {
+fn account(flight: &Flight, stamp: &Provenance) -> LogRecord {
+    LogRecord {
         log_path: stamp.log_path.clone(),
         size_bytes: 9_000_000,
         modified_utc_ns: flight.departure_utc.as_second() * 1_000_000_000,
@@ -159,7 +159,7 @@ fn account(flight: &Flight, stamp: &Provenance) -> LogAccount {
         flight_id: Some(flight.flight_id.to_string()),
         departure_utc: Some(flight.departure_utc),
         positions: POSITIONS.map(str::to_owned).to_vec(),
-        outcome: Outcome::Done,
+        outcome: LogOutcome::Done,
         estimated: POSITIONS.len() as i64,
         refused: 0,
         error_code: None,

@@ -1,56 +1,41 @@
-//! Results: gap records, accounts of logs and accounts of runs, kept in Delta tables.
+//! Result store: gap records, log records and run records in Delta tables.
 //!
-//! A store is a folder that other engines can open as it is:
+//! A store is a folder that other engines can open:
 //!
 //! ```text
 //! results/
-//!   store.json   the format of the folder
-//!   lock         who writes, while somebody does
+//!   store.json   format version of the store
+//!   lock         the current writer, while there is one
 //!   gaps/        one row per actuator and flight
 //!   logs/        one row per log and run that finished with it
-//!   runs/        one row when a run begins and one when it ends
+//!   runs/        one row at the start of a run and one at its end
 //! ```
 //!
-//! A prefix of a bucket holds the same, but for the lock: `docs/store.md` says what that means.
+//! A prefix of a bucket holds the same, except for the lock: see `docs/store.md`.
 //!
-//! One process writes at a time ([`Store::lock`]); any number read meanwhile, and each answer is made
-//! from one version of a table, so it shows whole commits only. A commit is on disk when it returns.
-//! The choice of Delta Lake, its layout and its guarantees are told in `docs/store.md`.
+//! One process writes at a time ([`Store::lock`]). Any number of processes read at the same time; each query reads
+//! one version of a table and therefore sees whole commits only. A commit is on disk when it returns.
+//! `docs/store.md` explains the choice of Delta Lake, the layout and the guarantees.
 
-mod account;
-mod adopt;
-pub mod columns;
-mod compact;
-mod datafile;
-mod durable;
+mod admin;
+mod delta;
 mod error;
-mod export;
-mod frame;
-mod info;
-mod latest;
-mod layout;
-mod lock;
-mod newest;
-mod numbered;
-mod parts;
-mod place;
-mod query;
+mod handle;
 mod read;
-mod runs;
-mod stats;
-mod table;
-mod tabled;
-mod verify;
-mod writer;
+mod rows;
+mod store_dir;
+mod write;
 
-pub use account::{LogAccount, Outcome, RunAccount};
-pub use adopt::Adopted;
-pub use compact::Compaction;
+pub use admin::export::Format;
+pub use admin::info::Info;
 pub use error::Error;
-pub use export::Format;
-pub use info::Info;
-pub use layout::Store;
-pub use lock::Holder;
-pub use parts::Parts;
-pub use query::{Query, RecordKey};
-pub use writer::{LogResult, Writer};
+pub use handle::Store;
+pub use read::column_scan::ColumnScan;
+pub use read::query::Query;
+pub use records::RecordKey;
+pub use rows::accounts::{LogOutcome, LogRecord, RunRecord};
+pub use rows::gap_columns as columns;
+pub use write::compact::Compaction;
+pub use write::lock::Holder;
+pub use write::promote::PromotionSummary;
+pub use write::writer::{LogResult, Writer};

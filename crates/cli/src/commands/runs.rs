@@ -7,7 +7,7 @@ use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use jiff::Timestamp;
 use records::Status;
 use serde::Serialize;
-use store::{LogAccount, Outcome, Query, RunAccount, Store};
+use store::{LogOutcome, LogRecord, Query, RunRecord, Store};
 
 use crate::args::Output;
 use crate::exit::{Code, Failure};
@@ -76,7 +76,7 @@ pub(crate) fn runs(
 }
 
 /// How a run ended, in a word.
-pub(crate) fn ended(run: &RunAccount, is_held: bool) -> &'static str {
+pub(crate) fn ended(run: &RunRecord, is_held: bool) -> &'static str {
     match run.exit_code {
         Some(0 | 4) => "well",
         Some(1) => "logs in error",
@@ -87,14 +87,14 @@ pub(crate) fn ended(run: &RunAccount, is_held: bool) -> &'static str {
     }
 }
 
-fn all(store: &Store, runs: &[RunAccount], output: &Output, talk: &Talk) -> Result<Code, Failure> {
+fn all(store: &Store, runs: &[RunRecord], output: &Output, talk: &Talk) -> Result<Code, Failure> {
     let is_held = store.is_held()?;
     let answer: Vec<Run<'_>> = runs.iter().map(|run| in_row(run, is_held)).collect();
     rows::answer(output, talk, || rows::batch(&run_schema(), &answer), || page(&answer))?;
     Ok(Code::Well)
 }
 
-fn in_row(run: &RunAccount, is_held: bool) -> Run<'_> {
+fn in_row(run: &RunRecord, is_held: bool) -> Run<'_> {
     Run {
         run_id: &run.run_id,
         started_utc: run.started_utc,
@@ -154,10 +154,10 @@ fn page(runs: &[Run<'_>]) -> String {
     }
 }
 
-fn logs(store: &Store, run: &RunAccount, output: &Output, talk: &Talk) -> Result<Code, Failure> {
+fn logs(store: &Store, run: &RunRecord, output: &Output, talk: &Talk) -> Result<Code, Failure> {
     let found = store.run_logs(&run.run_id)?;
     let reasons = reasons(store, &run.run_id)?;
-    let reason = |log: &LogAccount| log.error_code.clone().or_else(|| reasons.get(&log.log_path).map(words));
+    let reason = |log: &LogRecord| log.error_code.clone().or_else(|| reasons.get(&log.log_path).map(words));
     let answer: Vec<Log<'_>> = found.iter().map(|log| in_log(log, reason(log))).collect();
     let head = format!("run {}, {}: ", run.run_id, ended(run, store.is_held()?));
     rows::answer(output, talk, || rows::batch(&log_schema(), &answer), || head + &log_page(&answer))?;
@@ -184,7 +184,7 @@ fn words(reasons: &Reasons) -> String {
     words.join(", ")
 }
 
-fn in_log(log: &LogAccount, reason: Option<String>) -> Log<'_> {
+fn in_log(log: &LogRecord, reason: Option<String>) -> Log<'_> {
     Log {
         log_path: &log.log_path,
         class: class(log),
@@ -200,9 +200,9 @@ fn in_log(log: &LogAccount, reason: Option<String>) -> Log<'_> {
 }
 
 /// What became of a log, in a word: a sound log without a gap is *refused*.
-fn class(log: &LogAccount) -> &'static str {
+fn class(log: &LogRecord) -> &'static str {
     match log.outcome {
-        Outcome::Done if log.estimated == 0 && log.refused > 0 => "refused",
+        LogOutcome::Done if log.estimated == 0 && log.refused > 0 => "refused",
         other => other.as_str(),
     }
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 use records::Diagnostic;
 use serde_json::json;
-use store::{Holder, Info, Query, RunAccount, Store};
+use store::{Holder, Info, Query, RunRecord, Store};
 
 use crate::args::{Format, Global, Output, StoreArgs, StoreCommand, Table};
 use crate::exit::{Code, Failure};
@@ -69,7 +69,7 @@ fn info(store: &Store, max_age: Option<Duration>, as_json: bool, talk: &Talk) ->
 }
 
 /// Time since a run ended.
-fn age(run: &RunAccount) -> Option<Duration> {
+fn age(run: &RunRecord) -> Option<Duration> {
     Timestamp::now().duration_since(run.finished_utc?).try_into().ok()
 }
 
@@ -169,7 +169,7 @@ fn adopt(store: &Store, trial: &Path, talk: &Talk) -> Result<Code, Failure> {
     let mut writer = store.lock(&Holder::this_process(), None)?;
     let progress = Progress::new("adopt", talk);
     let mut begun = false;
-    let done = writer.adopt(&trial, |tail, total| {
+    let done = writer.promote(&trial, |tail, total| {
         if !std::mem::replace(&mut begun, true) {
             progress.total(total);
         }

@@ -49,11 +49,11 @@ fn a_store_is_scattered_once_a_table_has_a_hundred_files_too_many() {
     for _ in 0..101 {
         writer.end_run(&run("a", "2026-11-18T02:00:00Z", Some(0))).unwrap();
     }
-    assert!(!writer.store().is_scattered().unwrap());
+    assert!(!writer.store().needs_compaction().unwrap());
     writer.end_run(&run("b", "2026-11-19T02:00:00Z", Some(0))).unwrap();
-    assert!(writer.store().is_scattered().unwrap());
+    assert!(writer.store().needs_compaction().unwrap());
     writer.compact().unwrap();
-    assert!(!writer.store().is_scattered().unwrap());
+    assert!(!writer.store().needs_compaction().unwrap());
     assert_eq!(writer.store().run_files().unwrap().len(), 1);
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use proptest::prelude::*;
 use records::GapRecord;
-use store::{LogResult, Outcome, Query, RecordKey, Store};
+use store::{LogOutcome, LogResult, Query, RecordKey, Store};
 
 use crate::made::{POSITIONS, account, record, result, time, writer};
 
@@ -83,7 +83,7 @@ fn a_log_in_error_leaves_an_account_and_no_record() {
     let mut writer = writer(dir.path());
     let mut failed = result(1, 0, 30e-6);
     failed.records.clear();
-    failed.account.outcome = Outcome::Error;
+    failed.account.outcome = LogOutcome::Error;
     failed.account.error_code = Some("time_goes_back".into());
     writer.commit(std::slice::from_ref(&failed)).unwrap();
     assert_eq!(writer.store().accounts().unwrap(), [failed.account]);

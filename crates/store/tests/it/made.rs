@@ -7,7 +7,7 @@ use records::{
     Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
     TailNumber,
 };
-use store::{Holder, LogAccount, LogResult, Outcome, RunAccount, Store, Writer};
+use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
 
 pub(crate) const POSITIONS: [&str; 3] = ["aileron_left", "aileron_right", "elevator"];
 
@@ -54,8 +54,8 @@ pub(crate) fn record(tail: usize, flight: i64, position: &str, gap_m: f64) -> Ga
 }
 
 /// The account of the log of that flight.
-pub(crate) fn account(tail: usize, flight: i64) -> LogAccount {
-    LogAccount {
+pub(crate) fn account(tail: usize, flight: i64) -> LogRecord {
+    LogRecord {
         log_path: format!("logs/N{tail}/{flight}.parquet"),
         size_bytes: 1_000,
         modified_utc_ns: 1_700_000_000_123_456_789,
@@ -66,7 +66,7 @@ pub(crate) fn account(tail: usize, flight: i64) -> LogAccount {
         flight_id: Some(format!("F{flight:04}")),
         departure_utc: Some(departure(flight)),
         positions: POSITIONS.map(str::to_owned).to_vec(),
-        outcome: Outcome::Done,
+        outcome: LogOutcome::Done,
         estimated: 3,
         refused: 0,
         error_code: None,
@@ -83,8 +83,8 @@ pub(crate) fn result(tail: usize, flight: i64, gap_m: f64) -> LogResult {
     LogResult { account: account(tail, flight), records, retires: Vec::new() }
 }
 
-pub(crate) fn run(run_id: &str, started: &str, exit_code: Option<i64>) -> RunAccount {
-    RunAccount {
+pub(crate) fn run(run_id: &str, started: &str, exit_code: Option<i64>) -> RunRecord {
+    RunRecord {
         run_id: run_id.into(),
         started_utc: time(started),
         finished_utc: exit_code.map(|_| time(started) + SignedDuration::from_mins(6)),

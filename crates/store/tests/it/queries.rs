@@ -77,7 +77,7 @@ fn a_query_answers_what_asking_every_row_would() {
 
 /// Departure, serial number and gap of the rows of all parts, in order.
 fn parted(store: &Store, query: &Query) -> Vec<(i64, String, Option<u64>)> {
-    let parts = store.parts(query, &["gap_m", "serial_number", "departure_utc"]).unwrap();
+    let parts = store.scan_columns(query, &["gap_m", "serial_number", "departure_utc"]).unwrap();
     let mut rows = Vec::new();
     for batch in (0..parts.len()).flat_map(|part| parts.read(part).unwrap()) {
         let gaps_m = batch.column(0).as_primitive::<Float64Type>();
@@ -114,7 +114,7 @@ fn parts_hold_the_rows_that_a_scan_holds() {
     // Nor does it matter whether a night's rows lie together, or a unit's.
     writer.compact().unwrap();
     let store = Store::open(dir.path()).unwrap();
-    assert_eq!(store.parts(&Query::default(), &["gap_m"]).unwrap().len(), 1);
+    assert_eq!(store.scan_columns(&Query::default(), &["gap_m"]).unwrap().len(), 1);
     proptest!(config(), |(query in questions())| {
         prop_assert_eq!(parted(&store, &query), wanted(&query));
     });
@@ -135,11 +135,11 @@ fn flipped() -> tempfile::TempDir {
 fn a_part_with_a_flipped_byte_is_an_error_and_a_column_that_none_has_too() {
     let dir = flipped();
     let store = Store::open(dir.path()).unwrap();
-    let parts = store.parts(&Query::default(), &["gap_m"]).unwrap();
+    let parts = store.scan_columns(&Query::default(), &["gap_m"]).unwrap();
     let damaged = (0..parts.len()).filter_map(|part| parts.read(part).err());
     let codes: Vec<_> = damaged.map(|error| error.diagnostic().code).collect();
     assert_eq!(codes, ["store_damaged"]);
-    assert!(store.parts(&Query::default(), &["gap_mm"]).is_err());
+    assert!(store.scan_columns(&Query::default(), &["gap_mm"]).is_err());
 }
 
 #[test]
@@ -214,7 +214,7 @@ fn a_visit_meets_every_record_once_in_order_of_departure() {
     writer.commit(&flights(100..131)).unwrap();
     writer.commit(&flights(0..100)).unwrap();
     let mut met = Vec::new();
-    let version = writer.store().visit(|record| met.push(record)).unwrap();
+    let version = writer.store().for_each_record(|record| met.push(record)).unwrap();
     assert_eq!(met.len(), 131 * POSITIONS.len());
     assert_eq!(met, writer.store().records(&Query::default()).unwrap());
     assert_eq!(version, writer.store().info().unwrap().version);
@@ -224,6 +224,6 @@ fn a_visit_meets_every_record_once_in_order_of_departure() {
 fn a_visit_to_an_empty_store_meets_nobody() {
     let dir = tempfile::tempdir().unwrap();
     let mut met = 0;
-    writer(dir.path()).store().visit(|_| met += 1).unwrap();
+    writer(dir.path()).store().for_each_record(|_| met += 1).unwrap();
     assert_eq!(met, 0);
 }

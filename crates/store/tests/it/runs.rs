@@ -1,14 +1,14 @@
 //! What a run did is known at any instant, also when it was killed before it could say so.
 
 use records::Status;
-use store::{Holder, LogAccount, Outcome, Query, RunAccount, Store, Writer};
+use store::{Holder, LogOutcome, LogRecord, Query, RunRecord, Store, Writer};
 
 use crate::made::{account, record, result, run, writer};
 
 /// The four logs of a run that means to do flights 0 to 3 of tail 1, and does the first three: estimated,
 /// refused in two of its three positions, and broken.
 fn cut_short(writer: &mut Writer) {
-    let to_do: Vec<LogAccount> = (0..4).map(|flight| not_reached(flight, "run")).collect();
+    let to_do: Vec<LogRecord> = (0..4).map(|flight| not_reached(flight, "run")).collect();
     writer.begin_run(&run("run", "2026-11-20T02:00:00Z", None), &to_do).unwrap();
     let mut refused = result(1, 1, 0.0);
     (refused.account.estimated, refused.account.refused) = (1, 2);
@@ -16,14 +16,14 @@ fn cut_short(writer: &mut Writer) {
         record.estimate.status = Status::Refused;
     }
     let mut broken = account(1, 2);
-    (broken.outcome, broken.estimated) = (Outcome::Error, 0);
+    (broken.outcome, broken.estimated) = (LogOutcome::Error, 0);
     let broken = store::LogResult { account: broken, records: Vec::new(), retires: Vec::new() };
     writer.commit(&[result(1, 0, 30e-6), refused, broken]).unwrap();
 }
 
-fn not_reached(flight: i64, run_id: &str) -> LogAccount {
-    LogAccount {
-        outcome: Outcome::NotReached,
+fn not_reached(flight: i64, run_id: &str) -> LogRecord {
+    LogRecord {
+        outcome: LogOutcome::NotReached,
         positions: Vec::new(),
         estimated: 0,
         run_id: run_id.into(),
@@ -31,11 +31,11 @@ fn not_reached(flight: i64, run_id: &str) -> LogAccount {
     }
 }
 
-fn figures(run: &RunAccount) -> [i64; 5] {
+fn figures(run: &RunRecord) -> [i64; 5] {
     [run.done, run.estimated, run.refused, run.errors, run.not_reached]
 }
 
-fn outcomes(store: &Store, run_id: &str) -> Vec<Outcome> {
+fn outcomes(store: &Store, run_id: &str) -> Vec<LogOutcome> {
     store.run_logs(run_id).unwrap().iter().map(|log| log.outcome).collect()
 }
 
@@ -48,7 +48,10 @@ fn a_run_that_was_killed_is_accounted_for_log_by_log() {
     let runs = store.runs().unwrap();
     assert_eq!(figures(&runs[0]), [3, 4, 2, 1, 1]);
     assert_eq!((runs[0].exit_code, runs[0].has_ended()), (None, false));
-    assert_eq!(outcomes(&store, "run"), [Outcome::Done, Outcome::Done, Outcome::Error, Outcome::NotReached]);
+    assert_eq!(
+        outcomes(&store, "run"),
+        [LogOutcome::Done, LogOutcome::Done, LogOutcome::Error, LogOutcome::NotReached]
+    );
     assert_eq!(store.info().unwrap().last, Some(runs[0].clone()));
 }
 
@@ -57,7 +60,7 @@ fn a_run_that_was_killed_is_accounted_for_log_by_log() {
 fn records_without_an_account_are_counted_and_their_log_is_done_again() {
     let dir = tempfile::tempdir().unwrap();
     let mut writer = writer(dir.path());
-    let to_do: Vec<LogAccount> = (0..2).map(|flight| not_reached(flight, "run")).collect();
+    let to_do: Vec<LogRecord> = (0..2).map(|flight| not_reached(flight, "run")).collect();
     writer.begin_run(&run("run", "2026-11-20T02:00:00Z", None), &to_do).unwrap();
     writer.commit(&[result(1, 0, 30e-6)]).unwrap();
     let logs = dir.path().join("logs/_delta_log");
@@ -65,7 +68,7 @@ fn records_without_an_account_are_counted_and_their_log_is_done_again() {
     assert!(last(2).exists() && !last(3).exists());
     std::fs::remove_file(last(2)).unwrap();
 
-    assert_eq!(outcomes(writer.store(), "run"), [Outcome::Unaccounted, Outcome::NotReached]);
+    assert_eq!(outcomes(writer.store(), "run"), [LogOutcome::Unaccounted, LogOutcome::NotReached]);
     assert_eq!(figures(&writer.store().runs().unwrap()[0]), [1, 3, 0, 0, 1]);
     assert_eq!(writer.store().accounts().unwrap(), [], "the next run must do both");
 }

@@ -9,11 +9,12 @@ use jiff::Timestamp;
 use parquet::arrow::ArrowWriter;
 use std::sync::Arc;
 
+use crate::delta::snapshot::Snapshot;
 use crate::error::Error;
-use crate::layout::Store;
-use crate::query::Query;
-use crate::table::Snapshot;
-use crate::{columns, frame};
+use crate::handle::Store;
+use crate::read::polars_scan;
+use crate::read::query::Query;
+use crate::rows::gap_columns;
 
 /// Rows held in memory at a time; flights of one instant stay together.
 const WINDOW_ROWS: usize = 500_000;
@@ -25,7 +26,7 @@ pub enum Format {
     Csv,
     /// An array of objects that name every column, empty ones as `null`.
     Json,
-    /// Parquet with the columns of [`columns::schema`].
+    /// Parquet with the columns of [`gap_columns::schema`].
     Parquet,
 }
 
@@ -39,10 +40,10 @@ impl Store {
     /// As [`Store::scan`]; [`Error::Arrow`] and [`Error::Parquet`] when `to` cannot be written.
     pub fn export(&self, query: &Query, format: Format, to: impl Write + Send) -> Result<usize, Error> {
         let snapshot = self.gaps.snapshot()?;
-        let mut sink = Sink::new(format, to)?;
+        let mut sink = ExportWriter::new(format, to)?;
         let mut rows = 0;
         for window in self.windows(&snapshot, query)? {
-            let batch = self.select(&snapshot, &window, columns::schema())?;
+            let batch = self.select(&snapshot, &window, gap_columns::schema())?;
             rows += batch.num_rows();
             sink.write(&batch)?;
         }
@@ -55,7 +56,7 @@ impl Store {
         if query.last.is_some() {
             return Ok(vec![query.clone()]);
         }
-        let schema = frame::only(&columns::schema(), &["departure_utc"])?;
+        let schema = polars_scan::only(&gap_columns::schema(), &["departure_utc"])?;
         let departures = self.select(snapshot, query, schema)?;
         let departures = departures.column(0).as_primitive::<TimestampMicrosecondType>();
         let edges = (1..departures.len().div_ceil(WINDOW_ROWS)).map(|i| departures.value(i * WINDOW_ROWS));
@@ -72,18 +73,18 @@ impl Store {
     }
 }
 
-enum Sink<W: Write + Send> {
+enum ExportWriter<W: Write + Send> {
     Csv(arrow::csv::Writer<W>),
     Json(arrow::json::Writer<W, JsonArray>),
     Parquet(ArrowWriter<W>),
 }
 
-impl<W: Write + Send> Sink<W> {
+impl<W: Write + Send> ExportWriter<W> {
     fn new(format: Format, to: W) -> Result<Self, Error> {
         Ok(match format {
             Format::Csv => Self::Csv(arrow::csv::Writer::new(to)),
             Format::Json => Self::Json(WriterBuilder::new().with_explicit_nulls(true).build(to)),
-            Format::Parquet => Self::Parquet(ArrowWriter::try_new(to, columns::schema(), None)?),
+            Format::Parquet => Self::Parquet(ArrowWriter::try_new(to, gap_columns::schema(), None)?),
         })
     }
 

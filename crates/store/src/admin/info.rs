@@ -7,11 +7,11 @@ use arrow::array::AsArray;
 use arrow::datatypes::TimestampMicrosecondType;
 use jiff::Timestamp;
 
-use crate::account::RunAccount;
-use crate::columns;
 use crate::error::Error;
-use crate::frame::{self, Read};
-use crate::layout::Store;
+use crate::handle::Store;
+use crate::read::polars_scan::{self, ScanRequest};
+use crate::rows::accounts::RunRecord;
+use crate::rows::gap_columns;
 
 /// A store in numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,9 +37,9 @@ pub struct Info {
     /// The Delta version of the records.
     pub version: u64,
     /// The newest run that ended with code 0 or 1.
-    pub last_completed: Option<RunAccount>,
+    pub last_completed: Option<RunRecord>,
     /// The newest run, however it ended.
-    pub last: Option<RunAccount>,
+    pub last: Option<RunRecord>,
 }
 
 impl Store {
@@ -52,8 +52,9 @@ impl Store {
         let files: Vec<PathBuf> = snapshot.files.iter().map(|file| file.path.clone()).collect();
         self.check(&files)?;
         let names = ["departure_utc", "tail_number", "flight_id", "part_number", "serial_number"];
-        let schema = frame::only(&columns::schema(), &names)?;
-        let batch = Read { files: &files, schema, condition: None, order: &[], last: None }.collect()?;
+        let schema = polars_scan::only(&gap_columns::schema(), &names)?;
+        let batch =
+            ScanRequest { files: &files, schema, condition: None, order: &[], last: None }.collect()?;
         let departures = batch.column(0).as_primitive::<TimestampMicrosecondType>();
         let text = |column: usize| batch.column(column).as_string::<i32>().iter().flatten();
         let at = |micros: Option<i64>| micros.and_then(|us| Timestamp::from_microsecond(us).ok());
@@ -79,6 +80,6 @@ impl Store {
     }
 }
 
-fn completed(run: &RunAccount) -> bool {
+fn completed(run: &RunRecord) -> bool {
     matches!(run.exit_code, Some(0 | 1))
 }

@@ -15,10 +15,10 @@ use polars::prelude::{
 };
 
 use crate::error::Error;
-use crate::tabled::element;
+use crate::rows::row_schema::element;
 
 /// What is read of data files.
-pub(crate) struct Read<'a> {
+pub(crate) struct ScanRequest<'a> {
     /// The files, of one table.
     pub(crate) files: &'a [PathBuf],
     /// The columns wanted.
@@ -31,7 +31,7 @@ pub(crate) struct Read<'a> {
     pub(crate) last: Option<usize>,
 }
 
-impl Read<'_> {
+impl ScanRequest<'_> {
     /// Reads.
     ///
     /// Row groups whose statistics rule out the condition are not decoded.
@@ -45,17 +45,17 @@ impl Read<'_> {
         }
         // Files of one release are alike, and read as one. Where some lack columns that came later, or have
         // some that we do not know, Polars refuses, and each is read by itself.
-        let alike = scan(self.files).and_then(|frame| self.told(vec![self.chosen(frame)]));
+        let alike = scan(self.files).and_then(|frame| self.concat_collect(vec![self.with_filter(frame)]));
         let frame = match alike {
             Ok(frame) => frame,
-            Err(_) => {
-                self.told(self.files.iter().map(|file| self.alone(file)).collect::<PolarsResult<_>>()?)?
-            }
+            Err(_) => self.concat_collect(
+                self.files.iter().map(|file| self.scan_one(file)).collect::<PolarsResult<_>>()?,
+            )?,
         };
         to_arrow(&frame, &self.schema)
     }
 
-    fn chosen(&self, frame: LazyFrame) -> LazyFrame {
+    fn with_filter(&self, frame: LazyFrame) -> LazyFrame {
         match &self.condition {
             Some(condition) => frame.filter(condition.clone()),
             None => frame,
@@ -63,7 +63,7 @@ impl Read<'_> {
     }
 
     /// The rows of frames with the same columns, put together in order.
-    fn told(&self, frames: Vec<LazyFrame>) -> PolarsResult<DataFrame> {
+    fn concat_collect(&self, frames: Vec<LazyFrame>) -> PolarsResult<DataFrame> {
         let mut frame = concat(frames, UnionArgs::default())?;
         if !self.order.is_empty() {
             let order: Vec<Expr> = self.order.iter().map(|name| col(*name)).collect();
@@ -77,7 +77,7 @@ impl Read<'_> {
     }
 
     /// A file as if it had the columns wanted: those of a later release are empty.
-    fn alone(&self, file: &PathBuf) -> PolarsResult<LazyFrame> {
+    fn scan_one(&self, file: &PathBuf) -> PolarsResult<LazyFrame> {
         let mut frame = scan(std::slice::from_ref(file))?;
         let has = frame.collect_schema()?;
         let lacks =
@@ -88,7 +88,7 @@ impl Read<'_> {
         let wanted = self.schema.fields().iter().map(|field| field.name().as_str());
         let kept: BTreeSet<&str> = wanted.chain(self.order.iter().copied()).collect();
         let kept: Vec<Expr> = kept.into_iter().map(col).collect();
-        Ok(self.chosen(frame).with_columns(empty).select(kept))
+        Ok(self.with_filter(frame).with_columns(empty).select(kept))
     }
 }
 

@@ -10,13 +10,13 @@ use std::slice;
 use jiff::{SignedDuration, Timestamp};
 use records::{GapRecord, Status};
 
-use crate::account::{LogAccount, Outcome, RunAccount};
 use crate::error::Error;
-use crate::layout::Store;
-use crate::lock::Lock;
-use crate::newest::Wanted;
-use crate::query::Query;
-use crate::writer::{self, Writer};
+use crate::handle::Store;
+use crate::read::latest_rows::TextFilter;
+use crate::read::query::Query;
+use crate::rows::accounts::{LogOutcome, LogRecord, RunRecord};
+use crate::write::lock::Lock;
+use crate::write::writer::{self, Writer};
 
 /// A run in a bucket that gave no sign of life for so long was killed: it stores each log as it is finished.
 const SILENT: SignedDuration = SignedDuration::from_hours(1);
@@ -26,19 +26,19 @@ impl Store {
     ///
     /// # Errors
     /// As [`Store::records`].
-    pub fn run_logs(&self, run_id: &str) -> Result<Vec<LogAccount>, Error> {
+    pub fn run_logs(&self, run_id: &str) -> Result<Vec<LogRecord>, Error> {
         let logs = self.newest(
             &self.logs,
-            Some(Wanted { column: "run_id", is_wanted: &|id| id == run_id }),
+            Some(TextFilter { column: "run_id", is_wanted: &|id| id == run_id }),
             |stats| stats.may_hold("run_id", run_id),
-            |account: &LogAccount| account.log_path.clone(),
+            |account: &LogRecord| account.log_path.clone(),
         )?;
-        let mut logs: BTreeMap<String, LogAccount> =
+        let mut logs: BTreeMap<String, LogRecord> =
             logs.into_iter().map(|account| (account.log_path.clone(), account)).collect();
         let records = self.records(&Query { run_id: Some(run_id.to_owned()), ..Query::default() })?;
         for record in &records {
             let log = logs.entry(record.provenance.log_path.clone()).or_insert_with(|| seen(record));
-            if matches!(log.outcome, Outcome::NotReached | Outcome::Unaccounted) {
+            if matches!(log.outcome, LogOutcome::NotReached | LogOutcome::Unaccounted) {
                 count(log, record);
             }
         }
@@ -51,8 +51,8 @@ impl Store {
     ///
     /// # Errors
     /// As [`Store::records`].
-    pub fn runs(&self) -> Result<Vec<RunAccount>, Error> {
-        let mut runs = self.newest(&self.runs, None, |_| true, |run: &RunAccount| run.run_id.clone())?;
+    pub fn runs(&self) -> Result<Vec<RunRecord>, Error> {
+        let mut runs = self.newest(&self.runs, None, |_| true, |run: &RunRecord| run.run_id.clone())?;
         for run in runs.iter_mut().filter(|run| !run.has_ended()) {
             add_up(run, &self.run_logs(&run.run_id)?);
         }
@@ -72,11 +72,11 @@ impl Store {
     }
 
     /// Whether a run without an end may still go, where no lock says so.
-    fn may_live(&self, run: &RunAccount) -> bool {
+    fn may_live(&self, run: &RunRecord) -> bool {
         let signs =
             || self.run_logs(&run.run_id).unwrap_or_default().into_iter().map(|log| log.processed_utc);
         let is_late = |at: Timestamp| Timestamp::now().duration_since(at) < SILENT;
-        self.place.is_bucket()
+        self.location.is_bucket()
             && !run.has_ended()
             && (is_late(run.started_utc) || signs().max().is_some_and(is_late))
     }
@@ -87,7 +87,7 @@ impl Writer {
     ///
     /// # Errors
     /// As [`Writer::commit`].
-    pub fn begin_run(&mut self, run: &RunAccount, logs: &[LogAccount]) -> Result<(), Error> {
+    pub fn begin_run(&mut self, run: &RunRecord, logs: &[LogRecord]) -> Result<(), Error> {
         if !logs.is_empty() {
             writer::account(&self.store().logs, logs)?;
         }
@@ -98,7 +98,7 @@ impl Writer {
     ///
     /// # Errors
     /// As [`Writer::commit`].
-    pub fn end_run(&mut self, run: &RunAccount) -> Result<(), Error> {
+    pub fn end_run(&mut self, run: &RunRecord) -> Result<(), Error> {
         writer::account(&self.store().runs, slice::from_ref(run))
     }
 
@@ -107,16 +107,16 @@ impl Writer {
     ///
     /// # Errors
     /// As [`Writer::commit`].
-    pub fn close_killed_runs(&mut self) -> Result<Vec<RunAccount>, Error> {
+    pub fn close_killed_runs(&mut self) -> Result<Vec<RunRecord>, Error> {
         let runs = self.store().runs()?;
-        let is_killed = |run: &RunAccount| !run.has_ended() && !self.store().may_live(run);
-        let mut killed: Vec<RunAccount> = runs.into_iter().filter(is_killed).collect();
+        let is_killed = |run: &RunRecord| !run.has_ended() && !self.store().may_live(run);
+        let mut killed: Vec<RunRecord> = runs.into_iter().filter(is_killed).collect();
         for run in &mut killed {
             let logs = self.store().run_logs(&run.run_id)?;
-            let reached = logs.iter().filter(|log| log.outcome != Outcome::NotReached);
+            let reached = logs.iter().filter(|log| log.outcome != LogOutcome::NotReached);
             run.finished_utc = reached.map(|log| log.processed_utc).max().or(Some(run.started_utc));
-            let cut: Vec<LogAccount> =
-                logs.into_iter().filter(|log| log.outcome == Outcome::Unaccounted).collect();
+            let cut: Vec<LogRecord> =
+                logs.into_iter().filter(|log| log.outcome == LogOutcome::Unaccounted).collect();
             if !cut.is_empty() {
                 writer::account(&self.store().logs, &cut)?;
             }
@@ -127,8 +127,8 @@ impl Writer {
 }
 
 /// A log of which only records are stored.
-fn seen(record: &GapRecord) -> LogAccount {
-    LogAccount {
+fn seen(record: &GapRecord) -> LogRecord {
+    LogRecord {
         log_path: record.provenance.log_path.clone(),
         size_bytes: 0,
         modified_utc_ns: 0,
@@ -139,7 +139,7 @@ fn seen(record: &GapRecord) -> LogAccount {
         flight_id: None,
         departure_utc: None,
         positions: Vec::new(),
-        outcome: Outcome::NotReached,
+        outcome: LogOutcome::NotReached,
         estimated: 0,
         refused: 0,
         error_code: None,
@@ -151,9 +151,9 @@ fn seen(record: &GapRecord) -> LogAccount {
 }
 
 /// Counts a record into the account of a log that has none of its own.
-fn count(log: &mut LogAccount, record: &GapRecord) {
-    if log.outcome == Outcome::NotReached {
-        log.outcome = Outcome::Unaccounted;
+fn count(log: &mut LogRecord, record: &GapRecord) {
+    if log.outcome == LogOutcome::NotReached {
+        log.outcome = LogOutcome::Unaccounted;
         log.log_digest = Some(record.provenance.log_digest.clone());
         log.tail_number = Some(record.flight.tail_number.to_string());
         log.flight_id = Some(record.flight.flight_id.to_string());
@@ -171,12 +171,12 @@ fn count(log: &mut LogAccount, record: &GapRecord) {
     }
 }
 
-fn add_up(run: &mut RunAccount, logs: &[LogAccount]) {
-    let with = |wanted: &[Outcome]| logs.iter().filter(|log| wanted.contains(&log.outcome)).count() as i64;
-    run.done = with(&[Outcome::Done, Outcome::Error, Outcome::Unaccounted]);
-    run.errors = with(&[Outcome::Error]);
-    run.not_reached = with(&[Outcome::NotReached]);
-    let stored = || logs.iter().filter(|log| log.outcome != Outcome::Known);
+fn add_up(run: &mut RunRecord, logs: &[LogRecord]) {
+    let with = |wanted: &[LogOutcome]| logs.iter().filter(|log| wanted.contains(&log.outcome)).count() as i64;
+    run.done = with(&[LogOutcome::Done, LogOutcome::Error, LogOutcome::Unaccounted]);
+    run.errors = with(&[LogOutcome::Error]);
+    run.not_reached = with(&[LogOutcome::NotReached]);
+    let stored = || logs.iter().filter(|log| log.outcome != LogOutcome::Known);
     run.estimated = stored().map(|log| log.estimated).sum();
     run.refused = stored().map(|log| log.refused).sum();
 }

@@ -2,15 +2,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::account::LogAccount;
 use crate::error::Error;
-use crate::layout::Store;
-use crate::query::{Query, RecordKey};
-use crate::writer::{self, LogResult, Writer};
+use crate::handle::Store;
+use crate::read::query::Query;
+use crate::rows::accounts::LogRecord;
+use crate::write::writer::{self, LogResult, Writer};
+use records::RecordKey;
 
 /// What was taken over.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Adopted {
+pub struct PromotionSummary {
     /// Logs the trial accounts for.
     pub logs: usize,
     /// Records stored.
@@ -30,16 +31,20 @@ impl Writer {
     ///
     /// # Errors
     /// [`Error::Itself`] when both are one store, else as [`Writer::commit`] and [`Store::records`].
-    pub fn adopt(&mut self, trial: &Store, mut watch: impl FnMut(&str, usize)) -> Result<Adopted, Error> {
+    pub fn promote(
+        &mut self,
+        trial: &Store,
+        mut watch: impl FnMut(&str, usize),
+    ) -> Result<PromotionSummary, Error> {
         if trial.dir() == self.store().dir() {
             return Err(Error::Itself { dir: trial.dir().to_owned() });
         }
         let before = by_name(self.store().accounts()?);
-        let mut tails: BTreeMap<Option<String>, Vec<LogAccount>> = BTreeMap::new();
+        let mut tails: BTreeMap<Option<String>, Vec<LogRecord>> = BTreeMap::new();
         for account in trial.accounts()? {
             tails.entry(account.tail_number.clone()).or_default().push(account);
         }
-        let mut adopted = Adopted::default();
+        let mut adopted = PromotionSummary::default();
         let total = tails.len();
         for (tail, accounts) in tails {
             let results = results(trial, tail.as_deref(), accounts, &before)?;
@@ -55,7 +60,7 @@ impl Writer {
     }
 }
 
-impl Adopted {
+impl PromotionSummary {
     fn count(&mut self, results: &[LogResult]) {
         self.logs += results.len();
         self.records += results.iter().map(|result| result.records.len()).sum::<usize>();
@@ -67,8 +72,8 @@ impl Adopted {
 fn results(
     trial: &Store,
     tail: Option<&str>,
-    accounts: Vec<LogAccount>,
-    before: &BTreeMap<String, LogAccount>,
+    accounts: Vec<LogRecord>,
+    before: &BTreeMap<String, LogRecord>,
 ) -> Result<Vec<LogResult>, Error> {
     let records = match tail {
         Some(tail) => trial.records(&Query { tail_number: Some(tail.to_owned()), ..Query::default() })?,
@@ -77,10 +82,10 @@ fn results(
     let made: BTreeSet<RecordKey> = records.iter().map(RecordKey::of).collect();
     let mut owner = BTreeMap::new();
     for (at, account) in accounts.iter().enumerate() {
-        owner.extend(account.owned().into_iter().map(|key| (key, at)));
+        owner.extend(account.record_keys().into_iter().map(|key| (key, at)));
     }
-    let retires = |account: &LogAccount| match before.get(&account.log_path) {
-        Some(before) => before.owned().into_iter().filter(|key| !made.contains(key)).collect(),
+    let retires = |account: &LogRecord| match before.get(&account.log_path) {
+        Some(before) => before.record_keys().into_iter().filter(|key| !made.contains(key)).collect(),
         None => Vec::new(),
     };
     let mut results: Vec<LogResult> = accounts
@@ -96,6 +101,6 @@ fn results(
     Ok(results)
 }
 
-fn by_name(accounts: Vec<LogAccount>) -> BTreeMap<String, LogAccount> {
+fn by_name(accounts: Vec<LogRecord>) -> BTreeMap<String, LogRecord> {
     accounts.into_iter().map(|account| (account.log_path.clone(), account)).collect()
 }

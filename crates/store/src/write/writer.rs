@@ -3,27 +3,32 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::slice;
+use std::time::Duration;
 
 use arrow::array::{AsArray, BooleanArray, RecordBatch};
 use arrow::compute::filter_record_batch;
 use arrow::datatypes::{SchemaRef, TimestampMicrosecondType};
 use records::GapRecord;
 
-use crate::account::LogAccount;
+use crate::delta::data_file;
+use crate::delta::snapshot::{DataFile, Snapshot};
+use crate::delta::table::{Change, Table};
 use crate::error::Error;
-use crate::frame::{self, Read};
-use crate::layout::Store;
-use crate::lock::Lock;
-use crate::query::RecordKey;
-use crate::table::{Change, DataFile, Snapshot, Table};
-use crate::tabled::Tabled;
-use crate::{columns, datafile, numbered};
+use crate::handle::Store;
+use crate::read::polars_scan::{self, ScanRequest};
+use crate::rows::accounts::LogRecord;
+use crate::rows::gap_columns;
+use crate::rows::row_schema::RowSchema;
+use crate::rows::versioned;
+use crate::store_dir::{FORMAT, MARKER, check_marker, write_marker};
+use crate::write::lock::{Holder, Lock};
+use records::RecordKey;
 
 /// What came of one log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogResult {
     /// Its account.
-    pub account: LogAccount,
+    pub account: LogRecord,
     /// Its records; each takes the place of a stored one with the same key.
     pub records: Vec<GapRecord>,
     /// Records stored before that are no longer true.
@@ -38,7 +43,23 @@ pub struct Writer {
 }
 
 /// What becomes of each record named: a new one, or none.
-type Verdicts<'a> = BTreeMap<RecordKey, Option<&'a GapRecord>>;
+type MergeDecisions<'a> = BTreeMap<RecordKey, Option<&'a GapRecord>>;
+
+impl Store {
+    /// Locks the store for writing; waits at most `wait` for another writer.
+    ///
+    /// A bucket has no lock: a commit that another one preceded is rejected there, and planned again.
+    ///
+    /// # Errors
+    /// [`Error::Held`] names the holder; [`Error::Io`] when the folder cannot be written.
+    pub fn lock(&self, holder: &Holder, wait: Option<Duration>) -> Result<Writer, Error> {
+        let lock = self.lock_file().map(|file| Lock::take(&file, holder, wait)).transpose()?;
+        if check_marker(&self.location, MARKER)? < FORMAT {
+            write_marker(&self.location)?;
+        }
+        Ok(Writer::new(self.clone(), lock))
+    }
+}
 
 impl Writer {
     pub(crate) fn new(store: Store, lock: Option<Lock>) -> Self {
@@ -60,67 +81,71 @@ impl Writer {
     /// [`Error::Io`] and [`Error::Table`] when the disk refuses, [`Error::Damaged`] when a file to be
     /// copied is not the one that was committed. What was stored before is intact.
     pub fn commit(&mut self, results: &[LogResult]) -> Result<(), Error> {
-        let verdicts = verdicts(results);
-        if !verdicts.is_empty() {
-            self.store.gaps.change(|snapshot| self.supersede(snapshot, &verdicts))?;
+        let decisions = decisions(results);
+        if !decisions.is_empty() {
+            self.store.gaps.change(|snapshot| self.supersede(snapshot, &decisions))?;
         }
-        let newest: BTreeMap<&str, &LogAccount> =
+        let newest: BTreeMap<&str, &LogRecord> =
             results.iter().map(|result| (result.account.log_path.as_str(), &result.account)).collect();
-        let accounts: Vec<LogAccount> = newest.into_values().cloned().collect();
+        let accounts: Vec<LogRecord> = newest.into_values().cloned().collect();
         if accounts.is_empty() { Ok(()) } else { account(&self.store.logs, &accounts) }
     }
 
-    fn supersede<'a>(&self, snapshot: &'a Snapshot, verdicts: &Verdicts<'_>) -> Result<Change<'a>, Error> {
+    fn supersede<'a>(
+        &self,
+        snapshot: &'a Snapshot,
+        decisions: &MergeDecisions<'_>,
+    ) -> Result<Change<'a>, Error> {
         let mut change = Change::default();
-        let (place, version) = (&self.store.gaps.place, snapshot.version + 1);
-        for file in snapshot.files.iter().filter(|file| file.has_rows() && may_hold_any(file, verdicts)) {
-            if let Some(rest) = self.without(file, verdicts)? {
+        let (location, version) = (&self.store.gaps.location, snapshot.version + 1);
+        for file in snapshot.files.iter().filter(|file| file.has_rows() && may_hold_any(file, decisions)) {
+            if let Some(rest) = self.without(file, decisions)? {
                 change.remove.push(file);
                 if rest.num_rows() > 0 {
-                    change.add.push(datafile::write(place, version, &rest, true)?);
+                    change.add.push(data_file::write(location, version, &rest, true)?);
                 }
             }
         }
-        let new: Vec<GapRecord> = verdicts.values().copied().flatten().cloned().collect();
+        let new: Vec<GapRecord> = decisions.values().copied().flatten().cloned().collect();
         if !new.is_empty() {
-            change.add.push(datafile::write(place, version, &columns::to_batch(&new)?, true)?);
+            change.add.push(data_file::write(location, version, &gap_columns::to_batch(&new)?, true)?);
         }
         Ok(change)
     }
 
     /// What is left of a file without the records named; nothing when it holds none of them.
-    fn without(&self, file: &DataFile, verdicts: &Verdicts<'_>) -> Result<Option<RecordBatch>, Error> {
+    fn without(&self, file: &DataFile, decisions: &MergeDecisions<'_>) -> Result<Option<RecordBatch>, Error> {
         let files = slice::from_ref(&file.path);
         self.store.check(files)?;
-        let keys = frame::only(&columns::schema(), &RecordKey::COLUMNS)?;
-        if stays(&rows(files, keys)?, verdicts)?.false_count() == 0 {
+        let keys = polars_scan::only(&gap_columns::schema(), &RecordKey::COLUMNS)?;
+        if stays(&rows(files, keys)?, decisions)?.false_count() == 0 {
             return Ok(None);
         }
-        let all = rows(files, columns::schema())?;
-        Ok(Some(filter_record_batch(&all, &stays(&all, verdicts)?)?))
+        let all = rows(files, gap_columns::schema())?;
+        Ok(Some(filter_record_batch(&all, &stays(&all, decisions)?)?))
     }
 }
 
 /// Appends rows to a table of which the newest counts.
-pub(crate) fn account<R: Tabled>(table: &Table, rows: &[R]) -> Result<(), Error> {
+pub(crate) fn account<R: RowSchema>(table: &Table, rows: &[R]) -> Result<(), Error> {
     table.change(|snapshot| {
         let version = snapshot.version + 1;
-        let add = datafile::write(&table.place, version, &numbered::to_batch(rows, version)?, true)?;
+        let add = data_file::write(&table.location, version, &versioned::to_batch(rows, version)?, true)?;
         Ok(Change { add: vec![add], ..Change::default() })
     })
 }
 
-fn verdicts(results: &[LogResult]) -> Verdicts<'_> {
-    let mut verdicts = Verdicts::new();
+fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
+    let mut decisions = MergeDecisions::new();
     for result in results {
-        verdicts.extend(result.retires.iter().map(|key| (key.clone(), None)));
-        verdicts.extend(result.records.iter().map(|record| (RecordKey::of(record), Some(record))));
+        decisions.extend(result.retires.iter().map(|key| (key.clone(), None)));
+        decisions.extend(result.records.iter().map(|record| (RecordKey::of(record), Some(record))));
     }
-    verdicts
+    decisions
 }
 
 /// Whether the file's bounds leave room for one of the records.
-fn may_hold_any(file: &DataFile, verdicts: &Verdicts<'_>) -> bool {
+fn may_hold_any(file: &DataFile, decisions: &MergeDecisions<'_>) -> bool {
     let (earliest_us, latest_us) = file.stats.times_us("departure_utc");
     let from = |departure_us| RecordKey {
         departure_us,
@@ -128,18 +153,18 @@ fn may_hold_any(file: &DataFile, verdicts: &Verdicts<'_>) -> bool {
         flight_id: String::new(),
         position: String::new(),
     };
-    let in_time = verdicts.range(from(earliest_us)..from(latest_us.saturating_add(1)));
+    let in_time = decisions.range(from(earliest_us)..from(latest_us.saturating_add(1)));
     in_time.map(|(key, _)| key).any(|key| file.stats.may_hold("tail_number", &key.tail_number))
 }
 
 fn rows(files: &[PathBuf], schema: SchemaRef) -> Result<RecordBatch, Error> {
-    Read { files, schema, condition: None, order: &[], last: None }.collect()
+    ScanRequest { files, schema, condition: None, order: &[], last: None }.collect()
 }
 
 /// Which rows nobody speaks of.
-fn stays(batch: &RecordBatch, verdicts: &Verdicts<'_>) -> Result<BooleanArray, Error> {
+fn stays(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<BooleanArray, Error> {
     let keys = keys(batch)?;
-    Ok(keys.iter().map(|key| Some(!verdicts.contains_key(key))).collect())
+    Ok(keys.iter().map(|key| Some(!decisions.contains_key(key))).collect())
 }
 
 /// The keys of a batch, row by row.

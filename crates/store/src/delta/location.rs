@@ -1,7 +1,7 @@
 //! Where a store lies: a folder, or a prefix of a bucket of which copies lie in a folder of this process.
 //!
 //! Files go by the same path in both: for a bucket it is where the copy lies once the file was
-//! [brought](Place::bring). Data files never change under their names, so a copy is as good as the object; it is
+//! [brought](Location::fetch). Data files never change under their names, so a copy is as good as the object; it is
 //! compared with its digest like any file.
 
 use std::path::{Path, PathBuf};
@@ -16,20 +16,20 @@ use object_io::{Address, Client, block_on};
 use tokio::runtime::{Builder, Handle, Runtime};
 use url::Url;
 
-use crate::durable::{self, DurableFiles};
+use crate::delta::durable_fs::{self, DurableFiles};
 use crate::error::Error;
 
-/// A store's or a table's place.
+/// A store's or a table's location.
 #[derive(Debug, Clone)]
-pub(crate) struct Place {
+pub(crate) struct Location {
     /// The folder itself, or where copies lie.
     dir: PathBuf,
-    bucket: Option<Bucket>,
-    runtime: Arc<Threads>,
+    bucket: Option<BucketLocation>,
+    runtime: Arc<RuntimeHandle>,
 }
 
 #[derive(Debug, Clone)]
-struct Bucket {
+struct BucketLocation {
     address: Address,
     client: Client,
     /// Deleted with the last who reads from it.
@@ -38,19 +38,19 @@ struct Bucket {
 
 /// What runs Delta's asynchronous library: threads of our own, or those that serve the bucket's connections.
 #[derive(Debug)]
-enum Threads {
+enum RuntimeHandle {
     Own(Runtime),
     Shared(Handle),
 }
 
-impl Place {
+impl Location {
     /// A folder that exists, or an address.
     pub(crate) fn at(path: &Path) -> Result<Self, Error> {
         let Some(address) = Address::parse(path)? else { return Self::folder(path) };
         let copies = tempfile::tempdir().map_err(Error::io(std::env::temp_dir(), "written"))?;
-        let runtime = Arc::new(Threads::Shared(object_io::handle()?));
+        let runtime = Arc::new(RuntimeHandle::Shared(object_io::handle()?));
         let (dir, client) = (copies.path().to_owned(), address.client()?);
-        let bucket = Some(Bucket { address, client, _copies: Arc::new(copies) });
+        let bucket = Some(BucketLocation { address, client, _copies: Arc::new(copies) });
         Ok(Self { dir, bucket, runtime })
     }
 
@@ -58,13 +58,13 @@ impl Place {
     fn folder(path: &Path) -> Result<Self, Error> {
         let dir = std::fs::canonicalize(path).map_err(Error::io(path, "opened"))?;
         let own = Builder::new_multi_thread().worker_threads(1).thread_name("store").enable_all().build();
-        let runtime = Arc::new(Threads::Own(own.map_err(Error::io(&dir, "opened"))?));
+        let runtime = Arc::new(RuntimeHandle::Own(own.map_err(Error::io(&dir, "opened"))?));
         Ok(Self { dir, bucket: None, runtime })
     }
 
-    /// A folder of this place.
-    pub(crate) fn below(&self, name: &str) -> Self {
-        let deeper = |bucket: &Bucket| Bucket {
+    /// A folder of this location.
+    pub(crate) fn join(&self, name: &str) -> Self {
+        let deeper = |bucket: &BucketLocation| BucketLocation {
             address: bucket.address.with_key(&joined(bucket.address.key(), name)),
             ..bucket.clone()
         };
@@ -82,7 +82,7 @@ impl Place {
     }
 
     /// A file's name for people and for other programs.
-    pub(crate) fn named(&self, path: &Path) -> PathBuf {
+    pub(crate) fn display_path(&self, path: &Path) -> PathBuf {
         match &self.bucket {
             Some(bucket) => bucket.address.with_key(&self.key(bucket, path)).to_string().into(),
             None => path.to_owned(),
@@ -91,8 +91,8 @@ impl Place {
 
     pub(crate) fn block_on<F: Future>(&self, work: F) -> F::Output {
         match self.runtime.as_ref() {
-            Threads::Own(runtime) => runtime.block_on(work),
-            Threads::Shared(handle) => handle.block_on(work),
+            RuntimeHandle::Own(runtime) => runtime.block_on(work),
+            RuntimeHandle::Shared(handle) => handle.block_on(work),
         }
     }
 
@@ -119,7 +119,7 @@ impl Place {
         if self.is_bucket() {
             return Ok(());
         }
-        durable::sync_dir(&self.dir).map_err(Error::io(&self.dir, "synced"))
+        durable_fs::sync_dir(&self.dir).map_err(Error::io(&self.dir, "synced"))
     }
 
     /// Whether a file is there.
@@ -139,7 +139,7 @@ impl Place {
         }
     }
 
-    fn size(&self, bucket: &Bucket, path: &Path) -> Result<Option<u64>, Error> {
+    fn size(&self, bucket: &BucketLocation, path: &Path) -> Result<Option<u64>, Error> {
         match bucket.ask(&self.key(bucket, path), async |location| bucket.client.head(location).await) {
             Ok(meta) => Ok(Some(meta.size)),
             Err(object_io::Error::Missing { .. }) => Ok(None),
@@ -150,12 +150,12 @@ impl Place {
     /// A small file's content.
     pub(crate) fn read(&self, name: &str) -> Result<String, Error> {
         let path = self.dir.join(name);
-        self.bring(&path)?;
+        self.fetch(&path)?;
         std::fs::read_to_string(&path).map_err(Error::io(path, "read"))
     }
 
     /// Has a file at hand under its path: one in a bucket is copied there.
-    pub(crate) fn bring(&self, path: &Path) -> Result<(), Error> {
+    pub(crate) fn fetch(&self, path: &Path) -> Result<(), Error> {
         let Some(bucket) = &self.bucket else { return Ok(()) };
         let content = bucket.ask(&self.key(bucket, path), async |location| {
             bucket.client.get(location).await?.bytes().await
@@ -168,7 +168,7 @@ impl Place {
     /// Writes a whole file under a new name; one of that name is left as it is, and not told of.
     pub(crate) fn create(&self, path: &Path, content: &[u8]) -> Result<(), Error> {
         let Some(bucket) = &self.bucket else {
-            return match durable::create(path, content) {
+            return match durable_fs::create(path, content) {
                 Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => Ok(()),
                 done => done.map_err(Error::io(path, "written")),
             };
@@ -184,13 +184,13 @@ impl Place {
         let path = self.dir.join(name);
         match &self.bucket {
             Some(bucket) => Ok(self.put(bucket, &path, content, PutMode::Overwrite)?),
-            None => durable::replace(&path, content).map_err(Error::io(path, "written")),
+            None => durable_fs::replace(&path, content).map_err(Error::io(path, "written")),
         }
     }
 
     fn put(
         &self,
-        bucket: &Bucket,
+        bucket: &BucketLocation,
         path: &Path,
         content: &[u8],
         mode: PutMode,
@@ -230,13 +230,13 @@ impl Place {
     }
 
     /// The key of a file that goes by this path.
-    fn key(&self, bucket: &Bucket, path: &Path) -> String {
+    fn key(&self, bucket: &BucketLocation, path: &Path) -> String {
         let below = path.strip_prefix(&self.dir).unwrap_or(path).to_string_lossy().replace('\\', "/");
         if below.is_empty() { bucket.address.key().to_owned() } else { joined(bucket.address.key(), &below) }
     }
 }
 
-impl Bucket {
+impl BucketLocation {
     /// Asks for one key.
     fn ask<T>(
         &self,

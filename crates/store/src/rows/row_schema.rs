@@ -14,7 +14,7 @@ use jiff::Timestamp;
 use crate::error::Error;
 
 /// What a column takes out of a row.
-pub(crate) enum Get<R> {
+pub(crate) enum Getter<R> {
     Text(fn(&R) -> Option<&str>),
     Texts(fn(&R) -> &[String]),
     Number(fn(&R) -> Option<f64>),
@@ -26,36 +26,36 @@ pub(crate) enum Get<R> {
 pub(crate) struct Column<R> {
     pub(crate) name: &'static str,
     nullable: bool,
-    get: Get<R>,
+    get: Getter<R>,
 }
 
 impl<R> Column<R> {
-    pub(crate) const fn must(name: &'static str, get: Get<R>) -> Self {
+    pub(crate) const fn required(name: &'static str, get: Getter<R>) -> Self {
         Self { name, nullable: false, get }
     }
 
-    pub(crate) const fn may(name: &'static str, get: Get<R>) -> Self {
+    pub(crate) const fn nullable(name: &'static str, get: Getter<R>) -> Self {
         Self { name, nullable: true, get }
     }
 
     fn field(&self) -> Field {
         let data_type = match self.get {
-            Get::Text(_) => DataType::Utf8,
-            Get::Texts(_) => DataType::List(element()),
-            Get::Number(_) => DataType::Float64,
-            Get::Count(_) => DataType::Int64,
-            Get::Time(_) => time(),
+            Getter::Text(_) => DataType::Utf8,
+            Getter::Texts(_) => DataType::List(element()),
+            Getter::Number(_) => DataType::Float64,
+            Getter::Count(_) => DataType::Int64,
+            Getter::Time(_) => time(),
         };
         Field::new(self.name, data_type, self.nullable)
     }
 
     fn array(&self, rows: &[R]) -> ArrayRef {
         match self.get {
-            Get::Text(get) => Arc::new(rows.iter().map(get).collect::<StringArray>()),
-            Get::Texts(get) => Arc::new(texts(rows.iter().map(get))),
-            Get::Number(get) => Arc::new(rows.iter().map(get).collect::<Float64Array>()),
-            Get::Count(get) => Arc::new(rows.iter().map(get).collect::<Int64Array>()),
-            Get::Time(get) => {
+            Getter::Text(get) => Arc::new(rows.iter().map(get).collect::<StringArray>()),
+            Getter::Texts(get) => Arc::new(texts(rows.iter().map(get))),
+            Getter::Number(get) => Arc::new(rows.iter().map(get).collect::<Float64Array>()),
+            Getter::Count(get) => Arc::new(rows.iter().map(get).collect::<Int64Array>()),
+            Getter::Time(get) => {
                 let micros = rows.iter().map(|r| get(r).map(Timestamp::as_microsecond));
                 Arc::new(micros.collect::<TimestampMicrosecondArray>().with_timezone("UTC"))
             }
@@ -82,21 +82,21 @@ fn texts<'a>(rows: impl Iterator<Item = &'a [String]>) -> ListArray {
 }
 
 /// A row type that has a table.
-pub(crate) trait Tabled: Sized + 'static {
+pub(crate) trait RowSchema: Sized + 'static {
     /// The table's columns, in order.
     const COLUMNS: &'static [Column<Self>];
 
     /// Makes a row out of its cells, which come in the order of the columns.
-    fn from_cells(cells: &mut Cells<'_>) -> Result<Self, Error>;
+    fn from_cells(cells: &mut CellReader<'_>) -> Result<Self, Error>;
 }
 
 /// The table's columns with their types.
-pub(crate) fn schema<R: Tabled>() -> SchemaRef {
+pub(crate) fn schema<R: RowSchema>() -> SchemaRef {
     Arc::new(Schema::new(R::COLUMNS.iter().map(Column::field).collect::<Vec<_>>()))
 }
 
 /// Rows as columns.
-pub(crate) fn to_batch<R: Tabled>(rows: &[R]) -> Result<RecordBatch, Error> {
+pub(crate) fn to_batch<R: RowSchema>(rows: &[R]) -> Result<RecordBatch, Error> {
     let arrays = R::COLUMNS.iter().map(|column| column.array(rows)).collect();
     Ok(RecordBatch::try_new(schema::<R>(), arrays)?)
 }
@@ -106,30 +106,30 @@ pub(crate) fn to_batch<R: Tabled>(rows: &[R]) -> Result<RecordBatch, Error> {
 /// # Errors
 /// [`Error::Column`] when one is missing or of another type; [`Error::Value`] when a cell is out of
 /// range or empty where it must not be.
-pub(crate) fn from_batch<R: Tabled>(batch: &RecordBatch) -> Result<Vec<R>, Error> {
+pub(crate) fn from_batch<R: RowSchema>(batch: &RecordBatch) -> Result<Vec<R>, Error> {
     let arrays = R::COLUMNS.iter().map(|column| typed(batch, column)).collect::<Result<Vec<_>, _>>()?;
     let names: Vec<&'static str> = R::COLUMNS.iter().map(|column| column.name).collect();
     (0..batch.num_rows())
-        .map(|row| R::from_cells(&mut Cells { names: &names, arrays: &arrays, row, next: 0 }))
+        .map(|row| R::from_cells(&mut CellReader { names: &names, arrays: &arrays, row, next: 0 }))
         .collect()
 }
 
-fn typed<'a, R>(batch: &'a RecordBatch, column: &Column<R>) -> Result<Typed<'a>, Error> {
+fn typed<'a, R>(batch: &'a RecordBatch, column: &Column<R>) -> Result<TypedArray<'a>, Error> {
     let problem = |problem: String| Error::Column { column: column.name.to_owned(), problem };
     let array = batch.column_by_name(column.name).ok_or_else(|| problem("is not there".to_owned()))?;
     let typed = match column.get {
-        Get::Text(_) => array.as_string_opt().map(Typed::Text),
-        Get::Texts(_) => array.as_list_opt().map(Typed::Texts),
-        Get::Number(_) => array.as_primitive_opt::<Float64Type>().map(Typed::Number),
-        Get::Count(_) => array.as_primitive_opt::<Int64Type>().map(Typed::Count),
-        Get::Time(_) => array.as_primitive_opt::<TimestampMicrosecondType>().map(Typed::Time),
+        Getter::Text(_) => array.as_string_opt().map(TypedArray::Text),
+        Getter::Texts(_) => array.as_list_opt().map(TypedArray::Texts),
+        Getter::Number(_) => array.as_primitive_opt::<Float64Type>().map(TypedArray::Number),
+        Getter::Count(_) => array.as_primitive_opt::<Int64Type>().map(TypedArray::Count),
+        Getter::Time(_) => array.as_primitive_opt::<TimestampMicrosecondType>().map(TypedArray::Time),
     };
     typed.ok_or_else(|| {
         problem(format!("holds {}, where {} is wanted", array.data_type(), column.field().data_type()))
     })
 }
 
-enum Typed<'a> {
+enum TypedArray<'a> {
     Text(&'a StringArray),
     Texts(&'a ListArray),
     Number(&'a Float64Array),
@@ -138,15 +138,15 @@ enum Typed<'a> {
 }
 
 /// One row's cells, taken one after the other in the order of the columns.
-pub(crate) struct Cells<'a> {
+pub(crate) struct CellReader<'a> {
     names: &'a [&'static str],
-    arrays: &'a [Typed<'a>],
+    arrays: &'a [TypedArray<'a>],
     row: usize,
     next: usize,
 }
 
-impl<'a> Cells<'a> {
-    fn take(&mut self) -> &'a Typed<'a> {
+impl<'a> CellReader<'a> {
+    fn take(&mut self) -> &'a TypedArray<'a> {
         self.next += 1;
         &self.arrays[self.next - 1]
     }
@@ -162,7 +162,7 @@ impl<'a> Cells<'a> {
 
     pub(crate) fn text_or_none(&mut self) -> Option<&'a str> {
         match self.take() {
-            Typed::Text(array) => array.is_valid(self.row).then(|| array.value(self.row)),
+            TypedArray::Text(array) => array.is_valid(self.row).then(|| array.value(self.row)),
             _ => None,
         }
     }
@@ -191,7 +191,7 @@ impl<'a> Cells<'a> {
 
     pub(crate) fn texts(&mut self) -> Vec<String> {
         match self.take() {
-            Typed::Texts(lists) if lists.is_valid(self.row) => {
+            TypedArray::Texts(lists) if lists.is_valid(self.row) => {
                 let list = lists.value(self.row);
                 list.as_string_opt::<i32>().into_iter().flatten().flatten().map(str::to_owned).collect()
             }
@@ -201,14 +201,14 @@ impl<'a> Cells<'a> {
 
     pub(crate) fn number(&mut self) -> Option<f64> {
         match self.take() {
-            Typed::Number(array) => array.is_valid(self.row).then(|| array.value(self.row)),
+            TypedArray::Number(array) => array.is_valid(self.row).then(|| array.value(self.row)),
             _ => None,
         }
     }
 
     pub(crate) fn count_or_none(&mut self) -> Option<i64> {
         match self.take() {
-            Typed::Count(array) => array.is_valid(self.row).then(|| array.value(self.row)),
+            TypedArray::Count(array) => array.is_valid(self.row).then(|| array.value(self.row)),
             _ => None,
         }
     }
@@ -220,7 +220,7 @@ impl<'a> Cells<'a> {
 
     pub(crate) fn time_or_none(&mut self) -> Result<Option<Timestamp>, Error> {
         let micros = match self.take() {
-            Typed::Time(array) => array.is_valid(self.row).then(|| array.value(self.row)),
+            TypedArray::Time(array) => array.is_valid(self.row).then(|| array.value(self.row)),
             _ => None,
         };
         let time = micros.map(Timestamp::from_microsecond).transpose();

@@ -1,64 +1,33 @@
-//! What is asked of the records, and by what a record is known.
+//! Query: selection of gap records.
 
 use arrow::array::{BooleanArray, RecordBatch, StringArray, TimestampMicrosecondArray};
 use arrow::compute::kernels::cmp::{eq, gt_eq, lt};
 use arrow::error::ArrowError;
 use jiff::Timestamp;
 use polars::prelude::{Expr, Scalar, TimeUnit, TimeZone, col, lit};
-use records::GapRecord;
 
-use crate::stats::Stats;
+use crate::delta::file_stats::Stats;
 
-/// By what a record is known: one actuator's flight has one record.
-///
-/// Its order is the order in which records are shown and exported.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct RecordKey {
-    /// Departure, µs since 1970 UTC.
-    pub departure_us: i64,
-    /// The aircraft.
-    pub tail_number: String,
-    /// The flight.
-    pub flight_id: String,
-    /// The place on the aircraft.
-    pub position: String,
-}
-
-impl RecordKey {
-    /// The columns that hold it, in the order of its fields.
-    pub(crate) const COLUMNS: [&'static str; 4] = ["departure_utc", "tail_number", "flight_id", "position"];
-
-    /// The key of a record.
-    pub fn of(record: &GapRecord) -> Self {
-        Self {
-            departure_us: record.flight.departure_utc.as_microsecond(),
-            tail_number: record.flight.tail_number.to_string(),
-            flight_id: record.flight.flight_id.to_string(),
-            position: record.position.to_string(),
-        }
-    }
-}
-
-/// Which records are asked for; what is `None` is not asked.
+/// Selection of records; a field that is `None` does not restrict it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Query {
-    /// One aircraft.
+    /// Aircraft.
     pub tail_number: Option<String>,
-    /// One unit, wherever it flew; unique only with its part number.
+    /// Unit, on any tail; unique only together with its part number.
     pub serial_number: Option<String>,
-    /// One design.
+    /// Part number.
     pub part_number: Option<String>,
-    /// One flight.
+    /// Flight.
     pub flight_id: Option<String>,
-    /// One place.
+    /// One location.
     pub position: Option<String>,
-    /// One run.
+    /// Run.
     pub run_id: Option<String>,
-    /// Departures from then on.
+    /// Departures at or after this time.
     pub since_utc: Option<Timestamp>,
-    /// Departures before then.
+    /// Departures before this time.
     pub until_utc: Option<Timestamp>,
-    /// So many at most, the latest.
+    /// At most this many records, the latest.
     pub last: Option<usize>,
 }
 
@@ -76,7 +45,7 @@ impl Query {
         .filter_map(|(column, value)| Some((column, value.as_deref()?)))
     }
 
-    /// Whether a file may hold an answer.
+    /// Whether a file may hold matching records, by its statistics.
     pub(crate) fn may_be_in(&self, stats: &Stats) -> bool {
         let (earliest_us, latest_us) = stats.times_us("departure_utc");
         self.texts().all(|(column, value)| stats.may_hold(column, value))
@@ -84,7 +53,7 @@ impl Query {
             && self.until_utc.is_none_or(|until| earliest_us < until_us(until))
     }
 
-    /// The same as a condition on rows.
+    /// The selection as a Polars filter.
     pub(crate) fn condition(&self) -> Option<Expr> {
         let departure = || col("departure_utc");
         let texts = self.texts().map(|(column, value)| col(column).eq(lit(value.to_owned())));
@@ -94,13 +63,13 @@ impl Query {
         texts.chain(since).chain(until).reduce(Expr::and)
     }
 
-    /// The columns by which rows are told to fit.
+    /// Columns that the selection reads.
     pub(crate) fn columns(&self) -> impl Iterator<Item = &'static str> {
         let is_timed = self.since_utc.or(self.until_utc).is_some();
         self.texts().map(|(column, _)| column).chain(is_timed.then_some("departure_utc"))
     }
 
-    /// The same condition on the rows of a batch of these columns, times in µs, one answer for each part of it.
+    /// Masks of the matching rows of a batch of these columns (times in µs), one per condition.
     pub(crate) fn fits(&self, batch: &RecordBatch) -> impl Iterator<Item = Result<BooleanArray, ArrowError>> {
         let column = |name: &str| batch.schema_ref().index_of(name).map(|at| batch.column(at));
         let texts = self.texts().map(move |(name, value)| eq(column(name)?, &StringArray::new_scalar(value)));

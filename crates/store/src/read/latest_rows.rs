@@ -12,23 +12,23 @@ use arrow::compute::filter_record_batch;
 use arrow::datatypes::{Int64Type, SchemaRef};
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 
-use crate::datafile::GROUP_ROWS;
+use crate::delta::data_file::GROUP_ROWS;
 use crate::error::Error;
-use crate::numbered;
-use crate::parts::{formed, mask};
-use crate::tabled::{self, Tabled};
+use crate::read::column_scan::{cast_to_schema, mask};
+use crate::rows::row_schema::{self, RowSchema};
+use crate::rows::versioned;
 
 /// Rows in which a text column holds what is wanted; one that is empty there is not.
 #[derive(Clone, Copy)]
-pub(crate) struct Wanted<'a> {
+pub(crate) struct TextFilter<'a> {
     pub(crate) column: &'a str,
     pub(crate) is_wanted: &'a dyn Fn(&str) -> bool,
 }
 
 /// Rows by name, and the commit that each came with.
-pub(crate) struct Newest<R>(BTreeMap<String, (i64, R)>);
+pub(crate) struct LatestRows<R>(BTreeMap<String, (i64, R)>);
 
-impl<R: Tabled> Newest<R> {
+impl<R: RowSchema> LatestRows<R> {
     pub(crate) fn new() -> Self {
         Self(BTreeMap::new())
     }
@@ -41,17 +41,17 @@ impl<R: Tabled> Newest<R> {
     pub(crate) fn take(
         &mut self,
         file: &Path,
-        wanted: Option<Wanted<'_>>,
+        wanted: Option<TextFilter<'_>>,
         name: impl Fn(&R) -> String,
     ) -> Result<(), Error> {
-        let schema = numbered::schema::<R>();
+        let schema = versioned::schema::<R>();
         for batch in opened(file, &schema)? {
-            let mut batch = formed(&batch?, &schema)?;
+            let mut batch = cast_to_schema(&batch?, &schema)?;
             if let Some(wanted) = wanted {
                 batch = filter_record_batch(&batch, &wanted.of(&batch)?)?;
             }
-            let commits = batch.column(schema.index_of(numbered::COMMIT)?).as_primitive::<Int64Type>();
-            for (&commit, row) in commits.values().iter().zip(tabled::from_batch::<R>(&batch)?) {
+            let commits = batch.column(schema.index_of(versioned::COMMIT)?).as_primitive::<Int64Type>();
+            for (&commit, row) in commits.values().iter().zip(row_schema::from_batch::<R>(&batch)?) {
                 self.put(name(&row), commit, row);
             }
         }
@@ -72,7 +72,7 @@ impl<R: Tabled> Newest<R> {
     }
 }
 
-impl Wanted<'_> {
+impl TextFilter<'_> {
     fn of(&self, batch: &RecordBatch) -> Result<BooleanArray, Error> {
         let texts = batch.column(batch.schema_ref().index_of(self.column)?).as_string::<i32>();
         Ok(texts.iter().map(|text| Some(text.is_some_and(self.is_wanted))).collect())
@@ -94,7 +94,7 @@ mod tests {
     use parquet::arrow::ArrowWriter;
 
     use super::*;
-    use crate::account::RunAccount;
+    use crate::rows::accounts::RunRecord;
 
     /// Runs as another program may write them: long texts, nanoseconds, columns in another order and one of its own,
     /// and none of those that may be empty.
@@ -116,9 +116,9 @@ mod tests {
         RecordBatch::try_from_iter(columns).unwrap()
     }
 
-    fn taken(batches: &[RecordBatch], wanted: Option<Wanted<'_>>) -> Result<Vec<(String, i64)>, Error> {
+    fn taken(batches: &[RecordBatch], wanted: Option<TextFilter<'_>>) -> Result<Vec<(String, i64)>, Error> {
         let dir = tempfile::tempdir().unwrap();
-        let mut newest = Newest::<RunAccount>::new();
+        let mut newest = LatestRows::<RunRecord>::new();
         for (k, batch) in batches.iter().enumerate() {
             let path = dir.path().join(k.to_string());
             let mut writer =
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn rows_that_are_not_wanted_are_passed_over() {
-        let wanted = Wanted { column: "run_id", is_wanted: &|id| id != "a" };
+        let wanted = TextFilter { column: "run_id", is_wanted: &|id| id != "a" };
         let found = taken(&[foreign(&["b", "a"], 1, 1)], Some(wanted)).unwrap();
         assert_eq!(found, [("b".to_owned(), 1)]);
     }

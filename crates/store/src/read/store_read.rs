@@ -8,16 +8,18 @@ use arrow::datatypes::SchemaRef;
 use jiff::Timestamp;
 use records::{GapRecord, PartNumber, SerialNumber};
 
-use crate::account::{LogAccount, Outcome};
-use crate::columns;
+use crate::delta::file_stats::Stats;
+use crate::delta::snapshot::Snapshot;
+use crate::delta::table::Table;
 use crate::error::Error;
-use crate::frame::{self, Read};
-use crate::layout::Store;
-use crate::newest::{Newest, Wanted};
-use crate::query::{Query, RecordKey};
-use crate::stats::Stats;
-use crate::table::{Snapshot, Table};
-use crate::tabled::Tabled;
+use crate::handle::Store;
+use crate::read::latest_rows::{LatestRows, TextFilter};
+use crate::read::polars_scan::{self, ScanRequest};
+use crate::read::query::Query;
+use crate::rows::accounts::{LogOutcome, LogRecord};
+use crate::rows::gap_columns;
+use crate::rows::row_schema::RowSchema;
+use records::RecordKey;
 
 impl Store {
     /// The records that fit, as columns, by departure, tail, flight and position.
@@ -29,7 +31,7 @@ impl Store {
     /// [`Error::Table`] when the log cannot be read, [`Error::Damaged`] when a file is not the one that
     /// was committed, [`Error::Frame`] when it cannot be decoded.
     pub fn scan(&self, query: &Query) -> Result<RecordBatch, Error> {
-        self.select(&self.gaps.snapshot()?, query, columns::schema())
+        self.select(&self.gaps.snapshot()?, query, gap_columns::schema())
     }
 
     /// The same as rows.
@@ -37,7 +39,7 @@ impl Store {
     /// # Errors
     /// As [`Store::scan`]; [`Error::Value`] when a cell cannot be what it stands for.
     pub fn records(&self, query: &Query) -> Result<Vec<GapRecord>, Error> {
-        columns::from_batch(&self.scan(query)?)
+        gap_columns::from_batch(&self.scan(query)?)
     }
 
     /// Hands over every record, earliest departure first, and returns the version they are of.
@@ -47,11 +49,11 @@ impl Store {
     ///
     /// # Errors
     /// As [`Store::records`].
-    pub fn visit(&self, mut take: impl FnMut(GapRecord)) -> Result<u64, Error> {
+    pub fn for_each_record(&self, mut take: impl FnMut(GapRecord)) -> Result<u64, Error> {
         let snapshot = self.gaps.snapshot()?;
         for (since_utc, until_utc) in months(&snapshot) {
             let month = Query { since_utc, until_utc, ..Query::default() };
-            columns::from_batch(&self.select(&snapshot, &month, columns::schema())?)?
+            gap_columns::from_batch(&self.select(&snapshot, &month, gap_columns::schema())?)?
                 .into_iter()
                 .for_each(&mut take);
         }
@@ -65,8 +67,9 @@ impl Store {
     pub fn serials(&self) -> Result<Vec<(PartNumber, SerialNumber)>, Error> {
         let files = files_of(&self.gaps)?;
         self.check(&files)?;
-        let schema = frame::only(&columns::schema(), &["part_number", "serial_number"])?;
-        let units = Read { files: &files, schema, condition: None, order: &[], last: None }.collect()?;
+        let schema = polars_scan::only(&gap_columns::schema(), &["part_number", "serial_number"])?;
+        let units =
+            ScanRequest { files: &files, schema, condition: None, order: &[], last: None }.collect()?;
         let [parts, serials] = [0, 1].map(|column| units.column(column).as_string::<i32>());
         let units: BTreeSet<_> = parts.iter().flatten().zip(serials.iter().flatten()).collect();
         let named = |(part, serial)| Some((PartNumber::new(part).ok()?, SerialNumber::new(serial).ok()?));
@@ -77,13 +80,15 @@ impl Store {
     ///
     /// # Errors
     /// As [`Store::records`].
-    pub fn accounts(&self) -> Result<Vec<LogAccount>, Error> {
-        let is_settled = |outcome: &str| Outcome::OPEN.iter().all(|open| open.as_str() != outcome);
+    pub fn accounts(&self) -> Result<Vec<LogRecord>, Error> {
+        let is_settled = |outcome: &str| LogOutcome::UNSETTLED.iter().all(|open| open.as_str() != outcome);
         self.newest(
             &self.logs,
-            Some(Wanted { column: "outcome", is_wanted: &is_settled }),
-            |stats| !Outcome::OPEN.iter().any(|outcome| stats.holds_only("outcome", outcome.as_str())),
-            |account: &LogAccount| account.log_path.clone(),
+            Some(TextFilter { column: "outcome", is_wanted: &is_settled }),
+            |stats| {
+                !LogOutcome::UNSETTLED.iter().any(|outcome| stats.holds_only("outcome", outcome.as_str()))
+            },
+            |account: &LogRecord| account.log_path.clone(),
         )
     }
 
@@ -114,7 +119,7 @@ impl Store {
     }
 
     fn named_files(&self, table: &Table) -> Result<Vec<PathBuf>, Error> {
-        Ok(files_of(table)?.iter().map(|file| self.place.named(file)).collect())
+        Ok(files_of(table)?.iter().map(|file| self.location.display_path(file)).collect())
     }
 
     pub(crate) fn select(
@@ -123,23 +128,23 @@ impl Store {
         query: &Query,
         schema: SchemaRef,
     ) -> Result<RecordBatch, Error> {
-        let files = Self::holders(snapshot, query);
+        let files = Self::candidate_files(snapshot, query);
         self.check(&files)?;
         let (condition, last) = (query.condition(), query.last);
-        Read { files: &files, schema, condition, order: &RecordKey::COLUMNS, last }.collect()
+        ScanRequest { files: &files, schema, condition, order: &RecordKey::COLUMNS, last }.collect()
     }
 
     /// The files that may hold an answer.
-    pub(crate) fn holders(snapshot: &Snapshot, query: &Query) -> Vec<PathBuf> {
+    pub(crate) fn candidate_files(snapshot: &Snapshot, query: &Query) -> Vec<PathBuf> {
         let files = snapshot.files.iter().filter(|file| file.has_rows() && query.may_be_in(&file.stats));
         files.map(|file| file.path.clone()).collect()
     }
 
     /// Of the rows that fit, the newest of each name, by name; files that cannot hold one are passed over.
-    pub(crate) fn newest<R: Tabled>(
+    pub(crate) fn newest<R: RowSchema>(
         &self,
         table: &Table,
-        wanted: Option<Wanted<'_>>,
+        wanted: Option<TextFilter<'_>>,
         may_hold: impl Fn(&Stats) -> bool,
         name: impl Fn(&R) -> String,
     ) -> Result<Vec<R>, Error> {
@@ -147,7 +152,7 @@ impl Store {
         let files = snapshot.files.iter().filter(|file| file.has_rows() && may_hold(&file.stats));
         let files: Vec<PathBuf> = files.map(|file| file.path.clone()).collect();
         self.check(&files)?;
-        let mut newest = Newest::new();
+        let mut newest = LatestRows::new();
         files.iter().try_for_each(|file| newest.take(file, wanted, &name))?;
         Ok(newest.into_rows())
     }

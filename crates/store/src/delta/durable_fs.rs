@@ -20,12 +20,12 @@ use futures::stream::BoxStream;
 
 /// Writes a whole file under a new name, or fails when the name is taken.
 pub(crate) fn create(path: &FsPath, content: &[u8]) -> io::Result<()> {
-    write(path, [content].into_iter(), Naming::New)
+    write(path, [content].into_iter(), WriteMode::New)
 }
 
 /// Writes a whole file, in place of one of the same name.
 pub(crate) fn replace(path: &FsPath, content: &[u8]) -> io::Result<()> {
-    write(path, [content].into_iter(), Naming::Replace)
+    write(path, [content].into_iter(), WriteMode::Replace)
 }
 
 /// Makes a folder's entries last.
@@ -34,18 +34,18 @@ pub(crate) fn sync_dir(dir: &FsPath) -> io::Result<()> {
 }
 
 #[derive(Clone, Copy)]
-enum Naming {
+enum WriteMode {
     New,
     Replace,
 }
 
-fn write<'a>(path: &FsPath, parts: impl Iterator<Item = &'a [u8]>, naming: Naming) -> io::Result<()> {
+fn write<'a>(path: &FsPath, parts: impl Iterator<Item = &'a [u8]>, naming: WriteMode) -> io::Result<()> {
     let dir = path.parent().unwrap_or(FsPath::new("."));
     std::fs::create_dir_all(dir)?;
     let staged = staged(path);
     let written = stage(&staged, parts).and_then(|()| match naming {
-        Naming::New => std::fs::hard_link(&staged, path).and_then(|()| std::fs::remove_file(&staged)),
-        Naming::Replace => std::fs::rename(&staged, path),
+        WriteMode::New => std::fs::hard_link(&staged, path).and_then(|()| std::fs::remove_file(&staged)),
+        WriteMode::Replace => std::fs::rename(&staged, path),
     });
     if written.is_err() {
         // Best effort: the error that is reported is the one that happened first.
@@ -93,8 +93,8 @@ fn failed(path: &Path, source: io::Error) -> Error {
 impl ObjectStore for DurableFiles {
     async fn put_opts(&self, location: &Path, payload: PutPayload, options: PutOptions) -> Result<PutResult> {
         let naming = match options.mode {
-            PutMode::Create => Naming::New,
-            PutMode::Overwrite => Naming::Replace,
+            PutMode::Create => WriteMode::New,
+            PutMode::Overwrite => WriteMode::Replace,
             PutMode::Update(_) => return self.inner.put_opts(location, payload, options).await,
         };
         let path = self.inner.path_to_filesystem(location)?;

@@ -12,9 +12,9 @@ use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::properties::WriterProperties;
 
+use crate::delta::file_stats;
+use crate::delta::location::Location;
 use crate::error::Error;
-use crate::place::Place;
-use crate::stats;
 
 /// Rows of a row group: small enough that one tail's history decodes little of a big file.
 pub(crate) const GROUP_ROWS: usize = 16_384;
@@ -27,7 +27,7 @@ const DIGEST_DIGITS: usize = 64;
 /// The version the file is made for stands first in its name: the same content written again later
 /// is another file, since Delta cannot remove and add one name in one commit.
 pub(crate) fn write(
-    place: &Place,
+    location: &Location,
     version: u64,
     batch: &RecordBatch,
     data_change: bool,
@@ -35,13 +35,13 @@ pub(crate) fn write(
     let content = encode(batch)?;
     let name = format!("{version:012}-{}.parquet", blake3::hash(&content).to_hex());
     // An attempt that was cut short may have left the same content under the same name.
-    place.create(&place.dir().join(&name), &content)?;
+    location.create(&location.dir().join(&name), &content)?;
     Ok(Add {
         path: name,
         size: content.len() as i64,
         modification_time: Timestamp::now().as_millisecond(),
         data_change,
-        stats: Some(stats::of(batch)),
+        stats: Some(file_stats::of(batch)),
         ..Add::default()
     })
 }

@@ -16,15 +16,16 @@ use parquet::arrow::arrow_reader::{
     ArrowPredicateFn, ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowFilter,
 };
 
-use crate::datafile::GROUP_ROWS;
+use crate::delta::data_file::GROUP_ROWS;
 use crate::error::Error;
-use crate::layout::Store;
-use crate::query::Query;
-use crate::{columns, frame};
+use crate::handle::Store;
+use crate::read::polars_scan;
+use crate::read::query::Query;
+use crate::rows::gap_columns;
 
 /// Files that may hold records that fit, of one version of the table.
 #[derive(Debug)]
-pub struct Parts {
+pub struct ColumnScan {
     store: Store,
     files: Vec<PathBuf>,
     query: Query,
@@ -38,13 +39,13 @@ impl Store {
     ///
     /// # Errors
     /// [`Error::Table`] when the log cannot be read, and for a name that no column has.
-    pub fn parts(&self, query: &Query, names: &[&str]) -> Result<Parts, Error> {
-        let files = Self::holders(&self.gaps.snapshot()?, query);
-        Ok(Parts { store: self.clone(), files, query: query.clone(), schema: schema_of(names)? })
+    pub fn scan_columns(&self, query: &Query, names: &[&str]) -> Result<ColumnScan, Error> {
+        let files = Self::candidate_files(&self.gaps.snapshot()?, query);
+        Ok(ColumnScan { store: self.clone(), files, query: query.clone(), schema: schema_of(names)? })
     }
 }
 
-impl Parts {
+impl ColumnScan {
     /// How many there are.
     pub fn len(&self) -> usize {
         self.files.len()
@@ -70,7 +71,7 @@ impl Parts {
         let mask = mask(&builder, self.schema.fields().iter().map(|field| field.name().as_str()));
         // A group's dictionary serves its rows alone.
         let rows = builder.with_projection(mask).with_batch_size(GROUP_ROWS).build()?;
-        rows.map(|batch| Ok(formed(&batch?, &self.schema)?)).collect()
+        rows.map(|batch| Ok(cast_to_schema(&batch?, &self.schema)?)).collect()
     }
 
     /// The rows that fit, told by the columns that are asked for.
@@ -81,7 +82,7 @@ impl Parts {
         }
         let (query, schema) = (self.query.clone(), schema_of(&asked)?);
         let fits = ArrowPredicateFn::new(mask(builder, asked.into_iter()), move |batch| {
-            fits(&query, &formed(&batch, &schema)?)
+            fits(&query, &cast_to_schema(&batch, &schema)?)
         });
         Ok(Some(RowFilter::new(vec![Box::new(fits)])))
     }
@@ -89,13 +90,13 @@ impl Parts {
 
 /// Some columns of the records, in the form they have in a part.
 fn schema_of(names: &[&str]) -> Result<SchemaRef, Error> {
-    let wanted = frame::only(&columns::schema(), names)?;
+    let wanted = polars_scan::only(&gap_columns::schema(), names)?;
     Ok(Arc::new(Schema::new(wanted.fields().iter().map(|field| coded(field)).collect::<Vec<_>>())))
 }
 
 /// A batch's columns in the form wanted, whatever form another program gave them: one that came with a later release
 /// is empty.
-pub(crate) fn formed(batch: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
+pub(crate) fn cast_to_schema(batch: &RecordBatch, schema: &SchemaRef) -> Result<RecordBatch, ArrowError> {
     let column = |field: &Arc<Field>| match batch.column_by_name(field.name()) {
         Some(column) => cast(column, field.data_type()),
         None => Ok(new_null_array(field.data_type(), batch.num_rows())),
@@ -158,7 +159,8 @@ mod tests {
         let times: ArrayRef = Arc::new(times.with_timezone("UTC"));
         let batch = RecordBatch::try_from_iter([("tail_number", texts), ("departure_utc", times)]).unwrap();
         let found =
-            formed(&batch, &schema_of(&["departure_utc", "tail_number", "skew_se_s"]).unwrap()).unwrap();
+            cast_to_schema(&batch, &schema_of(&["departure_utc", "tail_number", "skew_se_s"]).unwrap())
+                .unwrap();
         assert_eq!(found.column(1).data_type(), &dictionary());
         assert_eq!(found.column(2).null_count(), 3);
         let query = Query {
@@ -167,6 +169,6 @@ mod tests {
             ..Query::default()
         };
         assert_eq!(fits(&query, &found).unwrap(), BooleanArray::from(vec![false, false, true]));
-        assert!(formed(&batch, &schema_of(&["serial_number"]).unwrap()).is_err());
+        assert!(cast_to_schema(&batch, &schema_of(&["serial_number"]).unwrap()).is_err());
     }
 }

@@ -6,15 +6,16 @@ use std::path::PathBuf;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use records::Diagnostic;
 
-use crate::columns;
-use crate::datafile;
+use crate::delta::data_file;
+use crate::delta::snapshot::DataFile;
+use crate::delta::table::Table;
 use crate::error::Error;
-use crate::frame::{self, Read};
-use crate::layout::Store;
-use crate::query::RecordKey;
-use crate::read::files_of;
-use crate::table::{DataFile, Table};
-use crate::writer::keys;
+use crate::handle::Store;
+use crate::read::polars_scan::{self, ScanRequest};
+use crate::read::store_read::files_of;
+use crate::rows::gap_columns;
+use crate::write::writer::keys;
+use records::RecordKey;
 
 /// So many alike are named; the rest is counted.
 const NAMED: usize = 3;
@@ -35,9 +36,9 @@ impl Store {
 
     fn duplicates(&self) -> Result<Vec<Diagnostic>, Error> {
         let files: Vec<PathBuf> = files_of(&self.gaps)?;
-        let schema = frame::only(&columns::schema(), &RecordKey::COLUMNS)?;
+        let schema = polars_scan::only(&gap_columns::schema(), &RecordKey::COLUMNS)?;
         let order = &RecordKey::COLUMNS;
-        let batch = Read { files: &files, schema, condition: None, order, last: None }.collect()?;
+        let batch = ScanRequest { files: &files, schema, condition: None, order, last: None }.collect()?;
         let keys = keys(&batch)?;
         let twice: Vec<&RecordKey> = keys.windows(2).filter(|k| k[0] == k[1]).map(|k| &k[0]).collect();
         let mut findings: Vec<Diagnostic> = twice.iter().take(NAMED).map(|key| duplicate(key)).collect();
@@ -63,9 +64,10 @@ fn wrong_in(table: &Table) -> Vec<Diagnostic> {
 }
 
 fn wrong_with(table: &Table, file: &DataFile) -> Option<Diagnostic> {
-    let diagnostic =
-        |code: &str, what: &str| Diagnostic::new(code, what).in_file(table.place.named(&file.path).display());
-    let length = match table.place.length(&file.path) {
+    let diagnostic = |code: &str, what: &str| {
+        Diagnostic::new(code, what).in_file(table.location.display_path(&file.path).display())
+    };
+    let length = match table.location.length(&file.path) {
         Ok(Some(length)) => length,
         Ok(None) => {
             let what = "a data file that was committed is not there";
@@ -75,7 +77,7 @@ fn wrong_with(table: &Table, file: &DataFile) -> Option<Diagnostic> {
         }
         Err(error) => return Some(error.diagnostic()),
     };
-    if let Err(error) = table.place.bring(&file.path).and_then(|()| datafile::check(&file.path)) {
+    if let Err(error) = table.location.fetch(&file.path).and_then(|()| data_file::check(&file.path)) {
         return Some(error.diagnostic());
     }
     if length != file.size_bytes {

@@ -3,12 +3,12 @@
 use jiff::Timestamp;
 
 use crate::error::Error;
-use crate::query::RecordKey;
-use crate::tabled::{Cells, Column, Get, Tabled};
+use crate::rows::row_schema::{CellReader, Column, Getter, RowSchema};
+use records::RecordKey;
 
 /// How a log ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum LogOutcome {
     /// Its flight's records are stored, or belong to another log.
     Done,
     /// It has a fault, which `error_code` names.
@@ -23,14 +23,14 @@ pub enum Outcome {
     NotReached,
 }
 
-impl Outcome {
+impl LogOutcome {
     const ALL: [Self; 5] = [Self::Done, Self::Error, Self::Known, Self::Unaccounted, Self::NotReached];
 
     /// Those that do not settle what is known of a log.
-    pub(crate) const OPEN: [Self; 2] = [Self::Unaccounted, Self::NotReached];
+    pub(crate) const UNSETTLED: [Self; 2] = [Self::Unaccounted, Self::NotReached];
 
     /// Whether the log went well.
-    pub fn is_well(self) -> bool {
+    pub fn is_success(self) -> bool {
         matches!(self, Self::Done | Self::Known)
     }
 
@@ -53,7 +53,7 @@ impl Outcome {
 
 /// The account of one log: enough to know, without opening it, whether it must be done again.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LogAccount {
+pub struct LogRecord {
     /// Its name; of its accounts that are neither *not reached* nor *unaccounted*, the newest counts.
     pub log_path: String,
     /// Bytes.
@@ -75,7 +75,7 @@ pub struct LogAccount {
     /// The positions it has channels of.
     pub positions: Vec<String>,
     /// How it ended.
-    pub outcome: Outcome,
+    pub outcome: LogOutcome,
     /// Records with a gap.
     pub estimated: i64,
     /// Records without one.
@@ -92,9 +92,9 @@ pub struct LogAccount {
     pub processed_utc: Timestamp,
 }
 
-impl LogAccount {
+impl LogRecord {
     /// The records it speaks for: those of its flight, where it made any.
-    pub fn owned(&self) -> Vec<RecordKey> {
+    pub fn record_keys(&self) -> Vec<RecordKey> {
         if self.estimated + self.refused > 0 { self.keys() } else { Vec::new() }
     }
 
@@ -115,29 +115,29 @@ impl LogAccount {
     }
 }
 
-impl Tabled for LogAccount {
+impl RowSchema for LogRecord {
     const COLUMNS: &'static [Column<Self>] = &[
-        Column::must("log_path", Get::Text(|a| Some(&a.log_path))),
-        Column::must("size_bytes", Get::Count(|a| Some(a.size_bytes))),
-        Column::must("modified_utc_ns", Get::Count(|a| Some(a.modified_utc_ns))),
-        Column::must("file_id", Get::Text(|a| Some(&a.file_id))),
-        Column::may("log_digest", Get::Text(|a| a.log_digest.as_deref())),
-        Column::may("config_digest", Get::Text(|a| a.config_digest.as_deref())),
-        Column::may("tail_number", Get::Text(|a| a.tail_number.as_deref())),
-        Column::may("flight_id", Get::Text(|a| a.flight_id.as_deref())),
-        Column::may("departure_utc", Get::Time(|a| a.departure_utc)),
-        Column::must("positions", Get::Texts(|a| &a.positions)),
-        Column::must("outcome", Get::Text(|a| Some(a.outcome.as_str()))),
-        Column::must("estimated", Get::Count(|a| Some(a.estimated))),
-        Column::must("refused", Get::Count(|a| Some(a.refused))),
-        Column::may("error_code", Get::Text(|a| a.error_code.as_deref())),
-        Column::may("error_detail", Get::Text(|a| a.error_detail.as_deref())),
-        Column::must("duration_s", Get::Number(|a| Some(a.duration_s))),
-        Column::must("run_id", Get::Text(|a| Some(&a.run_id))),
-        Column::must("processed_utc", Get::Time(|a| Some(a.processed_utc))),
+        Column::required("log_path", Getter::Text(|a| Some(&a.log_path))),
+        Column::required("size_bytes", Getter::Count(|a| Some(a.size_bytes))),
+        Column::required("modified_utc_ns", Getter::Count(|a| Some(a.modified_utc_ns))),
+        Column::required("file_id", Getter::Text(|a| Some(&a.file_id))),
+        Column::nullable("log_digest", Getter::Text(|a| a.log_digest.as_deref())),
+        Column::nullable("config_digest", Getter::Text(|a| a.config_digest.as_deref())),
+        Column::nullable("tail_number", Getter::Text(|a| a.tail_number.as_deref())),
+        Column::nullable("flight_id", Getter::Text(|a| a.flight_id.as_deref())),
+        Column::nullable("departure_utc", Getter::Time(|a| a.departure_utc)),
+        Column::required("positions", Getter::Texts(|a| &a.positions)),
+        Column::required("outcome", Getter::Text(|a| Some(a.outcome.as_str()))),
+        Column::required("estimated", Getter::Count(|a| Some(a.estimated))),
+        Column::required("refused", Getter::Count(|a| Some(a.refused))),
+        Column::nullable("error_code", Getter::Text(|a| a.error_code.as_deref())),
+        Column::nullable("error_detail", Getter::Text(|a| a.error_detail.as_deref())),
+        Column::required("duration_s", Getter::Number(|a| Some(a.duration_s))),
+        Column::required("run_id", Getter::Text(|a| Some(&a.run_id))),
+        Column::required("processed_utc", Getter::Time(|a| Some(a.processed_utc))),
     ];
 
-    fn from_cells(cells: &mut Cells<'_>) -> Result<Self, Error> {
+    fn from_cells(cells: &mut CellReader<'_>) -> Result<Self, Error> {
         Ok(Self {
             log_path: cells.owned()?,
             size_bytes: cells.count()?,
@@ -149,7 +149,7 @@ impl Tabled for LogAccount {
             flight_id: cells.owned_or_none(),
             departure_utc: cells.time_or_none()?,
             positions: cells.texts(),
-            outcome: cells.parse(Outcome::parse)?,
+            outcome: cells.parse(LogOutcome::parse)?,
             estimated: cells.count()?,
             refused: cells.count()?,
             error_code: cells.owned_or_none(),
@@ -163,7 +163,7 @@ impl Tabled for LogAccount {
 
 /// The account of one run, written when it begins and again when it ends.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RunAccount {
+pub struct RunRecord {
     /// Its name; the newest account of a name counts.
     pub run_id: String,
     /// When it began.
@@ -193,31 +193,31 @@ pub struct RunAccount {
     pub exit_code: Option<i64>,
 }
 
-impl RunAccount {
+impl RunRecord {
     /// Whether its figures are final.
     pub fn has_ended(&self) -> bool {
         self.finished_utc.is_some()
     }
 }
 
-impl Tabled for RunAccount {
+impl RowSchema for RunRecord {
     const COLUMNS: &'static [Column<Self>] = &[
-        Column::must("run_id", Get::Text(|a| Some(&a.run_id))),
-        Column::must("started_utc", Get::Time(|a| Some(a.started_utc))),
-        Column::may("finished_utc", Get::Time(|a| a.finished_utc)),
-        Column::must("program_version", Get::Text(|a| Some(&a.program_version))),
-        Column::must("config_path", Get::Text(|a| Some(&a.config_path))),
-        Column::must("found", Get::Count(|a| Some(a.found))),
-        Column::must("known", Get::Count(|a| Some(a.known))),
-        Column::must("done", Get::Count(|a| Some(a.done))),
-        Column::must("estimated", Get::Count(|a| Some(a.estimated))),
-        Column::must("refused", Get::Count(|a| Some(a.refused))),
-        Column::must("errors", Get::Count(|a| Some(a.errors))),
-        Column::must("not_reached", Get::Count(|a| Some(a.not_reached))),
-        Column::may("exit_code", Get::Count(|a| a.exit_code)),
+        Column::required("run_id", Getter::Text(|a| Some(&a.run_id))),
+        Column::required("started_utc", Getter::Time(|a| Some(a.started_utc))),
+        Column::nullable("finished_utc", Getter::Time(|a| a.finished_utc)),
+        Column::required("program_version", Getter::Text(|a| Some(&a.program_version))),
+        Column::required("config_path", Getter::Text(|a| Some(&a.config_path))),
+        Column::required("found", Getter::Count(|a| Some(a.found))),
+        Column::required("known", Getter::Count(|a| Some(a.known))),
+        Column::required("done", Getter::Count(|a| Some(a.done))),
+        Column::required("estimated", Getter::Count(|a| Some(a.estimated))),
+        Column::required("refused", Getter::Count(|a| Some(a.refused))),
+        Column::required("errors", Getter::Count(|a| Some(a.errors))),
+        Column::required("not_reached", Getter::Count(|a| Some(a.not_reached))),
+        Column::nullable("exit_code", Getter::Count(|a| a.exit_code)),
     ];
 
-    fn from_cells(cells: &mut Cells<'_>) -> Result<Self, Error> {
+    fn from_cells(cells: &mut CellReader<'_>) -> Result<Self, Error> {
         Ok(Self {
             run_id: cells.owned()?,
             started_utc: cells.time()?,

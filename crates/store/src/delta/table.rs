@@ -16,11 +16,12 @@ use deltalake::{DeltaTable, DeltaTableError, TableProperty};
 use futures::TryStreamExt;
 use jiff::Timestamp;
 
-use crate::datafile;
+use crate::delta::data_file;
+use crate::delta::file_stats::Stats;
+use crate::delta::location::Location;
+use crate::delta::snapshot::{DataFile, Snapshot};
+use crate::delta::snapshot_cache::{SnapshotCache, commit_file};
 use crate::error::Error;
-use crate::latest::{Latest, commit_file};
-use crate::place::Place;
-use crate::stats::Stats;
 
 /// Attempts at a change before its error is told, each from a fresh snapshot.
 const ATTEMPTS: u32 = 5;
@@ -45,37 +46,8 @@ const REWRITE: &str = "freeplay.rewrite";
 pub(crate) struct Table {
     pub(crate) name: &'static str,
     pub(crate) schema: SchemaRef,
-    pub(crate) place: Place,
-    latest: Latest,
-}
-
-/// A table as of one version; a clone costs nothing.
-#[derive(Clone)]
-pub(crate) struct Snapshot {
-    pub(crate) version: u64,
-    pub(crate) files: Arc<[DataFile]>,
-    delta: DeltaTable,
-}
-
-/// A data file as the log knows it.
-pub(crate) struct DataFile {
-    pub(crate) path: PathBuf,
-    pub(crate) size_bytes: u64,
-    pub(crate) stats: Stats,
-    view: LogicalFileView,
-}
-
-impl DataFile {
-    /// Whether it holds rows, as far as its log knows.
-    pub(crate) fn has_rows(&self) -> bool {
-        self.stats.num_records != Some(0)
-    }
-
-    /// Whether its name carries the digest of its content.
-    pub(crate) fn has_digest(&self) -> bool {
-        let name = self.path.file_name().and_then(|name| name.to_str());
-        name.is_some_and(|name| datafile::digest_of_name(name).is_some())
-    }
+    pub(crate) location: Location,
+    latest: SnapshotCache,
 }
 
 /// What a commit does.
@@ -90,12 +62,12 @@ pub(crate) struct Change<'a> {
 }
 
 impl Table {
-    pub(crate) fn new(store: &Place, name: &'static str, schema: SchemaRef) -> Self {
-        Self { name, schema, place: store.below(name), latest: Latest::default() }
+    pub(crate) fn new(store: &Location, name: &'static str, schema: SchemaRef) -> Self {
+        Self { name, schema, location: store.join(name), latest: SnapshotCache::default() }
     }
 
     pub(crate) fn exists(&self) -> Result<bool, Error> {
-        Ok(self.place.has(&commit_file(0))? || self.place.has("_delta_log/_last_checkpoint")?)
+        Ok(self.location.has(&commit_file(0))? || self.location.has("_delta_log/_last_checkpoint")?)
     }
 
     fn failed(&self, verb: &'static str) -> impl FnOnce(DeltaTableError) -> Error {
@@ -108,12 +80,12 @@ impl Table {
     /// Its first commit brings a file without rows: an engine that is handed the list of files, as DuckDB
     /// is, fails on an empty one.
     pub(crate) fn create(&self) -> Result<(), Error> {
-        self.place.make()?;
+        self.location.make()?;
         let empty = Action::Add(self.empty(0)?);
-        let made = self.place.block_on(async {
+        let made = self.location.block_on(async {
             let columns: StructType =
                 self.schema.as_ref().try_into_kernel().map_err(DeltaTableError::from)?;
-            let log_store = self.place.log_store()?;
+            let log_store = self.location.log_store()?;
             let create = CreateBuilder::new().with_log_store(log_store).with_table_name(self.name);
             let create =
                 create.with_configuration_property(TableProperty::CheckpointInterval, Some(CHECKPOINT));
@@ -129,7 +101,7 @@ impl Table {
 
     /// A file without rows.
     fn empty(&self, version: u64) -> Result<Add, Error> {
-        datafile::write(&self.place, version, &RecordBatch::new_empty(Arc::clone(&self.schema)), true)
+        data_file::write(&self.location, version, &RecordBatch::new_empty(Arc::clone(&self.schema)), true)
     }
 
     /// Brings a table of an earlier release up to this one: a file without rows where it has none, and the
@@ -161,28 +133,28 @@ impl Table {
 
     /// The table as it is now.
     pub(crate) fn snapshot(&self) -> Result<Snapshot, Error> {
-        if let Some(newest) = self.latest.get(&self.place) {
+        if let Some(newest) = self.latest.get(&self.location) {
             return Ok(newest);
         }
         let load = async {
-            let mut delta = DeltaTable::new(self.place.log_store()?);
+            let mut delta = DeltaTable::new(self.location.log_store()?);
             delta.load().await?;
             self.keep(delta)
         };
-        self.place.block_on(load).map_err(self.failed("read"))
+        self.location.block_on(load).map_err(self.failed("read"))
     }
 
     /// What a loaded table says, kept for those who ask next.
     fn keep(&self, delta: DeltaTable) -> Result<Snapshot, DeltaTableError> {
         let files = delta.snapshot()?.log_data().iter().map(|view| self.file(view)).collect();
         let snapshot = Snapshot { version: delta.version().unwrap_or_default(), files, delta };
-        self.latest.keep(&self.place, &snapshot);
+        self.latest.keep(&self.location, &snapshot);
         Ok(snapshot)
     }
 
     fn file(&self, view: LogicalFileView) -> DataFile {
         DataFile {
-            path: self.place.dir().join(view.path().as_ref()),
+            path: self.location.dir().join(view.path().as_ref()),
             size_bytes: u64::try_from(view.size()).unwrap_or_default(),
             stats: Stats::parse(view.stats().as_deref()),
             view,
@@ -218,13 +190,13 @@ impl Table {
     }
 
     fn attempts(&self) -> u32 {
-        if self.place.is_bucket() { ATTEMPTS_WITHOUT_LOCK } else { ATTEMPTS }
+        if self.location.is_bucket() { ATTEMPTS_WITHOUT_LOCK } else { ATTEMPTS }
     }
 
     fn commit(&self, snapshot: &Snapshot, change: Change<'_>) -> Result<(), DeltaTableError> {
         let mut properties = CommitProperties::default();
         // Without a lock, two who add the same flight must not both land either.
-        if !change.remove.is_empty() || self.place.is_bucket() {
+        if !change.remove.is_empty() || self.location.is_bucket() {
             let now = Timestamp::now().as_millisecond();
             let guard = Transaction::new_with_last_update(REWRITE, snapshot.version as i64, Some(now));
             properties = properties.with_application_transaction(guard);
@@ -238,7 +210,7 @@ impl Table {
         } else {
             DeltaOperation::Write { mode: SaveMode::Append, partition_by: None, predicate: None }
         };
-        self.place.block_on(async {
+        self.location.block_on(async {
             let builder = CommitBuilder::from(properties).with_actions(actions);
             let state = snapshot.delta.snapshot()?;
             let done = builder.build(Some(state), snapshot.delta.log_store(), operation).await?;
@@ -257,10 +229,10 @@ impl Table {
         let superseded = self.superseded(&snapshot).map_err(self.failed("read"))?;
         let horizon = SystemTime::now().checked_sub(kept).unwrap_or(SystemTime::UNIX_EPOCH);
         let mut deleted = 0;
-        for (path, written) in self.place.entries()?.into_iter().filter(|(path, _)| is_data(path)) {
+        for (path, written) in self.location.entries()?.into_iter().filter(|(path, _)| is_data(path)) {
             let since = superseded.get(&path).copied().unwrap_or(written);
             if !active.contains(path.as_path()) && since <= horizon {
-                self.place.delete(&path)?;
+                self.location.delete(&path)?;
                 deleted += 1;
             }
         }
@@ -269,13 +241,13 @@ impl Table {
 
     /// When each file that the log still remembers was superseded.
     fn superseded(&self, snapshot: &Snapshot) -> Result<HashMap<PathBuf, SystemTime>, DeltaTableError> {
-        let tombstones: Vec<TombstoneView> = self.place.block_on(async {
+        let tombstones: Vec<TombstoneView> = self.location.block_on(async {
             let log_store = snapshot.delta.log_store();
             snapshot.delta.snapshot()?.all_tombstones(&log_store).try_collect().await
         })?;
         let since = |ms: i64| UNIX_EPOCH + Duration::from_millis(u64::try_from(ms).unwrap_or_default());
         let entry = |t: &TombstoneView| {
-            Some((self.place.dir().join(t.path().as_ref()), since(t.deletion_timestamp()?)))
+            Some((self.location.dir().join(t.path().as_ref()), since(t.deletion_timestamp()?)))
         };
         Ok(tombstones.iter().filter_map(entry).collect())
     }
@@ -303,7 +275,7 @@ mod tests {
     use arrow::datatypes::{DataType, Field, Schema};
 
     use super::*;
-    use crate::tabled::time;
+    use crate::rows::row_schema::time;
 
     fn schema() -> SchemaRef {
         Arc::new(Schema::new(vec![
@@ -313,7 +285,7 @@ mod tests {
     }
 
     fn table(dir: &Path) -> Table {
-        let table = Table::new(&Place::at(dir).unwrap(), "numbers", schema());
+        let table = Table::new(&Location::at(dir).unwrap(), "numbers", schema());
         table.create().unwrap();
         table
     }
@@ -325,13 +297,14 @@ mod tests {
     }
 
     fn append(table: &Table, n: i64) {
-        let write =
-            |snapshot: &Snapshot| datafile::write(&table.place, snapshot.version + 1, &batch(vec![n]), true);
+        let write = |snapshot: &Snapshot| {
+            data_file::write(&table.location, snapshot.version + 1, &batch(vec![n]), true)
+        };
         table.change(|snapshot| Ok(Change { add: vec![write(snapshot)?], ..Change::default() })).unwrap();
     }
 
     fn merged<'a>(table: &Table, snapshot: &'a Snapshot, name: u64) -> Change<'a> {
-        let add = datafile::write(&table.place, name, &batch(vec![1, 2]), false).unwrap();
+        let add = data_file::write(&table.location, name, &batch(vec![1, 2]), false).unwrap();
         Change {
             add: vec![add],
             remove: snapshot.files.iter().collect(),
@@ -378,7 +351,7 @@ mod tests {
     #[test]
     fn what_is_kept_of_a_table_says_what_its_log_says_after_every_commit() {
         let dir = tempfile::tempdir().unwrap();
-        let (own, place) = (table(dir.path()), Place::at(dir.path()).unwrap());
+        let (own, location) = (table(dir.path()), Location::at(dir.path()).unwrap());
         // Past two checkpoints, with files that come and go.
         for n in 1..=45 {
             append(&own, n);
@@ -386,7 +359,7 @@ mod tests {
                 own.change(|snapshot| Ok(merged(&own, snapshot, 1000 + n as u64))).unwrap();
             }
             let (kept, read) =
-                (own.snapshot().unwrap(), Table::new(&place, "numbers", schema()).snapshot().unwrap());
+                (own.snapshot().unwrap(), Table::new(&location, "numbers", schema()).snapshot().unwrap());
             assert_eq!(kept.version, read.version);
             assert_eq!(told(&kept), told(&read), "after {n}");
         }
@@ -398,7 +371,7 @@ mod tests {
     fn a_commit_of_somebody_else_is_seen_at_once() {
         let dir = tempfile::tempdir().unwrap();
         let own = table(dir.path());
-        let other = Table::new(&Place::at(dir.path()).unwrap(), "numbers", schema());
+        let other = Table::new(&Location::at(dir.path()).unwrap(), "numbers", schema());
         append(&own, 1);
         assert_eq!(rows(&other), 1);
         append(&own, 2);
@@ -436,7 +409,7 @@ mod tests {
         for n in 1..25 {
             append(&table, n);
         }
-        assert!(table.place.has("_delta_log/_last_checkpoint").unwrap());
+        assert!(table.location.has("_delta_log/_last_checkpoint").unwrap());
         assert_eq!(rows(&table), 24);
         let snapshot = table.snapshot().unwrap();
         let filled: Vec<&DataFile> = snapshot.files.iter().filter(|file| file.has_rows()).collect();

@@ -8,13 +8,14 @@ use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::SchemaRef;
 use polars::prelude::{Expr, col, lit};
 
-use crate::datafile;
+use crate::delta::data_file;
+use crate::delta::snapshot::{DataFile, Snapshot};
+use crate::delta::table::{Change, Table};
 use crate::error::Error;
-use crate::frame::{self, Read};
-use crate::layout::Store;
-use crate::numbered;
-use crate::table::{Change, DataFile, Snapshot, Table};
-use crate::writer::Writer;
+use crate::handle::Store;
+use crate::read::polars_scan::{self, ScanRequest};
+use crate::rows::versioned;
+use crate::write::writer::Writer;
 
 /// Rows of a full file: many enough to open few, few enough to copy one for a flight estimated again.
 const FILE_ROWS: usize = 100_000;
@@ -41,7 +42,7 @@ impl Store {
     ///
     /// # Errors
     /// [`Error::Table`] when a table's log cannot be read.
-    pub fn is_scattered(&self) -> Result<bool, Error> {
+    pub fn needs_compaction(&self) -> Result<bool, Error> {
         for table in self.tables() {
             let snapshot = table.snapshot()?;
             let files = &snapshot.files;
@@ -63,10 +64,12 @@ impl Writer {
     /// As [`Writer::commit`]; the tables are unchanged then.
     pub fn compact(&mut self) -> Result<Compaction, Error> {
         let store = self.store();
-        let by_unit =
-            Plan { slice_by: "tail_number", order: &["tail_number", "serial_number", "departure_utc"] };
-        let by_log = Plan { slice_by: "log_path", order: &["log_path", numbered::COMMIT] };
-        let by_run = Plan { slice_by: "run_id", order: &[numbered::COMMIT] };
+        let by_unit = RewritePlan {
+            slice_by: "tail_number",
+            order: &["tail_number", "serial_number", "departure_utc"],
+        };
+        let by_log = RewritePlan { slice_by: "log_path", order: &["log_path", versioned::COMMIT] };
+        let by_run = RewritePlan { slice_by: "run_id", order: &[versioned::COMMIT] };
         let mut total = Compaction { before: 0, after: 0, deleted: 0 };
         for (table, plan) in store.tables().into_iter().zip([by_unit, by_log, by_run]) {
             let before = table.snapshot()?.files.len();
@@ -89,14 +92,14 @@ impl Writer {
 }
 
 /// How a table is laid out anew.
-struct Plan {
+struct RewritePlan {
     /// Rows of one value lie together.
     slice_by: &'static str,
     /// The order within a slice.
     order: &'static [&'static str],
 }
 
-impl Plan {
+impl RewritePlan {
     fn change<'a>(
         &self,
         table: &Table,
@@ -119,15 +122,15 @@ impl Plan {
             let rows = self.rows(&files, schema, &slice)?;
             for first in (0..rows.num_rows()).step_by(FILE_ROWS) {
                 let part = rows.slice(first, FILE_ROWS.min(rows.num_rows() - first));
-                change.add.push(datafile::write(&table.place, snapshot.version + 1, &part, false)?);
+                change.add.push(data_file::write(&table.location, snapshot.version + 1, &part, false)?);
             }
         }
         Ok(change)
     }
 
     fn counts(&self, files: &[PathBuf], schema: &SchemaRef) -> Result<BTreeMap<String, usize>, Error> {
-        let schema = frame::only(schema, &[self.slice_by])?;
-        let values = Read { files, schema, condition: None, order: &[], last: None }.collect()?;
+        let schema = polars_scan::only(schema, &[self.slice_by])?;
+        let values = ScanRequest { files, schema, condition: None, order: &[], last: None }.collect()?;
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
         for value in values.column(0).as_string::<i32>().iter().flatten() {
             match counts.get_mut(value) {
@@ -138,31 +141,31 @@ impl Plan {
         Ok(counts)
     }
 
-    fn rows(&self, files: &[PathBuf], schema: &SchemaRef, slice: &Slice) -> Result<RecordBatch, Error> {
+    fn rows(&self, files: &[PathBuf], schema: &SchemaRef, slice: &OutputRange) -> Result<RecordBatch, Error> {
         let value = || col(self.slice_by);
         let from: Expr = value().gt_eq(lit(slice.first.clone()));
         let condition = Some(from.and(value().lt_eq(lit(slice.last.clone()))));
-        Read { files, schema: schema.clone(), condition, order: self.order, last: None }.collect()
+        ScanRequest { files, schema: schema.clone(), condition, order: self.order, last: None }.collect()
     }
 }
 
 /// Neighbouring values whose rows fill a file together.
 #[derive(Debug, PartialEq)]
-struct Slice {
+struct OutputRange {
     first: String,
     last: String,
     rows: usize,
 }
 
-fn slices(counts: &BTreeMap<String, usize>, file_rows: usize) -> Vec<Slice> {
-    let mut slices: Vec<Slice> = Vec::new();
+fn slices(counts: &BTreeMap<String, usize>, file_rows: usize) -> Vec<OutputRange> {
+    let mut slices: Vec<OutputRange> = Vec::new();
     for (value, &rows) in counts {
         match slices.last_mut() {
             Some(slice) if slice.rows + rows <= file_rows => {
                 slice.last.clone_from(value);
                 slice.rows += rows;
             }
-            _ => slices.push(Slice { first: value.clone(), last: value.clone(), rows }),
+            _ => slices.push(OutputRange { first: value.clone(), last: value.clone(), rows }),
         }
     }
     slices

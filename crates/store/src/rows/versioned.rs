@@ -6,22 +6,22 @@ use arrow::array::{Int64Array, RecordBatch};
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 
 use crate::error::Error;
-use crate::tabled::{self, Tabled};
+use crate::rows::row_schema::{self, RowSchema};
 
 /// The column that tells newer rows from older ones; clocks may go back, commits do not.
 pub(crate) const COMMIT: &str = "commit";
 
 /// A row type's columns and the number of the commit.
-pub(crate) fn schema<R: Tabled>() -> SchemaRef {
-    let columns = tabled::schema::<R>();
+pub(crate) fn schema<R: RowSchema>() -> SchemaRef {
+    let columns = row_schema::schema::<R>();
     let fields =
         columns.fields().iter().cloned().chain([Arc::new(Field::new(COMMIT, DataType::Int64, false))]);
     Arc::new(Schema::new(fields.collect::<Vec<_>>()))
 }
 
 /// Rows as columns, all of one commit.
-pub(crate) fn to_batch<R: Tabled>(rows: &[R], commit: u64) -> Result<RecordBatch, Error> {
-    let batch = tabled::to_batch(rows)?;
+pub(crate) fn to_batch<R: RowSchema>(rows: &[R], commit: u64) -> Result<RecordBatch, Error> {
+    let batch = row_schema::to_batch(rows)?;
     let mut arrays = batch.columns().to_vec();
     arrays.push(Arc::new(Int64Array::from(vec![commit as i64; rows.len()])));
     Ok(RecordBatch::try_new(schema::<R>(), arrays)?)

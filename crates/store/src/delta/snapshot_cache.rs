@@ -10,27 +10,27 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
-use crate::place::Place;
-use crate::table::Snapshot;
+use crate::delta::location::Location;
+use crate::delta::snapshot::Snapshot;
 
 /// Where a table's log lies.
 const LOG: &str = "_delta_log";
 
 /// A snapshot that is kept, shared by all who hold the table.
 #[derive(Clone, Default)]
-pub(crate) struct Latest(Arc<Mutex<Option<Kept>>>);
+pub(crate) struct SnapshotCache(Arc<Mutex<Option<CachedSnapshot>>>);
 
-struct Kept {
+struct CachedSnapshot {
     snapshot: Snapshot,
-    log: Listing,
+    log: LogListing,
 }
 
 /// The files of a log, each with its bytes and when it was written: one that was torn or put in another's place
 /// has others.
 #[derive(PartialEq, Eq)]
-struct Listing(BTreeMap<OsString, (u64, SystemTime)>);
+struct LogListing(BTreeMap<OsString, (u64, SystemTime)>);
 
-impl Listing {
+impl LogListing {
     /// None where the folder cannot be read, or nobody says when its files were written.
     fn of(dir: &Path) -> Option<Self> {
         let mut files = BTreeMap::new();
@@ -58,26 +58,26 @@ pub(crate) fn commit_file(version: u64) -> String {
     format!("{LOG}/{}", name(version))
 }
 
-impl Latest {
+impl SnapshotCache {
     /// The snapshot kept, where the log has not changed since.
-    pub(crate) fn get(&self, place: &Place) -> Option<Snapshot> {
+    pub(crate) fn get(&self, location: &Location) -> Option<Snapshot> {
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let Kept { snapshot, log } = kept.as_ref()?;
-        (Listing::of(&place.dir().join(LOG)).as_ref() == Some(log)).then(|| snapshot.clone())
+        let CachedSnapshot { snapshot, log } = kept.as_ref()?;
+        (LogListing::of(&location.dir().join(LOG)).as_ref() == Some(log)).then(|| snapshot.clone())
     }
 
     /// Keeps a snapshot in place of the one before; none that another commit has overtaken. In a bucket a look costs
     /// as much as reading: nothing is kept.
-    pub(crate) fn keep(&self, place: &Place, snapshot: &Snapshot) {
-        let log = if place.is_bucket() { None } else { Listing::of(&place.dir().join(LOG)) };
+    pub(crate) fn keep(&self, location: &Location, snapshot: &Snapshot) {
+        let log = if location.is_bucket() { None } else { LogListing::of(&location.dir().join(LOG)) };
         let log = log.filter(|log| log.ends_with(snapshot.version));
-        let kept = log.map(|log| Kept { snapshot: snapshot.clone(), log });
+        let kept = log.map(|log| CachedSnapshot { snapshot: snapshot.clone(), log });
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = kept;
     }
 }
 
-impl fmt::Debug for Latest {
+impl fmt::Debug for SnapshotCache {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Latest")
+        f.write_str("SnapshotCache")
     }
 }

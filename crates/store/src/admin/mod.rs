@@ -1,0 +1,6 @@
+//! Store administration: run log, summary, verification and export.
+
+pub(crate) mod export;
+pub(crate) mod info;
+pub(crate) mod run_log;
+pub(crate) mod verify;

@@ -1,0 +1,74 @@
+//! Store handle: the location, the tables and the digest check of data files.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use records::GapRecord;
+
+use crate::delta::data_file;
+use crate::delta::location::Location;
+use crate::delta::table::Table;
+use crate::error::Error;
+use crate::rows::accounts::{LogRecord, RunRecord};
+use crate::rows::{row_schema, versioned};
+
+const LOCK: &str = "lock";
+
+/// Result store, open for reading.
+#[derive(Debug, Clone)]
+pub struct Store {
+    pub(crate) location: Location,
+    display_path: PathBuf,
+    pub(crate) gaps: Table,
+    pub(crate) logs: Table,
+    pub(crate) runs: Table,
+    /// Data files whose digests this process has verified.
+    verified: Arc<Mutex<HashSet<PathBuf>>>,
+}
+
+impl Store {
+    pub(crate) fn at(location: Location) -> Self {
+        let table = |name, schema| Table::new(&location, name, schema);
+        let gaps = table("gaps", row_schema::schema::<GapRecord>());
+        let logs = table("logs", versioned::schema::<LogRecord>());
+        let runs = table("runs", versioned::schema::<RunRecord>());
+        let display_path = location.display_path(location.dir());
+        Self { gaps, logs, runs, verified: Arc::default(), display_path, location }
+    }
+
+    /// The folder or the object address.
+    pub fn dir(&self) -> &Path {
+        &self.display_path
+    }
+
+    /// Path of the lock file; `None` in a bucket.
+    pub(crate) fn lock_file(&self) -> Option<PathBuf> {
+        (!self.location.is_bucket()).then(|| self.location.dir().join(LOCK))
+    }
+
+    /// All tables.
+    pub(crate) fn tables(&self) -> [&Table; 3] {
+        [&self.gaps, &self.logs, &self.runs]
+    }
+
+    /// Verifies the digests of data files, each once per store handle.
+    ///
+    /// Neither Delta Lake nor Polars detects a changed byte of a data file.
+    ///
+    /// # Errors
+    /// [`Error::Damaged`] for the first file that differs.
+    pub(crate) fn check(&self, files: &[PathBuf]) -> Result<(), Error> {
+        let verified = || self.verified.lock().unwrap_or_else(PoisonError::into_inner);
+        for file in files {
+            // The mutex is not held during the check, so that threads verify different files in parallel.
+            let is_known = verified().contains(file);
+            if !is_known {
+                self.location.fetch(file)?;
+                data_file::check(file)?;
+                verified().insert(file.clone());
+            }
+        }
+        Ok(())
+    }
+}

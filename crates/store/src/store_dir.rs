@@ -1,0 +1,149 @@
+//! Store directory: creation, opening and format version.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::delta::durable_fs;
+use crate::delta::location::Location;
+use crate::error::Error;
+use crate::handle::Store;
+
+/// Format version of the store; it is raised when an older release could no longer read or write the store.
+///
+/// 1: log records are *done* or *error*. 2: they may also be *known*, *not reached* or *unaccounted*.
+/// 3: files of one table may differ in later columns.
+/// Every earlier format is read, and is raised to the current one when the store is next written.
+pub(crate) const FORMAT: u32 = 3;
+pub(crate) const MARKER: &str = "store.json";
+
+/// Content of `store.json`.
+#[derive(Serialize, Deserialize)]
+struct FormatMarker {
+    freeplay_store: u32,
+}
+
+impl Store {
+    /// Opens a store for reading.
+    ///
+    /// # Errors
+    /// [`Error::Missing`] when there is no store, [`Error::Foreign`] when the folder holds other files,
+    /// [`Error::Format`] when a newer release wrote it.
+    pub fn open(dir: impl AsRef<Path>) -> Result<Self, Error> {
+        let dir = dir.as_ref();
+        let missing = || Error::Missing { dir: dir.to_owned() };
+        if !object_io::is_address(dir) && !is_there(dir)? {
+            return Err(missing());
+        }
+        let location = Location::at(check_name(dir)?)?;
+        match first_entry(&location)? {
+            None => return Err(missing()),
+            Some(found) => drop(check_marker(&location, &found)?),
+        }
+        let store = Self::at(location);
+        for table in store.tables() {
+            if !table.exists()? {
+                return Err(missing());
+            }
+        }
+        Ok(store)
+    }
+
+    /// Opens a store; creates it if the folder is missing or empty.
+    ///
+    /// # Errors
+    /// As [`Store::open`], except that a missing store is created; [`Error::Io`] when it cannot be.
+    pub fn create_or_open(dir: impl AsRef<Path>) -> Result<Self, Error> {
+        let dir = dir.as_ref();
+        check_name(dir)?;
+        if !object_io::is_address(dir) {
+            make_folder(dir)?;
+        }
+        let location = Location::at(dir)?;
+        match first_entry(&location)? {
+            None => write_marker(&location)?,
+            Some(found) => drop(check_marker(&location, &found)?),
+        }
+        let store = Self::at(location);
+        for table in store.tables() {
+            if table.exists()? {
+                table.renew()?;
+            } else {
+                table.create()?;
+            }
+        }
+        store.location.sync()?;
+        Ok(store)
+    }
+}
+
+/// A percent sign and two hexadecimal digits, which delta-rs decodes twice.
+fn percent_code(path: &str) -> Option<&str> {
+    let codes = path.match_indices('%').filter_map(|(at, _)| path.get(at..at + 3));
+    codes.into_iter().find(|code| code.bytes().skip(1).all(|digit| digit.is_ascii_hexdigit()))
+}
+
+/// Rejects names that delta-rs cannot handle.
+fn check_name(dir: &Path) -> Result<&Path, Error> {
+    let path = if object_io::is_address(dir) {
+        dir.to_owned()
+    } else {
+        std::path::absolute(dir).map_err(Error::io(dir, "opened"))?
+    };
+    match percent_code(&path.to_string_lossy()) {
+        Some(found) => Err(Error::Name { found: found.to_owned(), dir: dir.to_owned() }),
+        None => Ok(dir),
+    }
+}
+
+/// An entry of the folder, the format marker first; `None` when the folder is empty.
+fn first_entry(location: &Location) -> Result<Option<String>, Error> {
+    if location.is_bucket() {
+        return Ok(location.has(MARKER)?.then(|| MARKER.to_owned()));
+    }
+    let dir = location.dir();
+    let entries = std::fs::read_dir(dir).map_err(Error::io(dir, "opened"))?;
+    let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.filter(|name| !name.starts_with(&format!("{MARKER}#"))).collect();
+    names.sort_by_key(|name| name != MARKER);
+    Ok(names.into_iter().next())
+}
+
+pub(crate) fn write_marker(location: &Location) -> Result<(), Error> {
+    let marker = serde_json::json!(FormatMarker { freeplay_store: FORMAT }).to_string();
+    location.replace(MARKER, marker.as_bytes())
+}
+
+/// Whether the folder exists; a file of that name is an error.
+fn is_there(dir: &Path) -> Result<bool, Error> {
+    match std::fs::read_dir(dir) {
+        Ok(_) => Ok(true),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(false),
+        Err(e) => Err(Error::io(dir, "opened")(e)),
+    }
+}
+
+/// Creates the folder if it does not exist, and syncs its parent.
+fn make_folder(dir: &Path) -> Result<(), Error> {
+    if is_there(dir)? {
+        return Ok(());
+    }
+    std::fs::create_dir_all(dir).map_err(Error::io(dir, "created"))?;
+    // A bare name such as `results` has an empty parent, which is the current folder.
+    let parent = dir.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
+    parent.map_or(Ok(()), |parent| durable_fs::sync_dir(parent).map_err(Error::io(parent, "synced")))
+}
+
+/// The format version, if the folder is a store of a known format.
+pub(crate) fn check_marker(location: &Location, found: &str) -> Result<u32, Error> {
+    let file = location.display_path(&location.dir().join(MARKER));
+    if found != MARKER {
+        return Err(Error::Foreign { dir: location.display_path(location.dir()), found: found.to_owned() });
+    }
+    let text = location.read(MARKER)?;
+    match serde_json::from_str::<FormatMarker>(&text) {
+        Ok(FormatMarker { freeplay_store: format @ 1..=FORMAT }) => Ok(format),
+        Ok(marker) => Err(Error::Format { file, found: marker.freeplay_store.to_string(), known: FORMAT }),
+        Err(_) => Err(Error::Torn { file, found: text.trim().chars().take(40).collect() }),
+    }
+}
