@@ -542,7 +542,7 @@ fn parse_utc(text: &str) -> Result<Timestamp, String> {
 
 fn parse_limit(text: &str) -> Result<f64, String> {
     let limit_m = text.parse().map_err(|_| format!("`{text}` is no number of metres such as 150e-6"))?;
-    job::value::plausible_limit_m(limit_m)
+    job::config::limits::plausible_limit_m(limit_m)
 }
 
 fn parse_span(text: &str) -> Result<std::time::Duration, String> {

@@ -7,8 +7,8 @@ use estimator::{Filter, MidRange, Room, Samples, Schedule, midrange};
 use ingest::{Actuator, Geometry};
 use records::{Diagnostic, GapEstimate, Status};
 
+use crate::config::part::Part;
 use crate::config::{EstimateSettings, Method};
-use crate::part::Part;
 
 /// A filter whose slow pole is further off than this share is not the one that was asked for.
 const BANDWIDTH_TOLERANCE: f64 = 0.25;
@@ -25,21 +25,22 @@ pub fn estimate(
     part: &Part,
     settings: &EstimateSettings,
 ) -> Result<GapEstimate, Diagnostic> {
-    let schedule = part.schedules.of(&filter(channels, part)?);
+    let schedule = part.filters.of(&filter(channels, part)?);
     let prior = prior(part);
     let failed = |e: estimator::Error| Diagnostic::new("estimate_failed", e);
-    let mut estimate = if let Some(reason) = blind(channels) {
+    let mut estimate = if let Some(reason) = pre_check_rejection(channels) {
         GapEstimate::refused(reason)
     } else {
-        in_rooms(channels.dx_m.len(), |rooms| {
-            let published = match midrange::estimate_in(&samples(channels), &schedule, &mut rooms.published) {
-                Ok(found) => Some(found),
-                Err(estimator::Error::Constant { .. } | estimator::Error::NothingMeasured) => None,
-                Err(other) => return Err(failed(other)),
-            };
-            let outcome =
-                contact::estimate_with(&samples(channels), &prior, &mut rooms.contact).map_err(failed)?;
-            Ok(judged(published.as_ref(), &outcome, &prior, settings.method))
+        with_workspaces(channels.dx_m.len(), |workspaces| {
+            let published =
+                match midrange::estimate_in(&samples(channels), &schedule, &mut workspaces.published) {
+                    Ok(found) => Some(found),
+                    Err(estimator::Error::Constant { .. } | estimator::Error::NothingMeasured) => None,
+                    Err(other) => return Err(failed(other)),
+                };
+            let outcome = contact::estimate_with(&samples(channels), &prior, &mut workspaces.contact)
+                .map_err(failed)?;
+            Ok(combine_methods(published.as_ref(), &outcome, &prior, settings.method))
         })?
     };
     estimate.temperature_c = channels.temperature_c;
@@ -57,22 +58,26 @@ pub fn estimate(
 }
 
 /// Longer flights have rooms of their own, lest a thread keep them for ever: samples.
-const LONGEST_KEPT: usize = 2 << 20;
+const MAX_KEPT_SAMPLES: usize = 2 << 20;
 
 /// What the estimates of one actuator after the other are made in.
 #[derive(Debug, Default)]
-struct Rooms {
+struct Workspaces {
     published: Room,
     contact: contact::ContactWorkspace,
 }
 
 thread_local! {
-    static ROOMS: RefCell<Rooms> = RefCell::default();
+    static WORKSPACES: RefCell<Workspaces> = RefCell::default();
 }
 
 /// Does something in the rooms of this thread.
-fn in_rooms<T>(samples: usize, work: impl FnOnce(&mut Rooms) -> T) -> T {
-    if samples > LONGEST_KEPT { work(&mut Rooms::default()) } else { ROOMS.with_borrow_mut(work) }
+fn with_workspaces<T>(samples: usize, work: impl FnOnce(&mut Workspaces) -> T) -> T {
+    if samples > MAX_KEPT_SAMPLES {
+        work(&mut Workspaces::default())
+    } else {
+        WORKSPACES.with_borrow_mut(work)
+    }
 }
 
 /// The filter of a part at the step of a log.
@@ -117,7 +122,7 @@ pub fn prior(part: &Part) -> PartPrior {
 }
 
 /// Why no statistic could mean anything, seen before any is made.
-fn blind(channels: &Actuator) -> Option<&'static str> {
+fn pre_check_rejection(channels: &Actuator) -> Option<&'static str> {
     let [motor, screw, load] = &channels.quality;
     let first = channels.dx_m.iter().find(|dx| !dx.is_nan());
     if channels.segments.is_empty() {
@@ -133,14 +138,14 @@ fn blind(channels: &Actuator) -> Option<&'static str> {
 ///
 /// The published statistic never refuses, so under either method a flight that the regression finds
 /// blind is refused: its mid-range number is kept, and is not given as the gap.
-fn judged(
+fn combine_methods(
     published: Option<&MidRange>,
     outcome: &ContactOutcome,
     prior: &PartPrior,
     method: Method,
 ) -> GapEstimate {
     let mut estimate = match outcome {
-        ContactOutcome::Estimated(found) => regressed(found),
+        ContactOutcome::Estimated(found) => from_contact(found),
         ContactOutcome::Refused(why) => GapEstimate::refused(why.code()),
     };
     let Some(published) = published else { return estimate };
@@ -166,7 +171,7 @@ fn judged(
     estimate
 }
 
-fn regressed(found: &ContactEstimate) -> GapEstimate {
+fn from_contact(found: &ContactEstimate) -> GapEstimate {
     let (p05_m, p95_m) = found.gap_bounds_m;
     GapEstimate {
         status: Status::Estimated,

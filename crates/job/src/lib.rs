@@ -1,22 +1,21 @@
-//! What a fleet writes down in `pipeline.toml`, and what it makes of one flight: log in, records out.
+//! The estimation job: `pipeline.toml` in, one gap record per actuator and flight out.
 //!
-//! [`Config`] is checked whole before the first flight; [`Opened::record`] is a pure composition of
-//! the floors below it, the same in the nightly run, at the prompt and in a notebook.
+//! [`Config`] is validated completely before the first flight. [`FlightLog::record`] composes ingest and estimator;
+//! every caller (run, command line, Python) uses it.
 
 pub mod config;
 pub mod estimate;
-pub mod facts;
-pub mod flight;
-pub mod look;
+pub mod estimate_plot_data;
+pub mod filter_cache;
+pub mod flight_log;
 pub mod normalize;
-pub mod part;
-pub mod schedules;
+pub mod part_identification;
 pub mod trace;
-pub mod value;
 
 pub use config::Config;
-pub use flight::{Opened, Stamp};
-pub use part::Part;
+pub use config::part::Part;
+pub use flight_log::{FlightLog, ProvenanceStamp};
 
-/// Changes with every change to the method that can move a number; part of every configuration digest.
+/// Version of the estimation method: changes with every change that can move a number; part of every configuration
+/// digest.
 pub const METHOD_VERSION: u32 = 6;

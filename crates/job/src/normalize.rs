@@ -8,7 +8,7 @@ use ingest::{Files, PositionColumns};
 use records::{Diagnostic, Installations};
 
 use crate::config::Config;
-use crate::flight::{Opened, caught};
+use crate::flight_log::{FlightLog, catch_panic};
 
 /// Writes the normalized logs of one log below a folder, as `TAIL/FLIGHT/POSITION.parquet`.
 ///
@@ -23,8 +23,8 @@ pub fn normalize(
     installations: &Installations,
     (folder, encoding): (&Path, Encoding),
 ) -> Result<(Vec<PathBuf>, Vec<Diagnostic>), Diagnostic> {
-    caught(shown, || {
-        let opened = Opened::open(files, shown, config, installations)?;
+    catch_panic(shown, || {
+        let opened = FlightLog::open(files, shown, config, installations)?;
         let (mut written, mut diagnostics) = (Vec::new(), Vec::new());
         for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
             match one(&opened, at, config, installations, (folder, encoding)) {
@@ -37,7 +37,7 @@ pub fn normalize(
 }
 
 fn one(
-    opened: &Opened,
+    opened: &FlightLog,
     at: &PositionColumns,
     config: &Config,
     installations: &Installations,
@@ -49,7 +49,7 @@ fn one(
     let names = [id.tail_number.as_str(), id.flight_id.as_str(), at.position.as_str()].map(file_name);
     let file = folder.join(&names[0]).join(&names[1]).join(format!("{}.parquet", names[2]));
     let provenance = BTreeMap::from([
-        ("source_log".to_owned(), opened.shown().to_owned()),
+        ("source_log".to_owned(), opened.display_name().to_owned()),
         ("source_digest".to_owned(), opened.digest.clone()),
         ("config_digest".to_owned(), config.digest(&id.tail_number, &stay.part_number).to_string()),
         ("part_number".to_owned(), stay.part_number.to_string()),

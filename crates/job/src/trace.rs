@@ -6,9 +6,9 @@ use ingest::write::Column;
 use records::{Diagnostic, Installations, PartNumber};
 
 use crate::config::Config;
+use crate::config::part::Part;
 use crate::estimate;
-use crate::flight;
-use crate::part::Part;
+use crate::flight_log;
 
 /// S(t), its inputs, innovation and its variance of one or more actuators, one after the other.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -98,7 +98,7 @@ pub fn of_log(
     part: Option<&PartNumber>,
 ) -> Result<Trace, Diagnostic> {
     let mut whole = Trace::default();
-    flight::each(files, shown, config, installations, part, |channels, part| {
+    flight_log::for_each_actuator(files, shown, config, installations, part, |channels, part| {
         whole.extend(Trace::of(shown, channels, part)?);
         Ok(())
     })?;

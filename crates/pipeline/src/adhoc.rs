@@ -5,7 +5,7 @@ use std::path::Path;
 use ingest::Files;
 use ingest::arrays::Arrays;
 use job::Config;
-use job::flight::{Opened, anonymous, caught, part_of};
+use job::flight_log::{FlightLog, estimate_unidentified, catch_panic, part_of};
 use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
 use serde::Serialize;
 
@@ -47,10 +47,10 @@ pub fn estimate(
 ) -> Result<Vec<EstimateRow>, Error> {
     let shown = path.display().to_string();
     let read = match part {
-        Some(number) => caught(&shown, || as_part(path, &shown, config, number, program_version)),
+        Some(number) => catch_panic(&shown, || as_part(path, &shown, config, number, program_version)),
         None => {
             let files = bundle::around(config, path)?;
-            caught(&shown, || booked(&files, &shown, config, installations, program_version, diagnostics))
+            catch_panic(&shown, || booked(&files, &shown, config, installations, program_version, diagnostics))
         }
     };
     Ok(read.unwrap_or_else(|diagnostic| {
@@ -66,7 +66,7 @@ fn as_part(
     number: &PartNumber,
     program_version: &str,
 ) -> Result<Vec<EstimateRow>, Diagnostic> {
-    let found = anonymous(&Files::one(path), shown, config, part_of(config, number)?)?;
+    let found = estimate_unidentified(&Files::one(path), shown, config, part_of(config, number)?)?;
     let row = |(position, estimate): (Position, GapEstimate)| EstimateRow {
         tail_number: None,
         position: Some(position.to_string()),
@@ -93,7 +93,7 @@ fn booked(
     program_version: &str,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Result<Vec<EstimateRow>, Diagnostic> {
-    let opened = Opened::open(files, shown, config, installations)?;
+    let opened = FlightLog::open(files, shown, config, installations)?;
     let flight = opened.flight();
     let mut rows = Vec::new();
     for at in opened.actuators(installations) {

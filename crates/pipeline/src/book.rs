@@ -6,7 +6,7 @@
 use std::collections::{BTreeSet, HashMap};
 
 use job::Config;
-use job::flight::sample_digest;
+use job::flight_log::sample_digest;
 use records::{Diagnostic, GapRecord, Installations};
 use store::{LogOutcome, LogRecord, LogResult, RecordKey};
 

@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn a_panic_gives_back_what_it_held_and_becomes_a_complaint() {
         let budget = Budget::new(Some(1));
-        let ended = job::flight::caught("a.parquet", || {
+        let ended = job::flight_log::catch_panic("a.parquet", || {
             let _held = budget.take(1 << 20);
             let nothing: &[f64] = &[];
             Ok(nothing[std::hint::black_box(3)])

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use ingest::Files;
 use job::Config;
-use job::flight::{identify, identify_companion};
+use job::flight_log::{identify, identify_companion};
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, Position, TailNumber};
 

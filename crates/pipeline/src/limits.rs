@@ -1,7 +1,7 @@
 //! What units of each part number are judged by.
 
 use job::Config;
-use job::part::WearAxis;
+use job::config::part::WearAxis;
 use records::PartNumber;
 use trend::UsageAxis;
 

@@ -225,7 +225,7 @@ pub fn plan(
     } else {
         HashSet::new()
     };
-    let unidentified = job::flight::unidentified_digest(config, installations);
+    let unidentified = job::flight_log::digest_without_identity(config, installations);
     let judge =
         Judge { config, installations, request, owned: &owned, unidentified: &unidentified, seen: &seen };
     let verdicts: Vec<Verdict> =
@@ -306,7 +306,7 @@ impl Judge<'_> {
         let flight = || {
             before
                 .and_then(flight_of)
-                .or_else(|| Some(job::flight::identify(files, shown, self.config).ok()?.0))
+                .or_else(|| Some(job::flight_log::identify(files, shown, self.config).ok()?.0))
         };
         let asked =
             !self.request.is_narrow() || flight().is_none_or(|f| self.request.wants(&f, self.installations));
@@ -323,7 +323,7 @@ impl Judge<'_> {
         let settings = flight_of(account).map_or_else(
             || self.unidentified.to_owned(),
             |flight| {
-                job::flight::config_digest(self.config, self.installations, &flight, &positions_of(account))
+                job::flight_log::config_digest(self.config, self.installations, &flight, &positions_of(account))
             },
         );
         if self.request.redo {

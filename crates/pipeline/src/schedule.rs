@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use ingest::PositionColumns;
 use jiff::Timestamp;
-use job::flight::{Opened, caught, config_digest, unidentified_digest};
-use job::{Config, Stamp};
+use job::flight_log::{FlightLog, catch_panic, config_digest, digest_without_identity};
+use job::{Config, ProvenanceStamp};
 use rayon::prelude::*;
 use records::{Diagnostic, GapRecord, Installations, Status};
 use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
@@ -244,7 +244,7 @@ impl Shop<'_> {
     /// One log; a panic in it is an error row like any other.
     pub(crate) fn one(&self, work: &Work) -> Done {
         let clock = Instant::now();
-        let done = caught(&work.shown, || Ok(self.open(work)));
+        let done = catch_panic(&work.shown, || Ok(self.open(work)));
         let done = done.unwrap_or_else(|diagnostic| self.failed(work, diagnostic));
         match done {
             Done::Read { mut account, records, diagnostics } => {
@@ -257,7 +257,7 @@ impl Shop<'_> {
 
     fn failed(&self, work: &Work, diagnostic: Diagnostic) -> Done {
         let mut account = account::of_log(work, self.run_id);
-        account.config_digest = Some(unidentified_digest(self.config, self.installations));
+        account.config_digest = Some(digest_without_identity(self.config, self.installations));
         account::complain(&mut account, std::slice::from_ref(&diagnostic));
         Done::Read { account: Box::new(account), records: Vec::new(), diagnostics: vec![diagnostic] }
     }
@@ -266,7 +266,7 @@ impl Shop<'_> {
         if let Some(fault) = &work.fault {
             return self.failed(work, fault.clone());
         }
-        let opened = match Opened::open(&work.files, &work.shown, self.config, self.installations) {
+        let opened = match FlightLog::open(&work.files, &work.shown, self.config, self.installations) {
             Ok(opened) => opened,
             Err(diagnostic) => return self.failed(work, diagnostic),
         };
@@ -300,8 +300,8 @@ impl Shop<'_> {
             .or_else(|| self.plan.gone.get(&digests).copied())
     }
 
-    fn read(&self, opened: &Opened, mut account: LogRecord) -> Done {
-        let stamp = Stamp {
+    fn read(&self, opened: &FlightLog, mut account: LogRecord) -> Done {
+        let stamp = ProvenanceStamp {
             run_id: self.run_id.to_owned(),
             program_version: self.context.program_version.to_owned(),
             processed_utc: Timestamp::now(),
@@ -315,7 +315,7 @@ impl Shop<'_> {
     }
 
     /// The records of a log: its actuators are spread over workers that have no log left to take.
-    fn records(&self, opened: &Opened, stamp: &Stamp) -> (Vec<GapRecord>, Vec<Diagnostic>) {
+    fn records(&self, opened: &FlightLog, stamp: &ProvenanceStamp) -> (Vec<GapRecord>, Vec<Diagnostic>) {
         let actuators: Vec<_> = opened.actuators(self.installations).collect();
         let bytes = Budget::actuator_bytes(opened.rows());
         let one = |at: &&PositionColumns| {

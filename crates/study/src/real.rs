@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use ingest::Files;
 use job::Config;
-use job::look::Look;
+use job::estimate_plot_data::EstimatePlot;
 use records::{Installations, PartNumber};
 
 use crate::answer::{load_lines_m, spread_m};
@@ -42,12 +42,12 @@ fn looked(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<RealRow>, S
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let number = PartNumber::new(part).map_err(|e| format!("{part}: {e}"))?;
     let none = Installations::default();
-    let looks = job::look::of_log(&Files::one(path), &name, config, &none, Some(&number))
+    let looks = job::estimate_plot_data::of_log(&Files::one(path), &name, config, &none, Some(&number))
         .map_err(|diagnostic| diagnostic.to_string())?;
     Ok(looks.iter().map(|look| row(&name, look)).collect())
 }
 
-fn row(log: &str, look: &Look) -> RealRow {
+fn row(log: &str, look: &EstimatePlot) -> RealRow {
     let e = &look.estimate;
     let radius_m = e.reference_radius_m.unwrap_or(f64::NAN);
     let degrees = |m: f64| (m / radius_m).to_degrees();

@@ -35,7 +35,7 @@ fn partly(py: Python<'_>, batch: RecordBatch, diagnostics: &[Diagnostic]) -> Par
 
 fn part(py: Python<'_>, config: &Config, number: &str) -> PyResult<PartNumber> {
     let named = PartNumber::new(number).map_err(|e| refused(py, Diagnostic::new("empty_name", e)))?;
-    job::flight::part_of(&config.inner, &named).map_err(|diagnostic| refused(py, diagnostic))?;
+    job::flight_log::part_of(&config.inner, &named).map_err(|diagnostic| refused(py, diagnostic))?;
     Ok(named)
 }
 

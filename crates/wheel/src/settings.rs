@@ -43,9 +43,9 @@ impl Config {
 
     /// That of nobody's logs: defaults, to judge tables that were made elsewhere.
     #[staticmethod]
-    fn of_no_logs() -> Self {
+    fn without_logs() -> Self {
         let installations = OnceLock::from(Installations::default());
-        Self { inner: job::Config::of_no_logs(), files: Vec::new(), installations }
+        Self { inner: job::Config::without_logs(), files: Vec::new(), installations }
     }
 
     /// The files it was read from, absolute; none when it was read from a text.
@@ -82,7 +82,7 @@ impl Config {
             inner.document.store.path = store;
         }
         if let Some(limit_m) = limit_m {
-            let limit_m = job::value::plausible_limit_m(limit_m).map_err(PyValueError::new_err)?;
+            let limit_m = job::config::limits::plausible_limit_m(limit_m).map_err(PyValueError::new_err)?;
             inner.document.trend.limit_m = Some(limit_m);
         }
         Ok(Self { inner, files: self.files.clone(), installations: self.installations.clone() })

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use ingest::{Actuator, Files, PositionColumns, Quality, quality};
 use job::Config;
-use job::flight::{Opened, caught};
-use job::value::UNHEARD_OF_M;
+use job::flight_log::{FlightLog, catch_panic};
+use job::config::limits::MAX_PLAUSIBLE_LIMIT_M;
 use pipeline::bundle;
 use records::{Diagnostic, Installations, PartNumber};
 use serde::Serialize;
@@ -42,8 +42,8 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
     let mut schemas = Schemas::default();
     let mut facts = Facts::new();
     for (files, name) in &logs {
-        let looked = caught(name, || {
-            let opened = Opened::open(files, name, &config, &installations)?;
+        let looked = catch_panic(name, || {
+            let opened = FlightLog::open(files, name, &config, &installations)?;
             schemas.enter(name, &opened.column_types());
             one(
                 &opened,
@@ -76,13 +76,13 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, talk: &Talk) -> Result<Co
 
 /// Asks after limits that were given in another unit.
 fn doubt_limits(config: &Config, talk: &Talk) {
-    let of_part = |(number, part): (&String, &job::part::PartSettings)| {
+    let of_part = |(number, part): (&String, &job::config::part::PartSettings)| {
         [("limit_m", part.limit_m), ("watch_m", part.watch_m)]
             .map(|(key, m)| (format!("part {number}"), key, m))
     };
     let of_all = ("trend".to_owned(), "limit_m", config.document.trend.limit_m);
     for (whose, key, limit_m) in config.document.part.iter().flat_map(of_part).chain([of_all]) {
-        if let Some(limit_m) = limit_m.filter(|limit_m| *limit_m > UNHEARD_OF_M) {
+        if let Some(limit_m) = limit_m.filter(|limit_m| *limit_m > MAX_PLAUSIBLE_LIMIT_M) {
             let meant = "keys are in metres: 150 µm is 150e-6";
             talk.note(&format!("{whose}: is `{key}` = {limit_m} meant in another unit? {meant}"));
         }
@@ -138,17 +138,17 @@ struct Seen<'s> {
 }
 
 /// What actuators say of their part numbers.
-type Facts = BTreeMap<PartNumber, Vec<job::facts::Facts>>;
+type Facts = BTreeMap<PartNumber, Vec<job::part_identification::IdentifiedParams>>;
 
 /// What one actuator said.
 struct Looked {
     found: Vec<Channel>,
     clock: Option<String>,
-    says: Option<(PartNumber, job::facts::Facts)>,
+    says: Option<(PartNumber, job::part_identification::IdentifiedParams)>,
 }
 
 fn one(
-    opened: &Opened,
+    opened: &FlightLog,
     name: &str,
     config: &Config,
     installations: &Installations,
@@ -225,7 +225,7 @@ fn clock(a: &Actuator) -> String {
 }
 
 fn actuator(
-    opened: &Opened,
+    opened: &FlightLog,
     name: &str,
     at: &PositionColumns,
     config: &Config,
@@ -273,7 +273,7 @@ fn actuator(
         describe(base("load", load, "N"), load_seen, &said(&a, "load")),
     ];
     found[2].note = found[2].note.take().or(slope);
-    let says = Some((stay.part_number.clone(), job::facts::Facts::of(&a, part)));
+    let says = Some((stay.part_number.clone(), job::part_identification::IdentifiedParams::of(&a, part)));
     Ok(Looked { found, clock: Some(clock(&a)), says })
 }
 
@@ -413,12 +413,12 @@ fn proposals(facts: &Facts, config: &Config) -> String {
     let mut page = String::new();
     for (number, all) in facts {
         let Some(part) = config.parts.get(number) else { continue };
-        let proposals = job::facts::Facts::medians(all).proposals(part);
+        let proposals = job::part_identification::IdentifiedParams::medians(all).comparisons(part);
         let rows: Vec<Vec<String>> = proposals
             .iter()
             .map(|p| {
-                let stated = p.stated.map_or_else(table::dash, |v| format!("{v:.2e}"));
-                vec![p.key.to_owned(), format!("{:.2e}", p.found), stated]
+                let stated = p.configured.map_or_else(table::dash, |v| format!("{v:.2e}"));
+                vec![p.key.to_owned(), format!("{:.2e}", p.identified), stated]
             })
             .collect();
         let actuators = table::count(all.len(), "actuator");

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use job::Config;
-use job::flight::part_of;
+use job::flight_log::part_of;
 use pipeline::adhoc::{self, EstimateRow};
 use records::{Installations, PartNumber};
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use ingest::{Actuator, Files};
-use job::flight::{Opened, caught};
+use job::flight_log::{FlightLog, catch_panic};
 use job::{Config, estimate};
 use pipeline::bundle;
 use records::{Diagnostic, GapRecord};
@@ -83,8 +83,8 @@ fn replay(
     let shown = &record.provenance.log_path;
     let path = config.path(shown);
     let files = bundle::around(config, &path).unwrap_or_else(|_| Files::one(path));
-    caught(shown, || {
-        let opened = Opened::open(&files, shown, config, installations)?;
+    catch_panic(shown, || {
+        let opened = FlightLog::open(&files, shown, config, installations)?;
         let at = opened.positions.iter().find(|at| at.position == record.position).ok_or_else(|| {
             Diagnostic::new("no_position", format!("the log holds no {} any more", record.position))
                 .in_file(shown)

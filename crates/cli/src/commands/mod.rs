@@ -54,7 +54,7 @@ pub(crate) fn judging(
         if foreign.limit_m.is_none() {
             talk.note("no pipeline.toml here: judged without a limit, so without states; `--limit-m 150e-6` gives one");
         }
-        (Config::of_no_logs(), Installations::default())
+        (Config::without_logs(), Installations::default())
     } else {
         booked(global)?
     };

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use job::Config;
-use job::look::Look;
+use job::estimate_plot_data::EstimatePlot;
 use records::{Installations, PartNumber};
 use report::{ContactInterval, estimate_plot_html, estimate_plot_png, estimate_plot_svg};
 
@@ -31,7 +31,7 @@ pub(super) fn plot(
         let name = shown(path);
         // A log in error was told of already; it is simply not drawn.
         let files = pipeline::bundle::around(config, path)?;
-        let found = job::look::of_log(&files, &name, config, installations, part).unwrap_or_default();
+        let found = job::estimate_plot_data::of_log(&files, &name, config, installations, part).unwrap_or_default();
         looks.extend(found.into_iter().map(|look| drawn(&name, look)));
     }
     if looks.is_empty() {
@@ -63,7 +63,7 @@ fn drawer(file: &Path) -> Result<Drawer, Failure> {
     }
 }
 
-fn drawn(log: &str, look: Look) -> report::EstimatePlot {
+fn drawn(log: &str, look: EstimatePlot) -> report::EstimatePlot {
     let (upper, lower, touches) = match look.picture {
         Some(picture) => (picture.upper, picture.lower, picture.touches),
         None => Default::default(),

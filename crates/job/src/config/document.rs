@@ -12,10 +12,10 @@ use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::channel;
-use super::source::Source;
-use crate::part::{PartSettings, WearAxis};
-use crate::value::positive;
+use super::layers::Source;
+use super::validate_channels;
+use crate::config::limits::positive;
+use crate::config::part::{PartSettings, WearAxis};
 
 /// The whole file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -267,7 +267,7 @@ impl Document {
             let c = Diagnostic::new("empty_name", "`store.path` names no folder of its own");
             found.push(source.at(&["store", "path"], c.hint("path = \"results\"")));
         }
-        channel::check(&self.channel, &self.layout, &self.group, &["channel"], source, &mut found);
+        validate_channels::check(&self.channel, &self.layout, &self.group, &["channel"], source, &mut found);
         check_clock(&self.clock, &["clock"], source, &mut found);
         check_layout(&self.layout, &["layout"], source, &mut found);
         self.check_groups(source, &mut found);

@@ -1,11 +1,13 @@
 //! `pipeline.toml`: read once, checked whole, and its digest carried by every record.
 
-mod channel;
 mod document;
-mod meant;
-mod source;
-mod unknown;
-mod variant;
+mod layers;
+pub mod limits;
+mod overrides;
+pub mod part;
+mod toml_errors;
+mod unknown_keys;
+mod validate_channels;
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -19,11 +21,11 @@ use serde::Serialize;
 pub use document::{
     Document, EstimateSettings, LogSettings, Method, Override, StoreSettings, TableNames, TrendSettings,
 };
-use source::{Layer, Source};
-use variant::Variants;
+use layers::{ConfigLayer, Source};
+use overrides::Overrides;
 
 use crate::METHOD_VERSION;
-use crate::part::Part;
+use crate::config::part::Part;
 
 /// A checked configuration.
 #[derive(Debug, Clone)]
@@ -38,8 +40,8 @@ pub struct Config {
     pub parts: BTreeMap<PartNumber, Part>,
     /// The flights table; empty when there is none.
     pub flights: Flights,
-    variants: Variants,
-    layers: Arc<[Layer]>,
+    overrides: Overrides,
+    layers: Arc<[ConfigLayer]>,
 }
 
 impl Config {
@@ -52,14 +54,14 @@ impl Config {
     }
 
     /// That of nobody's logs: defaults, to judge tables that were made elsewhere.
-    pub fn of_no_logs() -> Self {
+    pub fn without_logs() -> Self {
         Self {
             file: PathBuf::new(),
             folder: PathBuf::new(),
             document: Document::default(),
             parts: BTreeMap::new(),
             flights: Flights::default(),
-            variants: Variants::none(),
+            overrides: Overrides::none(),
             layers: Arc::default(),
         }
     }
@@ -90,7 +92,7 @@ impl Config {
         let folder = files.first().and_then(|f| f.parent()).map_or_else(PathBuf::new, Path::to_path_buf);
         let shown: Vec<&str> = texts.iter().map(|(shown, _)| shown.as_str()).collect();
         let file = PathBuf::from(shown.join(" + "));
-        let mut config = Self::layered(Layer::stack(texts), &file, &folder)?;
+        let mut config = Self::from_layers(ConfigLayer::stack(texts), &file, &folder)?;
         // Before the first table is read: it may lie in an object store.
         object_io::configure(config.document.objects.patience());
         if let Some(table) = &config.document.logs.flights {
@@ -107,12 +109,12 @@ impl Config {
     /// As [`Config::read_layers`].
     pub fn parse(text: &str, file: &Path, folder: &Path) -> Result<Self, Vec<Diagnostic>> {
         let shown = file.display().to_string();
-        Self::layered(Layer::stack([(shown, text.to_owned())]), file, folder)
+        Self::from_layers(ConfigLayer::stack([(shown, text.to_owned())]), file, folder)
     }
 
-    fn layered(layers: Vec<Layer>, file: &Path, folder: &Path) -> Result<Self, Vec<Diagnostic>> {
+    fn from_layers(layers: Vec<ConfigLayer>, file: &Path, folder: &Path) -> Result<Self, Vec<Diagnostic>> {
         let source = Source::parse(&layers).map_err(|diagnostic| vec![*diagnostic])?;
-        let unknown = unknown::keys(&source, &Document::schema());
+        let unknown = unknown_keys::keys(&source, &Document::schema());
         if !unknown.is_empty() {
             return Err(unknown);
         }
@@ -129,11 +131,11 @@ impl Config {
                 })),
             }
         }
-        let variants = Variants::check(&document, &source);
-        match variants {
-            Ok(variants) if diagnostics.is_empty() => {
+        let overrides = Overrides::check(&document, &source);
+        match overrides {
+            Ok(overrides) if diagnostics.is_empty() => {
                 let (file, folder, flights) = (file.to_owned(), folder.to_owned(), Flights::default());
-                Ok(Self { file, folder, document, parts, flights, variants, layers: layers.into() })
+                Ok(Self { file, folder, document, parts, flights, overrides, layers: layers.into() })
             }
             Ok(_) => Err(diagnostics),
             Err(found) => Err(diagnostics.into_iter().chain(found).collect()),
@@ -142,7 +144,7 @@ impl Config {
 
     /// Names the line on which a text stands in the configuration, in a diagnostic about it.
     pub fn at(&self, text: &str, diagnostic: Diagnostic) -> Diagnostic {
-        source::at_text(&self.layers, text, diagnostic)
+        layers::at_text(&self.layers, text, diagnostic)
     }
 
     /// A path of the configuration, seen from the current folder.
@@ -157,29 +159,29 @@ impl Config {
 
     /// How logs are read where nothing is otherwise.
     pub fn base_mapping(&self) -> &Arc<Mapping> {
-        self.variants.base()
+        self.overrides.base()
     }
 
     /// How the logs of an aircraft are read; with a part, how the channels of its actuators are.
     pub fn mapping(&self, tail: &TailNumber, part: Option<&PartNumber>) -> Arc<Mapping> {
-        self.variants.mapping(tail, part)
+        self.overrides.mapping(tail, part)
     }
 
     /// The configured parts whose channels are read otherwise somewhere.
-    pub(crate) fn own_parts(&self) -> impl Iterator<Item = &PartNumber> {
-        self.parts.keys().filter(|part| self.variants.touches(part))
+    pub(crate) fn parts_with_overrides(&self) -> impl Iterator<Item = &PartNumber> {
+        self.parts.keys().filter(|part| self.overrides.applies_to_part(part))
     }
 
     /// blake3 of every setting that can move a number of this part on this aircraft: the mapping, the
     /// method, the part and the version of the method. Limits and schedules are left out, since they move
     /// none.
     pub fn digest(&self, tail: &TailNumber, part: &PartNumber) -> Arc<str> {
-        self.variants.told(tail, Some(part), |mapping| self.digest_with(mapping, part))
+        self.overrides.cached(tail, Some(part), |mapping| self.digest_with(mapping, part))
     }
 
     /// How the logs of an aircraft are read, as JSON.
     pub(crate) fn mapping_text(&self, tail: &TailNumber) -> Arc<str> {
-        self.variants.told(tail, None, |mapping| serde_json::to_string(mapping).unwrap_or_default())
+        self.overrides.cached(tail, None, |mapping| serde_json::to_string(mapping).unwrap_or_default())
     }
 
     /// The same for a log that says nothing of its aircraft.
@@ -189,21 +191,21 @@ impl Config {
 
     fn digest_with(&self, mapping: &Mapping, part: &PartNumber) -> String {
         #[derive(Serialize)]
-        struct Moves<'a> {
+        struct DigestInput<'a> {
             method_version: u32,
             mapping: &'a Mapping,
             estimate: &'a EstimateSettings,
-            part: Option<crate::part::PartSettings>,
+            part: Option<part::PartSettings>,
         }
-        let settings = self.document.part.get(part.as_str()).map(crate::part::PartSettings::without_limits);
-        let moves = Moves {
+        let settings = self.document.part.get(part.as_str()).map(part::PartSettings::without_limits);
+        let input = DigestInput {
             method_version: METHOD_VERSION,
             mapping,
             estimate: &self.document.estimate,
             part: settings,
         };
         // Structs and sorted maps of numbers and text always have a JSON form.
-        let text = serde_json::to_vec(&moves).unwrap_or_default();
+        let text = serde_json::to_vec(&input).unwrap_or_default();
         blake3::hash(&text).to_hex().to_string()
     }
 }

@@ -5,20 +5,20 @@ use std::sync::{Arc, Mutex, PoisonError};
 use estimator::{Filter, Schedule};
 
 /// Logs whose steps differ in their last digits would fill memory: so many schedules are kept.
-const MOST: usize = 16;
+const CAPACITY: usize = 16;
 
 /// What has been found so far. Clones share it.
 #[derive(Debug, Clone, Default)]
-pub struct Schedules(Arc<Mutex<Vec<Arc<Schedule>>>>);
+pub struct FilterCache(Arc<Mutex<Vec<Arc<Schedule>>>>);
 
-impl Schedules {
+impl FilterCache {
     /// The schedule of a filter, made now unless it is there.
     pub fn of(&self, filter: &Filter) -> Arc<Schedule> {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(schedule) = known.iter().find(|schedule| schedule.filter() == filter) {
             return Arc::clone(schedule);
         }
-        if known.len() == MOST {
+        if known.len() == CAPACITY {
             known.remove(0);
         }
         let schedule = Arc::new(Schedule::new(filter));
@@ -28,7 +28,7 @@ impl Schedules {
 }
 
 /// What has been found already is no setting of a part.
-impl PartialEq for Schedules {
+impl PartialEq for FilterCache {
     fn eq(&self, _: &Self) -> bool {
         true
     }
@@ -47,12 +47,12 @@ mod tests {
 
     #[test]
     fn flights_of_one_step_share_a_schedule_and_others_do_not() {
-        let schedules = Schedules::default();
+        let schedules = FilterCache::default();
         let first = schedules.of(&filter(0.004));
         assert!(Arc::ptr_eq(&first, &schedules.clone().of(&filter(0.004))));
         assert!(!Arc::ptr_eq(&first, &schedules.of(&filter(0.005))));
         (0..40).for_each(|k| drop(schedules.of(&filter(0.01 + 1e-6 * f64::from(k)))));
-        assert_eq!(schedules.0.lock().unwrap().len(), MOST);
+        assert_eq!(schedules.0.lock().unwrap().len(), CAPACITY);
         assert_eq!(schedules.of(&filter(0.004)).filter(), first.filter());
     }
 }

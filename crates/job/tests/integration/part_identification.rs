@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use ingest::Files;
-use job::facts::Facts;
-use job::{Config, Opened, flight};
+use job::part_identification::IdentifiedParams;
+use job::{Config, FlightLog, flight_log};
 use records::PartNumber;
 
 fn flights() -> PathBuf {
@@ -22,10 +22,10 @@ fn noise_resolution_and_stiffness_are_read_off_the_logs() {
         [("A_nominal", "A", 5e7), ("B_worn_stiffness_assumed_15pc_high", "B", 4.6e7)]
     {
         let file = flights().join(format!("{log}.parquet"));
-        let opened = Opened::open(&Files::one(file), log, &config, &installations).unwrap();
-        let part = flight::part_of(&config, &PartNumber::new(part).unwrap()).unwrap();
+        let opened = FlightLog::open(&Files::one(file), log, &config, &installations).unwrap();
+        let part = flight_log::part_of(&config, &PartNumber::new(part).unwrap()).unwrap();
         let at = opened.actuators(&installations).next().unwrap();
-        let facts = Facts::of(&opened.channels(at, part).unwrap(), part);
+        let facts = IdentifiedParams::of(&opened.channels(at, part).unwrap(), part);
         let near = |found: Option<f64>, wanted: f64, share: f64| {
             assert!(
                 (found.unwrap() / wanted - 1.0).abs() < share,
@@ -37,7 +37,7 @@ fn noise_resolution_and_stiffness_are_read_off_the_logs() {
         near(facts.screw_resolution_m, 2.3e-6, 0.01);
         near(facts.motor_resolution_m, 0.3e-6, 0.01);
         near(facts.stiffness_n_per_m, stiffness, 0.01);
-        let keys: Vec<&str> = facts.proposals(part).iter().map(|p| p.key).collect();
+        let keys: Vec<&str> = facts.comparisons(part).iter().map(|p| p.key).collect();
         assert_eq!(keys[0], "stiffness_n_per_m");
         assert!(keys.contains(&"noise.motor_resolution_m"));
     }
@@ -45,8 +45,9 @@ fn noise_resolution_and_stiffness_are_read_off_the_logs() {
 
 #[test]
 fn medians_pass_over_what_a_flight_did_not_show() {
-    let facts = |k: Option<f64>| Facts { stiffness_n_per_m: k, ..Facts::default() };
-    let medians = Facts::medians(&[facts(Some(3.0)), facts(None), facts(Some(1.0)), facts(Some(2.0))]);
+    let facts = |k: Option<f64>| IdentifiedParams { stiffness_n_per_m: k, ..IdentifiedParams::default() };
+    let medians =
+        IdentifiedParams::medians(&[facts(Some(3.0)), facts(None), facts(Some(1.0)), facts(Some(2.0))]);
     assert_eq!(medians.stiffness_n_per_m, Some(2.0));
     assert_eq!(medians.screw_rms_m, None);
 }

@@ -7,8 +7,8 @@ use ingest::unit::Dimension;
 use ingest::{ChannelMapping, Channels, Condition, GroupMapping, Layout};
 use records::Diagnostic;
 
-use super::source::Source;
-use crate::value::positive;
+use super::layers::Source;
+use crate::config::limits::positive;
 
 /// Every diagnostic about the channels, each at its key.
 pub(super) fn check(

@@ -7,43 +7,43 @@ use ingest::{Channels, ClockMapping, Mapping};
 use records::{Diagnostic, PartNumber, TailNumber};
 use serde::de::DeserializeOwned;
 
-use super::channel;
 use super::document::{Document, Override, check_clock};
-use super::source::Source;
+use super::layers::Source;
+use super::validate_channels;
 
 /// The overrides of a configuration, checked, and every mapping that was asked of them.
 #[derive(Debug)]
-pub(super) struct Variants {
+pub(super) struct Overrides {
     base: Arc<Mapping>,
-    overrides: Vec<Checked>,
+    overrides: Vec<ValidatedOverride>,
     /// By the numbers of the overrides that apply.
-    made: Mutex<BTreeMap<Vec<usize>, Arc<Mapping>>>,
+    mappings: Mutex<BTreeMap<Vec<usize>, Arc<Mapping>>>,
     /// What was told of them, by the same numbers and the part.
-    told: Mutex<Told>,
+    cached: Mutex<MappingCache>,
 }
 
-type Told = BTreeMap<(Vec<usize>, Option<PartNumber>), Arc<str>>;
+type MappingCache = BTreeMap<(Vec<usize>, Option<PartNumber>), Arc<str>>;
 
-impl Clone for Variants {
+impl Clone for Overrides {
     fn clone(&self) -> Self {
         Self {
             base: Arc::clone(&self.base),
             overrides: self.overrides.clone(),
-            made: Mutex::default(),
-            told: Mutex::default(),
+            mappings: Mutex::default(),
+            cached: Mutex::default(),
         }
     }
 }
 
 #[derive(Debug, Clone)]
-struct Checked {
+struct ValidatedOverride {
     tails: Vec<glob::Pattern>,
     parts: Vec<glob::Pattern>,
     clock: toml::Table,
     channel: toml::Table,
 }
 
-impl Checked {
+impl ValidatedOverride {
     fn is_for(&self, tail: &TailNumber, part: Option<&PartNumber>) -> bool {
         let fits = |patterns: &[glob::Pattern], text: &str| patterns.iter().any(|p| p.matches(text));
         let tail_fits = self.tails.is_empty() || fits(&self.tails, tail.as_str());
@@ -52,10 +52,15 @@ impl Checked {
     }
 }
 
-impl Variants {
+impl Overrides {
     /// None.
     pub(super) fn none() -> Self {
-        Self { base: Arc::default(), overrides: Vec::new(), made: Mutex::default(), told: Mutex::default() }
+        Self {
+            base: Arc::default(),
+            overrides: Vec::new(),
+            mappings: Mutex::default(),
+            cached: Mutex::default(),
+        }
     }
 
     /// Reads the overrides and tries each alone on the rest of the configuration.
@@ -63,7 +68,7 @@ impl Variants {
         let base = document.mapping();
         let (mut overrides, mut found) = (Vec::new(), Vec::new());
         for (number, settings) in document.overrides.iter().enumerate() {
-            match checked(settings) {
+            match validate(settings) {
                 Ok(one) => {
                     found.extend(try_alone(&one, number, document, &base, source));
                     overrides.push(one);
@@ -74,7 +79,7 @@ impl Variants {
         if !found.is_empty() {
             return Err(found);
         }
-        Ok(Self { base: Arc::new(base), overrides, made: Mutex::default(), told: Mutex::default() })
+        Ok(Self { base: Arc::new(base), overrides, mappings: Mutex::default(), cached: Mutex::default() })
     }
 
     /// How the logs of an aircraft are read, or the channels of a part on it.
@@ -83,48 +88,48 @@ impl Variants {
         if numbers.is_empty() {
             return Arc::clone(&self.base);
         }
-        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        let make = || Arc::new(self.made_of(&numbers));
-        Arc::clone(made.entry(numbers.clone()).or_insert_with(make))
+        let mut mappings = self.mappings.lock().unwrap_or_else(PoisonError::into_inner);
+        let make = || Arc::new(self.merged_mapping(&numbers));
+        Arc::clone(mappings.entry(numbers.clone()).or_insert_with(make))
     }
 
     /// A text about the same, made once: a night asks for it as often as there are logs.
-    pub(super) fn told(
+    pub(super) fn cached(
         &self,
         tail: &TailNumber,
         part: Option<&PartNumber>,
         make: impl FnOnce(&Mapping) -> String,
     ) -> Arc<str> {
         let key = (self.numbers(tail, part), part.cloned());
-        let told = || self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = told().get(&key) {
+        let cached = || self.cached.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = cached().get(&key) {
             return Arc::clone(known);
         }
         let text: Arc<str> = make(&self.mapping(tail, part)).into();
-        told().insert(key, Arc::clone(&text));
+        cached().insert(key, Arc::clone(&text));
         text
     }
 
     /// The overrides that apply.
     fn numbers(&self, tail: &TailNumber, part: Option<&PartNumber>) -> Vec<usize> {
-        let applies = |(number, one): (usize, &Checked)| one.is_for(tail, part).then_some(number);
+        let applies = |(number, one): (usize, &ValidatedOverride)| one.is_for(tail, part).then_some(number);
         self.overrides.iter().enumerate().filter_map(applies).collect()
     }
 
     /// Whether anything is otherwise for a part.
-    pub(super) fn touches(&self, part: &PartNumber) -> bool {
-        let fits = |one: &Checked| one.parts.iter().any(|p| p.matches(part.as_str()));
+    pub(super) fn applies_to_part(&self, part: &PartNumber) -> bool {
+        let fits = |one: &ValidatedOverride| one.parts.iter().any(|p| p.matches(part.as_str()));
         self.overrides.iter().any(fits)
     }
 
-    fn made_of(&self, numbers: &[usize]) -> Mapping {
+    fn merged_mapping(&self, numbers: &[usize]) -> Mapping {
         let mut mapping = Mapping::clone(&self.base);
         for one in numbers.iter().map(|&number| &self.overrides[number]) {
             // Each was tried alone; two that only clash together leave what was before.
-            if let Ok(clock) = laid_over(&mapping.clock, &one.clock) {
+            if let Ok(clock) = merge_into(&mapping.clock, &one.clock) {
                 mapping.clock = clock;
             }
-            if let Ok(channels) = laid_over(&mapping.channels, &one.channel) {
+            if let Ok(channels) = merge_into(&mapping.channels, &one.channel) {
                 mapping.channels = channels;
             }
         }
@@ -137,7 +142,7 @@ impl Variants {
     }
 }
 
-fn checked(settings: &Override) -> Result<Checked, Diagnostic> {
+fn validate(settings: &Override) -> Result<ValidatedOverride, Diagnostic> {
     let pattern = |text: &String| {
         glob::Pattern::new(text)
             .map_err(|e| Diagnostic::new("bad_pattern", format!("`{text}` is no pattern of names: {e}")))
@@ -151,7 +156,7 @@ fn checked(settings: &Override) -> Result<Checked, Diagnostic> {
         let what = "an override changes nothing";
         return Err(Diagnostic::new("key_missing", what).hint("[override.channel.load]\nsign = -1"));
     }
-    Ok(Checked {
+    Ok(ValidatedOverride {
         tails: patterns(&settings.tails)?,
         parts: patterns(&settings.parts)?,
         clock: settings.clock.clone().unwrap_or_default(),
@@ -160,7 +165,7 @@ fn checked(settings: &Override) -> Result<Checked, Diagnostic> {
 }
 
 fn try_alone(
-    one: &Checked,
+    one: &ValidatedOverride,
     number: usize,
     document: &Document,
     base: &Mapping,
@@ -171,13 +176,20 @@ fn try_alone(
         let what = format!("`{key}` of override {} cannot be laid over `[{key}]`: {e}", number + 1);
         source.at(&["override"], Diagnostic::new("bad_toml", what))
     };
-    match laid_over::<Channels>(&base.channels, &one.channel) {
+    match merge_into::<Channels>(&base.channels, &one.channel) {
         Ok(channels) => {
-            channel::check(&channels, &document.layout, &document.group, &["override"], source, &mut found);
+            validate_channels::check(
+                &channels,
+                &document.layout,
+                &document.group,
+                &["override"],
+                source,
+                &mut found,
+            );
         }
         Err(e) => found.push(at("channel", e)),
     }
-    match laid_over::<ClockMapping>(&base.clock, &one.clock) {
+    match merge_into::<ClockMapping>(&base.clock, &one.clock) {
         Ok(clock) => check_clock(&clock, &["override"], source, &mut found),
         Err(e) => found.push(at("clock", e)),
     }
@@ -185,7 +197,7 @@ fn try_alone(
 }
 
 /// Keys that are given replace those below; tables are laid over key by key.
-fn laid_over<T: serde::Serialize + DeserializeOwned>(base: &T, over: &toml::Table) -> Result<T, String> {
+fn merge_into<T: serde::Serialize + DeserializeOwned>(base: &T, over: &toml::Table) -> Result<T, String> {
     let mut table = toml::Table::try_from(base).map_err(|e| e.to_string())?;
     merge(&mut table, over);
     table.try_into().map_err(|e: toml::de::Error| e.message().to_owned())

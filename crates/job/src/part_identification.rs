@@ -5,15 +5,15 @@ use estimator::Noise;
 use estimator::contact::{self, ContactOutcome};
 use ingest::{Actuator, Geometry, noise};
 
+use crate::config::part::Part;
 use crate::estimate;
-use crate::part::Part;
 
 /// Friction below this share of the load is not told from none.
-const UNSEEN: f64 = 0.01;
+const MIN_FRICTION_SHARE: f64 = 0.01;
 
 /// What one actuator in one flight says of its part, or the medians of many; SI at the screw axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Facts {
+pub struct IdentifiedParams {
     /// K that the contact regression fitted, N/m.
     pub stiffness_n_per_m: Option<f64>,
     /// White noise of the screw position, rms, m.
@@ -30,16 +30,16 @@ pub struct Facts {
 
 /// A key of `[part."…"]`, what the logs say of it, and what the configuration says.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Proposal {
+pub struct ParamComparison {
     /// The key, below the part.
     pub key: &'static str,
     /// From the logs, in the key's unit.
-    pub found: f64,
+    pub identified: f64,
     /// As configured; none where the noise model asks for no such level.
-    pub stated: Option<f64>,
+    pub configured: Option<f64>,
 }
 
-impl Facts {
+impl IdentifiedParams {
     /// Looks at one actuator. What the flight does not show stays open.
     pub fn of(channels: &Actuator, part: &Part) -> Self {
         let [motor, screw, _] = &channels.quality;
@@ -51,7 +51,7 @@ impl Facts {
         let screw_rms_m = both_m
             .zip(motor_rms_m)
             .map(|(both_m, motor_m)| (both_m * both_m - motor_m * motor_m - rounding_m2).max(0.0).sqrt());
-        let mut facts = Self {
+        let mut params = Self {
             motor_rms_m,
             screw_rms_m,
             motor_resolution_m: motor.resolution,
@@ -61,12 +61,12 @@ impl Facts {
         if let Ok(ContactOutcome::Estimated(found)) =
             contact::estimate(&estimate::samples(channels), &estimate::prior(part))
         {
-            facts.stiffness_n_per_m = Some(found.stiffness_n_per_m);
+            params.stiffness_n_per_m = Some(found.stiffness_n_per_m);
             let load_n = rms_n(&channels.load_n);
             let friction_n = found.friction.at_n(load_n);
-            facts.unknown_force_n = (friction_n > UNSEEN * load_n).then_some(friction_n);
+            params.unknown_force_n = (friction_n > MIN_FRICTION_SHARE * load_n).then_some(friction_n);
         }
-        facts
+        params
     }
 
     /// The median of each fact, over those that show it.
@@ -87,7 +87,7 @@ impl Facts {
     }
 
     /// The facts under the keys and in the units in which a part of this kind is configured.
-    pub fn proposals(&self, part: &Part) -> Vec<Proposal> {
+    pub fn comparisons(&self, part: &Part) -> Vec<ParamComparison> {
         let sensors = match part.noise {
             Noise::Sensors(sensors) => Some(sensors),
             _ => None,
@@ -131,10 +131,15 @@ impl Facts {
                 sensors.map(|s| s.unknown_force_n),
             ),
         ];
-        let proposal = |(keys, scale, found, stated): ([&'static str; 2], f64, Option<f64>, Option<f64>)| {
-            Some(Proposal { key: keys[column], found: found? * scale, stated: stated.map(|v| v * scale) })
-        };
-        lines.into_iter().filter_map(proposal).collect()
+        let comparison =
+            |(keys, scale, identified, configured): ([&'static str; 2], f64, Option<f64>, Option<f64>)| {
+                Some(ParamComparison {
+                    key: keys[column],
+                    identified: identified? * scale,
+                    configured: configured.map(|v| v * scale),
+                })
+            };
+        lines.into_iter().filter_map(comparison).collect()
     }
 }
 

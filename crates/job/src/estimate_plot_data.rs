@@ -6,13 +6,13 @@ use ingest::{Actuator, Files};
 use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
 
 use crate::config::Config;
+use crate::config::part::Part;
 use crate::estimate;
-use crate::flight;
-use crate::part::Part;
+use crate::flight_log;
 
 /// One actuator in one flight.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Look {
+pub struct EstimatePlot {
     /// Its place.
     pub position: Position,
     /// Its record, or why there is none.
@@ -31,7 +31,7 @@ pub struct Look {
     pub picture: Option<ContactPlot>,
 }
 
-impl Look {
+impl EstimatePlot {
     fn of(channels: &Actuator, part: &Part, config: &Config) -> Result<Self, Diagnostic> {
         let track = estimate::filter(channels, part)?
             .track(&estimate::samples(channels), None)
@@ -59,11 +59,11 @@ pub fn of_log(
     config: &Config,
     installations: &Installations,
     part: Option<&PartNumber>,
-) -> Result<Vec<Look>, Diagnostic> {
-    let mut looks = Vec::new();
-    flight::each(files, shown, config, installations, part, |channels, part| {
-        looks.push(Look::of(channels, part, config)?);
+) -> Result<Vec<EstimatePlot>, Diagnostic> {
+    let mut plots = Vec::new();
+    flight_log::for_each_actuator(files, shown, config, installations, part, |channels, part| {
+        plots.push(EstimatePlot::of(channels, part, config)?);
         Ok(())
     })?;
-    Ok(looks)
+    Ok(plots)
 }

@@ -7,11 +7,11 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::meant;
+use super::toml_errors;
 
 /// A file of the configuration.
 #[derive(Debug)]
-pub(super) struct Layer {
+pub(super) struct ConfigLayer {
     file: String,
     /// Its text behind as many empty lines as the files before have bytes: so a span says of itself in which
     /// file it lies.
@@ -19,7 +19,7 @@ pub(super) struct Layer {
     start: usize,
 }
 
-impl Layer {
+impl ConfigLayer {
     /// Names and texts of files, each laid over those before it.
     pub(super) fn stack(files: impl IntoIterator<Item = (String, String)>) -> Vec<Self> {
         let mut start = 0;
@@ -34,19 +34,19 @@ impl Layer {
 
 /// Texts and their table with spans.
 pub(super) struct Source<'t> {
-    layers: &'t [Layer],
+    layers: &'t [ConfigLayer],
     table: Spanned<DeTable<'t>>,
 }
 
 impl<'t> Source<'t> {
     /// Keys of a later layer replace those before; tables are laid over key by key, lists are replaced.
-    pub(super) fn parse(layers: &'t [Layer]) -> Result<Self, Box<Diagnostic>> {
+    pub(super) fn parse(layers: &'t [ConfigLayer]) -> Result<Self, Box<Diagnostic>> {
         let mut whole: Option<Spanned<DeTable<'t>>> = None;
         for layer in layers {
             let table = DeTable::parse(&layer.text).map_err(|e| Box::new(from_toml(layers, &e)))?;
             match &mut whole {
                 None => whole = Some(table),
-                Some(below) => lay_over(below.get_mut(), table.into_inner()),
+                Some(below) => merge(below.get_mut(), table.into_inner()),
             }
         }
         Ok(Self { layers, table: whole.unwrap_or_else(|| Spanned::new(0..0, DeTable::new())) })
@@ -69,7 +69,7 @@ impl<'t> Source<'t> {
     }
 
     pub(super) fn at_span(&self, span: Range<usize>, diagnostic: Diagnostic) -> Diagnostic {
-        place(self.layers, &span, diagnostic)
+        at_span_of(self.layers, &span, diagnostic)
     }
 
     fn locate(&self, path: &[&str]) -> Option<Range<usize>> {
@@ -86,12 +86,12 @@ impl<'t> Source<'t> {
     }
 }
 
-fn lay_over<'t>(below: &mut DeTable<'t>, over: DeTable<'t>) {
+fn merge<'t>(below: &mut DeTable<'t>, over: DeTable<'t>) {
     for (key, value) in over {
         match (below.get_mut(&key).map(Spanned::get_mut), value.get_ref()) {
             (Some(DeValue::Table(inner)), DeValue::Table(_)) => {
                 if let DeValue::Table(value) = value.into_inner() {
-                    lay_over(inner, value);
+                    merge(inner, value);
                 }
             }
             _ => {
@@ -104,21 +104,21 @@ fn lay_over<'t>(below: &mut DeTable<'t>, over: DeTable<'t>) {
 }
 
 /// Names the line on which a text value stands, or else the file.
-pub(super) fn at_text(layers: &[Layer], value: &str, diagnostic: Diagnostic) -> Diagnostic {
+pub(super) fn at_text(layers: &[ConfigLayer], value: &str, diagnostic: Diagnostic) -> Diagnostic {
     let quoted = [format!("\"{value}\""), format!("'{value}'")];
     let found = layers.iter().rev().find_map(|layer| quoted.iter().find_map(|text| layer.text.find(text)));
     match (found, layers.first()) {
-        (Some(start), _) => place(layers, &(start..start), diagnostic),
+        (Some(start), _) => at_span_of(layers, &(start..start), diagnostic),
         (None, Some(layer)) => diagnostic.in_file(&layer.file),
         (None, None) => diagnostic,
     }
 }
 
-fn from_toml(layers: &[Layer], error: &toml::de::Error) -> Diagnostic {
-    place(layers, &error.span().unwrap_or(0..0), meant::diagnostic(error.message()))
+fn from_toml(layers: &[ConfigLayer], error: &toml::de::Error) -> Diagnostic {
+    at_span_of(layers, &error.span().unwrap_or(0..0), toml_errors::diagnostic(error.message()))
 }
 
-fn place(layers: &[Layer], span: &Range<usize>, diagnostic: Diagnostic) -> Diagnostic {
+fn at_span_of(layers: &[ConfigLayer], span: &Range<usize>, diagnostic: Diagnostic) -> Diagnostic {
     let Some(layer) = layers.iter().rfind(|layer| layer.start <= span.start) else { return diagnostic };
     let text = &layer.text[layer.start..];
     let before = &text[..(span.start - layer.start).min(text.len())];

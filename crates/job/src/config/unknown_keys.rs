@@ -7,7 +7,7 @@ use records::Diagnostic;
 use serde_json::Value;
 use toml::de::{DeTable, DeValue};
 
-use super::source::Source;
+use super::layers::Source;
 
 /// Every unknown key of the source.
 pub(super) fn keys(source: &Source<'_>, schema: &Value) -> Vec<Diagnostic> {

@@ -13,12 +13,12 @@ use records::{
 };
 
 use crate::config::Config;
+use crate::config::part::Part;
 use crate::estimate;
-use crate::part::Part;
 
 /// What a run writes on everything it makes.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Stamp {
+pub struct ProvenanceStamp {
     /// The run.
     pub run_id: String,
     /// The version of Freeplay.
@@ -29,9 +29,9 @@ pub struct Stamp {
 
 /// Which flight a log is and what it holds, before any channel is read.
 #[derive(Debug)]
-pub struct Opened {
+pub struct FlightLog {
     log: Log,
-    shown: String,
+    display_name: String,
     /// How the channels of each position are read.
     mappings: BTreeMap<Position, Arc<Mapping>>,
     /// Which flight it is.
@@ -42,33 +42,33 @@ pub struct Opened {
     pub digest: String,
 }
 
-impl Opened {
-    /// Opens a log; `shown` is its name in records and diagnostics.
+impl FlightLog {
+    /// Opens a log; `display_name` is its name in records and diagnostics.
     ///
     /// # Errors
     /// A diagnostic when the log cannot be read or identified.
     pub fn open(
         files: &Files,
-        shown: &str,
+        display_name: &str,
         config: &Config,
         installations: &Installations,
     ) -> Result<Self, Diagnostic> {
-        let complain = |e: ingest::Error| e.diagnostic().in_file(shown);
+        let complain = |e: ingest::Error| e.diagnostic().in_file(display_name);
         let log = Log::open(files, config.base_mapping()).map_err(complain)?;
         let identity = identity_of(&log, files, config).map_err(complain)?;
         let log = log.remapped(&config.mapping(&identity.tail_number, None));
-        let mapped = mapped(&log, &identity, config, installations).map_err(complain)?;
-        let used: Vec<_> = mapped.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
+        let map_actuators = map_actuators(&log, &identity, config, installations).map_err(complain)?;
+        let used: Vec<_> = map_actuators.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
         let digest = log.digest(&used).map_err(complain)?;
         let mappings =
-            mapped.iter().map(|(at, mapping)| (at.position.clone(), Arc::clone(mapping))).collect();
-        let positions = mapped.into_iter().map(|(at, _)| at).collect();
-        Ok(Self { log, shown: shown.to_owned(), mappings, identity, positions, digest })
+            map_actuators.iter().map(|(at, mapping)| (at.position.clone(), Arc::clone(mapping))).collect();
+        let positions = map_actuators.into_iter().map(|(at, _)| at).collect();
+        Ok(Self { log, display_name: display_name.to_owned(), mappings, identity, positions, digest })
     }
 
     /// Its name in records and diagnostics.
-    pub fn shown(&self) -> &str {
-        &self.shown
+    pub fn display_name(&self) -> &str {
+        &self.display_name
     }
 
     /// How the channels of a position are read.
@@ -83,7 +83,7 @@ impl Opened {
     pub fn is_checked(&self) -> Result<bool, Diagnostic> {
         let used: Vec<_> =
             self.positions.iter().filter_map(|at| Some((self.channels_map(at)?, at))).collect();
-        self.log.is_checked(&used).map_err(|e| e.diagnostic().in_file(&self.shown))
+        self.log.is_checked(&used).map_err(|e| e.diagnostic().in_file(&self.display_name))
     }
 
     /// Names of the positions, in order.
@@ -114,22 +114,24 @@ impl Opened {
         at: &PositionColumns,
         config: &Config,
         installations: &Installations,
-        stamp: &Stamp,
+        stamp: &ProvenanceStamp,
     ) -> Result<GapRecord, Diagnostic> {
-        let in_file = |diagnostic: Diagnostic| diagnostic.in_file(&self.shown);
-        let (stay, part) = self.unit(at, config, installations).map_err(in_file)?;
+        let in_file = |diagnostic: Diagnostic| diagnostic.in_file(&self.display_name);
+        let (installation, part) = self.unit(at, config, installations).map_err(in_file)?;
         let estimate = self.estimate(at, part, config).map_err(in_file)?;
         Ok(GapRecord {
             flight: self.flight(),
             position: at.position.clone(),
-            part_number: stay.part_number.clone(),
-            serial_number: stay.serial_number.clone(),
-            unit_hours: stay.unit_hours(self.identity.tail_hours_end),
+            part_number: installation.part_number.clone(),
+            serial_number: installation.serial_number.clone(),
+            unit_hours: installation.unit_hours(self.identity.tail_hours_end),
             estimate,
             provenance: Provenance {
-                log_path: self.shown.clone(),
+                log_path: self.display_name.clone(),
                 log_digest: self.digest.clone(),
-                config_digest: config.digest(&self.identity.tail_number, &stay.part_number).to_string(),
+                config_digest: config
+                    .digest(&self.identity.tail_number, &installation.part_number)
+                    .to_string(),
                 program_version: stamp.program_version.clone(),
                 run_id: stamp.run_id.clone(),
                 processed_utc: stamp.processed_utc,
@@ -148,10 +150,10 @@ impl Opened {
         installations: &'u Installations,
     ) -> Result<(&'u Installation, &'u Part), Diagnostic> {
         let id = &self.identity;
-        let stay = installations
+        let installation = installations
             .installed_at(&id.tail_number, &at.position, id.departure_utc)
-            .ok_or_else(|| nobody_installed(id, &at.position, installations))?;
-        Ok((stay, part_of(config, &stay.part_number)?))
+            .ok_or_else(|| no_installation(id, &at.position, installations))?;
+        Ok((installation, part_of(config, &installation.part_number)?))
     }
 
     /// Estimates one actuator as a given part, whoever is booked there.
@@ -180,10 +182,10 @@ impl Opened {
     pub fn channels(&self, at: &PositionColumns, part: &Part) -> Result<Actuator, Diagnostic> {
         let Some(channels) = self.channels_map(at) else {
             let what = format!("the log was not opened for {}", at.position);
-            return Err(Diagnostic::new("no_position", what).in_file(&self.shown));
+            return Err(Diagnostic::new("no_position", what).in_file(&self.display_name));
         };
         let read = self.log.actuator(at, channels, part.geometry);
-        read.map_err(|e| e.diagnostic().in_file(&self.shown))
+        read.map_err(|e| e.diagnostic().in_file(&self.display_name))
     }
 
     /// Rows the footers declare.
@@ -201,14 +203,14 @@ impl Opened {
 ///
 /// # Errors
 /// A diagnostic when the log cannot be read or put on one clock.
-pub fn anonymous(
+pub fn estimate_unidentified(
     files: &Files,
-    shown: &str,
+    display_name: &str,
     config: &Config,
     part: &Part,
 ) -> Result<Vec<(Position, GapEstimate)>, Diagnostic> {
     let mut found = Vec::new();
-    each_anonymous(files, shown, config, part, |channels| {
+    for_each_unidentified(files, display_name, config, part, |channels| {
         found.push((
             channels.position.clone(),
             estimate::estimate(channels, part, &config.document.estimate)?,
@@ -219,14 +221,14 @@ pub fn anonymous(
 }
 
 /// Hands over the channels of every actuator of a log that says nothing of its flight, as one part.
-pub(crate) fn each_anonymous(
+pub(crate) fn for_each_unidentified(
     files: &Files,
-    shown: &str,
+    display_name: &str,
     config: &Config,
     part: &Part,
     mut take: impl FnMut(&Actuator) -> Result<(), Diagnostic>,
 ) -> Result<(), Diagnostic> {
-    let complain = |e: ingest::Error| e.diagnostic().in_file(shown);
+    let complain = |e: ingest::Error| e.diagnostic().in_file(display_name);
     let log = Log::open(files, config.base_mapping()).map_err(complain)?;
     let channels = &config.base_mapping().channels;
     // A log of one actuator has no name for it here, but needs one to be asked by.
@@ -234,7 +236,7 @@ pub(crate) fn each_anonymous(
     let positions = log.positions(channels, Some(&own)).map_err(complain)?;
     for at in positions.iter().filter(|at| at.lacking.is_empty()) {
         let read = log.actuator(at, channels, part.geometry).map_err(complain)?;
-        take(&read).map_err(|diagnostic| diagnostic.in_file(shown))?;
+        take(&read).map_err(|diagnostic| diagnostic.in_file(display_name))?;
     }
     Ok(())
 }
@@ -243,9 +245,9 @@ pub(crate) fn each_anonymous(
 ///
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read, or `take` complains.
-pub(crate) fn each(
+pub(crate) fn for_each_actuator(
     files: &Files,
-    shown: &str,
+    display_name: &str,
     config: &Config,
     installations: &Installations,
     part: Option<&PartNumber>,
@@ -253,9 +255,9 @@ pub(crate) fn each(
 ) -> Result<(), Diagnostic> {
     if let Some(number) = part {
         let part = part_of(config, number)?;
-        return each_anonymous(files, shown, config, part, |channels| take(channels, part));
+        return for_each_unidentified(files, display_name, config, part, |channels| take(channels, part));
     }
-    let opened = Opened::open(files, shown, config, installations)?;
+    let opened = FlightLog::open(files, display_name, config, installations)?;
     for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
         let (_, part) = opened.unit(at, config, installations)?;
         take(&opened.channels(at, part)?, part)?;
@@ -274,7 +276,7 @@ pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, 
     })
 }
 
-fn nobody_installed(id: &Identity, position: &Position, installations: &Installations) -> Diagnostic {
+fn no_installation(id: &Identity, position: &Position, installations: &Installations) -> Diagnostic {
     let (tail, at) = (&id.tail_number, id.departure_utc);
     if installations.contains_tail(tail) {
         let what = format!("no unit is booked in {position} of {tail} on {at}");
@@ -298,10 +300,10 @@ pub fn config_digest(
 ) -> String {
     let mut hash = blake3::Hasher::new();
     for position in positions {
-        let stay = installations.installed_at(&flight.tail_number, position, flight.departure_utc);
+        let installation = installations.installed_at(&flight.tail_number, position, flight.departure_utc);
         // The whole stay, its hours included: they stand in the record too.
-        let stay_text = stay.map(|s| serde_json::to_string(s).unwrap_or_default());
-        let digest = stay.map(|s| config.digest(&flight.tail_number, &s.part_number));
+        let stay_text = installation.map(|s| serde_json::to_string(s).unwrap_or_default());
+        let digest = installation.map(|s| config.digest(&flight.tail_number, &s.part_number));
         for text in [Some(position.as_str()), stay_text.as_deref(), digest.as_deref()] {
             hash.update(text.unwrap_or_default().as_bytes());
             hash.update(&[0]);
@@ -309,21 +311,21 @@ pub fn config_digest(
     }
     hash.update(config.mapping_text(&flight.tail_number).as_bytes());
     // Hours stand in the record too, and the flights table may learn them later.
-    if let Some(known) = config.flights.of(flight) {
+    if let Some(fallback) = config.flights.of(flight) {
         let hours =
-            [known.flight_hours, known.tail_hours_end].map(|h| h.map_or(0, f64::to_bits).to_le_bytes());
+            [fallback.flight_hours, fallback.tail_hours_end].map(|h| h.map_or(0, f64::to_bits).to_le_bytes());
         hash.update(&hours.concat());
     }
     hash.finalize().to_hex().to_string()
 }
 
 /// Stands in for [`config_digest`] where a log could not be identified: of everything that might mend it.
-pub fn unidentified_digest(config: &Config, installations: &Installations) -> String {
+pub fn digest_without_identity(config: &Config, installations: &Installations) -> String {
     let mut hash = blake3::Hasher::new();
     hash.update(&crate::METHOD_VERSION.to_le_bytes());
     hash.update(serde_json::to_string(&config.document).unwrap_or_default().as_bytes());
-    for stay in installations.iter() {
-        hash.update(serde_json::to_string(stay).unwrap_or_default().as_bytes());
+    for installation in installations.iter() {
+        hash.update(serde_json::to_string(installation).unwrap_or_default().as_bytes());
     }
     hash.finalize().to_hex().to_string()
 }
@@ -334,11 +336,11 @@ pub fn unidentified_digest(config: &Config, installations: &Installations) -> St
 /// A diagnostic when the log cannot be read, put on one clock or identified.
 pub fn identify(
     files: &Files,
-    shown: &str,
+    display_name: &str,
     config: &Config,
 ) -> Result<(Flight, Option<Position>), Diagnostic> {
-    caught(shown, || {
-        let complain = |e: ingest::Error| e.diagnostic().in_file(shown);
+    catch_panic(display_name, || {
+        let complain = |e: ingest::Error| e.diagnostic().in_file(display_name);
         let log = Log::open(files, config.base_mapping()).map_err(complain)?;
         let id = identity_of(&log, files, config).map_err(complain)?;
         Ok((flight_of(&id), id.position))
@@ -352,13 +354,13 @@ pub fn identify(
 pub fn identify_companion(
     path: &Path,
     group: &str,
-    shown: &str,
+    display_name: &str,
     config: &Config,
 ) -> Result<(Flight, Option<Position>), Diagnostic> {
-    caught(shown, || {
-        let known = |said: &Facts| config.flights.facts(path, said, &config.document.identity);
-        let id = ingest::log::identity_of_file(path, config.base_mapping(), group, known)
-            .map_err(|e| e.diagnostic().in_file(shown))?;
+    catch_panic(display_name, || {
+        let fallback = |said: &Facts| config.flights.facts(path, said, &config.document.identity);
+        let id = ingest::log::identity_of_file(path, config.base_mapping(), group, fallback)
+            .map_err(|e| e.diagnostic().in_file(display_name))?;
         Ok((flight_of(&id), id.position))
     })
 }
@@ -372,7 +374,7 @@ fn identity_of(log: &Log, files: &Files, config: &Config) -> Result<Identity, in
 type Mapped = (PositionColumns, Arc<Mapping>);
 
 /// The actuators of a log, each as its aircraft and the part that sits there want it read.
-fn mapped(
+fn map_actuators(
     log: &Log,
     id: &Identity,
     config: &Config,
@@ -386,12 +388,12 @@ fn mapped(
         Ok(found) => at.extend(found.into_iter().map(|p| (p.position.clone(), (p, Arc::clone(&usual))))),
         Err(error) => failed = Some(error),
     }
-    for part in config.own_parts() {
+    for part in config.parts_with_overrides() {
         let mapping = config.mapping(&id.tail_number, Some(part));
         let Ok(found) = log.positions(&mapping.channels, id.position.as_ref()) else { continue };
         let sits = |p: &PositionColumns| {
-            let stay = installations.installed_at(&id.tail_number, &p.position, id.departure_utc);
-            stay.is_some_and(|stay| stay.part_number == *part)
+            let installation = installations.installed_at(&id.tail_number, &p.position, id.departure_utc);
+            installation.is_some_and(|installation| installation.part_number == *part)
         };
         at.extend(found.into_iter().filter(sits).map(|p| (p.position.clone(), (p, Arc::clone(&mapping)))));
     }
@@ -408,12 +410,12 @@ fn mapped(
 /// A diagnostic when a log or a channel cannot be read.
 pub fn sample_digest(
     files: &Files,
-    shown: &str,
+    display_name: &str,
     config: &Config,
     installations: &Installations,
 ) -> Result<String, Diagnostic> {
-    caught(shown, || {
-        let opened = Opened::open(files, shown, config, installations)?;
+    catch_panic(display_name, || {
+        let opened = FlightLog::open(files, display_name, config, installations)?;
         let mut hash = blake3::Hasher::new();
         for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
             let (_, part) = opened.unit(at, config, installations)?;
@@ -443,14 +445,17 @@ fn flight_of(id: &Identity) -> Flight {
 ///
 /// # Errors
 /// What the work complains of, or code `panic`.
-pub fn caught<T>(shown: &str, work: impl FnOnce() -> Result<T, Diagnostic>) -> Result<T, Diagnostic> {
+pub fn catch_panic<T>(
+    display_name: &str,
+    work: impl FnOnce() -> Result<T, Diagnostic>,
+) -> Result<T, Diagnostic> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<&str>().copied();
         let text =
             text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
         let what = format!("reading this log failed in a way that should not happen: {text}");
         Err(Diagnostic::new("panic", what)
-            .in_file(shown)
+            .in_file(display_name)
             .hint("the file is probably damaged; please report it with the file"))
     })
 }

@@ -6,7 +6,7 @@ use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::schedules::Schedules;
+use crate::filter_cache::FilterCache;
 
 /// How a part moves.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -160,13 +160,13 @@ pub struct Part {
     /// The gap that is reported, m.
     pub watch_m: Option<f64>,
     /// Gain schedules of its logs, as far as they have been found.
-    pub schedules: Schedules,
+    pub filters: FilterCache,
     /// What wear follows, where that is known.
     pub axis: Option<WearAxis>,
 }
 
 /// A key below the part's table, and what is wrong with it.
-pub(crate) type KeyComplaint = (&'static [&'static str], Diagnostic);
+pub(crate) type SettingError = (&'static [&'static str], Diagnostic);
 
 impl PartSettings {
     /// The settings that can move a gap: limits and the axis of wear move none.
@@ -178,8 +178,8 @@ impl PartSettings {
     ///
     /// # Errors
     /// Every key that is missing, out of place or cannot be.
-    pub(crate) fn check(&self) -> Result<Part, Vec<KeyComplaint>> {
-        let mut keys = Keys::default();
+    pub(crate) fn check(&self) -> Result<Part, Vec<SettingError>> {
+        let mut keys = SettingsValidator::default();
         self.check_kind(&mut keys);
         keys.positive(&["reference_load_n"], self.reference_load_n);
         keys.positive(&["limit_m"], self.limit_m);
@@ -205,7 +205,7 @@ impl PartSettings {
                 reference_load_n: self.reference_load_n,
                 limit_m: self.limit_m,
                 watch_m: self.watch_m,
-                schedules: Schedules::default(),
+                filters: FilterCache::default(),
                 axis: self.axis,
             }),
             _ => Err(keys.found),
@@ -213,7 +213,7 @@ impl PartSettings {
     }
 
     /// A key of the other kind is a misunderstanding, not a spare.
-    fn check_kind(&self, keys: &mut Keys) {
+    fn check_kind(&self, keys: &mut SettingsValidator) {
         let linear: [(&'static [&'static str], Option<f64>); 4] = [
             (&["stiffness_n_per_m"], self.stiffness_n_per_m),
             (&["damping_n_s_per_m"], self.damping_n_s_per_m),
@@ -240,7 +240,7 @@ impl PartSettings {
         }
     }
 
-    fn linear(&self, keys: &mut Keys) -> Option<(estimator::Actuator, Geometry)> {
+    fn linear(&self, keys: &mut SettingsValidator) -> Option<(estimator::Actuator, Geometry)> {
         let stiffness = keys.required(&["stiffness_n_per_m"], self.stiffness_n_per_m);
         let damping = keys.required(&["damping_n_s_per_m"], self.damping_n_s_per_m);
         let mass = keys.required(&["screw_mass_kg"], self.screw_mass_kg);
@@ -250,7 +250,7 @@ impl PartSettings {
         Some((actuator, Geometry::Linear { lead_m_per_rev: self.lead_m_per_rev }))
     }
 
-    fn rotary(&self, keys: &mut Keys) -> Option<(estimator::Actuator, Geometry)> {
+    fn rotary(&self, keys: &mut SettingsValidator) -> Option<(estimator::Actuator, Geometry)> {
         let stiffness = keys.required(&["stiffness_nm_per_rad"], self.stiffness_nm_per_rad);
         let damping = keys.required(&["damping_nm_s_per_rad"], self.damping_nm_s_per_rad);
         let inertia = keys.required(&["inertia_kg_m2"], self.inertia_kg_m2);
@@ -260,7 +260,7 @@ impl PartSettings {
         Some((actuator, Geometry::Rotary { reference_radius_m: radius }))
     }
 
-    fn check_noise(&self, keys: &mut Keys) -> Option<Noise> {
+    fn check_noise(&self, keys: &mut SettingsValidator) -> Option<Noise> {
         let Some(noise) = &self.noise else {
             let hint = "[part.\"…\".noise] needs screw_rms_m, motor_rms_m, unknown_force_n and bandwidth_hz; see docs/configuration.md";
             keys.complain(
@@ -294,7 +294,7 @@ impl PartSettings {
 
 impl NoiseSettings {
     /// Sensor facts at the screw axis; a rotary part's are in radians and newton metres.
-    fn sensors(&self, part: &PartSettings, keys: &mut Keys) -> Option<Sensors> {
+    fn sensors(&self, part: &PartSettings, keys: &mut SettingsValidator) -> Option<Sensors> {
         let bandwidth_hz = keys.required(&["noise", "bandwidth_hz"], self.bandwidth_hz);
         let none = Some(0.0);
         let (radius, levels) = match part.kind {
@@ -338,11 +338,11 @@ impl NoiseSettings {
 
 /// Collects complaints about keys.
 #[derive(Default)]
-struct Keys {
-    found: Vec<KeyComplaint>,
+struct SettingsValidator {
+    found: Vec<SettingError>,
 }
 
-impl Keys {
+impl SettingsValidator {
     fn complain(&mut self, key: &'static [&'static str], diagnostic: Diagnostic) {
         self.found.push((key, diagnostic));
     }
@@ -357,7 +357,7 @@ impl Keys {
 
     fn positive(&mut self, key: &'static [&'static str], value: Option<f64>) {
         let name = key.last().copied().unwrap_or_default();
-        self.found.extend(crate::value::positive(name, value).map(|c| (key, c)));
+        self.found.extend(crate::config::limits::positive(name, value).map(|c| (key, c)));
     }
 
     fn made<T>(&mut self, key: &'static [&'static str], made: Result<T, estimator::Error>) -> Option<T> {

@@ -3,6 +3,6 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod config;
-mod facts;
+mod part_identification;
 mod reference;
 mod schema;
