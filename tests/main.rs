@@ -1,21 +1,10 @@
-//! The `freeplay` command as its users type it, on the sample fleet, on logs of other machines, and on
-//! logs that are damaged.
+//! End-to-end tests of the `freeplay` command: on the sample fleet, on logs of other machines and on corrupt logs.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-mod accounts;
-mod bench;
-mod book;
-mod damaged;
-#[cfg(target_os = "linux")]
-mod disk;
-mod errors;
-mod interrupted;
-mod known;
-mod layouts;
-mod older;
-mod oracle;
-mod pages;
-mod speech;
-mod told;
-mod truth;
+mod cli_output;
+mod docs;
+mod harness;
+mod logs;
+mod markdown;
+mod runs;

@@ -151,7 +151,7 @@ pub(crate) enum Command {
 
 /// Where rows go, and in which form.
 #[derive(Debug, Clone, ClapArgs)]
-pub(crate) struct Output {
+pub(crate) struct RowFormatArgs {
     /// Form of the rows.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     pub format: Format,
@@ -163,7 +163,7 @@ pub(crate) struct Output {
     pub output: Option<PathBuf>,
 }
 
-impl Output {
+impl RowFormatArgs {
     /// The form asked for.
     pub(crate) fn format(&self) -> Format {
         if self.json { Format::Json } else { self.format }
@@ -203,7 +203,7 @@ pub(crate) struct CheckArgs {
     #[arg(long, default_value_t = 20)]
     pub limit: usize,
     #[command(flatten)]
-    pub output: Output,
+    pub rows: RowFormatArgs,
 }
 
 /// `explain`.
@@ -232,7 +232,7 @@ pub(crate) struct DiffArgs {
     #[arg(long, default_value_t = 0.0)]
     pub least_um: f64,
     #[command(flatten)]
-    pub output: Output,
+    pub rows: RowFormatArgs,
 }
 
 /// `normalize`.
@@ -344,7 +344,7 @@ pub(crate) struct EstimateArgs {
     #[arg(long, value_name = "FILE.svg|png|html")]
     pub plot: Option<PathBuf>,
     #[command(flatten)]
-    pub output: Output,
+    pub rows: RowFormatArgs,
 }
 
 /// `query`.
@@ -352,7 +352,7 @@ pub(crate) struct EstimateArgs {
 pub(crate) struct QueryArgs {
     /// What to ask by.
     #[arg(value_enum)]
-    pub by: By,
+    pub by: QueryKey,
     /// Its name.
     pub id: String,
     /// Departures from this UTC date or time on.
@@ -368,12 +368,12 @@ pub(crate) struct QueryArgs {
     #[arg(long)]
     pub part: Option<String>,
     #[command(flatten)]
-    pub output: Output,
+    pub rows: RowFormatArgs,
 }
 
 /// What records are asked by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum By {
+pub(crate) enum QueryKey {
     /// The aircraft.
     Tail,
     /// The unit.
@@ -400,7 +400,7 @@ pub(crate) struct TrendArgs {
     #[arg(long, value_parser = parse_utc, value_name = "UTC")]
     pub as_of: Option<Timestamp>,
     #[command(flatten)]
-    pub foreign: Foreign,
+    pub external: ExternalEstimatesArgs,
     /// One row per query: `serial_number`, `as_of_utc`, optionally `part_number`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["as_of", "tail", "serial", "part"])]
     pub queries: Option<PathBuf>,
@@ -408,12 +408,12 @@ pub(crate) struct TrendArgs {
     #[arg(long)]
     pub statistics: bool,
     #[command(flatten)]
-    pub output: Output,
+    pub rows: RowFormatArgs,
 }
 
 /// Histories that were estimated elsewhere.
 #[derive(Debug, ClapArgs)]
-pub(crate) struct Foreign {
+pub(crate) struct ExternalEstimatesArgs {
     /// An estimates table made elsewhere, instead of the store; it needs no configuration.
     #[arg(long, value_name = "FILE")]
     pub estimates: Option<PathBuf>,
@@ -426,9 +426,9 @@ pub(crate) struct Foreign {
 #[derive(Debug, ClapArgs)]
 pub(crate) struct BacktestArgs {
     #[command(flatten)]
-    pub foreign: Foreign,
+    pub external: ExternalEstimatesArgs,
     #[command(flatten)]
-    pub output: Output,
+    pub rows: RowFormatArgs,
 }
 
 /// `report`.
@@ -492,7 +492,7 @@ pub(crate) enum StoreCommand {
         #[arg(long, default_value_t = 20)]
         last: usize,
         #[command(flatten)]
-        output: Output,
+        rows: RowFormatArgs,
     },
     /// The data files of a table as of now, one a line, for engines that read no Delta log
     Files {
@@ -513,7 +513,7 @@ pub(crate) enum StoreCommand {
     /// All records, in order
     Export {
         #[command(flatten)]
-        output: Output,
+        rows: RowFormatArgs,
     },
 }
 

@@ -8,7 +8,7 @@ use records::Diagnostic;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Code {
     /// All well; refused flights are all well.
-    Well = 0,
+    Success = 0,
     /// Finished, but some logs were in error, or a check that was asked for failed.
     LogsInError = 1,
     /// Usage or configuration is wrong: nothing was run.
@@ -54,7 +54,7 @@ impl Failure {
         match self {
             Self::Refused(_) => Code::Usage,
             Self::Failed(_) => Code::RunFailed,
-            Self::PipeClosed => Code::Well,
+            Self::PipeClosed => Code::Success,
         }
     }
 }

@@ -5,15 +5,15 @@
 
 mod args;
 mod commands;
-mod exit;
-mod journal;
-mod progress;
 #[cfg(test)]
-mod reference;
-mod rows;
-mod spark;
+mod commands_doc;
+mod exit;
+mod json_log;
+mod output;
+mod progress;
+mod row_output;
+mod sparkline;
 mod table;
-mod talk;
 
 use std::process::ExitCode;
 
@@ -21,8 +21,8 @@ use clap::Parser;
 
 use args::{Args, Command};
 use exit::{Code, Failure};
+use output::Output;
 use records::Diagnostic;
-use talk::Talk;
 
 fn main() -> ExitCode {
     let args = match Args::try_parse() {
@@ -30,20 +30,20 @@ fn main() -> ExitCode {
         // Help and version are answers; anything else is a usage error, and clap says which.
         Err(error) => {
             let _ = error.print();
-            return if error.use_stderr() { Code::Usage.into() } else { Code::Well.into() };
+            return if error.use_stderr() { Code::Usage.into() } else { Code::Success.into() };
         }
     };
     ignore_file_size_signal();
-    let talk = Talk::new(&args.global);
+    let output = Output::new(&args.global);
     // A panic while reading a log becomes a diagnostic about that log; its backtrace would help nobody.
     std::panic::set_hook(Box::new(|_| {}));
-    let ended = std::panic::catch_unwind(|| dispatch(&args, &talk)).unwrap_or_else(|_| {
+    let ended = std::panic::catch_unwind(|| dispatch(&args, &output)).unwrap_or_else(|_| {
         let diagnostic = Diagnostic::new("panic", "the program failed in a way that should not happen");
         Err(Failure::failed(diagnostic.hint("what was stored before is intact; please report the command")))
     });
     match ended {
         Ok(code) => code.into(),
-        Err(failure) => talk.fail(&failure).into(),
+        Err(failure) => output.failure(&failure).into(),
     }
 }
 
@@ -58,22 +58,22 @@ fn ignore_file_size_signal() {
     }
 }
 
-fn dispatch(args: &Args, talk: &Talk) -> Result<Code, Failure> {
+fn dispatch(args: &Args, output: &Output) -> Result<Code, Failure> {
     match &args.command {
-        Command::Init(a) => commands::init::init(a, talk),
-        Command::Check(a) => commands::check::check(a, &args.global, talk),
-        Command::Run(a) => commands::run::run(a, &args.global, talk),
-        Command::Explain(a) => commands::explain::explain(a, &args.global, talk),
-        Command::Diff(a) => commands::diff::diff(a, talk),
-        Command::Estimate(a) => commands::estimate::estimate(a, &args.global, talk),
-        Command::Normalize(a) => commands::normalize::normalize(a, &args.global, talk),
-        Command::Query(a) => commands::query::query(a, &args.global, talk),
-        Command::Trend(a) => commands::trend::trend(a, &args.global, talk),
-        Command::Backtest(a) => commands::backtest::backtest(a, &args.global, talk),
-        Command::Report(a) => commands::report::report(a, &args.global, talk),
-        Command::Simulate(a) => commands::simulate::simulate(a, talk),
-        Command::Store(a) => commands::store::store(a, &args.global, talk),
-        Command::Completions(a) => commands::shell::completions(a, talk),
-        Command::Man => commands::shell::man(talk),
+        Command::Init(a) => commands::setup::init::init(a, output),
+        Command::Check(a) => commands::logs::check::check(a, &args.global, output),
+        Command::Run(a) => commands::run::run(a, &args.global, output),
+        Command::Explain(a) => commands::results::explain::explain(a, &args.global, output),
+        Command::Diff(a) => commands::results::diff::diff(a, output),
+        Command::Estimate(a) => commands::logs::estimate::estimate(a, &args.global, output),
+        Command::Normalize(a) => commands::logs::normalize::normalize(a, &args.global, output),
+        Command::Query(a) => commands::results::query::query(a, &args.global, output),
+        Command::Trend(a) => commands::results::trend::trend(a, &args.global, output),
+        Command::Backtest(a) => commands::results::backtest::backtest(a, &args.global, output),
+        Command::Report(a) => commands::results::report::report(a, &args.global, output),
+        Command::Simulate(a) => commands::setup::simulate::simulate(a, output),
+        Command::Store(a) => commands::store::store(a, &args.global, output),
+        Command::Completions(a) => commands::setup::shell::completions(a, output),
+        Command::Man => commands::setup::shell::man(output),
     }
 }

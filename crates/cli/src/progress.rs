@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-use crate::talk::{Talk, is_attended};
+use crate::output::{Output, is_attended};
 
 /// Without a terminal, one line in this time at most.
 const SPARSE: Duration = Duration::from_secs(30);
@@ -15,7 +15,7 @@ const SPARSE: Duration = Duration::from_secs(30);
 /// Progress of one piece of work.
 pub(crate) struct Progress<'t> {
     name: &'static str,
-    talk: &'t Talk,
+    output: &'t Output,
     bar: ProgressBar,
     terminal: bool,
     state: Mutex<State>,
@@ -33,9 +33,9 @@ struct State {
 
 impl<'t> Progress<'t> {
     /// Nothing is shown before [`Progress::total`] is known.
-    pub(crate) fn new(name: &'static str, talk: &'t Talk) -> Self {
+    pub(crate) fn new(name: &'static str, output: &'t Output) -> Self {
         let terminal = is_attended();
-        let target = if talk.progress() && terminal {
+        let target = if output.shows_progress() && terminal {
             ProgressDrawTarget::stderr()
         } else {
             ProgressDrawTarget::hidden()
@@ -52,7 +52,7 @@ impl<'t> Progress<'t> {
         };
         Self {
             name,
-            talk,
+            output,
             bar: ProgressBar::with_draw_target(None, target),
             terminal,
             state: Mutex::new(state),
@@ -112,7 +112,7 @@ impl<'t> Progress<'t> {
 
     /// A plain line, the first at once, then one each half minute.
     fn tell(&self) {
-        if self.terminal || !self.talk.progress() {
+        if self.terminal || !self.output.shows_progress() {
             return;
         }
         let line = self.update(|state| {
@@ -122,7 +122,7 @@ impl<'t> Progress<'t> {
                 line(self.name, state)
             })
         });
-        line.into_iter().for_each(|line| self.talk.note(&line));
+        line.into_iter().for_each(|line| self.output.note(&line));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use comfy_table::{CellAlignment, Table as Grid};
 
-use crate::talk::escape;
+use crate::output::escape;
 
 /// Blanks between two columns.
 const GAP: usize = 2;
@@ -130,16 +130,16 @@ fn terminal_width() -> usize {
 
 /// Micrometres with one decimal, or a dash.
 pub(crate) fn micrometres(m: Option<f64>) -> String {
-    m.map_or_else(dash, |m| format!("{:.1}", m * 1e6))
+    m.map_or_else(empty_cell, |m| format!("{:.1}", m * 1e6))
 }
 
 /// Whole hours, or a dash.
 pub(crate) fn hours(h: Option<f64>) -> String {
-    h.map_or_else(dash, |h| format!("{h:.0}"))
+    h.map_or_else(empty_cell, |h| format!("{h:.0}"))
 }
 
 /// What stands where nothing is known.
-pub(crate) fn dash() -> String {
+pub(crate) fn empty_cell() -> String {
     "–".to_owned()
 }
 

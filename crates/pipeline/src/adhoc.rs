@@ -5,7 +5,7 @@ use std::path::Path;
 use ingest::Files;
 use ingest::arrays::Arrays;
 use job::Config;
-use job::flight_log::{FlightLog, estimate_unidentified, catch_panic, part_of};
+use job::flight_log::{FlightLog, catch_panic, estimate_unidentified, part_of};
 use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
 use serde::Serialize;
 
@@ -50,7 +50,9 @@ pub fn estimate(
         Some(number) => catch_panic(&shown, || as_part(path, &shown, config, number, program_version)),
         None => {
             let files = bundle::around(config, path)?;
-            catch_panic(&shown, || booked(&files, &shown, config, installations, program_version, diagnostics))
+            catch_panic(&shown, || {
+                booked(&files, &shown, config, installations, program_version, diagnostics)
+            })
         }
     };
     Ok(read.unwrap_or_else(|diagnostic| {

@@ -323,7 +323,12 @@ impl Judge<'_> {
         let settings = flight_of(account).map_or_else(
             || self.unidentified.to_owned(),
             |flight| {
-                job::flight_log::config_digest(self.config, self.installations, &flight, &positions_of(account))
+                job::flight_log::config_digest(
+                    self.config,
+                    self.installations,
+                    &flight,
+                    &positions_of(account),
+                )
             },
         );
         if self.request.redo {

@@ -1,0 +1,126 @@
+//! `estimate`: logs ad hoc; nothing is stored.
+
+use std::path::{Path, PathBuf};
+
+use job::Config;
+use job::flight_log::part_of;
+use pipeline::adhoc::{self, EstimateRow};
+use records::{Installations, PartNumber};
+
+use crate::args::{EstimateArgs, Global};
+use crate::exit::{Code, Failure};
+use crate::output::Output;
+use crate::row_output;
+use crate::table::{self, count, number, text};
+
+use crate::commands::context::{VERSION, display_path, load_config, load_with_installations};
+use crate::commands::results::query::{doubts, load};
+
+/// Estimates the given logs.
+///
+/// # Errors
+/// When configuration or tables are wrong. Logs in error make the code 1.
+pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    let (config, installations) = match &args.part {
+        Some(_) => (load_config(global)?, Installations::default()),
+        None => load_with_installations(global)?,
+    };
+    let part = args.part.as_ref().map(|number| configured(&config, number)).transpose()?;
+    let (mut found, mut diagnostics) = (Vec::new(), Vec::new());
+    for path in &args.logs {
+        let part = part.as_ref();
+        found.extend(adhoc::estimate(path, &config, &installations, part, VERSION, &mut diagnostics)?);
+    }
+    if let Some(file) = &args.trace {
+        trace(file, &args.logs, &config, &installations, part.as_ref(), output)?;
+    }
+    if let Some(file) = &args.plot {
+        super::estimate_plot::estimate_plot(
+            file,
+            &args.logs,
+            &config,
+            &installations,
+            part.as_ref(),
+            output,
+        )?;
+    }
+    let batch = || row_output::batch(&pipeline::rows::estimates(), &found);
+    row_output::write_rows(&args.rows, output, batch, || page(&found))?;
+    output.diagnostics(&diagnostics);
+    Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
+}
+
+fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
+    let name = PartNumber::new(number)
+        .map_err(|e| Failure::usage("empty_name", e, "name one that the configuration has"))?;
+    match part_of(config, &name) {
+        Ok(_) => Ok(name),
+        Err(diagnostic) => Err(Failure::Refused(vec![diagnostic])),
+    }
+}
+
+fn page(found: &[EstimateRow]) -> String {
+    let columns = [
+        text("log", 3),
+        text("position", 0),
+        text("part / serial", 2),
+        number("gap µm", 0),
+        number("± µm", 3),
+        number("mid-range µm", 4),
+        number("reversals", 6),
+        number("load N", 5),
+        number("nis", 7),
+        text("doubts", 1),
+    ];
+    let cells = |r: &EstimateRow| {
+        let e = &r.estimate;
+        let known = |t: &Option<String>| t.clone().unwrap_or_else(table::empty_cell);
+        vec![
+            known(&r.log_path),
+            known(&r.position),
+            format!("{} / {}", known(&r.part_number), known(&r.serial_number)),
+            table::micrometres(e.gap_m),
+            table::micrometres(e.gap_se_m),
+            table::micrometres(e.gap_midrange_m),
+            e.load_reversals.to_string(),
+            load(e),
+            e.nis.map_or_else(table::empty_cell, |n| format!("{n:.2}")),
+            doubts(e),
+        ]
+    };
+    let head = format!("{}; nothing was stored\n", count(found.len(), "estimate"));
+    if found.is_empty() {
+        head
+    } else {
+        head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
+    }
+}
+
+/// Writes what the filter saw, per sample, of every actuator of the logs.
+fn trace(
+    file: &Path,
+    logs: &[PathBuf],
+    config: &Config,
+    installations: &Installations,
+    part: Option<&PartNumber>,
+    output: &Output,
+) -> Result<(), Failure> {
+    let mut all = job::trace::Trace::default();
+    for path in logs {
+        // A log in error was told of already; its trace is simply not there.
+        let Ok(opened) = job::trace::of_log(
+            &pipeline::bundle::around(config, path)?,
+            &display_path(path),
+            config,
+            installations,
+            part,
+        ) else {
+            continue;
+        };
+        all.extend(opened);
+    }
+    let columns = all.columns();
+    ingest::write::write_parquet(file, &columns, &[]).map_err(|e| Failure::failed(e.diagnostic()))?;
+    output.note(&format!("wrote {} samples to {}", all.len(), display_path(file)));
+    Ok(())
+}

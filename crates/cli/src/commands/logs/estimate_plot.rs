@@ -1,0 +1,106 @@
+//! `estimate --plot`: what an estimate stands on, as a picture or a page.
+
+use std::path::{Path, PathBuf};
+
+use job::Config;
+use job::estimate_plot_data::EstimatePlot;
+use records::{Installations, PartNumber};
+use report::{ContactInterval, estimate_plot_html, estimate_plot_png, estimate_plot_svg};
+
+use crate::exit::Failure;
+use crate::output::Output;
+use crate::table;
+
+use crate::commands::context::display_path;
+
+/// Draws every actuator of the logs into one file; its ending says how.
+///
+/// # Errors
+/// When the ending is not one we can draw, or the file cannot be written.
+pub(super) fn estimate_plot(
+    file: &Path,
+    logs: &[PathBuf],
+    config: &Config,
+    installations: &Installations,
+    part: Option<&PartNumber>,
+    output: &Output,
+) -> Result<(), Failure> {
+    let draw = renderer(file)?;
+    let mut looks = Vec::new();
+    for path in logs {
+        let name = display_path(path);
+        // A log in error was told of already; it is simply not drawn.
+        let files = pipeline::bundle::around(config, path)?;
+        let found =
+            job::estimate_plot_data::of_log(&files, &name, config, installations, part).unwrap_or_default();
+        looks.extend(found.into_iter().map(|look| drawn(&name, look)));
+    }
+    if looks.is_empty() {
+        output.note(&format!("no actuator to draw; {} was not written", display_path(file)));
+        return Ok(());
+    }
+    let failed = |what: &dyn std::fmt::Display| {
+        Failure::failed(records::Diagnostic::new("cannot_write", format!("{}: {what}", display_path(file))))
+    };
+    let picture = draw(&looks).map_err(|e| failed(&e))?;
+    std::fs::write(file, picture).map_err(|e| failed(&e))?;
+    output.note(&format!("drew {} to {}", table::count(looks.len(), "actuator"), display_path(file)));
+    Ok(())
+}
+
+type Renderer = fn(&[report::EstimatePlot]) -> Result<Vec<u8>, report::Error>;
+
+fn renderer(file: &Path) -> Result<Renderer, Failure> {
+    let ending = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+    match ending.as_str() {
+        "svg" => Ok(|looks| estimate_plot_svg(looks).map(String::into_bytes)),
+        "png" => Ok(estimate_plot_png),
+        "html" | "htm" => Ok(|looks| estimate_plot_html(looks).map(String::into_bytes)),
+        _ => Err(Failure::usage(
+            "unknown_ending",
+            format!("{} has no ending that says what to draw", display_path(file)),
+            "end it in .svg, .png or .html",
+        )),
+    }
+}
+
+fn drawn(log: &str, look: EstimatePlot) -> report::EstimatePlot {
+    let (upper, lower, touches) = match look.picture {
+        Some(picture) => (picture.upper, picture.lower, picture.touches),
+        None => Default::default(),
+    };
+    let stretches = touches.into_iter().map(|touch| ContactInterval {
+        time_s: touch.time_s,
+        is_upper: touch.flank.sign() > 0.0,
+        is_used: touch.trust.is_some_and(|trust| trust > 0.0),
+        force_n: touch.force_n,
+        dx_m: touch.dx_m,
+    });
+    report::EstimatePlot {
+        title: format!("{} in {log}", look.position),
+        summary: words(&look.estimate),
+        step_s: look.step_s,
+        contacts: stretches.collect(),
+        bounds_m: look.midrange.map(|gap| (gap.upper_m, gap.lower_m)),
+        flanks: [upper, lower],
+        dx_m: look.dx_m,
+        load_n: look.load_n,
+        s_m: look.s_m,
+    }
+}
+
+fn words(e: &records::GapEstimate) -> String {
+    let mut words = Vec::new();
+    let mut say = |name: &str, value: Option<f64>, unit: &str| {
+        words.extend(value.map(|v| format!("{name} {v:.1} {unit}")));
+    };
+    say("gap", e.gap_m.map(|m| m * 1e6), "µm");
+    say("standard error", e.gap_se_m.map(|m| m * 1e6), "µm");
+    say("mid-range", e.gap_midrange_m.map(|m| m * 1e6), "µm");
+    say("stiffness", e.stiffness_n_per_m.map(|k| k / 1e6), "N/µm");
+    say("skew", e.skew_s.map(|s| s * 1e3), "ms");
+    say("lost motion", e.lost_motion_m.map(|m| m * 1e6), "µm");
+    words.extend(e.reason.as_ref().filter(|_| e.gap_m.is_none()).map(|why| format!("refused: {why}")));
+    words.extend((!e.flags.is_empty()).then(|| e.flags.join(", ")));
+    words.join(" · ")
+}

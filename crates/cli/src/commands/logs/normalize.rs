@@ -1,0 +1,51 @@
+//! `normalize`: the canonical log of each actuator.
+
+use ingest::Files;
+use pipeline::{Event, bundle};
+
+use crate::args::{Global, NormalizeArgs};
+use crate::exit::{Code, Failure};
+use crate::output::Output;
+use crate::progress::Progress;
+use crate::table::count;
+
+use crate::commands::context::{display_path, load_with_installations};
+
+/// Writes normalized logs and says how many.
+///
+/// # Errors
+/// When configuration or tables are wrong. Logs in error make the code 1.
+pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    let (config, installations) = load_with_installations(global)?;
+    let logs: Vec<(Files, String)> = if args.logs.is_empty() {
+        bundle::find(&config)?.logs.into_iter().map(|(name, files)| (files, name)).collect()
+    } else {
+        let whole = |path: &std::path::PathBuf| Ok((bundle::around(&config, path)?, display_path(path)));
+        args.logs.iter().map(whole).collect::<Result<_, Failure>>()?
+    };
+    let progress = Progress::new("normalize", output);
+    let watch = |event: Event| match event {
+        Event::Planned { logs, .. } => progress.total(logs),
+        Event::Finished { log, diagnostics, .. } => progress.finished(&log, 0, diagnostics.len()),
+        _ => {}
+    };
+    let place = (args.output.as_path(), args.encoding.into());
+    let done = pipeline::normalize::normalize(
+        &config,
+        &installations,
+        &logs,
+        place,
+        args.jobs.map(usize::from),
+        &watch,
+    );
+    progress.end();
+    let done = done?;
+    output.write_result(&format!(
+        "{} of {} below {}\n",
+        count(done.written.len(), "normalized log"),
+        count(logs.len(), "log"),
+        display_path(&args.output)
+    ))?;
+    output.diagnostics(&done.diagnostics);
+    Ok(if done.diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
+}

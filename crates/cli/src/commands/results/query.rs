@@ -1,0 +1,141 @@
+//! `query`: stored records, by tail, serial number, flight or position.
+
+use std::collections::BTreeMap;
+
+use records::GapRecord;
+use store::{Query, Store};
+
+use crate::args::{Global, QueryArgs, QueryKey};
+use crate::exit::{Code, Failure};
+use crate::output::Output;
+use crate::row_output;
+use crate::sparkline::sparkline;
+use crate::table::{self, count, number, text};
+
+use crate::commands::context::load_config;
+
+/// Fewer estimates than this are no history.
+const LEAST_HISTORY: usize = 3;
+
+/// Answers with the records that fit, oldest first.
+///
+/// # Errors
+/// When configuration or store cannot be read.
+pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    let store = Store::open(load_config(global)?.store())?;
+    let records = store.records(&asked(args))?;
+    row_output::write_rows(
+        &args.rows,
+        output,
+        || Ok(store::columns::to_batch(&records)?),
+        || page(&records),
+    )?;
+    if records.is_empty() {
+        output.note(&format!(
+            "no record of {} `{}`; `freeplay store info` says what there is",
+            word(args.by),
+            args.id
+        ));
+    }
+    Ok(Code::Success)
+}
+
+fn word(by: QueryKey) -> &'static str {
+    match by {
+        QueryKey::Tail => "tail",
+        QueryKey::Serial => "serial",
+        QueryKey::Flight => "flight",
+        QueryKey::Position => "position",
+    }
+}
+
+fn asked(args: &QueryArgs) -> Query {
+    let id = |by: QueryKey| (args.by == by).then(|| args.id.clone());
+    Query {
+        tail_number: id(QueryKey::Tail),
+        serial_number: id(QueryKey::Serial),
+        flight_id: id(QueryKey::Flight),
+        position: id(QueryKey::Position),
+        part_number: args.part.clone(),
+        run_id: None,
+        since_utc: args.since,
+        until_utc: args.until,
+        last: args.last,
+    }
+}
+
+/// Records as people read them.
+pub(crate) fn page(records: &[GapRecord]) -> String {
+    let columns = [
+        text("departure UTC", 0),
+        text("tail", 2),
+        text("flight", 3),
+        text("position", 1),
+        text("part / serial", 2),
+        number("gap µm", 0),
+        number("± µm", 4),
+        number("mid-range µm", 5),
+        number("reversals", 7),
+        number("load N", 6),
+        text("doubts", 1),
+    ];
+    let cells = |r: &GapRecord| {
+        let e = &r.estimate;
+        vec![
+            r.flight.departure_utc.strftime("%Y-%m-%d %H:%M").to_string(),
+            r.flight.tail_number.to_string(),
+            r.flight.flight_id.to_string(),
+            r.position.to_string(),
+            format!("{} / {}", r.part_number, r.serial_number),
+            table::micrometres(e.gap_m),
+            table::micrometres(e.gap_se_m),
+            table::micrometres(e.gap_midrange_m),
+            e.load_reversals.to_string(),
+            load(e),
+            doubts(e),
+        ]
+    };
+    let head = format!("{}\n", count(records.len(), "record"));
+    if records.is_empty() {
+        head
+    } else {
+        head + &table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>()) + &sketches(records)
+    }
+}
+
+/// A line for each unit with a history in these records: from which gap to which.
+fn sketches(records: &[GapRecord]) -> String {
+    let mut units: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
+    for r in records {
+        let key = (r.part_number.as_str(), r.serial_number.as_str());
+        units.entry(key).or_default().extend(r.estimate.gap_m);
+    }
+    units.retain(|_, gaps_m| gaps_m.len() >= LEAST_HISTORY);
+    let rows: Vec<Vec<String>> = units
+        .iter()
+        .map(|((part, serial), gaps_m)| {
+            let ends = [gaps_m.first(), gaps_m.last()].map(|gap_m| table::micrometres(gap_m.copied()));
+            vec![format!("{part} / {serial}"), sparkline(gaps_m), ends.join(" → "), gaps_m.len().to_string()]
+        })
+        .collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let columns = [text("part / serial", 0), text("so far", 0), text("gap µm", 0), number("estimates", 0)];
+    format!("\n{}", table::layout(&columns, &rows))
+}
+
+/// The load band a number stands on.
+pub(crate) fn load(e: &records::GapEstimate) -> String {
+    e.load_p05_n.zip(e.load_p95_n).map_or_else(table::empty_cell, |(low, high)| format!("{low:.0}…{high:.0}"))
+}
+
+/// Why refused, or what is doubted.
+pub(crate) fn doubts(e: &records::GapEstimate) -> String {
+    let reason = e.reason.iter().map(|reason| match e.status {
+        records::Status::Refused => format!("refused: {reason}"),
+        records::Status::Estimated => reason.clone(),
+    });
+    let others = e.flags.iter().filter(|flag| Some(*flag) != e.reason.as_ref()).cloned();
+    reason.chain(others).collect::<Vec<_>>().join(", ")
+}

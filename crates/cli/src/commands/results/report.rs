@@ -1,0 +1,50 @@
+//! `report`: the morning's pages.
+
+use jiff::Timestamp;
+use pipeline::trends::Ask;
+use pipeline::{Event, pages, report as composed};
+use store::Store;
+
+use crate::args::{Global, ReportArgs};
+use crate::exit::{Code, Failure};
+use crate::output::Output;
+use crate::progress::Progress;
+use crate::table::count;
+
+use crate::commands::context::{VERSION, display_path, load_with_installations};
+
+/// Writes the pages and says where the first one is.
+///
+/// # Errors
+/// When configuration, tables or store cannot be read, or the folder cannot be written.
+pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    let (config, installations) = load_with_installations(global)?;
+    let ask = Ask {
+        tail_number: args.tail.clone(),
+        serial_number: args.serial.clone(),
+        part_number: None,
+        as_of_utc: args.as_of,
+        statistics: true,
+    };
+    let store = Store::open(config.store())?;
+    let program = format!("Freeplay {VERSION}");
+    let report = composed::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
+    if report.units.is_empty() {
+        let hint = "`freeplay store info` says what there is; `freeplay run` fills the store";
+        return Err(Failure::usage("nothing_to_report", "no unit fits", hint));
+    }
+    let progress = Progress::new("report", output);
+    let watch = |event: Event| match event {
+        Event::Planned { logs, .. } => progress.total(logs),
+        Event::Finished { log, .. } => progress.finished(&log, 0, 0),
+        _ => {}
+    };
+    let written = pages::write(&report, &args.output, &watch);
+    progress.end();
+    let written = written?;
+    let index = display_path(&args.output.join("index.html"));
+    let size = written.bytes as f64 / 1e6;
+    let units = count(report.units.len(), "unit");
+    output.write_result(&format!("{index}: {units}, {} files, {size:.1} MB\n", written.files))?;
+    Ok(Code::Success)
+}

@@ -1,0 +1,103 @@
+//! `trend`: level, rate, crossing of the limit and state of each unit.
+
+use pipeline::statement::TrendRow;
+use pipeline::trends::{self, Ask};
+use store::Store;
+
+use crate::args::{Global, TrendArgs};
+use crate::exit::{Code, Failure};
+use crate::output::Output;
+use crate::row_output;
+use crate::sparkline::sparkline;
+use crate::table::{self, count, number, state_mark, text};
+
+use crate::commands::context::load_trend_context;
+
+/// Answers with one row for each unit, or for each query.
+///
+/// # Errors
+/// When configuration, tables or store cannot be read.
+pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    let (config, installations) = load_trend_context(&args.external, global, output)?;
+    let ask = Ask {
+        tail_number: args.tail.clone(),
+        serial_number: args.serial.clone(),
+        part_number: args.part.clone(),
+        as_of_utc: args.as_of,
+        statistics: args.statistics,
+    };
+    let found = match (&args.external.estimates, &args.queries) {
+        (None, None) => trends::of_store(&config, &installations, &Store::open(config.store())?, &ask)?,
+        (estimates, queries) => {
+            let histories = match estimates {
+                Some(file) => pipeline::estimates::read(file)?,
+                None => trends::in_store(&Store::open(config.store())?)?,
+            };
+            match queries {
+                Some(file) => {
+                    let queries = pipeline::estimates::queries(file)?;
+                    trends::of_queries(&config, &installations, histories, &queries, args.statistics)?
+                }
+                None => trends::of_histories(&config, &installations, histories, &ask)?,
+            }
+        }
+    };
+    row_output::write_rows(
+        &args.rows,
+        output,
+        || row_output::batch(&pipeline::rows::trends(), &found),
+        || page(&found),
+    )?;
+    Ok(Code::Success)
+}
+
+fn page(found: &[TrendRow]) -> String {
+    let columns = [
+        text("state", 0),
+        text("part / serial", 0),
+        text("tail", 2),
+        text("position", 4),
+        number("flights", 6),
+        number("gap µm", 0),
+        number("± µm", 3),
+        text("so far", 2),
+        number("nm/h", 1),
+        text("trend", 4),
+        number("limit µm", 5),
+        number("not before h", 1),
+        text("not before", 2),
+        number("likely h", 4),
+        number("not after h", 6),
+        text("why", 7),
+    ];
+    let cells = |r: &TrendRow| {
+        vec![
+            state_mark(r.state),
+            format!("{} / {}", r.part_number.as_deref().unwrap_or("–"), r.serial_number),
+            r.tail_number.clone().unwrap_or_else(table::empty_cell),
+            r.position.clone().unwrap_or_else(table::empty_cell),
+            r.flights.to_string(),
+            table::micrometres(r.gap_m),
+            table::micrometres(r.gap_se_m),
+            sparkline(&r.sketch_m),
+            r.rate_m_per_hour.map_or_else(table::empty_cell, |v| format!("{:.1}", v * 1e9)),
+            r.trend.to_owned(),
+            table::micrometres(r.limit_m),
+            table::hours(r.crossing_hours_p05),
+            r.not_before_utc.map_or_else(table::empty_cell, |day| day.strftime("%Y-%m-%d").to_string()),
+            table::hours(r.crossing_hours_p50),
+            table::hours(r.crossing_hours_p95),
+            r.reason.clone().unwrap_or_default(),
+        ]
+    };
+    let as_of = found.iter().map(|r| r.as_of_utc).max();
+    let head = as_of.map_or_else(
+        || "no unit fits\n".to_owned(),
+        |as_of| format!("{} as of {}\n", count(found.len(), "unit"), as_of.strftime("%Y-%m-%d %H:%M UTC")),
+    );
+    if found.is_empty() {
+        head
+    } else {
+        head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
+    }
+}

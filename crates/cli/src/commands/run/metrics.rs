@@ -1,0 +1,56 @@
+//! The account of a run as metrics, in the text format of Prometheus (exposition format 0.0.4).
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use jiff::Timestamp;
+use pipeline::Report;
+
+use crate::exit::{Code, Failure};
+use crate::row_output::to_file;
+
+/// Writes the metrics beside the file and renames, so that a scraper never meets half of them.
+///
+/// # Errors
+/// When the file cannot be written.
+pub(crate) fn write(file: &Path, report: &Report, code: Code) -> Result<(), Failure> {
+    let text = text(report, code);
+    to_file(file, |out| Ok(std::io::Write::write_all(out, text.as_bytes())?))
+}
+
+fn text(report: &Report, code: Code) -> String {
+    let mut text = String::new();
+    let mut gauge = |name: &str, help: &str, value: f64| {
+        let _ = writeln!(
+            text,
+            "# HELP freeplay_{name} {help}\n# TYPE freeplay_{name} gauge\nfreeplay_{name} {value}"
+        );
+    };
+    let states = |state: &str| report.trends.iter().filter(|row| row.state == Some(state)).count() as f64;
+    let now = Timestamp::now().as_millisecond() as f64 / 1e3;
+    let completed = matches!(code, Code::Success | Code::LogsInError | Code::StateReached);
+    gauge(
+        "run_started_timestamp_seconds",
+        "When the last run began.",
+        report.started_utc.as_millisecond() as f64 / 1e3,
+    );
+    gauge("run_ended_timestamp_seconds", "When the last run ended.", now);
+    if completed {
+        gauge("run_completed_timestamp_seconds", "When a run last ended by itself.", now);
+    }
+    gauge("run_exit_code", "Its exit code.", f64::from(code as i32));
+    gauge("run_duration_seconds", "How long it took.", report.took_s);
+    gauge("logs_found", "Logs that fit the patterns.", report.found as f64);
+    gauge("logs_known", "Logs that were accounted for already.", report.known as f64);
+    gauge("logs_done", "Logs that were finished, those in error included.", report.done as f64);
+    gauge("logs_in_error", "Logs in error.", report.logs_in_error() as f64);
+    gauge("logs_not_reached", "Logs the run was stopped before.", report.not_reached as f64);
+    gauge("records_estimated", "Records with a gap that were stored.", report.estimated as f64);
+    gauge("records_refused", "Records of sound logs that cannot show one.", report.refusals() as f64);
+    gauge("tails_quiet", "Aircraft that sent nothing for longer than the others.", report.quiet.len() as f64);
+    for state in ["normal", "watch", "plan", "act"] {
+        let name = format!("units_touched_{state}");
+        gauge(&name, "Units this run touched that are in this state.", states(state));
+    }
+    text
+}

@@ -1,0 +1,381 @@
+//! `run`: the nightly job, and its account in the morning.
+
+mod metrics;
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use pipeline::changed::Changed;
+use pipeline::recorder::{Moved, Quantity};
+use pipeline::schedule::{self, Context};
+use pipeline::statement::TrendRow;
+use pipeline::{Event, Plan, Report, Request};
+use records::{SerialNumber, TailNumber};
+use store::Holder;
+
+use crate::args::{FailOn, Global, RunArgs};
+use crate::exit::{Code, Failure};
+use crate::output::{Output, escape};
+use crate::progress::{Progress, span};
+use crate::table::{self, count, number, state_mark, text};
+
+use crate::commands::context::{VERSION, load_config};
+
+/// Flights with unlike innovations that are named in the account.
+const MAX_UNUSUAL_SHOWN: usize = 5;
+
+/// Units of which something changed that are named in the account.
+const MAX_CHANGES_SHOWN: usize = 20;
+
+/// Runs the night's work.
+///
+/// # Errors
+/// When nothing could be run, or the store failed.
+pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    let config = load_config(global)?;
+    let request = request(args)?;
+    if args.dry_run {
+        return dry_run(&config, &request, output);
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    listen(&stop)?;
+    let progress = Progress::new("run", output);
+    let watch = |event: Event| {
+        output.event(&event);
+        follow(&event, &progress);
+    };
+    let context = Context {
+        program_version: VERSION,
+        holder: Holder::this_process(),
+        wait: args.wait,
+        stop: &stop,
+        watch: &watch,
+    };
+    let report = schedule::run(&config, &request, &context);
+    progress.end();
+    if let (Err(pipeline::Error::Store(store::Error::Held { .. })), true) =
+        (&report, stop.load(Ordering::Relaxed))
+    {
+        output.note("interrupted while waiting for another run; nothing was begun");
+        return Ok(Code::Interrupted);
+    }
+    let report = report?;
+    output.diagnostics(report.errors.iter().map(|e| &e.diagnostic));
+    let reached = args.fail_on.is_some_and(|least| is_reached(&report, least));
+    let code = code(&report, reached, stop.load(Ordering::Relaxed));
+    if let Some(file) = &args.metrics {
+        metrics::write(file, &report, code)?;
+    }
+    if args.json {
+        let text = serde_json::to_string_pretty(&report).map_err(std::io::Error::from)?;
+        output.write_result(&(text + "\n"))?;
+    } else {
+        output.write_result(&summary_text(&report, &config.file.display().to_string(), code))?;
+    }
+    Ok(code)
+}
+
+fn request(args: &RunArgs) -> Result<Request, Failure> {
+    let empty = |e: records::ids::EmptyIdError| {
+        Failure::usage("empty_name", e, "leave the option out to ask for all")
+    };
+    Ok(Request {
+        since_utc: args.since,
+        until_utc: args.until,
+        tail_number: args.tail.as_ref().map(TailNumber::new).transpose().map_err(empty)?,
+        serial_number: args.serial.as_ref().map(SerialNumber::new).transpose().map_err(empty)?,
+        limit: args.limit,
+        jobs: args.jobs.map(usize::from),
+        retry: args.retry,
+        redo: args.redo,
+        verify_content: args.verify_content,
+        counts_all: args.fail_on.is_some(),
+    })
+}
+
+/// The first signal lets flights in hand finish; the second ends the process at once.
+fn listen(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, Code::Interrupted as i32, Arc::clone(stop))?;
+        signal_hook::flag::register(signal, Arc::clone(stop))?;
+    }
+    Ok(())
+}
+
+fn follow(event: &Event, progress: &Progress<'_>) {
+    match event {
+        Event::Planned { logs, .. } => progress.total(*logs),
+        Event::Started { log } => progress.started(log),
+        Event::Finished { log, refused, diagnostics, .. } => {
+            progress.finished(log, *refused, diagnostics.len());
+        }
+        Event::Stored { .. } | Event::Trends { .. } => {}
+    }
+}
+
+/// Whether any unit of the store, touched tonight or not, is at or past a state.
+fn is_reached(report: &Report, least: FailOn) -> bool {
+    let at_or_past: &[&str] = match least {
+        FailOn::Watch => &["watch", "plan", "act"],
+        FailOn::Plan => &["plan", "act"],
+        FailOn::Act => &["act"],
+    };
+    at_or_past.iter().any(|state| report.states.contains_key(state))
+}
+
+fn code(report: &Report, reached: bool, stopped: bool) -> Code {
+    if stopped && report.not_reached > 0 {
+        Code::Interrupted
+    } else if !report.errors.is_empty() {
+        Code::LogsInError
+    } else if reached {
+        Code::StateReached
+    } else {
+        Code::Success
+    }
+}
+
+/// Flights in which the filter was surprised.
+fn unusual_innovations(report: &Report, page: &mut String) {
+    for unlike in report.innovations_unlike.iter().take(MAX_UNUSUAL_SHOWN) {
+        let text = format!(
+            "{} {}, flight {}: the filter's innovations (NIS {:.2}) are unlike this unit's other flights ({:.2})",
+            escape(&unlike.tail_number),
+            escape(&unlike.position),
+            escape(&unlike.flight_id),
+            unlike.nis,
+            unlike.usual
+        );
+        line(page, "unlike", &text);
+    }
+    if let Some(more @ 1..) = report.innovations_unlike.len().checked_sub(MAX_UNUSUAL_SHOWN) {
+        line(page, "", &format!("and {more} more, all in `freeplay run --json`"));
+    }
+}
+
+/// The morning's page.
+fn summary_text(report: &Report, config: &str, code: Code) -> String {
+    let mut page = format!(
+        "Freeplay {VERSION} · run {} · {config}\n",
+        report.started_utc.strftime("%Y-%m-%dT%H:%M:%SZ")
+    );
+    for run in &report.cut_short {
+        let text = format!(
+            "{} ended without a word: {} done, {} not reached",
+            run.started_utc.strftime("run %Y-%m-%dT%H:%M:%SZ"),
+            count(run.done as usize, "log"),
+            run.not_reached
+        );
+        line(&mut page, "cut short", &text);
+    }
+    let new = report.found - report.known - report.not_asked - report.left;
+    let mut found = format!("{}: {new} to do, {} known", count(report.found, "log"), report.known);
+    for (what, n) in [("not asked for", report.not_asked), ("left by the limit", report.left)] {
+        if n > 0 {
+            let _ = write!(found, ", {n} {what}");
+        }
+    }
+    line(&mut page, "found", &found);
+    let records = report.estimated + report.refusals();
+    line(
+        &mut page,
+        "stored",
+        &format!(
+            "{} of {}: {} estimated, {}",
+            count(records, "record"),
+            count(report.flights, "flight"),
+            report.estimated,
+            refused(report)
+        ),
+    );
+    if !report.errors.is_empty() {
+        line(
+            &mut page,
+            "in error",
+            &format!("{}; everything else is stored", count(report.logs_in_error(), "log")),
+        );
+    }
+    for error in report.errors.iter().take(10) {
+        let place = error.diagnostic.location().map(|p| format!("  {p}")).unwrap_or_default();
+        line(&mut page, "", &format!("{}  {}{place}", escape(&error.log), error.diagnostic.code));
+    }
+    if report.errors.len() > 10 {
+        line(&mut page, "", &format!("and {} more, all in `freeplay run --json`", report.errors.len() - 10));
+    }
+    if report.not_reached > 0 {
+        line(
+            &mut page,
+            "not reached",
+            &format!("{}; the next run does them", count(report.not_reached, "log")),
+        );
+        for log in report.not_reached_logs.iter().take(10) {
+            line(&mut page, "", &escape(log));
+        }
+        if report.not_reached > 10 {
+            line(
+                &mut page,
+                "",
+                &format!("and {} more, all in `freeplay run --json`", report.not_reached - 10),
+            );
+        }
+    }
+    if !report.quiet.is_empty() {
+        let tails: Vec<String> = report
+            .quiet
+            .iter()
+            .map(|quiet| {
+                format!("{} since {}", escape(&quiet.tail_number), quiet.since_utc.strftime("%Y-%m-%d"))
+            })
+            .collect();
+        line(&mut page, "quiet", &format!("{}: {}", count(tails.len(), "tail"), tails.join(", ")));
+    }
+    for moved in &report.recorder_moved {
+        line(&mut page, "recorder", &recorder_moved(moved));
+    }
+    unusual_innovations(report, &mut page);
+    if let Some((log, seconds)) = &report.slowest {
+        let took = span(Duration::from_secs_f64(report.took_s));
+        line(
+            &mut page,
+            "slowest",
+            &format!("{}, {seconds:.1} s · took {took}, {}", escape(log), count(report.workers, "worker")),
+        );
+    }
+    page.push_str(&work_list_section(&report.trends));
+    page.push_str(&changes_section(&report.changed));
+    if code == Code::LogsInError {
+        page.push_str("exit 1: some logs are in error. After mending: `freeplay run --retry`\n");
+    }
+    page
+}
+
+fn recorder_moved(moved: &Moved) -> String {
+    let change = match moved.quantity {
+        Quantity::SkewS => format!("delay {:.1} → {:.1} ms", moved.from * 1e3, moved.to * 1e3),
+        Quantity::StiffnessNPerM => format!("stiffness {:+.0} %", (moved.to / moved.from - 1.0) * 100.0),
+    };
+    let whole = if moved.everywhere { "all of " } else { "" };
+    format!(
+        "{} {whole}{}: {change} since {}; a recorder, a sensor or its wiring, not wear",
+        escape(&moved.tail_number),
+        escape(&moved.positions.join(", ")),
+        moved.since_utc.strftime("%Y-%m-%d")
+    )
+}
+
+fn refused(report: &Report) -> String {
+    let reasons: Vec<String> = report.refused.iter().map(|(reason, n)| format!("{reason} {n}")).collect();
+    if reasons.is_empty() {
+        "0 refused".into()
+    } else {
+        format!("{} refused ({})", report.refusals(), reasons.join(", "))
+    }
+}
+
+fn line(page: &mut String, label: &str, text: &str) {
+    let _ = writeln!(page, "  {label:<11} {text}");
+}
+
+/// The units that need a decision, most urgent first; the others as one number.
+fn work_list_section(rows: &[TrendRow]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let urgency = |row: &TrendRow| ["act", "plan", "watch"].iter().position(|s| row.state == Some(*s));
+    let mut urgent: Vec<&TrendRow> = rows.iter().filter(|r| urgency(r).is_some()).collect();
+    urgent.sort_by(|a, b| {
+        let hours = |r: &TrendRow| r.crossing_hours_p05.unwrap_or(f64::INFINITY);
+        urgency(a).cmp(&urgency(b)).then_with(|| hours(a).total_cmp(&hours(b)))
+    });
+    let silent = rows.iter().filter(|r| r.state.is_none()).count();
+    let normal = rows.len() - urgent.len() - silent;
+    let mut page = format!(
+        "\n{} touched: {} need attention, {normal} normal, {silent} without a statement\n",
+        count(rows.len(), "unit"),
+        urgent.len()
+    );
+    if !urgent.is_empty() {
+        let columns = [
+            text("state", 0),
+            text("part / serial", 0),
+            text("tail", 2),
+            text("position", 3),
+            number("gap µm", 0),
+            number("limit µm", 4),
+            number("not before h", 1),
+            text("why", 5),
+        ];
+        let cells = |r: &&TrendRow| {
+            vec![
+                state_mark(r.state),
+                format!("{} / {}", r.part_number.as_deref().unwrap_or("–"), r.serial_number),
+                r.tail_number.clone().unwrap_or_else(table::empty_cell),
+                r.position.clone().unwrap_or_else(table::empty_cell),
+                table::micrometres(r.gap_m),
+                table::micrometres(r.limit_m),
+                table::hours(r.crossing_hours_p05),
+                r.reason.clone().unwrap_or_default(),
+            ]
+        };
+        page.push_str(&table::layout(&columns, &urgent.iter().map(cells).collect::<Vec<_>>()));
+    }
+    page
+}
+
+/// What tonight's flights changed, unit by unit.
+fn changes_section(changed: &[Changed]) -> String {
+    if changed.is_empty() {
+        return String::new();
+    }
+    let mut page = format!("\nchanged by tonight's flights: {}\n", count(changed.len(), "unit"));
+    for unit in changed.iter().take(MAX_CHANGES_SHOWN) {
+        let part = unit.part_number.as_deref().unwrap_or("–");
+        let _ = writeln!(page, "  {} / {}: {}", escape(part), escape(&unit.serial_number), change_text(unit));
+    }
+    if let Some(more @ 1..) = changed.len().checked_sub(MAX_CHANGES_SHOWN) {
+        let _ = writeln!(page, "  and {more} more, all in `freeplay run --json`");
+    }
+    page
+}
+
+/// A unit's news in words.
+fn change_text(unit: &Changed) -> String {
+    let word = |state: Option<&'static str>| state.unwrap_or("no state");
+    let mut told = Vec::new();
+    if unit.from != unit.to {
+        let why = unit.reason.as_deref().map(|why| format!(" ({why})")).unwrap_or_default();
+        told.push(format!("{} → {}{why}", word(unit.from), word(unit.to)));
+    }
+    for (events, what) in [(&unit.new_events, "new"), (&unit.cleared_events, "cleared")] {
+        let day = |at: jiff::Timestamp| at.strftime("%Y-%m-%d").to_string();
+        told.extend(events.iter().map(|e| format!("{what}: {} of {}", e.kind, day(e.departure_utc))));
+    }
+    told.join("; ")
+}
+
+fn dry_run(config: &job::Config, request: &Request, output: &Output) -> Result<Code, Failure> {
+    let Plan { found, known, work, .. } = schedule::dry_run(config, request)?;
+    let bytes: i64 = work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes).sum();
+    let head = format!(
+        "would do {} of {found} ({known} known), {:.1} MB; nothing was done\n",
+        count(work.len(), "log"),
+        bytes as f64 / 1e6
+    );
+    let columns = [text("log", 0), text("why", 0), number("MB", 1)];
+    let rows: Vec<Vec<String>> = work
+        .iter()
+        .map(|w| {
+            let megabytes = w
+                .stat
+                .as_ref()
+                .map_or_else(table::empty_cell, |s| format!("{:.2}", s.size_bytes as f64 / 1e6));
+            vec![w.shown.clone(), w.why.as_str().to_owned(), megabytes]
+        })
+        .collect();
+    let table = if rows.is_empty() { String::new() } else { table::layout(&columns, &rows) };
+    output.write_result(&(head + &table))?;
+    Ok(Code::Success)
+}

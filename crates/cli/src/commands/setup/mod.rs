@@ -1,0 +1,5 @@
+//! Commands that prepare a folder or a shell.
+
+pub(crate) mod init;
+pub(crate) mod shell;
+pub(crate) mod simulate;

@@ -1,0 +1,43 @@
+//! `simulate`: a fleet whose gaps are known.
+
+use pipeline::{Event, simulate as fleet};
+
+use crate::args::SimulateArgs;
+use crate::exit::{Code, Failure};
+use crate::output::Output;
+use crate::progress::Progress;
+use crate::table::count;
+
+use crate::commands::context::display_path;
+
+/// Flies the fleet and says where it landed.
+///
+/// # Errors
+/// When the spec cannot be flown, the folder holds logs already, or a file cannot be written.
+pub(crate) fn simulate(args: &SimulateArgs, output: &Output) -> Result<Code, Failure> {
+    let taken = ["logs", "pipeline.toml", "installations.csv"]
+        .iter()
+        .map(|name| args.output.join(name))
+        .find(|p| p.exists());
+    if let Some(path) = taken {
+        let what = format!("{} is there already", display_path(&path));
+        return Err(Failure::usage("would_overwrite", what, "name an empty folder; nothing was changed"));
+    }
+    let spec = fleet::spec(args.spec.as_deref(), args.seed)?;
+    std::fs::create_dir_all(&args.output)?;
+    let progress = Progress::new("simulate", output);
+    let watch = |event: Event| match event {
+        Event::Planned { logs, .. } => progress.total(logs),
+        Event::Finished { log, .. } => progress.finished(&log, 0, 0),
+        _ => {}
+    };
+    let flights = fleet::simulate(&spec, &args.output, args.jobs.map(usize::from), &watch);
+    progress.end();
+    let folder = display_path(&args.output);
+    let count = count(flights?, "flight");
+    output.write_result(&format!(
+        "{count} in {folder}, with installations.csv, truth.parquet and pipeline.toml\n"
+    ))?;
+    output.note(&format!("next: freeplay run --config {folder}/pipeline.toml"));
+    Ok(Code::Success)
+}

@@ -1,0 +1,221 @@
+//! `store`: care of the results.
+
+mod runs;
+
+use std::path::Path;
+use std::time::Duration;
+
+use jiff::Timestamp;
+use records::Diagnostic;
+use serde_json::json;
+use store::{Holder, Info, Query, RunRecord, Store};
+
+use crate::args::{Format, Global, RowFormatArgs, StoreArgs, StoreCommand, Table};
+use crate::exit::{Code, Failure};
+use crate::output::Output;
+use crate::progress::{Progress, span};
+use crate::row_output;
+use crate::table::count;
+
+use crate::commands::context::load_config;
+use crate::commands::results::query;
+
+/// Cares for the store that the configuration names.
+///
+/// # Errors
+/// When configuration or store cannot be read, or written.
+pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    let store = Store::open(load_config(global)?.store())?;
+    match &args.command {
+        StoreCommand::Info { max_age, json } => info(&store, *max_age, *json, output),
+        StoreCommand::Runs { run, last, rows } => runs::runs(&store, run.as_deref(), *last, rows, output),
+        StoreCommand::Files { table } => files(&store, *table, output),
+        StoreCommand::Verify => verify(&store, output),
+        StoreCommand::Compact => compact(&store, output),
+        StoreCommand::Adopt { trial } => adopt(&store, trial, output),
+        StoreCommand::Export { rows } => export(&store, rows, output),
+    }
+}
+
+fn files(store: &Store, table: Table, output: &Output) -> Result<Code, Failure> {
+    let files = match table {
+        Table::Gaps => store.files()?,
+        Table::Logs => store.log_files()?,
+        Table::Runs => store.run_files()?,
+    };
+    let lines: Vec<String> = files.iter().map(|file| file.display().to_string() + "\n").collect();
+    output.write_result(&lines.concat())?;
+    Ok(Code::Success)
+}
+
+fn info(store: &Store, max_age: Option<Duration>, as_json: bool, output: &Output) -> Result<Code, Failure> {
+    let found = store.info()?;
+    let age = found.last_completed.as_ref().and_then(age);
+    if as_json {
+        output.write_result(&format!("{:#}\n", in_json(store, &found, age)?))?;
+    } else {
+        output.write_result(&(in_words(store, &found, age) + &unfinished(store, &found)?))?;
+    }
+    let late = max_age.filter(|allowed| age.is_none_or(|age| age > *allowed));
+    let Some(allowed) = late else { return Ok(Code::Success) };
+    let what = match age {
+        Some(age) => {
+            format!("the last completed run ended {} ago, and {} are allowed", span(age), span(allowed))
+        }
+        None => "no run was ever completed".to_owned(),
+    };
+    output.diagnostic(
+        &Diagnostic::new("run_overdue", what)
+            .hint("did the timer start `freeplay run`, and did it end with code 0 or 1?"),
+    );
+    Ok(Code::LogsInError)
+}
+
+/// Time since a run ended.
+fn age(run: &RunRecord) -> Option<Duration> {
+    Timestamp::now().duration_since(run.finished_utc?).try_into().ok()
+}
+
+fn in_words(store: &Store, found: &Info, age: Option<Duration>) -> String {
+    let day = |t: Option<Timestamp>| {
+        t.map_or_else(crate::table::empty_cell, |t| t.strftime("%Y-%m-%d %H:%M UTC").to_string())
+    };
+    let last = match (&found.last_completed, age) {
+        (Some(run), Some(age)) => {
+            format!("{}, {} ago, exit code {}", run.run_id, span(age), run.exit_code.unwrap_or_default())
+        }
+        _ => "none was ever completed".to_owned(),
+    };
+    format!(
+        "{}\n  records     {} of {}, {}, {}\n  departures  {} to {}\n  logs        {} accounted for\n  data        {}, {:.1} MB, Delta version {}\n  last run    {last}\n",
+        store.dir().display(),
+        found.records,
+        count(found.flights, "flight"),
+        count(found.serials, "unit"),
+        count(found.tails, "tail"),
+        day(found.first_departure_utc),
+        day(found.last_departure_utc),
+        found.logs,
+        count(found.files, "file"),
+        found.bytes as f64 / 1e6,
+        found.version,
+    )
+}
+
+/// A line about the newest run where that is not the one that completed: it still goes, or was killed.
+fn unfinished(store: &Store, found: &Info) -> Result<String, Failure> {
+    let Some(run) = found.last.as_ref().filter(|run| run.exit_code.is_none()) else {
+        return Ok(String::new());
+    };
+    let began = run.started_utc.strftime("%Y-%m-%d %H:%M UTC");
+    let how = match runs::run_status(run, store.is_held()?) {
+        "killed" => "ended without an exit: it was killed, or its disk failed",
+        other => other,
+    };
+    let left = if run.not_reached > 0 { "; `freeplay run` does those" } else { "" };
+    let (id, done, not_reached) = (&run.run_id, count(run.done as usize, "log"), run.not_reached);
+    let (estimated, refused, errors) = (run.estimated, run.refused, run.errors);
+    Ok(format!(
+        "  unfinished  {id}, begun {began}, {how}\n              {done} done ({estimated} estimated, {refused} refused, {errors} in error), {not_reached} not reached{left}\n",
+    ))
+}
+
+fn in_json(store: &Store, found: &Info, age: Option<Duration>) -> Result<serde_json::Value, Failure> {
+    let run = found.last_completed.as_ref();
+    let is_held = store.is_held()?;
+    let last = found.last.as_ref().map(|run| {
+        json!({
+            "run_id": run.run_id,
+            "started_utc": run.started_utc,
+            "ended": runs::run_status(run, is_held),
+            "exit_code": run.exit_code,
+            "done": run.done,
+            "estimated": run.estimated,
+            "refused": run.refused,
+            "errors": run.errors,
+            "not_reached": run.not_reached,
+        })
+    });
+    Ok(json!({
+        "path": store.dir().display().to_string(),
+        "records": found.records,
+        "flights": found.flights,
+        "serials": found.serials,
+        "tails": found.tails,
+        "first_departure_utc": found.first_departure_utc,
+        "last_departure_utc": found.last_departure_utc,
+        "logs": found.logs,
+        "files": found.files,
+        "bytes": found.bytes,
+        "version": found.version,
+        "last_completed_run_id": run.map(|r| r.run_id.clone()),
+        "last_completed_utc": run.and_then(|r| r.finished_utc),
+        "last_completed_exit_code": run.and_then(|r| r.exit_code),
+        "age_s": age.map(|a| a.as_secs_f64()),
+        "last_run": last,
+    }))
+}
+
+fn verify(store: &Store, output: &Output) -> Result<Code, Failure> {
+    let findings = store.verify();
+    if findings.is_empty() {
+        output.write_result(&format!("{} is whole\n", store.dir().display()))?;
+        return Ok(Code::Success);
+    }
+    output.diagnostics(&findings);
+    output.write_result(&format!("{} in {}\n", count(findings.len(), "finding"), store.dir().display()))?;
+    Ok(Code::LogsInError)
+}
+
+fn adopt(store: &Store, trial: &Path, output: &Output) -> Result<Code, Failure> {
+    let trial = Store::open(trial)?;
+    let mut writer = store.lock(&Holder::this_process(), None)?;
+    let progress = Progress::new("adopt", output);
+    let mut begun = false;
+    let done = writer.promote(&trial, |tail, total| {
+        if !std::mem::replace(&mut begun, true) {
+            progress.total(total);
+        }
+        progress.finished(tail, 0, 0);
+    });
+    progress.end();
+    let done = done?;
+    output.write_result(&format!(
+        "{} of {} taken over from {}{}\n  next  give pipeline.toml the settings of the trial; `freeplay run --dry-run` then finds nothing to do\n",
+        count(done.records, "record"),
+        count(done.logs, "log"),
+        trial.dir().display(),
+        match done.retired {
+            0 => String::new(),
+            retired => format!(", {} gone that it did not make", count(retired, "record")),
+        },
+    ))?;
+    Ok(Code::Success)
+}
+
+fn compact(store: &Store, output: &Output) -> Result<Code, Failure> {
+    let done = store.lock(&Holder::this_process(), None)?.compact()?;
+    let deleted = count(done.deleted, "superseded file");
+    output.write_result(&format!(
+        "merged {} into {}; {deleted} deleted\n",
+        count(done.before, "file"),
+        done.after
+    ))?;
+    Ok(Code::Success)
+}
+
+fn export(store: &Store, format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
+    if format.format() == Format::Table {
+        let records = store.records(&Query::default())?;
+        row_output::write_rows(
+            format,
+            output,
+            || Ok(store::columns::to_batch(&records)?),
+            || query::page(&records),
+        )?;
+    } else {
+        let batch = store.scan(&Query::default())?;
+        row_output::write_rows(format, output, || Ok(batch), String::new)?;
+    }
+    Ok(Code::Success)
+}

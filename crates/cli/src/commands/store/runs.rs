@@ -1,0 +1,260 @@
+//! `store runs`: the accounts of past runs, and of one of them log by log; killed runs have theirs too.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use jiff::Timestamp;
+use records::Status;
+use serde::Serialize;
+use store::{LogOutcome, LogRecord, Query, RunRecord, Store};
+
+use crate::args::RowFormatArgs;
+use crate::exit::{Code, Failure};
+use crate::output::Output;
+use crate::progress::span;
+use crate::row_output;
+use crate::table::{self, count, number, text};
+
+/// A run as it is answered.
+#[derive(Serialize)]
+struct Run<'a> {
+    run_id: &'a str,
+    started_utc: Timestamp,
+    finished_utc: Option<Timestamp>,
+    ended: &'static str,
+    exit_code: Option<i64>,
+    found: i64,
+    known: i64,
+    done: i64,
+    estimated: i64,
+    refused: i64,
+    errors: i64,
+    not_reached: i64,
+    program_version: &'a str,
+    config_path: &'a str,
+}
+
+/// One log of a run as it is answered.
+#[derive(Serialize)]
+struct Log<'a> {
+    log_path: &'a str,
+    class: &'static str,
+    reason: Option<String>,
+    tail_number: Option<&'a str>,
+    flight_id: Option<&'a str>,
+    departure_utc: Option<Timestamp>,
+    estimated: i64,
+    refused: i64,
+    duration_s: f64,
+    error_detail: Option<&'a str>,
+}
+
+/// Answers with the last runs, or with the logs of one.
+///
+/// # Errors
+/// When the store cannot be read, or holds no such run.
+pub(crate) fn runs(
+    store: &Store,
+    one: Option<&str>,
+    last: usize,
+    format: &RowFormatArgs,
+    output: &Output,
+) -> Result<Code, Failure> {
+    let runs = store.runs()?;
+    match one {
+        None => all(store, &runs[runs.len().saturating_sub(last)..], format, output),
+        Some(id) => {
+            let found = if id == "last" { runs.last() } else { runs.iter().find(|run| run.run_id == id) };
+            let unknown = || {
+                let what = format!("the store knows no run `{id}`");
+                Failure::usage("no_such_run", what, "`freeplay store runs` lists them; `last` is the newest")
+            };
+            logs(store, found.ok_or_else(unknown)?, format, output)
+        }
+    }
+}
+
+/// How a run ended, in a word.
+pub(crate) fn run_status(run: &RunRecord, is_held: bool) -> &'static str {
+    match run.exit_code {
+        Some(0 | 4) => "well",
+        Some(1) => "logs in error",
+        Some(130) => "interrupted",
+        Some(_) => "failed",
+        None if is_held && !run.has_ended() => "still goes",
+        None => "killed",
+    }
+}
+
+fn all(store: &Store, runs: &[RunRecord], format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
+    let is_held = store.is_held()?;
+    let answer: Vec<Run<'_>> = runs.iter().map(|run| in_row(run, is_held)).collect();
+    row_output::write_rows(format, output, || row_output::batch(&run_schema(), &answer), || page(&answer))?;
+    Ok(Code::Success)
+}
+
+fn in_row(run: &RunRecord, is_held: bool) -> Run<'_> {
+    Run {
+        run_id: &run.run_id,
+        started_utc: run.started_utc,
+        finished_utc: run.finished_utc,
+        ended: run_status(run, is_held),
+        exit_code: run.exit_code,
+        found: run.found,
+        known: run.known,
+        done: run.done,
+        estimated: run.estimated,
+        refused: run.refused,
+        errors: run.errors,
+        not_reached: run.not_reached,
+        program_version: &run.program_version,
+        config_path: &run.config_path,
+    }
+}
+
+fn run_schema() -> SchemaRef {
+    let field = |name: &str, kind: DataType| Field::new(name, kind, true);
+    let counts = ["exit_code", "found", "known", "done", "estimated", "refused", "errors", "not_reached"];
+    let mut fields = vec![field("run_id", DataType::Utf8)];
+    fields.extend(["started_utc", "finished_utc"].map(|name| field(name, row_output::utc())));
+    fields.push(field("ended", DataType::Utf8));
+    fields.extend(counts.map(|name| field(name, DataType::Int64)));
+    fields.extend(["program_version", "config_path"].map(|name| field(name, DataType::Utf8)));
+    Arc::new(Schema::new(fields))
+}
+
+fn page(runs: &[Run<'_>]) -> String {
+    let columns = [
+        text("run", 0),
+        text("ended", 0),
+        text("took", 4),
+        number("found", 2),
+        number("known", 3),
+        number("done", 0),
+        number("estimated", 1),
+        number("refused", 1),
+        number("errors", 0),
+        number("not reached", 1),
+    ];
+    let cells = |run: &Run<'_>| {
+        let counts =
+            [run.found, run.known, run.done, run.estimated, run.refused, run.errors, run.not_reached];
+        let took = run.finished_utc.map_or_else(table::empty_cell, |end| {
+            span(Duration::try_from(end.duration_since(run.started_utc)).unwrap_or_default())
+        });
+        let words = [run.run_id.to_owned(), run.ended.to_owned(), took];
+        words.into_iter().chain(counts.map(|n| n.to_string())).collect()
+    };
+    let head = format!("{}\n", count(runs.len(), "run"));
+    if runs.is_empty() {
+        head
+    } else {
+        head + &table::layout(&columns, &runs.iter().map(cells).collect::<Vec<_>>())
+    }
+}
+
+fn logs(store: &Store, run: &RunRecord, format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
+    let found = store.run_logs(&run.run_id)?;
+    let reasons = reasons(store, &run.run_id)?;
+    let reason = |log: &LogRecord| log.error_code.clone().or_else(|| reasons.get(&log.log_path).map(words));
+    let answer: Vec<Log<'_>> = found.iter().map(|log| in_log(log, reason(log))).collect();
+    let head = format!("run {}, {}: ", run.run_id, run_status(run, store.is_held()?));
+    row_output::write_rows(
+        format,
+        output,
+        || row_output::batch(&log_schema(), &answer),
+        || head + &log_page(&answer),
+    )?;
+    Ok(Code::Success)
+}
+
+/// How often each reason stands.
+type Reasons = std::collections::BTreeMap<String, usize>;
+
+/// Why the records of a run were refused, by log; those that a later run superseded are gone.
+fn reasons(store: &Store, run_id: &str) -> Result<std::collections::HashMap<String, Reasons>, Failure> {
+    let mut reasons: std::collections::HashMap<String, Reasons> = std::collections::HashMap::new();
+    for record in store.records(&Query { run_id: Some(run_id.to_owned()), ..Query::default() })? {
+        if record.estimate.status == Status::Refused {
+            let of_log = reasons.entry(record.provenance.log_path).or_default();
+            *of_log.entry(record.estimate.reason.unwrap_or_default()).or_default() += 1;
+        }
+    }
+    Ok(reasons)
+}
+
+fn words(reasons: &Reasons) -> String {
+    let words: Vec<String> = reasons.iter().map(|(reason, n)| format!("{reason} {n}")).collect();
+    words.join(", ")
+}
+
+fn in_log(log: &LogRecord, reason: Option<String>) -> Log<'_> {
+    Log {
+        log_path: &log.log_path,
+        class: class(log),
+        reason,
+        tail_number: log.tail_number.as_deref(),
+        flight_id: log.flight_id.as_deref(),
+        departure_utc: log.departure_utc,
+        estimated: log.estimated,
+        refused: log.refused,
+        duration_s: log.duration_s,
+        error_detail: log.error_detail.as_deref(),
+    }
+}
+
+/// What became of a log, in a word: a sound log without a gap is *refused*.
+fn class(log: &LogRecord) -> &'static str {
+    match log.outcome {
+        LogOutcome::Done if log.estimated == 0 && log.refused > 0 => "refused",
+        other => other.as_str(),
+    }
+}
+
+fn log_schema() -> SchemaRef {
+    let field = |name: &str, kind: DataType| Field::new(name, kind, true);
+    let texts = ["log_path", "class", "reason", "tail_number", "flight_id"];
+    let mut fields: Vec<Field> = texts.map(|name| field(name, DataType::Utf8)).into();
+    fields.push(field("departure_utc", row_output::utc()));
+    fields.extend(["estimated", "refused"].map(|name| field(name, DataType::Int64)));
+    fields.push(field("duration_s", DataType::Float64));
+    fields.push(field("error_detail", DataType::Utf8));
+    Arc::new(Schema::new(fields))
+}
+
+fn log_page(logs: &[Log<'_>]) -> String {
+    let columns = [
+        text("class", 0),
+        text("log", 0),
+        text("reason", 1),
+        text("tail", 4),
+        text("flight", 3),
+        number("estimated", 2),
+        number("refused", 2),
+        number("s", 5),
+    ];
+    let cells = |log: &Log<'_>| {
+        let name = |text: Option<&str>| text.map_or_else(table::empty_cell, str::to_owned);
+        vec![
+            log.class.replace('_', " "),
+            log.log_path.to_owned(),
+            log.reason.clone().unwrap_or_default(),
+            name(log.tail_number),
+            name(log.flight_id),
+            log.estimated.to_string(),
+            log.refused.to_string(),
+            format!("{:.1}", log.duration_s),
+        ]
+    };
+    let mut classes = Reasons::new();
+    for log in logs {
+        *classes.entry(log.class.replace('_', " ")).or_default() += 1;
+    }
+    let head = format!("{} ({})\n", count(logs.len(), "log"), words(&classes));
+    if logs.is_empty() {
+        head
+    } else {
+        head + &table::layout(&columns, &logs.iter().map(cells).collect::<Vec<_>>())
+    }
+}

@@ -1,0 +1,106 @@
+//! `docs/commands.md`, the reference of commands, is written from what the parser knows: this test keeps it so.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use clap::{Arg, Command, CommandFactory};
+
+use crate::args::Args;
+
+const HEAD: &str = "# Every command\n\nWritten from the program's own parser (`FREEPLAY_BLESS=1 cargo test -p cli \
+                    commands_doc`), so it cannot drift; a test compares it.\n`freeplay help COMMAND` says the same at a \
+                    prompt. Answers go to stdout, progress and diagnostics to stderr;\n[exit codes](columns.md#exit-codes) are the same everywhere.\n";
+
+#[test]
+fn the_reference_of_commands_is_what_the_parser_knows() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/commands.md");
+    let page = page();
+    if std::env::var_os("FREEPLAY_BLESS").is_some() {
+        std::fs::write(&file, &page).unwrap();
+    }
+    let found = std::fs::read_to_string(&file).unwrap();
+    assert!(
+        found == page,
+        "docs/commands.md is not what the parser knows: FREEPLAY_BLESS=1 cargo test -p cli commands_doc"
+    );
+}
+
+/// The page: each command, then what all of them take.
+fn page() -> String {
+    let mut root = Args::command();
+    root.build();
+    let mut page = HEAD.to_owned();
+    for command in root.get_subcommands().filter(|command| command.get_name() != "help") {
+        section(&mut page, command, "freeplay");
+    }
+    page.push_str("\n## Options of every command\n");
+    table(&mut page, root.get_arguments().filter(|arg| arg.is_global_set()));
+    page
+}
+
+/// A command's purpose, how it is typed, what it takes, its examples, and its own commands.
+fn section(page: &mut String, command: &Command, above: &str) {
+    let name = format!("{above} {}", command.get_name());
+    let below: Vec<&Command> = command.get_subcommands().filter(|c| c.get_name() != "help").collect();
+    let about = command.get_about().map(ToString::to_string).unwrap_or_default();
+    let _ = write!(page, "\n## `{name}`\n\n{about}.\n");
+    let usage = command.clone().render_usage().to_string();
+    let _ = write!(page, "\n```text\n{}\n```\n", usage.trim_start_matches("Usage: ").trim());
+    let taken = |arg: &&Arg| !arg.is_global_set() && !matches!(arg.get_id().as_str(), "help" | "version");
+    if command.get_arguments().any(|arg| taken(&arg)) {
+        table(page, command.get_arguments().filter(taken));
+    }
+    if let Some(examples) = command.get_after_help() {
+        let _ = write!(page, "\n```text\n{}\n```\n", examples.to_string().trim());
+    }
+    for command in below {
+        section(page, command, &name);
+    }
+}
+
+fn table<'a>(page: &mut String, args: impl Iterator<Item = &'a Arg>) {
+    page.push_str("\n| option | meaning |\n|---|---|\n");
+    for arg in args {
+        let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
+        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+        let _ = writeln!(
+            page,
+            "| {} | {}.{} |",
+            typed(arg),
+            help.trim_end_matches('.').replace('|', "\\|"),
+            beside(arg)
+        );
+    }
+}
+
+/// An option as it is typed: `-j`, `--jobs JOBS`, or `LOGS...`.
+fn typed(arg: &Arg) -> String {
+    let names: Vec<String> = arg.get_value_names().into_iter().flatten().map(ToString::to_string).collect();
+    let takes = arg.get_action().takes_values();
+    let value = if takes { names.join(" ") } else { String::new() };
+    let more = if arg.get_num_args().is_some_and(|n| n.max_values() > 1) { "…" } else { "" };
+    match (arg.get_short(), arg.get_long()) {
+        (Some(short), Some(long)) => format!("`-{short}`, `{}`", format!("--{long} {value}").trim()),
+        (None, Some(long)) => format!("`{}`", format!("--{long} {value}").trim()),
+        _ => format!("`{value}{more}`"),
+    }
+    .replace('|', "\\|")
+}
+
+/// The words an option takes, its default, and the variable that gives it.
+fn beside(arg: &Arg) -> String {
+    let mut beside = String::new();
+    let words: Vec<String> =
+        arg.get_possible_values().iter().map(|v| format!("`{}`", v.get_name())).collect();
+    if arg.get_action().takes_values() && !words.is_empty() {
+        let _ = write!(beside, " One of {}.", words.join(", "));
+    }
+    let default: Vec<_> = arg.get_default_values().iter().map(|v| v.to_string_lossy()).collect();
+    if arg.get_action().takes_values() && !default.is_empty() {
+        let _ = write!(beside, " Default `{}`.", default.join(" "));
+    }
+    if let Some(variable) = arg.get_env() {
+        let _ = write!(beside, " Also by `{}`.", variable.to_string_lossy());
+    }
+    beside
+}

@@ -1,0 +1,148 @@
+//! How the program speaks: answers to stdout, everything else to stderr, colour only where it is wanted.
+
+use std::io::{self, IsTerminal, Write};
+
+use records::Diagnostic;
+
+use pipeline::Event;
+
+use crate::args::{Color, Global, LogFormat};
+use crate::exit::{Code, Failure};
+use crate::json_log;
+
+/// Of alike diagnostics so many are shown whole.
+const SHOWN_WHOLE: usize = 3;
+
+/// Whether a person sits at the other end: a pipe on any side gets no bar and no colour.
+pub(crate) fn is_attended() -> bool {
+    io::stdin().is_terminal() && io::stdout().is_terminal() && io::stderr().is_terminal()
+}
+
+/// The voice of the program.
+#[derive(Debug, Clone)]
+pub(crate) struct Output {
+    quiet: bool,
+    verbose: u8,
+    progress: bool,
+    color_err: bool,
+    form: LogFormat,
+}
+
+impl Output {
+    /// Listens to the options, the terminal and `NO_COLOR`.
+    pub(crate) fn new(global: &Global) -> Self {
+        let auto = std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) && is_attended();
+        let color_err = match global.color {
+            Color::Always => true,
+            Color::Never => false,
+            Color::Auto => auto,
+        };
+        let json = global.log_format == LogFormat::Json;
+        Self {
+            quiet: global.quiet,
+            verbose: global.verbose,
+            progress: !(global.no_progress || global.quiet || json),
+            color_err,
+            form: global.log_format,
+        }
+    }
+
+    /// Whether progress may be shown.
+    pub(crate) fn shows_progress(&self) -> bool {
+        self.progress
+    }
+
+    /// Whether more should be said.
+    pub(crate) fn is_verbose(&self) -> bool {
+        self.verbose > 0
+    }
+
+    /// Writes an answer to stdout.
+    ///
+    /// # Errors
+    /// When stdout is closed or full.
+    #[expect(clippy::unused_self, reason = "only who holds the voice may speak")]
+    pub(crate) fn write_result(&self, text: &str) -> Result<(), Failure> {
+        let mut out = io::stdout().lock();
+        out.write_all(text.as_bytes())?;
+        Ok(out.flush()?)
+    }
+
+    /// Says something in passing, on stderr.
+    pub(crate) fn note(&self, text: &str) {
+        if !self.quiet {
+            self.err(&if self.is_json() { json_log::note(text) } else { text.to_owned() });
+        }
+    }
+
+    /// Tells whoever collects logs what happens while a run goes on; people see its progress instead.
+    pub(crate) fn event(&self, event: &Event) {
+        if self.is_json() && !self.quiet {
+            self.err(&json_log::event(event));
+        }
+    }
+
+    /// Shows a diagnostic, on stderr.
+    pub(crate) fn diagnostic(&self, diagnostic: &Diagnostic) {
+        if self.is_json() {
+            return self.err(&json_log::diagnostic(diagnostic));
+        }
+        let text = escape(&diagnostic.to_string());
+        self.err(&if self.color_err { painted(&text) } else { text });
+    }
+
+    /// Shows diagnostics: of each kind the first few whole, and how many more there are.
+    pub(crate) fn diagnostics<'c>(&self, diagnostics: impl IntoIterator<Item = &'c Diagnostic>) {
+        let mut seen: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
+        for diagnostic in diagnostics {
+            let count = seen.entry(&diagnostic.code).or_default();
+            *count += 1;
+            if *count <= SHOWN_WHOLE || self.shows_all() {
+                self.diagnostic(diagnostic);
+            }
+        }
+        let more = seen.into_iter().filter(|(_, count)| *count > SHOWN_WHOLE && !self.shows_all());
+        more.for_each(|(code, count)| {
+            self.err(&format!("{} more like it [{code}]; -v shows all", count - SHOWN_WHOLE));
+        });
+    }
+
+    fn is_json(&self) -> bool {
+        self.form == LogFormat::Json
+    }
+
+    fn shows_all(&self) -> bool {
+        self.is_verbose() || self.is_json()
+    }
+
+    /// Tells why a command could not answer.
+    pub(crate) fn failure(&self, failure: &Failure) -> Code {
+        match failure {
+            Failure::Refused(diagnostics) => {
+                self.diagnostics(diagnostics);
+                self.note("nothing was run");
+            }
+            Failure::Failed(diagnostic) => self.diagnostic(diagnostic),
+            Failure::PipeClosed => {}
+        }
+        failure.code()
+    }
+
+    /// Nobody can be told that stderr is closed.
+    #[expect(clippy::unused_self, reason = "only who holds the voice may speak")]
+    fn err(&self, text: &str) {
+        let _ = writeln!(io::stderr().lock(), "{text}");
+    }
+}
+
+/// Makes control characters visible: a name from a log must not move the cursor or paint the screen.
+pub(crate) fn escape(text: &str) -> String {
+    let shown =
+        |c: char| if c.is_control() && c != '\n' { c.escape_default().to_string() } else { c.to_string() };
+    text.chars().map(shown).collect()
+}
+
+fn painted(text: &str) -> String {
+    let (head, rest) = text.split_once(':').unwrap_or((text, ""));
+    format!("\u{1b}[1;31m{head}\u{1b}[0m:{}", rest.replace("\nhint:", "\n\u{1b}[36mhint\u{1b}[0m:"))
+}

@@ -1,0 +1,139 @@
+//! Rows for machines: one Arrow batch, written as JSON, CSV or Parquet.
+
+use std::fs::File;
+use std::io::{self, Write};
+use std::sync::Arc;
+
+use arrow::array::{Array, AsArray, RecordBatch, StringArray};
+use arrow::compute::cast;
+use arrow::csv::WriterBuilder as CsvWriter;
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use arrow::json::writer::{JsonArray, WriterBuilder as JsonWriter};
+use parquet::arrow::ArrowWriter;
+pub(crate) use pipeline::rows::utc;
+use records::Diagnostic;
+use serde::Serialize;
+
+use crate::args::{Format, RowFormatArgs};
+use crate::exit::Failure;
+use crate::output::Output;
+
+/// Answers with rows: people get `table`, machines get `batch`; to a file where one is named.
+///
+/// # Errors
+/// When the answer cannot be written.
+pub(crate) fn write_rows(
+    format: &RowFormatArgs,
+    output: &Output,
+    batch: impl FnOnce() -> Result<RecordBatch, Failure>,
+    table: impl FnOnce() -> String,
+) -> Result<(), Failure> {
+    match (format.format(), &format.output) {
+        (Format::Table, None) => output.write_result(&table()),
+        (Format::Table, Some(file)) => to_file(file, |out| Ok(out.write_all(table().as_bytes())?)),
+        (format, None) => write(&batch()?, format, &mut io::stdout()),
+        (format, Some(file)) => {
+            let batch = batch()?;
+            to_file(file, |out| write(&batch, format, out))
+        }
+    }
+}
+
+/// Writes beside and renames, so that nobody meets half an answer.
+pub(crate) fn to_file(
+    file: &std::path::Path,
+    fill: impl FnOnce(&mut File) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
+    let mut beside = shared().tempfile_in(folder).map_err(|e| not_written(file, &e))?;
+    fill(beside.as_file_mut())?;
+    beside.persist(file).map(drop).map_err(|e| not_written(file, &e.error))
+}
+
+/// Readable by whom the user's mask allows, as any file a command writes.
+fn shared() -> tempfile::Builder<'static, 'static> {
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder
+}
+
+fn not_written(file: &std::path::Path, error: &io::Error) -> Failure {
+    let (why, hint) = match error.kind() {
+        io::ErrorKind::NotFound => ("there is no such folder".to_owned(), "make the folder first"),
+        io::ErrorKind::PermissionDenied => {
+            ("this user may not write there".to_owned(), "name another folder")
+        }
+        io::ErrorKind::StorageFull => ("the disk is full".to_owned(), "make room, or name another folder"),
+        _ => (error.to_string(), "can a file be written there?"),
+    };
+    let what = format!("the answer cannot be written: {why}");
+    Failure::failed(Diagnostic::new("output_failed", what).in_file(file.display()).hint(hint))
+}
+
+fn write(batch: &RecordBatch, format: Format, out: &mut (impl Write + Send)) -> Result<(), Failure> {
+    match format {
+        Format::Json | Format::Table => {
+            let mut writer = JsonWriter::new().with_explicit_nulls(true).build::<_, JsonArray>(&mut *out);
+            writer.write(batch).and_then(|()| writer.finish()).map_err(|e| broken(&e))?;
+            out.write_all(b"\n")?;
+        }
+        Format::Csv => CsvWriter::new()
+            .with_header(true)
+            .build(&mut *out)
+            .write(&flat(batch)?)
+            .map_err(|e| broken(&e))?,
+        Format::Parquet => {
+            let fail = |e: parquet::errors::ParquetError| broken(&e.into());
+            let mut writer = ArrowWriter::try_new(&mut *out, batch.schema(), None).map_err(fail)?;
+            writer.write(batch).map_err(fail)?;
+            writer.close().map_err(fail)?;
+        }
+    }
+    Ok(out.flush()?)
+}
+
+fn broken(error: &arrow::error::ArrowError) -> Failure {
+    if error.to_string().contains("Broken pipe") {
+        return Failure::PipeClosed;
+    }
+    Failure::failed(Diagnostic::new("output_failed", format!("the answer cannot be written: {error}")))
+}
+
+/// CSV has no lists: theirs become text, its items parted by semicolons, other nests JSON.
+fn flat(batch: &RecordBatch) -> Result<RecordBatch, Failure> {
+    let (mut fields, mut columns) = (Vec::new(), Vec::new());
+    for (field, column) in batch.schema().fields().iter().zip(batch.columns()) {
+        let nested = matches!(field.data_type(), DataType::List(_));
+        fields.push(Field::new(
+            field.name(),
+            if nested { DataType::Utf8 } else { field.data_type().clone() },
+            true,
+        ));
+        columns.push(if nested { joined(column)? } else { Arc::clone(column) });
+    }
+    RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).map_err(|e| broken(&e))
+}
+
+fn joined(column: &Arc<dyn Array>) -> Result<Arc<dyn Array>, Failure> {
+    let lists = column.as_list::<i32>();
+    let text = |items: Arc<dyn Array>| -> Result<String, Failure> {
+        if let Ok(items) = cast(&items, &DataType::Utf8) {
+            return Ok(items.as_string::<i32>().iter().flatten().collect::<Vec<_>>().join(";"));
+        }
+        let batch = RecordBatch::from(items.as_struct());
+        let mut buffer = Vec::new();
+        write(&batch, Format::Json, &mut buffer)?;
+        Ok(String::from_utf8_lossy(&buffer).trim().to_owned())
+    };
+    let rows = lists.iter().map(|items| items.map(text).transpose()).collect::<Result<Vec<_>, _>>()?;
+    Ok(Arc::new(StringArray::from(rows)))
+}
+
+/// Rows of any serializable kind as a batch of a stated schema.
+///
+/// # Errors
+/// When a value does not fit its column.
+pub(crate) fn batch<T: Serialize>(schema: &SchemaRef, rows: &[T]) -> Result<RecordBatch, Failure> {
+    pipeline::rows::batch(schema, rows).map_err(|e| broken(&e))
+}

@@ -1,0 +1,136 @@
+"""The nightly run with its logs done on a Spark cluster.
+
+Only the DataFrame API of Spark Connect is used (``spark.range`` and ``mapInArrow``), so that classic Spark,
+Databricks serverless and Sail serve alike: no jar, no SparkContext, no RDD. The driver plans and stores, a worker
+does one log for each task with one thread, and a log with a fault comes back as a row that says so.
+
+Spark runs a task at least once. An answer counts once, whichever copy arrives; records take the place of those of the
+same flight, and a log whose settings are unchanged is known and not done again. Only the driver writes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import freeplay
+from freeplay import ArrowStream, Config, RunError, Settings, _freeplay
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    from pyspark.sql import SparkSession
+    from pyspark.sql.types import StructType
+
+__all__ = ["run"]
+
+
+def run(
+    spark: SparkSession,
+    logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] | None,
+    config: Settings,
+    output: str | os.PathLike[str] | None = None,
+    *,
+    logs_per_job: int = 1000,
+    redo: bool = False,
+    retry: bool = False,
+    wait_s: float | None = None,
+) -> dict[str, Any]:
+    """Does every log that is not accounted for yet, one task for each, and stores what comes of it.
+
+    ``logs`` are patterns that take the place of ``[logs] files``, ``output`` is the store and takes the place of
+    ``[store] path``; None leaves the configuration's. The configuration, the tables it names and the logs must be
+    readable on driver and workers under the same paths; workers refuse a configuration that differs.
+
+    Up to ``logs_per_job`` logs make one Spark job, and what they gave is stored before the next begins: a driver that
+    dies loses at most that, and the next run does it. The account is that of ``freeplay run --json``.
+    """
+    settings = freeplay.load(config)
+    if not settings.files:
+        raise ValueError("workers read the configuration themselves: give its file, not a text")
+    # Absolute paths mean the same to workers; logs below the configuration keep their short names.
+    settings = Config(settings.files)
+    settings = settings.replaced(_patterns(logs), None if output is None else os.path.abspath(output))
+    engine = _engine(spark, settings)
+    account: dict[str, Any] = json.loads(
+        _freeplay.run_distributed(settings, engine, logs_per_job, redo, retry, wait_s)
+    )
+    return account
+
+
+def _patterns(
+    logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] | None,
+) -> list[str] | None:
+    if logs is None:
+        return None
+    several = [logs] if isinstance(logs, (str, os.PathLike)) else logs
+    return [os.path.abspath(pattern) for pattern in several]
+
+
+def _engine(spark: SparkSession, settings: Config) -> Callable[[list[str]], ArrowStream]:
+    """What answers tasks by a Spark job of as many partitions: one log for each task of Spark's."""
+    files, digest = tuple(str(file) for file in settings.files), settings.digest()
+    schema = _spark_schema()
+
+    def answers(tasks: list[str]) -> ArrowStream:
+        # range() makes exactly one row for each partition; repartition() would put several into some.
+        count = len(tasks)
+        rows = spark.range(0, count, 1, count).mapInArrow(_worker(files, digest, tasks), schema)
+        table: ArrowStream = rows.toArrow()
+        return table
+
+    return answers
+
+
+def _worker(
+    files: tuple[str, ...], digest: str, tasks: list[str]
+) -> Callable[[Iterable[pa.RecordBatch]], Iterator[pa.RecordBatch]]:
+    def work(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
+        import pyarrow as pa
+
+        from freeplay import _freeplay, spark
+
+        config = spark._same(files, digest)
+        for batch in batches:
+            for number in batch.column(0).to_pylist():
+                yield from pa.table(_freeplay.process_task(config, tasks[number])).to_batches()
+
+    return work
+
+
+@lru_cache(maxsize=4)
+def _same(files: tuple[str, ...], digest: str) -> Config:
+    """The configuration as a worker reads it, which must be the driver's."""
+    config = freeplay.load(files)
+    if config.digest() != digest:
+        complaint = {
+            "code": "worker_differs",
+            "what": "this worker's configuration, tables or version of Freeplay differ from the driver's",
+            "file": files[0],
+            "hint": "give driver and workers the same files and the same wheel, then run again",
+        }
+        text = f"error[{complaint['code']}]: {complaint['what']}\n  file    {files[0]}\nhint: {complaint['hint']}"
+        raise RunError(text, json.dumps([complaint]))
+    return config
+
+
+def _spark_schema() -> StructType:
+    """The columns of an answer, in Spark's words."""
+    import pyarrow as pa
+    from pyspark.sql import types as spark_types
+
+    def kind(arrow: pa.DataType) -> spark_types.DataType:
+        if pa.types.is_timestamp(arrow):
+            return spark_types.TimestampType()
+        if pa.types.is_list(arrow):
+            return spark_types.ArrayType(kind(arrow.value_type))
+        if pa.types.is_floating(arrow):
+            return spark_types.DoubleType()
+        return spark_types.LongType() if pa.types.is_integer(arrow) else spark_types.StringType()
+
+    columns = pa.table(_freeplay.empty_result()).schema
+    return spark_types.StructType(
+        [spark_types.StructField(field.name, kind(field.type), True) for field in columns]
+    )

@@ -1,0 +1,261 @@
+//! The doors: each function of the module, arguments to a request and answer to a table.
+#![expect(clippy::needless_pass_by_value, reason = "Python hands values over")]
+
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use ::records::{Diagnostic, Installations, PartNumber};
+use arrow::array::RecordBatch;
+use ingest::arrays::Arrays;
+use ingest::tables::{Chunk, Table as Cells};
+use ingest::write::Encoding;
+use pipeline::schedule::Context;
+use pipeline::statement::TrendRow;
+use pipeline::trends::{self, Ask};
+use pipeline::{Request, adhoc, estimates, rows};
+use pyo3::prelude::*;
+use store::{Holder, Query, Store};
+
+use crate::VERSION;
+use crate::arrow_capsule::{self, arrow_error};
+use crate::config::Config;
+use crate::error::{ExceptionClass, config_error, to_exception, to_run_exception};
+use crate::numpy_input::numbers;
+use crate::table::Table;
+
+/// A table, and what was wrong with some of the logs: an exception to be to_exception, or none.
+type PartialResult = (Table, Option<Py<PyAny>>);
+
+fn partial_result(py: Python<'_>, batch: RecordBatch, diagnostics: &[Diagnostic]) -> PartialResult {
+    let trouble = (!diagnostics.is_empty())
+        .then(|| to_exception(py, ExceptionClass::Log, diagnostics).into_value(py).into_any());
+    (Table::of(batch), trouble)
+}
+
+fn part(py: Python<'_>, config: &Config, number: &str) -> PyResult<PartNumber> {
+    let named = PartNumber::new(number).map_err(|e| config_error(py, Diagnostic::new("empty_name", e)))?;
+    job::flight_log::part_of(&config.inner, &named).map_err(|diagnostic| config_error(py, diagnostic))?;
+    Ok(named)
+}
+
+fn instant(py: Python<'_>, text: Option<&str>) -> PyResult<Option<jiff::Timestamp>> {
+    let read = text.map(ingest::tables::utc).transpose();
+    read.map_err(|what| config_error(py, Diagnostic::new("bad_time", what)))
+}
+
+/// Estimates logs: as installations, or all as one part.
+#[pyfunction]
+#[pyo3(signature = (logs, config, part_number=None))]
+pub(crate) fn estimate(
+    py: Python<'_>,
+    logs: Vec<PathBuf>,
+    config: &Config,
+    part_number: Option<&str>,
+) -> PyResult<PartialResult> {
+    let no_installations = Installations::default();
+    let number = part_number.map(|number| part(py, config, number)).transpose()?;
+    let installations = if number.is_some() { &no_installations } else { config.installations(py)? };
+    let (mut found, mut diagnostics) = (Vec::new(), Vec::new());
+    for log in &logs {
+        py.check_signals()?;
+        let number = number.as_ref();
+        let read = py
+            .detach(|| adhoc::estimate(log, &config.inner, installations, number, VERSION, &mut diagnostics));
+        found.extend(read.map_err(|error| to_run_exception(py, error))?);
+    }
+    let batch = rows::batch(&rows::estimates(), &found).map_err(|e| arrow_error(&e))?;
+    Ok(partial_result(py, batch, &diagnostics))
+}
+
+/// Estimates channels held in memory.
+#[pyfunction]
+pub(crate) fn estimate_arrays(
+    py: Python<'_>,
+    time_s: &Bound<'_, PyAny>,
+    motor_m: &Bound<'_, PyAny>,
+    screw_m: &Bound<'_, PyAny>,
+    load_n: &Bound<'_, PyAny>,
+    part_number: &str,
+    config: &Config,
+) -> PyResult<Table> {
+    let number = part(py, config, part_number)?;
+    let [time_s, motor_m, screw_m, load_n] =
+        [numbers(time_s)?, numbers(motor_m)?, numbers(screw_m)?, numbers(load_n)?];
+    let found = py.detach(|| {
+        let arrays = Arrays { time_s: &time_s, motor_m: &motor_m, screw_m: &screw_m, load_n: &load_n };
+        adhoc::of_arrays(&arrays, &config.inner, &number, VERSION)
+    });
+    let found = found.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?;
+    Ok(Table::of(rows::batch(&rows::estimates(), &[found]).map_err(|e| arrow_error(&e))?))
+}
+
+/// What the filter saw of a log, sample by sample.
+#[pyfunction]
+#[pyo3(signature = (log, config, part_number=None))]
+pub(crate) fn trace(
+    py: Python<'_>,
+    log: PathBuf,
+    config: &Config,
+    part_number: Option<&str>,
+) -> PyResult<Table> {
+    let no_installations = Installations::default();
+    let number = part_number.map(|number| part(py, config, number)).transpose()?;
+    let installations = if number.is_some() { &no_installations } else { config.installations(py)? };
+    let files = pipeline::bundle::around(&config.inner, &log).map_err(|error| to_run_exception(py, error))?;
+    let shown = log.display().to_string();
+    let seen =
+        py.detach(|| job::trace::of_log(&files, &shown, &config.inner, installations, number.as_ref()));
+    let columns = seen.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?.columns();
+    Ok(Table::of(ingest::write::batch(&columns).map_err(|e| arrow_error(&e))?))
+}
+
+/// Trends: of the store, or of estimates made elsewhere; one row for each unit, or for each query.
+#[pyfunction]
+#[pyo3(signature = (estimates, config, tail, serial, part_number, as_of, queries, statistics))]
+#[expect(clippy::too_many_arguments, reason = "they are Python's keywords")]
+pub(crate) fn trend(
+    py: Python<'_>,
+    estimates: Option<&Bound<'_, PyAny>>,
+    config: &Config,
+    tail: Option<String>,
+    serial: Option<String>,
+    part_number: Option<String>,
+    as_of: Option<&str>,
+    queries: Option<&Bound<'_, PyAny>>,
+    statistics: bool,
+) -> PyResult<Table> {
+    let installations = config.installations(py)?;
+    let as_of_utc = instant(py, as_of)?;
+    let ask = Ask { tail_number: tail, serial_number: serial, part_number, as_of_utc, statistics };
+    let estimate_batches = estimates.map(arrow_capsule::batches).transpose()?;
+    let queries_table = queries.map(|table| to_table(table, "queries")).transpose()?;
+    let found =
+        py.detach(|| assess(&config.inner, installations, estimate_batches, queries_table.as_ref(), &ask));
+    let found = found.map_err(|error| to_run_exception(py, error))?;
+    Ok(Table::of(rows::batch(&rows::trends(), &found).map_err(|e| arrow_error(&e))?))
+}
+
+fn to_table(table: &Bound<'_, PyAny>, name: &str) -> PyResult<Cells> {
+    let read = Cells::of_batches(name.as_ref(), &arrow_capsule::batches(table)?);
+    read.map_err(|error| config_error(table.py(), error.diagnostic()))
+}
+
+fn assess(
+    config: &job::Config,
+    installations: &Installations,
+    estimate_batches: Option<Vec<RecordBatch>>,
+    queries_table: Option<&Cells>,
+    ask: &Ask,
+) -> Result<Vec<TrendRow>, pipeline::Error> {
+    let histories = match (estimate_batches, queries_table) {
+        (None, None) => return trends::of_store(config, installations, &Store::open(config.store())?, ask),
+        (Some(batches), _) => estimates::gathered(&chunks(batches))?,
+        (None, Some(_)) => trends::in_store(&Store::open(config.store())?)?,
+    };
+    match queries_table {
+        None => trends::of_histories(config, installations, histories, ask),
+        Some(queries_table) => trends::of_queries(
+            config,
+            installations,
+            histories,
+            &estimates::asked(queries_table)?,
+            ask.statistics,
+        ),
+    }
+}
+
+/// The rows of a table from memory, counted through.
+fn chunks(batches: Vec<RecordBatch>) -> Vec<Chunk> {
+    let mut before = 0;
+    let chunk = |batch: RecordBatch| {
+        let rows = batch.num_rows();
+        before += rows;
+        Chunk::new("estimates".as_ref(), batch, before - rows)
+    };
+    batches.into_iter().map(chunk).collect()
+}
+
+/// Stored records that fit.
+#[pyfunction]
+#[pyo3(signature = (config, texts, since, until, last))]
+pub(crate) fn records(
+    py: Python<'_>,
+    config: &Config,
+    texts: [Option<String>; 5],
+    since: Option<&str>,
+    until: Option<&str>,
+    last: Option<usize>,
+) -> PyResult<Table> {
+    let [tail_number, serial_number, part_number, flight_id, position] = texts;
+    let (since_utc, until_utc) = (instant(py, since)?, instant(py, until)?);
+    let query = Query {
+        tail_number,
+        serial_number,
+        part_number,
+        flight_id,
+        position,
+        since_utc,
+        until_utc,
+        last,
+        ..Query::default()
+    };
+    let found = py.detach(|| Store::open(config.inner.store())?.scan(&query));
+    Ok(Table::of(found.map_err(|error| to_run_exception(py, error.into()))?))
+}
+
+/// Writes normalized logs below a folder.
+#[pyfunction]
+#[pyo3(signature = (logs, output, config, compatible, jobs))]
+pub(crate) fn normalize(
+    py: Python<'_>,
+    logs: Vec<PathBuf>,
+    output: PathBuf,
+    config: &Config,
+    compatible: bool,
+    jobs: Option<usize>,
+) -> PyResult<(Vec<PathBuf>, Option<Py<PyAny>>)> {
+    let installations = config.installations(py)?;
+    let encoding = if compatible { Encoding::Compatible } else { Encoding::Split };
+    let done = py.detach(|| {
+        let whole =
+            |log: &PathBuf| Ok((pipeline::bundle::around(&config.inner, log)?, log.display().to_string()));
+        let logs = logs.iter().map(whole).collect::<Result<Vec<_>, pipeline::Error>>()?;
+        let place = (output.as_path(), encoding);
+        pipeline::normalize::normalize(&config.inner, installations, &logs, place, jobs, &|_| {})
+    });
+    let done = done.map_err(|error| to_run_exception(py, error))?;
+    let trouble = (!done.diagnostics.is_empty())
+        .then(|| to_exception(py, ExceptionClass::Log, &done.diagnostics).into_value(py).into_any());
+    Ok((done.written, trouble))
+}
+
+/// The nightly run on this machine; its account as JSON.
+#[pyfunction]
+#[pyo3(signature = (config, jobs, redo, retry, wait_s))]
+pub(crate) fn run(
+    py: Python<'_>,
+    config: &Config,
+    jobs: Option<usize>,
+    redo: bool,
+    retry: bool,
+    wait_s: Option<f64>,
+) -> PyResult<String> {
+    let request = Request { jobs, redo, retry, ..Request::default() };
+    let stop = AtomicBool::new(false);
+    let wait = wait_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    let holder = Holder::this_process();
+    let context = Context { program_version: VERSION, holder, wait, stop: &stop, watch: &|_| {} };
+    let report = py.detach(|| pipeline::run(&config.inner, &request, &context));
+    run_summary(py, report)
+}
+
+/// What a run did, as JSON.
+pub(crate) fn run_summary(
+    py: Python<'_>,
+    report: Result<pipeline::Report, pipeline::Error>,
+) -> PyResult<String> {
+    let report = report.map_err(|error| to_run_exception(py, error))?;
+    serde_json::to_string(&report)
+        .map_err(|e| to_exception(py, ExceptionClass::Run, &[Diagnostic::new("run_failed", e)]))
+}

@@ -1,0 +1,75 @@
+//! What an engine such as Spark needs of us: one log done on a worker, and a run that asks the engine for logs.
+#![expect(clippy::needless_pass_by_value, reason = "Python hands values over")]
+
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use arrow::array::RecordBatch;
+use pipeline::Request;
+use pipeline::elsewhere::{self, Task};
+use pipeline::schedule::Context;
+use pyo3::prelude::*;
+use records::Diagnostic;
+use store::Holder;
+
+use crate::VERSION;
+use crate::arrow_capsule;
+use crate::config::Config;
+use crate::error::{ExceptionClass, to_exception, to_run_exception};
+use crate::functions::run_summary;
+use crate::table::Table;
+
+/// Does one log of a run that is kept elsewhere; its fault, if it has one, is among the rows.
+#[pyfunction]
+pub(crate) fn process_task(py: Python<'_>, config: &Config, task: &str) -> PyResult<Table> {
+    let task: Task = serde_json::from_str(task)
+        .map_err(|e| to_exception(py, ExceptionClass::Run, &[Diagnostic::new("run_failed", e)]))?;
+    let installations = config.installations(py)?;
+    let rows = py.detach(|| elsewhere::answer(&config.inner, installations, &task, VERSION));
+    Ok(Table::of(rows.map_err(|error| to_run_exception(py, error))?))
+}
+
+/// An answer without rows: its columns.
+#[pyfunction]
+pub(crate) fn empty_result() -> Table {
+    Table::of(RecordBatch::new_empty(elsewhere::schema()))
+}
+
+/// The nightly run with its logs done by `engine`, which is estimate_batches tasks and brings an Arrow table of answers; the
+/// run's account as JSON.
+#[pyfunction]
+#[pyo3(signature = (config, engine, at_a_time, redo, retry, wait_s))]
+pub(crate) fn run_distributed(
+    py: Python<'_>,
+    config: &Config,
+    engine: Py<PyAny>,
+    at_a_time: usize,
+    redo: bool,
+    retry: bool,
+    wait_s: Option<f64>,
+) -> PyResult<String> {
+    let request = Request { redo, retry, ..Request::default() };
+    let stop = AtomicBool::new(false);
+    let wait = wait_s.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    let holder = Holder::this_process();
+    let context = Context { program_version: VERSION, holder, wait, stop: &stop, watch: &|_| {} };
+    let mut thrown: Option<PyErr> = None;
+    let mut ask = |tasks: &[Task]| {
+        let asked = Python::attach(|py| {
+            let json = |task: &Task| serde_json::to_string(task).unwrap_or_default();
+            let tasks: Vec<String> = tasks.iter().map(json).collect();
+            arrow_capsule::batches(engine.call1(py, (tasks,))?.bind(py))
+        });
+        asked.map_err(|error| {
+            let what = error.to_string();
+            thrown = Some(error);
+            what
+        })
+    };
+    let report = py.detach(|| elsewhere::run(&config.inner, &request, &context, at_a_time, &mut ask));
+    // Whoever reads the traceback wants the engine's own exception, not our word for it.
+    match thrown {
+        Some(error) => Err(error),
+        None => run_summary(py, report),
+    }
+}

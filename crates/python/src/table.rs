@@ -1,0 +1,68 @@
+//! A table that is handed out: its columns are read by whoever speaks Arrow.
+
+use arrow::array::{Array, RecordBatch};
+use arrow::datatypes::SchemaRef;
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::PyCapsule;
+
+use crate::arrow_capsule;
+
+/// Rows with named columns. Hand it to pyarrow, Polars, pandas or DuckDB: none of them copies it.
+#[pyclass(frozen, module = "freeplay")]
+pub(crate) struct Table {
+    schema: SchemaRef,
+    batches: Vec<RecordBatch>,
+}
+
+impl Table {
+    pub(crate) fn of(batch: RecordBatch) -> Self {
+        Self { schema: batch.schema(), batches: vec![batch] }
+    }
+}
+
+#[pymethods]
+impl Table {
+    /// Rows.
+    #[getter]
+    fn num_rows(&self) -> usize {
+        self.batches.iter().map(RecordBatch::num_rows).sum()
+    }
+
+    /// Names of the columns, in order.
+    #[getter]
+    fn column_names(&self) -> Vec<String> {
+        self.schema.fields().iter().map(|field| field.name().clone()).collect()
+    }
+
+    fn __len__(&self) -> usize {
+        self.num_rows()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<freeplay.Table: {} rows, {} columns>", self.num_rows(), self.schema.fields().len())
+    }
+
+    /// Where the values of a column of numbers lie in memory, for whoever wants to know that none was copied.
+    fn buffer_address(&self, column: &str) -> PyResult<usize> {
+        let found = self.batches.first().and_then(|batch| batch.column_by_name(column));
+        let data = found.ok_or_else(|| PyKeyError::new_err(column.to_owned()))?.to_data();
+        let values = data.buffers().first().ok_or_else(|| PyKeyError::new_err(column.to_owned()))?;
+        Ok(values.as_ptr() as usize)
+    }
+
+    fn __arrow_c_schema__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyCapsule>> {
+        arrow_capsule::schema(py, &self.schema)
+    }
+
+    /// The whole table; a schema that is asked for is a wish that Arrow allows to be passed over.
+    #[pyo3(signature = (requested_schema=None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        drop(requested_schema);
+        arrow_capsule::stream(py, &self.schema, self.batches.clone())
+    }
+}

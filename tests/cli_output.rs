@@ -1,0 +1,357 @@
+//! How the program speaks: codes, forms, quiet pipes, and help that a stranger can use.
+
+use std::io::Read;
+
+use crate::harness::TestFleet;
+
+/// Each line of stderr is an object with a time, a level and an event; the answer stays what it is.
+#[test]
+fn logs_are_structured_when_that_is_asked_for() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    std::fs::write(&fleet.logs()[0], b"broken").unwrap();
+    let result = fleet.freeplay(&["run", "--log-format", "json", "--json"]);
+    assert_eq!(result.code, Some(1), "{result:?}");
+    let lines: Vec<serde_json::Value> =
+        result.err.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert!(
+        lines.iter().all(|l| l["time_utc"].is_string() && l["level"].is_string() && l["event"].is_string())
+    );
+    let with = |event: &str| lines.iter().filter(|line| line["event"] == event).collect::<Vec<_>>();
+    assert_eq!(with("planned")[0]["logs"], 10);
+    assert_eq!(with("log_finished").len(), 10);
+    assert_eq!(with("complaint")[0]["code"], "not_parquet");
+    let stored: u64 = with("stored").iter().map(|line| line["logs"].as_u64().unwrap()).sum();
+    assert_eq!(stored, 10);
+    let report: serde_json::Value = serde_json::from_str(&result.out).unwrap();
+    assert_eq!(report["done"], 10);
+    let wrong = fleet.freeplay(&["run", "--config", "none.toml", "--log-format", "json"]);
+    assert!(wrong.err.lines().all(|line| line.starts_with('{')), "{}", wrong.err);
+}
+
+#[test]
+fn every_command_has_a_purpose_and_an_example() {
+    let fleet = TestFleet::empty();
+    let all = fleet.run_ok(&["--help"]);
+    for command in
+        ["init", "check", "run", "estimate", "query", "trend", "simulate", "store", "completions", "man"]
+    {
+        assert!(all.contains(&format!("  {command} ")), "{command} is not in the help");
+        let help = fleet.run_ok(&[command, "--help"]);
+        assert!(help.contains("Example"), "{command} shows no example: {help}");
+        assert!(help.contains("freeplay "), "{command}");
+    }
+}
+
+#[test]
+fn init_writes_a_configuration_that_is_good_and_never_overwrites() {
+    let fleet = TestFleet::empty();
+    fleet.run_ok(&["init", "new-fleet"]);
+    let toml = std::fs::read_to_string(fleet.path("new-fleet/pipeline.toml")).unwrap();
+    assert!(toml.starts_with("#:schema ./pipeline.schema.json\n"), "{toml}");
+    let schema = std::fs::read_to_string(fleet.path("new-fleet/pipeline.schema.json")).unwrap();
+    let schema: serde_json::Value = serde_json::from_str(&schema).unwrap();
+    assert!(schema["properties"]["logs"]["properties"]["files"].is_object(), "{schema}");
+    let again = fleet.freeplay(&["init", "new-fleet"]);
+    assert_eq!(again.code, Some(2));
+    assert!(again.err.contains("error[would_overwrite]"), "{}", again.err);
+    let silent = fleet.freeplay(&["run", "--config", "new-fleet/pipeline.toml"]);
+    assert_eq!(silent.code, Some(2), "no log fits: {silent:?}");
+    assert!(silent.err.contains("error[no_log_matched]"), "{}", silent.err);
+}
+
+/// Logs that say nothing of themselves but by their path: what `init` proposes is checked and run as it stands.
+#[test]
+fn what_init_proposes_for_foreign_logs_runs_as_it_stands() {
+    let fleet = TestFleet::sample();
+    for (log, tail) in fleet.logs().iter().zip(["TC-JRA", "TC-JRB"]) {
+        let folder = fleet.path("qar").join(tail);
+        std::fs::create_dir_all(&folder).unwrap();
+        let named = folder.join("FLT_2026-09-10_1307.parquet");
+        crate::harness::rewrite(log, &named, &Vec::new(), |_| true, |_| true);
+    }
+    fleet.run_ok(&["init", "new-fleet", "--from", "qar"]);
+    let stays = std::fs::read_to_string(fleet.path("new-fleet/installations.csv")).unwrap();
+    assert_eq!(stays.lines().filter(|line| line.starts_with("TC-JR")).count(), 8, "{stays}");
+    let checked = fleet.run_ok(&["check", "--config", "new-fleet/pipeline.toml"]);
+    assert!(checked.contains("2 logs: 0 in error"), "{checked}");
+    let account = fleet.run_ok(&["run", "--config", "new-fleet/pipeline.toml"]);
+    assert!(account.contains("8 records of 2 flights"), "{account}");
+    let records = fleet.run_ok(&["query", "tail", "TC-JRB", "--config", "new-fleet/pipeline.toml"]);
+    assert!(records.contains("2026-09-10 13:07"), "{records}");
+}
+
+#[test]
+fn usage_and_configuration_errors_are_code_2_and_run_nothing() {
+    let fleet = TestFleet::sample();
+    for args in [&["fly"][..], &["run", "--tale", "N1"], &["query", "tail"], &["run", "--since", "yesterday"]]
+    {
+        assert_eq!(fleet.freeplay(args).code, Some(2), "{args:?}");
+    }
+    let tale = fleet.freeplay(&["run", "--tale", "N1"]);
+    assert!(tale.err.contains("--tail"), "{}", tale.err);
+    fleet.configure("bandwidth_hz", "bandwith_hz");
+    let result = fleet.freeplay(&["run"]);
+    assert_eq!(result.code, Some(2));
+    assert!(result.err.contains("error[unknown_key]"), "{}", result.err);
+    assert!(result.err.contains("hint: `bandwidth_hz`?"), "{}", result.err);
+    assert!(result.err.contains("nothing was run"), "{}", result.err);
+    assert!(!fleet.path("results").exists());
+}
+
+#[test]
+fn rows_come_as_table_json_csv_and_parquet() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--limit", "3"]);
+    let json: Vec<serde_json::Value> =
+        serde_json::from_str(&fleet.run_ok(&["store", "export", "--json"])).unwrap();
+    assert_eq!(json.len(), 12);
+    assert!(json[0]["temperature_c"].is_null(), "nulls are written");
+    assert!(json[0]["departure_utc"].as_str().unwrap().ends_with('Z'));
+    let csv = fleet.run_ok(&["store", "export", "--format", "csv"]);
+    assert!(
+        csv.starts_with("tail_number,position,part_number,serial_number,flight_id,departure_utc,"),
+        "{csv}"
+    );
+    assert_eq!(csv.lines().count(), 13);
+    let gap: f64 = csv.lines().nth(1).unwrap().split(',').nth(12).unwrap().parse().unwrap();
+    assert_eq!(Some(gap), json[0]["gap_m"].as_f64(), "both forms hold the same bits");
+    fleet.run_ok(&["store", "export", "--format", "parquet", "--output", "all.parquet"]);
+    assert_eq!(crate::harness::Table::read(&fleet.path("all.parquet")).rows(), 12);
+    assert!(fleet.run_ok(&["trend"]).contains(" units as of "));
+}
+
+#[test]
+fn a_query_that_finds_nothing_is_well_and_has_no_rows() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--limit", "1"]);
+    assert_eq!(fleet.run_ok(&["query", "tail", "N000", "--json"]).trim(), "[]");
+}
+
+#[test]
+fn a_store_that_is_not_there_says_who_makes_it() {
+    let fleet = TestFleet::sample();
+    let result = fleet.freeplay(&["query", "tail", "N412FP"]);
+    assert_eq!(result.code, Some(3));
+    assert!(result.err.contains("freeplay run"), "{}", result.err);
+}
+
+#[test]
+fn a_trace_holds_every_sample_the_filter_saw() {
+    let fleet = TestFleet::of("flights");
+    fleet.run_ok(&["estimate", "A_nominal.parquet", "--part", "A", "--trace", "trace.parquet"]);
+    let trace = crate::harness::Table::read(&fleet.path("trace.parquet"));
+    assert_eq!(trace.rows(), 37_495);
+    assert!(trace.numbers("s_m").iter().all(|s| s.is_finite()));
+    let flank = trace.numbers("flank");
+    let pressed = |side: f64| flank.iter().filter(|f| **f * side > 0.0).count();
+    assert!(pressed(1.0) > 10_000 && pressed(-1.0) > 10_000 && pressed(1.0) + pressed(-1.0) < flank.len());
+}
+
+#[test]
+fn an_estimate_is_drawn_in_the_form_its_ending_names() {
+    let fleet = TestFleet::of("flights");
+    let logs = ["estimate", "A_nominal.parquet", "D_no_reversal.parquet", "--part", "A", "--plot"];
+    for (name, start) in [("a.svg", &b"<svg"[..]), ("a.png", b"\x89PNG"), ("a.html", b"<!DOCTYPE html>")] {
+        fleet.run_ok(&[&logs[..], &[name]].concat());
+        assert!(std::fs::read(fleet.path(name)).unwrap().starts_with(start), "{name}");
+    }
+    let page = std::fs::read_to_string(fleet.path("a.html")).unwrap();
+    assert!(page.contains("gap 100.0 µm") && page.contains("refused: no_load_reversal"));
+    let result = fleet.freeplay(&[&logs[..], &["a.pdf"]].concat());
+    assert_eq!(result.code, Some(2));
+    assert!(result.err.contains(".svg, .png or .html"), "{}", result.err);
+    let result = fleet.freeplay(&["estimate", "nowhere.parquet", "--part", "A", "--plot", "none.png"]);
+    assert!(result.err.contains("none.png was not written"), "{}", result.err);
+    assert!(!fleet.path("none.png").exists(), "an empty picture says nothing");
+}
+
+/// A reader that closes the pipe after a line ends the program quietly.
+#[test]
+fn a_closed_pipe_ends_quietly() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run"]);
+    let mut child = fleet
+        .command(&["store", "export", "--format", "csv"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut first = [0; 64];
+    child.stdout.take().unwrap().read_exact(&mut first).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
+    assert!(output.status.success());
+}
+
+/// A second run stops, naming who holds the store.
+#[test]
+fn a_held_store_is_code_3() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--limit", "1"]);
+    let lock = std::fs::File::options().write(true).open(fleet.path("results/lock")).unwrap();
+    lock.lock().unwrap();
+    let result = fleet.freeplay(&["run"]);
+    assert_eq!(result.code, Some(3), "{result:?}");
+    assert!(result.err.contains("error[store_held]"), "{}", result.err);
+    assert_eq!(fleet.freeplay(&["query", "tail", "N412FP"]).code, Some(0), "readers need not wait");
+    drop(lock);
+    fleet.run_ok(&["run"]);
+}
+
+#[test]
+fn fail_on_tells_a_scheduler_with_code_4() {
+    let fleet = TestFleet::sample();
+    assert_eq!(fleet.freeplay(&["run", "--fail-on", "watch"]).code, Some(4));
+}
+
+#[test]
+fn estimates_made_elsewhere_get_statements_and_queries_see_nothing_later() {
+    let fleet = TestFleet::sample();
+    let row = |day: i32| {
+        let gap_m = 50e-6 + f64::from(day) * 1e-6;
+        format!("U1,2026-02-{day:02}T08:00:00Z,{gap_m:e},2.0,EMA-27-1040\n")
+    };
+    let header = "serial,departure_utc,gap_m,flight_hours,part_number\n".to_owned();
+    let table: String = std::iter::once(header).chain((1..=28).map(row)).collect();
+    std::fs::write(fleet.path("history.csv"), &table).unwrap();
+    std::fs::write(
+        fleet.path("dates.csv"),
+        "serial,as_of_utc\nU1,2026-02-15T12:00:00Z\nU1,2026-02-28T12:00:00Z\n",
+    )
+    .unwrap();
+    let args = ["trend", "--estimates", "history.csv", "--queries", "dates.csv", "--statistics", "--json"];
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&fleet.run_ok(&args)).unwrap();
+    assert_eq!(rows.iter().map(|r| r["flights"].as_i64().unwrap()).collect::<Vec<_>>(), [15, 28]);
+    // One micrometre in two hours.
+    for row in &rows {
+        assert!((row["sen_rate_m_per_hour"].as_f64().unwrap() / 0.5e-6 - 1.0).abs() < 1e-9, "{row}");
+    }
+    let cut: Vec<&str> = table.lines().take(16).collect();
+    std::fs::write(fleet.path("history.csv"), cut.join("\n")).unwrap();
+    let early: Vec<serde_json::Value> = serde_json::from_str(&fleet.run_ok(&args)).unwrap();
+    assert_eq!(early[0], rows[0], "what came later changed what was known");
+}
+
+/// Twenty micrometres and half a micrometre more each day, in a folder without a configuration: 100 µm are met a
+/// hundred and twenty days after the fortieth, at an hour a day.
+#[test]
+fn a_table_made_elsewhere_is_judged_without_a_configuration() {
+    let fleet = TestFleet::empty();
+    let row = |day: i64| {
+        let departure = "2026-01-01T06:00:00Z".parse::<jiff::Timestamp>().unwrap();
+        let departure = departure + jiff::SignedDuration::from_hours(24 * day);
+        format!("U1,{departure},{:e},1.0\n", 20e-6 + 0.5e-6 * day as f64 + 1e-8 * f64::from(day % 3 == 0))
+    };
+    let header = "serial_number,departure_utc,gap_m,flight_hours\n".to_owned();
+    let table: String = std::iter::once(header).chain((0..=40).map(row)).collect();
+    std::fs::write(fleet.path("history.csv"), table).unwrap();
+    let judged = |more: &[&str]| {
+        let result = fleet.freeplay(&[&["trend", "--estimates", "history.csv", "--json"], more].concat());
+        assert_eq!(result.code, Some(0), "{result:?}");
+        let rows: Vec<serde_json::Value> = serde_json::from_str(&result.out).unwrap();
+        (rows[0].clone(), result.err)
+    };
+    let (without, said) = judged(&[]);
+    assert!(without["state"].is_null() && without["rate_m_per_hour"].as_f64().unwrap() > 0.4e-6, "{without}");
+    assert!(said.contains("--limit-m"), "{said}");
+    let (with, said) = judged(&["--limit-m", "100e-6"]);
+    let hours = |name: &str| with[name].as_f64().unwrap();
+    assert!((hours("crossing_hours_p05")..=hours("crossing_hours_p95")).contains(&120.0), "{with}");
+    assert_eq!((with["state"].as_str(), said.as_str()), (Some("plan"), ""));
+    // In micrometres nobody would ever hear of it.
+    let result = fleet.freeplay(&["trend", "--estimates", "history.csv", "--limit-m", "100"]);
+    assert_eq!(result.code, Some(2), "{result:?}");
+    assert!(result.err.contains("150e-6"), "{}", result.err);
+    // A configuration that is named must be there.
+    let named = fleet.freeplay(&["trend", "--estimates", "history.csv", "--config", "fleet.toml"]);
+    assert_eq!(named.code, Some(2), "{named:?}");
+}
+
+/// A part's own limit goes before everybody's.
+#[test]
+fn a_limit_for_all_parts_serves_those_that_state_none() {
+    let fleet = TestFleet::sample();
+    let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
+    let without = config.replacen("limit_m = 150e-6\n", "", 1).replacen("watch_m = 110e-6\n", "", 1);
+    let with = without.replacen("[trend]\n", "[trend]\nlimit_m = 200e-6\n", 1);
+    std::fs::write(fleet.path("pipeline.toml"), with).unwrap();
+    fleet.run_ok(&["run"]);
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&fleet.run_ok(&["trend", "--json"])).unwrap();
+    for row in &rows {
+        let own = if row["part_number"] == "EMA-27-1060" { 180e-6 } else { 200e-6 };
+        assert_eq!(row["limit_m"].as_f64(), Some(own), "{row}");
+        for name in ["growth_probability", "wear_law_probability", "check_probability"] {
+            assert!((0.0..=1.0).contains(&row[name].as_f64().unwrap()), "{name} of {row}");
+        }
+    }
+    assert_eq!(rows.len(), 12);
+}
+
+#[test]
+fn the_store_tells_what_it_holds_and_whether_it_is_fed() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run"]);
+    let info: serde_json::Value = serde_json::from_str(&fleet.run_ok(&["store", "info", "--json"])).unwrap();
+    assert_eq!(
+        (info["records"].as_i64(), info["flights"].as_i64(), info["serials"].as_i64()),
+        (Some(120), Some(30), Some(12))
+    );
+    fleet.run_ok(&["store", "info", "--max-age", "1h"]);
+    let late = fleet.freeplay(&["store", "info", "--max-age", "0s"]);
+    assert_eq!(late.code, Some(1), "{late:?}");
+    assert!(late.err.contains("error[run_overdue]"), "{}", late.err);
+}
+
+#[test]
+fn a_compacted_store_holds_the_same_records_and_a_flipped_byte_is_found() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--limit", "10"]);
+    fleet.run_ok(&["run"]);
+    let before = fleet.exported();
+    fleet.run_ok(&["store", "compact"]);
+    assert_eq!(fleet.exported(), before);
+    assert!(fleet.run_ok(&["store", "verify"]).contains("is whole"));
+    let files = glob::glob(fleet.path("results/gaps/*.parquet").to_str().unwrap()).unwrap().flatten();
+    for file in files {
+        let mut bytes = std::fs::read(&file).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        std::fs::write(&file, bytes).unwrap();
+    }
+    let result = fleet.freeplay(&["store", "verify"]);
+    assert_eq!(result.code, Some(1), "{result:?}");
+    assert!(result.err.contains("hint:"), "{}", result.err);
+}
+
+#[test]
+fn a_refused_run_leaves_nothing_behind() {
+    let fleet = TestFleet::empty();
+    fleet.run_ok(&["init"]);
+    assert_eq!(fleet.freeplay(&["run"]).code, Some(2));
+    assert!(!fleet.path("results").exists());
+}
+
+/// The configuration may lie elsewhere, in a folder whose name looks like a pattern.
+#[test]
+fn a_configuration_elsewhere_is_read_from_there() {
+    let fleet = TestFleet::sample();
+    let odd = fleet.path("fleet [1] ü");
+    std::fs::create_dir(&odd).unwrap();
+    std::fs::rename(fleet.path("pipeline.toml"), odd.join("pipeline.toml")).unwrap();
+    std::fs::rename(fleet.path("sample-data"), odd.join("sample-data")).unwrap();
+    fleet.run_ok(&["run", "--limit", "2", "--config", "fleet [1] ü/pipeline.toml"]);
+    assert!(odd.join("results").exists());
+}
+
+/// A stranger's first step: the proposal from the logs reads those very logs.
+#[test]
+fn a_proposal_from_logs_reads_them() {
+    let fleet = TestFleet::sample();
+    std::fs::remove_file(fleet.path("pipeline.toml")).unwrap();
+    fleet.run_ok(&["init", "--from", "sample-data/logs"]);
+    fleet.configure("\"installations.csv\"", "\"sample-data/installations.csv\"");
+    fleet.configure("[part.\"EMA-27-1040\"]", "[part.\"EMA-27-1060\"]\nstiffness_n_per_m = 6.5e7\ndamping_n_s_per_m = 2500.0\nscrew_mass_kg = 9.0\nlead_m_per_rev = 0.006\nnoise = { screw_rms_m = 3e-6, screw_resolution_m = 2e-6, motor_rms_m = 1e-6, motor_resolution_m = 3e-7, unknown_force_n = 200.0, bandwidth_hz = 10.0 }\n\n[part.\"EMA-27-1040\"]");
+    let account = fleet.run_ok(&["run"]);
+    assert!(account.contains("120 estimated"), "{account}");
+}

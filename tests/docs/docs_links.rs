@@ -1,0 +1,64 @@
+//! The book in `docs/`: every page is in its contents, and every link leads somewhere.
+
+use std::collections::BTreeSet;
+use std::path::{Component, Path, PathBuf};
+
+use crate::harness::top;
+use crate::markdown::{Page, all};
+
+/// A reader who follows a link inside the repository meets the file, and the heading it names.
+#[test]
+fn every_link_leads_to_a_file_and_a_heading_that_are_there() {
+    let pages = all();
+    let broken: Vec<String> = pages
+        .iter()
+        .flat_map(|page| page.links.iter().filter_map(|link| broken(page, link, &pages)))
+        .collect();
+    let links: usize = pages.iter().map(|page| page.links.len()).sum();
+    assert!(links > 50, "links were not found: {links}");
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+/// Why a link leads nowhere; those into the world are not followed.
+fn broken(page: &Page, link: &str, pages: &[Page]) -> Option<String> {
+    if link.contains("://") || link.starts_with("mailto:") {
+        return None;
+    }
+    let (file, heading) = link.split_once('#').unwrap_or((link, ""));
+    let here = Path::new(&page.name);
+    let name = if file.is_empty() { here.to_owned() } else { plain(&here.parent()?.join(file)) };
+    if !top().join(&name).exists() {
+        return Some(format!("{}: `{link}` leads to no file", page.name));
+    }
+    let target = pages.iter().find(|p| Path::new(&p.name) == name);
+    let found = heading.is_empty() || target?.anchors.iter().any(|a| a == heading);
+    (!found).then(|| format!("{}: `{link}` names no heading there", page.name))
+}
+
+/// A path without `..`.
+fn plain(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::ParentDir => drop(plain.pop()),
+            Component::CurDir => {}
+            other => plain.push(other),
+        }
+    }
+    plain
+}
+
+/// A page that is in no contents is read by nobody.
+#[test]
+fn every_page_is_in_the_contents_once() {
+    let pages = all();
+    let contents = pages.iter().find(|page| page.name == "docs/SUMMARY.md").unwrap();
+    let listed: BTreeSet<String> = contents.links.iter().map(|link| format!("docs/{link}")).collect();
+    let written: BTreeSet<String> = pages
+        .iter()
+        .filter(|page| page.name.starts_with("docs/") && page.name != contents.name)
+        .map(|page| page.name.clone())
+        .collect();
+    assert_eq!(listed, written, "docs/SUMMARY.md beside the pages of docs/");
+    assert_eq!(listed.len(), contents.links.len(), "a page stands twice in docs/SUMMARY.md");
+}

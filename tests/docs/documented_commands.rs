@@ -1,0 +1,205 @@
+//! Every command that the README and the book show is run, and must say what is shown below it.
+//!
+//! A page starts in a copy of the sample fleet, and its blocks of `sh` and `console` are run one after the other.
+//! Comments above a block say what is otherwise: `first: COMMAND` is run before it and not shown, `exit 1` is how its
+//! last command ends, `output` (above a block of `text`) is what the block before it says, and `not run: WHY` exempts
+//! it. A line `…` stands for lines that are left out; times, sizes and digests may differ.
+//! `FREEPLAY_BLESS=1 cargo test -p cli documented_commands` writes what was said into the pages, where nothing is left out.
+
+use std::fs;
+use std::ops::Range;
+use std::process::{Command, Stdio};
+
+use regex::Regex;
+
+use crate::harness::{TestFleet, top};
+use crate::markdown::{Block, Page, all};
+
+/// Blocks that cannot be run here: they want a service manager, a mail server, other programs.
+const EXEMPT: usize = 1;
+
+#[test]
+fn commands_in_the_pages_do_what_the_pages_say() {
+    let pages: Vec<Page> = all().into_iter().filter(|page| page.blocks.iter().any(runs)).collect();
+    let exempt: Vec<&Block> =
+        pages.iter().flat_map(|p| &p.blocks).filter(|b| runs(b) && b.mark("not run:").is_some()).collect();
+    assert_eq!(exempt.len(), EXEMPT, "blocks that are not run: {:?}", marks(&exempt));
+    let faults: Vec<String> = std::thread::scope(|scope| {
+        let tried: Vec<_> = pages.iter().map(|page| scope.spawn(|| Try::of(page))).collect();
+        tried.into_iter().flat_map(|page| page.join().unwrap()).collect()
+    });
+    assert!(faults.is_empty(), "{}", faults.join("\n\n"));
+}
+
+fn marks<'b>(blocks: &[&'b Block]) -> Vec<&'b str> {
+    blocks.iter().filter_map(|block| block.mark("not run:")).collect()
+}
+
+/// Whether a block is to be run: all of a page's `console`, and of `sh` what shows a command of ours.
+fn runs(block: &Block) -> bool {
+    let ours = |line: &str| {
+        ["freeplay ", "cargo run -- ", "cargo run --locked -- "].iter().any(|ours| line.starts_with(ours))
+    };
+    block.language == "console" || (block.language == "sh" && block.text.lines().any(ours))
+}
+
+/// One command, where what it says is shown, and how it must end.
+struct Step {
+    script: String,
+    shown: Option<Range<usize>>,
+    code: i32,
+}
+
+/// A page that is tried: its folder, and what was found wrong.
+struct Try<'p> {
+    page: &'p Page,
+    fleet: TestFleet,
+    faults: Vec<String>,
+    /// What to write where, with `FREEPLAY_BLESS`.
+    blessed: Vec<(Range<usize>, String)>,
+}
+
+impl<'p> Try<'p> {
+    /// Runs a page from its first block to its last.
+    fn of(page: &'p Page) -> Vec<String> {
+        let mut tried = Self { page, fleet: TestFleet::sample(), faults: Vec::new(), blessed: Vec::new() };
+        let mut said = String::new();
+        for block in &page.blocks {
+            if let Some(command) = block.mark("first:") {
+                tried.run(&Step { script: command.to_owned(), shown: None, code: 0 });
+            }
+            if block.marks.iter().any(|mark| mark == "output") {
+                tried.compare(&block.span, &said);
+            } else if runs(block) && block.mark("not run:").is_none() {
+                said = steps(block).iter().map(|step| tried.run(step)).collect();
+            }
+        }
+        tried.bless();
+        tried.faults
+    }
+
+    /// Runs a command in the shell, where the last one left off.
+    fn run(&mut self, step: &Step) -> String {
+        let command =
+            step.script.replace("cargo run --locked -- ", "freeplay ").replace("cargo run -- ", "freeplay ");
+        let script = format!(
+            "exec 2>&1\ncd \"$(cat .here)\"\nset -e\ntrap 'code=$?; pwd > \"$TOP\"/.here; exit $code' EXIT\n{command}"
+        );
+        let folder = fs::canonicalize(self.fleet.path("")).unwrap();
+        if !folder.join(".here").exists() {
+            fs::write(folder.join(".here"), folder.to_str().unwrap()).unwrap();
+        }
+        let result = shell(&folder, &script).output().unwrap();
+        let said = String::from_utf8_lossy(&result.stdout).replace(&*folder.to_string_lossy(), "/srv/fleet");
+        let said: String = said.split_inclusive('\n').filter(|line| !line.contains(" % elapsed ")).collect();
+        if result.status.code() != Some(step.code) {
+            let (name, code) = (&self.page.name, result.status.code());
+            self.faults
+                .push(format!("{name}: `{}` ended with {code:?}, not {}:\n{said}", step.script, step.code));
+        } else if let Some(span) = &step.shown {
+            self.compare(span, &said);
+        }
+        said
+    }
+
+    /// Holds what is shown against what was said.
+    fn compare(&mut self, span: &Range<usize>, said: &str) {
+        let shown = &self.page.text[span.clone()];
+        let said = trimmed(said);
+        if fits(&masked(shown), &masked(&said)) {
+            return;
+        }
+        if std::env::var_os("FREEPLAY_BLESS").is_some() && !shown.lines().any(|line| line == "…") {
+            self.blessed.push((span.clone(), said));
+        } else {
+            self.faults.push(format!("{}: shown\n{shown}\nsaid\n{said}", self.page.name));
+        }
+    }
+
+    fn bless(&mut self) {
+        if self.blessed.is_empty() {
+            return;
+        }
+        let mut text = self.page.text.clone();
+        self.blessed.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
+        for (span, said) in &self.blessed {
+            text.replace_range(span.clone(), said);
+        }
+        fs::write(top().join(&self.page.name), text).unwrap();
+    }
+}
+
+/// A shell that finds the program, and nothing of this machine's settings.
+fn shell(folder: &std::path::Path, script: &str) -> Command {
+    let program = std::path::Path::new(env!("CARGO_BIN_EXE_freeplay")).parent().unwrap();
+    let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap_or_default());
+    let mut shell = Command::new("sh");
+    shell.args(["-c", script]).current_dir(folder).stdin(Stdio::null());
+    shell.env("PATH", path).env("TOP", folder).env_remove("FREEPLAY_CONFIG");
+    shell
+}
+
+/// The commands of a block: all of a block of `sh` as one, those behind `$ ` one by one.
+fn steps(block: &Block) -> Vec<Step> {
+    let code = block.mark("exit").map_or(0, |code| code.parse().unwrap());
+    if block.language == "sh" {
+        return vec![Step { script: block.text.clone(), shown: None, code }];
+    }
+    let mut steps: Vec<Step> = Vec::new();
+    let mut at = block.span.start;
+    for line in block.text.split_inclusive('\n') {
+        let next = at + line.len();
+        if let Some(command) = line.strip_prefix("$ ") {
+            steps.push(Step { script: command.to_owned(), shown: Some(next..next), code: 0 });
+        } else if let Some(step) = steps.last_mut() {
+            match line.strip_prefix("> ") {
+                Some(more) => {
+                    step.script.push_str(more);
+                    step.shown = Some(next..next);
+                }
+                None => step.shown = step.shown.as_ref().map(|shown| shown.start..next),
+            }
+        }
+        at = next;
+    }
+    if let Some(last) = steps.last_mut() {
+        last.code = code;
+    }
+    steps
+}
+
+/// Lines without what trails, and the last one whole.
+fn trimmed(said: &str) -> String {
+    said.lines().flat_map(|line| [line.trim_end(), "\n"]).collect()
+}
+
+/// Lines in which what differs between two runs of the same logs is left out.
+fn masked(text: &str) -> Vec<String> {
+    const DIFFERS: &[(&str, &str)] = &[
+        (r"\d{8}T\d{9}Z-[0-9a-f]{8}", "RUN"),
+        (r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d+)?)?(Z| UTC)", "TIME"),
+        (r"\d+ min \d+ s|\d+(\.\d+)? m?s\b", "SPAN"),
+        (r"\d+(\.\d+)? ([kM]i?B|bytes)\b", "SIZE"),
+        (r"\b[0-9a-f]{12,}\b", "DIGEST"),
+        (r"\d+ workers?", "WORKERS"),
+        (r"slowest +\S+,", "slowest"),
+        (r" +", " "),
+    ];
+    let differs: Vec<_> =
+        DIFFERS.iter().map(|(differs, word)| (Regex::new(differs).unwrap(), *word)).collect();
+    let line = |line: &str| {
+        let cut =
+            |text: String, (differs, word): &(Regex, &str)| differs.replace_all(&text, *word).into_owned();
+        differs.iter().fold(line.trim().to_owned(), cut)
+    };
+    text.lines().map(line).collect()
+}
+
+/// Whether what is shown is what was said, `…` standing for any lines.
+fn fits(shown: &[String], said: &[String]) -> bool {
+    let Some((first, rest)) = shown.split_first() else { return said.is_empty() };
+    if first == "…" {
+        return (0..=said.len()).any(|skipped| fits(rest, &said[skipped..]));
+    }
+    said.split_first().is_some_and(|(line, after)| line == first && fits(rest, after))
+}

@@ -1,0 +1,5 @@
+//! The documentation: links, documented commands and error messages.
+
+mod docs_links;
+mod documented_commands;
+mod error_messages;

@@ -1,0 +1,193 @@
+//! What every test here needs: a folder of its own, a configuration in it, and the binary.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use arrow::array::{Array, AsArray, RecordBatch};
+use arrow::compute::{cast, concat_batches};
+use arrow::datatypes::{DataType, Float64Type};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+/// Says a figure past the test runner, which keeps what tests print to itself.
+pub(crate) fn print_line(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// The top of the repository.
+pub(crate) fn top() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// A fleet in a folder of its own.
+pub(crate) struct TestFleet {
+    folder: tempfile::TempDir,
+}
+
+/// How a command result.
+#[derive(Debug)]
+pub(crate) struct CommandResult {
+    pub(crate) code: Option<i32>,
+    pub(crate) out: String,
+    pub(crate) err: String,
+}
+
+impl TestFleet {
+    /// A copy of the sample fleet.
+    pub(crate) fn sample() -> Self {
+        let fleet = Self { folder: tempfile::tempdir().unwrap() };
+        copy(&top().join("sample-data"), &fleet.path("sample-data"));
+        std::fs::copy(top().join("pipeline.toml"), fleet.path("pipeline.toml")).unwrap();
+        fleet
+    }
+
+    /// A copy of a folder of `tests/data`.
+    pub(crate) fn of(data: &str) -> Self {
+        let fleet = Self { folder: tempfile::tempdir().unwrap() };
+        copy(&top().join("tests/data").join(data), fleet.folder.path());
+        fleet
+    }
+
+    pub(crate) fn empty() -> Self {
+        Self { folder: tempfile::tempdir().unwrap() }
+    }
+
+    pub(crate) fn path(&self, relative: &str) -> PathBuf {
+        self.folder.path().join(relative)
+    }
+
+    /// The command, in this folder, as a scheduler would start it.
+    pub(crate) fn command(&self, args: &[&str]) -> std::process::Command {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_freeplay"));
+        command.args(args).current_dir(self.folder.path());
+        command.env_remove("FREEPLAY_CONFIG").env_remove("NO_COLOR").stdin(std::process::Stdio::null());
+        command
+    }
+
+    pub(crate) fn freeplay(&self, args: &[&str]) -> CommandResult {
+        let output = self.command(args).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        CommandResult { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
+    }
+
+    /// Runs a command that must end well.
+    pub(crate) fn run_ok(&self, args: &[&str]) -> String {
+        let result = self.freeplay(args);
+        assert_eq!(result.code, Some(0), "{args:?}: {result:?}");
+        result.out
+    }
+
+    /// Every stored record as CSV, without what differs between two runs of the same logs.
+    pub(crate) fn exported(&self) -> String {
+        let all = self.run_ok(&["store", "export", "--format", "csv"]);
+        let header: Vec<&str> = all.lines().next().unwrap().split(',').collect();
+        let of_a_run = ["run_id", "processed_utc", "log_path"];
+        let kept: Vec<usize> = (0..header.len()).filter(|&i| !of_a_run.contains(&header[i])).collect();
+        let line = |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            kept.iter().map(|&i| cells[i]).collect::<Vec<_>>().join(",")
+        };
+        all.lines().map(line).collect::<Vec<_>>().join("\n")
+    }
+
+    /// Replaces text in the configuration.
+    pub(crate) fn configure(&self, from: &str, to: &str) {
+        let file = self.path("pipeline.toml");
+        let text = std::fs::read_to_string(&file).unwrap();
+        assert!(text.contains(from), "{from} is not in the configuration");
+        std::fs::write(file, text.replacen(from, to, 1)).unwrap();
+    }
+
+    /// The logs of the fleet, by name.
+    pub(crate) fn logs(&self) -> Vec<PathBuf> {
+        let pattern = self.path("sample-data/logs/*/*.parquet");
+        let mut logs: Vec<PathBuf> = glob::glob(pattern.to_str().unwrap()).unwrap().flatten().collect();
+        logs.sort();
+        logs
+    }
+}
+
+pub(crate) fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap().flatten() {
+        let (path, target) = (entry.path(), to.join(entry.file_name()));
+        if path.is_dir() {
+            copy(&path, &target);
+        } else {
+            std::fs::copy(&path, &target).unwrap();
+        }
+    }
+}
+
+/// A Parquet table, read whole with the plain reader of the Arrow library.
+pub(crate) struct Table(RecordBatch);
+
+impl Table {
+    pub(crate) fn read(file: &Path) -> Self {
+        let reader = ParquetRecordBatchReaderBuilder::try_new(std::fs::File::open(file).unwrap()).unwrap();
+        let schema = reader.schema().clone();
+        let batches: Vec<RecordBatch> = reader.build().unwrap().map(Result::unwrap).collect();
+        Self(concat_batches(&schema, &batches).unwrap())
+    }
+
+    pub(crate) fn rows(&self) -> usize {
+        self.0.num_rows()
+    }
+
+    pub(crate) fn texts(&self, column: &str) -> Vec<String> {
+        let text = cast(self.0.column_by_name(column).unwrap(), &DataType::Utf8).unwrap();
+        text.as_string::<i32>().iter().map(|v| v.unwrap_or_default().to_owned()).collect()
+    }
+
+    /// NaN where null.
+    pub(crate) fn numbers(&self, column: &str) -> Vec<f64> {
+        let values = self.0.column_by_name(column).unwrap().as_primitive::<Float64Type>();
+        (0..values.len()).map(|i| if values.is_null(i) { f64::NAN } else { values.value(i) }).collect()
+    }
+
+    /// One number for each flight and position.
+    pub(crate) fn by_flight(&self, column: &str) -> BTreeMap<(String, String, String), f64> {
+        let keys =
+            self.texts("tail_number").into_iter().zip(self.texts("flight_id")).zip(self.texts("position"));
+        keys.zip(self.numbers(column))
+            .map(|(((tail, flight), position), v)| ((tail, flight, position), v))
+            .collect()
+    }
+}
+
+/// Key-value pairs of a footer.
+pub(crate) type Facts = Vec<(String, String)>;
+
+/// The footer's metadata that says which flight a log is.
+pub(crate) fn facts(log: &Path) -> Facts {
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    let reader = SerializedFileReader::new(std::fs::File::open(log).unwrap()).unwrap();
+    let pairs = reader.metadata().file_metadata().key_value_metadata().unwrap();
+    pairs
+        .iter()
+        .filter_map(|p| Some((p.key.clone(), p.value.clone()?)))
+        .filter(|p| p.0 != "ARROW:schema")
+        .collect()
+}
+
+/// Writes some columns and rows of a log anew, as doubles, under an identity.
+pub(crate) fn rewrite(
+    from: &Path,
+    to: &Path,
+    facts: &Facts,
+    columns: impl Fn(&str) -> bool,
+    rows: impl Fn(usize) -> bool,
+) {
+    use ingest::write::{Column, write_parquet};
+    let Table(batch) = Table::read(from);
+    let mut kept: Vec<(String, Column)> = Vec::new();
+    for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {
+        if columns(field.name()) {
+            let real = cast(array, &DataType::Float64).unwrap();
+            let values = real.as_primitive::<Float64Type>().values();
+            let values = values.iter().enumerate().filter(|(row, _)| rows(*row)).map(|(_, v)| *v).collect();
+            kept.push((field.name().clone(), Column::Real(values)));
+        }
+    }
+    write_parquet(to, &kept, facts).unwrap();
+}

@@ -1,0 +1,6 @@
+//! Logs: layouts, corrupt files, reference logs and logs with known gaps.
+
+mod corrupt_logs;
+mod ground_truth;
+mod layouts;
+mod reference_logs;

@@ -1,0 +1,226 @@
+//! Disks that are full, and disks whose power is cut.
+//!
+//! Both need file systems of their own, which only root may mount: without the right to, the tests say that
+//! they were skipped, and why. A copy of a mounted disk image is what a power cut at that moment leaves: what
+//! was not synced is still in the kernel's memory and not in the image, and mounting the copy replays its
+//! journal.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::harness::{TestFleet, print_line};
+use crate::runs::interruption::{Chance, small, whole_flights};
+
+/// Power cuts with syncing as it is, and the most without it: the first of those should be caught.
+const CUTS: usize = 8;
+const CONTROL_CUTS: usize = 4;
+
+/// A mounted file system, gone when it is dropped.
+struct Mounted(PathBuf);
+
+impl Mounted {
+    /// Mounts, or says why that is not possible here.
+    fn new(args: &[&str], at: &Path) -> Result<Self, String> {
+        std::fs::create_dir_all(at).unwrap();
+        done(Command::new("mount").args(args).arg(at))?;
+        Ok(Self(at.to_owned()))
+    }
+}
+
+impl Drop for Mounted {
+    fn drop(&mut self) {
+        // Detached at the latest when its last file is closed.
+        let _ = done(Command::new("umount").arg("--lazy").arg(&self.0));
+    }
+}
+
+/// Runs a command that must end well, or says what it said.
+fn done(command: &mut Command) -> Result<(), String> {
+    let result = command.stdin(Stdio::null()).output().map_err(|e| format!("{command:?}: {e}"))?;
+    let said = String::from_utf8_lossy(&result.stderr);
+    if result.status.success() { Ok(()) } else { Err(format!("{command:?}: {}", said.trim())) }
+}
+
+/// A disk that is full at some byte: the run says so with code 3, what was stored before stays whole, and with
+/// room again the next run ends where it would have.
+#[test]
+fn a_full_disk_leaves_the_store_whole_and_the_next_run_finishes() {
+    let plain = small();
+    plain.run_ok(&["run"]);
+    let wanted = plain.exported();
+    let mut full = 0;
+    for kib in [16, 48, 64, 80, 96, 112, 128, 160, 192, 256] {
+        let fleet = small();
+        let disk = fleet.path("results");
+        let size = format!("size={kib}k");
+        let _mounted = match Mounted::new(&["-t", "tmpfs", "-o", &size, "tmpfs"], &disk) {
+            Ok(mounted) => mounted,
+            Err(why) => return print_line(&format!("skipped: no file system can be mounted here: {why}")),
+        };
+        let result = fleet.freeplay(&["run", "--jobs", "1"]);
+        assert!(matches!(result.code, Some(0 | 3)), "{kib} KiB: {result:?}");
+        full += usize::from(result.code == Some(3));
+        assert!(result.code != Some(3) || result.err.contains("error[store_"), "{kib} KiB: {}", result.err);
+        whole_flights(&fleet);
+        done(Command::new("mount").args(["-o", "remount,size=16m"]).arg(&disk)).unwrap();
+        fleet.run_ok(&["run"]);
+        assert_eq!(fleet.exported(), wanted, "{kib} KiB");
+    }
+    print_line(&format!("the disk was full in {full} of 10 runs"));
+    assert!((3..10).contains(&full), "{full} runs met a full disk");
+}
+
+/// A disk in a file, whose journal is written by nobody but who syncs.
+struct Disk<'b> {
+    fleet: &'b TestFleet,
+    image: PathBuf,
+    mounted: Option<Mounted>,
+}
+
+impl<'b> Disk<'b> {
+    fn new(fleet: &'b TestFleet) -> Result<Self, String> {
+        let image = fleet.path("live.img");
+        std::fs::File::create(&image).and_then(|file| file.set_len(24 << 20)).unwrap();
+        done(Command::new("mkfs.ext4").arg("-q").arg(&image))?;
+        let mut disk = Self { fleet, image, mounted: None };
+        disk.mount()?;
+        Ok(disk)
+    }
+
+    fn mount(&mut self) -> Result<(), String> {
+        let image = self.image.to_str().unwrap();
+        self.mounted = Some(Mounted::new(&["-o", "loop,commit=300", image], &self.fleet.path("disk"))?);
+        Ok(())
+    }
+
+    /// Takes what is on the disk at this moment.
+    fn copy(&self) -> PathBuf {
+        let copy = self.fleet.path("cut.img");
+        std::fs::copy(&self.image, &copy).unwrap();
+        copy
+    }
+
+    /// Puts a copy in the place of the disk, as a machine does that starts again.
+    fn start_again(&mut self, copy: PathBuf) -> Result<(), String> {
+        self.mounted = None;
+        self.image = copy;
+        self.mount()
+    }
+}
+
+/// One cut: some runs that result, then a cut at a random instant of another, or right after the last one result.
+/// Says how many records are there after it, or what is wrong with them.
+fn cut(disk: &mut Disk<'_>, chance: &mut Chance, preload: Option<&Path>, mid: bool) -> Result<usize, String> {
+    let run = || {
+        let mut command = disk.fleet.command(&["run", "--jobs", "1", "--limit", "3", "-q"]);
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        command.envs(preload.map(|library| ("LD_PRELOAD", library)));
+        command
+    };
+    let runs = if mid { (chance.next() * 3.0) as usize } else { 1 };
+    let began = Instant::now();
+    for _ in 0..runs {
+        assert!(run().status().unwrap().success());
+    }
+    let longest = began.elapsed().max(Duration::from_millis(300)).div_f64(runs.max(1) as f64);
+    let copy = if mid {
+        let mut child = run().spawn().unwrap();
+        std::thread::sleep(longest.mul_f64(chance.next()));
+        done(Command::new("kill").args(["-STOP", &child.id().to_string()])).unwrap();
+        let copy = disk.copy();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        copy
+    } else {
+        disk.copy()
+    };
+    disk.start_again(copy)?;
+    state(disk.fleet, runs * 3 * 4, !mid)
+}
+
+/// What the store holds, when that is whole and not less than what runs had said was stored; a run that ended
+/// had said that it did.
+fn state(fleet: &TestFleet, promised: usize, ended: bool) -> Result<usize, String> {
+    let store = match store::Store::open(fleet.path("disk/results")) {
+        Err(error) if error.diagnostic().code == "store_missing" && promised == 0 => return Ok(0),
+        opened => opened.map_err(|e| e.to_string())?,
+    };
+    let records = store.records(&store::Query::default()).map_err(|e| e.to_string())?;
+    let keys: std::collections::BTreeSet<_> = records.iter().map(store::RecordKey::of).collect();
+    if keys.len() != records.len() || records.len() % 4 != 0 {
+        return Err(format!("{} records, {} of them different", records.len(), keys.len()));
+    }
+    if records.len() < promised {
+        return Err(format!("{promised} records were promised, {} are there", records.len()));
+    }
+    let runs = store.runs().map_err(|e| e.to_string())?;
+    if ended && runs.last().is_none_or(|run| run.exit_code != Some(0)) {
+        return Err("the last run had result, and its account does not say so".to_owned());
+    }
+    let found = store.verify();
+    if found.is_empty() { Ok(records.len()) } else { Err(format!("{found:?}")) }
+}
+
+fn on_a_disk() -> TestFleet {
+    let fleet = small();
+    fleet.configure("path = \"results\"", "path = \"disk/results\"");
+    fleet
+}
+
+#[test]
+fn a_power_cut_at_any_instant_loses_nothing_that_was_promised() {
+    let plain = small();
+    plain.run_ok(&["run"]);
+    let wanted = plain.exported();
+    let seed = std::env::var("FREEPLAY_KILL_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(412_u64);
+    let (mut chance, mut partly) = (Chance(seed), 0);
+    for number in 0..CUTS {
+        let fleet = on_a_disk();
+        let mut disk = match Disk::new(&fleet) {
+            Ok(disk) => disk,
+            Err(why) => return print_line(&format!("skipped: no disk image can be mounted here: {why}")),
+        };
+        let kept = cut(&mut disk, &mut chance, None, number % 4 != 0);
+        let kept = kept.unwrap_or_else(|wrong| panic!("cut {number}, seed {seed}: {wrong}"));
+        partly += usize::from((1..40).contains(&kept));
+        fleet.run_ok(&["run"]);
+        assert_eq!(fleet.exported(), wanted, "cut {number}, seed {seed}");
+    }
+    print_line(&format!("{CUTS} power cuts, seed {seed}: {partly} left a store part full, none a wrong one"));
+    assert!(partly > 0, "no cut came between two commits");
+}
+
+/// The control: where syncing is a lie, a cut must be seen to lose what was promised.
+fn is_caught(what: &str, flags: &[&str]) {
+    let library = tempfile::tempdir().unwrap();
+    let (source, lie) =
+        (crate::harness::top().join("tests/data/disk/nosync.c"), library.path().join("lie.so"));
+    let mut compile = Command::new("cc");
+    compile.args(["-shared", "-fPIC", "-o"]).arg(&lie).arg(source).args(flags);
+    if let Err(why) = done(&mut compile) {
+        return print_line(&format!("skipped: no C compiler: {why}"));
+    }
+    let mut chance = Chance(1);
+    for number in 1..=CONTROL_CUTS {
+        let fleet = on_a_disk();
+        let mut disk = match Disk::new(&fleet) {
+            Ok(disk) => disk,
+            Err(why) => return print_line(&format!("skipped: no disk image can be mounted here: {why}")),
+        };
+        if let Err(wrong) = cut(&mut disk, &mut chance, Some(&lie), false) {
+            return print_line(&format!("without syncing {what}, cut {number} was caught: {wrong}"));
+        }
+    }
+    panic!("{CONTROL_CUTS} cuts without syncing {what} lost nothing: the harness cannot see a loss");
+}
+
+#[test]
+fn without_syncing_a_power_cut_is_caught() {
+    is_caught("anything", &[]);
+}
+
+#[test]
+fn without_syncing_folders_a_power_cut_is_caught() {
+    is_caught("folders", &["-DFOLDERS"]);
+}

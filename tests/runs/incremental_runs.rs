@@ -1,0 +1,325 @@
+//! Only new work: what is accounted for is not done again, and what changed is.
+
+use crate::harness::{TestFleet, facts, rewrite};
+
+fn to_do(account: &str) -> String {
+    account.lines().find(|l| l.trim_start().starts_with("found")).unwrap().trim().to_owned()
+}
+
+#[test]
+fn a_second_run_does_nothing() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run"]);
+    let before = fleet.exported();
+    let account = fleet.run_ok(&["run"]);
+    assert!(to_do(&account).ends_with("30 logs: 0 to do, 30 known"), "{account}");
+    assert_eq!(fleet.exported(), before);
+}
+
+#[test]
+fn a_changed_part_redoes_only_the_logs_it_flew_in() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--tail", "N412FP"]);
+    fleet.configure("stiffness_n_per_m = 6.5e7", "stiffness_n_per_m = 6.6e7");
+    let plan = fleet.run_ok(&["run", "--dry-run", "--tail", "N412FP"]);
+    assert_eq!(plan.matches("setting changed").count(), 10, "{plan}");
+    fleet.configure("limit_m = 150e-6", "limit_m = 151e-6");
+    fleet.run_ok(&["run", "--tail", "N412FP"]);
+    let plan = fleet.run_ok(&["run", "--dry-run", "--tail", "N412FP"]);
+    assert_eq!(plan.matches("setting changed").count(), 0, "{plan}");
+    let records = fleet.run_ok(&["query", "tail", "N412FP", "--json"]);
+    assert_eq!(records.matches("\"flight_id\"").count(), 40, "a flight is there once");
+}
+
+#[test]
+fn a_changed_limit_moves_no_gap_and_redoes_nothing() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run"]);
+    fleet.configure("limit_m = 150e-6", "limit_m = 160e-6");
+    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
+}
+
+#[test]
+fn a_renamed_or_touched_log_is_recognised_by_its_content() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run"]);
+    let before = fleet.exported();
+    let log = &fleet.logs()[0];
+    std::fs::rename(log, log.with_file_name("renamed.parquet")).unwrap();
+    let other = &fleet.logs()[5];
+    let bytes = std::fs::read(other).unwrap();
+    std::fs::remove_file(other).unwrap();
+    std::fs::write(other, bytes).unwrap();
+    let account = fleet.run_ok(&["run"]);
+    assert!(account.contains("0 records of 0 flights"), "{account}");
+    assert_eq!(fleet.exported(), before);
+    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
+}
+
+/// A changed byte that neither size nor date betray: it is found when contents are asked for, and only then.
+#[test]
+fn content_is_compared_when_it_is_asked_for() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    fleet.run_ok(&["run"]);
+    let log = &fleet.logs()[4];
+    let written = std::fs::metadata(log).unwrap().modified().unwrap();
+    let mut content = std::fs::read(log).unwrap();
+    let middle = content.len() / 2;
+    content[middle] ^= 1;
+    std::fs::write(log, content).unwrap();
+    std::fs::File::options().append(true).open(log).unwrap().set_modified(written).unwrap();
+    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("10 logs: 0 to do, 10 known"));
+    let result = fleet.freeplay(&["run", "--verify-content"]);
+    assert!(to_do(&result.out).ends_with("10 logs: 1 to do, 9 known"), "{result:?}");
+    let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
+    assert!(page.contains("known 9") && page.contains("10 logs"), "{page}");
+}
+
+/// Less memory and more workers than logs move no number.
+#[test]
+fn a_memory_budget_and_idle_workers_change_no_record() {
+    let plain = TestFleet::sample();
+    plain.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
+    plain.run_ok(&["run", "--jobs", "1"]);
+    for settings in ["", "[run]\nmemory_mib = 1\n\n", "[run]\nmemory_mib = 4\n\n"] {
+        let spread = TestFleet::sample();
+        spread.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
+        spread.configure("[store]", &format!("{settings}[store]"));
+        spread.run_ok(&["run", "--jobs", "8"]);
+        assert_eq!(spread.exported(), plain.exported(), "{settings}");
+    }
+}
+
+#[test]
+fn a_copy_of_a_log_adds_nothing_whichever_is_read_first() {
+    let fleet = TestFleet::sample();
+    let log = &fleet.logs()[3];
+    std::fs::copy(log, log.with_file_name("copy.parquet")).unwrap();
+    fleet.run_ok(&["run"]);
+    let plain = TestFleet::sample();
+    plain.run_ok(&["run"]);
+    assert_eq!(fleet.exported(), plain.exported());
+}
+
+/// Two recordings of one flight: the one whose name sorts first is used, and the other is named.
+#[test]
+fn a_rival_log_of_the_same_flight_is_in_error_whichever_is_read_first() {
+    for jobs in ["1", "2"] {
+        let fleet = TestFleet::sample();
+        let logs = fleet.logs();
+        let truth = facts(&logs[3]);
+        rewrite(&logs[4], &logs[3].with_file_name("z_rival.parquet"), &truth, |_| true, |_| true);
+        let result = fleet.freeplay(&["run", "--jobs", jobs]);
+        assert_eq!(result.code, Some(1), "{result:?}");
+        assert!(result.err.contains("error[duplicate_flight]"), "{}", result.err);
+        assert!(result.err.contains("z_rival.parquet"), "{}", result.err);
+        let plain = TestFleet::sample();
+        plain.run_ok(&["run"]);
+        assert_eq!(fleet.exported(), plain.exported());
+    }
+}
+
+#[test]
+fn redo_does_all_again_and_stores_each_flight_once() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run"]);
+    let before = fleet.exported();
+    let account = fleet.run_ok(&["run", "--redo", "--tail", "N413FP"]);
+    assert!(account.contains("40 records of 10 flights"), "{account}");
+    assert_eq!(fleet.exported(), before);
+}
+
+#[test]
+fn a_limit_leaves_the_rest_for_the_next_run() {
+    let fleet = TestFleet::sample();
+    assert!(fleet.run_ok(&["run", "--limit", "7"]).contains("28 records of 7 flights"));
+    assert!(fleet.run_ok(&["run"]).contains("92 records of 23 flights"));
+}
+
+/// When the log that spoke for a flight breaks, its copy takes over on the next run.
+#[test]
+fn a_copy_speaks_when_the_first_log_breaks() {
+    let fleet = TestFleet::sample();
+    let log = &fleet.logs()[3];
+    std::fs::copy(log, log.with_file_name("z_copy.parquet")).unwrap();
+    fleet.run_ok(&["run"]);
+    let before = fleet.exported();
+    std::fs::write(log, b"broken").unwrap();
+    assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
+    assert!(fleet.run_ok(&["run", "--dry-run"]).contains("its flight has no other log now"));
+    fleet.run_ok(&["run"]);
+    assert_eq!(fleet.exported(), before);
+    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("31 logs: 0 to do, 31 known"));
+}
+
+/// What is asked for is found out before the limit cuts, also of logs never seen.
+#[test]
+fn a_limit_counts_only_what_was_asked_for() {
+    let fleet = TestFleet::sample();
+    let account = fleet.run_ok(&["run", "--tail", "N414FP", "--limit", "3"]);
+    assert!(account.contains("3 to do, 0 known, 20 not asked for, 7 left by the limit"), "{account}");
+    assert!(account.contains("12 records of 3 flights"), "{account}");
+}
+
+#[test]
+fn the_account_does_not_depend_on_who_was_faster() {
+    let account = |jobs: &str| {
+        let fleet = TestFleet::sample();
+        let logs = fleet.logs();
+        let rival = logs[3].with_file_name("z_rival.parquet");
+        rewrite(&logs[4], &rival, &facts(&logs[3]), |_| true, |_| true);
+        let json = fleet.freeplay(&["run", "--json", "--jobs", jobs]).out;
+        let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+        ["found", "known", "done", "flights", "estimated", "refused"].map(|key| report[key].to_string())
+    };
+    assert_eq!(account("1"), account("2"));
+}
+
+#[test]
+fn a_pattern_that_reaches_our_own_results_does_not_read_them() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "**/*_N41*.parquet");
+    fleet.run_ok(&["run"]);
+    fleet.configure("**/*_N41*.parquet", "**/*.parquet");
+    std::fs::remove_file(fleet.path("sample-data/truth.parquet")).unwrap();
+    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
+}
+
+/// The number in the store can be made again from what the store says about it.
+#[test]
+fn a_record_explains_itself_and_comes_again() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
+    fleet.run_ok(&["run"]);
+    let told = fleet.run_ok(&["explain", "N412FP-0003", "aileron_left"]);
+    for part in ["every bit is the same", "stiffness_n_per_m = 50000000.0", "motor m", "made by    Freeplay"]
+    {
+        assert!(told.contains(part), "{part} is not in {told}");
+    }
+    let json = fleet.run_ok(&["explain", "N412FP-0003", "aileron_left", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(json["replay"]["verdict"], "same");
+    fleet.configure("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 5.1e7");
+    assert!(fleet.run_ok(&["explain", "N412FP-0003", "aileron_left"]).contains("settings have changed"));
+    std::fs::write(&fleet.logs()[2], b"gone").unwrap();
+    let result = fleet.freeplay(&["explain", "N412FP-0003", "aileron_left"]);
+    assert_eq!(result.code, Some(1), "{result:?}");
+    assert!(result.err.contains("error[not_parquet]"), "{}", result.err);
+    assert_eq!(fleet.freeplay(&["explain", "N412FP-0003", "rudder"]).code, Some(2));
+}
+
+/// Two methods side by side over the fleet: each in a store of its own, compared actuator by actuator.
+#[test]
+fn two_methods_live_side_by_side_and_are_compared() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    fleet.run_ok(&["run"]);
+    assert!(fleet.run_ok(&["diff", "results", "results"]).starts_with("0 of 40 actuator-flights differ"));
+    fleet.configure("path = \"results\"", "path = \"trial\"");
+    fleet.configure("method = \"contact\"", "method = \"midrange\"");
+    fleet.run_ok(&["run"]);
+    let told = fleet.run_ok(&["diff", "results", "trial"]);
+    assert!(told.starts_with("40 of 40 actuator-flights differ"), "{told}");
+    let few = fleet.run_ok(&["diff", "results", "trial", "--least-um", "1000"]);
+    assert!(few.starts_with("0 of 40"), "{few}");
+    let rows = fleet.run_ok(&["diff", "results", "trial", "--format", "csv"]);
+    assert_eq!(rows.lines().count(), 41);
+}
+
+/// The store takes over what a trial found, and the next run under the trial's settings has nothing to do.
+#[test]
+fn a_trial_is_adopted_and_what_it_did_not_see_stays() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N4*/*000[1-4].parquet");
+    fleet.run_ok(&["run"]);
+    let before = fleet.exported();
+    fleet.configure("path = \"results\"", "path = \"trial\"");
+    fleet.configure("method = \"contact\"", "method = \"midrange\"");
+    fleet.run_ok(&["run", "--tail", "N412FP"]);
+    let trial = fleet.exported();
+    fleet.configure("path = \"trial\"", "path = \"results\"");
+    let told = fleet.run_ok(&["store", "adopt", "trial"]);
+    assert!(told.starts_with("16 records of 4 logs taken over"), "{told}");
+    assert!(fleet.run_ok(&["diff", "results", "trial"]).contains("differ"));
+
+    let now = fleet.exported();
+    let of = |rows: &str, tail: &str| -> Vec<String> {
+        rows.lines().filter(|row| row.contains(tail)).map(str::to_owned).collect()
+    };
+    assert_eq!(of(&now, "N412FP"), of(&trial, "N412FP"));
+    let others: Vec<&str> = before.lines().filter(|row| !row.contains("N412FP")).collect();
+    assert_eq!(now.lines().filter(|row| !row.contains("N412FP")).collect::<Vec<_>>(), others);
+    let plan = fleet.run_ok(&["run", "--dry-run", "--tail", "N412FP"]);
+    assert!(plan.starts_with("would do 0 logs"), "{plan}");
+    fleet.run_ok(&["store", "verify"]);
+
+    let result = fleet.freeplay(&["store", "adopt", "results"]);
+    assert_eq!(result.code, Some(3));
+    assert!(result.err.contains("error[store_itself]"), "{}", result.err);
+}
+
+#[test]
+fn metrics_tell_when_a_run_last_completed_and_how() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    std::fs::write(&fleet.logs()[0], b"").unwrap();
+    let result = fleet.freeplay(&["run", "--metrics", "freeplay.prom"]);
+    assert_eq!(result.code, Some(1));
+    let text = std::fs::read_to_string(fleet.path("freeplay.prom")).unwrap();
+    for line in [
+        "freeplay_logs_found 10",
+        "freeplay_logs_in_error 1",
+        "freeplay_records_estimated 36",
+        "freeplay_run_exit_code 1",
+    ] {
+        assert!(text.contains(&format!("\n{line}\n")), "{line} is not in {text}");
+    }
+    assert!(text.contains("freeplay_run_completed_timestamp_seconds 1"));
+    // Every sample has its help and type, as the format asks.
+    let samples = text.lines().filter(|l| !l.starts_with('#')).count();
+    assert_eq!(text.lines().filter(|l| l.starts_with("# TYPE")).count(), samples);
+}
+
+#[test]
+fn a_tail_that_went_quiet_is_named() {
+    let fleet = TestFleet::sample();
+    let account = fleet.run_ok(&["run"]);
+    assert!(!account.contains("quiet"), "{account}");
+    let installations = fleet.path("pipeline.toml");
+    let text = std::fs::read_to_string(&installations).unwrap() + "stale_after_days = 20.0\n";
+    std::fs::write(&installations, text).unwrap();
+    for log in fleet.logs().iter().rev().filter(|log| log.to_string_lossy().contains("N414FP")).take(6) {
+        std::fs::remove_file(log).unwrap();
+    }
+    std::fs::remove_dir_all(fleet.path("results")).unwrap();
+    let account = fleet.run_ok(&["run"]);
+    assert!(account.contains("quiet       1 tail: N414FP since"), "{account}");
+}
+
+/// The screw channel of one aircraft comes 4 ms later from one night on: the run says so, and the gap stays.
+#[test]
+fn a_recorder_that_was_changed_is_told_from_wear() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    let late: Vec<_> =
+        fleet.logs().into_iter().filter(|log| log.to_string_lossy().contains("N412FP")).skip(6).collect();
+    std::fs::create_dir_all(fleet.path("sample-data/late")).unwrap();
+    for log in &late {
+        std::fs::rename(log, fleet.path("sample-data/late").join(log.file_name().unwrap())).unwrap();
+    }
+    assert!(!fleet.run_ok(&["run"]).contains("not wear"));
+    // Read with a latency of −4 ms, those logs are what a recorder that is 4 ms late would have written.
+    fleet.configure("sample-data/logs/N412FP/*.parquet", "sample-data/late/*.parquet");
+    fleet.configure(
+        "column = \"{position}_screw_mm\"",
+        "column = \"{position}_screw_mm\"\nlatency_s = -0.004",
+    );
+    let account = fleet.run_ok(&["run"]);
+    assert!(
+        account.contains(
+            "recorder    N412FP all of aileron_left, aileron_right, elevator_left, elevator_right: delay"
+        ),
+        "{account}"
+    );
+}

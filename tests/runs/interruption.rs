@@ -1,0 +1,235 @@
+//! Cut short in the middle: what was finished is kept, and the next run ends where an uninterrupted one does.
+
+use std::time::Duration;
+
+use crate::harness::{TestFleet, print_line};
+
+/// Records seen in the store by a reader, or none while there is no store yet.
+fn stored(fleet: &TestFleet) -> usize {
+    let result = fleet.freeplay(&["store", "export", "--format", "csv", "-q"]);
+    if result.code == Some(0) { result.out.lines().count().saturating_sub(1) } else { 0 }
+}
+
+/// When a run is killed.
+#[derive(Debug, Clone, Copy)]
+enum When {
+    /// So long after its start: nothing may be there yet.
+    After(Duration),
+    /// As soon as so many commits of records stand in the log of the table.
+    Committed(usize),
+}
+
+/// Kills a run; on Unix this is SIGKILL, and nothing in the process gets a last word.
+fn kill(fleet: &TestFleet, when: When) {
+    let mut child =
+        fleet.command(&["run", "--jobs", "1"]).stderr(std::process::Stdio::null()).spawn().unwrap();
+    match when {
+        When::After(pause) => std::thread::sleep(pause),
+        When::Committed(commits) => {
+            let entry = fleet.path(&format!("results/gaps/_delta_log/{commits:020}.json"));
+            while !entry.exists() && child.try_wait().unwrap().is_none() {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
+#[test]
+fn a_killed_run_keeps_whole_flights_and_the_next_one_finishes() {
+    let plain = TestFleet::sample();
+    plain.run_ok(&["run"]);
+    let wanted = plain.exported();
+    let pauses = [0, 60, 200, 500].map(|ms| When::After(Duration::from_millis(ms)));
+    for when in pauses.into_iter().chain([1, 2].map(When::Committed)) {
+        let fleet = TestFleet::sample();
+        kill(&fleet, when);
+        let kept = stored(&fleet);
+        print_line(&format!("killed {when:?}: {kept} of 120 records kept"));
+        assert_eq!(kept % 4, 0, "half a flight, {when:?}: {kept} records");
+        assert!(matches!(when, When::After(_)) || kept > 0, "a finished flight is lost, {when:?}");
+        fleet.run_ok(&["run"]);
+        assert_eq!(fleet.exported(), wanted, "killed {when:?}");
+    }
+}
+
+/// A run that was asked to stop finishes the flights in hand and says so.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_says_130_and_the_next_one_does_the_rest() {
+    let fleet = TestFleet::sample();
+    let child = fleet.command(&["run", "--jobs", "1"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(250));
+    let pid = child.id().to_string();
+    std::process::Command::new("kill").args(["-INT", &pid]).status().unwrap();
+    let output = child.wait_with_output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    match output.status.code() {
+        // A fast machine may be done before the signal comes.
+        Some(0) => assert!(!text.contains("not reached"), "{text}"),
+        code => {
+            assert_eq!(code, Some(130), "{text}");
+            assert!(text.contains("not reached") || text.is_empty(), "{text}");
+        }
+    }
+    fleet.run_ok(&["run"]);
+    assert_eq!(stored(&fleet), 120);
+}
+
+/// Two hundred kills at random instants, run after run on the same store until it is finished, and then
+/// from nothing again. After each, the store opens, holds whole flights, and each of them once.
+#[test]
+fn two_hundred_kills_lose_nothing_and_double_nothing() {
+    const KILLS: usize = 200;
+    let plain = small();
+    plain.run_ok(&["run", "--jobs", "1"]);
+    let wanted = plain.exported();
+    // The machine may be busy with other tests: the quickest of three runs says how long one takes.
+    let took = |_| {
+        let fleet = small();
+        let started = std::time::Instant::now();
+        fleet.run_ok(&["run", "--jobs", "1"]);
+        started.elapsed()
+    };
+    let mut longest = (0..3).map(took).min().unwrap();
+    let seed = std::env::var("FREEPLAY_KILL_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(412_u64);
+    print_line(&format!("killing {KILLS} runs of up to {longest:?}, seed {seed} (FREEPLAY_KILL_SEED)"));
+    let mut chance = Chance(seed);
+    let (mut fleet, mut finished, mut kept, mut partly, mut struck) = (small(), 0, 0, 0, 0);
+    while struck < KILLS {
+        let mut child = fleet.command(&["run", "--jobs", "1"]).stdout(null()).stderr(null()).spawn().unwrap();
+        std::thread::sleep(longest.mul_f64(1.05 * chance.next()));
+        let over = child.try_wait().unwrap().is_some();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let now = whole_flights(&fleet);
+        assert!(now >= kept, "{kept} records were kept, now {now}");
+        partly += usize::from(now > 0 && !over);
+        struck += usize::from(!over);
+        kept = now;
+        // However fast the machine is just now, about one run in six is to be over before its kill.
+        longest = longest.mul_f64(if over { 0.9 } else { 1.02 });
+        if over {
+            assert_eq!(fleet.exported(), wanted, "after kills, the finished store is another one");
+            (fleet, finished, kept) = (small(), finished + 1, 0);
+        }
+    }
+    fleet.run_ok(&["run"]);
+    assert_eq!(fleet.exported(), wanted);
+    print_line(&format!("{struck} runs were struck, {partly} with records stored, {finished} over before"));
+    assert!(partly > 0, "no kill came between two commits");
+}
+
+/// Ten flights of four actuators.
+pub(crate) fn small() -> TestFleet {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N413FP/*.parquet");
+    fleet
+}
+
+fn null() -> std::process::Stdio {
+    std::process::Stdio::null()
+}
+
+/// Opens the store as another program would, and counts its records: four for each flight, each once.
+pub(crate) fn whole_flights(fleet: &TestFleet) -> usize {
+    let store = match store::Store::open(fleet.path("results")) {
+        Ok(store) => store,
+        // Killed before the store was made, or while it was.
+        Err(error) if error.diagnostic().code == "store_missing" => return 0,
+        Err(error) => panic!("the store does not open: {error}"),
+    };
+    let records = store.records(&store::Query::default()).unwrap();
+    let mut flights = std::collections::BTreeMap::<String, std::collections::BTreeSet<String>>::new();
+    for record in &records {
+        let new = flights
+            .entry(record.flight.flight_id.to_string())
+            .or_default()
+            .insert(record.position.to_string());
+        assert!(new, "{} of {} is there twice", record.position, record.flight.flight_id);
+    }
+    assert!(flights.values().all(|positions| positions.len() == 4), "half a flight: {flights:?}");
+    assert!(store.verify().is_empty(), "{:?}", store.verify());
+    records.len()
+}
+
+/// Numbers from 0 to 1, the same for the same seed on every machine.
+pub(crate) struct Chance(pub(crate) u64);
+
+impl Chance {
+    pub(crate) fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// A file that may not grow: the write fails at some byte, the run says so with code 3, and what was stored
+/// before stays whole. With room again the next run finishes.
+#[cfg(unix)]
+#[test]
+fn a_writer_that_fails_at_any_byte_leaves_the_store_whole() {
+    let plain = small();
+    plain.run_ok(&["run"]);
+    let wanted = plain.exported();
+    let mut failed = 0;
+    for blocks in [0, 1, 2, 4, 6, 8, 12, 16, 24, 32] {
+        let fleet = small();
+        let program = env!("CARGO_BIN_EXE_freeplay");
+        // Blocks of 512 bytes: the limit strikes inside data files and inside the log alike.
+        let limited = format!("ulimit -f {blocks}; exec '{program}' run --jobs 1");
+        let result = std::process::Command::new("sh")
+            .args(["-c", &limited])
+            .current_dir(fleet.path(""))
+            .env_remove("FREEPLAY_CONFIG")
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&result.stderr);
+        assert!(matches!(result.status.code(), Some(0 | 3)), "{blocks} blocks: {:?} {said}", result.status);
+        failed += usize::from(result.status.code() == Some(3));
+        assert!(result.status.code() != Some(3) || said.contains("error["), "{blocks} blocks: {said}");
+        whole_flights(&fleet);
+        fleet.run_ok(&["run"]);
+        assert_eq!(fleet.exported(), wanted, "{blocks} blocks");
+    }
+    assert!(failed > 2, "the limit struck {failed} times only");
+}
+
+/// Two runs at once: one works, the other names it or waits; nothing is done twice.
+#[test]
+fn two_runs_at_once_store_each_flight_once() {
+    let plain = small();
+    plain.run_ok(&["run"]);
+    let fleet = small();
+    let run = |args: &[&str]| {
+        fleet.command(args).stdout(null()).stderr(std::process::Stdio::piped()).spawn().unwrap()
+    };
+    let children = [run(&["run"]), run(&["run"]), run(&["run", "--wait", "2m"])];
+    for child in children {
+        let result = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&result.stderr).into_owned();
+        match result.status.code() {
+            Some(0) => {}
+            Some(3) => assert!(said.contains("pid"), "{said}"),
+            code => panic!("{code:?}: {said}"),
+        }
+    }
+    assert_eq!(whole_flights(&fleet), 40);
+    assert_eq!(fleet.exported(), plain.exported());
+}
+
+/// A run that waits for another hears the first signal.
+#[cfg(unix)]
+#[test]
+fn a_run_that_waits_can_be_interrupted() {
+    let fleet = small();
+    fleet.run_ok(&["run", "--limit", "1"]);
+    let store = store::Store::open(fleet.path("results")).unwrap();
+    let held = store.lock(&store::Holder::this_process(), None).unwrap();
+    let child = fleet.command(&["run", "--wait", "10m"]).stdout(null()).stderr(null()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(700));
+    std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let result = child.wait_with_output().unwrap();
+    assert_eq!(result.status.code(), Some(130), "{result:?}");
+    drop(held);
+}

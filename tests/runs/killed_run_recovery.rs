@@ -1,0 +1,122 @@
+//! The morning after a night that was killed: what became of each log is known, and nothing is forgotten.
+
+use serde_json::Value;
+
+use crate::harness::TestFleet;
+
+fn json(fleet: &TestFleet, args: &[&str]) -> Value {
+    serde_json::from_str(&fleet.run_ok(args)).unwrap()
+}
+
+/// A run with one log in error, killed as soon as records of its first commit stand in the store.
+fn killed() -> TestFleet {
+    let fleet = TestFleet::sample();
+    std::fs::write(&fleet.logs()[0], b"broken").unwrap();
+    let mut child = fleet.command(&["run", "--jobs", "1", "-q"]).spawn().unwrap();
+    let entry = fleet.path("results/gaps/_delta_log/00000000000000000001.json");
+    while !entry.exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    assert_eq!(child.wait().unwrap().code(), None, "the run ended before it could be killed");
+    fleet
+}
+
+/// What the records of the store say by themselves.
+fn records(fleet: &TestFleet) -> usize {
+    fleet.run_ok(&["store", "export", "--format", "csv"]).lines().count() - 1
+}
+
+#[test]
+fn a_killed_night_has_its_account_too() {
+    let fleet = killed();
+    let stored = records(&fleet);
+    let runs = json(&fleet, &["store", "runs", "--json"]);
+    let run = &runs[0];
+    let figure = |name: &str| run[name].as_i64().unwrap();
+    assert_eq!((run["ended"].as_str(), &run["exit_code"]), (Some("killed"), &Value::Null));
+    assert_eq!(figure("found"), 30);
+    assert_eq!(figure("done") + figure("not_reached"), 30);
+    assert_eq!(figure("estimated") + figure("refused"), stored as i64);
+    assert!(figure("not_reached") > 0, "{run}");
+
+    let logs = json(&fleet, &["store", "runs", "--run", "last", "--json"]);
+    let logs = logs.as_array().unwrap();
+    assert_eq!(logs.len(), 30, "every log has a class");
+    let with = |class: &str| logs.iter().filter(|log| log["class"] == class).count() as i64;
+    assert_eq!(with("not_reached"), figure("not_reached"));
+    assert_eq!(with("done") + with("refused") + with("unaccounted") + with("error"), figure("done"));
+
+    let told = fleet.run_ok(&["store", "info"]);
+    let left = format!("{} not reached; `freeplay run` does those", figure("not_reached"));
+    assert!(told.contains("ended without an exit") && told.contains(&left), "{told}");
+    assert_eq!(json(&fleet, &["store", "info", "--json"])["last_run"]["ended"], "killed");
+}
+
+#[test]
+fn the_run_after_a_killed_one_says_so_and_does_the_rest() {
+    let fleet = killed();
+    let before = json(&fleet, &["store", "runs", "--json"])[0].clone();
+    let result = fleet.freeplay(&["run"]);
+    assert_eq!(result.code, Some(1), "{result:?}");
+    let line = format!("ended without a word: {} log", before["done"]);
+    assert!(result.out.contains(&line), "{line} is not in {}", result.out);
+    let runs = json(&fleet, &["store", "runs", "--json"]);
+    let same = ["run_id", "ended", "done", "estimated", "refused", "errors", "not_reached"];
+    assert!(same.iter().all(|name| runs[0][name] == before[name]), "{runs:#} was {before:#}");
+    assert_eq!(
+        (runs[1]["ended"].as_str(), &runs[1]["not_reached"]),
+        (Some("logs in error"), &Value::from(0))
+    );
+    let first = before["run_id"].as_str().unwrap();
+    let logs = json(&fleet, &["store", "runs", "--run", first, "--json"]);
+    assert_eq!(logs.as_array().unwrap().len(), 30, "its account stays");
+    let result = fleet.freeplay(&["run"]);
+    assert!(!result.out.contains("ended without a word"), "it is told once: {}", result.out);
+    assert_eq!(records(&fleet), 116, "29 sound logs of four actuators");
+}
+
+/// The list of files holds each row once, where the folder holds superseded files too.
+#[test]
+fn the_list_of_files_holds_every_row_once() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    fleet.run_ok(&["run", "--limit", "6"]);
+    fleet.run_ok(&["run", "--redo", "--limit", "2"]);
+    let rows = |table: &str| -> i64 {
+        let listed = fleet.run_ok(&["store", "files", "--table", table]);
+        let rows = |file: &str| {
+            let file = std::fs::File::open(file).unwrap();
+            let footer =
+                parquet::file::metadata::ParquetMetaDataReader::new().parse_and_finish(&file).unwrap();
+            footer.file_metadata().num_rows()
+        };
+        listed.lines().map(rows).sum()
+    };
+    assert_eq!(rows("gaps"), 24);
+    // Two rows for each log that was to be done, and two for each run.
+    assert_eq!((rows("logs"), rows("runs")), (16, 4));
+}
+
+#[test]
+fn the_logs_of_a_run_are_told_by_class_and_reason() {
+    let fleet = TestFleet::sample();
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
+    std::fs::write(&fleet.logs()[0], b"broken").unwrap();
+    assert_eq!(fleet.freeplay(&["run", "--limit", "8"]).code, Some(0));
+    assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
+    let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
+    assert!(page.contains("logs in error: 2 logs (done 1, error 1)"), "{page}");
+    assert!(page.contains("not_parquet"), "{page}");
+    let page = fleet.run_ok(&["store", "runs", "--last", "1"]);
+    assert!(page.starts_with("1 run\n"), "{page}");
+    // Only its date is new: that log is known, and no record is counted twice.
+    let log = &fleet.logs()[3];
+    let content = std::fs::read(log).unwrap();
+    std::fs::remove_file(log).unwrap();
+    std::fs::write(log, content).unwrap();
+    fleet.run_ok(&["run"]);
+    let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
+    assert!(page.contains("1 log (known 1)"), "{page}");
+    assert_eq!(fleet.freeplay(&["store", "runs", "--run", "never"]).code, Some(2));
+}

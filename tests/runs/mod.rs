@@ -1,0 +1,8 @@
+//! Runs: incremental, interrupted, killed, on failing disks and on stores of older versions.
+
+#[cfg(target_os = "linux")]
+mod disk_faults;
+mod incremental_runs;
+mod interruption;
+mod killed_run_recovery;
+mod old_store_formats;

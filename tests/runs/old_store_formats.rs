@@ -1,0 +1,79 @@
+//! Stores as earlier releases left them.
+//!
+//! `tests/data/store-0.1` was written by release 0.1 before accounts knew *not reached*: one run over two logs
+//! of the sample fleet, one over the rest of that tail with a log in error, one `--redo` of one log, and a
+//! run on another tail that was killed between the commits of its records and of their accounts.
+
+use crate::harness::{TestFleet, copy, top};
+
+fn old() -> TestFleet {
+    let fleet = TestFleet::sample();
+    copy(&top().join("tests/data/store-0.1"), &fleet.path("results"));
+    fleet
+}
+
+#[test]
+fn an_older_store_is_read_as_it_is() {
+    let fleet = old();
+    let mark = std::fs::read(fleet.path("results/store.json")).unwrap();
+    assert!(fleet.run_ok(&["store", "verify"]).ends_with("is whole\n"));
+    let info = fleet.run_ok(&["store", "info"]);
+    assert!(info.contains("52 of 13 flights, 8 units, 2 tails"), "{info}");
+    assert!(info.contains("3 logs done (12 estimated, 0 refused, 0 in error), 0 not reached"), "{info}");
+    assert!(fleet.run_ok(&["query", "tail", "N412FP"]).starts_with("40 records"));
+    let runs: serde_json::Value = serde_json::from_str(&fleet.run_ok(&["store", "runs", "--json"])).unwrap();
+    let told: Vec<_> =
+        runs.as_array().unwrap().iter().map(|r| (r["done"].as_i64(), r["errors"].as_i64())).collect();
+    assert_eq!(told, [(2, 0), (9, 1), (1, 0), (3, 0)].map(|(done, errors)| (Some(done), Some(errors))));
+    assert_eq!(std::fs::read(fleet.path("results/store.json")).unwrap(), mark, "reading changes nothing");
+}
+
+#[test]
+fn a_run_on_an_older_store_ends_where_a_new_one_does() {
+    let fleet = old();
+    let account = fleet.run_ok(&["run"]);
+    assert!(account.contains("ended without a word: 3 logs done, 0 not reached"), "{account}");
+    let plain = TestFleet::sample();
+    plain.run_ok(&["run"]);
+    let numbers = |fleet: &TestFleet| without(&fleet.exported(), &["program_version"]);
+    assert_eq!(numbers(&fleet), numbers(&plain));
+    assert!(fleet.run_ok(&["store", "verify"]).ends_with("is whole\n"));
+    fleet.run_ok(&["store", "compact"]);
+    assert_eq!(numbers(&fleet), numbers(&plain));
+    assert!(fleet.run_ok(&["run"]).contains("0 to do, 30 known"));
+}
+
+/// Rows without columns that name the release.
+fn without(rows: &str, columns: &[&str]) -> String {
+    let header: Vec<&str> = rows.lines().next().unwrap_or_default().split(',').collect();
+    let kept = |cells: Vec<&str>| {
+        let cells = header.iter().zip(cells).filter(|(name, _)| !columns.contains(name));
+        cells.map(|(_, cell)| cell).collect::<Vec<_>>().join(",")
+    };
+    rows.lines().map(|line| kept(line.split(',').collect())).collect::<Vec<_>>().join("\n")
+}
+
+/// Half of the files know columns that came later, half do not: they are one table to us and to others.
+#[test]
+fn files_of_two_releases_are_one_table() {
+    let fleet = old();
+    fleet.run_ok(&["run", "--limit", "3"]);
+    let rows: serde_json::Value =
+        serde_json::from_str(&fleet.run_ok(&["query", "tail", "N412FP", "--json"])).unwrap();
+    let told = |row: &serde_json::Value| row["skew_se_s"].is_number();
+    let rows = rows.as_array().unwrap();
+    assert!(rows.iter().any(told) && !rows.iter().all(told), "old rows and new ones");
+    assert!(rows.iter().all(|row| row["gap_m"].is_number() == (row["status"] == "estimated")));
+    let log = fleet.path("results/gaps/_delta_log");
+    let schemas: Vec<String> = std::fs::read_dir(log)
+        .unwrap()
+        .filter_map(|entry| std::fs::read_to_string(entry.unwrap().path()).ok())
+        .filter(|text| text.contains("\"metaData\"") && text.contains("skew_se_s"))
+        .collect();
+    assert_eq!(schemas.len(), 1, "the table was told once of its new columns");
+    assert!(fleet.run_ok(&["store", "verify"]).ends_with("is whole\n"));
+    fleet.run_ok(&["store", "compact"]);
+    let after: serde_json::Value =
+        serde_json::from_str(&fleet.run_ok(&["query", "tail", "N412FP", "--json"])).unwrap();
+    assert_eq!(after.as_array().unwrap(), rows);
+}
