@@ -178,7 +178,7 @@ pub(crate) fn rewrite(
     columns: impl Fn(&str) -> bool,
     rows: impl Fn(usize) -> bool,
 ) {
-    use ingest::write::{Column, write_parquet};
+    use ingest::parquet::writer::{Column, write_parquet};
     let Table(batch) = Table::read(from);
     let mut kept: Vec<(String, Column)> = Vec::new();
     for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {

@@ -226,7 +226,7 @@ fn a_flights_table_tells_what_the_logs_do_not() {
 /// A log of which a column selects a part gives the number of a log that is only this part.
 #[test]
 fn a_condition_selects_what_a_shorter_log_would_hold() {
-    use ingest::write::{Column, write_parquet};
+    use ingest::parquet::writer::{Column, write_parquet};
     let fleet = TestFleet::of("flights");
     let whole = fleet.path("A_nominal.parquet");
     rewrite(&whole, &fleet.path("doubles.parquet"), &Vec::new(), |_| true, |_| true);

@@ -260,7 +260,7 @@ pub(crate) enum LogEncoding {
     Compatible,
 }
 
-impl From<LogEncoding> for ingest::write::Encoding {
+impl From<LogEncoding> for ingest::parquet::writer::Encoding {
     fn from(encoding: LogEncoding) -> Self {
         match encoding {
             LogEncoding::Split => Self::Split,

@@ -1,43 +1,43 @@
 //! Why a log or a table cannot be used: a stable code, the place, what was found and what to do.
 
-use std::io::ErrorKind;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use records::Diagnostic;
 
-use crate::pattern::PLACEHOLDER;
+use crate::mapping::column_pattern::PLACEHOLDER;
 
 /// One file's trouble.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {fault}", file.display())]
+#[error("{}: {kind}", file.display())]
 pub struct Error {
     /// The file.
     pub file: PathBuf,
     /// What is wrong with it.
     #[source]
-    pub fault: Box<Fault>,
+    pub kind: Box<ErrorKind>,
 }
 
 impl Error {
-    pub(crate) fn new(file: &Path, fault: Fault) -> Self {
-        Self { file: file.to_owned(), fault: Box::new(fault) }
+    pub(crate) fn new(file: &Path, kind: ErrorKind) -> Self {
+        Self { file: file.to_owned(), kind: Box::new(kind) }
     }
 
     /// The form in which people and scripts see it.
     pub fn diagnostic(&self) -> Diagnostic {
-        self.fault.diagnostic().in_file(self.file.display())
+        self.kind.diagnostic().in_file(self.file.display())
     }
 }
 
 /// What can be wrong: one variant for each thing its owner would do differently.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each field is named for what it holds; rows count from 0")]
-pub enum Fault {
+pub enum ErrorKind {
     /// The file cannot be opened or read at all.
     #[error("{}", unreadable(source))]
     Unreadable {
         #[source]
-        source: std::io::Error,
+        source: io::Error,
     },
     /// It lies in an object store, which does not give it.
     #[error(transparent)]
@@ -113,7 +113,7 @@ pub enum Fault {
     Table { row: Option<u64>, column: Option<String>, detail: String },
 }
 
-impl Fault {
+impl ErrorKind {
     /// The stable code; `docs/errors.md` has a paragraph for each.
     pub fn code(&self) -> &'static str {
         match self {
@@ -281,20 +281,20 @@ impl Fault {
 }
 
 /// What the system said, in words of our own for the two cases that everybody meets.
-fn unreadable(source: &std::io::Error) -> String {
+fn unreadable(source: &io::Error) -> String {
     match source.kind() {
-        ErrorKind::NotFound => "there is no such file".into(),
-        ErrorKind::PermissionDenied => "this user may not read the file".into(),
-        ErrorKind::IsADirectory => "this is a folder, not a file".into(),
+        io::ErrorKind::NotFound => "there is no such file".into(),
+        io::ErrorKind::PermissionDenied => "this user may not read the file".into(),
+        io::ErrorKind::IsADirectory => "this is a folder, not a file".into(),
         _ => format!("the file cannot be read: {source}"),
     }
 }
 
-fn missing_remedy(source: &std::io::Error) -> String {
+fn missing_remedy(source: &io::Error) -> String {
     match source.kind() {
-        ErrorKind::NotFound => "is the name right, and the disk or share there?",
-        ErrorKind::PermissionDenied => "who runs this command needs to read it: see its owner and mode",
-        ErrorKind::IsADirectory => "name the file, or the files in it: `FOLDER/*.parquet`",
+        io::ErrorKind::NotFound => "is the name right, and the disk or share there?",
+        io::ErrorKind::PermissionDenied => "who runs this command needs to read it: see its owner and mode",
+        io::ErrorKind::IsADirectory => "name the file, or the files in it: `FOLDER/*.parquet`",
         _ => "is the disk sound?",
     }
     .into()

@@ -8,50 +8,23 @@
 //! [`Log::positions`] which actuators it holds, and [`Log::actuator`] reads the channels of one of them
 //! on one clock.
 
-pub mod arrays;
-mod channel;
-mod checksum;
-pub mod clock;
-mod coded;
-mod condition;
-mod digest;
+pub mod channel;
 pub mod error;
-mod file;
-pub mod flights;
-mod growing;
-mod hold;
-pub mod identity;
-mod leaf;
+mod io;
 pub mod log;
-pub mod noise;
-pub mod normal;
-mod numbers;
-mod page;
-pub mod pattern;
-mod positioned;
-pub mod propose;
-pub mod quality;
-mod resample;
-mod scan;
-pub mod schema;
-pub mod screw;
-mod sheet;
-mod source;
-mod spare;
-mod straight;
+pub mod mapping;
+pub mod parquet;
 pub mod tables;
-pub mod unit;
-mod wanted;
-pub mod write;
+pub mod time;
 
-pub use clock::Timeline;
-pub use condition::Condition;
-pub use error::{Error, Fault};
-pub use flights::Flights;
-pub use identity::Identity;
-pub use log::{Actuator, Files, Log, PositionColumns};
-pub use quality::Quality;
-pub use schema::{
+pub use channel::quality::Quality;
+pub use channel::si_conversion::Geometry;
+pub use error::{Error, ErrorKind};
+pub use log::identity::Identity;
+pub use log::{ActuatorChannels, ActuatorColumns, Log, LogFiles};
+pub use mapping::{
     ChannelMapping, Channels, ClockMapping, GroupMapping, IdentityMapping, Layout, Mapping, Role,
+    SampleFilter,
 };
-pub use screw::Geometry;
+pub use tables::flights::Flights;
+pub use time::clock::TimeBase;

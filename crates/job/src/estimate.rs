@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use estimator::contact::{self, ContactEstimate, ContactOutcome, ContactPlot, PartPrior};
 use estimator::{Filter, MidRange, Room, Samples, Schedule, midrange};
-use ingest::{Actuator, Geometry};
+use ingest::{ActuatorChannels, Geometry};
 use records::{Diagnostic, GapEstimate, Status};
 
 use crate::config::part::Part;
@@ -21,7 +21,7 @@ const BANDWIDTH_TOLERANCE: f64 = 0.25;
 /// # Errors
 /// A diagnostic when the settings of the part do not fit the step of the log.
 pub fn estimate(
-    channels: &Actuator,
+    channels: &ActuatorChannels,
     part: &Part,
     settings: &EstimateSettings,
 ) -> Result<GapEstimate, Diagnostic> {
@@ -84,7 +84,7 @@ fn with_workspaces<T>(samples: usize, work: impl FnOnce(&mut Workspaces) -> T) -
 ///
 /// # Errors
 /// A diagnostic when a noise level or the step cannot be.
-pub fn filter(channels: &Actuator, part: &Part) -> Result<Filter, Diagnostic> {
+pub fn filter(channels: &ActuatorChannels, part: &Part) -> Result<Filter, Diagnostic> {
     Filter::new(&part.actuator, channels.step_s, &part.noise)
         .map_err(|e| Diagnostic::new("bad_parameter", e).hint("see the part's settings in the configuration"))
 }
@@ -93,12 +93,12 @@ pub fn filter(channels: &Actuator, part: &Part) -> Result<Filter, Diagnostic> {
 ///
 /// # Errors
 /// A diagnostic when the settings of the part cannot be.
-pub fn picture(channels: &Actuator, part: &Part) -> Result<Option<ContactPlot>, Diagnostic> {
+pub fn picture(channels: &ActuatorChannels, part: &Part) -> Result<Option<ContactPlot>, Diagnostic> {
     contact::plot_data(&samples(channels), &prior(part)).map_err(|e| Diagnostic::new("estimate_failed", e))
 }
 
 /// The channels as the estimator takes them.
-pub fn samples(channels: &Actuator) -> Samples<'_> {
+pub fn samples(channels: &ActuatorChannels) -> Samples<'_> {
     Samples {
         step_s: channels.step_s,
         motor_m: &channels.motor_m,
@@ -122,7 +122,7 @@ pub fn prior(part: &Part) -> PartPrior {
 }
 
 /// Why no statistic could mean anything, seen before any is made.
-fn pre_check_rejection(channels: &Actuator) -> Option<&'static str> {
+fn pre_check_rejection(channels: &ActuatorChannels) -> Option<&'static str> {
     let [motor, screw, load] = &channels.quality;
     let first = channels.dx_m.iter().find(|dx| !dx.is_nan());
     if channels.segments.is_empty() {

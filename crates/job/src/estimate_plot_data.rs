@@ -2,7 +2,7 @@
 
 use estimator::contact::ContactPlot;
 use estimator::gap::{self, Gap};
-use ingest::{Actuator, Files};
+use ingest::{ActuatorChannels, LogFiles};
 use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
 
 use crate::config::Config;
@@ -32,7 +32,7 @@ pub struct EstimatePlot {
 }
 
 impl EstimatePlot {
-    fn of(channels: &Actuator, part: &Part, config: &Config) -> Result<Self, Diagnostic> {
+    fn of(channels: &ActuatorChannels, part: &Part, config: &Config) -> Result<Self, Diagnostic> {
         let track = estimate::filter(channels, part)?
             .track(&estimate::samples(channels), None)
             .map_err(|e| Diagnostic::new("estimate_failed", e))?;
@@ -54,7 +54,7 @@ impl EstimatePlot {
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read.
 pub fn of_log(
-    files: &Files,
+    files: &LogFiles,
     shown: &str,
     config: &Config,
     installations: &Installations,

@@ -5,8 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use ingest::identity::Facts;
-use ingest::{Actuator, Channels, Files, Identity, Log, Mapping, PositionColumns};
+use ingest::log::identity::IdentityFields;
+use ingest::{ActuatorChannels, ActuatorColumns, Channels, Identity, Log, LogFiles, Mapping};
 use jiff::Timestamp;
 use records::{
     Diagnostic, Flight, GapEstimate, GapRecord, Installation, Installations, PartNumber, Position, Provenance,
@@ -37,7 +37,7 @@ pub struct FlightLog {
     /// Which flight it is.
     pub identity: Identity,
     /// Its actuators.
-    pub positions: Vec<PositionColumns>,
+    pub positions: Vec<ActuatorColumns>,
     /// blake3 of what will be read.
     pub digest: String,
 }
@@ -48,7 +48,7 @@ impl FlightLog {
     /// # Errors
     /// A diagnostic when the log cannot be read or identified.
     pub fn open(
-        files: &Files,
+        files: &LogFiles,
         display_name: &str,
         config: &Config,
         installations: &Installations,
@@ -56,7 +56,7 @@ impl FlightLog {
         let complain = |e: ingest::Error| e.diagnostic().in_file(display_name);
         let log = Log::open(files, config.base_mapping()).map_err(complain)?;
         let identity = identity_of(&log, files, config).map_err(complain)?;
-        let log = log.remapped(&config.mapping(&identity.tail_number, None));
+        let log = log.with_mapping(&config.mapping(&identity.tail_number, None));
         let map_actuators = map_actuators(&log, &identity, config, installations).map_err(complain)?;
         let used: Vec<_> = map_actuators.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
         let digest = log.digest(&used).map_err(complain)?;
@@ -72,7 +72,7 @@ impl FlightLog {
     }
 
     /// How the channels of a position are read.
-    pub fn channels_map(&self, at: &PositionColumns) -> Option<&Channels> {
+    pub fn channels_map(&self, at: &ActuatorColumns) -> Option<&Channels> {
         self.mappings.get(&at.position).map(|mapping| &mapping.channels)
     }
 
@@ -83,7 +83,7 @@ impl FlightLog {
     pub fn is_checked(&self) -> Result<bool, Diagnostic> {
         let used: Vec<_> =
             self.positions.iter().filter_map(|at| Some((self.channels_map(at)?, at))).collect();
-        self.log.is_checked(&used).map_err(|e| e.diagnostic().in_file(&self.display_name))
+        self.log.has_page_checksums(&used).map_err(|e| e.diagnostic().in_file(&self.display_name))
     }
 
     /// Names of the positions, in order.
@@ -98,7 +98,7 @@ impl FlightLog {
 
     /// The actuators of the log. A position that lacks a channel is one only where a unit is booked:
     /// `battery_load` may fit a pattern without being an actuator.
-    pub fn actuators(&self, installations: &Installations) -> impl Iterator<Item = &PositionColumns> {
+    pub fn actuators(&self, installations: &Installations) -> impl Iterator<Item = &ActuatorColumns> {
         let id = &self.identity;
         let booked =
             |at: &Position| installations.installed_at(&id.tail_number, at, id.departure_utc).is_some();
@@ -111,7 +111,7 @@ impl FlightLog {
     /// A diagnostic when the actuator cannot be used; the others of the log are not affected.
     pub fn record(
         &self,
-        at: &PositionColumns,
+        at: &ActuatorColumns,
         config: &Config,
         installations: &Installations,
         stamp: &ProvenanceStamp,
@@ -145,7 +145,7 @@ impl FlightLog {
     /// A diagnostic when nobody is booked there, or the part is not configured.
     pub fn unit<'u>(
         &self,
-        at: &PositionColumns,
+        at: &ActuatorColumns,
         config: &'u Config,
         installations: &'u Installations,
     ) -> Result<(&'u Installation, &'u Part), Diagnostic> {
@@ -162,7 +162,7 @@ impl FlightLog {
     /// A diagnostic when its channels cannot be read.
     pub fn estimate(
         &self,
-        at: &PositionColumns,
+        at: &ActuatorColumns,
         part: &Part,
         config: &Config,
     ) -> Result<GapEstimate, Diagnostic> {
@@ -171,7 +171,7 @@ impl FlightLog {
         }
         let actuator = self.channels(at, part)?;
         let estimate = estimate::estimate(&actuator, part, &config.document.estimate);
-        actuator.reuse();
+        actuator.recycle_buffers();
         estimate
     }
 
@@ -179,12 +179,12 @@ impl FlightLog {
     ///
     /// # Errors
     /// A diagnostic when they cannot be read.
-    pub fn channels(&self, at: &PositionColumns, part: &Part) -> Result<Actuator, Diagnostic> {
+    pub fn channels(&self, at: &ActuatorColumns, part: &Part) -> Result<ActuatorChannels, Diagnostic> {
         let Some(channels) = self.channels_map(at) else {
             let what = format!("the log was not opened for {}", at.position);
             return Err(Diagnostic::new("no_position", what).in_file(&self.display_name));
         };
-        let read = self.log.actuator(at, channels, part.geometry);
+        let read = self.log.read_actuator(at, channels, part.geometry);
         read.map_err(|e| e.diagnostic().in_file(&self.display_name))
     }
 
@@ -204,7 +204,7 @@ impl FlightLog {
 /// # Errors
 /// A diagnostic when the log cannot be read or put on one clock.
 pub fn estimate_unidentified(
-    files: &Files,
+    files: &LogFiles,
     display_name: &str,
     config: &Config,
     part: &Part,
@@ -222,20 +222,20 @@ pub fn estimate_unidentified(
 
 /// Hands over the channels of every actuator of a log that says nothing of its flight, as one part.
 pub(crate) fn for_each_unidentified(
-    files: &Files,
+    files: &LogFiles,
     display_name: &str,
     config: &Config,
     part: &Part,
-    mut take: impl FnMut(&Actuator) -> Result<(), Diagnostic>,
+    mut take: impl FnMut(&ActuatorChannels) -> Result<(), Diagnostic>,
 ) -> Result<(), Diagnostic> {
     let complain = |e: ingest::Error| e.diagnostic().in_file(display_name);
     let log = Log::open(files, config.base_mapping()).map_err(complain)?;
     let channels = &config.base_mapping().channels;
     // A log of one actuator has no name for it here, but needs one to be asked by.
     let own = Position::new("actuator").map_err(|e| Diagnostic::new("empty_name", e))?;
-    let positions = log.positions(channels, Some(&own)).map_err(complain)?;
+    let positions = log.actuators(channels, Some(&own)).map_err(complain)?;
     for at in positions.iter().filter(|at| at.lacking.is_empty()) {
-        let read = log.actuator(at, channels, part.geometry).map_err(complain)?;
+        let read = log.read_actuator(at, channels, part.geometry).map_err(complain)?;
         take(&read).map_err(|diagnostic| diagnostic.in_file(display_name))?;
     }
     Ok(())
@@ -246,12 +246,12 @@ pub(crate) fn for_each_unidentified(
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read, or `take` complains.
 pub(crate) fn for_each_actuator(
-    files: &Files,
+    files: &LogFiles,
     display_name: &str,
     config: &Config,
     installations: &Installations,
     part: Option<&PartNumber>,
-    mut take: impl FnMut(&Actuator, &Part) -> Result<(), Diagnostic>,
+    mut take: impl FnMut(&ActuatorChannels, &Part) -> Result<(), Diagnostic>,
 ) -> Result<(), Diagnostic> {
     if let Some(number) = part {
         let part = part_of(config, number)?;
@@ -335,7 +335,7 @@ pub fn digest_without_identity(config: &Config, installations: &Installations) -
 /// # Errors
 /// A diagnostic when the log cannot be read, put on one clock or identified.
 pub fn identify(
-    files: &Files,
+    files: &LogFiles,
     display_name: &str,
     config: &Config,
 ) -> Result<(Flight, Option<Position>), Diagnostic> {
@@ -358,20 +358,20 @@ pub fn identify_companion(
     config: &Config,
 ) -> Result<(Flight, Option<Position>), Diagnostic> {
     catch_panic(display_name, || {
-        let fallback = |said: &Facts| config.flights.facts(path, said, &config.document.identity);
-        let id = ingest::log::identity_of_file(path, config.base_mapping(), group, fallback)
+        let fallback = |said: &IdentityFields| config.flights.facts(path, said, &config.document.identity);
+        let id = ingest::log::companion_identity(path, config.base_mapping(), group, fallback)
             .map_err(|e| e.diagnostic().in_file(display_name))?;
         Ok((flight_of(&id), id.position))
     })
 }
 
 /// What a log says of itself, and what the flights table adds.
-fn identity_of(log: &Log, files: &Files, config: &Config) -> Result<Identity, ingest::Error> {
+fn identity_of(log: &Log, files: &LogFiles, config: &Config) -> Result<Identity, ingest::Error> {
     let path = files.main.first().map_or(Path::new(""), PathBuf::as_path);
     log.identity(|said| config.flights.facts(path, said, &config.document.identity))
 }
 
-type Mapped = (PositionColumns, Arc<Mapping>);
+type Mapped = (ActuatorColumns, Arc<Mapping>);
 
 /// The actuators of a log, each as its aircraft and the part that sits there want it read.
 fn map_actuators(
@@ -381,7 +381,7 @@ fn map_actuators(
     installations: &Installations,
 ) -> Result<Vec<Mapped>, ingest::Error> {
     let usual = config.mapping(&id.tail_number, None);
-    let found = log.positions(&usual.channels, id.position.as_ref());
+    let found = log.actuators(&usual.channels, id.position.as_ref());
     let mut at: BTreeMap<Position, Mapped> = BTreeMap::new();
     let mut failed = None;
     match found {
@@ -390,8 +390,8 @@ fn map_actuators(
     }
     for part in config.parts_with_overrides() {
         let mapping = config.mapping(&id.tail_number, Some(part));
-        let Ok(found) = log.positions(&mapping.channels, id.position.as_ref()) else { continue };
-        let sits = |p: &PositionColumns| {
+        let Ok(found) = log.actuators(&mapping.channels, id.position.as_ref()) else { continue };
+        let sits = |p: &ActuatorColumns| {
             let installation = installations.installed_at(&id.tail_number, &p.position, id.departure_utc);
             installation.is_some_and(|installation| installation.part_number == *part)
         };
@@ -409,7 +409,7 @@ fn map_actuators(
 /// # Errors
 /// A diagnostic when a log or a channel cannot be read.
 pub fn sample_digest(
-    files: &Files,
+    files: &LogFiles,
     display_name: &str,
     config: &Config,
     installations: &Installations,

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use ingest::write::Encoding;
-use ingest::{Files, PositionColumns};
+use ingest::parquet::writer::Encoding;
+use ingest::{ActuatorColumns, LogFiles};
 use records::{Diagnostic, Installations};
 
 use crate::config::Config;
@@ -17,7 +17,7 @@ use crate::flight_log::{FlightLog, catch_panic};
 /// # Errors
 /// A diagnostic when the log cannot be read or identified.
 pub fn normalize(
-    files: &Files,
+    files: &LogFiles,
     shown: &str,
     config: &Config,
     installations: &Installations,
@@ -38,7 +38,7 @@ pub fn normalize(
 
 fn one(
     opened: &FlightLog,
-    at: &PositionColumns,
+    at: &ActuatorColumns,
     config: &Config,
     installations: &Installations,
     (folder, encoding): (&Path, Encoding),
@@ -55,7 +55,7 @@ fn one(
         ("part_number".to_owned(), stay.part_number.to_string()),
         ("serial_number".to_owned(), stay.serial_number.to_string()),
     ]);
-    ingest::normal::write(&file, &channels, id, part.geometry, &provenance, encoding)
+    ingest::log::normalized::write(&file, &channels, id, part.geometry, &provenance, encoding)
         .map_err(|e| e.diagnostic())?;
     Ok(file)
 }

@@ -3,7 +3,8 @@
 
 use estimator::Noise;
 use estimator::contact::{self, ContactOutcome};
-use ingest::{Actuator, Geometry, noise};
+use ingest::channel::noise_floor;
+use ingest::{ActuatorChannels, Geometry};
 
 use crate::config::part::Part;
 use crate::estimate;
@@ -41,11 +42,11 @@ pub struct ParamComparison {
 
 impl IdentifiedParams {
     /// Looks at one actuator. What the flight does not show stays open.
-    pub fn of(channels: &Actuator, part: &Part) -> Self {
+    pub fn of(channels: &ActuatorChannels, part: &Part) -> Self {
         let [motor, screw, _] = &channels.quality;
-        let motor_rms_m = noise::rms(&channels.motor_m, motor.resolution);
+        let motor_rms_m = noise_floor::white_noise_rms(&channels.motor_m, motor.resolution);
         // δX carries the noise of both positions; the motor's is known, the rest is the screw's.
-        let both_m = noise::rms(&channels.dx_m, None);
+        let both_m = noise_floor::white_noise_rms(&channels.dx_m, None);
         let rounding_m2 =
             [motor, screw].iter().filter_map(|q| q.resolution).map(|r| r * r / 12.0).sum::<f64>();
         let screw_rms_m = both_m

@@ -1,8 +1,8 @@
 //! What the filter saw, per sample: for a person who wants to look.
 
 use estimator::filter::Innovations;
-use ingest::Files;
-use ingest::write::Column;
+use ingest::LogFiles;
+use ingest::parquet::writer::Column;
 use records::{Diagnostic, Installations, PartNumber};
 
 use crate::config::Config;
@@ -50,7 +50,7 @@ impl Trace {
         text.chain(numbers.map(|(name, values)| ((*name).to_owned(), Column::Real(values.clone())))).collect()
     }
 
-    fn of(log: &str, channels: &ingest::Actuator, part: &Part) -> Result<Self, Diagnostic> {
+    fn of(log: &str, channels: &ingest::ActuatorChannels, part: &Part) -> Result<Self, Diagnostic> {
         let filter = estimate::filter(channels, part)?;
         let mut seen = Innovations::default();
         let track = filter
@@ -76,7 +76,7 @@ impl Trace {
 }
 
 /// Which flank was pressed at each sample, as the contact regression saw it.
-fn flanks(channels: &ingest::Actuator, part: &Part, count: usize) -> Result<Vec<f64>, Diagnostic> {
+fn flanks(channels: &ingest::ActuatorChannels, part: &Part, count: usize) -> Result<Vec<f64>, Diagnostic> {
     let mut pressed = vec![0.0; count];
     for touch in estimate::picture(channels, part)?.iter().flat_map(|picture| &picture.touches) {
         let at = |time_s: f64| ((time_s / channels.step_s).round().max(0.0) as usize).min(count);
@@ -91,7 +91,7 @@ fn flanks(channels: &ingest::Actuator, part: &Part, count: usize) -> Result<Vec<
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read.
 pub fn of_log(
-    files: &Files,
+    files: &LogFiles,
     shown: &str,
     config: &Config,
     installations: &Installations,

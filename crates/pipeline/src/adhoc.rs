@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use ingest::Files;
-use ingest::arrays::Arrays;
+use ingest::LogFiles;
+use ingest::log::in_memory::ChannelArrays;
 use job::Config;
 use job::flight_log::{FlightLog, catch_panic, estimate_unidentified, part_of};
 use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
@@ -68,7 +68,7 @@ fn as_part(
     number: &PartNumber,
     program_version: &str,
 ) -> Result<Vec<EstimateRow>, Diagnostic> {
-    let found = estimate_unidentified(&Files::one(path), shown, config, part_of(config, number)?)?;
+    let found = estimate_unidentified(&LogFiles::one(path), shown, config, part_of(config, number)?)?;
     let row = |(position, estimate): (Position, GapEstimate)| EstimateRow {
         tail_number: None,
         position: Some(position.to_string()),
@@ -88,7 +88,7 @@ fn as_part(
 }
 
 fn booked(
-    files: &Files,
+    files: &LogFiles,
     shown: &str,
     config: &Config,
     installations: &Installations,
@@ -129,7 +129,7 @@ fn booked(
 /// # Errors
 /// A diagnostic when the part is not configured, or the arrays are no channels.
 pub fn of_arrays(
-    arrays: &Arrays<'_>,
+    arrays: &ChannelArrays<'_>,
     config: &Config,
     number: &PartNumber,
     program_version: &str,
@@ -137,7 +137,7 @@ pub fn of_arrays(
     let part = part_of(config, number)?;
     // A position is part of a log's identity, which arrays have none of.
     let own = Position::new("arrays").map_err(|e| Diagnostic::new("empty_name", e))?;
-    let channels = arrays.actuator(own).map_err(|e| e.diagnostic())?;
+    let channels = arrays.to_channels(own).map_err(|e| e.diagnostic())?;
     let estimate = job::estimate::estimate(&channels, part, &config.document.estimate)?;
     Ok(EstimateRow {
         tail_number: None,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use ingest::Files;
+use ingest::LogFiles;
 use job::Config;
 use job::flight_log::{identify, identify_companion};
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ use crate::remote::{self, Seen};
 #[derive(Debug, Clone, Default)]
 pub struct Found {
     /// Their files, by the name of the first.
-    pub logs: BTreeMap<String, Files>,
+    pub logs: BTreeMap<String, LogFiles>,
     /// Files of groups that cannot be read, and why.
     pub faulty: BTreeMap<String, (PathBuf, Diagnostic)>,
     /// Files of groups whose flight has no main log.
@@ -38,7 +38,7 @@ pub fn find(config: &Config) -> Result<Found, Error> {
             .extend(matching(config, &group.files, &mut seen)?.into_iter().map(|file| (name.as_str(), file)));
     }
     if companions.is_empty() && !config.document.logs.pieces {
-        let logs = main.into_iter().map(|(shown, path)| (shown, Files::one(path))).collect();
+        let logs = main.into_iter().map(|(shown, path)| (shown, LogFiles::one(path))).collect();
         return Ok(Found { logs, seen, ..Found::default() });
     }
     Ok(Found { seen, ..join(config, main, companions) })
@@ -48,16 +48,16 @@ pub fn find(config: &Config) -> Result<Found, Error> {
 ///
 /// # Errors
 /// As [`find`], where groups or pieces have to be looked for.
-pub fn around(config: &Config, path: &Path) -> Result<Files, Error> {
+pub fn around(config: &Config, path: &Path) -> Result<LogFiles, Error> {
     if config.document.group.is_empty() && !config.document.logs.pieces {
-        return Ok(Files::one(path));
+        return Ok(LogFiles::one(path));
     }
     let same = |other: &PathBuf| {
         let whole = |path: &Path| std::fs::canonicalize(path).ok();
         other == path || whole(other).is_some_and(|other| Some(other) == whole(path))
     };
     let found = find(config)?.logs.into_values().find(|files| files.all().any(same));
-    Ok(found.unwrap_or_else(|| Files::one(path)))
+    Ok(found.unwrap_or_else(|| LogFiles::one(path)))
 }
 
 type Who = (Flight, Option<Position>);
@@ -68,13 +68,13 @@ type Whose = HashMap<TailNumber, Vec<(Who, String)>>;
 fn join(config: &Config, main: Vec<(String, PathBuf)>, companions: Vec<(&str, (String, PathBuf))>) -> Found {
     let known: Vec<_> = main
         .into_par_iter()
-        .map(|(shown, path)| (identify(&Files::one(&path), &shown, config).ok(), shown, path))
+        .map(|(shown, path)| (identify(&LogFiles::one(&path), &shown, config).ok(), shown, path))
         .collect();
     let mut found = Found::default();
     let mut whose = Whose::new();
     for (who, shown, path) in known {
         let Some(who) = who else {
-            found.logs.insert(shown, Files::one(path));
+            found.logs.insert(shown, LogFiles::one(path));
             continue;
         };
         let on_tail = whose.entry(who.0.tail_number.clone()).or_default();
@@ -83,7 +83,7 @@ fn join(config: &Config, main: Vec<(String, PathBuf)>, companions: Vec<(&str, (S
             Some(files) => files.main.push(path),
             None => {
                 on_tail.push((who, shown.clone()));
-                found.logs.insert(shown, Files::one(path));
+                found.logs.insert(shown, LogFiles::one(path));
             }
         }
     }

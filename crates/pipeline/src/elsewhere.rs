@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 use arrow::array::{Array, ArrayRef, AsArray, RecordBatch, StringArray, new_null_array};
 use arrow::compute::{cast, concat_batches, filter_record_batch, is_null};
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
-use ingest::Files;
+use ingest::LogFiles;
 use jiff::Timestamp;
 use job::Config;
 use records::{Diagnostic, GapRecord, Installations};
@@ -91,7 +91,7 @@ pub fn answer(
     let (context, plan, run_id) = (&context, &plan, task.run_id.as_str());
     let budget = Budget::new(config.document.run.memory_mib);
     let shop = Shop { config, installations, context, plan, run_id, budget };
-    let files = Files { main: task.main.clone(), groups: task.groups.clone() };
+    let files = LogFiles { main: task.main.clone(), groups: task.groups.clone() };
     let shown = task.log_path.clone();
     let work = Work { files, fault: None, shown, stat: None, why: Why::New, before: None };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ingest::tables::{Chunk, Parted, Table, name, utc};
+use ingest::tables::{Table, TableBatch, TableSplits, name, utc};
 
 use crate::error::Error;
 use crate::gathering::of_parts;
@@ -16,9 +16,9 @@ use crate::trends::AsOf;
 /// # Errors
 /// When the table cannot be read, lacks one of these, or holds a cell that cannot be read.
 pub fn read(file: &Path) -> Result<Histories, Error> {
-    let table = Parted::open(file, Some(&Gathering::COLUMNS), &Seats::COLUMNS).map_err(bad)?;
+    let table = TableSplits::open(file, Some(&Gathering::COLUMNS), &Seats::COLUMNS).map_err(bad)?;
     of_parts(table.len(), false, |gathering, some| {
-        let mut chunks = table.chunks(some).map_err(bad)?;
+        let mut chunks = table.batches(some).map_err(bad)?;
         chunks.try_for_each(|chunk| gathering.add(&chunk?)).map_err(bad)
     })
 }
@@ -27,7 +27,7 @@ pub fn read(file: &Path) -> Result<Histories, Error> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn gathered(chunks: &[Chunk]) -> Result<Histories, Error> {
+pub fn gathered(chunks: &[TableBatch]) -> Result<Histories, Error> {
     of_parts(chunks.len(), false, |gathering, some| {
         chunks[some].iter().try_for_each(|chunk| gathering.add(chunk)).map_err(bad)
     })

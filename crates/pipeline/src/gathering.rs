@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use arrow::array::{Array, Float64Array, RecordBatch};
-use ingest::tables::Chunk;
+use ingest::tables::TableBatch;
 use jiff::Timestamp;
 use rayon::prelude::*;
 use records::GapRecord;
@@ -90,7 +90,7 @@ impl Gathering {
     ///
     /// # Errors
     /// When a column that must be there is not, and the first cell that cannot be read.
-    pub fn add(&mut self, chunk: &Chunk) -> Result<(), ingest::Error> {
+    pub fn add(&mut self, chunk: &TableBatch) -> Result<(), ingest::Error> {
         chunk.column(&["serial_number", "serial"])?;
         self.rows(chunk, &Seats::of(chunk)?, &Names::of(chunk, &["flight_id"])?)
     }
@@ -100,14 +100,14 @@ impl Gathering {
     /// # Errors
     /// The first cell that cannot be read.
     pub(crate) fn add_stored(&mut self, batch: RecordBatch) -> Result<(), ingest::Error> {
-        self.add(&Chunk::new(Path::new("results"), batch, 0))
+        self.add(&TableBatch::new(Path::new("results"), batch, 0))
     }
 
-    fn rows(&mut self, chunk: &Chunk, seats: &Seats, flights: &Names) -> Result<(), ingest::Error> {
+    fn rows(&mut self, chunk: &TableBatch, seats: &Seats, flights: &Names) -> Result<(), ingest::Error> {
         let column = |names: &[&str]| chunk.column(names).map(Some);
         let (serial, departure) = (chunk.find(&["serial_number", "serial"]), column(&["departure_utc"])?);
         let gaps_m = chunk.numbers(column(&["gap_m"])?)?;
-        let departures = chunk.instants(departure)?;
+        let departures = chunk.timestamps(departure)?;
         let [hours, meters, reversals, errors_m] =
             ["flight_hours", "tail_hours_end", "load_reversals", "gap_se_m"]
                 .map(|name| chunk.numbers(chunk.find(&[name])));
@@ -351,7 +351,7 @@ mod tests {
         // In other parts names have other codes.
         for some in rows.chunks(230) {
             stored.add_stored(batch(some, &coded)).unwrap();
-            plain.add(&Chunk::new("table".as_ref(), batch(some, &DataType::Utf8), 0)).unwrap();
+            plain.add(&TableBatch::new("table".as_ref(), batch(some, &DataType::Utf8), 0)).unwrap();
         }
         let expected = told(&one_by_one(&rows));
         assert_eq!(told(&stored.booked()), expected);
@@ -395,7 +395,7 @@ mod tests {
         let refuse = |_: &mut Gathering, some: Range<usize>| match some.start {
             0 => Ok(()),
             first => Err(Error::refused(
-                Chunk::new(
+                TableBatch::new(
                     "t".as_ref(),
                     RecordBatch::new_empty(Arc::new(arrow::datatypes::Schema::empty())),
                     first,

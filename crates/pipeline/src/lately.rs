@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use arrow::array::RecordBatch;
-use ingest::tables::Chunk;
+use ingest::tables::TableBatch;
 use jiff::{SignedDuration, Timestamp};
 use store::{Query, Store};
 
@@ -73,12 +73,12 @@ struct Found {
 
 impl Found {
     fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
-        let chunk = Chunk::new(Path::new("results"), batch.clone(), 0);
+        let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
         let (seats, flights) = (Seats::of(&chunk)?, Names::of(&chunk, &["flight_id"])?);
         let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
         let [skews_s, stiffnesses, surprises] = ["skew_s", "stiffness_n_per_m", "nis"].map(numbers);
         let (skews_s, stiffnesses, surprises) = (skews_s?, stiffnesses?, surprises?);
-        let departures = chunk.instants(Some(chunk.column(&["departure_utc"])?))?;
+        let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
         let mut seen = Seen::default();
         for row in 0..chunk.len() {
             let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) else { continue };

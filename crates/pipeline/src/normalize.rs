@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use ingest::Files;
-use ingest::write::Encoding;
+use ingest::LogFiles;
+use ingest::parquet::writer::Encoding;
 use job::Config;
 use rayon::prelude::*;
 use records::{Diagnostic, Installations};
@@ -27,14 +27,14 @@ pub struct Normalized {
 pub fn normalize(
     config: &Config,
     installations: &Installations,
-    logs: &[(Files, String)],
+    logs: &[(LogFiles, String)],
     (folder, encoding): (&Path, Encoding),
     jobs: Option<usize>,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<Normalized, Error> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
     watch(Event::Planned { logs: logs.len(), bytes: 0 });
-    let one = |(files, shown): &(Files, String)| {
+    let one = |(files, shown): &(LogFiles, String)| {
         let done = job::normalize::normalize(files, shown, config, installations, (folder, encoding));
         let done = done.unwrap_or_else(|diagnostic| (Vec::new(), vec![diagnostic]));
         let (log, diagnostics) = (shown.clone(), done.1.clone());

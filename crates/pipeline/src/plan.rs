@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use ingest::Files;
+use ingest::LogFiles;
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
@@ -124,7 +124,7 @@ impl FileStat {
     }
 
     /// Of all files of a log: one that differs makes the whole differ.
-    fn of_log(files: &Files, seen: &Seen) -> Option<Self> {
+    fn of_log(files: &LogFiles, seen: &Seen) -> Option<Self> {
         let mut stats = files.all().map(|path| Self::of(path, seen));
         let first = stats.next()??;
         stats.try_fold(first, |whole, next| {
@@ -159,7 +159,7 @@ fn file_id(_: &std::fs::Metadata) -> String {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Work {
     /// Its files.
-    pub files: Files,
+    pub files: LogFiles,
     /// Why it cannot be read, where that is known already.
     pub fault: Option<Diagnostic>,
     /// Its name in records and messages: relative to the configuration where it lies below it.
@@ -194,7 +194,7 @@ pub struct Plan {
     /// Files of groups whose flight has no main log.
     pub strays: Vec<String>,
     /// The files of every log that was found; nothing without work.
-    pub files: BTreeMap<String, Files>,
+    pub files: BTreeMap<String, LogFiles>,
 }
 
 /// What was read of a log, and under which settings.
@@ -209,10 +209,10 @@ pub fn plan(
     request: &Request,
 ) -> Plan {
     let (strays, seen) = (found.strays, found.seen);
-    let mut logs: BTreeMap<String, (Files, Option<Diagnostic>)> =
+    let mut logs: BTreeMap<String, (LogFiles, Option<Diagnostic>)> =
         found.logs.into_iter().map(|(shown, files)| (shown, (files, None))).collect();
     let faulty = |(shown, (path, diagnostic)): (String, (PathBuf, Diagnostic))| {
-        (shown, (Files::one(path), Some(diagnostic)))
+        (shown, (LogFiles::one(path), Some(diagnostic)))
     };
     logs.extend(found.faulty.into_iter().map(faulty));
     let found = logs;
@@ -297,7 +297,7 @@ impl Judge<'_> {
     fn judge(
         &self,
         shown: &str,
-        (files, fault): &(Files, Option<Diagnostic>),
+        (files, fault): &(LogFiles, Option<Diagnostic>),
         before: Option<&LogRecord>,
     ) -> Verdict {
         let stat = FileStat::of_log(files, self.seen);

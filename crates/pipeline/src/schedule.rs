@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-use ingest::PositionColumns;
+use ingest::ActuatorColumns;
 use jiff::Timestamp;
 use job::flight_log::{FlightLog, catch_panic, config_digest, digest_without_identity};
 use job::{Config, ProvenanceStamp};
@@ -318,7 +318,7 @@ impl Shop<'_> {
     fn records(&self, opened: &FlightLog, stamp: &ProvenanceStamp) -> (Vec<GapRecord>, Vec<Diagnostic>) {
         let actuators: Vec<_> = opened.actuators(self.installations).collect();
         let bytes = Budget::actuator_bytes(opened.rows());
-        let one = |at: &&PositionColumns| {
+        let one = |at: &&ActuatorColumns| {
             let _held = self.budget.take(bytes);
             opened.record(at, self.config, self.installations, stamp)
         };

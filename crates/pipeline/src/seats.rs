@@ -2,7 +2,7 @@
 
 use arrow::array::{Array, AsArray, DictionaryArray, StringArray};
 use arrow::datatypes::Int32Type;
-use ingest::tables::{Chunk, Texts, trimmed};
+use ingest::tables::{StringColumn, TableBatch, trim_ascii_fast};
 
 /// Who flew, and where.
 #[derive(Debug, Clone, Copy)]
@@ -28,7 +28,7 @@ impl Seats {
         ["serial_number", "serial", "part_number", "tail_number", "tail", "position"];
 
     /// Those of some rows of a table.
-    pub(crate) fn of(chunk: &Chunk) -> Result<Self, ingest::Error> {
+    pub(crate) fn of(chunk: &TableBatch) -> Result<Self, ingest::Error> {
         let names: [&[&str]; 4] =
             [&["serial_number", "serial"], &["part_number"], &["tail_number", "tail"], &["position"]];
         let [serials, parts, tails, positions] = names.map(|names| Names::of(chunk, names));
@@ -87,15 +87,15 @@ impl<T: Copy> Seen<T> {
 
 /// Texts of a column: each by itself, or as a code for one of a few.
 pub(crate) enum Names {
-    Plain(Texts),
+    Plain(StringColumn),
     Coded(DictionaryArray<Int32Type>, StringArray),
 }
 
 impl Names {
     /// Those of a column under one of its names; all none where there is no such column.
-    pub(crate) fn of(chunk: &Chunk, names: &[&str]) -> Result<Self, ingest::Error> {
+    pub(crate) fn of(chunk: &TableBatch, names: &[&str]) -> Result<Self, ingest::Error> {
         let column = chunk.find(names);
-        let coded = column.and_then(|column| chunk.coded(column));
+        let coded = column.and_then(|column| chunk.dictionary_column(column));
         let texts = coded.and_then(|coded| coded.values().as_string_opt::<i32>());
         match coded.zip(texts) {
             Some((coded, texts)) => Ok(Self::Coded(coded.clone(), texts.clone())),
@@ -109,7 +109,7 @@ impl Names {
             Self::Plain(texts) => texts.get(row),
             Self::Coded(_, texts) => {
                 let code = self.code(row)?;
-                let text = texts.is_valid(code).then(|| trimmed(texts.value(code)))?;
+                let text = texts.is_valid(code).then(|| trim_ascii_fast(texts.value(code)))?;
                 (!text.is_empty()).then_some(text)
             }
         }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use ingest::write::{Column, write_parquet};
+use ingest::parquet::writer::{Column, write_parquet};
 use jiff::Timestamp;
 use rayon::prelude::*;
 use records::Diagnostic;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ingest::flights::Flights;
+use ingest::tables::flights::Flights;
 use jiff::{SignedDuration, Timestamp};
 use records::{Flight, Installation};
 

@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use ::records::{Diagnostic, Installations, PartNumber};
 use arrow::array::RecordBatch;
-use ingest::arrays::Arrays;
-use ingest::tables::{Chunk, Table as Cells};
-use ingest::write::Encoding;
+use ingest::log::in_memory::ChannelArrays;
+use ingest::parquet::writer::Encoding;
+use ingest::tables::{Table as Cells, TableBatch};
 use pipeline::schedule::Context;
 use pipeline::statement::TrendRow;
 use pipeline::trends::{self, Ask};
@@ -83,7 +83,7 @@ pub(crate) fn estimate_arrays(
     let [time_s, motor_m, screw_m, load_n] =
         [numbers(time_s)?, numbers(motor_m)?, numbers(screw_m)?, numbers(load_n)?];
     let found = py.detach(|| {
-        let arrays = Arrays { time_s: &time_s, motor_m: &motor_m, screw_m: &screw_m, load_n: &load_n };
+        let arrays = ChannelArrays { time_s: &time_s, motor_m: &motor_m, screw_m: &screw_m, load_n: &load_n };
         adhoc::of_arrays(&arrays, &config.inner, &number, VERSION)
     });
     let found = found.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?;
@@ -107,7 +107,7 @@ pub(crate) fn trace(
     let seen =
         py.detach(|| job::trace::of_log(&files, &shown, &config.inner, installations, number.as_ref()));
     let columns = seen.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?.columns();
-    Ok(Table::of(ingest::write::batch(&columns).map_err(|e| arrow_error(&e))?))
+    Ok(Table::of(ingest::parquet::writer::batch(&columns).map_err(|e| arrow_error(&e))?))
 }
 
 /// Trends: of the store, or of estimates made elsewhere; one row for each unit, or for each query.
@@ -166,12 +166,12 @@ fn assess(
 }
 
 /// The rows of a table from memory, counted through.
-fn chunks(batches: Vec<RecordBatch>) -> Vec<Chunk> {
+fn chunks(batches: Vec<RecordBatch>) -> Vec<TableBatch> {
     let mut before = 0;
     let chunk = |batch: RecordBatch| {
         let rows = batch.num_rows();
         before += rows;
-        Chunk::new("estimates".as_ref(), batch, before - rows)
+        TableBatch::new("estimates".as_ref(), batch, before - rows)
     };
     batches.into_iter().map(chunk).collect()
 }

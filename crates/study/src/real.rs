@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ingest::Files;
+use ingest::LogFiles;
 use job::Config;
 use job::estimate_plot_data::EstimatePlot;
 use records::{Installations, PartNumber};
@@ -42,7 +42,7 @@ fn looked(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<RealRow>, S
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let number = PartNumber::new(part).map_err(|e| format!("{part}: {e}"))?;
     let none = Installations::default();
-    let looks = job::estimate_plot_data::of_log(&Files::one(path), &name, config, &none, Some(&number))
+    let looks = job::estimate_plot_data::of_log(&LogFiles::one(path), &name, config, &none, Some(&number))
         .map_err(|diagnostic| diagnostic.to_string())?;
     Ok(looks.iter().map(|look| row(&name, look)).collect())
 }

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use ingest::identity::zone;
-use ingest::pattern::nearest;
-use ingest::schema::Fact;
-use ingest::unit::TimeUnit;
+use ingest::log::identity::zone;
+use ingest::mapping::IdentityField;
+use ingest::mapping::column_pattern::nearest;
+use ingest::mapping::units::TimeUnit;
 use ingest::{Channels, ClockMapping, GroupMapping, IdentityMapping, Layout, Mapping};
 use records::Diagnostic;
 use schemars::JsonSchema;
@@ -299,7 +299,7 @@ impl Document {
                 found.push(source.at(&["identity", "path"], c));
             }
             Some(Ok(regex)) => {
-                let facts = || Fact::ALL.iter().map(|fact| fact.as_str());
+                let facts = || IdentityField::ALL.iter().map(|fact| fact.as_str());
                 for group in
                     regex.capture_names().flatten().filter(|group| !facts().any(|fact| fact == *group))
                 {

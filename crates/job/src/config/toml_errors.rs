@@ -1,6 +1,6 @@
 //! What the TOML reader complains of, in words of the file and not of the program.
 
-use ingest::pattern::nearest;
+use ingest::mapping::column_pattern::nearest;
 use records::Diagnostic;
 
 /// The reader's message as a diagnostic; one that is not known is handed on as it is.

@@ -2,7 +2,7 @@
 //!
 //! The types themselves say which keys exist, through their JSON Schema, so this list cannot drift.
 
-use ingest::pattern::nearest;
+use ingest::mapping::column_pattern::nearest;
 use records::Diagnostic;
 use serde_json::Value;
 use toml::de::{DeTable, DeValue};

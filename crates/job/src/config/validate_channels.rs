@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use ingest::pattern::{PLACEHOLDER, nearest};
-use ingest::unit::Dimension;
-use ingest::{ChannelMapping, Channels, Condition, GroupMapping, Layout};
+use ingest::mapping::column_pattern::{PLACEHOLDER, nearest};
+use ingest::mapping::units::Dimension;
+use ingest::{ChannelMapping, Channels, GroupMapping, Layout, SampleFilter};
 use records::Diagnostic;
 
 use super::layers::Source;
@@ -160,7 +160,7 @@ fn wrong_unit(name: &str, channel: &ChannelMapping, wanted: [Dimension; 2]) -> O
 }
 
 /// What a condition asks and cannot mean.
-fn conditions(condition: &Condition, groups: &BTreeMap<String, GroupMapping>) -> Vec<Diagnostic> {
+fn conditions(condition: &SampleFilter, groups: &BTreeMap<String, GroupMapping>) -> Vec<Diagnostic> {
     let column = &condition.column;
     let mut found = Vec::new();
     if column.trim().is_empty() {

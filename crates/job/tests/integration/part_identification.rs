@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ingest::Files;
+use ingest::LogFiles;
 use job::part_identification::IdentifiedParams;
 use job::{Config, FlightLog, flight_log};
 use records::PartNumber;
@@ -15,14 +15,16 @@ fn flights() -> PathBuf {
 #[test]
 fn noise_resolution_and_stiffness_are_read_off_the_logs() {
     let config = Config::read(&flights().join("pipeline.toml")).unwrap();
-    let installations =
-        ingest::tables::installations(&flights().join("installations.csv"), &ingest::tables::Names::new())
-            .unwrap();
+    let installations = ingest::tables::installations(
+        &flights().join("installations.csv"),
+        &ingest::tables::ColumnAliases::new(),
+    )
+    .unwrap();
     for (log, part, stiffness) in
         [("A_nominal", "A", 5e7), ("B_worn_stiffness_assumed_15pc_high", "B", 4.6e7)]
     {
         let file = flights().join(format!("{log}.parquet"));
-        let opened = FlightLog::open(&Files::one(file), log, &config, &installations).unwrap();
+        let opened = FlightLog::open(&LogFiles::one(file), log, &config, &installations).unwrap();
         let part = flight_log::part_of(&config, &PartNumber::new(part).unwrap()).unwrap();
         let at = opened.actuators(&installations).next().unwrap();
         let facts = IdentifiedParams::of(&opened.channels(at, part).unwrap(), part);

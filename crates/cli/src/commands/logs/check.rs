@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
-use ingest::{Actuator, Files, PositionColumns, Quality, quality};
+use ingest::channel::quality;
+use ingest::{ActuatorChannels, ActuatorColumns, LogFiles, Quality};
 use job::Config;
 use job::config::limits::MAX_PLAUSIBLE_LIMIT_M;
 use job::flight_log::{FlightLog, catch_panic};
@@ -93,7 +94,7 @@ fn doubt_limits(config: &Config, output: &Output) {
     }
 }
 
-fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<Vec<(Files, String)>, Failure> {
+fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<Vec<(LogFiles, String)>, Failure> {
     if !args.logs.is_empty() {
         let whole = |path: &std::path::PathBuf| Ok((bundle::around(config, path)?, display_path(path)));
         return args.logs.iter().map(whole).collect();
@@ -102,7 +103,7 @@ fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<Vec<(Files
     for stray in &found.strays {
         output.note(&format!("{stray}: no main log is of its flight, so it is not used"));
     }
-    let faulty = found.faulty.into_iter().map(|(name, (path, _))| (Files::one(path), name));
+    let faulty = found.faulty.into_iter().map(|(name, (path, _))| (LogFiles::one(path), name));
     let mut logs: Vec<_> = found.logs.into_iter().map(|(name, files)| (files, name)).chain(faulty).collect();
     if logs.len() > args.limit {
         output.note(&format!("looking at {} of {} logs; `--limit` looks at more", args.limit, logs.len()));
@@ -202,7 +203,7 @@ fn one(
 }
 
 /// The clock of an actuator in words.
-fn clock(a: &Actuator) -> String {
+fn clock(a: &ActuatorChannels) -> String {
     let stretches = match a.segments.len() {
         1 => "unbroken".to_owned(),
         n => format!("{n} unbroken stretches"),
@@ -231,7 +232,7 @@ fn clock(a: &Actuator) -> String {
 fn actuator(
     opened: &FlightLog,
     name: &str,
-    at: &PositionColumns,
+    at: &ActuatorColumns,
     config: &Config,
     installations: &Installations,
 ) -> Result<ActuatorCheck, Diagnostic> {
@@ -268,7 +269,7 @@ fn actuator(
         });
     }
     let a = opened.channels(at, part)?;
-    let slope = quality::slope(&a.motor_m, &a.dx_m).map(slope_note);
+    let slope = quality::regression_slope(&a.motor_m, &a.dx_m).map(slope_note);
     let [motor_seen, screw_seen, load_seen] = a.quality;
     let mut found = vec![
         describe(base("motor_position", motor, "m"), motor_seen, &said(&a, "motor")),
@@ -282,7 +283,7 @@ fn actuator(
 }
 
 /// The doubts about one channel.
-fn said<'a>(a: &'a Actuator, channel: &str) -> Vec<&'a str> {
+fn said<'a>(a: &'a ActuatorChannels, channel: &str) -> Vec<&'a str> {
     a.flags.iter().map(String::as_str).filter(|flag| flag.starts_with(channel)).collect()
 }
 

@@ -120,7 +120,8 @@ fn trace(
         all.extend(opened);
     }
     let columns = all.columns();
-    ingest::write::write_parquet(file, &columns, &[]).map_err(|e| Failure::failed(e.diagnostic()))?;
+    ingest::parquet::writer::write_parquet(file, &columns, &[])
+        .map_err(|e| Failure::failed(e.diagnostic()))?;
     output.note(&format!("wrote {} samples to {}", all.len(), display_path(file)));
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! `normalize`: the canonical log of each actuator.
 
-use ingest::Files;
+use ingest::LogFiles;
 use pipeline::{Event, bundle};
 
 use crate::args::{Global, NormalizeArgs};
@@ -17,7 +17,7 @@ use crate::commands::context::{display_path, load_with_installations};
 /// When configuration or tables are wrong. Logs in error make the code 1.
 pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
-    let logs: Vec<(Files, String)> = if args.logs.is_empty() {
+    let logs: Vec<(LogFiles, String)> = if args.logs.is_empty() {
         bundle::find(&config)?.logs.into_iter().map(|(name, files)| (files, name)).collect()
     } else {
         let whole = |path: &std::path::PathBuf| Ok((bundle::around(&config, path)?, display_path(path)));

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use ingest::{Actuator, Files};
+use ingest::{ActuatorChannels, LogFiles};
 use job::flight_log::{FlightLog, catch_panic};
 use job::{Config, estimate};
 use pipeline::bundle;
@@ -75,7 +75,7 @@ fn find(args: &ExplainArgs, store: &Store) -> Result<GapRecord, Failure> {
 /// What came of making a record again.
 struct Recomputation {
     digest: String,
-    channels: Option<Actuator>,
+    channels: Option<ActuatorChannels>,
     estimate: records::GapEstimate,
 }
 
@@ -86,7 +86,7 @@ fn replay(
 ) -> Result<Recomputation, Diagnostic> {
     let shown = &record.provenance.log_path;
     let path = config.path(shown);
-    let files = bundle::around(config, &path).unwrap_or_else(|_| Files::one(path));
+    let files = bundle::around(config, &path).unwrap_or_else(|_| LogFiles::one(path));
     catch_panic(shown, || {
         let opened = FlightLog::open(&files, shown, config, installations)?;
         let at = opened.positions.iter().find(|at| at.position == record.position).ok_or_else(|| {
@@ -253,7 +253,7 @@ fn flat(above: &str, value: &Value) -> Vec<(String, String)> {
     table.iter().flat_map(|(key, value)| flat(&named(key), value)).collect()
 }
 
-fn quality(channels: &Actuator) -> String {
+fn quality(channels: &ActuatorChannels) -> String {
     let columns = [
         text("channel", 0),
         number("min", 0),

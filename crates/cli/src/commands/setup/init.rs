@@ -6,8 +6,8 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use ingest::Role;
-use ingest::propose::{Proposal, path_identity, propose};
-use ingest::schema::Fact;
+use ingest::log::infer_mapping::{InferredMapping, path_identity, propose};
+use ingest::mapping::IdentityField;
 
 use crate::args::InitArgs;
 use crate::exit::{Code, Failure};
@@ -90,12 +90,12 @@ fn logs(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// A table with one unit in each position of each tail, named after its place, if logs tell of both.
-fn stays(logs: &[PathBuf], offer: &Proposal) -> Option<String> {
+fn stays(logs: &[PathBuf], offer: &InferredMapping) -> Option<String> {
     let by_folder = |log: &PathBuf| {
         path_identity(log)?;
         Some(log.parent()?.file_name()?.to_str()?.to_owned())
     };
-    let named = offer.metadata.contains_key(&Fact::TailNumber);
+    let named = offer.metadata.contains_key(&IdentityField::TailNumber);
     let tail = |log: &PathBuf| if named { propose(log).ok()?.tail } else { by_folder(log) };
     let is_plain = |name: &String| !name.contains(['"', ',', '#', '\n']);
     let tails: BTreeSet<String> = logs.iter().take(MOST_LOGS).filter_map(tail).filter(is_plain).collect();
@@ -107,7 +107,7 @@ fn stays(logs: &[PathBuf], offer: &Proposal) -> Option<String> {
 }
 
 /// The template with what the logs below a folder seem to offer; a person confirms it with `check`.
-fn proposed(folder: &Path, dir: &Path, log: &Path, offer: &Proposal) -> Result<String, Failure> {
+fn proposed(folder: &Path, dir: &Path, log: &Path, offer: &InferredMapping) -> Result<String, Failure> {
     let (head, rest) = TEMPLATE.split_once("# Which flight a log is.").unwrap_or((TEMPLATE, ""));
     let (_, tail) = rest.split_once("[estimate]").unwrap_or(("", rest));
     let here = dir == Path::new(".") || folder.is_absolute();
@@ -118,7 +118,7 @@ fn proposed(folder: &Path, dir: &Path, log: &Path, offer: &Proposal) -> Result<S
 }
 
 /// The part of a configuration that a proposal fills; what it could not tell is left to be said.
-fn mapping(offer: &Proposal, log: &Path) -> String {
+fn mapping(offer: &InferredMapping, log: &Path) -> String {
     let positions: Vec<&str> = offer.positions.iter().map(String::as_str).collect();
     let positions = if positions.is_empty() { "none".to_owned() } else { positions.join(", ") };
     let others: Vec<&str> = offer.others.iter().take(12).map(String::as_str).collect();
@@ -147,7 +147,7 @@ fn mapping(offer: &Proposal, log: &Path) -> String {
     .concat()
 }
 
-fn identity(offer: &Proposal, log: &Path) -> String {
+fn identity(offer: &InferredMapping, log: &Path) -> String {
     if offer.metadata.is_empty() {
         let found = path_identity(log);
         let remark = match found {
@@ -167,7 +167,7 @@ fn identity(offer: &Proposal, log: &Path) -> String {
     format!("metadata = {{ {} }}\n", facts.join(", "))
 }
 
-fn clock(offer: &Proposal) -> String {
+fn clock(offer: &InferredMapping) -> String {
     match &offer.clock {
         Some((column, Some(unit))) => format!("column = {column:?}\nunit = {unit:?}\n"),
         Some((column, None)) => {
@@ -179,7 +179,7 @@ fn clock(offer: &Proposal) -> String {
     }
 }
 
-fn channel(offer: &Proposal, role: Role, usual: &str) -> String {
+fn channel(offer: &InferredMapping, role: Role, usual: &str) -> String {
     match offer.channels.get(&role) {
         Some((column, Some(unit))) => format!("column = {column:?}\nunit = {:?}\n", unit.as_str()),
         Some((column, None)) => {

@@ -1,0 +1,8 @@
+//! Values of one channel: conversion to SI, statistics, quality flags, noise floor.
+
+pub(crate) mod buffer_pool;
+pub(crate) mod column_builder;
+pub mod noise_floor;
+pub mod quality;
+pub mod si_conversion;
+pub(crate) mod stats;

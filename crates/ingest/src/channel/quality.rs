@@ -1,0 +1,381 @@
+//! What a channel looks like before anything is estimated: so that a mapping error is seen in seconds, and
+//! a sensor that lies is not believed.
+
+use std::ops::Range;
+
+use crate::channel::stats::{ChannelStats, range, second_difference};
+use crate::mapping::Role;
+use crate::time::zero_order_hold::median_sample_interval;
+
+/// One channel, described.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Samples that count, missing ones included.
+    pub samples: usize,
+    /// Share of samples without a value.
+    pub missing_share: f64,
+    /// Smallest value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+    /// Smallest step between neighbours that differ: the resolution actually seen.
+    pub resolution: Option<f64>,
+    /// Most samples in a row that repeat one value.
+    pub longest_run: usize,
+    /// Their share of all samples.
+    pub frozen_share: f64,
+    /// How often a value comes, Hz: the rate actually seen.
+    pub rate_hz: f64,
+    /// Share of samples that stand at the smallest or largest value as if cut off there.
+    pub saturated_share: f64,
+    /// Samples that leap away from both their neighbours and back.
+    pub spikes: usize,
+}
+
+impl Quality {
+    /// Describes a channel; missing samples are NaN, and so many of them are not asked for.
+    pub(crate) fn of(values: &[f64], step_s: f64, apart: usize) -> Self {
+        Self::seen(values, &ChannelStats::of(values), step_s, apart)
+    }
+
+    /// As [`Quality::of`], of a channel that was looked at already.
+    pub(crate) fn seen(values: &[f64], seen: &ChannelStats, step_s: f64, apart: usize) -> Self {
+        let (samples, missing) = (values.len() - apart, seen.missing - apart);
+        let share = |count: usize| count as f64 / samples.max(1) as f64;
+        let resolution = resolution(values, seen);
+        let longest_run = seen.longest_run.min(samples - missing);
+        Self {
+            samples,
+            missing_share: share(missing),
+            min: seen.min,
+            max: seen.max,
+            resolution,
+            longest_run,
+            frozen_share: share(longest_run),
+            rate_hz: (step_s * if missing == 0 { 1 } else { median_sample_interval(values) } as f64).recip(),
+            saturated_share: share(saturated(values, seen)),
+            spikes: spikes(values, samples, resolution, seen.max_second_difference),
+        }
+    }
+
+    /// Smallest and largest value; none where there is no value at all.
+    pub fn span(&self) -> Option<(f64, f64)> {
+        (self.min <= self.max).then_some((self.min, self.max))
+    }
+
+    /// Whether the channel never moves.
+    pub fn is_constant(&self) -> bool {
+        self.max <= self.min
+    }
+
+    /// Whether every value is zero.
+    pub fn is_zero(&self) -> bool {
+        self.is_constant() && self.max == 0.0
+    }
+}
+
+/// Steps below this share of the range are the rounding of arithmetic, not of a sensor.
+const ROUNDING: f64 = 1e-10;
+
+fn resolution(values: &[f64], seen: &ChannelStats) -> Option<f64> {
+    let least = ROUNDING * (seen.max - seen.min);
+    if seen.min_step > least {
+        return seen.min_step.is_finite().then_some(seen.min_step);
+    }
+    let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > least);
+    steps.min_by(f64::total_cmp)
+}
+
+/// Stretches of at least so many samples that repeat one value.
+#[expect(clippy::float_cmp, reason = "a frozen channel repeats its bits")]
+fn runs(values: &[f64], least: usize) -> impl Iterator<Item = Range<usize>> {
+    let mut start = 0;
+    let mut ends = (1..=values.len()).filter(|&i| i == values.len() || values[i] != values[i - 1]);
+    std::iter::from_fn(move || {
+        for end in ends.by_ref() {
+            let run = start..end;
+            start = end;
+            if run.len() >= least {
+                return Some(run);
+            }
+        }
+        None
+    })
+}
+
+/// Those of [`runs`] that repeat one of two values: rare, so most samples are passed over in groups.
+#[expect(clippy::float_cmp, reason = "a rail repeats its bits")]
+fn repeat_runs_of(values: &[f64], of: [f64; 2], least: usize) -> Vec<Range<usize>> {
+    const GROUP: usize = 16;
+    let is_one = |v: &f64| *v == of[0] || *v == of[1];
+    let (mut found, mut done) = (Vec::new(), 0);
+    for start in (0..values.len()).step_by(GROUP) {
+        let group = &values[start..values.len().min(start + GROUP)];
+        if group.iter().filter(|v| is_one(v)).count() == 0 {
+            continue;
+        }
+        for at in start..start + group.len() {
+            if at < done || !is_one(&values[at]) {
+                continue;
+            }
+            done = at + values[at..].iter().take_while(|v| **v == values[at]).count();
+            if done - at >= least {
+                found.push(at..done);
+            }
+        }
+    }
+    found
+}
+
+/// Samples at a rail: the channel comes to its smallest or largest value at full speed, stays there, and
+/// leaves it at full speed, more than once. A position that comes to rest slows down first.
+#[expect(clippy::float_cmp, reason = "a rail repeats its bits")]
+fn saturated(values: &[f64], seen: &ChannelStats) -> usize {
+    const LEAST_RUN: usize = 5;
+    let &ChannelStats { min, max, longest_run, .. } = seen;
+    if longest_run < LEAST_RUN {
+        return 0;
+    }
+    let at_rails: Vec<Range<usize>> = repeat_runs_of(values, [min, max], LEAST_RUN);
+    if at_rails.is_empty() {
+        return 0;
+    }
+    let speed = 0.5 * mean_step(values);
+    let mut count = [0, 0];
+    let mut samples = 0;
+    for run in at_rails {
+        let at = values[run.start];
+        // Two samples away, since the step that meets the rail is cut short.
+        let before = run.start.checked_sub(2).map(|i| values[i]);
+        let (Some(before), Some(after)) = (before, values.get(run.end + 1)) else { continue };
+        let cut = (before - at).abs() >= speed && (after - at).abs() >= speed;
+        if cut {
+            count[usize::from(at == max)] += 1;
+            samples += run.len();
+        }
+    }
+    if count.iter().any(|c| *c > 1) { samples } else { 0 }
+}
+
+/// Mean of the steps that are steps at all.
+fn mean_step(values: &[f64]) -> f64 {
+    let steps = values.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|step| *step > 0.0);
+    let (sum, count) = steps.fold((0.0, 0_usize), |(sum, n), step| (sum + step, n + 1));
+    sum / count.max(1) as f64
+}
+
+/// Samples far from the line between their neighbours, against what is usual for those that count.
+fn spikes(values: &[f64], samples: usize, resolution: Option<f64>, max_second_difference: f64) -> usize {
+    const FAR: f64 = 50.0;
+    const THINNED: usize = 4096;
+    let leap = |w: &[f64]| second_difference(w[0], w[1], w[2]);
+    let every = (samples / THINNED).max(1);
+    let mut usual: Vec<f64> = values.windows(3).step_by(every).map(leap).filter(|d| *d > 0.0).collect();
+    if usual.is_empty() {
+        return 0;
+    }
+    let middle = usual.len() / 2;
+    let median = *usual.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let far = FAR * median.max(resolution.unwrap_or(0.0));
+    if max_second_difference <= far {
+        return 0;
+    }
+    // Its neighbours leap with it, half as far: only the peak of the three counts.
+    let leaps = |i: usize| leap(&values[i - 1..=i + 1]);
+    (2..values.len().saturating_sub(2))
+        .filter(|&i| leaps(i) > far && leaps(i) >= leaps(i - 1) && leaps(i) > leaps(i + 1))
+        .count()
+}
+
+/// What the motor, screw and load channels give reason to doubt: stable codes.
+pub(crate) fn quality_flags(channels: &[Quality; 3], step_s: f64) -> Vec<String> {
+    const SATURATED: f64 = 0.002;
+    const MISSING: f64 = 0.2;
+    let mut found = Vec::new();
+    for (quality, role) in channels.iter().zip(Role::NEEDED) {
+        let slow_load = role == Role::Load && quality.rate_hz * step_s < 0.75;
+        let said = [
+            (quality.missing_share > MISSING && !slow_load, "missing"),
+            (quality.saturated_share > SATURATED, "saturated"),
+            (quality.spikes > 0, "spikes"),
+        ];
+        found.extend(said.iter().filter(|(is, _)| *is).map(|(_, what)| format!("{}_{what}", role.as_str())));
+    }
+    found
+}
+
+/// Positions whose smallest step is large beside what they have to show: a twentieth of all that the relative
+/// position does in the flight.
+pub(crate) fn coarse_resolution(channels: &[Quality; 3], travel_m: f64) -> Vec<String> {
+    const LARGEST_SHARE: f64 = 0.05;
+    let most_m = LARGEST_SHARE * travel_m;
+    let positions = channels.iter().zip(Role::NEEDED).take(2);
+    let is_coarse = |q: &Quality| q.resolution.is_some_and(|step_m| step_m > most_m);
+    positions.filter(|(q, _)| is_coarse(q)).map(|(_, role)| format!("{}_coarse", role.as_str())).collect()
+}
+
+/// Samples of a frozen position are no measurement: where one repeats its last value while the other
+/// travels further than any gap, it is marked as missing. Returns the codes of those that froze; no value of
+/// either is repeated for longer than `longest_run` samples.
+pub(crate) fn drop_frozen_samples(
+    motor_m: &mut [f64],
+    screw_m: &mut [f64],
+    longest_run: usize,
+    step_s: f64,
+) -> Vec<String> {
+    let least = min_frozen_run(step_s);
+    if longest_run < least {
+        return Vec::new();
+    }
+    let still = [frozen_ranges(motor_m, screw_m, least), frozen_ranges(screw_m, motor_m, least)];
+    let mut found = Vec::new();
+    for ((spans, values), role) in still.iter().zip([motor_m, screw_m]).zip([Role::Motor, Role::Screw]) {
+        spans.iter().for_each(|span| values[span.clone()].fill(f64::NAN));
+        if !spans.is_empty() {
+            found.push(format!("{}_frozen", role.as_str()));
+        }
+    }
+    found
+}
+
+/// Samples in the half second for which a position may repeat its value.
+fn min_frozen_run(step_s: f64) -> usize {
+    ((0.5 / step_s).ceil() as usize).max(3)
+}
+
+/// Where a position stands still for half a second at least while its partner travels a millimetre and a
+/// twentieth of its range. A channel that never moves is another matter, and refused as a whole.
+fn frozen_ranges(values: &[f64], partner: &[f64], least: usize) -> Vec<Range<usize>> {
+    const LEAST_TRAVEL_M: f64 = 1e-3;
+    const LEAST_SHARE: f64 = 0.05;
+    let travel_m = (LEAST_SHARE * range(partner)).max(LEAST_TRAVEL_M);
+    runs(values, least)
+        .filter(|run| run.len() < values.len() && range(&partner[run.clone()]) > travel_m)
+        // The first of the repeated values was measured.
+        .map(|run| run.start + 1..run.end)
+        .collect()
+}
+
+/// Whether a load stood still for ten seconds in which the actuator travelled a fifth of its range.
+pub(crate) fn load_frozen(
+    load_n: &[f64],
+    motor_m: &[f64],
+    longest_run: usize,
+    step_s: f64,
+) -> Option<String> {
+    const LEAST_S: f64 = 10.0;
+    const LEAST_SHARE: f64 = 0.2;
+    let least = ((LEAST_S / step_s).ceil() as usize).max(2);
+    if longest_run < least {
+        return None;
+    }
+    let travel_m = LEAST_SHARE * range(motor_m);
+    let froze = |run: Range<usize>| run.len() < load_n.len() && range(&motor_m[run]) > travel_m;
+    runs(load_n, least).any(froze).then(|| format!("{}_frozen", Role::Load.as_str()))
+}
+
+/// Slope of one position on the other, by least squares about their means: 1 when both are mapped
+/// right, −1 when a sign is wrong, another number when a ratio is.
+///
+/// Nothing when the motor does not move.
+pub fn regression_slope(motor_m: &[f64], dx_m: &[f64]) -> Option<f64> {
+    let pairs = || motor_m.iter().zip(dx_m).filter(|(m, d)| !m.is_nan() && !d.is_nan());
+    let count = pairs().count() as f64;
+    let (motor_sum, dx_sum) = pairs().fold((0.0, 0.0), |(a, b), (m, d)| (a + m, b + d));
+    let (motor_mean, dx_mean) = (motor_sum / count, dx_sum / count);
+    let (mut mm, mut md) = (0.0, 0.0);
+    for (m, d) in pairs() {
+        mm += (m - motor_mean) * (m - motor_mean);
+        md += (m - motor_mean) * (d - dx_mean);
+    }
+    (mm > 0.0).then(|| 1.0 + md / mm)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Passing over samples in groups finds the runs at the rails that looking at each of them does.
+        #[test]
+        fn runs_at_the_rails_are_those_of_all_runs(ticks in proptest::collection::vec(-2_i32..3, 0..90)) {
+            let values: Vec<f64> =
+                ticks.iter().map(|&k| if k == 0 { f64::NAN } else { f64::from(k) }).collect();
+            let all = runs(&values, 2).filter(|run| values[run.start].abs() > 1.5);
+            prop_assert_eq!(repeat_runs_of(&values, [-2.0, 2.0], 2), all.collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn a_channel_is_described_as_a_hand_would() {
+        let q = Quality::of(&[1.0, 1.0, 1.0, f64::NAN, 1.5, 1.25, 3.0, 3.0], 0.01, 0);
+        assert!((q.missing_share - 0.125).abs() < 1e-15);
+        assert_eq!((q.min, q.max, q.resolution), (1.0, 3.0, Some(0.25)));
+        assert!((q.frozen_share - 3.0 / 8.0).abs() < 1e-15);
+        assert!(Quality::of(&[2.0; 9], 0.01, 0).is_constant());
+    }
+
+    #[test]
+    fn a_flipped_sign_and_a_wrong_ratio_show_in_the_slope() {
+        let motor: Vec<f64> = (0..100).map(|i| (f64::from(i) * 0.1).sin()).collect();
+        for ratio in [1.0, -1.0, 25.4] {
+            let dx: Vec<f64> = motor.iter().map(|m| (ratio - 1.0) * m + 0.01).collect();
+            assert!((regression_slope(&motor, &dx).unwrap() - ratio).abs() < 1e-12);
+        }
+        assert_eq!(regression_slope(&[0.0; 5], &[1.0; 5]), None);
+    }
+
+    /// Steps of 20 µm under a relative motion of 100 µm.
+    #[test]
+    fn a_position_in_steps_as_large_as_a_gap_is_coarse() {
+        let stepped: Vec<f64> = wave(0.03).iter().map(|v| (v / 2e-5).round() * 2e-5).collect();
+        let channels = [&wave(0.03), &stepped, &wave(8e3)].map(|values| Quality::of(values, 0.004, 0));
+        assert_eq!(coarse_resolution(&channels, range(&wave(5e-5))), ["screw_coarse"]);
+        assert!(coarse_resolution(&channels, range(&wave(5e-4))).is_empty());
+    }
+
+    fn wave(amplitude: f64) -> Vec<f64> {
+        (0..4000)
+            .map(|k| amplitude * (f64::from(k) * 0.01).sin() + 1e-8 * f64::from(k * 7919 % 101))
+            .collect()
+    }
+
+    #[test]
+    fn a_channel_cut_off_at_a_rail_is_told_from_one_that_rests() {
+        let cut: Vec<f64> = wave(1.0).iter().map(|v| v.clamp(-0.8, 0.8)).collect();
+        let whole = Quality::of(&wave(1.0), 0.01, 0);
+        assert!(Quality::of(&cut, 0.01, 0).saturated_share > 0.2);
+        assert!(whole.saturated_share == 0.0 && whole.spikes == 0, "{whole:?}");
+    }
+
+    #[test]
+    fn each_leap_away_and_back_is_one_spike() {
+        let mut values = wave(0.03);
+        for at in [500, 1500, 2500] {
+            values[at] += 2e-3;
+        }
+        assert_eq!(Quality::of(&values, 0.004, 0).spikes, 3);
+    }
+
+    /// The motor stands still for 1 s while the screw travels: that is a dead sensor. While the screw moves
+    /// within the gap, it is the gap.
+    #[test]
+    fn a_frozen_position_is_no_measurement() {
+        let (mut motor, mut screw) = (wave(0.03), wave(0.03));
+        let last = motor[999];
+        motor[1000..1250].fill(last);
+        let before = motor.clone();
+        assert_eq!(drop_frozen_samples(&mut motor, &mut screw, 251, 0.004), ["motor_frozen"]);
+        assert!(
+            motor[1000..1250].iter().all(|m| m.is_nan())
+                && motor[999].to_bits() == last.to_bits()
+                && motor[1250].to_bits() == before[1250].to_bits()
+        );
+        let mut resting = vec![0.01; 4000];
+        let mut within: Vec<f64> = wave(2e-4);
+        resting[0] = 0.0;
+        assert!(drop_frozen_samples(&mut resting, &mut within, 3999, 0.004).is_empty());
+    }
+}

@@ -1,0 +1,159 @@
+//! From a raw reading to SI at the screw axis: one straight line, and the turns that a resolver forgets.
+
+use multiversion::multiversion;
+
+use crate::error::ErrorKind;
+use crate::mapping::ChannelMapping;
+use crate::mapping::units::{Dimension, Unit};
+
+/// What brings a part's angles and torques to the screw axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Geometry {
+    /// A part that pushes: x = θ·lead/2π (the paper's X₁ = θ·r/2π).
+    Linear {
+        /// Metres for a turn; needed only when a channel is an angle or a torque.
+        lead_m_per_rev: Option<f64>,
+    },
+    /// A part that only turns: x = r·θ, F = T/r.
+    Rotary {
+        /// The radius at which the gap is stated, m.
+        reference_radius_m: f64,
+    },
+}
+
+impl Geometry {
+    /// Metres at the screw axis for a radian, where it is known.
+    pub fn metres_per_radian(self) -> Option<f64> {
+        match self {
+            Self::Linear { lead_m_per_rev } => lead_m_per_rev.map(|lead| lead / std::f64::consts::TAU),
+            Self::Rotary { reference_radius_m } => Some(reference_radius_m),
+        }
+    }
+}
+
+/// One straight line from raw to SI.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SiConversion {
+    scale: f64,
+    offset: f64,
+    factor: f64,
+    shift: f64,
+}
+
+impl SiConversion {
+    /// An infinite reading is no reading.
+    #[inline]
+    pub(crate) fn apply(self, raw: f64) -> f64 {
+        let value = (raw * self.scale + self.offset) * self.factor + self.shift;
+        if value.is_finite() { value } else { f64::NAN }
+    }
+
+    /// As [`SiConversion::apply`], in place.
+    pub(crate) fn apply_to_all(self, values: &mut [f64]) {
+        apply_to_all(self, values);
+    }
+}
+
+/// Vectors change no number: sums and products are not fused.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn apply_to_all(line: SiConversion, values: &mut [f64]) {
+    for value in values {
+        *value = line.apply(*value);
+    }
+}
+
+/// The line of a channel on a part.
+///
+/// # Errors
+/// [`ErrorKind::UnitForPart`] when the part cannot be brought to the screw from that unit.
+pub(crate) fn to_si(
+    column: &str,
+    map: &ChannelMapping,
+    geometry: Geometry,
+) -> Result<SiConversion, ErrorKind> {
+    let (unit_factor, shift) = map.unit.to_si();
+    let lever = lever(map.unit, geometry).map_err(|wanted| ErrorKind::UnitForPart {
+        column: column.to_owned(),
+        unit: map.unit.as_str(),
+        wanted,
+    })?;
+    let gear = match map.unit.dimension() {
+        Dimension::Torque => map.gear_ratio,
+        Dimension::Angle => map.gear_ratio.recip(),
+        _ => 1.0,
+    };
+    Ok(SiConversion {
+        scale: map.scale,
+        offset: map.offset,
+        factor: f64::from(map.sign) * unit_factor * lever * gear,
+        shift,
+    })
+}
+
+/// What brings the unit's dimension to the screw axis, or what would be wanted instead.
+fn lever(unit: Unit, geometry: Geometry) -> Result<f64, &'static str> {
+    let rotary = matches!(geometry, Geometry::Rotary { .. });
+    match unit.dimension() {
+        Dimension::Length if rotary => Err("an angle (deg, rad, rev): the part only turns"),
+        Dimension::Force if rotary => Err("a torque (N.m, lbf.in, lbf.ft): the part only turns"),
+        Dimension::Length | Dimension::Force | Dimension::Temperature => Ok(1.0),
+        Dimension::Angle => geometry.metres_per_radian().ok_or("a length, or the part's `lead_m_per_rev`"),
+        Dimension::Torque => {
+            geometry.metres_per_radian().map(f64::recip).ok_or("a force, or the part's `lead_m_per_rev`")
+        }
+    }
+}
+
+/// Adds or takes turns so that no step exceeds half a turn; missing and infinite samples are passed over.
+pub(crate) fn unwrap_turns(values: &mut [f64], turn: f64) {
+    let (mut turns, mut before) = (0.0, f64::NAN);
+    for value in values.iter_mut().filter(|v| v.is_finite()) {
+        let raw = *value;
+        if !f64::is_nan(before) {
+            turns -= ((raw - before) / turn).round();
+        }
+        before = raw;
+        *value = raw + turns * turn;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// By hand: a 5 mm lead turns 0.1 N·m into 0.1·2π/0.005 = 125.66 N, and 90° into 1.25 mm.
+    #[test]
+    fn angles_and_torques_come_to_the_screw_by_the_lead() {
+        let geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
+        let angle = ChannelMapping { unit: Unit::Degree, ..ChannelMapping::default() };
+        let torque = ChannelMapping { unit: Unit::NewtonMetre, sign: -1, ..ChannelMapping::default() };
+        assert!((to_si("a", &angle, geometry).unwrap().apply(90.0) - 0.00125).abs() < 1e-15);
+        assert!((to_si("t", &torque, geometry).unwrap().apply(0.1) + 125.663_706_143_591_7).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_length_on_a_part_that_only_turns_is_refused() {
+        let fault =
+            to_si("x", &ChannelMapping::default(), Geometry::Rotary { reference_radius_m: 0.1 }).unwrap_err();
+        assert!(matches!(fault, ErrorKind::UnitForPart { unit: "m", .. }));
+    }
+
+    proptest! {
+        /// Wrapping loses only whole turns, and a resolver never moves half a turn in a sample.
+        #[test]
+        fn an_unwrapped_resolver_differs_from_the_truth_by_whole_turns(
+            steps in proptest::collection::vec(-170.0_f64..170.0, 1..200), start in 0.0_f64..360.0,
+        ) {
+            let truth: Vec<f64> = steps.iter().scan(start, |x, s| { *x += s; Some(*x) }).collect();
+            let mut values: Vec<f64> = truth.iter().map(|x| x.rem_euclid(360.0)).collect();
+            unwrap_turns(&mut values, 360.0);
+            let offset = values[0] - truth[0];
+            prop_assert!((offset / 360.0 - (offset / 360.0).round()).abs() < 1e-9);
+            for (v, t) in values.iter().zip(&truth) {
+                prop_assert!((v - t - offset).abs() < 1e-7);
+            }
+        }
+    }
+}

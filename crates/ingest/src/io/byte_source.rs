@@ -1,0 +1,51 @@
+//! Where the bytes of a file come from: this machine, or an object store.
+//!
+//! An object is a temporary file too, into which the ranges are copied that were asked for: everything that
+//! reads files reads it the same way, once its bytes are [wanted](ByteSource::want).
+
+use std::fs::File;
+use std::ops::Range;
+use std::path::Path;
+
+use object_io::{Address, ObjectFile};
+
+use crate::error::ErrorKind;
+
+/// An open file or object.
+#[derive(Debug)]
+pub(crate) enum ByteSource {
+    Local(File),
+    Object(Box<ObjectFile>),
+}
+
+impl ByteSource {
+    pub(crate) fn open(path: &Path) -> Result<Self, ErrorKind> {
+        match Address::parse(path)? {
+            Some(address) => Ok(Self::Object(Box::new(ObjectFile::open(&address)?))),
+            None => Ok(Self::Local(File::open(path).map_err(|source| ErrorKind::Unreadable { source })?)),
+        }
+    }
+
+    pub(crate) fn file(&self) -> &File {
+        match self {
+            Self::Local(file) => file,
+            Self::Object(spool) => spool.file(),
+        }
+    }
+
+    /// Has these bytes at hand: a local file has them all.
+    pub(crate) fn want(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> Result<(), ErrorKind> {
+        match self {
+            Self::Local(_) => Ok(()),
+            Self::Object(spool) => Ok(spool.ensure_range(ranges)?),
+        }
+    }
+}
+
+/// A whole file, at its beginning: for tables, all of which is read.
+pub(crate) fn whole(path: &Path) -> Result<File, ErrorKind> {
+    if object_io::is_address(path) {
+        return Ok(object_io::read_all(path)?);
+    }
+    File::open(path).map_err(|source| ErrorKind::Unreadable { source })
+}

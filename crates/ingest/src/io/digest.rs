@@ -1,0 +1,77 @@
+//! blake3 of stretches of files.
+
+use std::fs::File;
+use std::io;
+use std::ops::Range;
+
+use crate::io::read_at;
+
+/// As much as stays in the cache between reading and hashing.
+const BUFFER_BYTES: usize = 1 << 17;
+
+/// A digest that stretches are added to, one after the other as if they were one.
+///
+/// Wherever stretches end, the hash is fed with full buffers: it takes sixteen pieces of 1 KiB side by side, but only
+/// from places in the stream that are multiples of them.
+#[derive(Debug)]
+pub(crate) struct Digest {
+    hash: blake3::Hasher,
+    buffer: Vec<u8>,
+    filled: usize,
+}
+
+impl Digest {
+    pub(crate) fn new() -> Self {
+        Self { hash: blake3::Hasher::new(), buffer: vec![0; BUFFER_BYTES], filled: 0 }
+    }
+
+    /// Adds a stretch of a file; an empty one adds nothing.
+    ///
+    /// # Errors
+    /// When it cannot be read, or the file ends before.
+    pub(crate) fn take(&mut self, file: &File, stretch: Range<u64>) -> io::Result<()> {
+        let (mut at, mut left) = (stretch.start, stretch.end.saturating_sub(stretch.start));
+        while left > 0 {
+            let free = &mut self.buffer[self.filled..];
+            let bytes = usize::try_from(left).map_or(free.len(), |left| left.min(free.len()));
+            read_at::read_exact(file, &mut free[..bytes], at)?;
+            self.filled += bytes;
+            (at, left) = (at + bytes as u64, left - bytes as u64);
+            if self.filled == self.buffer.len() {
+                self.hash.update(&self.buffer);
+                self.filled = 0;
+            }
+        }
+        Ok(())
+    }
+
+    /// In hexadecimal.
+    pub(crate) fn end(mut self) -> String {
+        self.hash.update(&self.buffer[..self.filled]);
+        self.hash.finalize().to_hex().to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    /// However the stretches lie, their digest is that of their bytes in a row.
+    #[test]
+    fn stretches_are_one_stream() {
+        let bytes: Vec<u8> = (0..5 * BUFFER_BYTES as u64).map(|k| (k * k % 251) as u8).collect();
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(&bytes).unwrap();
+        let ends = [0, 1, 1, 3000, 140_000, 2 * BUFFER_BYTES + 140_000, 5 * BUFFER_BYTES];
+        let (mut digest, mut all) = (Digest::new(), Vec::new());
+        for pair in ends.windows(2).rev() {
+            digest.take(&file, pair[0] as u64..pair[1] as u64).unwrap();
+            all.extend_from_slice(&bytes[pair[0]..pair[1]]);
+        }
+        assert_eq!(digest.end(), blake3::hash(&all).to_hex().to_string());
+        let beyond = bytes.len() as u64;
+        assert!(Digest::new().take(&file, beyond - 1..beyond + 1).is_err());
+    }
+}

@@ -1,0 +1,5 @@
+//! Bytes of local files and objects: where they come from, positional reads, digests.
+
+pub(crate) mod byte_source;
+pub(crate) mod digest;
+pub(crate) mod read_at;

@@ -1,0 +1,118 @@
+//! Reading at a position: workers that share a file share no cursor.
+//!
+//! Copies of a `File` have one cursor between them, and Parquet's own reader of files moves it: two actuators
+//! of one log, read at a time, would get each other's bytes.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read};
+
+use bytes::Bytes;
+use parquet::errors::Result;
+use parquet::file::reader::{ChunkReader, Length};
+
+/// A file for Parquet's readers.
+#[derive(Debug)]
+pub(crate) struct PreadFile(pub(crate) File);
+
+/// A stretch of a file from some byte on.
+#[derive(Debug)]
+pub(crate) struct PreadCursor {
+    file: File,
+    at: u64,
+}
+
+impl Read for PreadCursor {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = read_at(&self.file, buffer, self.at)?;
+        self.at += count as u64;
+        Ok(count)
+    }
+}
+
+impl Length for PreadFile {
+    fn len(&self) -> u64 {
+        self.0.len()
+    }
+}
+
+impl ChunkReader for PreadFile {
+    type T = BufReader<PreadCursor>;
+
+    fn get_read(&self, start: u64) -> Result<Self::T> {
+        Ok(BufReader::new(PreadCursor { file: self.0.try_clone()?, at: start }))
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {
+        let mut buffer = vec![0; length];
+        read_exact(&self.0, &mut buffer, start)?;
+        Ok(buffer.into())
+    }
+}
+
+/// Fills the buffer from some byte on.
+///
+/// # Errors
+/// When the file ends before, or cannot be read.
+pub(crate) fn read_exact(file: &File, mut buffer: &mut [u8], mut at: u64) -> io::Result<()> {
+    while !buffer.is_empty() {
+        match read_at(file, buffer, at) {
+            Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+            Ok(count) => {
+                buffer = &mut buffer[count..];
+                at += count as u64;
+            }
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(())
+}
+
+#[cfg(unix)]
+pub(crate) fn read_at(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
+    std::os::unix::fs::FileExt::read_at(file, buffer, at)
+}
+
+#[cfg(windows)]
+pub(crate) fn read_at(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
+    std::os::windows::fs::FileExt::seek_read(file, buffer, at)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    /// Each byte says where it stands; eight readers of one file jump about in it.
+    #[test]
+    fn readers_of_one_file_do_not_move_each_other() {
+        let mut file = tempfile::tempfile().unwrap();
+        let content: Vec<u8> = (0..251_u8).cycle().take(100_000).collect();
+        file.write_all(&content).unwrap();
+        let file = PreadFile(file);
+        std::thread::scope(|scope| {
+            for reader in 0..8_usize {
+                let (file, content) = (&file, &content);
+                scope.spawn(move || {
+                    for step in 0..500_usize {
+                        let start = (reader * 7_919 + step * 104_729) % 99_000;
+                        let bytes = file.get_bytes(start as u64, 900).unwrap();
+                        assert_eq!(bytes.as_ref(), &content[start..start + 900]);
+                        let mut some = [0; 90];
+                        file.get_read(start as u64).unwrap().read_exact(&mut some).unwrap();
+                        assert_eq!(some, content[start..start + 90]);
+                    }
+                });
+            }
+        });
+    }
+
+    #[test]
+    fn a_file_that_ends_early_is_an_error() {
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(b"short").unwrap();
+        let ended = read_exact(&file, &mut [0; 4], 3).unwrap_err();
+        assert_eq!(ended.kind(), io::ErrorKind::UnexpectedEof);
+    }
+}

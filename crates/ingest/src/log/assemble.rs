@@ -1,0 +1,89 @@
+//! An actuator's channels from the raw ones: quality, frozen samples, relative position, held load.
+
+use records::Position;
+
+use crate::channel::quality::{self, Quality};
+use crate::channel::stats::{ChannelStats, MinMax};
+use crate::log::channel_reader::Channel;
+use crate::log::selection::SampleSelection;
+use crate::log::types::ActuatorChannels;
+use crate::time::clock::TimeBase;
+use crate::time::zero_order_hold::{non_empty_segments, zero_order_hold};
+
+/// Channels as read, on one clock.
+pub(crate) struct RawChannels {
+    pub(crate) motor: Channel,
+    pub(crate) screw: Channel,
+    pub(crate) load: Channel,
+    pub(crate) is_relative: bool,
+    pub(crate) selection: SampleSelection,
+}
+
+/// Looks at the channels, leaves out what a frozen one claims, and makes δX.
+pub(crate) fn assemble(
+    position: Position,
+    read: RawChannels,
+    line: &TimeBase,
+    temperature_c: Option<f64>,
+    mut flags: Vec<String>,
+) -> ActuatorChannels {
+    let RawChannels { motor, screw, load, is_relative, selection } = read;
+    let SampleSelection { segments, apart, .. } = selection;
+    let quality = [&motor, &screw, &load].map(|read| {
+        let seen = read.seen.unwrap_or_else(|| ChannelStats::of(&read.values));
+        Quality::seen(&read.values, &seen, line.step_s, apart)
+    });
+    let (mut motor_m, mut dx_m, mut load_n) = (motor.values, screw.values, load.values);
+    flags.extend(quality::quality_flags(&quality, line.step_s));
+    if !is_relative {
+        let longest = quality[0].longest_run.max(quality[1].longest_run);
+        flags.extend(quality::drop_frozen_samples(&mut motor_m, &mut dx_m, longest, line.step_s));
+    }
+    let (travel_m, missing) = relative(&motor_m, &mut dx_m, is_relative);
+    flags.extend(quality::coarse_resolution(&quality, travel_m));
+    flags.extend(quality::load_frozen(&load_n, &motor_m, quality[2].longest_run, line.step_s));
+    let is_whole = quality[2].missing_share == 0.0;
+    let segments = if is_whole {
+        non_empty_segments(&segments)
+    } else {
+        zero_order_hold(&mut load_n, &segments, line.step_s)
+    };
+    ActuatorChannels {
+        position,
+        step_s: line.step_s,
+        missing_share: (missing - apart) as f64 / (dx_m.len() - apart).max(1) as f64,
+        apart,
+        motor_m,
+        dx_m,
+        load_n,
+        segments,
+        temperature_c,
+        quality,
+        flags,
+        repairs: line.repairs,
+    }
+}
+
+/// Makes δX of the screw's position, or leaves it where it is one already; NaN where the motor's is missing. Returns its
+/// travel, m, and how many samples are missing.
+fn relative(motor_m: &[f64], screw_m: &mut [f64], is_relative: bool) -> (f64, usize) {
+    const BATCH: usize = 4096;
+    let (mut span, mut missing) = (MinMax::NONE, 0);
+    for (screw_m, motor_m) in screw_m.chunks_mut(BATCH).zip(motor_m.chunks(BATCH)) {
+        let pairs = screw_m.iter_mut().zip(motor_m);
+        if is_relative {
+            pairs.filter(|(_, motor)| motor.is_nan()).for_each(|(dx, _)| *dx = f64::NAN);
+        } else {
+            pairs.for_each(|(screw, motor)| *screw -= motor);
+        }
+        span.take(screw_m);
+        missing += screw_m.iter().filter(|dx| dx.is_nan()).count();
+    }
+    (span.length(), missing)
+}
+
+/// Mean of the values that are not missing.
+pub(crate) fn mean(values: &[f64]) -> Option<f64> {
+    let (sum, count) = values.iter().filter(|v| !v.is_nan()).fold((0.0, 0_u64), |(s, n), v| (s + v, n + 1));
+    (count > 0).then(|| sum / count as f64)
+}

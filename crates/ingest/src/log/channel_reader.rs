@@ -1,0 +1,325 @@
+//! One channel: from raw readings on its own clock to SI at the instants of the motor position.
+//!
+//! The motor position leads. A channel of the same rows and the same instants passes untouched; any
+//! other is brought to the motor's instants by [`crate::time::resample`].
+
+use std::borrow::Cow;
+
+use crate::channel::buffer_pool;
+use crate::channel::si_conversion::{Geometry, to_si, unwrap_turns};
+use crate::channel::stats::ChannelStats;
+use crate::error::{Error, ErrorKind};
+use crate::log::row_table::{RowTable, SampleSelector};
+use crate::mapping::column_pattern::ColumnPattern;
+use crate::mapping::{ChannelMapping, ClockMapping, Role};
+use crate::parquet::row_selection::RowSelection;
+use crate::time::clock::{self, BREAK_STEPS, TimeBase, Timestamps};
+use crate::time::resample::{Interpolation, TimeSeries, decimated_rows, interpolate_at};
+
+/// The least share of samples that a redundant channel must hold to be called alive.
+const ALIVE_SHARE: f64 = 0.5;
+
+/// Whether a channel can serve: at least half of its samples are there, but for so many that are not asked for, and it
+/// moves.
+pub(crate) fn lives(values: &[f64], apart: usize) -> bool {
+    let needed = (ALIVE_SHARE * (values.len() - apart) as f64).ceil() as usize;
+    let present = || values.iter().copied().filter(|v| v.is_finite());
+    let first = present().next();
+    present().take(needed).count() == needed && present().any(|v| Some(v) != first)
+}
+
+/// A channel in SI, and what was seen of it while it was read, where it is still as it was then.
+#[derive(Debug)]
+pub(crate) struct Channel {
+    pub(crate) values: Vec<f64>,
+    pub(crate) seen: Option<ChannelStats>,
+}
+
+impl From<Vec<f64>> for Channel {
+    fn from(values: Vec<f64>) -> Self {
+        Self { values, seen: None }
+    }
+}
+
+/// What the clock of a channel depends on: channels of one sheet that agree in it share one.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct TimeBaseKey {
+    listed_leaf: Option<String>,
+    rows: Vec<(String, String)>,
+    time_column: Option<String>,
+    shift_s: f64,
+    rate_hz: Option<f64>,
+}
+
+/// How the samples of a channel lie in time.
+#[derive(Debug)]
+pub(crate) struct ChannelSampling<'s> {
+    sheet: &'s RowTable,
+    samples: SampleSelector,
+    time_column: Option<String>,
+    valid: Option<SampleSelector>,
+    shift_s: f64,
+    /// Rows between samples where the channel is slower than its rows; else 1.
+    every: usize,
+    /// Its rows on one clock.
+    pub(crate) line: TimeBase,
+}
+
+impl<'s> ChannelSampling<'s> {
+    /// Puts the rows of a channel on one clock.
+    ///
+    /// # Errors
+    /// When there is no clock, or it cannot be mended.
+    pub(crate) fn new(
+        sheet: &'s RowTable,
+        map: &ChannelMapping,
+        name: &str,
+        position: &str,
+    ) -> Result<Self, Error> {
+        let mut sampling = Self::unread(sheet, map, name, position);
+        sampling.line = sampling.line_of(map)?;
+        sampling.every = sampling.rows_between(map);
+        Ok(sampling)
+    }
+
+    fn unread(sheet: &'s RowTable, map: &ChannelMapping, name: &str, position: &str) -> Self {
+        let named = |column: &String| ColumnPattern::new(column).column_for(position);
+        Self {
+            sheet,
+            samples: sheet.samples(name, position),
+            time_column: map.time_column.as_ref().map(named),
+            valid: map.valid_column.as_ref().map(|column| sheet.samples(&named(column), position)),
+            shift_s: map.shift_s(),
+            every: 1,
+            line: clock::uniform(0, 1.0),
+        }
+    }
+
+    /// What its clock depends on, within its sheet.
+    pub(crate) fn clock_key(&self, map: &ChannelMapping) -> TimeBaseKey {
+        let SampleSelector { leaf, rows } = &self.samples;
+        TimeBaseKey {
+            listed_leaf: self.sheet.is_listed(leaf).then(|| leaf.clone()),
+            rows: rows.clone(),
+            time_column: self.time_column.clone(),
+            shift_s: self.shift_s,
+            rate_hz: map.rate_hz,
+        }
+    }
+
+    /// Whether the pages of its column hold the rows that are declared, where a row is a sample.
+    pub(crate) fn check_rows(&self) -> Result<(), Error> {
+        if self.samples.rows.is_empty() { self.sheet.check_pages(&self.samples.leaf) } else { Ok(()) }
+    }
+
+    /// The column of the channel.
+    pub(crate) fn column(&self) -> &str {
+        self.samples.rows.first().map_or(&self.samples.leaf, |(_, name)| name)
+    }
+
+    /// Whether its rows are those of another channel.
+    fn shares_rows(&self, other: &Self) -> bool {
+        std::ptr::eq(self.sheet, other.sheet)
+            && self.samples.rows == other.samples.rows
+            && self.time_column == other.time_column
+    }
+
+    fn is_apart(&self) -> bool {
+        self.time_column.is_some() || self.sheet.layout.name_column.is_some()
+    }
+
+    /// A channel that stands in rows of its own has a rate of its own.
+    fn clock(&self, map: &ChannelMapping) -> Cow<'s, ClockMapping> {
+        if !self.is_apart() || self.sheet.clock.rate_hz == map.rate_hz {
+            return Cow::Borrowed(&self.sheet.clock);
+        }
+        let shared = if self.time_column.is_some() { None } else { self.sheet.clock.rate_hz };
+        Cow::Owned(ClockMapping { rate_hz: map.rate_hz.or(shared), ..self.sheet.clock.clone() })
+    }
+
+    /// The clock of its rows; that of a sheet's own rows is read once for all its channels.
+    fn line_of(&self, map: &ChannelMapping) -> Result<TimeBase, Error> {
+        let of_sheet = self.time_column.is_none()
+            && self.samples.rows.is_empty()
+            && matches!(self.clock(map), Cow::Borrowed(_))
+            && !self.sheet.is_listed(&self.samples.leaf);
+        if !of_sheet {
+            return Ok(self.read_line(map)?.1);
+        }
+        if let Some(known) = self.sheet.line.get() {
+            return Ok(known.clone());
+        }
+        let (stamps, line) = self.read_line(map)?;
+        buffer_pool::release(stamps.map(|stamps| stamps.seconds).unwrap_or_default());
+        Ok(self.sheet.line.get_or_init(|| line).clone())
+    }
+
+    fn read_line(&self, map: &ChannelMapping) -> Result<(Option<Timestamps>, TimeBase), Error> {
+        let clock = self.clock(map);
+        if let (None, None, Some(rate_hz), true) =
+            (&clock.column, &self.time_column, clock.rate_hz, self.samples.rows.is_empty())
+        {
+            let rows = self.sheet.count(&self.samples)?;
+            return Ok((None, clock::uniform(rows, rate_hz)));
+        }
+        let mut stamps = self.sheet.stamps(&self.samples, self.time_column.as_deref())?;
+        let line = clock::build_time_base(&mut stamps, &clock).map_err(|f| self.sheet.error(f))?;
+        Ok((Some(stamps), line))
+    }
+
+    fn rows_between(&self, map: &ChannelMapping) -> usize {
+        match map.rate_hz {
+            Some(rate_hz) if !self.is_apart() => {
+                ((self.line.step_s * rate_hz).recip().round() as usize).max(1)
+            }
+            _ => 1,
+        }
+    }
+
+    /// The stamps of the rows that count, and their instants, shifted to when the channel was true.
+    fn instants(&self, map: &ChannelMapping) -> Result<(Timestamps, Vec<f64>), Error> {
+        let (stamps, line) = self.read_line(map)?;
+        let stamps = stamps.unwrap_or_else(|| Timestamps::uniform(line.rows, line.step_s.recip()));
+        let mut instants = stamps.of(&self.line);
+        instants.iter_mut().for_each(|t| *t += self.shift_s);
+        Ok((Timestamps { seconds: Vec::new(), ..stamps }, instants))
+    }
+
+    /// The channel in SI at its own rows; those that are not wanted may be missing.
+    fn readings(
+        &self,
+        map: &ChannelMapping,
+        geometry: Geometry,
+        wanted: RowSelection<'_>,
+    ) -> Result<Channel, Error> {
+        let si = to_si(self.column(), map, geometry).map_err(|f| self.sheet.error(f))?;
+        let kept = |values: Vec<f64>| match &self.line.kept {
+            Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
+            None => values,
+        };
+        let is_mended = !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
+        if !is_mended {
+            // Rows that were put in order are not those of the file.
+            let wanted = if self.line.kept.is_none() { wanted } else { RowSelection::ALL };
+            let (values, seen) = self.sheet.numbers(&self.samples, Some(si), wanted)?;
+            self.same_count(values.len(), self.column())?;
+            let seen = seen.filter(|_| self.line.kept.is_none());
+            return Ok(Channel { values: kept(values), seen });
+        }
+        let read = self.raw(&self.samples)?;
+        self.same_count(read.len(), self.column())?;
+        let mut values = kept(read);
+        if !map.missing.is_empty() {
+            values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
+        }
+        if let Some(valid) = &self.valid {
+            let marks = self.raw(valid)?;
+            self.same_count(marks.len(), &valid.leaf)?;
+            let bad = |mark: &f64| !map.valid_values.contains(mark);
+            values.iter_mut().zip(kept(marks)).filter(|(_, m)| bad(m)).for_each(|(v, _)| *v = f64::NAN);
+        }
+        if let Some(turn) = map.wraps_at {
+            unwrap_turns(&mut values, turn);
+        }
+        si.apply_to_all(&mut values);
+        Ok(values.into())
+    }
+
+    fn raw(&self, samples: &SampleSelector) -> Result<Vec<f64>, Error> {
+        self.sheet.numbers(samples, None, RowSelection::ALL).map(|(values, _)| values)
+    }
+
+    fn same_count(&self, found: usize, column: &str) -> Result<(), Error> {
+        if found == self.line.rows {
+            return Ok(());
+        }
+        let (column, found, declared) = (column.to_owned(), found as u64, self.line.rows as u64);
+        Err(self.sheet.error(ErrorKind::RowCount { column, found, declared }))
+    }
+
+    /// The channel in SI at every row of its own that counts; those that are not wanted may be missing.
+    ///
+    /// # Errors
+    /// When a column is missing, holds no numbers, cannot be decoded or is in an impossible unit.
+    pub(crate) fn own(
+        &self,
+        map: &ChannelMapping,
+        geometry: Geometry,
+        wanted: RowSelection<'_>,
+    ) -> Result<Channel, Error> {
+        if self.every == 1 {
+            return self.readings(map, geometry, wanted);
+        }
+        let read = self.readings(map, geometry, RowSelection::ALL)?;
+        let (_, instants) = self.instants(map)?;
+        let (at_s, values) = thinned(&instants, &read.values, self.every);
+        let step_s = self.line.step_s * self.every as f64;
+        Ok(interpolate_at(
+            TimeSeries { at_s: &at_s, values: &values, step_s },
+            &instants,
+            Interpolation::Line,
+        )
+        .into())
+    }
+}
+
+fn thinned(instants: &[f64], values: &[f64], every: usize) -> (Vec<f64>, Vec<f64>) {
+    decimated_rows(values, every).into_iter().map(|i| (instants[i as usize], values[i as usize])).unzip()
+}
+
+/// The channel of an actuator that is to be brought to the motor's clock.
+pub(crate) struct FollowerChannel<'s, 'c> {
+    /// Its files.
+    pub(crate) sheet: &'s RowTable,
+    /// How it is read.
+    pub(crate) map: &'c ChannelMapping,
+    /// What it is called there.
+    pub(crate) name: &'c str,
+    /// Whose it is.
+    pub(crate) position: &'c str,
+    /// What it measures.
+    pub(crate) role: Role,
+}
+
+/// Reads a channel in SI at the instants of the motor position; those that are not wanted may be missing.
+///
+/// # Errors
+/// As [`ChannelSampling::own`]; [`ErrorKind::ClocksDiffer`] when its clock and the motor's share no zero.
+pub(crate) fn follow(
+    master: &ChannelSampling<'_>,
+    motor: &ChannelMapping,
+    channel: &FollowerChannel<'_, '_>,
+    geometry: Geometry,
+    wanted: RowSelection<'_>,
+) -> Result<Channel, Error> {
+    let &FollowerChannel { sheet, map, name, position, role } = channel;
+    let mut own = ChannelSampling::unread(sheet, map, name, position);
+    let shared = own.shares_rows(master);
+    own.line = if shared { master.line.clone() } else { own.line_of(map)? };
+    own.every = own.rows_between(map);
+    let is_slow_load = role == Role::Load && own.every > 1;
+    if shared && same_instants(own.shift_s, master.shift_s) && (own.every == 1 || is_slow_load) {
+        return own.readings(map, geometry, wanted);
+    }
+    let Channel { values, .. } = own.readings(map, geometry, RowSelection::ALL)?;
+    let (stamps, at_s) = own.instants(map)?;
+    let (at_s, values) = if own.every == 1 { (at_s, values) } else { thinned(&at_s, &values, own.every) };
+    let (lead, mut instants) = master.instants(motor)?;
+    let apart_s = lead.origin.since(stamps.origin).ok_or_else(|| {
+        sheet.error(ErrorKind::ClocksDiffer { column: stamps.column.clone(), other: lead.column.clone() })
+    })?;
+    instants.iter_mut().for_each(|t| *t += apart_s);
+    let step_s = own.line.step_s * own.every as f64;
+    let is_slow = step_s > BREAK_STEPS * master.line.step_s;
+    let between = if role == Role::Load && is_slow { Interpolation::First } else { Interpolation::Line };
+    Ok(interpolate_at(TimeSeries { at_s: &at_s, values: &values, step_s }, &instants, between).into())
+}
+
+/// A nanosecond is no shift.
+fn same_instants(a_s: f64, b_s: f64) -> bool {
+    (a_s - b_s).abs() < 1e-9
+}
+
+pub(crate) fn duration(seconds: f64) -> jiff::SignedDuration {
+    jiff::SignedDuration::try_from_secs_f64(seconds).unwrap_or_default()
+}

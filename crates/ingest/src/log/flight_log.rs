@@ -1,0 +1,590 @@
+//! One flight log: its identity, its actuators, and their channels in SI on one clock.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use jiff::Timestamp;
+use records::Position;
+
+use crate::channel::si_conversion::Geometry;
+use crate::error::{Error, ErrorKind};
+use crate::io::digest::Digest;
+use crate::log::assemble::{RawChannels, assemble, mean};
+use crate::log::channel_reader::{self, Channel, ChannelSampling, FollowerChannel, TimeBaseKey};
+use crate::log::identity::{self, Identity, IdentityFields};
+use crate::log::normalized::Normalized;
+use crate::log::row_table::{RowTable, SampleSelector};
+use crate::log::selection::SampleSelection;
+use crate::log::types::{ActuatorChannels, ActuatorColumns, LogFiles};
+use crate::mapping::column_pattern::ColumnPattern;
+use crate::mapping::{ChannelMapping, Channels, IdentityField, Mapping, Role, SampleFilter};
+use crate::parquet::log_file::LogFile;
+use crate::parquet::row_selection::RowSelection;
+use crate::time::clock::TimeOrigin;
+use crate::time::zero_order_hold::zero_order_hold;
+
+/// An open log.
+#[derive(Debug)]
+pub struct Log {
+    main: RowTable,
+    groups: BTreeMap<String, RowTable>,
+    mapping: Arc<Mapping>,
+    normalized: Option<Normalized>,
+    names: OnceLock<BTreeSet<String>>,
+    /// What the conditions left of the actuator before: most ask the same of every one.
+    selected: Mutex<Option<(SelectionKey, SampleSelection)>>,
+}
+
+/// Conditions, which samples and stamps of this log they were asked of, and the clock they were asked on.
+#[derive(Debug, PartialEq)]
+struct SelectionKey {
+    when: Vec<SampleFilter>,
+    of: Vec<(SampleSelector, Option<String>)>,
+    group: Option<String>,
+    clock: TimeBaseKey,
+}
+
+impl Log {
+    /// Opens the files of a log and reads their footers.
+    ///
+    /// # Errors
+    /// When a file cannot be read, is empty, or is not whole Parquet.
+    pub fn open(files: &LogFiles, mapping: &Arc<Mapping>) -> Result<Self, Error> {
+        let open = |paths: &[PathBuf]| paths.iter().map(|p| LogFile::open(p)).collect::<Result<Vec<_>, _>>();
+        let (clock, layout) = (mapping.clock.clone(), mapping.layout.clone());
+        let main = RowTable::new(open(&files.main)?, clock, layout);
+        let mut groups = BTreeMap::new();
+        for (name, group) in &mapping.groups {
+            let paths = files.groups.get(name).map(Vec::as_slice).unwrap_or_default();
+            if !paths.is_empty() {
+                let clock = group.clock.as_ref().unwrap_or(&mapping.clock).clone();
+                groups.insert(name.clone(), RowTable::new(open(paths)?, clock, group.layout.clone()));
+            }
+        }
+        let Some(first) = main.files.first() else {
+            let source = std::io::Error::from(std::io::ErrorKind::NotFound);
+            return Err(Error::new(Path::new(""), ErrorKind::Unreadable { source }));
+        };
+        let normalized = Normalized::of(first)?;
+        let mapping = Arc::clone(mapping);
+        let (names, selected) = (OnceLock::new(), Mutex::new(None));
+        let mut log = Self { main, groups, mapping, normalized, names, selected };
+        log.order_pieces()?;
+        Ok(log)
+    }
+
+    /// The same open files, read by another mapping of the same kinds of files.
+    #[must_use]
+    pub fn with_mapping(mut self, mapping: &Arc<Mapping>) -> Self {
+        self.main.remap(&mapping.clock, &mapping.layout);
+        for (name, sheet) in &mut self.groups {
+            if let Some(group) = mapping.groups.get(name) {
+                sheet.remap(group.clock.as_ref().unwrap_or(&mapping.clock), &group.layout);
+            }
+        }
+        self.mapping = Arc::clone(mapping);
+        (self.names, self.selected) = (OnceLock::new(), Mutex::new(None));
+        self
+    }
+
+    /// Pieces of a flight follow each other in time, whatever their files are called.
+    fn order_pieces(&mut self) -> Result<(), Error> {
+        for sheet in std::iter::once(&mut self.main).chain(self.groups.values_mut()) {
+            let Some(column) = sheet.clock.column.clone() else { continue };
+            if sheet.files.len() < 2 {
+                continue;
+            }
+            let mut starts = Vec::with_capacity(sheet.files.len());
+            for file in std::mem::take(&mut sheet.files) {
+                let (clock, layout) = (sheet.clock.clone(), sheet.layout.clone());
+                let alone = RowTable::new(vec![file], clock, layout);
+                let samples = SampleSelector { leaf: column.clone(), rows: Vec::new() };
+                let stamps = alone.stamps(&samples, None)?;
+                starts.push((stamps.origin, alone.files));
+            }
+            let first = starts[0].0;
+            let since = |origin: &TimeOrigin| origin.since(first).unwrap_or(0.0);
+            starts.sort_by(|a, b| since(&a.0).total_cmp(&since(&b.0)));
+            sheet.files = starts.into_iter().flat_map(|(_, files)| files).collect();
+        }
+        Ok(())
+    }
+
+    /// Rows the footers of the main log declare.
+    pub fn rows(&self) -> usize {
+        self.main.rows()
+    }
+
+    /// Whether this is a log that Freeplay itself wrote with `normalize`.
+    pub fn is_normalized(&self) -> bool {
+        self.normalized.is_some()
+    }
+
+    /// Names and types of all columns, for `check`.
+    pub fn column_types(&self) -> Vec<(String, String)> {
+        let leaves = self.main.files.iter().flat_map(LogFile::leaves);
+        leaves.map(|leaf| (leaf.name.clone(), leaf.kind.to_string())).collect()
+    }
+
+    /// Whether every page of the columns of these actuators carries a checksum.
+    ///
+    /// # Errors
+    /// When a page header cannot be.
+    pub fn has_page_checksums(&self, used: &[(&Channels, &ActuatorColumns)]) -> Result<bool, Error> {
+        for (sheet, leaves) in self.leaves(used) {
+            for file in &sheet.files {
+                let names: Vec<&str> = leaves.iter().map(String::as_str).filter(|l| file.has(l)).collect();
+                if !file.has_page_checksums(&names)? {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// Which flight this is; `known` fills what the log itself leaves open.
+    ///
+    /// # Errors
+    /// When tail or departure stand nowhere, cannot be read, or change within the log.
+    pub fn identity(&self, known: impl Fn(&IdentityFields) -> IdentityFields) -> Result<Identity, Error> {
+        if let Some(normalized) = &self.normalized {
+            let own = crate::mapping::IdentityMapping::default();
+            return identity::read(&normalized.facts, &own, None).map_err(|f| self.main.error(f));
+        }
+        let mut facts = facts(&self.main, &self.mapping.identity)?;
+        for (fact, text) in known(&facts) {
+            facts.entry(fact).or_insert(text);
+        }
+        let start = if facts.contains_key(&IdentityField::DepartureUtc) { None } else { self.start_utc()? };
+        identity::read(&facts, &self.mapping.identity, start).map_err(|f| self.main.error(f))
+    }
+
+    /// The first instant of an absolute clock.
+    ///
+    /// # Errors
+    /// When the time column cannot be read.
+    pub fn start_utc(&self) -> Result<Option<Timestamp>, Error> {
+        let Some(column) = &self.main.clock.column else { return Ok(None) };
+        if !self.main.files[0].has(column) {
+            return Ok(None);
+        }
+        let every_row = SampleSelector { leaf: column.clone(), rows: Vec::new() };
+        let stamps = self.main.stamps(&every_row, None)?;
+        let earliest = stamps.seconds.iter().copied().filter(|s| !s.is_nan()).fold(f64::INFINITY, f64::min);
+        let later = |start: Timestamp| start.checked_add(channel_reader::duration(earliest)).ok();
+        Ok(match stamps.origin {
+            TimeOrigin::Utc(start) => later(start),
+            TimeOrigin::Local(start) => {
+                later(start).and_then(|local| identity::local_to_utc(local, &self.mapping.identity))
+            }
+            TimeOrigin::Counted(_) | TimeOrigin::Start => None,
+        })
+    }
+
+    /// The sheet that holds a channel.
+    fn sheet(&self, map: &ChannelMapping) -> Option<&RowTable> {
+        map.group.as_ref().map_or(Some(&self.main), |name| self.groups.get(name))
+    }
+
+    /// What channels may be called in the sheet of one.
+    fn names_for(&self, map: &ChannelMapping) -> Result<BTreeSet<String>, Error> {
+        if map.group.is_some() {
+            return self.sheet(map).map_or_else(|| Ok(BTreeSet::new()), RowTable::names);
+        }
+        if self.names.get().is_none() {
+            let names = self.main.names()?;
+            return Ok(self.names.get_or_init(|| names).clone());
+        }
+        Ok(self.names.get().cloned().unwrap_or_default())
+    }
+
+    /// The actuators whose columns are here, in order of their names.
+    ///
+    /// `own` is the position of a log that holds one actuator and does not name it in its columns.
+    ///
+    /// # Errors
+    /// [`ErrorKind::NoPosition`] when no column fits; [`ErrorKind::ColumnMissing`] or
+    /// [`ErrorKind::IdentityMissing`] in a log of one actuator.
+    pub fn actuators(
+        &self,
+        channels: &Channels,
+        own: Option<&Position>,
+    ) -> Result<Vec<ActuatorColumns>, Error> {
+        if self.normalized.is_some() {
+            let of = |position: &Position| ActuatorColumns {
+                position: position.clone(),
+                columns: Normalized::COLUMNS.map(|name| Some(name.to_owned())),
+                lacking: Vec::new(),
+            };
+            return Ok(own.map(of).into_iter().collect());
+        }
+        let Some(found) = self.position_names(channels)? else { return self.only_position(channels, own) };
+        let asked = |text: &String| channels.positions.is_empty() || channels.positions.contains(text);
+        let named = found.into_iter().filter(asked).filter_map(|text| Position::new(text).ok());
+        let all = named.map(|p| self.columns_of(channels, p)).collect::<Result<Vec<_>, _>>()?;
+        if all.iter().any(|p| p.lacking.is_empty()) {
+            return Ok(all);
+        }
+        Err(self.no_position(channels, &all)?)
+    }
+
+    /// Names the channel that is not there: none of its columns fits, or it is lacking where others are.
+    fn no_position(&self, channels: &Channels, partly: &[ActuatorColumns]) -> Result<Error, Error> {
+        let mut fewest = (usize::MAX, &channels.motor_position);
+        for map in Role::NEEDED.iter().filter_map(|role| channels.of(*role)) {
+            let name =
+                |at: &ActuatorColumns| ColumnPattern::new(&map.column).column_for(at.position.as_str());
+            let count = partly.iter().filter(|at| !at.lacking.contains(&name(at))).count();
+            if count < fewest.0 {
+                fewest = (count, map);
+            }
+        }
+        let (pattern, columns) = (fewest.1.column.clone(), self.names_for(fewest.1)?.into_iter().collect());
+        Ok(self.main.error(ErrorKind::NoPosition { pattern, columns }))
+    }
+
+    /// The positions that rows or names speak of; none when neither can.
+    fn position_names(&self, channels: &Channels) -> Result<Option<BTreeSet<String>>, Error> {
+        if let Some(found) = self.main.row_positions()? {
+            return Ok(Some(found));
+        }
+        let (mut is_open, mut found) = (false, BTreeSet::new());
+        for map in Role::NEEDED.iter().filter_map(|role| channels.of(*role)).flat_map(ChannelMapping::choices)
+        {
+            let pattern = ColumnPattern::new(&map.column);
+            if pattern.is_open() {
+                is_open = true;
+                let names = self.names_for(map)?;
+                found.extend(names.iter().filter_map(|name| pattern.position_in(name)).map(str::to_owned));
+            }
+        }
+        Ok(is_open.then_some(found))
+    }
+
+    fn only_position(
+        &self,
+        channels: &Channels,
+        own: Option<&Position>,
+    ) -> Result<Vec<ActuatorColumns>, Error> {
+        let Some(position) = own else {
+            let looked = vec!["the names of columns (no `{position}` in them)".into()];
+            return Err(self.main.error(ErrorKind::IdentityMissing { fact: "position", looked }));
+        };
+        let only = self.columns_of(channels, position.clone())?;
+        match only.lacking.first() {
+            None => Ok(vec![only]),
+            Some(column) => Err(self.main.lacks(column)),
+        }
+    }
+
+    fn columns_of(&self, channels: &Channels, position: Position) -> Result<ActuatorColumns, Error> {
+        let mut columns = [None, None, None, None];
+        let mut lacking = Vec::new();
+        for (slot, role) in columns.iter_mut().zip(Role::ALL) {
+            let Some(map) = channels.of(role) else { continue };
+            let first = self.present(map, &position)?.into_iter().next();
+            let name = ColumnPattern::new(&map.column).column_for(position.as_str());
+            if first.is_none() && role != Role::Temperature {
+                lacking.push(name.clone());
+            }
+            *slot = first.map(|(_, name)| name).or((role != Role::Temperature).then_some(name));
+        }
+        Ok(ActuatorColumns { position, columns, lacking })
+    }
+
+    /// A channel and its alternatives, as far as the log has them, with their names here.
+    fn present<'c>(
+        &self,
+        map: &'c ChannelMapping,
+        position: &Position,
+    ) -> Result<Vec<(&'c ChannelMapping, String)>, Error> {
+        let mut found = Vec::new();
+        for choice in map.choices() {
+            let name = ColumnPattern::new(&choice.column).column_for(position.as_str());
+            if self.names_for(choice)?.contains(&name) {
+                found.push((choice, name));
+            }
+        }
+        Ok(found)
+    }
+
+    /// The leaves that these actuators need, sheet by sheet.
+    fn leaves(&self, used: &[(&Channels, &ActuatorColumns)]) -> Vec<(&RowTable, BTreeSet<String>)> {
+        let sheets =
+            std::iter::once((None, &self.main)).chain(self.groups.iter().map(|(n, s)| (Some(n.as_str()), s)));
+        let needed = |(group, sheet): (Option<&str>, &RowTable)| {
+            let mut leaves = BTreeSet::new();
+            for (channels, at) in used {
+                let conditions: Vec<ChannelMapping> =
+                    channels.when.iter().map(ChannelMapping::from).collect();
+                let maps = Role::ALL.iter().filter_map(|role| channels.of(*role));
+                let maps = maps.flat_map(ChannelMapping::choices).chain(&conditions);
+                for map in maps.filter(|m| m.group.as_deref() == group) {
+                    let named = |column: &String| ColumnPattern::new(column).column_for(at.position.as_str());
+                    for name in std::iter::once(&map.column).chain(&map.valid_column).map(named) {
+                        leaves.extend(sheet.leaves_of(&sheet.samples(&name, at.position.as_str())));
+                    }
+                    leaves.extend(map.time_column.iter().map(named));
+                }
+            }
+            leaves
+        };
+        sheets.map(|(group, sheet)| (sheet, needed((group, sheet)))).collect()
+    }
+
+    /// blake3 of the footers and the chunks of every column that the positions, the clock and the
+    /// identity use.
+    ///
+    /// # Errors
+    /// When a file cannot be read.
+    pub fn digest(&self, used: &[(&Channels, &ActuatorColumns)]) -> Result<String, Error> {
+        let mut digest = Digest::new();
+        for (sheet, mut leaves) in self.leaves(used) {
+            leaves.extend(self.mapping.identity.columns.values().cloned());
+            if self.normalized.is_some() {
+                leaves.extend(Normalized::COLUMNS.map(str::to_owned));
+            }
+            let names: Vec<&str> = leaves.iter().map(String::as_str).collect();
+            for file in &sheet.files {
+                file.feed(&names, &mut digest)?;
+            }
+        }
+        Ok(digest.end())
+    }
+
+    /// Reads the channels of one actuator.
+    ///
+    /// # Errors
+    /// When a column is missing, holds no numbers or no value, cannot be decoded, or is in a unit
+    /// that this part cannot be brought to the screw from; when clocks cannot be brought together.
+    pub fn read_actuator(
+        &self,
+        at: &ActuatorColumns,
+        channels: &Channels,
+        geometry: Geometry,
+    ) -> Result<ActuatorChannels, Error> {
+        if let Some(normalized) = &self.normalized {
+            return normalized.read_actuator(&self.main.files[0], at.position.clone(), geometry);
+        }
+        let sought = ChannelRequest { at, channels, geometry };
+        let ReferenceChannel { channel: motor, master, selection, mut flags } = self.motor(sought)?;
+        let read = |role: Role, from: &SampleSelection| self.follower(role, sought, &master, from);
+        let (screw, screw_flags) = read(Role::Screw, &selection)?;
+        let (load, load_flags) = read(Role::Load, &selection)?;
+        // The mean of the flight, whatever counts of it.
+        let whole = SampleSelection::whole(&master.0.line);
+        let temperature = channels.temperature.as_ref().and_then(|_| read(Role::Temperature, &whole).ok());
+        flags.extend(screw_flags.into_iter().chain(load_flags));
+        let read = RawChannels { motor, screw, load, is_relative: channels.is_relative(), selection };
+        let temperature_c = temperature.and_then(|(read, _)| mean(&read.values));
+        Ok(assemble(at.position.clone(), read, &master.0.line, temperature_c, flags))
+    }
+
+    /// The stretches of the motor's clock in which every condition holds; as before, where the same was asked.
+    fn selected(
+        &self,
+        sought: ChannelRequest<'_>,
+        master: &ReferenceClock<'_, '_>,
+    ) -> Result<SampleSelection, Error> {
+        let ChannelRequest { at, channels, .. } = sought;
+        if channels.when.is_empty() {
+            return Ok(SampleSelection::whole(&master.0.line));
+        }
+        let position = at.position.as_str();
+        let named = |column: &String| ColumnPattern::new(column).column_for(position);
+        let of = |when: &SampleFilter| {
+            let samples = self.sheet_of(&ChannelMapping::from(when))?.samples(&named(&when.column), position);
+            Ok((samples, when.time_column.as_ref().map(named)))
+        };
+        let asked = SelectionKey {
+            when: channels.when.clone(),
+            of: channels.when.iter().map(of).collect::<Result<_, Error>>()?,
+            group: master.1.group.clone(),
+            clock: master.0.clock_key(master.1),
+        };
+        let mut before = self.selected.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, selection)) = before.as_ref().filter(|(known, _)| *known == asked) {
+            return Ok(selection.clone());
+        }
+        let selection = self.select(sought, master)?;
+        *before = Some((asked, selection.clone()));
+        Ok(selection)
+    }
+
+    fn select(
+        &self,
+        sought: ChannelRequest<'_>,
+        master: &ReferenceClock<'_, '_>,
+    ) -> Result<SampleSelection, Error> {
+        let ChannelRequest { at, channels, geometry } = sought;
+        let line = &master.0.line;
+        let mut segments = line.segments.clone();
+        for condition in &channels.when {
+            let map = ChannelMapping::from(condition);
+            let name = ColumnPattern::new(&map.column).column_for(at.position.as_str());
+            let sheet = self.sheet_of(&map)?;
+            if !self.names_for(&map)?.contains(&name) {
+                return Err(sheet.lacks(&name));
+            }
+            // A state stands until the next one comes, as a slow load does.
+            let position = at.position.as_str();
+            let one = FollowerChannel { sheet, map: &map, name: &name, position, role: Role::Load };
+            let Channel { mut values, .. } =
+                channel_reader::follow(&master.0, master.1, &one, geometry, RowSelection::ALL)?;
+            zero_order_hold(&mut values, &line.segments, line.step_s);
+            segments = condition.within(&values, &segments, line.step_s);
+        }
+        Ok(SampleSelection::of(segments, line))
+    }
+
+    /// The motor position, whose clock all other channels follow.
+    fn motor<'c>(&self, sought: ChannelRequest<'c>) -> Result<ReferenceChannel<'_, 'c>, Error> {
+        let ChannelRequest { at, channels, geometry } = sought;
+        let mut found: Option<ReferenceChannel<'_, 'c>> = None;
+        let choices = self.present_or_lacking(Role::Motor, at, channels)?;
+        let is_only = choices.len() == 1;
+        for (k, (map, name)) in choices.into_iter().enumerate() {
+            let sampling = ChannelSampling::new(self.sheet_of(map)?, map, &name, at.position.as_str())?;
+            let master = (sampling, map);
+            if !channels.when.is_empty() {
+                // Conditions ask for memory by the rows that a footer declares: its pages must hold as many.
+                master.0.check_rows()?;
+            }
+            let selection = self.selected(sought, &master)?;
+            let read = selection.cut(master.0.own(map, geometry, selection.wanted())?);
+            let lives = is_only || channel_reader::lives(&read.values, selection.apart);
+            if lives || found.is_none() {
+                let flags = alternative(Role::Motor, k);
+                found = Some(ReferenceChannel { channel: read, master, selection, flags });
+            }
+            if lives {
+                break;
+            }
+        }
+        let lead = found.ok_or_else(|| self.main.lacks(&channels.motor_position.column))?;
+        self.not_empty(&lead.channel.values, lead.master.0.column(), &lead.selection)?;
+        Ok(lead)
+    }
+
+    /// A channel on the motor's clock.
+    fn follower(
+        &self,
+        role: Role,
+        sought: ChannelRequest<'_>,
+        master: &ReferenceClock<'_, '_>,
+        selection: &SampleSelection,
+    ) -> Result<(Channel, Vec<String>), Error> {
+        let ChannelRequest { at, channels, geometry } = sought;
+        let mut found: Option<(Channel, usize)> = None;
+        let mut column = String::new();
+        let choices = self.present_or_lacking(role, at, channels)?;
+        let is_only = choices.len() == 1;
+        for (k, (map, name)) in choices.into_iter().enumerate() {
+            let sheet = self.sheet_of(map)?;
+            let one = FollowerChannel { sheet, map, name: &name, position: at.position.as_str(), role };
+            let read = channel_reader::follow(&master.0, master.1, &one, geometry, selection.wanted())?;
+            let read = selection.cut(read);
+            let lives = is_only || channel_reader::lives(&read.values, selection.apart);
+            if lives || found.is_none() {
+                column = name;
+                found = Some((read, k));
+            }
+            if lives {
+                break;
+            }
+        }
+        let (read, k) = found.unwrap_or_else(|| (Vec::new().into(), 0));
+        self.not_empty(&read.values, &column, selection)?;
+        Ok((read, alternative(role, k)))
+    }
+
+    fn present_or_lacking<'c>(
+        &self,
+        role: Role,
+        at: &ActuatorColumns,
+        channels: &'c Channels,
+    ) -> Result<Vec<(&'c ChannelMapping, String)>, Error> {
+        let map = channels.of(role).unwrap_or(&channels.motor_position);
+        let found = self.present(map, &at.position)?;
+        if found.is_empty() {
+            let name = ColumnPattern::new(&map.column).column_for(at.position.as_str());
+            return Err(self.sheet(map).unwrap_or(&self.main).lacks(&name));
+        }
+        Ok(found)
+    }
+
+    fn sheet_of(&self, map: &ChannelMapping) -> Result<&RowTable, Error> {
+        self.sheet(map).ok_or_else(|| {
+            self.main.error(ErrorKind::GroupMissing { group: map.group.clone().unwrap_or_default() })
+        })
+    }
+
+    /// Whether a column holds a value where it counts, if it counts anywhere.
+    fn not_empty(&self, values: &[f64], column: &str, selection: &SampleSelection) -> Result<(), Error> {
+        let counted = values.len() - selection.apart;
+        if (counted == 0 && selection.apart > 0) || values.iter().any(|v| v.is_finite()) {
+            return Ok(());
+        }
+        let (column, rows) = (column.to_owned(), counted as u64);
+        Err(self.main.error(ErrorKind::AllMissing { column, rows }))
+    }
+}
+
+/// The actuator that is read: its columns, how its channels are read, and what its angles turn.
+#[derive(Clone, Copy)]
+struct ChannelRequest<'c> {
+    at: &'c ActuatorColumns,
+    channels: &'c Channels,
+    geometry: Geometry,
+}
+
+/// How the motor position lies in time, and by which mapping it is read.
+type ReferenceClock<'s, 'c> = (ChannelSampling<'s>, &'c ChannelMapping);
+
+/// The motor position's values, how they lie in time, what counts of them, and doubts about them.
+struct ReferenceChannel<'s, 'c> {
+    channel: Channel,
+    master: ReferenceClock<'s, 'c>,
+    selection: SampleSelection,
+    flags: Vec<String>,
+}
+
+/// What a sheet's files say of their flight.
+fn facts(sheet: &RowTable, map: &crate::mapping::IdentityMapping) -> Result<IdentityFields, Error> {
+    let first = &sheet.files[0];
+    let mut facts: IdentityFields = map.values.clone();
+    facts.extend(identity::from_hive_path(first.path(), &map.folders));
+    if let Some(expression) = &map.path {
+        facts.extend(identity::from_path(first.path(), expression).map_err(|f| sheet.error(f))?);
+    }
+    for (fact, column) in &map.columns {
+        // A column the log lacks may still be covered by another source; what is missing in all is named later.
+        facts.extend(sheet.constant(column, fact.as_str())?.map(|text| (*fact, text)));
+    }
+    let stated = |(fact, key): (&IdentityField, &String)| Some((*fact, first.metadata(key)?.to_owned()));
+    facts.extend(map.metadata.iter().filter_map(stated));
+    Ok(facts)
+}
+
+/// What a file of a group says of its flight, so that it finds its main log.
+///
+/// # Errors
+/// As [`Log::open`] and [`Log::identity`].
+pub fn companion_identity(
+    path: &Path,
+    mapping: &Mapping,
+    group: &str,
+    known: impl Fn(&IdentityFields) -> IdentityFields,
+) -> Result<Identity, Error> {
+    let settings = mapping.groups.get(group);
+    let identity = settings.and_then(|g| g.identity.clone()).unwrap_or_else(|| mapping.identity.clone());
+    let clock = settings.and_then(|g| g.clock.clone()).unwrap_or_else(|| mapping.clock.clone());
+    let layout = settings.map(|g| g.layout.clone()).unwrap_or_default();
+    let alone = Mapping { identity, clock, layout, ..Mapping::default() };
+    Log::open(&LogFiles::one(path), &Arc::new(alone))?.identity(known)
+}
+
+fn alternative(role: Role, choice: usize) -> Vec<String> {
+    if choice == 0 { Vec::new() } else { vec![format!("{}_alternative", role.as_str())] }
+}

@@ -1,0 +1,234 @@
+//! Which flight a log is: from its metadata, its constant columns or its path, in that order.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use jiff::{Timestamp, civil, tz::TimeZone};
+use percent_encoding::percent_decode_str;
+use records::{FlightId, Position, TailNumber};
+
+use crate::error::ErrorKind;
+use crate::mapping::{IdentityField, IdentityMapping};
+
+/// What a log says about its flight.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identity {
+    /// The aircraft.
+    pub tail_number: TailNumber,
+    /// The flight.
+    pub flight_id: FlightId,
+    /// Departure, UTC.
+    pub departure_utc: Timestamp,
+    /// The place of the one actuator in the log, where its columns do not say.
+    pub position: Option<Position>,
+    /// Length of the flight, hours.
+    pub flight_hours: Option<f64>,
+    /// The tail's total hours after the flight.
+    pub tail_hours_end: Option<f64>,
+}
+
+/// Facts as text, before they are read.
+pub type IdentityFields = BTreeMap<IdentityField, String>;
+
+/// The facts that the path's named groups hold.
+///
+/// # Errors
+/// [`ErrorKind::IdentityInvalid`] when the expression itself cannot be read.
+pub(crate) fn from_path(path: &Path, expression: &str) -> Result<IdentityFields, ErrorKind> {
+    let regex = regex::Regex::new(expression).map_err(|e| ErrorKind::IdentityInvalid {
+        fact: "path expression",
+        found: expression.to_owned(),
+        detail: e.to_string(),
+    })?;
+    // The same log must be the same flight wherever the command was typed, and on whichever system.
+    let whole = absolute(path);
+    let text = whole.to_string_lossy().replace('\\', "/");
+    let Some(groups) = regex.captures(&text) else { return Ok(IdentityFields::new()) };
+    let named = |fact: &IdentityField| Some((*fact, groups.name(fact.as_str())?.as_str().to_owned()));
+    Ok(IdentityField::ALL.iter().filter_map(named).collect())
+}
+
+/// The whole path; an address is whole as it is.
+pub(crate) fn absolute(path: &Path) -> PathBuf {
+    if object_io::is_address(path) {
+        return path.to_owned();
+    }
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
+/// The facts that folders called `name=value` hold, as Hive partitions are; the innermost wins.
+pub(crate) fn from_hive_path(path: &Path, folders: &BTreeMap<IdentityField, String>) -> IdentityFields {
+    let whole = absolute(path);
+    let named: BTreeMap<String, String> = whole
+        .parent()
+        .into_iter()
+        .flat_map(Path::components)
+        .filter_map(|part| part.as_os_str().to_str()?.split_once('='))
+        .map(|(name, value)| (name.to_owned(), percent_decode_str(value).decode_utf8_lossy().into_owned()))
+        .collect();
+    let stated = |(fact, name): (&IdentityField, &String)| Some((*fact, named.get(name)?.clone()));
+    // Hive's own word for a null.
+    let is_value = |(_, value): &(IdentityField, String)| value != "__HIVE_DEFAULT_PARTITION__";
+    folders.iter().filter_map(stated).filter(is_value).collect()
+}
+
+/// Reads the facts; what the log leaves open comes from its absolute clock.
+///
+/// # Errors
+/// [`ErrorKind::IdentityMissing`] for a tail or departure that stands nowhere, [`ErrorKind::IdentityInvalid`]
+/// for a fact that cannot be read.
+pub(crate) fn read(
+    facts: &IdentityFields,
+    mapping: &IdentityMapping,
+    clock_start: Option<Timestamp>,
+) -> Result<Identity, ErrorKind> {
+    let text = |fact: IdentityField| facts.get(&fact).map(|t| t.trim()).filter(|t| !t.is_empty());
+    let tail = text(IdentityField::TailNumber).ok_or_else(|| missing(IdentityField::TailNumber, mapping))?;
+    let departure_utc = match text(IdentityField::DepartureUtc) {
+        Some(departure) => instant(departure, mapping)?,
+        None => clock_start.ok_or_else(|| missing(IdentityField::DepartureUtc, mapping))?,
+    };
+    let flight = text(IdentityField::FlightId)
+        .map_or_else(|| departure_utc.strftime("%Y%m%dT%H%M%SZ").to_string(), str::to_owned);
+    let invalid = |fact: IdentityField| {
+        move |e: records::ids::EmptyIdError| ErrorKind::IdentityInvalid {
+            fact: fact.as_str(),
+            found: String::new(),
+            detail: e.to_string(),
+        }
+    };
+    Ok(Identity {
+        tail_number: TailNumber::new(tail).map_err(invalid(IdentityField::TailNumber))?,
+        flight_id: FlightId::new(flight).map_err(invalid(IdentityField::FlightId))?,
+        departure_utc,
+        position: text(IdentityField::Position)
+            .map(Position::new)
+            .transpose()
+            .map_err(invalid(IdentityField::Position))?,
+        flight_hours: hours(IdentityField::FlightHours, text(IdentityField::FlightHours))?,
+        tail_hours_end: hours(IdentityField::TailHoursEnd, text(IdentityField::TailHoursEnd))?,
+    })
+}
+
+fn missing(fact: IdentityField, mapping: &IdentityMapping) -> ErrorKind {
+    let looked = [
+        mapping.metadata.get(&fact).map(|key| format!("metadata `{key}`")),
+        mapping.columns.get(&fact).map(|column| format!("column `{column}`")),
+        mapping.path.as_ref().map(|expression| format!("path by `{expression}`")),
+        mapping.folders.get(&fact).map(|name| format!("folder `{name}=…`")),
+    ];
+    ErrorKind::IdentityMissing { fact: fact.as_str(), looked: looked.into_iter().flatten().collect() }
+}
+
+fn hours(fact: IdentityField, text: Option<&str>) -> Result<Option<f64>, ErrorKind> {
+    let Some(text) = text else { return Ok(None) };
+    match text.parse::<f64>() {
+        Ok(h) if h.is_finite() && h >= 0.0 => Ok(Some(h)),
+        _ => Err(ErrorKind::IdentityInvalid {
+            fact: fact.as_str(),
+            found: text.to_owned(),
+            detail: "hours are a number of at least 0".into(),
+        }),
+    }
+}
+
+/// Reads a departure. A zone or offset in the text wins; else the mapped zone; else it is refused.
+pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp, ErrorKind> {
+    let invalid =
+        |detail: String| ErrorKind::IdentityInvalid { fact: "departure_utc", found: text.to_owned(), detail };
+    let local = match &mapping.departure_format {
+        Some(format) => {
+            let other = |_| invalid(format!("it does not fit `departure_format` = \"{format}\""));
+            let parsed = jiff::fmt::strtime::parse(format, text).map_err(other)?;
+            if let Ok(instant) = parsed.to_timestamp() {
+                return Ok(instant);
+            }
+            parsed.to_datetime().map_err(other)?
+        }
+        None => match text.parse::<Timestamp>() {
+            Ok(instant) => return Ok(instant),
+            Err(_) => text.parse::<civil::DateTime>().map_err(|_| {
+                invalid(
+                    "it is no time such as 2026-11-19T04:13:00Z; `departure_format` says how others are read"
+                        .into(),
+                )
+            })?,
+        },
+    };
+    let name = mapping.time_zone.as_deref();
+    let name =
+        name.ok_or_else(|| invalid("it names no time zone, and `identity.time_zone` is not given".into()))?;
+    zone(name).map_err(invalid)?.to_timestamp(local).map_err(|e| invalid(e.to_string()))
+}
+
+/// A time zone by its name.
+///
+/// # Errors
+/// When no zone is called so.
+pub fn zone(name: &str) -> Result<TimeZone, String> {
+    if name.eq_ignore_ascii_case("utc") {
+        Ok(TimeZone::UTC)
+    } else {
+        TimeZone::get(name).map_err(|e| e.to_string())
+    }
+}
+
+/// The instant of a local time that was read as if it were UTC; nothing when no zone is mapped.
+pub(crate) fn local_to_utc(as_utc: Timestamp, mapping: &IdentityMapping) -> Option<Timestamp> {
+    let zone = zone(mapping.time_zone.as_deref()?).ok()?;
+    zone.to_timestamp(TimeZone::UTC.to_datetime(as_utc)).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mapping(format: Option<&str>, zone: Option<&str>) -> IdentityMapping {
+        IdentityMapping {
+            departure_format: format.map(Into::into),
+            time_zone: zone.map(Into::into),
+            ..IdentityMapping::default()
+        }
+    }
+
+    #[test]
+    fn named_groups_of_a_path_become_facts() {
+        let path = Path::new("/logs/N412FP/0413_20261119T120409Z.parquet");
+        let facts =
+            from_path(path, r"(?<tail_number>N\w+)/(?<flight_id>\d+)_(?<departure_utc>\w+)\.parquet$")
+                .unwrap();
+        let identity = read(&facts, &mapping(Some("%Y%m%dT%H%M%SZ"), Some("UTC")), None).unwrap();
+        assert_eq!(identity.tail_number.as_str(), "N412FP");
+        assert_eq!(identity.flight_id.as_str(), "0413");
+        assert_eq!(identity.departure_utc.to_string(), "2026-11-19T12:04:09Z");
+    }
+
+    /// Istanbul keeps UTC+3 all year since 2016.
+    #[test]
+    fn a_local_departure_needs_a_zone_and_takes_it() {
+        let local = "2026-07-01T03:00:00";
+        assert!(instant(local, &mapping(None, None)).is_err());
+        let there = instant(local, &mapping(None, Some("Europe/Istanbul"))).unwrap();
+        assert_eq!(there.to_string(), "2026-07-01T00:00:00Z");
+        let offset = instant("2026-07-01T03:00:00+02:00", &mapping(None, Some("Europe/Istanbul"))).unwrap();
+        assert_eq!(offset.to_string(), "2026-07-01T01:00:00Z");
+    }
+
+    #[test]
+    fn a_log_that_does_not_say_its_tail_is_told_where_we_looked() {
+        let mut m = mapping(None, None);
+        m.metadata.insert(IdentityField::TailNumber, "ac_reg".into());
+        let fault = read(&IdentityFields::new(), &m, None).unwrap_err();
+        assert!(
+            matches!(&fault, ErrorKind::IdentityMissing { fact: "tail_number", looked } if looked == &["metadata `ac_reg`"])
+        );
+    }
+
+    #[test]
+    fn an_absolute_clock_stands_in_for_departure_and_flight() {
+        let facts = IdentityFields::from([(IdentityField::TailNumber, "N1".into())]);
+        let start: Timestamp = "2026-11-19T04:13:00Z".parse().unwrap();
+        let identity = read(&facts, &mapping(None, None), Some(start)).unwrap();
+        assert_eq!(identity.flight_id.as_str(), "20261119T041300Z");
+    }
+}

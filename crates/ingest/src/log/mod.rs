@@ -1,0 +1,16 @@
+//! Flight logs: identity, actuators, and their channels in SI on one clock.
+
+mod assemble;
+mod channel_reader;
+mod flight_log;
+pub mod identity;
+pub mod in_memory;
+pub mod infer_mapping;
+pub mod normalized;
+mod row_table;
+mod selection;
+mod timestamps;
+mod types;
+
+pub use flight_log::{Log, companion_identity};
+pub use types::{ActuatorChannels, ActuatorColumns, LogFiles};

@@ -1,0 +1,185 @@
+//! The normalized log: one actuator's channels in SI on one clock, as the estimator takes them.
+//!
+//! `docs/normalized.md` is its description. Numbers are kept in full, the step and the stretches stand in
+//! the footer, so that reading it back gives every sample, and hence every gap, bit for bit.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::Path;
+
+use records::Position;
+
+use crate::channel::column_builder::ColumnBuilder;
+use crate::channel::quality::Quality;
+use crate::channel::si_conversion::Geometry;
+use crate::channel::stats::ChannelStats;
+use crate::error::{Error, ErrorKind};
+use crate::log::identity::{Identity, IdentityFields};
+use crate::log::types::ActuatorChannels;
+use crate::mapping::IdentityField;
+use crate::parquet::log_file::LogFile;
+use crate::parquet::row_selection::RowSelection;
+use crate::parquet::writer::{Column, Encoding, write_encoded};
+use crate::time::clock::TimestampRepairs;
+
+const VERSION: &str = "1";
+const KEY: &str = "freeplay.normalized";
+
+/// What the footer of a normalized log says.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Normalized {
+    /// Which flight it is, and which actuator.
+    pub(crate) facts: IdentityFields,
+    step_s: f64,
+    segments: Vec<Range<usize>>,
+    metres_per_radian: Option<f64>,
+    temperature_c: Option<f64>,
+    flags: Vec<String>,
+    /// Samples that no condition left.
+    apart: usize,
+}
+
+impl Normalized {
+    /// The columns, in the order of [`crate::ActuatorColumns`].
+    pub(crate) const COLUMNS: [&'static str; 4] = ["motor_m", "dx_m", "load_n", "temperature_c"];
+
+    /// What a file says of itself, if Freeplay normalized it.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Normalized`] when it was written by a version that this one does not know.
+    pub(crate) fn of(file: &LogFile) -> Result<Option<Self>, Error> {
+        let Some(version) = file.metadata(KEY) else { return Ok(None) };
+        let fail = |detail: String| file.error(ErrorKind::Normalized { detail });
+        if version != VERSION {
+            return Err(fail(format!("it is of form {version}, and this program knows {VERSION}")));
+        }
+        let text = |key: &str| file.metadata(&format!("freeplay.{key}")).filter(|t| !t.is_empty());
+        let number = |key: &str| text(key).and_then(|t| t.parse::<f64>().ok());
+        let step_s = number("step_s").ok_or_else(|| fail("its step is not there".into()))?;
+        let segments = text("segments").map_or_else(|| Some(Vec::new()), segments_from);
+        let facts = IdentityField::ALL
+            .iter()
+            .filter_map(|fact| Some((*fact, text(fact.as_str())?.to_owned())))
+            .collect();
+        Ok(Some(Self {
+            facts,
+            step_s,
+            segments: segments.ok_or_else(|| fail("its stretches cannot be read".into()))?,
+            metres_per_radian: number("metres_per_radian"),
+            temperature_c: number("temperature_c"),
+            apart: text("apart").and_then(|t| t.parse().ok()).unwrap_or(0),
+            flags: text("flags").map(|t| t.split(' ').map(str::to_owned).collect()).unwrap_or_default(),
+        }))
+    }
+
+    /// The channels as they were written.
+    ///
+    /// # Errors
+    /// When a column cannot be read, or the part's geometry is another one now.
+    pub(crate) fn read_actuator(
+        &self,
+        file: &LogFile,
+        position: Position,
+        geometry: Geometry,
+    ) -> Result<ActuatorChannels, Error> {
+        let (now, then) = (geometry.metres_per_radian(), self.metres_per_radian);
+        if now != then {
+            let said = |v: Option<f64>| v.map_or_else(|| "no lead".to_owned(), |v| format!("{v} m/rad"));
+            let detail = format!("with {}, where the part has {}", said(then), said(now));
+            return Err(file.error(ErrorKind::Normalized { detail }));
+        }
+        let [motor, dx, load] = ["motor_m", "dx_m", "load_n"].map(|name| numbers(file, name));
+        let read = [motor?, dx?, load?];
+        if read.iter().any(|(_, seen)| seen.missing < self.apart) {
+            let detail = format!("a channel lacks fewer than the {} samples that are left out", self.apart);
+            return Err(file.error(ErrorKind::Normalized { detail }));
+        }
+        let quality =
+            read.each_ref().map(|(values, seen)| Quality::seen(values, seen, self.step_s, self.apart));
+        let [motor_m, dx_m, load_n] = read.map(|(values, _)| values);
+        if self.segments.iter().any(|s| s.start > s.end || s.end > dx_m.len()) {
+            return Err(file.error(ErrorKind::Normalized { detail: "a stretch lies beyond its rows".into() }));
+        }
+        Ok(ActuatorChannels {
+            position,
+            step_s: self.step_s,
+            apart: self.apart,
+            missing_share: quality[1].missing_share,
+            quality,
+            motor_m,
+            dx_m,
+            load_n,
+            segments: self.segments.clone(),
+            temperature_c: self.temperature_c,
+            flags: self.flags.clone(),
+            repairs: TimestampRepairs::default(),
+        })
+    }
+}
+
+fn numbers(file: &LogFile, name: &str) -> Result<(Vec<f64>, ChannelStats), Error> {
+    let mut values = ColumnBuilder::with_capacity(file.rows().min(1 << 26), None).with_stats();
+    file.append_numbers(name, RowSelection::ALL, &mut values)?;
+    let (values, seen) = values.finish();
+    let seen = seen.unwrap_or_else(|| ChannelStats::of(&values));
+    Ok((values, seen))
+}
+
+fn segments_from(text: &str) -> Option<Vec<Range<usize>>> {
+    let range = |text: &str| {
+        let (start, end) = text.split_once("..")?;
+        Some(start.parse().ok()?..end.parse().ok()?)
+    };
+    text.split(' ').map(range).collect()
+}
+
+/// Writes one actuator's flight as a normalized log; `provenance` is told beside it.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write(
+    file: &Path,
+    channels: &ActuatorChannels,
+    identity: &Identity,
+    geometry: Geometry,
+    provenance: &BTreeMap<String, String>,
+    encoding: Encoding,
+) -> Result<(), Error> {
+    let time_s = (0..channels.dx_m.len()).map(|k| k as f64 * channels.step_s).collect();
+    let columns = [
+        ("time_s", Column::Real(time_s)),
+        ("motor_m", Column::Real(channels.motor_m.clone())),
+        ("dx_m", Column::Real(channels.dx_m.clone())),
+        ("load_n", Column::Real(channels.load_n.clone())),
+    ];
+    let columns: Vec<(String, Column)> = columns.into_iter().map(|(name, c)| (name.to_owned(), c)).collect();
+    write_encoded(file, &columns, &footer(channels, identity, geometry, provenance), encoding)
+}
+
+fn footer(
+    channels: &ActuatorChannels,
+    identity: &Identity,
+    geometry: Geometry,
+    provenance: &BTreeMap<String, String>,
+) -> Vec<(String, String)> {
+    let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
+    let segments: Vec<String> = channels.segments.iter().map(|s| format!("{}..{}", s.start, s.end)).collect();
+    let own = [
+        ("tail_number", identity.tail_number.to_string()),
+        ("flight_id", identity.flight_id.to_string()),
+        ("departure_utc", identity.departure_utc.to_string()),
+        ("position", channels.position.to_string()),
+        ("flight_hours", number(identity.flight_hours)),
+        ("tail_hours_end", number(identity.tail_hours_end)),
+        ("step_s", channels.step_s.to_string()),
+        ("segments", segments.join(" ")),
+        ("metres_per_radian", number(geometry.metres_per_radian())),
+        ("temperature_c", number(channels.temperature_c)),
+        ("apart", channels.apart.to_string()),
+        ("flags", channels.flags.join(" ")),
+        ("units", "time_s: s since the first sample; motor_m, dx_m: m at the screw; load_n: N".to_owned()),
+    ];
+    let own = own.into_iter().map(|(key, value)| (format!("freeplay.{key}"), value));
+    let told = provenance.iter().map(|(key, value)| (format!("freeplay.{key}"), value.clone()));
+    std::iter::once((KEY.to_owned(), VERSION.to_owned())).chain(own).chain(told).collect()
+}

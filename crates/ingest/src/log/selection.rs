@@ -1,0 +1,47 @@
+//! Samples that count: the unbroken segments of the motor's clock in which every sample filter holds.
+
+use std::ops::Range;
+
+use crate::log::channel_reader::Channel;
+use crate::parquet::row_selection::RowSelection;
+use crate::time::clock::TimeBase;
+
+/// The stretches of the motor's clock that count.
+#[derive(Debug, Clone)]
+pub(crate) struct SampleSelection {
+    pub(crate) segments: Vec<Range<usize>>,
+    /// Samples that no condition leaves.
+    pub(crate) apart: usize,
+}
+
+impl SampleSelection {
+    /// All that is unbroken.
+    pub(crate) fn whole(line: &TimeBase) -> Self {
+        Self { segments: line.segments.clone(), apart: 0 }
+    }
+
+    pub(crate) fn of(segments: Vec<Range<usize>>, line: &TimeBase) -> Self {
+        let samples = line.kept.as_ref().map_or(line.rows, Vec::len);
+        let apart = samples - segments.iter().map(Range::len).sum::<usize>();
+        Self { segments, apart }
+    }
+
+    pub(crate) fn wanted(&self) -> RowSelection<'_> {
+        if self.apart == 0 { RowSelection::ALL } else { RowSelection::of(&self.segments) }
+    }
+
+    /// Takes out what does not count, so that nothing is made of it however the file lies in pages.
+    pub(crate) fn cut(&self, mut channel: Channel) -> Channel {
+        if self.apart == 0 {
+            return channel;
+        }
+        let mut counted = 0;
+        for segment in &self.segments {
+            channel.values[counted..segment.start].fill(f64::NAN);
+            counted = segment.end;
+        }
+        channel.values[counted..].fill(f64::NAN);
+        channel.seen = None;
+        channel
+    }
+}

@@ -1,0 +1,197 @@
+//! Timestamps of a time column: integers, reals, Arrow timestamps or text, to seconds since the first one.
+
+use arrow::array::{Array, ArrayRef, AsArray, PrimitiveArray};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Int64Type, TimeUnit as ArrowTimeUnit};
+use jiff::Timestamp;
+
+use crate::channel::buffer_pool;
+use crate::error::ErrorKind;
+use crate::parquet::numeric::{append, as_text, wrong_type};
+use crate::time::clock::{TimeOrigin, Timestamps};
+
+/// What zero means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TickEpoch {
+    Own,
+    Utc,
+    Local,
+}
+
+/// What the numbers of a time column are.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TickFormat {
+    pub(crate) per_second: f64,
+    pub(crate) is_whole: bool,
+    pub(crate) is_text: bool,
+    pub(crate) origin: TickEpoch,
+    pub(crate) wraps_at: Option<f64>,
+}
+
+impl TickFormat {
+    pub(crate) fn of_timestamp(unit: ArrowTimeUnit, is_local: bool) -> Self {
+        let per_second = match unit {
+            ArrowTimeUnit::Second => 1.0,
+            ArrowTimeUnit::Millisecond => 1e3,
+            ArrowTimeUnit::Microsecond => 1e6,
+            ArrowTimeUnit::Nanosecond => 1e9,
+        };
+        let origin = if is_local { TickEpoch::Local } else { TickEpoch::Utc };
+        Self { per_second, is_whole: true, is_text: false, origin, wraps_at: None }
+    }
+
+    /// Whether they are numbers with a fraction.
+    pub(crate) fn is_real(self) -> bool {
+        !self.is_text && !self.is_whole
+    }
+
+    /// ISO 8601 text; an offset in it is taken, and without one the time is local.
+    pub(crate) fn text() -> Self {
+        Self { per_second: 1e9, is_whole: true, is_text: true, origin: TickEpoch::Local, wraps_at: None }
+    }
+}
+
+/// Turns a time column into seconds since its first stamp: ticks are subtracted before they become
+/// seconds, so that counts since 1970 lose nothing.
+pub(crate) struct TimestampParser<'a> {
+    column: &'a str,
+    ticks: TickFormat,
+    first: Option<FirstTick>,
+    turns: f64,
+    before: f64,
+    seconds: Vec<f64>,
+    is_zoned: bool,
+}
+
+#[derive(Clone, Copy)]
+enum FirstTick {
+    Whole(i64),
+    Real(f64),
+}
+
+impl<'a> TimestampParser<'a> {
+    pub(crate) fn new(column: &'a str, ticks: TickFormat, rows: usize) -> Self {
+        let seconds = Vec::with_capacity(rows.min(1 << 26));
+        Self { column, ticks, first: None, turns: 0.0, before: f64::NAN, seconds, is_zoned: false }
+    }
+
+    pub(crate) fn append(&mut self, array: &ArrayRef, wanted: Option<&[bool]>) -> Result<(), ErrorKind> {
+        let is_wanted = |row: usize| wanted.is_none_or(|marks| marks[row]);
+        if self.ticks.is_text {
+            let text = as_text(self.column, array)?;
+            for (row, value) in text.as_string::<i32>().iter().enumerate().filter(|(row, _)| is_wanted(*row))
+            {
+                let tick = value.map(|value| self.parsed(value, row)).transpose()?;
+                self.push_whole(tick);
+            }
+        } else if self.ticks.is_whole {
+            let whole =
+                cast(array, &DataType::Int64).map_err(|_| wrong_type(self.column, array, "time stamps"))?;
+            let whole: &PrimitiveArray<Int64Type> = whole.as_primitive();
+            whole
+                .iter()
+                .enumerate()
+                .filter(|(row, _)| is_wanted(*row))
+                .for_each(|(_, tick)| self.push_whole(tick));
+        } else {
+            let mut reals = Vec::with_capacity(array.len());
+            append(self.column, array, &mut reals)?;
+            reals
+                .iter()
+                .enumerate()
+                .filter(|(row, _)| is_wanted(*row))
+                .for_each(|(_, &tick)| self.push_real(tick));
+        }
+        Ok(())
+    }
+
+    /// As [`TimestampParser::append`], for all there is, in its place.
+    pub(crate) fn take_reals(&mut self, mut reals: Vec<f64>) {
+        if self.ticks.wraps_at.is_some() {
+            reals.iter().for_each(|&tick| self.push_real(tick));
+            return buffer_pool::release(reals);
+        }
+        let (begun, per_second) = (reals.iter().find(|tick| tick.is_finite()), self.ticks.per_second);
+        let first = begun.map_or(f64::NAN, |&begun| self.first_real(begun));
+        for tick in &mut reals {
+            *tick = if tick.is_finite() { (*tick - first) / per_second } else { f64::NAN };
+        }
+        self.seconds = reals;
+    }
+
+    /// The first tick of all, which is this one if none came before.
+    fn first_real(&mut self, tick: f64) -> f64 {
+        match *self.first.get_or_insert(FirstTick::Real(tick)) {
+            FirstTick::Real(first) => first,
+            FirstTick::Whole(first) => first as f64,
+        }
+    }
+
+    fn parsed(&mut self, value: &str, row: usize) -> Result<i64, ErrorKind> {
+        let value = value.trim();
+        let instant = value.parse::<Timestamp>().inspect(|_| self.is_zoned = true).or_else(|_| {
+            value
+                .parse::<jiff::civil::DateTime>()
+                .and_then(|local| jiff::tz::TimeZone::UTC.to_timestamp(local))
+        });
+        let tick = instant.ok().and_then(|t| i64::try_from(t.as_nanosecond()).ok());
+        let found = || format!("`{value}` in row {row}");
+        tick.ok_or_else(|| ErrorKind::TimeUnit { column: self.column.to_owned(), found: found() })
+    }
+
+    fn push_whole(&mut self, tick: Option<i64>) {
+        let Some(tick) = tick else { return self.seconds.push(f64::NAN) };
+        let first = match *self.first.get_or_insert(FirstTick::Whole(tick)) {
+            FirstTick::Whole(first) => first,
+            FirstTick::Real(first) => first as i64,
+        };
+        self.push(tick.wrapping_sub(first) as f64);
+    }
+
+    fn push_real(&mut self, tick: f64) {
+        if !tick.is_finite() {
+            return self.seconds.push(f64::NAN);
+        }
+        let first = self.first_real(tick);
+        self.push(tick - first);
+    }
+
+    /// A counter that starts again only ever goes on: a fall by more than half its range is a turn.
+    fn push(&mut self, ticks: f64) {
+        if let Some(range) = self.ticks.wraps_at {
+            if ticks - self.before < -0.5 * range {
+                self.turns += 1.0;
+            }
+            self.before = ticks;
+            self.seconds.push((ticks + self.turns * range) / self.ticks.per_second);
+        } else {
+            self.seconds.push(ticks / self.ticks.per_second);
+        }
+    }
+
+    pub(crate) fn stamps(self) -> Timestamps {
+        let instant = |whole: i64| {
+            let nanoseconds = i128::from(whole) * (1e9 / self.ticks.per_second) as i128;
+            Timestamp::from_nanosecond(nanoseconds).ok()
+        };
+        let real =
+            |ticks: f64| Timestamp::from_nanosecond((ticks / self.ticks.per_second * 1e9) as i128).ok();
+        let counted = match self.first {
+            Some(FirstTick::Whole(first)) => first as f64 / self.ticks.per_second,
+            Some(FirstTick::Real(first)) => first / self.ticks.per_second,
+            None => 0.0,
+        };
+        let start = match self.first {
+            Some(FirstTick::Whole(first)) => instant(first),
+            Some(FirstTick::Real(first)) => real(first),
+            None => None,
+        };
+        let zero = if self.is_zoned { TickEpoch::Utc } else { self.ticks.origin };
+        let origin = match (zero, start) {
+            (TickEpoch::Utc, Some(start)) => TimeOrigin::Utc(start),
+            (TickEpoch::Local, Some(start)) => TimeOrigin::Local(start),
+            _ => TimeOrigin::Counted(counted),
+        };
+        Timestamps { column: self.column.to_owned(), seconds: self.seconds, origin }
+    }
+}

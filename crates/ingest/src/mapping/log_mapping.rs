@@ -1,0 +1,397 @@
+//! What a log must offer, and where in it: the mapping that `pipeline.toml` writes down.
+
+use crate::mapping::SampleFilter;
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::mapping::units::{TimeUnit, Unit};
+
+/// Everything needed to read one log.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Mapping {
+    /// Which flight a log is.
+    pub identity: IdentityMapping,
+    /// Its clock.
+    pub clock: ClockMapping,
+    /// Its channels.
+    pub channels: Channels,
+    /// How its rows are laid out.
+    #[serde(default, skip_serializing_if = "Layout::is_wide")]
+    pub layout: Layout,
+    /// Files of other kinds that belong to the same flight, by the name that channels call them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub groups: BTreeMap<String, GroupMapping>,
+}
+
+/// How the rows of a log are laid out; by default a row holds one sample of every channel.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Layout {
+    /// A row holds a sample of one channel, and this column names it; `column` of a channel is then
+    /// such a name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name_column: Option<String>,
+    /// Where the value of such a row stands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value_column: Option<String>,
+    /// A row belongs to one actuator, and this column says to which.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_column: Option<String>,
+}
+
+impl Layout {
+    fn is_wide(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// A further kind of file: what it does not say itself it shares with the main logs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GroupMapping {
+    /// Patterns of its files, from the folder of the configuration.
+    pub files: Vec<String>,
+    /// Its clock; that of the main logs when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clock: Option<ClockMapping>,
+    /// Its layout; a row for each sample of every channel when not given.
+    #[serde(default, skip_serializing_if = "Layout::is_wide")]
+    pub layout: Layout,
+    /// Where it says which flight it is; as the main logs do when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identity: Option<IdentityMapping>,
+}
+
+/// Where tail, flight and departure stand: in the file's metadata, in constant columns, in its path, in
+/// the names of its folders, or in the configuration itself. For each fact the first source that has it
+/// wins, in that order; the flights table fills what is still open.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IdentityMapping {
+    /// Key-value metadata of the Parquet footer: fact → key. IdentityFields: `tail_number`, `flight_id`,
+    /// `departure_utc`, `position`, `flight_hours`, `tail_hours_end`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub metadata: BTreeMap<IdentityField, String>,
+    /// Columns that hold one value throughout: fact → column.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub columns: BTreeMap<IdentityField, String>,
+    /// A regular expression on the absolute path with named groups, e.g.
+    /// `(?<tail_number>N\w+)/(?<flight_id>[^/]+)_(?<departure_utc>\d{8}T\d{6}Z)\.parquet$`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<String>,
+    /// Folders called `name=value`, as Hive partitions are: fact → name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub folders: BTreeMap<IdentityField, String>,
+    /// What holds for every log that does not say otherwise: fact → value.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub values: BTreeMap<IdentityField, String>,
+    /// How departures are written, by `strftime` signs; ISO 8601 when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub departure_format: Option<String>,
+    /// The zone of departures that do not name one, e.g. `UTC` or `Europe/Istanbul`; without it such
+    /// a departure is refused rather than guessed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_zone: Option<String>,
+}
+
+/// A fact about a flight that a log may state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum IdentityField {
+    /// The aircraft.
+    TailNumber,
+    /// The flight; made from the departure when a log does not name it.
+    FlightId,
+    /// Departure; the first stamp of an absolute clock when a log does not name it.
+    DepartureUtc,
+    /// The place of the one actuator in this log, when columns do not name it.
+    Position,
+    /// Length of the flight, hours.
+    FlightHours,
+    /// The tail's total hours after the flight.
+    TailHoursEnd,
+}
+
+impl IdentityField {
+    /// Every fact, in the order in which they are looked for.
+    pub const ALL: [Self; 6] = [
+        Self::TailNumber,
+        Self::FlightId,
+        Self::DepartureUtc,
+        Self::Position,
+        Self::FlightHours,
+        Self::TailHoursEnd,
+    ];
+
+    /// The key as configuration spells it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::TailNumber => "tail_number",
+            Self::FlightId => "flight_id",
+            Self::DepartureUtc => "departure_utc",
+            Self::Position => "position",
+            Self::FlightHours => "flight_hours",
+            Self::TailHoursEnd => "tail_hours_end",
+        }
+    }
+}
+
+/// The clock of a log.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ClockMapping {
+    /// The time column. Not needed when `rate_hz` is given and rows are evenly spaced.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub column: Option<String>,
+    /// Its unit; not needed for Arrow timestamps and text. `count` is a counter of samples.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<TimeUnit>,
+    /// What a column of numbers counts from: nothing that is known, or 1970 UTC.
+    #[serde(default, skip_serializing_if = "Epoch::is_none")]
+    pub epoch: Epoch,
+    /// The raw value at which a counter starts again at zero, e.g. 65536.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wraps_at: Option<f64>,
+    /// The rate of the rows, Hz, where it is known better than from the stamps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
+    /// How coarsely the clock ticks, s: rows that share a stamp are spread evenly instead of left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tick_s: Option<f64>,
+    /// How far stamps may fall back and still be put in order, s. Default 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_back_s: Option<f64>,
+    /// Whether a log whose clock falls further is taken as several recordings, one after the other.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub split_at_jumps: bool,
+}
+
+/// What a clock of plain numbers counts from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Epoch {
+    /// From a zero that the log does not tell.
+    #[default]
+    None,
+    /// From 1970-01-01T00:00:00Z.
+    Unix,
+}
+
+impl Epoch {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
+    fn is_none(&self) -> bool {
+        *self == Self::None
+    }
+}
+
+/// The channels of an actuator.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Channels {
+    /// Only these positions; all that column names tell of when not given.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub positions: Vec<String>,
+    /// Motor position: an angle at the motor, or already a length at the screw.
+    pub motor_position: ChannelMapping,
+    /// Screw position.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub screw_position: Option<ChannelMapping>,
+    /// Screw minus motor, where it is logged instead of the screw's own position.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub relative_position: Option<ChannelMapping>,
+    /// Load on the screw: a force, or a torque. Positive where it drives δX = screw − motor up.
+    pub load: ChannelMapping,
+    /// Temperature, where logged.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<ChannelMapping>,
+    /// Conditions on other columns under which samples count; all must hold. Every sample when not given.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub when: Vec<SampleFilter>,
+}
+
+/// A channel of an actuator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Role {
+    /// Motor position.
+    Motor,
+    /// Screw position, or screw minus motor.
+    Screw,
+    /// Load.
+    Load,
+    /// Temperature.
+    Temperature,
+}
+
+impl Role {
+    /// Every channel, in the order in which they are read.
+    pub const ALL: [Self; 4] = [Self::Motor, Self::Screw, Self::Load, Self::Temperature];
+    /// Those without which there is no estimate.
+    pub const NEEDED: [Self; 3] = [Self::Motor, Self::Screw, Self::Load];
+
+    /// The word in codes: `motor_frozen`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Motor => "motor",
+            Self::Screw => "screw",
+            Self::Load => "load",
+            Self::Temperature => "temperature",
+        }
+    }
+}
+
+impl Channels {
+    /// The mapping of a channel, if it has one.
+    pub fn of(&self, role: Role) -> Option<&ChannelMapping> {
+        match role {
+            Role::Motor => Some(&self.motor_position),
+            Role::Screw => self.screw_position.as_ref().or(self.relative_position.as_ref()),
+            Role::Load => Some(&self.load),
+            Role::Temperature => self.temperature.as_ref(),
+        }
+    }
+
+    /// Whether δX is logged itself.
+    pub fn is_relative(&self) -> bool {
+        self.screw_position.is_none()
+    }
+}
+
+/// One channel: its column and how to read it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelMapping {
+    /// The column's name; `{position}` stands for the actuator's place in a log that holds several.
+    /// `record.field` reaches into structs, and lists are read sample by sample.
+    pub column: String,
+    /// m, mm, um, in, deg, rad, rev for positions; N, kN, daN, lbf or N.m, lbf.in, lbf.ft for loads;
+    /// degC, degF, K for temperatures.
+    pub unit: Unit,
+    /// 1, or −1 where the log counts the other way.
+    #[serde(default = "one_sign", skip_serializing_if = "is_one_sign")]
+    pub sign: i8,
+    /// `unit = raw · scale + offset`, for counts.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub scale: f64,
+    /// See `scale`.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub offset: f64,
+    /// The raw value at which a turning sensor starts again, e.g. 360 in degrees: it is unwrapped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wraps_at: Option<f64>,
+    /// Raw values that mean "no value", e.g. −9999.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<f64>,
+    /// Turns of this sensor to one turn of the screw, where a gear lies between. Default 1.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub gear_ratio: f64,
+    /// A column that says whether the sample is valid; `{position}` as in `column`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub valid_column: Option<String>,
+    /// The values of `valid_column` that mean yes. Default `[1]`, which is also *true*.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub valid_values: Vec<f64>,
+    /// The name of the `[group.…]` whose files hold this channel; the main logs when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<String>,
+    /// The channel's own time column, in the unit of the clock of its file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_column: Option<String>,
+    /// The channel's own rate, Hz, where it is recorded more slowly than the rows it stands in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
+    /// How long after the stamp of its row the channel is sampled, s.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub instant_s: f64,
+    /// How late the channel is recorded, s: logged(t) = true(t − latency).
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub latency_s: f64,
+    /// Redundant channels to be taken, in this order, where this one does not live.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub alternatives: Vec<ChannelMapping>,
+}
+
+impl ChannelMapping {
+    /// This channel and its alternatives, best first.
+    pub fn choices(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.alternatives)
+    }
+
+    /// How far the samples lie from the stamps of their rows, s.
+    pub(crate) fn shift_s(&self) -> f64 {
+        self.instant_s - self.latency_s
+    }
+}
+
+impl From<&SampleFilter> for ChannelMapping {
+    /// The filter's column, read raw: no unit is applied.
+    fn from(filter: &SampleFilter) -> Self {
+        Self {
+            column: filter.column.clone(),
+            unit: Unit::Celsius,
+            group: filter.group.clone(),
+            time_column: filter.time_column.clone(),
+            rate_hz: filter.rate_hz,
+            ..Self::default()
+        }
+    }
+}
+
+impl Default for ChannelMapping {
+    fn default() -> Self {
+        Self {
+            column: String::new(),
+            unit: Unit::Metre,
+            sign: 1,
+            scale: 1.0,
+            offset: 0.0,
+            wraps_at: None,
+            missing: Vec::new(),
+            gear_ratio: 1.0,
+            valid_column: None,
+            valid_values: yes(),
+            group: None,
+            time_column: None,
+            rate_hz: None,
+            instant_s: 0.0,
+            latency_s: 0.0,
+            alternatives: Vec::new(),
+        }
+    }
+}
+
+fn yes() -> Vec<f64> {
+    vec![1.0]
+}
+
+fn is_yes(values: &[f64]) -> bool {
+    values == [1.0]
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn one_sign() -> i8 {
+    1
+}
+
+#[expect(
+    clippy::float_cmp,
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde hands over a reference to the default itself"
+)]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
+fn is_one_sign(sign: &i8) -> bool {
+    *sign == 1
+}

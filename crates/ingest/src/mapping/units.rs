@@ -1,0 +1,217 @@
+//! Units, to SI, once.
+//!
+//! Factors are exact by definition: inch 0.0254 m, pound 0.453 592 37 kg, standard gravity
+//! 9.806 65 m/s² (NIST SP 811, appendix B).
+
+use std::f64::consts::{PI, TAU};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// One pound-force, N.
+const LBF_N: f64 = 4.448_221_615_260_5;
+/// One inch, m.
+const INCH_M: f64 = 0.0254;
+
+/// What a unit measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dimension {
+    /// SI: m.
+    Length,
+    /// SI: rad.
+    Angle,
+    /// SI: N.
+    Force,
+    /// SI: N·m.
+    Torque,
+    /// Here: °C.
+    Temperature,
+}
+
+impl Dimension {
+    /// The word for a person.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Length => "length",
+            Self::Angle => "angle",
+            Self::Force => "force",
+            Self::Torque => "torque",
+            Self::Temperature => "temperature",
+        }
+    }
+}
+
+/// The unit of a logged channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum Unit {
+    /// Metre.
+    #[serde(rename = "m")]
+    Metre,
+    /// Millimetre.
+    #[serde(rename = "mm")]
+    Millimetre,
+    /// Micrometre.
+    #[serde(rename = "um", alias = "µm", alias = "μm")]
+    Micrometre,
+    /// Inch.
+    #[serde(rename = "in", alias = "inch")]
+    Inch,
+    /// Degree of arc.
+    #[serde(rename = "deg", alias = "°")]
+    Degree,
+    /// Radian.
+    #[serde(rename = "rad")]
+    Radian,
+    /// Turn.
+    #[serde(rename = "rev", alias = "turn")]
+    Revolution,
+    /// Newton.
+    #[serde(rename = "N")]
+    Newton,
+    /// Kilonewton.
+    #[serde(rename = "kN")]
+    Kilonewton,
+    /// Decanewton.
+    #[serde(rename = "daN")]
+    Decanewton,
+    /// Pound-force.
+    #[serde(rename = "lbf")]
+    PoundForce,
+    /// Newton metre.
+    #[serde(rename = "N.m", alias = "N·m", alias = "Nm", alias = "N m")]
+    NewtonMetre,
+    /// Pound-force inch.
+    #[serde(rename = "lbf.in", alias = "lbf·in", alias = "in.lbf", alias = "lbf in")]
+    PoundForceInch,
+    /// Pound-force foot.
+    #[serde(rename = "lbf.ft", alias = "lbf·ft", alias = "ft.lbf", alias = "lbf ft")]
+    PoundForceFoot,
+    /// Degree Celsius.
+    #[serde(rename = "degC", alias = "°C", alias = "C")]
+    Celsius,
+    /// Degree Fahrenheit.
+    #[serde(rename = "degF", alias = "°F", alias = "F")]
+    Fahrenheit,
+    /// Kelvin.
+    #[serde(rename = "K")]
+    Kelvin,
+}
+
+impl Unit {
+    /// What it measures.
+    pub fn dimension(self) -> Dimension {
+        match self {
+            Self::Metre | Self::Millimetre | Self::Micrometre | Self::Inch => Dimension::Length,
+            Self::Degree | Self::Radian | Self::Revolution => Dimension::Angle,
+            Self::Newton | Self::Kilonewton | Self::Decanewton | Self::PoundForce => Dimension::Force,
+            Self::NewtonMetre | Self::PoundForceInch | Self::PoundForceFoot => Dimension::Torque,
+            Self::Celsius | Self::Fahrenheit | Self::Kelvin => Dimension::Temperature,
+        }
+    }
+
+    /// `SI = value · factor + offset`; temperatures go to °C.
+    pub fn to_si(self) -> (f64, f64) {
+        match self {
+            Self::Metre | Self::Radian | Self::Newton | Self::NewtonMetre | Self::Celsius => (1.0, 0.0),
+            Self::Millimetre => (1e-3, 0.0),
+            Self::Micrometre => (1e-6, 0.0),
+            Self::Inch => (INCH_M, 0.0),
+            Self::Degree => (PI / 180.0, 0.0),
+            Self::Revolution => (TAU, 0.0),
+            Self::Kilonewton => (1e3, 0.0),
+            Self::Decanewton => (10.0, 0.0),
+            Self::PoundForce => (LBF_N, 0.0),
+            Self::PoundForceInch => (LBF_N * INCH_M, 0.0),
+            Self::PoundForceFoot => (LBF_N * INCH_M * 12.0, 0.0),
+            Self::Fahrenheit => (5.0 / 9.0, -160.0 / 9.0),
+            Self::Kelvin => (1.0, -273.15),
+        }
+    }
+
+    /// The name as configuration spells it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Metre => "m",
+            Self::Millimetre => "mm",
+            Self::Micrometre => "um",
+            Self::Inch => "in",
+            Self::Degree => "deg",
+            Self::Radian => "rad",
+            Self::Revolution => "rev",
+            Self::Newton => "N",
+            Self::Kilonewton => "kN",
+            Self::Decanewton => "daN",
+            Self::PoundForce => "lbf",
+            Self::NewtonMetre => "N.m",
+            Self::PoundForceInch => "lbf.in",
+            Self::PoundForceFoot => "lbf.ft",
+            Self::Celsius => "degC",
+            Self::Fahrenheit => "degF",
+            Self::Kelvin => "K",
+        }
+    }
+}
+
+/// The unit of the time column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum TimeUnit {
+    /// Seconds.
+    #[serde(rename = "s")]
+    Second,
+    /// Milliseconds.
+    #[serde(rename = "ms")]
+    Millisecond,
+    /// Microseconds.
+    #[serde(rename = "us", alias = "µs", alias = "μs")]
+    Microsecond,
+    /// Nanoseconds.
+    #[serde(rename = "ns")]
+    Nanosecond,
+    /// SampleSelector: a counter that goes up by one with every row; `clock.rate_hz` says how fast.
+    #[serde(rename = "count")]
+    Count,
+}
+
+impl TimeUnit {
+    /// How many of them make a second; none for a counter, whose rate is given apart.
+    pub fn per_second(self) -> Option<f64> {
+        Some(match self {
+            Self::Count => return None,
+            Self::Second => 1.0,
+            Self::Millisecond => 1e3,
+            Self::Microsecond => 1e6,
+            Self::Nanosecond => 1e9,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// NIST SP 811 (2008), appendix B.8, to all digits printed there.
+    #[test]
+    fn factors_agree_with_the_published_table() {
+        let printed = [
+            (Unit::PoundForce, 4.448_222),
+            (Unit::PoundForceInch, 0.112_984_8),
+            (Unit::PoundForceFoot, 1.355_818),
+            (Unit::Inch, 0.0254),
+            (Unit::Degree, 0.017_453_29),
+        ];
+        for (unit, factor) in printed {
+            let (ours, offset) = unit.to_si();
+            assert!((ours / factor - 1.0).abs() < 3e-7, "{} is {ours}", unit.as_str());
+            assert!(offset.abs() < f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn water_freezes_and_boils_where_it_should() {
+        for (unit, freezing, boiling) in [(Unit::Fahrenheit, 32.0, 212.0), (Unit::Kelvin, 273.15, 373.15)] {
+            let (factor, offset) = unit.to_si();
+            assert!((freezing * factor + offset).abs() < 1e-12);
+            assert!((boiling * factor + offset - 100.0).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Where a named channel lies in a file: a column of its own, or inside structs and lists.
+//!
+//! `motor.angle_deg` is first looked for as the plain name of a column, since `SYSTEM.CHANNEL` is an
+//! ordinary name in flight logs; else as field `angle_deg` of struct `motor`. Lists are passed through
+//! without a name of their own: a list is simply more samples in one row.
+
+use std::sync::Arc;
+
+use arrow::array::{Array, ArrayRef, AsArray, UInt64Array, make_array};
+use arrow::buffer::NullBuffer;
+use arrow::compute::take;
+use arrow::datatypes::{DataType, Field, Fields};
+
+use crate::error::ErrorKind;
+
+/// One leaf of the schema.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct LeafColumn {
+    /// Its name: that of its column, with the fields below joined by dots.
+    pub(crate) name: String,
+    /// Its number among the file's leaves.
+    pub(crate) index: usize,
+    /// The number of the column it lies in.
+    pub(crate) root: usize,
+    /// The type of one of its values.
+    pub(crate) kind: DataType,
+    /// Whether lists lie on the way to it.
+    pub(crate) is_listed: bool,
+}
+
+/// All leaves of a schema, in the order of the file.
+pub(crate) fn leaves(fields: &Fields) -> Vec<LeafColumn> {
+    let mut found = Vec::new();
+    for (root, field) in fields.iter().enumerate() {
+        walk(field, field.name().clone(), root, false, &mut found);
+    }
+    found
+}
+
+fn walk(field: &Field, name: String, root: usize, is_listed: bool, found: &mut Vec<LeafColumn>) {
+    match field.data_type() {
+        DataType::Struct(inner) => {
+            for field in inner {
+                walk(field, format!("{name}.{}", field.name()), root, is_listed, found);
+            }
+        }
+        DataType::List(inner) | DataType::LargeList(inner) | DataType::FixedSizeList(inner, _) => {
+            walk(inner, name, root, true, found);
+        }
+        DataType::Map(inner, _) => walk(inner, name, root, true, found),
+        kind => {
+            let (index, kind) = (found.len(), kind.clone());
+            found.push(LeafColumn { name, index, root, kind, is_listed });
+        }
+    }
+}
+
+/// A leaf's values in a batch, and how many of them each row holds where lists lie on the way.
+pub(crate) struct FlatLeaf {
+    /// The values of all rows, one after the other.
+    pub(crate) values: ArrayRef,
+    /// Values for each row; none when it is one each.
+    pub(crate) lengths: Option<Vec<usize>>,
+}
+
+/// Goes down from a column, read with this leaf alone, to the leaf's values.
+pub(crate) fn flatten(column: &ArrayRef) -> FlatLeaf {
+    let (mut values, mut lengths) = (Arc::clone(column), None);
+    loop {
+        values = match values.data_type() {
+            DataType::Struct(_) => field_of(&values),
+            DataType::List(_) | DataType::LargeList(_) | DataType::FixedSizeList(..) | DataType::Map(..) => {
+                let (inner, counts) = list_values(&values);
+                lengths = Some(lengths_per_outer_row(lengths, &counts));
+                inner
+            }
+            _ => return FlatLeaf { values, lengths },
+        };
+    }
+}
+
+/// The only field that was read; where the struct is null, so is its field.
+fn field_of(array: &ArrayRef) -> ArrayRef {
+    let record = array.as_struct();
+    let inner = record.column(0);
+    match NullBuffer::union(record.nulls(), inner.nulls()) {
+        None => Arc::clone(inner),
+        nulls => match inner.to_data().into_builder().nulls(nulls).build() {
+            Ok(data) => make_array(data),
+            Err(_) => Arc::clone(inner),
+        },
+    }
+}
+
+fn list_values(array: &ArrayRef) -> (ArrayRef, Vec<usize>) {
+    let counted = |ends: Vec<usize>, values: &ArrayRef| {
+        let (first, last) = (ends.first().copied().unwrap_or(0), ends.last().copied().unwrap_or(0));
+        (values.slice(first, last - first), ends.windows(2).map(|w| w[1] - w[0]).collect())
+    };
+    if let Some(list) = array.as_list_opt::<i32>() {
+        counted(list.value_offsets().iter().map(|&o| o as usize).collect(), list.values())
+    } else if let Some(list) = array.as_list_opt::<i64>() {
+        counted(list.value_offsets().iter().map(|&o| o as usize).collect(), list.values())
+    } else if let Some(map) = array.as_map_opt() {
+        let entries: ArrayRef = Arc::new(map.entries().clone());
+        counted(map.value_offsets().iter().map(|&o| o as usize).collect(), &entries)
+    } else {
+        let list = array.as_fixed_size_list();
+        let each = list.value_length() as usize;
+        (Arc::clone(list.values()), vec![each; list.len()])
+    }
+}
+
+/// Values for each outer row, when each of its inner rows holds so many.
+fn lengths_per_outer_row(outer: Option<Vec<usize>>, inner: &[usize]) -> Vec<usize> {
+    let Some(outer) = outer else { return inner.to_vec() };
+    let mut rest = inner.iter();
+    outer.iter().map(|&rows| rest.by_ref().take(rows).sum()).collect()
+}
+
+/// Brings leaves of one batch to the same number of samples: where one of them is a list, a value that
+/// stands once for its row is repeated for every sample in it.
+///
+/// # Errors
+/// [`ErrorKind::ListLengths`] when two lists of one row differ in length.
+pub(crate) fn align_lengths(names: &[&str], flats: Vec<FlatLeaf>) -> Result<Vec<ArrayRef>, ErrorKind> {
+    let Some(listed) = flats.iter().position(|flat| flat.lengths.is_some()) else {
+        return Ok(flats.into_iter().map(|flat| flat.values).collect());
+    };
+    let lengths = flats[listed].lengths.clone().unwrap_or_default();
+    let differs = |flat: &FlatLeaf| flat.lengths.as_ref().is_some_and(|l| *l != lengths);
+    if let Some(other) = flats.iter().position(differs) {
+        return Err(ErrorKind::ListLengths {
+            column: names[other].to_owned(),
+            other: names[listed].to_owned(),
+        });
+    }
+    let rows: UInt64Array =
+        lengths.iter().enumerate().flat_map(|(row, &n)| std::iter::repeat_n(row as u64, n)).collect();
+    let spread = |(name, flat): (&&str, FlatLeaf)| match flat.lengths {
+        Some(_) => Ok(flat.values),
+        None => take(&flat.values, &rows, None).map_err(|_| ErrorKind::ColumnType {
+            column: (*name).to_owned(),
+            found: flat.values.data_type().to_string(),
+            wanted: "plain values beside lists",
+        }),
+    };
+    names.iter().zip(flats).map(spread).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use arrow::array::{Float64Array, Int32Array, ListArray, StructArray};
+    use arrow::datatypes::{Float64Type, Int32Type};
+
+    use super::*;
+
+    #[test]
+    fn leaves_are_named_through_structs_and_lists() {
+        let point = DataType::Struct(Fields::from(vec![
+            Field::new("t", DataType::Float64, true),
+            Field::new("x", DataType::Float32, true),
+        ]));
+        let fields = Fields::from(vec![
+            Field::new("a.b", DataType::Float64, true),
+            Field::new("s", DataType::List(Arc::new(Field::new("element", point, true))), true),
+        ]);
+        let found = leaves(&fields);
+        let told: Vec<_> = found.iter().map(|l| (l.name.as_str(), l.index, l.root, l.is_listed)).collect();
+        assert_eq!(told, [("a.b", 0, 0, false), ("s.t", 1, 1, true), ("s.x", 2, 1, true)]);
+    }
+
+    #[test]
+    fn a_value_beside_lists_is_repeated_for_each_of_their_samples() {
+        let list = ListArray::from_iter_primitive::<Float64Type, _, _>([
+            Some(vec![Some(1.0), Some(2.0)]),
+            None,
+            Some(vec![Some(3.0)]),
+        ]);
+        let flats = vec![
+            flatten(&(Arc::new(Int32Array::from(vec![7, 8, 9])) as ArrayRef)),
+            flatten(&(Arc::new(list) as ArrayRef)),
+        ];
+        let arrays = align_lengths(&["id", "x"], flats).unwrap();
+        assert_eq!(arrays[0].as_primitive::<Int32Type>().values(), &[7, 7, 9]);
+        assert_eq!(arrays[1].as_primitive::<Float64Type>().values(), &[1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn lists_of_other_lengths_in_one_row_are_refused() {
+        let list = |n: usize| {
+            let values = ListArray::from_iter_primitive::<Float64Type, _, _>([Some(vec![Some(1.0); n])]);
+            flatten(&(Arc::new(values) as ArrayRef))
+        };
+        assert!(matches!(
+            align_lengths(&["a", "b"], vec![list(2), list(3)]),
+            Err(ErrorKind::ListLengths { .. })
+        ));
+    }
+
+    #[test]
+    fn a_null_struct_has_null_fields() {
+        let inner: ArrayRef = Arc::new(Float64Array::from(vec![1.0, 2.0]));
+        let fields = Fields::from(vec![Field::new("x", DataType::Float64, false)]);
+        let record = StructArray::new(fields, vec![inner], Some(NullBuffer::from(vec![true, false])));
+        let flat = flatten(&(Arc::new(record) as ArrayRef));
+        assert!(flat.values.is_valid(0) && flat.values.is_null(1));
+    }
+}

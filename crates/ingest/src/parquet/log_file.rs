@@ -1,0 +1,353 @@
+//! One Parquet file: its leaves by name, their values in batches, checked against the footer.
+
+use std::fs::File;
+use std::iter::once;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use arrow::array::ArrayRef;
+use arrow::datatypes::DataType;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
+};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::ColumnChunkMetaData;
+
+use crate::channel::column_builder::ColumnBuilder;
+use crate::error::{Error, ErrorKind};
+use crate::io::byte_source::ByteSource;
+use crate::io::digest::Digest;
+use crate::io::read_at::{self, PreadFile};
+use crate::mapping::column_pattern::nearest;
+use crate::parquet::fast_decode;
+use crate::parquet::leaf_columns::{self, LeafColumn};
+use crate::parquet::numeric::append;
+use crate::parquet::page_header::{self, Page};
+use crate::parquet::row_selection::RowSelection;
+
+/// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
+const BATCH_ROWS: usize = 8192;
+
+/// So much of an object's end is fetched at first: most footers are shorter.
+const USUAL_FOOTER: u64 = 64 << 10;
+
+/// Why a footer could not be read: what the file begins with tells more than where its reader gave up.
+fn torn(source: &ByteSource, error: &ParquetError) -> String {
+    let mut head = [0; 4];
+    let length = source.want(once(0..4)).map(|()| read_at::read_at(source.file(), &mut head, 0));
+    match (length, &head) {
+        (Ok(Ok(4)), b"PAR1") => {
+            let detail = error.to_string();
+            format!("its end is torn ({})", detail.trim_start_matches("Parquet error: "))
+        }
+        (Ok(Ok(4)), b"PARE") => "it is encrypted".into(),
+        _ => "it does not begin as one".into(),
+    }
+}
+
+/// An open Parquet file, its footer read and nothing else.
+#[derive(Debug)]
+pub(crate) struct LogFile {
+    path: PathBuf,
+    source: ByteSource,
+    footer: ArrowReaderMetadata,
+    leaves: Vec<LeafColumn>,
+}
+
+impl LogFile {
+    pub(crate) fn open(path: &Path) -> Result<Self, Error> {
+        let fail = |fault| Error::new(path, fault);
+        let source = ByteSource::open(path).map_err(fail)?;
+        let file = source.file();
+        let length = file.metadata().map_err(|source| fail(ErrorKind::Unreadable { source }))?;
+        if length.is_dir() {
+            let source = std::io::Error::from(std::io::ErrorKind::IsADirectory);
+            return Err(fail(ErrorKind::Unreadable { source }));
+        }
+        if length.len() == 0 {
+            return Err(fail(ErrorKind::Empty));
+        }
+        want_footer(&source, length.len()).map_err(fail)?;
+        // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let footer = ArrowReaderMetadata::load(file, options)
+            .map_err(|e| fail(ErrorKind::NotParquet { detail: torn(&source, &e) }))?;
+        let leaves = leaf_columns::leaves(footer.schema().fields());
+        let opened = Self { path: path.to_owned(), source, footer, leaves };
+        if opened.rows() == 0 {
+            return Err(opened.error(ErrorKind::Empty));
+        }
+        Ok(opened)
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(crate) fn error(&self, fault: ErrorKind) -> Error {
+        Error::new(&self.path, fault)
+    }
+
+    /// Rows the footer declares.
+    pub(crate) fn rows(&self) -> usize {
+        usize::try_from(self.footer.metadata().file_metadata().num_rows()).unwrap_or(0)
+    }
+
+    /// Every leaf, in the order of the file.
+    pub(crate) fn leaves(&self) -> &[LeafColumn] {
+        &self.leaves
+    }
+
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.find(name).is_some()
+    }
+
+    fn find(&self, name: &str) -> Option<&LeafColumn> {
+        self.leaves.iter().find(|leaf| leaf.name == name)
+    }
+
+    /// A leaf by its name.
+    pub(crate) fn leaf(&self, name: &str) -> Result<&LeafColumn, Error> {
+        self.find(name).ok_or_else(|| {
+            let nearest = nearest(name, self.leaves.iter().map(|l| l.name.as_str())).map(str::to_owned);
+            self.error(ErrorKind::ColumnMissing { column: name.to_owned(), nearest })
+        })
+    }
+
+    /// The type of a leaf's values.
+    pub(crate) fn kind(&self, name: &str) -> Result<&DataType, Error> {
+        self.leaf(name).map(|leaf| &leaf.kind)
+    }
+
+    /// A value of the footer's key-value metadata.
+    pub(crate) fn metadata(&self, key: &str) -> Option<&str> {
+        let pairs = self.footer.metadata().file_metadata().key_value_metadata()?;
+        pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
+    }
+
+    /// The keys of that metadata.
+    pub(crate) fn metadata_keys(&self) -> Vec<&str> {
+        let pairs = self.footer.metadata().file_metadata().key_value_metadata();
+        pairs.into_iter().flatten().map(|pair| pair.key.as_str()).collect()
+    }
+
+    /// Hands the values of some leaves, batch by batch and sample by sample beside each other, to `take`.
+    ///
+    /// # Errors
+    /// When a leaf is missing, a page claims what cannot be, a page cannot be decoded, or other rows
+    /// come than were declared; and what `take` complains of.
+    pub(crate) fn each_batch(
+        &self,
+        names: &[&str],
+        mut take: impl FnMut(&[ArrayRef]) -> Result<(), ErrorKind>,
+    ) -> Result<(), Error> {
+        self.each_flat(names, |names, flats| take(&leaf_columns::align_lengths(names, flats)?))
+    }
+
+    /// As [`LogFile::each_batch`], before lists and single values are brought together.
+    pub(crate) fn each_flat(
+        &self,
+        names: &[&str],
+        mut take: impl FnMut(&[&str], Vec<leaf_columns::FlatLeaf>) -> Result<(), ErrorKind>,
+    ) -> Result<(), Error> {
+        let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
+        self.want(&leaves)?;
+        let mut rows = 0;
+        for group in 0..self.footer.metadata().num_row_groups() {
+            leaves.iter().try_for_each(|leaf| self.pages(group, leaf).map(drop))?;
+            rows += self.each_row_group(group, &leaves, |columns| {
+                take(names, columns.iter().map(leaf_columns::flatten).collect())
+            })?;
+        }
+        self.all_rows(rows, names.first().copied().unwrap_or_default())
+    }
+
+    /// Appends the numbers of a leaf, sample by sample; a null is NaN. So is what is not wanted: row groups and pages
+    /// of which nothing is wanted are not unpacked. Of a leaf whose rows hold lists all must be wanted.
+    ///
+    /// # Errors
+    /// As [`LogFile::each_batch`], and when the leaf holds no numbers.
+    pub(crate) fn append_numbers(
+        &self,
+        name: &str,
+        wanted: RowSelection<'_>,
+        into: &mut ColumnBuilder,
+    ) -> Result<(), Error> {
+        let leaf = self.leaf(name)?;
+        self.want(&[leaf])?;
+        let mut rows = 0;
+        for group in 0..self.footer.metadata().num_row_groups() {
+            let (declared, wanted) = (self.rows_of(group), wanted.offset(rows));
+            if !wanted.intersects(0..declared) {
+                if declared > self.rows().saturating_sub(rows) {
+                    return self.all_rows(rows.saturating_add(declared), name);
+                }
+                into.append_nulls(declared);
+                rows += declared;
+                continue;
+            }
+            let (pages, before) = (self.pages(group, leaf)?, into.len());
+            if fast_decode::decode_chunk((self.source.file(), self.chunk(group, leaf)), &pages, wanted, into)
+            {
+                rows += into.len() - before;
+                continue;
+            }
+            rows += self.each_row_group(group, &[leaf], |columns| {
+                append(name, &leaf_columns::flatten(&columns[0]).values, into)
+            })?;
+        }
+        self.all_rows(rows, name)
+    }
+
+    /// Whether as many rows came as were declared.
+    fn all_rows(&self, rows: usize, column: &str) -> Result<(), Error> {
+        if rows == self.rows() {
+            return Ok(());
+        }
+        let (found, declared, column) = (rows as u64, self.rows() as u64, column.to_owned());
+        Err(self.error(ErrorKind::RowCount { column, found, declared }))
+    }
+
+    /// Steps through one row group's leaves, each by its own reader: two fields of one struct would
+    /// otherwise come back as one column.
+    fn each_row_group(
+        &self,
+        group: usize,
+        leaves: &[&LeafColumn],
+        mut take: impl FnMut(&[ArrayRef]) -> Result<(), ErrorKind>,
+    ) -> Result<usize, Error> {
+        let mut columns =
+            leaves.iter().map(|leaf| self.column(group, leaf)).collect::<Result<Vec<_>, _>>()?;
+        let mut rows = 0;
+        loop {
+            let mut batch: Vec<ArrayRef> = Vec::with_capacity(columns.len());
+            for (reader, leaf) in columns.iter_mut().zip(leaves) {
+                match reader.next() {
+                    Some(Ok(found)) => batch.push(std::sync::Arc::clone(found.column(0))),
+                    Some(Err(e)) => return Err(self.decode(leaf, group, e.to_string())),
+                    None => {}
+                }
+            }
+            let Some(first) = batch.first() else { return Ok(rows) };
+            if batch.len() < leaves.len() || batch.iter().any(|a| a.len() != first.len()) {
+                let detail = "its leaves hold different numbers of rows".to_owned();
+                return Err(self.decode(leaves[0], group, detail));
+            }
+            rows += first.len();
+            take(&batch).map_err(|fault| self.error(fault))?;
+        }
+    }
+
+    fn column(&self, group: usize, leaf: &LeafColumn) -> Result<BatchIter, Error> {
+        let file =
+            self.source.file().try_clone().map_err(|source| self.error(ErrorKind::Unreadable { source }))?;
+        let builder =
+            ParquetRecordBatchReaderBuilder::new_with_metadata(PreadFile(file), self.footer.clone());
+        let mask = ProjectionMask::leaves(builder.parquet_schema(), [leaf.index]);
+        let reader = builder.with_projection(mask).with_row_groups(vec![group]).with_batch_size(BATCH_ROWS);
+        reader.build().map_err(|e| self.decode(leaf, group, e.to_string()))
+    }
+
+    /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
+    ///
+    /// # Errors
+    /// When they do not, or the leaf is missing.
+    pub(crate) fn check_pages(&self, name: &str) -> Result<(), Error> {
+        let leaf = self.leaf(name)?;
+        self.want(&[leaf])?;
+        let groups = 0..self.footer.metadata().num_row_groups();
+        let rows = groups.clone().fold(0_usize, |rows, group| rows.saturating_add(self.rows_of(group)));
+        groups.into_iter().try_for_each(|group| self.pages(group, leaf).map(drop))?;
+        self.all_rows(rows, name)
+    }
+
+    /// Rows that a row group declares.
+    fn rows_of(&self, group: usize) -> usize {
+        usize::try_from(self.footer.metadata().row_group(group).num_rows()).unwrap_or(0)
+    }
+
+    /// The pages of a chunk, none of which claims what cannot be.
+    fn pages(&self, group: usize, leaf: &LeafColumn) -> Result<Vec<Page>, Error> {
+        let rows = self.footer.metadata().row_group(group).num_rows();
+        page_header::bounded(self.source.file(), self.chunk(group, leaf), rows)
+            .map_err(|detail| self.decode(leaf, group, detail))
+    }
+
+    /// Whether every page of these leaves carries a checksum.
+    pub(crate) fn has_page_checksums(&self, names: &[&str]) -> Result<bool, Error> {
+        let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
+        self.want(&leaves)?;
+        for group in 0..self.footer.metadata().num_row_groups() {
+            for leaf in &leaves {
+                if self.pages(group, leaf)?.iter().any(|page| page.header.crc.is_none()) {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    fn chunk(&self, group: usize, leaf: &LeafColumn) -> &ColumnChunkMetaData {
+        self.footer.metadata().row_group(group).column(leaf.index)
+    }
+
+    /// Has every chunk of these leaves at hand.
+    fn want(&self, leaves: &[&LeafColumn]) -> Result<(), Error> {
+        let groups = 0..self.footer.metadata().num_row_groups();
+        let chunks = groups.flat_map(|group| leaves.iter().map(move |leaf| self.chunk(group, leaf)));
+        self.source.want(chunks.map(range_of)).map_err(|fault| self.error(fault))
+    }
+
+    fn decode(&self, leaf: &LeafColumn, group: usize, detail: String) -> Error {
+        let row_group = Some(group as u64);
+        self.error(ErrorKind::Decode { column: leaf.name.clone(), row_group, detail })
+    }
+
+    /// Feeds the footer and the chunks of the named leaves, in the order of the file, into a digest.
+    ///
+    /// It says that what was read is what was read before, whatever the file is called now and
+    /// whatever else was added to it.
+    pub(crate) fn feed(&self, names: &[&str], digest: &mut Digest) -> Result<(), Error> {
+        let unreadable = |source| self.error(ErrorKind::Unreadable { source });
+        let file = self.source.file();
+        let length = file.metadata().map_err(unreadable)?.len();
+        let wanted: Vec<&LeafColumn> =
+            self.leaves.iter().filter(|l| names.contains(&l.name.as_str())).collect();
+        self.want(&wanted)?;
+        for group in 0..self.footer.metadata().num_row_groups() {
+            for leaf in &wanted {
+                let (start, bytes) = self.chunk(group, leaf).byte_range();
+                let end = length.min(start.saturating_add(bytes));
+                digest.take(file, start..end).map_err(unreadable)?;
+            }
+        }
+        let start = length.saturating_sub(footer_bytes(file, length).map_err(unreadable)?);
+        digest.take(file, start..length).map_err(unreadable)
+    }
+}
+
+type BatchIter = parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+
+/// Where a chunk's pages lie, as its footer has it.
+fn range_of(chunk: &ColumnChunkMetaData) -> Range<u64> {
+    let (start, bytes) = chunk.byte_range();
+    start..start.saturating_add(bytes)
+}
+
+/// Has the footer at hand, however long it is.
+fn want_footer(source: &ByteSource, length: u64) -> Result<(), ErrorKind> {
+    source.want(once(length.saturating_sub(USUAL_FOOTER)..length))?;
+    match footer_bytes(source.file(), length) {
+        Ok(footer) => source.want(once(length - footer..length)),
+        // Shorter than a trailer: what reads the footer says so.
+        Err(_) => Ok(()),
+    }
+}
+
+/// Metadata length, which its own trailer states, plus the eight bytes of that trailer.
+fn footer_bytes(file: &File, length: u64) -> std::io::Result<u64> {
+    let mut trailer = [0; 4];
+    read_at::read_exact(file, &mut trailer, length.saturating_sub(8))?;
+    Ok((u64::from(u32::from_le_bytes(trailer)) + 8).min(length))
+}

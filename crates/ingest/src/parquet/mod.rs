@@ -1,0 +1,11 @@
+//! Parquet files: leaf columns as numbers, page by page, and a writer.
+
+pub(crate) mod dictionary;
+pub(crate) mod fast_decode;
+pub(crate) mod leaf_columns;
+pub(crate) mod log_file;
+pub(crate) mod numeric;
+pub(crate) mod page_crc;
+pub(crate) mod page_header;
+pub(crate) mod row_selection;
+pub mod writer;

@@ -1,0 +1,63 @@
+//! Which rows of a table are asked for: all, or those of the stretches that conditions leave.
+//!
+//! Nothing is made of the other rows, so neither are their pages unpacked. Whether a page is unpacked moves no number:
+//! what lies outside the stretches is taken out of pages that hold both.
+
+use std::ops::Range;
+
+/// Rows that are asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RowSelection<'a> {
+    /// Rows, in order and apart from each other; none when all are wanted.
+    stretches: Option<&'a [Range<usize>]>,
+    /// Rows of the table before the one that is called the first here.
+    before: usize,
+}
+
+impl<'a> RowSelection<'a> {
+    /// Every row.
+    pub(crate) const ALL: Self = Self { stretches: None, before: 0 };
+
+    /// The rows of these stretches, which are in order.
+    pub(crate) fn of(stretches: &'a [Range<usize>]) -> Self {
+        Self { stretches: Some(stretches), before: 0 }
+    }
+
+    /// Whether every row is.
+    pub(crate) fn is_all(self) -> bool {
+        self.stretches.is_none()
+    }
+
+    /// The same, counted from a row on.
+    pub(crate) fn offset(self, row: usize) -> Self {
+        Self { before: self.before + row, ..self }
+    }
+
+    /// Whether any of these rows is wanted.
+    pub(crate) fn intersects(self, rows: Range<usize>) -> bool {
+        let Some(stretches) = self.stretches else { return true };
+        let (start, end) = (self.before + rows.start, self.before + rows.end);
+        let next = stretches.partition_point(|stretch| stretch.end <= start);
+        stretches.get(next).is_some_and(|stretch| stretch.start < end)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_wanted_where_a_stretch_touches_them() {
+        let stretches = [10..20, 30..31];
+        let wanted = RowSelection::of(&stretches);
+        let found =
+            [0..10, 0..11, 19..30, 20..30, 25..31, 31..99, 12..13].map(|rows| wanted.intersects(rows));
+        assert_eq!(found, [false, true, true, false, true, false, true]);
+        assert!(
+            wanted.offset(5).offset(5).intersects(0..1)
+                && !wanted.offset(20).intersects(0..10)
+                && RowSelection::ALL.intersects(0..1)
+        );
+        assert!(!RowSelection::of(&[]).intersects(0..100));
+    }
+}

@@ -1,0 +1,144 @@
+//! Parquet out: simulated logs, truth tables, traces. Written beside and renamed, so no reader meets half a file.
+
+use std::fs::{self, File};
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{
+    ArrayRef, Float32Array, Float64Array, RecordBatch, StringArray, TimestampMicrosecondArray,
+};
+use arrow::datatypes::{DataType, Field, Schema};
+use arrow::error::ArrowError;
+use jiff::Timestamp;
+use parquet::arrow::ArrowWriter;
+use parquet::basic::{self, Compression, ZstdLevel};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+
+use crate::error::{Error, ErrorKind};
+use crate::parquet::page_crc;
+
+/// A column to be written.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Column {
+    /// Numbers in full; NaN is written as null.
+    Real(Vec<f64>),
+    /// Numbers rounded to 24 bits, as recorders keep them; NaN is written as null.
+    Single(Vec<f64>),
+    /// Text.
+    Text(Vec<String>),
+    /// Instants, UTC, to the microsecond.
+    Instant(Vec<Timestamp>),
+}
+
+impl Column {
+    fn array(&self) -> ArrayRef {
+        let present = |v: &f64| (!v.is_nan()).then_some(*v);
+        match self {
+            Self::Real(v) => Arc::new(v.iter().map(present).collect::<Float64Array>()),
+            Self::Single(v) => {
+                Arc::new(v.iter().map(|v| present(v).map(|v| v as f32)).collect::<Float32Array>())
+            }
+            Self::Text(v) => Arc::new(v.iter().map(Some).collect::<StringArray>()),
+            Self::Instant(v) => {
+                let ticks = TimestampMicrosecondArray::from_iter_values(v.iter().map(|t| t.as_microsecond()));
+                Arc::new(ticks.with_timezone("UTC"))
+            }
+        }
+    }
+
+    fn nullable(&self) -> bool {
+        matches!(self, Self::Real(v) | Self::Single(v) if v.iter().any(|v| v.is_nan()))
+    }
+}
+
+/// How numbers lie in the file; always under zstd, with a checksum on every page.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Encoding {
+    /// Byte stream split: the smallest, and in this program the quickest to read (`docs/normalized.md`).
+    #[default]
+    Split,
+    /// Dictionary while it pays, then plain: every reader knows it, also those that know no byte stream
+    /// split of double floats, Spark 4.2 among them.
+    Compatible,
+}
+
+/// Writes columns of one length as a Parquet file with key-value metadata, numbers split.
+///
+/// # Errors
+/// As [`write_encoded`].
+pub fn write_parquet(
+    file: &Path,
+    columns: &[(String, Column)],
+    metadata: &[(String, String)],
+) -> Result<(), Error> {
+    write_encoded(file, columns, metadata, Encoding::Split)
+}
+
+/// Writes columns of one length as a Parquet file with key-value metadata.
+///
+/// # Errors
+/// [`ErrorKind::Unreadable`] when the file cannot be written; [`ErrorKind::Table`] when the columns differ in length.
+pub fn write_encoded(
+    file: &Path,
+    columns: &[(String, Column)],
+    metadata: &[(String, String)],
+    encoding: Encoding,
+) -> Result<(), Error> {
+    let fail = |fault| Error::new(file, fault);
+    let io = |source| fail(ErrorKind::Unreadable { source });
+    let bad = |e: String| fail(ErrorKind::Table { row: None, column: None, detail: e });
+    let batch = batch(columns).map_err(|e| bad(e.to_string()))?;
+    let schema = batch.schema();
+    if let Some(folder) = file.parent() {
+        fs::create_dir_all(folder).map_err(io)?;
+    }
+    let (bare, beside) = (file.with_extension("parquet.bare"), file.with_extension("parquet.part"));
+    let sink = File::create(&bare).map_err(io)?;
+    let mut writer = ArrowWriter::try_new(sink, schema, Some(properties(&batch, metadata, encoding)))
+        .map_err(|e| bad(e.to_string()))?;
+    writer.write(&batch).map_err(|e| bad(e.to_string()))?;
+    writer.close().map_err(|e| bad(e.to_string()))?;
+    let from = File::open(&bare).map_err(io)?;
+    let mut to = File::create(&beside).map_err(io)?;
+    page_crc::copy(&from, &mut to).map_err(|e| bad(e.to_string()))?;
+    to.sync_all().map_err(io)?;
+    fs::remove_file(&bare).map_err(io)?;
+    fs::rename(&beside, file).map_err(io)
+}
+
+/// Columns of one length as they would be read back.
+///
+/// # Errors
+/// When the columns differ in length.
+pub fn batch(columns: &[(String, Column)]) -> Result<RecordBatch, ArrowError> {
+    let arrays: Vec<ArrayRef> = columns.iter().map(|(_, column)| column.array()).collect();
+    let field = |((name, column), array): (&(String, Column), &ArrayRef)| {
+        Field::new(name, array.data_type().clone(), column.nullable())
+    };
+    let schema = Arc::new(Schema::new(columns.iter().zip(&arrays).map(field).collect::<Vec<_>>()));
+    RecordBatch::try_new(schema, arrays)
+}
+
+fn properties(batch: &RecordBatch, metadata: &[(String, String)], encoding: Encoding) -> WriterProperties {
+    let pairs = metadata.iter().map(|(key, value)| KeyValue::new(key.clone(), value.clone())).collect();
+    let mut builder = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_key_value_metadata(Some(pairs))
+        // A page index would speak of places that the checksums move.
+        .set_offset_index_disabled(true)
+        .set_statistics_enabled(EnabledStatistics::Chunk)
+        .set_created_by(concat!("freeplay ", env!("CARGO_PKG_VERSION")).to_owned());
+    for field in batch.schema().fields() {
+        if matches!(field.data_type(), DataType::Float64 | DataType::Float32) {
+            let path = parquet::schema::types::ColumnPath::from(field.name().as_str());
+            builder = match encoding {
+                Encoding::Split => builder
+                    .set_column_dictionary_enabled(path.clone(), false)
+                    .set_column_encoding(path, basic::Encoding::BYTE_STREAM_SPLIT),
+                Encoding::Compatible => builder.set_column_dictionary_enabled(path, true),
+            };
+        }
+    }
+    builder.build()
+}

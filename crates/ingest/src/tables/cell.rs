@@ -1,0 +1,93 @@
+//! Cells and headers of tables: names, numbers, instants, and the errors that name row and column.
+
+use std::path::Path;
+use std::str::FromStr;
+
+use jiff::{Timestamp, civil, tz::TimeZone};
+
+use crate::error::{Error, ErrorKind};
+use crate::mapping::column_pattern::nearest;
+
+/// Names that tables use for what they mean: none of them is another one misspelled.
+const KNOWN: [&str; 12] = [
+    "tail_number",
+    "position",
+    "part_number",
+    "serial_number",
+    "installed_utc",
+    "removed_utc",
+    "departure_utc",
+    "flight_id",
+    "flight_hours",
+    "tail_hours_end",
+    "gap_m",
+    "date_utc",
+];
+
+/// Where a header has a name.
+pub(super) fn position(header: &[String], name: &str) -> Option<usize> {
+    header.iter().position(|h| h.trim() == name)
+}
+
+/// A column that is not there, with the nearest that is.
+pub(super) fn missing(file: &Path, wanted: &str, header: &[String]) -> Error {
+    // A column that is one of ours already stands for what it says.
+    let others = header.iter().filter(|h| !KNOWN.contains(&h.trim()));
+    let nearest = nearest(wanted, others.map(String::as_str)).map(str::to_owned);
+    Error::new(file, ErrorKind::TableColumn { column: wanted.to_owned(), nearest })
+}
+
+/// A cell that is not what it should be; rows count from 0 here and from 1 for people.
+pub(super) fn bad_cell(file: &Path, row: usize, column: Option<&String>, detail: String) -> Error {
+    Error::new(file, ErrorKind::Table { row: Some(row as u64 + 1), column: column.cloned(), detail })
+}
+
+/// Reads a name.
+///
+/// # Errors
+/// When it is blank.
+pub fn name<T: TryFrom<String, Error = records::ids::EmptyIdError>>(text: &str) -> Result<T, String> {
+    T::try_from(text.to_owned()).map_err(|e| e.to_string())
+}
+
+/// Reads a finite number.
+///
+/// # Errors
+/// When it is none.
+pub fn number(text: &str) -> Result<f64, String> {
+    match f64::from_str(text) {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(format!("`{text}` is no number")),
+    }
+}
+
+/// Reads an instant; in a column that says UTC, a date or a time without zone is UTC.
+///
+/// # Errors
+/// When it is neither a date nor a time.
+pub fn utc(text: &str) -> Result<Timestamp, String> {
+    let civil = || {
+        text.parse::<civil::DateTime>()
+            .or_else(|e| text.parse::<civil::Date>().map(civil::DateTime::from).map_err(|_| e))
+    };
+    match text.parse::<Timestamp>() {
+        Ok(instant) => Ok(instant),
+        Err(_) => {
+            let instant = civil().and_then(|civil| TimeZone::UTC.to_timestamp(civil));
+            instant.map_err(|_| not_utc(text))
+        }
+    }
+}
+
+/// Why a text is no instant: a day that no calendar has, or another form.
+fn not_utc(text: &str) -> String {
+    let is_date = |day: &str| {
+        let digits = |part: &str, n: usize| part.len() == n && part.bytes().all(|b| b.is_ascii_digit());
+        let parts: Vec<&str> = day.split('-').collect();
+        matches!(parts[..], [year, month, day] if digits(year, 4) && digits(month, 2) && digits(day, 2))
+    };
+    match text.get(..10).filter(|day| is_date(day)) {
+        Some(day) if day.parse::<civil::Date>().is_err() => format!("there is no day `{day}`"),
+        _ => format!("`{text}` is no UTC date or time such as 2026-11-19 or 2026-11-19T04:13:00Z"),
+    }
+}

@@ -1,0 +1,500 @@
+//! Some rows of a table at a time, its columns as what they stand for: text, numbers, instants.
+//!
+//! A fleet's history has tens of millions of rows, so nothing is turned into text that is a number already.
+
+use std::fs::File;
+use std::io::{Cursor, Read};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow::array::{
+    Array, ArrayRef, AsArray, DictionaryArray, Float64Array, PrimitiveArray, RecordBatch, StringArray,
+    StringBuilder, TimestampMicrosecondArray, new_null_array,
+};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema, TimeUnit, TimestampMicrosecondType};
+use jiff::Timestamp;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
+};
+use parquet::errors::ParquetError;
+
+use crate::error::{Error, ErrorKind};
+use crate::io::byte_source::whole;
+use crate::io::read_at::PreadFile;
+use crate::tables::cell::{bad_cell, missing, number, position, utc};
+
+/// Rows of a batch.
+const ROWS: usize = 65_536;
+
+/// Some rows of a table.
+#[derive(Debug, Clone)]
+pub struct TableBatch {
+    file: PathBuf,
+    header: Arc<[String]>,
+    batch: RecordBatch,
+    /// Rows of the table before these.
+    before: usize,
+}
+
+/// The texts of a column: trimmed, an empty one none.
+pub struct StringColumn(StringArray);
+
+impl StringColumn {
+    /// The text of a row.
+    pub fn get(&self, row: usize) -> Option<&str> {
+        let text = self.0.is_valid(row).then(|| trim_ascii_fast(self.0.value(row)))?;
+        (!text.is_empty()).then_some(text)
+    }
+}
+
+/// A text without the blanks around it, of which most have none.
+pub fn trim_ascii_fast(text: &str) -> &str {
+    let is_bare = |end: Option<&u8>| end.is_some_and(u8::is_ascii_graphic);
+    if is_bare(text.as_bytes().first()) && is_bare(text.as_bytes().last()) { text } else { text.trim() }
+}
+
+impl TableBatch {
+    /// Rows from memory, so many others before them; `name` stands for their file in diagnostics.
+    pub fn new(name: &Path, batch: RecordBatch, before: usize) -> Self {
+        let header = batch.schema_ref().fields().iter().map(|f| f.name().clone()).collect();
+        Self { file: name.to_owned(), header, batch, before }
+    }
+
+    /// Rows in it.
+    pub fn len(&self) -> usize {
+        self.batch.num_rows()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    pub(super) fn header(&self) -> &[String] {
+        &self.header
+    }
+
+    /// Where a column stands, if it is there under one of its names.
+    pub fn find(&self, names: &[&str]) -> Option<usize> {
+        names.iter().find_map(|name| position(&self.header, name))
+    }
+
+    /// Where a column stands.
+    ///
+    /// # Errors
+    /// When it is not there, with the nearest name that is.
+    pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
+        self.find(names).ok_or_else(|| missing(&self.file, names[0], &self.header))
+    }
+
+    /// A column as text; without one, all none.
+    ///
+    /// # Errors
+    /// When it is neither text, numbers nor times.
+    pub fn texts(&self, column: Option<usize>) -> Result<StringColumn, Error> {
+        let texts = self.cast(column, &DataType::Utf8)?;
+        Ok(StringColumn(texts.as_string().clone()))
+    }
+
+    /// A column of texts as the codes that it is stored as; none where it is not.
+    pub fn dictionary_column(&self, column: usize) -> Option<&DictionaryArray<Int32Type>> {
+        self.batch.column(column).as_dictionary_opt()
+    }
+
+    /// A column as finite numbers; without one, all none.
+    ///
+    /// # Errors
+    /// The first cell that is no number.
+    pub fn numbers(&self, column: Option<usize>) -> Result<Float64Array, Error> {
+        let wanted = DataType::Float64;
+        let Some(index) = column.filter(|c| !is_numeric(self.batch.column(*c))) else {
+            let numbers: Float64Array = self.cast(column, &wanted)?.as_primitive::<Float64Type>().clone();
+            // What lies under an empty cell may be anything.
+            if numbers.values().iter().all(|value| value.is_finite()) {
+                return Ok(numbers);
+            }
+            return match numbers.iter().position(|value| value.is_some_and(|value| !value.is_finite())) {
+                Some(row) => Err(self.error(row, column, format!("`{}` is no number", numbers.value(row)))),
+                None => Ok(numbers),
+            };
+        };
+        self.parsed::<Float64Type>(index, number)
+    }
+
+    /// A column as instants, µs since 1970 UTC; without one, all none.
+    ///
+    /// # Errors
+    /// The first cell that is neither a date nor a time.
+    pub fn timestamps(&self, column: Option<usize>) -> Result<TimestampMicrosecondArray, Error> {
+        let wanted = DataType::Timestamp(TimeUnit::Microsecond, None);
+        match column.filter(|c| !self.batch.column(*c).data_type().is_temporal()) {
+            None => Ok(self.cast(column, &wanted)?.as_primitive().clone()),
+            Some(index) => self
+                .parsed::<TimestampMicrosecondType>(index, |text| utc(text).map(Timestamp::as_microsecond)),
+        }
+    }
+
+    /// A diagnostic about a row's cell.
+    pub fn error(&self, row: usize, column: Option<usize>, detail: String) -> Error {
+        bad_cell(&self.file, self.before + row, column.and_then(|c| self.header.get(c)), detail)
+    }
+
+    fn parsed<T: arrow::datatypes::ArrowPrimitiveType>(
+        &self,
+        column: usize,
+        read: impl Fn(&str) -> Result<T::Native, String>,
+    ) -> Result<PrimitiveArray<T>, Error> {
+        let texts = self.texts(Some(column))?;
+        let cell = |row: usize| {
+            let value = texts.get(row).map(&read).transpose();
+            value.map_err(|detail| self.error(row, Some(column), detail))
+        };
+        (0..self.len()).map(cell).collect()
+    }
+
+    fn cast(&self, column: Option<usize>, wanted: &DataType) -> Result<ArrayRef, Error> {
+        let Some(column) = column else { return Ok(new_null_array(wanted, self.len())) };
+        let array = self.batch.column(column);
+        cast(array, wanted).map_err(|_| {
+            let (column, found) = (self.header[column].clone(), array.data_type().to_string());
+            Error::new(&self.file, ErrorKind::ColumnType { column, found, wanted: "text, numbers or times" })
+        })
+    }
+}
+
+/// Whether a column's cells need no parsing to be numbers: booleans and texts do, or are refused there.
+fn is_numeric(array: &ArrayRef) -> bool {
+    array.data_type().is_numeric()
+}
+
+/// The rows of a table, in order, as [`TableSplits`] knows it.
+///
+/// # Errors
+/// As [`TableSplits::open`].
+pub fn batches(file: &Path, wanted: Option<&[&str]>) -> Result<TableBatches, Error> {
+    let table = TableSplits::open(file, wanted, &[])?;
+    table.batches(0..table.len())
+}
+
+/// A table in parts that several may read at a time: a `.parquet` file as Parquet in its row groups, anything else
+/// as CSV in one.
+pub struct TableSplits {
+    file: PathBuf,
+    /// Of Parquet: the file, what its footer says in the form wanted, and the columns.
+    parquet: Option<(File, ArrowReaderMetadata, ProjectionMask)>,
+}
+
+impl TableSplits {
+    /// Opens a table. Of Parquet only the `wanted` columns are read, where some are named; texts of the `coded`
+    /// ones, which repeat, stay codes.
+    ///
+    /// # Errors
+    /// When the file cannot be opened, or is not the table its name says.
+    pub fn open(file: &Path, wanted: Option<&[&str]>, coded: &[&str]) -> Result<Self, Error> {
+        let is_parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+        let parquet = is_parquet.then(|| parquet(file, wanted, coded)).transpose();
+        Ok(Self { file: file.to_owned(), parquet: parquet.map_err(|fault| Error::new(file, fault))? })
+    }
+
+    /// How many parts there are: one at least.
+    #[expect(clippy::len_without_is_empty, reason = "there is no table without a part")]
+    pub fn len(&self) -> usize {
+        self.parquet.as_ref().map_or(1, |(_, footer, _)| footer.metadata().num_row_groups().max(1))
+    }
+
+    /// The rows of some parts, in order.
+    ///
+    /// There is always one batch, so that a table without rows still shows its columns.
+    ///
+    /// # Errors
+    /// As [`TableSplits::open`].
+    pub fn batches(&self, parts: Range<usize>) -> Result<TableBatches, Error> {
+        let opened = match &self.parquet {
+            Some((file, footer, mask)) => groups(file, footer, mask.clone(), parts),
+            None => Rows::csv(&self.file).map(|(rows, schema)| (rows, schema, 0)),
+        };
+        let (rows, schema, before) = opened.map_err(|fault| Error::new(&self.file, fault))?;
+        let header = schema.fields().iter().map(|f| f.name().clone()).collect();
+        Ok(TableBatches { file: self.file.clone(), header, schema, rows, before, is_begun: false })
+    }
+}
+
+fn torn(error: &ParquetError) -> ErrorKind {
+    ErrorKind::NotParquet { detail: error.to_string() }
+}
+
+fn parquet(
+    file: &Path,
+    wanted: Option<&[&str]>,
+    coded: &[&str],
+) -> Result<(File, ArrowReaderMetadata, ProjectionMask), ErrorKind> {
+    let opened = whole(file)?;
+    let clone = opened.try_clone().map_err(|source| ErrorKind::Unreadable { source })?;
+    let found = ArrowReaderMetadata::load(&PreadFile(clone), ArrowReaderOptions::new());
+    let found = found.map_err(|e| torn(&e))?;
+    let footer = if coded.is_empty() { found } else { with_codes(found, coded) };
+    let columns = footer.parquet_schema().root_schema().get_fields().iter().enumerate();
+    let is_wanted = |name: &str| wanted.is_none_or(|wanted| wanted.contains(&name.trim()));
+    let roots: Vec<usize> = columns.filter(|(_, c)| is_wanted(c.name())).map(|(root, _)| root).collect();
+    let mask = ProjectionMask::roots(footer.parquet_schema(), roots);
+    Ok((opened, footer, mask))
+}
+
+/// The same file, whose texts in some columns are read as codes, where they can be.
+fn with_codes(found: ArrowReaderMetadata, names: &[&str]) -> ArrowReaderMetadata {
+    let field = |field: &Arc<Field>| {
+        let is_text = matches!(field.data_type(), DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View);
+        let codes = || DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let name = field.name().trim();
+        if is_text && names.contains(&name) {
+            field.as_ref().clone().with_data_type(codes())
+        } else {
+            field.as_ref().clone()
+        }
+    };
+    let fields: Vec<Field> = found.schema().fields().iter().map(field).collect();
+    let options = ArrowReaderOptions::new().with_schema(Arc::new(Schema::new(fields)));
+    ArrowReaderMetadata::try_new(Arc::clone(found.metadata()), options).unwrap_or(found)
+}
+
+/// The rows of some row groups, their columns, and how many rows of the file are before them.
+fn groups(
+    file: &File,
+    footer: &ArrowReaderMetadata,
+    mask: ProjectionMask,
+    groups: Range<usize>,
+) -> Result<(Rows, Arc<Schema>, usize), ErrorKind> {
+    let clone = file.try_clone().map_err(|source| ErrorKind::Unreadable { source })?;
+    let some = footer.metadata().row_groups();
+    let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();
+    let groups = groups.start..groups.end.min(some.len());
+    let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(PreadFile(clone), footer.clone());
+    let builder = builder.with_projection(mask).with_row_groups(groups.collect()).with_batch_size(ROWS);
+    let reader = builder.build().map_err(|e| torn(&e))?;
+    let schema = arrow::array::RecordBatchReader::schema(&reader);
+    Ok((Rows::Parquet(reader), schema, before))
+}
+
+/// What [`TableSplits`] reads.
+pub struct TableBatches {
+    file: PathBuf,
+    header: Arc<[String]>,
+    schema: Arc<Schema>,
+    rows: Rows,
+    before: usize,
+    is_begun: bool,
+}
+
+impl Iterator for TableBatches {
+    type Item = Result<TableBatch, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let next = match self.rows.next(&self.schema) {
+            Some(next) => next,
+            None if !self.is_begun => Ok(RecordBatch::new_empty(Arc::clone(&self.schema))),
+            None => return None,
+        };
+        self.is_begun = true;
+        let batch = next.map_err(|fault| Error::new(&self.file, fault)).map(|batch| {
+            let before = self.before;
+            self.before += batch.num_rows();
+            TableBatch { file: self.file.clone(), header: Arc::clone(&self.header), batch, before }
+        });
+        Some(batch)
+    }
+}
+
+enum Rows {
+    Parquet(ParquetRecordBatchReader),
+    Csv(csv::StringRecordsIntoIter<Cursor<Vec<u8>>>),
+}
+
+impl Rows {
+    fn csv(file: &Path) -> Result<(Self, Arc<Schema>), ErrorKind> {
+        let mut text = Vec::new();
+        whole(file)?.read_to_end(&mut text).map_err(|source| ErrorKind::Unreadable { source })?;
+        // Spreadsheets open their UTF-8 with a byte order mark.
+        let mark = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
+        let mut text = Cursor::new(text);
+        text.set_position(mark);
+        let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text);
+        let header = reader.headers().map_err(|e| bad_row(&e))?;
+        let fields: Vec<Field> = header.iter().map(|name| Field::new(name, DataType::Utf8, true)).collect();
+        Ok((Self::Csv(reader.into_records()), Arc::new(Schema::new(fields))))
+    }
+
+    fn next(&mut self, schema: &Arc<Schema>) -> Option<Result<RecordBatch, ErrorKind>> {
+        match self {
+            Self::Parquet(reader) => {
+                let torn = |e: arrow::error::ArrowError| ErrorKind::NotParquet { detail: e.to_string() };
+                Some(reader.next()?.map_err(torn))
+            }
+            Self::Csv(records) => texts(records, schema).transpose(),
+        }
+    }
+}
+
+/// The next rows of a CSV file; nothing at its end.
+fn texts(
+    records: &mut csv::StringRecordsIntoIter<Cursor<Vec<u8>>>,
+    schema: &Arc<Schema>,
+) -> Result<Option<RecordBatch>, ErrorKind> {
+    let mut columns: Vec<StringBuilder> = schema.fields().iter().map(|_| StringBuilder::new()).collect();
+    let mut count = 0;
+    for record in records.take(ROWS) {
+        let record = record.map_err(|e| bad_row(&e))?;
+        for (column, cell) in columns.iter_mut().zip(&record) {
+            column.append_option((!cell.is_empty()).then_some(cell));
+        }
+        count += 1;
+    }
+    if count == 0 {
+        return Ok(None);
+    }
+    let columns: Vec<ArrayRef> =
+        columns.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef).collect();
+    let batch = RecordBatch::try_new(Arc::clone(schema), columns);
+    batch.map(Some).map_err(|e| ErrorKind::Table { row: None, column: None, detail: e.to_string() })
+}
+
+fn bad_row(error: &csv::Error) -> ErrorKind {
+    let row = error.position().map(csv::Position::record);
+    ErrorKind::Table { row, column: None, detail: error.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+
+    use arrow::array::{Int64Array, TimestampSecondArray};
+    use parquet::arrow::ArrowWriter;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn batch(columns: Vec<(&str, ArrayRef)>) -> RecordBatch {
+        RecordBatch::try_from_iter(columns).unwrap()
+    }
+
+    fn parquet(batch: &RecordBatch) -> (tempfile::TempDir, PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("table.parquet");
+        let mut writer = ArrowWriter::try_new(File::create(&file).unwrap(), batch.schema(), None).unwrap();
+        writer.write(batch).unwrap();
+        writer.close().unwrap();
+        (dir, file)
+    }
+
+    /// 2026-01-01 is 1,767,225,600 s after 1970 by any calendar.
+    #[test]
+    fn an_instant_is_the_same_as_text_as_a_day_and_as_a_stamp_of_any_zone() {
+        let seconds = || TimestampSecondArray::from(vec![1_767_225_600]);
+        let columns: [ArrayRef; 5] = [
+            Arc::new(StringArray::from(vec!["2026-01-01T01:00:00+01:00"])),
+            Arc::new(StringArray::from(vec![" 2026-01-01 "])),
+            Arc::new(arrow::array::Date32Array::from(vec![20_454])),
+            Arc::new(seconds()),
+            Arc::new(seconds().with_timezone("+05:30")),
+        ];
+        for column in columns {
+            let kind = column.data_type().clone();
+            let batch = TableBatch::new("t".as_ref(), batch(vec![("at", column)]), 0);
+            assert_eq!(batch.timestamps(Some(0)).unwrap().value(0), 1_767_225_600_000_000, "{kind}");
+        }
+    }
+
+    #[test]
+    fn only_columns_that_are_wanted_are_read_and_one_that_lacks_is_told() {
+        let column = |n: i64| Arc::new(Int64Array::from(vec![n])) as ArrayRef;
+        let (_dir, file) = parquet(&batch(vec![("a", column(1)), ("gap_mm", column(2)), ("c", column(3))]));
+        let batch = batches(&file, Some(&["c", "gap_mm"])).unwrap().next().unwrap().unwrap();
+        assert_eq!((batch.find(&["a"]), batch.find(&["c"])), (None, Some(1)));
+        let error = batch.column(&["gap_m"]).unwrap_err();
+        assert!(error.diagnostic().hint.unwrap().starts_with("`gap_mm`?"));
+    }
+
+    #[test]
+    fn a_bad_cell_is_counted_through_all_chunks() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("table.csv");
+        let rows: String = (0..=ROWS + 7).map(|row| if row == ROWS + 4 { "x\n" } else { "1.5\n" }).collect();
+        std::fs::write(&file, format!("gap_m\n{rows}")).unwrap();
+        let errors = batches(&file, None).unwrap().filter_map(|batch| batch.unwrap().numbers(Some(0)).err());
+        let places: Vec<_> = errors.map(|e| e.diagnostic().location().unwrap()).collect();
+        assert_eq!(places, [format!("column `gap_m`, row {}", ROWS + 5)]);
+        let not_finite = Arc::new(Float64Array::from(vec![1.0, f64::NAN])) as ArrayRef;
+        let batch = TableBatch::new("t".as_ref(), batch(vec![("gap_m", not_finite)]), 10);
+        let place = batch.numbers(Some(0)).unwrap_err().diagnostic().location().unwrap();
+        assert_eq!(place, "column `gap_m`, row 12");
+    }
+
+    /// Seven rows in groups of three, some texts as codes, whatever form of text the file's writer prefers.
+    #[test]
+    fn parts_of_a_table_are_its_rows_in_order_and_know_how_many_are_before_them() {
+        let serials: Vec<String> = (0..7).map(|row| format!(" S{} ", row / 4)).collect();
+        let texts: [ArrayRef; 3] = [
+            Arc::new(StringArray::from(serials.clone())),
+            Arc::new(arrow::array::LargeStringArray::from(serials.clone())),
+            Arc::new(arrow::array::StringViewArray::from_iter_values(serials)),
+        ];
+        let gaps = Float64Array::from(vec![0.0, 1.0, 2.0, 3.0, 4.0, f64::INFINITY, 6.0]);
+        for serials in texts {
+            let kind = serials.data_type().clone();
+            let table = batch(vec![("serial", serials), ("gap_m", Arc::new(gaps.clone()))]);
+            let dir = tempfile::tempdir().unwrap();
+            let file = dir.path().join("table.parquet");
+            let small = parquet::file::properties::WriterProperties::builder()
+                .set_max_row_group_row_count(Some(3))
+                .build();
+            let mut writer =
+                ArrowWriter::try_new(File::create(&file).unwrap(), table.schema(), Some(small)).unwrap();
+            writer.write(&table).unwrap();
+            writer.close().unwrap();
+            let parted = TableSplits::open(&file, None, &["serial"]).unwrap();
+            assert_eq!(parted.len(), 3);
+            let rows = |parts: Range<usize>| parted.batches(parts).unwrap().map(Result::unwrap);
+            assert_eq!(rows(1..3).map(|batch| batch.len()).sum::<usize>(), 4, "{kind}");
+            let last = rows(2..3).next().unwrap();
+            let codes = last.dictionary_column(0).unwrap();
+            assert_eq!(codes.values().as_string::<i32>().value(codes.key(0).unwrap()), " S1 ");
+            assert_eq!(last.numbers(Some(1)).unwrap(), Float64Array::from(vec![6.0]));
+            let bad = rows(1..2).next().unwrap().numbers(Some(1)).unwrap_err();
+            assert_eq!(bad.diagnostic().location().unwrap(), "column `gap_m`, row 6", "{kind}");
+        }
+    }
+
+    #[test]
+    fn a_text_is_trimmed_as_the_standard_library_does() {
+        for text in ["", " ", "a", " a", "a\u{a0}", "\u{2003}é \n", "ab c", "\u{85}"] {
+            assert_eq!(trim_ascii_fast(text), text.trim());
+        }
+    }
+
+    #[test]
+    fn a_table_without_rows_shows_its_columns() {
+        let (_dir, file) = parquet(&RecordBatch::new_empty(
+            batch(vec![("gap_m", Arc::new(Int64Array::from(vec![1])))]).schema(),
+        ));
+        let all: Vec<TableBatch> = batches(&file, None).unwrap().collect::<Result<_, _>>().unwrap();
+        assert_eq!((all.len(), all[0].len(), all[0].find(&["gap_m"])), (1, 0, Some(0)));
+    }
+
+    proptest! {
+        /// The shortest text that is a number's is that number again, so both tables hold the same.
+        #[test]
+        fn numbers_are_the_same_from_csv_and_from_parquet(
+            values in prop::collection::vec(prop::option::of(-1e300_f64..1e300), 1..50)
+        ) {
+            let (dir, file) = parquet(&batch(vec![("v", Arc::new(Float64Array::from(values.clone())))]));
+            let text: String = values.iter().map(|v| v.map_or("\"\"\n".into(), |v| format!("{v:e}\n"))).collect();
+            let csv = dir.path().join("table.csv");
+            std::fs::write(&csv, format!("v\n{text}")).unwrap();
+            let read = |file: &Path| batches(file, None).unwrap().next().unwrap().unwrap().numbers(Some(0)).unwrap();
+            prop_assert_eq!(read(&file), Float64Array::from(values));
+            prop_assert_eq!(read(&csv), read(&file));
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! The flights table: what an operator knows of its flights beside the logs, and of flights without one.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+
+use jiff::Timestamp;
+use records::{Flight, FlightId, TailNumber};
+
+use crate::error::Error;
+use crate::log::identity::{IdentityFields, instant};
+use crate::mapping::{IdentityField, IdentityMapping};
+use crate::tables::cell::{self, name, number};
+use crate::tables::table::{ColumnAliases, Table};
+
+/// Flights, found by the path of their log, or by what the log says of itself.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Flights {
+    rows: Vec<Row>,
+    by_path: HashMap<String, usize>,
+    by_flight: HashMap<(String, String), usize>,
+    by_departure: BTreeMap<(String, Timestamp), usize>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Row {
+    flight: Flight,
+    facts: IdentityFields,
+}
+
+impl Flights {
+    /// Reads the table: `tail_number, flight_id, departure_utc` and optionally `flight_hours`,
+    /// `tail_hours_end`, `path` (the end of the log's path is enough) and `position`.
+    ///
+    /// Departures are read as those of logs are; without a format and a zone they are UTC.
+    ///
+    /// # Errors
+    /// Every cell that cannot be read.
+    pub fn read(file: &Path, names: &ColumnAliases, identity: &IdentityMapping) -> Result<Self, Vec<Error>> {
+        let table = Table::read(file).map_err(|e| vec![e])?.with_aliases(names);
+        let wanted = ["tail_number", "flight_id", "departure_utc"].map(|name| table.column(&[name]));
+        if wanted.iter().any(Result::is_err) {
+            return Err(wanted.into_iter().filter_map(Result::err).collect());
+        }
+        let needed = wanted.map(Result::unwrap_or_default);
+        let optional = ["flight_hours", "tail_hours_end", "path", "position"].map(|name| table.find(&[name]));
+        let (mut flights, mut errors) = (Self::default(), Vec::new());
+        for row in 0..table.len() {
+            match flights.enter(&table, row, needed, optional, identity) {
+                Ok(()) => {}
+                Err(error) => errors.push(error),
+            }
+        }
+        if errors.is_empty() { Ok(flights) } else { Err(errors) }
+    }
+
+    fn enter(
+        &mut self,
+        table: &Table,
+        row: usize,
+        [tail, flight, departure]: [usize; 3],
+        [hours, tail_hours, path, position]: [Option<usize>; 4],
+        identity: &IdentityMapping,
+    ) -> Result<(), Error> {
+        let departs = |text: &str| cell::utc(text).or_else(|e| instant(text, identity).map_err(|_| e));
+        let flown = Flight {
+            tail_number: table.required(row, tail, name::<TailNumber>)?,
+            flight_id: table.required(row, flight, name::<FlightId>)?,
+            departure_utc: table.required(row, departure, departs)?,
+            flight_hours: table.optional(row, hours, number)?,
+            tail_hours_end: table.optional(row, tail_hours, number)?,
+        };
+        let known = [
+            (IdentityField::TailNumber, Some(flown.tail_number.to_string())),
+            (IdentityField::FlightId, Some(flown.flight_id.to_string())),
+            (IdentityField::DepartureUtc, Some(flown.departure_utc.to_string())),
+            (IdentityField::FlightHours, flown.flight_hours.map(|h| h.to_string())),
+            (IdentityField::TailHoursEnd, flown.tail_hours_end.map(|h| h.to_string())),
+            (IdentityField::Position, position.and_then(|column| table.text(row, column)).map(str::to_owned)),
+        ];
+        let facts = known.into_iter().filter_map(|(fact, text)| Some((fact, text?))).collect();
+        let index = self.rows.len();
+        if let Some(path) = path.and_then(|column| table.text(row, column)) {
+            self.by_path.insert(path.replace('\\', "/"), index);
+        }
+        let tail = flown.tail_number.to_string();
+        self.by_flight.insert((tail.clone(), flown.flight_id.to_string()), index);
+        self.by_departure.insert((tail, flown.departure_utc), index);
+        self.rows.push(Row { flight: flown, facts });
+        Ok(())
+    }
+
+    /// Every flight of the table.
+    pub fn iter(&self) -> impl Iterator<Item = &Flight> {
+        self.rows.iter().map(|row| &row.flight)
+    }
+
+    /// The table's row of a flight.
+    pub fn of(&self, flight: &Flight) -> Option<&Flight> {
+        let tail = flight.tail_number.to_string();
+        let by_flight = self.by_flight.get(&(tail.clone(), flight.flight_id.to_string()));
+        by_flight
+            .or_else(|| self.by_departure.get(&(tail, flight.departure_utc)))
+            .map(|&row| &self.rows[row].flight)
+    }
+
+    /// What the table knows of a log: by its path, else by its tail and flight, else by its tail and
+    /// departure.
+    pub fn facts(&self, path: &Path, said: &IdentityFields, identity: &IdentityMapping) -> IdentityFields {
+        if self.rows.is_empty() {
+            return IdentityFields::new();
+        }
+        let text = |fact: IdentityField| said.get(&fact).map(|t| t.trim().to_owned());
+        let by_flight = || {
+            self.by_flight.get(&(text(IdentityField::TailNumber)?, text(IdentityField::FlightId)?)).copied()
+        };
+        let by_departure = || {
+            let at = instant(&text(IdentityField::DepartureUtc)?, identity).ok()?;
+            self.by_departure.get(&(text(IdentityField::TailNumber)?, at)).copied()
+        };
+        let found = self.of_path(path).or_else(by_flight).or_else(by_departure);
+        found.map(|row| self.rows[row].facts.clone()).unwrap_or_default()
+    }
+
+    /// The row whose path the log's own path ends in, folder by folder.
+    fn of_path(&self, path: &Path) -> Option<usize> {
+        let text = crate::log::identity::absolute(path).to_string_lossy().replace('\\', "/");
+        let mut rest = text.as_str();
+        loop {
+            if let Some(&row) = self.by_path.get(rest) {
+                return Some(row);
+            }
+            rest = rest.split_once('/')?.1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_finds_its_flight_by_path_or_by_what_it_says() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("flights.csv");
+        let text = "reg,leg,off,flight_hours,path\nN1,0413,2026-11-19T04:13:00Z,2.5,N1/a.parquet\nN1,0500,2026-11-20 05:00,,\n";
+        std::fs::write(&file, text).unwrap();
+        let names = [("tail_number", "reg"), ("flight_id", "leg"), ("departure_utc", "off")];
+        let names = names.map(|(ours, theirs)| (ours.to_owned(), theirs.to_owned())).into();
+        let identity = IdentityMapping::default();
+        let flights = Flights::read(&file, &names, &identity).unwrap();
+        let by_path = flights.facts(Path::new("/logs/N1/a.parquet"), &IdentityFields::new(), &identity);
+        assert_eq!(
+            (by_path[&IdentityField::FlightId].as_str(), by_path[&IdentityField::FlightHours].as_str()),
+            ("0413", "2.5")
+        );
+        let said = IdentityFields::from([
+            (IdentityField::TailNumber, "N1".into()),
+            (IdentityField::DepartureUtc, "2026-11-20T05:00:00Z".into()),
+        ]);
+        let by_departure = flights.facts(Path::new("/logs/x.parquet"), &said, &identity);
+        assert_eq!(by_departure[&IdentityField::FlightId], "0500");
+        assert!(flights.facts(Path::new("/logs/y.parquet"), &IdentityFields::new(), &identity).is_empty());
+    }
+}

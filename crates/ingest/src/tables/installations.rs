@@ -1,0 +1,105 @@
+//! The installations table: which unit was installed where, from when to when.
+
+use std::path::Path;
+
+use records::{Installation, Installations};
+
+use crate::error::{Error, ErrorKind};
+use crate::tables::cell::{name, number, utc};
+use crate::tables::table::{ColumnAliases, Table};
+
+/// Reads the installations table: `tail_number, position, part_number, serial_number, installed_utc,
+/// removed_utc` and optionally `unit_hours_at_install`, `tail_hours_at_install`.
+///
+/// # Errors
+/// Every cell that cannot be read, or, when all can, every contradiction between rows.
+pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations, Vec<Error>> {
+    let table = Table::read(file).map_err(|e| vec![e])?.with_aliases(names);
+    let columns = InstallationColumns::find(&table)?;
+    let (mut rows, mut errors) = (Vec::new(), Vec::new());
+    for row in 0..table.len() {
+        match columns.installation(&table, row) {
+            Ok(stay) => rows.push(stay),
+            Err(error) => errors.push(error),
+        }
+    }
+    if !errors.is_empty() {
+        return Err(errors);
+    }
+    let contradiction = |e: records::installation::Error| {
+        Error::new(file, ErrorKind::Table { row: None, column: None, detail: e.to_string() })
+    };
+    Installations::new(rows).map_err(|found| found.into_iter().map(contradiction).collect())
+}
+
+struct InstallationColumns {
+    names: [usize; 5],
+    removed: Option<usize>,
+    hours: [Option<usize>; 2],
+}
+
+impl InstallationColumns {
+    fn find(table: &Table) -> Result<Self, Vec<Error>> {
+        let wanted = ["tail_number", "position", "part_number", "serial_number", "installed_utc"];
+        let found = wanted.map(|name| table.column(&[name]));
+        if found.iter().any(Result::is_err) {
+            return Err(found.into_iter().filter_map(Result::err).collect());
+        }
+        let names = found.map(Result::unwrap_or_default);
+        let hours = ["unit_hours_at_install", "tail_hours_at_install"].map(|name| table.find(&[name]));
+        Ok(Self { names, removed: table.find(&["removed_utc"]), hours })
+    }
+
+    fn installation(&self, table: &Table, row: usize) -> Result<Installation, Error> {
+        let [tail, position, part, serial, installed] = self.names;
+        Ok(Installation {
+            tail_number: table.required(row, tail, name)?,
+            position: table.required(row, position, name)?,
+            part_number: table.required(row, part, name)?,
+            serial_number: table.required(row, serial, name)?,
+            installed_utc: table.required(row, installed, utc)?,
+            removed_utc: table.optional(row, self.removed, utc)?,
+            unit_hours_at_install: table.optional(row, self.hours[0], number)?,
+            tail_hours_at_install: table.optional(row, self.hours[1], number)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("installations.csv");
+        std::fs::write(&file, text).unwrap();
+        (dir, file)
+    }
+
+    const HEADER: &str = "tail_number,position,part_number,serial_number,installed_utc,removed_utc\n";
+
+    #[test]
+    fn dates_in_a_utc_column_are_utc() {
+        let (_dir, file) = table(&format!("\u{feff}{HEADER}N1,aileron,EMA,17,2026-01-01,2026-02-01 06:00\n"));
+        let stays = installations(&file, &ColumnAliases::new()).unwrap();
+        let stay = stays.iter().next().unwrap();
+        assert_eq!(stay.installed_utc.to_string(), "2026-01-01T00:00:00Z");
+        assert_eq!(stay.removed_utc.unwrap().to_string(), "2026-02-01T06:00:00Z");
+    }
+
+    #[test]
+    fn every_bad_cell_is_named_by_row_and_column() {
+        let (_dir, file) =
+            table(&format!("{HEADER}N1,aileron,EMA,,2026-01-01,\nN1,elevator,EMA,18,yesterday,\n"));
+        let errors = installations(&file, &ColumnAliases::new()).unwrap_err();
+        let places: Vec<_> = errors.iter().map(|e| e.diagnostic().location().unwrap()).collect();
+        assert_eq!(places, ["column `serial_number`, row 1", "column `installed_utc`, row 2"]);
+    }
+
+    #[test]
+    fn a_missing_column_is_told_with_its_neighbour() {
+        let (_dir, file) = table("tail_number,position,part_number,serial_no,installed_utc\n");
+        let errors = installations(&file, &ColumnAliases::new()).unwrap_err();
+        assert!(errors[0].diagnostic().hint.unwrap().starts_with("`serial_no`?"));
+    }
+}

@@ -1,0 +1,14 @@
+//! Tables given beside the logs (CSV or Parquet): installations, flights, maintenance, estimates.
+//!
+//! A small table is read whole as text ([`Table`]), a long one in batches with typed columns ([`TableBatch`]).
+
+pub mod cell;
+mod column_batches;
+pub mod flights;
+mod installations;
+mod table;
+
+pub use cell::{name, number, utc};
+pub use column_batches::{StringColumn, TableBatch, TableBatches, TableSplits, batches, trim_ascii_fast};
+pub use installations::installations;
+pub use table::{ColumnAliases, Table};

@@ -1,0 +1,130 @@
+//! Small tables read whole, every cell as text.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use arrow::array::RecordBatch;
+
+use crate::error::Error;
+use crate::tables::cell::{bad_cell, missing, position};
+use crate::tables::column_batches::{TableBatch, batches};
+
+/// A small table, every cell text; an empty cell is none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    file: std::path::PathBuf,
+    header: Vec<String>,
+    rows: Vec<Vec<Option<String>>>,
+    names: ColumnAliases,
+}
+
+/// What a user's table calls the columns that we know: our name → theirs.
+pub type ColumnAliases = BTreeMap<String, String>;
+
+impl Table {
+    /// Reads a `.parquet` file as Parquet and anything else as CSV.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or is not the table its name says.
+    pub fn read(file: &Path) -> Result<Self, Error> {
+        let mut table = Self::empty(file);
+        for batch in batches(file, None)? {
+            table.extend(&batch?)?;
+        }
+        Ok(table)
+    }
+
+    /// The same table from memory; `name` stands for its file in diagnostics.
+    ///
+    /// # Errors
+    /// When a column is neither text, numbers nor times.
+    pub fn of_batches(name: &Path, batches: &[RecordBatch]) -> Result<Self, Error> {
+        let mut table = Self::empty(name);
+        batches.iter().try_for_each(|batch| table.extend(&TableBatch::new(name, batch.clone(), 0)))?;
+        Ok(table)
+    }
+
+    fn empty(file: &Path) -> Self {
+        Self { file: file.to_owned(), header: Vec::new(), rows: Vec::new(), names: ColumnAliases::new() }
+    }
+
+    fn extend(&mut self, batch: &TableBatch) -> Result<(), Error> {
+        self.header = batch.header().to_vec();
+        let columns = (0..self.header.len()).map(|column| batch.texts(Some(column)));
+        let columns = columns.collect::<Result<Vec<_>, _>>()?;
+        let row = |row| columns.iter().map(|texts| texts.get(row).map(str::to_owned)).collect();
+        self.rows.extend((0..batch.len()).map(row));
+        Ok(())
+    }
+
+    /// The same table, whose columns go by a user's own names.
+    #[must_use]
+    pub fn with_aliases(mut self, names: &ColumnAliases) -> Self {
+        self.names.clone_from(names);
+        self
+    }
+
+    /// Rows without the header.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Where a column stands, if it is there under one of its names.
+    pub fn find(&self, names: &[&str]) -> Option<usize> {
+        let theirs = |name: &str| self.names.get(name).map_or_else(|| name.to_owned(), Clone::clone);
+        names.iter().find_map(|name| position(&self.header, &theirs(name)))
+    }
+
+    /// Where a column stands.
+    ///
+    /// # Errors
+    /// When it is not there, with the nearest name that is.
+    pub fn column(&self, names: &[&str]) -> Result<usize, Error> {
+        let wanted = || self.names.get(names[0]).map_or(names[0], String::as_str);
+        self.find(names).ok_or_else(|| missing(&self.file, wanted(), &self.header))
+    }
+
+    /// The text of a cell.
+    pub fn text(&self, row: usize, column: usize) -> Option<&str> {
+        self.rows[row].get(column)?.as_deref()
+    }
+
+    /// A cell that must hold something, read as `T`.
+    ///
+    /// # Errors
+    /// When it is empty or cannot be read.
+    pub fn required<T>(
+        &self,
+        row: usize,
+        column: usize,
+        read: impl Fn(&str) -> Result<T, String>,
+    ) -> Result<T, Error> {
+        let text = self.text(row, column).ok_or_else(|| self.error(row, column, "it is empty".into()))?;
+        read(text).map_err(|detail| self.error(row, column, detail))
+    }
+
+    /// A cell of an optional column that may be empty.
+    ///
+    /// # Errors
+    /// When it holds something that cannot be read.
+    pub fn optional<T>(
+        &self,
+        row: usize,
+        column: Option<usize>,
+        read: impl Fn(&str) -> Result<T, String>,
+    ) -> Result<Option<T>, Error> {
+        let Some((column, text)) = column.and_then(|c| Some((c, self.text(row, c)?))) else {
+            return Ok(None);
+        };
+        read(text).map(Some).map_err(|detail| self.error(row, column, detail))
+    }
+
+    fn error(&self, row: usize, column: usize, detail: String) -> Error {
+        bad_cell(&self.file, row, self.header.get(column), detail)
+    }
+}

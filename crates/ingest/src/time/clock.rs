@@ -1,0 +1,544 @@
+//! One clock for a log: which rows count, in which order, at which step, and where time breaks.
+//!
+//! The rule for damaged time (`docs/equations.md`, "Time"): rows without a stamp are left out, unless
+//! the rate is declared and they are as many as fit between their neighbours; rows out of order are put
+//! in order by a stable sort; of repeated stamps the first row is kept, unless the clock is declared to
+//! tick coarsely; where a step exceeds one and a half times the usual one, time broke, and the filter
+//! starts again. Rows that are in order pass untouched.
+
+use std::ops::Range;
+
+use jiff::Timestamp;
+use multiversion::multiversion;
+
+use crate::error::ErrorKind;
+use crate::mapping::ClockMapping;
+
+/// A step longer than this many usual steps is a break: the filter cannot predict across it.
+pub(crate) const BREAK_STEPS: f64 = 1.5;
+
+/// A declared rate and the stamps may differ by this share: more is another rate, not a better one.
+const RATE_TOLERANCE: f64 = 0.25;
+
+/// How far stamps may fall back by default, s.
+const MAX_BACK_S: f64 = 1.0;
+
+/// A coarse clock's ticks are followed with this time constant, s: its rate is never quite the declared one.
+const TICK_FOLLOW_S: f64 = 10.0;
+
+/// The rows of a log on one clock.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeBase {
+    /// The declared rate's step, else the usual step, s.
+    pub step_s: f64,
+    /// Rows there are.
+    pub rows: usize,
+    /// The rows that count, in order of time; none when every row counts as it stands.
+    pub kept: Option<Vec<u32>>,
+    /// Unbroken stretches, in kept rows.
+    pub segments: Vec<Range<usize>>,
+    /// What had to be mended.
+    pub repairs: TimestampRepairs,
+}
+
+/// What had to be mended to put a log on one clock.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct TimestampRepairs {
+    /// Rows without a stamp, left out.
+    pub unstamped: usize,
+    /// Rows without a stamp that got one, since the rate is declared.
+    pub filled: usize,
+    /// Stamps below the one before.
+    pub out_of_order: usize,
+    /// Rows that repeat a stamp, left out.
+    pub repeated: usize,
+}
+
+impl TimestampRepairs {
+    /// Whether nothing had to be mended.
+    pub fn none(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// What the first stamp of a clock means.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TimeOrigin {
+    /// Where the log begins: rows without stamps.
+    Start,
+    /// Seconds on a zero of the clock's own, which all clocks of a log share.
+    Counted(f64),
+    /// An instant.
+    Utc(Timestamp),
+    /// A local time, read as if it were UTC, whose zone the log does not name.
+    Local(Timestamp),
+}
+
+impl TimeOrigin {
+    /// Seconds from another clock's origin to this one, where both mean the same kind of time.
+    pub fn since(self, other: Self) -> Option<f64> {
+        match (self, other) {
+            (Self::Start, _) | (_, Self::Start) => Some(0.0),
+            (Self::Counted(a), Self::Counted(b)) => Some(a - b),
+            (Self::Utc(a), Self::Utc(b)) | (Self::Local(a), Self::Local(b)) => {
+                Some(a.duration_since(b).as_secs_f64())
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The stamps of some rows: seconds since the first one; NaN where a row has none.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Timestamps {
+    /// The column they come from, for diagnostics.
+    pub column: String,
+    /// Seconds since the first stamp.
+    pub seconds: Vec<f64>,
+    /// What the first stamp means.
+    pub origin: TimeOrigin,
+}
+
+impl Timestamps {
+    /// Evenly spaced stamps, for rows that have none.
+    pub fn uniform(rows: usize, rate_hz: f64) -> Self {
+        let seconds = (0..rows).map(|k| k as f64 / rate_hz).collect();
+        Self { column: "clock.rate_hz".into(), seconds, origin: TimeOrigin::Start }
+    }
+
+    /// The instants of a timeline's rows, s since the first stamp.
+    pub fn of(&self, line: &TimeBase) -> Vec<f64> {
+        match &line.kept {
+            None => self.seconds.clone(),
+            Some(kept) => kept.iter().map(|&row| self.seconds[row as usize]).collect(),
+        }
+    }
+}
+
+/// Evenly spaced rows at a declared rate, when a log has no stamps.
+pub fn uniform(rows: usize, rate_hz: f64) -> TimeBase {
+    TimeBase {
+        step_s: rate_hz.recip(),
+        rows,
+        kept: None,
+        segments: std::iter::once(0..rows).collect(),
+        repairs: TimestampRepairs::default(),
+    }
+}
+
+/// Puts stamped rows on one clock, and mends the stamps themselves where the mapping says how.
+///
+/// # Errors
+/// [`ErrorKind::TimeGoesBack`] when stamps fall by more than `max_back_s` and the log is not to be split
+/// there; [`ErrorKind::TimeStandsStill`] when fewer than two differ; [`ErrorKind::RateContradicts`] when they
+/// tell of another rate than was declared.
+pub fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<TimeBase, ErrorKind> {
+    if clock.tick_s.is_none()
+        && let Some(seen) = UniformClock::of(&stamps.seconds)
+    {
+        let step_s = checked_step(seen.step_s, clock, &stamps.column)?;
+        if seen.longest_s <= BREAK_STEPS * step_s {
+            return Ok(TimeBase { step_s, ..uniform(stamps.seconds.len(), 1.0) });
+        }
+    }
+    let max_back_s = clock.max_back_s.unwrap_or(MAX_BACK_S);
+    let filled = clock.rate_hz.map_or(0, |rate_hz| fill_missing(&mut stamps.seconds, rate_hz));
+    let pieces = split_at_resets(stamps, max_back_s, clock.split_at_jumps)?;
+    if let Some(tick_s) = clock.tick_s {
+        let step_s = clock.rate_hz.map_or_else(|| coarse_step(&stamps.seconds, tick_s), f64::recip);
+        pieces.iter().for_each(|piece| spread_ticks(&mut stamps.seconds[piece.clone()], step_s, tick_s));
+    }
+    let t = &stamps.seconds;
+    let falls = t.windows(2).filter(|w| w[1] < w[0]).count().saturating_sub(pieces.len() - 1);
+    let kept = if pieces.len() == 1 && strictly_rising(t) { None } else { Some(sort_dedup(t, &pieces)) };
+    let at = |i: usize| kept.as_ref().map_or(t[i], |rows| t[rows[i] as usize]);
+    let count = kept.as_ref().map_or(t.len(), Vec::len);
+    let step = |i: usize| at(i) - at(i - 1);
+    if count < 2 {
+        return Err(ErrorKind::TimeStandsStill { column: stamps.column.clone(), rows: t.len() as u64 });
+    }
+    let seen_s = usual_step((1..count).map(step).filter(|s| *s > 0.0).collect());
+    let step_s = checked_step(seen_s, clock, &stamps.column)?;
+    let breaks: Vec<usize> =
+        (1..count).filter(|&i| step(i) > BREAK_STEPS * step_s || step(i) <= 0.0).collect();
+    let unstamped = t.iter().filter(|s| s.is_nan()).count();
+    let repairs =
+        TimestampRepairs { unstamped, filled, out_of_order: falls, repeated: t.len() - unstamped - count };
+    Ok(TimeBase { step_s, rows: t.len(), segments: split_at(count, &breaks), kept, repairs })
+}
+
+/// The declared step, where one is and the stamps do not contradict it; else the one that was seen.
+fn checked_step(seen_s: f64, clock: &ClockMapping, column: &str) -> Result<f64, ErrorKind> {
+    let step_s = clock.rate_hz.map_or(seen_s, f64::recip);
+    if (seen_s / step_s - 1.0).abs() > RATE_TOLERANCE {
+        let (column, declared_hz) = (column.to_owned(), step_s.recip());
+        return Err(ErrorKind::RateContradicts { column, declared_hz, seen_hz: seen_s.recip() });
+    }
+    Ok(step_s)
+}
+
+/// A clock that every row moves on by about the same: most clocks, for which two passes tell all there is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct UniformClock {
+    /// The usual step, as [`usual_step`] has it.
+    step_s: f64,
+    longest_s: f64,
+}
+
+impl UniformClock {
+    /// Nothing where a stamp is missing, does not rise, or steps are not all alike.
+    fn of(seconds: &[f64]) -> Option<Self> {
+        let StepStats { least_s, longest_s, rising } = StepStats::of(seconds);
+        if rising == 0 || rising + 1 < seconds.len() || longest_s - least_s > COARSE_TICK_SHARE * least_s {
+            return None;
+        }
+        Some(Self { step_s: median_step(seconds)?, longest_s })
+    }
+}
+
+/// Steps of a clock at a glance.
+struct StepStats {
+    /// Infinite where there is none.
+    least_s: f64,
+    /// Zero where none is longer.
+    longest_s: f64,
+    /// Steps forward.
+    rising: usize,
+}
+
+/// Steps that are looked at side by side.
+const LANES: usize = 8;
+
+impl StepStats {
+    fn of(seconds: &[f64]) -> Self {
+        let mut lanes = ([f64::INFINITY; LANES], [0.0; LANES], [0; LANES]);
+        let done = steps_in_lanes(seconds, &mut lanes);
+        let (least_s, longest_s, rising) = lanes;
+        let mut all = Self {
+            least_s: least_s.into_iter().fold(f64::INFINITY, f64::min),
+            longest_s: longest_s.into_iter().fold(0.0, f64::max),
+            rising: rising.iter().sum::<u64>() as usize,
+        };
+        for pair in seconds[done..].windows(2) {
+            let step_s = pair[1] - pair[0];
+            all.rising += usize::from(step_s > 0.0);
+            all.least_s = all.least_s.min(step_s);
+            all.longest_s = all.longest_s.max(step_s);
+        }
+        all
+    }
+}
+
+/// Least, longest and rising steps of each lane; how many steps were looked at.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn steps_in_lanes(
+    seconds: &[f64],
+    (least_s, longest_s, rising): &mut ([f64; LANES], [f64; LANES], [u64; LANES]),
+) -> usize {
+    let mut done = 0;
+    while let Some(group) = seconds[done..].first_chunk::<{ LANES + 1 }>() {
+        for lane in 0..LANES {
+            let step_s = group[lane + 1] - group[lane];
+            rising[lane] += u64::from(step_s > 0.0);
+            least_s[lane] = if step_s < least_s[lane] { step_s } else { least_s[lane] };
+            longest_s[lane] = if step_s > longest_s[lane] { step_s } else { longest_s[lane] };
+        }
+        done += LANES;
+    }
+    done
+}
+
+/// Steps that a bracket about their median is laid by.
+const SUBSAMPLE_SIZE: usize = 4096;
+/// Half width of that bracket in the order of those steps: more than five standard deviations of a rank.
+const HALF_BRACKET: usize = 200;
+
+/// The lower median of the steps; none where few steps mislead about the rest.
+fn median_step(seconds: &[f64]) -> Option<f64> {
+    let steps = || seconds.windows(2).map(|pair| pair[1] - pair[0]);
+    let middle = (seconds.len() - 2) / 2;
+    let mut looks: Vec<f64> = steps().step_by(seconds.len() / SUBSAMPLE_SIZE + 1).collect();
+    looks.sort_unstable_by(f64::total_cmp);
+    let at = looks.len() / 2;
+    let low = looks[at.saturating_sub(HALF_BRACKET)];
+    let high = looks[(at + HALF_BRACKET).min(looks.len() - 1)];
+    let below = steps().filter(|step| *step < low).count();
+    let not_above = steps().filter(|step| *step <= high).count();
+    if !(below..not_above).contains(&middle) {
+        return None;
+    }
+    if low >= high {
+        return Some(low);
+    }
+    // Each is written where the next belongs, wanted or not: which are wanted is not to be guessed.
+    let (mut within, mut next) = (vec![0.0; not_above - below + 1], 0);
+    for step in steps() {
+        within[next] = step;
+        next += usize::from(step >= low && step <= high);
+    }
+    within.truncate(next);
+    Some(*within.select_nth_unstable_by(middle - below, f64::total_cmp).1)
+}
+
+/// Gives rows without a stamp theirs where, at the declared rate, they just fill the time between their
+/// neighbours; returns how many got one.
+fn fill_missing(seconds: &mut [f64], rate_hz: f64) -> usize {
+    let (mut filled, mut before) = (0, None::<usize>);
+    for row in 0..seconds.len() {
+        if seconds[row].is_nan() {
+            continue;
+        }
+        if let Some(last) = before {
+            let rows = row - last;
+            let between = seconds[row] - seconds[last];
+            if rows > 1 && (between * rate_hz - rows as f64).abs() < 0.5 {
+                let start = seconds[last];
+                (1..rows).for_each(|k| seconds[last + k] = start + between * k as f64 / rows as f64);
+                filled += rows - 1;
+            }
+        }
+        before = Some(row);
+    }
+    filled
+}
+
+/// Cuts the rows where the clock falls too deep, or refuses to.
+fn split_at_resets(
+    stamps: &Timestamps,
+    max_back_s: f64,
+    split: bool,
+) -> Result<Vec<Range<usize>>, ErrorKind> {
+    let (mut newest, mut deep, mut cuts) = (f64::NEG_INFINITY, None, Vec::new());
+    for (row, &s) in stamps.seconds.iter().enumerate().filter(|(_, s)| !s.is_nan()) {
+        if newest - s > max_back_s {
+            deep.get_or_insert((row as u64, newest, s));
+            cuts.push(row);
+            newest = if split { s } else { newest };
+        }
+        newest = newest.max(s);
+    }
+    match deep {
+        Some((row, before_s, after_s)) if !split => {
+            let (column, times) = (stamps.column.clone(), cuts.len() as u64);
+            Err(ErrorKind::TimeGoesBack { column, row, before_s, after_s, max_back_s, times })
+        }
+        _ => Ok(split_at(stamps.seconds.len(), &cuts)),
+    }
+}
+
+/// The step of rows whose clock ticks coarsely: the time of all intervals between neighbouring ticks by
+/// the rows in them.
+fn coarse_step(seconds: &[f64], tick_s: f64) -> f64 {
+    let (mut time_s, mut rows, mut since) = (0.0, 0_usize, 0_usize);
+    let mut last = f64::NAN;
+    for &s in seconds.iter().filter(|s| !s.is_nan()) {
+        if s > last {
+            if s - last <= BREAK_STEPS * tick_s {
+                (time_s, rows) = (time_s + s - last, rows + since);
+            }
+            since = 0;
+        }
+        since += 1;
+        last = s;
+    }
+    if rows == 0 { tick_s } else { time_s / rows as f64 }
+}
+
+/// Spreads rows evenly over coarse ticks. A row lies within the tick that stamps it; where the stamps
+/// leave the even rows behind by more than a tick and a break, time broke there.
+fn spread_ticks(seconds: &mut [f64], step_s: f64, tick_s: f64) {
+    let follow = (step_s / TICK_FOLLOW_S).min(1.0);
+    let mut even = f64::NAN;
+    for s in seconds.iter_mut().filter(|s| !s.is_nan()) {
+        let (next, middle) = (even + step_s, *s + 0.5 * tick_s);
+        even = if (next - middle).abs() <= tick_s + BREAK_STEPS * step_s {
+            next + follow * (middle - next)
+        } else {
+            *s
+        };
+        *s = even;
+    }
+}
+
+/// NaN compares false, so a row without a stamp makes the answer no.
+fn strictly_rising(t: &[f64]) -> bool {
+    t.first().is_some_and(|s| !s.is_nan()) && t.windows(2).all(|w| w[0] < w[1])
+}
+
+/// Rows with a stamp, piece by piece in order of time, the first of each repeated stamp.
+#[expect(clippy::float_cmp, reason = "a repeated stamp repeats its bits")]
+fn sort_dedup(t: &[f64], pieces: &[Range<usize>]) -> Vec<u32> {
+    let mut rows = Vec::with_capacity(t.len());
+    for piece in pieces {
+        let first = rows.len();
+        rows.extend(piece.clone().filter(|&i| !t[i].is_nan()).map(|i| i as u32));
+        rows[first..].sort_by(|&a, &b| t[a as usize].total_cmp(&t[b as usize]));
+    }
+    rows.dedup_by(|later, first| t[*later as usize] == t[*first as usize]);
+    rows
+}
+
+/// Steps one tick apart, when the tick is at least this share of the step.
+const COARSE_TICK_SHARE: f64 = 0.02;
+
+/// The usual step: the lower median, which is an element of the steps, so that none is invented.
+///
+/// Where stamps are rounded to ticks that are coarse beside the step (milliseconds at 400 Hz: 2, 3, 2, 3),
+/// no element is right; then it is the mean of the steps that are no breaks.
+fn usual_step(mut steps: Vec<f64>) -> f64 {
+    /// Rounding of the stamps themselves, s.
+    const SAME_S: f64 = 1e-7;
+    if steps.is_empty() {
+        return f64::NAN;
+    }
+    let middle = (steps.len() - 1) / 2;
+    let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let even = |s: &&f64| **s <= (BREAK_STEPS + SAME_S) * median;
+    let (mut low, mut high) = (median, median);
+    for &s in steps.iter().filter(even) {
+        (low, high) = (low.min(s), high.max(s));
+    }
+    let between = |s: &f64| *s > low + SAME_S && *s < high - SAME_S;
+    let is_rounded = high - low > COARSE_TICK_SHARE * median && !steps.iter().filter(even).any(between);
+    if !is_rounded {
+        return median;
+    }
+    let (sum, count) = steps.iter().filter(even).fold((0.0, 0_usize), |(sum, n), s| (sum + s, n + 1));
+    sum / count as f64
+}
+
+fn split_at(count: usize, breaks: &[usize]) -> Vec<Range<usize>> {
+    let starts = std::iter::once(0).chain(breaks.iter().copied());
+    let ends = breaks.iter().copied().chain(std::iter::once(count));
+    starts.zip(ends).map(|(start, end)| start..end).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn stamps(seconds: &[f64]) -> Timestamps {
+        Timestamps { column: "t".into(), seconds: seconds.to_vec(), origin: TimeOrigin::Counted(0.0) }
+    }
+
+    fn line(seconds: &[f64], clock: &ClockMapping) -> Result<TimeBase, ErrorKind> {
+        build_time_base(&mut stamps(seconds), clock)
+    }
+
+    fn usual() -> ClockMapping {
+        ClockMapping::default()
+    }
+
+    #[test]
+    fn an_even_clock_passes_untouched() {
+        let t: Vec<f64> = (0..100).map(|i| f64::from(i) * 0.01).collect();
+        let line = line(&t, &usual()).unwrap();
+        assert_eq!(line.kept, None);
+        assert_eq!(line.segments, split_at(100, &[]));
+        assert!((line.step_s - 0.01).abs() < 1e-15);
+        assert!(line.repairs.none());
+    }
+
+    #[test]
+    fn a_pause_cuts_the_log_in_two() {
+        let line = line(&[0.0, 0.1, 0.2, 5.0, 5.1, 5.2], &usual()).unwrap();
+        assert_eq!(line.segments, [0..3, 3..6]);
+    }
+
+    #[test]
+    fn repeated_missing_and_swapped_stamps_are_mended_and_counted() {
+        let line = line(&[0.0, 0.2, 0.1, 0.1, f64::NAN, 0.3], &usual()).unwrap();
+        assert_eq!(line.kept, Some(vec![0, 2, 1, 5]));
+        assert_eq!(line.repairs, TimestampRepairs { unstamped: 1, filled: 0, out_of_order: 1, repeated: 1 });
+    }
+
+    #[test]
+    fn a_deep_fall_is_refused_with_its_row_or_splits_the_log() {
+        let t = [0.0, 0.1, 5.0, 5.1, 1.0, 1.1, 1.2];
+        assert!(matches!(line(&t, &usual()), Err(ErrorKind::TimeGoesBack { row: 4, times: 3, .. })));
+        let split = line(&t, &ClockMapping { split_at_jumps: true, ..usual() }).unwrap();
+        assert_eq!(split.segments, [0..2, 2..4, 4..7]);
+        assert_eq!(split.repairs.out_of_order, 0);
+    }
+
+    #[test]
+    fn a_clock_that_stands_still_is_refused() {
+        assert!(matches!(line(&[1.0, 1.0], &usual()), Err(ErrorKind::TimeStandsStill { rows: 2, .. })));
+    }
+
+    /// 400 Hz in whole milliseconds steps 2, 3, 2, 3 ms: the step is 2.5 ms, and nothing broke.
+    #[test]
+    fn a_step_between_two_ticks_is_their_mean() {
+        let t: Vec<f64> = (0..4000).map(|k| (f64::from(k) * 2.5).floor() * 1e-3).collect();
+        let line = line(&t, &usual()).unwrap();
+        assert!((line.step_s - 2.5e-3).abs() < 1e-6, "{} s", line.step_s);
+        assert_eq!(line.segments.len(), 1);
+    }
+
+    /// A computer's clock ticks every 15.6 ms while samples come every 2.5 ms.
+    #[test]
+    fn rows_under_a_coarse_clock_are_spread_evenly() {
+        let (tick, step) = (0.015_625, 0.002_5);
+        let truth: Vec<f64> =
+            (0..8000).map(|k| f64::from(k) * step + if k < 4000 { 0.0 } else { 3.0 }).collect();
+        let mut coarse = stamps(&truth.iter().map(|t| (t / tick).floor() * tick).collect::<Vec<_>>());
+        let line = build_time_base(&mut coarse, &ClockMapping { tick_s: Some(tick), ..usual() }).unwrap();
+        assert_eq!((line.kept.is_none(), line.segments.clone()), (true, vec![0..4000, 4000..8000]));
+        assert!((line.step_s / step - 1.0).abs() < 0.01, "{} s", line.step_s);
+        let worst = coarse.seconds.iter().zip(&truth).map(|(s, t)| (s - t).abs()).fold(0.0, f64::max);
+        assert!(worst < tick, "{worst} s");
+    }
+
+    #[test]
+    fn rows_without_a_stamp_get_one_where_the_rate_says_which() {
+        let nan = f64::NAN;
+        let clock = ClockMapping { rate_hz: Some(10.0), ..usual() };
+        let mut holed = stamps(&[0.0, nan, nan, 0.3, nan, 9.0, 9.1]);
+        let line = build_time_base(&mut holed, &clock).unwrap();
+        assert!((holed.seconds[2] - 0.2).abs() < 1e-12);
+        assert_eq!((line.repairs.filled, line.repairs.unstamped), (2, 1));
+        assert_eq!(line.segments, [0..4, 4..6]);
+    }
+
+    /// Clocks of many kinds: where the quick way gives a step, it is that of the slow one, to the bit.
+    #[test]
+    fn the_quick_way_sees_the_step_that_the_slow_one_does() {
+        let jitter = |k: u32| f64::from(k.wrapping_mul(40503) % 1024) / 1024.0;
+        for rows in [3, 4, 1000, 5001] {
+            let clocks = [
+                (0..rows).map(|k| f64::from(k) * 0.002).collect::<Vec<_>>(),
+                (0..rows).map(|k| f64::from(k) * 0.1 + 1e-4 * jitter(k)).collect(),
+                (0..rows).map(|k| (f64::from(k) * 0.004 * 1e6).round() / 1e6).collect(),
+                (0..rows).map(|k| f64::from(k) * 0.5).collect(),
+            ];
+            for t in clocks {
+                let found = UniformClock::of(&t).unwrap();
+                let steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+                assert_eq!(found.longest_s.to_bits(), steps.iter().copied().fold(0.0, f64::max).to_bits());
+                assert_eq!(found.step_s.to_bits(), usual_step(steps).to_bits(), "{rows} rows");
+            }
+        }
+        for t in [&[0.0, 1.0, 1.0, 2.0][..], &[0.0, 1.0, f64::NAN, 2.0], &[0.0, 1.0, 2.5], &[0.0], &[]] {
+            assert_eq!(UniformClock::of(t), None);
+        }
+    }
+
+    proptest! {
+        /// Whatever the order of the rows, time rises along the kept rows and no stamp is invented or lost.
+        #[test]
+        fn kept_rows_rise_and_hold_every_stamp(ticks in proptest::collection::vec(0_u32..50, 2..80)) {
+            let t: Vec<f64> = ticks.iter().map(|&k| f64::from(k) * 0.02).collect();
+            let mut distinct = ticks.clone();
+            distinct.sort_unstable();
+            distinct.dedup();
+            prop_assume!(distinct.len() > 1);
+            let line = line(&t, &ClockMapping { max_back_s: Some(2.0), ..usual() }).unwrap();
+            let kept = line.kept.clone().unwrap_or_else(|| (0..t.len() as u32).collect());
+            prop_assert!(kept.windows(2).all(|w| t[w[0] as usize] < t[w[1] as usize]));
+            prop_assert_eq!(kept.len(), distinct.len());
+            prop_assert_eq!(line.segments.iter().map(ExactSizeIterator::len).sum::<usize>(), kept.len());
+        }
+    }
+}

@@ -1,0 +1,5 @@
+//! Time bases of logs: timestamps, their repair, and bringing channels to a common clock.
+
+pub mod clock;
+pub(crate) mod resample;
+pub(crate) mod zero_order_hold;

@@ -1,0 +1,137 @@
+//! Samples of one clock at the instants of another: nothing is invented across a hole, nothing is
+//! smoothed by more than a straight line between two neighbours.
+
+use crate::time::clock::BREAK_STEPS;
+
+/// What a channel does between its samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Interpolation {
+    /// It moves: a straight line to the next sample, if that is at most a step and a half away.
+    Line,
+    /// It stands until the next one comes: a sample is given at the first instant at or after its own,
+    /// and whoever uses it holds it from there.
+    First,
+}
+
+/// One channel's samples and their instants, in order of time; missing samples are NaN.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TimeSeries<'a> {
+    pub(crate) at_s: &'a [f64],
+    pub(crate) values: &'a [f64],
+    /// The usual step between samples, s.
+    pub(crate) step_s: f64,
+}
+
+/// The channel at other instants, which rise too; NaN where it cannot be known.
+///
+/// An instant that is one of the channel's own takes that sample as it is. Shorter times than a
+/// millionth of a step are rounding of the stamps and count as none.
+pub(crate) fn interpolate_at(
+    channel: TimeSeries<'_>,
+    instants_s: &[f64],
+    between: Interpolation,
+) -> Vec<f64> {
+    let TimeSeries { at_s, values, step_s } = channel;
+    let same_s = 1e-6 * step_s;
+    let known: Vec<u32> = (0..values.len() as u32).filter(|&i| !values[i as usize].is_nan()).collect();
+    let (mut next, mut given) = (0, 0);
+    let mut interpolated = |instant: f64| {
+        while next < known.len() && at_s[known[next] as usize] <= instant + same_s {
+            next += 1;
+        }
+        let before = known[next.checked_sub(1)?] as usize;
+        let since = instant - at_s[before];
+        match between {
+            Interpolation::First => {
+                let is_new = next > given && since < step_s;
+                given = next;
+                is_new.then(|| values[before])
+            }
+            Interpolation::Line if since <= same_s => Some(values[before]),
+            Interpolation::Line => {
+                let after = *known.get(next)? as usize;
+                let apart = at_s[after] - at_s[before];
+                let share = since / apart;
+                (apart <= BREAK_STEPS * step_s)
+                    .then(|| values[before] + share * (values[after] - values[before]))
+            }
+        }
+    };
+    instants_s.iter().map(|&instant| interpolated(instant).unwrap_or(f64::NAN)).collect()
+}
+
+/// The rows of a channel that is recorded every `every`-th row and repeated, or left empty, in between.
+///
+/// Where it is left empty those rows are the ones that hold a value. Where it is repeated they are the
+/// ones at which it changes: the phase at which most changes fall.
+pub(crate) fn decimated_rows(values: &[f64], every: usize) -> Vec<u32> {
+    let all = 0..values.len() as u32;
+    if every <= 1 {
+        return all.collect();
+    }
+    let empty = values.iter().filter(|v| v.is_nan()).count();
+    if empty * 2 >= values.len() {
+        return all.filter(|&i| !values[i as usize].is_nan()).collect();
+    }
+    let mut changes = vec![0_usize; every];
+    for (i, pair) in values.windows(2).enumerate() {
+        changes[(i + 1) % every] += usize::from(pair[0].to_bits() != pair[1].to_bits());
+    }
+    let phase = (0..every).max_by_key(|&phase| (changes[phase], every - phase)).unwrap_or(0);
+    (phase as u32..values.len() as u32).step_by(every).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn same(found: &[f64], wanted: &[f64]) {
+        let equal = |(f, w): (&f64, &f64)| (f.is_nan() && w.is_nan()) || (f - w).abs() < 1e-12;
+        assert!(found.len() == wanted.len() && found.iter().zip(wanted).all(equal), "{found:?}");
+    }
+
+    #[test]
+    fn a_line_joins_neighbours_and_never_spans_a_hole() {
+        let nan = f64::NAN;
+        let channel = TimeSeries {
+            at_s: &[0.0, 1.0, 2.0, 3.0, 4.0],
+            values: &[0.0, 10.0, nan, 30.0, 40.0],
+            step_s: 1.0,
+        };
+        let found =
+            interpolate_at(channel, &[-0.5, 0.0, 0.25, 1.0, 1.5, 3.0, 3.5, 4.0, 4.5], Interpolation::Line);
+        same(&found, &[nan, 0.0, 2.5, 10.0, nan, 30.0, 35.0, 40.0, nan]);
+    }
+
+    #[test]
+    fn a_slow_sample_is_given_once_at_the_first_instant_after_it() {
+        let nan = f64::NAN;
+        let channel = TimeSeries { at_s: &[0.0, 1.0, 5.0], values: &[1.0, 2.0, 3.0], step_s: 1.0 };
+        let found = interpolate_at(channel, &[0.0, 0.4, 0.8, 1.2, 1.6, 5.0, 5.4], Interpolation::First);
+        same(&found, &[1.0, nan, nan, 2.0, nan, 3.0, nan]);
+    }
+
+    #[test]
+    fn a_slow_channel_is_found_whether_repeated_or_left_empty() {
+        let nan = f64::NAN;
+        assert_eq!(decimated_rows(&[nan, 1.0, nan, nan, 2.0, nan], 3), [1, 4]);
+        assert_eq!(decimated_rows(&[1.0, 2.0, 2.0, 2.0, 5.0, 5.0, 5.0, 6.0], 3), [1, 4, 7]);
+    }
+
+    proptest! {
+        /// On its own instants a channel is itself, to the bit; between them it stays between its neighbours.
+        #[test]
+        fn placing_invents_nothing(values in proptest::collection::vec(-1.0_f64..1.0, 2..50), shift in 0.0_f64..1.0) {
+            let at: Vec<f64> = (0..values.len()).map(|k| k as f64).collect();
+            let channel = TimeSeries { at_s: &at, values: &values, step_s: 1.0 };
+            prop_assert_eq!(&interpolate_at(channel, &at, Interpolation::Line), &values);
+            let moved: Vec<f64> = at.iter().map(|t| t + shift).collect();
+            for (k, v) in interpolate_at(channel, &moved, Interpolation::Line).iter().enumerate().take(values.len() - 1) {
+                let (low, high) = (values[k].min(values[k + 1]), values[k].max(values[k + 1]));
+                prop_assert!(*v >= low - 1e-12 && *v <= high + 1e-12);
+            }
+        }
+    }
+}

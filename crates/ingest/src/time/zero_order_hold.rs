@@ -1,0 +1,92 @@
+//! A load that is recorded more slowly than the positions stands until the next one comes.
+
+use std::ops::Range;
+
+/// A load is held over so many of its own steps, or so many seconds if that is more.
+const HOLD_STEPS: usize = 4;
+const HOLD_S: f64 = 0.2;
+
+/// Holds the last load over samples without one, and starts each segment at its first load.
+///
+/// It is held over four of its own steps or 0.2 s, whichever is longer; one that stays away longer has
+/// died, and the segment ends where it was last known.
+pub(crate) fn zero_order_hold(
+    load_n: &mut [f64],
+    segments: &[Range<usize>],
+    step_s: f64,
+) -> Vec<Range<usize>> {
+    if !load_n.iter().any(|f| f.is_nan()) {
+        return non_empty_segments(segments);
+    }
+    let longest = ((HOLD_S / step_s).ceil() as usize).max(HOLD_STEPS * median_sample_interval(load_n));
+    let mut loaded = Vec::with_capacity(segments.len());
+    for segment in segments {
+        let mut known: Option<Range<usize>> = None;
+        for i in segment.clone() {
+            if load_n[i].is_nan() {
+                continue;
+            }
+            match &mut known {
+                Some(span) if i - span.end <= longest => {
+                    let last = load_n[span.end - 1];
+                    load_n[span.end..i].fill(last);
+                    span.end = i + 1;
+                }
+                before => {
+                    loaded.extend(before.take());
+                    known = Some(i..i + 1);
+                }
+            }
+        }
+        if let Some(span) = known {
+            let end = segment.end.min(span.end + longest);
+            let last = load_n[span.end - 1];
+            load_n[span.end..end].fill(last);
+            loaded.push(span.start..end);
+        }
+    }
+    loaded
+}
+
+/// The segments that hold a sample.
+pub(crate) fn non_empty_segments(segments: &[Range<usize>]) -> Vec<Range<usize>> {
+    segments.iter().filter(|segment| !segment.is_empty()).cloned().collect()
+}
+
+/// Samples from one known load to the next, as the median has it.
+pub(crate) fn median_sample_interval(load_n: &[f64]) -> usize {
+    if !load_n.iter().any(|f| f.is_nan()) {
+        return 1;
+    }
+    let known: Vec<usize> = (0..load_n.len()).filter(|&i| !load_n[i].is_nan()).collect();
+    let mut steps: Vec<usize> = known.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() { 1 } else { *steps.select_nth_unstable(middle).1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_load_is_held_and_a_segment_waits_for_its_first() {
+        let nan = f64::NAN;
+        let mut load = [nan, 1.0, nan, 2.0, nan, nan];
+        let segments = zero_order_hold(&mut load, &[0..3, 3..5, 5..6], 0.1);
+        assert_eq!(segments, [1..3, 3..5]);
+        assert_eq!(load[1..5], [1.0, 1.0, 2.0, 2.0]);
+    }
+
+    /// The load comes every other sample, so it is held over eight at most.
+    #[test]
+    fn a_load_that_died_ends_its_segment() {
+        let mut load = [f64::NAN; 40];
+        for i in [0, 2, 4, 6, 30, 32] {
+            load[i] = i as f64;
+        }
+        let segments = zero_order_hold(&mut load, &[0..20, 20..40], 0.07);
+        assert_eq!(segments, [0..15, 30..40]);
+        assert_eq!((load[5], load[14], load[33]), (4.0, 6.0, 32.0));
+        assert!(load[15].is_nan());
+    }
+}

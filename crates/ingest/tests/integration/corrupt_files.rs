@@ -1,0 +1,158 @@
+//! Files that are torn, empty or lie: each becomes a reason with a stable code, never a number.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, Float64Array};
+use ingest::mapping::units::Unit;
+use ingest::{ActuatorChannels, ClockMapping, Error, Geometry, Log, LogFiles, Mapping, SampleFilter};
+
+use crate::layouts::{channel, mapping, write};
+
+fn plain() -> Mapping {
+    mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton))
+}
+
+fn sound(file: &Path) {
+    let values: ArrayRef = Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()));
+    write(
+        file,
+        &[("t", Arc::clone(&values)), ("m", Arc::clone(&values)), ("s", Arc::clone(&values)), ("f", values)],
+    );
+}
+
+fn read(file: &Path, m: &Mapping) -> Result<ActuatorChannels, Error> {
+    let log = Log::open(&LogFiles::one(file), &Arc::new(m.clone()))?;
+    let at = log.actuators(&m.channels, Some(&records::Position::new("a").unwrap()))?;
+    log.read_actuator(&at[0], &m.channels, Geometry::Linear { lead_m_per_rev: None })
+}
+
+fn code(result: Result<Log, Error>) -> String {
+    result.err().map(|e| e.diagnostic().code).unwrap_or_default()
+}
+
+#[test]
+fn what_is_no_log_is_told_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let m = plain();
+    let at = |name: &str, bytes: &[u8]| {
+        let file = dir.path().join(name);
+        std::fs::write(&file, bytes).unwrap();
+        code(Log::open(&LogFiles::one(&file), &Arc::new(m.clone())))
+    };
+    assert_eq!(at("empty.parquet", b""), "empty_log");
+    assert_eq!(at("text.parquet", b"time,motor,screw\n1,2,3\n"), "not_parquet");
+    assert_eq!(at("encrypted.parquet", b"PARE\x00\x00\x00\x00PARE"), "not_parquet");
+    assert_eq!(code(Log::open(&LogFiles::one(dir.path()), &Arc::new(m.clone()))), "unreadable");
+    assert_eq!(
+        code(Log::open(&LogFiles::one(dir.path().join("none.parquet")), &Arc::new(m.clone()))),
+        "unreadable"
+    );
+}
+
+#[test]
+fn a_log_without_rows_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("none.parquet");
+    let none: ArrayRef = Arc::new(Float64Array::from(Vec::<f64>::new()));
+    write(&file, &[("t", none)]);
+    assert_eq!(code(Log::open(&LogFiles::one(&file), &Arc::new(plain()))), "empty_log");
+}
+
+#[test]
+fn a_log_cut_short_anywhere_is_no_whole_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("whole.parquet");
+    sound(&file);
+    let bytes = std::fs::read(&file).unwrap();
+    for cut in [4, bytes.len() / 3, bytes.len() / 2, bytes.len() - 9, bytes.len() - 1] {
+        let torn = dir.path().join("torn.parquet");
+        std::fs::write(&torn, &bytes[..cut]).unwrap();
+        assert_eq!(code(Log::open(&LogFiles::one(&torn), &Arc::new(plain()))), "not_parquet", "cut at {cut}");
+    }
+}
+
+/// The digest must notice what a reader without page checksums cannot.
+#[test]
+fn a_flipped_byte_changes_the_digest() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("whole.parquet");
+    sound(&file);
+    let m = plain();
+    let digest = |file: &Path| {
+        let log = Log::open(&LogFiles::one(file), &Arc::new(m.clone())).unwrap();
+        let positions = log.actuators(&m.channels, Some(&records::Position::new("a").unwrap())).unwrap();
+        log.digest(&[(&m.channels, &positions[0])]).unwrap()
+    };
+    let before = digest(&file);
+    let mut bytes = std::fs::read(&file).unwrap();
+    bytes[100] ^= 1;
+    let moved = dir.path().join("flipped.parquet");
+    std::fs::write(&moved, &bytes).unwrap();
+    assert_ne!(digest(&moved), before);
+    bytes[100] ^= 1;
+    std::fs::write(&moved, &bytes).unwrap();
+    assert_eq!(digest(&moved), before, "a renamed log is the same log");
+}
+
+#[test]
+fn a_clock_without_a_unit_is_never_guessed() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("whole.parquet");
+    sound(&file);
+    let mut m = plain();
+    m.clock.unit = None;
+    let error = read(&file, &m).unwrap_err();
+    assert_eq!(error.diagnostic().code, "time_unit_unknown");
+    m.clock.column = None;
+    let error = read(&file, &m).unwrap_err();
+    assert_eq!(error.diagnostic().code, "no_clock");
+}
+
+/// Bytes changed anywhere in files of every writer: a number or a reason comes back, and never the end of
+/// the process. What was read holds as many samples as the file has rows.
+#[test]
+fn no_change_of_bytes_ends_the_process() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/writers");
+    let whole = crate::foreign_writers::wide();
+    let mut selected = whole.clone();
+    let column = whole.clock.column.clone().unwrap();
+    selected.channels.when.push(SampleFilter { column, at_least: Some(0.5), ..SampleFilter::default() });
+    let mut unstamped = selected.clone();
+    unstamped.clock = ClockMapping { rate_hz: Some(100.0), ..ClockMapping::default() };
+    let mappings = [whole, selected, unstamped].map(Arc::new);
+    let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().flatten().map(|e| e.path()).collect();
+    files.retain(|f| f.extension().is_some_and(|e| e == "parquet"));
+    files.sort();
+    let dir = tempfile::tempdir().unwrap();
+    let damaged = dir.path().join("damaged.parquet");
+    // A fixed multiplicative congruence: the same bytes on every machine.
+    let mut state = 0x2545_f491_4f6c_dd1d_u64;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize
+    };
+    for file in &files {
+        let bytes = std::fs::read(file).unwrap();
+        for _ in 0..40 {
+            let mut changed = bytes.clone();
+            for _ in 0..=(next() % 4) {
+                // Half of the changes go into the footer, where sizes and places stand.
+                let from = if next() % 2 == 0 { 0 } else { bytes.len() - bytes.len().min(3000) };
+                changed[from + next() % (bytes.len() - from)] = next() as u8;
+            }
+            std::fs::write(&damaged, &changed).unwrap();
+            for m in &mappings {
+                let read = std::panic::catch_unwind(|| -> Result<usize, Error> {
+                    let log = Log::open(&LogFiles::one(&damaged), m)?;
+                    let at = log.actuators(&m.channels, None)?;
+                    let geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
+                    Ok(log.read_actuator(&at[0], &m.channels, geometry)?.dx_m.len())
+                });
+                if let Ok(Ok(samples)) = read {
+                    assert!(samples <= 400, "{}: {samples} samples of 400 rows", file.display());
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Small logs by five writers in every layout (`tests/data/writers/make.py`): all hold the same flight.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use ingest::log::identity::IdentityFields;
+use ingest::mapping::units::{TimeUnit, Unit};
+use ingest::mapping::{IdentityField, IdentityMapping};
+use ingest::{
+    ActuatorChannels, ChannelMapping, Channels, ClockMapping, Geometry, GroupMapping, Layout, Log, LogFiles,
+    Mapping,
+};
+use records::Position;
+
+use crate::layouts::channel;
+
+const LINEAR: Geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
+
+fn file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/writers").join(name)
+}
+
+fn mapping(before: &str) -> Mapping {
+    let named = |what: &str, unit| channel(&format!("{before}{what}"), unit);
+    Mapping {
+        identity: IdentityMapping {
+            values: [
+                (IdentityField::TailNumber, "N1".into()),
+                (IdentityField::DepartureUtc, "2026-11-19T04:13:00Z".into()),
+            ]
+            .into(),
+            ..IdentityMapping::default()
+        },
+        clock: ClockMapping {
+            column: Some("time_s".into()),
+            unit: Some(TimeUnit::Second),
+            ..ClockMapping::default()
+        },
+        channels: Channels {
+            motor_position: named("motor_deg", Unit::Degree),
+            screw_position: Some(named("screw_mm", Unit::Millimetre)),
+            load: named("load_n", Unit::Newton),
+            ..Channels::default()
+        },
+        ..Mapping::default()
+    }
+}
+
+pub(crate) fn wide() -> Mapping {
+    mapping("{position}_")
+}
+
+fn actuators(files: &LogFiles, mapping: &Mapping) -> Vec<ActuatorChannels> {
+    let log = Log::open(files, &Arc::new(mapping.clone())).unwrap();
+    let own = log.identity(|_| IdentityFields::new()).unwrap().position;
+    let found = log.actuators(&mapping.channels, own.as_ref()).unwrap();
+    found.iter().map(|at| log.read_actuator(at, &mapping.channels, LINEAR).unwrap()).collect()
+}
+
+/// The samples that `make.py` wrote, from its formulas.
+fn assert_is_the_flight(found: &[ActuatorChannels], name: &str, rounding: f64, load_every: usize) {
+    let names: Vec<&str> = found.iter().map(|a| a.position.as_str()).collect();
+    assert_eq!(names, ["left", "right"], "{name}");
+    for (a, actuator) in found.iter().enumerate() {
+        assert_eq!(actuator.dx_m.len(), 400, "{name}");
+        assert!((actuator.step_s - 0.01).abs() < 1e-9, "{name}: {} s", actuator.step_s);
+        assert_eq!(actuator.segments, [std::ops::Range { start: 0, end: 400 }], "{name}");
+        for k in 0..400 {
+            let t = f64::from(k) / 100.0;
+            let motor_m = (720.0 * (0.5 * t).sin() + 90.0 * a as f64) / 360.0 * 0.005;
+            let at = k as usize;
+            let held = f64::from(k - k % load_every as i32) / 100.0;
+            let load_n = 1000.0 * (0.7 * held).cos() + a as f64;
+            assert!((actuator.motor_m[at] - motor_m).abs() < 1e-9 + rounding, "{name}: motor at {k}");
+            let dx_m = 5e-5 * t.cos();
+            assert!((actuator.dx_m[at] - dx_m).abs() < 1e-9 + 2.0 * rounding, "{name}: dx at {k}");
+            let rough = if name.contains("half") { 0.6 } else { 1e-3 };
+            assert!((actuator.load_n[at] - load_n).abs() < rough, "{name}: load at {k}");
+        }
+    }
+}
+
+#[test]
+fn every_writer_and_compression_gives_the_same_flight() {
+    let mut found = 0;
+    for entry in std::fs::read_dir(file("")).unwrap() {
+        let name = entry.unwrap().file_name().to_string_lossy().into_owned();
+        let by = ["pyarrow", "polars", "pandas", "duckdb", "spark"].iter().any(|w| name.starts_with(w));
+        if by && !name.contains("types") {
+            assert_is_the_flight(&actuators(&LogFiles::one(file(&name)), &wide()), &name, 0.0, 1);
+            found += 1;
+        }
+    }
+    assert_eq!(found, 19, "files by pyarrow, polars, pandas, duckdb and spark");
+}
+
+#[test]
+fn counts_decimals_and_dictionaries_give_the_same_flight() {
+    let mut m = wide();
+    m.channels.screw_position =
+        Some(ChannelMapping { scale: 0.001, offset: -20.0, ..m.channels.screw_position.clone().unwrap() });
+    assert_is_the_flight(&actuators(&LogFiles::one(file("pyarrow_types.parquet")), &m), "types", 6e-7, 1);
+}
+
+#[test]
+fn a_row_for_each_actuator_gives_the_same_flight() {
+    let layout = Layout { position_column: Some("actuator".into()), ..Layout::default() };
+    let m = Mapping { layout, ..mapping("") };
+    assert_is_the_flight(
+        &actuators(&LogFiles::one(file("layout_by_position.parquet")), &m),
+        "by position",
+        0.0,
+        1,
+    );
+}
+
+#[test]
+fn a_row_for_each_channel_gives_the_same_flight() {
+    let layout = Layout {
+        name_column: Some("parameter".into()),
+        value_column: Some("value".into()),
+        position_column: None,
+    };
+    let m = Mapping { layout: layout.clone(), ..wide() };
+    assert_is_the_flight(
+        &actuators(&LogFiles::one(file("layout_by_channel.parquet")), &m),
+        "by channel",
+        0.0,
+        1,
+    );
+    let layout = Layout { position_column: Some("actuator".into()), ..layout };
+    let m = Mapping { layout, ..mapping("") };
+    let both = file("layout_by_channel_and_position.parquet");
+    assert_is_the_flight(&actuators(&LogFiles::one(both), &m), "by channel and position", 0.0, 1);
+}
+
+#[test]
+fn structs_lists_and_lists_of_structs_give_the_same_flight() {
+    let structs = actuators(&LogFiles::one(file("layout_structs.parquet")), &mapping("{position}."));
+    assert_is_the_flight(&structs, "structs", 0.0, 1);
+    assert_is_the_flight(&actuators(&LogFiles::one(file("layout_lists.parquet")), &wide()), "lists", 0.0, 1);
+    let layout = Layout { position_column: Some("actuator".into()), ..Layout::default() };
+    let mut m = Mapping { layout, ..mapping("samples.") };
+    m.clock.column = Some("samples.t".into());
+    assert_is_the_flight(&actuators(&LogFiles::one(file("layout_records.parquet")), &m), "records", 0.0, 1);
+}
+
+#[test]
+fn hive_folders_say_which_flight_and_actuator_a_file_is() {
+    let mut m = mapping("");
+    m.identity = IdentityMapping {
+        folders: [
+            (IdentityField::TailNumber, "tail".into()),
+            (IdentityField::DepartureUtc, "off".into()),
+            (IdentityField::Position, "actuator".into()),
+        ]
+        .into(),
+        ..IdentityMapping::default()
+    };
+    let mut found = Vec::new();
+    for position in ["left", "right"] {
+        let path =
+            file(&format!("hive/tail=N1/off=2026-11-19T04%3A13%3A00Z/actuator={position}/part-0.parquet"));
+        let log = Log::open(&LogFiles::one(&path), &Arc::new(m.clone())).unwrap();
+        let identity = log.identity(|_| IdentityFields::new()).unwrap();
+        assert_eq!(identity.departure_utc.to_string(), "2026-11-19T04:13:00Z");
+        assert_eq!(identity.position, Some(Position::new(position).unwrap()));
+        found.extend(actuators(&LogFiles::one(path), &m));
+    }
+    assert_is_the_flight(&found, "hive", 0.0, 1);
+}
+
+#[test]
+fn loads_in_a_file_of_their_own_at_their_own_rate_are_held() {
+    let mut m = wide();
+    m.groups = [("loads".to_owned(), GroupMapping::default())].into();
+    m.channels.load.group = Some("loads".into());
+    let files = LogFiles {
+        main: vec![file("group_positions.parquet")],
+        groups: [("loads".to_owned(), vec![file("group_loads.parquet")])].into(),
+    };
+    assert_is_the_flight(&actuators(&files, &m), "groups", 0.0, 2);
+    let log = Log::open(&LogFiles::one(file("group_positions.parquet")), &Arc::new(m.clone())).unwrap();
+    let error = log.actuators(&m.channels, None).unwrap_err();
+    assert_eq!(error.diagnostic().code, "no_position");
+}

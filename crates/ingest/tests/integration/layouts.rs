@@ -1,0 +1,347 @@
+//! Logs as fleets write them: several actuators or one, every unit, every kind of clock.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{
+    ArrayRef, Decimal128Array, DictionaryArray, Float16Array, Float32Array, Float64Array, Int16Array,
+    Int32Array, Int64Array, RecordBatch, StringArray, TimestampMillisecondArray, TimestampNanosecondArray,
+};
+use arrow::datatypes::{Int32Type, Schema};
+use ingest::log::identity::IdentityFields;
+use ingest::mapping::units::{TimeUnit, Unit};
+use ingest::mapping::{IdentityField, IdentityMapping};
+use ingest::{ActuatorChannels, ChannelMapping, Channels, ClockMapping, Geometry, Log, LogFiles, Mapping};
+use parquet::arrow::ArrowWriter;
+use records::Position;
+
+/// Writes columns with the plain writer of the Arrow library.
+pub(crate) fn write(file: &Path, columns: &[(&str, ArrayRef)]) {
+    let fields: Vec<_> = columns
+        .iter()
+        .map(|(name, array)| arrow::datatypes::Field::new(*name, array.data_type().clone(), true))
+        .collect();
+    let schema = Arc::new(Schema::new(fields));
+    let batch = RecordBatch::try_new(Arc::clone(&schema), columns.iter().map(|c| Arc::clone(&c.1)).collect())
+        .unwrap();
+    let mut writer = ArrowWriter::try_new(std::fs::File::create(file).unwrap(), schema, None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+}
+
+pub(crate) fn channel(column: &str, unit: Unit) -> ChannelMapping {
+    ChannelMapping { column: column.into(), unit, ..ChannelMapping::default() }
+}
+
+pub(crate) fn mapping(motor: ChannelMapping, screw: ChannelMapping, load: ChannelMapping) -> Mapping {
+    Mapping {
+        identity: IdentityMapping {
+            path: Some(r"(?<tail_number>N\w+)_(?<departure_utc>\d{8}T\d{6}Z)".into()),
+            departure_format: Some("%Y%m%dT%H%M%SZ".into()),
+            time_zone: Some("UTC".into()),
+            ..IdentityMapping::default()
+        },
+        clock: ClockMapping {
+            column: Some("t".into()),
+            unit: Some(TimeUnit::Second),
+            ..ClockMapping::default()
+        },
+        channels: Channels {
+            motor_position: motor,
+            screw_position: Some(screw),
+            load,
+            ..Channels::default()
+        },
+        ..Mapping::default()
+    }
+}
+
+const LINEAR: Geometry = Geometry::Linear { lead_m_per_rev: Some(0.005) };
+
+/// Writes, opens and reads the only actuator of a log.
+fn only(mapping: &Mapping, columns: &[(&str, ArrayRef)], geometry: Geometry) -> ActuatorChannels {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    write(&file, columns);
+    let log = Log::open(&LogFiles::one(&file), &Arc::new(mapping.clone())).unwrap();
+    let positions = log.actuators(&mapping.channels, Some(&Position::new("aileron").unwrap())).unwrap();
+    log.read_actuator(&positions[0], &mapping.channels, geometry).unwrap()
+}
+
+fn reals(values: &[f64]) -> ArrayRef {
+    Arc::new(Float64Array::from(values.to_vec()))
+}
+
+fn near(found: &[f64], wanted: &[f64]) {
+    assert_eq!(found.len(), wanted.len());
+    for (f, w) in found.iter().zip(wanted) {
+        assert!((f - w).abs() <= 1e-12 * w.abs().max(1e-6), "{found:?} is not {wanted:?}");
+    }
+}
+
+/// One millimetre, 5 mm lead: 72° or 0.2 turns of the motor; 1 lbf is 4.448… N.
+#[test]
+fn every_unit_reaches_the_same_metres_and_newtons() {
+    let t = reals(&[0.0, 0.1]);
+    let positions = [
+        (Unit::Metre, 1e-3),
+        (Unit::Millimetre, 1.0),
+        (Unit::Micrometre, 1e3),
+        (Unit::Inch, 1.0 / 25.4),
+        (Unit::Degree, 72.0),
+        (Unit::Radian, 0.4 * std::f64::consts::PI),
+        (Unit::Revolution, 0.2),
+    ];
+    let loads = [
+        (Unit::Newton, 1000.0),
+        (Unit::Kilonewton, 1.0),
+        (Unit::Decanewton, 100.0),
+        (Unit::PoundForce, 224.808_943_099_710_5),
+        (Unit::NewtonMetre, 5.0 / (2.0 * std::f64::consts::PI)),
+        (Unit::PoundForceInch, 7.043199713697552),
+        (Unit::PoundForceFoot, 7.043199713697552 / 12.0),
+    ];
+    for (unit, millimetre) in positions {
+        for (load_unit, kilonewton) in loads {
+            let m = mapping(channel("m", unit), channel("s", Unit::Metre), channel("f", load_unit));
+            let values = [millimetre, 2.0 * millimetre];
+            let a = only(
+                &m,
+                &[
+                    ("t", t.clone()),
+                    ("m", reals(&values)),
+                    ("s", reals(&[1e-3, 2e-3])),
+                    ("f", reals(&[kilonewton, -kilonewton])),
+                ],
+                LINEAR,
+            );
+            near(&a.motor_m, &[1e-3, 2e-3]);
+            a.dx_m.iter().for_each(|dx| assert!(dx.abs() < 1e-15, "{} leaves {dx} m", unit.as_str()));
+            a.load_n
+                .iter()
+                .zip([1e3, -1e3])
+                .for_each(|(f, w)| assert!((f - w).abs() < 1e-8, "{} gives {f} N", load_unit.as_str()));
+        }
+    }
+}
+
+#[test]
+fn signs_counts_sentinels_and_gears_are_taken_as_mapped() {
+    let motor = ChannelMapping {
+        sign: -1,
+        scale: 0.5,
+        offset: 1.0,
+        gear_ratio: 2.0,
+        ..channel("m", Unit::Revolution)
+    };
+    let screw = ChannelMapping { missing: vec![-9999.0], ..channel("s", Unit::Millimetre) };
+    let m = mapping(motor, screw, channel("f", Unit::Newton));
+    let columns: [(&str, ArrayRef); 4] = [
+        ("t", reals(&[0.0, 0.1])),
+        ("m", Arc::new(Int16Array::from(vec![2, 6]))),
+        ("s", reals(&[1.0, -9999.0])),
+        ("f", reals(&[0.0, 1.0])),
+    ];
+    let a = only(&m, &columns, LINEAR);
+    // −(2·0.5 + 1) turns over a gear of 2 and a lead of 5 mm.
+    near(&a.motor_m, &[-0.005, -0.010]);
+    near(&a.dx_m[..1], &[0.006]);
+    assert!(a.dx_m[1].is_nan());
+}
+
+#[test]
+fn every_numeric_type_is_read() {
+    let decimals = Decimal128Array::from(vec![1_000_i128, 2_000]).with_precision_and_scale(10, 3).unwrap();
+    let dictionary: DictionaryArray<Int32Type> =
+        DictionaryArray::new(Int32Array::from(vec![0, 1]), reals(&[1.0, 2.0]));
+    let kinds: Vec<ArrayRef> = vec![
+        Arc::new(Float16Array::from(vec![half::f16::from_f32(1.0), half::f16::from_f32(2.0)])),
+        Arc::new(Float32Array::from(vec![1.0, 2.0])),
+        Arc::new(Int32Array::from(vec![1, 2])),
+        Arc::new(Int64Array::from(vec![1, 2])),
+        Arc::new(arrow::array::UInt8Array::from(vec![1, 2])),
+        Arc::new(decimals),
+        Arc::new(dictionary),
+    ];
+    let m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    for kind in kinds {
+        let name = kind.data_type().to_string();
+        let columns =
+            [("t", reals(&[0.0, 0.1])), ("m", kind), ("s", reals(&[1.0, 2.0])), ("f", reals(&[1.0, 2.0]))];
+        let a = only(&m, &columns, LINEAR);
+        assert_eq!(a.motor_m, [1.0, 2.0], "{name}");
+    }
+}
+
+#[test]
+fn every_clock_gives_the_same_step() {
+    let ticks = |per_second: i64| {
+        Int64Array::from((0..5).map(|i| 1_700_000_000 * per_second + i * per_second / 50).collect::<Vec<_>>())
+    };
+    let clocks: Vec<(ArrayRef, Option<TimeUnit>)> = vec![
+        (reals(&[10.0, 10.02, 10.04, 10.06, 10.08]), Some(TimeUnit::Second)),
+        (Arc::new(ticks(1000)), Some(TimeUnit::Millisecond)),
+        (Arc::new(ticks(1_000_000)), Some(TimeUnit::Microsecond)),
+        (Arc::new(ticks(1_000_000_000)), Some(TimeUnit::Nanosecond)),
+        (
+            Arc::new(
+                ticks(1000)
+                    .reinterpret_cast::<arrow::datatypes::TimestampMillisecondType>()
+                    .with_timezone("UTC"),
+            ),
+            None,
+        ),
+        (
+            Arc::new(ticks(1_000_000_000).reinterpret_cast::<arrow::datatypes::TimestampNanosecondType>()),
+            None,
+        ),
+    ];
+    let x = reals(&[0.0, 1.0, 2.0, 3.0, 4.0]);
+    for (clock, unit) in clocks {
+        let absolute = unit.is_none();
+        let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+        m.clock.unit = unit;
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("N1_20261119T041300Z.parquet");
+        write(&file, &[("t", clock), ("m", x.clone()), ("s", x.clone()), ("f", x.clone())]);
+        let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+        let at = log.actuators(&m.channels, Some(&Position::new("a").unwrap())).unwrap();
+        let line = log.read_actuator(&at[0], &m.channels, LINEAR).unwrap();
+        assert!((line.step_s - 0.02).abs() < 1e-9, "{line:?}");
+        assert_eq!(
+            log.start_utc().unwrap().map(jiff::Timestamp::as_second),
+            absolute.then_some(1_700_000_000)
+        );
+    }
+}
+
+#[test]
+fn a_wide_log_offers_each_position_and_names_what_one_lacks() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let x = || reals(&[0.0, 1.0]);
+    write(
+        &file,
+        &[("t", x()), ("left_m", x()), ("left_s", x()), ("left_f", x()), ("right_m", x()), ("right_s", x())],
+    );
+    let m = mapping(
+        channel("{position}_m", Unit::Metre),
+        channel("{position}_s", Unit::Metre),
+        channel("{position}_f", Unit::Newton),
+    );
+    let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+    let found = log.actuators(&m.channels, None).unwrap();
+    let told: Vec<_> = found.iter().map(|p| (p.position.as_str(), p.lacking.clone())).collect();
+    assert_eq!(told, [("left", vec![]), ("right", vec!["right_f".to_owned()])]);
+    let identity = log.identity(|_| IdentityFields::new()).unwrap();
+    assert_eq!(identity.tail_number.as_str(), "N1");
+    assert_eq!(identity.departure_utc.to_string(), "2026-11-19T04:13:00Z");
+}
+
+#[test]
+fn metadata_wins_over_columns_and_columns_over_the_path() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let x = || ingest::parquet::writer::Column::Real(vec![0.0, 1.0]);
+    let text = |t: &str| ingest::parquet::writer::Column::Text(vec![t.to_owned(); 2]);
+    let columns = [("t".to_owned(), x()), ("tail".into(), text("N2")), ("flight".into(), text("0413"))];
+    ingest::parquet::writer::write_parquet(
+        &file,
+        &columns,
+        &[("reg".into(), "N3".into()), ("fh".into(), "1.5".into())],
+    )
+    .unwrap();
+    let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    m.identity.columns = BTreeMap::from([
+        (IdentityField::TailNumber, "tail".into()),
+        (IdentityField::FlightId, "flight".into()),
+    ]);
+    let tail = |m: &Mapping| {
+        let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+        log.identity(|_| IdentityFields::new()).unwrap()
+    };
+    assert_eq!(tail(&m).tail_number.as_str(), "N2");
+    m.identity.metadata = BTreeMap::from([
+        (IdentityField::TailNumber, "reg".into()),
+        (IdentityField::FlightHours, "fh".into()),
+    ]);
+    let identity = tail(&m);
+    assert_eq!((identity.tail_number.as_str(), identity.flight_id.as_str()), ("N3", "0413"));
+    assert_eq!(identity.flight_hours, Some(1.5));
+}
+
+#[test]
+fn an_absolute_clock_in_milliseconds_keeps_its_instant() {
+    let m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let stamps = |t: ArrayRef| {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("x.parquet");
+        write(&file, &[("t", t)]);
+        Log::open(&LogFiles::one(&file), &Arc::new(m.clone()))
+            .unwrap()
+            .start_utc()
+            .unwrap()
+            .unwrap()
+            .to_string()
+    };
+    assert_eq!(
+        stamps(Arc::new(TimestampMillisecondArray::from(vec![1_763_525_580_250, 1_763_525_580_350]))),
+        "2025-11-19T04:13:00.25Z"
+    );
+    assert_eq!(
+        stamps(Arc::new(TimestampNanosecondArray::from(vec![
+            1_763_525_580_250_000_000,
+            1_763_525_580_350_000_000
+        ]))),
+        "2025-11-19T04:13:00.25Z"
+    );
+}
+
+#[test]
+fn text_where_numbers_should_stand_is_refused_by_name() {
+    let m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("N1_20261119T041300Z.parquet");
+    let text: ArrayRef = Arc::new(StringArray::from(vec!["0.1", "0.2"]));
+    write(
+        &file,
+        &[("t", reals(&[0.0, 1.0])), ("m", text), ("s", reals(&[0.0, 1.0])), ("f", reals(&[0.0, 1.0]))],
+    );
+    let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
+    let positions = log.actuators(&m.channels, Some(&Position::new("a").unwrap())).unwrap();
+    let error = log.read_actuator(&positions[0], &m.channels, LINEAR).unwrap_err();
+    assert_eq!(error.diagnostic().code, "column_type");
+    assert_eq!(error.diagnostic().column.as_deref(), Some("m"));
+}
+
+/// `SYSTEM.CHANNEL` is an ordinary name in flight logs, not a path into a nest.
+#[test]
+fn a_dot_in_a_name_is_part_of_the_name() {
+    let m =
+        mapping(channel("ail.m", Unit::Metre), channel("ail.s", Unit::Metre), channel("ail.f", Unit::Newton));
+    let x = || reals(&[1.0, 2.0]);
+    let a = only(&m, &[("t", reals(&[0.0, 0.1])), ("ail.m", x()), ("ail.s", x()), ("ail.f", x())], LINEAR);
+    assert_eq!(a.motor_m, [1.0, 2.0]);
+}
+
+/// Istanbul is three hours ahead: a clock that names no zone is local, and never taken for UTC.
+#[test]
+fn a_local_clock_takes_the_mapped_zone_or_says_nothing() {
+    let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    let start = |m: &Mapping| {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("x.parquet");
+        let stamps = TimestampMillisecondArray::from(vec![1_763_525_580_250, 1_763_525_580_350]);
+        write(&file, &[("t", Arc::new(stamps))]);
+        Log::open(&LogFiles::one(&file), &Arc::new(m.clone()))
+            .unwrap()
+            .start_utc()
+            .unwrap()
+            .map(|t| t.to_string())
+    };
+    m.identity.time_zone = Some("Europe/Istanbul".into());
+    assert_eq!(start(&m).as_deref(), Some("2025-11-19T01:13:00.25Z"));
+    m.identity.time_zone = None;
+    assert_eq!(start(&m), None);
+}

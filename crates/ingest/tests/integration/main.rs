@@ -1,0 +1,9 @@
+//! Integration tests of the public API of `ingest`: files in, channels or an error out.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+mod clocks;
+mod corrupt_files;
+mod foreign_writers;
+mod layouts;
+mod sample_filters;

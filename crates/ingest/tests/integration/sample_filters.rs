@@ -1,0 +1,219 @@
+//! Stretches that conditions select: what lies outside is neither read nor seen, however the file lies in pages.
+
+use std::fs::{self, File};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, Float64Array, RecordBatch};
+use ingest::mapping::units::Unit;
+use ingest::{ActuatorChannels, Error, Geometry, Log, LogFiles, Mapping, SampleFilter};
+use parquet::arrow::ArrowWriter;
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::file::metadata::{PageIndexPolicy, ParquetMetaDataReader};
+use parquet::file::properties::WriterProperties;
+use proptest::prelude::*;
+use records::Position;
+
+use crate::layouts::{channel, mapping};
+
+const ROWS: usize = 3000;
+/// Where the state is 1.
+const STRETCHES: [Range<usize>; 3] = [310..420, 1200..1300, 2890..2995];
+
+/// Rows and pages of a file.
+#[derive(Debug, Clone, Copy)]
+struct Laid {
+    group_rows: usize,
+    page_rows: usize,
+    is_coded: bool,
+}
+
+fn written(folder: &Path, laid: Laid) -> PathBuf {
+    let column = |value: fn(usize) -> f64| -> ArrayRef {
+        Arc::new(Float64Array::from((0..ROWS).map(value).collect::<Vec<_>>()))
+    };
+    let state = |k: usize| f64::from(u8::from(STRETCHES.iter().any(|s| s.contains(&k))));
+    let columns = [
+        ("t", column(|k| k as f64 * 0.01)),
+        ("state", column(state)),
+        ("m", column(|k| (k as f64 * 0.003).sin() * 0.02)),
+        // Few values, a hole within a stretch, and a leap that no stretch holds.
+        (
+            "s",
+            column(|k| match k {
+                1210..1215 => f64::NAN,
+                600 => 9.0,
+                _ => (k % 17) as f64 * 1e-4,
+            }),
+        ),
+        ("f", column(|k| (k as f64 * 0.011).cos() * 5e3)),
+    ];
+    let batch = RecordBatch::try_from_iter(columns).unwrap();
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_dictionary_enabled(laid.is_coded)
+        .set_max_row_group_row_count(Some(laid.group_rows))
+        .set_data_page_row_count_limit(laid.page_rows)
+        .set_write_batch_size(50)
+        .build();
+    let file = folder.join("N1_20261119T041300Z.parquet");
+    let mut writer =
+        ArrowWriter::try_new(File::create(&file).unwrap(), batch.schema(), Some(properties)).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+    file
+}
+
+fn conditional(is_conditional: bool) -> Mapping {
+    let mut mapping =
+        mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
+    if is_conditional {
+        let when = SampleFilter { column: "state".into(), equals: vec![1.0], ..SampleFilter::default() };
+        mapping.channels.when.push(when);
+    }
+    mapping
+}
+
+fn read(file: &Path, mapping: &Mapping) -> Result<ActuatorChannels, Error> {
+    let log = Log::open(&LogFiles::one(file), &Arc::new(mapping.clone()))?;
+    let at = log.actuators(&mapping.channels, Some(&Position::new("rudder").unwrap()))?;
+    log.read_actuator(&at[0], &mapping.channels, Geometry::Linear { lead_m_per_rev: None })
+}
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|v| if v.is_nan() { u64::MAX } else { v.to_bits() }).collect()
+}
+
+fn channels(read: &ActuatorChannels) -> [Vec<u64>; 3] {
+    [&read.motor_m, &read.dx_m, &read.load_n].map(|values| bits(values))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    /// What is read under a condition is what is read without one, less all that lies outside its stretches, and what
+    /// is seen of it is seen of the stretches alone.
+    #[test]
+    fn a_condition_leaves_its_stretches_and_nothing_else(
+        group_rows in 60_usize..3500, page_rows in 50_usize..900, is_coded in any::<bool>(),
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let file = written(folder.path(), Laid { group_rows, page_rows, is_coded });
+        let (all, some) = (read(&file, &conditional(false)).unwrap(), read(&file, &conditional(true)).unwrap());
+        prop_assert_eq!(&some.segments, &STRETCHES.to_vec());
+        let mut wanted = channels(&all);
+        for k in (0..ROWS).filter(|k| !STRETCHES.iter().any(|s| s.contains(k))) {
+            wanted.iter_mut().for_each(|values| values[k] = u64::MAX);
+        }
+        prop_assert_eq!(channels(&some), wanted);
+        let count = STRETCHES.iter().map(Range::len).sum::<usize>();
+        prop_assert_eq!((some.apart, some.quality[0].samples), (ROWS - count, count));
+        prop_assert!((some.missing_share - 5.0 / count as f64).abs() < 1e-15);
+        let seen = &some.quality[1];
+        prop_assert!(seen.max < 0.1 && seen.spikes == 0 && (seen.rate_hz - 100.0).abs() < 1e-9, "{:?}", seen);
+        prop_assert!(some.quality[2].missing_share == 0.0 && all.quality[1].max > 1.0);
+    }
+}
+
+/// Overwrites the second half of some pages of a column, of which their rows tell which.
+fn spoilt(file: &Path, column: usize, which: impl Fn(Range<usize>) -> bool) -> PathBuf {
+    let footer = ParquetMetaDataReader::new()
+        .with_page_index_policy(PageIndexPolicy::Required)
+        .parse_and_finish(&File::open(file).unwrap())
+        .unwrap();
+    let mut bytes = fs::read(file).unwrap();
+    let mut first = 0;
+    for (group, index) in footer.row_groups().iter().zip(footer.offset_index().unwrap()) {
+        let (rows, pages) = (group.num_rows() as usize, index[column].page_locations());
+        for (k, page) in pages.iter().enumerate() {
+            let end = pages.get(k + 1).map_or(rows, |next| next.first_row_index as usize);
+            if which(first + page.first_row_index as usize..first + end) {
+                let body = page.offset as usize..page.offset as usize + page.compressed_page_size as usize;
+                bytes[body.start + body.len() / 2..body.end].fill(0xff);
+            }
+        }
+        first += rows;
+    }
+    let spoilt = file.with_file_name("N2_20261119T041300Z.parquet");
+    fs::write(&spoilt, bytes).unwrap();
+    spoilt
+}
+
+/// A page of which nothing is selected may hold anything: nobody looks. One of which something is, may not.
+#[test]
+fn pages_outside_of_every_stretch_are_not_unpacked() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = written(folder.path(), Laid { group_rows: 1000, page_rows: 100, is_coded: false });
+    let sound = read(&file, &conditional(true)).unwrap();
+    let all = read(&file, &conditional(false)).unwrap();
+    let touched = |rows: &Range<usize>| STRETCHES.iter().any(|s| s.start < rows.end && rows.start < s.end);
+    // Bytes without a checksum may be unpacked to other numbers without a word.
+    let is = |file: &Path, is_conditional: bool, wanted: &ActuatorChannels| {
+        read(file, &conditional(is_conditional)).is_ok_and(|found| channels(&found) == channels(wanted))
+    };
+    for column in 2..5 {
+        let outside = spoilt(&file, column, |rows| !touched(&rows));
+        assert!(!is(&outside, false, &all), "column {column} was not spoilt");
+        assert!(is(&outside, true, &sound), "column {column} was read outside of the stretches");
+        let inside = spoilt(&file, column, |rows| rows.contains(&1250));
+        assert!(!is(&inside, true, &sound), "column {column} was not read");
+    }
+}
+
+/// A condition that is never met leaves nothing, and says no more than that.
+#[test]
+fn a_condition_that_is_never_met_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = written(folder.path(), Laid { group_rows: 1000, page_rows: 100, is_coded: false });
+    let mut never = conditional(true);
+    never.channels.when[0].equals = vec![7.0];
+    let read = read(&file, &never).unwrap();
+    assert!(read.segments.is_empty() && read.motor_m.len() == ROWS && read.apart == ROWS);
+    assert!(read.motor_m.iter().chain(&read.dx_m).all(|v| v.is_nan()) && read.missing_share == 0.0);
+}
+
+/// Each actuator is asked its own column where the condition names one, and all the same where it does not.
+#[test]
+#[expect(clippy::single_range_in_vec_init, reason = "one stretch is a list of one")]
+fn conditions_are_asked_of_each_actuator() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("N1_20261119T041300Z.parquet");
+    let column = |value: fn(usize) -> f64| -> ArrayRef {
+        Arc::new(Float64Array::from((0..100).map(value).collect::<Vec<_>>()))
+    };
+    let mut columns = vec![("t".to_owned(), column(|k| k as f64 * 0.01))];
+    for (position, mode) in [("a", column(|k| (k / 50) as f64)), ("b", column(|k| (k / 90) as f64))] {
+        for channel in ["m", "s", "f"] {
+            columns.push((format!("{position}_{channel}"), column(|k| k as f64)));
+        }
+        columns.push((format!("{position}_mode"), mode));
+        let own_s =
+            if position == "a" { column(|k| k as f64 * 0.01) } else { column(|k| 0.4 + k as f64 * 0.01) };
+        columns.push((format!("{position}_t"), own_s));
+    }
+    let batch = RecordBatch::try_from_iter(columns).unwrap();
+    let mut writer = ArrowWriter::try_new(File::create(&file).unwrap(), batch.schema(), None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+    let mut mapping = mapping(
+        channel("{position}_m", Unit::Metre),
+        channel("{position}_s", Unit::Metre),
+        channel("{position}_f", Unit::Newton),
+    );
+    let segments = |mapping: &Mapping| -> Vec<Vec<Range<usize>>> {
+        let log = Log::open(&LogFiles::one(&file), &Arc::new(mapping.clone())).unwrap();
+        let positions = log.actuators(&mapping.channels, None).unwrap();
+        let read = |at| log.read_actuator(at, &mapping.channels, Geometry::Linear { lead_m_per_rev: None });
+        positions.iter().map(|at| read(at).unwrap().segments).collect()
+    };
+    let when =
+        |column: &str| SampleFilter { column: column.into(), equals: vec![1.0], ..SampleFilter::default() };
+    mapping.channels.when = vec![when("{position}_mode")];
+    assert_eq!(segments(&mapping), [vec![50..100], vec![90..100]]);
+    mapping.channels.when = vec![when("a_mode")];
+    assert_eq!(segments(&mapping), [vec![50..100], vec![50..100]]);
+    // One column for all, on stamps of each one's own: b's come 0.4 s later.
+    let timed = SampleFilter { time_column: Some("{position}_t".into()), ..when("a_mode") };
+    mapping.channels.when = vec![timed];
+    assert_eq!(segments(&mapping), [vec![50..100], vec![100 - 10..100]]);
+}
