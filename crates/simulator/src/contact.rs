@@ -7,6 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::course::phase_factor;
 use crate::error::{Error, not_negative, positive, within};
 
 /// Below this change of the penetration the divided difference of V loses digits, and the force at mid-step serves.
@@ -33,13 +34,20 @@ pub enum Law {
         /// The penetration at which both parts are equally stiff in the secant, metres.
         reference_m: f64,
     },
+    /// Stiffness `K (1 − (1 − share) e^(−p/depth_m))`: a toe that stiffens exponentially.
+    Toe {
+        /// The stiffness at the touch, as a share of K, 0 to 1.
+        share: f64,
+        /// The penetration within which the missing stiffness falls by a factor e, metres.
+        depth_m: f64,
+    },
 }
 
 impl Law {
     pub(crate) fn check(&self, key: &str) -> Result<(), Error> {
         let (share, length_m) = match *self {
             Self::Linear => return Ok(()),
-            Self::Soft { share, depth_m } => (share, depth_m),
+            Self::Soft { share, depth_m } | Self::Toe { share, depth_m } => (share, depth_m),
             Self::Hertz { share, reference_m } => (share, reference_m),
         };
         within(&format!("{key}.share"), share, 0.0, 1.0, "between 0 and 1")?;
@@ -57,6 +65,9 @@ impl Law {
             Self::Hertz { share, reference_m } => {
                 (1.0 - share) * 0.5 * p * p + share * 0.4 * p * p * (p / reference_m).sqrt()
             }
+            Self::Toe { share, depth_m } => {
+                0.5 * p * p - (1.0 - share) * depth_m * (p + depth_m * (-p / depth_m).exp_m1())
+            }
         }
     }
 
@@ -66,6 +77,7 @@ impl Law {
             Self::Linear => p,
             Self::Soft { share, depth_m } => p - (1.0 - share) * p.min(depth_m),
             Self::Hertz { share, reference_m } => p * (1.0 - share + share * (p / reference_m).sqrt()),
+            Self::Toe { share, depth_m } => p + (1.0 - share) * depth_m * (-p / depth_m).exp_m1(),
         }
     }
 
@@ -81,9 +93,26 @@ impl Law {
                 }
             }
             Self::Hertz { share, reference_m } => 1.0 - share + share * 1.5 * (p / reference_m).sqrt(),
+            Self::Toe { share, depth_m } => 1.0 - (1.0 - share) * (-p / depth_m).exp(),
         }
     }
+
+    /// The penetration p at which `F(p)/K` has a value, by bisection.
+    fn penetration_m(&self, force_m: f64) -> f64 {
+        let (mut low_m, mut high_m) = (0.0, force_m.max(1e-9));
+        while self.force_m(high_m) < force_m {
+            high_m *= 2.0;
+        }
+        for _ in 0..80 {
+            let middle_m = 0.5 * (low_m + high_m);
+            if self.force_m(middle_m) < force_m { low_m = middle_m } else { high_m = middle_m }
+        }
+        0.5 * (low_m + high_m)
+    }
 }
+
+/// Loads at which a flank is sampled for its straight line.
+const LINE_POINTS: usize = 200;
 
 /// The coupling between motor and screw.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -99,6 +128,15 @@ pub struct Contact {
     pub offset_m: f64,
     /// How the force grows with the penetration.
     pub law: Law,
+    /// The law of the lower flank, which pushes the screw up. Default: `law`.
+    pub lower_law: Option<Law>,
+    /// Stiffness of the lower flank over the upper's, 0.2 to 5. Default 1.
+    pub lower_stiffness_factor: f64,
+    /// Growth of the stiffness from the start to the end of the log, as a share, −0.5 to 1. Default 0.
+    pub stiffness_drift: f64,
+    /// Stiffness in the middle of each phase (preflight, take-off, climb, cruise, approach, landing)
+    /// over `stiffness_n_per_m`, changing linearly between, 0.2 to 5. Default 1 in each.
+    pub stiffness_phase_factors: [f64; 6],
 }
 
 impl Default for Contact {
@@ -109,6 +147,10 @@ impl Default for Contact {
             gap_m: 100e-6,
             offset_m: 100e-6,
             law: Law::Linear,
+            lower_law: None,
+            lower_stiffness_factor: 1.0,
+            stiffness_drift: 0.0,
+            stiffness_phase_factors: [1.0; 6],
         }
     }
 }
@@ -128,13 +170,60 @@ impl Contact {
         not_negative("contact.damping_n_s_per_m", self.damping_n_s_per_m)?;
         not_negative("contact.gap_m", self.gap_m)?;
         crate::error::finite("contact.offset_m", self.offset_m)?;
-        self.law.check("contact.law")
+        self.law.check("contact.law")?;
+        self.lower_law.map_or(Ok(()), |law| law.check("contact.lower_law"))?;
+        let factor = |key, value| within(key, value, 0.2, 5.0, "between 0.2 and 5");
+        factor("contact.lower_stiffness_factor", self.lower_stiffness_factor)?;
+        within("contact.stiffness_drift", self.stiffness_drift, -0.5, 1.0, "between -0.5 and 1")?;
+        let mut factors = self.stiffness_phase_factors.into_iter();
+        factors.try_for_each(|value| factor("contact.stiffness_phase_factors", value))
+    }
+
+    /// The coupling at a share of the log, with the stiffness it has by then.
+    #[must_use]
+    pub(crate) fn at(&self, progress: f64) -> Self {
+        let progress = progress.clamp(0.0, 1.0);
+        let factor = phase_factor(progress, &self.stiffness_phase_factors);
+        let drift = 1.0 + self.stiffness_drift * progress;
+        Self { stiffness_n_per_m: self.stiffness_n_per_m * factor * drift, ..*self }
+    }
+
+    /// Whether the stiffness changes during a log.
+    pub(crate) fn is_varying(&self) -> bool {
+        let is_one = |factor: &f64| (factor - 1.0).abs() < f64::EPSILON;
+        self.stiffness_drift.abs() > 0.0 || !self.stiffness_phase_factors.iter().all(is_one)
+    }
+
+    /// Law and stiffness of the flank that pushes the screw up.
+    fn lower(&self) -> (Law, f64) {
+        (self.lower_law.unwrap_or(self.law), self.stiffness_n_per_m * self.lower_stiffness_factor)
+    }
+
+    /// The distance of both flanks when each is extrapolated to zero load from a band of loads.
+    ///
+    /// A straight line is fitted by least squares to δX against F on each flank, over evenly spaced
+    /// loads of the band; the result is the difference of the intercepts. For linear flanks it is the
+    /// gap; a soft toe of less force than the band adds to it.
+    pub fn extrapolated_gap_m(&self, from_n: f64, to_n: f64) -> f64 {
+        let (lower_law, lower_n_per_m) = self.lower();
+        let flanks = [(self.law, self.stiffness_n_per_m), (lower_law, lower_n_per_m)];
+        let intercept_m = |(law, stiffness_n_per_m): (Law, f64)| {
+            let points: [(f64, f64); LINE_POINTS] = std::array::from_fn(|k| {
+                let load_n = from_n + (to_n - from_n) * k as f64 / (LINE_POINTS - 1) as f64;
+                (load_n, law.penetration_m(load_n / stiffness_n_per_m))
+            });
+            intercept(&points)
+        };
+        self.gap_m + flanks.map(intercept_m).iter().sum::<f64>()
     }
 
     /// Elastic energy at a relative position δX, J.
     pub fn energy_j(&self, delta_m: f64) -> f64 {
-        let beyond_m = ((delta_m - self.offset_m).abs() - 0.5 * self.gap_m).max(0.0);
-        self.stiffness_n_per_m * self.law.potential_m2(beyond_m)
+        let from_m = delta_m - self.offset_m;
+        let beyond_m = (from_m.abs() - 0.5 * self.gap_m).max(0.0);
+        let upper = (self.law, self.stiffness_n_per_m);
+        let (law, stiffness_n_per_m) = if from_m < 0.0 { self.lower() } else { upper };
+        stiffness_n_per_m * law.potential_m2(beyond_m)
     }
 
     /// The mean force of a step that starts at δX and moves at the mean relative speed given.
@@ -145,8 +234,9 @@ impl Contact {
         if from_m.max(to_m) <= half_m && from_m.min(to_m) >= -half_m {
             return Mean::default();
         }
-        let upper = self.flank(from_m - half_m, to_m - half_m, step_s);
-        let lower = self.flank(-from_m - half_m, -to_m - half_m, step_s);
+        let upper = (self.law, self.stiffness_n_per_m);
+        let upper = self.flank(upper, from_m - half_m, to_m - half_m, step_s);
+        let lower = self.flank(self.lower(), -from_m - half_m, -to_m - half_m, step_s);
         Mean {
             force_n: upper.force_n - lower.force_n,
             slope_n_s_per_m: upper.slope_n_s_per_m + lower.slope_n_s_per_m,
@@ -154,20 +244,94 @@ impl Contact {
     }
 
     /// One flank, from one signed depth to another; zero depth is the touch.
-    fn flank(&self, from_m: f64, to_m: f64, step_s: f64) -> Mean {
+    fn flank(&self, (law, stiffness_n_per_m): (Law, f64), from_m: f64, to_m: f64, step_s: f64) -> Mean {
         let (p, q) = (from_m.max(0.0), to_m.max(0.0));
         let travel_m = to_m - from_m;
         let (mean_m, slope) = if travel_m.abs() < NEAR_M {
-            (self.law.force_m(0.5 * (p + q)), 0.5 * self.law.slope(0.5 * (p + q)))
+            (law.force_m(0.5 * (p + q)), 0.5 * law.slope(0.5 * (p + q)))
         } else {
-            let mean_m = (self.law.potential_m2(q) - self.law.potential_m2(p)) / travel_m;
-            (mean_m, (self.law.force_m(q) - mean_m) / travel_m)
+            let mean_m = (law.potential_m2(q) - law.potential_m2(p)) / travel_m;
+            (mean_m, (law.force_m(q) - mean_m) / travel_m)
         };
-        let force_n = self.stiffness_n_per_m * mean_m + self.damping_n_s_per_m * (q - p) / step_s;
+        let force_n = stiffness_n_per_m * mean_m + self.damping_n_s_per_m * (q - p) / step_s;
         if force_n <= 0.0 {
             return Mean::default();
         }
         let damping = if q > 0.0 { self.damping_n_s_per_m } else { 0.0 };
-        Mean { force_n, slope_n_s_per_m: self.stiffness_n_per_m * slope * step_s + damping }
+        Mean { force_n, slope_n_s_per_m: stiffness_n_per_m * slope * step_s + damping }
+    }
+}
+
+/// The intercept of the least-squares line of y on x.
+fn intercept(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
+    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+    let slope = mean(&|p| (p.0 - x) * (p.1 - y)) / mean(&|p| (p.0 - x).powi(2));
+    y - slope * x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contact(law: Law) -> Contact {
+        Contact { law, ..Contact::default() }
+    }
+
+    #[test]
+    fn linear_flanks_extrapolate_to_the_gap_even_when_they_differ() {
+        let unequal = Contact { lower_stiffness_factor: 0.6, ..contact(Law::Linear) };
+        assert!((unequal.extrapolated_gap_m(2400.0, 8000.0) - 100e-6).abs() < 1e-15);
+    }
+
+    /// Beyond the toe, soft and exponential flanks are `p = F/K + (1 − share) depth`.
+    #[test]
+    fn a_toe_below_the_band_adds_what_its_asymptote_says() {
+        let soft = contact(Law::Soft { share: 0.4, depth_m: 20e-6 });
+        let toe = Contact { lower_law: Some(Law::Toe { share: 0.5, depth_m: 5e-6 }), ..soft };
+        assert!((soft.extrapolated_gap_m(2400.0, 8000.0) - 124e-6).abs() < 1e-12);
+        assert!((toe.extrapolated_gap_m(2400.0, 8000.0) - 114.5e-6).abs() < 1e-9);
+    }
+
+    /// Pure Hertz: `p = (F/K)^(2/3) ref^(1/3)`, here fitted by a least-squares line in R:
+    /// the tangent at a load lies at a third of the penetration, so the line's intercept is near that.
+    #[test]
+    fn hertzian_flanks_extrapolate_to_about_a_third_of_their_penetration() {
+        let hertz = contact(Law::Hertz { share: 1.0, reference_m: 100e-6 });
+        let penetration_m = (5200.0_f64 / 5e7).powf(2.0 / 3.0) * 100e-6_f64.powf(1.0 / 3.0);
+        let extra_m = 0.5 * (hertz.extrapolated_gap_m(2400.0, 8000.0) - 100e-6);
+        assert!((extra_m / (penetration_m / 3.0) - 1.0).abs() < 0.1, "{extra_m:e}");
+    }
+
+    /// Force is the derivative of the potential, stiffness that of the force.
+    #[test]
+    fn every_law_has_the_force_and_slope_of_its_potential() {
+        let laws = [
+            Law::Linear,
+            Law::Soft { share: 0.3, depth_m: 30e-6 },
+            Law::Hertz { share: 0.7, reference_m: 80e-6 },
+            Law::Toe { share: 0.2, depth_m: 25e-6 },
+        ];
+        for law in laws {
+            for p in [1e-6, 20e-6, 70e-6] {
+                let h = 1e-9;
+                let force_m = (law.potential_m2(p + h) - law.potential_m2(p - h)) / (2.0 * h);
+                let slope = (law.force_m(p + h) - law.force_m(p - h)) / (2.0 * h);
+                assert!((force_m / law.force_m(p) - 1.0).abs() < 1e-4, "{law:?} at {p:e}");
+                assert!((slope / law.slope(p) - 1.0).abs() < 1e-4, "{law:?} at {p:e}");
+                assert!((law.penetration_m(law.force_m(p)) / p - 1.0).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn stiffness_drifts_and_follows_the_phases() {
+        let factors = [1.0, 1.0, 1.0, 0.9, 1.0, 1.0];
+        let varying =
+            Contact { stiffness_drift: 0.2, stiffness_phase_factors: factors, ..Contact::default() };
+        assert!(varying.is_varying() && !Contact::default().is_varying());
+        assert!((varying.at(1.0).stiffness_n_per_m / 6e7 - 1.0).abs() < 1e-12);
+        assert!((varying.at(0.49).stiffness_n_per_m / (5e7 * 0.9 * 1.098) - 1.0).abs() < 1e-12);
     }
 }

@@ -64,13 +64,22 @@ impl Course {
         let stick = path(&stick_moves(profile, &mut draw("stick")), points);
         let trim = coloured(TRIM_HZ, points, &mut draw("trim"));
         let manoeuvre = path(&manoeuvres(profile.duration_s, &mut draw("manoeuvre")), points);
-        let gust = coloured(profile.gust_hz, points, &mut draw("gust"));
+        let gust = gusts(profile, points, &mut draw("gust"));
+        let side = profile
+            .reversals
+            .map(|count| path(&sides(profile.duration_s, count, &mut draw("sides")), points));
+        let mut asked: Vec<f64> =
+            (0..points).map(|k| deployment[k] + stick[k] + profile.trim_share * trim[k]).collect();
+        rest(&mut asked, profile, &mut draw("rest"));
         let instant = |k: usize| {
-            let asked = deployment[k] + stick[k] + profile.trim_share * trim[k];
             let pressure = pressure(time_s(k) / profile.duration_s);
+            let air = match &side {
+                Some(side) => -side[k] * one_sided(profile, pressure, manoeuvre[k], gust[k]),
+                None => airload(profile, pressure, manoeuvre[k], gust[k]),
+            };
             Instant {
-                command_m: profile.stroke_m * asked.clamp(-1.0, 1.0),
-                air_n: profile.load_n * airload(profile, pressure, manoeuvre[k], gust[k]),
+                command_m: profile.stroke_m * asked[k].clamp(-1.0, 1.0),
+                air_n: profile.load_n * air,
                 hinge_n_per_m: pressure * profile.hinge_share * profile.load_n / profile.stroke_m,
             }
         };
@@ -96,15 +105,87 @@ fn time_s(index: usize) -> f64 {
 }
 
 /// Load at zero deflection over `load_n`.
-///
-/// Without reversals the mean outweighs manoeuvre, gust and full deflection together: a surface that
-/// is always sucked one way, even on the ground.
 fn airload(profile: &Profile, pressure: f64, manoeuvre: f64, gust: f64) -> f64 {
     if profile.no_reversal {
-        let swing = 0.15 * manoeuvre + 0.1 * (profile.gust_share * gust).tanh();
-        return -(0.35 + 0.65 * pressure) * (0.75 + swing);
+        return one_sided(profile, pressure, manoeuvre, gust);
     }
     pressure * (MANOEUVRE_SHARE * manoeuvre + profile.gust_share * gust)
+}
+
+/// Load at zero deflection over `load_n` of a surface that is sucked one way, even on the ground: the
+/// mean outweighs manoeuvre, gust and full deflection together.
+fn one_sided(profile: &Profile, pressure: f64, manoeuvre: f64, gust: f64) -> f64 {
+    let swing = 0.15 * manoeuvre + 0.1 * (profile.gust_share * gust).tanh();
+    -(0.35 + 0.65 * pressure) * (0.75 + swing)
+}
+
+/// A factor that holds for each phase, changing linearly between the middles of neighbouring phases.
+pub(crate) fn phase_factor(progress: f64, factors: &[f64; PHASES.len()]) -> f64 {
+    let (mut start, mut middle, mut factor) = (0.0, f64::NEG_INFINITY, factors[0]);
+    for (phase, next) in PHASES.iter().zip(factors) {
+        let next_middle = start + 0.5 * phase.share;
+        if progress < next_middle {
+            let part = if middle.is_finite() { (progress - middle) / (next_middle - middle) } else { 1.0 };
+            return factor + part * (next - factor);
+        }
+        (start, middle, factor) = (start + phase.share, next_middle, *next);
+    }
+    factor
+}
+
+/// The gusts of the form asked for, at unit variance.
+fn gusts(profile: &Profile, points: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    match profile.gust_form.noise(profile.gust_hz, GRID_S, rng.clone()) {
+        Some(mut noise) => (0..points).map(|_| noise.next()).collect(),
+        None => coloured(profile.gust_hz, points, rng),
+    }
+}
+
+/// Which side the load is on: a change of side at each of so many random times, well inside the log.
+fn sides(duration_s: f64, count: u32, rng: &mut ChaCha8Rng) -> Vec<Move> {
+    let mut target = if rng.random() { 1.0 } else { -1.0 };
+    let mut moves = vec![Move { start_s: -LEAD_IN_S, lasts_s: 1e-3, target }];
+    for k in 0..count {
+        // One in each of `count` equal windows.
+        let place = (f64::from(k) + rng.random_range(0.1..0.9)) / f64::from(count);
+        let lasts_s = rng.random_range(0.6..1.6);
+        target = -target;
+        moves.push(Move { start_s: duration_s * (0.1 + 0.8 * place) - lasts_s, lasts_s, target });
+    }
+    moves
+}
+
+/// Time in which the command returns from a rest to what was asked, seconds.
+const RETURN_S: f64 = 1.0;
+
+/// Holds the command still for rests of random length, spread over the flight after the preflight checks.
+fn rest(asked: &mut [f64], profile: &Profile, rng: &mut ChaCha8Rng) {
+    if profile.rest_share == 0.0 {
+        return;
+    }
+    let index = |at_s: f64| (((at_s + LEAD_IN_S) / GRID_S).round() as usize).min(asked.len() - 1);
+    let mut start_s = PHASES[PREFLIGHT].share * profile.duration_s;
+    let mut rests = Vec::new();
+    while start_s < profile.duration_s {
+        let lasts_s = profile.rest_s * rng.random_range(0.5..1.5);
+        let busy_s = lasts_s * (1.0 / profile.rest_share - 1.0);
+        start_s += busy_s * rng.random_range(0.5..1.0);
+        rests.push((index(start_s), index(start_s + lasts_s)));
+        start_s += lasts_s + 0.25 * busy_s;
+    }
+    let back = (RETURN_S / GRID_S) as usize;
+    for (from, to) in rests {
+        let held = asked[from];
+        asked[from..to].fill(held);
+        for (k, value) in asked[to..].iter_mut().take(back).enumerate() {
+            *value = held + eased(k as f64 / back as f64) * (*value - held);
+        }
+    }
+}
+
+/// Least jerk from 0 to 1.
+fn eased(part: f64) -> f64 {
+    part.powi(3) * (10.0 + part * (6.0 * part - 15.0))
 }
 
 /// Dynamic pressure over its greatest, at a share of the log.
@@ -191,8 +272,7 @@ fn path(moves: &[Move], points: usize) -> Vec<f64> {
             next = queue.next();
         }
         let part = if now_s >= start_s + lasts_s { 1.0 } else { (now_s - start_s) / lasts_s };
-        let eased = part.powi(3) * (10.0 + part * (6.0 * part - 15.0));
-        values.push(from + (target - from) * eased);
+        values.push(from + (target - from) * eased(part));
     }
     values
 }
@@ -217,6 +297,7 @@ fn coloured(corner_hz: f64, points: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
 
@@ -224,6 +305,43 @@ mod tests {
     fn phases_fill_the_flight() {
         let whole: f64 = PHASES.iter().map(|phase| phase.share).sum();
         assert!((whole - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_factor_holds_in_the_middle_of_its_phase() {
+        let factors = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        assert_eq!(phase_factor(-0.1, &factors), 1.0);
+        assert!((phase_factor(0.10, &factors) - 2.0).abs() < 1e-9);
+        assert!((phase_factor(0.49, &factors) - 4.0).abs() < 1e-9);
+        // Middles of climb and cruise are 0.22 and 0.49.
+        assert!((phase_factor(0.355, &factors) - 3.5).abs() < 1e-9);
+        assert_eq!(phase_factor(1.0, &factors), 6.0);
+    }
+
+    fn short(change: impl Fn(&mut Profile)) -> Course {
+        let mut profile = Profile { duration_s: 300.0, hinge_share: 0.0, ..Profile::default() };
+        change(&mut profile);
+        Course::lay(&profile, 3)
+    }
+
+    #[test]
+    fn a_load_with_few_reversals_changes_side_as_often_as_asked() {
+        for count in [1, 2, 5] {
+            let course = short(|p| p.reversals = Some(count));
+            let pairs = course.instants.windows(2);
+            let changes = pairs.filter(|pair| (pair[0].air_n > 0.0) != (pair[1].air_n > 0.0)).count();
+            assert_eq!(changes, count as usize);
+        }
+    }
+
+    #[test]
+    fn the_command_rests_for_about_the_share_asked() {
+        let course = short(|p| (p.rest_share, p.rest_s) = (0.6, 12.0));
+        let still = course.instants.windows(2).filter(|pair| pair[0].command_m == pair[1].command_m);
+        let share = still.count() as f64 * GRID_S / (0.94 * 300.0);
+        assert!((share - 0.6).abs() < 0.12, "{share}");
+        let jump = course.instants.windows(2).map(|pair| (pair[1].command_m - pair[0].command_m).abs());
+        assert!(jump.fold(0.0, f64::max) < 5e-4, "the command never jumps");
     }
 
     #[test]

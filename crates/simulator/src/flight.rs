@@ -1,13 +1,14 @@
 //! One actuator, one flight: the plant flown along a course and read through its sensors.
 
+use crate::channel_sampler::ChannelSampler;
 use crate::course::{Course, LEAD_IN_S};
 use crate::drive::Loop;
 use crate::error::Error;
 use crate::plant::Plant;
 use crate::profile::Profile;
-use crate::random::stream;
 use crate::sensor::Sensors;
 use crate::two_mass::{Forces, State, advance};
+use crate::vibration::VibrationSource;
 
 /// The integrator's step, seconds.
 const STEP_S: f64 = 1e-4;
@@ -63,79 +64,67 @@ pub fn simulate(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) 
     plant.check()?;
     profile.check()?;
     sensors.check()?;
-    let [motor, screw, load] = fly(plant, profile, sensors, &Course::lay(profile, seed));
+    let [motor, screw, load] = fly(plant, profile, sensors, seed);
     let rate_hz = profile.sample_rate_hz;
-    let noise = |name: &str| stream(seed, &["sensor", name]);
-    let stroke_m = profile.stroke_m;
     Ok(Flight {
         time_s: sensors.stamps(profile.samples(), rate_hz, seed),
-        motor_m: sensors.motor.read(motor, rate_hz, stroke_m, &mut noise("motor")),
-        screw_m: sensors.screw.read(screw, rate_hz, stroke_m, &mut noise("screw")),
-        load_n: sensors.load.read(load, rate_hz, stroke_m, &mut noise("load")),
+        motor_m: sensors.motor.read_log(motor, profile, seed, "motor"),
+        screw_m: sensors.screw.read_log(screw, profile, seed, "screw"),
+        load_n: sensors.load.read_log(load, profile, seed, "load"),
         gap_m: plant.contact.gap_m,
         stiffness_n_per_m: plant.contact.stiffness_n_per_m,
         skew_s: sensors.skew_s(),
-        expected: if profile.no_reversal { Expected::Refuse } else { Expected::Estimate },
+        expected: if profile.is_one_sided() { Expected::Refuse } else { Expected::Estimate },
     })
 }
 
+/// Steps between two looks at what changes slowly in a plant: 10 ms.
+const SLOW_STEPS: u64 = 100;
+
 /// Motor position, screw position and load at each channel's own sample instants.
-fn fly(plant: &Plant, profile: &Profile, sensors: &Sensors, course: &Course) -> [Vec<f64>; 3] {
-    let mut probes = [sensors.motor.delay_s, sensors.screw.delay_s, sensors.load.delay_s]
-        .map(|delay_s| Probe::new(delay_s, profile));
+fn fly(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) -> [Vec<f64>; 3] {
+    let course = Course::lay(profile, seed);
+    let mut buffet = VibrationSource::new(&profile.buffet, profile.load_n, STEP_S, seed, "load");
+    let mut shake = VibrationSource::new(&profile.motor_vibration, 1.0, STEP_S, seed, "motor");
     let mut motor = Loop::new(plant.drive, plant.motor_mass_kg + plant.screw_mass_kg);
     let mut state = State { screw_m: plant.contact.offset_m, ..State::default() };
-    let mut reading = [state.motor_m, state.screw_m, load_n(course, -LEAD_IN_S, state.screw_m)];
+    let (mut buffet_n, mut shake_m) = (buffet.next(), shake.next());
+    let mut reading =
+        [state.motor_m + shake_m, state.screw_m, load_n(&course, -LEAD_IN_S, state.screw_m) + buffet_n];
+    let channels = [&sensors.motor, &sensors.screw, &sensors.load];
+    let mut samplers: [ChannelSampler; 3] =
+        std::array::from_fn(|k| ChannelSampler::new(channels[k], profile, STEP_S, reading[k]));
+    let (is_varying, mut now) = (plant.is_varying(), plant.at(-LEAD_IN_S, profile.duration_s));
     let mut steps = 0_u64;
-    while probes.iter().any(|probe| !probe.full()) {
+    while samplers.iter().any(|sampler| !sampler.is_full()) {
         let now_s = steps as f64 * STEP_S - LEAD_IN_S;
+        if is_varying && steps.is_multiple_of(SLOW_STEPS) {
+            now = plant.at(now_s, profile.duration_s);
+        }
         steps += 1;
+        let (next_buffet_n, next_shake_m) = (buffet.next(), shake.next());
         let middle_m = state.screw_m + 0.5 * STEP_S * state.screw_m_per_s;
+        let middle_buffet_n = 0.5 * (buffet_n + next_buffet_n);
         let forces = Forces {
             drive_n: motor.force_n(course.at(now_s).command_m, state.motor_m, state.motor_m_per_s, STEP_S),
-            load_n: load_n(course, now_s + 0.5 * STEP_S, middle_m),
+            load_n: load_n(&course, now_s + 0.5 * STEP_S, middle_m) + middle_buffet_n,
+            shake_m,
+            shake_m_per_s: (next_shake_m - shake_m) / STEP_S,
         };
-        state = advance(plant, &state, forces, STEP_S);
-        let next = [state.motor_m, state.screw_m, load_n(course, now_s + STEP_S, state.screw_m)];
-        for ((probe, before), after) in probes.iter_mut().zip(reading).zip(next) {
-            probe.pass(now_s, before, after);
+        state = advance(&now, &state, forces, STEP_S);
+        (buffet_n, shake_m) = (next_buffet_n, next_shake_m);
+        let air_n = load_n(&course, now_s + STEP_S, state.screw_m);
+        let next = [state.motor_m + shake_m, state.screw_m, air_n + buffet_n];
+        for ((sampler, before), after) in samplers.iter_mut().zip(reading).zip(next) {
+            sampler.pass(now_s, before, after);
         }
         reading = next;
     }
-    probes.map(|probe| probe.samples)
+    samplers.map(ChannelSampler::into_samples)
 }
 
 /// The aerodynamic load at a deflection, N.
 fn load_n(course: &Course, time_s: f64, deflection_m: f64) -> f64 {
     let here = course.at(time_s);
     here.air_n - here.hinge_n_per_m * deflection_m
-}
-
-/// Samples one quantity at even instants minus a delay, by straight lines between steps.
-struct Probe {
-    samples: Vec<f64>,
-    wanted: usize,
-    rate_hz: f64,
-    delay_s: f64,
-}
-
-impl Probe {
-    fn new(delay_s: f64, profile: &Profile) -> Self {
-        let wanted = profile.samples();
-        Self { samples: Vec::with_capacity(wanted), wanted, rate_hz: profile.sample_rate_hz, delay_s }
-    }
-
-    fn full(&self) -> bool {
-        self.samples.len() == self.wanted
-    }
-
-    fn pass(&mut self, from_s: f64, before: f64, after: f64) {
-        while !self.full() {
-            let part = (self.samples.len() as f64 / self.rate_hz - self.delay_s - from_s) / STEP_S;
-            if part > 1.0 {
-                return;
-            }
-            self.samples.push(before + part * (after - before));
-        }
-    }
 }

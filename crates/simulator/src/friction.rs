@@ -1,4 +1,4 @@
-//! Friction of equation 1, set-valued at rest, and two laws that depart from it on purpose.
+//! Friction of equation 1, set-valued at rest, and laws that depart from it on purpose.
 //!
 //! ```text
 //! F_f = F_v Ẋ + sign(Ẋ) (F_dry + η |F_l|)                                             (1)
@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, not_negative, positive, within};
 
-/// The parameters of equation 1 for one mass.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+/// The parameters of equation 1 for one mass, and what departs from it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Friction {
     /// `F_dry`, N.
@@ -20,19 +20,122 @@ pub struct Friction {
     pub load_share: f64,
     /// `F_v`, N·s/m.
     pub viscous_n_s_per_m: f64,
+    /// η while the load drives the motion. Default: `load_share`, the same in both directions of power.
+    #[serde(default)]
+    pub backdriven_load_share: Option<f64>,
+    /// Dry and load-dependent friction is `1 + asymmetry` times as high in motion along +X and
+    /// `1 − asymmetry` times along −X, −0.9 to 0.9. Default 0.
+    #[serde(default)]
+    pub asymmetry: f64,
+    /// A grease film: drag `grease_n · 2u/(1 + u²)` with `u = |v|/grease_m_per_s`, zero at rest and
+    /// highest, `grease_n`, at that speed. Default 0.
+    #[serde(default)]
+    pub grease_n: f64,
+    /// Speed at which the drag of the grease film is highest, m/s. Default 0.002.
+    #[serde(default = "default_grease_m_per_s")]
+    pub grease_m_per_s: f64,
+    /// Viscous and grease drag at the start of the log over that of a warm actuator, 0.1 to 100. Default 1.
+    #[serde(default = "default_cold_factor")]
+    pub cold_factor: f64,
+    /// Time constant with which the drag falls to that of a warm actuator, seconds. Default 300.
+    #[serde(default = "default_warm_up_s")]
+    pub warm_up_s: f64,
+}
+
+fn default_grease_m_per_s() -> f64 {
+    2e-3
+}
+fn default_cold_factor() -> f64 {
+    1.0
+}
+fn default_warm_up_s() -> f64 {
+    300.0
+}
+
+impl Default for Friction {
+    /// None at all.
+    fn default() -> Self {
+        Self {
+            dry_n: 0.0,
+            load_share: 0.0,
+            viscous_n_s_per_m: 0.0,
+            backdriven_load_share: None,
+            asymmetry: 0.0,
+            grease_n: 0.0,
+            grease_m_per_s: default_grease_m_per_s(),
+            cold_factor: default_cold_factor(),
+            warm_up_s: default_warm_up_s(),
+        }
+    }
+}
+
+/// The level of dry friction against motion along either direction, N.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Levels {
+    /// Against motion along +X.
+    pub(crate) up_n: f64,
+    /// Against motion along −X.
+    pub(crate) down_n: f64,
 }
 
 impl Friction {
+    /// Friction of equation 1 as it stands.
+    pub fn new(dry_n: f64, load_share: f64, viscous_n_s_per_m: f64) -> Self {
+        Self { dry_n, load_share, viscous_n_s_per_m, ..Self::default() }
+    }
+
     /// The same friction, dry and load-dependent parts times a factor.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
-        Self { dry_n: self.dry_n * factor, load_share: self.load_share * factor, ..self }
+        let backdriven_load_share = self.backdriven_load_share.map(|share| share * factor);
+        let (dry_n, load_share) = (self.dry_n * factor, self.load_share * factor);
+        Self { dry_n, load_share, backdriven_load_share, ..self }
     }
 
     pub(crate) fn check(&self, key: &str) -> Result<(), Error> {
+        let share = |name: &str, value| within(&format!("{key}.{name}"), value, 0.0, 1.0, "between 0 and 1");
         not_negative(&format!("{key}.dry_n"), self.dry_n)?;
-        within(&format!("{key}.load_share"), self.load_share, 0.0, 1.0, "between 0 and 1")?;
-        not_negative(&format!("{key}.viscous_n_s_per_m"), self.viscous_n_s_per_m)
+        share("load_share", self.load_share)?;
+        share("backdriven_load_share", self.backdriven_load_share.unwrap_or(0.0))?;
+        not_negative(&format!("{key}.viscous_n_s_per_m"), self.viscous_n_s_per_m)?;
+        within(&format!("{key}.asymmetry"), self.asymmetry, -0.9, 0.9, "between -0.9 and 0.9")?;
+        not_negative(&format!("{key}.grease_n"), self.grease_n)?;
+        positive(&format!("{key}.grease_m_per_s"), self.grease_m_per_s)?;
+        within(&format!("{key}.cold_factor"), self.cold_factor, 0.1, 100.0, "between 0.1 and 100")?;
+        positive(&format!("{key}.warm_up_s"), self.warm_up_s)
+    }
+
+    /// Whether drag changes during a log.
+    pub(crate) fn is_warming(&self) -> bool {
+        (self.cold_factor - 1.0).abs() > 0.0
+    }
+
+    /// The friction at a time of the log, seconds.
+    #[must_use]
+    pub(crate) fn at(self, time_s: f64) -> Self {
+        if !self.is_warming() {
+            return self;
+        }
+        let drag = 1.0 + (self.cold_factor - 1.0) * (-time_s.max(0.0) / self.warm_up_s).exp();
+        Self { viscous_n_s_per_m: self.viscous_n_s_per_m * drag, grease_n: self.grease_n * drag, ..self }
+    }
+
+    /// Drag over speed at a speed, N·s/m: viscous friction and the grease film.
+    pub(crate) fn drag_n_s_per_m(&self, speed_m_per_s: f64) -> f64 {
+        if self.grease_n == 0.0 {
+            return self.viscous_n_s_per_m;
+        }
+        let u = speed_m_per_s / self.grease_m_per_s;
+        self.viscous_n_s_per_m + 2.0 * self.grease_n / self.grease_m_per_s / (1.0 + u * u)
+    }
+
+    /// Sliding friction under a load.
+    pub(crate) fn sliding(&self, load_n: f64) -> Levels {
+        // The load drives motion along its own sign.
+        let driven = self.backdriven_load_share.unwrap_or(self.load_share);
+        let (up, down) = if load_n > 0.0 { (driven, self.load_share) } else { (self.load_share, driven) };
+        let level_n = |share: f64, factor: f64| factor * (self.dry_n + share * load_n.abs());
+        Levels { up_n: level_n(up, 1.0 + self.asymmetry), down_n: level_n(down, 1.0 - self.asymmetry) }
     }
 }
 
@@ -56,28 +159,80 @@ pub enum Law {
         /// The travel over which the bristles bend, metres.
         travel_m: f64,
     },
+    /// The `LuGre` law: bristles of stiffness `level/travel` and a Stribeck curve g(v),
+    /// `ż = v − |v| z/(g(v)/stiffness)`, friction = stiffness · z + damping · ż.
+    LuGre {
+        /// Sliding level over the bristles' stiffness, metres.
+        travel_m: f64,
+        /// Break-away level over sliding level, 1 or more.
+        ratio: f64,
+        /// The speed at which most of the difference is gone, m/s.
+        speed_m_per_s: f64,
+        /// Damping of the bristles, N·s/m.
+        damping_n_s_per_m: f64,
+    },
 }
 
 impl Law {
     pub(crate) fn check(&self) -> Result<(), Error> {
+        let ratio_in_range = |law: &str, ratio| {
+            within(&format!("friction_law.{law}.ratio"), ratio, 1.0, 10.0, "between 1 and 10")
+        };
         match *self {
             Self::Coulomb => Ok(()),
             Self::Stribeck { ratio, speed_m_per_s } => {
-                within("friction_law.stribeck.ratio", ratio, 1.0, 10.0, "between 1 and 10")?;
+                ratio_in_range("stribeck", ratio)?;
                 positive("friction_law.stribeck.speed_m_per_s", speed_m_per_s)
             }
             Self::Presliding { travel_m } => positive("friction_law.presliding.travel_m", travel_m),
+            Self::LuGre { travel_m, ratio, speed_m_per_s, damping_n_s_per_m } => {
+                positive("friction_law.lu_gre.travel_m", travel_m)?;
+                ratio_in_range("lu_gre", ratio)?;
+                positive("friction_law.lu_gre.speed_m_per_s", speed_m_per_s)?;
+                not_negative("friction_law.lu_gre.damping_n_s_per_m", damping_n_s_per_m)
+            }
         }
     }
 
-    /// The dry level in force during a step that starts at the speed given, N.
-    pub(crate) fn level_n(&self, friction: &Friction, load_n: f64, speed_m_per_s: f64) -> f64 {
-        let sliding_n = friction.dry_n + friction.load_share * load_n.abs();
+    /// The dry levels in force during a step that starts at the speed given.
+    fn levels(&self, sliding: Levels, speed_m_per_s: f64) -> Levels {
         match *self {
-            Self::Stribeck { ratio, speed_m_per_s: knee } => {
-                sliding_n * (1.0 + (ratio - 1.0) * (-(speed_m_per_s / knee).powi(2)).exp())
+            Self::Stribeck { ratio, speed_m_per_s: knee }
+            | Self::LuGre { ratio, speed_m_per_s: knee, .. } => {
+                let lift = 1.0 + (ratio - 1.0) * (-(speed_m_per_s / knee).powi(2)).exp();
+                Levels { up_n: sliding.up_n * lift, down_n: sliding.down_n * lift }
             }
-            Self::Coulomb | Self::Presliding { .. } => sliding_n,
+            Self::Coulomb | Self::Presliding { .. } => sliding,
+        }
+    }
+
+    /// One mass under friction during a step.
+    ///
+    /// `inertia_n_s_per_m` is twice the mass over the step, `bend` the bristles' before it.
+    pub(crate) fn body(
+        &self,
+        friction: &Friction,
+        load_n: f64,
+        speed_m_per_s: f64,
+        bend: f64,
+        inertia_n_s_per_m: f64,
+        step_s: f64,
+    ) -> Body {
+        let sliding = friction.sliding(load_n);
+        let bristle = match *self {
+            Self::Coulomb | Self::Stribeck { .. } => None,
+            Self::Presliding { travel_m } => Some((travel_m, 0.0)),
+            Self::LuGre { travel_m, damping_n_s_per_m, .. } => Some((travel_m, damping_n_s_per_m)),
+        };
+        Body {
+            inertia_n_s_per_m: inertia_n_s_per_m + friction.drag_n_s_per_m(speed_m_per_s),
+            levels: self.levels(sliding, speed_m_per_s),
+            bristle: bristle.map(|(travel_m, damping)| Bristle {
+                bend,
+                rate_s_per_m: step_s / travel_m,
+                base_n: 0.5 * (sliding.up_n + sliding.down_n),
+                damping_n: damping * travel_m / step_s,
+            }),
         }
     }
 }
@@ -86,46 +241,88 @@ impl Law {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Body {
     /// Everything linear in v: twice the mass over the step, plus viscous friction, N·s/m.
-    pub(crate) inertia_n_s_per_m: f64,
-    /// The dry level, N.
-    pub(crate) level_n: f64,
-    /// Bend of the bristles before the step, −1 to 1, and step over travel, s/m; none without bristles.
-    pub(crate) bristle: Option<(f64, f64)>,
+    inertia_n_s_per_m: f64,
+    levels: Levels,
+    bristle: Option<Bristle>,
+}
+
+/// The bristles before a step; their force is `base · bend`, and `base · bend` may reach the level.
+#[derive(Debug, Clone, Copy)]
+struct Bristle {
+    bend: f64,
+    /// Step over travel.
+    rate_s_per_m: f64,
+    base_n: f64,
+    /// Damping times travel over step: force for each unit of change of the bend.
+    damping_n: f64,
+}
+
+/// Bristles that move one way, in units of the level they bend up to on that side.
+struct Bending {
+    level_n: f64,
+    /// Level over base.
+    lift: f64,
+    bend: f64,
+    rate_s_per_m: f64,
+    damping_n: f64,
+}
+
+impl Bristle {
+    fn bending(&self, level_n: f64) -> Bending {
+        let lift = if self.base_n > 0.0 { level_n / self.base_n } else { 1.0 };
+        Bending {
+            level_n,
+            lift,
+            bend: self.bend / lift,
+            rate_s_per_m: self.rate_s_per_m / lift,
+            damping_n: self.damping_n * lift,
+        }
+    }
 }
 
 impl Body {
     /// The mean speed under a push, m/s, and its derivative by the push; exactly zero when held.
     pub(crate) fn respond(&self, push_n: f64) -> (f64, f64) {
-        if let Some((bend, rate)) = self.bristle {
-            return self.bend(push_n, bend, rate);
+        if let Some(bristle) = &self.bristle {
+            return self.slide(push_n, bristle);
         }
-        if push_n.abs() <= self.level_n {
+        if push_n <= self.levels.up_n && push_n >= -self.levels.down_n {
             return (0.0, 0.0);
         }
-        let free_n = push_n - self.level_n.copysign(push_n);
+        let free_n = if push_n > 0.0 { push_n - self.levels.up_n } else { push_n + self.levels.down_n };
         (free_n / self.inertia_n_s_per_m, 1.0 / self.inertia_n_s_per_m)
     }
 
-    /// With `s′ = (s + r v)/(1 + r|v|)` the balance is a quadratic in v on the side the push points to.
-    fn bend(&self, push_n: f64, bend: f64, rate: f64) -> (f64, f64) {
-        let free_n = push_n - self.level_n * bend;
+    /// The level against motion to a side.
+    fn level_n(&self, is_down: bool) -> f64 {
+        if is_down { self.levels.down_n } else { self.levels.up_n }
+    }
+
+    /// With `e′ = (e + r v)/(1 + r|v|)` and friction `level · e′ + damping (e′ − e)` the balance is a
+    /// quadratic in v on the side the push points to.
+    fn slide(&self, push_n: f64, bristle: &Bristle) -> (f64, f64) {
+        let free_n = push_n - bristle.base_n * bristle.bend;
         let side = if free_n < 0.0 { -1.0 } else { 1.0 };
-        let (a, b, s) = (self.inertia_n_s_per_m, push_n * side, bend * side);
-        let linear = a + (self.level_n - b) * rate;
+        let bending = bristle.bending(self.level_n(free_n < 0.0));
+        let (a, e, rate) = (self.inertia_n_s_per_m, bending.bend * side, bending.rate_s_per_m);
+        let level_n = bending.level_n + bending.damping_n;
+        let b = push_n * side + bending.damping_n * e;
+        let linear = a + (level_n - b) * rate;
         let root = (linear * linear + 4.0 * a * rate * free_n.abs()).sqrt();
         let speed = if linear > 0.0 {
             2.0 * free_n.abs() / (linear + root)
         } else {
             (root - linear) / (2.0 * a * rate)
         };
-        let stiffening = self.level_n * rate * (1.0 - s) / (1.0 + rate * speed).powi(2);
+        let stiffening = level_n * rate * (1.0 - e) / (1.0 + rate * speed).powi(2);
         (side * speed, 1.0 / (a + stiffening))
     }
 
     /// The bend of the bristles after a step at a mean speed.
     pub(crate) fn bent(&self, speed_m_per_s: f64) -> f64 {
-        let bend = |(s, r): (f64, f64)| (s + r * speed_m_per_s) / (1.0 + r * speed_m_per_s.abs());
-        self.bristle.map_or(0.0, bend)
+        let Some(bristle) = &self.bristle else { return 0.0 };
+        let Bending { lift, bend, rate_s_per_m: r, .. } = bristle.bending(self.level_n(speed_m_per_s < 0.0));
+        lift * ((bend + r * speed_m_per_s) / (1.0 + r * speed_m_per_s.abs()))
     }
 }
 
@@ -134,29 +331,77 @@ impl Body {
 mod tests {
     use super::*;
 
+    /// A mass of 2·10³ N·s/m times half a step.
+    fn body(law: Law, friction: &Friction, load_n: f64, speed: f64, bend: f64) -> Body {
+        law.body(friction, load_n, speed, bend, 50.0, 1e-4)
+    }
+
     #[test]
     fn a_push_below_the_level_moves_nothing_and_one_above_moves_by_the_excess() {
-        let body = Body { inertia_n_s_per_m: 2.0, level_n: 10.0, bristle: None };
+        let body = Law::Coulomb.body(&Friction::new(10.0, 0.0, 0.0), 0.0, 0.0, 0.0, 2.0, 1e-4);
         assert_eq!(body.respond(9.9), (0.0, 0.0));
         assert_eq!(body.respond(-14.0), (-2.0, 0.5));
     }
 
     #[test]
     fn stribeck_holds_more_than_it_drags() {
-        let friction = Friction { dry_n: 100.0, load_share: 0.1, viscous_n_s_per_m: 0.0 };
+        let friction = Friction::new(100.0, 0.1, 0.0);
         let law = Law::Stribeck { ratio: 1.5, speed_m_per_s: 1e-3 };
-        assert_eq!(law.level_n(&friction, -1000.0, 0.0), 300.0);
-        assert!((law.level_n(&friction, -1000.0, 1.0) - 200.0).abs() < 1e-9);
+        assert_eq!(law.levels(friction.sliding(-1000.0), 0.0).up_n, 300.0);
+        assert!((law.levels(friction.sliding(-1000.0), 1.0).down_n - 200.0).abs() < 1e-9);
+    }
+
+    /// A screw that loses 10 % when it drives and 4 % when it is driven, under 1 kN along +X.
+    #[test]
+    fn friction_depends_on_the_direction_of_power_and_of_motion() {
+        let friction = Friction { backdriven_load_share: Some(0.04), ..Friction::new(50.0, 0.1, 0.0) };
+        assert_eq!(friction.sliding(1000.0), Levels { up_n: 90.0, down_n: 150.0 });
+        assert_eq!(friction.sliding(-1000.0), Levels { up_n: 150.0, down_n: 90.0 });
+        let lopsided = Friction { asymmetry: 0.2, ..Friction::new(50.0, 0.1, 0.0) };
+        assert_eq!(lopsided.sliding(500.0), Levels { up_n: 120.0, down_n: 80.0 });
+        let body = body(Law::Coulomb, &lopsided, 500.0, 0.0, 0.0);
+        assert_eq!((body.respond(119.0).0, body.respond(-90.0).0), (0.0, -10.0 / 50.0));
+    }
+
+    #[test]
+    fn a_grease_film_drags_most_at_its_speed_and_less_when_warm() {
+        let film = Friction { grease_n: 80.0, grease_m_per_s: 1e-3, ..Friction::new(0.0, 0.0, 0.0) };
+        let drag_n = |v: f64| v * film.drag_n_s_per_m(v);
+        assert!((drag_n(1e-3) - 80.0).abs() < 1e-9 && (drag_n(2e-3) - 64.0).abs() < 1e-9);
+        let cold = Friction { cold_factor: 3.0, warm_up_s: 100.0, ..film };
+        let expected = 80.0 * (1.0 + 2.0 * (-1.0_f64).exp());
+        assert!((cold.at(100.0).grease_n - expected).abs() < 1e-9 && film.at(0.0) == film);
     }
 
     /// The solution is put back into the balance it should solve.
     #[test]
     fn bent_bristles_balance_the_push() {
-        for (push_n, bend) in [(3.0, 0.0), (12.0, 0.9), (-7.0, 0.5), (500.0, 0.2), (-500.0, 1.0)] {
-            let body = Body { inertia_n_s_per_m: 50.0, level_n: 10.0, bristle: Some((bend, 20.0)) };
-            let (speed, _) = body.respond(push_n);
-            let balance = 50.0 * speed + 10.0 * body.bent(speed);
-            assert!((balance - push_n).abs() < 1e-9, "{balance} for {push_n}");
+        let friction = Friction { asymmetry: 0.3, ..Friction::new(10.0, 0.0, 0.0) };
+        let lu_gre = Law::LuGre { travel_m: 5e-6, ratio: 1.4, speed_m_per_s: 2e-3, damping_n_s_per_m: 90.0 };
+        for law in [Law::Presliding { travel_m: 5e-6 }, lu_gre] {
+            for (push_n, bend) in [(3.0, 0.0), (12.0, 0.9), (-7.0, 0.5), (500.0, 0.2), (-500.0, 1.0)] {
+                let body = body(law, &friction, 0.0, 1e-3, bend);
+                let (speed, _) = body.respond(push_n);
+                let after = body.bent(speed);
+                let damping_n = if law == lu_gre { 90.0 * 5e-6 / 1e-4 * (after - bend) } else { 0.0 };
+                let balance = 50.0 * speed + 10.0 * after + damping_n;
+                assert!((balance - push_n).abs() < 1e-9, "{balance} for {push_n} under {law:?}");
+            }
+        }
+    }
+
+    /// Slid far at one speed, the bristles of `LuGre` carry the Stribeck curve at that speed.
+    #[test]
+    fn lu_gre_slides_on_its_stribeck_curve() {
+        let law = Law::LuGre { travel_m: 5e-6, ratio: 1.6, speed_m_per_s: 2e-3, damping_n_s_per_m: 100.0 };
+        let friction = Friction::new(100.0, 0.0, 0.0);
+        for speed in [5e-4, 2e-3, -1e-2] {
+            let mut bend = 0.0;
+            for _ in 0..4000 {
+                bend = law.body(&friction, 0.0, speed, bend, 50.0, 1e-4).bent(speed);
+            }
+            let curve: f64 = 1.0 + 0.6 * (-(speed / 2e-3_f64).powi(2)).exp();
+            assert!((bend / curve.copysign(speed) - 1.0).abs() < 1e-9, "{bend} at {speed}");
         }
     }
 }

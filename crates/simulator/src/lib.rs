@@ -19,14 +19,18 @@ pub mod plant;
 pub mod profile;
 pub mod sensor;
 pub mod spec;
+pub mod turbulence;
 pub mod two_mass;
+pub mod vibration;
 pub mod wear;
 
 mod calendar;
+mod channel_sampler;
 mod course;
 mod planner;
 mod random;
 mod roster;
+mod shaping_filter;
 
 pub use error::Error;
 pub use flight::{Expected, Flight, simulate};

@@ -154,7 +154,7 @@ impl<'a> Planner<'a> {
             gap_m: unit.gap_m,
             stiffness_n_per_m: assignment.plant.contact.stiffness_n_per_m,
             skew_s: assignment.sensors.skew_s(),
-            expected: if assignment.profile.no_reversal { Expected::Refuse } else { Expected::Estimate },
+            expected: if assignment.profile.is_one_sided() { Expected::Refuse } else { Expected::Estimate },
         };
         (truth, assignment)
     }
@@ -179,6 +179,7 @@ impl<'a> Planner<'a> {
         sensors.screw.nonlinearity += spread.nonlinearity_m * normal(&mut of_place);
         sensors.screw.delay_s += spread.skew_s * normal(&mut of_flight);
         sensors.screw.drift += spread.drift_m * normal(&mut of_flight);
+        sensors.load.bias += spread.load_bias_n * normal(&mut of_place);
         let mut plant = spec.parts[unit.part].plant.with_gap_m(unit.gap_m);
         plant.contact.stiffness_n_per_m *= unit.stiffness_factor;
         plant.contact.offset_m = spread.offset_m * of_stay.random_range(-1.0..=1.0);

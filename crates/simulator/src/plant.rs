@@ -33,8 +33,8 @@ impl Default for Plant {
             motor_mass_kg: 80.0,
             screw_mass_kg: 8.0,
             contact: Contact::default(),
-            motor_friction: Friction { dry_n: 250.0, load_share: 0.04, viscous_n_s_per_m: 3000.0 },
-            screw_friction: Friction { dry_n: 150.0, load_share: 0.03, viscous_n_s_per_m: 1000.0 },
+            motor_friction: Friction::new(250.0, 0.04, 3000.0),
+            screw_friction: Friction::new(150.0, 0.03, 1000.0),
             friction_law: friction::Law::Coulomb,
             drive: Drive::default(),
         }
@@ -62,6 +62,22 @@ impl Plant {
         self.motor_friction = self.motor_friction.scaled(factor);
         self.screw_friction = self.screw_friction.scaled(factor);
         self
+    }
+
+    /// Whether anything changes during a log.
+    pub(crate) fn is_varying(&self) -> bool {
+        self.contact.is_varying() || self.motor_friction.is_warming() || self.screw_friction.is_warming()
+    }
+
+    /// The actuator as it is at a time of a log.
+    #[must_use]
+    pub(crate) fn at(&self, time_s: f64, duration_s: f64) -> Self {
+        Self {
+            contact: self.contact.at(time_s / duration_s),
+            motor_friction: self.motor_friction.at(time_s),
+            screw_friction: self.screw_friction.at(time_s),
+            ..*self
+        }
     }
 
     /// Says whether this can move at all.

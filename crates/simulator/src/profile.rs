@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, not_negative, positive, within};
+use crate::turbulence::GustForm;
+use crate::vibration::Vibration;
 
 /// An operational flight in six phases: preflight checks, take-off, climb, cruise, approach, landing.
 ///
@@ -31,6 +33,18 @@ pub struct Profile {
     pub hinge_share: f64,
     /// The load keeps one sign throughout: the gap cannot be seen. Default false.
     pub no_reversal: bool,
+    /// Spectrum of the gusts; `gust_hz` is `V/2πL` in the turbulence forms. Default `low_pass`.
+    pub gust_form: GustForm,
+    /// The load keeps one sign but for this many changes of side, at random times. Default none: many.
+    pub reversals: Option<u32>,
+    /// Vibration of the load, in shares of `load_n`; as strong on ground as in flight. Default silent.
+    pub buffet: Vibration,
+    /// Vibration of the motor on top of what its drive does, metres at the screw. Default silent.
+    pub motor_vibration: Vibration,
+    /// Share of the flight after the preflight checks in which the command stands still. Default 0.
+    pub rest_share: f64,
+    /// Mean length of a rest, seconds; rests last between half and one and a half times this. Default 10.
+    pub rest_s: f64,
 }
 
 impl Default for Profile {
@@ -46,6 +60,12 @@ impl Default for Profile {
             stick_share: 0.12,
             hinge_share: 0.3,
             no_reversal: false,
+            gust_form: GustForm::LowPass,
+            reversals: None,
+            buffet: Vibration::default(),
+            motor_vibration: Vibration::default(),
+            rest_share: 0.0,
+            rest_s: 10.0,
         }
     }
 }
@@ -54,6 +74,11 @@ impl Profile {
     /// Samples in the log.
     pub fn samples(&self) -> usize {
         (self.duration_s * self.sample_rate_hz).round() as usize
+    }
+
+    /// Whether the load touches one flank only, so that the gap cannot be seen.
+    pub fn is_one_sided(&self) -> bool {
+        self.no_reversal || self.reversals == Some(0)
     }
 
     /// Says whether this can be flown.
@@ -69,6 +94,10 @@ impl Profile {
         within("profile.gust_hz", self.gust_hz, 0.01, 20.0, "between 0.01 and 20 Hz")?;
         within("profile.trim_share", self.trim_share, 0.0, 0.2, "between 0 and 0.2")?;
         within("profile.stick_share", self.stick_share, 0.0, 0.5, "between 0 and 0.5")?;
-        within("profile.hinge_share", self.hinge_share, 0.0, 0.4, "between 0 and 0.4")
+        within("profile.hinge_share", self.hinge_share, 0.0, 0.4, "between 0 and 0.4")?;
+        self.buffet.check("profile.buffet")?;
+        self.motor_vibration.check("profile.motor_vibration")?;
+        within("profile.rest_share", self.rest_share, 0.0, 0.9, "between 0 and 0.9")?;
+        within("profile.rest_s", self.rest_s, 1.0, 1e3, "between 1 and 1000 s")
     }
 }

@@ -1,21 +1,108 @@
 //! What the recorder makes of the truth: delay, distortion, noise, resolution, and the faults of a bus.
 //!
 //! Position channels are described in metres at the screw, the load channel in newtons, whatever unit
-//! they are logged in later. Delay acts where the plant is sampled; all else acts here.
+//! they are logged in later. Hysteresis, lag, averaging and delay act where the plant is sampled; all
+//! else acts here.
+
+use std::f64::consts::TAU;
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, finite, not_negative, within};
+use crate::error::{Error, finite, not_negative, positive, within};
+use crate::profile::Profile;
 use crate::random::stream;
 
 /// Height of `u − u³` at its peak, which `nonlinearity` is scaled by: `2/(3√3)`.
 const CUBIC_PEAK: f64 = 0.384_900_179_459_750_5;
 
-/// One channel; every default is zero, a perfect channel. Lengths in the channel's own unit, m or N.
+/// The most periodic errors a channel can have.
+const PERIODIC: usize = 3;
+
+/// An error that repeats with the travel: a pitch error, a gear or a resolver's harmonic.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PeriodicError {
+    /// Amplitude, in the channel's unit.
+    pub amplitude: f64,
+    /// Travel of one period, in the channel's unit.
+    pub period: f64,
+    /// Phase at position zero, radians. Default 0.
+    pub phase_rad: f64,
+}
+
+impl PeriodicError {
+    fn at(&self, position: f64) -> f64 {
+        if self.amplitude == 0.0 {
+            return 0.0;
+        }
+        self.amplitude * (TAU * position / self.period + self.phase_rad).sin()
+    }
+}
+
+/// Up to three periodic errors; an unused one has no amplitude.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<PeriodicError>", into = "Vec<PeriodicError>")]
+pub struct PeriodicErrors([PeriodicError; PERIODIC]);
+
+impl TryFrom<Vec<PeriodicError>> for PeriodicErrors {
+    type Error = String;
+
+    fn try_from(errors: Vec<PeriodicError>) -> Result<Self, String> {
+        if errors.len() > PERIODIC {
+            return Err(format!(
+                "{} periodic errors are given; at most {PERIODIC} are possible",
+                errors.len()
+            ));
+        }
+        let mut all = [PeriodicError::default(); PERIODIC];
+        all[..errors.len()].copy_from_slice(&errors);
+        Ok(Self(all))
+    }
+}
+
+impl From<PeriodicErrors> for Vec<PeriodicError> {
+    fn from(errors: PeriodicErrors) -> Self {
+        errors.0.into_iter().filter(|error| error.amplitude != 0.0).collect()
+    }
+}
+
+impl From<[PeriodicError; PERIODIC]> for PeriodicErrors {
+    fn from(errors: [PeriodicError; PERIODIC]) -> Self {
+        Self(errors)
+    }
+}
+
+impl PeriodicErrors {
+    fn check(&self, key: &str) -> Result<(), Error> {
+        for error in self.0.iter().filter(|error| error.amplitude != 0.0) {
+            finite(&format!("{key}.amplitude"), error.amplitude)?;
+            positive(&format!("{key}.period"), error.period)?;
+            finite(&format!("{key}.phase_rad"), error.phase_rad)?;
+        }
+        Ok(())
+    }
+
+    fn at(&self, position: f64) -> f64 {
+        self.0.iter().map(|error| error.at(position)).sum()
+    }
+}
+
+/// The spectrum of a channel's coloured noise.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseColour {
+    /// White noise through a first-order low-pass at `coloured_hz`.
+    #[default]
+    FirstOrder,
+    /// About 1/f between `coloured_hz` and half the sample rate: two low-passes a decade.
+    Flicker,
+}
+
+/// One channel; every default is zero, a perfect channel. Lengths in the channel's own unit, m or N.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Channel {
     /// White noise, rms.
@@ -42,6 +129,54 @@ pub struct Channel {
     pub freezes_per_minute: f64,
     /// For how long, seconds.
     pub freeze_s: f64,
+    /// Half the width of the hysteresis loop: the reading lags the truth by this when it has moved far
+    /// in one direction.
+    pub hysteresis: f64,
+    /// Travel within which the hysteretic error turns to the other side, up to a factor e. Default 1000.
+    pub hysteresis_length: f64,
+    /// Time constant of a first-order lag, seconds, 0 to 1.
+    pub lag_s: f64,
+    /// Each sample is the mean over the sample period that ends at its instant (anti-alias filter).
+    /// Adds half a sample period of delay. Default false.
+    pub box_average: bool,
+    /// The channel's own samples per second, held between; 0 or any rate above the log's: the log's.
+    pub rate_hz: f64,
+    /// Errors that repeat with the travel; an array of up to three tables.
+    pub periodic: PeriodicErrors,
+    /// Coloured noise, rms, besides the white.
+    pub coloured_rms: f64,
+    /// Corner of the coloured noise, Hz. Default 1.
+    pub coloured_hz: f64,
+    /// Spectrum of the coloured noise. Default `first_order`.
+    pub coloured_form: NoiseColour,
+}
+
+impl Default for Channel {
+    fn default() -> Self {
+        Self {
+            noise_rms: 0.0,
+            resolution: 0.0,
+            gain_error: 0.0,
+            bias: 0.0,
+            drift: 0.0,
+            nonlinearity: 0.0,
+            delay_s: 0.0,
+            dropout_share: 0.0,
+            spikes_per_minute: 0.0,
+            spike: 0.0,
+            freezes_per_minute: 0.0,
+            freeze_s: 0.0,
+            hysteresis: 0.0,
+            hysteresis_length: 1000.0,
+            lag_s: 0.0,
+            box_average: false,
+            rate_hz: 0.0,
+            periodic: PeriodicErrors::default(),
+            coloured_rms: 0.0,
+            coloured_hz: 1.0,
+            coloured_form: NoiseColour::FirstOrder,
+        }
+    }
 }
 
 /// Mean length of a burst of missing samples.
@@ -61,13 +196,74 @@ impl Channel {
         not_negative(&named("spikes_per_minute"), self.spikes_per_minute)?;
         finite(&named("spike"), self.spike)?;
         not_negative(&named("freezes_per_minute"), self.freezes_per_minute)?;
-        not_negative(&named("freeze_s"), self.freeze_s)
+        not_negative(&named("freeze_s"), self.freeze_s)?;
+        not_negative(&named("hysteresis"), self.hysteresis)?;
+        positive(&named("hysteresis_length"), self.hysteresis_length)?;
+        within(&named("lag_s"), self.lag_s, 0.0, 1.0, "between 0 and 1 s")?;
+        within(&named("rate_hz"), self.rate_hz, 0.0, 5e3, "between 0 and 5000 Hz")?;
+        self.periodic.check(&named("periodic"))?;
+        not_negative(&named("coloured_rms"), self.coloured_rms)?;
+        within(&named("coloured_hz"), self.coloured_hz, 1e-3, 1e3, "between 0.001 and 1000 Hz")
     }
 
-    /// Turns the truth at the sample instants into readings.
-    pub(crate) fn read(
+    /// The rate at which the channel itself is sampled, within a log of the given rate.
+    pub(crate) fn own_rate_hz(&self, log_rate_hz: f64) -> f64 {
+        if self.rate_hz > 0.0 { self.rate_hz.min(log_rate_hz) } else { log_rate_hz }
+    }
+
+    /// How many samples the channel itself takes during a log.
+    pub(crate) fn own_samples(&self, profile: &Profile) -> usize {
+        let log_rate_hz = profile.sample_rate_hz;
+        let rate_hz = self.own_rate_hz(log_rate_hz);
+        if rate_hz < log_rate_hz {
+            return held_index(profile.samples().max(1) - 1, log_rate_hz, rate_hz) + 1;
+        }
+        profile.samples()
+    }
+
+    /// Turns the truth at the channel's own sample instants into readings at those of the log.
+    pub(crate) fn read_log(&self, values: Vec<f64>, profile: &Profile, seed: u64, name: &str) -> Vec<f64> {
+        let rate_hz = self.own_rate_hz(profile.sample_rate_hz);
+        let coloured = self.coloured(values.len(), rate_hz, &mut stream(seed, &["sensor", name, "coloured"]));
+        let rng = &mut stream(seed, &["sensor", name]);
+        let read = self.read(values, &coloured, rate_hz, profile.stroke_m, rng);
+        if rate_hz < profile.sample_rate_hz {
+            let hold = |k| read[held_index(k, profile.sample_rate_hz, rate_hz)];
+            return (0..profile.samples()).map(hold).collect();
+        }
+        read
+    }
+
+    /// Coloured noise of unit rms times `coloured_rms`; empty without.
+    fn coloured(&self, samples: usize, rate_hz: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        if self.coloured_rms == 0.0 {
+            return Vec::new();
+        }
+        let corners: Vec<f64> = match self.coloured_form {
+            NoiseColour::FirstOrder => vec![self.coloured_hz],
+            NoiseColour::Flicker => (0..)
+                .map(|k| self.coloured_hz * 10f64.powf(0.5 * f64::from(k)))
+                .take_while(|corner| *corner <= self.coloured_hz.max(0.5 * rate_hz))
+                .collect(),
+        };
+        let rms = self.coloured_rms / (corners.len() as f64).sqrt();
+        let mut sum = vec![0.0; samples];
+        for corner_hz in corners {
+            let pole = (-TAU * corner_hz / rate_hz).exp();
+            let mut level: f64 = StandardNormal.sample(rng);
+            for value in &mut sum {
+                *value += rms * level;
+                let white: f64 = StandardNormal.sample(rng);
+                level = pole * level + (1.0 - pole * pole).sqrt() * white;
+            }
+        }
+        sum
+    }
+
+    fn read(
         &self,
         mut values: Vec<f64>,
+        coloured: &[f64],
         rate_hz: f64,
         stroke_m: f64,
         rng: &mut ChaCha8Rng,
@@ -75,7 +271,9 @@ impl Channel {
         let last = (values.len().max(2) - 1) as f64;
         for (k, value) in values.iter_mut().enumerate() {
             let u = (*value / stroke_m).clamp(-1.0, 1.0);
-            let bent = self.nonlinearity * (u - u.powi(3)) / CUBIC_PEAK;
+            let bent = self.nonlinearity * (u - u.powi(3)) / CUBIC_PEAK
+                + self.periodic.at(*value)
+                + coloured.get(k).copied().unwrap_or(0.0);
             let white: f64 = StandardNormal.sample(rng);
             let level = (*value + bent) * (1.0 + self.gain_error) + self.bias + self.drift * k as f64 / last;
             *value = self.rounded(level + self.noise_rms * white);
@@ -125,6 +323,12 @@ impl Channel {
             }
         }
     }
+}
+
+/// The latest of a slow channel's samples at a sample of the log.
+fn held_index(sample: usize, log_rate_hz: f64, rate_hz: f64) -> usize {
+    // A billionth of a sample forgives the rounding of commensurate rates.
+    (sample as f64 * rate_hz / log_rate_hz + 1e-9) as usize
 }
 
 /// The recorder's clock. The samples are even; the stamps need not be.
@@ -185,9 +389,9 @@ impl Sensors {
         Self { motor: channel, screw: channel, load: channel, clock: Clock::default() }
     }
 
-    /// τ in `screw_logged(t) = X_screw(t − τ)`, against the motor channel, seconds.
+    /// τ in `screw_logged(t) = X_screw(t − τ)`, against the motor channel, seconds: delays and lags.
     pub fn skew_s(&self) -> f64 {
-        self.screw.delay_s - self.motor.delay_s
+        (self.screw.delay_s + self.screw.lag_s) - (self.motor.delay_s + self.motor.lag_s)
     }
 
     /// Says whether these can be simulated.
@@ -214,7 +418,49 @@ mod tests {
     use super::*;
 
     fn read(channel: Channel, value: f64, samples: usize) -> Vec<f64> {
-        channel.read(vec![value; samples], 100.0, 1.0, &mut stream(3, &["sensor"]))
+        channel.read(vec![value; samples], &[], 100.0, 1.0, &mut stream(3, &["sensor"]))
+    }
+
+    /// First-order noise: autocorrelation `e^(−2πft)`; flicker: equal power in each decade.
+    #[test]
+    fn coloured_noise_has_its_rms_and_spectrum() {
+        let noise = |coloured_form, coloured_hz, seed| {
+            let channel = Channel { coloured_rms: 2.0, coloured_hz, coloured_form, ..Channel::default() };
+            channel.coloured(1_000_000, 100.0, &mut stream(seed, &["coloured"]))
+        };
+        let mean = |values: &[f64], lag: usize| {
+            let pairs = values.iter().zip(&values[lag..]);
+            pairs.map(|(a, b)| a * b).sum::<f64>() / (values.len() - lag) as f64
+        };
+        let first = noise(NoiseColour::FirstOrder, 1.0, 1);
+        assert!((mean(&first, 0) / 4.0 - 1.0).abs() < 0.03);
+        assert!((mean(&first, 10) / 4.0 - (-TAU * 0.1).exp()).abs() < 0.03);
+        // Corners 0.1, 0.32, 1, 3.2, 10 and 32 Hz: the mean of their six autocorrelations.
+        let flicker = noise(NoiseColour::Flicker, 0.1, 2);
+        let expected = (0..6).map(|k| (-TAU * 0.1 * 10f64.powf(0.5 * f64::from(k)) * 0.1).exp()).sum::<f64>();
+        assert!((mean(&flicker, 0) / 4.0 - 1.0).abs() < 0.1);
+        assert!((mean(&flicker, 10) / 4.0 - expected / 6.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_periodic_error_repeats_with_the_travel() {
+        let error = PeriodicError { amplitude: 4e-6, period: 5e-3, phase_rad: 0.3 };
+        let none = PeriodicError::default();
+        let channel = Channel { periodic: [error, none, none].into(), ..Channel::default() };
+        let at = |x: f64| read(channel, x, 1)[0] - x;
+        assert!((at(0.0) - 4e-6 * 0.3_f64.sin()).abs() < 1e-15);
+        assert!((at(7e-3) - at(2e-3)).abs() < 1e-15 && (at(2e-3) + at(4.5e-3)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_slow_channel_is_held_between_its_samples() {
+        let profile = Profile { duration_s: 10.0, sample_rate_hz: 100.0, ..Profile::default() };
+        let channel = Channel { rate_hz: 40.0, ..Channel::default() };
+        let own: Vec<f64> = (0..channel.own_samples(&profile)).map(|k| k as f64).collect();
+        assert_eq!(own.len(), 400);
+        let held = channel.read_log(own, &profile, 1, "screw");
+        assert_eq!(held[..8], [0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
+        assert_eq!(held.len(), 1000);
     }
 
     #[test]

@@ -92,6 +92,8 @@ pub struct Spread {
     pub offset_m: f64,
     /// Gain of a place's load cell, minus one: rms.
     pub load_gain: f64,
+    /// Zero error of a place's load cell: rms, N.
+    pub load_bias_n: f64,
     /// Nonlinearity of a place's screw transducer: rms of its peak, metres.
     pub nonlinearity_m: f64,
     /// Delay of a flight's screw channel, added to the sensors' own: rms, seconds.
@@ -321,6 +323,7 @@ impl Spread {
         within("spread.stiffness", self.stiffness, 0.0, 0.3, "between 0 and 0.3")?;
         finite("spread.offset_m", self.offset_m)?;
         within("spread.load_gain", self.load_gain, 0.0, 0.1, "between 0 and 0.1")?;
+        not_negative("spread.load_bias_n", self.load_bias_n)?;
         not_negative("spread.nonlinearity_m", self.nonlinearity_m)?;
         within("spread.skew_s", self.skew_s, 0.0, 0.05, "between 0 and 0.05 s")?;
         not_negative("spread.drift_m", self.drift_m)?;

@@ -13,7 +13,7 @@
 //! Each mass answers monotonically to c, and c to U₂ − U₁, so one scalar equation with one root
 //! remains; Newton's method inside a bracket finds it in two or three turns.
 
-use crate::friction::{Body, Friction, Law};
+use crate::friction::Body;
 use crate::plant::Plant;
 
 /// The equation for U₂ − U₁ is solved to this, m/s: 10⁻¹⁷ m over a step of 10⁻⁴ s.
@@ -45,6 +45,17 @@ pub struct Forces {
     pub drive_n: f64,
     /// The aerodynamic load on the screw, N, positive along +X.
     pub load_n: f64,
+    /// Motion of the motor on top of X₁ at the start of the step, metres: a vibration nothing resists.
+    pub shake_m: f64,
+    /// Its mean speed over the step, m/s.
+    pub shake_m_per_s: f64,
+}
+
+impl Forces {
+    /// Drive and load without vibration of the motor.
+    pub const fn new(drive_n: f64, load_n: f64) -> Self {
+        Self { drive_n, load_n, shake_m: 0.0, shake_m_per_s: 0.0 }
+    }
 }
 
 impl State {
@@ -60,32 +71,18 @@ impl State {
 pub fn advance(plant: &Plant, state: &State, forces: Forces, step_s: f64) -> State {
     let motor_rate = 2.0 * plant.motor_mass_kg / step_s;
     let screw_rate = 2.0 * plant.screw_mass_kg / step_s;
-    let law = &plant.friction_law;
+    let body = |friction, speed, bend, rate| {
+        plant.friction_law.body(friction, forces.load_n, speed, bend, rate, step_s)
+    };
     let motor = Mass {
-        body: body(
-            law,
-            &plant.motor_friction,
-            forces,
-            state.motor_m_per_s,
-            state.motor_bend,
-            motor_rate,
-            step_s,
-        ),
+        body: body(&plant.motor_friction, state.motor_m_per_s, state.motor_bend, motor_rate),
         push_n: motor_rate * state.motor_m_per_s + forces.drive_n,
     };
     let screw = Mass {
-        body: body(
-            law,
-            &plant.screw_friction,
-            forces,
-            state.screw_m_per_s,
-            state.screw_bend,
-            screw_rate,
-            step_s,
-        ),
+        body: body(&plant.screw_friction, state.screw_m_per_s, state.screw_bend, screw_rate),
         push_n: screw_rate * state.screw_m_per_s + forces.load_n,
     };
-    let (u1, u2) = meet(plant, state, &motor, &screw, step_s);
+    let (u1, u2) = meet(plant, state, &forces, &motor, &screw, step_s);
     State {
         motor_m: state.motor_m + step_s * u1,
         motor_m_per_s: after(state.motor_m_per_s, u1),
@@ -102,37 +99,24 @@ struct Mass {
     push_n: f64,
 }
 
-fn body(
-    law: &Law,
-    friction: &Friction,
-    forces: Forces,
-    speed: f64,
-    bend: f64,
-    rate: f64,
-    step_s: f64,
-) -> Body {
-    let bristle = match *law {
-        Law::Presliding { travel_m } => Some((bend, step_s / travel_m)),
-        Law::Coulomb | Law::Stribeck { .. } => None,
-    };
-    Body {
-        inertia_n_s_per_m: rate + friction.viscous_n_s_per_m,
-        level_n: law.level_n(friction, forces.load_n, speed),
-        bristle,
-    }
-}
-
 /// The mean speeds at which both masses and the coupling agree.
 ///
 /// The mismatch falls at least as fast as the relative speed rises, so the root lies between the
 /// guess and the guess plus the mismatch.
-fn meet(plant: &Plant, state: &State, motor: &Mass, screw: &Mass, step_s: f64) -> (f64, f64) {
-    let delta_m = state.screw_m - state.motor_m;
+fn meet(
+    plant: &Plant,
+    state: &State,
+    forces: &Forces,
+    motor: &Mass,
+    screw: &Mass,
+    step_s: f64,
+) -> (f64, f64) {
+    let delta_m = state.screw_m - state.motor_m - forces.shake_m;
     let mut relative = state.screw_m_per_s - state.motor_m_per_s;
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     let mut speeds = (0.0, 0.0);
     for _ in 0..TURNS {
-        let coupling = plant.contact.mean(delta_m, relative, step_s);
+        let coupling = plant.contact.mean(delta_m, relative - forces.shake_m_per_s, step_s);
         let (u1, slope1) = motor.body.respond(motor.push_n + coupling.force_n);
         let (u2, slope2) = screw.body.respond(screw.push_n - coupling.force_n);
         speeds = (u1, u2);

@@ -1,6 +1,7 @@
 //! One simulated flight: repeatable, loaded as asked, and sampled when it says.
 
 use simulator::sensor::Channel;
+use simulator::vibration::Vibration;
 use simulator::{Expected, Plant, Profile, Sensors, simulate};
 
 fn short() -> Profile {
@@ -73,6 +74,79 @@ fn a_delay_is_a_delay_to_a_fraction_of_a_sample() {
         assert!((late.screw_m[k] - prompt.screw_m[4 * k - 1]).abs() < 1e-12);
         assert!((late.motor_m[k] - prompt.motor_m[4 * k]).abs() < 1e-12);
     }
+}
+
+/// The load cell sees buffet of the rms asked for: with and without it the loads differ by just that.
+#[test]
+fn buffet_adds_its_rms_to_the_load_and_vibration_to_the_motor() {
+    let fly = |change: fn(&mut Profile)| {
+        let mut profile = Profile { hinge_share: 0.0, sample_rate_hz: 500.0, ..short() };
+        change(&mut profile);
+        simulate(&Plant::default(), &profile, &Sensors::perfect(), 9).unwrap()
+    };
+    let rms = |a: &[f64], b: &[f64]| {
+        (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
+    };
+    let (calm, buffeted) = (fly(|_| ()), fly(|p| p.buffet = Vibration::band(10.0, 60.0, 0.1)));
+    assert!((rms(&calm.load_n, &buffeted.load_n) / 800.0 - 1.0).abs() < 0.05);
+    // A motor that friction holds moves by the vibration alone.
+    let mut held = Plant::default();
+    held.motor_friction.dry_n = 1e9;
+    let profile = Profile { motor_vibration: Vibration::band(20.0, 60.0, 10e-6), ..short() };
+    let motor_m = simulate(&held, &profile, &Sensors::perfect(), 9).unwrap().motor_m;
+    assert!((rms(&motor_m, &vec![0.0; motor_m.len()]) / 10e-6 - 1.0).abs() < 0.05);
+}
+
+#[test]
+fn a_load_with_one_reversal_changes_sign_once_and_with_none_is_expected_to_be_refused() {
+    let fly = |count| {
+        let profile = Profile { reversals: Some(count), ..short() };
+        simulate(&Plant::default(), &profile, &Sensors::perfect(), 9).unwrap()
+    };
+    let flight = fly(1);
+    let changes = flight.load_n.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
+    assert_eq!((changes, flight.expected), (1, Expected::Estimate));
+    assert_eq!(fly(0).expected, Expected::Refuse);
+}
+
+/// Keys of load spectrum, sensors, friction and flanks as a spec writes them.
+#[test]
+fn every_new_key_is_read_from_a_spec() {
+    let text = r#"
+        gust_form = "von_karman"
+        reversals = 3
+        buffet = { low_hz = 8.0, high_hz = 40.0, rms = 0.1, lines = [{ frequency_hz = 17.0, amplitude = 0.05 }] }
+        motor_vibration = { rms = 5e-6 }
+        rest_share = 0.5
+    "#;
+    let profile: Profile = toml::from_str(text).unwrap();
+    assert!(profile.check().is_ok() && profile.reversals == Some(3) && !profile.buffet.is_silent());
+    assert_eq!(toml::from_str::<Profile>(&toml::to_string(&profile).unwrap()).unwrap(), profile);
+    let text = r#"
+        hysteresis = 30.0
+        hysteresis_length = 800.0
+        lag_s = 0.01
+        box_average = true
+        rate_hz = 50.0
+        coloured_rms = 20.0
+        coloured_form = "flicker"
+        periodic = [{ amplitude = 1e-6, period = 5e-3 }]
+    "#;
+    let channel: Channel = toml::from_str(text).unwrap();
+    assert_eq!(toml::from_str::<Channel>(&toml::to_string(&channel).unwrap()).unwrap(), channel);
+    let text = r#"
+        friction_law = { lu_gre = { travel_m = 5e-6, ratio = 1.4, speed_m_per_s = 2e-3, damping_n_s_per_m = 500.0 } }
+        screw_friction = { dry_n = 100.0, load_share = 0.03, viscous_n_s_per_m = 1e3, backdriven_load_share = 0.01, asymmetry = 0.1, grease_n = 50.0, cold_factor = 2.0 }
+        [contact]
+        law = { toe = { share = 0.3, depth_m = 10e-6 } }
+        lower_law = { hertz = { share = 0.5, reference_m = 80e-6 } }
+        lower_stiffness_factor = 1.2
+        stiffness_drift = 0.05
+        stiffness_phase_factors = [1.0, 1.0, 0.97, 1.0, 1.02, 1.0]
+    "#;
+    let plant: Plant = toml::from_str(text).unwrap();
+    assert!(plant.check().is_ok());
+    assert_eq!(toml::from_str::<Plant>(&toml::to_string(&plant).unwrap()).unwrap(), plant);
 }
 
 /// While the load is large the coupling is closed, and all that stands between δX − F/K and half a gap

@@ -5,3 +5,4 @@
 mod fleet;
 mod flight;
 mod physics;
+mod unchanged;

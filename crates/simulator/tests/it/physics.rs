@@ -8,7 +8,7 @@ use simulator::two_mass::{Forces, State, advance};
 use simulator::{Plant, contact};
 
 const STEP_S: f64 = 1e-4;
-const NOTHING: Forces = Forces { drive_n: 0.0, load_n: 0.0 };
+const NOTHING: Forces = Forces::new(0.0, 0.0);
 
 /// No friction and no damping anywhere.
 fn slippery() -> Plant {
@@ -55,7 +55,7 @@ proptest! {
         plant.contact.damping_n_s_per_m = (stiffness * screw_kg).sqrt();
         let sign: f64 = if side { 1.0 } else { -1.0 };
         let from = State { screw_m: offset_m, ..State::default() };
-        let rest = run(&plant, from, Forces { drive_n: 0.0, load_n: sign * load_n }, 2.0, STEP_S);
+        let rest = run(&plant, from, Forces::new(0.0, sign * load_n), 2.0, STEP_S);
         let expected_m = sign * (0.5 * gap_m + load_n / stiffness);
         prop_assert!(((delta_m(&rest) - offset_m) / expected_m - 1.0).abs() < 1e-6);
         prop_assert_eq!(rest.motor_m, 0.0);
@@ -65,17 +65,20 @@ proptest! {
     #[test]
     fn an_undamped_rattle_keeps_its_energy(
         stiffness in 1e7..1.5e8, gap_m in 0.0..300e-6, motor_kg in 1.0..100.0, screw_kg in 1.0..100.0,
-        speed in 0.01..0.2, law in 0..3_usize,
+        speed in 0.01..0.2, law in 0..4_usize, lower_factor in 0.5..2.0,
     ) {
         let laws = [
             contact::Law::Linear,
             contact::Law::Soft { share: 0.4, depth_m: 50e-6 },
             contact::Law::Hertz { share: 0.5, reference_m: 100e-6 },
+            contact::Law::Toe { share: 0.3, depth_m: 30e-6 },
         ];
         let mut plant = Plant { motor_mass_kg: motor_kg, screw_mass_kg: screw_kg, ..slippery() };
         plant.contact.stiffness_n_per_m = stiffness;
         plant.contact.gap_m = gap_m;
         plant.contact.law = laws[law];
+        plant.contact.lower_law = Some(laws[(law + 1) % 4]);
+        plant.contact.lower_stiffness_factor = lower_factor;
         let start = State { screw_m_per_s: speed, ..State::default() };
         let end = run(&plant, start, NOTHING, 1.0, STEP_S);
         prop_assert!((end.energy_j(&plant) / start.energy_j(&plant) - 1.0).abs() < 1e-8);
@@ -148,12 +151,12 @@ fn a_rattling_screw_takes_two_half_periods_and_two_crossings() {
 fn a_slow_load_cycle_leaves_the_loop_of_a_stuck_screw() {
     let mut plant = braked(slippery());
     plant.contact.damping_n_s_per_m = 4e4;
-    plant.screw_friction = Friction { dry_n: 300.0, load_share: 0.05, viscous_n_s_per_m: 2e4 };
+    plant.screw_friction = Friction::new(300.0, 0.05, 2e4);
     let mut state = State::default();
     let mut coupling_n: f64 = 0.0;
     for k in 0..100_000 {
         let load_n = 6000.0 * (TAU * f64::from(k) / 50_000.0).sin();
-        state = advance(&plant, &state, Forces { drive_n: 0.0, load_n }, STEP_S);
+        state = advance(&plant, &state, Forces::new(0.0, load_n), STEP_S);
         let level_n = 300.0 + 0.05 * load_n.abs();
         coupling_n = coupling_n.clamp(load_n - level_n, load_n + level_n);
         if coupling_n.abs() > 400.0 {
@@ -167,13 +170,51 @@ fn a_slow_load_cycle_leaves_the_loop_of_a_stuck_screw() {
     }
 }
 
+/// A screw pressed against a shaken motor follows it: `δX − shake` stays what the load makes it.
+#[test]
+fn a_pressed_screw_follows_a_shaken_motor() {
+    let mut plant = braked(slippery());
+    plant.contact.damping_n_s_per_m = 2e4;
+    let shake_m = |k: i32| 20e-6 * (TAU * 10.0 * f64::from(k) * STEP_S).sin();
+    let mut state = State { screw_m: 50e-6 + 5000.0 / 5e7, ..State::default() };
+    for k in 0..20_000 {
+        let shake_m_per_s = (shake_m(k + 1) - shake_m(k)) / STEP_S;
+        let forces = Forces { shake_m: shake_m(k), shake_m_per_s, ..Forces::new(0.0, 5000.0) };
+        state = advance(&plant, &state, forces, STEP_S);
+        if k > 2000 {
+            // The inertia of 8 kg: 8·(2π·10)²·20 µm is 0.6 N.
+            let expected_m = 50e-6 + 5000.0 / 5e7;
+            assert!((delta_m(&state) - shake_m(k + 1) - expected_m).abs() < 5e-8);
+        }
+    }
+    assert_eq!(state.motor_m, 0.0);
+}
+
+/// Under `LuGre` a screw pushed with half its sliding level bends the bristles by
+/// `−ln(1 − ½/ratio)·ratio` of their travel, less than Dahl's since g is higher at rest.
+#[test]
+fn lu_gre_bends_before_it_slides() {
+    let travel_m = 5e-6;
+    let mut plant = braked(slippery());
+    plant.friction_law =
+        friction::Law::LuGre { travel_m, ratio: 1.5, speed_m_per_s: 0.1, damping_n_s_per_m: 2e3 };
+    plant.screw_friction = Friction::new(400.0, 0.0, 1e5);
+    let mut state = State::default();
+    for k in 0..40_000 {
+        let load_n = 200.0 * (f64::from(k) / 30_000.0).min(1.0);
+        state = advance(&plant, &state, Forces::new(0.0, load_n), STEP_S);
+    }
+    let expected_m = -travel_m * 1.5 * (1.0_f64 - 0.5 / 1.5).ln();
+    assert!((state.screw_m / expected_m - 1.0).abs() < 0.01, "{:e} for {expected_m:e}", state.screw_m);
+}
+
 #[test]
 fn a_screw_held_by_friction_does_not_creep() {
     let plant = braked(Plant::default());
     let start = State { screw_m: plant.contact.offset_m, ..State::default() };
-    let held = run(&plant, start, Forces { drive_n: 0.0, load_n: 150.0 }, 10.0, STEP_S);
+    let held = run(&plant, start, Forces::new(0.0, 150.0), 10.0, STEP_S);
     assert_eq!(held, start);
-    let moved = run(&plant, start, Forces { drive_n: 0.0, load_n: 160.0 }, 10.0, STEP_S);
+    let moved = run(&plant, start, Forces::new(0.0, 160.0), 10.0, STEP_S);
     assert!(moved.screw_m > start.screw_m + 40e-6);
 }
 
@@ -185,11 +226,11 @@ fn bristles_bend_before_they_slide() {
     let mut plant = braked(slippery());
     plant.friction_law = friction::Law::Presliding { travel_m };
     plant.motor_friction.dry_n = 1e12;
-    plant.screw_friction = Friction { dry_n: 400.0, load_share: 0.0, viscous_n_s_per_m: 1e5 };
+    plant.screw_friction = Friction::new(400.0, 0.0, 1e5);
     let mut state = State::default();
     for k in 0..40_000 {
         let load_n = 200.0 * (f64::from(k) / 30_000.0).min(1.0);
-        state = advance(&plant, &state, Forces { drive_n: 0.0, load_n }, STEP_S);
+        state = advance(&plant, &state, Forces::new(0.0, load_n), STEP_S);
     }
     let expected_m = travel_m * std::f64::consts::LN_2;
     assert!((state.screw_m / expected_m - 1.0).abs() < 0.01, "{:e} for {expected_m:e}", state.screw_m);
@@ -204,7 +245,7 @@ fn the_stiffest_and_lightest_actuator_is_stable() {
     for k in 0..100_000 {
         let load_n = 8000.0 * (TAU * f64::from(k) * 5e-5).sin();
         let drive_n = -2e4 * state.motor_m_per_s - 1e7 * state.motor_m;
-        state = advance(&plant, &state, Forces { drive_n, load_n }, STEP_S);
+        state = advance(&plant, &state, Forces::new(drive_n, load_n), STEP_S);
         assert!((delta_m(&state) - plant.contact.offset_m).abs() < 200e-6);
     }
 }
@@ -221,7 +262,7 @@ fn a_finer_step_converges_to_one_motion() {
             let middle_s = (k as f64 + 0.5) * step_s;
             let load_n = 5000.0 * (TAU * 2.0 * middle_s).sin();
             let drive_n = 9000.0 * (TAU * 1.3 * middle_s).cos();
-            state = advance(&plant, &state, Forces { drive_n, load_n }, step_s);
+            state = advance(&plant, &state, Forces::new(drive_n, load_n), step_s);
         }
         state
     };

@@ -3,9 +3,9 @@
 use plotters::coord::ranged1d::SegmentedCoord;
 use plotters::prelude::*;
 
-use crate::answer::METHODS;
-use crate::case::Kind;
-use crate::tally::Tally;
+use crate::methods::METHODS;
+use crate::metrics::ErrorStats;
+use crate::scenarios::Kind;
 
 const INK: RGBColor = RGBColor(0x1C, 0x25, 0x30);
 const GRID: RGBColor = RGBColor(0xE1, 0xE6, 0xEB);
@@ -25,8 +25,8 @@ fn text(size: u32) -> TextStyle<'static> {
 }
 
 /// Median (dot) and 95 % quantile (end of the bar) of each method in each scenario with one gap.
-pub(crate) fn errors(tallies: &[Tally]) -> Drawn {
-    let rows: Vec<&Tally> = tallies.iter().filter(|t| t.kind == Kind::Single).rev().collect();
+pub fn errors(tallies: &[ErrorStats]) -> Drawn {
+    let rows: Vec<&ErrorStats> = tallies.iter().filter(|t| t.kind == Kind::Single).rev().collect();
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, (960, 60 + 34 * rows.len() as u32)).into_drawing_area();
@@ -74,8 +74,9 @@ pub(crate) fn errors(tallies: &[Tally]) -> Drawn {
 }
 
 /// Contact regression's error against the true gap, for each drawn flight.
-pub(crate) fn scatter(tallies: &[Tally]) -> Drawn {
-    let rows: Vec<&Tally> = tallies.iter().filter(|t| matches!(t.kind, Kind::Wide | Kind::Foreign)).collect();
+pub fn scatter(tallies: &[ErrorStats]) -> Drawn {
+    let rows: Vec<&ErrorStats> =
+        tallies.iter().filter(|t| matches!(t.kind, Kind::Wide | Kind::Foreign)).collect();
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, (960, 340)).into_drawing_area();
@@ -108,7 +109,7 @@ pub(crate) fn scatter(tallies: &[Tally]) -> Drawn {
 }
 
 /// Share of intervals that hold against the share they promise, from error over standard error.
-pub(crate) fn calibration(tallies: &[Tally]) -> Drawn {
+pub fn calibration(tallies: &[ErrorStats]) -> Drawn {
     let mut svg = String::new();
     {
         let root = SVGBackend::with_string(&mut svg, (560, 460)).into_drawing_area();

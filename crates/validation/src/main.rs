@@ -1,17 +1,6 @@
-//! The accuracy study: simulated flights of known gap and real machines, by every method; writes
-//! `docs/accuracy.md` and its pictures.
-//!
-//! `simulator` shares no equation with `estimator`, so neither can flatter the other.
+//! Runs the accuracy study and writes `docs/accuracy.md` and its pictures.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a study prints")]
-
-mod answer;
-mod case;
-mod gears;
-mod page;
-mod picture;
-mod real;
-mod tally;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -20,14 +9,15 @@ use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
-use answer::{Answer, answer};
-use case::{Kind, SCENARIOS, Scenario};
-use tally::Tally;
+use validation::methods::{MethodResults, estimate_flight};
+use validation::metrics::ErrorStats;
+use validation::scenarios::{Class, Kind, classes};
+use validation::{accuracy_page, gear_bench, plots, robot_logs};
 
 /// Estimates simulated flights of known gap by every method, and writes tables and pictures of the errors.
 #[derive(Debug, Parser)]
 #[command(
-    after_help = "Examples:\n  cargo run --release -p study\n  cargo run --release -p study -- --flights 20 --drawn 60 --only mixture --output /tmp/study"
+    after_help = "Examples:\n  cargo run --release -p validation\n  cargo run --release -p validation -- --flights 20 --drawn 60 --only mixture --output /tmp/validation"
 )]
 struct Args {
     /// Flights in each scenario.
@@ -51,7 +41,7 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    match study(&Args::parse()) {
+    match run(&Args::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(what) => {
             eprintln!("error: {what}");
@@ -60,17 +50,17 @@ fn main() -> ExitCode {
     }
 }
 
-fn study(args: &Args) -> Result<(), String> {
-    let wanted: Vec<&Scenario> =
-        SCENARIOS.iter().filter(|s| args.only.as_ref().is_none_or(|text| s.name.contains(text))).collect();
-    let robot = real::robot(&args.robot)?;
-    let gears = args.gears.as_deref().map(gears::gears).transpose()?;
+fn run(args: &Args) -> Result<(), String> {
+    let wanted: Vec<&Class> =
+        classes().iter().filter(|s| args.only.as_ref().is_none_or(|text| s.name.contains(text))).collect();
+    let robot = robot_logs::robot(&args.robot)?;
+    let gears = args.gears.as_deref().map(gear_bench::gear_bench_logs).transpose()?;
     let tallies = fly(&wanted, args)?;
-    let page = page::page(&tallies, &robot, gears.as_deref());
+    let page = accuracy_page::page(&tallies, &robot, gears.as_deref());
     let pictures = [
-        ("accuracy-errors.svg", picture::errors(&tallies)),
-        ("accuracy-scatter.svg", picture::scatter(&tallies)),
-        ("accuracy-calibration.svg", picture::calibration(&tallies)),
+        ("accuracy-errors.svg", plots::errors(&tallies)),
+        ("accuracy-scatter.svg", plots::scatter(&tallies)),
+        ("accuracy-calibration.svg", plots::calibration(&tallies)),
     ];
     write(&args.output, "accuracy.md", &page)?;
     for (name, drawn) in pictures {
@@ -81,8 +71,8 @@ fn study(args: &Args) -> Result<(), String> {
 }
 
 /// All flights of all scenarios side by side, so that a slow one at the end keeps no core idle for long.
-fn fly(wanted: &[&Scenario], args: &Args) -> Result<Vec<Tally>, String> {
-    let count = |scenario: &Scenario| match scenario.kind {
+fn fly(wanted: &[&Class], args: &Args) -> Result<Vec<ErrorStats>, String> {
+    let count = |scenario: &Class| match scenario.kind {
         Kind::Wide => args.drawn,
         Kind::Foreign => args.drawn.div_ceil(3),
         _ => args.flights,
@@ -97,12 +87,13 @@ fn fly(wanted: &[&Scenario], args: &Args) -> Result<Vec<Tally>, String> {
         bar.set_style(style);
     }
     let fly = |&(s, k): &(usize, u64)| {
-        let said = answer(wanted[s], k);
+        let results = estimate_flight(wanted[s], k);
         bar.inc(1);
-        said
+        results
     };
     // One at a time from the queue: flights take from milliseconds to seconds.
-    let answers: Vec<Answer> = flights.par_iter().with_max_len(1).map(fly).collect::<Result<_, _>>()?;
+    let answers: Vec<MethodResults> =
+        flights.par_iter().with_max_len(1).map(fly).collect::<Result<_, _>>()?;
     bar.finish_and_clear();
     let mut rest = answers.as_slice();
     Ok(wanted
@@ -110,7 +101,7 @@ fn fly(wanted: &[&Scenario], args: &Args) -> Result<Vec<Tally>, String> {
         .map(|scenario| {
             let (mine, others) = rest.split_at(count(scenario) as usize);
             rest = others;
-            Tally::of(scenario, mine)
+            ErrorStats::of(scenario, mine)
         })
         .collect())
 }

@@ -1,4 +1,4 @@
-//! Gear actuators with their output locked to the bench, whose play their authors measured: real play, real
+//! GearBenchLog actuators with their output locked to the bench, whose play their authors measured: real play, real
 //! friction, hardening flanks. The logs carry a share-alike licence and are no part of the project; only
 //! figures come from them, where somebody has them at hand.
 //!
@@ -16,18 +16,18 @@ use estimator::noise::Sensors;
 use estimator::{Actuator, Filter, Noise, Samples, midrange};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
-use crate::answer::{load_lines_m, spread_m};
+use crate::methods::{load_lines_m, spread_m};
 
 /// One log: degrees.
-pub(crate) struct Gear {
+pub struct GearBenchLog {
     /// Play of this phase as its authors measured it, over three places of the output.
-    pub(crate) authors_deg: f64,
+    pub authors_deg: f64,
     /// The paper's statistic over the ramps to 4 N·m, and over all, those to 40 N·m included.
-    pub(crate) midrange_deg: [f64; 2],
+    pub midrange_deg: [f64; 2],
     /// Load lines, over the same.
-    pub(crate) lines_deg: [f64; 2],
+    pub lines_deg: [f64; 2],
     /// P99 − P1 of δX, over the same.
-    pub(crate) spread_deg: [f64; 2],
+    pub spread_deg: [f64; 2],
 }
 
 /// Stiffness as its authors give it, 0.084 °/(N·m), N·m/rad.
@@ -36,7 +36,7 @@ const STIFFNESS_NM_PER_RAD: f64 = 680.0;
 const LAST_SMALL_RAMP: f64 = 4.0;
 
 /// Reads every log of a folder that its `manifest.csv` lists.
-pub(crate) fn gears(folder: &Path) -> Result<Vec<Gear>, String> {
+pub fn gear_bench_logs(folder: &Path) -> Result<Vec<GearBenchLog>, String> {
     let manifest = folder.join("manifest.csv");
     let text = std::fs::read_to_string(&manifest).map_err(|e| format!("{}: {e}", manifest.display()))?;
     let mut lines = text.lines();
@@ -54,7 +54,7 @@ pub(crate) fn gears(folder: &Path) -> Result<Vec<Gear>, String> {
     listed.collect()
 }
 
-fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<Gear, String> {
+fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, String> {
     let columns = columns(&folder.join(file)).map_err(|e| format!("{file}: {e}"))?;
     let of = |name: &str| columns.get(name).ok_or_else(|| format!("{file}: no column `{name}`"));
     let (time_s, motor_deg, torque_nm, ramp) =
@@ -80,7 +80,7 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<Gear, String> {
             midrange::estimate(&samples, &filter).map_or(f64::NAN, |m| m.gap.gap_m.to_degrees()),
         )
     };
-    Ok(Gear {
+    Ok(GearBenchLog {
         authors_deg,
         midrange_deg: [published(parts[0])?, published(parts[1])?],
         lines_deg: parts.map(|end| load_lines_m(&dx_rad[..end], &load_nm[..end]).to_degrees()),

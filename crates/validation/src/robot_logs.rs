@@ -1,4 +1,4 @@
-//! A real machine: a robot whose play is near zero and whose channels are 3 ms apart.
+//! Logs of a real machine: a robot whose play is near zero and whose channels are 3 ms apart.
 
 use std::path::{Path, PathBuf};
 
@@ -7,38 +7,38 @@ use job::Config;
 use job::estimate_plot_data::EstimatePlot;
 use records::{Installations, PartNumber};
 
-use crate::answer::{load_lines_m, spread_m};
+use crate::methods::{load_lines_m, spread_m};
 
-/// What each method says of a real log, in degrees.
-pub(crate) struct RealRow {
-    pub(crate) log: String,
+/// The results of every method for a log, in degrees.
+pub struct RobotRow {
+    pub log: String,
     /// Degrees; NaN where refused.
-    pub(crate) gap_deg: f64,
-    pub(crate) se_deg: f64,
-    pub(crate) midrange_deg: f64,
-    pub(crate) lines_deg: f64,
-    pub(crate) spread_deg: f64,
-    pub(crate) skew_ms: f64,
+    pub gap_deg: f64,
+    pub se_deg: f64,
+    pub midrange_deg: f64,
+    pub lines_deg: f64,
+    pub spread_deg: f64,
+    pub skew_ms: f64,
     /// Refusal or flags.
-    pub(crate) remarks: String,
+    pub remarks: String,
 }
 
 /// The robot's axes, by the configuration that lies beside them.
-pub(crate) fn robot(folder: &Path) -> Result<Vec<RealRow>, String> {
-    let config = Config::read(&folder.join("pipeline.toml")).map_err(|all| told(&all))?;
+pub fn robot(folder: &Path) -> Result<Vec<RobotRow>, String> {
+    let config = Config::read(&folder.join("pipeline.toml")).map_err(|all| join_diagnostics(&all))?;
     let mut rows = Vec::new();
     for axis in ["AX1", "AX2", "AX3"] {
         let log = folder.join(format!("KR300-{axis}_trajC.parquet"));
-        rows.extend(looked(&log, &config, &format!("KR300-{axis}"))?);
+        rows.extend(estimate_log(&log, &config, &format!("KR300-{axis}"))?);
     }
     Ok(rows)
 }
 
-fn told(diagnostics: &[records::Diagnostic]) -> String {
+fn join_diagnostics(diagnostics: &[records::Diagnostic]) -> String {
     diagnostics.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
-fn looked(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<RealRow>, String> {
+fn estimate_log(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<RobotRow>, String> {
     let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
     let number = PartNumber::new(part).map_err(|e| format!("{part}: {e}"))?;
     let none = Installations::default();
@@ -47,12 +47,12 @@ fn looked(path: &PathBuf, config: &Config, part: &str) -> Result<Vec<RealRow>, S
     Ok(looks.iter().map(|look| row(&name, look)).collect())
 }
 
-fn row(log: &str, look: &EstimatePlot) -> RealRow {
+fn row(log: &str, look: &EstimatePlot) -> RobotRow {
     let e = &look.estimate;
     let radius_m = e.reference_radius_m.unwrap_or(f64::NAN);
     let degrees = |m: f64| (m / radius_m).to_degrees();
     let or_nan = |m: Option<f64>| m.map_or(f64::NAN, degrees);
-    RealRow {
+    RobotRow {
         log: log.to_owned(),
         gap_deg: or_nan(e.gap_m),
         se_deg: or_nan(e.gap_se_m),

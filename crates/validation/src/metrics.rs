@@ -2,34 +2,34 @@
 
 use std::collections::BTreeMap;
 
-use crate::answer::{Answer, METHODS};
-use crate::case::{Kind, Scenario};
+use crate::methods::{METHODS, MethodResults};
+use crate::scenarios::{Class, Kind};
 
 /// One scenario, told in numbers.
-pub(crate) struct Tally {
-    pub(crate) name: &'static str,
-    pub(crate) kind: Kind,
-    pub(crate) flights: usize,
+pub struct ErrorStats {
+    pub name: &'static str,
+    pub kind: Kind,
+    pub flights: usize,
     /// Errors of each method, in the scenario's unit.
-    pub(crate) errors: [Errors; METHODS.len()],
+    pub errors: [Errors; METHODS.len()],
     /// Flights that contact regression gave a number, and those whose 90 % interval holds the truth.
-    pub(crate) estimated: usize,
-    pub(crate) held: usize,
+    pub estimated: usize,
+    pub held: usize,
     /// How often each code was given, as refusal or flag.
-    pub(crate) codes: BTreeMap<&'static str, usize>,
+    pub codes: BTreeMap<&'static str, usize>,
     /// Every flight: true gap and contact regression's error, µm.
-    pub(crate) scatter_um: Vec<(f64, f64)>,
+    pub scatter_um: Vec<(f64, f64)>,
     /// Error over standard error of every flight.
-    pub(crate) deviations: Vec<f64>,
+    pub deviations: Vec<f64>,
 }
 
 /// Absolute errors: median, 95 % quantile, worst, and how many there are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Errors {
-    pub(crate) median: f64,
-    pub(crate) p95: f64,
-    pub(crate) worst: f64,
-    pub(crate) count: usize,
+pub struct Errors {
+    pub median: f64,
+    pub p95: f64,
+    pub worst: f64,
+    pub count: usize,
 }
 
 impl Errors {
@@ -49,14 +49,14 @@ const NORMAL_95: f64 = 1.644_853_626_951_472_2;
 
 impl Kind {
     /// The unit errors are told in.
-    pub(crate) fn unit(self) -> &'static str {
+    pub fn unit(self) -> &'static str {
         if self == Self::Single { "%" } else { "µm" }
     }
 }
 
-impl Tally {
-    pub(crate) fn of(scenario: &Scenario, answers: &[Answer]) -> Self {
-        let size = |a: &Answer, said_m: f64| {
+impl ErrorStats {
+    pub fn of(scenario: &Class, answers: &[MethodResults]) -> Self {
+        let size = |a: &MethodResults, said_m: f64| {
             let unit_m = if scenario.kind == Kind::Single { 0.01 * a.truth_m } else { 1e-6 };
             (said_m - a.truth_m).abs() / unit_m
         };
@@ -88,17 +88,17 @@ impl Tally {
     }
 
     /// Refused though the flight shows its gap.
-    pub(crate) fn false_refusals(&self) -> usize {
+    pub fn false_refusals(&self) -> usize {
         if self.must_refuse().is_some() { 0 } else { self.flights - self.estimated }
     }
 
     /// Given a number though the flight cannot show one.
-    pub(crate) fn missed_refusals(&self) -> usize {
+    pub fn missed_refusals(&self) -> usize {
         if self.must_refuse().is_some() { self.estimated } else { 0 }
     }
 
     /// The code to be refused with.
-    pub(crate) fn must_refuse(&self) -> Option<&'static str> {
+    pub fn must_refuse(&self) -> Option<&'static str> {
         match self.kind {
             Kind::Blind(code) => Some(code),
             _ => None,
@@ -106,7 +106,7 @@ impl Tally {
     }
 
     /// Share of intervals that hold, and the 90 % bounds of that share (Wilson).
-    pub(crate) fn coverage(&self) -> (f64, f64, f64) {
+    pub fn coverage(&self) -> (f64, f64, f64) {
         wilson(self.held, self.estimated)
     }
 }

@@ -2,14 +2,14 @@
 
 use std::fmt::Write as _;
 
-use crate::answer::METHODS;
-use crate::case::Kind;
-use crate::gears::Gear;
-use crate::real::RealRow;
-use crate::tally::{Errors, Tally};
+use crate::gear_bench::GearBenchLog;
+use crate::methods::METHODS;
+use crate::metrics::{ErrorStats, Errors};
+use crate::robot_logs::RobotRow;
+use crate::scenarios::Kind;
 
 /// Fills the page's places with tables.
-pub(crate) fn page(tallies: &[Tally], robot: &[RealRow], gears: Option<&[Gear]>) -> String {
+pub fn page(tallies: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchLog]>) -> String {
     let of = |kinds: fn(Kind) -> bool| tallies.iter().filter(move |t| kinds(t.kind)).collect::<Vec<_>>();
     let shown = of(|k| !matches!(k, Kind::Blind(_)));
     let text = include_str!("../accuracy.md.in");
@@ -22,7 +22,7 @@ pub(crate) fn page(tallies: &[Tally], robot: &[RealRow], gears: Option<&[Gear]>)
 }
 
 /// Median / 95 % quantile / worst of every method.
-fn errors(tallies: &[&Tally]) -> String {
+fn errors(tallies: &[&ErrorStats]) -> String {
     let mut table = format!("| scenario | flights | unit | {} |\n|---|---|---|", METHODS.join(" | "));
     table += &"---|".repeat(METHODS.len());
     table.push('\n');
@@ -45,7 +45,7 @@ fn three(errors: &Errors) -> String {
 }
 
 /// How often the interval held, and which flags were raised.
-fn intervals(tallies: &[&Tally]) -> String {
+fn intervals(tallies: &[&ErrorStats]) -> String {
     let mut table = "| scenario | estimated | 90 % intervals that hold | of 100, with 90 % certainty | flags |\n|---|---|---|---|---|\n".to_owned();
     for t in tallies {
         let (share, low, high) = t.coverage();
@@ -63,13 +63,13 @@ fn intervals(tallies: &[&Tally]) -> String {
     table
 }
 
-fn codes(tally: &Tally) -> String {
+fn codes(tally: &ErrorStats) -> String {
     let said: Vec<String> = tally.codes.iter().map(|(code, n)| format!("`{code}` {n}")).collect();
     if said.is_empty() { "–".to_owned() } else { said.join(", ") }
 }
 
 /// Flights that cannot show a gap, and what became of them; then the false refusals of all others.
-fn refusals(tallies: &[Tally]) -> String {
+fn refusals(tallies: &[ErrorStats]) -> String {
     let mut table =
         "| flights that cannot show a gap | flights | given a number | wanted | said |\n|---|---|---|---|---|\n".to_owned();
     for t in tallies {
@@ -83,20 +83,22 @@ fn refusals(tallies: &[Tally]) -> String {
             codes(t)
         );
     }
-    let (blind, sound): (Vec<&Tally>, Vec<&Tally>) = tallies.iter().partition(|t| t.must_refuse().is_some());
-    let sum = |of: &[&Tally], count: fn(&Tally) -> usize| of.iter().map(|t| count(t)).sum::<usize>();
+    let (blind, sound): (Vec<&ErrorStats>, Vec<&ErrorStats>) =
+        tallies.iter().partition(|t| t.must_refuse().is_some());
+    let sum =
+        |of: &[&ErrorStats], count: fn(&ErrorStats) -> usize| of.iter().map(|t| count(t)).sum::<usize>();
     let _ = writeln!(
         table,
         "\nMissed refusals: {} of {}. False refusals: {} of {}.",
-        sum(&blind, Tally::missed_refusals),
+        sum(&blind, ErrorStats::missed_refusals),
         sum(&blind, |t| t.flights),
-        sum(&sound, Tally::false_refusals),
+        sum(&sound, ErrorStats::false_refusals),
         sum(&sound, |t| t.flights),
     );
     table
 }
 
-fn real(rows: &[RealRow]) -> String {
+fn real(rows: &[RobotRow]) -> String {
     let mut table = "| log | contact regression ° | ± ° | skew ms | paper (29–31) ° | load lines ° | P99 − P1 ° | remarks |\n|---|---|---|---|---|---|---|---|\n".to_owned();
     let cell = |v: f64, digits: usize| if v.is_nan() { "–".to_owned() } else { format!("{v:.digits$}") };
     for r in rows {
@@ -117,10 +119,10 @@ fn real(rows: &[RealRow]) -> String {
 }
 
 /// One method's answers to a log, over small ramps and over all.
-type Said = fn(&Gear) -> [f64; 2];
+type Said = fn(&GearBenchLog) -> [f64; 2];
 
 /// Against the authors' play: correlation, mean and mean absolute difference, of each method.
-fn geared(rows: &[Gear]) -> String {
+fn geared(rows: &[GearBenchLog]) -> String {
     let mut table = "| method | ramps | correlation | mean difference ° | mean absolute difference ° |\n|---|---|---|---|---|\n".to_owned();
     let methods: [(&str, Said); 3] =
         [(METHODS[1], |g| g.midrange_deg), (METHODS[2], |g| g.lines_deg), (METHODS[3], |g| g.spread_deg)];

@@ -1,46 +1,56 @@
-//! What each method says of one flight, and what is true.
+//! The methods compared: contact regression, the paper's statistic and two baselines.
 
 use estimator::contact::{self, ContactOutcome, PartPrior};
 use estimator::noise::Sensors;
 use estimator::{Actuator, Filter, Noise, Samples, midrange};
 
-use crate::case::{Case, Scenario};
+use crate::scenarios::{Case, Class};
 
-/// What the methods say of one flight, m; NaN where a method gave no number.
+/// The results of every method for one flight, m; NaN where a method gave no number.
 #[derive(Debug, Clone)]
-pub(crate) struct Answer {
-    pub(crate) truth_m: f64,
+pub struct MethodResults {
+    /// The true gap, extrapolated from the stiff part of the flanks.
+    pub truth_m: f64,
     /// Contact regression, with its bounds.
-    pub(crate) contact: Option<(f64, f64, f64)>,
+    pub contact: Option<(f64, f64, f64)>,
     /// Its refusal or flags.
-    pub(crate) codes: Vec<&'static str>,
+    pub codes: Vec<&'static str>,
     /// By method: see [`METHODS`].
-    pub(crate) by_method_m: [f64; METHODS.len()],
+    pub by_method_m: [f64; METHODS.len()],
 }
 
 /// The methods compared, ours first.
-pub(crate) const METHODS: [&str; 4] = ["contact regression", "paper (29–31)", "load lines", "P99 − P1 of δX"];
+pub const METHODS: [&str; 4] = ["contact regression", "paper (29–31)", "load lines", "P99 − P1 of δX"];
 
-/// What a fleet would say of the friction it expects, N.
+/// The friction that a fleet expects, N.
 const UNKNOWN_FORCE_N: f64 = 200.0;
 
-/// Flies a flight of a scenario and asks every method.
-pub(crate) fn answer(scenario: &Scenario, index: u64) -> Result<Answer, String> {
-    let (case, flight) = scenario.fly(index).map_err(|e| format!("{}: {e}", scenario.name))?;
+/// Flies a flight of a class and applies every method.
+///
+/// # Errors
+/// The simulator's or the estimator's error as text, after the name of the class.
+pub fn estimate_flight(class: &Class, index: u64) -> Result<MethodResults, String> {
+    let flown = class.fly(index).map_err(|e| format!("{} {index}: {e}", class.name))?;
+    let flight = &flown.flight;
     let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
     let whole = 0..dx_m.len();
     let samples = Samples {
-        step_s: case.profile.sample_rate_hz.recip(),
+        step_s: flown.case.profile.sample_rate_hz.recip(),
         motor_m: &flight.motor_m,
         dx_m: &dx_m,
         load_n: &flight.load_n,
         segments: std::slice::from_ref(&whole),
     };
-    judge(&case, flight.gap_m, &samples).map_err(|e| format!("{}: {e}", scenario.name))
+    let truth_m = flown.extrapolated_gap_m;
+    apply_methods(&flown.case, truth_m, &samples).map_err(|e| format!("{} {index}: {e}", class.name))
 }
 
-fn judge(case: &Case, truth_m: f64, samples: &Samples<'_>) -> Result<Answer, estimator::Error> {
-    let stiffness_n_per_m = case.plant.contact.stiffness_n_per_m * case.assumed;
+fn apply_methods(
+    case: &Case,
+    truth_m: f64,
+    samples: &Samples<'_>,
+) -> Result<MethodResults, estimator::Error> {
+    let stiffness_n_per_m = case.assumed_stiffness_n_per_m();
     let prior =
         PartPrior { stiffness_n_per_m, reference_load_n: None, unknown_force_n: Some(UNKNOWN_FORCE_N) };
     let outcome = contact::estimate(samples, &prior)?;
@@ -56,7 +66,7 @@ fn judge(case: &Case, truth_m: f64, samples: &Samples<'_>) -> Result<Answer, est
     let ours_m = contact.map_or(f64::NAN, |(gap_m, ..)| gap_m);
     let lines_m = load_lines_m(samples.dx_m, samples.load_n);
     let spread_m = spread_m(samples.dx_m);
-    Ok(Answer { truth_m, contact, codes, by_method_m: [ours_m, midrange_m, lines_m, spread_m] })
+    Ok(MethodResults { truth_m, contact, codes, by_method_m: [ours_m, midrange_m, lines_m, spread_m] })
 }
 
 fn filter(case: &Case, step_s: f64, stiffness_n_per_m: f64) -> Result<Filter, estimator::Error> {
@@ -73,7 +83,7 @@ fn filter(case: &Case, step_s: f64, stiffness_n_per_m: f64) -> Result<Filter, es
 
 /// A baseline: δX on F by least squares on each side of the load, beyond a tenth of its greatest; the
 /// difference of the intercepts.
-pub(crate) fn load_lines_m(dx_m: &[f64], load_n: &[f64]) -> f64 {
+pub fn load_lines_m(dx_m: &[f64], load_n: &[f64]) -> f64 {
     let least_n = 0.1 * load_n.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
     let intercept_m = |side: f64| {
         let (mut n, mut sf, mut sy, mut sff, mut sfy) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -86,7 +96,7 @@ pub(crate) fn load_lines_m(dx_m: &[f64], load_n: &[f64]) -> f64 {
 }
 
 /// A baseline: the 99 % quantile of δX less the 1 % quantile.
-pub(crate) fn spread_m(dx_m: &[f64]) -> f64 {
+pub fn spread_m(dx_m: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = dx_m.iter().copied().filter(|y| y.is_finite()).collect();
     if sorted.is_empty() {
         return f64::NAN;

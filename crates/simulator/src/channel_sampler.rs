@@ -1,0 +1,257 @@
+//! From the true course of a quantity to one channel's samples: hysteresis, lag, averaging, delay.
+
+use crate::profile::Profile;
+use crate::sensor::Channel;
+
+/// Samples one quantity at even instants minus a delay, by straight lines between steps.
+#[derive(Debug)]
+pub(crate) struct ChannelSampler {
+    samples: Vec<f64>,
+    wanted: usize,
+    rate_hz: f64,
+    delay_s: f64,
+    step_s: f64,
+    sensor: SensorState,
+    /// What the sensor showed at the end of the last step.
+    shown: f64,
+    average: Option<BoxAverage>,
+}
+
+impl ChannelSampler {
+    /// A sampler of a quantity that has rested at its initial value.
+    pub(crate) fn new(channel: &Channel, profile: &Profile, step_s: f64, initial: f64) -> Self {
+        let rate_hz = channel.own_rate_hz(profile.sample_rate_hz);
+        let wanted = channel.own_samples(profile);
+        Self {
+            samples: Vec::with_capacity(wanted),
+            wanted,
+            rate_hz,
+            delay_s: channel.delay_s,
+            step_s,
+            sensor: SensorState::new(channel, initial),
+            shown: initial,
+            average: channel.box_average.then(|| BoxAverage::new(rate_hz, channel.delay_s)),
+        }
+    }
+
+    pub(crate) fn is_full(&self) -> bool {
+        self.samples.len() == self.wanted
+    }
+
+    /// The samples at the channel's own rate.
+    pub(crate) fn into_samples(self) -> Vec<f64> {
+        self.samples
+    }
+
+    /// One step of the integrator, in which the quantity goes from one value to the next.
+    pub(crate) fn pass(&mut self, from_s: f64, before: f64, after: f64) {
+        let (before, after) = if self.sensor.is_ideal() {
+            (before, after)
+        } else {
+            let shown = self.shown;
+            self.shown = self.sensor.follow(before, after, self.step_s);
+            (shown, self.shown)
+        };
+        match &mut self.average {
+            None => self.sample(from_s, before, after),
+            Some(average) => {
+                while self.samples.len() < self.wanted {
+                    let Some(mean) = average.next_mean(from_s, before, after, self.step_s) else { break };
+                    self.samples.extend(mean);
+                }
+                average.integrate(before, after, self.step_s);
+            }
+        }
+    }
+
+    fn sample(&mut self, from_s: f64, before: f64, after: f64) {
+        while !self.is_full() {
+            let instant_s = self.samples.len() as f64 / self.rate_hz - self.delay_s;
+            let part = (instant_s - from_s) / self.step_s;
+            if part > 1.0 {
+                return;
+            }
+            self.samples.push(before + part * (after - before));
+        }
+    }
+}
+
+/// Hysteresis and lag of a sensor, both with a memory of their own.
+#[derive(Debug)]
+struct SensorState {
+    hysteresis: f64,
+    hysteresis_length: f64,
+    lag_s: f64,
+    /// The hysteretic error, within ± `hysteresis`.
+    error: f64,
+    /// The output of the lag.
+    lagged: f64,
+}
+
+impl SensorState {
+    fn new(channel: &Channel, initial: f64) -> Self {
+        Self {
+            hysteresis: channel.hysteresis,
+            hysteresis_length: channel.hysteresis_length,
+            lag_s: channel.lag_s,
+            error: 0.0,
+            lagged: initial,
+        }
+    }
+
+    fn is_ideal(&self) -> bool {
+        self.hysteresis == 0.0 && self.lag_s == 0.0
+    }
+
+    /// What the sensor shows after a step in which its input moves evenly between two values.
+    ///
+    /// The hysteretic error obeys `de = (H sgn dx − e) |dx|/ℓ`, and the lag `τ y' = x − y`; both are
+    /// integrated exactly.
+    fn follow(&mut self, before: f64, after: f64, step_s: f64) -> f64 {
+        let mut input = (before, after);
+        if self.hysteresis > 0.0 {
+            let (moved, error) = (after - before, self.error);
+            let towards = self.hysteresis.copysign(moved);
+            self.error = towards + (error - towards) * (-moved.abs() / self.hysteresis_length).exp();
+            input = (before - error, after - self.error);
+        }
+        if self.lag_s == 0.0 {
+            return input.1;
+        }
+        // The input is a ramp: the output trails it by τ times the slope, and forgets its start.
+        let trail = (input.1 - input.0) / step_s * self.lag_s;
+        let forgotten = (-step_s / self.lag_s).exp();
+        self.lagged = input.1 - trail + (self.lagged - input.0 + trail) * forgotten;
+        self.lagged
+    }
+}
+
+/// The mean over one sample period, which ends at the sample instant.
+#[derive(Debug)]
+struct BoxAverage {
+    rate_hz: f64,
+    delay_s: f64,
+    /// Boundaries passed so far; the first opens the first period.
+    boundaries: usize,
+    /// The integral since the last boundary.
+    integral: f64,
+    /// Where within the present step the last boundary lay, 0 to 1.
+    since: f64,
+}
+
+impl BoxAverage {
+    fn new(rate_hz: f64, delay_s: f64) -> Self {
+        Self { rate_hz, delay_s, boundaries: 0, integral: 0.0, since: 0.0 }
+    }
+
+    /// The mean of a period that ends in this step: none if no boundary is left in it, and an empty
+    /// inner value at the boundary that only opens the first period.
+    #[expect(clippy::option_option, reason = "the first boundary ends no period, yet is passed")]
+    fn next_mean(&mut self, from_s: f64, before: f64, after: f64, step_s: f64) -> Option<Option<f64>> {
+        let boundary_s = (self.boundaries as f64 - 1.0) / self.rate_hz - self.delay_s;
+        let part = (boundary_s - from_s) / step_s;
+        if part > 1.0 {
+            return None;
+        }
+        let whole = self.integral + integral(before, after, self.since, part, step_s);
+        let opens = self.boundaries == 0;
+        (self.boundaries, self.integral, self.since) = (self.boundaries + 1, 0.0, part);
+        Some((!opens).then_some(whole * self.rate_hz))
+    }
+
+    /// The rest of the step after its last boundary.
+    fn integrate(&mut self, before: f64, after: f64, step_s: f64) {
+        self.integral += integral(before, after, self.since, 1.0, step_s);
+        self.since = 0.0;
+    }
+}
+
+/// The integral of a straight line over a part of a step.
+fn integral(before: f64, after: f64, from: f64, to: f64, step_s: f64) -> f64 {
+    (to - from) * step_s * (before + 0.5 * (from + to) * (after - before))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+
+    const STEP_S: f64 = 1e-4;
+
+    /// Samples of a function of time, from two seconds before the log on.
+    fn sampled(channel: &Channel, profile: &Profile, of: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut sampler = ChannelSampler::new(channel, profile, STEP_S, of(-2.0));
+        let mut k = 0.0;
+        while !sampler.is_full() {
+            let from_s = k * STEP_S - 2.0;
+            sampler.pass(from_s, of(from_s), of(from_s + STEP_S));
+            k += 1.0;
+        }
+        sampler.into_samples()
+    }
+
+    fn profile() -> Profile {
+        Profile { duration_s: 6.0, sample_rate_hz: 50.0, ..Profile::default() }
+    }
+
+    /// A step through a lag: `1 − e^(−t/τ)`.
+    #[test]
+    fn a_lag_answers_a_step_exponentially() {
+        let channel = Channel { lag_s: 0.2, ..Channel::default() };
+        let values = sampled(&channel, &profile(), |t| f64::from(u8::from(t > 1.0)));
+        for k in [60, 75, 100] {
+            let expected = 1.0 - (-(k as f64 / 50.0 - 1.0) / 0.2).exp();
+            assert!((values[k] - expected).abs() < 1e-3, "{} for {expected}", values[k]);
+        }
+    }
+
+    /// A sine through a lag: amplitude `1/√(1 + (ωτ)²)`, phase `−atan ωτ`.
+    #[test]
+    fn a_lag_turns_and_shrinks_a_sine() {
+        let (lag_s, omega) = (0.05, TAU * 3.0);
+        let values = sampled(&Channel { lag_s, ..Channel::default() }, &profile(), |t| (omega * t).sin());
+        let phase = (omega * lag_s).atan();
+        for (k, value) in values.iter().enumerate() {
+            let expected = phase.cos() * (omega * k as f64 / 50.0 - phase).sin();
+            assert!((value - expected).abs() < 1e-5, "{value} for {expected}");
+        }
+    }
+
+    /// The mean of a sine over a period T that ends at t: `(cos ω(t−T) − cos ωt)/ωT`.
+    #[test]
+    fn a_box_average_is_the_mean_over_the_sample_period() {
+        let omega = TAU * 7.3;
+        let channel = Channel { box_average: true, delay_s: 0.003_37, ..Channel::default() };
+        for (k, value) in sampled(&channel, &profile(), |t| (omega * t).sin()).iter().enumerate() {
+            let end = k as f64 / 50.0 - 0.003_37;
+            let expected = ((omega * (end - 0.02)).cos() - (omega * end).cos()) / (omega * 0.02);
+            // Straight lines between steps leave (ωh)²/12 = 2e-6.
+            assert!((value - expected).abs() < 5e-6, "{value} for {expected}");
+        }
+    }
+
+    /// Cycled far beyond its length, the error is `H (1 − 2 e^(−Δ/ℓ))` after a turn and a travel Δ; the
+    /// loop is twice that wide, 2H in the end.
+    #[test]
+    fn a_hysteresis_loop_is_as_wide_as_stated() {
+        let channel = Channel { hysteresis: 40.0, hysteresis_length: 1000.0, ..Channel::default() };
+        let triangle = |t: f64| 8000.0 * ((t + 2.0).rem_euclid(2.0) - 1.0).abs();
+        let values = sampled(&channel, &profile(), triangle);
+        // Falls from 8000 at t = 0 to 0 at t = 1, then rises again.
+        let error = |k: usize| triangle(k as f64 / 50.0) - values[k];
+        let (falling, rising) = (error(25), error(75));
+        let width = 80.0 * (1.0 - 2.0 * (-4.0_f64).exp());
+        assert!((rising - falling - width).abs() < 1e-2, "{}", rising - falling);
+        let turned = error(55) - 40.0 * (1.0 - 2.0 * (-0.8_f64).exp());
+        assert!(turned.abs() < 0.5, "{turned}");
+    }
+
+    #[test]
+    fn a_slow_channel_is_sampled_at_its_own_rate() {
+        let channel = Channel { rate_hz: 20.0, ..Channel::default() };
+        let values = sampled(&channel, &profile(), |t| t);
+        assert!((values[7] - 0.35).abs() < 1e-9);
+        assert_eq!(values.len(), 120);
+    }
+}

@@ -1,0 +1,180 @@
+//! Vibration: band-limited noise and spectral lines, made at the integrator's step.
+
+use std::f64::consts::TAU;
+
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, not_negative, within};
+use crate::random::stream;
+use crate::shaping_filter::ShapedNoise;
+
+/// The most lines a vibration can have.
+const LINES: usize = 3;
+
+/// A narrow spectral line, such as a structural mode or a rotor's harmonic.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Line {
+    /// Frequency, Hz, 0.5 to 500.
+    pub frequency_hz: f64,
+    /// Amplitude, in the unit of the vibration. Default 0.
+    pub amplitude: f64,
+    /// The phase walks at random, its variance growing by this squared each second, rad/√s. Default 0.
+    pub phase_walk_rad: f64,
+}
+
+/// Vibration as noise in a band and up to three lines.
+///
+/// Of the load, `rms` and `amplitude` are shares of `load_n`; of the motor, metres at the screw.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Vibration {
+    /// Lower edge of the band, Hz, 0.5 to 500. Default 5.
+    pub low_hz: f64,
+    /// Upper edge of the band, Hz. Default 60.
+    pub high_hz: f64,
+    /// Rms of the noise in the band. Default 0.
+    pub rms: f64,
+    /// Lines; TOML knows an array of up to three tables.
+    pub lines: Lines,
+}
+
+impl Default for Vibration {
+    fn default() -> Self {
+        Self { low_hz: 5.0, high_hz: 60.0, rms: 0.0, lines: Lines::default() }
+    }
+}
+
+/// Up to three lines; an unused line has no amplitude.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<Line>", into = "Vec<Line>")]
+pub struct Lines([Line; LINES]);
+
+impl TryFrom<Vec<Line>> for Lines {
+    type Error = String;
+
+    fn try_from(lines: Vec<Line>) -> Result<Self, String> {
+        if lines.len() > LINES {
+            return Err(format!("{} lines are given; at most {LINES} are possible", lines.len()));
+        }
+        let mut all = [Line::default(); LINES];
+        all[..lines.len()].copy_from_slice(&lines);
+        Ok(Self(all))
+    }
+}
+
+impl From<Lines> for Vec<Line> {
+    fn from(lines: Lines) -> Self {
+        lines.0.into_iter().filter(|line| line.amplitude > 0.0).collect()
+    }
+}
+
+impl From<[Line; LINES]> for Lines {
+    fn from(lines: [Line; LINES]) -> Self {
+        Self(lines)
+    }
+}
+
+impl Vibration {
+    /// Noise between two frequencies.
+    pub fn band(low_hz: f64, high_hz: f64, rms: f64) -> Self {
+        Self { low_hz, high_hz, rms, lines: Lines::default() }
+    }
+
+    /// Whether there is none.
+    pub fn is_silent(&self) -> bool {
+        self.rms == 0.0 && self.lines.0.iter().all(|line| line.amplitude == 0.0)
+    }
+
+    pub(crate) fn check(&self, key: &str) -> Result<(), Error> {
+        let named = |name: &str| format!("{key}.{name}");
+        let range = "between 0.5 and 500 Hz, the lower edge first";
+        within(&named("low_hz"), self.low_hz, 0.5, 500.0, range)?;
+        within(&named("high_hz"), self.high_hz, self.low_hz, 500.0, range)?;
+        not_negative(&named("rms"), self.rms)?;
+        for line in self.lines.0.iter().filter(|line| **line != Line::default()) {
+            within(&named("lines.frequency_hz"), line.frequency_hz, 0.5, 500.0, "between 0.5 and 500 Hz")?;
+            not_negative(&named("lines.amplitude"), line.amplitude)?;
+            not_negative(&named("lines.phase_walk_rad"), line.phase_walk_rad)?;
+        }
+        Ok(())
+    }
+}
+
+/// A vibration at work: one value each step.
+#[derive(Debug)]
+pub(crate) struct VibrationSource {
+    scale: f64,
+    rms: f64,
+    noise: Option<ShapedNoise>,
+    lines: Vec<(Line, f64)>,
+    step_s: f64,
+    rng: ChaCha8Rng,
+}
+
+impl VibrationSource {
+    /// `scale` turns the vibration's unit into the unit of the values.
+    pub(crate) fn new(vibration: &Vibration, scale: f64, step_s: f64, seed: u64, name: &str) -> Self {
+        let draw = |part: &str| stream(seed, &["vibration", name, part]);
+        let mut rng = draw("lines");
+        let live = vibration.lines.0.into_iter().filter(|line| line.amplitude > 0.0);
+        let lines = live.map(|line| (line, rng.random_range(0.0..TAU))).collect();
+        let band = || ShapedNoise::band(vibration.low_hz, vibration.high_hz, step_s, draw("noise"));
+        let noise = (vibration.rms > 0.0).then(band);
+        Self { scale, rms: vibration.rms, noise, lines, step_s, rng }
+    }
+
+    /// The value at the next step; zero without vibration.
+    pub(crate) fn next(&mut self) -> f64 {
+        let noise = self.noise.as_mut().map_or(0.0, |noise| self.rms * noise.next());
+        let (step_s, rng) = (self.step_s, &mut self.rng);
+        let line = |(line, phase): &mut (Line, f64)| {
+            let value = line.amplitude * phase.sin();
+            *phase += TAU * line.frequency_hz * step_s;
+            if line.phase_walk_rad > 0.0 {
+                let white: f64 = StandardNormal.sample(rng);
+                *phase += line.phase_walk_rad * step_s.sqrt() * white;
+            }
+            value
+        };
+        self.scale * (noise + self.lines.iter_mut().map(line).sum::<f64>())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn values(vibration: &Vibration, seconds: f64, seed: u64) -> Vec<f64> {
+        let mut source = VibrationSource::new(vibration, 1.0, 1e-3, seed, "load");
+        (0..(seconds * 1e3) as usize).map(|_| source.next()).collect()
+    }
+
+    #[test]
+    fn vibration_has_the_rms_of_its_noise_and_lines_together() {
+        let line = Line { frequency_hz: 17.0, amplitude: 0.4, phase_walk_rad: 0.5 };
+        let lines = Lines::from([line, Line::default(), Line::default()]);
+        let all = values(&Vibration { rms: 0.3, lines, ..Vibration::default() }, 400.0, 1);
+        let power = all.iter().map(|v| v * v).sum::<f64>() / all.len() as f64;
+        assert!((power / (0.09 + 0.08) - 1.0).abs() < 0.03, "{power}");
+    }
+
+    /// A phase that walks: the mean of cos(φ(t) − φ(0)) is `e^(−w² t/2)`, seen in the autocorrelation.
+    #[test]
+    fn the_phase_of_a_line_walks_as_fast_as_stated() {
+        let line = Line { frequency_hz: 20.0, amplitude: 1.0, phase_walk_rad: 1.0 };
+        let lines = Lines::from([line, Line::default(), Line::default()]);
+        let all = values(&Vibration { lines, ..Vibration::default() }, 4000.0, 3);
+        let pairs = all.iter().zip(&all[1000..]);
+        let measured = 2.0 * pairs.map(|(a, b)| a * b).sum::<f64>() / (all.len() - 1000) as f64;
+        assert!((measured - (-0.5_f64).exp()).abs() < 0.05, "{measured}");
+    }
+
+    #[test]
+    fn four_lines_are_refused() {
+        assert!(Lines::try_from(vec![Line::default(); 4]).is_err());
+    }
+}

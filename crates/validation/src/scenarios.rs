@@ -1,0 +1,646 @@
+//! Classes of flights: what each breaks, and the flights drawn from it.
+//!
+//! A case is drawn from a class and an index; the same pair gives the same bits.
+
+use std::ops::Range;
+
+use rand::seq::IndexedRandom as _;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use simulator::contact::Law as ContactLaw;
+use simulator::friction::Law as FrictionLaw;
+use simulator::sensor::{NoiseColour, PeriodicError};
+use simulator::turbulence::GustForm;
+use simulator::vibration::{Line, Lines, Vibration};
+use simulator::{Flight, Plant, Profile, Sensors, simulate};
+
+/// A flight to be flown, and what its estimator is told.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// What moves.
+    pub plant: Plant,
+    /// What the flight asks of it.
+    pub profile: Profile,
+    /// What reads it.
+    pub sensors: Sensors,
+    /// Stiffness assumed over the true one.
+    pub assumed_factor: f64,
+    /// What a mapping made of the channels before the estimator saw them.
+    pub mapping: Mapping,
+    /// Seed of the flight.
+    pub seed: u64,
+}
+
+/// A flown case.
+#[derive(Debug, Clone)]
+pub struct FlownCase {
+    /// The case.
+    pub case: Case,
+    /// The log as the estimator meets it, and the truth behind it.
+    pub flight: Flight,
+    /// The distance of the flanks, extrapolated to zero load by least squares over 30 to 100 % of the
+    /// flight's P95 load; equal to the gap for linear flanks, metres.
+    pub extrapolated_gap_m: f64,
+}
+
+/// Channels as they are, or as somebody mapped them by mistake.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mapping {
+    /// As they are.
+    Right,
+    /// The load has the wrong sign.
+    LoadFlipped,
+    /// Motor and screw are exchanged.
+    Swapped,
+    /// The screw's lead is two per cent off.
+    Ratio,
+    /// The load of another actuator, in another flight.
+    OtherLoad,
+    /// A channel that repeats its first value.
+    DeadLoad,
+    /// See [`Mapping::DeadLoad`].
+    DeadScrew,
+    /// See [`Mapping::DeadLoad`].
+    DeadMotor,
+}
+
+/// Which flights a class is judged with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// One gap, errors in per cent of it.
+    Single,
+    /// One gap of zero, errors in µm.
+    Zero,
+    /// Gaps of 0 to 300 µm and all else drawn wide, errors in µm; the interval is counted here.
+    Wide,
+    /// The same, under laws that the estimator does not contain.
+    Foreign,
+    /// Gap and flight drawn, one assumption broken, errors in µm.
+    Drawn,
+    /// Flights that cannot show a gap: to be refused with this code.
+    Blind(&'static str),
+}
+
+/// A class of flights.
+#[derive(Debug)]
+pub struct Class {
+    /// Its name, unique.
+    pub name: &'static str,
+    /// How it is judged.
+    pub kind: Kind,
+    gap_m: f64,
+    change: fn(&mut Case, &mut ChaCha8Rng),
+}
+
+/// Every class.
+pub fn classes() -> &'static [Class] {
+    CLASSES
+}
+
+/// The class of a name.
+pub fn class(name: &str) -> Option<&'static Class> {
+    CLASSES.iter().find(|class| class.name == name)
+}
+
+const UM: f64 = 1e-6;
+
+const fn of_gap(name: &'static str, gap_um: f64, change: fn(&mut Case, &mut ChaCha8Rng)) -> Class {
+    Class { name, kind: Kind::Single, gap_m: gap_um * UM, change }
+}
+
+const fn single(name: &'static str, change: fn(&mut Case, &mut ChaCha8Rng)) -> Class {
+    of_gap(name, 100.0, change)
+}
+
+const fn blind(name: &'static str, code: &'static str, change: fn(&mut Case, &mut ChaCha8Rng)) -> Class {
+    Class { name, kind: Kind::Blind(code), gap_m: 100.0 * UM, change }
+}
+
+const fn foreign(name: &'static str, change: fn(&mut Case, &mut ChaCha8Rng)) -> Class {
+    Class { name, kind: Kind::Foreign, gap_m: 0.0, change }
+}
+
+const fn drawn(name: &'static str, change: fn(&mut Case, &mut ChaCha8Rng)) -> Class {
+    Class { name, kind: Kind::Drawn, gap_m: 0.0, change }
+}
+
+static CLASSES: &[Class] = &[
+    single("nominal", |_, _| ()),
+    single("stiffness assumed 30 % high", |c, _| c.assumed_factor = 1.3),
+    single("stiffness assumed 30 % low", |c, _| c.assumed_factor = 0.7),
+    single("load cell reads 5 % high", |c, _| c.sensors.load.gain_error = 0.05),
+    single("friction × 8", |c, _| c.plant = c.plant.with_friction_factor(8.0)),
+    single("screw channel 5 ms late", |c, _| c.sensors.screw.delay_s = 5e-3),
+    single("load channel 5 ms late", |c, _| c.sensors.load.delay_s = 5e-3),
+    single("spikes of 2 mm", |c, _| {
+        (c.sensors.screw.spikes_per_minute, c.sensors.screw.spike) = (1.0, 2e-3);
+    }),
+    single("5 % of samples missing", |c, _| c.sensors.screw.dropout_share = 0.05),
+    single("screw channel freezes for 2 s", |c, _| {
+        (c.sensors.screw.freezes_per_minute, c.sensors.screw.freeze_s) = (1.0, 2.0);
+    }),
+    single("drift of 50 µm", |c, _| c.sensors.screw.drift = 50.0 * UM),
+    single("transducer bent by 15 µm", |c, _| c.sensors.screw.nonlinearity = 15.0 * UM),
+    single("airload of 800 N", |c, rng| {
+        mixture(c, rng);
+        c.profile.load_n = 800.0;
+    }),
+    single("mixture, 100 µm", mixture),
+    Class { name: "mixture, 30 µm", kind: Kind::Single, gap_m: 30.0 * UM, change: mixture },
+    Class { name: "mixture, no gap", kind: Kind::Zero, gap_m: 0.0, change: mixture },
+    Class { name: "wide", kind: Kind::Wide, gap_m: 0.0, change: wide },
+    foreign("wide, Stribeck friction", |c, rng| {
+        wide(c, rng);
+        let ratio = rng.random_range(1.1..1.6);
+        c.plant.friction_law = FrictionLaw::Stribeck { ratio, speed_m_per_s: rng.random_range(1e-3..1e-2) };
+    }),
+    foreign("wide, pre-sliding friction", |c, rng| {
+        wide(c, rng);
+        c.plant.friction_law = FrictionLaw::Presliding { travel_m: rng.random_range(2e-6..20e-6) };
+    }),
+    single("soft flanks, 20 µm deep", |c, rng| {
+        mixture(c, rng);
+        c.plant.contact.law = ContactLaw::Soft { share: 0.4, depth_m: 20.0 * UM };
+    }),
+    single("soft flanks, 100 µm deep", |c, rng| {
+        mixture(c, rng);
+        c.plant.contact.law = ContactLaw::Soft { share: 0.4, depth_m: 100.0 * UM };
+    }),
+    single("flanks partly Hertzian", |c, rng| {
+        mixture(c, rng);
+        c.plant.contact.law = ContactLaw::Hertz { share: 0.3, reference_m: 100.0 * UM };
+    }),
+    single("Hertzian flanks", |c, rng| {
+        mixture(c, rng);
+        c.plant.contact.law = ContactLaw::Hertz { share: 1.0, reference_m: 100.0 * UM };
+    }),
+    of_gap("vibration of 0 N, 80 µm", 80.0, vibration::<0>),
+    of_gap("vibration of 200 N, 80 µm", 80.0, vibration::<200>),
+    of_gap("vibration of 500 N, 80 µm", 80.0, vibration::<500>),
+    of_gap("vibration of 1000 N, 80 µm", 80.0, vibration::<1000>),
+    of_gap("vibration of 2000 N, 80 µm", 80.0, vibration::<2000>),
+    of_gap("vibration of 0 N, 25 µm", 25.0, vibration::<0>),
+    of_gap("vibration of 200 N, 25 µm", 25.0, vibration::<200>),
+    of_gap("vibration of 500 N, 25 µm", 25.0, vibration::<500>),
+    of_gap("vibration of 1000 N, 25 µm", 25.0, vibration::<1000>),
+    of_gap("vibration of 2000 N, 25 µm", 25.0, vibration::<2000>),
+    drawn("no fault", |_, _| ()),
+    drawn("load-cell zero", load_zero),
+    drawn("load-cell zero that drifts", |c, rng| {
+        c.sensors.load.drift = either(rng) * rng.random_range(0.02..0.1) * c.profile.load_n;
+    }),
+    drawn("load-cell lag", |c, rng| c.sensors.load.lag_s = log_uniform(rng, 1e-3..30e-3)),
+    drawn("load-cell hysteresis", hysteresis),
+    drawn("buffet", buffet),
+    drawn("structural lines", lines),
+    drawn("turbulence", turbulence),
+    drawn("motor vibration", motor_vibration),
+    drawn("averaging channels", |c, _| {
+        for channel in [&mut c.sensors.motor, &mut c.sensors.screw, &mut c.sensors.load] {
+            channel.box_average = true;
+        }
+    }),
+    drawn("averaging load cell", |c, _| c.sensors.load.box_average = true),
+    drawn("slow load channel", |c, rng| c.sensors.load.rate_hz = log_uniform(rng, 10.0..62.5)),
+    drawn("slow screw channel", |c, rng| c.sensors.screw.rate_hz = log_uniform(rng, 20.0..125.0)),
+    drawn("periodic position error", periodic),
+    drawn("coloured sensor noise", coloured),
+    drawn("Stribeck friction", stribeck),
+    drawn("pre-sliding friction", |c, rng| {
+        c.plant.friction_law = FrictionLaw::Presliding { travel_m: log_uniform(rng, 1e-6..20e-6) };
+    }),
+    drawn("LuGre friction", lu_gre),
+    drawn("power-flow friction", power_flow),
+    drawn("asymmetric friction", |c, rng| {
+        c.plant.motor_friction.asymmetry = rng.random_range(-0.4..0.4);
+        c.plant.screw_friction.asymmetry = rng.random_range(-0.4..0.4);
+    }),
+    drawn("heavy friction", |c, rng| {
+        c.plant = Plant { contact: c.plant.contact, ..Plant::default() }
+            .with_friction_factor(rng.random_range(3.0..8.0));
+    }),
+    drawn("grease film", grease),
+    drawn("few reversals", |c, rng| c.profile.reversals = Some(rng.random_range(1..=6))),
+    drawn("long rests", |c, rng| {
+        (c.profile.rest_share, c.profile.rest_s) = (rng.random_range(0.4..0.85), rng.random_range(8.0..30.0));
+    }),
+    drawn("stiffness that moves", moving_stiffness),
+    drawn("unequal flanks", |c, rng| {
+        c.plant.contact.lower_stiffness_factor = log_uniform(rng, 0.7..1.4);
+    }),
+    drawn("soft flanks, bilinear", |c, rng| soft(c, rng, bilinear)),
+    drawn("soft flanks, Hertz", |c, rng| soft(c, rng, hertz)),
+    drawn("soft flanks, exponential toe", |c, rng| soft(c, rng, toe)),
+    Class {
+        name: "zero gap, drawn wide",
+        kind: Kind::Drawn,
+        gap_m: 0.0,
+        change: |c, rng| {
+            everything(c, rng);
+            c.plant.contact.gap_m = 0.0;
+        },
+    },
+    drawn("everything, hard flanks", everything),
+    drawn("everything, soft flanks", |c, rng| {
+        everything(c, rng);
+        let law = *[bilinear as LawDraw, hertz, toe].choose(rng).unwrap_or(&(toe as LawDraw));
+        soft(c, rng, law);
+    }),
+    blind("the load never reverses", "no_load_reversal", |c, rng| {
+        mixture(c, rng);
+        c.profile.no_reversal = true;
+    }),
+    blind("load sign flipped", "load_sign_flipped", |c, rng| {
+        mixture(c, rng);
+        c.mapping = Mapping::LoadFlipped;
+    }),
+    blind("positions swapped", "positions_swapped", |c, rng| {
+        mixture(c, rng);
+        c.mapping = Mapping::Swapped;
+    }),
+    blind("screw position 2 % off its lead", "position_ratio", |c, rng| {
+        mixture(c, rng);
+        c.mapping = Mapping::Ratio;
+    }),
+    blind("10 samples a second", "rate_too_low", |c, rng| {
+        mixture(c, rng);
+        c.profile.sample_rate_hz = 10.0;
+    }),
+    blind("eight seconds", "too_short", |c, rng| {
+        mixture(c, rng);
+        c.profile.duration_s = 8.0;
+    }),
+    blind("airload below friction", "load_too_small", |c, rng| {
+        mixture(c, rng);
+        c.profile.load_n = 100.0;
+    }),
+    blind("another actuator's load", "motion_unexplained", |c, rng| {
+        mixture(c, rng);
+        c.mapping = Mapping::OtherLoad;
+    }),
+    blind("the motor hardly moves", "travel_too_small", |c, rng| {
+        mixture(c, rng);
+        (c.profile.stroke_m, c.profile.stick_share, c.profile.trim_share) = (2e-5, 0.01, 0.003);
+    }),
+    blind("load cell dead", "channel_constant", |c, rng| {
+        mixture(c, rng);
+        c.mapping = Mapping::DeadLoad;
+    }),
+    blind("screw channel dead", "channel_constant", |c, rng| {
+        mixture(c, rng);
+        c.mapping = Mapping::DeadScrew;
+    }),
+    blind("motor channel dead", "channel_constant", |c, rng| {
+        mixture(c, rng);
+        c.mapping = Mapping::DeadMotor;
+    }),
+];
+
+/// Several small faults at once, as in service.
+fn mixture(case: &mut Case, rng: &mut ChaCha8Rng) {
+    case.assumed_factor = rng.random_range(0.85..1.15);
+    let sensors = &mut case.sensors;
+    sensors.load.gain_error = rng.random_range(-0.02..0.02);
+    sensors.screw.delay_s = rng.random_range(-1e-3..1e-3);
+    sensors.screw.drift = rng.random_range(-20e-6..20e-6);
+    sensors.screw.nonlinearity = rng.random_range(-15e-6..15e-6);
+    case.plant = case.plant.with_friction_factor(rng.random_range(0.7..2.7));
+}
+
+/// Everything over wide ranges: plant, sensors, flight and what is assumed.
+fn wide(case: &mut Case, rng: &mut ChaCha8Rng) {
+    mixture(case, rng);
+    case.plant.contact.gap_m = rng.random_range(0.0..300e-6);
+    case.plant.contact.stiffness_n_per_m = log_uniform(rng, 3e7..1e8);
+    case.assumed_factor = rng.random_range(0.7..1.3);
+    case.plant = Plant { contact: case.plant.contact, ..Plant::default() }
+        .with_friction_factor(log_uniform(rng, 0.3..8.0));
+    let sensors = &mut case.sensors;
+    sensors.load.gain_error = rng.random_range(-0.05..0.05);
+    sensors.load.delay_s = rng.random_range(-2e-3..2e-3);
+    sensors.screw.noise_rms = log_uniform(rng, 1e-6..20e-6);
+    sensors.screw.delay_s = rng.random_range(-5e-3..5e-3);
+    sensors.screw.drift = rng.random_range(-50e-6..50e-6);
+    case.profile = Profile {
+        duration_s: log_uniform(rng, 30.0..7200.0),
+        sample_rate_hz: log_uniform(rng, 50.0..1000.0),
+        load_n: log_uniform(rng, 4e3..15e3),
+        gust_share: rng.random_range(0.15..0.4),
+        gust_hz: log_uniform(rng, 0.3..2.0),
+        trim_share: rng.random_range(0.003..0.03),
+        stick_share: rng.random_range(0.05..0.2),
+        hinge_share: rng.random_range(0.1..0.4),
+        no_reversal: false,
+        ..case.profile
+    };
+}
+
+fn log_uniform(rng: &mut ChaCha8Rng, range: Range<f64>) -> f64 {
+    range.start * (range.end / range.start).powf(rng.random())
+}
+
+/// One sign or the other.
+fn either(rng: &mut ChaCha8Rng) -> f64 {
+    if rng.random() { 1.0 } else { -1.0 }
+}
+
+/// Small faults of service, gap, load and sample rate drawn: what every drawn class starts from.
+fn service(case: &mut Case, rng: &mut ChaCha8Rng) {
+    mixture(case, rng);
+    case.plant.contact.gap_m = log_uniform(rng, 5e-6..250e-6);
+    case.plant.contact.stiffness_n_per_m = log_uniform(rng, 3e7..1e8);
+    case.profile.load_n = rng.random_range(5e3..10e3);
+    case.profile.sample_rate_hz = log_uniform(rng, 50.0..1000.0);
+}
+
+/// ± 7 kN and vibration of 5 to 60 Hz.
+fn vibration<const RMS_N: u32>(case: &mut Case, rng: &mut ChaCha8Rng) {
+    mixture(case, rng);
+    case.profile.load_n = 7e3;
+    case.profile.buffet = Vibration::band(5.0, 60.0, f64::from(RMS_N) / 7e3);
+}
+
+fn load_zero(case: &mut Case, rng: &mut ChaCha8Rng) {
+    let sizes_n = [0.0, 200.0, 400.0, 800.0, 0.1 * case.profile.load_n];
+    case.sensors.load.bias = either(rng) * sizes_n[rng.random_range(0..sizes_n.len())];
+}
+
+fn hysteresis(case: &mut Case, rng: &mut ChaCha8Rng) {
+    let load = &mut case.sensors.load;
+    load.hysteresis = log_uniform(rng, 1e-3..2e-2) * case.profile.load_n;
+    load.hysteresis_length = rng.random_range(0.05..0.3) * case.profile.load_n;
+}
+
+fn buffet(case: &mut Case, rng: &mut ChaCha8Rng) {
+    let low_hz = log_uniform(rng, 5.0..50.0);
+    let high_hz = log_uniform(rng, 1.3 * low_hz..101.0);
+    case.profile.buffet = Vibration::band(low_hz, high_hz, rng.random_range(0.0..0.3));
+}
+
+fn lines(case: &mut Case, rng: &mut ChaCha8Rng) {
+    let count = rng.random_range(1..=3);
+    let lines: [Line; 3] = std::array::from_fn(|k| Line {
+        frequency_hz: log_uniform(rng, 8.0..60.0),
+        amplitude: if k < count { log_uniform(rng, 0.01..0.2) } else { 0.0 },
+        phase_walk_rad: rng.random_range(0.0..1.0),
+    });
+    case.profile.buffet.lines = Lines::from(lines);
+}
+
+fn turbulence(case: &mut Case, rng: &mut ChaCha8Rng) {
+    let profile = &mut case.profile;
+    profile.gust_form = if rng.random() { GustForm::Dryden } else { GustForm::VonKarman };
+    profile.gust_share = rng.random_range(0.15..0.5);
+    profile.gust_hz = log_uniform(rng, 0.05..3.0);
+}
+
+fn motor_vibration(case: &mut Case, rng: &mut ChaCha8Rng) {
+    let low_hz = log_uniform(rng, 5.0..40.0);
+    case.profile.motor_vibration =
+        Vibration::band(low_hz, log_uniform(rng, 1.3 * low_hz..100.0), log_uniform(rng, 1e-6..30e-6));
+}
+
+fn periodic(case: &mut Case, rng: &mut ChaCha8Rng) {
+    let mut error = |amplitude_m: Range<f64>, period: f64| PeriodicError {
+        amplitude: log_uniform(rng, amplitude_m),
+        period,
+        phase_rad: rng.random_range(0.0..std::f64::consts::TAU),
+    };
+    let none = PeriodicError::default();
+    // Once and four times a turn of the resolver; a rack or a second gear of the screw transducer.
+    case.sensors.motor.periodic = [error(0.5e-6..5e-6, 5e-3), error(0.2e-6..2e-6, 1.25e-3), none].into();
+    case.sensors.screw.periodic = [error(0.5e-6..8e-6, 3.1e-3), none, none].into();
+}
+
+fn coloured(case: &mut Case, rng: &mut ChaCha8Rng) {
+    let colour = if rng.random() { NoiseColour::FirstOrder } else { NoiseColour::Flicker };
+    for (channel, range) in [(&mut case.sensors.screw, 1e-6..6e-6), (&mut case.sensors.load, 20.0..150.0)] {
+        channel.coloured_form = colour;
+        channel.coloured_rms = log_uniform(rng, range);
+        channel.coloured_hz = log_uniform(rng, 0.05..3.0);
+    }
+}
+
+fn stribeck(case: &mut Case, rng: &mut ChaCha8Rng) {
+    let ratio = rng.random_range(1.1..2.0);
+    case.plant.friction_law = FrictionLaw::Stribeck { ratio, speed_m_per_s: log_uniform(rng, 1e-3..1e-2) };
+}
+
+fn lu_gre(case: &mut Case, rng: &mut ChaCha8Rng) {
+    case.plant.friction_law = FrictionLaw::LuGre {
+        travel_m: log_uniform(rng, 2e-6..20e-6),
+        ratio: rng.random_range(1.0..1.6),
+        speed_m_per_s: log_uniform(rng, 1e-3..1e-2),
+        damping_n_s_per_m: log_uniform(rng, 300.0..1e4),
+    };
+}
+
+/// A screw loses more while it drives the load than while the load drives it, or the other way round.
+fn power_flow(case: &mut Case, rng: &mut ChaCha8Rng) {
+    for friction in [&mut case.plant.motor_friction, &mut case.plant.screw_friction] {
+        friction.load_share = rng.random_range(0.0..0.12);
+        friction.backdriven_load_share = Some(rng.random_range(0.0..0.12));
+    }
+}
+
+fn grease(case: &mut Case, rng: &mut ChaCha8Rng) {
+    let (factor, cold_factor) = (log_uniform(rng, 1.0..10.0), log_uniform(rng, 1.0..6.0));
+    let (grease_m_per_s, warm_up_s) = (log_uniform(rng, 5e-4..1e-2), log_uniform(rng, 30.0..600.0));
+    for friction in [&mut case.plant.motor_friction, &mut case.plant.screw_friction] {
+        friction.viscous_n_s_per_m *= factor;
+        friction.grease_n = log_uniform(rng, 30.0..400.0);
+        (friction.grease_m_per_s, friction.cold_factor, friction.warm_up_s) =
+            (grease_m_per_s, cold_factor, warm_up_s);
+    }
+}
+
+fn moving_stiffness(case: &mut Case, rng: &mut ChaCha8Rng) {
+    case.plant.contact.stiffness_drift = rng.random_range(-0.1..0.1);
+    case.plant.contact.stiffness_phase_factors = std::array::from_fn(|_| rng.random_range(0.93..1.07));
+}
+
+/// Draws the law of one flank.
+type LawDraw = fn(&mut ChaCha8Rng) -> ContactLaw;
+
+fn soft(case: &mut Case, rng: &mut ChaCha8Rng, law: LawDraw) {
+    case.plant.contact.law = law(rng);
+    case.plant.contact.lower_law = Some(law(rng));
+}
+
+fn bilinear(rng: &mut ChaCha8Rng) -> ContactLaw {
+    ContactLaw::Soft { share: rng.random_range(0.2..0.8), depth_m: log_uniform(rng, 6e-6..80e-6) }
+}
+
+fn hertz(rng: &mut ChaCha8Rng) -> ContactLaw {
+    ContactLaw::Hertz { share: rng.random_range(0.2..1.0), reference_m: log_uniform(rng, 50e-6..150e-6) }
+}
+
+fn toe(rng: &mut ChaCha8Rng) -> ContactLaw {
+    ContactLaw::Toe { share: rng.random_range(0.1..0.7), depth_m: log_uniform(rng, 3e-6..40e-6) }
+}
+
+/// Every assumption may be broken, several at a time; flanks stay hard.
+fn everything(case: &mut Case, rng: &mut ChaCha8Rng) {
+    wide(case, rng);
+    case.plant.contact.gap_m = if rng.random_bool(0.1) { 0.0 } else { rng.random_range(2e-6..300e-6) };
+    case.plant.contact.lower_stiffness_factor = log_uniform(rng, 0.9..1.1);
+    case.profile.duration_s = log_uniform(rng, 60.0..300.0);
+    match rng.random_range(0..4) {
+        0 => stribeck(case, rng),
+        1 => lu_gre(case, rng),
+        2 => power_flow(case, rng),
+        _ => (),
+    }
+    case.sensors.load.bias = rng.random_range(-800.0..800.0);
+    if rng.random() {
+        (case.sensors.load.delay_s, case.sensors.load.lag_s) = (0.0, log_uniform(rng, 1e-3..20e-3));
+    }
+    const FAULTS: [fn(&mut Case, &mut ChaCha8Rng); 9] = [
+        buffet,
+        lines,
+        turbulence,
+        motor_vibration,
+        hysteresis,
+        periodic,
+        coloured,
+        |case, rng| case.profile.reversals = Some(rng.random_range(2..=8)),
+        |case, rng| case.profile.rest_share = rng.random_range(0.2..0.7),
+    ];
+    for fault in FAULTS {
+        if rng.random_bool(0.2) {
+            fault(case, rng);
+        }
+    }
+}
+
+fn repeat(channel: &mut [f64]) {
+    let first = channel.first().copied().unwrap_or(0.0);
+    channel.fill(first);
+}
+
+/// A seed of its own for a class of a name (FNV-1a).
+fn name_seed(name: &str) -> u64 {
+    name.bytes()
+        .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+impl Class {
+    /// The case of an index; the same index gives the same case.
+    pub fn case(&self, index: u64) -> Case {
+        let own = if self.kind == Kind::Drawn { name_seed(self.name) } else { 0 };
+        let mut rng = ChaCha8Rng::seed_from_u64(0x5eed ^ own ^ (index << 8));
+        let mut case = Case {
+            plant: Plant::default().with_gap_m(self.gap_m),
+            profile: Profile { duration_s: 120.0, ..Profile::default() },
+            sensors: Sensors::default(),
+            assumed_factor: 1.0,
+            mapping: Mapping::Right,
+            seed: (own >> 20) + 1000 + index,
+        };
+        case.plant.contact.offset_m = rng.random_range(-3e-4..3e-4);
+        if self.kind == Kind::Drawn {
+            service(&mut case, &mut rng);
+        }
+        (self.change)(&mut case, &mut rng);
+        case
+    }
+
+    /// Flies the flight of an index.
+    ///
+    /// # Errors
+    /// [`simulator::Error::Value`] for a drawn parameter outside its range.
+    pub fn fly(&self, index: u64) -> Result<FlownCase, simulator::Error> {
+        self.case(index).fly()
+    }
+}
+
+/// The band of loads over which flanks are extrapolated, as shares of the P95 load.
+const STIFF_BAND: (f64, f64) = (0.3, 1.0);
+
+impl Case {
+    /// The stiffness the estimator is told, N/m.
+    pub fn assumed_stiffness_n_per_m(&self) -> f64 {
+        self.plant.contact.stiffness_n_per_m * self.assumed_factor
+    }
+
+    /// Flies the case.
+    ///
+    /// # Errors
+    /// [`simulator::Error::Value`] for a parameter outside its range.
+    pub fn fly(self) -> Result<FlownCase, simulator::Error> {
+        let mut flight = simulate(&self.plant, &self.profile, &self.sensors, self.seed)?;
+        let p95_n = p95(flight.load_n.iter().map(|f| (f - self.sensors.load.bias).abs()));
+        match self.mapping {
+            Mapping::Right => (),
+            Mapping::LoadFlipped => flight.load_n.iter_mut().for_each(|f| *f = -*f),
+            Mapping::Swapped => std::mem::swap(&mut flight.motor_m, &mut flight.screw_m),
+            Mapping::Ratio => flight.screw_m.iter_mut().for_each(|x| *x *= 1.02),
+            Mapping::OtherLoad => {
+                let seed = self.seed + 899_000;
+                flight.load_n = simulate(&self.plant, &self.profile, &self.sensors, seed)?.load_n;
+            }
+            Mapping::DeadLoad => repeat(&mut flight.load_n),
+            Mapping::DeadScrew => repeat(&mut flight.screw_m),
+            Mapping::DeadMotor => repeat(&mut flight.motor_m),
+        }
+        let contact = &self.plant.contact;
+        let is_hard = matches!(contact.law, ContactLaw::Linear)
+            && matches!(contact.lower_law, None | Some(ContactLaw::Linear));
+        let extrapolated_gap_m = if is_hard {
+            contact.gap_m
+        } else {
+            contact.extrapolated_gap_m(STIFF_BAND.0 * p95_n, STIFF_BAND.1 * p95_n)
+        };
+        Ok(FlownCase { flight, extrapolated_gap_m, case: self })
+    }
+}
+
+/// The 95 % quantile of the finite values; zero without any.
+fn p95(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    sorted.get(sorted.len() * 95 / 100).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_class_has_a_name_of_its_own_and_cases_that_can_be_flown() {
+        for (k, class) in CLASSES.iter().enumerate() {
+            assert!(CLASSES[..k].iter().all(|other| other.name != class.name), "{}", class.name);
+            for index in 0..50 {
+                let case = class.case(index);
+                let checks = [case.plant.check(), case.profile.check(), case.sensors.check()];
+                for check in checks {
+                    assert!(check.is_ok(), "{} {index}: {check:?}", class.name);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_case_is_the_same_each_time_and_another_index_gives_another() {
+        let fly = |index| {
+            let mut case = class("everything, hard flanks").unwrap().case(index);
+            case.profile.duration_s = 5.0;
+            case.fly().unwrap().flight
+        };
+        assert_eq!(fly(3).screw_m.len(), fly(3).screw_m.len());
+        assert_eq!(fly(3), fly(3));
+        assert_ne!(fly(3), fly(4));
+    }
+
+    #[test]
+    fn a_toe_below_the_band_adds_to_the_gap_and_hard_flanks_do_not() {
+        let mut case = class("soft flanks, 20 µm deep").unwrap().case(0);
+        case.profile.duration_s = 60.0;
+        let flown = case.fly().unwrap();
+        assert!((flown.extrapolated_gap_m - flown.flight.gap_m - 24e-6).abs() < 1e-9);
+        let mut hard = class("nominal").unwrap().case(0);
+        hard.profile.duration_s = 5.0;
+        let flown = hard.fly().unwrap();
+        assert!((flown.extrapolated_gap_m - flown.flight.gap_m).abs() < 1e-15);
+    }
+}
