@@ -241,10 +241,10 @@ impl Channel {
         }
         let corners: Vec<f64> = match self.coloured_form {
             NoiseColour::FirstOrder => vec![self.coloured_hz],
-            NoiseColour::Flicker => (0..)
-                .map(|k| self.coloured_hz * 10f64.powf(0.5 * f64::from(k)))
-                .take_while(|corner| *corner <= self.coloured_hz.max(0.5 * rate_hz))
-                .collect(),
+            NoiseColour::Flicker => {
+                let half_decades = (2.0 * (0.5 * rate_hz / self.coloured_hz).log10()).max(0.0) as i32;
+                (0..=half_decades).map(|k| self.coloured_hz * 10f64.powf(0.5 * f64::from(k))).collect()
+            }
         };
         let rms = self.coloured_rms / (corners.len() as f64).sqrt();
         let mut sum = vec![0.0; samples];

@@ -18,7 +18,8 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::methods::{load_lines_m, spread_m};
 
-/// One log: degrees.
+/// The results of every method for one log, degrees.
+#[derive(Debug, Clone, Copy)]
 pub struct GearBenchLog {
     /// Play of this phase as its authors measured it, over three places of the output.
     pub authors_deg: f64,
@@ -36,6 +37,9 @@ const STIFFNESS_NM_PER_RAD: f64 = 680.0;
 const LAST_SMALL_RAMP: f64 = 4.0;
 
 /// Reads every log of a folder that its `manifest.csv` lists.
+///
+/// # Errors
+/// A file that cannot be read or lacks a column, as text.
 pub fn gear_bench_logs(folder: &Path) -> Result<Vec<GearBenchLog>, String> {
     let manifest = folder.join("manifest.csv");
     let text = std::fs::read_to_string(&manifest).map_err(|e| format!("{}: {e}", manifest.display()))?;

@@ -101,7 +101,7 @@ fn fly(wanted: &[&Class], args: &Args) -> Result<Vec<ErrorStats>, String> {
         .map(|scenario| {
             let (mine, others) = rest.split_at(count(scenario) as usize);
             rest = others;
-            ErrorStats::of(scenario, mine)
+            ErrorStats::new(scenario, mine)
         })
         .collect())
 }

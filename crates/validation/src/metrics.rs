@@ -1,19 +1,24 @@
-//! Errors of many flights as a few numbers, and how many flights those numbers stand on.
+//! Error statistics of many flights, with the number of flights behind each.
 
 use std::collections::BTreeMap;
 
 use crate::methods::{METHODS, MethodResults};
 use crate::scenarios::{Class, Kind};
 
-/// One scenario, told in numbers.
+/// The errors of every method over the flights of one class.
+#[derive(Debug, Clone)]
 pub struct ErrorStats {
+    /// The class.
     pub name: &'static str,
+    /// How it is judged.
     pub kind: Kind,
+    /// Flights flown.
     pub flights: usize,
-    /// Errors of each method, in the scenario's unit.
+    /// Errors of each method, in the unit of the class.
     pub errors: [Errors; METHODS.len()],
-    /// Flights that contact regression gave a number, and those whose 90 % interval holds the truth.
+    /// Flights with an estimate of contact regression.
     pub estimated: usize,
+    /// Flights whose 90 % interval holds the truth.
     pub held: usize,
     /// How often each code was given, as refusal or flag.
     pub codes: BTreeMap<&'static str, usize>,
@@ -26,9 +31,13 @@ pub struct ErrorStats {
 /// Absolute errors: median, 95 % quantile, worst, and how many there are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
+    /// Median.
     pub median: f64,
+    /// 95 % quantile.
     pub p95: f64,
+    /// Maximum.
     pub worst: f64,
+    /// Flights with an estimate.
     pub count: usize,
 }
 
@@ -48,38 +57,41 @@ impl Errors {
 const NORMAL_95: f64 = 1.644_853_626_951_472_2;
 
 impl Kind {
-    /// The unit errors are told in.
+    /// The unit of the errors.
     pub fn unit(self) -> &'static str {
         if self == Self::Single { "%" } else { "µm" }
     }
 }
 
 impl ErrorStats {
-    pub fn of(scenario: &Class, answers: &[MethodResults]) -> Self {
-        let size = |a: &MethodResults, said_m: f64| {
-            let unit_m = if scenario.kind == Kind::Single { 0.01 * a.truth_m } else { 1e-6 };
-            (said_m - a.truth_m).abs() / unit_m
+    /// Summarises the results of a class.
+    pub fn new(class: &Class, results: &[MethodResults]) -> Self {
+        let size = |a: &MethodResults, estimate_m: f64| {
+            let unit_m = if class.kind == Kind::Single { 0.01 * a.truth_m } else { 1e-6 };
+            (estimate_m - a.truth_m).abs() / unit_m
         };
         let errors = std::array::from_fn(|method| {
-            Errors::of(answers.iter().map(|a| size(a, a.by_method_m[method])).collect())
+            Errors::of(results.iter().map(|a| size(a, a.by_method_m[method])).collect())
         });
-        let said = || answers.iter().filter_map(|a| a.contact.map(|c| (a.truth_m, c)));
+        let estimates = || results.iter().filter_map(|a| a.contact.map(|c| (a.truth_m, c)));
         let mut codes = BTreeMap::new();
-        for code in answers.iter().flat_map(|a| &a.codes) {
+        for code in results.iter().flat_map(|a| &a.codes) {
             *codes.entry(*code).or_insert(0) += 1;
         }
         Self {
-            name: scenario.name,
-            kind: scenario.kind,
-            flights: answers.len(),
+            name: class.name,
+            kind: class.kind,
+            flights: results.len(),
             errors,
-            estimated: said().count(),
-            held: said().filter(|(truth_m, (_, low_m, high_m))| (low_m..=high_m).contains(&truth_m)).count(),
+            estimated: estimates().count(),
+            held: estimates()
+                .filter(|(truth_m, (_, low_m, high_m))| (low_m..=high_m).contains(&truth_m))
+                .count(),
             codes,
-            scatter_um: said()
+            scatter_um: estimates()
                 .map(|(truth_m, (gap_m, ..))| (truth_m * 1e6, (gap_m - truth_m) * 1e6))
                 .collect(),
-            deviations: said()
+            deviations: estimates()
                 .map(|(truth_m, (gap_m, low_m, high_m))| {
                     (gap_m - truth_m) * 2.0 * NORMAL_95 / (high_m - low_m)
                 })
@@ -87,17 +99,17 @@ impl ErrorStats {
         }
     }
 
-    /// Refused though the flight shows its gap.
+    /// Flights refused although the gap can be seen.
     pub fn false_refusals(&self) -> usize {
         if self.must_refuse().is_some() { 0 } else { self.flights - self.estimated }
     }
 
-    /// Given a number though the flight cannot show one.
+    /// Flights with an estimate although the gap cannot be seen.
     pub fn missed_refusals(&self) -> usize {
         if self.must_refuse().is_some() { self.estimated } else { 0 }
     }
 
-    /// The code to be refused with.
+    /// The refusal code expected.
     pub fn must_refuse(&self) -> Option<&'static str> {
         match self.kind {
             Kind::Blind(code) => Some(code),
@@ -126,14 +138,14 @@ mod tests {
 
     /// 90 of 100: Wilson's 90 % interval by R's `binom::binom.confint(90, 100, 0.9, "wilson")`.
     #[test]
-    fn a_share_is_told_with_its_bounds() {
+    fn a_share_has_its_wilson_bounds() {
         let (share, low, high) = wilson(90, 100);
         assert!((share - 0.9).abs() < 1e-12);
         assert!((low - 0.8395).abs() < 1e-3 && (high - 0.9394).abs() < 1e-3, "{low} {high}");
     }
 
     #[test]
-    fn quantiles_pass_over_what_was_not_said() {
+    fn quantiles_ignore_missing_estimates() {
         let errors = Errors::of((0..=100).map(f64::from).chain([f64::NAN]).collect());
         assert_eq!((errors.median, errors.p95, errors.worst, errors.count), (50.0, 95.0, 100.0, 101));
         assert!(Errors::of(Vec::new()).median.is_nan());

@@ -18,13 +18,17 @@ const COLOURS: [RGBColor; METHODS.len()] = [
 /// Errors smaller than this are drawn at the edge.
 const LEAST: f64 = 0.03;
 
-type Drawn = Result<String, DrawingAreaErrorKind<std::io::Error>>;
+/// An SVG drawing.
+pub type Drawn = Result<String, DrawingAreaErrorKind<std::io::Error>>;
 
 fn text(size: u32) -> TextStyle<'static> {
     ("sans-serif", size).into_font().color(&INK)
 }
 
 /// Median (dot) and 95 % quantile (end of the bar) of each method in each scenario with one gap.
+///
+/// # Errors
+/// The drawing backend fails.
 pub fn errors(tallies: &[ErrorStats]) -> Drawn {
     let rows: Vec<&ErrorStats> = tallies.iter().filter(|t| t.kind == Kind::Single).rev().collect();
     let mut svg = String::new();
@@ -74,6 +78,9 @@ pub fn errors(tallies: &[ErrorStats]) -> Drawn {
 }
 
 /// Contact regression's error against the true gap, for each drawn flight.
+///
+/// # Errors
+/// The drawing backend fails.
 pub fn scatter(tallies: &[ErrorStats]) -> Drawn {
     let rows: Vec<&ErrorStats> =
         tallies.iter().filter(|t| matches!(t.kind, Kind::Wide | Kind::Foreign)).collect();
@@ -109,6 +116,9 @@ pub fn scatter(tallies: &[ErrorStats]) -> Drawn {
 }
 
 /// Share of intervals that hold against the share they promise, from error over standard error.
+///
+/// # Errors
+/// The drawing backend fails.
 pub fn calibration(tallies: &[ErrorStats]) -> Drawn {
     let mut svg = String::new();
     {

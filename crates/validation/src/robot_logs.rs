@@ -9,21 +9,31 @@ use records::{Installations, PartNumber};
 
 use crate::methods::{load_lines_m, spread_m};
 
-/// The results of every method for a log, in degrees.
+/// The results of every method for a log; degrees unless a name says otherwise, NaN where refused.
+#[derive(Debug, Clone)]
 pub struct RobotRow {
+    /// Name of the log.
     pub log: String,
-    /// Degrees; NaN where refused.
+    /// Contact regression.
     pub gap_deg: f64,
+    /// Its standard error.
     pub se_deg: f64,
+    /// The paper's statistic.
     pub midrange_deg: f64,
+    /// Load lines.
     pub lines_deg: f64,
+    /// P99 − P1 of δX.
     pub spread_deg: f64,
+    /// Skew of the screw channel, ms.
     pub skew_ms: f64,
     /// Refusal or flags.
     pub remarks: String,
 }
 
-/// The robot's axes, by the configuration that lies beside them.
+/// Estimates the robot's axes with the configuration in the same folder.
+///
+/// # Errors
+/// A configuration or a log that cannot be read, as text.
 pub fn robot(folder: &Path) -> Result<Vec<RobotRow>, String> {
     let config = Config::read(&folder.join("pipeline.toml")).map_err(|all| join_diagnostics(&all))?;
     let mut rows = Vec::new();

@@ -479,6 +479,19 @@ fn toe(rng: &mut ChaCha8Rng) -> ContactLaw {
     ContactLaw::Toe { share: rng.random_range(0.1..0.7), depth_m: log_uniform(rng, 3e-6..40e-6) }
 }
 
+/// Faults of which each flight of *everything* has about two.
+const FAULTS: [fn(&mut Case, &mut ChaCha8Rng); 9] = [
+    buffet,
+    lines,
+    turbulence,
+    motor_vibration,
+    hysteresis,
+    periodic,
+    coloured,
+    |case, rng| case.profile.reversals = Some(rng.random_range(2..=8)),
+    |case, rng| case.profile.rest_share = rng.random_range(0.2..0.7),
+];
+
 /// Every assumption may be broken, several at a time; flanks stay hard.
 fn everything(case: &mut Case, rng: &mut ChaCha8Rng) {
     wide(case, rng);
@@ -495,17 +508,6 @@ fn everything(case: &mut Case, rng: &mut ChaCha8Rng) {
     if rng.random() {
         (case.sensors.load.delay_s, case.sensors.load.lag_s) = (0.0, log_uniform(rng, 1e-3..20e-3));
     }
-    const FAULTS: [fn(&mut Case, &mut ChaCha8Rng); 9] = [
-        buffet,
-        lines,
-        turbulence,
-        motor_vibration,
-        hysteresis,
-        periodic,
-        coloured,
-        |case, rng| case.profile.reversals = Some(rng.random_range(2..=8)),
-        |case, rng| case.profile.rest_share = rng.random_range(0.2..0.7),
-    ];
     for fault in FAULTS {
         if rng.random_bool(0.2) {
             fault(case, rng);

@@ -134,7 +134,7 @@ fn every_new_key_is_read_from_a_spec() {
     "#;
     let channel: Channel = toml::from_str(text).unwrap();
     assert_eq!(toml::from_str::<Channel>(&toml::to_string(&channel).unwrap()).unwrap(), channel);
-    let text = r#"
+    let text = r"
         friction_law = { lu_gre = { travel_m = 5e-6, ratio = 1.4, speed_m_per_s = 2e-3, damping_n_s_per_m = 500.0 } }
         screw_friction = { dry_n = 100.0, load_share = 0.03, viscous_n_s_per_m = 1e3, backdriven_load_share = 0.01, asymmetry = 0.1, grease_n = 50.0, cold_factor = 2.0 }
         [contact]
@@ -143,7 +143,7 @@ fn every_new_key_is_read_from_a_spec() {
         lower_stiffness_factor = 1.2
         stiffness_drift = 0.05
         stiffness_phase_factors = [1.0, 1.0, 0.97, 1.0, 1.02, 1.0]
-    "#;
+    ";
     let plant: Plant = toml::from_str(text).unwrap();
     assert!(plant.check().is_ok());
     assert_eq!(toml::from_str::<Plant>(&toml::to_string(&plant).unwrap()).unwrap(), plant);
