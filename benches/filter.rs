@@ -12,8 +12,8 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use estimator::contact::{self, PartPrior};
-use estimator::noise::Sensors;
-use estimator::{Actuator, Filter, Noise, Room, RunningGap, Samples, Schedule, Stream, gap, load, midrange};
+use estimator::SensorNoise;
+use estimator::{ActuatorModel, Filter, NoiseModel, FilterWorkspace, StreamingGap, Samples, GainSchedule, Stream, gap, load, midrange};
 
 /// Positions, loads and S of so many samples stay in the second cache.
 const SAMPLES: usize = 16_384;
@@ -27,8 +27,8 @@ fn main() {
 }
 
 fn filter() -> Filter {
-    let actuator = Actuator::linear(5e7, 2000.0, 8.0).unwrap();
-    let noise = Noise::Sensors(Sensors {
+    let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap();
+    let noise = NoiseModel::Sensors(SensorNoise {
         screw_rms_m: 3e-6,
         screw_resolution_m: 2.3e-6,
         motor_rms_m: 1e-6,
@@ -56,7 +56,7 @@ fn track(bencher: Bencher, count: usize) {
 #[divan::bench]
 fn schedule(bencher: Bencher) {
     let filter = filter();
-    bencher.bench_local(|| Schedule::new(black_box(&filter)));
+    bencher.bench_local(|| GainSchedule::new(black_box(&filter)));
 }
 
 #[divan::bench]
@@ -65,13 +65,13 @@ fn batch(bencher: Bencher) {
 }
 
 fn in_a_room(bencher: Bencher, count: usize) {
-    let ((dx_m, load_n), schedule, whole) = (channels(count), Schedule::new(&filter()), 0..count);
+    let ((dx_m, load_n), schedule, whole) = (channels(count), GainSchedule::new(&filter()), 0..count);
     let segments = std::slice::from_ref(&whole);
     let samples = Samples { step_s: 0.004, motor_m: &dx_m, dx_m: &dx_m, load_n: &load_n, segments };
-    let mut room = Room::default();
+    let mut room = FilterWorkspace::default();
     bencher
         .counter(ItemsCount::new(count))
-        .bench_local(|| schedule.track_in(black_box(&samples), None, &mut room).unwrap());
+        .bench_local(|| schedule.filter_with(black_box(&samples), None, &mut room).unwrap());
 }
 
 #[divan::bench]
@@ -97,13 +97,13 @@ fn batch_too_short_for_parts(bencher: Bencher) {
 }
 
 fn published(bencher: Bencher, count: usize) {
-    let ((dx_m, load_n), schedule, whole) = (channels(count), Schedule::new(&filter()), 0..count);
+    let ((dx_m, load_n), schedule, whole) = (channels(count), GainSchedule::new(&filter()), 0..count);
     let segments = std::slice::from_ref(&whole);
     let samples = Samples { step_s: 0.004, motor_m: &dx_m, dx_m: &dx_m, load_n: &load_n, segments };
-    let mut room = Room::default();
+    let mut room = FilterWorkspace::default();
     bencher
         .counter(ItemsCount::new(count))
-        .bench_local(|| midrange::estimate_in(black_box(&samples), &schedule, &mut room).unwrap());
+        .bench_local(|| midrange::estimate_with(black_box(&samples), &schedule, &mut room).unwrap());
 }
 
 #[divan::bench]
@@ -137,7 +137,7 @@ fn contact_regression(bencher: Bencher) {
     let segments = std::slice::from_ref(&whole);
     let samples = Samples { step_s: 0.004, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
     let prior = PartPrior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
-    let mut room = contact::Room::default();
+    let mut room = contact::FilterWorkspace::default();
     bencher
         .counter(ItemsCount::new(OUT_OF_CACHE))
         .bench_local(|| contact::estimate_in(black_box(&samples), &prior, &mut room).unwrap());
@@ -165,17 +165,17 @@ fn stream(bencher: Bencher, start: fn(&Filter) -> Stream, restart_each: usize) {
 
 #[divan::bench]
 fn stream_even(bencher: Bencher) {
-    stream(bencher, Stream::even, SAMPLES);
+    stream(bencher, Stream::constant_time, SAMPLES);
 }
 
 #[divan::bench]
 fn stream_even_unsettled(bencher: Bencher) {
-    stream(bencher, Stream::even, UNSETTLED);
+    stream(bencher, Stream::constant_time, UNSETTLED);
 }
 
 #[divan::bench]
 fn stream_as_batch(bencher: Bencher) {
-    stream(bencher, Stream::as_batch, SAMPLES);
+    stream(bencher, Stream::steady_state, SAMPLES);
 }
 
 #[divan::bench]
@@ -188,7 +188,7 @@ fn gap_of_the_batch(bencher: Bencher) {
 fn gap_running(bencher: Bencher) {
     let (s_m, _) = channels(SAMPLES);
     bencher.counter(ItemsCount::new(SAMPLES)).bench_local(|| {
-        let mut gap = RunningGap::<256>::new(2e-6).unwrap();
+        let mut gap = StreamingGap::<256>::new(2e-6).unwrap();
         black_box(&s_m).iter().for_each(|s| gap.push(*s));
         gap.read().unwrap()
     });

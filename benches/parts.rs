@@ -8,8 +8,8 @@ use std::hint::black_box;
 use std::process::ExitCode;
 
 use estimator::contact::{self, PartPrior};
-use estimator::noise::Sensors;
-use estimator::{Actuator, Error, Filter, Noise, Room, Samples, Schedule, gap, load, midrange};
+use estimator::SensorNoise;
+use estimator::{ActuatorModel, Error, Filter, NoiseModel, FilterWorkspace, Samples, GainSchedule, gap, load, midrange};
 
 const STEP_S: f64 = 0.004;
 /// What can be asked for; `nothing` makes the flight and no more.
@@ -31,7 +31,7 @@ fn main() -> ExitCode {
 }
 
 fn filter() -> Result<Filter, Error> {
-    let noise = Noise::Sensors(Sensors {
+    let noise = NoiseModel::Sensors(SensorNoise {
         screw_rms_m: 3e-6,
         screw_resolution_m: 2.3e-6,
         motor_rms_m: 1e-6,
@@ -39,7 +39,7 @@ fn filter() -> Result<Filter, Error> {
         unknown_force_n: 200.0,
         bandwidth_hz: 10.0,
     });
-    Filter::new(&Actuator::linear(5e7, 2000.0, 8.0)?, STEP_S, &noise)
+    Filter::new(&ActuatorModel::linear(5e7, 2000.0, 8.0)?, STEP_S, &noise)
 }
 
 fn run(part: &str, count: usize) -> Result<(), Error> {
@@ -55,12 +55,12 @@ fn run(part: &str, count: usize) -> Result<(), Error> {
     let prior = PartPrior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
     let filter = filter()?;
     match part {
-        "schedule" => drop(black_box(Schedule::new(&filter))),
+        "schedule" => drop(black_box(GainSchedule::new(&filter))),
         "filter" => drop(black_box(filter.track(&samples, None)?)),
         "statistic" => drop(black_box(gap::mid_range(&dx_m)).is_ok()),
         "load" => drop(black_box(load::band(&load_n, segments)).is_some()),
         "published" => {
-            black_box(midrange::estimate_in(&samples, &Schedule::new(&filter), &mut Room::default())?);
+            black_box(midrange::estimate_with(&samples, &GainSchedule::new(&filter), &mut FilterWorkspace::default())?);
         }
         "contact" => drop(black_box(contact::estimate(&samples, &prior)?)),
         _ => {}

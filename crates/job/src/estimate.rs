@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use estimator::contact::{self, ContactEstimate, ContactOutcome, ContactPlot, PartPrior};
-use estimator::{Filter, MidRange, Room, Samples, Schedule, midrange};
+use estimator::{Filter, FilterWorkspace, GainSchedule, MidRangeEstimate, Samples, midrange};
 use ingest::{ActuatorChannels, Geometry};
 use records::{Diagnostic, GapEstimate, Status};
 
@@ -33,7 +33,7 @@ pub fn estimate(
     } else {
         with_workspaces(channels.dx_m.len(), |workspaces| {
             let published =
-                match midrange::estimate_in(&samples(channels), &schedule, &mut workspaces.published) {
+                match midrange::estimate_with(&samples(channels), &schedule, &mut workspaces.published) {
                     Ok(found) => Some(found),
                     Err(estimator::Error::Constant { .. } | estimator::Error::NothingMeasured) => None,
                     Err(other) => return Err(failed(other)),
@@ -63,7 +63,7 @@ const MAX_KEPT_SAMPLES: usize = 2 << 20;
 /// What the estimates of one actuator after the other are made in.
 #[derive(Debug, Default)]
 struct Workspaces {
-    published: Room,
+    published: FilterWorkspace,
     contact: contact::ContactWorkspace,
 }
 
@@ -111,7 +111,9 @@ pub fn samples(channels: &ActuatorChannels) -> Samples<'_> {
 /// What is known of a part before its flight is seen.
 pub fn prior(part: &Part) -> PartPrior {
     let unknown_force_n = match part.noise {
-        estimator::Noise::Sensors(sensors) => Some(sensors.unknown_force_n).filter(|force_n| *force_n > 0.0),
+        estimator::NoiseModel::Sensors(sensors) => {
+            Some(sensors.unknown_force_n).filter(|force_n| *force_n > 0.0)
+        }
         _ => None,
     };
     PartPrior {
@@ -139,7 +141,7 @@ fn pre_check_rejection(channels: &ActuatorChannels) -> Option<&'static str> {
 /// The published statistic never refuses, so under either method a flight that the regression finds
 /// blind is refused: its mid-range number is kept, and is not given as the gap.
 fn combine_methods(
-    published: Option<&MidRange>,
+    published: Option<&MidRangeEstimate>,
     outcome: &ContactOutcome,
     prior: &PartPrior,
     method: Method,
@@ -194,7 +196,7 @@ fn from_contact(found: &ContactEstimate) -> GapEstimate {
 }
 
 /// A lightly damped mode, or one near Nyquist, puts the pole elsewhere: the number stands, with a flag.
-fn bandwidth_differs(schedule: &Schedule, part: &Part) -> bool {
-    let estimator::Noise::Sensors(asked) = part.noise else { return false };
+fn bandwidth_differs(schedule: &GainSchedule, part: &Part) -> bool {
+    let estimator::NoiseModel::Sensors(asked) = part.noise else { return false };
     schedule.bandwidth_hz().is_ok_and(|got| (got / asked.bandwidth_hz - 1.0).abs() > BANDWIDTH_TOLERANCE)
 }

@@ -1,7 +1,7 @@
 //! Everything one would draw of an estimate: channels, S(t), and the flanks as they were found.
 
 use estimator::contact::ContactPlot;
-use estimator::gap::{self, Gap};
+use estimator::{GapStatistic, gap};
 use ingest::{ActuatorChannels, LogFiles};
 use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
 
@@ -26,7 +26,7 @@ pub struct EstimatePlot {
     /// S(t), m; NaN outside the segments.
     pub s_m: Vec<f64>,
     /// The published statistic of S, where it moves.
-    pub midrange: Option<Gap>,
+    pub midrange: Option<GapStatistic>,
     /// What the contact regression stands on; none where it refused.
     pub picture: Option<ContactPlot>,
 }

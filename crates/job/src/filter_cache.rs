@@ -2,18 +2,18 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use estimator::{Filter, Schedule};
+use estimator::{Filter, GainSchedule};
 
 /// Logs whose steps differ in their last digits would fill memory: so many schedules are kept.
 const CAPACITY: usize = 16;
 
 /// What has been found so far. Clones share it.
 #[derive(Debug, Clone, Default)]
-pub struct FilterCache(Arc<Mutex<Vec<Arc<Schedule>>>>);
+pub struct FilterCache(Arc<Mutex<Vec<Arc<GainSchedule>>>>);
 
 impl FilterCache {
     /// The schedule of a filter, made now unless it is there.
-    pub fn of(&self, filter: &Filter) -> Arc<Schedule> {
+    pub fn of(&self, filter: &Filter) -> Arc<GainSchedule> {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(schedule) = known.iter().find(|schedule| schedule.filter() == filter) {
             return Arc::clone(schedule);
@@ -21,7 +21,7 @@ impl FilterCache {
         if known.len() == CAPACITY {
             known.remove(0);
         }
-        let schedule = Arc::new(Schedule::new(filter));
+        let schedule = Arc::new(GainSchedule::new(filter));
         known.push(Arc::clone(&schedule));
         schedule
     }
@@ -40,9 +40,9 @@ mod tests {
     use super::*;
 
     fn filter(step_s: f64) -> Filter {
-        let actuator = estimator::Actuator::linear(5e7, 2000.0, 8.0).unwrap();
+        let actuator = estimator::ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap();
         let (w_d, v_d_m2) = (nalgebra::Matrix3::identity() * 1e-12, 1e-11);
-        Filter::new(&actuator, step_s, &estimator::Noise::PerStep { w_d, v_d_m2 }).unwrap()
+        Filter::new(&actuator, step_s, &estimator::NoiseModel::PerStep { w_d, v_d_m2 }).unwrap()
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What logs themselves say of a part: stiffness, noise of its sensors, friction. To be held against the data
 //! sheet, so that nobody has to guess a noise level.
 
-use estimator::Noise;
+use estimator::NoiseModel;
 use estimator::contact::{self, ContactOutcome};
 use ingest::channel::noise_floor;
 use ingest::{ActuatorChannels, Geometry};
@@ -90,7 +90,7 @@ impl IdentifiedParams {
     /// The facts under the keys and in the units in which a part of this kind is configured.
     pub fn comparisons(&self, part: &Part) -> Vec<ParamComparison> {
         let sensors = match part.noise {
-            Noise::Sensors(sensors) => Some(sensors),
+            NoiseModel::Sensors(sensors) => Some(sensors),
             _ => None,
         };
         let stiffness = part.actuator.stiffness_n_per_m();

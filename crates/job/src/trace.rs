@@ -1,6 +1,6 @@
 //! What the filter saw, per sample: for a person who wants to look.
 
-use estimator::filter::Innovations;
+use estimator::InnovationBuffers;
 use ingest::LogFiles;
 use ingest::parquet::writer::Column;
 use records::{Diagnostic, Installations, PartNumber};
@@ -52,7 +52,7 @@ impl Trace {
 
     fn of(log: &str, channels: &ingest::ActuatorChannels, part: &Part) -> Result<Self, Diagnostic> {
         let filter = estimate::filter(channels, part)?;
-        let mut seen = Innovations::default();
+        let mut seen = InnovationBuffers::default();
         let track = filter
             .track(&estimate::samples(channels), Some(&mut seen))
             .map_err(|e| Diagnostic::new("estimate_failed", e))?;

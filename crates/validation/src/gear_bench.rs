@@ -12,8 +12,8 @@ use std::path::Path;
 use arrow::array::{AsArray, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type};
-use estimator::noise::Sensors;
-use estimator::{Actuator, Filter, Noise, Samples, midrange};
+use estimator::SensorNoise;
+use estimator::{ActuatorModel, Filter, NoiseModel, Samples, midrange};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::methods::{load_lines_m, spread_m};
@@ -93,7 +93,7 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, Str
 }
 
 fn filter(step_s: f64) -> Result<Filter, estimator::Error> {
-    let noise = Sensors {
+    let noise = SensorNoise {
         screw_rms_m: 1e-4,
         screw_resolution_m: 0.0,
         motor_rms_m: 1e-4,
@@ -101,7 +101,7 @@ fn filter(step_s: f64) -> Result<Filter, estimator::Error> {
         unknown_force_n: 2.0,
         bandwidth_hz: 10.0,
     };
-    Filter::new(&Actuator::linear(STIFFNESS_NM_PER_RAD, 5.0, 0.01)?, step_s, &Noise::Sensors(noise))
+    Filter::new(&ActuatorModel::linear(STIFFNESS_NM_PER_RAD, 5.0, 0.01)?, step_s, &NoiseModel::Sensors(noise))
 }
 
 /// Every column of a file as numbers.

@@ -1,8 +1,8 @@
 //! The methods compared: contact regression, the paper's statistic and two baselines.
 
+use estimator::SensorNoise;
 use estimator::contact::{self, ContactOutcome, PartPrior};
-use estimator::noise::Sensors;
-use estimator::{Actuator, Filter, Noise, Samples, midrange};
+use estimator::{ActuatorModel, Filter, NoiseModel, Samples, midrange};
 
 use crate::scenarios::{Case, Class};
 
@@ -70,7 +70,7 @@ fn apply_methods(
 }
 
 fn filter(case: &Case, step_s: f64, stiffness_n_per_m: f64) -> Result<Filter, estimator::Error> {
-    let noise = Sensors {
+    let noise = SensorNoise {
         screw_rms_m: case.sensors.screw.noise_rms,
         screw_resolution_m: case.sensors.screw.resolution,
         motor_rms_m: case.sensors.motor.noise_rms,
@@ -78,7 +78,7 @@ fn filter(case: &Case, step_s: f64, stiffness_n_per_m: f64) -> Result<Filter, es
         unknown_force_n: UNKNOWN_FORCE_N,
         bandwidth_hz: 10.0,
     };
-    Filter::new(&Actuator::linear(stiffness_n_per_m, 2000.0, 8.0)?, step_s, &Noise::Sensors(noise))
+    Filter::new(&ActuatorModel::linear(stiffness_n_per_m, 2000.0, 8.0)?, step_s, &NoiseModel::Sensors(noise))
 }
 
 /// A baseline: δX on F by least squares on each side of the load, beyond a tenth of its greatest; the

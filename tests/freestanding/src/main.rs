@@ -9,11 +9,11 @@
 mod bare;
 mod vector;
 
-use estimator::{Actuator, Error, Filter, Noise, RunningGap, Stream};
+use estimator::{ActuatorModel, Error, Filter, NoiseModel, StreamingGap, Stream};
 use nalgebra::Matrix3;
 use vector::{GAP_M, LOAD_N, POSITION_M, S_M};
 
-/// Largest difference of S, as a share of its peak; of the gap, as `RunningGap` states for such bins.
+/// Largest difference of S, as a share of its peak; of the gap, as `StreamingGap` states for such bins.
 const TOLERANCE: (f64, f64) = (1e-12, 2e-3);
 /// Bins of a sixtieth of the gap.
 const BIN_M: f64 = 2e-6;
@@ -31,21 +31,21 @@ extern "C" fn run(words: usize) -> ! {
 
 fn agrees(wrong: bool) -> Result<bool, Error> {
     let filter = filter()?;
-    let even = follows(Stream::even(&filter), wrong)?;
-    let as_batch = follows(Stream::as_batch(&filter), wrong)?;
+    let even = follows(Stream::constant_time(&filter), wrong)?;
+    let as_batch = follows(Stream::steady_state(&filter), wrong)?;
     Ok(even && as_batch)
 }
 
 fn filter() -> Result<Filter, Error> {
     let [stiffness_n_per_m, damping_n_s_per_m, screw_mass_kg] = vector::ACTUATOR;
-    let actuator = Actuator::linear(stiffness_n_per_m, damping_n_s_per_m, screw_mass_kg)?;
+    let actuator = ActuatorModel::linear(stiffness_n_per_m, damping_n_s_per_m, screw_mass_kg)?;
     let w_d = Matrix3::from(vector::W_D);
-    Filter::new(&actuator, vector::STEP_S, &Noise::PerStep { w_d, v_d_m2: vector::V_D_M2 })
+    Filter::new(&actuator, vector::STEP_S, &NoiseModel::PerStep { w_d, v_d_m2: vector::V_D_M2 })
 }
 
 /// Whether S, sample by sample, and ΔS at the end are the reference's.
 fn follows(mut stream: Stream, wrong: bool) -> Result<bool, Error> {
-    let mut gap = RunningGap::<256>::new(BIN_M)?;
+    let mut gap = StreamingGap::<256>::new(BIN_M)?;
     let (mut peak_m, mut worst_m) = (0.0_f64, 0.0_f64);
     for (k, ((y_m, load_n), wanted_m)) in POSITION_M.iter().zip(LOAD_N).zip(S_M).enumerate() {
         let error_m = if wrong && k == WRONG.0 { WRONG.1 } else { 0.0 };

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::Samples;
-use crate::wide::{Lanes, widest};
+use crate::simd::dispatch::{Lanes, simd_dispatch as widest};
 
 use super::SHORTEST_S;
 use super::acceptance::Rejection;

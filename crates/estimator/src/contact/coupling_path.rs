@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::block_means::{BlockMeans, is_sound};
 use super::design_matrix::{FIRM_SHARE, Flank, Scaling};
 use super::friction_model::{CouplingForce, CouplingIntegrator, CouplingParams, FrictionState, ScrewState};
-use crate::wide::{Lanes, widest};
+use crate::simd::dispatch::{Lanes, simd_dispatch as widest};
 
 /// Blocks before one that must keep its flank and firmness; one after it must as well.
 const BEFORE: usize = 2;

@@ -7,8 +7,8 @@ use super::acceptance::Rejection;
 use super::block_means::BlockMeans;
 use super::coupling_path::{CouplingPath, Touch};
 use super::friction_model::FrictionState;
-use crate::gap::extremes;
-use crate::load::quantiles;
+use crate::gap::load_band::quantiles;
+use crate::gap::statistic::extremes;
 
 /// Columns while the flanks are straight.
 pub(super) const LINEAR: usize = 12;

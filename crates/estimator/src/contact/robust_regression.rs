@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
 use super::design_matrix::DesignRow;
-use crate::wide::{Lanes, widest};
+use crate::simd::dispatch::{Lanes, simd_dispatch as widest};
 
 /// Residuals beyond this many times their spread lose weight (Huber).
 const HUBER: f64 = 2.0;

@@ -4,9 +4,9 @@
 use std::fs::File;
 use std::path::PathBuf;
 
+use estimator::SensorNoise;
 use estimator::contact::{self, ContactEstimate, ContactOutcome, PartPrior, Rejection};
-use estimator::noise::Sensors;
-use estimator::{Actuator, Filter, Noise, Samples, midrange};
+use estimator::{ActuatorModel, Filter, NoiseModel, Samples, midrange};
 use serde_json::Value;
 
 use crate::table::columns;
@@ -45,12 +45,12 @@ impl Log {
 
     fn filter(&self) -> Filter {
         let assumed = |key| self.number("assumed", key);
-        let actuator = Actuator::linear(
+        let actuator = ActuatorModel::linear(
             assumed("stiffness_n_per_m"),
             assumed("damping_n_s_per_m"),
             assumed("screw_mass_kg"),
         );
-        let noise = Noise::Sensors(Sensors {
+        let noise = NoiseModel::Sensors(SensorNoise {
             screw_rms_m: self.number("sensors", "noise_s"),
             screw_resolution_m: self.number("sensors", "lsb_s"),
             motor_rms_m: self.number("sensors", "noise_m"),

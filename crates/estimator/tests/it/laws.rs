@@ -1,16 +1,16 @@
 //! Laws that hold for any input: offset, scale, sign, restarts, missing samples, the asked bandwidth.
 
-use estimator::noise::Sensors;
-use estimator::{Actuator, Error, Filter, Noise, Samples, gap, model};
+use estimator::SensorNoise;
+use estimator::{ActuatorModel, Error, Filter, NoiseModel, Samples, gap, model};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
 fn filter(step_s: f64, bandwidth_hz: f64) -> Filter {
-    filter_of(&Actuator::linear(5e7, 2000.0, 8.0).unwrap(), step_s, bandwidth_hz)
+    filter_of(&ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap(), step_s, bandwidth_hz)
 }
 
-fn filter_of(actuator: &Actuator, step_s: f64, bandwidth_hz: f64) -> Filter {
-    let noise = Noise::Sensors(Sensors {
+fn filter_of(actuator: &ActuatorModel, step_s: f64, bandwidth_hz: f64) -> Filter {
+    let noise = NoiseModel::Sensors(SensorNoise {
         screw_rms_m: 3e-6,
         screw_resolution_m: 2.3e-6,
         motor_rms_m: 1e-6,
@@ -55,10 +55,12 @@ fn motor_angle_and_inertia_come_to_the_screw() {
 /// A part that only turns is the linear one seen at its radius: 2·10⁴ N·m/rad at 0.1 m is 2·10⁶ N/m.
 #[test]
 fn a_rotary_part_is_a_linear_one_at_its_radius() {
-    let (turning, pushing) =
-        (Actuator::rotary(2e4, 1.5, 0.02, 0.1).unwrap(), Actuator::linear(2e6, 150.0, 2.0).unwrap());
+    let (turning, pushing) = (
+        ActuatorModel::rotary(2e4, 1.5, 0.02, 0.1).unwrap(),
+        ActuatorModel::linear(2e6, 150.0, 2.0).unwrap(),
+    );
     assert!((turning.a() - pushing.a()).amax() < 1e-9 * pushing.a().amax());
-    assert!(Actuator::rotary(2e4, 1.5, 0.02, 0.0).is_err());
+    assert!(ActuatorModel::rotary(2e4, 1.5, 0.02, 0.0).is_err());
 }
 
 proptest! {
@@ -96,12 +98,12 @@ proptest! {
         let whole = 0..dx.len();
         let fast = track(&f, &dx, &load, std::slice::from_ref(&whole));
         let first = dx.iter().position(|y| !y.is_nan()).unwrap();
-        let mut state = f.start(dx[first], load[first]);
+        let mut state = f.initial_state(dx[first], load[first]);
         for k in 0..dx.len() {
             if k > 0 {
                 state = f.predict(&state, load[k - 1]);
             }
-            state = f.correct(&state, dx[k]).unwrap().posterior;
+            state = f.update(&state, dx[k]).unwrap().posterior;
             prop_assert!((state.x[2] - fast[k]).abs() < 1e-12 * 1e-4, "row {k}: {} and {}", state.x[2], fast[k]);
         }
     }
@@ -123,7 +125,7 @@ proptest! {
         let ringing_samples = 2.0 * ten(mass) / ten(damping) * ten(rate_hz);
         let hides = turns > 0.5 && (turns - turns.round()).abs() < 0.01 && ringing_samples > 100.0;
         prop_assume!(!hides);
-        let actuator = Actuator::linear(ten(stiffness), ten(damping), ten(mass)).unwrap();
+        let actuator = ActuatorModel::linear(ten(stiffness), ten(damping), ten(mass)).unwrap();
         let f = filter_of(&actuator, ten(-rate_hz), ten(bandwidth_hz));
         let load: Vec<f64> = (0..jumps.len()).map(|k| 5e3 * (0.01 * k as f64).sin()).collect();
         let dx: Vec<f64> =
@@ -131,12 +133,12 @@ proptest! {
         let whole = 0..dx.len();
         let fast = track(&f, &dx, &load, std::slice::from_ref(&whole));
         let peak_m = dx.iter().chain(&fast).fold(0.0, |peak: f64, v| peak.max(v.abs()));
-        let mut state = f.start(dx[0], load[0]);
+        let mut state = f.initial_state(dx[0], load[0]);
         for k in 0..dx.len() {
             if k > 0 {
                 state = f.predict(&state, load[k - 1]);
             }
-            state = f.correct(&state, dx[k]).unwrap().posterior;
+            state = f.update(&state, dx[k]).unwrap().posterior;
             let off_m = (state.x[2] - fast[k]).abs();
             prop_assert!(off_m < 1e-12 * peak_m, "row {k}: off by {:e} of the peak", off_m / peak_m);
         }

@@ -1,7 +1,7 @@
 //! The filter and the statistic as the samples come, against the batch that has them all.
 
-use estimator::noise::Sensors as Noises;
-use estimator::{Actuator, Error, Filter, Noise, Reading, RunningGap, Samples, Stream, gap};
+use estimator::SensorNoise as Noises;
+use estimator::{ActuatorModel, BoundedGap, Error, Filter, NoiseModel, Samples, Stream, StreamingGap, gap};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use simulator::{Flight, Plant, Profile, Sensors, simulate};
@@ -9,12 +9,12 @@ use simulator::{Flight, Plant, Profile, Sensors, simulate};
 use crate::vectors::{SETS, Set};
 
 /// 256 bins of 2 µm: 4 KiB, for gaps from 30 to 300 µm.
-type Histogram = RunningGap<256>;
+type Histogram = StreamingGap<256>;
 const BIN_M: f64 = 2e-6;
 
 fn filter(rate_hz: f64, bandwidth_hz: f64) -> Filter {
-    let actuator = Actuator::linear(5e7, 2000.0, 8.0).unwrap();
-    let noise = Noise::Sensors(Noises {
+    let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap();
+    let noise = NoiseModel::Sensors(Noises {
         screw_rms_m: 3e-6,
         screw_resolution_m: 2.3e-6,
         motor_rms_m: 1e-6,
@@ -36,7 +36,7 @@ fn streamed(mut stream: Stream, dx_m: &[f64], load_n: &[f64]) -> Vec<f64> {
     dx_m.iter().zip(load_n).map(|(y, u)| stream.push(*y, *u).unwrap()).collect()
 }
 
-fn running(s_m: &[f64]) -> Result<Reading, Error> {
+fn running(s_m: &[f64]) -> Result<BoundedGap, Error> {
     let mut gap = Histogram::new(BIN_M).unwrap();
     s_m.iter().for_each(|s| gap.push(*s));
     gap.read()
@@ -66,7 +66,7 @@ fn a_stream_agrees_with_the_fifty_digits() {
         let set = Set::load(name);
         let filter = set.filter(&set.as_given());
         let (y, u, wanted) = (&set.columns["y"], &set.columns["u"], &set.columns["x_filt_2"]);
-        for stream in [Stream::even(&filter), Stream::as_batch(&filter)] {
+        for stream in [Stream::constant_time(&filter), Stream::steady_state(&filter)] {
             let error = difference(&streamed(stream, y, u), wanted);
             assert!(error < 1e-10, "{name}: S off by {error:e} of the peak");
         }
@@ -80,9 +80,9 @@ fn a_stream_is_the_batch_over_whole_flights() {
         let (flight, filter) = (fly(seed, 100e-6, 1.0, rate_hz), filter(rate_hz, 10.0));
         let (dx_m, load_n) = channels(&flight);
         let wanted = batch(&filter, &dx_m, load_n);
-        let even = difference(&streamed(Stream::even(&filter), &dx_m, load_n), &wanted);
+        let even = difference(&streamed(Stream::constant_time(&filter), &dx_m, load_n), &wanted);
         assert!(even < 1e-12, "{rate_hz} Hz: off by {even:e} of the peak");
-        assert_eq!(streamed(Stream::as_batch(&filter), &dx_m, load_n), wanted);
+        assert_eq!(streamed(Stream::steady_state(&filter), &dx_m, load_n), wanted);
     }
 }
 
@@ -90,7 +90,7 @@ fn a_stream_is_the_batch_over_whole_flights() {
 fn a_restart_is_a_new_segment() {
     let (flight, filter) = (fly(4, 100e-6, 1.0, 100.0), filter(100.0, 10.0));
     let (dx_m, load_n) = channels(&flight);
-    for mut stream in [Stream::even(&filter), Stream::as_batch(&filter)] {
+    for mut stream in [Stream::constant_time(&filter), Stream::steady_state(&filter)] {
         let fresh = streamed(stream, &dx_m, load_n);
         stream.push(1e-3, -5e3).unwrap();
         stream.restart();
@@ -105,13 +105,13 @@ fn a_stream_starts_at_the_first_measurement() {
     let (flight, filter) = (fly(5, 100e-6, 1.0, 100.0), filter(100.0, 10.0));
     let (mut dx_m, load_n) = channels(&flight);
     dx_m[..40].fill(f64::NAN);
-    let found = streamed(Stream::as_batch(&filter), &dx_m, load_n);
+    let found = streamed(Stream::steady_state(&filter), &dx_m, load_n);
     assert!(found[..40].iter().all(|s| s.is_nan()));
     assert_eq!(found[40..], batch(&filter, &dx_m[40..], &load_n[40..]));
 }
 
 /// Thirty-two flights, four gaps, three frictions, two rates: bounds that hold, and the error that
-/// `RunningGap` states.
+/// `StreamingGap` states.
 #[test]
 fn a_running_gap_keeps_near_the_batch_over_many_flights() {
     let (mut worst, mut widest) = (0.0_f64, 0.0_f64);
@@ -132,7 +132,7 @@ fn a_running_gap_keeps_near_the_batch_over_many_flights() {
 }
 
 /// The batch's gap lies within the bounds, but for the rounding of sums taken in another order.
-fn holds(found: &Reading, wanted_m: f64) -> bool {
+fn holds(found: &BoundedGap, wanted_m: f64) -> bool {
     let (slack_m, within) = (1e-12 * wanted_m.abs() + 1e-18, found.least_m..=found.greatest_m);
     within.contains(&found.gap_m)
         && found.least_m <= wanted_m + slack_m
@@ -177,8 +177,8 @@ proptest! {
         prop_assume!(!dx[0].is_nan());
         let f = filter(250.0, 40.0);
         let wanted = batch(&f, &dx, load);
-        prop_assert_eq!(&streamed(Stream::as_batch(&f), &dx, load), &wanted);
-        let even = difference(&streamed(Stream::even(&f), &dx, load), &wanted);
+        prop_assert_eq!(&streamed(Stream::steady_state(&f), &dx, load), &wanted);
+        let even = difference(&streamed(Stream::constant_time(&f), &dx, load), &wanted);
         prop_assert!(even < 1e-12, "off by {even:e} of the peak");
     }
 

@@ -4,8 +4,8 @@
 use std::fs::File;
 use std::path::PathBuf;
 
-use estimator::noise::Sensors;
-use estimator::{Actuator, Filter, Noise, Samples, gap};
+use estimator::SensorNoise;
+use estimator::{ActuatorModel, Filter, NoiseModel, Samples, gap};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 
@@ -47,12 +47,13 @@ impl Set {
     }
 
     /// The vectors' own units; a rotary set is a linear one in radians.
-    fn actuator(&self) -> Actuator {
-        Actuator::linear(self.number("stiffness"), self.number("damping"), self.number("inertia")).unwrap()
+    fn actuator(&self) -> ActuatorModel {
+        ActuatorModel::linear(self.number("stiffness"), self.number("damping"), self.number("inertia"))
+            .unwrap()
     }
 
-    fn sensors(&self) -> Noise {
-        Noise::Sensors(Sensors {
+    fn sensors(&self) -> NoiseModel {
+        NoiseModel::Sensors(SensorNoise {
             screw_rms_m: self.number("sigma_y"),
             screw_resolution_m: 0.0,
             motor_rms_m: 0.0,
@@ -63,11 +64,11 @@ impl Set {
     }
 
     /// The noise as the rows have it, so that a last digit of W_d is not blamed on the recursion.
-    pub(crate) fn as_given(&self) -> Noise {
-        Noise::PerStep { w_d: Self::matrix(&self.json["W_d"]), v_d_m2: self.number("V_d") }
+    pub(crate) fn as_given(&self) -> NoiseModel {
+        NoiseModel::PerStep { w_d: Self::matrix(&self.json["W_d"]), v_d_m2: self.number("V_d") }
     }
 
-    pub(crate) fn filter(&self, noise: &Noise) -> Filter {
+    pub(crate) fn filter(&self, noise: &NoiseModel) -> Filter {
         Filter::new(&self.actuator(), self.step_s(), noise).unwrap()
     }
 }
@@ -104,7 +105,7 @@ fn the_exact_covariance_of_white_noise_agrees() {
     for name in SETS {
         let set = Set::load(name);
         let loan = &set.json["van_loan"];
-        let noise = Noise::Continuous {
+        let noise = NoiseModel::Continuous {
             force_psd_n2_s: loan["force_psd"].as_f64().unwrap(),
             backlash_rate_psd_m2_per_s: loan["backlash_rate_psd"].as_f64().unwrap(),
             v_d_m2: set.number("V_d"),
@@ -128,7 +129,7 @@ fn every_step_of_the_recursion_agrees() {
         let filter = set.filter(&set.as_given());
         let (y, u) = (&set.columns["y"], &set.columns["u"]);
         let first = y.iter().position(|y| !y.is_nan()).unwrap();
-        let mut state = filter.start(y[first], u[first]);
+        let mut state = filter.initial_state(y[first], u[first]);
         // The vectors carry their own P₀, whose backlash entry is in the set's unit.
         state.p = Matrix3::from_diagonal(&Set::vector(&set.json["P0"]));
         let mut worst = Worst::default();
@@ -136,7 +137,7 @@ fn every_step_of_the_recursion_agrees() {
             if k > 0 {
                 state = filter.predict(&state, u[k - 1]);
             }
-            let step = filter.correct(&state, y[k]).unwrap();
+            let step = filter.update(&state, y[k]).unwrap();
             for i in 0..3 {
                 worst.state(&set, &format!("x_pred_{i}"), k, step.prior.x[i]);
                 worst.state(&set, &format!("x_filt_{i}"), k, step.posterior.x[i]);
@@ -186,7 +187,7 @@ fn the_settled_gain_and_its_poles_agree() {
     for name in SETS {
         let set = Set::load(name);
         let filter = set.filter(&set.as_given());
-        let (gain, _) = filter.settled().unwrap();
+        let (gain, _) = filter.steady_state_gain().unwrap();
         let wanted = Set::vector(&set.json["steady_gain"]);
         let error = (gain - wanted).component_div(&wanted).amax();
         assert!(error < 1e-9, "{name}: settled gain off by {error:e}");

@@ -1,6 +1,6 @@
 //! A part number's settings: whose stiffness, damping, mass, sensors and limits we use.
 
-use estimator::noise::{Noise, Sensors};
+use estimator::SensorNoise;
 use ingest::Geometry;
 use records::Diagnostic;
 use schemars::JsonSchema;
@@ -148,11 +148,11 @@ pub struct NoiseSettings {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Part {
     /// Stiffness, damping and mass at the screw axis.
-    pub actuator: estimator::Actuator,
+    pub actuator: estimator::ActuatorModel,
     /// What brings its angles to the screw axis.
     pub geometry: Geometry,
     /// Its noise.
-    pub noise: Noise,
+    pub noise: estimator::NoiseModel,
     /// Load between whose positive and negative value lost motion is stated, N.
     pub reference_load_n: Option<f64>,
     /// The gap that grounds, m.
@@ -240,27 +240,27 @@ impl PartSettings {
         }
     }
 
-    fn linear(&self, keys: &mut SettingsValidator) -> Option<(estimator::Actuator, Geometry)> {
+    fn linear(&self, keys: &mut SettingsValidator) -> Option<(estimator::ActuatorModel, Geometry)> {
         let stiffness = keys.required(&["stiffness_n_per_m"], self.stiffness_n_per_m);
         let damping = keys.required(&["damping_n_s_per_m"], self.damping_n_s_per_m);
         let mass = keys.required(&["screw_mass_kg"], self.screw_mass_kg);
         keys.positive(&["lead_m_per_rev"], self.lead_m_per_rev);
         let actuator =
-            keys.made(&["stiffness_n_per_m"], estimator::Actuator::linear(stiffness?, damping?, mass?))?;
+            keys.made(&["stiffness_n_per_m"], estimator::ActuatorModel::linear(stiffness?, damping?, mass?))?;
         Some((actuator, Geometry::Linear { lead_m_per_rev: self.lead_m_per_rev }))
     }
 
-    fn rotary(&self, keys: &mut SettingsValidator) -> Option<(estimator::Actuator, Geometry)> {
+    fn rotary(&self, keys: &mut SettingsValidator) -> Option<(estimator::ActuatorModel, Geometry)> {
         let stiffness = keys.required(&["stiffness_nm_per_rad"], self.stiffness_nm_per_rad);
         let damping = keys.required(&["damping_nm_s_per_rad"], self.damping_nm_s_per_rad);
         let inertia = keys.required(&["inertia_kg_m2"], self.inertia_kg_m2);
         let radius = keys.required(&["reference_radius_m"], self.reference_radius_m)?;
-        let made = estimator::Actuator::rotary(stiffness?, damping?, inertia?, radius);
+        let made = estimator::ActuatorModel::rotary(stiffness?, damping?, inertia?, radius);
         let actuator = keys.made(&["stiffness_nm_per_rad"], made)?;
         Some((actuator, Geometry::Rotary { reference_radius_m: radius }))
     }
 
-    fn check_noise(&self, keys: &mut SettingsValidator) -> Option<Noise> {
+    fn check_noise(&self, keys: &mut SettingsValidator) -> Option<estimator::NoiseModel> {
         let Some(noise) = &self.noise else {
             let hint = "[part.\"…\".noise] needs screw_rms_m, motor_rms_m, unknown_force_n and bandwidth_hz; see docs/configuration.md";
             keys.complain(
@@ -271,18 +271,21 @@ impl PartSettings {
             return None;
         };
         match noise.model {
-            NoiseModel::Sensors => noise.sensors(self, keys).map(Noise::Sensors),
+            NoiseModel::Sensors => noise.sensors(self, keys).map(estimator::NoiseModel::Sensors),
             NoiseModel::PerStep => {
                 let v_d_m2 = keys.required(&["noise", "v_d_m2"], noise.v_d_m2);
                 let w_d = keys.required(&["noise", "w_d"], noise.w_d)?;
-                Some(Noise::PerStep { w_d: nalgebra::Matrix3::from_fn(|i, j| w_d[i][j]), v_d_m2: v_d_m2? })
+                Some(estimator::NoiseModel::PerStep {
+                    w_d: nalgebra::Matrix3::from_fn(|i, j| w_d[i][j]),
+                    v_d_m2: v_d_m2?,
+                })
             }
             NoiseModel::Continuous => {
                 let force = keys.required(&["noise", "force_psd_n2_s"], noise.force_psd_n2_s);
                 let rate =
                     keys.required(&["noise", "backlash_rate_psd_m2_per_s"], noise.backlash_rate_psd_m2_per_s);
                 let v_d_m2 = keys.required(&["noise", "v_d_m2"], noise.v_d_m2);
-                Some(Noise::Continuous {
+                Some(estimator::NoiseModel::Continuous {
                     force_psd_n2_s: force?,
                     backlash_rate_psd_m2_per_s: rate?,
                     v_d_m2: v_d_m2?,
@@ -294,7 +297,7 @@ impl PartSettings {
 
 impl NoiseSettings {
     /// Sensor facts at the screw axis; a rotary part's are in radians and newton metres.
-    fn sensors(&self, part: &PartSettings, keys: &mut SettingsValidator) -> Option<Sensors> {
+    fn sensors(&self, part: &PartSettings, keys: &mut SettingsValidator) -> Option<SensorNoise> {
         let bandwidth_hz = keys.required(&["noise", "bandwidth_hz"], self.bandwidth_hz);
         let none = Some(0.0);
         let (radius, levels) = match part.kind {
@@ -325,7 +328,7 @@ impl NoiseSettings {
             keys.complain(&["noise"], Diagnostic::new("bad_parameter", what));
         }
         let [screw_rms, screw_resolution, motor_rms, motor_resolution, force] = levels;
-        Some(Sensors {
+        Some(SensorNoise {
             screw_rms_m: screw_rms? * radius,
             screw_resolution_m: screw_resolution? * radius,
             motor_rms_m: motor_rms? * radius,

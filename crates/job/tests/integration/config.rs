@@ -166,7 +166,7 @@ bandwidth_hz = 8.0
 "#;
     let config = parse(&format!("{}{rotary}", &GOOD[..start])).unwrap();
     let part = &config.parts[&PartNumber::new("GEAR").unwrap()];
-    let estimator::Noise::Sensors(s) = part.noise else { panic!("{:?}", part.noise) };
+    let estimator::NoiseModel::Sensors(s) = part.noise else { panic!("{:?}", part.noise) };
     // 0.2 mrad at 0.1 m is 20 µm; 4 N·m there is 40 N; 2·10⁴ N·m/rad is 2·10⁶ N/m.
     assert!((s.screw_rms_m - 20e-6).abs() < 1e-18);
     assert!((s.unknown_force_n - 40.0).abs() < 1e-12);

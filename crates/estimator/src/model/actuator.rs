@@ -22,13 +22,13 @@ pub fn reflected_mass_kg(inertia_kg_m2: f64, lead_m_per_rev: f64) -> f64 {
 
 /// Stiffness, damping and screw mass of an actuator at the screw axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Actuator {
+pub struct ActuatorModel {
     stiffness_n_per_m: f64,
     damping_n_s_per_m: f64,
     screw_mass_kg: f64,
 }
 
-impl Actuator {
+impl ActuatorModel {
     /// A linear actuator: K in N/m, f in N·s/m, m_s in kg.
     ///
     /// # Errors
@@ -46,7 +46,7 @@ impl Actuator {
     /// A part that only turns, seen at a radius r: x = rθ, so K = k/r², f = c/r², m = J/r².
     ///
     /// # Errors
-    /// As [`Actuator::linear`], and for a radius that is not positive.
+    /// As [`ActuatorModel::linear`], and for a radius that is not positive.
     pub fn rotary(
         stiffness_nm_per_rad: f64,
         damping_nm_s_per_rad: f64,

@@ -2,9 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::filter::{Filter, Step, distance};
-use crate::series::Series;
-use crate::wide::widest;
+use crate::kalman::filter::{Filter, FilterStep, distance};
+use crate::simd::dispatch::simd_dispatch;
+use crate::simd::fma::FmaScalar;
 
 /// The folded map takes over when the covariance is this near to its limit, as a share of itself. The
 /// difference leaves a share as small in S, and is forgotten.
@@ -17,7 +17,7 @@ pub(crate) const GROUP: usize = 32;
 
 /// The state in the coordinates of the folded map, m: z = δX − S, what is bent and not backlash; v = a₀₁ δẊ, what the
 /// speed adds to that in a step; and S.
-pub(crate) type Bent = [f64; 3];
+pub(crate) type SteadyState = [f64; 3];
 
 /// Predict and correct in one, at the settled gain K.
 ///
@@ -34,8 +34,8 @@ pub(crate) type Bent = [f64; 3];
 /// difference, or if S were moved by k₂ e; but then a difference of the last bit would live on for long, and
 /// `lanes` needs that starts are forgotten wholly. Each product is fused with its sum, on any machine.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Folded {
-    coefficients: Coefficients<f64>,
+pub(crate) struct SteadyStateFilter {
+    coefficients: SteadyStateCoefficients<f64>,
     #[cfg(feature = "std")]
     pub(crate) variance_m2: f64,
     /// a₀₁, s.
@@ -45,9 +45,9 @@ pub(crate) struct Folded {
     p: Matrix3<f64>,
 }
 
-/// See [`Folded`].
+/// See [`SteadyStateFilter`].
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Coefficients<E> {
+pub(crate) struct SteadyStateCoefficients<E> {
     b: E,
     a: E,
     kappa: E,
@@ -61,11 +61,11 @@ pub(crate) struct Coefficients<E> {
     less_k: E,
 }
 
-impl Folded {
+impl SteadyStateFilter {
     pub(crate) fn new(filter: &Filter, gain: &Vector3<f64>, p: &Matrix3<f64>) -> Self {
         let (a, b) = (&filter.discrete().a_d, &filter.discrete().b_d);
         let (kappa, lambda) = (gain[0] - gain[2], a[(0, 1)] * gain[1]);
-        let coefficients = Coefficients {
+        let coefficients = SteadyStateCoefficients {
             b: b[0],
             a: a[(0, 0)],
             kappa,
@@ -89,42 +89,42 @@ impl Folded {
     }
 
     /// Whether a correction was made with a covariance near to the limit this map belongs to.
-    pub(crate) fn suits(&self, step: &Step) -> bool {
+    pub(crate) fn is_converged(&self, step: &FilterStep) -> bool {
         !step.innovation_m.is_nan() && distance(&self.p, &step.prior.p) <= NEAR
     }
 
     /// From the state after a sample.
-    pub(crate) fn bent(&self, x: &Vector3<f64>) -> Bent {
+    pub(crate) fn to_transformed(&self, x: &Vector3<f64>) -> SteadyState {
         [x[0] - x[2], self.speed_to_way_s * x[1], x[2]]
     }
 
     /// Back to the state. A speed that does not outlast a step moves nothing, and is told as zero.
-    pub(crate) fn state(&self, [z_m, v_m, s_m]: Bent) -> Vector3<f64> {
+    pub(crate) fn from_transformed(&self, [z_m, v_m, s_m]: SteadyState) -> Vector3<f64> {
         Vector3::new(z_m + s_m, v_m * self.way_to_speed_per_s, s_m)
     }
 
     /// The same map for eight series side by side, or for one.
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "must be compiled within each of its shells")]
-    pub(crate) fn wide<E: Series>(&self) -> Coefficients<E> {
+    pub(crate) fn wide<E: FmaScalar>(&self) -> SteadyStateCoefficients<E> {
         let of = &self.coefficients;
-        Coefficients {
-            b: E::all(of.b),
-            a: E::all(of.a),
-            kappa: E::all(of.kappa),
-            less_kappa: E::all(of.less_kappa),
-            lambda: E::all(of.lambda),
-            v_by_v: E::all(of.v_by_v),
-            v_by_z: E::all(of.v_by_z),
-            v_by_u: E::all(of.v_by_u),
-            k: E::all(of.k),
-            minus_k: E::all(of.minus_k),
-            less_k: E::all(of.less_k),
+        SteadyStateCoefficients {
+            b: E::splat(of.b),
+            a: E::splat(of.a),
+            kappa: E::splat(of.kappa),
+            less_kappa: E::splat(of.less_kappa),
+            lambda: E::splat(of.lambda),
+            v_by_v: E::splat(of.v_by_v),
+            v_by_z: E::splat(of.v_by_z),
+            v_by_u: E::splat(of.v_by_u),
+            k: E::splat(of.k),
+            minus_k: E::splat(of.minus_k),
+            less_k: E::splat(of.less_k),
         }
     }
 }
 
-impl<E: Series> Coefficients<E> {
+impl<E: FmaScalar> SteadyStateCoefficients<E> {
     /// One sample of each series: the state after it, and its innovation.
     ///
     /// What comes latest is added last: a state waits ten cycles for the one before it where a sum takes three and a
@@ -132,36 +132,36 @@ impl<E: Series> Coefficients<E> {
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "must be compiled within each of its shells")]
     pub(crate) fn step(&self, [z_m, v_m, s_m]: [E; 3], y_m: E, load_n: E) -> ([E; 3], E) {
-        let pushed_m = self.b.times(load_n);
-        let w_m = y_m.less(pushed_m);
-        let n_m = w_m.less(s_m);
-        let p_m = self.a.fused(z_m, v_m);
-        let next_z_m = self.less_kappa.fused(p_m, self.kappa.fused(n_m, pushed_m));
-        let moved_m = self.v_by_v.fused(v_m, self.v_by_z.fused(z_m, self.v_by_u.times(load_n)));
-        let next_s_m = self.minus_k.fused(p_m, self.less_k.fused(s_m, self.k.times(w_m)));
-        ([next_z_m, self.lambda.fused(n_m, moved_m), next_s_m], n_m.less(p_m))
+        let pushed_m = self.b.mul(load_n);
+        let w_m = y_m.sub(pushed_m);
+        let n_m = w_m.sub(s_m);
+        let p_m = self.a.mul_add(z_m, v_m);
+        let next_z_m = self.less_kappa.mul_add(p_m, self.kappa.mul_add(n_m, pushed_m));
+        let moved_m = self.v_by_v.mul_add(v_m, self.v_by_z.mul_add(z_m, self.v_by_u.mul(load_n)));
+        let next_s_m = self.minus_k.mul_add(p_m, self.less_k.mul_add(s_m, self.k.mul(w_m)));
+        ([next_z_m, self.lambda.mul_add(n_m, moved_m), next_s_m], n_m.sub(p_m))
     }
 }
 
-widest! {
-    /// One sample; see [`Coefficients::step`].
-    pub(crate) fn step(map: &Folded, x: &mut Bent, y_m: f64, load_n: f64) {
+simd_dispatch! {
+    /// One sample; see [`SteadyStateCoefficients::step`].
+    pub(crate) fn step(map: &SteadyStateFilter, x: &mut SteadyState, y_m: f64, load_n: f64) {
         *x = map.wide::<f64>().step(*x, y_m, load_n).0;
     }
 }
 
 #[cfg(feature = "std")]
-widest! {
+simd_dispatch! {
     /// Samples one after the other: the last state, and a sum with the squared innovations added, [`GROUP`] by
     /// [`GROUP`]. The innovations are handed out as far as there is room for them.
     pub(crate) fn run(
-        map: &Folded,
-        from: Bent,
+        map: &SteadyStateFilter,
+        from: SteadyState,
         sum_m2: f64,
         columns: (&[f64], &[f64]),
         s_m: &mut [f64],
         innovation_m: &mut [f64],
-    ) -> (Bent, f64) {
+    ) -> (SteadyState, f64) {
         let (coefficients, mut x, mut sum_m2) = (map.wide::<f64>(), from, sum_m2);
         let mut room = innovation_m.iter_mut();
         let groups = columns.0.chunks(GROUP).zip(columns.1.chunks(GROUP)).zip(s_m.chunks_mut(GROUP));
@@ -171,7 +171,7 @@ widest! {
                 let e_m;
                 (x, e_m) = coefficients.step(x, y, u);
                 *s = x[2];
-                group_m2 = e_m.fused(e_m, group_m2);
+                group_m2 = e_m.mul_add(e_m, group_m2);
                 if let Some(out) = room.next() {
                     *out = e_m;
                 }

@@ -1,25 +1,25 @@
 //! The filter as the samples come: one at a time, in bounded time and without allocating.
 //!
 //! The step loops over nothing and decides nothing by the value of a sample, but for one question: is it
-//! there? [`Stream::even`] runs the whole recursion at each step, before it has settled and after, so
+//! there? [`Stream::constant_time`] runs the whole recursion at each step, before it has settled and after, so
 //! the longest step takes as many operations as the mean one (a missing sample, fewer).
-//! [`Stream::as_batch`] takes the settled shortcut of the batch and gives its bits; its longest step is
+//! [`Stream::steady_state`] takes the settled shortcut of the batch and gives its bits; its longest step is
 //! the even one.
 
 use crate::error::Error;
-use crate::filter::{Estimate, Filter};
-use crate::folded::{self, Bent, Folded};
+use crate::kalman::filter::{Filter, KalmanState};
+use crate::kalman::steady_state::{self, SteadyState, SteadyStateFilter};
 
 /// A filter under way.
 #[derive(Debug, Clone, Copy)]
 pub struct Stream {
     filter: Filter,
-    folded: Option<Folded>,
-    state: Option<Estimate>,
+    folded: Option<SteadyStateFilter>,
+    state: Option<KalmanState>,
     /// Whether the covariance has come to that of the folded map.
     settled: bool,
     /// The state as the folded map has it, once it has taken a sample and while it takes all.
-    bent: Option<Bent>,
+    bent: Option<SteadyState>,
     /// Load of the last sample, N; NaN where it was missing.
     last_load_n: f64,
     /// The last load that was there, N.
@@ -30,7 +30,7 @@ impl Stream {
     /// The whole recursion at each step: worst time equals mean time, and nothing is computed ahead.
     ///
     /// Differs from the batch by less than 1e-12 of the peak of S.
-    pub fn even(filter: &Filter) -> Self {
+    pub fn constant_time(filter: &Filter) -> Self {
         let (filter, nan) = (*filter, f64::NAN);
         let (folded, state, bent) = (None, None, None);
         Self { filter, folded, state, settled: false, bent, last_load_n: nan, held_load_n: 0.0 }
@@ -38,10 +38,11 @@ impl Stream {
 
     /// The batch's bits: the whole recursion until the gain has settled, one constant map from there.
     ///
-    /// Where the gain never settles it goes on as [`Stream::even`], like the batch.
-    pub fn as_batch(filter: &Filter) -> Self {
-        let folded = filter.settled().ok().map(|(gain, p)| Folded::new(filter, &gain, &p));
-        Self { folded, ..Self::even(filter) }
+    /// Where the gain never settles it goes on as [`Stream::constant_time`], like the batch.
+    pub fn steady_state(filter: &Filter) -> Self {
+        let folded =
+            filter.steady_state_gain().ok().map(|(gain, p)| SteadyStateFilter::new(filter, &gain, &p));
+        Self { folded, ..Self::constant_time(filter) }
     }
 
     /// Takes the next sample, and gives S, m: relative position `y_m` in m and load in N, NaN where missing.
@@ -60,9 +61,9 @@ impl Stream {
         let Some(state) = &mut self.state else { return self.start(y_m) };
         let whole = self.settled && !(y_m + before_n).is_nan();
         if let Some(folded) = self.folded.as_ref().filter(|_| whole) {
-            let bent = self.bent.get_or_insert_with(|| folded.bent(&state.x));
-            folded::step(folded, bent, y_m, before_n);
-            state.x = folded.state(*bent);
+            let bent = self.bent.get_or_insert_with(|| folded.to_transformed(&state.x));
+            steady_state::step(folded, bent, y_m, before_n);
+            state.x = folded.from_transformed(*bent);
             return Ok(bent[2]);
         }
         self.bent = None;
@@ -72,25 +73,25 @@ impl Stream {
 
     /// The state after the last sample, once a position was measured. In the settled shortcut its
     /// covariance stays that of the step before it.
-    pub fn estimate(&self) -> Option<&Estimate> {
+    pub fn estimate(&self) -> Option<&KalmanState> {
         self.state.as_ref()
     }
 
     /// Forgets all samples: the next is the first of a new segment.
     pub fn restart(&mut self) {
-        *self = Self { folded: self.folded, ..Self::even(&self.filter) };
+        *self = Self { folded: self.folded, ..Self::constant_time(&self.filter) };
     }
 
     fn start(&mut self, y_m: f64) -> Result<f64, Error> {
         if y_m.is_nan() {
             return Ok(f64::NAN);
         }
-        self.correct(self.filter.start(y_m, self.held_load_n), y_m)
+        self.correct(self.filter.initial_state(y_m, self.held_load_n), y_m)
     }
 
-    fn correct(&mut self, prior: Estimate, y_m: f64) -> Result<f64, Error> {
-        let step = self.filter.correct(&prior, y_m)?;
-        self.settled = self.folded.as_ref().is_some_and(|folded| folded.suits(&step));
+    fn correct(&mut self, prior: KalmanState, y_m: f64) -> Result<f64, Error> {
+        let step = self.filter.update(&prior, y_m)?;
+        self.settled = self.folded.as_ref().is_some_and(|folded| folded.is_converged(&step));
         self.state = Some(step.posterior);
         Ok(step.posterior.x[2])
     }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::wide::{filled_up, widest};
+use crate::simd::dispatch::{pad_with_nan, simd_dispatch};
 
 /// A load counts as being on a side beyond this share of its greater quantile, so noise about zero is no reversal.
 const SIDE_SHARE: f64 = 0.12;
@@ -21,7 +21,7 @@ pub struct LoadBand {
 /// Describes the load over the segments; nothing when they are empty.
 ///
 /// A reversal is a change from beyond +12 % of the greater of the two quantiles to beyond −12 %, or back.
-pub fn band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
+pub fn load_band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
     let [p05_n, p95_n] = quantiles(load_n, segments, [0.05, 0.95])?;
     let threshold = SIDE_SHARE * p05_n.abs().max(p95_n.abs());
     let reversals = segments.iter().map(|segment| reversals(&load_n[segment.clone()], threshold)).sum();
@@ -35,7 +35,7 @@ const BLOCK: usize = 64;
 fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
     let (mut side, mut changes, mut at) = (0.0, 0, 0);
     while at < load_n.len() {
-        at += BLOCK * calm(&load_n[at..], side);
+        at += BLOCK * run_length_on_side(&load_n[at..], side);
         let end = load_n.len().min(at + BLOCK);
         for &f in load_n[at..end].iter().filter(|f| f.abs() > threshold_n) {
             changes += usize::from(side * f < 0.0);
@@ -46,9 +46,9 @@ fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
     changes
 }
 
-widest! {
+simd_dispatch! {
     /// How many blocks from here stay on a side, or between the two: nearly all.
-    fn calm(load_n: &[f64], side: f64) -> usize {
+    fn run_length_on_side(load_n: &[f64], side: f64) -> usize {
         let (blocks, _) = load_n.as_chunks::<BLOCK>();
         let mut count = 0;
         for block in blocks {
@@ -94,19 +94,20 @@ pub(crate) fn quantiles<const N: usize>(
     let every = |s: &Range<usize>| load_n[s.clone()].iter().step_by(stride).copied();
     let mut looks: Vec<f64> = segments.iter().flat_map(every).filter(|f| !f.is_nan()).collect();
     looks.sort_unstable_by(f64::total_cmp);
-    let mut brackets = shares.map(|share| Bracket::about(share, &looks));
-    let count: usize = segments.iter().map(|segment| seen(&load_n[segment.clone()], &mut brackets)).sum();
+    let mut brackets = shares.map(|share| QuantileBracket::about(share, &looks));
+    let count: usize =
+        segments.iter().map(|segment| count_into_brackets(&load_n[segment.clone()], &mut brackets)).sum();
     let last = count.checked_sub(1)?;
     let found = brackets.map(|bracket| bracket.quantile(last));
     if found.iter().all(Option::is_some) { Some(found.map(Option::unwrap_or_default)) } else { in_order() }
 }
 
-widest! {
+simd_dispatch! {
     /// Shows loads to all brackets, and counts those that are there.
-    fn seen<const N: usize>(load_n: &[f64], brackets: &mut [Bracket; N]) -> usize {
+    fn count_into_brackets<const N: usize>(load_n: &[f64], brackets: &mut [QuantileBracket; N]) -> usize {
         let (blocks, rest) = load_n.as_chunks::<BLOCK>();
         let mut there = 0_u64;
-        for block in blocks.iter().chain([&filled_up(rest)]) {
+        for block in blocks.iter().chain([&pad_with_nan(rest)]) {
             for f in block {
                 there += u64::from(!f.is_nan());
             }
@@ -125,7 +126,7 @@ fn rank(last: usize, share: f64) -> usize {
 
 /// Loads about a quantile, and how many lie below them.
 #[derive(Debug)]
-struct Bracket {
+struct QuantileBracket {
     share: f64,
     least: f64,
     greatest: f64,
@@ -133,7 +134,7 @@ struct Bracket {
     within: Vec<f64>,
 }
 
-impl Bracket {
+impl QuantileBracket {
     fn about(share: f64, looks: &[f64]) -> Self {
         let at = rank(looks.len().saturating_sub(1), share);
         let least = at.checked_sub(HALF_BRACKET).map_or(f64::NEG_INFINITY, |k| looks[k]);
@@ -142,7 +143,7 @@ impl Bracket {
     }
 
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "see `widest`")]
+    #[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
     fn take(&mut self, block: &[f64; BLOCK]) {
         let (mut below, mut not_above) = (0_u64, 0_u64);
         for &f in block {

@@ -1,20 +1,20 @@
 //! Eight series side by side, as the vectors of each kind of machine.
 
-use crate::series::Series;
+use crate::simd::fma::FmaScalar;
 
 /// Eight numbers.
-pub(crate) trait Eight: Series {
+pub(crate) trait F64x8: FmaScalar {
     /// From an array.
-    fn of(values: &[f64; 8]) -> Self;
+    fn load(values: &[f64; 8]) -> Self;
     /// Back to an array.
-    fn put(self, values: &mut [f64; 8]);
+    fn store(self, values: &mut [f64; 8]);
     /// Lines to columns.
-    fn turned(lines: [Self; 8]) -> [Self; 8];
+    fn transpose(lines: [Self; 8]) -> [Self; 8];
     /// Lines in memory to columns.
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "all must be compiled within one function")]
-    fn gathered(lines: [&[f64; 8]; 8]) -> [Self; 8] {
-        Self::turned(lines.map(Self::of))
+    fn gather_transpose(lines: [&[f64; 8]; 8]) -> [Self; 8] {
+        Self::transpose(lines.map(Self::load))
     }
 }
 
@@ -22,7 +22,7 @@ pub(crate) trait Eight: Series {
 #[inline(always)]
 #[allow(clippy::inline_always, reason = "all must be compiled within one function")]
 #[allow(unsafe_code, reason = "eight looks for each line take as long as the lines")]
-pub(crate) fn lines(column: &[f64], first: usize, apart: usize) -> [&[f64; 8]; 8] {
+pub(crate) fn load_rows(column: &[f64], first: usize, apart: usize) -> [&[f64; 8]; 8] {
     assert!(first + 7 * apart + 8 <= column.len(), "lines lie within their column");
     // SAFETY: the last of them does, and so do those before it.
     std::array::from_fn(|i| unsafe { &*column.as_ptr().add(first + i * apart).cast() })
@@ -32,27 +32,27 @@ pub(crate) fn lines(column: &[f64], first: usize, apart: usize) -> [&[f64; 8]; 8
 #[inline(always)]
 #[allow(clippy::inline_always, reason = "all must be compiled within one function")]
 #[allow(unsafe_code, reason = "see `lines`")]
-pub(crate) fn put_lines<E: Eight>(lines: [E; 8], column: &mut [f64], first: usize, apart: usize) {
+pub(crate) fn store_rows<E: F64x8>(lines: [E; 8], column: &mut [f64], first: usize, apart: usize) {
     assert!(first + 7 * apart + 8 <= column.len(), "lines lie within their column");
     for (i, line) in lines.into_iter().enumerate() {
         // SAFETY: as above; each is given back before the next is taken.
-        line.put(unsafe { &mut *column.as_mut_ptr().add(first + i * apart).cast() });
+        line.store(unsafe { &mut *column.as_mut_ptr().add(first + i * apart).cast() });
     }
 }
 
 /// For any machine.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Plain([f64; 8]);
+pub(crate) struct PortableF64x8([f64; 8]);
 
 #[allow(clippy::inline_always, reason = "all must be compiled within one function")]
-impl Series for Plain {
+impl FmaScalar for PortableF64x8 {
     #[inline(always)]
-    fn all(value: f64) -> Self {
+    fn splat(value: f64) -> Self {
         Self([value; 8])
     }
 
     #[inline(always)]
-    fn less(mut self, other: Self) -> Self {
+    fn sub(mut self, other: Self) -> Self {
         for (a, b) in self.0.iter_mut().zip(other.0) {
             *a -= b;
         }
@@ -60,7 +60,7 @@ impl Series for Plain {
     }
 
     #[inline(always)]
-    fn times(mut self, other: Self) -> Self {
+    fn mul(mut self, other: Self) -> Self {
         for (a, b) in self.0.iter_mut().zip(other.0) {
             *a *= b;
         }
@@ -68,28 +68,28 @@ impl Series for Plain {
     }
 
     #[inline(always)]
-    fn fused(mut self, factor: Self, summand: Self) -> Self {
+    fn mul_add(mut self, factor: Self, summand: Self) -> Self {
         for ((a, b), c) in self.0.iter_mut().zip(factor.0).zip(summand.0) {
-            *a = a.fused(b, c);
+            *a = a.mul_add(b, c);
         }
         self
     }
 }
 
 #[allow(clippy::inline_always, reason = "all must be compiled within one function")]
-impl Eight for Plain {
+impl F64x8 for PortableF64x8 {
     #[inline(always)]
-    fn of(values: &[f64; 8]) -> Self {
+    fn load(values: &[f64; 8]) -> Self {
         Self(*values)
     }
 
     #[inline(always)]
-    fn put(self, values: &mut [f64; 8]) {
+    fn store(self, values: &mut [f64; 8]) {
         *values = self.0;
     }
 
     #[inline(always)]
-    fn turned(lines: [Self; 8]) -> [Self; 8] {
+    fn transpose(lines: [Self; 8]) -> [Self; 8] {
         let mut columns = lines;
         for (i, line) in lines.iter().enumerate() {
             for (column, value) in columns.iter_mut().zip(line.0) {
@@ -113,36 +113,36 @@ pub(crate) mod x86 {
         _mm512_unpacklo_pd,
     };
 
-    use super::{Eight, Series};
+    use super::{F64x8, FmaScalar};
 
     /// Two vectors of AVX; made only where the processor has AVX2 and FMA.
     #[derive(Debug, Clone, Copy)]
-    pub(crate) struct Avx(__m256d, __m256d);
+    pub(crate) struct Avx2F64x8(__m256d, __m256d);
 
     /// One vector of AVX-512F; made only where the processor has it.
     #[derive(Debug, Clone, Copy)]
-    pub(crate) struct Avx512(__m512d);
+    pub(crate) struct Avx512F64x8(__m512d);
 
     // SAFETY, for all that follows: such a vector exists only where the processor has its kind, and arrays are as
     // long as what is loaded from them or stored to them.
-    impl Series for Avx {
+    impl FmaScalar for Avx2F64x8 {
         #[inline(always)]
-        fn all(value: f64) -> Self {
+        fn splat(value: f64) -> Self {
             unsafe { Self(_mm256_set1_pd(value), _mm256_set1_pd(value)) }
         }
 
         #[inline(always)]
-        fn less(self, other: Self) -> Self {
+        fn sub(self, other: Self) -> Self {
             unsafe { Self(_mm256_sub_pd(self.0, other.0), _mm256_sub_pd(self.1, other.1)) }
         }
 
         #[inline(always)]
-        fn times(self, other: Self) -> Self {
+        fn mul(self, other: Self) -> Self {
             unsafe { Self(_mm256_mul_pd(self.0, other.0), _mm256_mul_pd(self.1, other.1)) }
         }
 
         #[inline(always)]
-        fn fused(self, factor: Self, summand: Self) -> Self {
+        fn mul_add(self, factor: Self, summand: Self) -> Self {
             unsafe {
                 Self(
                     _mm256_fmadd_pd(self.0, factor.0, summand.0),
@@ -152,14 +152,14 @@ pub(crate) mod x86 {
         }
     }
 
-    impl Eight for Avx {
+    impl F64x8 for Avx2F64x8 {
         #[inline(always)]
-        fn of(values: &[f64; 8]) -> Self {
+        fn load(values: &[f64; 8]) -> Self {
             unsafe { Self(_mm256_loadu_pd(values.as_ptr()), _mm256_loadu_pd(values.as_ptr().add(4))) }
         }
 
         #[inline(always)]
-        fn put(self, values: &mut [f64; 8]) {
+        fn store(self, values: &mut [f64; 8]) {
             unsafe {
                 _mm256_storeu_pd(values.as_mut_ptr(), self.0);
                 _mm256_storeu_pd(values.as_mut_ptr().add(4), self.1);
@@ -168,7 +168,7 @@ pub(crate) mod x86 {
 
         /// Four squares of four by four, each to its mirrored place.
         #[inline(always)]
-        fn turned([a, b, c, d, e, f, g, h]: [Self; 8]) -> [Self; 8] {
+        fn transpose([a, b, c, d, e, f, g, h]: [Self; 8]) -> [Self; 8] {
             let [p, q, r, s] = square(a.0, b.0, c.0, d.0);
             let [t, u, v, w] = square(a.1, b.1, c.1, d.1);
             let [i, j, k, l] = square(e.0, f.0, g.0, h.0);
@@ -192,42 +192,42 @@ pub(crate) mod x86 {
         }
     }
 
-    impl Series for Avx512 {
+    impl FmaScalar for Avx512F64x8 {
         #[inline(always)]
-        fn all(value: f64) -> Self {
+        fn splat(value: f64) -> Self {
             unsafe { Self(_mm512_set1_pd(value)) }
         }
 
         #[inline(always)]
-        fn less(self, other: Self) -> Self {
+        fn sub(self, other: Self) -> Self {
             unsafe { Self(_mm512_sub_pd(self.0, other.0)) }
         }
 
         #[inline(always)]
-        fn times(self, other: Self) -> Self {
+        fn mul(self, other: Self) -> Self {
             unsafe { Self(_mm512_mul_pd(self.0, other.0)) }
         }
 
         #[inline(always)]
-        fn fused(self, factor: Self, summand: Self) -> Self {
+        fn mul_add(self, factor: Self, summand: Self) -> Self {
             unsafe { Self(_mm512_fmadd_pd(self.0, factor.0, summand.0)) }
         }
     }
 
-    impl Eight for Avx512 {
+    impl F64x8 for Avx512F64x8 {
         #[inline(always)]
-        fn of(values: &[f64; 8]) -> Self {
+        fn load(values: &[f64; 8]) -> Self {
             unsafe { Self(_mm512_loadu_pd(values.as_ptr())) }
         }
 
         #[inline(always)]
-        fn put(self, values: &mut [f64; 8]) {
+        fn store(self, values: &mut [f64; 8]) {
             unsafe { _mm512_storeu_pd(values.as_mut_ptr(), self.0) }
         }
 
-        /// Halves as they are loaded, then pairs, then pairs of pairs: a third fewer turns than [`Eight::turned`].
+        /// Halves as they are loaded, then pairs, then pairs of pairs: a third fewer turns than [`F64x8::transpose`].
         #[inline(always)]
-        fn gathered([a, b, c, d, e, f, g, h]: [&[f64; 8]; 8]) -> [Self; 8] {
+        fn gather_transpose([a, b, c, d, e, f, g, h]: [&[f64; 8]; 8]) -> [Self; 8] {
             let [p, q, r, s] = half::<0>([a, b, c, d, e, f, g, h]);
             let [t, u, v, w] = half::<4>([a, b, c, d, e, f, g, h]);
             [p, q, r, s, t, u, v, w]
@@ -235,7 +235,7 @@ pub(crate) mod x86 {
 
         /// Pairs, then pairs of pairs, then halves.
         #[inline(always)]
-        fn turned([a, b, c, d, e, f, g, h]: [Self; 8]) -> [Self; 8] {
+        fn transpose([a, b, c, d, e, f, g, h]: [Self; 8]) -> [Self; 8] {
             let [p, r, t, v] = even([a, b, c, d, e, f, g, h]);
             let [q, s, u, w] = odd([a, b, c, d, e, f, g, h]);
             [p, q, r, s, t, u, v, w]
@@ -244,7 +244,7 @@ pub(crate) mod x86 {
 
     /// Four columns from some number on.
     #[inline(always)]
-    fn half<const FROM: usize>([a, b, c, d, e, f, g, h]: [&[f64; 8]; 8]) -> [Avx512; 4] {
+    fn half<const FROM: usize>([a, b, c, d, e, f, g, h]: [&[f64; 8]; 8]) -> [Avx512F64x8; 4] {
         // SAFETY: as above.
         unsafe {
             let two = |near: &[f64; 8], far: &[f64; 8]| {
@@ -255,17 +255,17 @@ pub(crate) mod x86 {
             let (even_near, odd_near) = (_mm512_unpacklo_pd(ac, bd), _mm512_unpackhi_pd(ac, bd));
             let (even_far, odd_far) = (_mm512_unpacklo_pd(eg, fh), _mm512_unpackhi_pd(eg, fh));
             [
-                Avx512(_mm512_shuffle_f64x2::<0x88>(even_near, even_far)),
-                Avx512(_mm512_shuffle_f64x2::<0x88>(odd_near, odd_far)),
-                Avx512(_mm512_shuffle_f64x2::<0xdd>(even_near, even_far)),
-                Avx512(_mm512_shuffle_f64x2::<0xdd>(odd_near, odd_far)),
+                Avx512F64x8(_mm512_shuffle_f64x2::<0x88>(even_near, even_far)),
+                Avx512F64x8(_mm512_shuffle_f64x2::<0x88>(odd_near, odd_far)),
+                Avx512F64x8(_mm512_shuffle_f64x2::<0xdd>(even_near, even_far)),
+                Avx512F64x8(_mm512_shuffle_f64x2::<0xdd>(odd_near, odd_far)),
             ]
         }
     }
 
     /// The columns of even number.
     #[inline(always)]
-    fn even([a, b, c, d, e, f, g, h]: [Avx512; 8]) -> [Avx512; 4] {
+    fn even([a, b, c, d, e, f, g, h]: [Avx512F64x8; 8]) -> [Avx512F64x8; 4] {
         // SAFETY: as above.
         unsafe {
             quarters(
@@ -279,7 +279,7 @@ pub(crate) mod x86 {
 
     /// The columns of odd number.
     #[inline(always)]
-    fn odd([a, b, c, d, e, f, g, h]: [Avx512; 8]) -> [Avx512; 4] {
+    fn odd([a, b, c, d, e, f, g, h]: [Avx512F64x8; 8]) -> [Avx512F64x8; 4] {
         // SAFETY: as above.
         unsafe {
             quarters(
@@ -293,7 +293,7 @@ pub(crate) mod x86 {
 
     /// Of four vectors of four pairs: the first pairs of all, the second, the third, the fourth.
     #[inline(always)]
-    fn quarters(ab: __m512d, cd: __m512d, ef: __m512d, gh: __m512d) -> [Avx512; 4] {
+    fn quarters(ab: __m512d, cd: __m512d, ef: __m512d, gh: __m512d) -> [Avx512F64x8; 4] {
         // SAFETY: as above.
         unsafe {
             let (near_even, far_even) =
@@ -301,10 +301,10 @@ pub(crate) mod x86 {
             let (near_odd, far_odd) =
                 (_mm512_shuffle_f64x2::<0xdd>(ab, cd), _mm512_shuffle_f64x2::<0xdd>(ef, gh));
             [
-                Avx512(_mm512_shuffle_f64x2::<0x88>(near_even, far_even)),
-                Avx512(_mm512_shuffle_f64x2::<0x88>(near_odd, far_odd)),
-                Avx512(_mm512_shuffle_f64x2::<0xdd>(near_even, far_even)),
-                Avx512(_mm512_shuffle_f64x2::<0xdd>(near_odd, far_odd)),
+                Avx512F64x8(_mm512_shuffle_f64x2::<0x88>(near_even, far_even)),
+                Avx512F64x8(_mm512_shuffle_f64x2::<0x88>(near_odd, far_odd)),
+                Avx512F64x8(_mm512_shuffle_f64x2::<0xdd>(near_even, far_even)),
+                Avx512F64x8(_mm512_shuffle_f64x2::<0xdd>(near_odd, far_odd)),
             ]
         }
     }
@@ -315,12 +315,12 @@ mod tests {
     use super::*;
 
     /// 0 to 63 in lines of eight: entry j of column i is 8 j + i.
-    fn check<E: Eight>() {
+    fn check<E: F64x8>() {
         let lines: [E; 8] =
-            std::array::from_fn(|i| E::of(&std::array::from_fn(|j| f64::from(8 * i as u32 + j as u32))));
-        for (i, column) in E::turned(lines).into_iter().enumerate() {
+            std::array::from_fn(|i| E::load(&std::array::from_fn(|j| f64::from(8 * i as u32 + j as u32))));
+        for (i, column) in E::transpose(lines).into_iter().enumerate() {
             let mut found = [0.0; 8];
-            column.put(&mut found);
+            column.store(&mut found);
             let wanted: Vec<usize> = (0..8).map(|j| 8 * j + i).collect();
             assert_eq!(found.map(|v| v as usize).to_vec(), wanted);
         }
@@ -328,14 +328,14 @@ mod tests {
 
     #[test]
     fn lines_become_columns_with_every_kind_of_vector() {
-        check::<Plain>();
+        check::<PortableF64x8>();
         #[cfg(target_arch = "x86_64")]
         {
             if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-                check::<x86::Avx>();
+                check::<x86::Avx2F64x8>();
             }
             if is_x86_feature_detected!("avx512f") {
-                check::<x86::Avx512>();
+                check::<x86::Avx512F64x8>();
             }
         }
     }

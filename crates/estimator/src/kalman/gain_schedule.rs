@@ -2,10 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::Samples;
 use crate::error::Error;
-use crate::filter::{Filter, Innovations, Track};
-use crate::folded::Folded;
+use crate::kalman::filter::Filter;
+use crate::kalman::steady_state::SteadyStateFilter;
 
 /// Steps of a start that are kept, at most; a sound tuning settles in far fewer.
 const MOST_STEPS: usize = 4096;
@@ -18,7 +17,7 @@ const LONGEST_LEAD: usize = 65_536;
 
 /// A step after a start, while every sample is measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Opening {
+pub(crate) struct TransientGain {
     pub(crate) gain: Vector3<f64>,
     pub(crate) variance_m2: f64,
     /// Covariance after the step.
@@ -28,28 +27,28 @@ pub(crate) struct Opening {
 /// The gains of one filter from a start until they settle, and the settled map: the covariance depends on no
 /// measurement, so one schedule serves every series of these parameters, this step and this noise.
 #[derive(Debug, Clone)]
-pub struct Schedule {
+pub struct GainSchedule {
     pub(crate) filter: Filter,
-    pub(crate) openings: Vec<Opening>,
+    pub(crate) transient: Vec<TransientGain>,
     /// Whether the settled map takes over after them.
     pub(crate) settles: bool,
-    pub(crate) folded: Option<Folded>,
+    pub(crate) folded: Option<SteadyStateFilter>,
     /// Steps after which a start is forgotten to the last bit.
     pub(crate) lead: Option<usize>,
     bandwidth_hz: Result<f64, Error>,
 }
 
-impl Schedule {
+impl GainSchedule {
     /// Runs the covariance ahead.
     pub fn new(filter: &Filter) -> Self {
-        let settled = filter.settled();
+        let settled = filter.steady_state_gain();
         let radius = settled.as_ref().map(|(gain, _)| filter.radius_at(gain)).map_err(Clone::clone);
-        let folded = settled.ok().map(|(gain, p)| Folded::new(filter, &gain, &p));
+        let folded = settled.ok().map(|(gain, p)| SteadyStateFilter::new(filter, &gain, &p));
         let lead = radius.as_ref().ok().map(|radius| FORGOTTEN.ln() / radius.ln());
-        let (openings, settles) = openings(filter, folded.as_ref());
+        let (transient, settles) = transient(filter, folded.as_ref());
         Self {
             filter: *filter,
-            openings,
+            transient,
             settles,
             folded,
             lead: lead.filter(|n| (1.0..LONGEST_LEAD as f64).contains(n)).map(|n| n.ceil() as usize),
@@ -65,39 +64,25 @@ impl Schedule {
     /// As [`Filter::bandwidth_hz`], found already.
     ///
     /// # Errors
-    /// As [`Filter::settled`].
+    /// As [`Filter::steady_state_gain`].
     pub fn bandwidth_hz(&self) -> Result<f64, Error> {
         self.bandwidth_hz.clone()
     }
 }
 
-impl Filter {
-    /// [`Schedule::track`] for a single flight.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn track(
-        &self,
-        samples: &Samples<'_>,
-        innovations: Option<&mut Innovations>,
-    ) -> Result<Track, Error> {
-        Schedule::new(self).track(samples, innovations)
-    }
-}
-
 /// Steps from a start until the settled map takes over, and whether it does; none where the noise levels
 /// forbid a first one.
-fn openings(filter: &Filter, folded: Option<&Folded>) -> (Vec<Opening>, bool) {
-    let mut openings = Vec::new();
-    let mut state = filter.start(0.0, 0.0);
-    while openings.len() < MOST_STEPS {
-        let Ok(step) = filter.correct(&state, 0.0) else { break };
+fn transient(filter: &Filter, folded: Option<&SteadyStateFilter>) -> (Vec<TransientGain>, bool) {
+    let mut transient = Vec::new();
+    let mut state = filter.initial_state(0.0, 0.0);
+    while transient.len() < MOST_STEPS {
+        let Ok(step) = filter.update(&state, 0.0) else { break };
         let p = step.posterior.p;
-        openings.push(Opening { gain: step.gain, variance_m2: step.innovation_variance_m2, p });
-        if folded.is_some_and(|folded| folded.suits(&step)) {
-            return (openings, true);
+        transient.push(TransientGain { gain: step.gain, variance_m2: step.innovation_variance_m2, p });
+        if folded.is_some_and(|folded| folded.is_converged(&step)) {
+            return (transient, true);
         }
         state = filter.predict(&step.posterior, 0.0);
     }
-    (openings, false)
+    (transient, false)
 }

@@ -8,7 +8,7 @@
 /// Defines a function whose body runs with AVX-512 or AVX2, and fused products, where the processor has them.
 ///
 /// A body must hold no closure: one would be compiled without the wider vectors.
-macro_rules! widest {
+macro_rules! simd_dispatch {
     ($(#[$note:meta])* $seen:vis fn $name:ident$(<const $n:ident: usize>)?($($arg:ident: $is:ty),* $(,)?)
         $(-> $out:ty)? $body:block) => {
         $(#[$note])*
@@ -46,12 +46,12 @@ macro_rules! widest {
     };
 }
 
-pub(crate) use widest;
+pub(crate) use simd_dispatch;
 
 /// Up to `N` numbers, filled up with NaN, which no sum, count or extreme takes in.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "see `widest`")]
-pub(crate) fn filled_up<const N: usize>(values: &[f64]) -> [f64; N] {
+#[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+pub(crate) fn pad_with_nan<const N: usize>(values: &[f64]) -> [f64; N] {
     let mut all = [f64::NAN; N];
     all[..values.len()].copy_from_slice(values);
     all
@@ -64,7 +64,7 @@ pub(crate) fn filled_up<const N: usize>(values: &[f64]) -> [f64; N] {
 pub(crate) struct Lanes(pub(crate) [f64; Lanes::COUNT]);
 
 #[cfg(feature = "std")]
-#[allow(clippy::inline_always, reason = "see `widest`")]
+#[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
 impl Lanes {
     pub(crate) const COUNT: usize = 8;
     pub(crate) const ZERO: Self = Self([0.0; Self::COUNT]);

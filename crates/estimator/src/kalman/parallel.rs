@@ -11,10 +11,10 @@ use core::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
 use std::hint::black_box;
 use std::ops::Range;
 
+use crate::kalman::steady_state::{self, GROUP, SteadyState, SteadyStateFilter};
 #[cfg(target_arch = "x86_64")]
-use crate::eight::x86::{Avx, Avx512};
-use crate::eight::{Eight, Plain, lines, put_lines};
-use crate::folded::{self, Bent, Folded, GROUP};
+use crate::simd::f64x8::x86::{Avx2F64x8, Avx512F64x8};
+use crate::simd::f64x8::{F64x8, PortableF64x8, load_rows, store_rows};
 
 /// Parts worked on side by side.
 pub(crate) const PARTS: usize = 8;
@@ -31,14 +31,14 @@ const TILE: usize = 8;
 /// How a stretch is cut: part `i` covers `lead + part` samples from `i·part`; the first `lead` of them are its
 /// early start, but for the first part, whose state is known.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Cut {
+pub(crate) struct ChunkPlan {
     lead: usize,
     part: usize,
 }
 
-impl Cut {
+impl ChunkPlan {
     /// Of up to so many samples; none where they are too few. `lead` is how long it takes to forget a start.
-    pub(crate) fn of(samples: usize, lead: usize) -> Option<Self> {
+    pub(crate) fn new(samples: usize, lead: usize) -> Option<Self> {
         let lead = lead.div_ceil(GROUP) * GROUP;
         let part = (samples.checked_sub(lead)? / PARTS).min(LONGEST_PART.max(4 * lead)) / GROUP * GROUP;
         (part > 0 && part as f64 >= SHORTEST_SHARE * lead as f64).then_some(Self { lead, part })
@@ -67,22 +67,22 @@ impl Cut {
 }
 
 /// The states of eight parts: eight numbers for each entry of the state.
-pub(crate) type States = [[f64; PARTS]; 3];
+pub(crate) type ChunkStates = [[f64; PARTS]; 3];
 
 /// The state of one part.
-fn state(states: &States, part: usize) -> Bent {
+fn state(states: &ChunkStates, part: usize) -> SteadyState {
     states.each_ref().map(|entry| entry[part])
 }
 
-fn same(a: Bent, b: Bent) -> bool {
+fn same(a: SteadyState, b: SteadyState) -> bool {
     a.map(f64::to_bits) == b.map(f64::to_bits)
 }
 
 /// What the parts read and write. Columns may go on behind the last part: what the next eight will need is fetched
 /// meanwhile, since memory is quickest line after line.
-pub(crate) struct Work<'a> {
-    pub(crate) map: &'a Folded,
-    pub(crate) cut: Cut,
+pub(crate) struct ChunkIo<'a> {
+    pub(crate) map: &'a SteadyStateFilter,
+    pub(crate) cut: ChunkPlan,
     pub(crate) y_m: &'a [f64],
     pub(crate) load_n: &'a [f64],
     pub(crate) s_m: &'a mut [f64],
@@ -90,29 +90,29 @@ pub(crate) struct Work<'a> {
     pub(crate) squares_m2: &'a mut [[f64; PARTS]],
 }
 
-impl Work<'_> {
+impl ChunkIo<'_> {
     /// Runs the parts from their states: the last state of the plain recursion, and a sum with its squared
     /// innovations added, group by group. None where a sample is missing, which leaves no state behind it a number.
-    pub(crate) fn run(&mut self, states: States, mut sum_m2: f64) -> Option<(Bent, f64)> {
-        let arrived = self.advance(states, 0..self.cut.lead);
+    pub(crate) fn run(&mut self, states: ChunkStates, mut sum_m2: f64) -> Option<(SteadyState, f64)> {
+        let arrived = self.advance_chunks(states, 0..self.cut.lead);
         let mut marks = [arrived; MARKS];
         let mut reached = arrived;
         for (mark, states) in marks.iter_mut().enumerate() {
             // A part's end is written after the early start of the next, which lies in the same place.
-            reached = self.advance(reached, self.cut.between(mark));
+            reached = self.advance_chunks(reached, self.cut.between(mark));
             *states = reached;
         }
         if reached.as_flattened().iter().any(|entry| !entry.is_finite()) {
             return None;
         }
         // The early start of the first part is no guess.
-        sum_m2 = self.added(sum_m2, 0, 0);
+        sum_m2 = self.add_squares(sum_m2, 0, 0);
         let mut last = state(&reached, 0);
         for part in 1..PARTS {
             (last, sum_m2) = if same(state(&arrived, part), last) {
-                (state(&reached, part), self.added(sum_m2, part, self.cut.lead))
+                (state(&reached, part), self.add_squares(sum_m2, part, self.cut.lead))
             } else {
-                self.catch_up(part, last, sum_m2, &marks)
+                self.recompute_until_match(part, last, sum_m2, &marks)
             };
         }
         Some((last, sum_m2))
@@ -120,71 +120,71 @@ impl Work<'_> {
 
     /// A part from the state it should have arrived in, until it is in one that it was in.
     #[cold]
-    fn catch_up(
+    fn recompute_until_match(
         &mut self,
         part: usize,
-        mut x: Bent,
+        mut x: SteadyState,
         mut sum_m2: f64,
-        marks: &[States; MARKS],
-    ) -> (Bent, f64) {
+        marks: &[ChunkStates; MARKS],
+    ) -> (SteadyState, f64) {
         for (mark, states) in marks.iter().enumerate() {
             let Range { start, end } = self.cut.between(mark);
             let all = self.cut.start(part) + start..self.cut.start(part) + end;
             let columns = (&self.y_m[all.clone()], &self.load_n[all.clone()]);
-            (x, sum_m2) = folded::run(self.map, x, sum_m2, columns, &mut self.s_m[all], &mut []);
+            (x, sum_m2) = steady_state::run(self.map, x, sum_m2, columns, &mut self.s_m[all], &mut []);
             if same(x, state(states, part)) {
-                return (state(&marks[MARKS - 1], part), self.added(sum_m2, part, end));
+                return (state(&marks[MARKS - 1], part), self.add_squares(sum_m2, part, end));
             }
         }
         (x, sum_m2)
     }
 
     /// A sum with the squared innovations of a part added from one of its samples on.
-    fn added(&self, sum_m2: f64, part: usize, from: usize) -> f64 {
+    fn add_squares(&self, sum_m2: f64, part: usize, from: usize) -> f64 {
         let groups = &self.squares_m2[from / GROUP..self.cut.groups()];
         groups.iter().fold(sum_m2, |sum, group| sum + group[part])
     }
 
     /// Takes all parts from one of their samples to another, with the widest vectors the machine has.
-    fn advance(&mut self, states: States, within: Range<usize>) -> States {
+    fn advance_chunks(&mut self, states: ChunkStates, within: Range<usize>) -> ChunkStates {
         #[cfg(target_arch = "x86_64")]
         {
             if is_x86_feature_detected!("avx512f") {
                 // SAFETY: the processor has what it was compiled for.
-                #[allow(unsafe_code, reason = "see `eight`")]
+                #[allow(unsafe_code, reason = "see `f64x8`")]
                 return unsafe { advance_avx512(self, states, within) };
             }
             if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
                 // SAFETY: as above.
-                #[allow(unsafe_code, reason = "see `eight`")]
+                #[allow(unsafe_code, reason = "see `f64x8`")]
                 return unsafe { advance_avx2(self, states, within) };
             }
         }
-        advance::<Plain>(self, states, within)
+        advance_chunks::<PortableF64x8>(self, states, within)
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
-fn advance_avx512(work: &mut Work<'_>, states: States, within: Range<usize>) -> States {
-    advance::<Avx512>(work, states, within)
+fn advance_avx512(work: &mut ChunkIo<'_>, states: ChunkStates, within: Range<usize>) -> ChunkStates {
+    advance_chunks::<Avx512F64x8>(work, states, within)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn advance_avx2(work: &mut Work<'_>, states: States, within: Range<usize>) -> States {
-    advance::<Avx>(work, states, within)
+fn advance_avx2(work: &mut ChunkIo<'_>, states: ChunkStates, within: Range<usize>) -> ChunkStates {
+    advance_chunks::<Avx2F64x8>(work, states, within)
 }
 
 /// Tells the processor that numbers will be needed.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "see `eight`")]
+#[allow(clippy::inline_always, reason = "see `f64x8`")]
 #[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables, reason = "no way to tell"))]
-fn fetch(numbers: &[f64]) {
+fn prefetch(numbers: &[f64]) {
     #[cfg(target_arch = "x86_64")]
     for line in numbers.iter().step_by(TILE) {
         // SAFETY: it reads nothing that could be seen.
-        #[allow(unsafe_code, reason = "see `eight`")]
+        #[allow(unsafe_code, reason = "see `f64x8`")]
         unsafe {
             _mm_prefetch::<_MM_HINT_T1>(std::ptr::from_ref(line).cast());
         }
@@ -192,38 +192,45 @@ fn fetch(numbers: &[f64]) {
 }
 
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "see `eight`")]
-fn advance<E: Eight>(work: &mut Work<'_>, states: States, within: Range<usize>) -> States {
+#[allow(clippy::inline_always, reason = "see `f64x8`")]
+fn advance_chunks<E: F64x8>(
+    work: &mut ChunkIo<'_>,
+    states: ChunkStates,
+    within: Range<usize>,
+) -> ChunkStates {
     let (map, part) = (work.map.wide::<E>(), work.cut.part);
-    let mut x = [E::of(&states[0]), E::of(&states[1]), E::of(&states[2])];
+    let mut x = [E::load(&states[0]), E::load(&states[1]), E::load(&states[2])];
     for group in within.step_by(GROUP) {
-        let mut squares = E::all(0.0);
+        let mut squares = E::splat(0.0);
         for at in (group..group + GROUP).step_by(TILE) {
             // Hidden, or each of the 24 places would be kept in a register, of which there are not enough.
             let part = black_box(part);
             let next = work.cut.samples() + PARTS * at;
             for column in [work.y_m, work.load_n, work.s_m] {
                 if let Some(tiles) = column.get(next..next + PARTS * TILE) {
-                    fetch(tiles);
+                    prefetch(tiles);
                 }
             }
-            let (y, u) = (E::gathered(lines(work.y_m, at, part)), E::gathered(lines(work.load_n, at, part)));
+            let (y, u) = (
+                E::gather_transpose(load_rows(work.y_m, at, part)),
+                E::gather_transpose(load_rows(work.load_n, at, part)),
+            );
             let mut s = y;
             for k in 0..TILE {
                 let e_m;
                 (x, e_m) = map.step(x, y[k], u[k]);
                 s[k] = x[2];
-                squares = e_m.fused(e_m, squares);
+                squares = e_m.mul_add(e_m, squares);
             }
-            put_lines(E::turned(s), work.s_m, at, part);
+            store_rows(E::transpose(s), work.s_m, at, part);
         }
         if let Some(group) = work.squares_m2.get_mut(group / GROUP) {
-            squares.put(group);
+            squares.store(group);
         }
     }
     let mut states = states;
     for (entry, x) in states.iter_mut().zip(x) {
-        x.put(entry);
+        x.store(entry);
     }
     states
 }
@@ -235,11 +242,11 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::noise::{Noise, Sensors};
-    use crate::{Actuator, Filter, Schedule};
+    use crate::model::{NoiseModel, SensorNoise};
+    use crate::{ActuatorModel, Filter, GainSchedule};
 
     fn filter((stiffness, damping, mass): (f64, f64, f64), rate_hz: f64, bandwidth_hz: f64) -> Filter {
-        let noise = Noise::Sensors(Sensors {
+        let noise = NoiseModel::Sensors(SensorNoise {
             screw_rms_m: 3e-6,
             screw_resolution_m: 2.3e-6,
             motor_rms_m: 1e-6,
@@ -247,15 +254,16 @@ mod tests {
             unknown_force_n: 200.0,
             bandwidth_hz,
         });
-        Filter::new(&Actuator::linear(stiffness, damping, mass).unwrap(), rate_hz.recip(), &noise).unwrap()
+        Filter::new(&ActuatorModel::linear(stiffness, damping, mass).unwrap(), rate_hz.recip(), &noise)
+            .unwrap()
     }
 
-    fn folded_of(filter: &Filter) -> Folded {
-        let (gain, p) = filter.settled().unwrap();
-        Folded::new(filter, &gain, &p)
+    fn folded_of(filter: &Filter) -> SteadyStateFilter {
+        let (gain, p) = filter.steady_state_gain().unwrap();
+        SteadyStateFilter::new(filter, &gain, &p)
     }
 
-    fn map() -> Folded {
+    fn map() -> SteadyStateFilter {
         folded_of(&filter((5e7, 2000.0, 8.0), 250.0, 10.0))
     }
 
@@ -267,20 +275,25 @@ mod tests {
         (y_m, load_n)
     }
 
-    const STARTS: States = [[1e-4, 0.0, 0.0, 1e-3, 0.0, 0.0, -1e-3, 0.0], [0.0; PARTS], [2e-4; PARTS]];
+    const STARTS: ChunkStates = [[1e-4, 0.0, 0.0, 1e-3, 0.0, 0.0, -1e-3, 0.0], [0.0; PARTS], [2e-4; PARTS]];
 
     fn bits(values: &[f64]) -> Vec<u64> {
         values.iter().map(|v| v.to_bits()).collect()
     }
 
-    type Advance = fn(&mut Work<'_>, States, Range<usize>) -> States;
+    type Advance = fn(&mut ChunkIo<'_>, ChunkStates, Range<usize>) -> ChunkStates;
 
     /// S and the sums of squares of eight parts of 96 samples, by one kind of vector.
-    fn advanced(map: &Folded, y_m: &[f64], load_n: &[f64], advance: Advance) -> (Vec<u64>, Vec<u64>) {
-        let cut = Cut { lead: 0, part: 96 };
+    fn advanced(
+        map: &SteadyStateFilter,
+        y_m: &[f64],
+        load_n: &[f64],
+        advance_chunks: Advance,
+    ) -> (Vec<u64>, Vec<u64>) {
+        let cut = ChunkPlan { lead: 0, part: 96 };
         let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.groups()]);
-        advance(
-            &mut Work { map, cut, y_m, load_n, s_m: &mut s_m, squares_m2: &mut squares_m2 },
+        advance_chunks(
+            &mut ChunkIo { map, cut, y_m, load_n, s_m: &mut s_m, squares_m2: &mut squares_m2 },
             STARTS,
             0..96,
         );
@@ -288,13 +301,13 @@ mod tests {
     }
 
     /// Each part by itself, from its start, as the plain recursion does it.
-    fn one_by_one(map: &Folded, y_m: &[f64], load_n: &[f64]) -> (Vec<u64>, Vec<u64>) {
+    fn one_by_one(map: &SteadyStateFilter, y_m: &[f64], load_n: &[f64]) -> (Vec<u64>, Vec<u64>) {
         let (mut s_m, mut squares_m2) = (vec![0.0; y_m.len()], vec![[0.0; PARTS]; 96 / GROUP]);
         for part in 0..PARTS {
             let within = part * 96..(part + 1) * 96;
             let columns = (&y_m[within.clone()], &load_n[within.clone()]);
             let mut e_m = [0.0; 96];
-            folded::run(map, state(&STARTS, part), 0.0, columns, &mut s_m[within], &mut e_m);
+            steady_state::run(map, state(&STARTS, part), 0.0, columns, &mut s_m[within], &mut e_m);
             for (squares_m2, e_m) in squares_m2.iter_mut().zip(e_m.chunks(GROUP)) {
                 squares_m2[part] = e_m.iter().fold(0.0, |sum, e: &f64| e.mul_add(*e, sum));
             }
@@ -305,11 +318,11 @@ mod tests {
     /// The first without the processor's own fused products, where it could do without.
     fn kinds() -> Vec<Advance> {
         let mut kinds: Vec<Advance> =
-            vec![advance::<Plain>, |work, states, within| work.advance(states, within)];
+            vec![advance_chunks::<PortableF64x8>, |work, states, within| work.advance_chunks(states, within)];
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
             // SAFETY: the processor has them.
-            #[allow(unsafe_code, reason = "see `eight`")]
+            #[allow(unsafe_code, reason = "see `f64x8`")]
             kinds.push(|work, states, within| unsafe { advance_avx2(work, states, within) });
         }
         kinds
@@ -328,8 +341,8 @@ mod tests {
             let plant = (ten(stiffness), ten(damping), ten(mass));
             let map = folded_of(&filter(plant, ten(rate_hz), ten(bandwidth_hz)));
             let wanted = one_by_one(&map, &y_m, &load_n);
-            for advance in kinds() {
-                prop_assert!(advanced(&map, &y_m, &load_n, advance) == wanted);
+            for advance_chunks in kinds() {
+                prop_assert!(advanced(&map, &y_m, &load_n, advance_chunks) == wanted);
             }
         }
     }
@@ -343,13 +356,14 @@ mod tests {
             for bandwidth_hz in [3.0, 10.0] {
                 for plant in [(5e7, 2000.0, 8.0), (2e7, 3000.0, 40.0), (3e8, 20_000.0, 5.0)] {
                     let filter = filter(plant, rate_hz, bandwidth_hz);
-                    let (map, lead) = (folded_of(&filter), Schedule::new(&filter).lead.unwrap());
+                    let (map, lead) = (folded_of(&filter), GainSchedule::new(&filter).lead.unwrap());
                     let (y_m, load_n) = channels(lead + 100);
                     for from in (0..100).step_by(5) {
                         let columns = (&y_m[from..from + lead], &load_n[from..from + lead]);
-                        let ended =
-                            |x: Bent| folded::run(&map, x, 0.0, columns, &mut vec![0.0; lead], &mut []).0;
-                        let start = map.bent(&filter.start(y_m[from], load_n[from]).x);
+                        let ended = |x: SteadyState| {
+                            steady_state::run(&map, x, 0.0, columns, &mut vec![0.0; lead], &mut []).0
+                        };
+                        let start = map.to_transformed(&filter.initial_state(y_m[from], load_n[from]).x);
                         starts += 1;
                         remembered += u32::from(!same(ended(start), ended([1e-4, 1e-5, -1e-4])));
                     }
@@ -364,15 +378,15 @@ mod tests {
     fn parts_that_have_not_forgotten_their_start_are_caught_up_with() {
         let map = map();
         for (lead, part) in [(224, 96), (32, 512), (32, 32), (0, 96)] {
-            let cut = Cut { lead, part };
+            let cut = ChunkPlan { lead, part };
             let (y_m, load_n) = channels(cut.samples());
             let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.groups()]);
             let (s_m, squares_m2) = (&mut s_m, &mut squares_m2);
-            let mut work = Work { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 };
+            let mut work = ChunkIo { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 };
             let (x, sum_m2) = work.run(STARTS, 0.25).unwrap();
             let (mut wanted_m, start) = (vec![0.0; cut.samples()], STARTS.map(|entry| entry[0]));
             let (wanted_x, wanted_m2) =
-                folded::run(&map, start, 0.25, (&y_m, &load_n), &mut wanted_m, &mut []);
+                steady_state::run(&map, start, 0.25, (&y_m, &load_n), &mut wanted_m, &mut []);
             assert_eq!((bits(s_m), bits(&x)), (bits(&wanted_m), bits(&wanted_x)), "{cut:?}");
             assert_eq!(sum_m2.to_bits(), wanted_m2.to_bits(), "{cut:?}");
         }
@@ -381,14 +395,14 @@ mod tests {
     /// Wherever one is missing, the first and the last among them.
     #[test]
     fn a_missing_sample_is_noticed() {
-        let (map, cut) = (map(), Cut { lead: 64, part: 96 });
+        let (map, cut) = (map(), ChunkPlan { lead: 64, part: 96 });
         for at in [0, 63, 64, 159, 160, 500, cut.samples() - 1] {
             for is_load in [false, true] {
                 let (mut y_m, mut load_n) = channels(cut.samples());
                 (if is_load { &mut load_n } else { &mut y_m })[at] = f64::NAN;
                 let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.groups()]);
                 let (s_m, squares_m2) = (&mut s_m, &mut squares_m2);
-                let mut work = Work { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 };
+                let mut work = ChunkIo { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 };
                 assert!(work.run(STARTS, 0.0).is_none(), "sample {at} is missing");
             }
         }

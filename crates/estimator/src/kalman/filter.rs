@@ -2,12 +2,10 @@
 
 use nalgebra::{ComplexField, Matrix3, Vector3};
 
-use crate::discretise::Discrete;
 use crate::error::Error;
-use crate::model::Actuator;
-use crate::noise::{Covariances, Noise};
-#[cfg(feature = "std")]
-pub use crate::track::{Innovations, Track};
+use crate::model::ActuatorModel;
+use crate::model::DiscreteModel;
+use crate::model::{NoiseCovariances, NoiseModel};
 
 /// Variance of the initial speed, (m/s)², and of the initial backlash, m²: the paper gives none.
 const INITIAL_VARIANCE: (f64, f64) = (1e-4, 1e-6);
@@ -21,7 +19,7 @@ const SETTLING_STEPS: usize = 200_000;
 
 /// State x = [δX m, δẊ m/s, S m] and its covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub struct KalmanState {
     /// The state, 3×1 (7).
     pub x: Vector3<f64>,
     /// Its covariance, 3×3.
@@ -30,11 +28,11 @@ pub struct Estimate {
 
 /// What one sample did to the state.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
+pub struct FilterStep {
     /// Before the measurement: x(k+1/k), P(k+1/k).
-    pub prior: Estimate,
+    pub prior: KalmanState,
     /// After it: x(k+1/k+1), P(k+1/k+1); the prior where the measurement is missing.
-    pub posterior: Estimate,
+    pub posterior: KalmanState,
     /// e = y − C x(k+1/k), m; NaN where the measurement is missing.
     pub innovation_m: f64,
     /// Its variance C P Cᵀ + V_d, m².
@@ -46,8 +44,8 @@ pub struct Step {
 /// A filter for one actuator, step and noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Filter {
-    discrete: Discrete,
-    noise: Covariances,
+    discrete: DiscreteModel,
+    noise: NoiseCovariances,
     stiffness_n_per_m: f64,
     step_s: f64,
 }
@@ -57,37 +55,37 @@ impl Filter {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a step or noise level that no log can have.
-    pub fn new(actuator: &Actuator, step_s: f64, noise: &Noise) -> Result<Self, Error> {
-        let discrete = Discrete::new(actuator, step_s)?;
+    pub fn new(actuator: &ActuatorModel, step_s: f64, noise: &NoiseModel) -> Result<Self, Error> {
+        let discrete = DiscreteModel::new(actuator, step_s)?;
         let noise = noise.covariances(actuator, &discrete, step_s)?;
         Ok(Self { discrete, noise, stiffness_n_per_m: actuator.stiffness_n_per_m(), step_s })
     }
 
     /// A_d and B_d.
-    pub fn discrete(&self) -> &Discrete {
+    pub fn discrete(&self) -> &DiscreteModel {
         &self.discrete
     }
 
     /// W_d and V_d.
-    pub fn noise(&self) -> &Covariances {
+    pub fn noise(&self) -> &NoiseCovariances {
         &self.noise
     }
 
     /// The state before anything is measured, from the first measurement and its load:
     /// x₀ = [y, 0, y − u/K], P₀ = diag(V_d, 10⁻⁴, 10⁻⁶). Starting at zero instead costs +650 % of the
     /// gap where δX carries an offset of a millimetre.
-    pub fn start(&self, y_m: f64, load_n: f64) -> Estimate {
+    pub fn initial_state(&self, y_m: f64, load_n: f64) -> KalmanState {
         let (speed, backlash) = INITIAL_VARIANCE;
-        Estimate {
+        KalmanState {
             x: Vector3::new(y_m, 0.0, y_m - load_n / self.stiffness_n_per_m),
             p: Matrix3::from_diagonal(&Vector3::new(self.noise.v_d_m2, speed, backlash)),
         }
     }
 
     /// One step ahead under a held load (24, 25): x = A_d x + B_d u, P = A_d P A_dᵀ + W_d.
-    pub fn predict(&self, posterior: &Estimate, load_n: f64) -> Estimate {
+    pub fn predict(&self, posterior: &KalmanState, load_n: f64) -> KalmanState {
         let a_d = &self.discrete.a_d;
-        Estimate {
+        KalmanState {
             x: self.predict_state(&posterior.x, load_n),
             p: symmetric(&(a_d * posterior.p * a_d.transpose() + self.noise.w_d)),
         }
@@ -110,7 +108,7 @@ impl Filter {
     ///
     /// # Errors
     /// [`Error::InnovationCovariance`] when s is not a positive, finite number.
-    pub fn correct(&self, prior: &Estimate, y_m: f64) -> Result<Step, Error> {
+    pub fn update(&self, prior: &KalmanState, y_m: f64) -> Result<FilterStep, Error> {
         let s_m2 = prior.p[(0, 0)] + self.noise.v_d_m2;
         if !(s_m2.is_finite() && s_m2 > 0.0) {
             return Err(Error::InnovationCovariance { s_m2 });
@@ -118,7 +116,7 @@ impl Filter {
         let (innovation_variance_m2, prior) = (s_m2, *prior);
         if y_m.is_nan() {
             let gain = Vector3::zeros();
-            return Ok(Step {
+            return Ok(FilterStep {
                 prior,
                 posterior: prior,
                 innovation_m: f64::NAN,
@@ -129,19 +127,19 @@ impl Filter {
         let gain = prior.p.column(0) / s_m2;
         let innovation_m = y_m - prior.x[0];
         let p = symmetric(&(prior.p - gain * prior.p.row(0)));
-        let posterior = Estimate { x: prior.x + gain * innovation_m, p };
-        Ok(Step { prior, posterior, innovation_m, innovation_variance_m2, gain })
+        let posterior = KalmanState { x: prior.x + gain * innovation_m, p };
+        Ok(FilterStep { prior, posterior, innovation_m, innovation_variance_m2, gain })
     }
 
     /// The gain once every sample is measured, 3×1, with P(k+1/k) it belongs to.
     ///
     /// # Errors
     /// [`Error::Unsettled`] when it does not settle; [`Error::InnovationCovariance`].
-    pub fn settled(&self) -> Result<(Vector3<f64>, Matrix3<f64>), Error> {
-        let mut state = self.start(0.0, 0.0);
+    pub fn steady_state_gain(&self) -> Result<(Vector3<f64>, Matrix3<f64>), Error> {
+        let mut state = self.initial_state(0.0, 0.0);
         let (mut least, mut since) = (f64::INFINITY, 0);
         for _ in 0..SETTLING_STEPS {
-            let step = self.correct(&state, 0.0)?;
+            let step = self.update(&state, 0.0)?;
             let next = self.predict(&step.posterior, 0.0);
             let change = distance(&next.p, &state.p);
             (least, since) = if change < least { (change, 0) } else { (least, since + 1) };
@@ -157,7 +155,7 @@ impl Filter {
     /// the spectral radius of (I − K C) A_d. To be held against the bandwidth that was asked for.
     ///
     /// # Errors
-    /// As [`Filter::settled`].
+    /// As [`Filter::steady_state_gain`].
     pub fn bandwidth_hz(&self) -> Result<f64, Error> {
         Ok(self.bandwidth_at_hz(self.spectral_radius()?))
     }
@@ -170,9 +168,9 @@ impl Filter {
     /// ρ of (I − K C) A_d: a wrong start is forgotten by this factor at each step.
     ///
     /// # Errors
-    /// As [`Filter::settled`].
+    /// As [`Filter::steady_state_gain`].
     pub fn spectral_radius(&self) -> Result<f64, Error> {
-        Ok(self.radius_at(&self.settled()?.0))
+        Ok(self.radius_at(&self.steady_state_gain()?.0))
     }
 
     /// ρ at a gain.

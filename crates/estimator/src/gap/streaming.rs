@@ -28,18 +28,18 @@ use crate::model::positive;
 /// What lies beyond the outermost bins counts in them, and is no less exact while the mid-range stays
 /// within. 256 bins take 4 KiB.
 #[derive(Debug, Clone, Copy)]
-pub struct RunningGap<const BINS: usize> {
+pub struct StreamingGap<const BINS: usize> {
     bin_m: f64,
     /// The first S, m; the others are held relative to it.
     origin_m: f64,
     least_m: f64,
     greatest_m: f64,
-    bins: [Bin; BINS],
+    bins: [HistogramBin; BINS],
 }
 
 /// ΔS of everything added so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reading {
+pub struct BoundedGap {
     /// ΔS, the bin of the mid-range taken to be evenly filled, m.
     pub gap_m: f64,
     /// The batch's ΔS is no smaller, m.
@@ -52,12 +52,12 @@ pub struct Reading {
 
 /// Samples, and their sum relative to the origin.
 #[derive(Debug, Clone, Copy, Default)]
-struct Bin {
+struct HistogramBin {
     count: u64,
     sum_m: f64,
 }
 
-impl Bin {
+impl HistogramBin {
     fn add(&mut self, other: &Self) {
         self.count += other.count;
         self.sum_m += other.sum_m;
@@ -68,7 +68,7 @@ impl Bin {
     }
 }
 
-impl<const BINS: usize> RunningGap<BINS> {
+impl<const BINS: usize> StreamingGap<BINS> {
     /// Empty, with bins so wide, m: together they should span what S may move in, and one should be small
     /// beside the gap.
     ///
@@ -77,7 +77,7 @@ impl<const BINS: usize> RunningGap<BINS> {
     pub fn new(bin_m: f64) -> Result<Self, Error> {
         const { assert!(BINS > 1, "a histogram of one bin divides nothing") };
         positive("bin_m", bin_m)?;
-        let (inf, bins) = (f64::INFINITY, [Bin::default(); BINS]);
+        let (inf, bins) = (f64::INFINITY, [HistogramBin::default(); BINS]);
         Ok(Self { bin_m, origin_m: f64::NAN, least_m: inf, greatest_m: -inf, bins })
     }
 
@@ -90,14 +90,14 @@ impl<const BINS: usize> RunningGap<BINS> {
         let relative_m = s_m - self.origin_m;
         self.least_m = self.least_m.min(relative_m);
         self.greatest_m = self.greatest_m.max(relative_m);
-        self.bins[self.place(relative_m)].add(&Bin { count: 1, sum_m: relative_m });
+        self.bins[self.place(relative_m)].add(&HistogramBin { count: 1, sum_m: relative_m });
     }
 
     /// ΔS of everything so far, with the bounds of the batch's.
     ///
     /// # Errors
     /// [`Error::NothingMeasured`] before the first sample; [`Error::Constant`] while S has not moved.
-    pub fn read(&self) -> Result<Reading, Error> {
+    pub fn read(&self) -> Result<BoundedGap, Error> {
         let mid_m = f64::midpoint(self.least_m, self.greatest_m);
         if self.origin_m.is_nan() {
             return Err(Error::NothingMeasured);
@@ -107,28 +107,29 @@ impl<const BINS: usize> RunningGap<BINS> {
         if mid_m <= self.least_m {
             return Err(Error::Constant { samples: count as usize, s_m: self.origin_m + mid_m });
         }
-        Ok(Reading { samples: count, ..self.divide(mid_m, [below, within, above]) })
+        Ok(BoundedGap { samples: count, ..self.divide(mid_m, [below, within, above]) })
     }
 
     /// Each mean is furthest out without the samples of the mid-range's bin, and furthest in with all
     /// of them at the mid-range. An empty side has only its extreme.
-    fn divide(&self, mid_m: f64, [below, within, above]: [Bin; 3]) -> Reading {
+    fn divide(&self, mid_m: f64, [below, within, above]: [HistogramBin; 3]) -> BoundedGap {
         let (low_m, high_m) = self.edges(mid_m);
         let count = within.count as f64;
         // Rounding at an edge may leave the bin no width.
         let up = count * (high_m - mid_m) / (high_m - low_m).max(f64::MIN_POSITIVE);
-        let outermost_m = |bin: Bin, extreme_m| if bin.count == 0 { extreme_m } else { bin.with(0.0, 0.0) };
+        let outermost_m =
+            |bin: HistogramBin, extreme_m| if bin.count == 0 { extreme_m } else { bin.with(0.0, 0.0) };
         let (upper_m, lower_m) = (outermost_m(above, self.greatest_m), outermost_m(below, self.least_m));
         let innermost_m =
-            |bin: Bin| if bin.count + within.count == 0 { mid_m } else { bin.with(count, mid_m) };
-        let mean_m = |bin: Bin, share, edge_m, else_m| {
+            |bin: HistogramBin| if bin.count + within.count == 0 { mid_m } else { bin.with(count, mid_m) };
+        let mean_m = |bin: HistogramBin, share, edge_m, else_m| {
             if bin.count as f64 + share > 0.0 {
                 bin.with(share, f64::midpoint(mid_m, edge_m))
             } else {
                 else_m
             }
         };
-        Reading {
+        BoundedGap {
             gap_m: mean_m(above, up, high_m, upper_m) - mean_m(below, count - up, low_m, lower_m),
             least_m: innermost_m(above) - innermost_m(below),
             greatest_m: upper_m - lower_m,
@@ -137,9 +138,9 @@ impl<const BINS: usize> RunningGap<BINS> {
     }
 
     /// What lies in the bins below, at and above one.
-    fn split(&self, at: usize) -> (Bin, Bin, Bin) {
-        let sum = |bins: &[Bin]| {
-            bins.iter().fold(Bin::default(), |mut sum, bin| {
+    fn split(&self, at: usize) -> (HistogramBin, HistogramBin, HistogramBin) {
+        let sum = |bins: &[HistogramBin]| {
+            bins.iter().fold(HistogramBin::default(), |mut sum, bin| {
                 sum.add(bin);
                 sum
             })

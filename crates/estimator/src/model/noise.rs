@@ -4,15 +4,15 @@ use core::f64::consts::TAU;
 
 use nalgebra::{ComplexField, Matrix3, Vector3};
 
-use crate::discretise::{Discrete, white_covariance};
 use crate::error::Error;
-use crate::model::{Actuator, positive};
+use crate::model::actuator::{ActuatorModel, positive};
+use crate::model::discretise::{DiscreteModel, white_covariance};
 
 /// How W_d and V_d are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Noise {
+pub enum NoiseModel {
     /// From what is known of sensors and friction; the default.
-    Sensors(Sensors),
+    Sensors(SensorNoise),
     /// As the paper has them: per step, right for one sample rate.
     PerStep {
         /// W_d, 3×3, covariance of the states [m, m/s, m] over a step.
@@ -34,7 +34,7 @@ pub enum Noise {
 
 /// Sensor facts, m at the screw axis, and the bandwidth in which the backlash may move.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sensors {
+pub struct SensorNoise {
     /// Noise of the screw position, rms, m.
     pub screw_rms_m: f64,
     /// Its smallest step, m.
@@ -51,14 +51,14 @@ pub struct Sensors {
 
 /// W_d and V_d of one sample rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Covariances {
+pub struct NoiseCovariances {
     /// W_d, 3×3.
     pub w_d: Matrix3<f64>,
     /// V_d, m².
     pub v_d_m2: f64,
 }
 
-impl Sensors {
+impl SensorNoise {
     /// σ_y² = both noise variances plus resolution²/12 each, m².
     pub fn variance_m2(&self) -> f64 {
         let square = |v: f64| v * v;
@@ -71,10 +71,10 @@ impl Sensors {
     /// g = 1 − e^(−2π f_S Ts): the slow pole of the closed loop then sits at f_S.
     fn covariances(
         &self,
-        actuator: &Actuator,
-        discrete: &Discrete,
+        actuator: &ActuatorModel,
+        discrete: &DiscreteModel,
         step_s: f64,
-    ) -> Result<Covariances, Error> {
+    ) -> Result<NoiseCovariances, Error> {
         for (name, value) in [
             ("screw_rms_m", self.screw_rms_m),
             ("screw_resolution_m", self.screw_resolution_m),
@@ -91,21 +91,21 @@ impl Sensors {
         let slack = self.unknown_force_n / actuator.stiffness_n_per_m();
         let q = (v_d_m2 + slack * slack) * g * g / (1.0 - g);
         let force = discrete.b_d * discrete.b_d.transpose() * (self.unknown_force_n * self.unknown_force_n);
-        Ok(Covariances { w_d: force + Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, q)), v_d_m2 })
+        Ok(NoiseCovariances { w_d: force + Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, q)), v_d_m2 })
     }
 }
 
-impl Noise {
+impl NoiseModel {
     /// W_d and V_d at a step.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a level that is negative or not finite, or a measurement without noise.
     pub fn covariances(
         &self,
-        actuator: &Actuator,
-        discrete: &Discrete,
+        actuator: &ActuatorModel,
+        discrete: &DiscreteModel,
         step_s: f64,
-    ) -> Result<Covariances, Error> {
+    ) -> Result<NoiseCovariances, Error> {
         match *self {
             Self::Sensors(sensors) => sensors.covariances(actuator, discrete, step_s),
             Self::PerStep { w_d, v_d_m2 } => {
@@ -114,7 +114,7 @@ impl Noise {
                     if v.is_finite() { Ok(()) } else { Err(Error::Parameter { name: "w_d", value: *v }) }
                 })?;
                 w_d.diagonal().iter().try_for_each(|v| not_negative("w_d", *v))?;
-                Ok(Covariances { w_d, v_d_m2 })
+                Ok(NoiseCovariances { w_d, v_d_m2 })
             }
             Self::Continuous { force_psd_n2_s, backlash_rate_psd_m2_per_s, v_d_m2 } => {
                 positive("v_d_m2", v_d_m2)?;
@@ -123,7 +123,7 @@ impl Noise {
                 let b = actuator.b();
                 let s = Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, backlash_rate_psd_m2_per_s));
                 let q_c = b * b.transpose() * force_psd_n2_s + s;
-                Ok(Covariances { w_d: white_covariance(actuator, &q_c, step_s), v_d_m2 })
+                Ok(NoiseCovariances { w_d: white_covariance(actuator, &q_c, step_s), v_d_m2 })
             }
         }
     }

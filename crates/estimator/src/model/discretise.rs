@@ -3,26 +3,26 @@
 use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3};
 
 use crate::error::Error;
-use crate::exponential::exponential;
-use crate::model::{Actuator, positive};
+use crate::model::actuator::{ActuatorModel, positive};
+use crate::model::matrix_exp::exponential;
 
 /// x(k+1) = A_d x(k) + B_d u(k), with C_d = C = [1 0 0] (23).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Discrete {
+pub struct DiscreteModel {
     /// A_d = e^{A Ts}, 3×3 (20).
     pub a_d: Matrix3<f64>,
     /// B_d = ∫₀^Ts e^{Aυ} B dυ, 3×1 (21).
     pub b_d: Vector3<f64>,
 }
 
-impl Discrete {
+impl DiscreteModel {
     /// Exact for a load that is constant over each step.
     ///
     /// Both come out of one exponential: exp([A B; 0 0]·Ts) = [A_d B_d; 0 1] (van Loan 1978).
     ///
     /// # Errors
     /// [`Error::Parameter`] for a step that is not positive and finite.
-    pub fn new(actuator: &Actuator, step_s: f64) -> Result<Self, Error> {
+    pub fn new(actuator: &ActuatorModel, step_s: f64) -> Result<Self, Error> {
         positive("step_s", step_s)?;
         let mut whole = Matrix4::zeros();
         whole.fixed_view_mut::<3, 3>(0, 0).copy_from(&(actuator.a() * step_s));
@@ -37,7 +37,7 @@ impl Discrete {
 
 /// The covariance over one step of white noise of density `q_c` (3×3, per second) on the state:
 /// ∫₀^Ts e^{Aυ} Q_c e^{Aᵀυ} dυ, by the exponential of [−A Q_c; 0 Aᵀ]·Ts (van Loan 1978).
-pub(crate) fn white_covariance(actuator: &Actuator, q_c: &Matrix3<f64>, step_s: f64) -> Matrix3<f64> {
+pub(crate) fn white_covariance(actuator: &ActuatorModel, q_c: &Matrix3<f64>, step_s: f64) -> Matrix3<f64> {
     let a = actuator.a();
     let mut whole = Matrix6::zeros();
     whole.fixed_view_mut::<3, 3>(0, 0).copy_from(&(-a * step_s));

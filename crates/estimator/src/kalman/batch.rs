@@ -8,17 +8,17 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use crate::Samples;
 use crate::error::Error;
-use crate::filter::{Estimate, Filter};
-use crate::folded::{self, Bent, Folded};
-use crate::lanes::{Cut, PARTS, States, Work};
-use crate::schedule::Schedule;
-use crate::wide::widest;
+use crate::kalman::filter::{Filter, KalmanState};
+use crate::kalman::gain_schedule::GainSchedule;
+use crate::kalman::parallel::{ChunkIo, ChunkPlan, ChunkStates, PARTS};
+use crate::kalman::steady_state::{self, SteadyState, SteadyStateFilter};
+use crate::samples::Samples;
+use crate::simd::dispatch::simd_dispatch;
 
 /// S(t) of one actuator's flight, and how well the model explained it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Track {
+pub struct FilterOutput {
     /// S at each sample, m; NaN outside the segments.
     pub s_m: Vec<f64>,
     /// Mean normalised innovation squared over the measured samples; 1 for a true model.
@@ -29,14 +29,14 @@ pub struct Track {
 
 /// What a batch may hand out for each sample.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Innovations {
+pub struct InnovationBuffers {
     /// e, m; NaN where nothing was measured.
     pub innovation_m: Vec<f64>,
     /// Its variance, m².
     pub variance_m2: Vec<f64>,
 }
 
-impl Schedule {
+impl GainSchedule {
     /// Runs over all segments, each from a start of its own, and hands out S(t).
     ///
     /// A missing load (NaN) is taken to be the one before it.
@@ -47,23 +47,23 @@ impl Schedule {
     pub fn track(
         &self,
         samples: &Samples<'_>,
-        innovations: Option<&mut Innovations>,
-    ) -> Result<Track, Error> {
-        let mut room = Room::default();
-        let (nis, measured) = self.track_in(samples, innovations, &mut room)?;
-        Ok(Track { s_m: room.s_m, nis, measured })
+        innovations: Option<&mut InnovationBuffers>,
+    ) -> Result<FilterOutput, Error> {
+        let mut room = FilterWorkspace::default();
+        let (nis, measured) = self.filter_with(samples, innovations, &mut room)?;
+        Ok(FilterOutput { s_m: room.s_m, nis, measured })
     }
 
-    /// As [`Schedule::track`] with S left in the room: the mean normalised innovation squared, and how many samples
+    /// As [`GainSchedule::track`] with S left in the room: the mean normalised innovation squared, and how many samples
     /// were measured.
     ///
     /// # Errors
-    /// As [`Schedule::track`].
-    pub fn track_in(
+    /// As [`GainSchedule::track`].
+    pub fn filter_with(
         &self,
         samples: &Samples<'_>,
-        mut innovations: Option<&mut Innovations>,
-        room: &mut Room,
+        mut innovations: Option<&mut InnovationBuffers>,
+        room: &mut FilterWorkspace,
     ) -> Result<(f64, usize), Error> {
         samples.check()?;
         let count = samples.dx_m.len();
@@ -73,8 +73,9 @@ impl Schedule {
         }
         // What no segment covers is NaN; all else will be written.
         room.s_m.resize(count, 0.0);
-        outside(samples.segments, count, |gap| room.s_m[gap].fill(f64::NAN));
-        let mut pass = Pass { schedule: self, innovations, room, nis: 0.0, measured: 0, doubtful_until: 0 };
+        for_each_uncovered(samples.segments, count, |gap| room.s_m[gap].fill(f64::NAN));
+        let mut pass =
+            FilterPass { schedule: self, innovations, room, nis: 0.0, measured: 0, doubtful_until: 0 };
         for segment in samples.segments {
             let (y_m, load_n) = (&samples.dx_m[segment.clone()], &samples.load_n[segment.clone()]);
             pass.segment(y_m, load_n, segment.start)?;
@@ -84,15 +85,29 @@ impl Schedule {
     }
 }
 
+impl Filter {
+    /// [`GainSchedule::track`] for a single flight.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn track(
+        &self,
+        samples: &Samples<'_>,
+        innovations: Option<&mut InnovationBuffers>,
+    ) -> Result<FilterOutput, Error> {
+        GainSchedule::new(self).track(samples, innovations)
+    }
+}
+
 /// Memory for S(t), to be used again for the next series instead of being asked for anew.
 #[derive(Debug, Default)]
-pub struct Room {
+pub struct FilterWorkspace {
     s_m: Vec<f64>,
     /// Squared innovations of eight parts, group by group.
     squares_m2: Vec<[f64; PARTS]>,
 }
 
-impl Room {
+impl FilterWorkspace {
     /// S of the last series at each sample, m; NaN outside its segments.
     pub fn s_m(&self) -> &[f64] {
         &self.s_m
@@ -100,7 +115,7 @@ impl Room {
 }
 
 /// The stretches that no segment covers.
-fn outside(segments: &[Range<usize>], count: usize, mut note: impl FnMut(Range<usize>)) {
+fn for_each_uncovered(segments: &[Range<usize>], count: usize, mut note: impl FnMut(Range<usize>)) {
     let mut sorted: Vec<&Range<usize>> = segments.iter().collect();
     sorted.sort_unstable_by_key(|segment| segment.start);
     let mut covered = 0;
@@ -112,26 +127,26 @@ fn outside(segments: &[Range<usize>], count: usize, mut note: impl FnMut(Range<u
 }
 
 /// A run over segments, and what it has handed out so far.
-struct Pass<'f> {
-    schedule: &'f Schedule,
-    innovations: Option<&'f mut Innovations>,
-    room: &'f mut Room,
+struct FilterPass<'f> {
+    schedule: &'f GainSchedule,
+    innovations: Option<&'f mut InnovationBuffers>,
+    room: &'f mut FilterWorkspace,
     nis: f64,
     measured: usize,
     /// Samples are looked at for missing ones before this one.
     doubtful_until: usize,
 }
 
-impl Pass<'_> {
+impl FilterPass<'_> {
     fn segment(&mut self, y_m: &[f64], load_n: &[f64], offset: usize) -> Result<(), Error> {
-        let Schedule { filter, folded, .. } = self.schedule;
+        let GainSchedule { filter, folded, .. } = self.schedule;
         let Some(first) = y_m.iter().position(|y| !y.is_nan()) else {
             self.room.s_m[offset..offset + y_m.len()].fill(f64::NAN);
             return Ok(());
         };
-        let mut state = filter.start(y_m[first], held(load_n, first));
+        let mut state = filter.initial_state(y_m[first], held(load_n, first));
         let mut k = self.open(&mut state, y_m, load_n, offset);
-        let mut settled = k == self.schedule.openings.len() && self.schedule.settles;
+        let mut settled = k == self.schedule.transient.len() && self.schedule.settles;
         while k < y_m.len() {
             if let Some(folded) = folded.as_ref().filter(|_| settled) {
                 k += self.stretch(folded, &mut state.x, &y_m[k..], &load_n[k - 1..], offset + k);
@@ -141,25 +156,25 @@ impl Pass<'_> {
             if k > 0 {
                 state = filter.predict(&state, held(load_n, k - 1));
             }
-            let step = filter.correct(&state, y_m[k])?;
+            let step = filter.update(&state, y_m[k])?;
             self.put(offset + k, &step.posterior.x, step.innovation_m, step.innovation_variance_m2);
             state = step.posterior;
             k += 1;
-            settled = folded.as_ref().is_some_and(|folded| folded.suits(&step));
+            settled = folded.as_ref().is_some_and(|folded| folded.is_converged(&step));
         }
         Ok(())
     }
 
     /// The first samples by the gains of the schedule, as long as none is missing; how many.
-    fn open(&mut self, state: &mut Estimate, y_m: &[f64], load_n: &[f64], offset: usize) -> usize {
-        let Schedule { filter, openings, .. } = self.schedule;
+    fn open(&mut self, state: &mut KalmanState, y_m: &[f64], load_n: &[f64], offset: usize) -> usize {
+        let GainSchedule { filter, transient, .. } = self.schedule;
         let mut done = 0;
-        for (opening, &y_m) in openings.iter().zip(y_m).take_while(|(_, y_m)| !y_m.is_nan()) {
+        for (opening, &y_m) in transient.iter().zip(y_m).take_while(|(_, y_m)| !y_m.is_nan()) {
             if done > 0 {
                 state.x = filter.predict_state(&state.x, held(load_n, done - 1));
             }
             let innovation_m = y_m - state.x[0];
-            *state = Estimate { x: state.x + opening.gain * innovation_m, p: opening.p };
+            *state = KalmanState { x: state.x + opening.gain * innovation_m, p: opening.p };
             self.put(offset + done, &state.x, innovation_m, opening.variance_m2);
             done += 1;
         }
@@ -181,18 +196,18 @@ impl Pass<'_> {
     /// it.
     fn stretch(
         &mut self,
-        map: &Folded,
+        map: &SteadyStateFilter,
         x: &mut Vector3<f64>,
         y_m: &[f64],
         load_n: &[f64],
         at: usize,
     ) -> usize {
-        let (from, load_n) = (map.bent(x), &load_n[..y_m.len()]);
+        let (from, load_n) = (map.to_transformed(x), &load_n[..y_m.len()]);
         let s_m = &mut self.room.s_m[at..at + y_m.len()];
         let (done, last, squares_m2) = match self.innovations.as_deref_mut() {
             None => {
                 let doubt = self.doubtful_until.saturating_sub(at);
-                let mut stretch = Stretch { schedule: self.schedule, map, y_m, load_n, s_m, doubt };
+                let mut stretch = SampleRun { schedule: self.schedule, map, y_m, load_n, s_m, doubt };
                 let found = stretch.run(from, &mut self.room.squares_m2);
                 self.doubtful_until = at + stretch.doubt;
                 found
@@ -202,12 +217,13 @@ impl Pass<'_> {
                 out.variance_m2[at..at + done].fill(map.variance_m2);
                 let innovation_m = &mut out.innovation_m[at..at + done];
                 let columns = (&y_m[..done], &load_n[..done]);
-                let (last, squares_m2) = folded::run(map, from, 0.0, columns, &mut s_m[..done], innovation_m);
+                let (last, squares_m2) =
+                    steady_state::run(map, from, 0.0, columns, &mut s_m[..done], innovation_m);
                 (done, last, squares_m2)
             }
         };
         if done > 0 {
-            *x = map.state(last);
+            *x = map.from_transformed(last);
         }
         self.nis += squares_m2 / map.variance_m2;
         self.measured += done;
@@ -220,9 +236,9 @@ impl Pass<'_> {
 const DOUBT: usize = 16;
 
 /// Samples under a settled gain, and the room for their S.
-struct Stretch<'a> {
-    schedule: &'a Schedule,
-    map: &'a Folded,
+struct SampleRun<'a> {
+    schedule: &'a GainSchedule,
+    map: &'a SteadyStateFilter,
     y_m: &'a [f64],
     load_n: &'a [f64],
     s_m: &'a mut [f64],
@@ -230,23 +246,23 @@ struct Stretch<'a> {
     doubt: usize,
 }
 
-impl Stretch<'_> {
+impl SampleRun<'_> {
     /// In eight parts at once while enough is left, then one after the other, until a sample is missing: how many,
     /// the last state, and the sum of the squared innovations, added up in the order of the groups.
     ///
     /// Whether one is missing is seen by what the parts came to, which costs less than to look before.
-    fn run(&mut self, from: Bent, room_m2: &mut Vec<[f64; PARTS]>) -> (usize, Bent, f64) {
+    fn run(&mut self, from: SteadyState, room_m2: &mut Vec<[f64; PARTS]>) -> (usize, SteadyState, f64) {
         let Self { schedule, map, y_m, load_n, .. } = *self;
         let (mut x, mut sum_m2, mut at, mut end) = (from, 0.0, 0, y_m.len());
         if self.doubt > 0 {
             end = whole_until(y_m, load_n);
         }
-        while let Some(cut) = schedule.lead.and_then(|lead| Cut::of(end - at, lead)) {
+        while let Some(cut) = schedule.lead.and_then(|lead| ChunkPlan::new(end - at, lead)) {
             let all = at..at + cut.samples();
             let (y_m, load_n) = (&y_m[at..], &load_n[at..]);
             room_m2.resize(room_m2.len().max(cut.groups()), [0.0; PARTS]);
             let states = starts((&schedule.filter, map), cut, x, y_m, load_n);
-            let mut work = Work { map, cut, y_m, load_n, s_m: &mut self.s_m[at..], squares_m2: room_m2 };
+            let mut work = ChunkIo { map, cut, y_m, load_n, s_m: &mut self.s_m[at..], squares_m2: room_m2 };
             if let Some(found) = work.run(states, sum_m2) {
                 (x, sum_m2) = found;
                 at = all.end;
@@ -260,18 +276,30 @@ impl Stretch<'_> {
             end = at + whole;
         }
         end = at + whole_until(&y_m[at..end], &load_n[at..end]);
-        (x, sum_m2) =
-            folded::run(map, x, sum_m2, (&y_m[at..end], &load_n[at..end]), &mut self.s_m[at..end], &mut []);
+        (x, sum_m2) = steady_state::run(
+            map,
+            x,
+            sum_m2,
+            (&y_m[at..end], &load_n[at..end]),
+            &mut self.s_m[at..end],
+            &mut [],
+        );
         (end, x, sum_m2)
     }
 }
 
 /// The state before each part: known for the first, guessed from the sample before for the others.
-fn starts((filter, map): (&Filter, &Folded), cut: Cut, x: Bent, y_m: &[f64], load_n: &[f64]) -> States {
+fn starts(
+    (filter, map): (&Filter, &SteadyStateFilter),
+    cut: ChunkPlan,
+    x: SteadyState,
+    y_m: &[f64],
+    load_n: &[f64],
+) -> ChunkStates {
     let mut states = x.map(|entry| [entry; PARTS]);
     for part in 1..PARTS {
         let before = cut.start(part) - 1;
-        let guess = map.bent(&filter.start(y_m[before], load_n[before]).x);
+        let guess = map.to_transformed(&filter.initial_state(y_m[before], load_n[before]).x);
         states.iter_mut().zip(&guess).for_each(|(entry, guess)| entry[part] = *guess);
     }
     states
@@ -292,7 +320,7 @@ fn whole_until(y_m: &[f64], load_n: &[f64]) -> usize {
 /// Samples that are looked at together: without a way out of the loop it runs in vectors.
 const BLOCK: usize = 64;
 
-widest! {
+simd_dispatch! {
     /// How many blocks from here lack nothing.
     fn whole_blocks(y_m: &[f64], load_n: &[f64]) -> usize {
         let (y_m, load_n) = (y_m.as_chunks::<BLOCK>().0, load_n.as_chunks::<BLOCK>().0);
@@ -315,22 +343,22 @@ widest! {
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use super::*;
-    use crate::{Actuator, Noise};
+    use crate::{ActuatorModel, NoiseModel};
     use nalgebra::{Matrix3, Vector3};
 
     /// However early the parts start, too late included, or in one piece: the same bits.
     #[test]
     fn a_lead_that_is_too_short_costs_time_and_no_bit() {
         let w_d = Matrix3::from_diagonal(&Vector3::new(1e-14, 1e-8, 1e-12));
-        let noise = Noise::PerStep { w_d, v_d_m2: 1e-11 };
-        let filter = Filter::new(&Actuator::linear(5e7, 2000.0, 8.0).unwrap(), 0.004, &noise).unwrap();
+        let noise = NoiseModel::PerStep { w_d, v_d_m2: 1e-11 };
+        let filter = Filter::new(&ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap(), 0.004, &noise).unwrap();
         let load_n: Vec<f64> = (0..30_000).map(|k| 5e3 * (f64::from(k) * 0.01).sin()).collect();
         let mut dx_m: Vec<f64> = load_n.iter().map(|u| u / 5e7 + 50e-6 * u.signum()).collect();
         dx_m[20_000] = f64::NAN;
         let segments = [0..25_000, 25_500..30_000];
         let samples =
             Samples { step_s: 0.004, motor_m: &dx_m, dx_m: &dx_m, load_n: &load_n, segments: &segments };
-        let schedule = Schedule::new(&filter);
+        let schedule = GainSchedule::new(&filter);
         assert!(schedule.lead.is_some());
         let track = |lead| {
             let mut schedule = schedule.clone();

@@ -6,34 +6,34 @@
 use nalgebra::ComplexField;
 
 /// A number of each series.
-pub(crate) trait Series: Copy {
+pub(crate) trait FmaScalar: Copy {
     /// The same number for each.
-    fn all(value: f64) -> Self;
-    fn less(self, other: Self) -> Self;
-    fn times(self, other: Self) -> Self;
+    fn splat(value: f64) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
     /// `self · factor + summand`, rounded once.
-    fn fused(self, factor: Self, summand: Self) -> Self;
+    fn mul_add(self, factor: Self, summand: Self) -> Self;
 }
 
 #[allow(clippy::inline_always, reason = "all must be compiled within one function")]
-impl Series for f64 {
+impl FmaScalar for f64 {
     #[inline(always)]
-    fn all(value: f64) -> Self {
+    fn splat(value: f64) -> Self {
         value
     }
 
     #[inline(always)]
-    fn less(self, other: Self) -> Self {
+    fn sub(self, other: Self) -> Self {
         self - other
     }
 
     #[inline(always)]
-    fn times(self, other: Self) -> Self {
+    fn mul(self, other: Self) -> Self {
         self * other
     }
 
     #[inline(always)]
-    fn fused(self, factor: Self, summand: Self) -> Self {
+    fn mul_add(self, factor: Self, summand: Self) -> Self {
         // With the standard library and without.
         ComplexField::mul_add(self, factor, summand)
     }

@@ -1,11 +1,11 @@
 //! The gap statistic (equations 29–31).
 
 use crate::error::Error;
-use crate::wide::{filled_up, widest};
+use crate::simd::dispatch::{pad_with_nan, simd_dispatch};
 
 /// ΔS and what it is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gap {
+pub struct GapStatistic {
     /// ΔS = mean of the upper set less mean of the lower (29), m.
     pub gap_m: f64,
     /// Mean of S at or above its mid-range (30), m.
@@ -25,7 +25,7 @@ pub struct Gap {
 /// # Errors
 /// [`Error::Constant`] when S does not move, so that the lower set is empty; [`Error::NothingMeasured`]
 /// when there is no sample.
-pub fn mid_range(s_m: &[f64]) -> Result<Gap, Error> {
+pub fn mid_range(s_m: &[f64]) -> Result<GapStatistic, Error> {
     let (min, max) = range(s_m);
     if min > max {
         return Err(Error::NothingMeasured);
@@ -38,7 +38,7 @@ pub fn mid_range(s_m: &[f64]) -> Result<Gap, Error> {
         return Err(Error::Constant { samples: upper, s_m: max });
     }
     let (upper_m, lower_m) = (upper_sum / upper as f64, lower_sum / lower as f64);
-    Ok(Gap {
+    Ok(GapStatistic {
         gap_m: upper_m - lower_m,
         upper_m: upper_m + mid_range_m,
         lower_m: lower_m + mid_range_m,
@@ -52,13 +52,13 @@ pub fn mid_range(s_m: &[f64]) -> Result<Gap, Error> {
 /// part of the number: sample k belongs to chain k mod 8, and the chains are added up in their order.
 const CHAINS: usize = 8;
 
-widest! {
+simd_dispatch! {
     /// Samples at or above a level and below it, by chains: the sums of what they differ from it, m, and how many
     /// they are. NaN is neither.
     fn halves(s_m: &[f64], level_m: f64) -> ([[f64; CHAINS]; 2], [[u64; CHAINS]; 2]) {
         let ([mut upper_m, mut lower_m], mut counts) = ([[0.0; CHAINS]; 2], [[0; CHAINS]; 2]);
         let (eights, rest) = s_m.as_chunks::<CHAINS>();
-        for eight in eights.iter().chain([&filled_up(rest)]) {
+        for eight in eights.iter().chain([&pad_with_nan(rest)]) {
             for (chain, &s) in eight.iter().enumerate() {
                 // Both sums at every sample, of which at least one is of nothing: no branch to guess.
                 let (is_upper, is_lower) = (s >= level_m, s < level_m);
@@ -78,12 +78,12 @@ fn range(s_m: &[f64]) -> (f64, f64) {
     (least.into_iter().fold(f64::INFINITY, f64::min), greatest.into_iter().fold(f64::NEG_INFINITY, f64::max))
 }
 
-widest! {
+simd_dispatch! {
     /// Least and greatest of each chain.
     pub(crate) fn extremes(s_m: &[f64]) -> ([f64; CHAINS], [f64; CHAINS]) {
         let (mut least, mut greatest) = ([f64::INFINITY; CHAINS], [f64::NEG_INFINITY; CHAINS]);
         let (eights, rest) = s_m.as_chunks::<CHAINS>();
-        for eight in eights.iter().chain([&filled_up(rest)]) {
+        for eight in eights.iter().chain([&pad_with_nan(rest)]) {
             for (chain, &s) in eight.iter().enumerate() {
                 least[chain] = if s < least[chain] { s } else { least[chain] };
                 greatest[chain] = if s > greatest[chain] { s } else { greatest[chain] };

@@ -1,0 +1,18 @@
+//! Kalman filter: sample by sample, streaming, and over whole flights.
+
+#[cfg(feature = "std")]
+pub(crate) mod batch;
+pub(crate) mod filter;
+#[cfg(feature = "std")]
+pub(crate) mod gain_schedule;
+#[cfg(feature = "std")]
+mod parallel;
+pub(crate) mod steady_state;
+pub(crate) mod stream;
+
+#[cfg(feature = "std")]
+pub use batch::{FilterOutput, FilterWorkspace, InnovationBuffers};
+pub use filter::{Filter, FilterStep, KalmanState};
+#[cfg(feature = "std")]
+pub use gain_schedule::GainSchedule;
+pub use stream::Stream;
