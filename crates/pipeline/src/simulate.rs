@@ -7,9 +7,7 @@ use ingest::parquet::writer::{Column, write_parquet};
 use jiff::Timestamp;
 use rayon::prelude::*;
 use records::Diagnostic;
-use simulator::plan::Unit;
-use simulator::spec::MotorLog;
-use simulator::{ActuatorLog, Plan, PlannedFlight, Spec};
+use simulator::{ActuatorLog, ChannelUnit, MotorLogFormat, Plan, PlannedFlight, Spec};
 
 use crate::error::Error;
 use crate::event::Event;
@@ -70,7 +68,7 @@ pub fn simulate(
 /// Flies one flight and writes its log: a column for each channel of each actuator.
 fn fly(plan: &Plan, index: usize, folder: &Path) -> Result<String, Error> {
     let planned = &plan.flights[index];
-    let flight = plan.fly(index).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
+    let flight = plan.simulate_flight(index).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
     let mut columns = vec![("time_s".to_owned(), Column::Real(flight.time_s))];
     for actuator in flight.actuators {
         columns.extend(channels(actuator));
@@ -99,7 +97,7 @@ fn facts(flight: &PlannedFlight) -> Vec<(String, String)> {
 
 /// The channels in the units of a recorder: degrees, millimetres, newtons or newton metres.
 fn channels(actuator: ActuatorLog) -> [(String, Column); 3] {
-    let named = |channel: &str, unit: Unit, values: Vec<f64>| {
+    let named = |channel: &str, unit: ChannelUnit, values: Vec<f64>| {
         let (suffix, factor) = recorded(unit);
         (
             format!("{}_{channel}_{suffix}", actuator.position),
@@ -113,12 +111,12 @@ fn channels(actuator: ActuatorLog) -> [(String, Column); 3] {
     ]
 }
 
-fn recorded(unit: Unit) -> (&'static str, f64) {
+fn recorded(unit: ChannelUnit) -> (&'static str, f64) {
     match unit {
-        Unit::Metre => ("mm", 1e3),
-        Unit::Radian => ("deg", 180.0 / std::f64::consts::PI),
-        Unit::Newton => ("n", 1.0),
-        Unit::NewtonMetre => ("nm", 1.0),
+        ChannelUnit::Metre => ("mm", 1e3),
+        ChannelUnit::Radian => ("deg", 180.0 / std::f64::consts::PI),
+        ChannelUnit::Newton => ("n", 1.0),
+        ChannelUnit::NewtonMetre => ("nm", 1.0),
     }
 }
 
@@ -204,10 +202,10 @@ unit = "s"
 "#;
 
 /// How the logs of a part name and measure its channels.
-fn channel_tables(part: &simulator::spec::Part, above: &str) -> String {
+fn channel_tables(part: &simulator::Part, above: &str) -> String {
     let rotary = part.reference_radius_m.is_some();
     let unit = |angle: bool| if angle { ("deg", "deg") } else { ("mm", "mm") };
-    let motor = unit(rotary || part.motor_log != MotorLog::Position);
+    let motor = unit(rotary || part.motor_log != MotorLogFormat::Position);
     let load = if rotary { ("nm", "N.m") } else { ("n", "N") };
     let mut text = String::new();
     for (channel, column, (suffix, unit)) in [
@@ -219,7 +217,7 @@ fn channel_tables(part: &simulator::spec::Part, above: &str) -> String {
             text,
             "\n[{above}.{channel}]\ncolumn = \"{{position}}_{column}_{suffix}\"\nunit = \"{unit}\""
         );
-        if column == "motor" && part.motor_log == MotorLog::WrappedAngle {
+        if column == "motor" && part.motor_log == MotorLogFormat::WrappedAngle {
             let _ = writeln!(text, "wraps_at = 360.0");
         }
         if let (Some(radius_m), "motor") = (part.reference_radius_m, column) {
@@ -230,7 +228,7 @@ fn channel_tables(part: &simulator::spec::Part, above: &str) -> String {
     text
 }
 
-fn part_table(text: &mut String, part: &simulator::spec::Part, spec: &Spec) {
+fn part_table(text: &mut String, part: &simulator::Part, spec: &Spec) {
     let (plant, name) = (&part.plant, &part.part_number);
     let (screw, motor) = (&spec.sensors.screw, &spec.sensors.motor);
     // Friction that the filter does not know is of the order of a fortieth of the load.

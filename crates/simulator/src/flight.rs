@@ -1,28 +1,28 @@
-//! One actuator, one flight: the plant flown along a course and read through its sensors.
+//! Simulation of one actuator over one flight, read through its sensors.
 
-use crate::channel_sampler::ChannelSampler;
-use crate::course::{Course, LEAD_IN_S};
-use crate::drive::Loop;
 use crate::error::Error;
-use crate::plant::Plant;
-use crate::profile::Profile;
-use crate::sensor::Sensors;
-use crate::two_mass::{Forces, State, advance};
-use crate::vibration::VibrationSource;
+use crate::load::flight_commands::{CommandProfile, LEAD_IN_S};
+use crate::load::flight_profile::Profile;
+use crate::load::vibration::VibrationSource;
+use crate::plant::actuator_plant::Plant;
+use crate::plant::motor_controller::PositionLoop;
+use crate::plant::two_mass::{Forces, State, advance};
+use crate::sensors::channel_sampler::ChannelSampler;
+use crate::sensors::sensor::Sensors;
 
 /// The integrator's step, seconds.
 const STEP_S: f64 = 1e-4;
 
 /// What an estimator should do with a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Expected {
+pub enum ExpectedOutcome {
     /// The gap can be seen.
     Estimate,
     /// It cannot: the load keeps one sign.
     Refuse,
 }
 
-impl Expected {
+impl ExpectedOutcome {
     /// The word used in truth tables.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -50,12 +50,12 @@ pub struct Flight {
     /// τ in `screw_logged(t) = X_screw(t − τ)` against the motor channel, seconds.
     pub skew_s: f64,
     /// Whether the gap can be seen at all.
-    pub expected: Expected,
+    pub expected: ExpectedOutcome,
 }
 
-/// Flies one actuator and records it. The same arguments give the same bits.
+/// Simulates one actuator over one flight and records it. The same arguments give the same bits.
 ///
-/// Course, clock and each channel draw from streams of their own: two calls that differ in the plant
+/// CommandProfile, clock and each channel draw from streams of their own: two calls that differ in the plant
 /// or in one sensor alone meet the same flight and the same noise elsewhere.
 ///
 /// # Errors
@@ -74,7 +74,7 @@ pub fn simulate(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) 
         gap_m: plant.contact.gap_m,
         stiffness_n_per_m: plant.contact.stiffness_n_per_m,
         skew_s: sensors.skew_s(),
-        expected: if profile.is_one_sided() { Expected::Refuse } else { Expected::Estimate },
+        expected: if profile.is_one_sided() { ExpectedOutcome::Refuse } else { ExpectedOutcome::Estimate },
     })
 }
 
@@ -83,14 +83,14 @@ const SLOW_STEPS: u64 = 100;
 
 /// Motor position, screw position and load at each channel's own sample instants.
 fn fly(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) -> [Vec<f64>; 3] {
-    let course = Course::lay(profile, seed);
+    let commands = CommandProfile::generate(profile, seed);
     let mut buffet = VibrationSource::new(&profile.buffet, profile.load_n, STEP_S, seed, "load");
     let mut shake = VibrationSource::new(&profile.motor_vibration, 1.0, STEP_S, seed, "motor");
-    let mut motor = Loop::new(plant.drive, plant.motor_mass_kg + plant.screw_mass_kg);
+    let mut motor = PositionLoop::new(plant.drive, plant.motor_mass_kg + plant.screw_mass_kg);
     let mut state = State { screw_m: plant.contact.offset_m, ..State::default() };
     let (mut buffet_n, mut shake_m) = (buffet.next(), shake.next());
     let mut reading =
-        [state.motor_m + shake_m, state.screw_m, load_n(&course, -LEAD_IN_S, state.screw_m) + buffet_n];
+        [state.motor_m + shake_m, state.screw_m, load_n(&commands, -LEAD_IN_S, state.screw_m) + buffet_n];
     let channels = [&sensors.motor, &sensors.screw, &sensors.load];
     let mut samplers: [ChannelSampler; 3] =
         std::array::from_fn(|k| ChannelSampler::new(channels[k], profile, STEP_S, reading[k]));
@@ -106,14 +106,14 @@ fn fly(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) -> [Vec<f
         let middle_m = state.screw_m + 0.5 * STEP_S * state.screw_m_per_s;
         let middle_buffet_n = 0.5 * (buffet_n + next_buffet_n);
         let forces = Forces {
-            drive_n: motor.force_n(course.at(now_s).command_m, state.motor_m, state.motor_m_per_s, STEP_S),
-            load_n: load_n(&course, now_s + 0.5 * STEP_S, middle_m) + middle_buffet_n,
+            drive_n: motor.force_n(commands.at(now_s).command_m, state.motor_m, state.motor_m_per_s, STEP_S),
+            load_n: load_n(&commands, now_s + 0.5 * STEP_S, middle_m) + middle_buffet_n,
             shake_m,
             shake_m_per_s: (next_shake_m - shake_m) / STEP_S,
         };
         state = advance(&now, &state, forces, STEP_S);
         (buffet_n, shake_m) = (next_buffet_n, next_shake_m);
-        let air_n = load_n(&course, now_s + STEP_S, state.screw_m);
+        let air_n = load_n(&commands, now_s + STEP_S, state.screw_m);
         let next = [state.motor_m + shake_m, state.screw_m, air_n + buffet_n];
         for ((sampler, before), after) in samplers.iter_mut().zip(reading).zip(next) {
             sampler.pass(now_s, before, after);
@@ -124,7 +124,7 @@ fn fly(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) -> [Vec<f
 }
 
 /// The aerodynamic load at a deflection, N.
-fn load_n(course: &Course, time_s: f64, deflection_m: f64) -> f64 {
-    let here = course.at(time_s);
+fn load_n(commands: &CommandProfile, time_s: f64, deflection_m: f64) -> f64 {
+    let here = commands.at(time_s);
     here.air_n - here.hinge_n_per_m * deflection_m
 }

@@ -1,41 +1,40 @@
-//! Two masses, a compliant dead zone and friction: flights whose backlash gap is known.
+//! Simulated flights of electromechanical actuators whose backlash gap is known.
 //!
-//! The physics is written in absolute coordinates, motor and screw each with its own position, and
-//! shares no equation with the estimator: a model cannot be its own witness. The way through the
-//! rooms is [`Plant`] (what moves) and [`Profile`] (what it is asked to do), integrated by
-//! [`two_mass`], read through [`Sensors`] into a [`Flight`]; a [`Spec`] makes a whole [`Plan`] of
-//! tails, serial numbers and flights out of these.
+//! The model has two masses, a compliant dead zone and friction. The physics is written in absolute
+//! coordinates, motor and screw each with its own position, and shares no equation with the
+//! estimator: a model cannot verify itself. Every assumption of the estimator can be broken by a key
+//! of a [`Spec`].
+//!
+//! [`Plant`] (what moves) and [`Profile`] (commands and loads) are integrated by [`two_mass`] and read
+//! through [`Sensors`] into a [`Flight`] by [`simulate`]. A [`Spec`] makes a whole [`Plan`] of tails,
+//! serial numbers and flights.
 //!
 //! Nothing here reads a file, a clock or the environment: the same seed gives the same bits, in any
-//! order of asking.
+//! order of calls.
 
-pub mod contact;
-pub mod drive;
-pub mod error;
-pub mod flight;
-pub mod friction;
-pub mod plan;
-pub mod plant;
-pub mod profile;
-pub mod sensor;
-pub mod spec;
-pub mod turbulence;
-pub mod two_mass;
-pub mod vibration;
-pub mod wear;
-
-mod calendar;
-mod channel_sampler;
-mod course;
-mod planner;
-mod random;
-mod roster;
-mod shaping_filter;
+mod error;
+mod fleet;
+mod flight;
+mod load;
+mod plant;
+mod seeded_streams;
+mod sensors;
 
 pub use error::Error;
-pub use flight::{Expected, Flight, simulate};
-pub use plan::{ActuatorLog, ActuatorTruth, Installation, Plan, PlannedFlight, SimulatedFlight, Unit};
-pub use plant::Plant;
-pub use profile::Profile;
-pub use sensor::Sensors;
-pub use spec::{SAMPLE_SPEC, Spec};
+pub use fleet::fleet_plan_types::{
+    ActuatorLog, ActuatorTruth, ChannelUnit, Installation, Plan, PlannedFlight, SimulatedFlight,
+};
+pub use fleet::fleet_spec::{
+    MotorLogFormat, ParameterSpread, Part, Place, Position, SAMPLE_SPEC, Spec, Swap, UnitSpec,
+};
+pub use fleet::wear::WearLaw;
+pub use flight::{ExpectedOutcome, Flight, simulate};
+pub use load::flight_profile::Profile;
+pub use load::turbulence::GustForm;
+pub use load::vibration::{Line, Lines, Vibration};
+pub use plant::actuator_plant::Plant;
+pub use plant::backlash_contact::{Contact, ContactLaw};
+pub use plant::friction::{Friction, FrictionLaw};
+pub use plant::motor_controller::{Drive, PositionLoop};
+pub use plant::two_mass;
+pub use sensors::sensor::{Channel, Clock, NoiseColour, PeriodicError, PeriodicErrors, Sensors};

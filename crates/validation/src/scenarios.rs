@@ -7,12 +7,10 @@ use std::ops::Range;
 use rand::seq::IndexedRandom as _;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simulator::contact::Law as ContactLaw;
-use simulator::friction::Law as FrictionLaw;
-use simulator::sensor::{NoiseColour, PeriodicError};
-use simulator::turbulence::GustForm;
-use simulator::vibration::{Line, Lines, Vibration};
-use simulator::{Flight, Plant, Profile, Sensors, simulate};
+use simulator::{
+    ContactLaw, Flight, FrictionLaw, GustForm, Line, Lines, NoiseColour, PeriodicError, Plant, Profile,
+    Sensors, Vibration, simulate,
+};
 
 /// A flight to be flown, and what its estimator is told.
 #[derive(Debug, Clone)]

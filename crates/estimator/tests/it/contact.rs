@@ -5,8 +5,7 @@ use estimator::{Error, Samples};
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use simulator::contact::Law;
-use simulator::{Flight, Plant, Profile, Sensors, simulate};
+use simulator::{ContactLaw, Flight, Plant, Profile, Sensors, simulate};
 
 type Fault = fn(&mut Case);
 
@@ -125,9 +124,9 @@ fn the_skew_between_the_positions_is_found_with_its_sign() {
 #[test]
 fn soft_flanks_are_flagged_and_their_gap_read_off_a_curve() {
     let laws = [
-        (Law::Soft { share: 0.4, depth_m: 20e-6 }, 6e-6),
-        (Law::Soft { share: 0.4, depth_m: 100e-6 }, 10e-6),
-        (Law::Hertz { share: 1.0, reference_m: 100e-6 }, 6e-6),
+        (ContactLaw::Soft { share: 0.4, depth_m: 20e-6 }, 6e-6),
+        (ContactLaw::Soft { share: 0.4, depth_m: 100e-6 }, 10e-6),
+        (ContactLaw::Hertz { share: 1.0, reference_m: 100e-6 }, 6e-6),
     ];
     for (law, within_m) in laws {
         let found = Case::with(100e-6, |c| c.plant.contact.law = law).gap(2);

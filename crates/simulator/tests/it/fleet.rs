@@ -1,6 +1,6 @@
 //! A planned fleet: books that balance, and flights that do not depend on the order of asking.
 
-use simulator::{Error, Expected, Plan, SAMPLE_SPEC, Spec};
+use simulator::{Error, ExpectedOutcome, Plan, SAMPLE_SPEC, Spec};
 
 fn sample() -> Spec {
     toml::from_str(SAMPLE_SPEC).unwrap()
@@ -22,10 +22,10 @@ fn small() -> Spec {
 #[test]
 fn flights_may_be_flown_in_any_order() {
     let plan = Plan::new(&small()).unwrap();
-    let forward: Vec<_> = (0..4).map(|k| plan.fly(k).unwrap()).collect();
+    let forward: Vec<_> = (0..4).map(|k| plan.simulate_flight(k).unwrap()).collect();
     let again = Plan::new(&small()).unwrap();
     for k in [2, 0, 3, 1] {
-        assert_eq!(again.fly(k).unwrap(), forward[k]);
+        assert_eq!(again.simulate_flight(k).unwrap(), forward[k]);
     }
     assert_ne!(forward[0].actuators[0].load, forward[0].actuators[1].load);
     assert_ne!(forward[0].actuators[0].load, forward[1].actuators[0].load);
@@ -34,7 +34,7 @@ fn flights_may_be_flown_in_any_order() {
 #[test]
 fn a_flight_beyond_the_plan_is_refused() {
     let plan = Plan::new(&small()).unwrap();
-    assert_eq!(plan.fly(4).unwrap_err(), Error::NoSuchFlight { index: 4, flights: 4 });
+    assert_eq!(plan.simulate_flight(4).unwrap_err(), Error::NoSuchFlight { index: 4, flights: 4 });
 }
 
 /// The contract's lookup: the stay that covers the departure names the serial the truth names, and its
@@ -109,13 +109,13 @@ fn toml_of_small() -> String {
 #[test]
 fn a_rotary_part_is_logged_in_radians_and_newton_metres() {
     let mut spec = small();
-    let linear = Plan::new(&spec).unwrap().fly(0).unwrap();
+    let linear = Plan::new(&spec).unwrap().simulate_flight(0).unwrap();
     spec.parts[0].reference_radius_m = Some(0.05);
-    let rotary = Plan::new(&spec).unwrap().fly(0).unwrap();
+    let rotary = Plan::new(&spec).unwrap().simulate_flight(0).unwrap();
     let (a, b) = (&linear.actuators[0], &rotary.actuators[0]);
     assert_eq!(
         (b.screw_unit, b.load_unit),
-        (simulator::plan::Unit::Radian, simulator::plan::Unit::NewtonMetre)
+        (simulator::ChannelUnit::Radian, simulator::ChannelUnit::NewtonMetre)
     );
     assert!((a.screw[100] / b.screw[100] - 0.05).abs() < 1e-12);
     assert!((b.load[100] / a.load[100] - 0.05).abs() < 1e-12);
@@ -156,7 +156,7 @@ fn mistakes_are_named() {
 fn the_sample_fleet_swaps_two_units_wears_one_and_brings_one_near_its_limit() {
     let plan = Plan::new(&sample()).unwrap();
     assert_eq!((plan.flights.len(), plan.flights[0].actuators.len()), (30, 4));
-    assert!(plan.flights.iter().flat_map(|f| &f.actuators).all(|t| t.expected == Expected::Estimate));
+    assert!(plan.flights.iter().flat_map(|f| &f.actuators).all(|t| t.expected == ExpectedOutcome::Estimate));
     let history = |serial: &str| -> Vec<(String, f64)> {
         let rows = plan.flights.iter().flat_map(|f| f.actuators.iter().map(move |t| (f, t)));
         rows.filter(|(_, t)| t.serial_number == serial)
@@ -183,7 +183,7 @@ fn every_spec_that_comes_with_the_crate_flies() {
     {
         let mut spec: Spec = toml::from_str(text).unwrap();
         spec.profile.duration_s = 10.0;
-        let flight = Plan::new(&spec).unwrap().fly(1).unwrap();
+        let flight = Plan::new(&spec).unwrap().simulate_flight(1).unwrap();
         assert_eq!(flight.actuators.len(), spec.positions.len());
         assert_eq!(flight.time_s.len(), flight.actuators[0].motor.len());
     }

@@ -1,8 +1,8 @@
 //! One simulated flight: repeatable, loaded as asked, and sampled when it says.
 
-use simulator::sensor::Channel;
-use simulator::vibration::Vibration;
-use simulator::{Expected, Plant, Profile, Sensors, simulate};
+use simulator::{
+    Channel, ContactLaw, ExpectedOutcome, Friction, FrictionLaw, Plant, Profile, Sensors, Vibration, simulate,
+};
 
 fn short() -> Profile {
     Profile { duration_s: 30.0, sample_rate_hz: 100.0, ..Profile::default() }
@@ -45,7 +45,7 @@ fn a_flight_without_reversal_keeps_the_sign_of_its_load_and_is_expected_to_be_re
         let profile = Profile { no_reversal: true, ..short() };
         let flight = simulate(&Plant::default(), &profile, &Sensors::default(), seed).unwrap();
         assert!(flight.load_n.iter().all(|f| *f < 0.0));
-        assert_eq!(flight.expected, Expected::Refuse);
+        assert_eq!(flight.expected, ExpectedOutcome::Refuse);
     }
 }
 
@@ -105,8 +105,8 @@ fn a_load_with_one_reversal_changes_sign_once_and_with_none_is_expected_to_be_re
     };
     let flight = fly(1);
     let changes = flight.load_n.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
-    assert_eq!((changes, flight.expected), (1, Expected::Estimate));
-    assert_eq!(fly(0).expected, Expected::Refuse);
+    assert_eq!((changes, flight.expected), (1, ExpectedOutcome::Estimate));
+    assert_eq!(fly(0).expected, ExpectedOutcome::Refuse);
 }
 
 /// Keys of load spectrum, sensors, friction and flanks as a spec writes them.
@@ -154,7 +154,7 @@ fn every_new_key_is_read_from_a_spec() {
 #[test]
 fn a_flight_without_friction_shows_its_gap_between_the_flanks() {
     let mut plant = Plant::default().with_gap_m(120e-6);
-    plant.screw_friction = simulator::friction::Friction::default();
+    plant.screw_friction = Friction::default();
     let flight = simulate(&plant, &short(), &Sensors::perfect(), 6).unwrap();
     let slack = |side: f64| {
         let loaded = flight.load_n.iter().enumerate().filter(|(_, f)| *f * side > 1500.0);
@@ -169,16 +169,15 @@ fn a_flight_without_friction_shows_its_gap_between_the_flanks() {
 
 #[test]
 fn every_friction_and_contact_law_flies() {
-    use simulator::{contact, friction};
     let frictions = [
-        friction::Law::Coulomb,
-        friction::Law::Stribeck { ratio: 1.5, speed_m_per_s: 2e-3 },
-        friction::Law::Presliding { travel_m: 5e-6 },
+        FrictionLaw::Coulomb,
+        FrictionLaw::Stribeck { ratio: 1.5, speed_m_per_s: 2e-3 },
+        FrictionLaw::Presliding { travel_m: 5e-6 },
     ];
     let contacts = [
-        contact::Law::Linear,
-        contact::Law::Soft { share: 0.4, depth_m: 100e-6 },
-        contact::Law::Hertz { share: 0.5, reference_m: 150e-6 },
+        ContactLaw::Linear,
+        ContactLaw::Soft { share: 0.4, depth_m: 100e-6 },
+        ContactLaw::Hertz { share: 0.5, reference_m: 150e-6 },
     ];
     for friction_law in frictions {
         for law in contacts {

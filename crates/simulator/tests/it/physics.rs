@@ -3,9 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use proptest::prelude::*;
-use simulator::friction::{self, Friction};
 use simulator::two_mass::{Forces, State, advance};
-use simulator::{Plant, contact};
+use simulator::{ContactLaw, Friction, FrictionLaw, Plant};
 
 const STEP_S: f64 = 1e-4;
 const NOTHING: Forces = Forces::new(0.0, 0.0);
@@ -68,10 +67,10 @@ proptest! {
         speed in 0.01..0.2, law in 0..4_usize, lower_factor in 0.5..2.0,
     ) {
         let laws = [
-            contact::Law::Linear,
-            contact::Law::Soft { share: 0.4, depth_m: 50e-6 },
-            contact::Law::Hertz { share: 0.5, reference_m: 100e-6 },
-            contact::Law::Toe { share: 0.3, depth_m: 30e-6 },
+            ContactLaw::Linear,
+            ContactLaw::Soft { share: 0.4, depth_m: 50e-6 },
+            ContactLaw::Hertz { share: 0.5, reference_m: 100e-6 },
+            ContactLaw::Toe { share: 0.3, depth_m: 30e-6 },
         ];
         let mut plant = Plant { motor_mass_kg: motor_kg, screw_mass_kg: screw_kg, ..slippery() };
         plant.contact.stiffness_n_per_m = stiffness;
@@ -90,9 +89,9 @@ proptest! {
         gap_m in 0.0..300e-6, motor_speed in -0.1..0.1, screw_speed in -0.1..0.1, stribeck in prop::bool::ANY,
     ) {
         let law = if stribeck {
-            friction::Law::Stribeck { ratio: 1.6, speed_m_per_s: 2e-3 }
+            FrictionLaw::Stribeck { ratio: 1.6, speed_m_per_s: 2e-3 }
         } else {
-            friction::Law::Coulomb
+            FrictionLaw::Coulomb
         };
         let plant = Plant { friction_law: law, ..Plant::default() }.with_gap_m(gap_m);
         let mut state = State {
@@ -197,7 +196,7 @@ fn lu_gre_bends_before_it_slides() {
     let travel_m = 5e-6;
     let mut plant = braked(slippery());
     plant.friction_law =
-        friction::Law::LuGre { travel_m, ratio: 1.5, speed_m_per_s: 0.1, damping_n_s_per_m: 2e3 };
+        FrictionLaw::LuGre { travel_m, ratio: 1.5, speed_m_per_s: 0.1, damping_n_s_per_m: 2e3 };
     plant.screw_friction = Friction::new(400.0, 0.0, 1e5);
     let mut state = State::default();
     for k in 0..40_000 {
@@ -224,7 +223,7 @@ fn a_screw_held_by_friction_does_not_creep() {
 fn bristles_bend_before_they_slide() {
     let travel_m = 5e-6;
     let mut plant = braked(slippery());
-    plant.friction_law = friction::Law::Presliding { travel_m };
+    plant.friction_law = FrictionLaw::Presliding { travel_m };
     plant.motor_friction.dry_n = 1e12;
     plant.screw_friction = Friction::new(400.0, 0.0, 1e5);
     let mut state = State::default();

@@ -1,7 +1,7 @@
 //! From the true course of a quantity to one channel's samples: hysteresis, lag, averaging, delay.
 
-use crate::profile::Profile;
-use crate::sensor::Channel;
+use crate::load::flight_profile::Profile;
+use crate::sensors::sensor::Channel;
 
 /// Samples one quantity at even instants minus a delay, by straight lines between steps.
 #[derive(Debug)]

@@ -4,7 +4,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 /// The stream that belongs to a seed and a path of names, for example tail, flight, position.
-pub(crate) fn stream(seed: u64, names: &[&str]) -> ChaCha8Rng {
+pub(crate) fn seeded_rng(seed: u64, names: &[&str]) -> ChaCha8Rng {
     let mut key = [0; 32];
     key[..8].copy_from_slice(&seed.to_le_bytes());
     key[8..16].copy_from_slice(&digest(names).to_le_bytes());
@@ -12,9 +12,9 @@ pub(crate) fn stream(seed: u64, names: &[&str]) -> ChaCha8Rng {
 }
 
 /// A seed of its own for whatever lies below a path of names.
-pub(crate) fn derived(seed: u64, names: &[&str]) -> u64 {
+pub(crate) fn derive_seed(seed: u64, names: &[&str]) -> u64 {
     use rand::RngCore;
-    stream(seed, names).next_u64()
+    seeded_rng(seed, names).next_u64()
 }
 
 /// FNV-1a in 64 bits; each name is closed by a byte that UTF-8 never uses, so `ab, c` is not `a, bc`.
@@ -29,8 +29,8 @@ mod tests {
 
     #[test]
     fn names_cut_differently_give_different_streams() {
-        assert_ne!(derived(1, &["ab", "c"]), derived(1, &["a", "bc"]));
-        assert_ne!(derived(1, &["ab", "c"]), derived(2, &["ab", "c"]));
+        assert_ne!(derive_seed(1, &["ab", "c"]), derive_seed(1, &["a", "bc"]));
+        assert_ne!(derive_seed(1, &["ab", "c"]), derive_seed(2, &["ab", "c"]));
     }
 
     /// The published FNV-1a test vector for the single byte 0xff: `offset ^ 0xff × prime`.

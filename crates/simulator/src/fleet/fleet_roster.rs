@@ -1,28 +1,28 @@
-//! Which unit sits where at which flight, and the booking of every stay.
+//! Assignment of units to positions over time.
 
 use rand::Rng;
 
 use crate::error::Error;
-use crate::random::stream;
-use crate::spec::{Place, Position, Spec};
-use crate::wear;
+use crate::fleet::fleet_spec::{Place, Position, Spec};
+use crate::fleet::wear::WearLaw;
+use crate::seeded_streams::seeded_rng;
 
 /// A unit as chance and the spec made it.
 #[derive(Debug, Clone)]
-pub(crate) struct Unit {
+pub(crate) struct FleetUnit {
     /// Index into the spec's parts.
     pub(crate) part: usize,
     pub(crate) serial_number: String,
     pub(crate) age_hours: f64,
     pub(crate) gap_m: f64,
     pub(crate) stiffness_factor: f64,
-    pub(crate) wear: wear::Law,
+    pub(crate) wear: WearLaw,
 }
 
 /// Every unit of the fleet, in order of tail and position at the start.
-pub(crate) fn units(spec: &Spec) -> Result<Vec<Unit>, Error> {
+pub(crate) fn fleet_units(spec: &Spec) -> Result<Vec<FleetUnit>, Error> {
     let places = spec.tails.iter().flat_map(|tail| spec.positions.iter().map(move |place| (tail, place)));
-    let units: Vec<Unit> = places
+    let units: Vec<FleetUnit> = places
         .enumerate()
         .map(|(count, (tail, place))| unit(spec, tail, place, count))
         .collect::<Result<_, _>>()?;
@@ -33,32 +33,34 @@ pub(crate) fn units(spec: &Spec) -> Result<Vec<Unit>, Error> {
     }
 }
 
-fn unit(spec: &Spec, tail: &str, place: &Position, count: usize) -> Result<Unit, Error> {
+fn unit(spec: &Spec, tail: &str, place: &Position, count: usize) -> Result<FleetUnit, Error> {
     let part = spec.part_index(&place.position, &place.part_number)?;
     let chances = &spec.parts[part];
-    let mut rng = stream(spec.seed, &["unit", tail, &place.position]);
+    let mut rng = seeded_rng(spec.seed, &["unit", tail, &place.position]);
     let mut between = |[least, greatest]: [f64; 2]| least + (greatest - least) * rng.random::<f64>();
     let (gap_m, age_hours) = (between(chances.gap_m), between(chances.unit_hours));
     let stiffness_factor = 1.0 + between([-spec.spread.stiffness, spec.spread.stiffness]);
-    let asked = spec.units.iter().find(|unit| unit.tail == tail && unit.position == place.position);
-    Ok(Unit {
+    let declared = spec.units.iter().find(|unit| unit.tail == tail && unit.position == place.position);
+    Ok(FleetUnit {
         part,
-        serial_number: asked.and_then(|u| u.serial_number.clone()).unwrap_or(format!("S{}", 10_001 + count)),
-        age_hours: asked.and_then(|u| u.unit_hours).unwrap_or(age_hours),
-        gap_m: asked.and_then(|u| u.gap_m).unwrap_or(gap_m),
-        stiffness_factor: asked.and_then(|u| u.stiffness_factor).unwrap_or(stiffness_factor),
-        wear: asked.and_then(|u| u.wear).unwrap_or(chances.wear),
+        serial_number: declared
+            .and_then(|u| u.serial_number.clone())
+            .unwrap_or(format!("S{}", 10_001 + count)),
+        age_hours: declared.and_then(|u| u.unit_hours).unwrap_or(age_hours),
+        gap_m: declared.and_then(|u| u.gap_m).unwrap_or(gap_m),
+        stiffness_factor: declared.and_then(|u| u.stiffness_factor).unwrap_or(stiffness_factor),
+        wear: declared.and_then(|u| u.wear).unwrap_or(chances.wear),
     })
 }
 
 /// Who sits where, one flight after the other.
 #[derive(Debug, Clone)]
-pub(crate) struct Seats {
+pub(crate) struct UnitAssignment {
     positions: usize,
     units: Vec<usize>,
 }
 
-impl Seats {
+impl UnitAssignment {
     /// Everybody where they start.
     pub(crate) fn new(spec: &Spec) -> Self {
         let positions = spec.positions.len();
@@ -74,7 +76,7 @@ impl Seats {
     pub(crate) fn swap(
         &mut self,
         spec: &Spec,
-        units: &[Unit],
+        units: &[FleetUnit],
         flight: usize,
     ) -> Result<Vec<(usize, usize)>, Error> {
         let mut touched = Vec::new();

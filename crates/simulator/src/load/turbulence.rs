@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::shaping_filter::{Section, ShapedNoise};
+use crate::load::shaping_filter::{Section, ShapedNoise};
 
 /// The spectrum of the gust load.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,7 +47,7 @@ impl GustForm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::stream;
+    use crate::seeded_streams::seeded_rng;
 
     fn spectrum(values: &[f64], frequency_hz: f64, step_s: f64) -> f64 {
         let (mut re, mut im) = (0.0, 0.0);
@@ -62,7 +62,7 @@ mod tests {
     /// The autocorrelation of Dryden's vertical gust is `e^(−t/T) (1 − t/2T)`, with `T = 1/2πf`.
     #[test]
     fn dryden_turbulence_has_its_autocorrelation() {
-        let mut noise = GustForm::Dryden.noise(1.0, 0.005, stream(4, &["gust"])).unwrap();
+        let mut noise = GustForm::Dryden.noise(1.0, 0.005, seeded_rng(4, &["gust"])).unwrap();
         let values: Vec<f64> = (0..800_000).map(|_| noise.next()).collect();
         for lag in [0, 8, 32, 64, 128] {
             let pairs = values.iter().zip(&values[lag..]);
@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn von_karman_turbulence_has_its_spectrum() {
         let corner_hz = 0.5;
-        let mut noise = GustForm::VonKarman.noise(corner_hz, 0.005, stream(5, &["gust"])).unwrap();
+        let mut noise = GustForm::VonKarman.noise(corner_hz, 0.005, seeded_rng(5, &["gust"])).unwrap();
         for frequency_hz in [0.25, 0.5, 1.0, 2.5, 5.0] {
             let mean: f64 = (0..200)
                 .map(|_| {

@@ -1,18 +1,10 @@
-//! A fleet's calendar with its truth, and each of its flights on demand.
-//!
-//! The plan is cheap and made whole; a flight is dear and made alone, from streams named after seed,
-//! tail, flight and position. So flights may be flown in any order and on any thread, to the same bits.
+//! A fleet's calendar with its truth, and the log of one flight.
 
-use std::f64::consts::{PI, TAU};
-
-use crate::error::Error;
-use crate::flight::{Expected, simulate};
-use crate::planner::Planner;
-use crate::plant::Plant;
-use crate::profile::Profile;
-use crate::random::derived;
-use crate::sensor::Sensors;
-use crate::spec::{MotorLog, Part, Spec};
+use crate::fleet::fleet_spec::Part;
+use crate::flight::ExpectedOutcome;
+use crate::load::flight_profile::Profile;
+use crate::plant::actuator_plant::Plant;
+use crate::sensors::sensor::Sensors;
 
 /// One stay of one unit in one place.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,7 +45,7 @@ pub struct ActuatorTruth {
     /// τ in `screw_logged(t) = X_screw(t − τ)` against the motor channel, seconds.
     pub skew_s: f64,
     /// Whether the gap can be seen.
-    pub expected: Expected,
+    pub expected: ExpectedOutcome,
 }
 
 /// One flight of the calendar.
@@ -85,9 +77,9 @@ pub(crate) struct Assignment {
     pub(crate) part: usize,
 }
 
-/// In which unit a channel is logged.
+/// The unit of a logged channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unit {
+pub enum ChannelUnit {
     /// m.
     Metre,
     /// rad.
@@ -106,15 +98,15 @@ pub struct ActuatorLog {
     /// Motor position, in `motor_unit`.
     pub motor: Vec<f64>,
     /// Metres at the screw or radians of the resolver.
-    pub motor_unit: Unit,
+    pub motor_unit: ChannelUnit,
     /// Screw position, in `screw_unit`.
     pub screw: Vec<f64>,
     /// Metres, or radians of a rotary output.
-    pub screw_unit: Unit,
+    pub screw_unit: ChannelUnit,
     /// Load, in `load_unit`.
     pub load: Vec<f64>,
     /// Newtons, or newton metres of a rotary output.
-    pub load_unit: Unit,
+    pub load_unit: ChannelUnit,
 }
 
 /// The log of one flight.
@@ -137,67 +129,4 @@ pub struct Plan {
     pub installations: Vec<Installation>,
     /// Every flight, by flight number, then tail.
     pub flights: Vec<PlannedFlight>,
-}
-
-impl Plan {
-    /// Lays out the calendar of a fleet and the truth of each of its actuators.
-    ///
-    /// # Errors
-    /// Any variant but [`Error::NoSuchFlight`]: the first diagnostic about the spec.
-    pub fn new(spec: &Spec) -> Result<Self, Error> {
-        spec.check()?;
-        Planner::new(spec)?.plan()
-    }
-
-    /// Flies one flight, counted from 0; the same flight gives the same bits in any order.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchFlight`] beyond the end of the plan.
-    pub fn fly(&self, flight_index: usize) -> Result<SimulatedFlight, Error> {
-        let missing = Error::NoSuchFlight { index: flight_index, flights: self.flights.len() };
-        let flight = self.flights.get(flight_index).ok_or(missing)?;
-        let pairs = flight.actuators.iter().zip(&flight.assignments);
-        let actuators =
-            pairs.map(|(truth, task)| self.record(flight, truth, task)).collect::<Result<_, _>>()?;
-        let first = &flight.assignments[0];
-        let rate_hz = first.profile.sample_rate_hz;
-        Ok(SimulatedFlight {
-            step_s: 1.0 / rate_hz,
-            time_s: first.sensors.stamps(first.profile.samples(), rate_hz, flight.seed),
-            actuators,
-        })
-    }
-
-    fn record(
-        &self,
-        flight: &PlannedFlight,
-        truth: &ActuatorTruth,
-        task: &Assignment,
-    ) -> Result<ActuatorLog, Error> {
-        let seed = derived(flight.seed, &[&truth.position]);
-        let log = simulate(&task.plant, &task.profile, &task.sensors, seed)?;
-        let part = &self.parts[task.part];
-        let (motor, motor_unit) = motor_as_logged(log.motor_m, part);
-        let position = truth.position.clone();
-        let (mut screw, mut load) = (log.screw_m, log.load_n);
-        let Some(radius_m) = part.reference_radius_m else {
-            let (screw_unit, load_unit) = (Unit::Metre, Unit::Newton);
-            return Ok(ActuatorLog { position, motor, motor_unit, screw, screw_unit, load, load_unit });
-        };
-        screw.iter_mut().for_each(|x| *x /= radius_m);
-        load.iter_mut().for_each(|f| *f *= radius_m);
-        let (screw_unit, load_unit) = (Unit::Radian, Unit::NewtonMetre);
-        Ok(ActuatorLog { position, motor, motor_unit, screw, screw_unit, load, load_unit })
-    }
-}
-
-fn motor_as_logged(mut motor: Vec<f64>, part: &Part) -> (Vec<f64>, Unit) {
-    if part.motor_log == MotorLog::Position {
-        return (motor, Unit::Metre);
-    }
-    motor.iter_mut().for_each(|x| *x *= TAU / part.lead_m);
-    if part.motor_log == MotorLog::WrappedAngle {
-        motor.iter_mut().for_each(|angle| *angle = (*angle + PI).rem_euclid(TAU) - PI);
-    }
-    (motor, Unit::Radian)
 }

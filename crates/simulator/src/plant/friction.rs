@@ -142,7 +142,7 @@ impl Friction {
 /// How the dry part answers to speed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Law {
+pub enum FrictionLaw {
     /// Equation 1 as it stands.
     #[default]
     Coulomb,
@@ -173,7 +173,7 @@ pub enum Law {
     },
 }
 
-impl Law {
+impl FrictionLaw {
     pub(crate) fn check(&self) -> Result<(), Error> {
         let ratio_in_range = |law: &str, ratio| {
             within(&format!("friction_law.{law}.ratio"), ratio, 1.0, 10.0, "between 1 and 10")
@@ -217,14 +217,14 @@ impl Law {
         bend: f64,
         inertia_n_s_per_m: f64,
         step_s: f64,
-    ) -> Body {
+    ) -> FrictionBody {
         let sliding = friction.sliding(load_n);
         let bristle = match *self {
             Self::Coulomb | Self::Stribeck { .. } => None,
             Self::Presliding { travel_m } => Some((travel_m, 0.0)),
             Self::LuGre { travel_m, damping_n_s_per_m, .. } => Some((travel_m, damping_n_s_per_m)),
         };
-        Body {
+        FrictionBody {
             inertia_n_s_per_m: inertia_n_s_per_m + friction.drag_n_s_per_m(speed_m_per_s),
             levels: self.levels(sliding, speed_m_per_s),
             bristle: bristle.map(|(travel_m, damping)| Bristle {
@@ -239,7 +239,7 @@ impl Law {
 
 /// One mass during one step: `mass · v + friction(v) = push`, to be solved for the mean speed v.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Body {
+pub(crate) struct FrictionBody {
     /// Everything linear in v: twice the mass over the step, plus viscous friction, N·s/m.
     inertia_n_s_per_m: f64,
     levels: Levels,
@@ -280,9 +280,9 @@ impl Bristle {
     }
 }
 
-impl Body {
+impl FrictionBody {
     /// The mean speed under a push, m/s, and its derivative by the push; exactly zero when held.
-    pub(crate) fn respond(&self, push_n: f64) -> (f64, f64) {
+    pub(crate) fn mean_velocity(&self, push_n: f64) -> (f64, f64) {
         if let Some(bristle) = &self.bristle {
             return self.slide(push_n, bristle);
         }
@@ -319,7 +319,7 @@ impl Body {
     }
 
     /// The bend of the bristles after a step at a mean speed.
-    pub(crate) fn bent(&self, speed_m_per_s: f64) -> f64 {
+    pub(crate) fn bristle_update(&self, speed_m_per_s: f64) -> f64 {
         let Some(bristle) = &self.bristle else { return 0.0 };
         let Bending { lift, bend, rate_s_per_m: r, .. } = bristle.bending(self.level_n(speed_m_per_s < 0.0));
         lift * ((bend + r * speed_m_per_s) / (1.0 + r * speed_m_per_s.abs()))
@@ -332,21 +332,21 @@ mod tests {
     use super::*;
 
     /// A mass of 2·10³ N·s/m times half a step.
-    fn body(law: Law, friction: &Friction, load_n: f64, speed: f64, bend: f64) -> Body {
+    fn body(law: FrictionLaw, friction: &Friction, load_n: f64, speed: f64, bend: f64) -> FrictionBody {
         law.body(friction, load_n, speed, bend, 50.0, 1e-4)
     }
 
     #[test]
     fn a_push_below_the_level_moves_nothing_and_one_above_moves_by_the_excess() {
-        let body = Law::Coulomb.body(&Friction::new(10.0, 0.0, 0.0), 0.0, 0.0, 0.0, 2.0, 1e-4);
-        assert_eq!(body.respond(9.9), (0.0, 0.0));
-        assert_eq!(body.respond(-14.0), (-2.0, 0.5));
+        let body = FrictionLaw::Coulomb.body(&Friction::new(10.0, 0.0, 0.0), 0.0, 0.0, 0.0, 2.0, 1e-4);
+        assert_eq!(body.mean_velocity(9.9), (0.0, 0.0));
+        assert_eq!(body.mean_velocity(-14.0), (-2.0, 0.5));
     }
 
     #[test]
     fn stribeck_holds_more_than_it_drags() {
         let friction = Friction::new(100.0, 0.1, 0.0);
-        let law = Law::Stribeck { ratio: 1.5, speed_m_per_s: 1e-3 };
+        let law = FrictionLaw::Stribeck { ratio: 1.5, speed_m_per_s: 1e-3 };
         assert_eq!(law.levels(friction.sliding(-1000.0), 0.0).up_n, 300.0);
         assert!((law.levels(friction.sliding(-1000.0), 1.0).down_n - 200.0).abs() < 1e-9);
     }
@@ -359,8 +359,8 @@ mod tests {
         assert_eq!(friction.sliding(-1000.0), Levels { up_n: 150.0, down_n: 90.0 });
         let lopsided = Friction { asymmetry: 0.2, ..Friction::new(50.0, 0.1, 0.0) };
         assert_eq!(lopsided.sliding(500.0), Levels { up_n: 120.0, down_n: 80.0 });
-        let body = body(Law::Coulomb, &lopsided, 500.0, 0.0, 0.0);
-        assert_eq!((body.respond(119.0).0, body.respond(-90.0).0), (0.0, -10.0 / 50.0));
+        let body = body(FrictionLaw::Coulomb, &lopsided, 500.0, 0.0, 0.0);
+        assert_eq!((body.mean_velocity(119.0).0, body.mean_velocity(-90.0).0), (0.0, -10.0 / 50.0));
     }
 
     #[test]
@@ -377,12 +377,13 @@ mod tests {
     #[test]
     fn bent_bristles_balance_the_push() {
         let friction = Friction { asymmetry: 0.3, ..Friction::new(10.0, 0.0, 0.0) };
-        let lu_gre = Law::LuGre { travel_m: 5e-6, ratio: 1.4, speed_m_per_s: 2e-3, damping_n_s_per_m: 90.0 };
-        for law in [Law::Presliding { travel_m: 5e-6 }, lu_gre] {
+        let lu_gre =
+            FrictionLaw::LuGre { travel_m: 5e-6, ratio: 1.4, speed_m_per_s: 2e-3, damping_n_s_per_m: 90.0 };
+        for law in [FrictionLaw::Presliding { travel_m: 5e-6 }, lu_gre] {
             for (push_n, bend) in [(3.0, 0.0), (12.0, 0.9), (-7.0, 0.5), (500.0, 0.2), (-500.0, 1.0)] {
                 let body = body(law, &friction, 0.0, 1e-3, bend);
-                let (speed, _) = body.respond(push_n);
-                let after = body.bent(speed);
+                let (speed, _) = body.mean_velocity(push_n);
+                let after = body.bristle_update(speed);
                 let damping_n = if law == lu_gre { 90.0 * 5e-6 / 1e-4 * (after - bend) } else { 0.0 };
                 let balance = 50.0 * speed + 10.0 * after + damping_n;
                 assert!((balance - push_n).abs() < 1e-9, "{balance} for {push_n} under {law:?}");
@@ -393,12 +394,13 @@ mod tests {
     /// Slid far at one speed, the bristles of `LuGre` carry the Stribeck curve at that speed.
     #[test]
     fn lu_gre_slides_on_its_stribeck_curve() {
-        let law = Law::LuGre { travel_m: 5e-6, ratio: 1.6, speed_m_per_s: 2e-3, damping_n_s_per_m: 100.0 };
+        let law =
+            FrictionLaw::LuGre { travel_m: 5e-6, ratio: 1.6, speed_m_per_s: 2e-3, damping_n_s_per_m: 100.0 };
         let friction = Friction::new(100.0, 0.0, 0.0);
         for speed in [5e-4, 2e-3, -1e-2] {
             let mut bend = 0.0;
             for _ in 0..4000 {
-                bend = law.body(&friction, 0.0, speed, bend, 50.0, 1e-4).bent(speed);
+                bend = law.body(&friction, 0.0, speed, bend, 50.0, 1e-4).bristle_update(speed);
             }
             let curve: f64 = 1.0 + 0.6 * (-(speed / 2e-3_f64).powi(2)).exp();
             assert!((bend / curve.copysign(speed) - 1.0).abs() < 1e-9, "{bend} at {speed}");

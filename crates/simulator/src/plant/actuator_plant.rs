@@ -1,11 +1,11 @@
-//! What moves: two masses at the screw, the coupling between them, friction on both, and the drive.
+//! The actuator: two masses at the screw, the coupling between them, friction on both, and the drive.
 
 use serde::{Deserialize, Serialize};
 
-use crate::contact::Contact;
-use crate::drive::Drive;
 use crate::error::{Error, positive};
-use crate::friction::{self, Friction};
+use crate::plant::backlash_contact::Contact;
+use crate::plant::friction::{Friction, FrictionLaw};
+use crate::plant::motor_controller::Drive;
 
 /// One actuator. Defaults are a mid-sized aileron actuator of about 10 kN.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -22,7 +22,7 @@ pub struct Plant {
     /// Friction on the screw. Default 150 N, 0.03, 1000 N·s/m.
     pub screw_friction: Friction,
     /// How dry friction answers to speed, for both masses. Default Coulomb, equation 1.
-    pub friction_law: friction::Law,
+    pub friction_law: FrictionLaw,
     /// The position loop of the motor.
     pub drive: Drive,
 }
@@ -35,7 +35,7 @@ impl Default for Plant {
             contact: Contact::default(),
             motor_friction: Friction::new(250.0, 0.04, 3000.0),
             screw_friction: Friction::new(150.0, 0.03, 1000.0),
-            friction_law: friction::Law::Coulomb,
+            friction_law: FrictionLaw::Coulomb,
             drive: Drive::default(),
         }
     }
@@ -80,7 +80,7 @@ impl Plant {
         }
     }
 
-    /// Says whether this can move at all.
+    /// Checks every parameter against its range.
     ///
     /// # Errors
     /// [`Error::Value`] for the first parameter outside its range.

@@ -7,8 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::course::phase_factor;
 use crate::error::{Error, not_negative, positive, within};
+use crate::load::flight_commands::phase_factor;
 
 /// Below this change of the penetration the divided difference of V loses digits, and the force at mid-step serves.
 const NEAR_M: f64 = 1e-9;
@@ -16,7 +16,7 @@ const NEAR_M: f64 = 1e-9;
 /// How the force of a flank grows with its penetration p.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Law {
+pub enum ContactLaw {
     /// `F = K p`.
     #[default]
     Linear,
@@ -43,7 +43,7 @@ pub enum Law {
     },
 }
 
-impl Law {
+impl ContactLaw {
     pub(crate) fn check(&self, key: &str) -> Result<(), Error> {
         let (share, length_m) = match *self {
             Self::Linear => return Ok(()),
@@ -127,9 +127,9 @@ pub struct Contact {
     /// δX₀: the relative position X₂ − X₁ in the middle of the gap, metres.
     pub offset_m: f64,
     /// How the force grows with the penetration.
-    pub law: Law,
+    pub law: ContactLaw,
     /// The law of the lower flank, which pushes the screw up. Default: `law`.
-    pub lower_law: Option<Law>,
+    pub lower_law: Option<ContactLaw>,
     /// Stiffness of the lower flank over the upper's, 0.2 to 5. Default 1.
     pub lower_stiffness_factor: f64,
     /// Growth of the stiffness from the start to the end of the log, as a share, −0.5 to 1. Default 0.
@@ -146,7 +146,7 @@ impl Default for Contact {
             damping_n_s_per_m: 2000.0,
             gap_m: 100e-6,
             offset_m: 100e-6,
-            law: Law::Linear,
+            law: ContactLaw::Linear,
             lower_law: None,
             lower_stiffness_factor: 1.0,
             stiffness_drift: 0.0,
@@ -157,7 +157,7 @@ impl Default for Contact {
 
 /// A force over a step, and how it answers to the relative speed of that step.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Mean {
+pub(crate) struct MeanForce {
     /// N; positive when the screw is ahead of the motor and pushed back.
     pub(crate) force_n: f64,
     /// ∂force/∂speed, N·s/m.
@@ -195,7 +195,7 @@ impl Contact {
     }
 
     /// Law and stiffness of the flank that pushes the screw up.
-    fn lower(&self) -> (Law, f64) {
+    fn lower(&self) -> (ContactLaw, f64) {
         (self.lower_law.unwrap_or(self.law), self.stiffness_n_per_m * self.lower_stiffness_factor)
     }
 
@@ -207,7 +207,7 @@ impl Contact {
     pub fn extrapolated_gap_m(&self, from_n: f64, to_n: f64) -> f64 {
         let (lower_law, lower_n_per_m) = self.lower();
         let flanks = [(self.law, self.stiffness_n_per_m), (lower_law, lower_n_per_m)];
-        let intercept_m = |(law, stiffness_n_per_m): (Law, f64)| {
+        let intercept_m = |(law, stiffness_n_per_m): (ContactLaw, f64)| {
             let points: [(f64, f64); LINE_POINTS] = std::array::from_fn(|k| {
                 let load_n = from_n + (to_n - from_n) * k as f64 / (LINE_POINTS - 1) as f64;
                 (load_n, law.penetration_m(load_n / stiffness_n_per_m))
@@ -227,24 +227,30 @@ impl Contact {
     }
 
     /// The mean force of a step that starts at δX and moves at the mean relative speed given.
-    pub(crate) fn mean(&self, delta_m: f64, speed_m_per_s: f64, step_s: f64) -> Mean {
+    pub(crate) fn mean_force(&self, delta_m: f64, speed_m_per_s: f64, step_s: f64) -> MeanForce {
         let from_m = delta_m - self.offset_m;
         let to_m = from_m + step_s * speed_m_per_s;
         let half_m = 0.5 * self.gap_m;
         if from_m.max(to_m) <= half_m && from_m.min(to_m) >= -half_m {
-            return Mean::default();
+            return MeanForce::default();
         }
         let upper = (self.law, self.stiffness_n_per_m);
         let upper = self.flank(upper, from_m - half_m, to_m - half_m, step_s);
         let lower = self.flank(self.lower(), -from_m - half_m, -to_m - half_m, step_s);
-        Mean {
+        MeanForce {
             force_n: upper.force_n - lower.force_n,
             slope_n_s_per_m: upper.slope_n_s_per_m + lower.slope_n_s_per_m,
         }
     }
 
     /// One flank, from one signed depth to another; zero depth is the touch.
-    fn flank(&self, (law, stiffness_n_per_m): (Law, f64), from_m: f64, to_m: f64, step_s: f64) -> Mean {
+    fn flank(
+        &self,
+        (law, stiffness_n_per_m): (ContactLaw, f64),
+        from_m: f64,
+        to_m: f64,
+        step_s: f64,
+    ) -> MeanForce {
         let (p, q) = (from_m.max(0.0), to_m.max(0.0));
         let travel_m = to_m - from_m;
         let (mean_m, slope) = if travel_m.abs() < NEAR_M {
@@ -255,10 +261,10 @@ impl Contact {
         };
         let force_n = stiffness_n_per_m * mean_m + self.damping_n_s_per_m * (q - p) / step_s;
         if force_n <= 0.0 {
-            return Mean::default();
+            return MeanForce::default();
         }
         let damping = if q > 0.0 { self.damping_n_s_per_m } else { 0.0 };
-        Mean { force_n, slope_n_s_per_m: stiffness_n_per_m * slope * step_s + damping }
+        MeanForce { force_n, slope_n_s_per_m: stiffness_n_per_m * slope * step_s + damping }
     }
 }
 
@@ -275,21 +281,21 @@ fn intercept(points: &[(f64, f64)]) -> f64 {
 mod tests {
     use super::*;
 
-    fn contact(law: Law) -> Contact {
+    fn contact(law: ContactLaw) -> Contact {
         Contact { law, ..Contact::default() }
     }
 
     #[test]
     fn linear_flanks_extrapolate_to_the_gap_even_when_they_differ() {
-        let unequal = Contact { lower_stiffness_factor: 0.6, ..contact(Law::Linear) };
+        let unequal = Contact { lower_stiffness_factor: 0.6, ..contact(ContactLaw::Linear) };
         assert!((unequal.extrapolated_gap_m(2400.0, 8000.0) - 100e-6).abs() < 1e-15);
     }
 
     /// Beyond the toe, soft and exponential flanks are `p = F/K + (1 − share) depth`.
     #[test]
     fn a_toe_below_the_band_adds_what_its_asymptote_says() {
-        let soft = contact(Law::Soft { share: 0.4, depth_m: 20e-6 });
-        let toe = Contact { lower_law: Some(Law::Toe { share: 0.5, depth_m: 5e-6 }), ..soft };
+        let soft = contact(ContactLaw::Soft { share: 0.4, depth_m: 20e-6 });
+        let toe = Contact { lower_law: Some(ContactLaw::Toe { share: 0.5, depth_m: 5e-6 }), ..soft };
         assert!((soft.extrapolated_gap_m(2400.0, 8000.0) - 124e-6).abs() < 1e-12);
         assert!((toe.extrapolated_gap_m(2400.0, 8000.0) - 114.5e-6).abs() < 1e-9);
     }
@@ -298,7 +304,7 @@ mod tests {
     /// the tangent at a load lies at a third of the penetration, so the line's intercept is near that.
     #[test]
     fn hertzian_flanks_extrapolate_to_about_a_third_of_their_penetration() {
-        let hertz = contact(Law::Hertz { share: 1.0, reference_m: 100e-6 });
+        let hertz = contact(ContactLaw::Hertz { share: 1.0, reference_m: 100e-6 });
         let penetration_m = (5200.0_f64 / 5e7).powf(2.0 / 3.0) * 100e-6_f64.powf(1.0 / 3.0);
         let extra_m = 0.5 * (hertz.extrapolated_gap_m(2400.0, 8000.0) - 100e-6);
         assert!((extra_m / (penetration_m / 3.0) - 1.0).abs() < 0.1, "{extra_m:e}");
@@ -308,10 +314,10 @@ mod tests {
     #[test]
     fn every_law_has_the_force_and_slope_of_its_potential() {
         let laws = [
-            Law::Linear,
-            Law::Soft { share: 0.3, depth_m: 30e-6 },
-            Law::Hertz { share: 0.7, reference_m: 80e-6 },
-            Law::Toe { share: 0.2, depth_m: 25e-6 },
+            ContactLaw::Linear,
+            ContactLaw::Soft { share: 0.3, depth_m: 30e-6 },
+            ContactLaw::Hertz { share: 0.7, reference_m: 80e-6 },
+            ContactLaw::Toe { share: 0.2, depth_m: 25e-6 },
         ];
         for law in laws {
             for p in [1e-6, 20e-6, 70e-6] {

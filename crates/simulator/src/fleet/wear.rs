@@ -9,7 +9,7 @@ use crate::error::{Error, not_negative, positive};
 /// The mean growth of a gap since the unit was new.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Law {
+pub enum WearLaw {
     /// No growth.
     #[default]
     Steady,
@@ -43,7 +43,7 @@ pub enum Law {
     },
 }
 
-impl Law {
+impl WearLaw {
     /// Mean growth from new to an age, metres.
     pub fn growth_m(&self, unit_hours: f64) -> f64 {
         match *self {
@@ -94,21 +94,21 @@ pub(crate) fn step_m(mean_m: f64, scatter_m: f64, rng: &mut ChaCha8Rng) -> f64 {
 #[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
-    use crate::random::stream;
+    use crate::seeded_streams::seeded_rng;
 
     #[test]
     fn every_law_starts_from_nothing_and_grows_as_its_formula_says() {
-        let power = Law::Power { amplitude_m: 2e-5, life_hours: 100.0, exponent: 2.0 };
+        let power = WearLaw::Power { amplitude_m: 2e-5, life_hours: 100.0, exponent: 2.0 };
         assert_eq!((power.growth_m(0.0), power.growth_m(50.0)), (0.0, 5e-6));
-        let onset = Law::Onset { onset_hours: 10.0, rate_m_per_hour: 1e-6 };
+        let onset = WearLaw::Onset { onset_hours: 10.0, rate_m_per_hour: 1e-6 };
         assert_eq!((onset.growth_m(9.0), onset.growth_m(12.0)), (0.0, 2e-6));
-        let exponential = Law::Exponential { amplitude_m: 1e-6, life_hours: 10.0 };
+        let exponential = WearLaw::Exponential { amplitude_m: 1e-6, life_hours: 10.0 };
         assert!((exponential.growth_m(10.0) - 1e-6 * (std::f64::consts::E - 1.0)).abs() < 1e-18);
     }
 
     #[test]
     fn uneven_wear_has_the_mean_and_variance_it_states() {
-        let mut rng = stream(5, &["wear"]);
+        let mut rng = seeded_rng(5, &["wear"]);
         let steps: Vec<f64> = (0..100_000).map(|_| step_m(25e-6, 1e-6, &mut rng)).collect();
         let mean = steps.iter().sum::<f64>() / 1e5;
         let variance = steps.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / 1e5;

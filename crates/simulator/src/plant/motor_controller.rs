@@ -16,7 +16,7 @@ pub struct Drive {
     pub speed_hz: f64,
     /// The most the motor can push, N. Default 40 000.
     pub force_limit_n: f64,
-    /// The fastest it may be asked to go, m/s. Default 0.15.
+    /// Greatest commanded speed, m/s. Default 0.15.
     pub speed_limit_m_per_s: f64,
 }
 
@@ -35,21 +35,21 @@ impl Drive {
     }
 }
 
-/// A drive at work: its gains for one moved mass, and its integrator.
+/// The state of a drive: its gains for one moved mass, and its integrator.
 #[derive(Debug, Clone, Copy)]
-pub struct Loop {
+pub struct PositionLoop {
     drive: Drive,
     gain_n_s_per_m: f64,
     integral_n: f64,
 }
 
-impl Loop {
+impl PositionLoop {
     /// A loop tuned for the mass it moves.
     pub fn new(drive: Drive, moved_kg: f64) -> Self {
         Self { drive, gain_n_s_per_m: TAU * drive.speed_hz * moved_kg, integral_n: 0.0 }
     }
 
-    /// The force asked of the motor over the next step, N.
+    /// The commanded motor force over the next step, N.
     ///
     /// The integrator has a fifth of the speed loop's bandwidth and stands still while the force
     /// saturates, so it does not wind up.
@@ -74,10 +74,10 @@ mod tests {
     #[test]
     fn a_loop_pushes_towards_its_command_and_never_harder_than_its_limit() {
         let drive = Drive::default();
-        let mut slow = Loop::new(drive, 88.0);
+        let mut slow = PositionLoop::new(drive, 88.0);
         assert_eq!(slow.force_n(1.0, 0.0, -10.0, 1e-4), drive.force_limit_n);
         assert_eq!(slow.integral_n, 0.0);
-        let mut calm = Loop::new(drive, 88.0);
+        let mut calm = PositionLoop::new(drive, 88.0);
         assert!(calm.force_n(0.0, 1e-6, 0.0, 1e-4) < 0.0);
     }
 }

@@ -1,16 +1,16 @@
-//! A fleet as a person writes it down: `SPEC.toml`, every key with a default but names, parts and positions.
+//! Fleet specification `SPEC.toml`: every key has a default except names, parts and positions.
 
 use serde::{Deserialize, Serialize};
 
-use crate::calendar::midnight_us;
 use crate::error::{Error, finite, not_negative, positive, within};
-use crate::plant::Plant;
-use crate::profile::Profile;
-use crate::sensor::Sensors;
-use crate::wear;
+use crate::fleet::calendar::midnight_us;
+use crate::fleet::wear::WearLaw;
+use crate::load::flight_profile::Profile;
+use crate::plant::actuator_plant::Plant;
+use crate::sensors::sensor::Sensors;
 
 /// The fleet that made the sample data, as TOML text: three tails, four positions, ten flights each.
-pub const SAMPLE_SPEC: &str = include_str!("../specs/sample.toml");
+pub const SAMPLE_SPEC: &str = include_str!("../../specs/sample.toml");
 
 /// A fleet, its flights and its sensors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -47,14 +47,14 @@ pub struct Spec {
     pub sensors: Sensors,
     /// How units, aircraft and flights differ from each other.
     #[serde(default)]
-    pub spread: Spread,
+    pub spread: ParameterSpread,
     /// The designs.
     pub parts: Vec<Part>,
     /// The places on each tail.
     pub positions: Vec<Position>,
     /// Units that are to differ from what chance gives.
     #[serde(default)]
-    pub units: Vec<Unit>,
+    pub units: Vec<UnitSpec>,
     /// Exchanges of two units.
     #[serde(default)]
     pub swaps: Vec<Swap>,
@@ -85,7 +85,7 @@ fn default_tail_hours() -> f64 {
 /// What differs, drawn per unit, per place or per flight; every default is zero, no difference.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Spread {
+pub struct ParameterSpread {
     /// Stiffness of a unit over the part's, minus one: evenly between ± this.
     pub stiffness: f64,
     /// δX₀ of a stay: evenly between ± this, metres.
@@ -109,7 +109,7 @@ pub struct Spread {
 /// In which quantity the motor position is logged.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum MotorLog {
+pub enum MotorLogFormat {
     /// Metres at the screw.
     Position,
     /// Resolver angle, radians, counted on through the turns.
@@ -130,7 +130,7 @@ pub struct Part {
     pub lead_m: f64,
     /// How its motor position is logged. Default `angle`.
     #[serde(default)]
-    pub motor_log: MotorLog,
+    pub motor_log: MotorLogFormat,
     /// For a rotary actuator the radius r at which its metres and newtons are meant: the output is
     /// logged as `X/r` in radians and the load as `F·r` in N·m. Default none, a linear actuator.
     #[serde(default)]
@@ -146,7 +146,7 @@ pub struct Part {
     pub unit_hours: [f64; 2],
     /// How its units wear. Default steady.
     #[serde(default)]
-    pub wear: wear::Law,
+    pub wear: WearLaw,
     /// Unevenness of wear, metres: the variance of a growth is this times the growth. Default 0.
     #[serde(default)]
     pub wear_scatter_m: f64,
@@ -191,7 +191,7 @@ fn default_factor() -> f64 {
 /// The unit that sits in a place at the start; whatever is left out comes from chance and the part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Unit {
+pub struct UnitSpec {
     /// The tail it starts on.
     pub tail: String,
     /// The place it starts in.
@@ -210,7 +210,7 @@ pub struct Unit {
     pub stiffness_factor: Option<f64>,
     /// How it wears.
     #[serde(default)]
-    pub wear: Option<wear::Law>,
+    pub wear: Option<WearLaw>,
 }
 
 /// Before a flight, the units of two places change places.
@@ -243,7 +243,7 @@ impl Spec {
         found.ok_or_else(|| unknown(&format!("position \"{place}\""), "part", part_number, &mut names))
     }
 
-    /// Says whether this fleet can be planned: every number in its range, every name declared once.
+    /// Checks that every number is in its range and every name is declared once.
     ///
     /// # Errors
     /// The first diagnostic, any variant but [`Error::NoSuchFlight`] and [`Error::Misfit`].
@@ -264,9 +264,9 @@ impl Spec {
         let tails: Vec<&str> = self.tails.iter().map(String::as_str).collect();
         let parts: Vec<&str> = self.parts.iter().map(|part| part.part_number.as_str()).collect();
         let positions: Vec<&str> = self.positions.iter().map(|place| place.position.as_str()).collect();
-        once("tails", "tail", &tails)?;
-        once("parts", "part", &parts)?;
-        once("positions", "position", &positions)
+        check_unique("tails", "tail", &tails)?;
+        check_unique("parts", "part", &parts)?;
+        check_unique("positions", "position", &positions)
     }
 
     fn check_flights(&self) -> Result<(), Error> {
@@ -289,7 +289,7 @@ impl Spec {
         self.part_index(&place.position, &place.part_number).map(|_| ())
     }
 
-    fn check_unit(&self, unit: &Unit) -> Result<(), Error> {
+    fn check_unit(&self, unit: &UnitSpec) -> Result<(), Error> {
         self.check_place("a unit", &unit.tail, &unit.position)?;
         let key = |name: &str| format!("units {} {} {name}", unit.tail, unit.position);
         not_negative(&key("gap_m"), unit.gap_m.unwrap_or(0.0))?;
@@ -318,7 +318,7 @@ impl Spec {
     }
 }
 
-impl Spread {
+impl ParameterSpread {
     fn check(&self) -> Result<(), Error> {
         within("spread.stiffness", self.stiffness, 0.0, 0.3, "between 0 and 0.3")?;
         finite("spread.offset_m", self.offset_m)?;
@@ -348,7 +348,7 @@ impl Part {
     }
 }
 
-fn once(key: &'static str, kind: &'static str, names: &[&str]) -> Result<(), Error> {
+fn check_unique(key: &'static str, kind: &'static str, names: &[&str]) -> Result<(), Error> {
     if names.is_empty() {
         return Err(Error::Empty { key });
     }

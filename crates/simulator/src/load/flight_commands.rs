@@ -1,4 +1,4 @@
-//! A flight laid out before it is flown: command, airload and hinge stiffness on a fixed grid.
+//! Commands and loads of a flight on a fixed grid: motor command, airload and hinge stiffness.
 //!
 //! The grid is independent of the integrator's step, so a finer step meets the same flight.
 
@@ -8,10 +8,10 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::profile::Profile;
-use crate::random::stream;
+use crate::load::flight_profile::Profile;
+use crate::seeded_streams::seeded_rng;
 
-/// The grid of the course, seconds.
+/// The grid of the commands, seconds.
 const GRID_S: f64 = 0.005;
 /// Quiet time before the log begins, in which motor and screw find their places, seconds.
 pub(crate) const LEAD_IN_S: f64 = 2.0;
@@ -39,10 +39,10 @@ const PHASES: [Phase; 6] = [
     Phase { share: 0.12, pressure: (0.6, 0.15), deployed: 0.35 },
 ];
 
-/// One instant of a course.
+/// Commands and loads at one instant.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Instant {
-    /// Where the motor is told to be, at the screw, metres.
+pub(crate) struct CommandSample {
+    /// Commanded motor position, at the screw, metres.
     pub(crate) command_m: f64,
     /// Load at zero deflection, N.
     pub(crate) air_n: f64,
@@ -50,16 +50,16 @@ pub(crate) struct Instant {
     pub(crate) hinge_n_per_m: f64,
 }
 
-/// A whole flight, from the lead-in to a grid step past the last sample.
-pub(crate) struct Course {
-    instants: Vec<Instant>,
+/// The commands and loads of a whole flight, from the lead-in to a grid step past the last sample.
+pub(crate) struct CommandProfile {
+    samples: Vec<CommandSample>,
 }
 
-impl Course {
-    /// Lays out a flight; the same profile and seed give the same course.
-    pub(crate) fn lay(profile: &Profile, seed: u64) -> Self {
+impl CommandProfile {
+    /// Lays out a flight; the same profile and seed give the same commands.
+    pub(crate) fn generate(profile: &Profile, seed: u64) -> Self {
         let points = ((profile.duration_s + 2.0 * LEAD_IN_S) / GRID_S).ceil() as usize + 2;
-        let draw = |name: &str| stream(seed, &["course", name]);
+        let draw = |name: &str| seeded_rng(seed, &["course", name]);
         let deployment = path(&deployments(profile.duration_s), points);
         let stick = path(&stick_moves(profile, &mut draw("stick")), points);
         let trim = coloured(TRIM_HZ, points, &mut draw("trim"));
@@ -71,28 +71,28 @@ impl Course {
         let mut asked: Vec<f64> =
             (0..points).map(|k| deployment[k] + stick[k] + profile.trim_share * trim[k]).collect();
         rest(&mut asked, profile, &mut draw("rest"));
-        let instant = |k: usize| {
+        let sample = |k: usize| {
             let pressure = pressure(time_s(k) / profile.duration_s);
             let air = match &side {
                 Some(side) => -side[k] * one_sided(profile, pressure, manoeuvre[k], gust[k]),
                 None => airload(profile, pressure, manoeuvre[k], gust[k]),
             };
-            Instant {
+            CommandSample {
                 command_m: profile.stroke_m * asked[k].clamp(-1.0, 1.0),
                 air_n: profile.load_n * air,
                 hinge_n_per_m: pressure * profile.hinge_share * profile.load_n / profile.stroke_m,
             }
         };
-        Self { instants: (0..points).map(instant).collect() }
+        Self { samples: (0..points).map(sample).collect() }
     }
 
-    /// The course between its grid points, by straight lines.
-    pub(crate) fn at(&self, time_s: f64) -> Instant {
-        let place = ((time_s + LEAD_IN_S) / GRID_S).clamp(0.0, (self.instants.len() - 2) as f64);
+    /// The commands between its grid points, by straight lines.
+    pub(crate) fn at(&self, time_s: f64) -> CommandSample {
+        let place = ((time_s + LEAD_IN_S) / GRID_S).clamp(0.0, (self.samples.len() - 2) as f64);
         let (index, part) = (place as usize, place.fract());
-        let (a, b) = (&self.instants[index], &self.instants[index + 1]);
+        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
         let mix = |a: f64, b: f64| a + part * (b - a);
-        Instant {
+        CommandSample {
             command_m: mix(a.command_m, b.command_m),
             air_n: mix(a.air_n, b.air_n),
             hinge_n_per_m: mix(a.hinge_n_per_m, b.hinge_n_per_m),
@@ -133,7 +133,7 @@ pub(crate) fn phase_factor(progress: f64, factors: &[f64; PHASES.len()]) -> f64 
     factor
 }
 
-/// The gusts of the form asked for, at unit variance.
+/// Gusts of the profile's form, at unit variance.
 fn gusts(profile: &Profile, points: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
     match profile.gust_form.noise(profile.gust_hz, GRID_S, rng.clone()) {
         Some(mut noise) => (0..points).map(|_| noise.next()).collect(),
@@ -142,20 +142,20 @@ fn gusts(profile: &Profile, points: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
 }
 
 /// Which side the load is on: a change of side at each of so many random times, well inside the log.
-fn sides(duration_s: f64, count: u32, rng: &mut ChaCha8Rng) -> Vec<Move> {
+fn sides(duration_s: f64, count: u32, rng: &mut ChaCha8Rng) -> Vec<MotionPrimitive> {
     let mut target = if rng.random() { 1.0 } else { -1.0 };
-    let mut moves = vec![Move { start_s: -LEAD_IN_S, lasts_s: 1e-3, target }];
+    let mut moves = vec![MotionPrimitive { start_s: -LEAD_IN_S, lasts_s: 1e-3, target }];
     for k in 0..count {
         // One in each of `count` equal windows.
         let place = (f64::from(k) + rng.random_range(0.1..0.9)) / f64::from(count);
         let lasts_s = rng.random_range(0.6..1.6);
         target = -target;
-        moves.push(Move { start_s: duration_s * (0.1 + 0.8 * place) - lasts_s, lasts_s, target });
+        moves.push(MotionPrimitive { start_s: duration_s * (0.1 + 0.8 * place) - lasts_s, lasts_s, target });
     }
     moves
 }
 
-/// Time in which the command returns from a rest to what was asked, seconds.
+/// Time in which the command returns from a rest to the commanded path, seconds.
 const RETURN_S: f64 = 1.0;
 
 /// Holds the command still for rests of random length, spread over the flight after the preflight checks.
@@ -202,47 +202,47 @@ fn pressure(progress: f64) -> f64 {
 }
 
 /// A smooth move to a target, over the stroke or the load it belongs to.
-struct Move {
+struct MotionPrimitive {
     start_s: f64,
     lasts_s: f64,
     target: f64,
 }
 
 /// Full-travel checks before the flight, then each phase's deployment at its start, and back at the end.
-fn deployments(duration_s: f64) -> Vec<Move> {
+fn deployments(duration_s: f64) -> Vec<MotionPrimitive> {
     let checks_s = PHASES[PREFLIGHT].share * duration_s;
-    let check = |(k, target): (usize, f64)| Move {
+    let check = |(k, target): (usize, f64)| MotionPrimitive {
         start_s: checks_s * (0.1 + 0.3 * k as f64),
         lasts_s: 0.25 * checks_s,
         target,
     };
-    let mut moves: Vec<Move> = [0.8, -0.8, 0.0].into_iter().enumerate().map(check).collect();
+    let mut moves: Vec<MotionPrimitive> = [0.8, -0.8, 0.0].into_iter().enumerate().map(check).collect();
     let mut start_s = checks_s;
     for phase in &PHASES[PREFLIGHT + 1..] {
         let length_s = phase.share * duration_s;
-        moves.push(Move { start_s, lasts_s: (0.4 * length_s).min(3.0), target: phase.deployed });
+        moves.push(MotionPrimitive { start_s, lasts_s: (0.4 * length_s).min(3.0), target: phase.deployed });
         start_s += length_s;
     }
     let home_s = 0.03 * duration_s;
-    moves.push(Move { start_s: duration_s - home_s, lasts_s: home_s.min(3.0), target: 0.0 });
+    moves.push(MotionPrimitive { start_s: duration_s - home_s, lasts_s: home_s.min(3.0), target: 0.0 });
     moves
 }
 
 /// The pilot's moves: every two to six seconds from take-off to landing.
-fn stick_moves(profile: &Profile, rng: &mut ChaCha8Rng) -> Vec<Move> {
+fn stick_moves(profile: &Profile, rng: &mut ChaCha8Rng) -> Vec<MotionPrimitive> {
     let mut start_s = PHASES[PREFLIGHT].share * profile.duration_s;
     let mut moves = Vec::new();
     while start_s < profile.duration_s {
         let size: f64 = StandardNormal.sample(rng);
         let target = (profile.stick_share * size).clamp(-0.5, 0.5);
-        moves.push(Move { start_s, lasts_s: rng.random_range(0.5..1.5), target });
+        moves.push(MotionPrimitive { start_s, lasts_s: rng.random_range(0.5..1.5), target });
         start_s += rng.random_range(2.0..6.0);
     }
     moves
 }
 
 /// Turns and pulls: a new level of load every two to six seconds, on alternating sides more often than not.
-fn manoeuvres(duration_s: f64, rng: &mut ChaCha8Rng) -> Vec<Move> {
+fn manoeuvres(duration_s: f64, rng: &mut ChaCha8Rng) -> Vec<MotionPrimitive> {
     let mut start_s = -LEAD_IN_S;
     let mut side = 1.0;
     let mut moves = Vec::new();
@@ -250,7 +250,7 @@ fn manoeuvres(duration_s: f64, rng: &mut ChaCha8Rng) -> Vec<Move> {
         if rng.random_bool(0.7) {
             side = -side;
         }
-        moves.push(Move {
+        moves.push(MotionPrimitive {
             start_s,
             lasts_s: rng.random_range(0.6..1.6),
             target: side * rng.random_range(0.0..1.0),
@@ -261,7 +261,7 @@ fn manoeuvres(duration_s: f64, rng: &mut ChaCha8Rng) -> Vec<Move> {
 }
 
 /// The moves one after the other, each of least jerk; one that begins too early waits for its turn.
-fn path(moves: &[Move], points: usize) -> Vec<f64> {
+fn path(moves: &[MotionPrimitive], points: usize) -> Vec<f64> {
     let mut queue = moves.iter();
     let mut next = queue.next();
     let (mut from, mut start_s, mut lasts_s, mut target) = (0.0, f64::NEG_INFINITY, 0.0, 0.0);
@@ -318,17 +318,17 @@ mod tests {
         assert_eq!(phase_factor(1.0, &factors), 6.0);
     }
 
-    fn short(change: impl Fn(&mut Profile)) -> Course {
+    fn short(change: impl Fn(&mut Profile)) -> CommandProfile {
         let mut profile = Profile { duration_s: 300.0, hinge_share: 0.0, ..Profile::default() };
         change(&mut profile);
-        Course::lay(&profile, 3)
+        CommandProfile::generate(&profile, 3)
     }
 
     #[test]
     fn a_load_with_few_reversals_changes_side_as_often_as_asked() {
         for count in [1, 2, 5] {
-            let course = short(|p| p.reversals = Some(count));
-            let pairs = course.instants.windows(2);
+            let commands = short(|p| p.reversals = Some(count));
+            let pairs = commands.samples.windows(2);
             let changes = pairs.filter(|pair| (pair[0].air_n > 0.0) != (pair[1].air_n > 0.0)).count();
             assert_eq!(changes, count as usize);
         }
@@ -336,24 +336,24 @@ mod tests {
 
     #[test]
     fn the_command_rests_for_about_the_share_asked() {
-        let course = short(|p| (p.rest_share, p.rest_s) = (0.6, 12.0));
-        let still = course.instants.windows(2).filter(|pair| pair[0].command_m == pair[1].command_m);
+        let commands = short(|p| (p.rest_share, p.rest_s) = (0.6, 12.0));
+        let still = commands.samples.windows(2).filter(|pair| pair[0].command_m == pair[1].command_m);
         let share = still.count() as f64 * GRID_S / (0.94 * 300.0);
         assert!((share - 0.6).abs() < 0.12, "{share}");
-        let jump = course.instants.windows(2).map(|pair| (pair[1].command_m - pair[0].command_m).abs());
+        let jump = commands.samples.windows(2).map(|pair| (pair[1].command_m - pair[0].command_m).abs());
         assert!(jump.fold(0.0, f64::max) < 5e-4, "the command never jumps");
     }
 
     #[test]
     fn coloured_noise_has_unit_variance() {
-        let values = coloured(2.0, 400_000, &mut stream(7, &["variance"]));
+        let values = coloured(2.0, 400_000, &mut seeded_rng(7, &["variance"]));
         let power = values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64;
         assert!((power - 1.0).abs() < 0.05, "{power}");
     }
 
     #[test]
     fn a_move_starts_and_ends_at_rest_and_is_halfway_at_half_time() {
-        let values = path(&[Move { start_s: 0.0, lasts_s: 1.0, target: 2.0 }], 800);
+        let values = path(&[MotionPrimitive { start_s: 0.0, lasts_s: 1.0, target: 2.0 }], 800);
         let at = |seconds: f64| values[((seconds + LEAD_IN_S) / GRID_S).round() as usize];
         assert_eq!((at(-0.5), at(1.5)), (0.0, 2.0));
         assert!((at(0.5) - 1.0).abs() < 1e-9);

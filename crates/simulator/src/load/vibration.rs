@@ -8,8 +8,8 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, not_negative, within};
-use crate::random::stream;
-use crate::shaping_filter::ShapedNoise;
+use crate::load::shaping_filter::ShapedNoise;
+use crate::seeded_streams::seeded_rng;
 
 /// The most lines a vibration can have.
 const LINES: usize = 3;
@@ -104,7 +104,7 @@ impl Vibration {
     }
 }
 
-/// A vibration at work: one value each step.
+/// The state of a vibration: one value each step.
 #[derive(Debug)]
 pub(crate) struct VibrationSource {
     scale: f64,
@@ -118,7 +118,7 @@ pub(crate) struct VibrationSource {
 impl VibrationSource {
     /// `scale` turns the vibration's unit into the unit of the values.
     pub(crate) fn new(vibration: &Vibration, scale: f64, step_s: f64, seed: u64, name: &str) -> Self {
-        let draw = |part: &str| stream(seed, &["vibration", name, part]);
+        let draw = |part: &str| seeded_rng(seed, &["vibration", name, part]);
         let mut rng = draw("lines");
         let live = vibration.lines.0.into_iter().filter(|line| line.amplitude > 0.0);
         let lines = live.map(|line| (line, rng.random_range(0.0..TAU))).collect();

@@ -1,24 +1,24 @@
-//! The making of a calendar: slots, departures, swaps, hours, wear, and what each actuator is on the day.
+//! Planning of a fleet: slots, departures, swaps, flight hours, wear, and the state of each actuator.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::calendar::{DAY_US, HOUR_US, midnight_us};
 use crate::error::Error;
-use crate::flight::Expected;
-use crate::plan::{ActuatorTruth, Assignment, Installation, Plan, PlannedFlight};
-use crate::random::{derived, stream};
-use crate::roster::{self, Seats};
-use crate::spec::Spec;
-use crate::wear;
+use crate::fleet::calendar::{DAY_US, HOUR_US, midnight_us};
+use crate::fleet::fleet_plan_types::{ActuatorTruth, Assignment, Installation, Plan, PlannedFlight};
+use crate::fleet::fleet_roster::{FleetUnit, UnitAssignment, fleet_units};
+use crate::fleet::fleet_spec::Spec;
+use crate::fleet::wear;
+use crate::flight::ExpectedOutcome;
+use crate::seeded_streams::{derive_seed, seeded_rng};
 
 /// A calendar in the making.
 pub(crate) struct Planner<'a> {
     spec: &'a Spec,
     start_us: i64,
-    seats: Seats,
-    units: Vec<roster::Unit>,
+    unit_at: UnitAssignment,
+    units: Vec<FleetUnit>,
     wear: Vec<ChaCha8Rng>,
     tail_hours: Vec<f64>,
     installations: Vec<Installation>,
@@ -28,12 +28,12 @@ pub(crate) struct Planner<'a> {
 impl<'a> Planner<'a> {
     /// Every tail on the ground with its first units.
     pub(crate) fn new(spec: &'a Spec) -> Result<Self, Error> {
-        let units = roster::units(spec)?;
-        let wear = units.iter().map(|unit| stream(spec.seed, &["wear", &unit.serial_number])).collect();
+        let units = fleet_units(spec)?;
+        let wear = units.iter().map(|unit| seeded_rng(spec.seed, &["wear", &unit.serial_number])).collect();
         let mut planner = Self {
             spec,
             start_us: midnight_us(&spec.start_date)?,
-            seats: Seats::new(spec),
+            unit_at: UnitAssignment::new(spec),
             units,
             wear,
             tail_hours: (0..spec.tails.len()).map(|k| spec.tail_hours * (1.0 + 0.1 * k as f64)).collect(),
@@ -70,7 +70,7 @@ impl<'a> Planner<'a> {
 
     fn swap(&mut self, number: usize) -> Result<(), Error> {
         let at_us = self.slot_us(number);
-        for (tail, position) in self.seats.swap(self.spec, &self.units, number)? {
+        for (tail, position) in self.unit_at.swap(self.spec, &self.units, number)? {
             let (tail_number, place) = (&self.spec.tails[tail], &self.spec.positions[position].position);
             let here = |stay: &&mut Installation| stay.tail_number == *tail_number && stay.position == *place;
             if let Some(stay) = self.installations.iter_mut().rev().find(here) {
@@ -82,7 +82,7 @@ impl<'a> Planner<'a> {
     }
 
     fn install(&mut self, tail: usize, position: usize, installed_us: i64) {
-        let unit = &self.units[self.seats.unit(tail, position)];
+        let unit = &self.units[self.unit_at.unit(tail, position)];
         self.installations.push(Installation {
             tail_number: self.spec.tails[tail].clone(),
             position: self.spec.positions[position].position.clone(),
@@ -99,7 +99,7 @@ impl<'a> Planner<'a> {
         let spec = self.spec;
         let name = &spec.tails[tail];
         let flight_id = format!("{name}-{number:04}");
-        let mut rng = stream(spec.seed, &["flight", &flight_id]);
+        let mut rng = seeded_rng(spec.seed, &["flight", &flight_id]);
         // Books keep hours to a hundredth.
         let spread = spec.flight_hours_spread * rng.random_range(-1.0..=1.0);
         let flight_hours = (spec.flight_hours * (1.0 + spread) * 100.0).round() / 100.0;
@@ -110,7 +110,7 @@ impl<'a> Planner<'a> {
             seats.map(|position| self.plan_actuator(tail, position, &flight_id, flight_hours)).unzip();
         self.flights.push(PlannedFlight {
             tail_number: name.clone(),
-            seed: derived(spec.seed, &["log", &flight_id]),
+            seed: derive_seed(spec.seed, &["log", &flight_id]),
             flight_id,
             departure_us,
             flight_hours,
@@ -134,7 +134,7 @@ impl<'a> Planner<'a> {
         ((hours * 3600.0) as i64) * (HOUR_US as i64 / 3600)
     }
 
-    /// Wears the unit through the flight and says what flies.
+    /// Applies the wear of the flight and assigns plant, profile and sensors.
     fn plan_actuator(
         &mut self,
         tail: usize,
@@ -142,7 +142,7 @@ impl<'a> Planner<'a> {
         flight_id: &str,
         flight_hours: f64,
     ) -> (ActuatorTruth, Assignment) {
-        let index = self.seats.unit(tail, position);
+        let index = self.unit_at.unit(tail, position);
         self.wear(index, flight_hours);
         let assignment = self.assignment(tail, position, flight_id);
         let unit = &self.units[index];
@@ -154,7 +154,11 @@ impl<'a> Planner<'a> {
             gap_m: unit.gap_m,
             stiffness_n_per_m: assignment.plant.contact.stiffness_n_per_m,
             skew_s: assignment.sensors.skew_s(),
-            expected: if assignment.profile.is_one_sided() { Expected::Refuse } else { Expected::Estimate },
+            expected: if assignment.profile.is_one_sided() {
+                ExpectedOutcome::Refuse
+            } else {
+                ExpectedOutcome::Estimate
+            },
         };
         (truth, assignment)
     }
@@ -169,11 +173,11 @@ impl<'a> Planner<'a> {
     }
 
     fn assignment(&self, tail: usize, position: usize, flight_id: &str) -> Assignment {
-        let (spec, unit) = (self.spec, &self.units[self.seats.unit(tail, position)]);
+        let (spec, unit) = (self.spec, &self.units[self.unit_at.unit(tail, position)]);
         let (spread, place, tail) = (&spec.spread, &spec.positions[position], &spec.tails[tail]);
-        let mut of_place = stream(spec.seed, &["place", tail, &place.position]);
-        let mut of_stay = stream(spec.seed, &["stay", tail, &place.position, &unit.serial_number]);
-        let mut of_flight = stream(spec.seed, &["actuator", flight_id, &place.position]);
+        let mut of_place = seeded_rng(spec.seed, &["place", tail, &place.position]);
+        let mut of_stay = seeded_rng(spec.seed, &["stay", tail, &place.position, &unit.serial_number]);
+        let mut of_flight = seeded_rng(spec.seed, &["actuator", flight_id, &place.position]);
         let mut sensors = spec.sensors;
         sensors.load.gain_error += spread.load_gain * normal(&mut of_place);
         sensors.screw.nonlinearity += spread.nonlinearity_m * normal(&mut of_place);

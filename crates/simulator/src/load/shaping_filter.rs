@@ -112,7 +112,7 @@ impl ShapedNoise {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::stream;
+    use crate::seeded_streams::seeded_rng;
 
     /// Amplitude of the filtered sine, by correlation over whole periods.
     fn gain(noise: &mut ShapedNoise, frequency_hz: f64, step_s: f64) -> f64 {
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn the_edges_of_a_band_are_butterworth() {
         for frequency_hz in [2.5, 5.0, 20.0, 50.0, 100.0] {
-            let mut noise = ShapedNoise::band(5.0, 50.0, 1e-3, stream(1, &["band"]));
+            let mut noise = ShapedNoise::band(5.0, 50.0, 1e-3, seeded_rng(1, &["band"]));
             let high = 1.0 / (1.0 + (5.0_f64 / frequency_hz).powi(8));
             // The bilinear transform maps f to tan(π f T).
             let tan = |f: f64| (std::f64::consts::PI * f * 1e-3).tan();
@@ -148,10 +148,10 @@ mod tests {
     #[test]
     fn shaped_noise_has_unit_variance_from_its_first_value() {
         let first: f64 = (0..4000)
-            .map(|seed| ShapedNoise::band(20.0, 60.0, 2e-3, stream(seed, &["unit"])).next().powi(2))
+            .map(|seed| ShapedNoise::band(20.0, 60.0, 2e-3, seeded_rng(seed, &["unit"])).next().powi(2))
             .sum();
         assert!((first / 4000.0 - 1.0).abs() < 0.07, "{first}");
-        let mut noise = ShapedNoise::band(5.0, 60.0, 1e-3, stream(2, &["unit"]));
+        let mut noise = ShapedNoise::band(5.0, 60.0, 1e-3, seeded_rng(2, &["unit"]));
         let power: f64 = (0..400_000).map(|_| noise.next().powi(2)).sum();
         assert!((power / 4e5 - 1.0).abs() < 0.03, "{power}");
     }

@@ -1,15 +1,15 @@
-//! What a flight asks of an actuator: how long, how hard, how busily.
+//! Flight profile: duration, sample rate, commands and loads.
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, not_negative, positive, within};
-use crate::turbulence::GustForm;
-use crate::vibration::Vibration;
+use crate::load::turbulence::GustForm;
+use crate::load::vibration::Vibration;
 
 /// An operational flight in six phases: preflight checks, take-off, climb, cruise, approach, landing.
 ///
 /// The phases stretch with the duration. The load is dynamic pressure × (manoeuvre + gust −
-/// stiffness × deflection), so it reverses many times unless it is told not to.
+/// stiffness × deflection), so it reverses many times unless `no_reversal` or `reversals` limits that.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Profile {
@@ -81,7 +81,7 @@ impl Profile {
         self.no_reversal || self.reversals == Some(0)
     }
 
-    /// Says whether this can be flown.
+    /// Checks every parameter against its range.
     ///
     /// # Errors
     /// [`Error::Value`] for the first parameter outside its range.

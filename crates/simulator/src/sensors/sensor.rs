@@ -1,4 +1,4 @@
-//! What the recorder makes of the truth: delay, distortion, noise, resolution, and the faults of a bus.
+//! Sensors and recorder: delay, distortion, noise, resolution, and the faults of a bus.
 //!
 //! Position channels are described in metres at the screw, the load channel in newtons, whatever unit
 //! they are logged in later. Hysteresis, lag, averaging and delay act where the plant is sampled; all
@@ -12,8 +12,8 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, finite, not_negative, positive, within};
-use crate::profile::Profile;
-use crate::random::stream;
+use crate::load::flight_profile::Profile;
+use crate::seeded_streams::seeded_rng;
 
 /// Height of `u − u³` at its peak, which `nonlinearity` is scaled by: `2/(3√3)`.
 const CUBIC_PEAK: f64 = 0.384_900_179_459_750_5;
@@ -224,8 +224,9 @@ impl Channel {
     /// Turns the truth at the channel's own sample instants into readings at those of the log.
     pub(crate) fn read_log(&self, values: Vec<f64>, profile: &Profile, seed: u64, name: &str) -> Vec<f64> {
         let rate_hz = self.own_rate_hz(profile.sample_rate_hz);
-        let coloured = self.coloured(values.len(), rate_hz, &mut stream(seed, &["sensor", name, "coloured"]));
-        let rng = &mut stream(seed, &["sensor", name]);
+        let coloured =
+            self.coloured(values.len(), rate_hz, &mut seeded_rng(seed, &["sensor", name, "coloured"]));
+        let rng = &mut seeded_rng(seed, &["sensor", name]);
         let read = self.read(values, &coloured, rate_hz, profile.stroke_m, rng);
         if rate_hz < profile.sample_rate_hz {
             let hold = |k| read[held_index(k, profile.sample_rate_hz, rate_hz)];
@@ -394,7 +395,7 @@ impl Sensors {
         (self.screw.delay_s + self.screw.lag_s) - (self.motor.delay_s + self.motor.lag_s)
     }
 
-    /// Says whether these can be simulated.
+    /// Checks every parameter against its range.
     ///
     /// # Errors
     /// [`Error::Value`] for the first parameter outside its range.
@@ -408,7 +409,7 @@ impl Sensors {
 
     /// The stamps of a log; the same seed gives every actuator of a flight the same clock.
     pub(crate) fn stamps(&self, samples: usize, rate_hz: f64, seed: u64) -> Vec<f64> {
-        self.clock.stamps(samples, rate_hz, &mut stream(seed, &["clock"]))
+        self.clock.stamps(samples, rate_hz, &mut seeded_rng(seed, &["clock"]))
     }
 }
 
@@ -418,7 +419,7 @@ mod tests {
     use super::*;
 
     fn read(channel: Channel, value: f64, samples: usize) -> Vec<f64> {
-        channel.read(vec![value; samples], &[], 100.0, 1.0, &mut stream(3, &["sensor"]))
+        channel.read(vec![value; samples], &[], 100.0, 1.0, &mut seeded_rng(3, &["sensor"]))
     }
 
     /// First-order noise: autocorrelation `e^(−2πft)`; flicker: equal power in each decade.
@@ -426,7 +427,7 @@ mod tests {
     fn coloured_noise_has_its_rms_and_spectrum() {
         let noise = |coloured_form, coloured_hz, seed| {
             let channel = Channel { coloured_rms: 2.0, coloured_hz, coloured_form, ..Channel::default() };
-            channel.coloured(1_000_000, 100.0, &mut stream(seed, &["coloured"]))
+            channel.coloured(1_000_000, 100.0, &mut seeded_rng(seed, &["coloured"]))
         };
         let mean = |values: &[f64], lag: usize| {
             let pairs = values.iter().zip(&values[lag..]);
@@ -499,7 +500,7 @@ mod tests {
     #[test]
     fn stamps_fall_on_ticks() {
         let clock = Clock { jitter_s: 1e-3, tick_s: 0.02 };
-        let stamps = clock.stamps(500, 100.0, &mut stream(1, &["clock"]));
+        let stamps = clock.stamps(500, 100.0, &mut seeded_rng(1, &["clock"]));
         assert!(stamps.iter().all(|t| (t / 0.02 - (t / 0.02).round()).abs() < 1e-9));
     }
 }

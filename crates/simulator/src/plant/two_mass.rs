@@ -13,8 +13,8 @@
 //! Each mass answers monotonically to c, and c to U₂ − U₁, so one scalar equation with one root
 //! remains; Newton's method inside a bracket finds it in two or three turns.
 
-use crate::friction::Body;
-use crate::plant::Plant;
+use crate::plant::actuator_plant::Plant;
+use crate::plant::friction::FrictionBody;
 
 /// The equation for U₂ − U₁ is solved to this, m/s: 10⁻¹⁷ m over a step of 10⁻⁴ s.
 const SPEED_TOLERANCE_M_PER_S: f64 = 1e-13;
@@ -82,20 +82,20 @@ pub fn advance(plant: &Plant, state: &State, forces: Forces, step_s: f64) -> Sta
         body: body(&plant.screw_friction, state.screw_m_per_s, state.screw_bend, screw_rate),
         push_n: screw_rate * state.screw_m_per_s + forces.load_n,
     };
-    let (u1, u2) = meet(plant, state, &forces, &motor, &screw, step_s);
+    let (u1, u2) = solve_step(plant, state, &forces, &motor, &screw, step_s);
     State {
         motor_m: state.motor_m + step_s * u1,
         motor_m_per_s: after(state.motor_m_per_s, u1),
         screw_m: state.screw_m + step_s * u2,
         screw_m_per_s: after(state.screw_m_per_s, u2),
-        motor_bend: motor.body.bent(u1),
-        screw_bend: screw.body.bent(u2),
+        motor_bend: motor.body.bristle_update(u1),
+        screw_bend: screw.body.bristle_update(u2),
     }
 }
 
 /// A mass and all that pushes it but the coupling.
 struct Mass {
-    body: Body,
+    body: FrictionBody,
     push_n: f64,
 }
 
@@ -103,7 +103,7 @@ struct Mass {
 ///
 /// The mismatch falls at least as fast as the relative speed rises, so the root lies between the
 /// guess and the guess plus the mismatch.
-fn meet(
+fn solve_step(
     plant: &Plant,
     state: &State,
     forces: &Forces,
@@ -116,9 +116,9 @@ fn meet(
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     let mut speeds = (0.0, 0.0);
     for _ in 0..TURNS {
-        let coupling = plant.contact.mean(delta_m, relative - forces.shake_m_per_s, step_s);
-        let (u1, slope1) = motor.body.respond(motor.push_n + coupling.force_n);
-        let (u2, slope2) = screw.body.respond(screw.push_n - coupling.force_n);
+        let coupling = plant.contact.mean_force(delta_m, relative - forces.shake_m_per_s, step_s);
+        let (u1, slope1) = motor.body.mean_velocity(motor.push_n + coupling.force_n);
+        let (u2, slope2) = screw.body.mean_velocity(screw.push_n - coupling.force_n);
         speeds = (u1, u2);
         let miss = u2 - u1 - relative;
         if miss.abs() < SPEED_TOLERANCE_M_PER_S {

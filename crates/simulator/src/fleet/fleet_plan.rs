@@ -1,0 +1,79 @@
+//! The making of a plan, and of each of its flights on demand.
+//!
+//! A plan is cheap and made at once; a flight is costly and made alone, from random streams named
+//! after seed, tail, flight and position. Flights can be simulated in any order and on any thread, to
+//! the same bits.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::error::Error;
+use crate::fleet::fleet_plan_types::{
+    ActuatorLog, ActuatorTruth, Assignment, ChannelUnit, Plan, PlannedFlight, SimulatedFlight,
+};
+use crate::fleet::fleet_planner::Planner;
+use crate::fleet::fleet_spec::{MotorLogFormat, Part, Spec};
+use crate::flight::simulate;
+use crate::seeded_streams::derive_seed;
+
+impl Plan {
+    /// Lays out the calendar of a fleet and the truth of each of its actuators.
+    ///
+    /// # Errors
+    /// Any variant but [`Error::NoSuchFlight`]: the first diagnostic about the spec.
+    pub fn new(spec: &Spec) -> Result<Self, Error> {
+        spec.check()?;
+        Planner::new(spec)?.plan()
+    }
+
+    /// Flies one flight, counted from 0; the same flight gives the same bits in any order.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchFlight`] beyond the end of the plan.
+    pub fn simulate_flight(&self, flight_index: usize) -> Result<SimulatedFlight, Error> {
+        let missing = Error::NoSuchFlight { index: flight_index, flights: self.flights.len() };
+        let flight = self.flights.get(flight_index).ok_or(missing)?;
+        let pairs = flight.actuators.iter().zip(&flight.assignments);
+        let actuators =
+            pairs.map(|(truth, task)| self.record(flight, truth, task)).collect::<Result<_, _>>()?;
+        let first = &flight.assignments[0];
+        let rate_hz = first.profile.sample_rate_hz;
+        Ok(SimulatedFlight {
+            step_s: 1.0 / rate_hz,
+            time_s: first.sensors.stamps(first.profile.samples(), rate_hz, flight.seed),
+            actuators,
+        })
+    }
+
+    fn record(
+        &self,
+        flight: &PlannedFlight,
+        truth: &ActuatorTruth,
+        task: &Assignment,
+    ) -> Result<ActuatorLog, Error> {
+        let seed = derive_seed(flight.seed, &[&truth.position]);
+        let log = simulate(&task.plant, &task.profile, &task.sensors, seed)?;
+        let part = &self.parts[task.part];
+        let (motor, motor_unit) = motor_as_logged(log.motor_m, part);
+        let position = truth.position.clone();
+        let (mut screw, mut load) = (log.screw_m, log.load_n);
+        let Some(radius_m) = part.reference_radius_m else {
+            let (screw_unit, load_unit) = (ChannelUnit::Metre, ChannelUnit::Newton);
+            return Ok(ActuatorLog { position, motor, motor_unit, screw, screw_unit, load, load_unit });
+        };
+        screw.iter_mut().for_each(|x| *x /= radius_m);
+        load.iter_mut().for_each(|f| *f *= radius_m);
+        let (screw_unit, load_unit) = (ChannelUnit::Radian, ChannelUnit::NewtonMetre);
+        Ok(ActuatorLog { position, motor, motor_unit, screw, screw_unit, load, load_unit })
+    }
+}
+
+fn motor_as_logged(mut motor: Vec<f64>, part: &Part) -> (Vec<f64>, ChannelUnit) {
+    if part.motor_log == MotorLogFormat::Position {
+        return (motor, ChannelUnit::Metre);
+    }
+    motor.iter_mut().for_each(|x| *x *= TAU / part.lead_m);
+    if part.motor_log == MotorLogFormat::WrappedAngle {
+        motor.iter_mut().for_each(|angle| *angle = (*angle + PI).rem_euclid(TAU) - PI);
+    }
+    (motor, ChannelUnit::Radian)
+}

@@ -1,0 +1,10 @@
+//! A fleet: its specification, its calendar with the truth, and its flights.
+
+pub(crate) mod fleet_plan;
+pub(crate) mod fleet_plan_types;
+pub(crate) mod fleet_spec;
+pub(crate) mod wear;
+
+mod calendar;
+mod fleet_planner;
+mod fleet_roster;
