@@ -27,7 +27,7 @@ impl From<Code> for ExitCode {
     }
 }
 
-/// Why a command could not answer.
+/// WorkReason a command could not answer.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// Configuration, tables or arguments: code 2.

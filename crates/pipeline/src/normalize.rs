@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use records::{Diagnostic, Installations};
 
 use crate::error::Error;
-use crate::event::Event;
+use crate::run::event::Event;
 
 /// What became of the logs.
 #[derive(Debug, Clone, Default, PartialEq)]

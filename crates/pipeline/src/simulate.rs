@@ -10,7 +10,7 @@ use records::Diagnostic;
 use simulator::{ActuatorLog, ChannelUnit, MotorLogFormat, Plan, PlannedFlight, Spec};
 
 use crate::error::Error;
-use crate::event::Event;
+use crate::run::event::Event;
 
 /// Reads a spec, or takes the small fleet that made `sample-data/`.
 ///

@@ -5,10 +5,13 @@ use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
 use job::Config;
-use pipeline::backtest;
-use pipeline::histories::{Gathering, Histories, Row as Said, Who};
-use pipeline::statement::TrendRow;
-use pipeline::trends::{self, Ask};
+use pipeline::fleet_trends::assess::{self, UnitSelection};
+use pipeline::fleet_trends::backtest;
+use pipeline::fleet_trends::trend_row::TrendRow;
+use pipeline::history::builder::HistoryBuilder;
+use pipeline::history::flight_row::FlightInput;
+use pipeline::history::histories::Histories;
+use pipeline::history::row_keys::RowKey;
 use records::Installations;
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
@@ -41,26 +44,26 @@ struct Row {
     tail: String,
     flight_id: String,
     /// All but its name.
-    said: Said<'static>,
+    said: FlightInput<'static>,
 }
 
-fn gathering(rows: &[Row]) -> Gathering {
-    let mut gathering = Gathering::default();
+fn gathering(rows: &[Row]) -> HistoryBuilder {
+    let mut gathering = HistoryBuilder::default();
     for Row { unit, tail, flight_id, said } in rows {
         let (serial, position) = (format!("S{unit:02}"), format!("place_{unit}"));
-        let who = Who {
+        let who = RowKey {
             part_number: Some("EMA-27-1040"),
             serial_number: &serial,
             tail_number: Some(tail),
             position: Some(&position),
         };
-        gathering.put(who, &Said { flight_id: Some(flight_id), ..*said });
+        gathering.put(who, &FlightInput { flight_id: Some(flight_id), ..*said });
     }
     gathering
 }
 
 fn histories(rows: &[Row]) -> Histories {
-    gathering(rows).foreign()
+    gathering(rows).into_external()
 }
 
 /// Fourteen units, the nth of which wears by 15 + n µm in 1,000 h.
@@ -68,7 +71,7 @@ fn flown(days: i32) -> Vec<Row> {
     let flight = |unit: i32, at: i32| {
         let hours = HOURS_A_DAY * f64::from(at + 1);
         let gap_um = 20.0 + (15.0 + f64::from(unit)) * hours / 1000.0 + scatter_um(unit, at);
-        let said = Said {
+        let said = FlightInput {
             flight_id: None,
             departure_utc: day(at),
             flight_hours: Some(HOURS_A_DAY),
@@ -83,8 +86,8 @@ fn flown(days: i32) -> Vec<Row> {
 }
 
 fn said(flown: &[Row], as_of: Timestamp) -> Vec<TrendRow> {
-    let ask = Ask { as_of_utc: Some(as_of), ..Ask::default() };
-    trends::of_histories(&config(), &Installations::default(), histories(flown), &ask).unwrap()
+    let ask = UnitSelection { as_of_utc: Some(as_of), ..UnitSelection::default() };
+    assess::assess_histories(&config(), &Installations::default(), histories(flown), &ask).unwrap()
 }
 
 #[test]
@@ -142,9 +145,9 @@ fn booked(file: &str) -> Config {
 #[test]
 fn what_the_maintenance_book_says_is_a_change_point_once_its_day_has_come() {
     let nobody = Installations::default();
-    let ask = Ask { as_of_utc: Some(day(199)), ..Ask::default() };
+    let ask = UnitSelection { as_of_utc: Some(day(199)), ..UnitSelection::default() };
     let rows =
-        trends::of_histories(&booked("maintenance.csv"), &nobody, histories(&flown(200)), &ask).unwrap();
+        assess::assess_histories(&booked("maintenance.csv"), &nobody, histories(&flown(200)), &ask).unwrap();
     let recorded = |row: &TrendRow| row.change_points.iter().filter(|c| c.kind == "recorded").count();
     let units: Vec<&str> =
         rows.iter().filter(|row| recorded(row) > 0).map(|row| row.serial_number.as_str()).collect();
@@ -157,11 +160,11 @@ fn what_the_maintenance_book_says_is_a_change_point_once_its_day_has_come() {
 #[test]
 fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
     let nobody = Installations::default();
-    let found = trends::of_histories(
+    let found = assess::assess_histories(
         &booked("maintenance_unknown.csv"),
         &nobody,
         histories(&flown(20)),
-        &Ask::default(),
+        &UnitSelection::default(),
     );
     let Err(pipeline::Error::Refused(diagnostics)) = found else { panic!("{found:?}") };
     let text = format!("{diagnostics:?}");
@@ -178,7 +181,9 @@ fn told(axis: &str) -> Config {
 fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
     let axes = |config: &Config| {
         let nobody = Installations::default();
-        let rows = trends::of_histories(config, &nobody, histories(&flown(60)), &Ask::default()).unwrap();
+        let rows =
+            assess::assess_histories(config, &nobody, histories(&flown(60)), &UnitSelection::default())
+                .unwrap();
         rows.into_iter().map(|row| row.usage_axis).collect::<std::collections::BTreeSet<_>>()
     };
     assert_eq!(axes(&told("flights")), [Some("flights".to_owned())].into());
@@ -214,12 +219,12 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
         tail_hours_at_install: None,
     };
     let installations = Installations::new((0..UNITS).map(stay).collect()).unwrap();
-    let ask = Ask { as_of_utc: Some(day(DAYS - 1)), ..Ask::default() };
+    let ask = UnitSelection { as_of_utc: Some(day(DAYS - 1)), ..UnitSelection::default() };
     let said = |config: &Config| {
         let mut logged = flown(DAYS);
         logged.retain(|row| row.flight_id.ends_with(['1', '3', '5', '7', '9']));
         logged.iter_mut().for_each(|row| row.said.tail_hours_end = None);
-        trends::of_histories(config, &installations, gathering(&logged).booked(), &ask).unwrap()
+        assess::assess_histories(config, &installations, gathering(&logged).into_store(), &ask).unwrap()
     };
     let mut ratios = 0.0;
     for (unit, (with, without)) in said(&config_with).iter().zip(said(&config())).enumerate() {
@@ -252,7 +257,7 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     let all = || histories(&rows);
     let tonight: Vec<Row> = rows.iter().filter(|row| row.said.departure_utc >= day(200)).cloned().collect();
     let night = |tonight: &Histories, counts_all| {
-        trends::of_night(&config(), &nobody, all(), tonight, &units, Vec::new(), counts_all).unwrap()
+        assess::assess_run_from(&config(), &nobody, all(), tonight, &units, Vec::new(), counts_all).unwrap()
     };
     let of_night = |tonight: &Histories| {
         let night = night(tonight, false);
@@ -263,7 +268,7 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     let counted = night(&histories(&tonight), true);
     assert_eq!((&counted.now, &counted.changed), (&now, &news));
     let mut states = std::collections::BTreeMap::new();
-    for row in trends::of_histories(&config(), &nobody, all(), &Ask::default()).unwrap() {
+    for row in assess::assess_histories(&config(), &nobody, all(), &UnitSelection::default()).unwrap() {
         row.state.into_iter().for_each(|state| *states.entry(state).or_default() += 1);
     }
     assert_eq!((states.values().sum::<usize>(), &counted.states), (14, &states));
@@ -323,7 +328,12 @@ fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
         );
     }
     // Asked for alone, a unit is told the same.
-    let ask = Ask { as_of_utc: Some(day(227)), serial_number: Some("S02".into()), ..Ask::default() };
-    let alone = trends::of_histories(&config(), &Installations::default(), histories(&rows), &ask).unwrap();
+    let ask = UnitSelection {
+        as_of_utc: Some(day(227)),
+        serial_number: Some("S02".into()),
+        ..UnitSelection::default()
+    };
+    let alone =
+        assess::assess_histories(&config(), &Installations::default(), histories(&rows), &ask).unwrap();
     assert_eq!(alone, said[2..3]);
 }

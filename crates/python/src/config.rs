@@ -111,7 +111,7 @@ impl Config {
         if let Some(known) = self.installations.get() {
             return Ok(known);
         }
-        let read = py.detach(|| pipeline::schedule::installations(&self.inner));
+        let read = py.detach(|| pipeline::run::scheduler::installations(&self.inner));
         let read = read.map_err(|error| to_run_exception(py, error))?;
         Ok(self.installations.get_or_init(|| read))
     }

@@ -10,10 +10,11 @@ use arrow::array::RecordBatch;
 use ingest::log::in_memory::ChannelArrays;
 use ingest::parquet::writer::Encoding;
 use ingest::tables::{Table as Cells, TableBatch};
-use pipeline::schedule::Context;
-use pipeline::statement::TrendRow;
-use pipeline::trends::{self, Ask};
-use pipeline::{Request, adhoc, estimates, rows};
+use pipeline::fleet_trends::assess::{self, UnitSelection};
+use pipeline::fleet_trends::trend_row::TrendRow;
+use pipeline::history::external_estimates;
+use pipeline::run::scheduler::Context;
+use pipeline::{Request, rows};
 use pyo3::prelude::*;
 use store::{Holder, Query, Store};
 
@@ -60,8 +61,9 @@ pub(crate) fn estimate(
     for log in &logs {
         py.check_signals()?;
         let number = number.as_ref();
-        let read = py
-            .detach(|| adhoc::estimate(log, &config.inner, installations, number, VERSION, &mut diagnostics));
+        let read = py.detach(|| {
+            pipeline::estimate::estimate(log, &config.inner, installations, number, VERSION, &mut diagnostics)
+        });
         found.extend(read.map_err(|error| to_run_exception(py, error))?);
     }
     let batch = rows::batch(&rows::estimates(), &found).map_err(|e| arrow_error(&e))?;
@@ -84,7 +86,7 @@ pub(crate) fn estimate_arrays(
         [numbers(time_s)?, numbers(motor_m)?, numbers(screw_m)?, numbers(load_n)?];
     let found = py.detach(|| {
         let arrays = ChannelArrays { time_s: &time_s, motor_m: &motor_m, screw_m: &screw_m, load_n: &load_n };
-        adhoc::of_arrays(&arrays, &config.inner, &number, VERSION)
+        pipeline::estimate::of_arrays(&arrays, &config.inner, &number, VERSION)
     });
     let found = found.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?;
     Ok(Table::of(rows::batch(&rows::estimates(), &[found]).map_err(|e| arrow_error(&e))?))
@@ -102,7 +104,8 @@ pub(crate) fn trace(
     let no_installations = Installations::default();
     let number = part_number.map(|number| part(py, config, number)).transpose()?;
     let installations = if number.is_some() { &no_installations } else { config.installations(py)? };
-    let files = pipeline::bundle::around(&config.inner, &log).map_err(|error| to_run_exception(py, error))?;
+    let files = pipeline::run::discover::log_containing(&config.inner, &log)
+        .map_err(|error| to_run_exception(py, error))?;
     let shown = log.display().to_string();
     let seen =
         py.detach(|| job::trace::of_log(&files, &shown, &config.inner, installations, number.as_ref()));
@@ -127,7 +130,7 @@ pub(crate) fn trend(
 ) -> PyResult<Table> {
     let installations = config.installations(py)?;
     let as_of_utc = instant(py, as_of)?;
-    let ask = Ask { tail_number: tail, serial_number: serial, part_number, as_of_utc, statistics };
+    let ask = UnitSelection { tail_number: tail, serial_number: serial, part_number, as_of_utc, statistics };
     let estimate_batches = estimates.map(arrow_capsule::batches).transpose()?;
     let queries_table = queries.map(|table| to_table(table, "queries")).transpose()?;
     let found =
@@ -146,20 +149,22 @@ fn assess(
     installations: &Installations,
     estimate_batches: Option<Vec<RecordBatch>>,
     queries_table: Option<&Cells>,
-    ask: &Ask,
+    ask: &UnitSelection,
 ) -> Result<Vec<TrendRow>, pipeline::Error> {
     let histories = match (estimate_batches, queries_table) {
-        (None, None) => return trends::of_store(config, installations, &Store::open(config.store())?, ask),
-        (Some(batches), _) => estimates::gathered(&chunks(batches))?,
-        (None, Some(_)) => trends::in_store(&Store::open(config.store())?)?,
+        (None, None) => {
+            return assess::assess_store(config, installations, &Store::open(config.store())?, ask);
+        }
+        (Some(batches), _) => external_estimates::gathered(&chunks(batches))?,
+        (None, Some(_)) => assess::load_histories(&Store::open(config.store())?)?,
     };
     match queries_table {
-        None => trends::of_histories(config, installations, histories, ask),
-        Some(queries_table) => trends::of_queries(
+        None => assess::assess_histories(config, installations, histories, ask),
+        Some(queries_table) => assess::assess_queries(
             config,
             installations,
             histories,
-            &estimates::asked(queries_table)?,
+            &external_estimates::asked(queries_table)?,
             ask.statistics,
         ),
     }
@@ -218,8 +223,9 @@ pub(crate) fn normalize(
     let installations = config.installations(py)?;
     let encoding = if compatible { Encoding::Compatible } else { Encoding::Split };
     let done = py.detach(|| {
-        let whole =
-            |log: &PathBuf| Ok((pipeline::bundle::around(&config.inner, log)?, log.display().to_string()));
+        let whole = |log: &PathBuf| {
+            Ok((pipeline::run::discover::log_containing(&config.inner, log)?, log.display().to_string()))
+        };
         let logs = logs.iter().map(whole).collect::<Result<Vec<_>, pipeline::Error>>()?;
         let place = (output.as_path(), encoding);
         pipeline::normalize::normalize(&config.inner, installations, &logs, place, jobs, &|_| {})
@@ -253,7 +259,7 @@ pub(crate) fn run(
 /// What a run did, as JSON.
 pub(crate) fn run_summary(
     py: Python<'_>,
-    report: Result<pipeline::Report, pipeline::Error>,
+    report: Result<pipeline::RunSummary, pipeline::Error>,
 ) -> PyResult<String> {
     let report = report.map_err(|error| to_run_exception(py, error))?;
     serde_json::to_string(&report)

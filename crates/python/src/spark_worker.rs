@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use arrow::array::RecordBatch;
 use pipeline::Request;
-use pipeline::elsewhere::{self, Task};
-use pipeline::schedule::Context;
+use pipeline::run::distributed::{self, Task};
+use pipeline::run::scheduler::Context;
 use pyo3::prelude::*;
 use records::Diagnostic;
 use store::Holder;
@@ -25,14 +25,14 @@ pub(crate) fn process_task(py: Python<'_>, config: &Config, task: &str) -> PyRes
     let task: Task = serde_json::from_str(task)
         .map_err(|e| to_exception(py, ExceptionClass::Run, &[Diagnostic::new("run_failed", e)]))?;
     let installations = config.installations(py)?;
-    let rows = py.detach(|| elsewhere::answer(&config.inner, installations, &task, VERSION));
+    let rows = py.detach(|| distributed::process_task(&config.inner, installations, &task, VERSION));
     Ok(Table::of(rows.map_err(|error| to_run_exception(py, error))?))
 }
 
 /// An answer without rows: its columns.
 #[pyfunction]
 pub(crate) fn empty_result() -> Table {
-    Table::of(RecordBatch::new_empty(elsewhere::schema()))
+    Table::of(RecordBatch::new_empty(distributed::schema()))
 }
 
 /// The nightly run with its logs done by `engine`, which is estimate_batches tasks and brings an Arrow table of answers; the
@@ -66,7 +66,7 @@ pub(crate) fn run_distributed(
             what
         })
     };
-    let report = py.detach(|| elsewhere::run(&config.inner, &request, &context, at_a_time, &mut ask));
+    let report = py.detach(|| distributed::run(&config.inner, &request, &context, at_a_time, &mut ask));
     // Whoever reads the traceback wants the engine's own exception, not our word for it.
     match thrown {
         Some(error) => Err(error),

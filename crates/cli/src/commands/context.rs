@@ -20,7 +20,7 @@ pub(crate) fn load_config(global: &Global) -> Result<Config, Failure> {
 /// The configuration and its installations table.
 pub(crate) fn load_with_installations(global: &Global) -> Result<(Config, Installations), Failure> {
     let config = load_config(global)?;
-    let installations = pipeline::schedule::installations(&config)?;
+    let installations = pipeline::run::scheduler::installations(&config)?;
     Ok((config, installations))
 }
 

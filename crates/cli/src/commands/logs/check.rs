@@ -10,7 +10,7 @@ use ingest::{ActuatorChannels, ActuatorColumns, LogFiles, Quality};
 use job::Config;
 use job::config::limits::MAX_PLAUSIBLE_LIMIT_M;
 use job::flight_log::{FlightLog, catch_panic};
-use pipeline::bundle;
+use pipeline::run::discover;
 use records::{Diagnostic, Installations, PartNumber};
 use serde::Serialize;
 
@@ -96,10 +96,11 @@ fn doubt_limits(config: &Config, output: &Output) {
 
 fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<Vec<(LogFiles, String)>, Failure> {
     if !args.logs.is_empty() {
-        let whole = |path: &std::path::PathBuf| Ok((bundle::around(config, path)?, display_path(path)));
+        let whole =
+            |path: &std::path::PathBuf| Ok((discover::log_containing(config, path)?, display_path(path)));
         return args.logs.iter().map(whole).collect();
     }
-    let found = bundle::find(config)?;
+    let found = discover::discover(config)?;
     for stray in &found.strays {
         output.note(&format!("{stray}: no main log is of its flight, so it is not used"));
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use job::Config;
 use job::flight_log::part_of;
-use pipeline::adhoc::{self, EstimateRow};
+use pipeline::estimate::{self, EstimateRow};
 use records::{Installations, PartNumber};
 
 use crate::args::{EstimateArgs, Global};
@@ -29,7 +29,7 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
     let (mut found, mut diagnostics) = (Vec::new(), Vec::new());
     for path in &args.logs {
         let part = part.as_ref();
-        found.extend(adhoc::estimate(path, &config, &installations, part, VERSION, &mut diagnostics)?);
+        found.extend(estimate::estimate(path, &config, &installations, part, VERSION, &mut diagnostics)?);
     }
     if let Some(file) = &args.trace {
         trace(file, &args.logs, &config, &installations, part.as_ref(), output)?;
@@ -109,7 +109,7 @@ fn trace(
     for path in logs {
         // A log in error was told of already; its trace is simply not there.
         let Ok(opened) = job::trace::of_log(
-            &pipeline::bundle::around(config, path)?,
+            &pipeline::run::discover::log_containing(config, path)?,
             &display_path(path),
             config,
             installations,

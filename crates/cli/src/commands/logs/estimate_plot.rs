@@ -30,7 +30,7 @@ pub(super) fn estimate_plot(
     for path in logs {
         let name = display_path(path);
         // A log in error was told of already; it is simply not drawn.
-        let files = pipeline::bundle::around(config, path)?;
+        let files = pipeline::run::discover::log_containing(config, path)?;
         let found =
             job::estimate_plot_data::of_log(&files, &name, config, installations, part).unwrap_or_default();
         looks.extend(found.into_iter().map(|look| drawn(&name, look)));

@@ -1,7 +1,8 @@
 //! `normalize`: the canonical log of each actuator.
 
 use ingest::LogFiles;
-use pipeline::{Event, bundle};
+use pipeline::Event;
+use pipeline::run::discover;
 
 use crate::args::{Global, NormalizeArgs};
 use crate::exit::{Code, Failure};
@@ -18,9 +19,10 @@ use crate::commands::context::{display_path, load_with_installations};
 pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
     let logs: Vec<(LogFiles, String)> = if args.logs.is_empty() {
-        bundle::find(&config)?.logs.into_iter().map(|(name, files)| (files, name)).collect()
+        discover::discover(&config)?.logs.into_iter().map(|(name, files)| (files, name)).collect()
     } else {
-        let whole = |path: &std::path::PathBuf| Ok((bundle::around(&config, path)?, display_path(path)));
+        let whole =
+            |path: &std::path::PathBuf| Ok((discover::log_containing(&config, path)?, display_path(path)));
         args.logs.iter().map(whole).collect::<Result<_, Failure>>()?
     };
     let progress = Progress::new("normalize", output);

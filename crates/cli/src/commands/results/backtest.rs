@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
-use pipeline::backtest::{self, Past};
-use pipeline::trends;
+use pipeline::fleet_trends::assess;
+use pipeline::fleet_trends::backtest::{self, BacktestRow};
 use store::Store;
 
 use crate::args::{BacktestArgs, Global};
@@ -30,15 +30,15 @@ const SHARES: [(f64, f64, &str); 4] = [
 pub(crate) fn backtest(args: &BacktestArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_trend_context(&args.external, global, output)?;
     let histories = match &args.external.estimates {
-        Some(file) => pipeline::estimates::read(file)?,
-        None => trends::in_store(&Store::open(config.store())?)?,
+        Some(file) => pipeline::history::external_estimates::read(file)?,
+        None => assess::load_histories(&Store::open(config.store())?)?,
     };
     let found = backtest::of_histories(&config, &installations, &histories)?;
     row_output::write_rows(&args.rows, output, || row_output::batch(&schema(), &found), || page(&found))?;
     Ok(Code::Success)
 }
 
-fn page(found: &[Past]) -> String {
+fn page(found: &[BacktestRow]) -> String {
     if found.is_empty() {
         return "no past statement can be held against what came true: it takes a unit seen to wear, and more wear since\n".to_owned();
     }
@@ -62,13 +62,13 @@ fn page(found: &[Past]) -> String {
 
 /// One line of the summary; nothing where no statement falls into it.
 fn line(
-    found: &[Past],
+    found: &[BacktestRow],
     target: &str,
     name: &str,
     (from, to, share): (f64, f64, &str),
 ) -> Option<Vec<String>> {
-    let within = |p: &&Past| p.target == target && p.used_share >= from && p.used_share < to;
-    let among: Vec<&Past> = found.iter().filter(within).collect();
+    let within = |p: &&BacktestRow| p.target == target && p.used_share >= from && p.used_share < to;
+    let among: Vec<&BacktestRow> = found.iter().filter(within).collect();
     let mut errors: Vec<f64> = among.iter().map(|p| p.relative_error).collect();
     errors.sort_unstable_by(f64::total_cmp);
     let median = errors.get(errors.len() / 2)?;

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use ingest::{ActuatorChannels, LogFiles};
 use job::flight_log::{FlightLog, catch_panic};
 use job::{Config, estimate};
-use pipeline::bundle;
+use pipeline::run::discover;
 use records::{Diagnostic, GapRecord};
 use serde_json::{Value, json};
 use store::{Query, Store};
@@ -86,7 +86,7 @@ fn replay(
 ) -> Result<Recomputation, Diagnostic> {
     let shown = &record.provenance.log_path;
     let path = config.path(shown);
-    let files = bundle::around(config, &path).unwrap_or_else(|_| LogFiles::one(path));
+    let files = discover::log_containing(config, &path).unwrap_or_else(|_| LogFiles::one(path));
     catch_panic(shown, || {
         let opened = FlightLog::open(&files, shown, config, installations)?;
         let at = opened.positions.iter().find(|at| at.position == record.position).ok_or_else(|| {

@@ -1,8 +1,9 @@
 //! `report`: the morning's pages.
 
 use jiff::Timestamp;
-use pipeline::trends::Ask;
-use pipeline::{Event, pages, report as composed};
+use pipeline::Event;
+use pipeline::fleet_trends::assess::UnitSelection;
+use pipeline::report::{compose, publish};
 use store::Store;
 
 use crate::args::{Global, ReportArgs};
@@ -19,7 +20,7 @@ use crate::commands::context::{VERSION, display_path, load_with_installations};
 /// When configuration, tables or store cannot be read, or the folder cannot be written.
 pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
-    let ask = Ask {
+    let ask = UnitSelection {
         tail_number: args.tail.clone(),
         serial_number: args.serial.clone(),
         part_number: None,
@@ -28,7 +29,7 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
     };
     let store = Store::open(config.store())?;
     let program = format!("Freeplay {VERSION}");
-    let report = composed::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
+    let report = compose::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
     if report.units.is_empty() {
         let hint = "`freeplay store info` says what there is; `freeplay run` fills the store";
         return Err(Failure::usage("nothing_to_report", "no unit fits", hint));
@@ -39,7 +40,7 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
         Event::Finished { log, .. } => progress.finished(&log, 0, 0),
         _ => {}
     };
-    let written = pages::write(&report, &args.output, &watch);
+    let written = publish::write(&report, &args.output, &watch);
     progress.end();
     let written = written?;
     let index = display_path(&args.output.join("index.html"));

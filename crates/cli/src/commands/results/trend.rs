@@ -1,7 +1,7 @@
 //! `trend`: level, rate, crossing of the limit and state of each unit.
 
-use pipeline::statement::TrendRow;
-use pipeline::trends::{self, Ask};
+use pipeline::fleet_trends::assess::{self, UnitSelection};
+use pipeline::fleet_trends::trend_row::TrendRow;
 use store::Store;
 
 use crate::args::{Global, TrendArgs};
@@ -19,7 +19,7 @@ use crate::commands::context::load_trend_context;
 /// When configuration, tables or store cannot be read.
 pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_trend_context(&args.external, global, output)?;
-    let ask = Ask {
+    let ask = UnitSelection {
         tail_number: args.tail.clone(),
         serial_number: args.serial.clone(),
         part_number: args.part.clone(),
@@ -27,18 +27,18 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
         statistics: args.statistics,
     };
     let found = match (&args.external.estimates, &args.queries) {
-        (None, None) => trends::of_store(&config, &installations, &Store::open(config.store())?, &ask)?,
+        (None, None) => assess::assess_store(&config, &installations, &Store::open(config.store())?, &ask)?,
         (estimates, queries) => {
             let histories = match estimates {
-                Some(file) => pipeline::estimates::read(file)?,
-                None => trends::in_store(&Store::open(config.store())?)?,
+                Some(file) => pipeline::history::external_estimates::read(file)?,
+                None => assess::load_histories(&Store::open(config.store())?)?,
             };
             match queries {
                 Some(file) => {
-                    let queries = pipeline::estimates::queries(file)?;
-                    trends::of_queries(&config, &installations, histories, &queries, args.statistics)?
+                    let queries = pipeline::history::external_estimates::queries(file)?;
+                    assess::assess_queries(&config, &installations, histories, &queries, args.statistics)?
                 }
-                None => trends::of_histories(&config, &installations, histories, &ask)?,
+                None => assess::assess_histories(&config, &installations, histories, &ask)?,
             }
         }
     };

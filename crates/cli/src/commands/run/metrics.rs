@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use jiff::Timestamp;
-use pipeline::Report;
+use pipeline::RunSummary;
 
 use crate::exit::{Code, Failure};
 use crate::row_output::to_file;
@@ -13,12 +13,12 @@ use crate::row_output::to_file;
 ///
 /// # Errors
 /// When the file cannot be written.
-pub(crate) fn write(file: &Path, report: &Report, code: Code) -> Result<(), Failure> {
+pub(crate) fn write(file: &Path, report: &RunSummary, code: Code) -> Result<(), Failure> {
     let text = text(report, code);
     to_file(file, |out| Ok(std::io::Write::write_all(out, text.as_bytes())?))
 }
 
-fn text(report: &Report, code: Code) -> String {
+fn text(report: &RunSummary, code: Code) -> String {
     let mut text = String::new();
     let mut gauge = |name: &str, help: &str, value: f64| {
         let _ = writeln!(

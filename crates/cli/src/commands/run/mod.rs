@@ -7,11 +7,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use pipeline::changed::Changed;
-use pipeline::recorder::{Moved, Quantity};
-use pipeline::schedule::{self, Context};
-use pipeline::statement::TrendRow;
-use pipeline::{Event, Plan, Report, Request};
+use pipeline::fleet_trends::changes::UnitChange;
+use pipeline::fleet_trends::trend_row::TrendRow;
+use pipeline::monitoring::recorder_change::{Quantity, RecorderChange};
+use pipeline::run::scheduler::{self, Context};
+use pipeline::{Event, Plan, Request, RunSummary};
 use records::{SerialNumber, TailNumber};
 use store::Holder;
 
@@ -53,7 +53,7 @@ pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Co
         stop: &stop,
         watch: &watch,
     };
-    let report = schedule::run(&config, &request, &context);
+    let report = scheduler::run(&config, &request, &context);
     progress.end();
     if let (Err(pipeline::Error::Store(store::Error::Held { .. })), true) =
         (&report, stop.load(Ordering::Relaxed))
@@ -117,7 +117,7 @@ fn follow(event: &Event, progress: &Progress<'_>) {
 }
 
 /// Whether any unit of the store, touched tonight or not, is at or past a state.
-fn is_reached(report: &Report, least: FailOn) -> bool {
+fn is_reached(report: &RunSummary, least: FailOn) -> bool {
     let at_or_past: &[&str] = match least {
         FailOn::Watch => &["watch", "plan", "act"],
         FailOn::Plan => &["plan", "act"],
@@ -126,7 +126,7 @@ fn is_reached(report: &Report, least: FailOn) -> bool {
     at_or_past.iter().any(|state| report.states.contains_key(state))
 }
 
-fn code(report: &Report, reached: bool, stopped: bool) -> Code {
+fn code(report: &RunSummary, reached: bool, stopped: bool) -> Code {
     if stopped && report.not_reached > 0 {
         Code::Interrupted
     } else if !report.errors.is_empty() {
@@ -139,7 +139,7 @@ fn code(report: &Report, reached: bool, stopped: bool) -> Code {
 }
 
 /// Flights in which the filter was surprised.
-fn unusual_innovations(report: &Report, page: &mut String) {
+fn unusual_innovations(report: &RunSummary, page: &mut String) {
     for unlike in report.innovations_unlike.iter().take(MAX_UNUSUAL_SHOWN) {
         let text = format!(
             "{} {}, flight {}: the filter's innovations (NIS {:.2}) are unlike this unit's other flights ({:.2})",
@@ -157,7 +157,7 @@ fn unusual_innovations(report: &Report, page: &mut String) {
 }
 
 /// The morning's page.
-fn summary_text(report: &Report, config: &str, code: Code) -> String {
+fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     let mut page = format!(
         "Freeplay {VERSION} · run {} · {config}\n",
         report.started_utc.strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -252,7 +252,7 @@ fn summary_text(report: &Report, config: &str, code: Code) -> String {
     page
 }
 
-fn recorder_moved(moved: &Moved) -> String {
+fn recorder_moved(moved: &RecorderChange) -> String {
     let change = match moved.quantity {
         Quantity::SkewS => format!("delay {:.1} → {:.1} ms", moved.from * 1e3, moved.to * 1e3),
         Quantity::StiffnessNPerM => format!("stiffness {:+.0} %", (moved.to / moved.from - 1.0) * 100.0),
@@ -266,7 +266,7 @@ fn recorder_moved(moved: &Moved) -> String {
     )
 }
 
-fn refused(report: &Report) -> String {
+fn refused(report: &RunSummary) -> String {
     let reasons: Vec<String> = report.refused.iter().map(|(reason, n)| format!("{reason} {n}")).collect();
     if reasons.is_empty() {
         "0 refused".into()
@@ -326,7 +326,7 @@ fn work_list_section(rows: &[TrendRow]) -> String {
 }
 
 /// What tonight's flights changed, unit by unit.
-fn changes_section(changed: &[Changed]) -> String {
+fn changes_section(changed: &[UnitChange]) -> String {
     if changed.is_empty() {
         return String::new();
     }
@@ -342,7 +342,7 @@ fn changes_section(changed: &[Changed]) -> String {
 }
 
 /// A unit's news in words.
-fn change_text(unit: &Changed) -> String {
+fn change_text(unit: &UnitChange) -> String {
     let word = |state: Option<&'static str>| state.unwrap_or("no state");
     let mut told = Vec::new();
     if unit.from != unit.to {
@@ -357,7 +357,7 @@ fn change_text(unit: &Changed) -> String {
 }
 
 fn dry_run(config: &job::Config, request: &Request, output: &Output) -> Result<Code, Failure> {
-    let Plan { found, known, work, .. } = schedule::dry_run(config, request)?;
+    let Plan { found, known, work, .. } = scheduler::dry_run(config, request)?;
     let bytes: i64 = work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes).sum();
     let head = format!(
         "would do {} of {found} ({known} known), {:.1} MB; nothing was done\n",

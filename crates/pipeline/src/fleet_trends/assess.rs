@@ -1,0 +1,447 @@
+//! Trends of units: the store's records, per part and serial number across tails, as statements.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use jiff::Timestamp;
+use job::Config;
+use rayon::prelude::*;
+use records::{Installations, PartNumber, SerialNumber};
+use store::{Query, Store};
+use trend::{Assessment, FleetPrior, Series, UsageDefaults, classic};
+
+use crate::error::Error;
+use crate::fleet_trends::changes::{UnitChange, changed};
+use crate::fleet_trends::limits::Limits;
+use crate::fleet_trends::priors::FleetPriors;
+use crate::fleet_trends::tail_wide_steps::TailWide;
+use crate::fleet_trends::trend_row::{self, TrendRow};
+use crate::history::builder::HistoryBuilder;
+use crate::history::external_estimates::AsOfQuery;
+use crate::history::histories::{Histories, History, UnitKey};
+use crate::history::merge::of_parts;
+use crate::history::usage::UsageSources;
+use crate::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
+use crate::monitoring::recorder_change::{RecorderChange, detect_changes, detect_changes_in_store};
+
+/// A unit, by part and serial number.
+pub type Unit = (PartNumber, SerialNumber);
+
+/// Which units, and of which day, a statement is asked for.
+#[derive(Debug, Clone, Default)]
+pub struct UnitSelection {
+    /// Units on this tail at the end of the records only.
+    pub tail_number: Option<String>,
+    /// This serial number only.
+    pub serial_number: Option<String>,
+    /// This part number only.
+    pub part_number: Option<String>,
+    /// The day; the newest departure in the store when not given.
+    pub as_of_utc: Option<Timestamp>,
+    /// Theil–Sen and Hamed–Rao as well: their time grows with the square of a history's length.
+    pub statistics: bool,
+}
+
+impl UnitSelection {
+    /// Whether a unit of that name is asked for, wherever it flies.
+    fn names(&self, name: &UnitKey) -> bool {
+        self.serial_number.as_ref().is_none_or(|s| *s == name.1)
+            && (self.part_number.is_none() || self.part_number == name.0)
+    }
+
+    /// Whether a statement of a unit so named is asked for: it has flown, and on the tail that is meant.
+    fn fits(&self, row: &TrendRow) -> bool {
+        row.flights > 0 && (self.tail_number.is_none() || row.tail_number == self.tail_number)
+    }
+}
+
+/// States what is known of the asked units.
+///
+/// # Errors
+/// When the store cannot be read, or a part's limits cannot be judged by.
+pub fn assess_store(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+    ask: &UnitSelection,
+) -> Result<Vec<TrendRow>, Error> {
+    // A statement leans on what the part's other units teach, so what is asked selects rows, not records.
+    let mut histories = load_histories(store)?;
+    let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
+    let moved = detect_changes_in_store(store, as_of)?;
+    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?
+        .with_recorder_changes(moved);
+    fleet.asked(ask, as_of)
+}
+
+/// What a run's units say.
+#[derive(Debug, Default)]
+pub struct RunAssessments {
+    /// Statements of the newest day in the store.
+    pub now: Vec<TrendRow>,
+    /// What of them is otherwise than without the run's records. Where the store holds no others, nothing is.
+    pub changed: Vec<UnitChange>,
+    /// What the last months say beside gaps, of all tails.
+    pub recent: RecentDiagnostics,
+    /// How many units of the whole fleet are in which state, where that was asked.
+    pub states: BTreeMap<&'static str, usize>,
+}
+
+/// States what is known of units whose records a run changed; with `counts_all`, counts the states of all.
+///
+/// # Errors
+/// As [`assess_store`].
+pub fn assess_run(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+    units: &[Unit],
+    run_id: &str,
+    counts_all: bool,
+) -> Result<RunAssessments, Error> {
+    if units.is_empty() && !counts_all {
+        return Ok(RunAssessments::default());
+    }
+    let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
+    let (all, of_run) = (load_histories(store)?, gathered(store, &query)?);
+    let recent =
+        all.newest_utc().map(|newest| recent_diagnostics(store, newest)).transpose()?.unwrap_or_default();
+    let moved = detect_changes(&recent);
+    let run = assess_run_from(config, installations, all, &of_run, units, moved, counts_all)?;
+    Ok(RunAssessments { recent, ..run })
+}
+
+/// The same of all flights that are known after a night, and those of the night.
+///
+/// # Errors
+/// As [`assess_histories`].
+pub fn assess_run_from(
+    config: &Config,
+    installations: &Installations,
+    mut all: Histories,
+    of_run: &Histories,
+    units: &[Unit],
+    moved: Vec<RecorderChange>,
+    counts_all: bool,
+) -> Result<RunAssessments, Error> {
+    let names: BTreeSet<UnitKey> =
+        units.iter().map(|(part, serial)| (Some(part.to_string()), serial.to_string())).collect();
+    let Some(as_of) = all.newest_utc() else { return Ok(RunAssessments::default()) };
+    let before_utc = all.newest_without_utc(of_run);
+    let days: Vec<Timestamp> = before_utc.into_iter().chain([as_of]).collect();
+    // Flights later than all others change nothing of what is said of a day before them; but where a flights
+    // table is given, those without a row are counted from a unit's rows.
+    let is_later =
+        config.flights.iter().next().is_none() && before_utc.is_none_or(|before| of_run.all_after(before));
+    let earlier = if is_later { Histories::default() } else { all.without(&names, of_run) };
+    let fleet = FleetContext::consuming(config, installations, &mut all, &days)?.with_recorder_changes(moved);
+    let stated: Vec<&UnitKey> =
+        if counts_all { fleet.units.keys().copied().collect() } else { names.iter().collect() };
+    let mut now = fleet.statements(stated.into_iter(), as_of)?;
+    now.retain(|row| row.flights > 0);
+    let mut run = RunAssessments::default();
+    if counts_all {
+        let states = now.iter().filter_map(|row| row.state);
+        states.for_each(|state| *run.states.entry(state).or_default() += 1);
+        now.retain(|row| names.contains(&row.name()));
+    }
+    let Some(before_utc) = before_utc else { return Ok(RunAssessments { now, ..run }) };
+    let before = if is_later {
+        fleet.statements(names.iter(), before_utc)?
+    } else {
+        let read = FleetContext::read(config, installations, &earlier)?;
+        let fleet = FleetContext { priors: fleet.priors, ..read };
+        fleet.statements(earlier.names(), before_utc)?
+    };
+    let before = before.into_iter().filter(|row| row.flights > 0).map(|row| (row.name(), row)).collect();
+    let changed = changed(&before, &now);
+    Ok(RunAssessments { now, changed, ..run })
+}
+
+/// All that a report says of the asked units.
+#[derive(Default)]
+pub(crate) struct ReportAssessments {
+    /// Statements of the day.
+    pub(crate) now: Vec<TrendRow>,
+    /// What is drawn beside each of them.
+    pub(crate) drawn: Vec<trend::Forecast>,
+    /// Statements of so many days before, by days.
+    pub(crate) before: BTreeMap<i64, Vec<TrendRow>>,
+    /// What each part's units had taught, and by when.
+    pub(crate) priors: Vec<(Option<String>, Timestamp, FleetPrior)>,
+}
+
+/// States what is known of the asked units, and what was known of them so many days before.
+///
+/// # Errors
+/// As [`assess_histories`].
+pub(crate) fn assess_for_report(
+    config: &Config,
+    installations: &Installations,
+    histories: &Histories,
+    ask: &UnitSelection,
+    days_before: &[i64],
+    moved: Vec<RecorderChange>,
+) -> Result<ReportAssessments, Error> {
+    let newest = || histories.newest_utc();
+    let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(ReportAssessments::default()) };
+    let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
+    let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
+    let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
+    let fleet = FleetContext::new(config, installations, histories, &days)?.with_recorder_changes(moved);
+    let now = fleet.asked(ask, as_of)?;
+    let names: Vec<UnitKey> =
+        now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
+    let drawn =
+        names.par_iter().zip(&now).map(|(name, row)| fleet.outlook(name, row)).collect::<Result<_, _>>()?;
+    let then = |(days, at): (i64, Timestamp)| Ok((days, fleet.statements(names.iter(), at)?));
+    let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
+    let asked: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
+    let priors = |part: Option<&str>| {
+        let (turn, prior) = fleet.priors.of(part, as_of)?;
+        Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
+    };
+    let priors = asked.into_iter().filter_map(priors).collect();
+    Ok(ReportAssessments { now, drawn, before, priors })
+}
+
+/// One statement for each query, from nothing later than its date.
+///
+/// # Errors
+/// When a history or a part's limits cannot be judged.
+pub fn assess_queries(
+    config: &Config,
+    installations: &Installations,
+    mut histories: Histories,
+    queries: &[AsOfQuery],
+    statistics: bool,
+) -> Result<Vec<TrendRow>, Error> {
+    let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
+    let asked: Vec<UnitKey> = queries.iter().map(|query| unit_of(query, &histories)).collect();
+    let fleet = FleetContext::consuming(config, installations, &mut histories, &days)?;
+    let statement = |(query, unit): (&AsOfQuery, &UnitKey)| fleet.statement(unit, query.as_of_utc);
+    let mut rows: Vec<TrendRow> = queries.par_iter().zip(&asked).map(statement).collect::<Result<_, _>>()?;
+    fleet.add_statistics(&mut rows, statistics);
+    Ok(rows)
+}
+
+/// The unit a query means; one that never flew has a name all the same.
+fn unit_of(query: &AsOfQuery, histories: &Histories) -> UnitKey {
+    let named = (query.part_number.clone(), query.serial_number.clone());
+    if query.part_number.is_some() || histories.get(&named).is_some() {
+        return named;
+    }
+    histories.names().find(|name| name.1 == query.serial_number).cloned().unwrap_or(named)
+}
+
+/// Every unit's flights in the store.
+///
+/// # Errors
+/// When the store cannot be read.
+pub fn load_histories(store: &Store) -> Result<Histories, Error> {
+    gathered(store, &Query::default())
+}
+
+fn gathered(store: &Store, query: &Query) -> Result<Histories, Error> {
+    let stored: Vec<&str> =
+        HistoryBuilder::COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name)).collect();
+    let parts = store.scan_columns(query, &stored)?;
+    of_parts(parts.len(), true, |gathering, some| {
+        for part in some {
+            let mut batches = parts.read(part)?.into_iter();
+            let put = batches.try_for_each(|batch| gathering.add_store_batch(batch));
+            put.map_err(|e| Error::refused(e.diagnostic()))?;
+        }
+        Ok(())
+    })
+}
+
+/// One statement for each asked unit, by part and serial number.
+///
+/// # Errors
+/// When a history or a part's limits cannot be judged.
+pub fn assess_histories(
+    config: &Config,
+    installations: &Installations,
+    mut histories: Histories,
+    ask: &UnitSelection,
+) -> Result<Vec<TrendRow>, Error> {
+    let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
+    FleetContext::consuming(config, installations, &mut histories, &[as_of])?.asked(ask, as_of)
+}
+
+/// All units, and what each part's units had taught about the next by each turn.
+pub(crate) struct FleetContext<'a> {
+    limits: Limits<'a>,
+    units: BTreeMap<&'a UnitKey, (&'a History, Series)>,
+    priors: FleetPriors<'a>,
+    /// What moved on whole aircraft beside gaps.
+    moved: Vec<RecorderChange>,
+}
+
+impl<'a> FleetContext<'a> {
+    /// Reads all histories and learns by the turn before each of the `days`, each from nothing later.
+    pub(crate) fn new(
+        config: &'a Config,
+        installations: &Installations,
+        histories: &'a Histories,
+        days: &[Timestamp],
+    ) -> Result<Self, Error> {
+        Ok(Self::read(config, installations, histories)?.taught_by(days))
+    }
+
+    /// The same where nobody else needs the histories: of each flight what is in its series is forgotten.
+    fn consuming(
+        config: &'a Config,
+        installations: &Installations,
+        histories: &'a mut Histories,
+        days: &[Timestamp],
+    ) -> Result<Self, Error> {
+        let books = UsageSources::read(config, installations)?;
+        let is_booked = histories.is_booked();
+        let read = |(name, history): (&UnitKey, &mut History)| {
+            let series = books.series(name, history, is_booked)?;
+            history.drop_secondary();
+            Ok(series)
+        };
+        let units: Vec<_> = histories.iter_mut().collect();
+        let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+        Ok(Self::of(config, histories, series).taught_by(days))
+    }
+
+    /// Reads all histories and learns nothing.
+    fn read(
+        config: &'a Config,
+        installations: &Installations,
+        histories: &'a Histories,
+    ) -> Result<Self, Error> {
+        let books = UsageSources::read(config, installations)?;
+        let is_booked = histories.is_booked();
+        let units: Vec<_> = histories.iter().collect();
+        let read = |(name, history)| books.series(name, history, is_booked);
+        let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+        Ok(Self::of(config, histories, series))
+    }
+
+    /// Histories, and what each adds up to.
+    fn of(config: &'a Config, histories: &'a Histories, series: Vec<Series>) -> Self {
+        let units = histories.iter().zip(series);
+        let units = units.map(|((name, history), series)| (name, (history, series))).collect();
+        Self { limits: Limits(config), units, priors: FleetPriors::default(), moved: Vec::new() }
+    }
+
+    /// The same with what was learned by the turn before each of the days.
+    fn taught_by(mut self, days: &[Timestamp]) -> Self {
+        let units = self.units.iter().map(|(name, (_, series))| (name.0.as_deref(), series));
+        self.priors = FleetPriors::train(units, self.limits, days);
+        self
+    }
+
+    /// A unit's flights.
+    pub(crate) fn series(&self, name: &UnitKey) -> Option<&Series> {
+        self.units.get(name).map(|(_, series)| series)
+    }
+
+    /// What a unit is judged by.
+    pub(crate) fn settings(&self, name: &UnitKey) -> trend::Settings {
+        self.limits.settings(name.0.as_deref())
+    }
+
+    /// What was known of a unit's like on a day.
+    pub(crate) fn prior<'s>(&'s self, name: &'s UnitKey, as_of: Timestamp) -> Option<&'s FleetPrior> {
+        Some(self.priors.of(name.0.as_deref(), as_of)?.1)
+    }
+
+    /// The same, with what moved on whole aircraft beside gaps.
+    pub(crate) fn with_recorder_changes(self, moved: Vec<RecorderChange>) -> Self {
+        Self { moved, ..self }
+    }
+
+    /// The statements that are asked for, with the statistics if they are.
+    fn asked(&self, ask: &UnitSelection, as_of: Timestamp) -> Result<Vec<TrendRow>, Error> {
+        let names = self.units.keys().copied();
+        let mut rows = self.statements(names.filter(|name| ask.names(name)), as_of)?;
+        rows.retain(|row| ask.fits(row));
+        self.add_statistics(&mut rows, ask.statistics);
+        Ok(rows)
+    }
+
+    fn statements<'b>(
+        &self,
+        names: impl Iterator<Item = &'b UnitKey>,
+        as_of: Timestamp,
+    ) -> Result<Vec<TrendRow>, Error> {
+        let names: BTreeSet<&UnitKey> = names.collect();
+        // A change is a tail's when its other units made it too, so they are judged with those asked for.
+        let judged: Vec<&UnitKey> = self.mates(&names).union(&names).copied().collect();
+        let trends: Vec<Assessment> =
+            judged.par_iter().map(|name| self.trend(name, as_of)).collect::<Result<_, _>>()?;
+        let known = judged.iter().zip(&trends).filter_map(|(name, t)| Some((self.units.get(*name)?.0, t)));
+        let wide = TailWide::new(&known.collect::<Vec<_>>(), &self.moved);
+        let asked = judged.par_iter().zip(&trends).filter(|(name, _)| names.contains(*name));
+        Ok(asked.map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect())
+    }
+
+    /// The units that have flown on the tails of some.
+    fn mates(&self, names: &BTreeSet<&UnitKey>) -> BTreeSet<&UnitKey> {
+        let history = |name: &&UnitKey| self.units.get(*name).map(|unit| unit.0);
+        let tails: BTreeSet<&str> = names.iter().filter_map(history).flat_map(History::tails).collect();
+        let is_mate = |unit: &(&'a History, Series)| unit.0.tails().any(|tail| tails.contains(tail));
+        self.units.iter().filter(|(_, unit)| is_mate(unit)).map(|(name, _)| *name).collect()
+    }
+
+    fn trend(&self, name: &UnitKey, as_of: Timestamp) -> Result<Assessment, Error> {
+        let nothing = (&History::default(), Series::new([], &UsageDefaults::default())?);
+        let (_, series) = self.units.get(name).unwrap_or(&nothing);
+        let prior = self.prior(name, as_of);
+        Ok(trend::assess_with_hysteresis(series, as_of.as_microsecond(), &self.settings(name), prior)?)
+    }
+
+    /// What engineers know, and no alarm is made from.
+    fn add_statistics(&self, rows: &mut [TrendRow], are_asked: bool) {
+        let add = |row: &mut TrendRow| {
+            let Some(series) = self.series(&row.name()) else { return };
+            let known = series.flights_until(row.as_of_utc.as_microsecond()).iter();
+            let (hours, gaps_m): (Vec<f64>, Vec<f64>) =
+                known.filter_map(|f| Some((f.hours, f.gap?.gap_m))).unzip();
+            let sen = classic::theil_sen(&hours, &gaps_m, 0.90).ok();
+            row.sen_rate_m_per_hour = sen.map(|s| s.slope);
+            row.sen_low_m_per_hour = sen.map(|s| s.slope_low);
+            row.sen_high_m_per_hour = sen.map(|s| s.slope_high);
+            row.hamed_rao_p_value = classic::hamed_rao(&gaps_m).ok().map(|test| test.p_value);
+        };
+        if are_asked {
+            rows.par_iter_mut().for_each(add);
+        }
+    }
+
+    /// One unit's statement, whatever its tail's others made.
+    fn statement(&self, name: &UnitKey, as_of: Timestamp) -> Result<TrendRow, Error> {
+        Ok(self.row(name, &self.trend(name, as_of)?, as_of, &TailWide::default()))
+    }
+
+    fn row(&self, name: &UnitKey, trend: &Assessment, as_of: Timestamp, wide: &TailWide) -> TrendRow {
+        let unit = self.units.get(name);
+        let nobody = History::default();
+        let (history, series) = unit.map_or((&nobody, None), |(history, series)| (*history, Some(series)));
+        let limit_m = self.limits.stated_m(name.0.as_deref());
+        let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
+        let usage_axis = prior.map(|prior| prior.axis().to_string());
+        let row = trend_row::row(name, history, series, limit_m, trend, as_of, wide);
+        TrendRow { usage_axis, ..row }
+    }
+
+    /// What is drawn beside a statement: as far ahead as its crossing, within sight of what was flown.
+    fn outlook(&self, name: &UnitKey, row: &TrendRow) -> Result<trend::Forecast, Error> {
+        const STEPS: u32 = 24;
+        let Some(series) = self.series(name) else { return Ok(trend::Forecast::default()) };
+        let as_of_us = row.as_of_utc.as_microsecond();
+        let flown = series.flights_until(as_of_us);
+        let span_hours = flown.first().zip(flown.last()).map_or(0.0, |(a, b)| b.hours - a.hours);
+        let far = row
+            .crossing_hours_p95
+            .map_or(span_hours, |h| (1.1 * h).clamp(0.3 * span_hours, 2.0 * span_hours));
+        let steps = (0..=STEPS).map(|step| far * f64::from(step) / f64::from(STEPS));
+        let prior = self.prior(name, row.as_of_utc);
+        Ok(trend::forecast(series, as_of_us, &self.settings(name), prior, steps)?)
+    }
+}

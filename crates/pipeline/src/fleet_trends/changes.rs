@@ -1,0 +1,64 @@
+//! What a night's flights changed: states and events of units, with them and without them.
+//!
+//! Both statements are made now, by one prior, so nothing is kept from night to night and the month's turn
+//! of a prior is no news.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::days::days;
+use crate::fleet_trends::trend_row::{ChangePoint, TrendRow};
+use crate::history::histories::UnitKey;
+
+/// An event of one kind is the same one when its date moved by no more than this: dates are estimates.
+const SAME_EVENT_DAYS: f64 = 60.0;
+
+/// A unit of which something else is said than without the night's flights.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
+pub struct UnitChange {
+    pub part_number: Option<String>,
+    pub serial_number: String,
+    pub tail_number: Option<String>,
+    pub position: Option<String>,
+    /// The state without the night's flights, and with them.
+    pub from: Option<&'static str>,
+    pub to: Option<&'static str>,
+    /// Why the state is what it is now.
+    pub reason: Option<String>,
+    pub new_events: Vec<ChangePoint>,
+    pub cleared_events: Vec<ChangePoint>,
+}
+
+/// The units whose state or events differ, in the order of `now`.
+pub(crate) fn changed(before: &BTreeMap<UnitKey, TrendRow>, now: &[TrendRow]) -> Vec<UnitChange> {
+    now.iter().filter_map(|row| of_unit(before.get(&row.name()), row)).collect()
+}
+
+fn of_unit(before: Option<&TrendRow>, now: &TrendRow) -> Option<UnitChange> {
+    let known = before.map_or(&[][..], |row| &row.change_points);
+    let new_events = beyond(&now.change_points, known);
+    let cleared_events = beyond(known, &now.change_points);
+    let from = before.and_then(|row| row.state);
+    let is_news = from != now.state || !new_events.is_empty() || !cleared_events.is_empty();
+    is_news.then(|| UnitChange {
+        part_number: now.part_number.clone(),
+        serial_number: now.serial_number.clone(),
+        tail_number: now.tail_number.clone(),
+        position: now.position.clone(),
+        from,
+        to: now.state,
+        reason: now.reason.clone(),
+        new_events,
+        cleared_events,
+    })
+}
+
+/// Events that have no like among others.
+fn beyond(events: &[ChangePoint], others: &[ChangePoint]) -> Vec<ChangePoint> {
+    let is_like = |a: &ChangePoint, b: &ChangePoint| {
+        a.kind == b.kind && days(a.departure_utc, b.departure_utc).abs() <= SAME_EVENT_DAYS
+    };
+    events.iter().filter(|event| !others.iter().any(|other| is_like(event, other))).cloned().collect()
+}

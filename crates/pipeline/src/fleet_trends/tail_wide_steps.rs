@@ -1,0 +1,100 @@
+//! Steps that all actuators of a tail make at once: what measures them changed, not their screws.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use jiff::Timestamp;
+use trend::{Assessment, ChangePoint, ChangePointKind};
+
+use crate::days::days;
+use crate::history::flight_row::FlightRow;
+use crate::history::histories::History;
+use crate::monitoring::recorder_change::RecorderChange;
+
+/// Steps of one tail this close together are one, days: a step is dated to within some flights.
+const SAME_DAYS: f64 = 7.0;
+
+/// Of the units that could show it, this share at least makes the step: one may be too noisy to.
+const SHARE: f64 = 0.75;
+
+/// The changes, by tail and departure, that are a tail's and not a unit's.
+#[derive(Debug, Default)]
+pub(crate) struct TailWide(BTreeSet<(String, Timestamp)>);
+
+/// A change of one of the judged units.
+struct Made<'a> {
+    tail_number: &'a str,
+    departure_utc: Timestamp,
+    kind: ChangePointKind,
+    unit: usize,
+}
+
+impl TailWide {
+    /// Looks over units that fly together. What no book knows counts: a step of several units at once, and a
+    /// step or reset when what is fitted of all of them `moved`.
+    pub(crate) fn new(judged: &[(&History, &Assessment)], moved: &[RecorderChange]) -> Self {
+        let made: Vec<Made<'_>> =
+            judged.iter().enumerate().flat_map(|(unit, (h, t))| changes(unit, h, t)).collect();
+        let mut by_tail: BTreeMap<&str, Vec<&Made<'_>>> = BTreeMap::new();
+        for change in made.iter().filter(|change| change.kind == ChangePointKind::Step) {
+            by_tail.entry(change.tail_number).or_default().push(change);
+        }
+        let is_wide = |change: &&Made<'_>| {
+            let steps = by_tail.get(change.tail_number).map_or(&[][..], Vec::as_slice);
+            is_explained(change, moved)
+                || (change.kind == ChangePointKind::Step && is_of_all(change, steps, judged))
+        };
+        let wide = made.iter().filter(is_wide).map(|c| (c.tail_number.to_owned(), c.departure_utc));
+        Self(wide.collect())
+    }
+
+    /// The tail whose change it is; none where it is the unit's own.
+    pub(crate) fn tail<'a>(&self, change: &ChangePoint, history: &'a History) -> Option<&'a str> {
+        let (flown, tail_number) = made_on(change, history)?;
+        self.0.contains(&(tail_number.to_owned(), flown.departure_utc())).then_some(tail_number)
+    }
+}
+
+/// The first flight after a change, and its tail.
+fn made_on<'a>(change: &ChangePoint, history: &'a History) -> Option<(&'a FlightRow, &'a str)> {
+    let flown = history.at(Timestamp::from_microsecond(change.departure_us).ok()?)?;
+    Some((flown, history.place(flown).tail_number.as_deref()?))
+}
+
+fn changes<'a>(unit: usize, history: &'a History, trend: &'a Assessment) -> impl Iterator<Item = Made<'a>> {
+    let unbooked =
+        trend.changes.iter().filter(|c| matches!(c.kind, ChangePointKind::Step | ChangePointKind::Reset));
+    unbooked.filter_map(move |change| {
+        let (flown, tail_number) = made_on(change, history)?;
+        Some(Made { tail_number, departure_utc: flown.departure_utc(), kind: change.kind, unit })
+    })
+}
+
+fn is_explained(change: &Made<'_>, moved: &[RecorderChange]) -> bool {
+    moved.iter().any(|moved| moved.explains(change.tail_number, change.departure_utc))
+}
+
+/// Whether the units that flew on the tail before and after made it together.
+fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], judged: &[(&History, &Assessment)]) -> bool {
+    let near = |step: &&&Made<'_>| days(step.departure_utc, change.departure_utc).abs() <= SAME_DAYS;
+    let stepped: BTreeSet<usize> = steps.iter().filter(near).map(|step| step.unit).collect();
+    if stepped.len() < 2 {
+        return false;
+    }
+    let able = judged.iter().filter(|(history, trend)| is_there(history, trend.as_of_us, change)).count();
+    stepped.len() as f64 >= SHARE * able as f64
+}
+
+/// Whether a unit has gaps on the change's tail some time before it, and after, by a day.
+fn is_there(history: &History, as_of_us: i64, change: &Made<'_>) -> bool {
+    let known = history.flights().iter().take_while(|f| f.departure_us() <= as_of_us);
+    let on_tail = known.filter(|f| {
+        f.gap_m().is_some() && history.place(f).tail_number.as_deref() == Some(change.tail_number)
+    });
+    let away = |f: &FlightRow| days(change.departure_utc, f.departure_utc());
+    let (mut before, mut after) = (false, false);
+    for days in on_tail.map(away) {
+        before |= days < -SAME_DAYS;
+        after |= days >= 0.0;
+    }
+    before && after
+}

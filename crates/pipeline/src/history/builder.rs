@@ -1,0 +1,231 @@
+//! Histories while their rows come in, from tables of any length.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use arrow::array::{Array, Float64Array, RecordBatch};
+use ingest::tables::TableBatch;
+use jiff::Timestamp;
+use records::GapRecord;
+
+use crate::history::flight_row::{FlightExtras, FlightInput};
+use crate::history::histories::{Positions, UnitKey};
+use crate::history::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
+
+/// Rows of a block: its 32 MiB are more than what any allocator keeps to itself once they are given up.
+const BLOCK_ROWS: usize = 1 << 19;
+
+/// Histories while their rows come in.
+///
+/// Most rows are of another unit than the row before. So they are put down in the order of arrival, and each unit's
+/// are brought together at the end, when it is known how many there are: nothing grows, and no row is moved twice.
+#[derive(Debug, Default)]
+pub struct HistoryBuilder {
+    /// Units by serial number; a serial number is unique only with its part number.
+    by_serial: HashMap<String, Vec<usize>>,
+    pub(crate) units: Vec<UnitEntry>,
+    last: usize,
+    /// The unit that came after each the last time.
+    follows: Vec<usize>,
+    pub(crate) blocks: Vec<RowBlock>,
+}
+
+/// A unit, and how much was put down of it.
+#[derive(Debug)]
+pub(crate) struct UnitEntry {
+    pub(crate) name: UnitKey,
+    pub(crate) places: Positions,
+    pub(crate) rows: usize,
+    /// Of its flights' names.
+    pub(crate) bytes: usize,
+}
+
+/// Rows in the order of arrival, and their flights' names one after the other.
+#[derive(Debug, Default)]
+pub(crate) struct RowBlock {
+    pub(crate) rows: Vec<StagedRow>,
+    pub(crate) names: String,
+}
+
+/// A row that was put down.
+#[derive(Debug)]
+pub(crate) struct StagedRow {
+    pub(crate) unit: u32,
+    /// Which of its unit's places it was flown in.
+    pub(crate) place: u32,
+    /// Where its flight's name ends in the block.
+    pub(crate) name_end: u32,
+    pub(crate) departure_us: i64,
+    /// `NaN` for none.
+    pub(crate) gap_m: f64,
+    pub(crate) extras: FlightExtras,
+}
+
+impl HistoryBuilder {
+    /// The columns a chunk may bring; `serial_number`, `departure_utc` and `gap_m` it must.
+    pub const COLUMNS: [&'static str; 13] = [
+        "serial_number",
+        "serial",
+        "part_number",
+        "tail_number",
+        "tail",
+        "position",
+        "flight_id",
+        "departure_utc",
+        "flight_hours",
+        "tail_hours_end",
+        "load_reversals",
+        "gap_m",
+        "gap_se_m",
+    ];
+
+    /// Puts down the rows of a chunk.
+    ///
+    /// # Errors
+    /// When a column that must be there is not, and the first cell that cannot be read.
+    pub fn add(&mut self, chunk: &TableBatch) -> Result<(), ingest::Error> {
+        chunk.column(&["serial_number", "serial"])?;
+        self.rows(chunk, &KeyColumns::of(chunk)?, &TextColumn::of(chunk, &["flight_id"])?)
+    }
+
+    /// Puts down rows of the store.
+    ///
+    /// # Errors
+    /// The first cell that cannot be read.
+    pub(crate) fn add_store_batch(&mut self, batch: RecordBatch) -> Result<(), ingest::Error> {
+        self.add(&TableBatch::new(Path::new("results"), batch, 0))
+    }
+
+    fn rows(
+        &mut self,
+        chunk: &TableBatch,
+        seats: &KeyColumns,
+        flights: &TextColumn,
+    ) -> Result<(), ingest::Error> {
+        let column = |names: &[&str]| chunk.column(names).map(Some);
+        let (serial, departure) = (chunk.find(&["serial_number", "serial"]), column(&["departure_utc"])?);
+        let gaps_m = chunk.numbers(column(&["gap_m"])?)?;
+        let departures = chunk.timestamps(departure)?;
+        let [hours, meters, reversals, errors_m] =
+            ["flight_hours", "tail_hours_end", "load_reversals", "gap_se_m"]
+                .map(|name| chunk.numbers(chunk.find(&[name])));
+        let (hours, meters, reversals, errors_m) = (hours?, meters?, reversals?, errors_m?);
+        let mut seen = KeyCache::default();
+        for row in 0..chunk.len() {
+            let empty = |column| chunk.error(row, column, "it is empty".into());
+            let seat = match seen.get(seats, row) {
+                Some(seat) => seat,
+                None => {
+                    let seat = self.seat(seats.who(row).ok_or_else(|| empty(serial))?);
+                    seen.put(seats, row, seat);
+                    seat
+                }
+            };
+            let departure_us = departures.is_valid(row).then(|| departures.value(row));
+            let departure_utc = departure_us.ok_or_else(|| empty(departure))?;
+            let departure_utc = Timestamp::from_microsecond(departure_utc)
+                .map_err(|e| chunk.error(row, departure, e.to_string()))?;
+            let said = FlightInput {
+                flight_id: flights.get(row),
+                departure_utc,
+                flight_hours: at(&hours, row),
+                tail_hours_end: at(&meters, row),
+                load_reversals: at(&reversals, row).map(|n| n as u64),
+                gap_m: at(&gaps_m, row),
+                gap_se_m: at(&errors_m, row),
+            };
+            self.push_row(seat, &said);
+        }
+        Ok(())
+    }
+
+    /// Puts down a flight.
+    pub fn put(&mut self, who: RowKey<'_>, row: &FlightInput<'_>) {
+        let seat = self.seat(who);
+        self.push_row(seat, row);
+    }
+
+    fn push_row(&mut self, seat: RowTarget, row: &FlightInput<'_>) {
+        if self.blocks.last().is_none_or(|block| block.rows.len() == BLOCK_ROWS) {
+            self.blocks.push(RowBlock { rows: Vec::with_capacity(BLOCK_ROWS), names: String::new() });
+        }
+        let last = self.blocks.len() - 1;
+        let (block, unit) = (&mut self.blocks[last], &mut self.units[seat.unit]);
+        let name = row.flight_id.unwrap_or_default();
+        block.names.push_str(name);
+        block.rows.push(StagedRow {
+            unit: seat.unit as u32,
+            place: seat.place,
+            name_end: block.names.len() as u32,
+            departure_us: row.departure_utc.as_microsecond(),
+            gap_m: row.gap_m.unwrap_or(f64::NAN),
+            extras: FlightExtras::of(row),
+        });
+        unit.rows += 1;
+        unit.bytes += name.len();
+    }
+
+    /// Puts down what a record says.
+    pub(crate) fn push_record(&mut self, push_record: &GapRecord) {
+        let GapRecord { flight, estimate, .. } = push_record;
+        let who = RowKey {
+            part_number: Some(push_record.part_number.as_str()),
+            serial_number: push_record.serial_number.as_str(),
+            tail_number: Some(flight.tail_number.as_str()),
+            position: Some(push_record.position.as_str()),
+        };
+        let row = FlightInput {
+            flight_id: Some(flight.flight_id.as_str()),
+            departure_utc: flight.departure_utc,
+            flight_hours: flight.flight_hours,
+            tail_hours_end: flight.tail_hours_end,
+            load_reversals: u64::try_from(estimate.load_reversals).ok(),
+            gap_m: estimate.gap_m,
+            gap_se_m: estimate.gap_se_m,
+        };
+        self.put(who, &row);
+    }
+
+    fn seat(&mut self, who: RowKey<'_>) -> RowTarget {
+        let unit = self.unit(who.part_number, who.serial_number);
+        RowTarget { unit, place: self.units[unit].places.number(who.tail_number, who.position) }
+    }
+
+    /// Where a unit is kept. Most tables have one unit's rows together, or the units in one order every night.
+    fn unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
+        let is = |(part, serial): &UnitKey| serial == serial_number && part.as_deref() == part_number;
+        let units = &self.units;
+        let follows = self.follows.get(self.last).copied();
+        let expected = [Some(self.last), follows].into_iter().flatten();
+        if let Some(unit) = expected.into_iter().find(|unit| units.get(*unit).is_some_and(|u| is(&u.name))) {
+            self.last = unit;
+            return unit;
+        }
+        let known = self.by_serial.get(serial_number);
+        let known = known.and_then(|all| all.iter().copied().find(|&unit| is(&units[unit].name)));
+        let unit = known.unwrap_or_else(|| self.new_unit(part_number, serial_number));
+        self.follows[self.last] = unit;
+        self.last = unit;
+        unit
+    }
+
+    fn new_unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
+        let (unit, name) = (self.units.len(), (part_number.map(str::to_owned), serial_number.to_owned()));
+        self.by_serial.entry(name.1.clone()).or_default().push(unit);
+        self.units.push(UnitEntry { name, places: Positions::default(), rows: 0, bytes: 0 });
+        self.follows.push(0);
+        unit
+    }
+}
+
+/// A unit, and one of its places.
+#[derive(Debug, Clone, Copy)]
+struct RowTarget {
+    unit: usize,
+    place: u32,
+}
+
+/// The number of a row.
+pub(crate) fn at(numbers: &Float64Array, row: usize) -> Option<f64> {
+    numbers.is_valid(row).then(|| numbers.value(row))
+}

@@ -1,0 +1,126 @@
+//! One flight of one unit in as few bytes as its numbers take: a fleet has tens of millions of them.
+
+use jiff::Timestamp;
+
+/// What a row says of one flight of one unit, wherever its gap was estimated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
+pub struct FlightInput<'a> {
+    pub flight_id: Option<&'a str>,
+    pub departure_utc: Timestamp,
+    pub flight_hours: Option<f64>,
+    pub tail_hours_end: Option<f64>,
+    pub load_reversals: Option<u64>,
+    pub gap_m: Option<f64>,
+    pub gap_se_m: Option<f64>,
+}
+
+/// A flight as a unit's history keeps it, in 32 bytes.
+#[derive(Debug, Clone, Copy)]
+pub struct FlightRow {
+    departure_us: i64,
+    /// `NaN` for none.
+    gap_m: f64,
+    /// Which of its unit's places it was flown in.
+    pub(crate) place: u32,
+    /// How many of its unit's rows came before it, in the order of arrival.
+    pub(crate) row: u32,
+    /// Where its name begins and ends among its unit's names; at one place where it has none.
+    name: [u32; 2],
+}
+
+impl FlightRow {
+    /// A flight whose name is not known yet: the gap `NaN` for none, and how many of its unit's rows came before it.
+    pub(crate) fn new(departure_us: i64, gap_m: f64, place: u32, row: u32) -> Self {
+        Self { departure_us, gap_m, place, row, name: [0, 0] }
+    }
+
+    /// The same with its name, which is put down behind those of its unit's others.
+    pub(crate) fn named(self, name: &str, names: &mut String) -> Self {
+        let begin = names.len() as u32;
+        names.push_str(name);
+        Self { name: [begin, names.len() as u32], ..self }
+    }
+
+    /// Its name among those of its unit's flights.
+    pub(crate) fn name_in<'a>(&self, names: &'a str) -> Option<&'a str> {
+        let name = &names[self.name[0] as usize..self.name[1] as usize];
+        (!name.is_empty()).then_some(name)
+    }
+
+    /// Departure, µs since 1970 UTC.
+    pub fn departure_us(&self) -> i64 {
+        self.departure_us
+    }
+
+    /// Departure, to the microsecond.
+    pub fn departure_utc(&self) -> Timestamp {
+        // It was an instant when it was put down, so it is one now.
+        Timestamp::from_microsecond(self.departure_us).unwrap_or_default()
+    }
+
+    /// The gap, m; none of a refused flight.
+    pub fn gap_m(&self) -> Option<f64> {
+        known(self.gap_m)
+    }
+}
+
+/// What else a row says of a flight, in 32 bytes: a statement needs it only until usage is added up.
+#[derive(Debug, Clone, Copy)]
+pub struct FlightExtras {
+    /// Numbers; `NaN` for none.
+    flight_hours: f64,
+    tail_hours_end: f64,
+    gap_se_m: f64,
+    /// The largest number for none.
+    load_reversals: u64,
+}
+
+impl FlightExtras {
+    pub(crate) fn of(row: &FlightInput<'_>) -> Self {
+        Self {
+            flight_hours: row.flight_hours.unwrap_or(f64::NAN),
+            tail_hours_end: row.tail_hours_end.unwrap_or(f64::NAN),
+            gap_se_m: row.gap_se_m.unwrap_or(f64::NAN),
+            load_reversals: row.load_reversals.unwrap_or(u64::MAX),
+        }
+    }
+
+    pub(crate) fn to_bits(self) -> [u64; 4] {
+        let Self { flight_hours, tail_hours_end, gap_se_m, load_reversals } = self;
+        [flight_hours.to_bits(), tail_hours_end.to_bits(), gap_se_m.to_bits(), load_reversals]
+    }
+
+    pub(crate) fn from_bits([flight_hours, tail_hours_end, gap_se_m, load_reversals]: [u64; 4]) -> Self {
+        Self {
+            flight_hours: f64::from_bits(flight_hours),
+            tail_hours_end: f64::from_bits(tail_hours_end),
+            gap_se_m: f64::from_bits(gap_se_m),
+            load_reversals,
+        }
+    }
+
+    /// The flight's length, hours.
+    pub fn flight_hours(&self) -> Option<f64> {
+        known(self.flight_hours)
+    }
+
+    /// The tail's hours after it.
+    pub fn tail_hours_end(&self) -> Option<f64> {
+        known(self.tail_hours_end)
+    }
+
+    /// Load reversals in it.
+    pub fn load_reversals(&self) -> Option<u64> {
+        (self.load_reversals != u64::MAX).then_some(self.load_reversals)
+    }
+
+    /// The gap's standard error, m.
+    pub fn gap_se_m(&self) -> Option<f64> {
+        known(self.gap_se_m)
+    }
+}
+
+fn known(number: f64) -> Option<f64> {
+    (!number.is_nan()).then_some(number)
+}

@@ -1,0 +1,248 @@
+//! Every unit's flights as statements need them.
+//!
+//! A fleet's store holds tens of millions of records of some fifty columns; of each flight this keeps what a
+//! trend is made from, and names once for each unit.
+
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
+
+use jiff::Timestamp;
+use records::Installation;
+
+use crate::history::extras::UnitExtras;
+use crate::history::flight_row::{FlightExtras, FlightRow};
+
+/// Part number where known, and serial number.
+pub type UnitKey = (Option<String>, String);
+
+/// Where a unit sat, as far as its rows say.
+#[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "each field is named for the contract's column")]
+pub struct TailPosition {
+    pub tail_number: Option<String>,
+    pub position: Option<String>,
+}
+
+impl TailPosition {
+    /// Where a stay is.
+    pub(crate) fn of(stay: &Installation) -> Self {
+        Self { tail_number: Some(stay.tail_number.to_string()), position: Some(stay.position.to_string()) }
+    }
+
+    fn is(&self, tail_number: Option<&str>, position: Option<&str>) -> bool {
+        self.tail_number.as_deref() == tail_number && self.position.as_deref() == position
+    }
+}
+
+/// A unit's places, as they come.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Positions(Vec<TailPosition>);
+
+impl Positions {
+    /// The number of a place.
+    pub(crate) fn number(&mut self, tail_number: Option<&str>, position: Option<&str>) -> u32 {
+        // A unit sits where it sat in the row before, or in one of a handful of places.
+        let known = self.0.iter().rposition(|place| place.is(tail_number, position));
+        let at = known.unwrap_or_else(|| {
+            let owned = |name: Option<&str>| name.map(str::to_owned);
+            self.0.push(TailPosition { tail_number: owned(tail_number), position: owned(position) });
+            self.0.len() - 1
+        });
+        at as u32
+    }
+
+    /// The numbers of others.
+    pub(crate) fn numbers(&mut self, others: &Self) -> Vec<u32> {
+        let number =
+            |place: &TailPosition| self.number(place.tail_number.as_deref(), place.position.as_deref());
+        others.0.iter().map(number).collect()
+    }
+}
+
+/// A unit's flights, by departure.
+#[derive(Debug, Clone, Default)]
+pub struct History {
+    places: Vec<TailPosition>,
+    flights: Vec<FlightRow>,
+    /// What else their rows say; nothing once it was [forgotten](History::forget).
+    extras: UnitExtras,
+    /// The flights' names, one after the other.
+    names: String,
+}
+
+impl History {
+    /// The flights, by departure.
+    pub fn flights(&self) -> &[FlightRow] {
+        &self.flights
+    }
+
+    /// The tails it was flown on.
+    pub(crate) fn tails(&self) -> impl Iterator<Item = &str> {
+        self.places.iter().filter_map(|place| place.tail_number.as_deref())
+    }
+
+    /// Those that departed at or before a time.
+    pub(crate) fn until(&self, as_of: Timestamp) -> &[FlightRow] {
+        &self.flights[..self.flights.partition_point(|f| f.departure_utc() <= as_of)]
+    }
+
+    /// The one that departed then.
+    pub(crate) fn at(&self, departure_utc: Timestamp) -> Option<&FlightRow> {
+        let first = self.flights.partition_point(|f| f.departure_utc() < departure_utc);
+        self.flights.get(first).filter(|f| f.departure_utc() == departure_utc)
+    }
+
+    /// The name of one of them.
+    pub fn flight_id(&self, flown: &FlightRow) -> Option<&str> {
+        flown.name_in(&self.names)
+    }
+
+    /// What else the row of one of them says.
+    pub fn extras(&self, flown: &FlightRow) -> FlightExtras {
+        self.extras.row(flown.row)
+    }
+
+    /// Makes room: from now on nobody asks what else the rows say.
+    pub(crate) fn drop_secondary(&mut self) {
+        self.extras = UnitExtras::default();
+    }
+
+    /// Where one of them was flown.
+    pub fn place(&self, flown: &FlightRow) -> &TailPosition {
+        &self.places[flown.place as usize]
+    }
+
+    /// The stay among some of the unit's that a flight belongs to.
+    pub(crate) fn stay<'a>(&self, flown: &FlightRow, stays: &[&'a Installation]) -> Option<&'a Installation> {
+        let TailPosition { tail_number, position } = self.place(flown);
+        let is_here = |stay: &&&Installation| {
+            tail_number.as_deref() == Some(stay.tail_number.as_str())
+                && position.as_deref() == Some(stay.position.as_str())
+                && stay.covers(flown.departure_utc())
+        };
+        stays.iter().find(is_here).copied()
+    }
+
+    fn key<'a>(&'a self, flown: &FlightRow) -> Key<'a> {
+        (flown.departure_us(), self.place(flown), self.flight_id(flown))
+    }
+
+    /// One with places, and room for so many flights and so many bytes of their names.
+    pub(crate) fn with_room(places: Positions, flights: usize, names: usize) -> Self {
+        Self {
+            places: places.0,
+            flights: Vec::with_capacity(flights),
+            extras: UnitExtras::default(),
+            names: String::with_capacity(names),
+        }
+    }
+
+    /// Puts down a flight behind the others.
+    pub(crate) fn put(&mut self, flown: FlightRow, name: &str) {
+        self.flights.push(flown.named(name, &mut self.names));
+    }
+
+    /// With what else the rows say, and the same whatever order they came in.
+    pub(crate) fn finish(mut self, extras: UnitExtras) -> Self {
+        self.extras = extras;
+        let (places, names) = (&self.places, &self.names);
+        let place = |flown: &FlightRow| &places[flown.place as usize];
+        let order = |a: &FlightRow, b: &FlightRow| {
+            let rest = || place(a).cmp(place(b)).then_with(|| a.name_in(names).cmp(&b.name_in(names)));
+            a.departure_us().cmp(&b.departure_us()).then_with(rest)
+        };
+        if !self.flights.is_sorted_by(|a, b| order(a, b) != Ordering::Greater) {
+            self.flights.sort_by(order);
+        }
+        self
+    }
+}
+
+/// All units' flights.
+#[derive(Debug, Clone, Default)]
+pub struct Histories {
+    units: BTreeMap<UnitKey, History>,
+    is_booked: bool,
+}
+
+impl Histories {
+    pub(crate) fn new(units: BTreeMap<UnitKey, History>, is_booked: bool) -> Self {
+        Self { units, is_booked }
+    }
+
+    /// Whether these are the store's own, whose flights belong to stays of the installations table.
+    ///
+    /// Those of a table made elsewhere may be of other aircraft under the same names.
+    pub(crate) fn is_booked(&self) -> bool {
+        self.is_booked
+    }
+
+    /// Every unit and its flights, by name, to be changed.
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (&UnitKey, &mut History)> {
+        self.units.iter_mut()
+    }
+
+    /// Every unit and its flights, by name.
+    pub fn iter(&self) -> impl Iterator<Item = (&UnitKey, &History)> {
+        self.units.iter()
+    }
+
+    /// Every unit.
+    pub fn names(&self) -> impl Iterator<Item = &UnitKey> {
+        self.units.keys()
+    }
+
+    /// A unit's flights.
+    pub fn get(&self, name: &UnitKey) -> Option<&History> {
+        self.units.get(name)
+    }
+
+    /// The last departure of all.
+    pub fn newest_utc(&self) -> Option<Timestamp> {
+        self.units.values().filter_map(|history| history.flights.last()).map(FlightRow::departure_utc).max()
+    }
+
+    /// The last departure of all but the flights that others hold.
+    pub(crate) fn newest_without_utc(&self, others: &Self) -> Option<Timestamp> {
+        let last = |(name, history): (&UnitKey, &History)| {
+            let held = others.held(name);
+            history
+                .flights
+                .iter()
+                .rev()
+                .find(|f| !held.contains(&history.key(f)))
+                .map(FlightRow::departure_utc)
+        };
+        self.units.iter().filter_map(last).max()
+    }
+
+    /// The histories of some units without the flights that others hold; a unit left with none goes.
+    pub(crate) fn without(&self, names: &BTreeSet<UnitKey>, others: &Self) -> Self {
+        let left = |name: &UnitKey| {
+            let (history, held) = (self.get(name)?, others.held(name));
+            let flights = history.flights.iter().filter(|f| !held.contains(&history.key(f)));
+            let left = History {
+                places: history.places.clone(),
+                flights: flights.copied().collect(),
+                extras: history.extras.clone(),
+                names: history.names.clone(),
+            };
+            (!left.flights.is_empty()).then(|| (name.clone(), left))
+        };
+        Self { units: names.iter().filter_map(left).collect(), is_booked: self.is_booked }
+    }
+
+    /// Whether all flights of these are later than a time.
+    pub(crate) fn all_after(&self, time: Timestamp) -> bool {
+        let first = |history: &History| history.flights.first().is_none_or(|f| f.departure_utc() > time);
+        self.units.values().all(first)
+    }
+
+    fn held(&self, name: &UnitKey) -> BTreeSet<Key<'_>> {
+        let Some(history) = self.get(name) else { return BTreeSet::new() };
+        history.flights.iter().map(|f| history.key(f)).collect()
+    }
+}
+
+/// By what a unit's flight is known.
+type Key<'a> = (i64, &'a TailPosition, Option<&'a str>);

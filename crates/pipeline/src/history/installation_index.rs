@@ -1,0 +1,28 @@
+//! The installations table, unit by unit.
+
+use std::collections::HashMap;
+
+use records::{Installation, Installations};
+
+use crate::history::histories::UnitKey;
+
+/// Every unit's stays, earliest first.
+pub(crate) struct InstallationIndex<'a>(HashMap<&'a str, Vec<&'a Installation>>);
+
+impl<'a> InstallationIndex<'a> {
+    pub(crate) fn new(installations: &'a Installations) -> Self {
+        let mut by_serial: HashMap<&str, Vec<&Installation>> = HashMap::new();
+        for stay in installations.iter() {
+            by_serial.entry(stay.serial_number.as_str()).or_default().push(stay);
+        }
+        by_serial.values_mut().for_each(|stays| stays.sort_by_key(|stay| stay.installed_utc));
+        Self(by_serial)
+    }
+
+    /// A unit's stays; where its part number is not known, its serial number says so.
+    pub(crate) fn of(&self, (part, serial): &UnitKey) -> Vec<&'a Installation> {
+        let is_of =
+            |stay: &&&Installation| part.as_deref().is_none_or(|part| stay.part_number.as_str() == part);
+        self.0.get(serial.as_str()).into_iter().flatten().filter(is_of).copied().collect()
+    }
+}

@@ -1,0 +1,336 @@
+//! What several workers put down, brought together unit by unit.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::error::Error;
+use crate::history::builder::{HistoryBuilder, RowBlock, StagedRow, UnitEntry};
+use crate::history::extras::ExtrasArena;
+use crate::history::flight_row::FlightRow;
+use crate::history::histories::{Histories, History, Positions, UnitKey};
+
+/// Shares of a table that a worker is given: the slower one leaves some of its own to the others.
+const SHARES: usize = 4;
+
+/// Histories of the rows of all, as if one had put them down in this order.
+///
+/// Each worker takes the rows of its own units, so that nobody waits for another one's, and a block is given up
+/// once nobody needs it any more.
+pub(crate) fn merge(gathered: Vec<HistoryBuilder>, is_booked: bool) -> Histories {
+    let mut rooms = rooms(&gathered);
+    let homes: Vec<TargetMap> = gathered.iter().map(|one| TargetMap::of(&one.units, &mut rooms)).collect();
+    let mut stacks: Vec<Partition<'_>> = sections(rooms).into_iter().map(Partition::of).collect();
+    for (one, homes) in gathered.into_iter().zip(&homes) {
+        for block in one.blocks.into_iter().map(Arc::new) {
+            let takers = stacks.iter_mut().filter(|stack| homes.are_in(&stack.ranks));
+            takers.for_each(|stack| stack.blocks.push((homes, Arc::clone(&block))));
+        }
+    }
+    let full: Vec<Vec<_>> = stacks.into_par_iter().map(Partition::histories).collect();
+    Histories::new(full.into_iter().flatten().collect(), is_booked)
+}
+
+/// What all rows of a unit will need.
+#[derive(Default)]
+struct UnitCapacity {
+    /// Which of all units it is, by name.
+    rank: u32,
+    places: Positions,
+    rows: usize,
+    bytes: usize,
+}
+
+fn rooms(gathered: &[HistoryBuilder]) -> BTreeMap<UnitKey, UnitCapacity> {
+    let mut rooms: BTreeMap<UnitKey, UnitCapacity> = BTreeMap::new();
+    for unit in gathered.iter().flat_map(|one| &one.units) {
+        let room = rooms.entry(unit.name.clone()).or_default();
+        room.rows += unit.rows;
+        room.bytes += unit.bytes;
+    }
+    for (rank, room) in rooms.values_mut().enumerate() {
+        room.rank = rank as u32;
+    }
+    rooms
+}
+
+/// Where the rows of each unit go that one gathering knows.
+struct TargetMap(Vec<Target>);
+
+/// Which of all units it is, and the numbers that its places have there.
+struct Target {
+    rank: u32,
+    places: Vec<u32>,
+}
+
+impl TargetMap {
+    fn of(units: &[UnitEntry], rooms: &mut BTreeMap<UnitKey, UnitCapacity>) -> Self {
+        let home = |unit: &UnitEntry| {
+            // Each unit's room was made from these names.
+            let room = rooms.entry(unit.name.clone()).or_default();
+            Target { rank: room.rank, places: room.places.numbers(&unit.places) }
+        };
+        Self(units.iter().map(home).collect())
+    }
+
+    /// Whether any of them is one of those units.
+    fn are_in(&self, ranks: &Range<u32>) -> bool {
+        self.0.iter().any(|home| ranks.contains(&home.rank))
+    }
+}
+
+/// As many sections as there are workers, of about as many rows each; the units of one follow each other by name.
+fn sections(rooms: BTreeMap<UnitKey, UnitCapacity>) -> Vec<Vec<(UnitKey, UnitCapacity)>> {
+    let rows: usize = rooms.values().map(|room| room.rows).sum();
+    let most = rows.div_ceil(rayon::current_num_threads());
+    let (mut sections, mut some, mut held) = (Vec::new(), Vec::new(), 0);
+    for room in rooms {
+        held += room.1.rows;
+        some.push(room);
+        if held >= most {
+            sections.push(std::mem::take(&mut some));
+            held = 0;
+        }
+    }
+    sections.push(some);
+    sections
+}
+
+/// A section, and the blocks in which rows of it may be.
+struct Partition<'a> {
+    ranks: Range<u32>,
+    section: Vec<(UnitKey, UnitCapacity)>,
+    blocks: Vec<(&'a TargetMap, Arc<RowBlock>)>,
+}
+
+impl Partition<'_> {
+    fn of(section: Vec<(UnitKey, UnitCapacity)>) -> Self {
+        let first = section.first().map_or(0, |(_, room)| room.rank);
+        Self { ranks: first..first + section.len() as u32, section, blocks: Vec::new() }
+    }
+
+    fn histories(self) -> Vec<(UnitKey, History)> {
+        let mut arena = ExtrasArena::with_room(self.section.iter().map(|(_, room)| room.rows));
+        let history =
+            |(name, room): (_, UnitCapacity)| (name, History::with_room(room.places, room.rows, room.bytes));
+        let mut units: Vec<(UnitKey, History)> = self.section.into_iter().map(history).collect();
+        for (homes, block) in self.blocks {
+            each_row(&block, homes, |home, put, name| {
+                let unit = home.rank.wrapping_sub(self.ranks.start) as usize;
+                let Some((_, history)) = units.get_mut(unit) else { return };
+                let row = history.flights().len() as u32;
+                let place = home.places[put.place as usize];
+                history.put(FlightRow::new(put.departure_us, put.gap_m, place, row), name);
+                arena.put(unit, row, put.extras);
+            });
+        }
+        let full = units.into_iter().zip(arena.of_units());
+        full.map(|((name, history), extras)| (name, history.finish(extras))).collect()
+    }
+}
+
+/// Hands over the rows of a block in order, each with where it goes and its flight's name.
+fn each_row(block: &RowBlock, homes: &TargetMap, mut take: impl FnMut(&Target, &StagedRow, &str)) {
+    let mut begin = 0;
+    for put in &block.rows {
+        let end = put.name_end as usize;
+        take(&homes.0[put.unit as usize], put, &block.names[begin..end]);
+        begin = end;
+    }
+}
+
+impl HistoryBuilder {
+    /// The histories of a table made elsewhere.
+    pub fn into_external(self) -> Histories {
+        merge(vec![self], false)
+    }
+
+    /// The histories of the store, whose flights belong to stays of the installations table.
+    pub fn into_store(self) -> Histories {
+        merge(vec![self], true)
+    }
+}
+
+/// The histories of a table in so many parts, `put` down in shares by all workers: the same as if one had put down
+/// all of them in order.
+///
+/// # Errors
+/// The first of the parts' errors.
+pub(crate) fn of_parts(
+    parts: usize,
+    is_booked: bool,
+    put: impl Fn(&mut HistoryBuilder, Range<usize>) -> Result<(), Error> + Sync,
+) -> Result<Histories, Error> {
+    let share = parts.div_ceil(SHARES * rayon::current_num_threads()).max(1);
+    let shares: Vec<usize> = (0..parts).step_by(share).collect();
+    let gathered = |first: &usize| {
+        let mut gathering = HistoryBuilder::default();
+        put(&mut gathering, *first..parts.min(first + share))?;
+        Ok(gathering)
+    };
+    let gathered: Vec<Result<HistoryBuilder, Error>> = shares.par_iter().map(gathered).collect();
+    Ok(merge(gathered.into_iter().collect::<Result<_, _>>()?, is_booked))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow::array::{ArrayRef, Int64Array, StringArray, TimestampMicrosecondArray};
+    use arrow::compute::cast;
+    use arrow::datatypes::DataType;
+
+    use super::*;
+    use crate::history::flight_row::FlightInput;
+    use crate::history::flight_row::FlightRow;
+    use crate::history::histories::History;
+    use crate::history::row_keys::RowKey;
+    use arrow::array::{Float64Array, RecordBatch};
+    use ingest::tables::TableBatch;
+    use jiff::Timestamp;
+
+    /// Whole numbers below a bound that look like chance.
+    fn chances() -> impl FnMut(u64) -> u64 {
+        let mut state = 7_u64;
+        move |bound| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % bound
+        }
+    }
+
+    /// A row's texts (part, serial number, tail, position, flight), its departure and its gap.
+    type Cells = ([Option<String>; 5], i64, Option<f64>);
+
+    /// Serial numbers of two parts, units that move about, names with a blank, and flights that arrive late.
+    fn rows() -> Vec<Cells> {
+        let mut chance = chances();
+        let mut row = |at: i64| {
+            let mut text = |name: &str, count| (chance(9) > 0).then(|| format!("{name}{}", chance(count)));
+            let (part, tail, position, flight) =
+                (text("P", 2), text("T", 3), text("place ", 2), text(" F", 40));
+            let serial = Some(format!("S{}", chance(4)));
+            let departure_us = 1_000_000 * (at - chance(20) as i64);
+            ([part, serial, tail, position, flight], departure_us, (chance(5) > 0).then(|| chance(90) as f64))
+        };
+        (0..600).map(&mut row).collect()
+    }
+
+    fn batch(rows: &[Cells], texts: &DataType) -> RecordBatch {
+        let names = ["part_number", "serial_number", "tail_number", "position", "flight_id"];
+        let text = |column: usize| {
+            let plain: StringArray = rows.iter().map(|(texts, ..)| texts[column].as_deref()).collect();
+            cast(&plain, texts).unwrap()
+        };
+        let departures: TimestampMicrosecondArray = rows.iter().map(|row| Some(row.1)).collect();
+        let gaps_m: Float64Array = rows.iter().map(|row| row.2).collect();
+        let reversals: Int64Array = rows.iter().map(|row| row.2.map(|gap| gap as i64)).collect();
+        let numbers: [(&str, ArrayRef); 3] = [
+            ("departure_utc", Arc::new(departures)),
+            ("gap_m", Arc::new(gaps_m)),
+            ("load_reversals", Arc::new(reversals)),
+        ];
+        let texts = names.into_iter().enumerate().map(|(column, name)| (name, text(column)));
+        RecordBatch::try_from_iter(texts.chain(numbers)).unwrap()
+    }
+
+    /// Each row by itself, as the tables mean it.
+    fn one_by_one(rows: &[Cells]) -> Histories {
+        let mut gathering = HistoryBuilder::default();
+        for ([part, serial, tail, position, flight], departure_us, gap_m) in rows {
+            let who = RowKey {
+                part_number: part.as_deref(),
+                serial_number: serial.as_deref().unwrap(),
+                tail_number: tail.as_deref(),
+                position: position.as_deref(),
+            };
+            let row = FlightInput {
+                flight_id: flight.as_deref().map(str::trim),
+                departure_utc: Timestamp::from_microsecond(*departure_us).unwrap(),
+                flight_hours: None,
+                tail_hours_end: None,
+                load_reversals: gap_m.map(|gap| gap as u64),
+                gap_m: *gap_m,
+                gap_se_m: None,
+            };
+            gathering.put(who, &row);
+        }
+        gathering.into_store()
+    }
+
+    #[test]
+    fn rows_of_the_store_and_of_a_foreign_table_are_what_each_of_them_is_by_itself() {
+        let rows = rows();
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let (mut stored, mut plain) = (HistoryBuilder::default(), HistoryBuilder::default());
+        // In other parts names have other codes.
+        for some in rows.chunks(230) {
+            stored.add_store_batch(batch(some, &coded)).unwrap();
+            plain.add(&TableBatch::new("table".as_ref(), batch(some, &DataType::Utf8), 0)).unwrap();
+        }
+        let expected = told(&one_by_one(&rows));
+        assert_eq!(told(&stored.into_store()), expected);
+        assert_eq!(told(&plain.into_store()), expected);
+    }
+
+    /// All that is known of all units.
+    fn told(histories: &Histories) -> Vec<String> {
+        let of_unit = |(name, history): (&UnitKey, &History)| {
+            let flight = |f: &FlightRow| {
+                format!("{f:?} {:?} {:?} {:?}", history.place(f), history.flight_id(f), history.extras(f))
+            };
+            format!("{name:?} {:?}", history.flights().iter().map(flight).collect::<Vec<_>>())
+        };
+        histories.iter().map(of_unit).collect()
+    }
+
+    /// The order of parts decides, not that of the workers, of whom there may be more than parts or units.
+    #[test]
+    fn any_number_of_workers_brings_together_what_one_does() {
+        let rows = rows();
+        let expected = told(&one_by_one(&rows));
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        for (rows_of_part, workers) in [(600, 1), (600, 7), (90, 2), (41, 3), (7, 5)] {
+            let parts: Vec<RecordBatch> = rows.chunks(rows_of_part).map(|some| batch(some, &coded)).collect();
+            let put = |gathering: &mut HistoryBuilder, some: Range<usize>| {
+                let mut some = parts[some].iter().cloned();
+                some.try_for_each(|batch| gathering.add_store_batch(batch)).unwrap();
+                Ok(())
+            };
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build().unwrap();
+            let found = pool.install(|| of_parts(parts.len(), true, put)).unwrap();
+            assert!(told(&found) == expected, "{rows_of_part} rows a part, {workers} workers");
+        }
+        assert_eq!(of_parts(0, true, |_, _| Ok(())).unwrap().names().count(), 0);
+    }
+
+    /// Whoever is first, it is the table's first error that is told.
+    #[test]
+    fn of_several_errors_the_first_is_told() {
+        let refuse = |_: &mut HistoryBuilder, some: Range<usize>| match some.start {
+            0 => Ok(()),
+            first => Err(Error::refused(
+                TableBatch::new(
+                    "t".as_ref(),
+                    RecordBatch::new_empty(Arc::new(arrow::datatypes::Schema::empty())),
+                    first,
+                )
+                .error(0, None, "bad".into())
+                .diagnostic(),
+            )),
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let error = pool.install(|| of_parts(24, true, refuse)).unwrap_err();
+        assert!(format!("{error:?}").contains("row: Some(3)"), "{error:?}");
+    }
+
+    #[test]
+    fn a_row_without_a_serial_number_is_told_by_its_number() {
+        let mut rows = rows();
+        rows[17].0[1] = Some("  ".into());
+        let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+        let error = HistoryBuilder::default().add_store_batch(batch(&rows, &coded)).unwrap_err();
+        assert_eq!(error.diagnostic().location().unwrap(), "column `serial_number`, row 18");
+    }
+}

@@ -1,0 +1,131 @@
+//! Who flew and where, row by row, found once for the many rows that say the same.
+
+use arrow::array::{Array, AsArray, DictionaryArray, StringArray};
+use arrow::datatypes::Int32Type;
+use ingest::tables::{StringColumn, TableBatch, trim_ascii_fast};
+
+/// Who flew, and where.
+#[derive(Debug, Clone, Copy)]
+#[expect(missing_docs, reason = "each field is named for the contract's column")]
+pub struct RowKey<'a> {
+    pub part_number: Option<&'a str>,
+    pub serial_number: &'a str,
+    pub tail_number: Option<&'a str>,
+    pub position: Option<&'a str>,
+}
+
+/// Who flew and where, row by row.
+pub(crate) struct KeyColumns {
+    serials: TextColumn,
+    parts: TextColumn,
+    tails: TextColumn,
+    positions: TextColumn,
+}
+
+impl KeyColumns {
+    /// The columns of names that repeat, under all their names.
+    pub(crate) const COLUMNS: [&'static str; 6] =
+        ["serial_number", "serial", "part_number", "tail_number", "tail", "position"];
+
+    /// Those of some rows of a table.
+    pub(crate) fn of(chunk: &TableBatch) -> Result<Self, ingest::Error> {
+        let names: [&[&str]; 4] =
+            [&["serial_number", "serial"], &["part_number"], &["tail_number", "tail"], &["position"]];
+        let [serials, parts, tails, positions] = names.map(|names| TextColumn::of(chunk, names));
+        Ok(Self { serials: serials?, parts: parts?, tails: tails?, positions: positions? })
+    }
+
+    /// Who flew in a row; none where the cell of the serial number is empty.
+    pub(crate) fn who(&self, row: usize) -> Option<RowKey<'_>> {
+        Some(RowKey {
+            part_number: self.parts.get(row),
+            serial_number: self.serials.get(row)?,
+            tail_number: self.tails.get(row),
+            position: self.positions.get(row),
+        })
+    }
+
+    /// Whether two rows are of one unit in one place.
+    fn are_same(&self, a: usize, b: usize) -> bool {
+        [&self.serials, &self.positions, &self.tails, &self.parts].iter().all(|names| names.are_same(a, b))
+    }
+}
+
+/// What was found for the seats of the rows before: of the last one, and of the last one of each serial number
+/// where these have codes.
+pub(crate) struct KeyCache<T> {
+    last: Option<(usize, T)>,
+    by_code: Vec<Option<(usize, T)>>,
+}
+
+impl<T> Default for KeyCache<T> {
+    fn default() -> Self {
+        Self { last: None, by_code: Vec::new() }
+    }
+}
+
+impl<T: Copy> KeyCache<T> {
+    /// What was found for a row's seat.
+    pub(crate) fn get(&self, seats: &KeyColumns, row: usize) -> Option<T> {
+        let of_code = match seats.serials.code(row) {
+            Some(code) => self.by_code.get(code).copied().flatten(),
+            None => self.last,
+        };
+        of_code.filter(|(before, _)| seats.are_same(*before, row)).map(|(_, found)| found)
+    }
+
+    /// Keeps what was found for a row's seat.
+    pub(crate) fn put(&mut self, seats: &KeyColumns, row: usize, found: T) {
+        self.last = Some((row, found));
+        let Some(code) = seats.serials.code(row) else { return };
+        if self.by_code.len() <= code {
+            self.by_code.resize(code + 1, None);
+        }
+        self.by_code[code] = self.last;
+    }
+}
+
+/// Texts of a column: each by itself, or as a code for one of a few.
+pub(crate) enum TextColumn {
+    Plain(StringColumn),
+    Coded(DictionaryArray<Int32Type>, StringArray),
+}
+
+impl TextColumn {
+    /// Those of a column under one of its names; all none where there is no such column.
+    pub(crate) fn of(chunk: &TableBatch, names: &[&str]) -> Result<Self, ingest::Error> {
+        let column = chunk.find(names);
+        let coded = column.and_then(|column| chunk.dictionary_column(column));
+        let texts = coded.and_then(|coded| coded.values().as_string_opt::<i32>());
+        match coded.zip(texts) {
+            Some((coded, texts)) => Ok(Self::Coded(coded.clone(), texts.clone())),
+            None => Ok(Self::Plain(chunk.texts(column)?)),
+        }
+    }
+
+    /// The text of a row, trimmed; an empty one is none.
+    pub(crate) fn get(&self, row: usize) -> Option<&str> {
+        match self {
+            Self::Plain(texts) => texts.get(row),
+            Self::Coded(_, texts) => {
+                let code = self.code(row)?;
+                let text = texts.is_valid(code).then(|| trim_ascii_fast(texts.value(code)))?;
+                (!text.is_empty()).then_some(text)
+            }
+        }
+    }
+
+    fn code(&self, row: usize) -> Option<usize> {
+        match self {
+            Self::Plain(_) => None,
+            Self::Coded(coded, _) => coded.key(row),
+        }
+    }
+
+    fn are_same(&self, a: usize, b: usize) -> bool {
+        match self {
+            Self::Plain(texts) => texts.get(a) == texts.get(b),
+            Self::Coded(..) => self.code(a) == self.code(b),
+        }
+    }
+}

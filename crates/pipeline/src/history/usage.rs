@@ -1,0 +1,116 @@
+//! What a unit's flights add up to: its rows, those that left none, and what the books say.
+
+use jiff::Timestamp;
+use job::Config;
+use records::{Installation, Installations};
+use trend::{Observation, Series, UsageDefaults};
+
+use crate::error::Error;
+use crate::history::flight_row::FlightRow;
+use crate::history::histories::{History, TailPosition, UnitKey};
+use crate::history::installation_index::InstallationIndex;
+use crate::history::maintenance_log;
+use crate::history::unlogged_flights::UnloggedFlights;
+
+/// What the books say of units beside their rows.
+pub(crate) struct UsageSources<'a> {
+    maintenance: maintenance_log::MaintenanceLog,
+    unlogged: UnloggedFlights<'a>,
+    stays: InstallationIndex<'a>,
+}
+
+impl<'a> UsageSources<'a> {
+    pub(crate) fn read(config: &'a Config, installations: &'a Installations) -> Result<Self, Error> {
+        let file = config.document.logs.maintenance.as_ref();
+        let maintenance = file.map(|file| maintenance_log::read(&config.path(file))).transpose()?;
+        Ok(Self {
+            maintenance: maintenance.unwrap_or_default(),
+            unlogged: UnloggedFlights::of_table(&config.flights),
+            stays: InstallationIndex::new(installations),
+        })
+    }
+
+    /// A unit's flights, added up.
+    pub(crate) fn series(&self, name: &UnitKey, history: &History, is_booked: bool) -> Result<Series, Error> {
+        let stays = self.stays.of(name);
+        let booked = if is_booked { &stays[..] } else { &[] };
+        let first = stays.iter().min_by_key(|stay| stay.installed_utc);
+        let unit_hours_at_start = first.and_then(|stay| stay.unit_hours_at_install);
+        let observations = observations(history, booked, &self.unlogged.of_unit(history, booked));
+        let usage = UsageDefaults { unit_hours_at_start, ..UsageDefaults::default() };
+        Ok(Series::new(observations, &usage)?.with_maintenance(maintenance_events(&self.maintenance, name)))
+    }
+}
+
+/// What the maintenance book says of a unit; of one whose part number is not known, nothing.
+fn maintenance_events(
+    book: &maintenance_log::MaintenanceLog,
+    (part, serial): &UnitKey,
+) -> Vec<trend::MaintenanceEvent> {
+    part.clone().and_then(|part| book.get(&(part, serial.clone())).cloned()).unwrap_or_default()
+}
+
+/// A unit's flights as the trend knows them, those that left no record among them.
+fn observations(
+    history: &History,
+    stays: &[&Installation],
+    unlogged: &[(&Installation, &records::Flight)],
+) -> Vec<Observation> {
+    let mut numbers = InstallationIds::default();
+    let seen = history.flights().iter().map(|f| {
+        let extras = history.extras(f);
+        Observation {
+            departure_us: f.departure_us(),
+            installation: numbers.of_flown(f, history, stays),
+            flight_hours: extras.flight_hours(),
+            tail_hours_end: extras.tail_hours_end(),
+            load_reversals: extras.load_reversals(),
+            gap_m: f.gap_m(),
+            gap_se_m: extras.gap_se_m().filter(|se| *se > 0.0),
+        }
+    });
+    let mut observations: Vec<Observation> = seen.collect();
+    observations.extend(unlogged.iter().map(|(stay, flight)| Observation {
+        departure_us: flight.departure_utc.as_microsecond(),
+        installation: numbers.of(&TailPosition::of(stay), Some(stay)),
+        flight_hours: flight.flight_hours,
+        tail_hours_end: flight.tail_hours_end,
+        load_reversals: None,
+        gap_m: None,
+        gap_se_m: None,
+    }));
+    observations
+}
+
+/// Installations of one unit, numbered as they come.
+#[derive(Default)]
+struct InstallationIds<'a> {
+    known: Vec<(TailPosition, Option<Timestamp>)>,
+    /// Place and stay of the flight before, and their number.
+    last: Option<(u32, &'a Installation, u32)>,
+}
+
+impl<'a> InstallationIds<'a> {
+    /// That of a flight. Stays of one place do not overlap, so most flights are of the stay of the one before.
+    fn of_flown(&mut self, flown: &FlightRow, history: &History, stays: &[&'a Installation]) -> u32 {
+        let is_here =
+            |last: &(u32, &Installation, u32)| last.0 == flown.place && last.1.covers(flown.departure_utc());
+        if let Some((_, _, number)) = self.last.filter(is_here) {
+            return number;
+        }
+        let stay = history.stay(flown, stays);
+        let number = self.of(history.place(flown), stay);
+        self.last = stay.map(|stay| (flown.place, stay, number));
+        number
+    }
+
+    fn of(&mut self, place: &TailPosition, stay: Option<&Installation>) -> u32 {
+        let installed_utc = stay.map(|stay| stay.installed_utc);
+        let known = self.known.iter().rposition(|(p, at)| p == place && *at == installed_utc);
+        let number = known.unwrap_or_else(|| {
+            self.known.push((place.clone(), installed_utc));
+            self.known.len() - 1
+        });
+        number as u32
+    }
+}

@@ -1,0 +1,5 @@
+//! Diagnostics besides the gap: filter innovations and recorder changes.
+
+pub mod innovations;
+pub mod recent;
+pub mod recorder_change;

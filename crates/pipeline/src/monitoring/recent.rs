@@ -1,0 +1,134 @@
+//! What the last months' flights say beside gaps: delay, stiffness and surprise, place by place.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use arrow::array::RecordBatch;
+use ingest::tables::TableBatch;
+use jiff::{SignedDuration, Timestamp};
+use store::{Query, Store};
+
+use crate::error::Error;
+use crate::history::builder::at;
+use crate::history::parallel_scan::read_each;
+use crate::history::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
+
+/// As far back as is looked: some months of flights.
+const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
+
+/// One flight of one place.
+#[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
+pub struct FlightDiagnostics {
+    pub departure_utc: Timestamp,
+    pub flight_id: Box<str>,
+    pub skew_s: Option<f64>,
+    pub stiffness_n_per_m: Option<f64>,
+    pub nis: Option<f64>,
+}
+
+/// Where which unit sits.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "each field is named for the contract's column")]
+pub struct PositionKey {
+    pub tail_number: String,
+    pub position: String,
+    pub part_number: String,
+    pub serial_number: String,
+}
+
+/// The flights of a unit in a seat, by departure.
+pub type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
+
+/// The last months until a time, with it.
+///
+/// # Errors
+/// When the store cannot be read.
+pub fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagnostics, Error> {
+    const COLUMNS: [&str; 9] = [
+        "tail_number",
+        "position",
+        "part_number",
+        "serial_number",
+        "flight_id",
+        "departure_utc",
+        "skew_s",
+        "stiffness_n_per_m",
+        "nis",
+    ];
+    let since_utc = until.checked_sub(LOOKED_BACK).ok();
+    let until_utc = until.checked_add(SignedDuration::from_micros(1)).ok();
+    let query = Query { since_utc, until_utc, ..Query::default() };
+    let mut found = Found::default();
+    read_each(&store.scan_columns(&query, &COLUMNS)?, |batch| found.add(batch))?;
+    Ok(found.in_order())
+}
+
+/// Looks while their rows come in.
+#[derive(Default)]
+struct Found {
+    by_seat: BTreeMap<PositionKey, usize>,
+    diagnostics: Vec<Vec<FlightDiagnostics>>,
+}
+
+impl Found {
+    fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
+        let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
+        let (seats, flights) = (KeyColumns::of(&chunk)?, TextColumn::of(&chunk, &["flight_id"])?);
+        let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
+        let [skews_s, stiffnesses, surprises] = ["skew_s", "stiffness_n_per_m", "nis"].map(numbers);
+        let (skews_s, stiffnesses, surprises) = (skews_s?, stiffnesses?, surprises?);
+        let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
+        let mut seen = KeyCache::default();
+        for row in 0..chunk.len() {
+            let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) else { continue };
+            let Some(who) = seats.who(row) else { continue };
+            let of_position = seen.get(&seats, row).unwrap_or_else(|| {
+                let found = self.of_position(who);
+                seen.put(&seats, row, found);
+                found
+            });
+            self.diagnostics[of_position].push(FlightDiagnostics {
+                departure_utc,
+                flight_id: flights.get(row).unwrap_or_default().into(),
+                skew_s: at(&skews_s, row),
+                stiffness_n_per_m: at(&stiffnesses, row),
+                nis: at(&surprises, row),
+            });
+        }
+        Ok(())
+    }
+
+    fn of_position(&mut self, who: RowKey<'_>) -> usize {
+        let text = |name: Option<&str>| name.unwrap_or_default().to_owned();
+        let position = PositionKey {
+            tail_number: text(who.tail_number),
+            position: text(who.position),
+            part_number: text(who.part_number),
+            serial_number: who.serial_number.to_owned(),
+        };
+        let diagnostics = &mut self.diagnostics;
+        *self.by_seat.entry(position).or_insert_with(|| {
+            diagnostics.push(Vec::new());
+            diagnostics.len() - 1
+        })
+    }
+
+    fn in_order(mut self) -> RecentDiagnostics {
+        let in_order = |(position, of_position): (PositionKey, usize)| {
+            let mut diagnostics = std::mem::take(&mut self.diagnostics[of_position]);
+            diagnostics.sort_by(|a, b| (a.departure_utc, &a.flight_id).cmp(&(b.departure_utc, &b.flight_id)));
+            (position, diagnostics)
+        };
+        self.by_seat.into_iter().map(in_order).collect()
+    }
+}
+
+/// The newest departure of all.
+pub(crate) fn newest_utc(recent_diagnostics: &RecentDiagnostics) -> Option<Timestamp> {
+    recent_diagnostics
+        .values()
+        .filter_map(|diagnostics| diagnostics.last())
+        .map(|diagnostics| diagnostics.departure_utc)
+        .max()
+}

@@ -1,0 +1,551 @@
+//! What a report says, composed from the store: statements now and before, flights, stays, inspections.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use ::report::{
+    Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
+    Report, Tail, TimedInterval, UnitView,
+};
+use ingest::tables::{Table, name, number, utc};
+use jiff::{SignedDuration, Timestamp};
+use job::Config;
+use records::{GapRecord, Installations, PartNumber, SerialNumber};
+use store::{LogOutcome, Store};
+use trend::Forecast;
+
+use crate::days::days;
+use crate::error::Error;
+use crate::fleet_trends::assess::{self, ReportAssessments, UnitSelection};
+use crate::fleet_trends::trend_row::{ChangePoint, TrendRow};
+use crate::history::builder::HistoryBuilder;
+use crate::history::flight_row::FlightRow as FlownRow;
+use crate::history::histories::{Histories, History, UnitKey as Name};
+use crate::history::installation_index::InstallationIndex;
+use crate::monitoring::recorder_change::detect_changes_in_store;
+
+/// Days before the report of which statements are held against what came.
+const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
+/// An installation within so many days explains a change.
+const BOOKED_WITHIN_DAYS: f64 = 7.0;
+/// Estimates beside an inspection: so many at most, within so many days before it.
+const BESIDE: usize = 10;
+const BESIDE_DAYS: f64 = 30.0;
+
+/// Composes the report of the asked units.
+///
+/// # Errors
+/// When the store or the table of inspections cannot be read, or a part's limits cannot be judged by.
+pub fn compose(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+    ask: &UnitSelection,
+    made_utc: Timestamp,
+    program: &str,
+) -> Result<Report, Error> {
+    let checks = inspections(config)?;
+    let mut logs = Logs::of(store)?;
+    let StoreContents { histories, mut rest, store_version } = StoreContents::until(ask.as_of_utc, store)?;
+    let newest_departure_utc = histories.newest_utc();
+    let as_of = ask.as_of_utc.or(newest_departure_utc);
+    let moved = as_of.map(|as_of| detect_changes_in_store(store, as_of)).transpose()?.unwrap_or_default();
+    let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
+    let ReportAssessments { now, drawn, before, priors } =
+        assess::assess_for_report(config, installations, &histories, ask, &days, moved)?;
+    let as_of_utc = now.first().map(|row| row.as_of_utc);
+    let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
+    let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
+    let mut tails = tails(&histories);
+    let compose = ReportComposer {
+        config,
+        before: &by_name(before),
+        checks: checks.as_deref().unwrap_or(&[]),
+        stays: &InstallationIndex::new(installations),
+    };
+    let unit = |(row, drawn): (&TrendRow, &Forecast)| {
+        let name = name_of(row);
+        let rest = rest.remove(&name).unwrap_or_default();
+        compose.unit(row, drawn, histories.get(&name).unwrap_or(&History::default()), &rest)
+    };
+    let units: Vec<UnitView> = now.iter().zip(&drawn).map(unit).collect();
+    let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
+    let narrowed = ask.tail_number.is_some() || ask.serial_number.is_some();
+    let wanted = |tail: Option<&str>| !narrowed || tail.is_some_and(|tail| shown.contains(tail));
+    logs.faults.retain(|fault| wanted(fault.tail_number.as_deref()));
+    add_log_errors(&mut tails, &logs.faults);
+    let tails = tails.into_values().filter(|t| wanted(Some(&t.tail_number))).collect();
+    Ok(Report {
+        made_utc,
+        program: program.to_owned(),
+        store_version: Some(store_version),
+        scope: scope(ask),
+        as_of_utc,
+        newest_departure_utc,
+        logs_known: logs.known.iter().filter(|(tail, _)| wanted(tail.as_deref())).map(|(_, n)| n).sum(),
+        check_interval_hours: config.document.trend.next_check_hours,
+        log_errors: logs.faults,
+        priors: priors.into_iter().map(prior).collect(),
+        tails,
+        inspections_given: checks.is_some(),
+        inspections_unmatched,
+        units,
+    })
+}
+
+fn scope(ask: &UnitSelection) -> Option<String> {
+    let tail = ask.tail_number.as_ref().map(|tail| format!("Tail {tail} only"));
+    let serial = ask.serial_number.as_ref().map(|serial| format!("Serial {serial} only"));
+    let both: Vec<String> = tail.into_iter().chain(serial).collect();
+    (!both.is_empty()).then(|| both.join(", "))
+}
+
+/// What became of all logs: how many of each tail, and those in error.
+struct Logs {
+    known: BTreeMap<Option<String>, usize>,
+    faults: Vec<LogError>,
+}
+
+impl Logs {
+    fn of(store: &Store) -> Result<Self, Error> {
+        let (mut known, mut faults) = (BTreeMap::new(), Vec::new());
+        for account in store.accounts()? {
+            *known.entry(account.tail_number.clone()).or_default() += 1;
+            if account.outcome == LogOutcome::Error {
+                faults.push(LogError {
+                    log_path: account.log_path,
+                    tail_number: account.tail_number,
+                    code: account.error_code.unwrap_or_default(),
+                    processed_utc: account.processed_utc,
+                });
+            }
+        }
+        Ok(Self { known, faults })
+    }
+}
+
+/// All flights of all units, and what of them no statement needs but a page shows.
+struct StoreContents {
+    histories: Histories,
+    /// In the order of arrival, which each flight's `row` counts.
+    rest: BTreeMap<Name, Vec<FlightExtras>>,
+    store_version: u64,
+}
+
+/// What a page shows of a flight beside what statements are made from.
+#[derive(Debug, Clone)]
+struct FlightExtras {
+    unit_hours: Option<f64>,
+    gap_p05_m: Option<f64>,
+    gap_p95_m: Option<f64>,
+    gap_midrange_m: Option<f64>,
+    load_p05_n: Option<f64>,
+    load_p95_n: Option<f64>,
+    reason: Option<String>,
+    flags: Vec<String>,
+}
+
+impl StoreContents {
+    /// Reads the store month by month and keeps what is used: records hold several times as much.
+    fn until(last: Option<Timestamp>, store: &Store) -> Result<Self, Error> {
+        let (mut gathering, mut rest) =
+            (HistoryBuilder::default(), BTreeMap::<Name, Vec<FlightExtras>>::new());
+        let store_version = store.for_each_record(|mut record| {
+            if last.is_none_or(|last| record.flight.departure_utc <= last) {
+                let name = (Some(record.part_number.to_string()), record.serial_number.to_string());
+                gathering.push_record(&record);
+                rest.entry(name).or_default().push(FlightExtras::take(&mut record));
+            }
+        })?;
+        // Room to grow is half as much again, and nothing grows any more.
+        rest.values_mut().for_each(Vec::shrink_to_fit);
+        Ok(Self { histories: gathering.into_store(), rest, store_version })
+    }
+}
+
+impl FlightExtras {
+    fn take(record: &mut GapRecord) -> Self {
+        let e = &mut record.estimate;
+        Self {
+            unit_hours: record.unit_hours,
+            gap_p05_m: e.gap_p05_m,
+            gap_p95_m: e.gap_p95_m,
+            gap_midrange_m: e.gap_midrange_m,
+            load_p05_n: e.load_p05_n,
+            load_p95_n: e.load_p95_n,
+            reason: e.reason.take(),
+            flags: std::mem::take(&mut e.flags),
+        }
+    }
+}
+
+fn name_of(row: &TrendRow) -> Name {
+    (row.part_number.clone(), row.serial_number.clone())
+}
+
+/// The statements of one and of more days before, by days; of units that had flown by then.
+type PastAssessments = BTreeMap<i64, BTreeMap<Name, TrendRow>>;
+
+fn by_name(before: BTreeMap<i64, Vec<TrendRow>>) -> PastAssessments {
+    let named = |rows: Vec<TrendRow>| {
+        rows.into_iter().filter(|row| row.flights > 0).map(|row| (name_of(&row), row)).collect()
+    };
+    before.into_iter().map(|(days, rows)| (days, named(rows))).collect()
+}
+
+/// What all units' pages are composed from.
+struct ReportComposer<'a> {
+    config: &'a Config,
+    before: &'a PastAssessments,
+    checks: &'a [InspectionRow],
+    stays: &'a InstallationIndex<'a>,
+}
+
+impl ReportComposer<'_> {
+    fn unit(&self, row: &TrendRow, drawn: &Forecast, history: &History, rest: &[FlightExtras]) -> UnitView {
+        let flown = history.flights();
+        let name = name_of(row);
+        let stays: Vec<Installation> = self.stays.of(&name).into_iter().map(stay).collect();
+        UnitView {
+            level: drawn
+                .past
+                .iter()
+                .filter_map(|(us, b)| timed_interval(Timestamp::from_microsecond(*us).ok(), b))
+                .collect(),
+            forecast: forecast(drawn, history),
+            assessment: self.statement(row, history, &name),
+            quality: quality(history, rest, row.as_of_utc),
+            events: events(row, &stays),
+            past_forecasts: self.past(row, history, &name),
+            inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.extras(flown)).collect(),
+            flights: flown.iter().map(|flown| flight(history, flown, &rest[flown.row as usize])).collect(),
+            installations: stays,
+            part_number: name.0,
+            serial_number: name.1,
+            tail_number: row.tail_number.clone(),
+            position: row.position.clone(),
+        }
+    }
+
+    fn statement(&self, row: &TrendRow, history: &History, name: &Name) -> Assessment {
+        let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
+        let part = part.and_then(|part| self.config.parts.get(&part));
+        let records = history.flights();
+        let utilization = utilization(history);
+        let last = records.last().map_or(row.as_of_utc, FlownRow::departure_utc);
+        let at = |hours: Option<f64>| date(last, hours? / utilization?.0);
+        Assessment {
+            state: row.state.map(str::to_owned),
+            reason: row.reason.clone(),
+            flights: records.len(),
+            unit_hours: row.unit_hours,
+            gap_m: row.gap_m,
+            gap_se_m: row.gap_se_m,
+            limit_m: row.limit_m,
+            watch_m: part.and_then(|p| p.watch_m),
+            rate_m_per_hour: row.rate_m_per_hour,
+            rate_p05_m_per_hour: row.rate_p05_m_per_hour,
+            rate_p95_m_per_hour: row.rate_p95_m_per_hour,
+            trend: row.trend.to_owned(),
+            crossing_hours_p05: row.crossing_hours_p05,
+            crossing_hours_p50: row.crossing_hours_p50,
+            crossing_hours_p95: row.crossing_hours_p95,
+            not_before_utc: row.not_before_utc.or_else(|| at(row.crossing_hours_p05)),
+            likely_utc: row.likely_utc.or_else(|| at(row.crossing_hours_p50)),
+            not_after_utc: row.not_after_utc.or_else(|| at(row.crossing_hours_p95)),
+            hours_per_day: utilization.map(|p| p.0),
+            hours_per_flight: utilization.map(|p| p.1),
+            check_probability: row.check_probability,
+            law: row.wear_law.clone(),
+            axis: row.usage_axis.clone(),
+            mann_kendall_p: row.trend_p_value,
+            hamed_rao_p: row.hamed_rao_p_value,
+            sen_rate_m_per_hour: row.sen_rate_m_per_hour,
+            sen_low_m_per_hour: row.sen_low_m_per_hour,
+            sen_high_m_per_hour: row.sen_high_m_per_hour,
+            state_day_before: self
+                .before
+                .get(&1)
+                .and_then(|d| d.get(name))
+                .map(|r| r.state.map(str::to_owned)),
+        }
+    }
+
+    /// What was foreseen for today, and what is found.
+    fn past(&self, row: &TrendRow, history: &History, name: &Name) -> Vec<PastForecast> {
+        let of_day = |days: &i64| {
+            let then = self.before.get(days)?.get(name)?;
+            linear_forecast(then, row, flown_hours(history, then.as_of_utc)?, *days)
+        };
+        LOOK_BACK_DAYS.iter().filter_map(of_day).collect()
+    }
+}
+
+fn stay(of: &records::Installation) -> Installation {
+    Installation {
+        tail_number: of.tail_number.to_string(),
+        position: of.position.to_string(),
+        installed_utc: of.installed_utc,
+        removed_utc: of.removed_utc,
+    }
+}
+
+/// The level then, grown at the rate then over the hours since; the errors of both levels and the
+/// interval of the rate are independent of each other.
+fn linear_forecast(then: &TrendRow, now: &TrendRow, hours: f64, days_ago: i64) -> Option<PastForecast> {
+    let gap_m = then.gap_m?;
+    let rate = then.rate_m_per_hour?;
+    let level = 1.645 * then.gap_se_m?.hypot(now.gap_se_m?);
+    let foreseen_m = gap_m + rate * hours;
+    Some(PastForecast {
+        as_of_utc: then.as_of_utc,
+        days_ago,
+        state: then.state.map(str::to_owned),
+        gap_m,
+        predicted_low_m: foreseen_m - level.hypot((rate - then.rate_p05_m_per_hour?) * hours),
+        predicted_m: foreseen_m,
+        predicted_high_m: foreseen_m + level.hypot((then.rate_p95_m_per_hour? - rate) * hours),
+        found_m: now.gap_m?,
+    })
+}
+
+/// Hours flown after a day; nothing when a flight does not say its length.
+fn flown_hours(history: &History, after: Timestamp) -> Option<f64> {
+    let since = history.flights().iter().filter(|r| r.departure_utc() > after);
+    since.map(|r| history.extras(r).flight_hours()).sum()
+}
+
+/// Hours a day and hours a flight over the last ninety days of flights.
+fn utilization(history: &History) -> Option<(f64, f64)> {
+    let records = history.flights();
+    let last = records.last()?.departure_utc();
+    let from = records.partition_point(|r| days(r.departure_utc(), last) > 90.0);
+    let (first, since) = records[from..].split_first()?;
+    let hours: f64 = since.iter().map(|r| history.extras(r).flight_hours()).sum::<Option<f64>>()?;
+    let days = days(first.departure_utc(), last);
+    (hours > 0.0 && days > 0.0).then(|| (hours / days, hours / since.len() as f64))
+}
+
+/// The fan on the calendar, at this unit's use; nothing where that is not known.
+fn forecast(drawn: &Forecast, history: &History) -> Vec<TimedInterval> {
+    let last = history.flights().last();
+    let Some((last, (hours_per_day, _))) = last.zip(utilization(history)) else { return Vec::new() };
+    let at = |hours: f64| date(last.departure_utc(), hours / hours_per_day);
+    drawn.ahead.iter().filter_map(|(hours, band)| timed_interval(at(*hours), band)).collect()
+}
+
+fn timed_interval(at_utc: Option<Timestamp>, band: &trend::Interval) -> Option<TimedInterval> {
+    Some(TimedInterval { at_utc: at_utc?, p05_m: band.p05_m, m: band.m, p95_m: band.p95_m })
+}
+
+fn prior(
+    (part_number, learned_until_utc, prior): (Option<String>, Timestamp, trend::FleetPrior),
+) -> FleetPriorView {
+    let (new_m, new_sd_m) = prior.new_gap_m();
+    let (life_p05_hours, life_p95_hours) = prior.life_range_hours();
+    FleetPriorView {
+        part_number,
+        learned_until_utc,
+        axis: prior.axis().to_string(),
+        new_m,
+        new_sd_m,
+        life_p05_hours,
+        life_p50_hours: prior.median_life_hours(),
+        life_p95_hours,
+        widening: prior.interval_scale(),
+    }
+}
+
+/// So many days after; nothing where the calendar ends.
+fn date(from: Timestamp, days: f64) -> Option<Timestamp> {
+    from.checked_add(SignedDuration::try_from_secs_f64(days * 86_400.0).ok()?).ok()
+}
+
+fn events(row: &TrendRow, stays: &[Installation]) -> Vec<Event> {
+    let booked = |at: Timestamp| {
+        stays.iter().any(|s| {
+            let ends = [Some(s.installed_utc), s.removed_utc];
+            ends.into_iter().flatten().any(|end| days(end, at).abs() <= BOOKED_WITHIN_DAYS)
+        })
+    };
+    let event = |c: &ChangePoint| Event {
+        departure_utc: c.departure_utc,
+        kind: c.kind.to_owned(),
+        step_m: c.step_m,
+        is_tail_wide: c.tail_wide,
+        // Wear that sets in is nothing that maintenance does.
+        is_on_record: c.kind == "recorded" || (c.kind != "onset" && booked(c.departure_utc)),
+    };
+    row.change_points.iter().map(event).collect()
+}
+
+fn quality(history: &History, rest: &[FlightExtras], as_of: Timestamp) -> Quality {
+    let records = history.flights();
+    let (mut reasons, mut doubts) = (BTreeMap::new(), BTreeMap::new());
+    for (flown, rest) in records.iter().map(|flown| (flown, &rest[flown.row as usize])) {
+        if flown.gap_m().is_none() {
+            *reasons.entry(rest.reason.clone().unwrap_or_default()).or_default() += 1;
+        }
+        for flag in &rest.flags {
+            *doubts.entry(flag.clone()).or_default() += 1;
+        }
+    }
+    let estimated = records.iter().filter(|r| r.gap_m().is_some());
+    let last = estimated.clone().next_back().map(FlownRow::departure_utc);
+    let count = estimated.count();
+    Quality {
+        estimated: count,
+        refused: records.len() - count,
+        reasons: ranked(reasons),
+        flags: ranked(doubts),
+        last_estimate_utc: last,
+        days_since_estimate: last.map(|last| days(last, as_of)),
+        noise_ratio: successive_difference_ratio(history),
+    }
+}
+
+fn ranked(counts: BTreeMap<String, usize>) -> Vec<(String, usize)> {
+    let mut counts: Vec<(String, usize)> = counts.into_iter().collect();
+    counts.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    counts
+}
+
+/// The spread of neighbouring flights' differences, by the median, over the joint standard error.
+fn successive_difference_ratio(history: &History) -> Option<f64> {
+    let gap = |r: &FlownRow| Some((r.gap_m()?, history.extras(r).gap_se_m()?));
+    let gaps: Vec<(f64, f64)> = history.flights().iter().filter_map(gap).collect();
+    let ratio = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0).abs() / pair[0].1.hypot(pair[1].1);
+    let mut ratios: Vec<f64> = gaps.windows(2).map(ratio).filter(|r| r.is_finite()).collect();
+    ratios.sort_by(f64::total_cmp);
+    (ratios.len() >= 5).then(|| 1.4826 * ratios[ratios.len() / 2])
+}
+
+fn flight(history: &History, flown: &FlownRow, rest: &FlightExtras) -> FlightRow {
+    let place = history.place(flown);
+    let others = rest.flags.iter().filter(|flag| Some(*flag) != rest.reason.as_ref()).cloned();
+    let remark = |reason: &String| match flown.gap_m() {
+        None => format!("refused: {reason}"),
+        Some(_) => reason.clone(),
+    };
+    FlightRow {
+        departure_utc: flown.departure_utc(),
+        flight_id: history.flight_id(flown).unwrap_or_default().to_owned(),
+        tail_number: place.tail_number.clone().unwrap_or_default(),
+        position: place.position.clone().unwrap_or_default(),
+        unit_hours: rest.unit_hours,
+        gap_m: flown.gap_m(),
+        gap_p05_m: rest.gap_p05_m,
+        gap_p95_m: rest.gap_p95_m,
+        gap_midrange_m: rest.gap_midrange_m,
+        load_reversals: history.extras(flown).load_reversals(),
+        load_p05_n: rest.load_p05_n,
+        load_p95_n: rest.load_p95_n,
+        remarks: rest.reason.iter().map(remark).chain(others).collect::<Vec<_>>().join(", "),
+    }
+}
+
+fn tails(histories: &Histories) -> BTreeMap<String, Tail> {
+    let mut tails: BTreeMap<&str, (Tail, BTreeSet<&str>)> = BTreeMap::new();
+    let flown = histories.iter().flat_map(|(_, h)| h.flights().iter().map(move |f| (h, f)));
+    for (history, record) in flown {
+        let (Some(name), Some(flight)) =
+            (history.place(record).tail_number.as_deref(), history.flight_id(record))
+        else {
+            continue;
+        };
+        let (tail, flights) = tails.entry(name).or_insert_with(|| (empty_tail(name), BTreeSet::new()));
+        flights.insert(flight);
+        tail.records += 1;
+        tail.last_departure_utc = tail.last_departure_utc.max(Some(record.departure_utc()));
+        if record.gap_m().is_some() {
+            tail.last_estimate_utc = tail.last_estimate_utc.max(Some(record.departure_utc()));
+        } else {
+            tail.refused += 1;
+        }
+    }
+    let counted = |(name, (tail, flights)): (&str, (Tail, BTreeSet<&str>))| {
+        (name.to_owned(), Tail { flights: flights.len(), ..tail })
+    };
+    tails.into_iter().map(counted).collect()
+}
+
+/// Adds each tail's logs in error, of tails that never had a good one too.
+fn add_log_errors(tails: &mut BTreeMap<String, Tail>, faults: &[LogError]) {
+    for name in faults.iter().filter_map(|fault| fault.tail_number.as_deref()) {
+        tails.entry(name.to_owned()).or_insert_with(|| empty_tail(name)).logs_in_error += 1;
+    }
+}
+
+fn empty_tail(tail_number: &str) -> Tail {
+    Tail {
+        tail_number: tail_number.to_owned(),
+        flights: 0,
+        records: 0,
+        refused: 0,
+        logs_in_error: 0,
+        last_departure_utc: None,
+        last_estimate_utc: None,
+    }
+}
+
+/// A hangar check as the table has it.
+#[derive(Debug, Clone, PartialEq)]
+struct InspectionRow {
+    part_number: Option<String>,
+    serial_number: String,
+    date_utc: Timestamp,
+    play_m: f64,
+    instrument: Option<String>,
+    force_n: Option<f64>,
+}
+
+impl InspectionRow {
+    fn is_of(&self, name: &Name) -> bool {
+        self.serial_number == name.1 && (self.part_number.is_none() || self.part_number == name.0)
+    }
+
+    /// The check beside the median of the last estimates before it: what follows may be another gap.
+    fn extras(&self, records: &[FlownRow]) -> Inspection {
+        let near = records
+            .iter()
+            .rev()
+            .filter(|r| (0.0..=BESIDE_DAYS).contains(&days(r.departure_utc(), self.date_utc)));
+        let mut gaps: Vec<f64> = near.filter_map(FlownRow::gap_m).take(BESIDE).collect();
+        gaps.sort_by(f64::total_cmp);
+        let middle = gaps.len() / 2;
+        let median = gaps
+            .get(middle)
+            .map(|upper| if gaps.len() % 2 == 1 { *upper } else { f64::midpoint(gaps[middle - 1], *upper) });
+        Inspection {
+            date_utc: self.date_utc,
+            play_m: self.play_m,
+            instrument: self.instrument.clone(),
+            force_n: self.force_n,
+            estimate_m: median,
+            estimates: gaps.len(),
+        }
+    }
+}
+
+/// The configured table of hangar checks.
+fn inspections(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error> {
+    let Some(file) = &config.document.logs.inspections else { return Ok(None) };
+    let bad = |e: ingest::Error| Error::refused(e.diagnostic());
+    let table = Table::read(&config.path(file)).map_err(bad)?;
+    let serial = table.column(&["serial_number", "serial"]).map_err(bad)?;
+    let date = table.column(&["date_utc", "date"]).map_err(bad)?;
+    let play = table.column(&["play_m"]).map_err(bad)?;
+    let [part, instrument, force] =
+        ["part_number", "instrument", "force_n"].map(|column| table.find(&[column]));
+    let text = |row, column: Option<usize>| column.and_then(|c| table.text(row, c)).map(str::to_owned);
+    let check = |row| {
+        Ok(InspectionRow {
+            part_number: text(row, part),
+            serial_number: table.required(row, serial, name::<SerialNumber>).map_err(bad)?.to_string(),
+            date_utc: table.required(row, date, utc).map_err(bad)?,
+            play_m: table.required(row, play, number).map_err(bad)?,
+            instrument: text(row, instrument),
+            force_n: table.optional(row, force, number).map_err(bad)?,
+        })
+    };
+    (0..table.len()).map(check).collect::<Result<Vec<_>, Error>>().map(Some)
+}

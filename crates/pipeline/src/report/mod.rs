@@ -1,0 +1,4 @@
+//! The report: composition of its view model and publication of its folder.
+
+pub mod compose;
+pub mod publish;

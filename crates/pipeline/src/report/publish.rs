@@ -1,0 +1,140 @@
+//! A report on disk: written whole beside its place, then put there by renaming.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+use records::Diagnostic;
+use report::{Page, Report};
+
+use crate::error::Error;
+use crate::run::event::Event;
+
+/// What was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PublishSummary {
+    /// Files.
+    pub files: u64,
+    /// Their bytes.
+    pub bytes: u64,
+}
+
+/// Writes the pages of a report to a folder, in the place of the report that was there.
+///
+/// # Errors
+/// When the folder holds something that is no report, or a page cannot be made or written: the report
+/// that was there stays.
+pub fn write(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<PublishSummary, Error> {
+    refuse_foreign(dir)?;
+    let fresh = beside(dir, "new");
+    let old = beside(dir, "old");
+    for leftover in [&fresh, &old] {
+        if leftover.exists() {
+            fs::remove_dir_all(leftover).map_err(|e| failed(leftover, e))?;
+        }
+    }
+    let written = all(report, &fresh, watch)?;
+    if dir.exists() {
+        fs::rename(dir, &old).map_err(|e| failed(dir, e))?;
+    }
+    fs::rename(&fresh, dir).map_err(|e| failed(dir, e))?;
+    if old.exists() {
+        fs::remove_dir_all(&old).map_err(|e| failed(&old, e))?;
+    }
+    Ok(written)
+}
+
+/// A folder that holds files but no `report.json` is somebody's work.
+fn refuse_foreign(dir: &Path) -> Result<(), Error> {
+    let holds = fs::read_dir(dir).is_ok_and(|mut entries| entries.next().is_some());
+    if !holds || dir.join("report.json").exists() {
+        return Ok(());
+    }
+    let what = format!("{} holds files that are no report", dir.display());
+    let diagnostic = Diagnostic::new("would_overwrite", what)
+        .hint("name an empty folder, or one that a report was written to");
+    Err(Error::refused(diagnostic))
+}
+
+fn all(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<PublishSummary, Error> {
+    for folder in ["assets", "tail", "serial"] {
+        fs::create_dir_all(dir.join(folder)).map_err(|e| failed(dir, e))?;
+    }
+    let pages = report.units.len() + report.tails.len();
+    watch(Event::Planned { logs: pages, bytes: 0 });
+    let (files, bytes) = (AtomicU64::new(0), AtomicU64::new(0));
+    let put = |page: Page| {
+        let path = dir.join(&page.path);
+        files.fetch_add(1, Ordering::Relaxed);
+        bytes.fetch_add(page.body.len() as u64, Ordering::Relaxed);
+        fs::write(&path, &page.body).map_err(|e| failed(&path, e))
+    };
+    let done = |page: Page| {
+        let log = page.path.clone();
+        let bytes = page.body.len() as u64;
+        put(page)?;
+        watch(Event::Finished { log, bytes, estimated: 0, refused: 0, diagnostics: Vec::new() });
+        Ok::<(), Error>(())
+    };
+    report::assets().into_iter().try_for_each(put)?;
+    let spreads = report::RateSpreads::of(report);
+    report.units.par_iter().try_for_each(|unit| done(report::unit_page(report, &spreads, unit)?))?;
+    report.tails.par_iter().try_for_each(|tail| done(report::tail_page(report, tail)?))?;
+    report::fleet_pages(report)?.into_iter().try_for_each(put)?;
+    Ok(PublishSummary { files: files.into_inner(), bytes: bytes.into_inner() })
+}
+
+fn beside(dir: &Path, what: &str) -> PathBuf {
+    let name = dir.file_name().map_or_else(|| "report".to_owned(), |n| n.to_string_lossy().into_owned());
+    dir.with_file_name(format!(".{name}.{what}"))
+}
+
+fn failed(path: &Path, source: std::io::Error) -> Error {
+    Error::Pages { path: path.to_owned(), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn empty() -> Report {
+        Report {
+            made_utc: jiff::Timestamp::UNIX_EPOCH,
+            program: "Freeplay".to_owned(),
+            store_version: None,
+            scope: None,
+            as_of_utc: None,
+            newest_departure_utc: None,
+            logs_known: 0,
+            check_interval_hours: 300.0,
+            log_errors: Vec::new(),
+            priors: Vec::new(),
+            tails: Vec::new(),
+            units: Vec::new(),
+            inspections_given: false,
+            inspections_unmatched: 0,
+        }
+    }
+
+    #[test]
+    fn a_folder_with_someone_elses_work_is_left_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        fs::create_dir(&out).unwrap();
+        fs::write(out.join("thesis.txt"), "years").unwrap();
+        assert!(matches!(write(&empty(), &out, &|_| ()), Err(Error::Refused(_))));
+        assert_eq!(fs::read_to_string(out.join("thesis.txt")).unwrap(), "years");
+    }
+
+    #[test]
+    fn a_report_takes_the_place_of_the_one_before_and_leaves_nothing_beside_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let first = write(&empty(), &out, &|_| ()).unwrap();
+        fs::write(out.join("serial/unit-GONE.html"), "old").unwrap();
+        assert_eq!(write(&empty(), &out, &|_| ()).unwrap(), first);
+        assert!(out.join("index.html").exists() && !out.join("serial/unit-GONE.html").exists());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+}

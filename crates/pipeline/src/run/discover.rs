@@ -1,0 +1,200 @@
+//! Which files make a log: usually one; with groups or pieces, those that say they are of one flight.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+
+use ingest::LogFiles;
+use job::Config;
+use job::flight_log::{identify, identify_companion};
+use rayon::prelude::*;
+use records::{Diagnostic, Flight, Position, TailNumber};
+
+use crate::error::Error;
+use crate::run::discover_remote::{self};
+use crate::run::file_stat::SeenObjects;
+
+/// The logs that fit the patterns.
+#[derive(Debug, Clone, Default)]
+pub struct DiscoveredLogs {
+    /// Their files, by the name of the first.
+    pub logs: BTreeMap<String, LogFiles>,
+    /// Files of groups that cannot be read, and why.
+    pub faulty: BTreeMap<String, (PathBuf, Diagnostic)>,
+    /// Files of groups whose flight has no main log.
+    pub strays: Vec<String>,
+    /// What listings of object stores told of them, by address.
+    pub(crate) seen: SeenObjects,
+}
+
+/// Every log that fits the patterns, by the shown name of its first file.
+///
+/// # Errors
+/// [`Error::Refused`] when a pattern fits no file, or is no pattern.
+pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
+    let mut seen = SeenObjects::new();
+    let main = matching(config, &config.document.logs.files, &mut seen)?;
+    let mut companions = Vec::new();
+    for (name, group) in &config.document.group {
+        companions
+            .extend(matching(config, &group.files, &mut seen)?.into_iter().map(|file| (name.as_str(), file)));
+    }
+    if companions.is_empty() && !config.document.logs.pieces {
+        let logs = main.into_iter().map(|(shown, path)| (shown, LogFiles::one(path))).collect();
+        return Ok(DiscoveredLogs { logs, seen, ..DiscoveredLogs::default() });
+    }
+    Ok(DiscoveredLogs { seen, ..group_files(config, main, companions) })
+}
+
+/// The whole log that a file given by hand belongs to.
+///
+/// # Errors
+/// As [`discover`], where groups or pieces have to be looked for.
+pub fn log_containing(config: &Config, path: &Path) -> Result<LogFiles, Error> {
+    if config.document.group.is_empty() && !config.document.logs.pieces {
+        return Ok(LogFiles::one(path));
+    }
+    let same = |other: &PathBuf| {
+        let whole = |path: &Path| std::fs::canonicalize(path).ok();
+        other == path || whole(other).is_some_and(|other| Some(other) == whole(path))
+    };
+    let found = discover(config)?.logs.into_values().find(|files| files.all().any(same));
+    Ok(found.unwrap_or_else(|| LogFiles::one(path)))
+}
+
+type FlightIdentity = (Flight, Option<Position>);
+
+/// Who the logs are, tail by tail, each with the name that its files go by.
+type IdentityIndex = HashMap<TailNumber, Vec<(FlightIdentity, String)>>;
+
+fn group_files(
+    config: &Config,
+    main: Vec<(String, PathBuf)>,
+    companions: Vec<(&str, (String, PathBuf))>,
+) -> DiscoveredLogs {
+    let known: Vec<_> = main
+        .into_par_iter()
+        .map(|(shown, path)| (identify(&LogFiles::one(&path), &shown, config).ok(), shown, path))
+        .collect();
+    let mut found = DiscoveredLogs::default();
+    let mut whose = IdentityIndex::new();
+    for (who, shown, path) in known {
+        let Some(who) = who else {
+            found.logs.insert(shown, LogFiles::one(path));
+            continue;
+        };
+        let on_tail = whose.entry(who.0.tail_number.clone()).or_default();
+        let is_piece = |(other, _): &&(FlightIdentity, String)| config.document.logs.pieces && *other == who;
+        match on_tail.iter().find(is_piece).and_then(|(_, first)| found.logs.get_mut(first)) {
+            Some(files) => files.main.push(path),
+            None => {
+                on_tail.push((who, shown.clone()));
+                found.logs.insert(shown, LogFiles::one(path));
+            }
+        }
+    }
+    let said: Vec<_> = companions
+        .into_par_iter()
+        .map(|(group, (shown, path))| (identify_companion(&path, group, &shown, config), group, shown, path))
+        .collect();
+    for (who, group, shown, path) in said {
+        match who {
+            Err(diagnostic) => drop(found.faulty.insert(shown, (path, diagnostic))),
+            Ok(who) => attach_companions(&mut found, &whose, &who, group, shown, &path),
+        }
+    }
+    found
+}
+
+/// A file of a group goes to every main log of its flight: of its actuator only, where both name one.
+fn attach_companions(
+    found: &mut DiscoveredLogs,
+    whose: &IdentityIndex,
+    who: &FlightIdentity,
+    group: &str,
+    shown: String,
+    path: &Path,
+) {
+    let mut is_stray = true;
+    let on_tail = whose.get(&who.0.tail_number).map_or(&[][..], Vec::as_slice);
+    for (_, first) in on_tail.iter().filter(|(main, _)| is_same_flight(who, main)) {
+        if let Some(files) = found.logs.get_mut(first) {
+            files.groups.entry(group.to_owned()).or_default().push(path.to_owned());
+            is_stray = false;
+        }
+    }
+    if is_stray {
+        found.strays.push(shown);
+    }
+}
+
+fn is_same_flight((flight, position): &FlightIdentity, (main, main_position): &FlightIdentity) -> bool {
+    let same_flight = flight.flight_id == main.flight_id || flight.departure_utc == main.departure_utc;
+    let same_place = match (position, main_position) {
+        (Some(position), Some(main)) => position == main,
+        _ => true,
+    };
+    same_flight && same_place
+}
+
+/// Files that fit some patterns, each by its shown name, in order of it.
+fn matching(
+    config: &Config,
+    patterns: &[String],
+    seen: &mut SeenObjects,
+) -> Result<Vec<(String, PathBuf)>, Error> {
+    let mut found = BTreeMap::new();
+    let mut silent = BTreeSet::new();
+    // `**` reaches our own results and tables, which are no logs.
+    let logs = &config.document.logs;
+    let tables: Vec<PathBuf> =
+        std::iter::once(&logs.installations).chain(&logs.flights).map(|table| config.path(table)).collect();
+    let store = config.store();
+    let ours = |path: &PathBuf| path.starts_with(&store) || tables.contains(path);
+    let invalid = |pattern: &str, e: &dyn std::fmt::Display| {
+        let what = format!("`{pattern}` is no pattern of files: {e}");
+        Error::refused(config.at(pattern, Diagnostic::new("bad_pattern", what)))
+    };
+    for pattern in patterns {
+        if object_io::is_address(pattern) {
+            let before = found.len();
+            let listed = discover_remote::each(pattern, |entry| {
+                if !ours(&entry.path) {
+                    found.insert(shown(config, &entry.path), entry.path.clone());
+                    seen.insert(entry.path.clone(), entry.into());
+                }
+            })?;
+            listed.map_err(|e| invalid(pattern, &e))?;
+            if found.len() == before {
+                silent.insert(pattern.as_str());
+            }
+            continue;
+        }
+        // The folder's own name may hold brackets; only what the user wrote is a pattern.
+        let folder = glob::Pattern::escape(&config.folder.to_string_lossy());
+        let full = Path::new(&folder).join(pattern);
+        let paths = glob::glob(&full.to_string_lossy()).map_err(|e| invalid(pattern, &e.msg))?;
+        let files: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file() && !ours(path)).collect();
+        if files.is_empty() {
+            silent.insert(pattern.as_str());
+        }
+        found.extend(files.into_iter().map(|path| (shown(config, &path), path)));
+    }
+    // Silence is a fault: a pattern that fits nothing is more often a moved folder than a day without flights.
+    if silent.is_empty() {
+        Ok(found.into_iter().collect())
+    } else {
+        Err(Error::refused(no_log(config, &silent)))
+    }
+}
+
+fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
+    let patterns = silent.iter().map(|p| format!("`{p}`")).collect::<Vec<_>>().join(", ");
+    let folder = if config.folder.as_os_str().is_empty() { Path::new(".") } else { &config.folder };
+    let diagnostic = Diagnostic::new("no_log_matched", format!("no log fits {patterns}"))
+        .hint(format!("patterns start from {}; are the logs there tonight?", folder.display()));
+    config.at(silent.first().copied().unwrap_or_default(), diagnostic)
+}
+
+fn shown(config: &Config, path: &Path) -> String {
+    path.strip_prefix(&config.folder).unwrap_or(path).to_string_lossy().replace('\\', "/")
+}

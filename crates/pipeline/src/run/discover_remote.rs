@@ -1,0 +1,46 @@
+//! Logs in an object store: which keys fit a pattern, and what a listing tells of them.
+
+use std::path::Path;
+
+use object_io::{Address, ListEntry};
+
+use crate::error::Error;
+
+/// Keys are matched as files are: `*` stays within a folder, `**` does not.
+const AS_FILES: glob::MatchOptions = glob::MatchOptions {
+    case_sensitive: true,
+    require_literal_separator: true,
+    require_literal_leading_dot: false,
+};
+
+/// Hands over every object that fits a pattern. Only the folder before its first wildcard is listed, and what
+/// does not fit is not kept.
+///
+/// # Errors
+/// [`Error::Objects`] when the store does not answer; the text of what is wrong with the pattern.
+pub(crate) fn each(pattern: &str, mut take: impl FnMut(ListEntry)) -> Result<Result<(), String>, Error> {
+    let address = Address::parse_required(pattern)?;
+    let wanted = match glob::Pattern::new(address.key()) {
+        Ok(wanted) => wanted,
+        Err(e) => return Ok(Err(e.to_string())),
+    };
+    let Some(first) = address.key().find(['*', '?', '[']) else {
+        return match object_io::head(Path::new(pattern)) {
+            Ok(entry) => {
+                take(entry);
+                Ok(Ok(()))
+            }
+            Err(object_io::Error::Missing { .. }) => Ok(Ok(())),
+            Err(error) => Err(error.into()),
+        };
+    };
+    let folder = address.key()[..first].rsplit_once('/').map_or("", |(folder, _)| folder);
+    let root = address.bucket_url();
+    object_io::list(&address.with_key(folder), |entry| {
+        let key = entry.path.to_str().and_then(|text| text.strip_prefix(&root));
+        if key.is_some_and(|key| wanted.matches_with(key, AS_FILES)) {
+            take(entry);
+        }
+    })?;
+    Ok(Ok(()))
+}

@@ -1,0 +1,284 @@
+//! A run whose logs are done elsewhere, on the machines of an engine such as Spark: the plan is made here, a
+//! log is a [`Task`] that [`process_task`] does there, and its answer comes back as rows that are stored here.
+//!
+//! Engines run a task at least once, and may lose it. An answer counts once, whichever copy arrives; records
+//! take the place of those with the same key; a log without an answer is *not reached*, and the next run
+//! does it. Only this side writes, so the store's promises stand.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use arrow::array::{Array, ArrayRef, AsArray, RecordBatch, StringArray, new_null_array};
+use arrow::compute::{cast, concat_batches, filter_record_batch, is_null};
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use ingest::LogFiles;
+use jiff::Timestamp;
+use job::Config;
+use records::{Diagnostic, GapRecord, Installations};
+use serde::{Deserialize, Serialize};
+use store::{Holder, LogOutcome, LogRecord, LogResult, RecordKey, Writer};
+
+use crate::error::Error;
+use crate::fleet_trends::assess;
+use crate::run::event::Event;
+use crate::run::flight_ownership::{LogOutcomeData, OwnershipLedger};
+use crate::run::memory_budget::MemoryBudget;
+use crate::run::plan::{Plan, Request, WorkItem, WorkReason};
+use crate::run::scheduler::{Context, WorkerContext, execute_run};
+use crate::run::summary::{self, RunSummary};
+
+/// One log to be done elsewhere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Task {
+    /// Its name in records and messages.
+    pub log_path: String,
+    /// Its files, the main log's first.
+    pub main: Vec<PathBuf>,
+    /// Files of other kinds, by the name of their group.
+    pub groups: BTreeMap<String, Vec<PathBuf>>,
+    /// The run it is done for.
+    pub run_id: String,
+}
+
+/// What does some tasks, and brings their answers in any order.
+pub type Engine<'a> = dyn FnMut(&[Task]) -> Result<Vec<RecordBatch>, String> + 'a;
+
+/// What is said of a log besides its records.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct TaskResult {
+    log_digest: Option<String>,
+    config_digest: Option<String>,
+    tail_number: Option<String>,
+    flight_id: Option<String>,
+    departure_utc: Option<Timestamp>,
+    positions: Vec<String>,
+    estimated: i64,
+    refused: i64,
+    duration_s: f64,
+    processed_utc: Timestamp,
+    #[serde(rename = "diagnostics")]
+    diagnostics: Vec<Diagnostic>,
+}
+
+/// The columns of an answer: those of a record, and three more. Each log has one row that says what became of
+/// it (`account`, and `error_code` with `error_detail` where it has a fault), and one for each record.
+pub fn schema() -> SchemaRef {
+    let records = store::columns::schema();
+    let record = records.fields().iter().map(|field| field.as_ref().clone().with_nullable(true));
+    let text = |name: &&str| Field::new(*name, DataType::Utf8, true);
+    Arc::new(Schema::new(record.chain(OURS.iter().map(text)).collect::<Vec<_>>()))
+}
+
+const OURS: [&str; 3] = ["error_code", "error_detail", "account"];
+
+/// Does one log, on one thread: the engine gives a task one core.
+///
+/// A log in error is an answer like any other.
+///
+/// # Errors
+/// When a thread cannot be started, or the answer does not fit its columns.
+pub fn process_task(
+    config: &Config,
+    installations: &Installations,
+    task: &Task,
+    program_version: &str,
+) -> Result<RecordBatch, Error> {
+    let stop = AtomicBool::new(false);
+    let (holder, plan) = (Holder::this_process(), Plan::default());
+    let context = Context { program_version, holder, wait: None, stop: &stop, watch: &|_| {} };
+    let (context, plan, run_id) = (&context, &plan, task.run_id.as_str());
+    let budget = MemoryBudget::new(config.document.run.memory_mib);
+    let shop = WorkerContext { config, installations, context, plan, run_id, budget };
+    let files = LogFiles { main: task.main.clone(), groups: task.groups.clone() };
+    let shown = task.log_path.clone();
+    let work = WorkItem { files, fault: None, shown, stat: None, why: WorkReason::New, before: None };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    match pool.install(|| shop.process_log(&work)) {
+        LogOutcomeData::Read { account, records, diagnostics } => {
+            encode_result(&account, &records, diagnostics)
+        }
+        // Content can be known only to a plan that has accounts, and this one has none.
+        LogOutcomeData::Same(account) => encode_result(&account, &[], Vec::new()),
+    }
+}
+
+/// One log's answer as rows: what became of it first, then its records.
+fn encode_result(
+    account: &LogRecord,
+    records: &[GapRecord],
+    diagnostics: Vec<Diagnostic>,
+) -> Result<RecordBatch, Error> {
+    let said = TaskResult {
+        log_digest: account.log_digest.clone(),
+        config_digest: account.config_digest.clone(),
+        tail_number: account.tail_number.clone(),
+        flight_id: account.flight_id.clone(),
+        departure_utc: account.departure_utc,
+        positions: account.positions.clone(),
+        estimated: account.estimated,
+        refused: account.refused,
+        duration_s: account.duration_s,
+        processed_utc: account.processed_utc,
+        diagnostics,
+    };
+    let said = serde_json::to_string(&said).map_err(|e| Error::Engine(e.to_string()))?;
+    let schema = schema();
+    let head = |field: &Arc<Field>| -> ArrayRef {
+        let text = match field.name().as_str() {
+            "log_path" => Some(account.log_path.as_str()),
+            "error_code" => account.error_code.as_deref(),
+            "error_detail" => account.error_detail.as_deref(),
+            "account" => Some(said.as_str()),
+            _ => return new_null_array(field.data_type(), 1),
+        };
+        Arc::new(StringArray::from(vec![text]))
+    };
+    let first = RecordBatch::try_new(Arc::clone(&schema), schema.fields().iter().map(head).collect())?;
+    let records = store::columns::to_batch(records)?;
+    let rest = |field: &Arc<Field>| {
+        let column = records.column_by_name(field.name()).cloned();
+        column.unwrap_or_else(|| new_null_array(field.data_type(), records.num_rows()))
+    };
+    let rest = RecordBatch::try_new(Arc::clone(&schema), schema.fields().iter().map(rest).collect())?;
+    Ok(concat_batches(&schema, [&first, &rest])?)
+}
+
+/// As [`crate::run`], with the logs done by an engine: so many at a time are given to it, and stored when it
+/// answers.
+///
+/// # Errors
+/// As [`crate::run`], and [`Error::Engine`] when the engine fails. What it answered before is stored.
+pub fn run(
+    config: &Config,
+    request: &Request,
+    context: &Context<'_>,
+    at_a_time: usize,
+    engine: &mut Engine<'_>,
+) -> Result<RunSummary, Error> {
+    execute_run(config, request, context, 0, |shop, intent, writer, report| {
+        intent.state(writer)?;
+        let mut book = OwnershipLedger::of(shop.plan, shop.config, shop.installations);
+        report.not_reached = 0;
+        for works in shop.plan.work.chunks(at_a_time.max(1)) {
+            some(shop, works, engine, (writer, &mut book, report))?;
+        }
+        report.not_reached = report.not_reached_logs.len();
+        report.quiet = summary::quiet(book.accounts(), shop.config.document.trend.stale_after_days);
+        Ok(book.touched.into_iter().collect::<Vec<assess::Unit>>())
+    })
+}
+
+/// Some logs: those whose fault is known already are told here, the others are asked for.
+fn some(
+    shop: &WorkerContext<'_>,
+    works: &[WorkItem],
+    engine: &mut Engine<'_>,
+    (writer, book, report): (&mut Writer, &mut OwnershipLedger<'_>, &mut RunSummary),
+) -> Result<(), Error> {
+    let sound = works.iter().filter(|work| work.fault.is_none());
+    let tasks: Vec<Task> = sound.map(|work| task(work, shop.run_id)).collect();
+    let mut answers =
+        if tasks.is_empty() { HashMap::new() } else { read(&engine(&tasks).map_err(Error::Engine)?)? };
+    let mut results: Vec<LogResult> = Vec::new();
+    for work in works {
+        let done = match answers.remove(&work.shown) {
+            Some((said, records)) => to_log_result(shop, work, said, records),
+            None if work.fault.is_some() => shop.process_log(work),
+            None => {
+                report.not_reached_logs.push(work.shown.clone());
+                continue;
+            }
+        };
+        (shop.context.watch)(done.event(work));
+        results.extend(book.resolve(done, report));
+    }
+    if !results.is_empty() {
+        writer.commit(&results)?;
+        (shop.context.watch)(Event::Stored { logs: results.len() });
+    }
+    Ok(())
+}
+
+fn task(work: &WorkItem, run_id: &str) -> Task {
+    Task {
+        log_path: work.shown.clone(),
+        main: work.files.main.clone(),
+        groups: work.files.groups.clone(),
+        run_id: run_id.to_owned(),
+    }
+}
+
+/// What came of a log, as if it had been read here.
+fn to_log_result(
+    shop: &WorkerContext<'_>,
+    work: &WorkItem,
+    said: TaskResult,
+    records: Vec<GapRecord>,
+) -> LogOutcomeData {
+    let mut account = LogRecord {
+        log_digest: said.log_digest,
+        config_digest: said.config_digest,
+        tail_number: said.tail_number,
+        flight_id: said.flight_id,
+        departure_utc: said.departure_utc,
+        positions: said.positions,
+        estimated: said.estimated,
+        refused: said.refused,
+        duration_s: said.duration_s,
+        processed_utc: said.processed_utc,
+        ..summary::of_log(work, shop.run_id)
+    };
+    if let Some((estimated, refused)) = shop.already_recorded(work, &account) {
+        let already_recorded = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account };
+        return LogOutcomeData::Same(Box::new(already_recorded));
+    }
+    summary::complain(&mut account, &said.diagnostics);
+    LogOutcomeData::Read { account: Box::new(account), records, diagnostics: said.diagnostics }
+}
+
+type TaskResults = HashMap<String, (TaskResult, Vec<GapRecord>)>;
+
+/// Answers by log, in whatever order their rows come. Of two rows that say the same the first counts; an answer
+/// that lacks records is none.
+fn read(batches: &[RecordBatch]) -> Result<TaskResults, Error> {
+    let mut said: HashMap<String, TaskResult> = HashMap::new();
+    let mut records: HashMap<String, BTreeMap<RecordKey, GapRecord>> = HashMap::new();
+    for batch in batches {
+        let batch = typed(batch)?;
+        let (logs, accounts) = (text(&batch, "log_path")?, text(&batch, "account")?);
+        for row in (0..batch.num_rows()).filter(|row| accounts.is_valid(*row)) {
+            let process_log =
+                serde_json::from_str(accounts.value(row)).map_err(|e| Error::Engine(e.to_string()))?;
+            said.entry(logs.value(row).to_owned()).or_insert(process_log);
+        }
+        let rest = filter_record_batch(&batch, &is_null(accounts)?)?;
+        for record in store::columns::from_batch(&rest)? {
+            let of_log = records.entry(record.provenance.log_path.clone()).or_default();
+            of_log.entry(RecordKey::of(&record)).or_insert(record);
+        }
+    }
+    let whole = said.into_iter().filter_map(|(log, said)| {
+        let records: Vec<GapRecord> = records.remove(&log).unwrap_or_default().into_values().collect();
+        (records.len() as i64 == said.estimated + said.refused).then_some((log, (said, records)))
+    });
+    Ok(whole.collect())
+}
+
+/// A batch in our own types: engines hand text and lists on as they like best.
+fn typed(batch: &RecordBatch) -> Result<RecordBatch, Error> {
+    let schema = schema();
+    let column = |field: &Arc<Field>| {
+        let found = batch.column_by_name(field.name());
+        let found = found.ok_or_else(|| Error::Engine(format!("an answer lacks `{}`", field.name())))?;
+        Ok(cast(found, field.data_type())?)
+    };
+    let columns = schema.fields().iter().map(column).collect::<Result<Vec<_>, Error>>()?;
+    Ok(RecordBatch::try_new(schema, columns)?)
+}
+
+fn text<'b>(batch: &'b RecordBatch, name: &str) -> Result<&'b StringArray, Error> {
+    let column = batch.column_by_name(name).and_then(|column| column.as_string_opt::<i32>());
+    column.ok_or_else(|| Error::Engine(format!("an answer lacks `{name}`")))
+}

@@ -1,0 +1,174 @@
+//! Who owns a flight: two logs may claim the same one, and the answer must not depend on who came first.
+//!
+//! The log whose name sorts first owns it. A copy of the same content is known and says nothing; a
+//! log of the same flight with other content is in error and names its rival.
+
+use std::collections::{BTreeSet, HashMap};
+
+use job::Config;
+use job::flight_log::sample_digest;
+use records::{Diagnostic, GapRecord, Installations};
+use store::{LogOutcome, LogRecord, LogResult, RecordKey};
+
+use crate::fleet_trends::assess::Unit;
+use crate::run::event::Event;
+use crate::run::plan::{Plan, WorkItem};
+use crate::run::summary::{self, RunSummary};
+
+/// What came of one log.
+pub(crate) enum LogOutcomeData {
+    /// Its content is known; only its name or date is new.
+    Same(Box<LogRecord>),
+    /// It was read.
+    Read {
+        /// Its account.
+        account: Box<LogRecord>,
+        /// Its records.
+        records: Vec<GapRecord>,
+        /// What is wrong with it.
+        diagnostics: Vec<Diagnostic>,
+    },
+}
+
+impl LogOutcomeData {
+    pub(crate) fn event(&self, work: &WorkItem) -> Event {
+        let (log, bytes) = (work.shown.clone(), work.stat.as_ref().map_or(0, |s| s.size_bytes as u64));
+        let (estimated, refused, diagnostics) = match self {
+            Self::Read { account, diagnostics, .. } => {
+                (account.estimated as usize, account.refused as usize, diagnostics.clone())
+            }
+            Self::Same(_) => (0, 0, Vec::new()),
+        };
+        Event::Finished { log, bytes, estimated, refused, diagnostics }
+    }
+}
+
+/// The writer's book of the store as it is and as it will be.
+pub(crate) struct OwnershipLedger<'a> {
+    config: &'a Config,
+    installations: &'a Installations,
+    plan: &'a Plan,
+    accounts: HashMap<String, LogRecord>,
+    owners: HashMap<RecordKey, String>,
+    /// Units whose records changed.
+    pub(crate) touched: BTreeSet<Unit>,
+}
+
+impl<'a> OwnershipLedger<'a> {
+    pub(crate) fn of(plan: &'a Plan, config: &'a Config, installations: &'a Installations) -> Self {
+        let (accounts, owners) = (HashMap::new(), HashMap::new());
+        let mut book = Self { config, installations, plan, accounts, owners, touched: BTreeSet::new() };
+        if !plan.work.is_empty() {
+            plan.accounts.values().for_each(|account| book.insert(account.clone()));
+        }
+        book
+    }
+
+    /// What is accounted for now.
+    pub(crate) fn accounts(&self) -> impl Iterator<Item = &LogRecord> {
+        let unchanged = self.plan.work.is_empty().then(|| self.plan.accounts.values());
+        self.accounts.values().chain(unchanged.into_iter().flatten())
+    }
+
+    fn insert(&mut self, account: LogRecord) {
+        let names = account.record_keys();
+        self.owners.extend(names.into_iter().map(|name| (name, account.log_path.clone())));
+        self.accounts.insert(account.log_path.clone(), account);
+    }
+
+    /// Turns what came of a log into what is written, and counts it.
+    pub(crate) fn resolve(&mut self, done: LogOutcomeData, report: &mut RunSummary) -> Vec<LogResult> {
+        match done {
+            LogOutcomeData::Same(account) => {
+                report.known += 1;
+                self.insert((*account).clone());
+                vec![LogResult { account: *account, records: Vec::new(), retires: Vec::new() }]
+            }
+            LogOutcomeData::Read { account, records, diagnostics } => {
+                self.read(*account, records, &diagnostics, report)
+            }
+        }
+    }
+
+    fn read(
+        &mut self,
+        account: LogRecord,
+        records: Vec<GapRecord>,
+        diagnostics: &[Diagnostic],
+        report: &mut RunSummary,
+    ) -> Vec<LogResult> {
+        let Some(competing_log) = self.competing_log(&account, &records) else {
+            return vec![self.store(account, records, diagnostics, report)];
+        };
+        let same =
+            account.log_digest == competing_log.log_digest || self.holds_the_same(&account, &competing_log);
+        if competing_log.log_path < account.log_path {
+            let (account, diagnostics) = superseded(account, &competing_log, same);
+            return vec![self.store(account, Vec::new(), &diagnostics, report)];
+        }
+        let first = self.store(account, records, diagnostics, report);
+        let (loser, diagnostics) = superseded(competing_log, &first.account, same);
+        vec![first, self.store(loser, Vec::new(), &diagnostics, report)]
+    }
+
+    /// Whether two logs hold the same samples in another encoding. Rare, so it is found out by reading both.
+    fn holds_the_same(&self, one: &LogRecord, other: &LogRecord) -> bool {
+        let digest = |account: &LogRecord| {
+            let files = self.plan.files.get(&account.log_path)?;
+            sample_digest(files, &account.log_path, self.config, self.installations).ok()
+        };
+        digest(one).is_some_and(|one| digest(other) == Some(one))
+    }
+
+    /// Another log that speaks for one of these flights.
+    fn competing_log(&self, account: &LogRecord, records: &[GapRecord]) -> Option<LogRecord> {
+        let owner = |r: &GapRecord| self.owners.get(&RecordKey::of(r));
+        let other = records.iter().filter_map(owner).find(|path| **path != account.log_path)?;
+        self.accounts.get(other).cloned()
+    }
+
+    fn store(
+        &mut self,
+        account: LogRecord,
+        records: Vec<GapRecord>,
+        diagnostics: &[Diagnostic],
+        report: &mut RunSummary,
+    ) -> LogResult {
+        report.count(&account, &records, diagnostics);
+        let unit = |r: &GapRecord| (r.part_number.clone(), r.serial_number.clone());
+        self.touched.extend(records.iter().map(unit));
+        let retires = self.stale_records(&account, &records);
+        self.insert(account.clone());
+        LogResult { account, records, retires }
+    }
+
+    /// Records this log made under another identity or for positions it no longer speaks for.
+    fn stale_records(&mut self, account: &LogRecord, records: &[GapRecord]) -> Vec<RecordKey> {
+        let Some(before) = self.accounts.get(&account.log_path) else { return Vec::new() };
+        let now: BTreeSet<RecordKey> = records.iter().map(RecordKey::of).collect();
+        let mine = |name: &RecordKey| self.owners.get(name) == Some(&account.log_path);
+        let gone: Vec<RecordKey> =
+            before.record_keys().into_iter().filter(|n| mine(n) && !now.contains(n)).collect();
+        for name in &gone {
+            self.owners.remove(name);
+        }
+        gone
+    }
+}
+
+/// The account of a log whose flight belongs to another.
+fn superseded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> (LogRecord, Vec<Diagnostic>) {
+    (account.estimated, account.refused) = (0, 0);
+    account.outcome = LogOutcome::Done;
+    if is_same {
+        return (account, Vec::new());
+    }
+    let diagnostic = Diagnostic::new(
+        "duplicate_flight",
+        format!("another log holds the same flight: {}", owner.log_path),
+    )
+    .in_file(&account.log_path)
+    .hint("the log whose name sorts first is used; remove one of them, or map what tells the flights apart");
+    summary::complain(&mut account, std::slice::from_ref(&diagnostic));
+    (account, vec![diagnostic])
+}

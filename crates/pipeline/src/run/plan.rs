@@ -1,0 +1,312 @@
+//! Which logs are there, which are already accounted for, and why each of the others is done.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::PathBuf;
+
+use ingest::LogFiles;
+use jiff::Timestamp;
+use job::Config;
+use rayon::prelude::*;
+use records::{Diagnostic, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
+use store::{LogOutcome, LogRecord, RecordKey};
+
+use crate::run::discover::DiscoveredLogs;
+use crate::run::file_stat::FileStat;
+use crate::run::file_stat::SeenObjects;
+
+/// What is asked of a run.
+#[derive(Debug, Clone, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option of the command, free of the others")]
+pub struct Request {
+    /// Departures from then on.
+    pub since_utc: Option<Timestamp>,
+    /// Departures before then.
+    pub until_utc: Option<Timestamp>,
+    /// One aircraft only.
+    pub tail_number: Option<TailNumber>,
+    /// Logs of flights on which this unit flew only.
+    pub serial_number: Option<SerialNumber>,
+    /// So many logs at most.
+    pub limit: Option<usize>,
+    /// Workers; as many as cores when not given.
+    pub jobs: Option<usize>,
+    /// Logs in error again.
+    pub retry: bool,
+    /// Every log again.
+    pub redo: bool,
+    /// The content of known logs too, though nothing about their files has changed.
+    pub verify_content: bool,
+    /// The states of the whole fleet, counted.
+    pub counts_all: bool,
+}
+
+impl Request {
+    /// Whether anything but all flights is asked for.
+    fn is_narrow(&self) -> bool {
+        self.since_utc.is_some()
+            || self.until_utc.is_some()
+            || self.tail_number.is_some()
+            || self.serial_number.is_some()
+    }
+
+    /// Whether a flight is asked for.
+    pub fn wants(&self, flight: &Flight, installations: &Installations) -> bool {
+        let at = flight.departure_utc;
+        let flew = |serial: &SerialNumber| {
+            installations.units_on_tail(&flight.tail_number, at).any(|stay| stay.serial_number == *serial)
+        };
+        self.since_utc.is_none_or(|since| since <= at)
+            && self.until_utc.is_none_or(|until| at < until)
+            && self.tail_number.as_ref().is_none_or(|tail| *tail == flight.tail_number)
+            && self.serial_number.as_ref().is_none_or(flew)
+    }
+}
+
+/// Why a log is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum WorkReason {
+    /// It was never seen.
+    New,
+    /// Its file is not the one that was accounted for.
+    ContentChanged,
+    /// A setting that touches it, or an installation, changed.
+    SettingChanged,
+    /// The log it had yielded its flight to speaks for it no longer.
+    OwnerGone,
+    /// It was in error, and `--retry` asks for it.
+    Retry,
+    /// It could not be fetched from its object store before.
+    Unfetched,
+    /// `--redo` asks for it.
+    Asked,
+    /// `--verify-content` asks whether it is still what was read.
+    Verify,
+}
+
+impl WorkReason {
+    /// In words.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::New => "new",
+            Self::ContentChanged => "content changed",
+            Self::SettingChanged => "setting changed",
+            Self::OwnerGone => "its flight has no other log now",
+            Self::Retry => "in error, asked again",
+            Self::Unfetched => "could not be fetched before",
+            Self::Asked => "asked again",
+            Self::Verify => "content to be compared",
+        }
+    }
+}
+
+/// One log to be done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WorkItem {
+    /// Its files.
+    pub files: LogFiles,
+    /// Why it cannot be read, where that is known already.
+    pub fault: Option<Diagnostic>,
+    /// Its name in records and messages: relative to the configuration where it lies below it.
+    pub shown: String,
+    /// What tells its file apart; none when it vanished since it was found.
+    pub stat: Option<FileStat>,
+    /// Why it is done.
+    pub why: WorkReason,
+    /// What was accounted for before under this name.
+    pub before: Option<LogRecord>,
+}
+
+/// The night's plan.
+#[derive(Debug, Clone, Default)]
+pub struct Plan {
+    /// Logs that fit the patterns.
+    pub found: usize,
+    /// Those already accounted for.
+    pub known: usize,
+    /// Those to be done, longest first.
+    pub work: Vec<WorkItem>,
+    /// What is accounted for, by name, of the logs that are still there.
+    pub accounts: BTreeMap<String, LogRecord>,
+    /// What was read, and under which settings, of logs that are there; nothing without work.
+    pub here: HashSet<Digests>,
+    /// The same of logs that are gone, with their records: they may be here under another name.
+    pub gone: HashMap<Digests, (i64, i64)>,
+    /// Logs of flights that were not asked for.
+    pub not_asked: usize,
+    /// Logs left by the limit.
+    pub left: usize,
+    /// Files of groups whose flight has no main log.
+    pub strays: Vec<String>,
+    /// The files of every log that was found; nothing without work.
+    pub files: BTreeMap<String, LogFiles>,
+}
+
+/// What was read of a log, and under which settings.
+pub type Digests = (String, String);
+
+/// Makes the plan from the logs there are and the accounts kept.
+pub fn plan(
+    config: &Config,
+    installations: &Installations,
+    found: DiscoveredLogs,
+    accounts: Vec<LogRecord>,
+    request: &Request,
+) -> Plan {
+    let (strays, seen) = (found.strays, found.seen);
+    let mut logs: BTreeMap<String, (LogFiles, Option<Diagnostic>)> =
+        found.logs.into_iter().map(|(shown, files)| (shown, (files, None))).collect();
+    let faulty = |(shown, (path, diagnostic)): (String, (PathBuf, Diagnostic))| {
+        (shown, (LogFiles::one(path), Some(diagnostic)))
+    };
+    logs.extend(found.faulty.into_iter().map(faulty));
+    let found = logs;
+    let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
+    let gone = gone.iter().filter_map(|a| Some((digests(a)?, (a.estimated, a.refused)))).collect();
+    let accounts: BTreeMap<String, LogRecord> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
+    // Names and digests of a hundred thousand logs are made only where they decide something.
+    let owned: HashSet<RecordKey> = if accounts.values().any(is_silent) {
+        accounts.values().flat_map(LogRecord::record_keys).collect()
+    } else {
+        HashSet::new()
+    };
+    let unidentified = job::flight_log::digest_without_identity(config, installations);
+    let judge =
+        Judge { config, installations, request, owned: &owned, unidentified: &unidentified, seen: &seen };
+    let verdicts: Vec<Verdict> =
+        found.par_iter().map(|(shown, log)| judge.judge(shown, log, accounts.get(shown))).collect();
+    let not_asked = verdicts.iter().filter(|v| matches!(v, Verdict::NotAsked)).count();
+    let mut work: Vec<WorkItem> = verdicts.into_iter().filter_map(Verdict::work).collect();
+    let size = |w: &WorkItem| w.stat.as_ref().map_or(0, |s| s.size_bytes);
+    work.sort_by(|a, b| size(b).cmp(&size(a)).then_with(|| a.shown.cmp(&b.shown)));
+    let wanted = work.len();
+    work.truncate(request.limit.unwrap_or(usize::MAX));
+    let left = wanted - work.len();
+    let known = found.len() - wanted - not_asked;
+    let mut plan =
+        Plan { found: found.len(), known, work, accounts, gone, not_asked, left, strays, ..Plan::default() };
+    if !plan.work.is_empty() {
+        plan.here = plan.accounts.values().filter_map(digests).collect();
+        plan.files = found.into_iter().map(|(shown, (files, _))| (shown, files)).collect();
+    }
+    plan
+}
+
+/// What was read, and which settings touched it, of a log that went well.
+pub fn digests(account: &LogRecord) -> Option<(String, String)> {
+    account
+        .outcome
+        .is_success()
+        .then(|| Some((account.log_digest.clone()?, account.config_digest.clone()?)))
+        .flatten()
+}
+
+/// The flight an account speaks of, where its log was identified.
+pub fn flight_of(account: &LogRecord) -> Option<Flight> {
+    Some(Flight {
+        tail_number: TailNumber::new(account.tail_number.as_ref()?).ok()?,
+        flight_id: FlightId::new(account.flight_id.as_ref()?).ok()?,
+        departure_utc: account.departure_utc?,
+        flight_hours: None,
+        tail_hours_end: None,
+    })
+}
+
+/// What becomes of one log tonight.
+enum Verdict {
+    Known,
+    NotAsked,
+    Process(Box<WorkItem>),
+}
+
+impl Verdict {
+    fn work(self) -> Option<WorkItem> {
+        match self {
+            Self::Process(work) => Some(*work),
+            Self::Known | Self::NotAsked => None,
+        }
+    }
+}
+
+/// Everything that one log's verdict depends on.
+struct Judge<'a> {
+    config: &'a Config,
+    installations: &'a Installations,
+    request: &'a Request,
+    owned: &'a HashSet<RecordKey>,
+    unidentified: &'a str,
+    seen: &'a SeenObjects,
+}
+
+impl Judge<'_> {
+    fn judge(
+        &self,
+        shown: &str,
+        (files, fault): &(LogFiles, Option<Diagnostic>),
+        before: Option<&LogRecord>,
+    ) -> Verdict {
+        let stat = FileStat::of_log(files, self.seen);
+        let Some(why) = self.reason(before, stat.as_ref()) else { return Verdict::Known };
+        // A log that cannot be identified is done whatever was asked, or its fault would never be told.
+        let flight = || {
+            before
+                .and_then(flight_of)
+                .or_else(|| Some(job::flight_log::identify(files, shown, self.config).ok()?.0))
+        };
+        let asked =
+            !self.request.is_narrow() || flight().is_none_or(|f| self.request.wants(&f, self.installations));
+        if !asked {
+            return Verdict::NotAsked;
+        }
+        let (files, fault, shown) = (files.clone(), fault.clone(), shown.to_owned());
+        Verdict::Process(Box::new(WorkItem { files, fault, shown, stat, why, before: before.cloned() }))
+    }
+
+    /// Why this log is done tonight, or nothing when it is accounted for.
+    fn reason(&self, account: Option<&LogRecord>, stat: Option<&FileStat>) -> Option<WorkReason> {
+        let Some(account) = account else { return Some(WorkReason::New) };
+        let settings = flight_of(account).map_or_else(
+            || self.unidentified.to_owned(),
+            |flight| {
+                job::flight_log::config_digest(
+                    self.config,
+                    self.installations,
+                    &flight,
+                    &positions_of(account),
+                )
+            },
+        );
+        if self.request.redo {
+            Some(WorkReason::Asked)
+        } else if !stat.is_some_and(|stat| stat.is_of(account)) {
+            Some(WorkReason::ContentChanged)
+        } else if account.config_digest.as_deref() != Some(&settings) {
+            Some(WorkReason::SettingChanged)
+        } else if self.is_orphan(account) {
+            Some(WorkReason::OwnerGone)
+        } else if account.error_code.as_deref().is_some_and(object_io::Error::is_passing) {
+            Some(WorkReason::Unfetched)
+        } else if self.request.retry && account.outcome == LogOutcome::Error {
+            Some(WorkReason::Retry)
+        } else if self.request.verify_content && account.outcome.is_success() {
+            Some(WorkReason::Verify)
+        } else {
+            None
+        }
+    }
+
+    /// A log that yielded its flight to another, which speaks for it no longer.
+    fn is_orphan(&self, account: &LogRecord) -> bool {
+        let keys = if is_silent(account) { account.keys() } else { Vec::new() };
+        !keys.is_empty() && keys.iter().all(|key| !self.owned.contains(key))
+    }
+}
+
+/// Whether a sound log has no record of its own.
+fn is_silent(account: &LogRecord) -> bool {
+    let sound = account.outcome.is_success() || account.error_code.as_deref() == Some("duplicate_flight");
+    sound && account.estimated + account.refused == 0
+}
+
+fn positions_of(account: &LogRecord) -> Vec<Position> {
+    account.positions.iter().filter_map(|p| Position::new(p).ok()).collect()
+}

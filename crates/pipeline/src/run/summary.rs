@@ -1,0 +1,286 @@
+//! The account of a run: every log done, refused, in error, known or not reached; nothing is missing.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use jiff::Timestamp;
+use records::{Diagnostic, GapRecord, Status};
+use store::{LogOutcome, LogRecord, RunRecord};
+
+use crate::fleet_trends::assess::RunAssessments;
+use crate::fleet_trends::changes::UnitChange;
+use crate::fleet_trends::trend_row::TrendRow;
+use crate::monitoring::innovations::{self, InnovationOutlier};
+use crate::monitoring::recorder_change::{self, RecorderChange};
+use crate::run::plan::{Plan, WorkItem};
+
+/// One log's trouble.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct LogError {
+    /// The log.
+    pub log: String,
+    /// What is wrong with it.
+    #[serde(rename = "diagnostic")]
+    pub diagnostic: Diagnostic,
+}
+
+/// An aircraft that sends nothing while others do.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct SilentTail {
+    /// The aircraft.
+    pub tail_number: String,
+    /// Its newest departure in the store.
+    pub since_utc: Timestamp,
+}
+
+/// The aircraft that have been silent for longer than `days` before the fleet's newest departure.
+pub(crate) fn quiet<'a>(accounts: impl Iterator<Item = &'a LogRecord>, days: f64) -> Vec<SilentTail> {
+    let mut newest: BTreeMap<&str, Timestamp> = BTreeMap::new();
+    for (tail, at) in accounts.filter_map(|a| Some((a.tail_number.as_deref()?, a.departure_utc?))) {
+        newest.entry(tail).and_modify(|known| *known = (*known).max(at)).or_insert(at);
+    }
+    let Some(&last) = newest.values().max() else { return Vec::new() };
+    let is_late = |at: Timestamp| last.duration_since(at).as_secs_f64() > days * 86_400.0;
+    let late = newest.into_iter().filter(|(_, at)| is_late(*at));
+    late.map(|(tail, since_utc)| SilentTail { tail_number: tail.to_owned(), since_utc }).collect()
+}
+
+/// An earlier run that ended without a word: it was killed, or its disk failed.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct KilledRun {
+    /// Its name.
+    pub run_id: String,
+    /// When it began.
+    pub started_utc: Timestamp,
+    /// Logs it had finished.
+    pub done: i64,
+    /// Logs it had not come to.
+    pub not_reached: i64,
+}
+
+impl From<RunRecord> for KilledRun {
+    fn from(run: RunRecord) -> Self {
+        Self {
+            run_id: run.run_id,
+            started_utc: run.started_utc,
+            done: run.done,
+            not_reached: run.not_reached,
+        }
+    }
+}
+
+/// What a run did.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct RunSummary {
+    /// Its name.
+    pub run_id: String,
+    /// When it began.
+    pub started_utc: Timestamp,
+    /// Runs before it that ended without a word.
+    pub cut_short: Vec<KilledRun>,
+    /// Logs that fit the patterns.
+    pub found: usize,
+    /// Logs that were accounted for already.
+    pub known: usize,
+    /// Logs of flights that were not asked for.
+    pub not_asked: usize,
+    /// Logs left by the limit.
+    pub left: usize,
+    /// Logs finished, those in error included.
+    pub done: usize,
+    /// Flights whose records were stored.
+    pub flights: usize,
+    /// Records with a gap.
+    pub estimated: usize,
+    /// Records of sound logs that cannot show one, by reason.
+    pub refused: BTreeMap<String, usize>,
+    /// Logs in error, in the order of their names.
+    pub errors: Vec<LogError>,
+    /// Logs the run has not come to, or was stopped before.
+    pub not_reached: usize,
+    /// Their names.
+    pub not_reached_logs: Vec<String>,
+    /// Aircraft whose newest departure is older than the fleet's by more than a trend may be stale.
+    pub quiet: Vec<SilentTail>,
+    /// Delays between the positions, and stiffnesses of whole aircraft, that moved within the last month, on
+    /// the aircraft this run touched.
+    pub recorder_moved: Vec<RecorderChange>,
+    /// Flights of the last month, on those aircraft, whose innovations are unlike their unit's others.
+    pub innovations_unlike: Vec<InnovationOutlier>,
+    /// The slowest log and its seconds.
+    pub slowest: Option<(String, f64)>,
+    /// Seconds from plan to account.
+    pub took_s: f64,
+    /// Workers.
+    pub workers: usize,
+    /// Units whose records changed, with the statement made of each.
+    pub trends: Vec<TrendRow>,
+    /// Those of them of which something else is said than without this run's records.
+    pub changed: Vec<UnitChange>,
+    /// How many units of the whole fleet are in which state, where that was asked.
+    #[serde(skip)]
+    pub states: BTreeMap<&'static str, usize>,
+    /// What came of each log; the last word on it counts, whoever was faster.
+    #[serde(skip)]
+    logs: BTreeMap<String, LogCounts>,
+}
+
+/// What came of one log.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct LogCounts {
+    estimated: usize,
+    refused: BTreeMap<String, usize>,
+    diagnostics: Vec<Diagnostic>,
+    duration_s: f64,
+}
+
+impl RunSummary {
+    pub(crate) fn begin(run_id: String, started_utc: Timestamp, plan: &Plan, workers: usize) -> Self {
+        Self {
+            run_id,
+            started_utc,
+            cut_short: Vec::new(),
+            found: plan.found,
+            known: plan.known,
+            not_asked: plan.not_asked,
+            left: plan.left,
+            done: 0,
+            flights: 0,
+            estimated: 0,
+            refused: BTreeMap::new(),
+            errors: Vec::new(),
+            not_reached: plan.work.len(),
+            not_reached_logs: Vec::new(),
+            quiet: Vec::new(),
+            recorder_moved: Vec::new(),
+            innovations_unlike: Vec::new(),
+            slowest: None,
+            took_s: 0.0,
+            workers,
+            trends: Vec::new(),
+            changed: Vec::new(),
+            states: BTreeMap::new(),
+            logs: BTreeMap::new(),
+        }
+    }
+
+    /// Takes what the run's units say now, and what is new on their aircraft beside their gaps.
+    pub(crate) fn add_assessments(&mut self, night: RunAssessments) {
+        let RunAssessments { now, changed, recent, states } = night;
+        let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
+        let touched = |tail: &String| tails.contains(tail.as_str());
+        self.recorder_moved = recorder_change::detect_changes(&recent)
+            .into_iter()
+            .filter(|m| touched(&m.tail_number))
+            .collect();
+        self.innovations_unlike =
+            innovations::find_outliers(&recent).into_iter().filter(|u| touched(&u.tail_number)).collect();
+        (self.trends, self.changed, self.states) = (now, changed, states);
+    }
+
+    pub(crate) fn count(&mut self, account: &LogRecord, records: &[GapRecord], diagnostics: &[Diagnostic]) {
+        let mut counted = LogCounts {
+            diagnostics: diagnostics.to_vec(),
+            duration_s: account.duration_s,
+            ..LogCounts::default()
+        };
+        for record in records {
+            match record.estimate.status {
+                Status::Estimated => counted.estimated += 1,
+                Status::Refused => {
+                    let reason = record.estimate.reason.clone().unwrap_or_default();
+                    *counted.refused.entry(reason).or_default() += 1;
+                }
+            }
+        }
+        self.logs.insert(account.log_path.clone(), counted);
+    }
+
+    /// Adds up the logs, in the order of their names.
+    pub(crate) fn close(&mut self, took_s: f64) {
+        self.took_s = took_s;
+        self.done = self.logs.len();
+        for (log, counted) in &self.logs {
+            self.flights += usize::from(counted.estimated > 0 || !counted.refused.is_empty());
+            self.estimated += counted.estimated;
+            for (reason, count) in &counted.refused {
+                *self.refused.entry(reason.clone()).or_default() += count;
+            }
+            let error =
+                |diagnostic: &Diagnostic| LogError { log: log.clone(), diagnostic: diagnostic.clone() };
+            self.errors.extend(counted.diagnostics.iter().map(error));
+            if self.slowest.as_ref().is_none_or(|(_, seconds)| *seconds < counted.duration_s) {
+                self.slowest = Some((log.clone(), counted.duration_s));
+            }
+        }
+    }
+
+    /// Records that say no gap.
+    pub fn refusals(&self) -> usize {
+        self.refused.values().sum()
+    }
+
+    /// Logs in error; one log may have several diagnostics.
+    pub fn logs_in_error(&self) -> usize {
+        let mut logs: Vec<&str> = self.errors.iter().map(|e| e.log.as_str()).collect();
+        logs.dedup();
+        logs.len()
+    }
+
+    /// The row kept in the store.
+    pub(crate) fn row(&self, program_version: &str, config_path: &str, exit_code: Option<i64>) -> RunRecord {
+        RunRecord {
+            run_id: self.run_id.clone(),
+            started_utc: self.started_utc,
+            finished_utc: exit_code.map(|_| Timestamp::now()),
+            program_version: program_version.to_owned(),
+            config_path: config_path.to_owned(),
+            found: self.found as i64,
+            known: self.known as i64,
+            done: self.done as i64,
+            estimated: self.estimated as i64,
+            refused: self.refusals() as i64,
+            errors: self.logs_in_error() as i64,
+            not_reached: self.not_reached as i64,
+            exit_code,
+        }
+    }
+}
+
+/// The account of one log, before anything is known of its flight.
+pub(crate) fn of_log(work: &WorkItem, run_id: &str) -> LogRecord {
+    let stat = work.stat.as_ref();
+    LogRecord {
+        log_path: work.shown.clone(),
+        size_bytes: stat.map_or(0, |s| s.size_bytes),
+        modified_utc_ns: stat.map_or(0, |s| s.modified_utc_ns),
+        file_id: stat.map(|s| s.file_id.clone()).unwrap_or_default(),
+        log_digest: None,
+        config_digest: None,
+        tail_number: None,
+        flight_id: None,
+        departure_utc: None,
+        positions: Vec::new(),
+        outcome: LogOutcome::Done,
+        estimated: 0,
+        refused: 0,
+        error_code: None,
+        error_detail: None,
+        duration_s: 0.0,
+        run_id: run_id.to_owned(),
+        processed_utc: Timestamp::now(),
+    }
+}
+
+/// The account of a log that a run means to do.
+pub(crate) fn not_reached(work: &WorkItem, run_id: &str) -> LogRecord {
+    LogRecord { outcome: LogOutcome::NotReached, ..of_log(work, run_id) }
+}
+
+/// Writes diagnostics into an account: the first one's code, all of their text.
+pub(crate) fn complain(account: &mut LogRecord, diagnostics: &[Diagnostic]) {
+    let Some(first) = diagnostics.first() else { return };
+    account.outcome = LogOutcome::Error;
+    account.error_code = Some(first.code.clone());
+    let all: Vec<String> = diagnostics.iter().map(ToString::to_string).collect();
+    account.error_detail = Some(all.join("\n"));
+}
