@@ -52,6 +52,32 @@ fn motor_angle_and_inertia_come_to_the_screw() {
     assert!((model::reflected_mass_kg(0.002, 0.005) - 3_158.273_408_348_595).abs() < 1e-9);
 }
 
+/// Equation 1 by hand: 500 N·s/m · 0.02 m/s + 120 N + 0.05 · 8000 N = 530 N, against the motion, whatever the load's sign.
+#[test]
+fn friction_is_viscous_dry_and_proportional_to_the_load() {
+    let friction_n = |speed_m_per_s, load_n| model::friction_n(speed_m_per_s, load_n, 500.0, 120.0, 0.05);
+    for (speed_m_per_s, expected_n) in [(0.02, 530.0), (-0.02, -530.0), (0.0, 0.0)] {
+        for load_n in [8000.0, -8000.0] {
+            let found_n: f64 = friction_n(speed_m_per_s, load_n);
+            assert!((found_n - expected_n).abs() < 1e-9, "{found_n} N at {speed_m_per_s} m/s");
+        }
+    }
+}
+
+/// Equations 11 and 12 by hand: K/m = 5·10⁷/8 = 6.25·10⁶ 1/s², f/m = 2000/8 = 250 1/s, 1/m = 0.125 1/kg.
+#[test]
+fn the_continuous_model_is_that_of_equations_11_and_12() {
+    let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap();
+    let expected = [[0.0, 1.0, 0.0], [-6.25e6, -250.0, 6.25e6], [0.0, 0.0, 0.0]];
+    let (a, b) = (actuator.a(), actuator.b());
+    for (row, expected) in expected.iter().enumerate() {
+        for (column, expected) in expected.iter().enumerate() {
+            assert!((a[(row, column)] - expected).abs() < 1e-6, "A[{row},{column}] = {}", a[(row, column)]);
+        }
+    }
+    assert!(b[0] == 0.0 && (b[1] - 0.125).abs() < 1e-15 && b[2] == 0.0, "{b}");
+}
+
 /// A part that only turns is the linear one seen at its radius: 2·10⁴ N·m/rad at 0.1 m is 2·10⁶ N/m.
 #[test]
 fn a_rotary_part_is_a_linear_one_at_its_radius() {
