@@ -74,7 +74,7 @@ fn what_init_proposes_for_foreign_logs_runs_as_it_stands() {
     let stays = std::fs::read_to_string(fleet.path("new-fleet/installations.csv")).unwrap();
     assert_eq!(stays.lines().filter(|line| line.starts_with("TC-JR")).count(), 8, "{stays}");
     let checked = fleet.run_ok(&["check", "--config", "new-fleet/pipeline.toml"]);
-    assert!(checked.contains("2 logs: 0 in error"), "{checked}");
+    assert!(checked.contains("2 logs checked, 0 failed"), "{checked}");
     let account = fleet.run_ok(&["run", "--config", "new-fleet/pipeline.toml"]);
     assert!(account.contains("8 records of 2 flights"), "{account}");
     let records = fleet.run_ok(&["query", "tail", "TC-JRB", "--config", "new-fleet/pipeline.toml"]);
@@ -95,7 +95,7 @@ fn usage_and_configuration_errors_are_code_2_and_run_nothing() {
     assert_eq!(result.code, Some(2));
     assert!(result.err.contains("error[unknown_key]"), "{}", result.err);
     assert!(result.err.contains("hint: `bandwidth_hz`?"), "{}", result.err);
-    assert!(result.err.contains("nothing was run"), "{}", result.err);
+    assert!(result.err.contains("no changes were made"), "{}", result.err);
     assert!(!fleet.path("results").exists());
 }
 
@@ -311,7 +311,7 @@ fn a_compacted_store_holds_the_same_records_and_a_flipped_byte_is_found() {
     let before = fleet.exported();
     fleet.run_ok(&["store", "compact"]);
     assert_eq!(fleet.exported(), before);
-    assert!(fleet.run_ok(&["store", "verify"]).contains("is whole"));
+    assert!(fleet.run_ok(&["store", "verify"]).contains("OK: all data files present"));
     let files = glob::glob(fleet.path("results/gaps/*.parquet").to_str().unwrap()).unwrap().flatten();
     for file in files {
         let mut bytes = std::fs::read(&file).unwrap();

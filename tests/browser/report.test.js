@@ -57,10 +57,10 @@ for (const which of Object.keys(reports)) {
         assert.equal(await fact(page, "Gap now"), level(unit.statement));
         assert.equal(await fact(page, "Flights used"), String(unit.quality.estimated));
         const share = Math.round((100 * unit.statement.gap_m) / unit.statement.limit_m);
-        assert.equal(await fact(page, "Share of limit"), unit.statement.gap_m === null ? "no data" : `${share} %`);
+        assert.equal(await fact(page, "% of limit"), unit.statement.gap_m === null ? "no data" : `${share} %`);
         const over = unit.statement.crossing_hours_p05 !== null && unit.statement.crossing_hours_p05 <= 0;
         const before = over ? "now" : (unit.statement.not_before_utc?.slice(0, 10) ?? "");
-        assert.ok((await fact(page, "Not before")).includes(before));
+        assert.ok((await fact(page, "Earliest (5 %)")).includes(before));
         const gaps = await page.$$eval("#flights tbody tr td:nth-child(5)", (cells) => cells.filter((c) => c.textContent !== "").length);
         assert.equal(gaps, unit.quality.estimated);
       }
@@ -71,7 +71,7 @@ for (const which of Object.keys(reports)) {
     const report = twin(which);
     await on(index(which), {}, async (page) => {
       const words = { act: "act", plan: "plan", watch: "watch", normal: "normal" };
-      for (const [word, state] of [...Object.entries(words), ["without a statement", null]]) {
+      for (const [word, state] of [...Object.entries(words), ["not assessed", null]]) {
         const count = report.units.filter((u) => u.statement.state === state).length;
         const card = page.locator(".counts li", { hasText: word });
         assert.equal(await card.locator("b").textContent(), String(count), word);

@@ -182,7 +182,7 @@ fn masked(text: &str) -> Vec<String> {
         (r"\d+(\.\d+)? ([kM]i?B|bytes)\b", "SIZE"),
         (r"\b[0-9a-f]{12,}\b", "DIGEST"),
         (r"\d+ workers?", "WORKERS"),
-        (r"slowest +\S+,", "slowest"),
+        (r"slowest log +\S+ ", "slowest"),
         (r" +", " "),
     ];
     let differs: Vec<_> =

@@ -90,7 +90,7 @@ fn a_flight_in_pieces_is_one_flight_whatever_the_pieces_are_called() {
     let account = fleet.run_ok(&["run"]);
     assert!(account.contains("10 logs: 10 to do"), "{account}");
     assert_eq!(numbers(&fleet), plain());
-    assert!(fleet.run_ok(&["run"]).contains("10 logs: 0 to do, 10 known"));
+    assert!(fleet.run_ok(&["run"]).contains("10 logs: 0 new or changed, 10 already processed"));
 }
 
 /// Positions in one file, loads in another: the same numbers. Loads at half the rate: nearly so.

@@ -162,7 +162,7 @@ def what_is_known_is_not_fetched_again(bench):
     bench.line.spoil(0, 0)
     bench.run(folder, "run")
     bench.line.spoil(0, 0)
-    assert f"0 to do, {len(bench.logs)} known" in bench.run(folder, "run")
+    assert f"0 new or changed, {len(bench.logs)} already processed" in bench.run(folder, "run")
     assert bench.line.body_bytes(".parquet") == 0
     asked = [r for r in bench.line.requests if r.path.split("?")[0].endswith(".parquet")]
     assert not asked, "a known object was asked for by itself"
@@ -209,7 +209,7 @@ def a_store_in_a_bucket_is_the_local_one_over_a_bad_line(bench):
         bench.line.spoil(SHARE, seed)
         bench.run(folder, "run")
         assert bench.exported(folder) == wanted
-        assert "is whole" in bench.run(folder, "store", "verify")
+        assert "OK: all data files present" in bench.run(folder, "store", "verify")
         injected += sum(bench.line.faults().values())
     return f"{len(wanted)} rows written, read and verified twice, through {injected} faults"
 
@@ -218,7 +218,7 @@ def every_reader_reads_a_store_in_a_bucket(bench):
     folder = bench.folder("readers", store="s3://fleet/readers")
     local_rows(bench)
     bench.line.spoil(0, 0)
-    assert "would do" in bench.run(folder, "run", "--dry-run")
+    assert "Dry run" in bench.run(folder, "run", "--dry-run")
     for wave in ("2026-09-25", "2026-10-10", "2026-12-01"):
         bench.run(folder, "run", "--until", wave)
     for question in (
@@ -236,7 +236,7 @@ def every_reader_reads_a_store_in_a_bucket(bench):
     assert "merged" in bench.run(folder, "store", "compact")
     after = bench.run(folder, "store", "files").split()
     assert len(after) < files and all(f.startswith("s3://fleet/readers/gaps/") for f in after), after
-    assert "is whole" in bench.run(folder, "store", "verify")
+    assert "OK: all data files present" in bench.run(folder, "store", "verify")
     assert bench.exported(folder) == local_rows(bench)
     info = json.loads(bench.run(folder, "store", "info", "--json"))
     assert info["path"] == "s3://fleet/readers" and info["records"] == len(local_rows(bench))
@@ -257,7 +257,7 @@ def two_runs_at_once_store_every_flight_once(bench):
     assert [code for *_, code in ended] == [0, 0], ended
     folder = bench.work / "twin-a"
     assert bench.exported(folder) == local_rows(bench)
-    assert "is whole" in bench.run(folder, "store", "verify")
+    assert "OK: all data files present" in bench.run(folder, "store", "verify")
     runs = json.loads(bench.run(folder, "store", "runs", "--json"))
     assert [run["ended"] for run in runs] == ["well", "well"], runs
     done = [run["done"] for run in runs]
@@ -301,7 +301,7 @@ def a_listing_takes_no_more_memory_the_longer_it_is(bench):
         _, status, used = os.wait4(process.pid, 0)
         out = process.stdout.read()
         assert os.waitstatus_to_exitcode(status) == 0, process.stderr.read()
-        assert "of 1 (0 known)" in out, out
+        assert "of 1 logs would be processed (0 up to date)" in out, out
         return used.ru_maxrss / 1024
 
     few, many = peak_mib(1_000), peak_mib(KEYS)

@@ -41,7 +41,7 @@ def test_a_run_and_its_records_are_the_commands(fleet: Path, command: Command) -
     command("store", "export", "--format", "parquet", "--output", "told.parquet")
     ours = pa.table(freeplay.records(freeplay.load().replaced(store="ours")))
     assert differing(ours, pq.read_table("told.parquet"), {"run_id", "processed_utc"}) == []
-    assert "0 to do, 30 known" in command("run").stdout
+    assert "0 new or changed, 30 already processed" in command("run").stdout
 
 
 def test_trends_are_the_commands_from_store_table_and_queries(fleet: Path, command: Command) -> None:

@@ -20,4 +20,4 @@ def test_a_run_through_spark_connect_is_that_of_one_machine(fleet: Path, command
     theirs = pa.table(freeplay.records(freeplay.load().replaced(store="theirs")))
     assert differing(theirs, pa.table(freeplay.records()), {"run_id", "processed_utc"}) == []
     Path("pipeline.toml").write_text(Path("pipeline.toml").read_text().replace('"results"', '"theirs"'))
-    assert "30 logs: 0 to do, 30 known" in command("run").stdout
+    assert "30 logs: 0 new or changed, 30 already processed" in command("run").stdout

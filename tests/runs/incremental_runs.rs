@@ -12,7 +12,7 @@ fn a_second_run_does_nothing() {
     fleet.run_ok(&["run"]);
     let before = fleet.exported();
     let account = fleet.run_ok(&["run"]);
-    assert!(to_do(&account).ends_with("30 logs: 0 to do, 30 known"), "{account}");
+    assert!(to_do(&account).ends_with("30 logs: 0 new or changed, 30 already processed"), "{account}");
     assert_eq!(fleet.exported(), before);
 }
 
@@ -36,7 +36,7 @@ fn a_changed_limit_moves_no_gap_and_redoes_nothing() {
     let fleet = TestFleet::sample();
     fleet.run_ok(&["run"]);
     fleet.configure("limit_m = 150e-6", "limit_m = 160e-6");
-    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
+    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 new or changed, 30 already processed"));
 }
 
 #[test]
@@ -53,7 +53,7 @@ fn a_renamed_or_touched_log_is_recognised_by_its_content() {
     let account = fleet.run_ok(&["run"]);
     assert!(account.contains("0 records of 0 flights"), "{account}");
     assert_eq!(fleet.exported(), before);
-    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
+    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 new or changed, 30 already processed"));
 }
 
 /// A changed byte that neither size nor date betray: it is found when contents are asked for, and only then.
@@ -69,9 +69,9 @@ fn content_is_compared_when_it_is_asked_for() {
     content[middle] ^= 1;
     std::fs::write(log, content).unwrap();
     std::fs::File::options().append(true).open(log).unwrap().set_modified(written).unwrap();
-    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("10 logs: 0 to do, 10 known"));
+    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("10 logs: 0 new or changed, 10 already processed"));
     let result = fleet.freeplay(&["run", "--verify-content"]);
-    assert!(to_do(&result.out).ends_with("10 logs: 1 to do, 9 known"), "{result:?}");
+    assert!(to_do(&result.out).ends_with("10 logs: 1 new or changed, 9 already processed"), "{result:?}");
     let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
     assert!(page.contains("known 9") && page.contains("10 logs"), "{page}");
 }
@@ -150,7 +150,7 @@ fn a_copy_speaks_when_the_first_log_breaks() {
     assert!(fleet.run_ok(&["run", "--dry-run"]).contains("its flight has no other log now"));
     fleet.run_ok(&["run"]);
     assert_eq!(fleet.exported(), before);
-    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("31 logs: 0 to do, 31 known"));
+    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("31 logs: 0 new or changed, 31 already processed"));
 }
 
 /// What is asked for is found out before the limit cuts, also of logs never seen.
@@ -158,7 +158,7 @@ fn a_copy_speaks_when_the_first_log_breaks() {
 fn a_limit_counts_only_what_was_asked_for() {
     let fleet = TestFleet::sample();
     let account = fleet.run_ok(&["run", "--tail", "N414FP", "--limit", "3"]);
-    assert!(account.contains("3 to do, 0 known, 20 not asked for, 7 left by the limit"), "{account}");
+    assert!(account.contains("3 new or changed, 0 already processed, 20 excluded by --tail/--serial/--since/--until, 7 left for later by --limit"), "{account}");
     assert!(account.contains("12 records of 3 flights"), "{account}");
 }
 
@@ -183,7 +183,7 @@ fn a_pattern_that_reaches_our_own_results_does_not_read_them() {
     fleet.run_ok(&["run"]);
     fleet.configure("**/*_N41*.parquet", "**/*.parquet");
     std::fs::remove_file(fleet.path("sample-data/truth.parquet")).unwrap();
-    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 to do, 30 known"));
+    assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 new or changed, 30 already processed"));
 }
 
 /// The number in the store can be made again from what the store says about it.
@@ -221,7 +221,7 @@ fn two_methods_live_side_by_side_and_are_compared() {
     fleet.run_ok(&["run"]);
     let told = fleet.run_ok(&["diff", "results", "trial"]);
     assert!(told.starts_with("40 of 40 actuator-flights differ"), "{told}");
-    let few = fleet.run_ok(&["diff", "results", "trial", "--least-um", "1000"]);
+    let few = fleet.run_ok(&["diff", "results", "trial", "--min-change-um", "1000"]);
     assert!(few.starts_with("0 of 40"), "{few}");
     let rows = fleet.run_ok(&["diff", "results", "trial", "--format", "csv"]);
     assert_eq!(rows.lines().count(), 41);
@@ -240,7 +240,7 @@ fn a_trial_is_adopted_and_what_it_did_not_see_stays() {
     let trial = fleet.exported();
     fleet.configure("path = \"trial\"", "path = \"results\"");
     let told = fleet.run_ok(&["store", "adopt", "trial"]);
-    assert!(told.starts_with("16 records of 4 logs taken over"), "{told}");
+    assert!(told.starts_with("adopted 16 records of 4 logs"), "{told}");
     assert!(fleet.run_ok(&["diff", "results", "trial"]).contains("differ"));
 
     let now = fleet.exported();
@@ -251,7 +251,7 @@ fn a_trial_is_adopted_and_what_it_did_not_see_stays() {
     let others: Vec<&str> = before.lines().filter(|row| !row.contains("N412FP")).collect();
     assert_eq!(now.lines().filter(|row| !row.contains("N412FP")).collect::<Vec<_>>(), others);
     let plan = fleet.run_ok(&["run", "--dry-run", "--tail", "N412FP"]);
-    assert!(plan.starts_with("would do 0 logs"), "{plan}");
+    assert!(plan.starts_with("Dry run: 0 logs"), "{plan}");
     fleet.run_ok(&["store", "verify"]);
 
     let result = fleet.freeplay(&["store", "adopt", "results"]);
@@ -285,7 +285,7 @@ fn metrics_tell_when_a_run_last_completed_and_how() {
 fn a_tail_that_went_quiet_is_named() {
     let fleet = TestFleet::sample();
     let account = fleet.run_ok(&["run"]);
-    assert!(!account.contains("quiet"), "{account}");
+    assert!(!account.contains("no data"), "{account}");
     let installations = fleet.path("pipeline.toml");
     let text = std::fs::read_to_string(&installations).unwrap() + "stale_after_days = 20.0\n";
     std::fs::write(&installations, text).unwrap();
@@ -294,7 +294,7 @@ fn a_tail_that_went_quiet_is_named() {
     }
     std::fs::remove_dir_all(fleet.path("results")).unwrap();
     let account = fleet.run_ok(&["run"]);
-    assert!(account.contains("quiet       1 tail: N414FP since"), "{account}");
+    assert!(account.contains("no data     from 1 tail: N414FP since"), "{account}");
 }
 
 /// The screw channel of one aircraft comes 4 ms later from one night on: the run says so, and the gap stays.

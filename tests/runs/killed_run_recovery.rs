@@ -48,8 +48,8 @@ fn a_killed_night_has_its_account_too() {
     assert_eq!(with("done") + with("refused") + with("unaccounted") + with("error"), figure("done"));
 
     let told = fleet.run_ok(&["store", "info"]);
-    let left = format!("{} not reached; `freeplay run` does those", figure("not_reached"));
-    assert!(told.contains("ended without an exit") && told.contains(&left), "{told}");
+    let left = format!("{} not processed; `freeplay run` processes them", figure("not_reached"));
+    assert!(told.contains("did not exit cleanly") && told.contains(&left), "{told}");
     assert_eq!(json(&fleet, &["store", "info", "--json"])["last_run"]["ended"], "killed");
 }
 
@@ -59,7 +59,7 @@ fn the_run_after_a_killed_one_says_so_and_does_the_rest() {
     let before = json(&fleet, &["store", "runs", "--json"])[0].clone();
     let result = fleet.freeplay(&["run"]);
     assert_eq!(result.code, Some(1), "{result:?}");
-    let line = format!("ended without a word: {} log", before["done"]);
+    let line = format!("did not finish: {} log", before["done"]);
     assert!(result.out.contains(&line), "{line} is not in {}", result.out);
     let runs = json(&fleet, &["store", "runs", "--json"]);
     let same = ["run_id", "ended", "done", "estimated", "refused", "errors", "not_reached"];
@@ -72,7 +72,7 @@ fn the_run_after_a_killed_one_says_so_and_does_the_rest() {
     let logs = json(&fleet, &["store", "runs", "--run", first, "--json"]);
     assert_eq!(logs.as_array().unwrap().len(), 30, "its account stays");
     let result = fleet.freeplay(&["run"]);
-    assert!(!result.out.contains("ended without a word"), "it is told once: {}", result.out);
+    assert!(!result.out.contains("did not finish"), "it is told once: {}", result.out);
     assert_eq!(records(&fleet), 116, "29 sound logs of four actuators");
 }
 
@@ -106,7 +106,7 @@ fn the_logs_of_a_run_are_told_by_class_and_reason() {
     assert_eq!(fleet.freeplay(&["run", "--limit", "8"]).code, Some(0));
     assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
     let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
-    assert!(page.contains("logs in error: 2 logs (done 1, error 1)"), "{page}");
+    assert!(page.contains("completed, some logs failed: 2 logs (done 1, error 1)"), "{page}");
     assert!(page.contains("not_parquet"), "{page}");
     let page = fleet.run_ok(&["store", "runs", "--last", "1"]);
     assert!(page.starts_with("1 run\n"), "{page}");

@@ -16,10 +16,10 @@ fn old() -> TestFleet {
 fn an_older_store_is_read_as_it_is() {
     let fleet = old();
     let mark = std::fs::read(fleet.path("results/store.json")).unwrap();
-    assert!(fleet.run_ok(&["store", "verify"]).ends_with("is whole\n"));
+    assert!(fleet.run_ok(&["store", "verify"]).ends_with("OK: all data files present and unchanged\n"));
     let info = fleet.run_ok(&["store", "info"]);
     assert!(info.contains("52 of 13 flights, 8 units, 2 tails"), "{info}");
-    assert!(info.contains("3 logs done (12 estimated, 0 refused, 0 in error), 0 not reached"), "{info}");
+    assert!(info.contains("3 logs processed (12 estimated, 0 refused, 0 failed), 0 not processed"), "{info}");
     assert!(fleet.run_ok(&["query", "tail", "N412FP"]).starts_with("40 records"));
     let runs: serde_json::Value = serde_json::from_str(&fleet.run_ok(&["store", "runs", "--json"])).unwrap();
     let told: Vec<_> =
@@ -32,15 +32,15 @@ fn an_older_store_is_read_as_it_is() {
 fn a_run_on_an_older_store_ends_where_a_new_one_does() {
     let fleet = old();
     let account = fleet.run_ok(&["run"]);
-    assert!(account.contains("ended without a word: 3 logs done, 0 not reached"), "{account}");
+    assert!(account.contains("did not finish: 3 logs processed, 0 remaining"), "{account}");
     let plain = TestFleet::sample();
     plain.run_ok(&["run"]);
     let numbers = |fleet: &TestFleet| without(&fleet.exported(), &["program_version"]);
     assert_eq!(numbers(&fleet), numbers(&plain));
-    assert!(fleet.run_ok(&["store", "verify"]).ends_with("is whole\n"));
+    assert!(fleet.run_ok(&["store", "verify"]).ends_with("OK: all data files present and unchanged\n"));
     fleet.run_ok(&["store", "compact"]);
     assert_eq!(numbers(&fleet), numbers(&plain));
-    assert!(fleet.run_ok(&["run"]).contains("0 to do, 30 known"));
+    assert!(fleet.run_ok(&["run"]).contains("0 new or changed, 30 already processed"));
 }
 
 /// Rows without columns that name the release.
@@ -71,7 +71,7 @@ fn files_of_two_releases_are_one_table() {
         .filter(|text| text.contains("\"metaData\"") && text.contains("skew_se_s"))
         .collect();
     assert_eq!(schemas.len(), 1, "the table was told once of its new columns");
-    assert!(fleet.run_ok(&["store", "verify"]).ends_with("is whole\n"));
+    assert!(fleet.run_ok(&["store", "verify"]).ends_with("OK: all data files present and unchanged\n"));
     fleet.run_ok(&["store", "compact"]);
     let after: serde_json::Value =
         serde_json::from_str(&fleet.run_ok(&["query", "tail", "N412FP", "--json"])).unwrap();

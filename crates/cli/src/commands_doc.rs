@@ -1,4 +1,4 @@
-//! `docs/commands.md`, the reference of commands, is written from what the parser knows: this test keeps it so.
+//! Generator of `docs/commands.md` from the argument parser; the test compares the file with it.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,8 +8,8 @@ use clap::{Arg, Command, CommandFactory};
 use crate::args::Args;
 
 const HEAD: &str = "# Every command\n\nWritten from the program's own parser (`FREEPLAY_BLESS=1 cargo test -p cli \
-                    commands_doc`), so it cannot drift; a test compares it.\n`freeplay help COMMAND` says the same at a \
-                    prompt. Answers go to stdout, progress and diagnostics to stderr;\n[exit codes](columns.md#exit-codes) are the same everywhere.\n";
+                    commands_doc`), and compared with it by a test.\n`freeplay help COMMAND` prints the same \
+                    text. Results go to stdout, progress and diagnostics to stderr;\n[exit codes](columns.md#exit-codes) are the same everywhere.\n";
 
 #[test]
 fn the_reference_of_commands_is_what_the_parser_knows() {

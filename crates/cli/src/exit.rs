@@ -1,23 +1,23 @@
-//! How a command ends: the exit codes that schedulers are written against, and why one was chosen.
+//! Exit codes and the failures that lead to them.
 
 use std::process::ExitCode;
 
 use records::Diagnostic;
 
-/// The codes of the contract.
+/// Exit codes; schedulers rely on them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Code {
-    /// All well; refused flights are all well.
+    /// Success; rejected flights count as success.
     Success = 0,
-    /// Finished, but some logs were in error, or a check that was asked for failed.
+    /// Finished, but some logs or a requested check failed.
     LogsInError = 1,
-    /// Usage or configuration is wrong: nothing was run.
+    /// Wrong usage or configuration: nothing was run.
     Usage = 2,
     /// The run itself failed; what was stored before is intact.
     RunFailed = 3,
-    /// With `--fail-on`: an actuator is at or past that state.
+    /// With `--fail-on`: a unit is in that state or worse.
     StateReached = 4,
-    /// Interrupted: finished flights are stored, the rest will run next time.
+    /// Interrupted: finished flights are stored; the next run processes the others.
     Interrupted = 130,
 }
 
@@ -27,14 +27,14 @@ impl From<Code> for ExitCode {
     }
 }
 
-/// WorkReason a command could not answer.
+/// Why a command failed.
 #[derive(Debug)]
 pub(crate) enum Failure {
     /// Configuration, tables or arguments: code 2.
     Refused(Vec<Diagnostic>),
     /// Store or disk: code 3.
     Failed(Box<Diagnostic>),
-    /// The reader of our answer closed its pipe; nobody is left to tell.
+    /// The reader closed the pipe; there is nothing to report.
     PipeClosed,
 }
 
@@ -83,6 +83,6 @@ impl From<std::io::Error> for Failure {
         if error.kind() == std::io::ErrorKind::BrokenPipe {
             return Self::PipeClosed;
         }
-        Self::failed(Diagnostic::new("output_failed", format!("the answer cannot be written: {error}")))
+        Self::failed(Diagnostic::new("output_failed", format!("the output cannot be written: {error}")))
     }
 }

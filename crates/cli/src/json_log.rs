@@ -1,4 +1,4 @@
-//! Structured lines: one JSON object each, on stderr, for whoever collects logs.
+//! JSON-lines log on stderr, for log collectors.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use records::Diagnostic;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// One line: when, how bad, what happened, and what belongs to it.
+/// One line: time, level, event and its fields.
 #[derive(Serialize)]
 struct LogLine<'a> {
     time_utc: Timestamp,
@@ -27,17 +27,17 @@ fn line(level: &str, event: &str, rest: Value) -> String {
     serde_json::to_string(&LogLine { time_utc: Timestamp::now(), level, event, rest }).unwrap_or_default()
 }
 
-/// Something said in passing.
+/// A note.
 pub(crate) fn note(text: &str) -> String {
     line("info", "note", json!({ "message": text }))
 }
 
-/// What is wrong with something.
+/// A diagnostic.
 pub(crate) fn diagnostic(diagnostic: &Diagnostic) -> String {
     line("error", "complaint", serde_json::to_value(diagnostic).unwrap_or_default())
 }
 
-/// What happens while a run goes on.
+/// An event of a run.
 pub(crate) fn event(event: &Event) -> String {
     match event {
         Event::Planned { logs, bytes } => line("info", "planned", json!({ "logs": logs, "bytes": bytes })),

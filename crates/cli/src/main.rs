@@ -1,7 +1,7 @@
-//! `freeplay`: the backlash gap of flight-control actuators, from the logs a fleet records anyway.
+//! `freeplay`: estimates actuator backlash from flight logs and forecasts when each unit reaches its limit.
 //!
-//! This crate parses, calls and answers. Only it prints, exits and reads the environment: answers go
-//! to stdout, progress and diagnostics to stderr.
+//! This crate parses arguments, calls the libraries and formats their results. Only it prints, exits and reads
+//! the environment: results go to stdout, progress and diagnostics to stderr.
 
 mod args;
 mod commands;
@@ -27,7 +27,7 @@ use records::Diagnostic;
 fn main() -> ExitCode {
     let args = match Args::try_parse() {
         Ok(args) => args,
-        // Help and version are answers; anything else is a usage error, and clap says which.
+        // Help and version go to stdout with code 0; other parser errors are usage errors.
         Err(error) => {
             let _ = error.print();
             return if error.use_stderr() { Code::Usage.into() } else { Code::Success.into() };
@@ -35,11 +35,12 @@ fn main() -> ExitCode {
     };
     ignore_file_size_signal();
     let output = Output::new(&args.global);
-    // A panic while reading a log becomes a diagnostic about that log; its backtrace would help nobody.
-    std::panic::set_hook(Box::new(|_| {}));
-    let ended = std::panic::catch_unwind(|| dispatch(&args, &output)).unwrap_or_else(|_| {
-        let diagnostic = Diagnostic::new("panic", "the program failed in a way that should not happen");
-        Err(Failure::failed(diagnostic.hint("what was stored before is intact; please report the command")))
+    // A panic becomes a diagnostic with its message and location; `RUST_BACKTRACE=1` prints the backtrace too.
+    job::panic::install_hook();
+    let ended = std::panic::catch_unwind(|| dispatch(&args, &output)).unwrap_or_else(|caught| {
+        let message = format!("internal error: {}", job::panic::describe(caught.as_ref()));
+        let hint = "stored results are intact; please report this message with the command";
+        Err(Failure::failed(Diagnostic::new("panic", message).hint(hint)))
     });
     match ended {
         Ok(code) => code.into(),
@@ -47,14 +48,13 @@ fn main() -> ExitCode {
     }
 }
 
-/// A file that outgrows its limit should fail to be written and be complained of, not end the process
-/// without a word, as the signal does by default.
+/// Ignores the file-size signal: a write beyond the limit must fail with an error instead of killing the process.
 fn ignore_file_size_signal() {
     #[cfg(unix)]
     {
-        let heard = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
-        // Where it cannot be registered things stay as they are.
-        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, heard);
+        let received = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
+        // Without registration, the default action of the signal stays.
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, received);
     }
 }
 

@@ -1,4 +1,4 @@
-//! How the program speaks: answers to stdout, everything else to stderr, colour only where it is wanted.
+//! Console output: results to stdout, messages to stderr, colour only on terminals.
 
 use std::io::{self, IsTerminal, Write};
 
@@ -10,15 +10,15 @@ use crate::args::{Color, Global, LogFormat};
 use crate::exit::{Code, Failure};
 use crate::json_log;
 
-/// Of alike diagnostics so many are shown whole.
+/// Maximum number of diagnostics of one code that are shown in full.
 const SHOWN_WHOLE: usize = 3;
 
-/// Whether a person sits at the other end: a pipe on any side gets no bar and no colour.
+/// Whether all three streams are terminals: only then are progress bars and colour used.
 pub(crate) fn is_attended() -> bool {
     io::stdin().is_terminal() && io::stdout().is_terminal() && io::stderr().is_terminal()
 }
 
-/// The voice of the program.
+/// Console output with its verbosity, colour and format.
 #[derive(Debug, Clone)]
 pub(crate) struct Output {
     quiet: bool,
@@ -29,7 +29,7 @@ pub(crate) struct Output {
 }
 
 impl Output {
-    /// Listens to the options, the terminal and `NO_COLOR`.
+    /// Sets up the output from the options, the terminal and `NO_COLOR`.
     pub(crate) fn new(global: &Global) -> Self {
         let auto = std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) && is_attended();
         let color_err = match global.color {
@@ -52,15 +52,15 @@ impl Output {
         self.progress
     }
 
-    /// Whether more should be said.
+    /// Whether output is verbose.
     pub(crate) fn is_verbose(&self) -> bool {
         self.verbose > 0
     }
 
-    /// Writes an answer to stdout.
+    /// Writes a result to stdout.
     ///
     /// # Errors
-    /// When stdout is closed or full.
+    /// If stdout is closed or full.
     #[expect(clippy::unused_self, reason = "only who holds the voice may speak")]
     pub(crate) fn write_result(&self, text: &str) -> Result<(), Failure> {
         let mut out = io::stdout().lock();
@@ -68,14 +68,14 @@ impl Output {
         Ok(out.flush()?)
     }
 
-    /// Says something in passing, on stderr.
+    /// Writes a note to stderr.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
             self.err(&if self.is_json() { json_log::note(text) } else { text.to_owned() });
         }
     }
 
-    /// Tells whoever collects logs what happens while a run goes on; people see its progress instead.
+    /// Writes an event of a run as a JSON line; in text format the progress is shown instead.
     pub(crate) fn event(&self, event: &Event) {
         if self.is_json() && !self.quiet {
             self.err(&json_log::event(event));
@@ -103,7 +103,7 @@ impl Output {
         }
         let more = seen.into_iter().filter(|(_, count)| *count > SHOWN_WHOLE && !self.shows_all());
         more.for_each(|(code, count)| {
-            self.err(&format!("{} more like it [{code}]; -v shows all", count - SHOWN_WHOLE));
+            self.err(&format!("{} more [{code}]; use -v to list them", count - SHOWN_WHOLE));
         });
     }
 
@@ -115,12 +115,12 @@ impl Output {
         self.is_verbose() || self.is_json()
     }
 
-    /// Tells why a command could not answer.
+    /// Reports why a command failed and returns its exit code.
     pub(crate) fn failure(&self, failure: &Failure) -> Code {
         match failure {
             Failure::Refused(diagnostics) => {
                 self.diagnostics(diagnostics);
-                self.note("nothing was run");
+                self.note("no changes were made");
             }
             Failure::Failed(diagnostic) => self.diagnostic(diagnostic),
             Failure::PipeClosed => {}
@@ -128,14 +128,14 @@ impl Output {
         failure.code()
     }
 
-    /// Nobody can be told that stderr is closed.
+    /// Writes to stderr; a closed stderr is ignored.
     #[expect(clippy::unused_self, reason = "only who holds the voice may speak")]
     fn err(&self, text: &str) {
         let _ = writeln!(io::stderr().lock(), "{text}");
     }
 }
 
-/// Makes control characters visible: a name from a log must not move the cursor or paint the screen.
+/// Escapes control characters: a name from a log must not move the cursor or change colours.
 pub(crate) fn escape(text: &str) -> String {
     let shown =
         |c: char| if c.is_control() && c != '\n' { c.escape_default().to_string() } else { c.to_string() };

@@ -1,4 +1,4 @@
-//! Progress of long work: a bar on a terminal, sparse whole lines without one, nothing when quiet.
+//! Progress of a long command: a bar on a terminal, a line now and then without one, nothing with `--quiet`.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -9,10 +9,10 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use crate::output::{Output, is_attended};
 
-/// Without a terminal, one line in this time at most.
+/// Minimum interval between progress lines without a terminal.
 const SPARSE: Duration = Duration::from_secs(30);
 
-/// Progress of one piece of work.
+/// Progress of one command.
 pub(crate) struct Progress<'t> {
     name: &'static str,
     output: &'t Output,
@@ -32,7 +32,7 @@ struct State {
 }
 
 impl<'t> Progress<'t> {
-    /// Nothing is shown before [`Progress::total`] is known.
+    /// Starts hidden, until [`Progress::total`] is called.
     pub(crate) fn new(name: &'static str, output: &'t Output) -> Self {
         let terminal = is_attended();
         let target = if output.shows_progress() && terminal {
@@ -59,7 +59,7 @@ impl<'t> Progress<'t> {
         }
     }
 
-    /// So much is to be done.
+    /// Sets the number of items.
     pub(crate) fn total(&self, total: usize) {
         self.update(|state| {
             state.total = total as u64;
@@ -77,14 +77,14 @@ impl<'t> Progress<'t> {
         self.bar.enable_steady_tick(Duration::from_millis(200));
     }
 
-    /// A worker took a piece.
+    /// Records that a worker started an item.
     pub(crate) fn started(&self, piece: &str) {
         self.update(|state| {
             state.in_hand.insert(piece.to_owned());
         });
     }
 
-    /// A piece is finished.
+    /// Records that an item is finished.
     pub(crate) fn finished(&self, piece: &str, refused: usize, errors: usize) {
         let message = self.update(|state| {
             state.in_hand.remove(piece);
@@ -100,17 +100,17 @@ impl<'t> Progress<'t> {
         self.tell();
     }
 
-    /// The bar goes away; what follows is the answer.
+    /// Removes the bar before the result is printed.
     pub(crate) fn end(&self) {
         self.bar.finish_and_clear();
     }
 
     fn update<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
-        // A panic elsewhere must not take the progress with it: the numbers are still right.
+        // A panic in another thread must not stop the progress display: the numbers are still right.
         change(&mut self.state.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
     }
 
-    /// A plain line, the first at once, then one each half minute.
+    /// Prints a plain progress line: the first at once, then every 30 s.
     fn tell(&self) {
         if self.terminal || !self.output.shows_progress() {
             return;
@@ -142,7 +142,7 @@ fn line(name: &str, state: &State) -> String {
     )
 }
 
-/// A span of time as people say it.
+/// Duration as text.
 pub(crate) fn span(span: Duration) -> String {
     match span.as_secs() {
         0 => format!("{:.1} s", span.as_secs_f64()),

@@ -1,7 +1,7 @@
-//! Rows for machines: one Arrow batch, written as JSON, CSV or Parquet.
+//! Row output: a table for readers, or one Arrow batch as JSON, CSV or Parquet.
 
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
 
 use arrow::array::{Array, AsArray, RecordBatch, StringArray};
@@ -18,10 +18,10 @@ use crate::args::{Format, RowFormatArgs};
 use crate::exit::Failure;
 use crate::output::Output;
 
-/// Answers with rows: people get `table`, machines get `batch`; to a file where one is named.
+/// Writes `table` or `batch` in the selected format to stdout or a file.
 ///
 /// # Errors
-/// When the answer cannot be written.
+/// If the output cannot be written.
 pub(crate) fn write_rows(
     format: &RowFormatArgs,
     output: &Output,
@@ -31,6 +31,11 @@ pub(crate) fn write_rows(
     match (format.format(), &format.output) {
         (Format::Table, None) => output.write_result(&table()),
         (Format::Table, Some(file)) => to_file(file, |out| Ok(out.write_all(table().as_bytes())?)),
+        (Format::Parquet, None) if io::stdout().is_terminal() => Err(Failure::usage(
+            "binary_output",
+            "Parquet is binary and is not written to a terminal",
+            "add `--output FILE`, or redirect stdout",
+        )),
         (format, None) => write(&batch()?, format, &mut io::stdout()),
         (format, Some(file)) => {
             let batch = batch()?;
@@ -39,7 +44,7 @@ pub(crate) fn write_rows(
     }
 }
 
-/// Writes beside and renames, so that nobody meets half an answer.
+/// Writes to a temporary file and renames it, so that no reader finds half a file.
 pub(crate) fn to_file(
     file: &std::path::Path,
     fill: impl FnOnce(&mut File) -> Result<(), Failure>,
@@ -50,7 +55,7 @@ pub(crate) fn to_file(
     beside.persist(file).map(drop).map_err(|e| not_written(file, &e.error))
 }
 
-/// Readable by whom the user's mask allows, as any file a command writes.
+/// Temporary file with the permissions of the user's umask.
 fn shared() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
@@ -60,14 +65,12 @@ fn shared() -> tempfile::Builder<'static, 'static> {
 
 fn not_written(file: &std::path::Path, error: &io::Error) -> Failure {
     let (why, hint) = match error.kind() {
-        io::ErrorKind::NotFound => ("there is no such folder".to_owned(), "make the folder first"),
-        io::ErrorKind::PermissionDenied => {
-            ("this user may not write there".to_owned(), "name another folder")
-        }
-        io::ErrorKind::StorageFull => ("the disk is full".to_owned(), "make room, or name another folder"),
-        _ => (error.to_string(), "can a file be written there?"),
+        io::ErrorKind::NotFound => ("no such folder".to_owned(), "create the folder first"),
+        io::ErrorKind::PermissionDenied => ("permission denied".to_owned(), "choose another folder"),
+        io::ErrorKind::StorageFull => ("the disk is full".to_owned(), "free space, or choose another folder"),
+        _ => (error.to_string(), "check that the folder is writable"),
     };
-    let what = format!("the answer cannot be written: {why}");
+    let what = format!("the output cannot be written: {why}");
     Failure::failed(Diagnostic::new("output_failed", what).in_file(file.display()).hint(hint))
 }
 
@@ -97,10 +100,10 @@ fn broken(error: &arrow::error::ArrowError) -> Failure {
     if error.to_string().contains("Broken pipe") {
         return Failure::PipeClosed;
     }
-    Failure::failed(Diagnostic::new("output_failed", format!("the answer cannot be written: {error}")))
+    Failure::failed(Diagnostic::new("output_failed", format!("the output cannot be written: {error}")))
 }
 
-/// CSV has no lists: theirs become text, its items parted by semicolons, other nests JSON.
+/// Flattens lists for CSV: scalar items are separated by semicolons, nested ones written as JSON.
 fn flat(batch: &RecordBatch) -> Result<RecordBatch, Failure> {
     let (mut fields, mut columns) = (Vec::new(), Vec::new());
     for (field, column) in batch.schema().fields().iter().zip(batch.columns()) {
@@ -130,10 +133,10 @@ fn joined(column: &Arc<dyn Array>) -> Result<Arc<dyn Array>, Failure> {
     Ok(Arc::new(StringArray::from(rows)))
 }
 
-/// Rows of any serializable kind as a batch of a stated schema.
+/// Converts serialisable rows to a batch of a schema.
 ///
 /// # Errors
-/// When a value does not fit its column.
+/// If a value does not fit its column.
 pub(crate) fn batch<T: Serialize>(schema: &SchemaRef, rows: &[T]) -> Result<RecordBatch, Failure> {
     pipeline::rows::batch(schema, rows).map_err(|e| broken(&e))
 }

@@ -1,13 +1,13 @@
-//! A row of numbers as a word: `▁▂▃▅▇`.
+//! Sparkline: a series of numbers as `▁▂▃▅▇`.
 
-/// Eight heights.
+/// Characters by height.
 const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
-/// Longest sparkline, characters.
+/// Maximum length, characters.
 const WIDTH: usize = 12;
-/// The whole height is no less than this share of the largest value, so that noise does not look like growth.
+/// Minimum full scale as a share of the largest value, so that noise does not look like growth.
 const LEAST_SHARE: f64 = 0.2;
 
-/// Heights of at most twelve means of neighbours, oldest first; empty for fewer than two values.
+/// Sparkline of at most twelve means of neighbours, oldest first; empty for fewer than two values.
 pub(crate) fn sparkline(values: &[f64]) -> String {
     if values.len() < 2 {
         return String::new();

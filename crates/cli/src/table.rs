@@ -1,4 +1,4 @@
-//! Tables for people: as wide as the terminal, the least important columns left out first.
+//! Text tables: fitted to the terminal by hiding the least important columns first.
 
 use comfy_table::{CellAlignment, Table as Grid};
 
@@ -6,31 +6,31 @@ use crate::output::escape;
 
 /// Blanks between two columns.
 const GAP: usize = 2;
-/// Text is not cut to less than this.
+/// Minimum width to which text is cut.
 const LEAST_TEXT: usize = 6;
 
 /// A column of a table.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Column {
-    /// Its heading, with its unit.
+    /// Heading, with the unit in brackets.
     pub heading: &'static str,
-    /// Numbers stand to the right.
+    /// Whether the column is right-aligned.
     pub right: bool,
-    /// 0 stays longest.
+    /// Rank: 0 is hidden last.
     pub rank: u8,
 }
 
-/// Text to the left.
+/// Left-aligned text column.
 pub(crate) const fn text(heading: &'static str, rank: u8) -> Column {
     Column { heading, right: false, rank }
 }
 
-/// Numbers to the right.
+/// Right-aligned number column.
 pub(crate) const fn number(heading: &'static str, rank: u8) -> Column {
     Column { heading, right: true, rank }
 }
 
-/// Lays out rows within the width of the terminal; a pipe gets everything.
+/// Lays out rows within the width of the terminal; a pipe gets all columns.
 pub(crate) fn layout(columns: &[Column], rows: &[Vec<String>]) -> String {
     within(columns, rows, terminal_width())
 }
@@ -48,7 +48,11 @@ fn within(columns: &[Column], rows: &[Vec<String>], width: usize) -> String {
     let mut text = grid(columns, rows, &kept, &widths(columns, rows, &kept, width));
     text.push('\n');
     if kept.len() < columns.len() {
-        let note = format!("{} of {} columns fit here; a pipe gets all\n", kept.len(), columns.len());
+        let note = format!(
+            "{} columns shown ({} hidden; widen the terminal or use --format csv)\n",
+            kept.len(),
+            columns.len() - kept.len()
+        );
         text.push_str(&note);
     }
     text
@@ -75,7 +79,7 @@ fn grid(columns: &[Column], rows: &[Vec<String>], kept: &[usize], widths: &[usiz
     lines.join("\n")
 }
 
-/// Text that is too long for its column: a path keeps its end, a sentence its beginning.
+/// Shortens text to a width: a path keeps its end, other text its beginning.
 fn shortened(text: &str, width: usize) -> String {
     let length = text.chars().count();
     if length <= width {
@@ -87,7 +91,7 @@ fn shortened(text: &str, width: usize) -> String {
     }
 }
 
-/// How wide each column may be: text gives way, the widest first; a number is never cut.
+/// Column widths: text columns are narrowed, the widest first; numbers are never cut.
 fn widths(columns: &[Column], rows: &[Vec<String>], kept: &[usize], width: usize) -> Vec<usize> {
     let mut widths: Vec<usize> = kept.iter().map(|&i| wide(columns, rows, i)).collect();
     let least: Vec<usize> = kept.iter().map(|&i| least(columns, rows, i)).collect();
@@ -99,7 +103,7 @@ fn widths(columns: &[Column], rows: &[Vec<String>], kept: &[usize], width: usize
     widths
 }
 
-/// What a column may be cut to: the last digit in any of its cells stays, but for paths, which keep their end.
+/// Minimum width of a column: the last digit of every cell stays visible, except in paths, which keep their end.
 fn least(columns: &[Column], rows: &[Vec<String>], i: usize) -> usize {
     if columns[i].right {
         return usize::MAX;
@@ -122,7 +126,7 @@ fn needed(columns: &[Column], rows: &[Vec<String>], kept: &[usize]) -> usize {
     kept.iter().map(|&i| wide(columns, rows, i) + GAP).sum::<usize>().saturating_sub(GAP)
 }
 
-/// Columns of the terminal on stdout; a pipe has no edge.
+/// Width of the terminal on stdout; unlimited for a pipe.
 fn terminal_width() -> usize {
     let columns = console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
     columns.unwrap_or(usize::MAX)
@@ -138,7 +142,7 @@ pub(crate) fn hours(h: Option<f64>) -> String {
     h.map_or_else(empty_cell, |h| format!("{h:.0}"))
 }
 
-/// What stands where nothing is known.
+/// Text of an empty cell.
 pub(crate) fn empty_cell() -> String {
     "–".to_owned()
 }
@@ -148,7 +152,7 @@ pub(crate) fn count(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
-/// A state as word and shape, told apart without colour.
+/// State as shape and word, distinguishable without colour.
 pub(crate) fn state_mark(state: Option<&str>) -> String {
     let shape = match state {
         Some("act") => "◆",
@@ -183,7 +187,7 @@ mod tests {
             let table = within(&COLUMNS, &rows(), width);
             assert!(table.lines().all(|line| line.chars().count() <= width), "{width}:\n{table}");
             assert!(table.contains("103.25") && table.contains("0.99856") && table.contains("0413.parquet"));
-            assert_eq!(table.lines().count(), if table.contains("fit here") { 4 } else { 3 }, "{table}");
+            assert_eq!(table.lines().count(), if table.contains("hidden") { 4 } else { 3 }, "{table}");
         }
     }
 

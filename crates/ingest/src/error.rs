@@ -67,13 +67,13 @@ pub enum ErrorKind {
     #[error("the clocks `{column}` and `{other}` cannot be brought together")]
     ClocksDiffer { column: String, other: String },
     /// A log that Freeplay normalized does not fit the settings any more.
-    #[error("this normalized log was made otherwise: {detail}")]
+    #[error("normalized log was written with other settings: {detail}")]
     Normalized { detail: String },
     /// A column is there, but its type holds no numbers.
     #[error("column `{column}` holds {found}, not {wanted}")]
     ColumnType { column: String, found: String, wanted: &'static str },
     /// No column fits the `{position}` patterns.
-    #[error("no actuator is found: no column fits `{pattern}`")]
+    #[error("no column matches `{pattern}`")]
     NoPosition { pattern: String, columns: Vec<String> },
     /// The time column needs a unit, or has one that contradicts it.
     #[error("the unit of the time column `{column}` is not known")]
@@ -82,22 +82,22 @@ pub enum ErrorKind {
     #[error("the log has no clock: neither `clock.column` nor `clock.rate_hz` is given")]
     NoClock,
     /// Stamps fall further than allowed.
-    #[error("the clock runs backwards")]
+    #[error("time runs backwards")]
     TimeGoesBack { column: String, row: u64, before_s: f64, after_s: f64, max_back_s: f64, times: u64 },
     /// The stamps tell of another rate than was declared.
-    #[error("the stamps tell of another rate than `clock.rate_hz`")]
+    #[error("timestamps give {seen_hz} Hz but `clock.rate_hz` = {declared_hz}")]
     RateContradicts { column: String, declared_hz: f64, seen_hz: f64 },
     /// No two stamps differ.
-    #[error("the clock stands still")]
+    #[error("time does not advance")]
     TimeStandsStill { column: String, rows: u64 },
     /// A channel has no value at all.
     #[error("column `{column}` holds no value in {rows} rows")]
     AllMissing { column: String, rows: u64 },
     /// A length was mapped for a part that turns, or an angle for a part whose lead is not given.
-    #[error("column `{column}` is logged in {unit}, which this part cannot be brought to the screw from")]
+    #[error("column `{column}` is logged in {unit}, which cannot be converted to screw travel for this part")]
     UnitForPart { column: String, unit: &'static str, wanted: &'static str },
     /// No source states a fact that is needed.
-    #[error("the log does not say its {fact}")]
+    #[error("cannot determine {fact} for this log")]
     IdentityMissing { fact: &'static str, looked: Vec<String> },
     /// A fact that cannot be read.
     #[error("`{found}` is no {fact}: {detail}")]
@@ -215,15 +215,12 @@ impl ErrorKind {
         let text = match self {
             Self::Unreadable { source } => return missing_remedy(source),
             Self::Object(source) => return source.remedy().into(),
-            Self::Empty => {
-                "was the recorder on? Such a file can be deleted or left; it is not tried again until it changes"
-            }
+            Self::Empty => "file is empty; delete it or ignore it. It is skipped until it changes",
             Self::NotParquet { .. } => {
-                "was the copy cut short, or is it a file of another kind? Copy it again, or have `logs.files` pass \
-                 it over, then `freeplay run --retry`"
+                "copy the file again, or exclude it in `logs.files`; then `freeplay run --retry`"
             }
             Self::Decode { .. } | Self::RowCount { .. } => {
-                "the file is damaged: fetch it again from where it was recorded, then `freeplay run --retry`"
+                "the file is corrupt: fetch it again from the recorder, then `freeplay run --retry`"
             }
             Self::ColumnMissing { nearest: Some(near), .. } => {
                 return format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`");
@@ -231,46 +228,44 @@ impl ErrorKind {
             Self::TableColumn { nearest: Some(near), .. } => {
                 return format!("`{near}`? A table may call its columns otherwise: see `[columns]`");
             }
-            Self::TableColumn { .. } => {
-                "a table may call its columns otherwise: see `[columns]` in docs/configuration.md"
-            }
+            Self::TableColumn { .. } => "map the column names under `[columns]` (docs/configuration.md)",
             Self::ColumnMissing { .. } => "names are mapped under `[channel]`, `[clock]` and `[identity]`",
             Self::ColumnType { .. } => "map another column, or have the recorder write numbers",
             Self::GroupMissing { .. } => {
-                "is its file late? Files find each other by tail and flight (`freeplay check` shows what each says)"
+                "check that the file has arrived and has the same tail and flight (see `freeplay check`)"
             }
             Self::ListLengths { .. } => "channels in lists must hold as many samples in every row",
             Self::ClocksDiffer { .. } => {
                 "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`"
             }
-            Self::Normalized { .. } => "make it again from the recorder's log: `freeplay normalize`",
+            Self::Normalized { .. } => "write it again from the recorded log: `freeplay normalize`",
             Self::NoPosition { pattern, .. } if pattern.contains('{') && !pattern.contains(PLACEHOLDER) => {
-                return format!("the word that stands for a place is {PLACEHOLDER}");
+                return format!("the placeholder of the position is {PLACEHOLDER}");
             }
             Self::NoPosition { pattern, columns } => {
                 let meant = columns.iter().map(|c| (strsim::jaro_winkler(pattern, c), c));
                 return match meant.max_by(|a, b| a.0.total_cmp(&b.0)) {
                     Some((_, near)) => format!(
-                        "what stands for {PLACEHOLDER} in `{near}`? Names are mapped under `[channel]`"
+                        "closest column: `{near}`. Fix `column` under `[channel]`: {PLACEHOLDER} stands for the position"
                     ),
                     None => "names are mapped under `[channel]`".into(),
                 };
             }
-            Self::TimeUnit { .. } => "a wrong unit puts a flight in 1970, so it is never guessed",
+            Self::TimeUnit { .. } => "set `clock.unit` to s, ms, us or ns",
             Self::NoClock => "name the time column, or give the rate when rows are evenly spaced",
             Self::TimeGoesBack { .. } => {
-                "two recorder segments in one file? Split it, or raise `clock.max_back_s`"
+                "split the file if it holds two recorder segments, or raise `clock.max_back_s`"
             }
             Self::RateContradicts { .. } => {
-                "is `clock.unit` right? Leave `clock.rate_hz` out to take the stamps' own"
+                "check `clock.unit`; omit `clock.rate_hz` to use the rate of the timestamps"
             }
-            Self::TimeStandsStill { .. } => "map the column that counts, or give `clock.rate_hz` alone",
-            Self::AllMissing { .. } => "was the sensor connected? Map the other of two redundant channels",
+            Self::TimeStandsStill { .. } => "map the column with the time, or give only `clock.rate_hz`",
+            Self::AllMissing { .. } => "check the sensor, or map the redundant channel",
             Self::UnitForPart { .. } => {
                 "give the part `lead_m_per_rev`, or `kind = \"rotary\"` with `reference_radius_m`"
             }
             Self::IdentityMissing { .. } => {
-                "say under `[identity]` where it stands: `metadata`, `columns` or `path`"
+                "set its source under `[identity]`: `metadata`, `columns` or `path`"
             }
             Self::IdentityInvalid { .. } => "see `identity.departure_format` and `identity.time_zone`",
             Self::IdentityChanges { .. } => "a log must hold one flight: split it by this column",
@@ -283,8 +278,8 @@ impl ErrorKind {
 /// What the system said, in words of our own for the two cases that everybody meets.
 fn unreadable(source: &io::Error) -> String {
     match source.kind() {
-        io::ErrorKind::NotFound => "there is no such file".into(),
-        io::ErrorKind::PermissionDenied => "this user may not read the file".into(),
+        io::ErrorKind::NotFound => "no such file".into(),
+        io::ErrorKind::PermissionDenied => "permission denied".into(),
         io::ErrorKind::IsADirectory => "this is a folder, not a file".into(),
         _ => format!("the file cannot be read: {source}"),
     }
@@ -292,17 +287,17 @@ fn unreadable(source: &io::Error) -> String {
 
 fn missing_remedy(source: &io::Error) -> String {
     match source.kind() {
-        io::ErrorKind::NotFound => "is the name right, and the disk or share there?",
-        io::ErrorKind::PermissionDenied => "who runs this command needs to read it: see its owner and mode",
+        io::ErrorKind::NotFound => "check the name, and that the disk or share is mounted",
+        io::ErrorKind::PermissionDenied => "run as a user with read access, or change the file mode",
         io::ErrorKind::IsADirectory => "name the file, or the files in it: `FOLDER/*.parquet`",
-        _ => "is the disk sound?",
+        _ => "check the disk",
     }
     .into()
 }
 
 /// The places where a fact was looked for.
 fn told(places: &[String]) -> String {
-    if places.is_empty() { "nothing: `[identity]` names no place for it".into() } else { places.join(", ") }
+    if places.is_empty() { "nowhere: `[identity]` has no source for it".into() } else { places.join(", ") }
 }
 
 /// A list a person can take in: the first eight, and how many more there are.

@@ -14,7 +14,7 @@ use records::{
 
 use crate::config::Config;
 use crate::config::part::Part;
-use crate::estimate;
+use crate::{estimate, panic};
 
 /// What a run writes on everything it makes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -441,21 +441,18 @@ fn flight_of(id: &Identity) -> Flight {
     }
 }
 
-/// Does something with one log; a panic in it is a diagnostic like any other.
+/// Runs work on one log; a panic becomes a diagnostic with its message and location.
 ///
 /// # Errors
-/// What the work complains of, or code `panic`.
+/// The error of the work, or code `panic`.
 pub fn catch_panic<T>(
     display_name: &str,
     work: impl FnOnce() -> Result<T, Diagnostic>,
 ) -> Result<T, Diagnostic> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<&str>().copied();
-        let text =
-            text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message");
-        let what = format!("reading this log failed in a way that should not happen: {text}");
-        Err(Diagnostic::new("panic", what)
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|caught| {
+        let message = format!("internal error while reading this log: {}", panic::describe(caught.as_ref()));
+        Err(Diagnostic::new("panic", message)
             .in_file(display_name)
-            .hint("the file is probably damaged; please report it with the file"))
+            .hint("the file is probably corrupt; please report this message with the file"))
     })
 }

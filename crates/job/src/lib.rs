@@ -9,6 +9,7 @@ pub mod estimate_plot_data;
 pub mod filter_cache;
 pub mod flight_log;
 pub mod normalize;
+pub mod panic;
 pub mod part_identification;
 pub mod trace;
 

@@ -40,7 +40,7 @@ impl StateBadge {
             Self::Plan => "plan",
             Self::Watch => "watch",
             Self::Normal => "normal",
-            Self::NotAssessed => "without a statement",
+            Self::NotAssessed => "not assessed",
         }
     }
 

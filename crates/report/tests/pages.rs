@@ -78,7 +78,7 @@ fn a_hostile_name_is_shown_and_not_run() {
 fn a_unit_without_a_statement_is_never_called_normal() {
     let report = report(vec![unit("A", None)]);
     let html = text(&unit_page(&report, &RateSpreads::of(&report), &report.units[0]).unwrap());
-    assert!(html.contains("without a statement") && html.contains("no data") && !html.contains("normal"));
+    assert!(html.contains("not assessed") && html.contains("no data") && !html.contains("normal"));
 }
 
 #[test]

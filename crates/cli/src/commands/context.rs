@@ -9,23 +9,22 @@ use crate::args::{CONFIG, ExternalEstimatesArgs, Global};
 use crate::exit::Failure;
 use crate::output::Output;
 
-/// The version written into every record.
+/// Version written into every record.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The configuration that the options name.
+/// Reads the configuration files named by the options.
 pub(crate) fn load_config(global: &Global) -> Result<Config, Failure> {
     Config::read_layers(&global.config).map_err(Failure::Refused)
 }
 
-/// The configuration and its installations table.
+/// Reads the configuration and its installations table.
 pub(crate) fn load_with_installations(global: &Global) -> Result<(Config, Installations), Failure> {
     let config = load_config(global)?;
     let installations = pipeline::run::scheduler::installations(&config)?;
     Ok((config, installations))
 }
 
-/// What statements need of a configuration and its installations table. For a table of estimates made elsewhere
-/// there need not be one.
+/// Reads configuration and installations for trends. An external table of estimates needs neither.
 pub(crate) fn load_trend_context(
     external: &ExternalEstimatesArgs,
     global: &Global,
@@ -34,7 +33,7 @@ pub(crate) fn load_trend_context(
     let is_none_named = matches!(&global.config[..], [file] if file.as_os_str() == CONFIG && !file.exists());
     let (mut config, installations) = if external.estimates.is_some() && is_none_named {
         if external.limit_m.is_none() {
-            output.note("no pipeline.toml here: judged without a limit, so without states; `--limit-m 150e-6` gives one");
+            output.note("no pipeline.toml here and no limit, so no states; set one with `--limit-m 150e-6`");
         }
         (Config::without_logs(), Installations::default())
     } else {
@@ -44,7 +43,7 @@ pub(crate) fn load_trend_context(
     Ok((config, installations))
 }
 
-/// A path as people see it.
+/// Path as text for messages.
 pub(crate) fn display_path(path: &Path) -> String {
     path.display().to_string()
 }

@@ -39,7 +39,7 @@ fn torn(source: &ByteSource, error: &ParquetError) -> String {
     match (length, &head) {
         (Ok(Ok(4)), b"PAR1") => {
             let detail = error.to_string();
-            format!("its end is torn ({})", detail.trim_start_matches("Parquet error: "))
+            format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: "))
         }
         (Ok(Ok(4)), b"PARE") => "it is encrypted".into(),
         _ => "it does not begin as one".into(),

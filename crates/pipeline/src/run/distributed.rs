@@ -58,7 +58,7 @@ struct TaskResult {
     refused: i64,
     duration_s: f64,
     processed_utc: Timestamp,
-    #[serde(rename = "diagnostics")]
+    #[serde(rename = "complaints")]
     diagnostics: Vec<Diagnostic>,
 }
 

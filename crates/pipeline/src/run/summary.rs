@@ -19,7 +19,7 @@ pub struct LogError {
     /// The log.
     pub log: String,
     /// What is wrong with it.
-    #[serde(rename = "diagnostic")]
+    #[serde(rename = "complaint")]
     pub diagnostic: Diagnostic,
 }
 

@@ -37,8 +37,8 @@ fn draw(
         .bold_line_style(GRID)
         .axis_style(INK)
         .label_style(("sans-serif", 13).into_font().color(&INK))
-        .x_desc("inspection µm")
-        .y_desc("estimate µm")
+        .x_desc("Inspection [µm]")
+        .y_desc("Estimate [µm]")
         .draw()?;
     let shifted = |by_um: f64| [(low.max(low - by_um), low.max(low - by_um) + by_um), upper(high, by_um)];
     chart.draw_series(LineSeries::new(shifted(0.0), INK.stroke_width(1)))?;

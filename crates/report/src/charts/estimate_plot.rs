@@ -186,7 +186,7 @@ fn draw_positions(area: &Area<'_>, plot: &EstimatePlot, end_s: f64) -> Result<()
     let (low, high) = span(plot.dx_m.iter().chain(&plot.s_m).map(|v| to_um(*v)));
     let floor = low - 0.06 * (high - low);
     let mut chart =
-        axes(area, (0.0, end_s), (floor - 0.04 * (high - low), high), ("", "µm from the middle"))?;
+        axes(area, (0.0, end_s), (floor - 0.04 * (high - low), high), ("", "backlash S, δX [µm]"))?;
     let curve = |values: &[f64]| curve(values, plot.step_s, to_um);
     for piece in curve(&plot.dx_m) {
         chart.draw_series(LineSeries::new(piece, FAINT))?;
@@ -214,7 +214,7 @@ fn draw_positions(area: &Area<'_>, plot: &EstimatePlot, end_s: f64) -> Result<()
 fn draw_load(area: &Area<'_>, plot: &EstimatePlot, end_s: f64) -> Result<(), DrawError> {
     let kn = |v: f64| v / 1e3;
     let (low, high) = span(plot.load_n.iter().map(|v| kn(*v)));
-    let mut chart = axes(area, (0.0, end_s), (low, high), ("time s", "load kN"))?;
+    let mut chart = axes(area, (0.0, end_s), (low, high), ("time [s]", "load [kN]"))?;
     for piece in curve(&plot.load_n, plot.step_s, kn) {
         chart.draw_series(LineSeries::new(piece, INK))?;
     }
@@ -226,8 +226,7 @@ fn draw_flanks(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
     let to_um = |v: f64| (v - origin_m(plot)) * 1e6;
     let (low, high) = span(plot.contacts.iter().map(|s| to_um(s.dx_m)));
     let (left, right) = span(plot.contacts.iter().map(|s| s.force_n / 1e3));
-    let mut chart =
-        axes(area, (left, right), (low, high), ("force in the coupling kN", "δX, corrected, µm"))?;
+    let mut chart = axes(area, (left, right), (low, high), ("coupling force [kN]", "corrected δX [µm]"))?;
     let marks = |is_used: bool| {
         let which = downsampled(&plot.contacts).filter(move |s| s.is_used == is_used);
         which.map(move |s| {
@@ -243,7 +242,7 @@ fn draw_flanks(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
     }
     if plot.contacts.is_empty() {
         let style = ("sans-serif", 14).into_font().color(&INK);
-        area.draw(&Text::new("no contact was found", (150, 240), style))?;
+        area.draw(&Text::new("no contact found", (150, 240), style))?;
     }
     Ok(())
 }

@@ -66,7 +66,7 @@ fn draw(
         .label_style(("sans-serif", 13).into_font().color(&INK))
         .x_labels(7)
         .x_label_formatter(&|d| date_of(*d))
-        .y_desc("gap µm")
+        .y_desc("Gap [µm]")
         .draw()
         .map_err(plot_error)?;
     draw_flights(&mut chart, points).map_err(plot_error)?;

@@ -63,10 +63,10 @@ pub(crate) fn when(h: Option<f64>, at: Option<jiff::Timestamp>, unit: &UnitView)
     let s = &unit.assessment;
     match (h, at) {
         (Some(h), _) if h <= 0.0 => "now".to_owned(),
-        (Some(h), Some(at)) => format!("{} ({} h)", date(at), hours(h)),
-        (Some(h), None) => format!("{} h", hours(h)),
+        (Some(h), Some(at)) => format!("{} ({} FH)", date(at), hours(h)),
+        (Some(h), None) => format!("{} FH", hours(h)),
         (None, _) if s.limit_m.is_none() || s.gap_m.is_none() || s.state.is_none() => NO_DATA.to_owned(),
-        (None, _) => "beyond the horizon".to_owned(),
+        (None, _) => "after the forecast horizon".to_owned(),
     }
 }
 
@@ -87,6 +87,7 @@ struct FleetView {
     root: &'static str,
     title: String,
     footer: String,
+    heading: String,
     lead: String,
     counts: Vec<(StateBadge, String)>,
     data_summary: String,
@@ -188,18 +189,19 @@ fn index_page(
     Ok(FleetView {
         root: "",
         title: "Actuator free play".to_owned(),
+        heading: heading(report),
         footer: footer(report),
         lead: format!(
-            "{} · flights to {} · statements of {}",
+            "{} · data to {} · assessed {}",
             report.scope.as_deref().unwrap_or("Whole fleet"),
             minute_or(report.newest_departure_utc),
             minute_or(report.as_of_utc),
         ),
         counts: StateBadge::ALL.map(|s| (s, count(number(s)))).into(),
         data_summary: format!(
-            "{} read · {} in error · {} · {}",
+            "{} read · {} failed · {} · {}",
             counted(report.logs_known, "log"),
-            counted(report.log_errors.len(), "log"),
+            count(report.log_errors.len()),
             counted(report.tails.len(), "tail"),
             counted(report.units.len(), "unit"),
         ),
@@ -220,6 +222,15 @@ fn index_page(
         scatter: agreement_plot(&inspection_pairs(report))?,
         pairs,
     })
+}
+
+/// Heading of the fleet page: scope and date.
+fn heading(report: &Report) -> String {
+    let scope = report.scope.as_deref().unwrap_or("Fleet");
+    match report.as_of_utc {
+        Some(day) => format!("{scope}: actuator free play – {}", date(day)),
+        None => format!("{scope}: actuator free play"),
+    }
 }
 
 /// Units that need action, by earliest date.
@@ -272,9 +283,9 @@ fn changes(report: &Report) -> Vec<(String, String, String, String)> {
             let age = report.as_of_utc.map(|now| days_between(event.departure_utc, now));
             if age.is_some_and(|age| age <= 30.0) {
                 let books = match (event.is_on_record, event.is_tail_wide) {
-                    (true, _) => "in the books",
-                    (false, true) => "with the whole tail: sensor or recorder",
-                    (false, false) => "not in the books",
+                    (true, _) => "on record",
+                    (false, true) => "whole tail: sensor or recorder",
+                    (false, false) => "not on record",
                 };
                 add(
                     event.kind.clone(),
@@ -373,7 +384,7 @@ fn forecast_accuracy(report: &Report) -> Vec<(String, String, String)> {
     }
     let row = |(days, (held, all)): (i64, (usize, usize))| {
         (
-            format!("{days} days before"),
+            format!("{days} days"),
             format!("{} of {}", count(held), count(all)),
             percent(held as f64 / all as f64),
         )
@@ -392,10 +403,7 @@ fn inspection_pairs(report: &Report) -> Vec<(f64, f64)> {
 /// Agreement of estimates with hangar inspections: summary and pairs.
 fn inspection_agreement(report: &Report) -> (String, Pairs) {
     if !report.inspections_given {
-        return (
-            "No data: no table of inspections is configured (`logs.inspections`).".to_owned(),
-            Vec::new(),
-        );
+        return ("No data: no inspections table is configured (`logs.inspections`).".to_owned(), Vec::new());
     }
     let checks = || report.units.iter().flat_map(|u| u.inspections.iter().map(move |i| (u, i)));
     let pairs = inspection_pairs(report);

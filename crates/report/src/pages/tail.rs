@@ -36,9 +36,9 @@ pub fn tail_page(report: &Report, tail: &Tail) -> Result<Page, Error> {
         footer: crate::pages::fleet::footer(report),
         tail: name,
         facts: vec![
-            ("Flights in the store", count(tail.flights)),
-            ("Records", format!("{}, {} refused", count(tail.records), count(tail.refused))),
-            ("Logs in error", count(tail.logs_in_error)),
+            ("Flights", count(tail.flights)),
+            ("Records", format!("{}, {} rejected", count(tail.records), count(tail.refused))),
+            ("Failed logs", count(tail.logs_in_error)),
             ("Last flight", minute_or(tail.last_departure_utc)),
             ("Last estimate", minute_or(tail.last_estimate_utc)),
         ],

@@ -66,7 +66,7 @@ struct Flight {
 pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) -> Result<Page, Error> {
     let s = &unit.assessment;
     let forecast =
-        [("not before", s.not_before_utc), ("likely", s.likely_utc), ("not after", s.not_after_utc)];
+        [("earliest (5 %)", s.not_before_utc), ("median", s.likely_utc), ("latest (95 %)", s.not_after_utc)];
     let view = View {
         root: "../",
         title: format!("{} · actuator free play", unit.name()),
@@ -102,22 +102,17 @@ fn now(spreads: &RateSpreads<'_>, unit: &UnitView) -> Facts {
     let fleet = unit.part_number.as_deref().and_then(|part| spreads.part(part));
     let fleet = fleet.map_or_else(
         || NO_DATA.to_owned(),
-        |f| {
-            format!(
-                "median {}, 5 to 95 % {} to {}, {}",
-                rate(f.median),
-                rate(f.low),
-                rate(f.high),
-                counted(f.units, "unit")
-            )
-        },
+        |f| format!("{} ({} to {}), {}", rate(f.median), rate(f.low), rate(f.high), counted(f.units, "unit")),
     );
     vec![
         ("Gap now", level(s.gap_m, s.gap_se_m)),
         ("Act limit", s.limit_m.map_or_else(|| NO_DATA.to_owned(), |l| format!("{} µm", micrometres(l)))),
-        ("Share of limit", share(unit).map_or_else(|| NO_DATA.to_owned(), percent)),
-        ("Rate, µm per 1000 h", rates(s.rate_p05_m_per_hour, s.rate_m_per_hour, s.rate_p95_m_per_hour)),
-        ("Rate of this part's fleet", fleet),
+        ("% of limit", share(unit).map_or_else(|| NO_DATA.to_owned(), percent)),
+        (
+            "Rate [µm per 1000 FH], 90 % interval",
+            rates(s.rate_p05_m_per_hour, s.rate_m_per_hour, s.rate_p95_m_per_hour),
+        ),
+        ("Fleet rate [µm per 1000 FH]: median, 5–95 %, units", fleet),
         ("Trend", s.trend.clone()),
     ]
 }
@@ -134,14 +129,16 @@ fn rates(low: Option<f64>, middle: Option<f64>, high: Option<f64>) -> String {
 fn remaining(report: &Report, unit: &UnitView) -> Facts {
     let s = &unit.assessment;
     let flights = s.crossing_hours_p50.zip(s.hours_per_flight).map(|(h, per)| h / per);
-    let pace = s.hours_per_day.map_or_else(|| NO_DATA.to_owned(), |h| format!("{h:.1} h a day"));
+    let pace = s.hours_per_day.map_or_else(|| NO_DATA.to_owned(), |h| format!("{h:.1} FH/day"));
+    let check = probability_text(s, report.check_interval_hours);
+    let check = format!("{check} ({} FH)", hours(report.check_interval_hours));
     vec![
-        ("Not before", when(s.crossing_hours_p05, s.not_before_utc, unit)),
-        ("Likely", when(s.crossing_hours_p50, s.likely_utc, unit)),
-        ("Not after", when(s.crossing_hours_p95, s.not_after_utc, unit)),
-        ("Likely, in flights", flights.map_or_else(|| NO_DATA.to_owned(), |n| count(n.round() as usize))),
-        ("Limit met before the next check", probability_text(s, report.check_interval_hours)),
-        ("Use in the last 90 days", pace),
+        ("Earliest (5 %)", when(s.crossing_hours_p05, s.not_before_utc, unit)),
+        ("Median", when(s.crossing_hours_p50, s.likely_utc, unit)),
+        ("Latest (95 %)", when(s.crossing_hours_p95, s.not_after_utc, unit)),
+        ("Median, flights", flights.map_or_else(|| NO_DATA.to_owned(), |n| count(n.round() as usize))),
+        ("Chance of reaching the limit before the next check", check),
+        ("Utilisation, last 90 days", pace),
     ]
 }
 
@@ -177,7 +174,7 @@ fn events(unit: &UnitView) -> Vec<(String, String, String, &'static str)> {
 
 fn installations(unit: &UnitView) -> Vec<(String, String, String, String, String)> {
     let row = |s: &crate::model::Installation| {
-        let until = s.removed_utc.map_or_else(|| "still there".to_owned(), date);
+        let until = s.removed_utc.map_or_else(|| "installed".to_owned(), date);
         (
             format!("../{}", tail_path(&s.tail_number)),
             s.tail_number.clone(),
@@ -197,12 +194,15 @@ fn quality(unit: &UnitView) -> Facts {
     };
     vec![
         ("Flights used", count(q.estimated)),
-        ("Flights refused", count(q.refused)),
-        ("Why refused", list(&q.reasons)),
-        ("Doubts", list(&q.flags)),
+        ("Flights rejected", count(q.refused)),
+        ("Rejection reasons", list(&q.reasons)),
+        ("Quality flags", list(&q.flags)),
         ("Last estimate", date_or(q.last_estimate_utc)),
         ("Days since", q.days_since_estimate.map_or_else(|| NO_DATA.to_owned(), |d| format!("{d:.0}"))),
-        ("Noise found over stated", q.noise_ratio.map_or_else(|| NO_DATA.to_owned(), |r| format!("{r:.2}"))),
+        (
+            "Scatter / reported uncertainty",
+            q.noise_ratio.map_or_else(|| NO_DATA.to_owned(), |r| format!("{r:.2}")),
+        ),
     ]
 }
 
@@ -221,7 +221,7 @@ fn past_forecasts(unit: &UnitView) -> Vec<(String, String, String, String, Strin
             micrometres(p.gap_m),
             interval,
             micrometres(p.found_m),
-            if p.held() { "held" } else { "missed" },
+            if p.held() { "inside" } else { "outside" },
         )
     };
     unit.past_forecasts.iter().map(row).collect()
@@ -239,17 +239,20 @@ fn inspections(unit: &UnitView) -> Vec<(String, String, String, String, String)>
 fn statistics(unit: &UnitView) -> Facts {
     let s = &unit.assessment;
     vec![
-        ("UnitView hours", s.unit_hours.map_or_else(|| NO_DATA.to_owned(), hours)),
-        ("Wear law believed in most", s.law.clone().unwrap_or_else(|| NO_DATA.to_owned())),
+        ("Unit hours [FH]", s.unit_hours.map_or_else(|| NO_DATA.to_owned(), hours)),
+        ("Most probable wear law", s.law.clone().unwrap_or_else(|| NO_DATA.to_owned())),
         ("Usage axis", s.axis.as_ref().map_or_else(|| NO_DATA.to_owned(), |axis| axis.replace('_', " "))),
-        ("Mann–Kendall, two-sided p", s.mann_kendall_p.map_or_else(|| NO_DATA.to_owned(), p_value)),
-        ("The same, allowing for autocorrelation", s.hamed_rao_p.map_or_else(|| NO_DATA.to_owned(), p_value)),
+        ("Mann–Kendall p (two-sided)", s.mann_kendall_p.map_or_else(|| NO_DATA.to_owned(), p_value)),
         (
-            "Sen's slope, µm per 1000 h",
+            "Hamed–Rao p (autocorrelation-corrected)",
+            s.hamed_rao_p.map_or_else(|| NO_DATA.to_owned(), p_value),
+        ),
+        (
+            "Sen's slope [µm per 1000 FH], 95 % interval",
             rates(s.sen_low_m_per_hour, s.sen_rate_m_per_hour, s.sen_high_m_per_hour),
         ),
         (
-            "State the day before",
+            "Previous-day state",
             match &s.state_day_before {
                 Some(before) => StateBadge::from_state(before.as_deref()).word().to_owned(),
                 None => NO_DATA.to_owned(),
@@ -269,16 +272,15 @@ fn prior(report: &Report, unit: &UnitView) -> String {
             let part = p.part_number.as_deref().unwrap_or("units without a part number");
             let wider = if p.widening > WIDER {
                 format!(
-                    "PastForecast forecasts of this fleet missed more often than they should: its intervals are {:.1} \
-                     times as wide as they usually are.",
+                    "Past forecast coverage was too low: intervals are widened {:.1} times.",
                     p.widening
                 )
             } else {
-                "PastForecast forecasts of this fleet held: its intervals are as wide as usual.".to_owned()
+                "Past forecast coverage was adequate; intervals not widened.".to_owned()
             };
             format!(
-                "Learned from {part} until {}: a new unit has {} ± {} µm; from new to the act limit it takes {} h, \
-                 90 % of units between {} and {} h; wear follows {}. {wider}",
+                "Learned from {part} until {}: a new unit has {} ± {} µm; time from new to the act limit: median {} FH, \
+                 90 % of units between {} and {} FH; wear follows {}. {wider}",
                 date(p.learned_until_utc),
                 micrometres(p.new_m),
                 micrometres(1.645 * p.new_sd_m),

@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::polars_scan::{self, ScanRequest};
-use crate::rows::accounts::RunRecord;
+use crate::rows::accounts::{LogOutcome, RunRecord};
 use crate::rows::gap_columns;
 
 /// A store in numbers.
@@ -30,6 +30,8 @@ pub struct Info {
     pub last_departure_utc: Option<Timestamp>,
     /// Logs with an account.
     pub logs: usize,
+    /// Logs whose processing failed.
+    pub failed_logs: usize,
     /// Data files of the records.
     pub files: usize,
     /// Their bytes; superseded files, which are kept for a while, are not counted.
@@ -59,6 +61,7 @@ impl Store {
         let text = |column: usize| batch.column(column).as_string::<i32>().iter().flatten();
         let at = |micros: Option<i64>| micros.and_then(|us| Timestamp::from_microsecond(us).ok());
         let runs = self.runs()?;
+        let accounts = self.accounts()?;
         Ok(Info {
             records: batch.num_rows(),
             flights: departures.values().iter().zip(text(1).zip(text(2))).collect::<HashSet<_>>().len(),
@@ -66,7 +69,8 @@ impl Store {
             tails: text(1).collect::<BTreeSet<_>>().len(),
             first_departure_utc: at(arrow::compute::min(departures)),
             last_departure_utc: at(arrow::compute::max(departures)),
-            logs: self.accounts()?.len(),
+            logs: accounts.len(),
+            failed_logs: accounts.iter().filter(|log| log.outcome == LogOutcome::Error).count(),
             files: files.len(),
             bytes: snapshot.files.iter().map(|file| file.size_bytes).sum(),
             version: snapshot.version,

@@ -55,32 +55,38 @@ impl fmt::Display for Reason {
         let um = |m: f64| m * 1e6;
         match *self {
             Self::NoEstimate => write!(f, "no estimate yet"),
-            Self::Stale { days } => write!(f, "last estimate is {days:.0} days old"),
+            Self::Stale { days } => write!(f, "no estimate for {days:.0} days"),
             Self::TooFew { estimates } => {
                 let noun = if estimates == 1 { "estimate" } else { "estimates" };
-                write!(f, "only {estimates} {noun}, {MIN_ESTIMATES} are needed")
+                write!(f, "only {estimates} {noun}; at least {MIN_ESTIMATES} are needed")
             }
             Self::Unsupported { gap_m, recent_m } => {
                 let (gap_um, recent_um) = (um(gap_m), um(recent_m));
                 write!(
                     f,
-                    "curves through all estimates end at {gap_um:.1} µm, the last ones are near {recent_um:.1} µm"
+                    "fit ends at {gap_um:.1} µm but the latest estimates average {recent_um:.1} µm: not assessed"
                 )
             }
             Self::AtLimit { gap_m, limit_m } => {
-                write!(f, "gap {:.1} µm is at the limit of {:.1} µm", um(gap_m), um(limit_m))
+                write!(f, "gap {:.1} µm is at or above the limit of {:.1} µm", um(gap_m), um(limit_m))
+            }
+            Self::CrossesSoon { p05_hours, planning_horizon_hours } if p05_hours < 0.5 => {
+                write!(
+                    f,
+                    "may already be at the limit (5 % point); planning horizon {planning_horizon_hours:.0} FH"
+                )
             }
             Self::CrossesSoon { p05_hours, planning_horizon_hours } => {
                 write!(
                     f,
-                    "limit may be met in {p05_hours:.0} h, within the planning horizon of {planning_horizon_hours:.0} h"
+                    "could reach the limit within {p05_hours:.0} FH (5 % point); planning horizon {planning_horizon_hours:.0} FH"
                 )
             }
             Self::AtWatch { gap_m, watch_m } => {
-                write!(f, "gap {:.1} µm is at the watch limit of {:.1} µm", um(gap_m), um(watch_m))
+                write!(f, "gap {:.1} µm is above the watch limit of {:.1} µm", um(gap_m), um(watch_m))
             }
-            Self::Changed { kind, days } => write!(f, "{kind} {days:.0} days ago that no book knows"),
-            Self::Clear => write!(f, "no limit is near"),
+            Self::Changed { kind, days } => write!(f, "{kind} {days:.0} days ago, not on record"),
+            Self::Clear => write!(f, "below all limits"),
         }
     }
 }

@@ -68,7 +68,10 @@ fn a_unit_over_its_limit_must_act_and_has_no_hours_left() {
     assert_eq!(assessment.state, Some(State::Act));
     assert_eq!(assessment.crossing.unwrap().p50_hours, Some(0.0));
     let text = assessment.reason.to_string();
-    assert!(text.starts_with("gap 104.") && text.ends_with(" µm is at the limit of 100.0 µm"), "{text}");
+    assert!(
+        text.starts_with("gap 104.") && text.ends_with(" µm is at or above the limit of 100.0 µm"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -81,7 +84,7 @@ fn a_unit_that_meets_its_limit_soon_is_planned() {
 fn no_state_stands_on_old_or_on_few_estimates() {
     let series = unit(400, |h| 20.0 + 0.02 * h);
     let stale = state_of(&series, 500);
-    assert_eq!((stale.state, stale.reason.to_string().as_str()), (None, "last estimate is 101 days old"));
+    assert_eq!((stale.state, stale.reason.to_string().as_str()), (None, "no estimate for 101 days"));
     let young = state_of(&series, 3);
     assert_eq!((young.state, young.reason), (None, Reason::TooFew { estimates: 4 }));
     assert_eq!(state_of(&series, 0).reason.to_string(), "only 1 estimate, 8 are needed");

@@ -1,6 +1,6 @@
-//! `check`: what logs offer, channel by channel, before anything is computed or written.
+//! `check`: shows how logs are mapped, channel by channel, without computing or writing anything.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::sync::Arc;
 
@@ -22,22 +22,25 @@ use crate::table::{self, number, text};
 
 use crate::commands::context::{display_path, load_with_installations};
 
-/// How far the slope of screw on motor may be off 1 before it is called a mapping error.
+/// Tolerance of the slope of screw on motor around 1; beyond it the mapping is suspect.
 const SLOPE_TOLERANCE: f64 = 0.02;
 
-/// Rates at which actuators are logged; one beyond is more often a wrong unit of time.
+/// Usual logging rates; a rate outside mostly means a wrong unit of time.
 const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=20e3;
 
-/// What stands for the table of channels where no actuator could be looked at.
-const NOTHING: &str = "  no actuator could be looked at: see the errors\n";
+/// Note on the slope of screw on motor.
+const RATIO: &str = "screw/motor ratio";
 
-/// Looks at logs and says what was found.
+/// Replaces the channel table if no actuator could be checked.
+const NOTHING: &str = "  no actuator could be checked; see errors above\n";
+
+/// Checks logs and prints what was found.
 ///
 /// # Errors
-/// When configuration or tables are wrong. Logs in error make the code 1.
+/// If configuration or tables are wrong. Failed logs make the exit code 1.
 pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
-    doubt_limits(&config, output);
+    warn_implausible_limits(&config, output);
     let logs = logs(args, &config, output)?;
     let (mut channels, mut diagnostics, mut page) = (Vec::new(), Vec::new(), String::new());
     let mut schemas = ColumnTypes::default();
@@ -67,7 +70,7 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
             "{page}{}{}{}",
             schemas.drift(),
             proposals(&facts, &config),
-            summary(logs.len(), &diagnostics)
+            summary(logs.len(), &channels, &diagnostics)
         )
     };
     if args.rows.format() == Format::Table && args.rows.output.is_none() {
@@ -79,8 +82,8 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
 }
 
-/// Asks after limits that were given in another unit.
-fn doubt_limits(config: &Config, output: &Output) {
+/// Warns about limits that seem to be in another unit.
+fn warn_implausible_limits(config: &Config, output: &Output) {
     let of_part = |(number, part): (&String, &job::config::part::PartSettings)| {
         [("limit_m", part.limit_m), ("watch_m", part.watch_m)]
             .map(|(key, m)| (format!("part {number}"), key, m))
@@ -88,8 +91,8 @@ fn doubt_limits(config: &Config, output: &Output) {
     let of_all = ("trend".to_owned(), "limit_m", config.document.trend.limit_m);
     for (whose, key, limit_m) in config.document.part.iter().flat_map(of_part).chain([of_all]) {
         if let Some(limit_m) = limit_m.filter(|limit_m| *limit_m > MAX_PLAUSIBLE_LIMIT_M) {
-            let meant = "keys are in metres: 150 µm is 150e-6";
-            output.note(&format!("{whose}: is `{key}` = {limit_m} meant in another unit? {meant}"));
+            let meant = "limits are in metres: 150 µm is 150e-6";
+            output.note(&format!("{whose}: `{key}` = {limit_m} is implausibly large; {meant}"));
         }
     }
 }
@@ -102,12 +105,12 @@ fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<Vec<(LogFi
     }
     let found = discover::discover(config)?;
     for stray in &found.strays {
-        output.note(&format!("{stray}: no main log is of its flight, so it is not used"));
+        output.note(&format!("{stray}: no matching main log for this flight; not used"));
     }
     let faulty = found.faulty.into_iter().map(|(name, (path, _))| (LogFiles::one(path), name));
     let mut logs: Vec<_> = found.logs.into_iter().map(|(name, files)| (files, name)).chain(faulty).collect();
     if logs.len() > args.limit {
-        output.note(&format!("looking at {} of {} logs; `--limit` looks at more", args.limit, logs.len()));
+        output.note(&format!("checking {} of {} logs; use `--limit` to check more", args.limit, logs.len()));
         logs.truncate(args.limit);
     }
     Ok(logs)
@@ -136,17 +139,17 @@ struct Channel {
     note: Option<String>,
 }
 
-/// What all logs said, so far.
+/// Findings of all logs so far.
 struct CheckSummary<'s> {
     channels: &'s mut Vec<Channel>,
     facts: &'s mut Facts,
     diagnostics: &'s mut Vec<Diagnostic>,
 }
 
-/// What actuators say of their part numbers.
+/// Identified parameters by part number.
 type Facts = BTreeMap<PartNumber, Vec<job::part_identification::IdentifiedParams>>;
 
-/// What one actuator said.
+/// Findings of one actuator.
 struct ActuatorCheck {
     found: Vec<Channel>,
     clock: Option<String>,
@@ -173,7 +176,7 @@ fn one(
                     facts.entry(part).or_default().push(says);
                 }
             }
-            // What is wrong with the log as a whole is wrong with each of its actuators.
+            // A fault of the whole log is reported for each of its actuators.
             Err(diagnostic) => {
                 let diagnostic = diagnostic.in_file(name);
                 if !diagnostics.contains(&diagnostic) {
@@ -184,9 +187,9 @@ fn one(
     }
     clocks.dedup();
     let checksums = match opened.is_checked() {
-        Ok(true) => "every page carries a checksum",
+        Ok(true) => "all pages have checksums",
         Ok(false) => {
-            "no page checksums: a flipped byte may go unseen (`write_page_checksum=True` in pyarrow)"
+            "no page checksums: silent corruption would not be detected (`write_page_checksum=True` in pyarrow)"
         }
         Err(_) => "page headers cannot be read",
     };
@@ -203,27 +206,27 @@ fn one(
     page.push('\n');
 }
 
-/// The clock of an actuator in words.
+/// Time base of an actuator as text.
 fn clock(a: &ActuatorChannels) -> String {
     let stretches = match a.segments.len() {
-        1 => "unbroken".to_owned(),
-        n => format!("{n} unbroken stretches"),
+        1 => "no gaps".to_owned(),
+        n => format!("{n} segments"),
     };
     let r = a.repairs;
     let mended = [
         (r.out_of_order, "out of order"),
         (r.repeated, "repeated"),
-        (r.unstamped, "without a stamp"),
-        (r.filled, "given a stamp by the rate"),
+        (r.unstamped, "without a timestamp"),
+        (r.filled, "filled in from the rate"),
     ];
     let mended: Vec<String> = mended
         .iter()
         .filter(|(count, _)| *count > 0)
         .map(|(count, what)| format!("{count} {what}"))
         .collect();
-    let mended = if mended.is_empty() { String::new() } else { format!("; mended: {}", mended.join(", ")) };
+    let mended = if mended.is_empty() { String::new() } else { format!("; repaired: {}", mended.join(", ")) };
     let rate_hz = a.step_s.recip();
-    let doubt = if USUAL_RATES_HZ.contains(&rate_hz) { "" } else { " (is `clock.unit` right?)" };
+    let doubt = if USUAL_RATES_HZ.contains(&rate_hz) { "" } else { " (unusual: check `clock.unit`)" };
     let kept = 1.0 - a.apart as f64 / a.dx_m.len().max(1) as f64;
     let selected =
         if a.apart > 0 { format!(", {:.1} % of the rows selected", 100.0 * kept) } else { String::new() };
@@ -290,21 +293,21 @@ fn said<'a>(a: &'a ActuatorChannels, channel: &str) -> Vec<&'a str> {
 
 fn slope_note(slope: f64) -> String {
     if (slope - 1.0).abs() > SLOPE_TOLERANCE {
-        format!("screw moves {slope:.4} for 1 of motor: a wrong sign, unit, lead or gear ratio?")
+        format!("{RATIO} {slope:.4} (expected 1): check sign, unit, lead or gear ratio")
     } else {
-        format!("screw moves {slope:.5} for 1 of motor")
+        format!("{RATIO} {slope:.5}")
     }
 }
 
 fn describe(base: Channel, q: Quality, doubts: &[&str]) -> Channel {
     let still = if q.samples == 0 {
-        Some("no sample is selected: nothing_selected".to_owned())
+        Some("no sample selected: nothing_selected".to_owned())
     } else if q.span().is_none() {
-        Some("holds no value that counts: channel_constant".to_owned())
+        Some("no finite value: channel_constant".to_owned())
     } else if q.is_zero() {
-        Some("is always zero: channel_zero".to_owned())
+        Some("always zero: channel_zero".to_owned())
     } else {
-        q.is_constant().then(|| "never moves: channel_constant".to_owned())
+        q.is_constant().then(|| "constant: channel_constant".to_owned())
     };
     Channel {
         samples: q.samples as i64,
@@ -330,10 +333,10 @@ fn layout(channels: &[Channel]) -> String {
         number("min", 0),
         number("max", 0),
         text("unit", 1),
-        number("smallest step", 4),
-        number("rate Hz", 6),
-        number("missing %", 2),
-        number("frozen %", 5),
+        number("resolution", 4),
+        number("rate [Hz]", 6),
+        number("missing [%]", 2),
+        number("frozen [%]", 5),
         number("spikes", 7),
         text("note", 0),
     ];
@@ -363,11 +366,11 @@ fn layout(channels: &[Channel]) -> String {
     table::layout(&columns, &channels.iter().map(cells).collect::<Vec<_>>())
 }
 
-/// Which columns the logs have, and of which types: they change over the years.
+/// Column types by log, to find columns whose type changes between logs.
 #[derive(Default)]
 struct ColumnTypes {
     logs: usize,
-    /// Column → type → logs that have it so, and the first of them.
+    /// Column → type → number of logs, and the first of them.
     columns: BTreeMap<String, BTreeMap<String, (usize, String)>>,
 }
 
@@ -380,7 +383,7 @@ impl ColumnTypes {
         }
     }
 
-    /// What is not alike in all logs; each is read as it is.
+    /// Lists columns that are missing or have another type in some logs; each log is read with its own types.
     fn drift(&self) -> String {
         const SHOWN: usize = 12;
         let differs = |kinds: &BTreeMap<String, (usize, String)>| {
@@ -403,19 +406,19 @@ impl ColumnTypes {
         }
         let more = match lines.len().saturating_sub(SHOWN) {
             0 => String::new(),
-            n => format!("  and {n} columns more\n"),
+            n => format!("  and {n} more columns\n"),
         };
         let shown: String = lines.into_iter().take(SHOWN).collect();
         format!(
-            "columns that are not alike in all {} logs (each log is read as it is):\n{shown}{more}",
+            "columns that are missing or whose type differs between {} logs (each log is read with its own types):\n{shown}{more}",
             self.logs
         )
     }
 }
 
-/// What the logs say of each part, beside what the configuration says.
+/// Compares the parameters identified from the logs with the configured ones, by part number.
 fn proposals(facts: &Facts, config: &Config) -> String {
-    let columns = [text("key", 0), number("found", 0), number("stated", 0)];
+    let columns = [text("key", 0), number("identified", 0), number("configured", 0)];
     let mut page = String::new();
     for (number, all) in facts {
         let Some(part) = config.parts.get(number) else { continue };
@@ -427,22 +430,30 @@ fn proposals(facts: &Facts, config: &Config) -> String {
                 vec![p.key.to_owned(), format!("{:.2e}", p.identified), stated]
             })
             .collect();
-        let actuators = table::count(all.len(), "actuator");
-        let _ = writeln!(
-            page,
-            "part {number} as {actuators} of these logs would have it; data sheets know better"
-        );
+        let flights = table::count(all.len(), "actuator-flight");
+        let _ = writeln!(page, "part {number}, identified from {flights} (prefer data-sheet values)");
         page.push_str(&table::layout(&columns, &rows));
         page.push('\n');
     }
     page
 }
 
-fn summary(logs: usize, diagnostics: &[Diagnostic]) -> String {
+/// Whether the note of a channel is a warning; a ratio within tolerance is information.
+fn is_warning(channel: &Channel) -> bool {
+    channel.note.as_ref().is_some_and(|note| !note.starts_with(RATIO) || note.contains("expected"))
+}
+
+fn summary(logs: usize, channels: &[Channel], diagnostics: &[Diagnostic]) -> String {
     let mut files: Vec<&str> = diagnostics.iter().filter_map(|c| c.file.as_deref()).collect();
     files.sort_unstable();
     files.dedup();
-    format!("{}: {} in error; nothing was computed or written\n", table::count(logs, "log"), files.len())
+    let warned: BTreeSet<&str> = channels.iter().filter(|c| is_warning(c)).map(|c| c.log.as_str()).collect();
+    format!(
+        "{} checked, {} failed, {} with warnings; nothing was computed or written\n",
+        table::count(logs, "log"),
+        files.len(),
+        warned.len()
+    )
 }
 
 fn schema() -> SchemaRef {

@@ -1,4 +1,4 @@
-//! `estimate`: logs ad hoc; nothing is stored.
+//! `estimate`: estimates the given logs without storing the results.
 
 use std::path::{Path, PathBuf};
 
@@ -14,12 +14,12 @@ use crate::row_output;
 use crate::table::{self, count, number, text};
 
 use crate::commands::context::{VERSION, display_path, load_config, load_with_installations};
-use crate::commands::results::query::{doubts, load};
+use crate::commands::results::query::{flags_text, load};
 
 /// Estimates the given logs.
 ///
 /// # Errors
-/// When configuration or tables are wrong. Logs in error make the code 1.
+/// If configuration or tables are wrong. Failed logs make the exit code 1.
 pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = match &args.part {
         Some(_) => (load_config(global)?, Installations::default()),
@@ -51,12 +51,17 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
 }
 
 fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
-    let name = PartNumber::new(number)
-        .map_err(|e| Failure::usage("empty_name", e, "name one that the configuration has"))?;
+    let name =
+        PartNumber::new(number).map_err(|e| Failure::usage("empty_name", e, &configured_parts(config)))?;
     match part_of(config, &name) {
         Ok(_) => Ok(name),
         Err(diagnostic) => Err(Failure::Refused(vec![diagnostic])),
     }
+}
+
+fn configured_parts(config: &Config) -> String {
+    let parts: Vec<String> = config.parts.keys().map(ToString::to_string).collect();
+    format!("configured parts: {}", parts.join(", "))
 }
 
 fn page(found: &[EstimateRow]) -> String {
@@ -64,13 +69,13 @@ fn page(found: &[EstimateRow]) -> String {
         text("log", 3),
         text("position", 0),
         text("part / serial", 2),
-        number("gap µm", 0),
-        number("± µm", 3),
-        number("mid-range µm", 4),
-        number("reversals", 6),
-        number("load N", 5),
-        number("nis", 7),
-        text("doubts", 1),
+        number("gap [µm]", 0),
+        number("SE [µm]", 3),
+        number("mid-range [µm]", 4),
+        number("load reversals", 6),
+        number("load [N]", 5),
+        number("NIS", 7),
+        text("flags", 1),
     ];
     let cells = |r: &EstimateRow| {
         let e = &r.estimate;
@@ -85,7 +90,7 @@ fn page(found: &[EstimateRow]) -> String {
             e.load_reversals.to_string(),
             load(e),
             e.nis.map_or_else(table::empty_cell, |n| format!("{n:.2}")),
-            doubts(e),
+            flags_text(e),
         ]
     };
     let head = format!("{}; nothing was stored\n", count(found.len(), "estimate"));
@@ -96,7 +101,7 @@ fn page(found: &[EstimateRow]) -> String {
     }
 }
 
-/// Writes what the filter saw, per sample, of every actuator of the logs.
+/// Writes per-sample filter output of every actuator of the logs.
 fn trace(
     file: &Path,
     logs: &[PathBuf],
@@ -107,7 +112,7 @@ fn trace(
 ) -> Result<(), Failure> {
     let mut all = job::trace::Trace::default();
     for path in logs {
-        // A log in error was told of already; its trace is simply not there.
+        // A failed log is reported already; it has no trace.
         let Ok(opened) = job::trace::of_log(
             &pipeline::run::discover::log_containing(config, path)?,
             &display_path(path),

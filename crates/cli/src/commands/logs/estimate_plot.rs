@@ -1,4 +1,4 @@
-//! `estimate --plot`: what an estimate stands on, as a picture or a page.
+//! `estimate --plot`: diagnostic plot of an estimate as SVG, PNG or HTML.
 
 use std::path::{Path, PathBuf};
 
@@ -13,10 +13,10 @@ use crate::table;
 
 use crate::commands::context::display_path;
 
-/// Draws every actuator of the logs into one file; its ending says how.
+/// Draws every actuator of the logs into one file; the extension selects the format.
 ///
 /// # Errors
-/// When the ending is not one we can draw, or the file cannot be written.
+/// If the extension is unknown or the file cannot be written.
 pub(super) fn estimate_plot(
     file: &Path,
     logs: &[PathBuf],
@@ -29,7 +29,7 @@ pub(super) fn estimate_plot(
     let mut looks = Vec::new();
     for path in logs {
         let name = display_path(path);
-        // A log in error was told of already; it is simply not drawn.
+        // A failed log is reported already; it is not drawn.
         let files = pipeline::run::discover::log_containing(config, path)?;
         let found =
             job::estimate_plot_data::of_log(&files, &name, config, installations, part).unwrap_or_default();
@@ -58,8 +58,8 @@ fn renderer(file: &Path) -> Result<Renderer, Failure> {
         "html" | "htm" => Ok(|looks| estimate_plot_html(looks).map(String::into_bytes)),
         _ => Err(Failure::usage(
             "unknown_ending",
-            format!("{} has no ending that says what to draw", display_path(file)),
-            "end it in .svg, .png or .html",
+            format!("{} has no known extension", display_path(file)),
+            "use the extension .svg, .png or .html",
         )),
     }
 }

@@ -1,4 +1,4 @@
-//! `normalize`: the canonical log of each actuator.
+//! `normalize`: writes the normalized log of each actuator.
 
 use ingest::LogFiles;
 use pipeline::Event;
@@ -12,10 +12,10 @@ use crate::table::count;
 
 use crate::commands::context::{display_path, load_with_installations};
 
-/// Writes normalized logs and says how many.
+/// Writes normalized logs and prints their number.
 ///
 /// # Errors
-/// When configuration or tables are wrong. Logs in error make the code 1.
+/// If configuration or tables are wrong. Failed logs make the exit code 1.
 pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
     let logs: Vec<(LogFiles, String)> = if args.logs.is_empty() {

@@ -1,4 +1,4 @@
-//! `backtest`: past statements against what came true, by share of the way that was behind the unit.
+//! `backtest`: scores past forecasts against later measurements, by share of life used.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::table::{self, number, text};
 
 use crate::commands::context::load_trend_context;
 
-/// Bounds of the shares, and what they are called.
+/// Bounds and labels of the shares of life used.
 const SHARES: [(f64, f64, &str); 4] = [
     (0.0, 0.35, "below 35 %"),
     (0.35, 0.65, "35 to 65 %"),
@@ -23,10 +23,10 @@ const SHARES: [(f64, f64, &str); 4] = [
     (0.0, 1.01, "all"),
 ];
 
-/// Answers with a summary for people, and with one row for each past statement for machines.
+/// Prints a summary table, or one row per past forecast in the machine-readable formats.
 ///
 /// # Errors
-/// When configuration, tables or store cannot be read.
+/// If configuration, tables or store cannot be read.
 pub(crate) fn backtest(args: &BacktestArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_trend_context(&args.external, global, output)?;
     let histories = match &args.external.estimates {
@@ -40,19 +40,19 @@ pub(crate) fn backtest(args: &BacktestArgs, global: &Global, output: &Output) ->
 
 fn page(found: &[BacktestRow]) -> String {
     if found.is_empty() {
-        return "no past statement can be held against what came true: it takes a unit seen to wear, and more wear since\n".to_owned();
+        return "no past forecast can be scored yet: needs a wearing unit with later data\n".to_owned();
     }
     let columns = [
-        text("asked for", 0),
-        text("way behind", 0),
-        number("statements", 0),
-        number("median error %", 0),
-        number("90 % interval held %", 0),
-        number("said too late %", 1),
-        number("said too early %", 1),
-        number("within 20 %", 1),
+        text("target", 0),
+        text("life used", 0),
+        number("forecasts", 0),
+        number("median error [%]", 0),
+        number("90 % interval coverage [%]", 0),
+        number("late forecasts [%]", 1),
+        number("early forecasts [%]", 1),
+        number("within 20 % [%]", 1),
     ];
-    let cells: Vec<Vec<String>> = [("limit", "the limit"), ("level", "the level now")]
+    let cells: Vec<Vec<String>> = [("limit", "the limit"), ("level", "the current level")]
         .into_iter()
         .flat_map(|(target, name)| SHARES.map(|share| line(found, target, name, share)))
         .flatten()
@@ -60,7 +60,7 @@ fn page(found: &[BacktestRow]) -> String {
     table::layout(&columns, &cells)
 }
 
-/// One line of the summary; nothing where no statement falls into it.
+/// One line of the summary; `None` if it has no forecast.
 fn line(
     found: &[BacktestRow],
     target: &str,

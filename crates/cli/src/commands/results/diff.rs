@@ -1,4 +1,4 @@
-//! `diff`: two stores that saw the same flights, actuator by actuator.
+//! `diff`: compares the estimates of two stores.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -16,7 +16,7 @@ use crate::output::Output;
 use crate::row_output;
 use crate::table::{self, count, number, text};
 
-/// One actuator's flight that the stores see differently.
+/// An actuator-flight whose results differ between the stores.
 #[derive(Debug, Serialize)]
 struct Row {
     tail_number: String,
@@ -36,12 +36,12 @@ struct Row {
 /// Compares two stores.
 ///
 /// # Errors
-/// When one of them cannot be read.
+/// If one of them cannot be read.
 pub(crate) fn diff(args: &DiffArgs, output: &Output) -> Result<Code, Failure> {
     let (before, after) = (records(&args.before)?, records(&args.after)?);
     let keys: BTreeSet<_> = before.keys().chain(after.keys()).collect();
     let rows: Vec<Row> = keys.iter().filter_map(|key| row(before.get(*key), after.get(*key))).collect();
-    let shown: Vec<Row> = rows.into_iter().filter(|row| differs(row, args.least_um * 1e-6)).collect();
+    let shown: Vec<Row> = rows.into_iter().filter(|row| differs(row, args.min_change_um * 1e-6)).collect();
     let page = || page(&shown, keys.len(), &before, &after);
     row_output::write_rows(&args.rows, output, || row_output::batch(&schema(), &shown), page)?;
     Ok(Code::Success)
@@ -118,16 +118,16 @@ fn page(
         return head;
     }
     let columns = [
-        text("departure UTC", 3),
+        text("departure [UTC]", 3),
         text("tail", 1),
         text("flight", 2),
         text("position", 0),
         text("part / serial", 4),
-        number("before µm", 0),
-        number("after µm", 0),
-        number("change µm", 0),
-        text("was", 5),
-        text("is", 5),
+        number("before [µm]", 0),
+        number("after [µm]", 0),
+        number("change [µm]", 0),
+        text("status before", 5),
+        text("status after", 5),
     ];
     let cells = |r: &Row| {
         vec![
@@ -139,8 +139,8 @@ fn page(
             table::micrometres(r.gap_m_before),
             table::micrometres(r.gap_m_after),
             r.gap_change_m.map_or_else(table::empty_cell, |c| format!("{:+.3}", c * 1e6)),
-            r.status_before.clone().unwrap_or_else(|| "not there".into()),
-            r.status_after.clone().unwrap_or_else(|| "not there".into()),
+            r.status_before.clone().unwrap_or_else(|| "absent".into()),
+            r.status_after.clone().unwrap_or_else(|| "absent".into()),
         ]
     };
     head + &table::layout(&columns, &rows.iter().map(cells).collect::<Vec<_>>())

@@ -1,4 +1,4 @@
-//! `explain`: where one number came from, and whether it comes again.
+//! `explain`: traces one estimate to its inputs and settings, and recomputes it.
 
 use std::fmt::Write as _;
 
@@ -20,8 +20,8 @@ use crate::commands::context::load_with_installations;
 /// Explains one record.
 ///
 /// # Errors
-/// When configuration or store cannot be read, or there is no such record. A record that does not come
-/// again makes the code 1.
+/// If configuration or store cannot be read, or there is no such record. A record that cannot be reproduced
+/// makes the exit code 1.
 pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
     let record = find(args, &Store::open(config.store())?)?;
@@ -61,18 +61,18 @@ fn find(args: &ExplainArgs, store: &Store) -> Result<GapRecord, Failure> {
         1 => Ok(found.remove(0)),
         0 => {
             let what = format!("no record of {} in flight {}", args.position, args.flight);
-            let hint = format!("`freeplay query flight {}` lists what there is", args.flight);
+            let hint = format!("list its records with `freeplay query flight {}`", args.flight);
             Err(Failure::usage("no_such_record", what, &hint))
         }
         _ => {
             let tails: Vec<String> = found.iter().map(|r| r.flight.tail_number.to_string()).collect();
-            let what = format!("flight {} is there of {}", args.flight, tails.join(", "));
-            Err(Failure::usage("no_such_record", what, "say which with `--tail`"))
+            let what = format!("flight {} exists for several tails: {}", args.flight, tails.join(", "));
+            Err(Failure::usage("no_such_record", what, "select one with `--tail`"))
         }
     }
 }
 
-/// What came of making a record again.
+/// Result of recomputing a record.
 struct Recomputation {
     digest: String,
     channels: Option<ActuatorChannels>,
@@ -90,7 +90,7 @@ fn replay(
     catch_panic(shown, || {
         let opened = FlightLog::open(&files, shown, config, installations)?;
         let at = opened.positions.iter().find(|at| at.position == record.position).ok_or_else(|| {
-            Diagnostic::new("no_position", format!("the log holds no {} any more", record.position))
+            Diagnostic::new("no_position", format!("the log has no position {} any more", record.position))
                 .in_file(shown)
         })?;
         let (_, part) = opened.unit(at, config, installations)?;
@@ -104,7 +104,7 @@ fn replay(
     })
 }
 
-/// Whether a record comes again.
+/// Whether a record is reproduced.
 enum ReplayVerdict {
     Same,
     OtherSettings,
@@ -141,16 +141,16 @@ impl ReplayVerdict {
 impl std::fmt::Display for ReplayVerdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Same => "made again just now: every bit is the same",
-            Self::OtherSettings => "settings have changed since; `freeplay run` will make it again",
-            Self::OtherLog => "the log holds something else now; `freeplay run` will make it again",
-            Self::OtherNumber => "made again, it is ANOTHER number: please report this with the log",
-            Self::NotReplayed => "the log cannot be read now",
+            Self::Same => "recomputed: bit-identical",
+            Self::OtherSettings => "settings changed since; `freeplay run` will recompute it",
+            Self::OtherLog => "the log changed since; `freeplay run` will recompute it",
+            Self::OtherNumber => "recomputed value differs: please report this with the log",
+            Self::NotReplayed => "the log can no longer be read",
         })
     }
 }
 
-/// Numbers are written in the shortest form that reads back to the same bits.
+/// JSON form of an estimate, for bitwise comparison: numbers are written so that they read back unchanged.
 fn in_bits(estimate: &records::GapEstimate) -> Value {
     serde_json::to_value(estimate).unwrap_or_default()
 }
@@ -172,12 +172,12 @@ fn page(
         flight.departure_utc
     );
     let mut line = |label: &str, text: &str| {
-        let _ = writeln!(page, "  {label:<10} {text}");
+        let _ = writeln!(page, "  {label:<11} {text}");
     };
     line(
         "gap",
         &format!(
-            "{} ± {} µm, 90 % interval {} to {}; mid-range {} µm",
+            "{} µm, standard error {} µm, 90 % interval {} to {}; mid-range {} µm",
             table::micrometres(e.gap_m),
             table::micrometres(e.gap_se_m),
             table::micrometres(e.gap_p05_m),
@@ -185,8 +185,8 @@ fn page(
             table::micrometres(e.gap_midrange_m)
         ),
     );
-    let doubts = super::query::doubts(e);
-    line("doubts", if doubts.is_empty() { "none" } else { &doubts });
+    let flags = super::query::flags_text(e);
+    line("flags", if flags.is_empty() { "none" } else { &flags });
     let newtons = |v: Option<f64>| v.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
     line(
         "fitted",
@@ -200,7 +200,7 @@ fn page(
         ),
     );
     line(
-        "stands on",
+        "data",
         &format!(
             "{} samples, {} load reversals, load {} N",
             e.samples,
@@ -219,7 +219,7 @@ fn page(
         ),
     );
     line(
-        "made by",
+        "computed by",
         &format!(
             "Freeplay {} in run {} on {}",
             p.program_version,
@@ -228,7 +228,7 @@ fn page(
         ),
     );
     line("replay", &verdict.to_string());
-    line("by hand", &format!("freeplay estimate {}", config.path(&p.log_path).display()));
+    line("reproduce", &format!("freeplay estimate {}", config.path(&p.log_path).display()));
     if let Some(part) = config.document.part.get(record.part_number.as_str()) {
         let settings = serde_json::to_value(part).unwrap_or_default();
         for (at, (key, value)) in flat("", &settings).into_iter().enumerate() {
@@ -246,7 +246,7 @@ fn short(digest: &str) -> &str {
     digest.get(..12).unwrap_or(digest)
 }
 
-/// Keys and values of nested tables, by their whole names.
+/// Keys and values of nested tables, with their full names.
 fn flat(above: &str, value: &Value) -> Vec<(String, String)> {
     let Value::Object(table) = value else { return vec![(above.to_owned(), value.to_string())] };
     let named = |key: &str| if above.is_empty() { key.to_owned() } else { format!("{above}.{key}") };
@@ -258,12 +258,12 @@ fn quality(channels: &ActuatorChannels) -> String {
         text("channel", 0),
         number("min", 0),
         number("max", 0),
-        number("smallest step", 3),
-        number("rate Hz", 2),
-        number("missing %", 1),
+        number("resolution", 3),
+        number("rate [Hz]", 2),
+        number("missing [%]", 1),
         number("spikes", 4),
     ];
-    let rows: Vec<Vec<String>> = ["motor m", "screw m", "load N"]
+    let rows: Vec<Vec<String>> = ["motor [m]", "screw [m]", "load [N]"]
         .iter()
         .zip(&channels.quality)
         .map(|(name, q)| {

@@ -1,4 +1,4 @@
-//! `query`: stored records, by tail, serial number, flight or position.
+//! `query`: lists stored records by tail, serial, flight or position.
 
 use std::collections::BTreeMap;
 
@@ -14,13 +14,13 @@ use crate::table::{self, count, number, text};
 
 use crate::commands::context::load_config;
 
-/// Fewer estimates than this are no history.
+/// Minimum number of estimates for a history line.
 const LEAST_HISTORY: usize = 3;
 
-/// Answers with the records that fit, oldest first.
+/// Prints the matching records, oldest first.
 ///
 /// # Errors
-/// When configuration or store cannot be read.
+/// If configuration or store cannot be read.
 pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let store = Store::open(load_config(global)?.store())?;
     let records = store.records(&asked(args))?;
@@ -32,7 +32,7 @@ pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Resul
     )?;
     if records.is_empty() {
         output.note(&format!(
-            "no record of {} `{}`; `freeplay store info` says what there is",
+            "no record of {} `{}`; list the store's contents with `freeplay store info`",
             word(args.by),
             args.id
         ));
@@ -64,20 +64,20 @@ fn asked(args: &QueryArgs) -> Query {
     }
 }
 
-/// Records as people read them.
+/// Records as a table.
 pub(crate) fn page(records: &[GapRecord]) -> String {
     let columns = [
-        text("departure UTC", 0),
+        text("departure [UTC]", 0),
         text("tail", 2),
         text("flight", 3),
         text("position", 1),
         text("part / serial", 2),
-        number("gap µm", 0),
-        number("± µm", 4),
-        number("mid-range µm", 5),
-        number("reversals", 7),
-        number("load N", 6),
-        text("doubts", 1),
+        number("gap [µm]", 0),
+        number("SE [µm]", 4),
+        number("mid-range [µm]", 5),
+        number("load reversals", 7),
+        number("load [N]", 6),
+        text("flags", 1),
     ];
     let cells = |r: &GapRecord| {
         let e = &r.estimate;
@@ -92,7 +92,7 @@ pub(crate) fn page(records: &[GapRecord]) -> String {
             table::micrometres(e.gap_midrange_m),
             e.load_reversals.to_string(),
             load(e),
-            doubts(e),
+            flags_text(e),
         ]
     };
     let head = format!("{}\n", count(records.len(), "record"));
@@ -103,7 +103,7 @@ pub(crate) fn page(records: &[GapRecord]) -> String {
     }
 }
 
-/// A line for each unit with a history in these records: from which gap to which.
+/// One line per unit with a history in these records: sparkline, first and last gap.
 fn sketches(records: &[GapRecord]) -> String {
     let mut units: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
     for r in records {
@@ -121,17 +121,17 @@ fn sketches(records: &[GapRecord]) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    let columns = [text("part / serial", 0), text("so far", 0), text("gap µm", 0), number("estimates", 0)];
+    let columns = [text("part / serial", 0), text("history", 0), text("gap [µm]", 0), number("estimates", 0)];
     format!("\n{}", table::layout(&columns, &rows))
 }
 
-/// The load band a number stands on.
+/// Load band of an estimate, N.
 pub(crate) fn load(e: &records::GapEstimate) -> String {
     e.load_p05_n.zip(e.load_p95_n).map_or_else(table::empty_cell, |(low, high)| format!("{low:.0}…{high:.0}"))
 }
 
-/// Why refused, or what is doubted.
-pub(crate) fn doubts(e: &records::GapEstimate) -> String {
+/// Rejection reason or quality flags.
+pub(crate) fn flags_text(e: &records::GapEstimate) -> String {
     let reason = e.reason.iter().map(|reason| match e.status {
         records::Status::Refused => format!("refused: {reason}"),
         records::Status::Estimated => reason.clone(),

@@ -1,4 +1,4 @@
-//! `report`: the morning's pages.
+//! `report`: writes the HTML report.
 
 use jiff::Timestamp;
 use pipeline::Event;
@@ -14,10 +14,10 @@ use crate::table::count;
 
 use crate::commands::context::{VERSION, display_path, load_with_installations};
 
-/// Writes the pages and says where the first one is.
+/// Writes the pages and prints the path of the first one.
 ///
 /// # Errors
-/// When configuration, tables or store cannot be read, or the folder cannot be written.
+/// If configuration, tables or store cannot be read, or the folder cannot be written.
 pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
     let ask = UnitSelection {
@@ -31,8 +31,8 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
     let program = format!("Freeplay {VERSION}");
     let report = compose::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
     if report.units.is_empty() {
-        let hint = "`freeplay store info` says what there is; `freeplay run` fills the store";
-        return Err(Failure::usage("nothing_to_report", "no unit fits", hint));
+        let hint = "list the store's contents with `freeplay store info`; fill it with `freeplay run`";
+        return Err(Failure::usage("nothing_to_report", "no unit matches the selection", hint));
     }
     let progress = Progress::new("report", output);
     let watch = |event: Event| match event {

@@ -1,4 +1,4 @@
-//! `trend`: level, rate, crossing of the limit and state of each unit.
+//! `trend`: current gap, wear rate, time to limit and state of each unit.
 
 use pipeline::fleet_trends::assess::{self, UnitSelection};
 use pipeline::fleet_trends::trend_row::TrendRow;
@@ -13,10 +13,10 @@ use crate::table::{self, count, number, state_mark, text};
 
 use crate::commands::context::load_trend_context;
 
-/// Answers with one row for each unit, or for each query.
+/// Prints one row per unit, or per query.
 ///
 /// # Errors
-/// When configuration, tables or store cannot be read.
+/// If configuration, tables or store cannot be read.
 pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_trend_context(&args.external, global, output)?;
     let ask = UnitSelection {
@@ -58,17 +58,17 @@ fn page(found: &[TrendRow]) -> String {
         text("tail", 2),
         text("position", 4),
         number("flights", 6),
-        number("gap µm", 0),
-        number("± µm", 3),
-        text("so far", 2),
-        number("nm/h", 1),
+        number("gap [µm]", 0),
+        number("SE [µm]", 3),
+        text("history", 2),
+        number("rate [nm/FH]", 1),
         text("trend", 4),
-        number("limit µm", 5),
-        number("not before h", 1),
-        text("not before", 2),
-        number("likely h", 4),
-        number("not after h", 6),
-        text("why", 7),
+        number("limit [µm]", 5),
+        number("earliest 5 % [FH]", 1),
+        text("earliest date", 2),
+        number("median [FH]", 4),
+        number("latest 95 % [FH]", 6),
+        text("reason", 7),
     ];
     let cells = |r: &TrendRow| {
         vec![
@@ -92,7 +92,7 @@ fn page(found: &[TrendRow]) -> String {
     };
     let as_of = found.iter().map(|r| r.as_of_utc).max();
     let head = as_of.map_or_else(
-        || "no unit fits\n".to_owned(),
+        || "no unit matches the selection; list the store's contents with `freeplay store info`\n".to_owned(),
         |as_of| format!("{} as of {}\n", count(found.len(), "unit"), as_of.strftime("%Y-%m-%d %H:%M UTC")),
     );
     if found.is_empty() {

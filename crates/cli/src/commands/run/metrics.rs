@@ -1,4 +1,4 @@
-//! The account of a run as metrics, in the text format of Prometheus (exposition format 0.0.4).
+//! Run metrics in the Prometheus text format (exposition format 0.0.4).
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -9,10 +9,10 @@ use pipeline::RunSummary;
 use crate::exit::{Code, Failure};
 use crate::row_output::to_file;
 
-/// Writes the metrics beside the file and renames, so that a scraper never meets half of them.
+/// Writes the metrics to a temporary file and renames it, so that a scraper never reads half of them.
 ///
 /// # Errors
-/// When the file cannot be written.
+/// If the file cannot be written.
 pub(crate) fn write(file: &Path, report: &RunSummary, code: Code) -> Result<(), Failure> {
     let text = text(report, code);
     to_file(file, |out| Ok(std::io::Write::write_all(out, text.as_bytes())?))
@@ -36,21 +36,25 @@ fn text(report: &RunSummary, code: Code) -> String {
     );
     gauge("run_ended_timestamp_seconds", "When the last run ended.", now);
     if completed {
-        gauge("run_completed_timestamp_seconds", "When a run last ended by itself.", now);
+        gauge("run_completed_timestamp_seconds", "When a run last completed.", now);
     }
-    gauge("run_exit_code", "Its exit code.", f64::from(code as i32));
-    gauge("run_duration_seconds", "How long it took.", report.took_s);
-    gauge("logs_found", "Logs that fit the patterns.", report.found as f64);
-    gauge("logs_known", "Logs that were accounted for already.", report.known as f64);
-    gauge("logs_done", "Logs that were finished, those in error included.", report.done as f64);
-    gauge("logs_in_error", "Logs in error.", report.logs_in_error() as f64);
-    gauge("logs_not_reached", "Logs the run was stopped before.", report.not_reached as f64);
-    gauge("records_estimated", "Records with a gap that were stored.", report.estimated as f64);
-    gauge("records_refused", "Records of sound logs that cannot show one.", report.refusals() as f64);
-    gauge("tails_quiet", "Aircraft that sent nothing for longer than the others.", report.quiet.len() as f64);
+    gauge("run_exit_code", "Exit code of the last run.", f64::from(code as i32));
+    gauge("run_duration_seconds", "Duration of the last run.", report.took_s);
+    gauge("logs_found", "Logs that match the patterns.", report.found as f64);
+    gauge("logs_known", "Logs already processed by earlier runs.", report.known as f64);
+    gauge("logs_done", "Logs processed, including failed ones.", report.done as f64);
+    gauge("logs_in_error", "Failed logs.", report.logs_in_error() as f64);
+    gauge("logs_not_reached", "Logs not processed because the run stopped.", report.not_reached as f64);
+    gauge("records_estimated", "Stored records with a gap.", report.estimated as f64);
+    gauge(
+        "records_refused",
+        "Actuator-flights for which no gap could be determined.",
+        report.refusals() as f64,
+    );
+    gauge("tails_quiet", "Tails with no new logs for unusually long.", report.quiet.len() as f64);
     for state in ["normal", "watch", "plan", "act"] {
         let name = format!("units_touched_{state}");
-        gauge(&name, "Units this run touched that are in this state.", states(state));
+        gauge(&name, "Units updated by this run that are in this state.", states(state));
     }
     text
 }

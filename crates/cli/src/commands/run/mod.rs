@@ -1,4 +1,4 @@
-//! `run`: the nightly job, and its account in the morning.
+//! `run`: processes new and changed logs, updates trends and prints the run summary.
 
 mod metrics;
 
@@ -23,16 +23,16 @@ use crate::table::{self, count, number, state_mark, text};
 
 use crate::commands::context::{VERSION, load_config};
 
-/// Flights with unlike innovations that are named in the account.
+/// Maximum number of flights with unusual filter innovations in the summary.
 const MAX_UNUSUAL_SHOWN: usize = 5;
 
-/// Units of which something changed that are named in the account.
+/// Maximum number of changed units in the summary.
 const MAX_CHANGES_SHOWN: usize = 20;
 
-/// Runs the night's work.
+/// Runs the pipeline.
 ///
 /// # Errors
-/// When nothing could be run, or the store failed.
+/// If nothing could be run, or the store failed.
 pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let config = load_config(global)?;
     let request = request(args)?;
@@ -53,12 +53,15 @@ pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Co
         stop: &stop,
         watch: &watch,
     };
+    let is_done = Arc::new(AtomicBool::new(false));
+    announce_interrupt(&stop, &is_done, output);
     let report = scheduler::run(&config, &request, &context);
+    is_done.store(true, Ordering::Relaxed);
     progress.end();
     if let (Err(pipeline::Error::Store(store::Error::Held { .. })), true) =
         (&report, stop.load(Ordering::Relaxed))
     {
-        output.note("interrupted while waiting for another run; nothing was begun");
+        output.note("interrupted while waiting for another run; nothing was started");
         return Ok(Code::Interrupted);
     }
     let report = report?;
@@ -78,9 +81,8 @@ pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Co
 }
 
 fn request(args: &RunArgs) -> Result<Request, Failure> {
-    let empty = |e: records::ids::EmptyIdError| {
-        Failure::usage("empty_name", e, "leave the option out to ask for all")
-    };
+    let empty =
+        |e: records::ids::EmptyIdError| Failure::usage("empty_name", e, "omit the option to select all");
     Ok(Request {
         since_utc: args.since,
         until_utc: args.until,
@@ -95,7 +97,7 @@ fn request(args: &RunArgs) -> Result<Request, Failure> {
     })
 }
 
-/// The first signal lets flights in hand finish; the second ends the process at once.
+/// The first signal stops the run after the logs in progress; the second ends the process at once.
 fn listen(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
     use signal_hook::consts::{SIGINT, SIGTERM};
     for signal in [SIGINT, SIGTERM] {
@@ -103,6 +105,22 @@ fn listen(stop: &Arc<AtomicBool>) -> Result<(), Failure> {
         signal_hook::flag::register(signal, Arc::clone(stop))?;
     }
     Ok(())
+}
+
+/// Acknowledges the first signal within a fraction of a second, while the logs in progress finish.
+fn announce_interrupt(stop: &Arc<AtomicBool>, is_done: &Arc<AtomicBool>, output: &Output) {
+    const POLL: Duration = Duration::from_millis(100);
+    let (stop, is_done, output) = (Arc::clone(stop), Arc::clone(is_done), output.clone());
+    std::thread::spawn(move || {
+        while !is_done.load(Ordering::Relaxed) {
+            if stop.load(Ordering::Relaxed) {
+                output
+                    .note("interrupted: finishing the logs in progress; press Ctrl-C again to stop at once");
+                return;
+            }
+            std::thread::sleep(POLL);
+        }
+    });
 }
 
 fn follow(event: &Event, progress: &Progress<'_>) {
@@ -116,7 +134,7 @@ fn follow(event: &Event, progress: &Progress<'_>) {
     }
 }
 
-/// Whether any unit of the store, touched tonight or not, is at or past a state.
+/// Whether any unit of the store is in a state or worse, updated by this run or not.
 fn is_reached(report: &RunSummary, least: FailOn) -> bool {
     let at_or_past: &[&str] = match least {
         FailOn::Watch => &["watch", "plan", "act"],
@@ -138,25 +156,25 @@ fn code(report: &RunSummary, reached: bool, stopped: bool) -> Code {
     }
 }
 
-/// Flights in which the filter was surprised.
+/// Lists flights with unusual filter innovations.
 fn unusual_innovations(report: &RunSummary, page: &mut String) {
     for unlike in report.innovations_unlike.iter().take(MAX_UNUSUAL_SHOWN) {
         let text = format!(
-            "{} {}, flight {}: the filter's innovations (NIS {:.2}) are unlike this unit's other flights ({:.2})",
+            "{} {}, flight {}: filter residuals unusual (NIS {:.2}; this unit usually {:.2})",
             escape(&unlike.tail_number),
             escape(&unlike.position),
             escape(&unlike.flight_id),
             unlike.nis,
             unlike.usual
         );
-        line(page, "unlike", &text);
+        line(page, "unusual", &text);
     }
     if let Some(more @ 1..) = report.innovations_unlike.len().checked_sub(MAX_UNUSUAL_SHOWN) {
         line(page, "", &format!("and {more} more, all in `freeplay run --json`"));
     }
 }
 
-/// The morning's page.
+/// Run summary as text.
 fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     let mut page = format!(
         "Freeplay {VERSION} · run {} · {config}\n",
@@ -164,16 +182,20 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     );
     for run in &report.cut_short {
         let text = format!(
-            "{} ended without a word: {} done, {} not reached",
-            run.started_utc.strftime("run %Y-%m-%dT%H:%M:%SZ"),
+            "{} did not finish: {} processed, {} remaining",
+            run.started_utc.strftime("previous run %Y-%m-%dT%H:%M:%SZ"),
             count(run.done as usize, "log"),
             run.not_reached
         );
-        line(&mut page, "cut short", &text);
+        line(&mut page, "interrupted", &text);
     }
     let new = report.found - report.known - report.not_asked - report.left;
-    let mut found = format!("{}: {new} to do, {} known", count(report.found, "log"), report.known);
-    for (what, n) in [("not asked for", report.not_asked), ("left by the limit", report.left)] {
+    let mut found =
+        format!("{}: {new} new or changed, {} already processed", count(report.found, "log"), report.known);
+    for (what, n) in [
+        ("excluded by --tail/--serial/--since/--until", report.not_asked),
+        ("left for later by --limit", report.left),
+    ] {
         if n > 0 {
             let _ = write!(found, ", {n} {what}");
         }
@@ -194,8 +216,8 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     if !report.errors.is_empty() {
         line(
             &mut page,
-            "in error",
-            &format!("{}; everything else is stored", count(report.logs_in_error(), "log")),
+            "failed",
+            &format!("{} could not be used; all others are stored", count(report.logs_in_error(), "log")),
         );
     }
     for error in report.errors.iter().take(10) {
@@ -208,8 +230,8 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     if report.not_reached > 0 {
         line(
             &mut page,
-            "not reached",
-            &format!("{}; the next run does them", count(report.not_reached, "log")),
+            "remaining",
+            &format!("{} not processed; the next run processes them", count(report.not_reached, "log")),
         );
         for log in report.not_reached_logs.iter().take(10) {
             line(&mut page, "", &escape(log));
@@ -222,7 +244,8 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
             );
         }
     }
-    if !report.quiet.is_empty() {
+    // A run that left logs out cannot tell which tails have no data.
+    if !report.quiet.is_empty() && report.not_reached + report.left + report.not_asked == 0 {
         let tails: Vec<String> = report
             .quiet
             .iter()
@@ -230,7 +253,7 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
                 format!("{} since {}", escape(&quiet.tail_number), quiet.since_utc.strftime("%Y-%m-%d"))
             })
             .collect();
-        line(&mut page, "quiet", &format!("{}: {}", count(tails.len(), "tail"), tails.join(", ")));
+        line(&mut page, "no data", &format!("from {}: {}", count(tails.len(), "tail"), tails.join(", ")));
     }
     for moved in &report.recorder_moved {
         line(&mut page, "recorder", &recorder_moved(moved));
@@ -240,14 +263,21 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
         let took = span(Duration::from_secs_f64(report.took_s));
         line(
             &mut page,
-            "slowest",
-            &format!("{}, {seconds:.1} s · took {took}, {}", escape(log), count(report.workers, "worker")),
+            "time",
+            &format!(
+                "{took}, {}; slowest log {} ({seconds:.1} s)",
+                count(report.workers, "worker"),
+                escape(log)
+            ),
         );
     }
     page.push_str(&work_list_section(&report.trends));
     page.push_str(&changes_section(&report.changed));
     if code == Code::LogsInError {
-        page.push_str("exit 1: some logs are in error. After mending: `freeplay run --retry`\n");
+        page.push_str(&format!(
+            "Exit code 1: {} failed. After fixing them: `freeplay run --retry`\n",
+            count(report.logs_in_error(), "log")
+        ));
     }
     page
 }
@@ -259,7 +289,7 @@ fn recorder_moved(moved: &RecorderChange) -> String {
     };
     let whole = if moved.everywhere { "all of " } else { "" };
     format!(
-        "{} {whole}{}: {change} since {}; a recorder, a sensor or its wiring, not wear",
+        "{} {whole}{}: {change} since {}; likely a recorder, sensor or wiring change, not wear",
         escape(&moved.tail_number),
         escape(&moved.positions.join(", ")),
         moved.since_utc.strftime("%Y-%m-%d")
@@ -279,7 +309,7 @@ fn line(page: &mut String, label: &str, text: &str) {
     let _ = writeln!(page, "  {label:<11} {text}");
 }
 
-/// The units that need a decision, most urgent first; the others as one number.
+/// Lists the units that need attention, most urgent first, and counts the others.
 fn work_list_section(rows: &[TrendRow]) -> String {
     if rows.is_empty() {
         return String::new();
@@ -293,9 +323,10 @@ fn work_list_section(rows: &[TrendRow]) -> String {
     let silent = rows.iter().filter(|r| r.state.is_none()).count();
     let normal = rows.len() - urgent.len() - silent;
     let mut page = format!(
-        "\n{} touched: {} need attention, {normal} normal, {silent} without a statement\n",
+        "\n{} updated: {} need attention, {normal} normal, {silent} not assessed{}\n",
         count(rows.len(), "unit"),
-        urgent.len()
+        urgent.len(),
+        if silent > 0 { " (see `freeplay trend`)" } else { "" }
     );
     if !urgent.is_empty() {
         let columns = [
@@ -303,10 +334,10 @@ fn work_list_section(rows: &[TrendRow]) -> String {
             text("part / serial", 0),
             text("tail", 2),
             text("position", 3),
-            number("gap µm", 0),
-            number("limit µm", 4),
-            number("not before h", 1),
-            text("why", 5),
+            number("gap [µm]", 0),
+            number("limit [µm]", 4),
+            number("earliest [FH]", 1),
+            text("reason", 5),
         ];
         let cells = |r: &&TrendRow| {
             vec![
@@ -325,12 +356,12 @@ fn work_list_section(rows: &[TrendRow]) -> String {
     page
 }
 
-/// What tonight's flights changed, unit by unit.
+/// Lists the state changes of this run, unit by unit.
 fn changes_section(changed: &[UnitChange]) -> String {
     if changed.is_empty() {
         return String::new();
     }
-    let mut page = format!("\nchanged by tonight's flights: {}\n", count(changed.len(), "unit"));
+    let mut page = format!("\nstate changes in this run: {}\n", count(changed.len(), "unit"));
     for unit in changed.iter().take(MAX_CHANGES_SHOWN) {
         let part = unit.part_number.as_deref().unwrap_or("–");
         let _ = writeln!(page, "  {} / {}: {}", escape(part), escape(&unit.serial_number), change_text(unit));
@@ -341,7 +372,7 @@ fn changes_section(changed: &[UnitChange]) -> String {
     page
 }
 
-/// A unit's news in words.
+/// State and event changes of a unit as text.
 fn change_text(unit: &UnitChange) -> String {
     let word = |state: Option<&'static str>| state.unwrap_or("no state");
     let mut told = Vec::new();
@@ -360,11 +391,11 @@ fn dry_run(config: &job::Config, request: &Request, output: &Output) -> Result<C
     let Plan { found, known, work, .. } = scheduler::dry_run(config, request)?;
     let bytes: i64 = work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes).sum();
     let head = format!(
-        "would do {} of {found} ({known} known), {:.1} MB; nothing was done\n",
+        "Dry run: {} of {found} would be processed ({known} up to date), {:.1} MB\n",
         count(work.len(), "log"),
         bytes as f64 / 1e6
     );
-    let columns = [text("log", 0), text("why", 0), number("MB", 1)];
+    let columns = [text("log", 0), text("reason", 0), number("size [MB]", 1)];
     let rows: Vec<Vec<String>> = work
         .iter()
         .map(|w| {

@@ -1,4 +1,4 @@
-//! `init`: a commented configuration, its schema and an example table, never over something that is there.
+//! `init`: writes a commented configuration, its JSON schema and an example table; never overwrites a file.
 
 use std::collections::BTreeSet;
 use std::fs::{self, OpenOptions};
@@ -22,29 +22,29 @@ const FILES: [(&str, &str); 2] = [
     ("installations.csv", include_str!("../../../templates/installations.csv")),
 ];
 
-/// What an editor needs to complete and to check the configuration; its first line points here.
+/// JSON schema with which editors complete and check the configuration.
 const SCHEMA: &str = "pipeline.schema.json";
 
-/// So many logs are asked for their tails at most.
+/// Maximum number of logs that are read for their tail numbers.
 const MOST_LOGS: usize = 5000;
 
 const STAYS: &str = "\
-# Proposed: a row for each tail and position found, each with one unit named after its place, since ever.
-# Put the real part and serial numbers and dates in: a trend belongs to the unit, and goes with it when it moves.
-# An empty removed_utc: it still sits there. A date alone is midnight UTC.
+# Proposed: one row per tail and position found, each with a placeholder unit.
+# Enter the real part and serial numbers and dates: a trend belongs to the unit and follows it to other positions.
+# Empty removed_utc: still installed. A date without time is midnight UTC.
 tail_number,position,part_number,serial_number,installed_utc,removed_utc
 ";
 
-/// What a newcomer does next.
-const NEXT: &str = "next: say in pipeline.toml where your logs are and what their columns are called, and in \
-                    installations.csv which serial number sat where; then `freeplay check`";
-const NEXT_OF_PROPOSAL: &str = "next: read pipeline.toml and mend what was guessed wrong, say in installations.csv which \
-                                serial number sat where; then `freeplay check`";
+/// Next steps after `init`.
+const NEXT: &str = "next: set the log paths and column names in pipeline.toml, enter in installations.csv which serial \
+                    number was installed where, then run `freeplay check`";
+const NEXT_OF_PROPOSAL: &str = "next: review pipeline.toml and correct wrong guesses, enter in installations.csv which serial \
+                                number was installed where, then run `freeplay check`";
 
 /// Writes the configuration, the example table and the schema.
 ///
 /// # Errors
-/// When one of them is there already; then nothing is written.
+/// If one of them already exists; then nothing is written.
 pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
     let names = FILES.iter().map(|(name, _)| *name).chain([SCHEMA]);
     let there = names.map(|name| args.dir.join(name)).find(|path| path.exists());
@@ -67,7 +67,7 @@ pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
     Ok(Code::Success)
 }
 
-/// Writes a file that was not there.
+/// Writes a new file.
 fn write(path: &Path, text: &str, output: &Output) -> Result<(), Failure> {
     let file = OpenOptions::new().write(true).create_new(true).open(path);
     let mut file =
@@ -77,19 +77,19 @@ fn write(path: &Path, text: &str, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Every Parquet file below a folder, one at least.
+/// All Parquet files below a folder; an error if there is none.
 fn logs(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let pattern = glob::Pattern::escape(&folder.to_string_lossy());
     let found: Vec<PathBuf> =
         glob::glob(&format!("{pattern}/**/*.parquet")).into_iter().flatten().flatten().collect();
     if found.is_empty() {
-        let what = format!("no Parquet log lies below {}", display_path(folder));
-        return Err(Failure::usage("no_log_matched", what, "name the folder that holds your logs"));
+        let what = format!("no *.parquet files found under {}", display_path(folder));
+        return Err(Failure::usage("no_log_matched", what, "give the folder that holds your logs"));
     }
     Ok(found)
 }
 
-/// A table with one unit in each position of each tail, named after its place, if logs tell of both.
+/// Installations table with a placeholder unit per tail and position, if the logs name both.
 fn stays(logs: &[PathBuf], offer: &InferredMapping) -> Option<String> {
     let by_folder = |log: &PathBuf| {
         path_identity(log)?;
@@ -106,7 +106,7 @@ fn stays(logs: &[PathBuf], offer: &InferredMapping) -> Option<String> {
     (!rows.is_empty()).then(|| format!("{STAYS}{}", rows.concat()))
 }
 
-/// The template with what the logs below a folder seem to offer; a person confirms it with `check`.
+/// Template with the mapping inferred from the logs below a folder, to be verified with `check`.
 fn proposed(folder: &Path, dir: &Path, log: &Path, offer: &InferredMapping) -> Result<String, Failure> {
     let (head, rest) = TEMPLATE.split_once("# Which flight a log is.").unwrap_or((TEMPLATE, ""));
     let (_, tail) = rest.split_once("[estimate]").unwrap_or(("", rest));
@@ -117,7 +117,7 @@ fn proposed(folder: &Path, dir: &Path, log: &Path, offer: &InferredMapping) -> R
     Ok(format!("{head}{}[estimate]{tail}", mapping(offer, log)))
 }
 
-/// The part of a configuration that a proposal fills; what it could not tell is left to be said.
+/// Inferred part of the configuration; keys that could not be inferred are left to fill in.
 fn mapping(offer: &InferredMapping, log: &Path) -> String {
     let positions: Vec<&str> = offer.positions.iter().map(String::as_str).collect();
     let positions = if positions.is_empty() { "none".to_owned() } else { positions.join(", ") };
@@ -131,17 +131,17 @@ fn mapping(offer: &InferredMapping, log: &Path) -> String {
         channels.map(|(role, name, usual)| format!("\n[channel.{name}]\n{}", channel(offer, role, usual)));
     [
         format!(
-            "# Proposed from {}: names, units and signs are guesses until `freeplay check` agrees.\n",
+            "# Inferred from {}: verify names, units and signs with `freeplay check`.\n",
             display_path(log)
         ),
         format!("# Positions found: {positions}.\n\n[identity]\n{}", identity(offer, log)),
-        "# The zone of departures that do not name one.\ntime_zone = \"UTC\"\n".to_owned(),
+        "# Time zone of departures without one.\ntime_zone = \"UTC\"\n".to_owned(),
         format!("\n[clock]\n{}", clock(offer)),
         channels.concat(),
         if others.is_empty() {
             "\n".to_owned()
         } else {
-            format!("\n# Columns of numbers that were not understood: {}\n\n", others.join(", "))
+            format!("\n# Unmapped numeric columns: {}\n\n", others.join(", "))
         },
     ]
     .concat()
@@ -151,8 +151,8 @@ fn identity(offer: &InferredMapping, log: &Path) -> String {
     if offer.metadata.is_empty() {
         let found = path_identity(log);
         let remark = match found {
-            Some(_) => "# The footer says nothing of the flight; the path seems to.\n",
-            None => "# Neither footer nor path says which flight it is: another path, folders or columns?\n",
+            Some(_) => "# No identity in the file metadata; inferred from the path.\n",
+            None => "# TODO: no tail/departure found in metadata or path; set path, folders or columns\n",
         };
         let (path, format) = found.unwrap_or_else(|| {
             (
@@ -183,24 +183,28 @@ fn channel(offer: &InferredMapping, role: Role, usual: &str) -> String {
     match offer.channels.get(&role) {
         Some((column, Some(unit))) => format!("column = {column:?}\nunit = {:?}\n", unit.as_str()),
         Some((column, None)) => {
-            format!("column = {column:?}\nunit = {usual:?}          # a guess: the name does not tell\n")
+            format!("column = {column:?}\nunit = {usual:?}          # a guess: the name has no unit\n")
         }
         None => format!("column = \"\"           # no column was recognised\nunit = {usual:?}\n"),
     }
 }
 
 fn exists(path: &Path) -> Failure {
-    let what = format!("{} is there already", display_path(path));
-    Failure::usage("would_overwrite", what, "`freeplay init DIR` writes elsewhere; nothing was changed")
+    let what = format!("{} already exists", display_path(path));
+    Failure::usage(
+        "would_overwrite",
+        what,
+        "write to another folder with `freeplay init DIR`; nothing was changed",
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// What we hand to a newcomer must pass our own checks.
+    /// The template must pass the program's own checks.
     #[test]
-    fn the_configuration_we_hand_out_is_a_good_one() {
+    fn the_template_configuration_is_valid() {
         let read = job::Config::parse(FILES[0].1, Path::new("pipeline.toml"), Path::new("."));
         assert!(read.is_ok(), "{:?}", read.err());
         let dir = tempfile::tempdir().unwrap();

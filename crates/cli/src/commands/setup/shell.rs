@@ -1,4 +1,4 @@
-//! `completions` and `man`: for the shell.
+//! `completions` and `man`: shell completions and manual page.
 
 use clap::CommandFactory;
 
@@ -9,7 +9,7 @@ use crate::output::Output;
 /// Writes completions for a shell.
 ///
 /// # Errors
-/// When stdout is closed or full.
+/// If stdout is closed or full.
 pub(crate) fn completions(args: &CompletionsArgs, output: &Output) -> Result<Code, Failure> {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut Args::command(), "freeplay", &mut text);
@@ -20,7 +20,7 @@ pub(crate) fn completions(args: &CompletionsArgs, output: &Output) -> Result<Cod
 /// Writes the manual page: the program, then each of its commands.
 ///
 /// # Errors
-/// When stdout is closed or full.
+/// If stdout is closed or full.
 pub(crate) fn man(output: &Output) -> Result<Code, Failure> {
     let mut text = Vec::new();
     let command = Args::command();

@@ -1,4 +1,4 @@
-//! `simulate`: a fleet whose gaps are known.
+//! `simulate`: simulates a fleet with known gaps.
 
 use pipeline::{Event, simulate as fleet};
 
@@ -10,18 +10,18 @@ use crate::table::count;
 
 use crate::commands::context::display_path;
 
-/// Flies the fleet and says where it landed.
+/// Simulates the fleet and prints the folder.
 ///
 /// # Errors
-/// When the spec cannot be flown, the folder holds logs already, or a file cannot be written.
+/// If the spec is invalid, the folder already holds logs, or a file cannot be written.
 pub(crate) fn simulate(args: &SimulateArgs, output: &Output) -> Result<Code, Failure> {
     let taken = ["logs", "pipeline.toml", "installations.csv"]
         .iter()
         .map(|name| args.output.join(name))
         .find(|p| p.exists());
     if let Some(path) = taken {
-        let what = format!("{} is there already", display_path(&path));
-        return Err(Failure::usage("would_overwrite", what, "name an empty folder; nothing was changed"));
+        let what = format!("{} already exists", display_path(&path));
+        return Err(Failure::usage("would_overwrite", what, "give an empty folder; nothing was changed"));
     }
     let spec = fleet::spec(args.spec.as_deref(), args.seed)?;
     std::fs::create_dir_all(&args.output)?;

@@ -1,4 +1,4 @@
-//! `store`: care of the results.
+//! `store`: inspects and maintains the results store.
 
 mod runs;
 
@@ -20,10 +20,10 @@ use crate::table::count;
 use crate::commands::context::load_config;
 use crate::commands::results::query;
 
-/// Cares for the store that the configuration names.
+/// Runs a command on the configured store.
 ///
 /// # Errors
-/// When configuration or store cannot be read, or written.
+/// If configuration or store cannot be read or written.
 pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let store = Store::open(load_config(global)?.store())?;
     match &args.command {
@@ -60,13 +60,13 @@ fn info(store: &Store, max_age: Option<Duration>, as_json: bool, output: &Output
     let Some(allowed) = late else { return Ok(Code::Success) };
     let what = match age {
         Some(age) => {
-            format!("the last completed run ended {} ago, and {} are allowed", span(age), span(allowed))
+            format!("the last completed run ended {} ago, more than {}", span(age), span(allowed))
         }
-        None => "no run was ever completed".to_owned(),
+        None => "no completed run".to_owned(),
     };
     output.diagnostic(
         &Diagnostic::new("run_overdue", what)
-            .hint("did the timer start `freeplay run`, and did it end with code 0 or 1?"),
+            .hint("check that the timer starts `freeplay run` and that it exits with code 0 or 1"),
     );
     Ok(Code::LogsInError)
 }
@@ -84,10 +84,10 @@ fn in_words(store: &Store, found: &Info, age: Option<Duration>) -> String {
         (Some(run), Some(age)) => {
             format!("{}, {} ago, exit code {}", run.run_id, span(age), run.exit_code.unwrap_or_default())
         }
-        _ => "none was ever completed".to_owned(),
+        _ => "no completed run".to_owned(),
     };
     format!(
-        "{}\n  records     {} of {}, {}, {}\n  departures  {} to {}\n  logs        {} accounted for\n  data        {}, {:.1} MB, Delta version {}\n  last run    {last}\n",
+        "{}\n  records     {} of {}, {}, {}\n  departures  {} to {}\n  logs        {} processed ({} failed)\n  data        {}, {:.1} MB, Delta version {}\n  last run    {last}\n",
         store.dir().display(),
         found.records,
         count(found.flights, "flight"),
@@ -96,27 +96,28 @@ fn in_words(store: &Store, found: &Info, age: Option<Duration>) -> String {
         day(found.first_departure_utc),
         day(found.last_departure_utc),
         found.logs,
+        found.failed_logs,
         count(found.files, "file"),
         found.bytes as f64 / 1e6,
         found.version,
     )
 }
 
-/// A line about the newest run where that is not the one that completed: it still goes, or was killed.
+/// Line about the newest run if it has not completed: it is running or was killed.
 fn unfinished(store: &Store, found: &Info) -> Result<String, Failure> {
     let Some(run) = found.last.as_ref().filter(|run| run.exit_code.is_none()) else {
         return Ok(String::new());
     };
     let began = run.started_utc.strftime("%Y-%m-%d %H:%M UTC");
     let how = match runs::run_status(run, store.is_held()?) {
-        "killed" => "ended without an exit: it was killed, or its disk failed",
-        other => other,
+        "killed" => "did not exit cleanly (killed, or disk failure)",
+        other => runs::status_text(other),
     };
-    let left = if run.not_reached > 0 { "; `freeplay run` does those" } else { "" };
+    let left = if run.not_reached > 0 { "; `freeplay run` processes them" } else { "" };
     let (id, done, not_reached) = (&run.run_id, count(run.done as usize, "log"), run.not_reached);
     let (estimated, refused, errors) = (run.estimated, run.refused, run.errors);
     Ok(format!(
-        "  unfinished  {id}, begun {began}, {how}\n              {done} done ({estimated} estimated, {refused} refused, {errors} in error), {not_reached} not reached{left}\n",
+        "  unfinished  {id}, started {began}, {how}\n              {done} processed ({estimated} estimated, {refused} refused, {errors} failed), {not_reached} not processed{left}\n",
     ))
 }
 
@@ -145,6 +146,7 @@ fn in_json(store: &Store, found: &Info, age: Option<Duration>) -> Result<serde_j
         "first_departure_utc": found.first_departure_utc,
         "last_departure_utc": found.last_departure_utc,
         "logs": found.logs,
+        "logs_in_error": found.failed_logs,
         "files": found.files,
         "bytes": found.bytes,
         "version": found.version,
@@ -159,7 +161,10 @@ fn in_json(store: &Store, found: &Info, age: Option<Duration>) -> Result<serde_j
 fn verify(store: &Store, output: &Output) -> Result<Code, Failure> {
     let findings = store.verify();
     if findings.is_empty() {
-        output.write_result(&format!("{} is whole\n", store.dir().display()))?;
+        output.write_result(&format!(
+            "{}: OK: all data files present and unchanged\n",
+            store.dir().display()
+        ))?;
         return Ok(Code::Success);
     }
     output.diagnostics(&findings);
@@ -181,13 +186,13 @@ fn adopt(store: &Store, trial: &Path, output: &Output) -> Result<Code, Failure> 
     progress.end();
     let done = done?;
     output.write_result(&format!(
-        "{} of {} taken over from {}{}\n  next  give pipeline.toml the settings of the trial; `freeplay run --dry-run` then finds nothing to do\n",
+        "adopted {} of {} from {}{}\n  next  copy the settings of the trial into pipeline.toml; `freeplay run --dry-run` must then list no logs\n",
         count(done.records, "record"),
         count(done.logs, "log"),
         trial.dir().display(),
         match done.retired {
             0 => String::new(),
-            retired => format!(", {} gone that it did not make", count(retired, "record")),
+            retired => format!("; {} absent there removed", count(retired, "record")),
         },
     ))?;
     Ok(Code::Success)

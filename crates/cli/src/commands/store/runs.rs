@@ -1,4 +1,4 @@
-//! `store runs`: the accounts of past runs, and of one of them log by log; killed runs have theirs too.
+//! `store runs`: recent runs, or the logs of one run; killed runs included.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -16,7 +16,7 @@ use crate::progress::span;
 use crate::row_output;
 use crate::table::{self, count, number, text};
 
-/// A run as it is answered.
+/// A run as an output row.
 #[derive(Serialize)]
 struct Run<'a> {
     run_id: &'a str,
@@ -35,7 +35,7 @@ struct Run<'a> {
     config_path: &'a str,
 }
 
-/// One log of a run as it is answered.
+/// A log of a run as an output row.
 #[derive(Serialize)]
 struct Log<'a> {
     log_path: &'a str,
@@ -50,10 +50,10 @@ struct Log<'a> {
     error_detail: Option<&'a str>,
 }
 
-/// Answers with the last runs, or with the logs of one.
+/// Lists the last runs, or the logs of one.
 ///
 /// # Errors
-/// When the store cannot be read, or holds no such run.
+/// If the store cannot be read or has no such run.
 pub(crate) fn runs(
     store: &Store,
     one: Option<&str>,
@@ -67,7 +67,7 @@ pub(crate) fn runs(
         Some(id) => {
             let found = if id == "last" { runs.last() } else { runs.iter().find(|run| run.run_id == id) };
             let unknown = || {
-                let what = format!("the store knows no run `{id}`");
+                let what = format!("no run `{id}` in the store");
                 Failure::usage("no_such_run", what, "`freeplay store runs` lists them; `last` is the newest")
             };
             logs(store, found.ok_or_else(unknown)?, format, output)
@@ -75,7 +75,7 @@ pub(crate) fn runs(
     }
 }
 
-/// How a run ended, in a word.
+/// Status of a run: value of the column `ended`.
 pub(crate) fn run_status(run: &RunRecord, is_held: bool) -> &'static str {
     match run.exit_code {
         Some(0 | 4) => "well",
@@ -84,6 +84,16 @@ pub(crate) fn run_status(run: &RunRecord, is_held: bool) -> &'static str {
         Some(_) => "failed",
         None if is_held && !run.has_ended() => "still goes",
         None => "killed",
+    }
+}
+
+/// Text shown for a status.
+pub(crate) fn status_text(status: &'static str) -> &'static str {
+    match status {
+        "well" => "completed",
+        "logs in error" => "completed, some logs failed",
+        "still goes" => "running",
+        other => other,
     }
 }
 
@@ -128,14 +138,14 @@ fn page(runs: &[Run<'_>]) -> String {
     let columns = [
         text("run", 0),
         text("ended", 0),
-        text("took", 4),
+        text("duration", 4),
         number("found", 2),
-        number("known", 3),
-        number("done", 0),
+        number("unchanged", 3),
+        number("processed", 0),
         number("estimated", 1),
         number("refused", 1),
-        number("errors", 0),
-        number("not reached", 1),
+        number("failed", 0),
+        number("not processed", 1),
     ];
     let cells = |run: &Run<'_>| {
         let counts =
@@ -143,7 +153,7 @@ fn page(runs: &[Run<'_>]) -> String {
         let took = run.finished_utc.map_or_else(table::empty_cell, |end| {
             span(Duration::try_from(end.duration_since(run.started_utc)).unwrap_or_default())
         });
-        let words = [run.run_id.to_owned(), run.ended.to_owned(), took];
+        let words = [run.run_id.to_owned(), status_text(run.ended).to_owned(), took];
         words.into_iter().chain(counts.map(|n| n.to_string())).collect()
     };
     let head = format!("{}\n", count(runs.len(), "run"));
@@ -159,7 +169,7 @@ fn logs(store: &Store, run: &RunRecord, format: &RowFormatArgs, output: &Output)
     let reasons = reasons(store, &run.run_id)?;
     let reason = |log: &LogRecord| log.error_code.clone().or_else(|| reasons.get(&log.log_path).map(words));
     let answer: Vec<Log<'_>> = found.iter().map(|log| in_log(log, reason(log))).collect();
-    let head = format!("run {}, {}: ", run.run_id, run_status(run, store.is_held()?));
+    let head = format!("run {}, {}: ", run.run_id, status_text(run_status(run, store.is_held()?)));
     row_output::write_rows(
         format,
         output,
@@ -169,10 +179,10 @@ fn logs(store: &Store, run: &RunRecord, format: &RowFormatArgs, output: &Output)
     Ok(Code::Success)
 }
 
-/// How often each reason stands.
+/// Count by reason.
 type Reasons = std::collections::BTreeMap<String, usize>;
 
-/// Why the records of a run were refused, by log; those that a later run superseded are gone.
+/// Rejection reasons of a run's records by log; records superseded by a later run are not included.
 fn reasons(store: &Store, run_id: &str) -> Result<std::collections::HashMap<String, Reasons>, Failure> {
     let mut reasons: std::collections::HashMap<String, Reasons> = std::collections::HashMap::new();
     for record in store.records(&Query { run_id: Some(run_id.to_owned()), ..Query::default() })? {
@@ -204,7 +214,7 @@ fn in_log(log: &LogRecord, reason: Option<String>) -> Log<'_> {
     }
 }
 
-/// What became of a log, in a word: a sound log without a gap is *refused*.
+/// Class of a log: a readable log without any gap is *refused*.
 fn class(log: &LogRecord) -> &'static str {
     match log.outcome {
         LogOutcome::Done if log.estimated == 0 && log.refused > 0 => "refused",
@@ -232,7 +242,7 @@ fn log_page(logs: &[Log<'_>]) -> String {
         text("flight", 3),
         number("estimated", 2),
         number("refused", 2),
-        number("s", 5),
+        number("time [s]", 5),
     ];
     let cells = |log: &Log<'_>| {
         let name = |text: Option<&str>| text.map_or_else(table::empty_cell, str::to_owned);

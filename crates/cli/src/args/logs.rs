@@ -1,0 +1,99 @@
+//! Arguments of the commands that read or make logs: `init`, `check`, `estimate`, `normalize`, `simulate`.
+
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, ValueEnum};
+
+use super::rows::RowFormatArgs;
+
+/// `init`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct InitArgs {
+    /// Write to this folder.
+    #[arg(default_value = ".")]
+    pub dir: PathBuf,
+    /// Infer the log mapping from the logs below this folder.
+    #[arg(long, value_name = "FOLDER")]
+    pub from: Option<PathBuf>,
+}
+
+/// `check`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct CheckArgs {
+    /// Logs to read; default: those of the configuration.
+    pub logs: Vec<PathBuf>,
+    /// Check at most N logs.
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub limit: usize,
+    #[command(flatten)]
+    pub rows: RowFormatArgs,
+}
+
+/// `estimate`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct EstimateArgs {
+    /// Logs to estimate.
+    #[arg(required = true)]
+    pub logs: Vec<PathBuf>,
+    /// Treat every actuator as this part number (identity and installations not required).
+    #[arg(long, value_name = "PART")]
+    pub part: Option<String>,
+    /// Write per-sample filter output (S, inputs, innovation, contact side) to Parquet.
+    #[arg(long, value_name = "FILE.parquet")]
+    pub trace: Option<PathBuf>,
+    /// Plot time histories and the load–deflection fit.
+    #[arg(long, value_name = "FILE.svg|png|html")]
+    pub plot: Option<PathBuf>,
+    #[command(flatten)]
+    pub rows: RowFormatArgs,
+}
+
+/// `normalize`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct NormalizeArgs {
+    /// Logs to read; default: those of the configuration.
+    pub logs: Vec<PathBuf>,
+    /// Write TAIL/FLIGHT/POSITION.parquet below this folder.
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Parquet encoding.
+    #[arg(long, value_enum, default_value_t = LogEncoding::Split)]
+    pub encoding: LogEncoding,
+    /// Use N workers; default: one per core.
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+}
+
+/// Parquet encoding of a normalized log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LogEncoding {
+    /// Byte stream split: smallest, and fastest to read with Freeplay.
+    Split,
+    /// Dictionary and plain: for readers without byte stream split, such as Spark 4.2.
+    Compatible,
+}
+
+impl From<LogEncoding> for ingest::parquet::writer::Encoding {
+    fn from(encoding: LogEncoding) -> Self {
+        match encoding {
+            LogEncoding::Split => Self::Split,
+            LogEncoding::Compatible => Self::Compatible,
+        }
+    }
+}
+
+/// `simulate`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct SimulateArgs {
+    /// Simulation spec; default: a small fleet.
+    pub spec: Option<PathBuf>,
+    /// Write logs, installations and ground truth to this folder.
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Override the seed of the spec.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Use N workers; default: one per core.
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+}

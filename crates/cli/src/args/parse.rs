@@ -1,0 +1,25 @@
+//! Parsers of option values.
+
+use jiff::Timestamp;
+
+pub(super) fn parse_utc(text: &str) -> Result<Timestamp, String> {
+    ingest::tables::utc(text)
+}
+
+pub(super) fn parse_count(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) | Err(_) => Err(format!("`{text}` is not a number of at least 1")),
+        Ok(count) => Ok(count),
+    }
+}
+
+pub(super) fn parse_limit(text: &str) -> Result<f64, String> {
+    let limit_m = text.parse().map_err(|_| format!("`{text}` is not a length in metres such as 150e-6"))?;
+    job::config::limits::plausible_limit_m(limit_m)
+}
+
+pub(super) fn parse_span(text: &str) -> Result<std::time::Duration, String> {
+    let span: jiff::SignedDuration =
+        text.parse().map_err(|e| format!("`{text}` is not a duration such as 20m or 30h: {e}"))?;
+    span.try_into().map_err(|_| format!("`{text}` is negative"))
+}

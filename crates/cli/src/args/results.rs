@@ -1,0 +1,139 @@
+//! Arguments of the commands that read results: `query`, `trend`, `explain`, `diff`, `backtest`, `report`.
+
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, ValueEnum};
+use jiff::Timestamp;
+
+use super::parse::{parse_count, parse_limit, parse_utc};
+use super::rows::RowFormatArgs;
+
+/// `query`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct QueryArgs {
+    /// Selection field.
+    #[arg(value_enum)]
+    pub by: QueryKey,
+    /// Value to match.
+    pub id: String,
+    /// Only departures at or after this UTC time.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub since: Option<Timestamp>,
+    /// Only departures before this UTC time.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub until: Option<Timestamp>,
+    /// Show only the newest N records.
+    #[arg(long, value_name = "N", value_parser = parse_count)]
+    pub last: Option<usize>,
+    /// Only this part number.
+    #[arg(long)]
+    pub part: Option<String>,
+    #[command(flatten)]
+    pub rows: RowFormatArgs,
+}
+
+/// Fields by which records can be selected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum QueryKey {
+    /// Tail number.
+    Tail,
+    /// Serial number.
+    Serial,
+    /// Flight.
+    Flight,
+    /// Installed position.
+    Position,
+}
+
+/// `trend`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct TrendArgs {
+    /// Only units on this tail.
+    #[arg(long)]
+    pub tail: Option<String>,
+    /// Only this unit.
+    #[arg(long)]
+    pub serial: Option<String>,
+    /// Only this part number.
+    #[arg(long)]
+    pub part: Option<String>,
+    /// Date of the assessment; default: that of the newest record. Later data are ignored.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub as_of: Option<Timestamp>,
+    #[command(flatten)]
+    pub external: ExternalEstimatesArgs,
+    /// Table of (`serial_number`, `as_of_utc`, optional `part_number`) to assess, one row each.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["as_of", "tail", "serial", "part"])]
+    pub queries: Option<PathBuf>,
+    /// Also compute the Theil–Sen slope and the Hamed–Rao test (slow: quadratic in history length).
+    #[arg(long)]
+    pub statistics: bool,
+    #[command(flatten)]
+    pub rows: RowFormatArgs,
+}
+
+/// Options for estimates made by another program.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ExternalEstimatesArgs {
+    /// Read this table of estimates instead of the store; needs no configuration.
+    #[arg(long, value_name = "FILE")]
+    pub estimates: Option<PathBuf>,
+    /// Removal limit in m for parts without one in the configuration, e.g. 150e-6.
+    #[arg(long, value_name = "M", value_parser = parse_limit)]
+    pub limit_m: Option<f64>,
+}
+
+/// `explain`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ExplainArgs {
+    /// Flight to trace.
+    pub flight: String,
+    /// Position of the actuator.
+    pub position: String,
+    /// Tail number, if several aircraft have a flight of this name.
+    #[arg(long)]
+    pub tail: Option<String>,
+    /// Print JSON, SI.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `diff`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct DiffArgs {
+    /// First store.
+    pub before: PathBuf,
+    /// Second store.
+    pub after: PathBuf,
+    /// Ignore differences below this, µm.
+    #[arg(long, alias = "least-um", value_name = "UM", default_value_t = 0.0)]
+    pub min_change_um: f64,
+    #[command(flatten)]
+    pub rows: RowFormatArgs,
+}
+
+/// `backtest`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct BacktestArgs {
+    #[command(flatten)]
+    pub external: ExternalEstimatesArgs,
+    #[command(flatten)]
+    pub rows: RowFormatArgs,
+}
+
+/// `report`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ReportArgs {
+    /// Write to this folder; an existing report is replaced, other files are kept.
+    #[arg(long, short, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Only units on this tail.
+    #[arg(long)]
+    pub tail: Option<String>,
+    /// Only this unit.
+    #[arg(long)]
+    pub serial: Option<String>,
+    /// Date of the assessments; default: that of the newest record. Later data are ignored.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub as_of: Option<Timestamp>,
+}

@@ -1,0 +1,67 @@
+//! Arguments of `run`.
+
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, ValueEnum};
+use jiff::Timestamp;
+
+use super::parse::{parse_span, parse_utc};
+
+/// `run`.
+#[derive(Debug, ClapArgs)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag that a user types")]
+pub(crate) struct RunArgs {
+    /// Only departures at or after this UTC time.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub since: Option<Timestamp>,
+    /// Only departures before this UTC time.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub until: Option<Timestamp>,
+    /// Only this tail.
+    #[arg(long)]
+    pub tail: Option<String>,
+    /// Only flights of this unit.
+    #[arg(long)]
+    pub serial: Option<String>,
+    /// Process at most N logs.
+    #[arg(long, value_name = "N")]
+    pub limit: Option<usize>,
+    /// Use N workers; default: one per core.
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// Retry failed logs.
+    #[arg(long)]
+    pub retry: bool,
+    /// Reprocess all logs.
+    #[arg(long)]
+    pub redo: bool,
+    /// Hash known logs and reprocess those whose content changed.
+    #[arg(long)]
+    pub verify_content: bool,
+    /// Dry run: show what would be processed and why.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Write run metrics in Prometheus text format, e.g. for a node exporter.
+    #[arg(long, value_name = "FILE")]
+    pub metrics: Option<PathBuf>,
+    /// Wait up to TIME for another run to release the store, e.g. `20m`.
+    #[arg(long, value_parser = parse_span, value_name = "TIME")]
+    pub wait: Option<std::time::Duration>,
+    /// Exit with code 4 if any unit is in this state or worse.
+    #[arg(long, value_enum, value_name = "STATE")]
+    pub fail_on: Option<FailOn>,
+    /// Print the run summary as JSON on stdout.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// States that can make a run fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub(crate) enum FailOn {
+    /// Watch limit.
+    Watch,
+    /// Planning horizon.
+    Plan,
+    /// Act limit.
+    Act,
+}

@@ -1,0 +1,72 @@
+//! Arguments of `store`.
+
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, Subcommand, ValueEnum};
+
+use super::parse::{parse_count, parse_span};
+use super::rows::RowFormatArgs;
+
+/// `store`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct StoreArgs {
+    #[command(subcommand)]
+    pub command: StoreCommand,
+}
+
+/// Commands on the results store.
+#[derive(Debug, Subcommand)]
+pub(crate) enum StoreCommand {
+    /// Show store contents and the last run
+    Info {
+        /// Exit with code 1 if the last completed run is older, e.g. `30h`.
+        #[arg(long, value_parser = parse_span, value_name = "TIME")]
+        max_age: Option<std::time::Duration>,
+        /// Print JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// List recent runs, or the logs of one run
+    Runs {
+        /// List the logs of this run; `last` is the newest.
+        #[arg(long, value_name = "ID")]
+        run: Option<String>,
+        /// Show at most N runs.
+        #[arg(long, value_name = "N", value_parser = parse_count, default_value_t = 20)]
+        last: usize,
+        #[command(flatten)]
+        rows: RowFormatArgs,
+    },
+    /// List the current data files of a table, for tools without Delta support
+    Files {
+        /// Table to list.
+        #[arg(long, value_enum, default_value_t = Table::Gaps)]
+        table: Table,
+    },
+    /// Verify store integrity
+    Verify,
+    /// Merge small files, sorted for queries
+    Compact,
+    /// Adopt the results of another store, e.g. a trial of other settings
+    Adopt {
+        /// Folder of the other store; it is not changed.
+        #[arg(value_name = "TRIAL")]
+        trial: PathBuf,
+    },
+    /// Export all records
+    Export {
+        #[command(flatten)]
+        rows: RowFormatArgs,
+    },
+}
+
+/// Tables of the store.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Table {
+    /// One row per actuator and flight.
+    Gaps,
+    /// One row per log.
+    Logs,
+    /// One row per run.
+    Runs,
+}
