@@ -1,5 +1,6 @@
-//! The documentation: links, documented commands and error messages.
+//! Documentation: links, documented commands, error messages and vocabulary.
 
 mod docs_links;
 mod documented_commands;
 mod error_messages;
+mod prose;

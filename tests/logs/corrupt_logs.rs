@@ -25,7 +25,7 @@ fn broken_logs_are_named_and_the_others_stored() {
         assert!(result.err.contains(&format!("error[{code}]")), "{code} is not in {}", result.err);
     }
     assert!(result.out.contains("98 records of 27 flights"), "{}", result.out);
-    assert!(result.out.contains("13 logs; everything else is stored"), "{}", result.out);
+    assert!(result.out.contains("13 logs could not be used; all others are stored"), "{}", result.out);
     assert!(result.out.contains("freeplay run --retry"), "{}", result.out);
 }
 

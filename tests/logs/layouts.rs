@@ -88,7 +88,7 @@ fn a_flight_in_pieces_is_one_flight_whatever_the_pieces_are_called() {
     }
     fleet.configure("[store]", "pieces = true\n\n[store]");
     let account = fleet.run_ok(&["run"]);
-    assert!(account.contains("10 logs: 10 to do"), "{account}");
+    assert!(account.contains("10 logs: 10 new or changed"), "{account}");
     assert_eq!(numbers(&fleet), plain());
     assert!(fleet.run_ok(&["run"]).contains("10 logs: 0 new or changed, 10 already processed"));
 }
@@ -148,7 +148,7 @@ fn a_broken_file_of_a_group_and_one_without_a_flight_are_told() {
     assert_eq!(result.code, Some(1), "{result:?}");
     assert!(result.err.contains("error[not_parquet]") && result.err.contains("loads/"), "{}", result.err);
     let checked = fleet.freeplay(&["check"]);
-    assert!(checked.err.contains("no main log is of its flight"), "{}", checked.err);
+    assert!(checked.err.contains("no matching main log for this flight"), "{}", checked.err);
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn columns_that_change_are_told() {
     rewrite(log, &log.with_file_name("x.parquet"), &facts(log), |c| c != "aileron_left_load_n", |_| true);
     std::fs::rename(log.with_file_name("x.parquet"), log).unwrap();
     let said = fleet.run_ok(&["check"]);
-    assert!(said.contains("not alike in all 10 logs"), "{said}");
+    assert!(said.contains("missing or whose type differs between 10 logs"), "{said}");
     assert!(said.contains("`aileron_left_load_n`: Float32 in 9"), "{said}");
     assert!(
         said.contains("`aileron_left_motor_deg`: Float32 in 9") && said.contains("Float64 in 1"),

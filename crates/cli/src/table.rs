@@ -49,9 +49,9 @@ fn within(columns: &[Column], rows: &[Vec<String>], width: usize) -> String {
     text.push('\n');
     if kept.len() < columns.len() {
         let note = format!(
-            "{} columns shown ({} hidden; widen the terminal or use --format csv)\n",
-            kept.len(),
-            columns.len() - kept.len()
+            "{} of {} columns hidden; see all with --format csv\n",
+            columns.len() - kept.len(),
+            columns.len()
         );
         text.push_str(&note);
     }

@@ -1,6 +1,6 @@
-//! Arrow's C interface as Python passes it on: capsules in, capsules out, no byte copied.
+//! Arrow PyCapsule interface: import and export of tables without copying.
 //!
-//! The only place, with [`crate::numpy_input`], where memory of others is touched: both say why they may.
+//! With [`crate::numpy_input`] the only unsafe code of this crate; each use states its safety argument.
 #![expect(unsafe_code, reason = "the C interface is made of raw structures")]
 
 use std::ffi::CStr;
@@ -19,12 +19,12 @@ const STREAM: &CStr = c"arrow_array_stream";
 const SCHEMA: &CStr = c"arrow_schema";
 const ARRAY: &CStr = c"arrow_array";
 
-/// Something that Arrow cannot do, as a `ValueError`.
+/// Converts an Arrow error to a `ValueError`.
 pub(crate) fn arrow_error(error: &ArrowError) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// Batches as a stream that whoever takes the capsule reads.
+/// Exports batches as an Arrow stream capsule.
 pub(crate) fn stream<'py>(
     py: Python<'py>,
     schema: &SchemaRef,
@@ -35,13 +35,13 @@ pub(crate) fn stream<'py>(
     PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(Box::new(reader)), STREAM)
 }
 
-/// Columns without rows.
+/// Exports a schema capsule.
 pub(crate) fn schema<'py>(py: Python<'py>, schema: &SchemaRef) -> PyResult<Bound<'py, PyCapsule>> {
     let schema = FFI_ArrowSchema::try_from(schema.as_ref()).map_err(|e| arrow_error(&e))?;
     PyCapsule::new_with_value(py, schema, SCHEMA)
 }
 
-/// The batches of whatever is a table to Arrow.
+/// Imports the batches of any Arrow table.
 pub(crate) fn batches(table: &Bound<'_, PyAny>) -> PyResult<Vec<RecordBatch>> {
     let chunks = arrays(table)?.ok_or_else(|| {
         let kind = table.get_type();
@@ -55,12 +55,12 @@ pub(crate) fn batches(table: &Bound<'_, PyAny>) -> PyResult<Vec<RecordBatch>> {
     chunks.into_iter().map(batch).collect()
 }
 
-/// The chunks of whatever speaks Arrow's interface; none when it does not.
+/// Imports the chunks of any object with the Arrow interface; `None` without it.
 pub(crate) fn arrays(object: &Bound<'_, PyAny>) -> PyResult<Option<Vec<ArrayRef>>> {
     if object.hasattr("__arrow_c_stream__")? {
         let capsule = object.call_method0("__arrow_c_stream__")?.cast_into::<PyCapsule>()?;
         let raw = capsule.pointer_checked(Some(STREAM))?.cast::<FFI_ArrowArrayStream>();
-        // SAFETY: the capsule's name says what it points to; `from_raw` takes it out and leaves a released one.
+        // SAFETY: the capsule's name guarantees its type; `from_raw` moves the stream out and leaves a released one.
         let stream = unsafe { FFI_ArrowArrayStream::from_raw(raw.as_ptr()) };
         return Stream(stream).collect().map(Some);
     }
@@ -78,9 +78,9 @@ pub(crate) fn arrays(object: &Bound<'_, PyAny>) -> PyResult<Option<Vec<ArrayRef>
     Ok(None)
 }
 
-/// An array whose buffers stay where they are.
+/// Imports an array without copying its buffers.
 fn import_array(array: FFI_ArrowArray, schema: &FFI_ArrowSchema) -> PyResult<ArrayRef> {
-    // SAFETY: the producer vouches for its array; releasing it is Arrow's business from here.
+    // SAFETY: the producer guarantees a valid array; Arrow releases it.
     let mut data: ArrayData = unsafe { from_ffi(array, schema) }.map_err(|e| arrow_error(&e))?;
     data.align_buffers();
     Ok(make_array(data))
@@ -130,10 +130,10 @@ impl Stream {
         if code == 0 {
             return Ok(());
         }
-        // SAFETY: after a failure the stream tells of it by a text of its own, or none.
+        // SAFETY: after a failure `get_last_error` returns the stream's message, or null.
         let text = self.0.get_last_error.map(|tell| unsafe { tell(&raw mut self.0) });
         let text = text.filter(|text| !text.is_null());
-        // SAFETY: that text ends in a zero and lives until the stream is asked again.
+        // SAFETY: the message is null-terminated and valid until the next call on the stream.
         let text =
             text.map_or_else(String::new, |text| unsafe { CStr::from_ptr(text) }.to_string_lossy().into());
         Err(PyValueError::new_err(format!("the Arrow stream failed with code {code}: {text}")))

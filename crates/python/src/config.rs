@@ -1,4 +1,4 @@
-//! Settings: `pipeline.toml`, read and checked once, with the tables it names.
+//! Configuration class: `pipeline.toml`, read and validated once, with its installations table.
 #![expect(clippy::needless_pass_by_value, reason = "Python hands values over")]
 
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use records::Installations;
 use crate::VERSION;
 use crate::error::{ExceptionClass, to_exception, to_run_exception};
 
-/// A checked configuration. Files that are estimate_batches together are laid over each other, as by `--config A --config B`.
+/// A checked configuration. Keys of later files override those of earlier ones, as with `--config A --config B`.
 #[pyclass(frozen, module = "freeplay")]
 pub(crate) struct Config {
     pub(crate) inner: job::Config,
@@ -66,7 +66,7 @@ impl Config {
         self.inner.parts.keys().map(ToString::to_string).collect()
     }
 
-    /// The same with other logs, another store, or another limit, m, of parts that state none.
+    /// Copy with other logs, another store, or a limit in m for parts without one.
     #[pyo3(signature = (logs=None, store=None, limit_m=None))]
     fn replaced(
         &self,
@@ -88,8 +88,7 @@ impl Config {
         Ok(Self { inner, files: self.files.clone(), installations: self.installations.clone() })
     }
 
-    /// blake3 of everything that an estimate elsewhere must have in common with one here: this program's version,
-    /// the configuration and the tables it names.
+    /// BLAKE3 digest of program version, configuration and tables, which driver and workers must share.
     fn digest(&self) -> PyResult<String> {
         let mut hash = blake3::Hasher::new();
         let logs = &self.inner.document.logs;
@@ -106,7 +105,7 @@ impl Config {
 }
 
 impl Config {
-    /// The installations table, read when it is first asked for.
+    /// Installations table, read on first use.
     pub(crate) fn installations(&self, py: Python<'_>) -> PyResult<&Installations> {
         if let Some(known) = self.installations.get() {
             return Ok(known);

@@ -6,7 +6,7 @@ use records::Diagnostic;
 /// Which exception, by what the command's exit code would be.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum ExceptionClass {
-    /// Some logs are in error: 1.
+    /// Some logs failed: 1.
     Log,
     /// Configuration, tables or arguments: 2.
     Config,
@@ -40,7 +40,7 @@ pub(crate) fn config_error(py: Python<'_>, diagnostic: Diagnostic) -> PyErr {
     to_exception(py, ExceptionClass::Config, &[diagnostic])
 }
 
-/// What ended a run or a question, as the command would tell it.
+/// Converts a pipeline error to the exception that matches the command's exit code.
 pub(crate) fn to_run_exception(py: Python<'_>, error: pipeline::Error) -> PyErr {
     match error {
         pipeline::Error::Refused(diagnostics) => to_exception(py, ExceptionClass::Config, &diagnostics),

@@ -1,5 +1,5 @@
-//! A column of numbers as Python holds it: an Arrow array or a numpy array, read where it lies.
-#![expect(unsafe_code, reason = "numpy tells where its numbers lie, and only that")]
+//! Numeric input from Python: Arrow and numpy arrays, read without copying.
+#![expect(unsafe_code, reason = "numpy provides only the address of its data")]
 
 use std::panic::AssertUnwindSafe;
 use std::ptr::NonNull;
@@ -14,12 +14,12 @@ use pyo3::prelude::*;
 
 use crate::arrow_capsule;
 
-/// Keeps a Python object alive for as long as its numbers are read.
+/// Keeps a Python object alive while its buffer is in use.
 struct BufferOwner {
     _object: AssertUnwindSafe<Py<PyAny>>,
 }
 
-/// Numbers; where they are not missing and already `float64` in one piece, the very bytes of Python.
+/// Values as `f64`; contiguous `float64` without missing values is not copied.
 pub(crate) fn numbers(object: &Bound<'_, PyAny>) -> PyResult<ScalarBuffer<f64>> {
     if let Some(chunks) = arrow_capsule::arrays(object)? {
         return of_arrow(&chunks);
@@ -44,7 +44,7 @@ fn of_arrow(chunks: &[ArrayRef]) -> PyResult<ScalarBuffer<f64>> {
     Ok(reals.iter().map(|value| value.unwrap_or(f64::NAN)).collect::<Vec<_>>().into())
 }
 
-/// The bytes of a numpy array of one dimension that lie one after the other; none of anything else.
+/// Buffer of a contiguous one-dimensional `float64` numpy array; `None` for anything else.
 fn of_numpy(object: &Bound<'_, PyAny>) -> PyResult<Option<ScalarBuffer<f64>>> {
     let Ok(face) = object.getattr("__array_interface__") else { return Ok(None) };
     let shape: Vec<usize> = face.get_item("shape")?.extract()?;
@@ -59,12 +59,12 @@ fn of_numpy(object: &Bound<'_, PyAny>) -> PyResult<Option<ScalarBuffer<f64>>> {
         return Ok(None);
     };
     let owner = Arc::new(BufferOwner { _object: AssertUnwindSafe(object.clone().unbind()) });
-    // SAFETY: numpy vouches for so many numbers at that place for as long as the array lives, and `owner` keeps it.
+    // SAFETY: numpy guarantees `rows` numbers at this address while the array lives, and `owner` keeps it alive.
     let bytes = unsafe { Buffer::from_custom_allocation(start, rows * size_of::<f64>(), owner) };
     Ok(Some(ScalarBuffer::new(bytes, 0, *rows)))
 }
 
-/// Where the numbers of a column lie once they are here: equal to where Python has them when none was copied.
+/// Address of a column's data after import: equal to Python's address if nothing was copied.
 #[pyfunction]
 pub(crate) fn data_pointer(column: &Bound<'_, PyAny>) -> PyResult<usize> {
     Ok(numbers(column)?.as_ptr() as usize)

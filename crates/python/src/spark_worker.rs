@@ -1,4 +1,4 @@
-//! What an engine such as Spark needs of us: one log done on a worker, and a run that asks the engine for logs.
+//! Entry points for a cluster engine such as Spark: process one log on a worker, and run with the engine's workers.
 #![expect(clippy::needless_pass_by_value, reason = "Python hands values over")]
 
 use std::sync::atomic::AtomicBool;
@@ -19,7 +19,7 @@ use crate::error::{ExceptionClass, to_exception, to_run_exception};
 use crate::functions::run_summary;
 use crate::table::Table;
 
-/// Does one log of a run that is kept elsewhere; its fault, if it has one, is among the rows.
+/// Processes one log of a distributed run; an error of the log is returned as a row.
 #[pyfunction]
 pub(crate) fn process_task(py: Python<'_>, config: &Config, task: &str) -> PyResult<Table> {
     let task: Task = serde_json::from_str(task)
@@ -29,7 +29,7 @@ pub(crate) fn process_task(py: Python<'_>, config: &Config, task: &str) -> PyRes
     Ok(Table::of(rows.map_err(|error| to_run_exception(py, error))?))
 }
 
-/// An answer without rows: its columns.
+/// Result table without rows, for its schema.
 #[pyfunction]
 pub(crate) fn empty_result() -> Table {
     Table::of(RecordBatch::new_empty(distributed::schema()))
@@ -67,7 +67,7 @@ pub(crate) fn run_distributed(
         })
     };
     let report = py.detach(|| distributed::run(&config.inner, &request, &context, at_a_time, &mut ask));
-    // Whoever reads the traceback wants the engine's own exception, not our word for it.
+    // The traceback must show the engine's own exception.
     match thrown {
         Some(error) => Err(error),
         None => run_summary(py, report),

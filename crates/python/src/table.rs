@@ -1,4 +1,4 @@
-//! A table that is handed out: its columns are read by whoever speaks Arrow.
+//! Result table with the Arrow PyCapsule interface.
 
 use arrow::array::{Array, RecordBatch};
 use arrow::datatypes::SchemaRef;
@@ -43,7 +43,7 @@ impl Table {
         format!("<freeplay.Table: {} rows, {} columns>", self.num_rows(), self.schema.fields().len())
     }
 
-    /// Where the values of a column of numbers lie in memory, for whoever wants to know that none was copied.
+    /// Address of a numeric column's values, to check that nothing was copied.
     fn buffer_address(&self, column: &str) -> PyResult<usize> {
         let found = self.batches.first().and_then(|batch| batch.column_by_name(column));
         let data = found.ok_or_else(|| PyKeyError::new_err(column.to_owned()))?.to_data();
@@ -55,7 +55,7 @@ impl Table {
         arrow_capsule::schema(py, &self.schema)
     }
 
-    /// The whole table; a schema that is asked for is a wish that Arrow allows to be passed over.
+    /// Exports the table; a requested schema is optional in the Arrow protocol and ignored.
     #[pyo3(signature = (requested_schema=None))]
     fn __arrow_c_stream__<'py>(
         &self,

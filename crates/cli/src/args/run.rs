@@ -38,7 +38,7 @@ pub(crate) struct RunArgs {
     /// Hash known logs and reprocess those whose content changed.
     #[arg(long)]
     pub verify_content: bool,
-    /// Dry run: show what would be processed and why.
+    /// Show what would be processed and why, without processing it (dry run).
     #[arg(long)]
     pub dry_run: bool,
     /// Write run metrics in Prometheus text format, e.g. for a node exporter.

@@ -1,6 +1,6 @@
 """The backlash gap of flight-control actuators from flight logs, and its trend per serial number.
 
-The functions read the same ``pipeline.toml`` as the command ``freeplay`` and give the same rows, bit for bit.
+The functions read the same ``pipeline.toml`` as the command ``freeplay`` and return bitwise identical rows.
 Tables come in and go out through Arrow's PyCapsule interface: hand a :class:`Table` to ``pyarrow.table``,
 ``polars.DataFrame``, ``pandas.DataFrame.from_arrow`` or DuckDB, and hand any of theirs back. Work is done without
 the interpreter's lock. What is wrong is raised as :class:`FreeplayError`, with the command's code, text and remedy.
@@ -51,14 +51,14 @@ _USUAL = "pipeline.toml"
 
 
 def load(config: Settings = _USUAL) -> Config:
-    """Reads and checks a configuration once, for many calls; several files are laid over each other.
+    """Reads and checks a configuration once, for many calls; keys of later files override earlier ones.
 
     >>> import freeplay
     >>> config = freeplay.load("pipeline.toml")
     >>> config.parts
     ['EMA-27-1040', 'EMA-27-1060']
 
-    Raises :class:`ConfigError` with every complaint about it:
+    Raises :class:`ConfigError` with all its diagnostics:
 
     >>> try:
     ...     freeplay.load("nowhere.toml")
@@ -105,7 +105,7 @@ def estimate_arrays(
     ``t`` is time in s from any zero, ``motor`` the motor's position brought to the screw axis in m (angle times
     lead / 2 pi), ``screw`` the screw's position in m, ``load_n`` the load in N; ``part`` names a part number of
     the configuration. Each is anything that speaks Arrow's interface, a numpy array, or a sequence of numbers;
-    ``float64`` in one piece is read where it lies. NaN and null are missing readings.
+    ``float64`` in one piece is read without copying. NaN and null are missing readings.
 
     >>> import freeplay, numpy as np, pyarrow as pa
     >>> t = np.arange(0, 100, 0.01)
@@ -145,10 +145,10 @@ def trend(
     """Level, rate, changes, crossing of the limit and state: one row for each unit.
 
     ``estimates`` is any Arrow table with ``serial_number`` (or ``serial``), ``departure_utc`` and ``gap_m``, such as
-    that of :func:`estimate`; without it the store of the configuration is asked. ``queries`` (``serial_number``,
+    that of :func:`estimate`; without it the store of the configuration is read. ``queries`` (``serial_number``,
     ``as_of_utc``, optional ``part_number``) asks for one row each, using nothing later than its date. ``statistics``
-    adds Theil-Sen's slope and Hamed and Rao's test, which take longer than all the rest. ``limit_m`` is the gap that
-    grounds, m, for parts of which the configuration states none; where no configuration is named and there is no
+    adds Theil-Sen's slope and Hamed and Rao's test, which take longer than all the rest. ``limit_m`` is the removal
+    limit in m for parts without one in the configuration; where no configuration is named and there is no
     ``pipeline.toml``, ``estimates`` are judged by it alone.
 
     >>> import freeplay, glob, pyarrow as pa

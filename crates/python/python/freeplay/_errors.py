@@ -7,7 +7,7 @@ from typing import Any
 
 
 class FreeplayError(Exception):
-    """Something that Freeplay complains about.
+    """Base of all errors of Freeplay.
 
     The text is what the command prints. ``docs/errors.md`` explains every code.
     """
@@ -17,7 +17,7 @@ class FreeplayError(Exception):
 
     def __init__(self, text: str, complaints: str = "[]") -> None:
         super().__init__(text, complaints)
-        #: Every complaint with its fields: ``code``, ``what`` and, where known, ``file``, ``line``, ``column``,
+        #: All diagnostics with their fields: ``code``, ``what`` and, where known, ``file``, ``line``, ``column``,
         #: ``row``, ``row_group``, ``found``, ``wanted``, ``hint``.
         self.complaints: list[dict[str, Any]] = json.loads(complaints)
 
@@ -26,12 +26,12 @@ class FreeplayError(Exception):
 
     @property
     def code(self) -> str | None:
-        """The first complaint's code: stable, to be matched on."""
+        """Stable code of the first diagnostic."""
         return self.complaints[0]["code"] if self.complaints else None
 
     @property
     def help(self) -> str | None:
-        """The first complaint's remedy."""
+        """Remedy of the first diagnostic."""
         return self.complaints[0].get("hint") if self.complaints else None
 
 

@@ -22,7 +22,7 @@ class Table:
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object: ...
 
 class Config:
-    """A checked configuration. Files that are given together are laid over each other."""
+    """A checked configuration. Keys of later files override those of earlier ones."""
 
     def __new__(cls, files: Sequence[str | PathLike[str]]) -> Config: ...
     @staticmethod

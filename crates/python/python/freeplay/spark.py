@@ -1,8 +1,8 @@
 """The nightly run with its logs done on a Spark cluster.
 
 Only the DataFrame API of Spark Connect is used (``spark.range`` and ``mapInArrow``), so that classic Spark,
-Databricks serverless and Sail serve alike: no jar, no SparkContext, no RDD. The driver plans and stores, a worker
-does one log for each task with one thread, and a log with a fault comes back as a row that says so.
+Databricks serverless and Sail work the same way: no jar, no SparkContext, no RDD. The driver plans and stores, a worker
+does one log for each task with one thread, and a failed log is returned as an error row.
 
 Spark runs a task at least once. An answer counts once, whichever copy arrives; records take the place of those of the
 same flight, and a log whose settings are unchanged is known and not done again. Only the driver writes.

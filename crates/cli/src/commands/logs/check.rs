@@ -208,29 +208,30 @@ fn one(
 
 /// Time base of an actuator as text.
 fn clock(a: &ActuatorChannels) -> String {
-    let stretches = match a.segments.len() {
+    let segments = match a.segments.len() {
         1 => "no gaps".to_owned(),
         n => format!("{n} segments"),
     };
     let r = a.repairs;
-    let mended = [
+    let repaired = [
         (r.out_of_order, "out of order"),
         (r.repeated, "repeated"),
         (r.unstamped, "without a timestamp"),
         (r.filled, "filled in from the rate"),
     ];
-    let mended: Vec<String> = mended
+    let repaired: Vec<String> = repaired
         .iter()
         .filter(|(count, _)| *count > 0)
         .map(|(count, what)| format!("{count} {what}"))
         .collect();
-    let mended = if mended.is_empty() { String::new() } else { format!("; repaired: {}", mended.join(", ")) };
+    let repaired =
+        if repaired.is_empty() { String::new() } else { format!("; repaired: {}", repaired.join(", ")) };
     let rate_hz = a.step_s.recip();
-    let doubt = if USUAL_RATES_HZ.contains(&rate_hz) { "" } else { " (unusual: check `clock.unit`)" };
+    let hint = if USUAL_RATES_HZ.contains(&rate_hz) { "" } else { " (unusual: check `clock.unit`)" };
     let kept = 1.0 - a.apart as f64 / a.dx_m.len().max(1) as f64;
     let selected =
         if a.apart > 0 { format!(", {:.1} % of the rows selected", 100.0 * kept) } else { String::new() };
-    format!("{rate_hz:.3} Hz{doubt}, {stretches}{selected}{mended}")
+    format!("{rate_hz:.3} Hz{hint}, {segments}{selected}{repaired}")
 }
 
 fn actuator(
@@ -276,18 +277,18 @@ fn actuator(
     let slope = quality::regression_slope(&a.motor_m, &a.dx_m).map(slope_note);
     let [motor_seen, screw_seen, load_seen] = a.quality;
     let mut found = vec![
-        describe(base("motor_position", motor, "m"), motor_seen, &said(&a, "motor")),
-        describe(base("screw_position", screw, "m"), screw_seen, &said(&a, "screw")),
+        describe(base("motor_position", motor, "m"), motor_seen, &channel_flags(&a, "motor")),
+        describe(base("screw_position", screw, "m"), screw_seen, &channel_flags(&a, "screw")),
         describe(base("screw − motor", screw, "m"), a.dx_quality(), &[]),
-        describe(base("load", load, "N"), load_seen, &said(&a, "load")),
+        describe(base("load", load, "N"), load_seen, &channel_flags(&a, "load")),
     ];
     found[2].note = found[2].note.take().or(slope);
     let says = Some((stay.part_number.clone(), job::part_identification::IdentifiedParams::of(&a, part)));
     Ok(ActuatorCheck { found, clock: Some(clock(&a)), says })
 }
 
-/// The doubts about one channel.
-fn said<'a>(a: &'a ActuatorChannels, channel: &str) -> Vec<&'a str> {
+/// Quality flags of one channel.
+fn channel_flags<'a>(a: &'a ActuatorChannels, channel: &str) -> Vec<&'a str> {
     a.flags.iter().map(String::as_str).filter(|flag| flag.starts_with(channel)).collect()
 }
 
@@ -299,7 +300,7 @@ fn slope_note(slope: f64) -> String {
     }
 }
 
-fn describe(base: Channel, q: Quality, doubts: &[&str]) -> Channel {
+fn describe(base: Channel, q: Quality, flags: &[&str]) -> Channel {
     let still = if q.samples == 0 {
         Some("no sample selected: nothing_selected".to_owned())
     } else if q.span().is_none() {
@@ -319,7 +320,7 @@ fn describe(base: Channel, q: Quality, doubts: &[&str]) -> Channel {
         frozen_share: Some(q.frozen_share),
         saturated_share: Some(q.saturated_share),
         spikes: Some(q.spikes as i64),
-        note: still.or_else(|| (!doubts.is_empty()).then(|| doubts.join(", "))),
+        note: still.or_else(|| (!flags.is_empty()).then(|| flags.join(", "))),
         ..base
     }
 }

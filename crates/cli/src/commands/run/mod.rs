@@ -244,7 +244,7 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
             );
         }
     }
-    // A run that left logs out cannot tell which tails have no data.
+    // A run that left logs out cannot determine which tails have no data.
     if !report.quiet.is_empty() && report.not_reached + report.left + report.not_asked == 0 {
         let tails: Vec<String> = report
             .quiet
