@@ -42,6 +42,10 @@ impl Address {
         let Some(text) = path.as_ref().to_str() else { return Ok(None) };
         let scheme = Scheme::ALL.iter().find_map(|(s, prefix)| Some((*s, text.strip_prefix(prefix)?)));
         let Some((scheme, rest)) = scheme else { return Ok(None) };
+        if let Some(text) = without_credentials(text) {
+            let detail = "it contains credentials: set them as variables or in a profile (docs/objects.md)";
+            return Err(Error::Address { text, detail: detail.to_owned() });
+        }
         let (bucket, key) = rest.split_once('/').unwrap_or((rest, ""));
         if bucket.is_empty() {
             return Err(Error::Address { text: text.to_owned(), detail: "it names no bucket".to_owned() });
@@ -88,6 +92,39 @@ impl Address {
     }
 }
 
+/// Parameters of a signed address, which grant access to whoever reads them.
+const SECRET_PARAMETERS: [&str; 6] = [
+    "sig=",
+    "signature=",
+    "x-amz-signature=",
+    "x-amz-security-token=",
+    "x-goog-signature=",
+    "sharedaccesssignature=",
+];
+
+/// The address with its credentials masked; `None` when it contains none.
+///
+/// Credentials are `user:password@` before the bucket, or a query with a signature. Other question marks are part of a
+/// key or a pattern.
+fn without_credentials(text: &str) -> Option<String> {
+    let (scheme, rest) = text.split_once("://")?;
+    let authority = rest.split('/').next().unwrap_or(rest);
+    // A bucket has neither sign; a password may contain a slash.
+    let has_user = authority.contains(['@', ':']);
+    let shown = rest.rsplit_once('@').map_or("", |(_, bucket)| bucket);
+    let shown = if has_user { shown } else { rest };
+    let is_signed = |query: &str| {
+        let query = query.to_ascii_lowercase();
+        query.split(['?', '&']).any(|one| SECRET_PARAMETERS.iter().any(|secret| one.starts_with(secret)))
+    };
+    let signed = shown.find('?').filter(|at| is_signed(&shown[at + 1..]));
+    if !has_user && signed.is_none() {
+        return None;
+    }
+    let (user, path) = (if has_user { "***@" } else { "" }, &shown[..signed.unwrap_or(shown.len())]);
+    Some(format!("{scheme}://{user}{path}{}", if signed.is_some() { "?***" } else { "" }))
+}
+
 impl std::fmt::Display for Address {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}{}", self.bucket_url(), self.key)
@@ -108,6 +145,21 @@ mod tests {
         assert_eq!((address.bucket.as_str(), address.key()), ("fleet", "logs/N1/a b.parquet"));
         assert_eq!(address.to_string(), "s3://fleet/logs/N1/a b.parquet");
         assert_eq!(Address::parse_required("gs://fleet").unwrap().bucket_url(), "gs://fleet/");
+    }
+
+    #[test]
+    fn credentials_in_an_address_are_refused_and_never_shown() {
+        for (text, masked) in [
+            ("s3://AKIA:hunter2@fleet/logs", "s3://***@fleet/logs"),
+            ("s3://AKIA:hun/ter2@fleet/logs", "s3://***@fleet/logs"),
+            ("az://logs/a.parquet?sv=2022&sig=hunter2", "az://logs/a.parquet?***"),
+            ("s3://fleet/a?X-Amz-Signature=hunter2", "s3://fleet/a?***"),
+        ] {
+            let error = Address::parse(text).unwrap_err().to_string();
+            assert!(error.contains(masked) && !error.contains("ter2"), "{error}");
+        }
+        assert!(Address::parse("s3://fleet/logs/N1/?.parquet").is_ok(), "a pattern");
+        assert!(Address::parse("s3://fleet/logs/a@b.parquet").is_ok(), "a key");
     }
 
     #[test]

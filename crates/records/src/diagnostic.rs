@@ -3,9 +3,10 @@
 //! Every crate has its own error enum. [`Diagnostic`] is the one form in which an error reaches the terminal,
 //! the run summary and a script, so that all three report the same.
 
+use std::borrow::Cow;
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 /// One error in one file, with a hint that its owner can act on.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -13,16 +14,16 @@ pub struct Diagnostic {
     /// Stable, lower case; scripts match on it.
     pub code: String,
     /// One sentence without blame and without a full stop.
-    #[serde(rename = "what")]
+    #[serde(rename = "what", serialize_with = "serialize_masked")]
     pub message: String,
     /// The file: a log, a table, the configuration.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub file: Option<String>,
     /// Line and column in a text file, from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line: Option<(usize, usize)>,
     /// The text of that line.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub text: Option<String>,
     /// The column of a table or log.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -34,7 +35,7 @@ pub struct Diagnostic {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_group: Option<u64>,
     /// The value that was found.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub found: Option<String>,
     /// The value that was expected.
     #[serde(rename = "wanted", skip_serializing_if = "Option::is_none")]
@@ -78,16 +79,56 @@ impl Diagnostic {
     }
 }
 
+/// Masks the credentials of addresses in a text: `user:password@` before a host or bucket, and signed queries.
+///
+/// A diagnostic may quote a line of the configuration, and ends up on terminals, in logs and in tickets.
+pub fn mask_credentials(text: &str) -> Cow<'_, str> {
+    const SIGNATURES: [&str; 5] = ["sig=", "signature=", "-signature=", "token=", "secret="];
+    let (mut masked, mut rest) = (String::new(), text);
+    while let Some(at) = rest.find("://") {
+        let (before, address) = rest.split_at(at + 3);
+        let end = address.find(|c: char| c.is_whitespace() || "\"'`<>".contains(c)).unwrap_or(address.len());
+        let (address, after) = address.split_at(end);
+        let authority = address.split('/').next().unwrap_or(address);
+        let user = authority.contains('@').then(|| address.find('@')).flatten();
+        masked.push_str(before);
+        masked.push_str(if user.is_some() { "***@" } else { "" });
+        let path = user.map_or(address, |at| &address[at + 1..]);
+        let query = path.find('?').filter(|at| {
+            let query = path[*at..].to_ascii_lowercase();
+            SIGNATURES.iter().any(|name| query.contains(name))
+        });
+        masked.push_str(&path[..query.unwrap_or(path.len())]);
+        masked.push_str(if query.is_some() { "?***" } else { "" });
+        rest = after;
+    }
+    masked.push_str(rest);
+    if masked == text { Cow::Borrowed(text) } else { Cow::Owned(masked) }
+}
+
+fn serialize_masked<S: Serializer>(text: &str, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_str(&mask_credentials(text))
+}
+
+#[expect(clippy::ref_option, reason = "serde passes the field")]
+fn serialize_masked_option<S: Serializer>(text: &Option<String>, to: S) -> Result<S::Ok, S::Error> {
+    match text {
+        Some(text) => to.serialize_some(&mask_credentials(text)),
+        None => to.serialize_none(),
+    }
+}
+
 /// The layout of `docs/errors.md`, without colour: the first line is the error, the other lines are indented.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "error[{}]: {}", self.code, self.message)?;
-        if let (Some(file), Some((line, column))) = (&self.file, self.line) {
+        write!(f, "error[{}]: {}", self.code, mask_credentials(&self.message))?;
+        let file = self.file.as_deref().map(mask_credentials);
+        if let (Some(file), Some((line, column))) = (&file, self.line) {
             write!(f, "\n  {file}:{line}:{column}")?;
             if let Some(text) = &self.text {
-                write!(f, "   {}", text.trim())?;
+                write!(f, "   {}", mask_credentials(text.trim()))?;
             }
-        } else if let Some(file) = &self.file {
+        } else if let Some(file) = &file {
             write!(f, "\n  file    {file}")?;
         }
         if let Some(location) = self.location() {
@@ -95,11 +136,11 @@ impl fmt::Display for Diagnostic {
         }
         for (label, value) in [("found ", &self.found), ("wanted", &self.expected)] {
             if let Some(value) = value {
-                write!(f, "\n  {label}  {value}")?;
+                write!(f, "\n  {label}  {}", mask_credentials(value))?;
             }
         }
         if let Some(hint) = &self.hint {
-            write!(f, "\nhint: {hint}")?;
+            write!(f, "\nhint: {}", mask_credentials(hint))?;
         }
         Ok(())
     }
@@ -121,5 +162,24 @@ mod tests {
         };
         let text = "error[time_goes_back]: the clock runs backwards\n  file    a.parquet\n  at      column `t_ns`, row 9\n  found   12:04:07 after 12:04:09\nhint: sort it";
         assert_eq!(c.to_string(), text);
+    }
+
+    #[test]
+    fn credentials_in_a_quoted_line_are_masked_on_the_terminal_and_in_json() {
+        let line = "files = [\"s3://AKIA:hunter2@fleet/*.parquet\", \"az://c/a?sv=1&sig=hunter2\", \"s3://b/?.parquet\"]";
+        let diagnostic = Diagnostic {
+            line: Some((3, 1)),
+            text: Some(line.to_owned()),
+            ..Diagnostic::new("object_address", "`az://c/a?sig=hunter2` is no address")
+                .in_file("pipeline.toml")
+        };
+        for shown in [diagnostic.to_string(), serde_json::to_string(&diagnostic).unwrap()] {
+            assert!(!shown.contains("hunter2"), "{shown}");
+            assert!(
+                shown.contains("s3://***@fleet/*.parquet") && shown.contains("s3://b/?.parquet"),
+                "{shown}"
+            );
+        }
+        assert!(matches!(mask_credentials("s3://fleet/a@b.parquet"), Cow::Borrowed(_)));
     }
 }

@@ -67,7 +67,7 @@ fn imports_between_the_files_of_a_crate_have_no_cycle() {
     for name in crates() {
         let modules = Modules::read(&name);
         for cycle in cycles(&modules.imports()) {
-            found.insert(format!("{name}: {}", modules.names(&cycle).join(" <-> ")));
+            found.insert(format!("{name}: {}", names(&cycle).join(" <-> ")));
         }
     }
     expect_known("cycles", &found);
@@ -228,6 +228,10 @@ impl Modules {
     }
 }
 
+fn names(cycle: &[ModulePath]) -> Vec<String> {
+    cycle.iter().map(|path| if path.is_empty() { "crate root".to_owned() } else { path.join("/") }).collect()
+}
+
 fn module_path(file: &Path) -> ModulePath {
     let mut path: ModulePath = file.iter().map(|part| part.to_str().unwrap().to_owned()).collect();
     let name = path.pop().unwrap();
@@ -300,7 +304,9 @@ fn without_tests(code: &str) -> String {
         } else {
             // A test module in a file of its own is kept as a mark for `test_modules`.
             let name = item[..end].split_whitespace().skip_while(|word| *word != "mod").nth(1);
-            name.into_iter().for_each(|name| kept.push_str(&format!("\ntest_mod {name};\n")));
+            if let Some(name) = name {
+                let _ = writeln!(kept, "\ntest_mod {name};");
+            }
             rest = &item[end..];
         }
     }

@@ -113,6 +113,9 @@ impl Error {
                 "name the store of the trial, and let the configuration name the one that takes it over"
             }
             Self::Io { source, .. } => io_remedy(source.kind()),
+            Self::Table { source, .. } if io_cause(source).is_some() => {
+                io_cause(source).map_or("", |cause| io_remedy(cause.kind()))
+            }
             Self::Table { verb: "read", .. } => {
                 "its log (`_delta_log` in the table's folder) may be torn: restore the store from a backup; without \
                  one, remove it and run its logs again"
@@ -143,14 +146,30 @@ fn io_remedy(kind: ErrorKind) -> &'static str {
              backup"
         }
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
-            "this user may not write there: see the owner and mode of the folder, or name another one under `[store]`"
+            "this user may not read or write there: see the owner and mode of the folder, or name another one under \
+             `[store]`"
         }
         ErrorKind::NotADirectory => "name a folder, not a file, as `path` under `[store]`",
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
             "make room and run again: what was stored before is whole"
         }
-        _ => "is the disk full, or the folder not ours to write?",
+        _ => {
+            "check the disk or the mount, and run again: the system could not read or write, which says nothing about \
+             the content of the store"
+        }
     }
+}
+
+/// The system error that caused an error of the Delta library.
+fn io_cause(error: &DeltaTableError) -> Option<&std::io::Error> {
+    let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
+    while let Some(error) = cause {
+        if let Some(found) = error.downcast_ref::<std::io::Error>() {
+            return Some(found);
+        }
+        cause = error.source();
+    }
+    None
 }
 
 /// The libraries underneath add where in their code it happened, which helps nobody here.
@@ -161,4 +180,23 @@ fn first_line(error: &DeltaTableError) -> String {
 /// As much of a digest as tells it from another.
 fn short(digest: &str) -> &str {
     digest.get(..12).unwrap_or(digest)
+}
+
+#[cfg(test)]
+mod tests {
+    use deltalake::logstore::object_store;
+
+    use super::*;
+
+    /// An NFS server that restarts gives `ESTALE`, a failing disk `EIO`: neither is a reason to remove a table.
+    #[test]
+    fn a_system_error_below_a_table_never_advises_to_remove_it() {
+        for code in [116, 5] {
+            let source = Box::new(std::io::Error::from_raw_os_error(code));
+            let source = object_store::Error::Generic { store: "LocalFileSystem", source };
+            let source = Box::new(DeltaTableError::from(source));
+            let error = Error::Table { table: "gaps", verb: "read", source };
+            assert!(error.remedy().contains("run again") && !error.remedy().contains("remove"), "{code}");
+        }
+    }
 }

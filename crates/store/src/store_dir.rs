@@ -86,6 +86,8 @@ fn percent_code(path: &str) -> Option<&str> {
 /// Rejects names that delta-rs cannot handle.
 fn check_name(dir: &Path) -> Result<&Path, Error> {
     let path = if object_io::is_address(dir) {
+        // Before any message prints the address: it may contain credentials.
+        object_io::Address::parse(dir)?;
         dir.to_owned()
     } else {
         std::path::absolute(dir).map_err(Error::io(dir, "opened"))?
@@ -103,8 +105,11 @@ fn first_entry(location: &Location) -> Result<Option<String>, Error> {
     }
     let dir = location.dir();
     let entries = std::fs::read_dir(dir).map_err(Error::io(dir, "opened"))?;
-    let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let mut names: Vec<String> = names.filter(|name| !name.starts_with(&format!("{MARKER}#"))).collect();
+    let entries = entries.collect::<Result<Vec<_>, _>>().map_err(Error::io(dir, "read"))?;
+    let names = entries.into_iter().map(|entry| entry.file_name().to_string_lossy().into_owned());
+    // `mkfs.ext4` puts `lost+found` into the root of every volume.
+    let is_ours = |name: &String| !name.starts_with(&format!("{MARKER}#")) && name != "lost+found";
+    let mut names: Vec<String> = names.filter(is_ours).collect();
     names.sort_by_key(|name| name != MARKER);
     Ok(names.into_iter().next())
 }
@@ -128,7 +133,7 @@ fn make_folder(dir: &Path) -> Result<(), Error> {
     if is_there(dir)? {
         return Ok(());
     }
-    std::fs::create_dir_all(dir).map_err(Error::io(dir, "created"))?;
+    durable_fs::create_folder(dir).map_err(Error::io(dir, "created"))?;
     // A bare name such as `results` has an empty parent, which is the current folder.
     let parent = dir.parent().map(|p| if p.as_os_str().is_empty() { Path::new(".") } else { p });
     parent.map_or(Ok(()), |parent| durable_fs::sync_dir(parent).map_err(Error::io(parent, "synced")))

@@ -1,8 +1,7 @@
-//! What is written stays written: content reaches the disk before its name does, and the name before we return.
+//! Durable local writes: content is synced before its name appears, and the folder before the call returns.
 //!
-//! `object_store` 0.13 never syncs, so a power cut can leave a commit's name on an empty file. This
-//! wraps its local store for every write Delta makes (commits, checkpoints), and is used as it is
-//! for data files.
+//! `object_store` 0.13 does not sync, so a power cut can leave the name of a commit on an empty file. [`DurableFiles`]
+//! wraps its local store for every write of delta-rs (commits, checkpoints); data files are written by the functions.
 
 use std::fmt;
 use std::fs::File;
@@ -18,43 +17,78 @@ use deltalake::logstore::object_store::{
 };
 use futures::stream::BoxStream;
 
-/// Writes a whole file under a new name, or fails when the name is taken.
-pub(crate) fn create(path: &FsPath, content: &[u8]) -> io::Result<()> {
-    write(path, [content].into_iter(), WriteMode::New)
+/// Writes a whole file under a new name. `false` when a file with other content has that name.
+pub(crate) fn create(path: &FsPath, content: &[u8]) -> io::Result<bool> {
+    create_parts(path, &[content])
 }
 
-/// Writes a whole file, in place of one of the same name.
+/// Writes a whole file; replaces a file of the same name.
 pub(crate) fn replace(path: &FsPath, content: &[u8]) -> io::Result<()> {
-    write(path, [content].into_iter(), WriteMode::Replace)
+    replace_parts(path, &[content])
 }
 
-/// Makes a folder's entries last.
+/// Makes the entries of a folder durable.
 pub(crate) fn sync_dir(dir: &FsPath) -> io::Result<()> {
     if cfg!(unix) { File::open(dir)?.sync_all() } else { Ok(()) }
 }
 
-#[derive(Clone, Copy)]
-enum WriteMode {
-    New,
-    Replace,
+/// Only the link itself reports that the name is taken: other calls give `AlreadyExists` for other reasons.
+///
+/// A name that is taken by the same content counts as written, since the reply to an earlier link may have been lost.
+fn create_parts(path: &FsPath, parts: &[&[u8]]) -> io::Result<bool> {
+    let (dir, staged) = stage(path, parts)?;
+    let linked = std::fs::hard_link(&staged, path);
+    // Best effort: a staged file that stays is ignored by readers and replaced by the next write.
+    let _ = std::fs::remove_file(&staged);
+    let is_ours = match linked {
+        Ok(()) => true,
+        Err(e) if e.kind() == io::ErrorKind::AlreadyExists => std::fs::read(path)? == parts.concat(),
+        Err(e) => return Err(e),
+    };
+    sync_dir(dir)?;
+    Ok(is_ours)
 }
 
-fn write<'a>(path: &FsPath, parts: impl Iterator<Item = &'a [u8]>, naming: WriteMode) -> io::Result<()> {
-    let dir = path.parent().unwrap_or(FsPath::new("."));
-    std::fs::create_dir_all(dir)?;
-    let staged = staged(path);
-    let written = stage(&staged, parts).and_then(|()| match naming {
-        WriteMode::New => std::fs::hard_link(&staged, path).and_then(|()| std::fs::remove_file(&staged)),
-        WriteMode::Replace => std::fs::rename(&staged, path),
-    });
-    if written.is_err() {
-        // Best effort: the error that is reported is the one that happened first.
+fn replace_parts(path: &FsPath, parts: &[&[u8]]) -> io::Result<()> {
+    let (dir, staged) = stage(path, parts)?;
+    if let Err(error) = std::fs::rename(&staged, path) {
         let _ = std::fs::remove_file(&staged);
+        return Err(error);
     }
-    written.and_then(|()| sync_dir(dir))
+    sync_dir(dir)
 }
 
-fn stage<'a>(staged: &FsPath, parts: impl Iterator<Item = &'a [u8]>) -> io::Result<()> {
+/// Creates a folder and its parents.
+///
+/// `create_dir_all` returns `AlreadyExists` when the folder exists and its `stat` fails. That error says nothing about
+/// the file to be written, so the error of the `stat` is returned instead.
+pub(crate) fn create_folder(dir: &FsPath) -> io::Result<()> {
+    match std::fs::create_dir_all(dir) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => match std::fs::metadata(dir) {
+            Ok(found) if found.is_dir() => Ok(()),
+            Ok(_) => Err(io::ErrorKind::NotADirectory.into()),
+            Err(error) => Err(error),
+        },
+        done => done,
+    }
+}
+
+/// Writes and syncs the content under a temporary name; returns the folder and that name.
+fn stage<'a>(path: &'a FsPath, parts: &[&[u8]]) -> io::Result<(&'a FsPath, PathBuf)> {
+    let dir = path.parent().unwrap_or(FsPath::new("."));
+    create_folder(dir)?;
+    let staged = staged(path);
+    match write_synced(&staged, parts) {
+        Ok(()) => Ok((dir, staged)),
+        Err(error) => {
+            // Best effort: the error that is reported is the one that happened first.
+            let _ = std::fs::remove_file(&staged);
+            Err(error)
+        }
+    }
+}
+
+fn write_synced(staged: &FsPath, parts: &[&[u8]]) -> io::Result<()> {
     let mut file = File::create(staged)?;
     for part in parts {
         file.write_all(part)?;
@@ -62,14 +96,14 @@ fn stage<'a>(staged: &FsPath, parts: impl Iterator<Item = &'a [u8]>) -> io::Resu
     file.sync_all()
 }
 
-/// A name that the local object store does not list: a number after a hash sign.
+/// Temporary name that the local object store does not list: a number after a hash sign.
 fn staged(path: &FsPath) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(format!("#{}", std::process::id()));
     PathBuf::from(name)
 }
 
-/// The local file system, with writes that last.
+/// Local file system with durable writes.
 #[derive(Debug, Default)]
 pub(crate) struct DurableFiles {
     inner: LocalFileSystem,
@@ -81,24 +115,24 @@ impl fmt::Display for DurableFiles {
     }
 }
 
-fn failed(path: &Path, source: io::Error) -> Error {
-    let (path, source) = (path.to_string(), Box::new(source));
-    match source.kind() {
-        io::ErrorKind::AlreadyExists => Error::AlreadyExists { path, source },
-        _ => Error::Generic { store: "durable", source },
-    }
+fn failed(source: io::Error) -> Error {
+    Error::Generic { store: "durable", source: Box::new(source) }
 }
 
 #[async_trait]
 impl ObjectStore for DurableFiles {
     async fn put_opts(&self, location: &Path, payload: PutPayload, options: PutOptions) -> Result<PutResult> {
-        let naming = match options.mode {
-            PutMode::Create => WriteMode::New,
-            PutMode::Overwrite => WriteMode::Replace,
-            PutMode::Update(_) => return self.inner.put_opts(location, payload, options).await,
-        };
         let path = self.inner.path_to_filesystem(location)?;
-        write(&path, payload.iter().map(AsRef::as_ref), naming).map_err(|e| failed(location, e))?;
+        let parts: Vec<&[u8]> = payload.iter().map(AsRef::as_ref).collect();
+        match options.mode {
+            PutMode::Create if create_parts(&path, &parts).map_err(failed)? => {}
+            PutMode::Create => {
+                let source = io::Error::from(io::ErrorKind::AlreadyExists).into();
+                return Err(Error::AlreadyExists { path: location.to_string(), source });
+            }
+            PutMode::Overwrite => replace_parts(&path, &parts).map_err(failed)?,
+            PutMode::Update(_) => return self.inner.put_opts(location, payload, options).await,
+        }
         Ok(PutResult { e_tag: None, version: None })
     }
 
@@ -140,5 +174,32 @@ impl ObjectStore for DurableFiles {
 
     async fn rename_opts(&self, from: &Path, to: &Path, options: RenameOptions) -> Result<()> {
         self.inner.rename_opts(from, to, options).await
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_that_is_taken_is_told_from_one_that_holds_the_same() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a");
+        assert!(create(&path, b"one").unwrap());
+        assert!(create(&path, b"one").unwrap(), "the same content counts as written");
+        assert!(!create(&path, b"two").unwrap());
+        assert_eq!(std::fs::read(&path).unwrap(), b"one");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no staged file is left");
+    }
+
+    /// `mkdir` gives `EEXIST` for a dangling link, as for a folder whose `stat` fails with `EIO`.
+    #[cfg(unix)]
+    #[test]
+    fn a_folder_that_cannot_be_reached_is_not_taken_for_a_written_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("table");
+        std::os::unix::fs::symlink(dir.path().join("nowhere"), &folder).unwrap();
+        let error = create(&folder.join("a"), b"one").unwrap_err();
+        assert_ne!(error.kind(), io::ErrorKind::AlreadyExists);
     }
 }

@@ -111,7 +111,7 @@ impl Location {
 
     /// Makes room for files: a folder where this is one, or where copies lie.
     pub(crate) fn make(&self) -> Result<(), Error> {
-        std::fs::create_dir_all(&self.dir).map_err(Error::io(&self.dir, "created"))
+        durable_fs::create_folder(&self.dir).map_err(Error::io(&self.dir, "created"))
     }
 
     /// Makes the names of new files last; a bucket's do when their writing returns.
@@ -127,7 +127,7 @@ impl Location {
         let path = self.dir.join(name);
         match &self.bucket {
             Some(bucket) => Ok(self.size(bucket, &path)?.is_some()),
-            None => Ok(path.exists()),
+            None => path.try_exists().map_err(Error::io(path, "read")),
         }
     }
 
@@ -135,7 +135,11 @@ impl Location {
     pub(crate) fn length(&self, path: &Path) -> Result<Option<u64>, Error> {
         match &self.bucket {
             Some(bucket) => self.size(bucket, path),
-            None => Ok(std::fs::metadata(path).ok().map(|data| data.len())),
+            None => match std::fs::metadata(path) {
+                Ok(data) => Ok(Some(data.len())),
+                Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+                Err(e) => Err(Error::io(path, "read")(e)),
+            },
         }
     }
 
@@ -145,6 +149,13 @@ impl Location {
             Err(object_io::Error::Missing { .. }) => Ok(None),
             Err(error) => Err(error.into()),
         }
+    }
+
+    /// Why a local folder cannot be read; `None` when it can, and in a bucket.
+    pub(crate) fn unreadable(&self, name: &str) -> Option<Error> {
+        let path = self.dir.join(name);
+        let error = (!self.is_bucket()).then(|| std::fs::read_dir(&path).err()).flatten()?;
+        (error.kind() != std::io::ErrorKind::NotFound).then(|| Error::io(path, "read")(error))
     }
 
     /// A small file's content.
@@ -165,16 +176,21 @@ impl Location {
         written.map_err(Error::io(path, "copied"))
     }
 
-    /// Writes a whole file under a new name; one of that name is left as it is, and not told of.
+    /// Writes a file whose name contains the digest of its content.
+    ///
+    /// A file of that name with other content is damaged and is replaced: no commit can mean it.
     pub(crate) fn create(&self, path: &Path, content: &[u8]) -> Result<(), Error> {
         let Some(bucket) = &self.bucket else {
             return match durable_fs::create(path, content) {
-                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => Ok(()),
-                done => done.map_err(Error::io(path, "written")),
+                Ok(true) => Ok(()),
+                Ok(false) => durable_fs::replace(path, content).map_err(Error::io(path, "written")),
+                Err(error) => Err(Error::io(path, "written")(error)),
             };
         };
         match self.put(bucket, path, content, PutMode::Create) {
-            Err(object_io::Error::Exists { .. }) => Ok(()),
+            Err(object_io::Error::Exists { .. }) => {
+                Ok(self.put(bucket, path, content, PutMode::Overwrite)?)
+            }
             done => Ok(done?),
         }
     }

@@ -141,7 +141,10 @@ impl Table {
             delta.load().await?;
             self.keep(delta)
         };
-        self.location.block_on(load).map_err(self.failed("read"))
+        self.location.block_on(load).map_err(|error| match self.location.unreadable("_delta_log") {
+            Some(cause) => cause,
+            None => self.failed("read")(error),
+        })
     }
 
     /// What a loaded table says, kept for those who ask next.

@@ -81,3 +81,38 @@ fn a_second_writer_is_told_who_holds_the_store_and_may_wait() {
     drop(first);
     store.lock(&Holder::this_process(), Some(Duration::from_secs(5))).unwrap();
 }
+
+#[test]
+fn the_root_of_an_ext4_volume_can_be_a_store() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir(dir.path().join("lost+found")).unwrap();
+    assert!(matches!(Store::open(dir.path()).unwrap_err(), Error::Missing { .. }));
+    writer(dir.path()).commit(&[result(1, 0, 1e-6)]).unwrap();
+    assert_eq!(Store::open(dir.path()).unwrap().records(&Query::default()).unwrap().len(), 3);
+}
+
+/// A link to itself cannot be read by any user, root included, like a folder without permissions by others.
+#[cfg(unix)]
+#[test]
+fn a_table_that_cannot_be_read_is_not_taken_for_a_missing_store() {
+    let dir = tempfile::tempdir().unwrap();
+    writer(dir.path()).commit(&[result(1, 0, 1e-6)]).unwrap();
+    let opened = Store::open(dir.path()).unwrap();
+    let (table, kept) = (dir.path().join("gaps"), dir.path().join("logs-kept"));
+    std::fs::rename(&table, &kept).unwrap();
+    std::os::unix::fs::symlink(&table, &table).unwrap();
+    for error in [Store::open(dir.path()).unwrap_err(), opened.records(&Query::default()).unwrap_err()] {
+        assert!(matches!(error, Error::Io { .. }), "{error}");
+        assert!(!error.diagnostic().hint.unwrap().contains("remove"), "{error}");
+    }
+}
+
+#[test]
+fn an_address_with_a_password_is_refused_without_showing_it() {
+    for text in ["s3://AKIA:hunter2@fleet/results", "az://results?sv=1&sig=hunter2%2B"] {
+        for opened in [Store::open(text), Store::create_or_open(text)] {
+            let shown = opened.unwrap_err().diagnostic().to_string();
+            assert!(shown.contains("credentials") && !shown.contains("hunter2"), "{shown}");
+        }
+    }
+}
