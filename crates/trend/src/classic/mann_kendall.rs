@@ -1,6 +1,6 @@
 //! Mann–Kendall's test of a monotonic trend, and two remedies for values that are not independent.
 
-use super::{check, theil_sen};
+use super::{check, sizes_of_equals, theil_sen};
 use crate::error::Error;
 use crate::math::distributions::{quantile, two_sided};
 
@@ -100,17 +100,6 @@ fn inversions(values: &mut [f64], spare: &mut [f64]) -> u64 {
     spare[left.len() + j..].copy_from_slice(&right[j..]);
     values.copy_from_slice(spare);
     count
-}
-
-/// Sizes of the groups of equal values.
-pub(super) fn tie_sizes(y: &[f64]) -> impl Iterator<Item = f64> {
-    let mut sorted = y.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    sizes_of_equals(&sorted).collect::<Vec<f64>>().into_iter()
-}
-
-fn sizes_of_equals(sorted: &[f64]) -> impl Iterator<Item = f64> {
-    sorted.chunk_by(|a, b| a == b).map(|group| group.len() as f64)
 }
 
 /// The series less its Sen slope by index counted from one, and that slope.

@@ -46,3 +46,14 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
     let (below, &mut upper, _) = values.select_nth_unstable_by(half, f64::total_cmp);
     if even { below.iter().copied().fold(f64::NEG_INFINITY, f64::max).midpoint(upper) } else { upper }
 }
+
+/// Sizes of the groups of equal values.
+fn tie_sizes(y: &[f64]) -> impl Iterator<Item = f64> {
+    let mut sorted = y.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    sizes_of_equals(&sorted).collect::<Vec<f64>>().into_iter()
+}
+
+fn sizes_of_equals(sorted: &[f64]) -> impl Iterator<Item = f64> {
+    sorted.chunk_by(|a, b| a == b).map(|group| group.len() as f64)
+}

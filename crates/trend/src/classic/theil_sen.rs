@@ -1,6 +1,6 @@
 //! The Theil–Sen line: the median of all pairwise slopes, exactly, without keeping them.
 
-use super::{check_pairs, median};
+use super::{check_pairs, median, tie_sizes};
 use crate::error::Error;
 use crate::math::distributions::quantile;
 
@@ -49,7 +49,7 @@ pub fn theil_sen(x: &[f64], y: &[f64], confidence: f64) -> Result<TheilSen, Erro
 /// Variance of Kendall's S with both margins' ties.
 fn sen_variance(x: &[f64], y: &[f64]) -> f64 {
     let term = |k: f64| k * (k - 1.0) * (2.0 * k + 5.0);
-    let ties = |values: &[f64]| super::mann_kendall::tie_sizes(values).map(term).sum::<f64>();
+    let ties = |values: &[f64]| tie_sizes(values).map(term).sum::<f64>();
     (term(x.len() as f64) - ties(x) - ties(y)) / 18.0
 }
 
