@@ -1,39 +1,111 @@
-//! The study as a page: tables between words that stand in `accuracy.md.in`.
+//! The accuracy page: tables in the template `accuracy.md.in`.
 
 use std::fmt::Write as _;
 
 use crate::gear_bench::GearBenchLog;
 use crate::methods::METHODS;
-use crate::metrics::{ErrorStats, Errors};
+use crate::metrics::{ErrorStats, Errors, FALSE_ALARMS};
 use crate::robot_logs::RobotRow;
 use crate::scenarios::Kind;
 
-/// Fills the page's places with tables.
-pub fn page(tallies: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchLog]>) -> String {
-    let of = |kinds: fn(Kind) -> bool| tallies.iter().filter(move |t| kinds(t.kind)).collect::<Vec<_>>();
-    let shown = of(|k| !matches!(k, Kind::Blind(_)));
+/// Fills the template's places with tables.
+pub fn page(stats: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchLog]>) -> String {
     let text = include_str!("../accuracy.md.in");
-    let gears = gears.map_or_else(|| "Not run: `--gears DIR` was not given.\n".to_owned(), geared);
-    text.replace("{{errors}}", &errors(&shown))
-        .replace("{{intervals}}", &intervals(&shown))
-        .replace("{{refusals}}", &refusals(tallies))
-        .replace("{{robot}}", &real(robot))
+    let gears = gears.map_or_else(|| "Not run: `--gears DIR` was not given.\n".to_owned(), gear_bench_table);
+    let visible: Vec<&ErrorStats> = visible(stats).collect();
+    text.replace("{{classes}}", &classes(&visible))
+        .replace("{{methods}}", &methods(&visible))
+        .replace("{{alarms}}", &alarms(&visible))
+        .replace("{{refusals}}", &refusals(stats))
+        .replace("{{robot}}", &robot_table(robot))
         .replace("{{gears}}", &gears)
 }
 
+/// The tables of simulated flights, for a reduced run.
+pub fn tables(stats: &[ErrorStats]) -> String {
+    let visible: Vec<&ErrorStats> = visible(stats).collect();
+    [classes(&visible), methods(&visible), alarms(&visible), refusals(stats)].join("\n")
+}
+
+/// The classes whose gap can be seen.
+fn visible(stats: &[ErrorStats]) -> impl Iterator<Item = &ErrorStats> {
+    stats.iter().filter(|t| !matches!(t.kind, Kind::Blind(_)))
+}
+
+/// Contact regression: errors, coverage, flags and refusals of every class.
+fn classes(stats: &[&ErrorStats]) -> String {
+    let mut table = "| scenario | flights | unit | median | P95 | worst | 90 % coverage [%] | range of coverage [%] | flags | refusals |\n|---|---|---|---|---|---|---|---|---|---|\n".to_owned();
+    for t in stats {
+        let errors = &t.errors[0];
+        let (share, low, high) = t.coverage();
+        let coverage = if t.estimated == 0 {
+            "– | –".to_owned()
+        } else {
+            format!("{:.0} | {:.0}–{:.0}", 100.0 * share, 100.0 * low, 100.0 * high)
+        };
+        let _ = writeln!(
+            table,
+            "| {} | {} | {} | {} | {} | {} | {coverage} | {} | {} |",
+            t.name,
+            t.flights,
+            t.kind.unit(),
+            digits(errors.median),
+            digits(errors.p95),
+            digits(errors.worst),
+            flags(t),
+            t.false_refusals(),
+        );
+    }
+    table
+}
+
+/// Two digits after the point for small numbers, none for large ones.
+fn digits(value: f64) -> String {
+    match value {
+        v if v.is_nan() => "–".to_owned(),
+        v if v < 10.0 => format!("{v:.2}"),
+        v => format!("{v:.0}"),
+    }
+}
+
 /// Median / 95 % quantile / worst of every method.
-fn errors(tallies: &[&ErrorStats]) -> String {
-    let mut table = format!("| scenario | flights | unit | {} |\n|---|---|---|", METHODS.join(" | "));
+fn methods(stats: &[&ErrorStats]) -> String {
+    let mut table = format!("| scenario | unit | {} |\n|---|---|", METHODS.join(" | "));
     table += &"---|".repeat(METHODS.len());
     table.push('\n');
-    for t in tallies {
-        let _ = write!(table, "| {} | {} | {} |", t.name, t.flights, t.kind.unit());
+    for t in stats {
+        let _ = write!(table, "| {} | {} |", t.name, t.kind.unit());
         for errors in &t.errors {
             let _ = write!(table, " {} |", three(errors));
         }
         table.push('\n');
     }
     table
+}
+
+/// Flags raised without cause, by class; classes without any are summed up in the last line.
+fn alarms(stats: &[&ErrorStats]) -> String {
+    let names = FALSE_ALARMS.map(|flag| format!("`{flag}`")).join(" | ");
+    let mut table =
+        format!("| scenario | estimated | {names} |\n|---|---|{}\n", "---|".repeat(FALSE_ALARMS.len()));
+    let (mut quiet, mut quiet_flights) = (0, 0);
+    for t in stats {
+        let Some(alarms) = &t.false_alarms else { continue };
+        if alarms.iter().all(|count| *count == 0) {
+            (quiet, quiet_flights) = (quiet + 1, quiet_flights + t.estimated);
+            continue;
+        }
+        let counts = alarms.map(|count| count.to_string()).join(" | ");
+        let _ = writeln!(table, "| {} | {} | {counts} |", t.name, t.estimated);
+    }
+    let _ = writeln!(table, "\nNo false alarm in {quiet} further classes with {quiet_flights} estimates.");
+    table
+}
+
+/// The codes of estimates and refusals, with how often each was given.
+fn flags(stats: &ErrorStats) -> String {
+    let codes: Vec<String> = stats.codes.iter().map(|(code, n)| format!("`{code}` {n}")).collect();
+    if codes.is_empty() { "–".to_owned() } else { codes.join(", ") }
 }
 
 fn three(errors: &Errors) -> String {
@@ -44,34 +116,10 @@ fn three(errors: &Errors) -> String {
     format!("{:.digits$} / {:.digits$} / {:.digits$}", errors.median, errors.p95, errors.worst)
 }
 
-/// How often the interval held, and which flags were raised.
-fn intervals(tallies: &[&ErrorStats]) -> String {
-    let mut table = "| scenario | estimated | 90 % intervals that hold | of 100, with 90 % certainty | flags |\n|---|---|---|---|---|\n".to_owned();
-    for t in tallies {
-        let (share, low, high) = t.coverage();
-        let _ = writeln!(
-            table,
-            "| {} | {} | {:.1} % | {:.0} to {:.0} | {} |",
-            t.name,
-            t.estimated,
-            100.0 * share,
-            100.0 * low,
-            100.0 * high,
-            codes(t)
-        );
-    }
-    table
-}
-
-fn codes(tally: &ErrorStats) -> String {
-    let said: Vec<String> = tally.codes.iter().map(|(code, n)| format!("`{code}` {n}")).collect();
-    if said.is_empty() { "–".to_owned() } else { said.join(", ") }
-}
-
-/// Flights that cannot show a gap, and what became of them; then the false refusals of all others.
+/// Flights that cannot show a gap with the codes given, and the false refusals of all others.
 fn refusals(tallies: &[ErrorStats]) -> String {
     let mut table =
-        "| flights that cannot show a gap | flights | given a number | wanted | said |\n|---|---|---|---|---|\n".to_owned();
+        "| flights that cannot show a gap | flights | estimated | expected code | codes given |\n|---|---|---|---|---|\n".to_owned();
     for t in tallies {
         let Some(code) = t.must_refuse() else { continue };
         let _ = writeln!(
@@ -80,7 +128,7 @@ fn refusals(tallies: &[ErrorStats]) -> String {
             t.name,
             t.flights,
             t.missed_refusals(),
-            codes(t)
+            flags(t)
         );
     }
     let (blind, sound): (Vec<&ErrorStats>, Vec<&ErrorStats>) =
@@ -98,7 +146,7 @@ fn refusals(tallies: &[ErrorStats]) -> String {
     table
 }
 
-fn real(rows: &[RobotRow]) -> String {
+fn robot_table(rows: &[RobotRow]) -> String {
     let mut table = "| log | contact regression ° | ± ° | skew ms | paper (29–31) ° | load lines ° | P99 − P1 ° | remarks |\n|---|---|---|---|---|---|---|---|\n".to_owned();
     let cell = |v: f64, digits: usize| if v.is_nan() { "–".to_owned() } else { format!("{v:.digits$}") };
     for r in rows {
@@ -118,13 +166,13 @@ fn real(rows: &[RobotRow]) -> String {
     table
 }
 
-/// One method's answers to a log, over small ramps and over all.
-type Said = fn(&GearBenchLog) -> [f64; 2];
+/// One method's results for a log, over small ramps and over all.
+type Results = fn(&GearBenchLog) -> [f64; 2];
 
 /// Against the authors' play: correlation, mean and mean absolute difference, of each method.
-fn geared(rows: &[GearBenchLog]) -> String {
+fn gear_bench_table(rows: &[GearBenchLog]) -> String {
     let mut table = "| method | ramps | correlation | mean difference ° | mean absolute difference ° |\n|---|---|---|---|---|\n".to_owned();
-    let methods: [(&str, Said); 3] =
+    let methods: [(&str, Results); 3] =
         [(METHODS[1], |g| g.midrange_deg), (METHODS[2], |g| g.lines_deg), (METHODS[3], |g| g.spread_deg)];
     for (name, of) in methods {
         for (k, ramps) in ["4 N·m", "4 and 40 N·m"].iter().enumerate() {

@@ -2,6 +2,7 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a study prints")]
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -14,30 +15,37 @@ use validation::metrics::ErrorStats;
 use validation::scenarios::{Class, Kind, classes};
 use validation::{accuracy_page, gear_bench, plots, robot_logs};
 
-/// Estimates simulated flights of known gap by every method, and writes tables and pictures of the errors.
+/// Estimates simulated flights of known gap by every method and writes tables and plots of the errors.
 #[derive(Debug, Parser)]
 #[command(
-    after_help = "Examples:\n  cargo run --release -p validation\n  cargo run --release -p validation -- --flights 20 --drawn 60 --only mixture --output /tmp/validation"
+    after_help = "Examples:\n  cargo run --release -p validation\n  cargo run --release -p validation -- --flights 20 --only buffet\n  cargo run --release -p validation -- --only friction --csv /tmp/friction.csv"
 )]
 struct Args {
-    /// Flights in each scenario.
+    /// Flights of each class.
     #[arg(long, default_value_t = 100)]
     flights: u64,
-    /// Flights drawn over wide ranges; a third as many for each foreign friction law.
-    #[arg(long, default_value_t = 600)]
-    drawn: u64,
-    /// Only scenarios whose name holds this.
+    /// Flights of the class `wide`; a third as many of each `wide` class with another friction law.
+    /// Default: 600, or as `--flights` with `--only`.
+    #[arg(long)]
+    drawn: Option<u64>,
+    /// Run only classes whose name contains TEXT, and print the tables instead of writing them.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
-    /// The robot's logs and their configuration.
+    /// List the classes and exit.
+    #[arg(long)]
+    list: bool,
+    /// Write the result of each flight to FILE.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Folder of the robot's logs and their configuration.
     #[arg(long, value_name = "DIR", default_value = "tests/data/kr300")]
     robot: PathBuf,
-    /// Logs of the gear actuators, with their manifest; they are not part of the project (CC BY-SA 4.0).
+    /// Folder of the gear-bench logs with their manifest; they are not part of the project (CC BY-SA 4.0).
     #[arg(long, value_name = "DIR")]
     gears: Option<PathBuf>,
-    /// Where `accuracy.md` and its pictures go.
-    #[arg(long, value_name = "DIR", default_value = "docs")]
-    output: PathBuf,
+    /// Folder for `accuracy.md` and its plots. Default: docs, or none with `--only`.
+    #[arg(long, value_name = "DIR")]
+    output: Option<PathBuf>,
 }
 
 fn main() -> ExitCode {
@@ -51,59 +59,86 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &Args) -> Result<(), String> {
-    let wanted: Vec<&Class> =
-        classes().iter().filter(|s| args.only.as_ref().is_none_or(|text| s.name.contains(text))).collect();
+    let is_wanted = |class: &&Class| args.only.as_ref().is_none_or(|text| class.name.contains(text));
+    let wanted: Vec<&Class> = classes().iter().filter(is_wanted).collect();
+    if args.list {
+        wanted.iter().for_each(|class| println!("{}", class.name));
+        return Ok(());
+    }
+    let results = estimate_flights(&wanted, args)?;
+    if let Some(file) = &args.csv {
+        let text = csv(&wanted, &results);
+        std::fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()))?;
+    }
+    let stats: Vec<ErrorStats> =
+        wanted.iter().zip(&results).map(|(class, results)| ErrorStats::new(class, results)).collect();
+    let whole = args.only.is_none().then(|| Path::new("docs"));
+    match args.output.as_deref().or(whole) {
+        Some(folder) => write_page(folder, &stats, args),
+        None => {
+            println!("{}", accuracy_page::tables(&stats));
+            Ok(())
+        }
+    }
+}
+
+/// The page with its plots, real machines included.
+fn write_page(folder: &Path, stats: &[ErrorStats], args: &Args) -> Result<(), String> {
     let robot = robot_logs::robot(&args.robot)?;
     let gears = args.gears.as_deref().map(gear_bench::gear_bench_logs).transpose()?;
-    let tallies = fly(&wanted, args)?;
-    let page = accuracy_page::page(&tallies, &robot, gears.as_deref());
-    let pictures = [
-        ("accuracy-errors.svg", plots::errors(&tallies)),
-        ("accuracy-scatter.svg", plots::scatter(&tallies)),
-        ("accuracy-calibration.svg", plots::calibration(&tallies)),
+    let page = accuracy_page::page(stats, &robot, gears.as_deref());
+    let plots = [
+        ("accuracy-errors.svg", plots::errors(stats)),
+        ("accuracy-scatter.svg", plots::scatter(stats)),
+        ("accuracy-classes.svg", plots::classes(stats)),
+        ("accuracy-calibration.svg", plots::calibration(stats)),
     ];
-    write(&args.output, "accuracy.md", &page)?;
-    for (name, drawn) in pictures {
-        write(&args.output.join("pictures"), name, &drawn.map_err(|e| format!("{name}: {e}"))?)?;
+    write(folder, "accuracy.md", &page)?;
+    for (name, plot) in plots {
+        write(&folder.join("pictures"), name, &plot.map_err(|e| format!("{name}: {e}"))?)?;
     }
     println!("{page}");
     Ok(())
 }
 
-/// All flights of all scenarios side by side, so that a slow one at the end keeps no core idle for long.
-fn fly(wanted: &[&Class], args: &Args) -> Result<Vec<ErrorStats>, String> {
-    let count = |scenario: &Class| match scenario.kind {
-        Kind::Wide => args.drawn,
-        Kind::Foreign => args.drawn.div_ceil(3),
+/// The flights of every class in parallel, one at a time from one queue: a flight takes from
+/// milliseconds to seconds.
+fn estimate_flights(wanted: &[&Class], args: &Args) -> Result<Vec<Vec<MethodResults>>, String> {
+    let drawn = args.drawn.unwrap_or(if args.only.is_some() { args.flights } else { 600 });
+    let count = |class: &Class| match class.kind {
+        Kind::Wide => drawn,
+        Kind::Foreign => drawn.div_ceil(3),
         _ => args.flights,
     };
-    let flights: Vec<(usize, u64)> = wanted
-        .iter()
-        .enumerate()
-        .flat_map(|(s, scenario)| (0..count(scenario)).map(move |k| (s, k)))
-        .collect();
+    let flights: Vec<(&Class, u64)> =
+        wanted.iter().flat_map(|class| (0..count(class)).map(|index| (*class, index))).collect();
     let bar = ProgressBar::new(flights.len() as u64);
     if let Ok(style) = ProgressStyle::with_template("flights {bar:30} {pos}/{len}  left {eta}") {
         bar.set_style(style);
     }
-    let fly = |&(s, k): &(usize, u64)| {
-        let results = estimate_flight(wanted[s], k);
+    let estimate = |&(class, index): &(&Class, u64)| {
+        let results = estimate_flight(class, index);
         bar.inc(1);
         results
     };
-    // One at a time from the queue: flights take from milliseconds to seconds.
-    let answers: Vec<MethodResults> =
-        flights.par_iter().with_max_len(1).map(fly).collect::<Result<_, _>>()?;
+    let results: Vec<MethodResults> =
+        flights.par_iter().with_max_len(1).map(estimate).collect::<Result<_, _>>()?;
     bar.finish_and_clear();
-    let mut rest = answers.as_slice();
-    Ok(wanted
-        .iter()
-        .map(|scenario| {
-            let (mine, others) = rest.split_at(count(scenario) as usize);
-            rest = others;
-            ErrorStats::new(scenario, mine)
-        })
-        .collect())
+    let mut rest = results.into_iter();
+    Ok(wanted.iter().map(|class| rest.by_ref().take(count(class) as usize).collect()).collect())
+}
+
+/// One line for each flight: µm; empty where there is no number.
+fn csv(wanted: &[&Class], results: &[Vec<MethodResults>]) -> String {
+    let mut text = "class,index,truth_um,gap_um,low_um,high_um,midrange_um,codes\n".to_owned();
+    let um = |m: f64| if m.is_finite() { format!("{:.4}", m * 1e6) } else { String::new() };
+    for (class, result) in wanted.iter().zip(results).flat_map(|(c, all)| all.iter().map(move |r| (c, r))) {
+        let (gap_m, low_m, high_m) = result.contact.unwrap_or((f64::NAN, f64::NAN, f64::NAN));
+        let numbers = [result.truth_m, gap_m, low_m, high_m, result.by_method_m[1]].map(um).join(",");
+        let codes = result.codes.join(" ");
+        let _ = writeln!(text, "\"{}\",{},{numbers},{codes}", class.name, result.index);
+    }
+    text
 }
 
 fn write(folder: &Path, name: &str, text: &str) -> Result<(), String> {

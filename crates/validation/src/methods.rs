@@ -1,20 +1,26 @@
 //! The methods compared: contact regression, the paper's statistic and two baselines.
 
-use estimator::SensorNoise;
-use estimator::contact::{self, ContactOutcome, PartPrior};
-use estimator::{ActuatorModel, Filter, NoiseModel, Samples, midrange};
+use estimator::{ActuatorModel, NoiseModel, SensorNoise};
+use ingest::log::in_memory::ChannelArrays;
+use ingest::{ActuatorChannels, Geometry};
+use job::Part;
+use job::config::EstimateSettings;
+use job::filter_cache::FilterCache;
+use records::Position;
 
-use crate::scenarios::{Case, Class};
+use crate::scenarios::{Case, Class, FlownCase};
 
 /// The results of every method for one flight, m; NaN where a method gave no number.
 #[derive(Debug, Clone)]
 pub struct MethodResults {
+    /// Index of the flight in its class.
+    pub index: u64,
     /// The true gap, extrapolated from the stiff part of the flanks.
     pub truth_m: f64,
-    /// Contact regression, with its bounds.
+    /// Contact regression with its 90 % bounds: gap, lower, upper.
     pub contact: Option<(f64, f64, f64)>,
-    /// Its refusal or flags.
-    pub codes: Vec<&'static str>,
+    /// The reason of a refusal, or the flags of an estimate.
+    pub codes: Vec<String>,
     /// By method: see [`METHODS`].
     pub by_method_m: [f64; METHODS.len()],
 }
@@ -25,51 +31,62 @@ pub const METHODS: [&str; 4] = ["contact regression", "paper (29–31)", "load l
 /// The friction that a fleet expects, N.
 const UNKNOWN_FORCE_N: f64 = 200.0;
 
-/// Flies a flight of a class and applies every method.
+/// Flies a flight of a class and applies every method, as `freeplay estimate` would.
 ///
 /// # Errors
-/// The simulator's or the estimator's error as text, after the name of the class.
+/// The error of the simulator, of reading the channels or of the estimator as text, after the class.
 pub fn estimate_flight(class: &Class, index: u64) -> Result<MethodResults, String> {
-    let flown = class.fly(index).map_err(|e| format!("{} {index}: {e}", class.name))?;
-    let flight = &flown.flight;
-    let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
-    let whole = 0..dx_m.len();
-    let samples = Samples {
-        step_s: flown.case.profile.sample_rate_hz.recip(),
-        motor_m: &flight.motor_m,
-        dx_m: &dx_m,
-        load_n: &flight.load_n,
-        segments: std::slice::from_ref(&whole),
-    };
-    let truth_m = flown.extrapolated_gap_m;
-    apply_methods(&flown.case, truth_m, &samples).map_err(|e| format!("{} {index}: {e}", class.name))
+    let in_class = |error: String| format!("{} {index}: {error}", class.name);
+    let flown = class.fly(index).map_err(|e| in_class(e.to_string()))?;
+    apply_methods(&flown, index).map_err(in_class)
 }
 
-fn apply_methods(
-    case: &Case,
-    truth_m: f64,
-    samples: &Samples<'_>,
-) -> Result<MethodResults, estimator::Error> {
-    let stiffness_n_per_m = case.assumed_stiffness_n_per_m();
-    let prior =
-        PartPrior { stiffness_n_per_m, reference_load_n: None, unknown_force_n: Some(UNKNOWN_FORCE_N) };
-    let outcome = contact::estimate(samples, &prior)?;
-    let filter = filter(case, samples.step_s, stiffness_n_per_m)?;
-    let midrange_m = midrange::estimate(samples, &filter).map_or(f64::NAN, |found| found.gap.gap_m);
-    let (contact, codes) = match &outcome {
-        ContactOutcome::Estimated(gap) => (
-            Some((gap.gap_m, gap.gap_bounds_m.0, gap.gap_bounds_m.1)),
-            gap.flags.iter().map(|flag| flag.code()).collect(),
-        ),
-        ContactOutcome::Refused(refusal) => (None, vec![refusal.code()]),
+fn apply_methods(flown: &FlownCase, index: u64) -> Result<MethodResults, String> {
+    let part = part(&flown.case).map_err(|e| e.to_string())?;
+    let channels = channels(flown)?;
+    let found =
+        job::estimate::estimate(&channels, &part, &EstimateSettings::default()).map_err(|e| e.to_string())?;
+    let contact = match (found.gap_m, found.gap_p05_m, found.gap_p95_m) {
+        (Some(gap_m), Some(low_m), Some(high_m)) => Some((gap_m, low_m, high_m)),
+        _ => None,
     };
+    let mut codes = found.flags;
+    if contact.is_none() {
+        codes = found.reason.into_iter().collect();
+    }
+    let lines_m = load_lines_m(&channels.dx_m, &channels.load_n);
+    let spread_m = spread_m(&channels.dx_m);
     let ours_m = contact.map_or(f64::NAN, |(gap_m, ..)| gap_m);
-    let lines_m = load_lines_m(samples.dx_m, samples.load_n);
-    let spread_m = spread_m(samples.dx_m);
-    Ok(MethodResults { truth_m, contact, codes, by_method_m: [ours_m, midrange_m, lines_m, spread_m] })
+    Ok(MethodResults {
+        index,
+        truth_m: flown.extrapolated_gap_m,
+        contact,
+        codes,
+        by_method_m: [ours_m, found.gap_midrange_m.unwrap_or(f64::NAN), lines_m, spread_m],
+    })
 }
 
-fn filter(case: &Case, step_s: f64, stiffness_n_per_m: f64) -> Result<Filter, estimator::Error> {
+/// The flight's channels as the estimator gets them from a log.
+///
+/// # Errors
+/// Stamps or channels that cannot be read, as text.
+pub fn channels(flown: &FlownCase) -> Result<ActuatorChannels, String> {
+    let flight = &flown.flight;
+    let arrays = ChannelArrays {
+        time_s: &flight.time_s,
+        motor_m: &flight.motor_m,
+        screw_m: &flight.screw_m,
+        load_n: &flight.load_n,
+    };
+    let position = Position::new("actuator").map_err(|e| e.to_string())?;
+    arrays.to_channels(position).map_err(|e| e.diagnostic().to_string())
+}
+
+/// The part as a fleet would configure it: the assumed stiffness and the true sensor noise.
+///
+/// # Errors
+/// A stiffness that is not positive.
+pub fn part(case: &Case) -> Result<Part, estimator::Error> {
     let noise = SensorNoise {
         screw_rms_m: case.sensors.screw.noise_rms,
         screw_resolution_m: case.sensors.screw.resolution,
@@ -78,7 +95,16 @@ fn filter(case: &Case, step_s: f64, stiffness_n_per_m: f64) -> Result<Filter, es
         unknown_force_n: UNKNOWN_FORCE_N,
         bandwidth_hz: 10.0,
     };
-    Filter::new(&ActuatorModel::linear(stiffness_n_per_m, 2000.0, 8.0)?, step_s, &NoiseModel::Sensors(noise))
+    Ok(Part {
+        actuator: ActuatorModel::linear(case.assumed_stiffness_n_per_m(), 2000.0, 8.0)?,
+        geometry: Geometry::Linear { lead_m_per_rev: None },
+        noise: NoiseModel::Sensors(noise),
+        reference_load_n: None,
+        limit_m: None,
+        watch_m: None,
+        filters: FilterCache::default(),
+        axis: None,
+    })
 }
 
 /// A baseline: δX on F by least squares on each side of the load, beyond a tenth of its greatest; the

@@ -5,6 +5,14 @@ use std::collections::BTreeMap;
 use crate::methods::{METHODS, MethodResults};
 use crate::scenarios::{Class, Kind};
 
+/// Flags that no flight of a sound class should raise. `below_detection` counts on gaps of 10 µm and more,
+/// `soft_contact` on hard flanks.
+pub const FALSE_ALARMS: [&str; 6] =
+    ["motor_spikes", "screw_spikes", "load_spikes", "estimators_disagree", "below_detection", "soft_contact"];
+
+/// The least gap on which `below_detection` is a false alarm, m.
+const VISIBLE_GAP_M: f64 = 10e-6;
+
 /// The errors of every method over the flights of one class.
 #[derive(Debug, Clone)]
 pub struct ErrorStats {
@@ -21,7 +29,9 @@ pub struct ErrorStats {
     /// Flights whose 90 % interval holds the truth.
     pub held: usize,
     /// How often each code was given, as refusal or flag.
-    pub codes: BTreeMap<&'static str, usize>,
+    pub codes: BTreeMap<String, usize>,
+    /// How often each of [`FALSE_ALARMS`] was raised without cause; none where the class has a cause.
+    pub false_alarms: Option<[usize; FALSE_ALARMS.len()]>,
     /// Every flight: true gap and contact regression's error, µm.
     pub scatter_um: Vec<(f64, f64)>,
     /// Error over standard error of every flight.
@@ -53,7 +63,7 @@ impl Errors {
     }
 }
 
-/// Standard normal 95 % quantile: the bounds stand so many standard errors from the gap.
+/// Standard normal 95 % quantile: distance of a bound from the gap, in standard errors.
 const NORMAL_95: f64 = 1.644_853_626_951_472_2;
 
 impl Kind {
@@ -76,7 +86,7 @@ impl ErrorStats {
         let estimates = || results.iter().filter_map(|a| a.contact.map(|c| (a.truth_m, c)));
         let mut codes = BTreeMap::new();
         for code in results.iter().flat_map(|a| &a.codes) {
-            *codes.entry(*code).or_insert(0) += 1;
+            *codes.entry(code.clone()).or_insert(0) += 1;
         }
         Self {
             name: class.name,
@@ -88,6 +98,7 @@ impl ErrorStats {
                 .filter(|(truth_m, (_, low_m, high_m))| (low_m..=high_m).contains(&truth_m))
                 .count(),
             codes,
+            false_alarms: (!class.has_spikes()).then(|| false_alarms(class, results)),
             scatter_um: estimates()
                 .map(|(truth_m, (gap_m, ..))| (truth_m * 1e6, (gap_m - truth_m) * 1e6))
                 .collect(),
@@ -121,6 +132,18 @@ impl ErrorStats {
     pub fn coverage(&self) -> (f64, f64, f64) {
         wilson(self.held, self.estimated)
     }
+}
+
+fn false_alarms(class: &Class, results: &[MethodResults]) -> [usize; FALSE_ALARMS.len()] {
+    FALSE_ALARMS.map(|flag| {
+        let is_false = |a: &&MethodResults| match flag {
+            "below_detection" => a.truth_m >= VISIBLE_GAP_M,
+            "soft_contact" => !class.has_soft_flanks(),
+            _ => true,
+        };
+        let raised = |a: &&MethodResults| a.contact.is_some() && a.codes.iter().any(|code| code == flag);
+        results.iter().filter(raised).filter(is_false).count()
+    })
 }
 
 /// A share and its 90 % bounds: Wilson's, which keep within 0 and 1.

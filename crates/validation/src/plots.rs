@@ -115,6 +115,52 @@ pub fn scatter(tallies: &[ErrorStats]) -> Drawn {
     Ok(svg)
 }
 
+/// Panels of [`classes`] side by side, their size, and the errors at which they are cut, µm.
+const PANELS: usize = 4;
+const PANEL_PX: (u32, u32) = (300, 220);
+const PANEL_UM: f64 = 8.0;
+
+/// Contact regression's error against the true gap: one panel for each class with drawn gaps.
+///
+/// # Errors
+/// The drawing backend fails.
+pub fn classes(tallies: &[ErrorStats]) -> Drawn {
+    let rows: Vec<&ErrorStats> = tallies.iter().filter(|t| t.kind == Kind::Drawn).collect();
+    let lines = rows.len().div_ceil(PANELS).max(1);
+    let mut svg = String::new();
+    {
+        let size = (PANEL_PX.0 * PANELS as u32, PANEL_PX.1 * lines as u32);
+        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        root.fill(&WHITE)?;
+        for (area, tally) in root.split_evenly((lines, PANELS)).iter().zip(rows) {
+            let mut chart = ChartBuilder::on(area)
+                .margin(8)
+                .caption(tally.name, text(13))
+                .x_label_area_size(28)
+                .y_label_area_size(34)
+                .build_cartesian_2d(0.0..310.0, -PANEL_UM..PANEL_UM)?;
+            chart
+                .configure_mesh()
+                .light_line_style(TRANSPARENT)
+                .bold_line_style(GRID)
+                .axis_style(INK)
+                .label_style(text(10))
+                .x_labels(4)
+                .y_labels(5)
+                .x_desc("gap [µm]")
+                .y_desc("error [µm]")
+                .draw()?;
+            let dots = tally.scatter_um.iter().map(|(gap, error)| {
+                let colour = COLOURS[usize::from(error.abs() > PANEL_UM)];
+                Circle::new((*gap, error.clamp(-PANEL_UM, PANEL_UM)), 2, colour.mix(0.6).filled())
+            });
+            chart.draw_series(dots)?;
+        }
+        root.present()?;
+    }
+    Ok(svg)
+}
+
 /// Share of intervals that hold against the share they promise, from error over standard error.
 ///
 /// # Errors

@@ -12,7 +12,7 @@ use simulator::{
     Sensors, Vibration, simulate,
 };
 
-/// A flight to be flown, and what its estimator is told.
+/// A flight to be simulated, and the assumptions of its estimator.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// What moves.
@@ -23,7 +23,7 @@ pub struct Case {
     pub sensors: Sensors,
     /// Stiffness assumed over the true one.
     pub assumed_factor: f64,
-    /// What a mapping made of the channels before the estimator saw them.
+    /// How the channels were mapped.
     pub mapping: Mapping,
     /// Seed of the flight.
     pub seed: u64,
@@ -41,10 +41,10 @@ pub struct FlownCase {
     pub extrapolated_gap_m: f64,
 }
 
-/// Channels as they are, or as somebody mapped them by mistake.
+/// Channels mapped correctly, or by mistake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mapping {
-    /// As they are.
+    /// Correctly.
     Right,
     /// The load has the wrong sign.
     LoadFlipped,
@@ -305,7 +305,7 @@ fn mixture(case: &mut Case, rng: &mut ChaCha8Rng) {
     case.plant = case.plant.with_friction_factor(rng.random_range(0.7..2.7));
 }
 
-/// Everything over wide ranges: plant, sensors, flight and what is assumed.
+/// Draws plant, sensors, flight and assumed stiffness over wide ranges.
 fn wide(case: &mut Case, rng: &mut ChaCha8Rng) {
     mixture(case, rng);
     case.plant.contact.gap_m = rng.random_range(0.0..300e-6);
@@ -525,6 +525,18 @@ fn name_seed(name: &str) -> u64 {
 }
 
 impl Class {
+    /// Whether its channels hold spikes or wrong channels.
+    pub fn has_spikes(&self) -> bool {
+        let case = self.case(0);
+        let channels = [case.sensors.motor, case.sensors.screw, case.sensors.load];
+        case.mapping != Mapping::Right || channels.iter().any(|channel| channel.spikes_per_minute > 0.0)
+    }
+
+    /// Whether a flank is soft at low load.
+    pub fn has_soft_flanks(&self) -> bool {
+        self.case(0).has_soft_flanks()
+    }
+
     /// The case of an index; the same index gives the same case.
     pub fn case(&self, index: u64) -> Case {
         let own = if self.kind == Kind::Drawn { name_seed(self.name) } else { 0 };
@@ -558,7 +570,13 @@ impl Class {
 const STIFF_BAND: (f64, f64) = (0.3, 1.0);
 
 impl Case {
-    /// The stiffness the estimator is told, N/m.
+    /// Whether a flank is soft at low load.
+    pub fn has_soft_flanks(&self) -> bool {
+        let contact = &self.plant.contact;
+        contact.law != ContactLaw::Linear || contact.lower_law.is_some_and(|law| law != ContactLaw::Linear)
+    }
+
+    /// The stiffness of the part's configuration, N/m.
     pub fn assumed_stiffness_n_per_m(&self) -> f64 {
         self.plant.contact.stiffness_n_per_m * self.assumed_factor
     }
@@ -584,12 +602,10 @@ impl Case {
             Mapping::DeadMotor => repeat(&mut flight.motor_m),
         }
         let contact = &self.plant.contact;
-        let is_hard = matches!(contact.law, ContactLaw::Linear)
-            && matches!(contact.lower_law, None | Some(ContactLaw::Linear));
-        let extrapolated_gap_m = if is_hard {
-            contact.gap_m
-        } else {
+        let extrapolated_gap_m = if self.has_soft_flanks() {
             contact.extrapolated_gap_m(STIFF_BAND.0 * p95_n, STIFF_BAND.1 * p95_n)
+        } else {
+            contact.gap_m
         };
         Ok(FlownCase { flight, extrapolated_gap_m, case: self })
     }
