@@ -117,10 +117,15 @@ fn three(errors: &Errors) -> String {
 }
 
 /// Flights that cannot show a gap with the codes given, and the false refusals of all others.
-fn refusals(tallies: &[ErrorStats]) -> String {
+fn refusals(stats: &[ErrorStats]) -> String {
     let mut table =
         "| flights that cannot show a gap | flights | estimated | expected code | codes given |\n|---|---|---|---|---|\n".to_owned();
-    for t in tallies {
+    let (blind, sound): (Vec<&ErrorStats>, Vec<&ErrorStats>) =
+        stats.iter().partition(|t| t.must_refuse().is_some());
+    if blind.is_empty() {
+        table.clear();
+    }
+    for t in &blind {
         let Some(code) = t.must_refuse() else { continue };
         let _ = writeln!(
             table,
@@ -131,8 +136,6 @@ fn refusals(tallies: &[ErrorStats]) -> String {
             flags(t)
         );
     }
-    let (blind, sound): (Vec<&ErrorStats>, Vec<&ErrorStats>) =
-        tallies.iter().partition(|t| t.must_refuse().is_some());
     let sum =
         |of: &[&ErrorStats], count: fn(&ErrorStats) -> usize| of.iter().map(|t| count(t)).sum::<usize>();
     let _ = writeln!(

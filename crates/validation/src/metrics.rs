@@ -152,7 +152,7 @@ fn wilson(hits: usize, of: usize) -> (f64, f64, f64) {
     let (share, z2) = (hits as f64 / n, NORMAL_95 * NORMAL_95);
     let middle = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = NORMAL_95 / (1.0 + z2 / n) * (share * (1.0 - share) / n + z2 / (4.0 * n * n)).sqrt();
-    (share, middle - half, middle + half)
+    (share, (middle - half).max(0.0), (middle + half).min(1.0))
 }
 
 #[cfg(test)]

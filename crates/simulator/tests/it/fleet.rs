@@ -178,9 +178,13 @@ fn the_sample_fleet_swaps_two_units_wears_one_and_brings_one_near_its_limit() {
 
 #[test]
 fn every_spec_that_comes_with_the_crate_flies() {
-    for text in
-        [SAMPLE_SPEC, include_str!("../../specs/service.toml"), include_str!("../../specs/rough.toml")]
-    {
+    let specs = [
+        SAMPLE_SPEC,
+        include_str!("../../specs/service.toml"),
+        include_str!("../../specs/rough.toml"),
+        include_str!("../../specs/harsh.toml"),
+    ];
+    for text in specs {
         let mut spec: Spec = toml::from_str(text).unwrap();
         spec.profile.duration_s = 10.0;
         let flight = Plan::new(&spec).unwrap().simulate_flight(1).unwrap();
