@@ -193,8 +193,7 @@ fn a_record_is_explained_and_recomputed_bitwise() {
     fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
     fleet.run_ok(&["run"]);
     let told = fleet.run_ok(&["explain", "N412FP-0003", "aileron_left"]);
-    for part in ["bit-identical", "stiffness_n_per_m = 50000000.0", "motor [m]", "computed by Freeplay"]
-    {
+    for part in ["bit-identical", "stiffness_n_per_m = 50000000.0", "motor [m]", "computed by Freeplay"] {
         assert!(told.contains(part), "{part} is not in {told}");
     }
     let json = fleet.run_ok(&["explain", "N412FP-0003", "aileron_left", "--json"]);

@@ -2,7 +2,7 @@
 
 /// Why a specification cannot be flown.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[expect(missing_docs, reason = "each field is named for what it holds; units stand in the key")]
+#[expect(missing_docs, reason = "each field is named for what it holds; the key has the unit")]
 pub enum Error {
     /// A number lies outside what the physics or the generator can use.
     #[error("`{key}` is {value}, which must be {must}")]
@@ -28,8 +28,8 @@ pub enum Error {
          raise `days_between_flights` or lower `flight_hours`"
     )]
     Crowded { flight_hours: f64, days: f64 },
-    /// A flight is asked for that the plan does not hold.
-    #[error("flight {index} was asked for, but the plan holds {flights} flights, counted from 0")]
+    /// The plan has no flight of the requested index.
+    #[error("flight {index} does not exist; the plan has {flights} flights, counted from 0")]
     NoSuchFlight { index: usize, flights: usize },
 }
 

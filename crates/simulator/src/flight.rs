@@ -53,7 +53,7 @@ pub struct Flight {
     pub expected: ExpectedOutcome,
 }
 
-/// Simulates one actuator over one flight and records it. The same arguments give the same bits.
+/// Simulates one actuator over one flight and records it. Equal arguments give bitwise identical logs.
 ///
 /// CommandProfile, clock and each channel draw from streams of their own: two calls that differ in the plant
 /// or in one sensor alone meet the same flight and the same noise elsewhere.

@@ -9,8 +9,8 @@
 //! through [`Sensors`] into a [`Flight`] by [`simulate`]. A [`Spec`] makes a whole [`Plan`] of tails,
 //! serial numbers and flights.
 //!
-//! Nothing here reads a file, a clock or the environment: the same seed gives the same bits, in any
-//! order of calls.
+//! Nothing here reads a file, a clock or the environment: equal seeds give bitwise identical
+//! flights, in any order of calls.
 
 mod error;
 mod fleet;

@@ -11,7 +11,7 @@ pub(crate) fn seeded_rng(seed: u64, names: &[&str]) -> ChaCha8Rng {
     ChaCha8Rng::from_seed(key)
 }
 
-/// A seed of its own for whatever lies below a path of names.
+/// A seed derived from a seed and a path of names.
 pub(crate) fn derive_seed(seed: u64, names: &[&str]) -> u64 {
     use rand::RngCore;
     seeded_rng(seed, names).next_u64()

@@ -1,8 +1,8 @@
-//! GearBenchLog actuators with their output locked to the bench, whose play their authors measured: real play, real
-//! friction, hardening flanks. The logs carry a share-alike licence and are no part of the project; only
-//! figures come from them, where somebody has them at hand.
+//! Gear actuators with their output locked to the bench, whose play their authors measured: real play, real
+//! friction, hardening flanks. The logs are licensed CC BY-SA and are no part of the project; the
+//! study uses them when `--gears` names their folder.
 //!
-//! A locked output cannot be told from a dead sensor, so our own estimate refuses these logs by design. What
+//! A locked output looks like a dead sensor, so our own estimate refuses these logs by design. What
 //! can be compared is the published statistic and the baselines, which never refuse.
 
 use std::collections::BTreeMap;

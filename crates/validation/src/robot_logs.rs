@@ -9,7 +9,7 @@ use records::{Installations, PartNumber};
 
 use crate::methods::{load_lines_m, spread_m};
 
-/// The results of every method for a log; degrees unless a name says otherwise, NaN where refused.
+/// The results of every method for a log; degrees unless the name has another unit, NaN where refused.
 #[derive(Debug, Clone)]
 pub struct RobotRow {
     /// Name of the log.

@@ -1,6 +1,6 @@
 //! Classes of flights: what each breaks, and the flights drawn from it.
 //!
-//! A case is drawn from a class and an index; the same pair gives the same bits.
+//! A case is drawn from a class and an index; equal pairs give bitwise identical flights.
 
 use std::ops::Range;
 

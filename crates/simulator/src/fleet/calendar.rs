@@ -11,7 +11,7 @@ pub(crate) fn midnight_us(text: &str) -> Result<i64, Error> {
     let fields: Option<Vec<i64>> = text.split('-').map(|field| field.parse().ok()).collect();
     let [year, month, day] = fields.ok_or_else(fail)?[..] else { return Err(fail()) };
     let days = days_since_1970(year, month, day);
-    // A day such as 30 February runs over into the next month: the following day then tells.
+    // A day such as 30 February runs over into the next month.
     let sound = (1970..10_000).contains(&year) && (1..=12).contains(&month) && (1..=31).contains(&day);
     let next_month = if month == 12 { (year + 1, 1) } else { (year, month + 1) };
     if !sound || days >= days_since_1970(next_month.0, next_month.1, 1) {

@@ -1,8 +1,8 @@
 //! The making of a plan, and of each of its flights on demand.
 //!
 //! A plan is cheap and made at once; a flight is costly and made alone, from random streams named
-//! after seed, tail, flight and position. Flights can be simulated in any order and on any thread, to
-//! the same bits.
+//! after seed, tail, flight and position. Flights can be simulated in any order and on any thread, with
+//! bitwise identical results.
 
 use std::f64::consts::{PI, TAU};
 
@@ -25,7 +25,7 @@ impl Plan {
         Planner::new(spec)?.plan()
     }
 
-    /// Flies one flight, counted from 0; the same flight gives the same bits in any order.
+    /// Simulates one flight, counted from 0; the result does not depend on the order of calls.
     ///
     /// # Errors
     /// [`Error::NoSuchFlight`] beyond the end of the plan.

@@ -41,7 +41,7 @@ pub struct Profile {
     pub buffet: Vibration,
     /// Vibration of the motor on top of what its drive does, metres at the screw. Default silent.
     pub motor_vibration: Vibration,
-    /// Share of the flight after the preflight checks in which the command stands still. Default 0.
+    /// Share of the flight after the preflight checks with a constant command. Default 0.
     pub rest_share: f64,
     /// Mean length of a rest, seconds; rests last between half and one and a half times this. Default 10.
     pub rest_s: f64,

@@ -301,7 +301,7 @@ mod tests {
     }
 
     /// Pure Hertz: `p = (F/K)^(2/3) ref^(1/3)`, here fitted by a least-squares line in R:
-    /// the tangent at a load lies at a third of the penetration, so the line's intercept is near that.
+    /// the tangent at a load meets zero load at a third of the penetration, so the line's intercept is near that.
     #[test]
     fn hertzian_flanks_extrapolate_to_about_a_third_of_their_penetration() {
         let hertz = contact(ContactLaw::Hertz { share: 1.0, reference_m: 100e-6 });

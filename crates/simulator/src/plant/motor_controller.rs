@@ -51,7 +51,7 @@ impl PositionLoop {
 
     /// The commanded motor force over the next step, N.
     ///
-    /// The integrator has a fifth of the speed loop's bandwidth and stands still while the force
+    /// The integrator has a fifth of the speed loop's bandwidth and holds its value while the force
     /// saturates, so it does not wind up.
     pub fn force_n(&mut self, command_m: f64, motor_m: f64, motor_m_per_s: f64, step_s: f64) -> f64 {
         let limit = self.drive.speed_limit_m_per_s;

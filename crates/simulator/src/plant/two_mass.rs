@@ -135,7 +135,7 @@ fn solve_step(
     speeds
 }
 
-/// A held mass has stopped; any other leaves the step as the midpoint rule says.
+/// A held mass has stopped; any other leaves the step by the midpoint rule.
 fn after(before: f64, mean: f64) -> f64 {
     if mean == 0.0 { 0.0 } else { 2.0 * mean - before }
 }

@@ -107,7 +107,7 @@ pub enum NoiseColour {
 pub struct Channel {
     /// White noise, rms.
     pub noise_rms: f64,
-    /// The least step the channel can tell.
+    /// Resolution: readings are multiples of this.
     pub resolution: f64,
     /// Reading over truth, minus one.
     pub gain_error: f64,
@@ -121,9 +121,9 @@ pub struct Channel {
     pub delay_s: f64,
     /// Share of samples missing (NaN), in bursts of about five.
     pub dropout_share: f64,
-    /// Single wild samples per minute.
+    /// Spikes of one sample, per minute.
     pub spikes_per_minute: f64,
-    /// Height of a wild sample, either way.
+    /// Height of a spike, either way.
     pub spike: f64,
     /// How often per minute the channel repeats itself for a while.
     pub freezes_per_minute: f64,
@@ -143,7 +143,7 @@ pub struct Channel {
     pub rate_hz: f64,
     /// Errors that repeat with the travel; an array of up to three tables.
     pub periodic: PeriodicErrors,
-    /// Coloured noise, rms, besides the white.
+    /// Coloured noise, rms, added to the white noise.
     pub coloured_rms: f64,
     /// Corner of the coloured noise, Hz. Default 1.
     pub coloured_hz: f64,
@@ -357,7 +357,7 @@ impl Clock {
 /// All sensors of one actuator.
 ///
 /// Defaults are good ones: noise of 1 and 3 µm and 40 N, steps of 0.3 and 2.3 µm and 10 N, no fault. A
-/// channel that a spec writes down starts from a perfect one instead: what it does not say is zero.
+/// channel that a spec writes down starts from a perfect one instead: every key left out is zero.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sensors {
