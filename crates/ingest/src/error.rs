@@ -43,10 +43,10 @@ pub enum ErrorKind {
     #[error(transparent)]
     Object(#[from] object_io::Error),
     /// It has no bytes, or no rows.
-    #[error("the log holds no rows")]
+    #[error("the log has no rows")]
     Empty,
     /// It is not Parquet, or its footer is torn.
-    #[error("this is not a whole Parquet file: {detail}")]
+    #[error("cannot read as Parquet: {detail}")]
     NotParquet { detail: String },
     /// The footer is sound, a page is not.
     #[error("a column cannot be decoded: {detail}")]

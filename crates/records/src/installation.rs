@@ -61,7 +61,7 @@ pub enum Error {
     PositionTaken { row: usize, other: usize, tail: TailNumber, position: Position, at: Timestamp },
     /// One unit in two positions at once.
     #[error(
-        "rows {row} and {other}: {part} / {serial} sits in two places at {at}; give the earlier stay its `removed_utc`"
+        "rows {row} and {other}: {part} / {serial} is installed in two places at {at}; set `removed_utc` of the earlier installation"
     )]
     UnitTwice { row: usize, other: usize, part: PartNumber, serial: SerialNumber, at: Timestamp },
 }

@@ -11,19 +11,19 @@ use records::Diagnostic;
 #[expect(missing_docs, reason = "each field is named for what it holds")]
 pub enum Error {
     /// The folder is not there, or nothing was ever written into it.
-    #[error("there is no store at {}", dir.display())]
+    #[error("no store at {}", dir.display())]
     Missing { dir: PathBuf },
     /// The folder holds something else.
-    #[error("{} is no Freeplay store: it holds `{found}` and no `store.json`", dir.display())]
+    #[error("{} is not a Freeplay store: it holds `{found}` and no `store.json`", dir.display())]
     Foreign { dir: PathBuf, found: String },
     /// Delta Lake takes a percent sign and two hexadecimal digits in a path for another character.
     #[error("{} cannot hold a store: Delta Lake takes `{found}` in its path for another character", dir.display())]
     Name { dir: PathBuf, found: String },
     /// The folder was written by another release.
-    #[error("{} has format {found}, and this release knows format {known}", file.display())]
+    #[error("{} has format {found}; this release supports format {known}", file.display())]
     Format { file: PathBuf, found: String, known: u32 },
     /// The file that says which format the folder has cannot be read.
-    #[error("{} is torn: it holds `{found}`", file.display())]
+    #[error("{} is truncated: it holds `{found}`", file.display())]
     Torn { file: PathBuf, found: String },
     /// Another process writes.
     #[error("the store is {holder}")]
@@ -38,7 +38,7 @@ pub enum Error {
     #[error("table `{table}` cannot be {verb}: {}", first_line(source))]
     Table { table: &'static str, verb: &'static str, source: Box<DeltaTableError> },
     /// A data file is not the one that was committed.
-    #[error("a data file is damaged: its digest is {}…, and {}… was committed", short(found), short(wanted))]
+    #[error("a data file is corrupt: its digest is {}…, but {}… was committed", short(found), short(wanted))]
     Damaged { path: PathBuf, found: String, wanted: String },
     /// The bucket it lies in does not give or take a file.
     #[error(transparent)]
@@ -101,13 +101,11 @@ impl Error {
 
     fn remedy(&self) -> &'static str {
         match self {
-            Self::Missing { .. } => {
-                "`freeplay run` makes it; does `store` in the configuration name the right folder?"
-            }
+            Self::Missing { .. } => "create it with `freeplay run`, or correct `path` under `[store]`",
             Self::Foreign { .. } => "name a new or an empty folder as `store` in the configuration",
             Self::Name { .. } => "name a folder without a percent sign as `store` in the configuration",
             Self::Format { .. } => "read it with the release that wrote it",
-            Self::Torn { .. } => "restore this file from a backup; docs/store.md says what it holds",
+            Self::Torn { .. } => "restore this file from a backup; its content is in docs/store.md",
             Self::Held { .. } => "wait for it with `--wait 20m`; readers need not wait",
             Self::Itself { .. } => {
                 "name the store of the trial, and let the configuration name the one that takes it over"
@@ -117,7 +115,7 @@ impl Error {
                 io_cause(source).map_or("", |cause| io_remedy(cause.kind()))
             }
             Self::Table { verb: "read", .. } => {
-                "its log (`_delta_log` in the table's folder) may be torn: restore the store from a backup; without \
+                "its log (`_delta_log` in the table's folder) may be truncated: restore the store from a backup; without \
                  one, remove it and run its logs again"
             }
             Self::Table { .. } => "is the disk full, or does another program write into this table?",
@@ -142,7 +140,7 @@ impl Error {
 fn io_remedy(kind: ErrorKind) -> &'static str {
     match kind {
         ErrorKind::NotFound => {
-            "was a file of the store deleted? `freeplay store verify` names all that are missing; restore them from a \
+            "list all missing files with `freeplay store verify` and restore them from a \
              backup"
         }
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {

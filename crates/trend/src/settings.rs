@@ -5,7 +5,7 @@ use crate::error::Error;
 /// Limits and horizons of one part number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// The gap that grounds, metres: state `act`, and what a crossing is a crossing of.
+    /// Removal limit, m: state `act` at or above; a crossing is a crossing of this limit.
     pub limit_m: f64,
     /// The gap that reports, metres: state `watch`.
     pub watch_m: f64,

@@ -41,8 +41,8 @@ fn torn(source: &ByteSource, error: &ParquetError) -> String {
             let detail = error.to_string();
             format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: "))
         }
-        (Ok(Ok(4)), b"PARE") => "it is encrypted".into(),
-        _ => "it does not begin as one".into(),
+        (Ok(Ok(4)), b"PARE") => "the file is encrypted".into(),
+        _ => "not a Parquet file".into(),
     }
 }
 

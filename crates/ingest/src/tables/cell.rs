@@ -57,7 +57,7 @@ pub fn name<T: TryFrom<String, Error = records::ids::EmptyIdError>>(text: &str) 
 pub fn number(text: &str) -> Result<f64, String> {
     match f64::from_str(text) {
         Ok(value) if value.is_finite() => Ok(value),
-        _ => Err(format!("`{text}` is no number")),
+        _ => Err(format!("`{text}` is not a number")),
     }
 }
 
@@ -88,6 +88,6 @@ fn not_utc(text: &str) -> String {
     };
     match text.get(..10).filter(|day| is_date(day)) {
         Some(day) if day.parse::<civil::Date>().is_err() => format!("there is no day `{day}`"),
-        _ => format!("`{text}` is no UTC date or time such as 2026-11-19 or 2026-11-19T04:13:00Z"),
+        _ => format!("`{text}` is not a UTC date or time such as 2026-11-19 or 2026-11-19T04:13:00Z"),
     }
 }

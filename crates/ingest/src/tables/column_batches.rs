@@ -117,7 +117,9 @@ impl TableBatch {
                 return Ok(numbers);
             }
             return match numbers.iter().position(|value| value.is_some_and(|value| !value.is_finite())) {
-                Some(row) => Err(self.error(row, column, format!("`{}` is no number", numbers.value(row)))),
+                Some(row) => {
+                    Err(self.error(row, column, format!("`{}` is not a number", numbers.value(row))))
+                }
                 None => Ok(numbers),
             };
         };

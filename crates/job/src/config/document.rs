@@ -215,7 +215,7 @@ pub struct TrendSettings {
     /// histories speak for. A part's `axis` goes before it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<WearAxis>,
-    /// The gap that grounds, m, of parts that state none themselves.
+    /// Removal limit of parts without a `limit_m` of their own, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_m: Option<f64>,
 }
@@ -259,12 +259,12 @@ impl Document {
     pub(super) fn check(&self, source: &Source<'_>) -> Vec<Diagnostic> {
         let mut found = Vec::new();
         if self.logs.files.is_empty() {
-            let c = Diagnostic::new("no_logs", "`logs.files` names no log")
+            let c = Diagnostic::new("no_logs", "`logs.files` has no pattern")
                 .hint("files = [\"logs/**/*.parquet\"]");
             found.push(source.at(&["logs", "files"], c));
         }
         if matches!(self.store.path.trim(), "" | ".") {
-            let c = Diagnostic::new("empty_name", "`store.path` names no folder of its own");
+            let c = Diagnostic::new("empty_name", "`store.path` is not a folder of its own");
             found.push(source.at(&["store", "path"], c.hint("path = \"results\"")));
         }
         validate_channels::check(&self.channel, &self.layout, &self.group, &["channel"], source, &mut found);
@@ -293,7 +293,7 @@ impl Document {
                 // The reader draws the expression over several lines; the last of them says what is wrong.
                 let e = e.to_string();
                 let why = e.lines().last().unwrap_or_default().trim_start_matches("error: ");
-                let what = format!("`identity.path` is no regular expression: {why}");
+                let what = format!("`identity.path` is not a valid regular expression: {why}");
                 let c = Diagnostic::new("bad_pattern", what)
                     .hint("such as '(?<tail_number>N\\w+)/(?<departure_utc>\\d{8}T\\d{6}Z)\\.parquet$'");
                 found.push(source.at(&["identity", "path"], c));
@@ -339,7 +339,7 @@ impl Document {
 /// A zone that nobody knows, with the one that was probably meant.
 fn no_zone(name: &str) -> Diagnostic {
     let known: Vec<String> = jiff::tz::db().available().map(|zone| zone.to_string()).collect();
-    let diagnostic = Diagnostic::new("bad_zone", format!("no time zone is called `{name}`"));
+    let diagnostic = Diagnostic::new("bad_zone", format!("unknown time zone `{name}`"));
     match nearest(name, known.iter().map(String::as_str)) {
         Some(near) => diagnostic.hint(format!("`{near}`?")),
         None => diagnostic.hint("names such as `UTC`, `Europe/Istanbul`, `America/New_York`"),

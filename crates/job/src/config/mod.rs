@@ -77,13 +77,13 @@ impl Config {
             let shown = file.display().to_string();
             let text = std::fs::read_to_string(file).map_err(|e| {
                 let why = match e.kind() {
-                    ErrorKind::NotFound => "there is no such file".to_owned(),
+                    ErrorKind::NotFound => "no such file".to_owned(),
                     ErrorKind::IsADirectory => "this is a folder, not a file".to_owned(),
                     ErrorKind::InvalidData => "it is no UTF-8 text".to_owned(),
                     _ => e.to_string(),
                 };
                 let what = format!("the configuration cannot be read: {why}");
-                let hint = "`freeplay init` writes one; `--config FILE` or FREEPLAY_CONFIG names another";
+                let hint = "create one with `freeplay init`, or select another with `--config FILE` or FREEPLAY_CONFIG";
                 vec![Diagnostic::new("config_unreadable", what).in_file(&shown).hint(hint)]
             })?;
             Ok((shown, text))

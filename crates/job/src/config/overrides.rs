@@ -145,7 +145,7 @@ impl Overrides {
 fn validate(settings: &Override) -> Result<ValidatedOverride, Diagnostic> {
     let pattern = |text: &String| {
         glob::Pattern::new(text)
-            .map_err(|e| Diagnostic::new("bad_pattern", format!("`{text}` is no pattern of names: {e}")))
+            .map_err(|e| Diagnostic::new("bad_pattern", format!("`{text}` is not a valid name pattern: {e}")))
     };
     let patterns = |texts: &[String]| texts.iter().map(pattern).collect::<Result<Vec<_>, _>>();
     if settings.clock.is_some() && !settings.parts.is_empty() {

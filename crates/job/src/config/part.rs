@@ -67,10 +67,10 @@ pub struct PartSettings {
     /// What the sensors and the model do not know.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseSettings>,
-    /// The gap that grounds: state `act`, m.
+    /// Removal limit, m: state `act` at or above.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_m: Option<f64>,
-    /// The gap that is reported: state `watch`, m.
+    /// Alert level, m: state `watch` at or above.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub watch_m: Option<f64>,
     /// What wear follows: `hours`, `flights` or `reversals`; that of `[trend]` when not given.
@@ -155,9 +155,9 @@ pub struct Part {
     pub noise: estimator::NoiseModel,
     /// Load between whose positive and negative value lost motion is stated, N.
     pub reference_load_n: Option<f64>,
-    /// The gap that grounds, m.
+    /// Removal limit, m.
     pub limit_m: Option<f64>,
-    /// The gap that is reported, m.
+    /// Alert level, m.
     pub watch_m: Option<f64>,
     /// Gain schedules of its logs, as far as they have been found.
     pub filters: FilterCache,
@@ -185,11 +185,10 @@ impl PartSettings {
         keys.positive(&["limit_m"], self.limit_m);
         keys.positive(&["watch_m"], self.watch_m);
         if let Some((watch, limit)) = self.watch_m.zip(self.limit_m).filter(|(watch, limit)| watch > limit) {
-            let what = format!("`watch_m` {watch} lies above `limit_m` {limit}");
+            let what = format!("`watch_m` {watch} is above `limit_m` {limit}");
             keys.complain(
                 &["watch_m"],
-                Diagnostic::new("limit_order", what)
-                    .hint("the gap that is reported comes before the one that grounds"),
+                Diagnostic::new("limit_order", what).hint("set `watch_m` below `limit_m`"),
             );
         }
         let noise = self.check_noise(&mut keys);
@@ -231,7 +230,7 @@ impl PartSettings {
             Kind::Rotary => (linear, "rotary"),
         };
         for (key, _) in stray.into_iter().filter(|(_, value)| value.is_some()) {
-            let what = format!("`{}` is no key of a {kind} part", key[0]);
+            let what = format!("`{}` is not a key of a {kind} part", key[0]);
             keys.complain(
                 key,
                 Diagnostic::new("key_of_other_kind", what)
@@ -353,7 +352,7 @@ impl SettingsValidator {
     fn required<T>(&mut self, key: &'static [&'static str], value: Option<T>) -> Option<T> {
         if value.is_none() {
             let name = key.join(".");
-            self.complain(key, Diagnostic::new("key_missing", format!("the part does not say its `{name}`")));
+            self.complain(key, Diagnostic::new("key_missing", format!("the part has no `{name}`")));
         }
         value
     }

@@ -10,7 +10,7 @@ pub(super) fn diagnostic(message: &str) -> Diagnostic {
         || {
             let diagnostic = Diagnostic::new("bad_toml", message);
             if message == "duplicate key" {
-                diagnostic.hint("leave one of the two lines")
+                diagnostic.hint("remove one of the two lines")
             } else {
                 diagnostic
             }
@@ -24,7 +24,7 @@ fn unknown_value(message: &str) -> Option<Diagnostic> {
     let near = nearest(found, wanted.split('`').skip(1).step_by(2));
     let near = near.map(|near| format!("`{near}`? ")).unwrap_or_default();
     Some(
-        Diagnostic::new("bad_toml", format!("`{found}` is not known here"))
+        Diagnostic::new("bad_toml", format!("unknown value or key `{found}`"))
             .hint(format!("{near}It can be {wanted}")),
     )
 }
@@ -32,7 +32,7 @@ fn unknown_value(message: &str) -> Option<Diagnostic> {
 fn missing_key(message: &str) -> Option<Diagnostic> {
     let key = message.strip_prefix("missing field `")?.strip_suffix('`')?;
     Some(
-        Diagnostic::new("bad_toml", format!("`{key}` is not given"))
+        Diagnostic::new("bad_toml", format!("`{key}` is missing"))
             .hint(format!("add a line `{key} = …` here")),
     )
 }
@@ -41,11 +41,11 @@ fn other_type(message: &str) -> Option<Diagnostic> {
     let (found, wanted) = message.strip_prefix("invalid type: ")?.split_once(", expected ")?;
     let (wanted, hint) = match wanted {
         "f64" => ("a number", Some("a plain number such as `8.0`; its unit is in the key's name")),
-        "a string" => ("text", Some("text stands in quotes: `\"…\"`")),
+        "a string" => ("text", Some("put text in quotes: `\"…\"`")),
         "a sequence" => ("a list", Some("a list stands in brackets: `[\"…\"]`")),
         other => (other, None),
     };
-    let diagnostic = Diagnostic::new("bad_toml", format!("{found} stands where {wanted} is wanted"));
+    let diagnostic = Diagnostic::new("bad_toml", format!("expected {wanted}, found {found}"));
     Some(match hint {
         Some(hint) => diagnostic.hint(hint),
         None => diagnostic,
@@ -60,11 +60,11 @@ mod tests {
     #[test]
     fn the_readers_sentences_are_put_in_words_of_the_file() {
         let unit = diagnostic("unknown variant `degre`, expected one of `m`, `deg`, `rad`");
-        assert_eq!(unit.message, "`degre` is not known here");
+        assert_eq!(unit.message, "unknown value or key `degre`");
         assert_eq!(unit.hint.as_deref(), Some("`deg`? It can be `m`, `deg`, `rad`"));
         let number = diagnostic("invalid type: string \"8 kg\", expected f64");
-        assert_eq!(number.message, "string \"8 kg\" stands where a number is wanted");
-        assert_eq!(diagnostic("missing field `files`").message, "`files` is not given");
+        assert_eq!(number.message, "expected a number, found string \"8 kg\"");
+        assert_eq!(diagnostic("missing field `files`").message, "`files` is missing");
         assert_eq!(diagnostic("something else").message, "something else");
     }
 }

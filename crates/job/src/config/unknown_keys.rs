@@ -73,7 +73,7 @@ fn each_table<'t, 'i>(value: &'t DeValue<'i>, visit: &mut impl FnMut(&'t DeTable
 
 fn diagnostic<'n>(name: &str, above: &str, known: impl Iterator<Item = &'n str> + Clone) -> Diagnostic {
     let place = if above.is_empty() { "the configuration".to_owned() } else { format!("`[{above}]`") };
-    let diagnostic = Diagnostic::new("unknown_key", format!("`{name}` is no key of {place}"));
+    let diagnostic = Diagnostic::new("unknown_key", format!("`{name}` is not a key of {place}"));
     match nearest(name, known.clone()) {
         Some(near) => diagnostic.hint(format!("`{near}`?")),
         None => {

@@ -135,10 +135,7 @@ fn one(
         [("latency_s", channel.latency_s), ("instant_s", channel.instant_s), ("offset", channel.offset)]
     {
         if !value.is_finite() {
-            found.push((
-                key,
-                Diagnostic::new("bad_parameter", format!("`{key}` is {value}, which is no number")),
-            ));
+            found.push((key, Diagnostic::new("bad_parameter", format!("`{key}` is {value}, not a number"))));
         }
     }
     found.extend(unknown_group(name, channel, groups).map(|c| ("group", c)));
@@ -173,7 +170,7 @@ fn conditions(condition: &SampleFilter, groups: &BTreeMap<String, GroupMapping>)
     if let Some((least, most)) =
         condition.at_least.zip(condition.at_most).filter(|(least, most)| least > most)
     {
-        let what = format!("`at_least` {least} lies above `at_most` {most}: no value of `{column}` will do");
+        let what = format!("`at_least` {least} is above `at_most` {most}: no value of `{column}` matches");
         found.push(Diagnostic::new("bad_parameter", what));
     }
     if let Some(margin_s) = condition.margin_s.filter(|s| !(s.is_finite() && *s >= 0.0)) {

@@ -51,7 +51,7 @@ fn refuse_foreign(dir: &Path) -> Result<(), Error> {
     if !holds || dir.join("report.json").exists() {
         return Ok(());
     }
-    let what = format!("{} holds files that are no report", dir.display());
+    let what = format!("{} holds files that are not a report", dir.display());
     let diagnostic = Diagnostic::new("would_overwrite", what)
         .hint("name an empty folder, or one that a report was written to");
     Err(Error::refused(diagnostic))

@@ -151,7 +151,7 @@ fn matching(
     let store = config.store();
     let ours = |path: &PathBuf| path.starts_with(&store) || tables.contains(path);
     let invalid = |pattern: &str, e: &dyn std::fmt::Display| {
-        let what = format!("`{pattern}` is no pattern of files: {e}");
+        let what = format!("`{pattern}` is not a valid file pattern: {e}");
         Error::refused(config.at(pattern, Diagnostic::new("bad_pattern", what)))
     };
     for pattern in patterns {
@@ -190,8 +190,8 @@ fn matching(
 fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
     let patterns = silent.iter().map(|p| format!("`{p}`")).collect::<Vec<_>>().join(", ");
     let folder = if config.folder.as_os_str().is_empty() { Path::new(".") } else { &config.folder };
-    let diagnostic = Diagnostic::new("no_log_matched", format!("no log fits {patterns}"))
-        .hint(format!("patterns start from {}; are the logs there tonight?", folder.display()));
+    let diagnostic = Diagnostic::new("no_log_matched", format!("no log matches {patterns}"))
+        .hint(format!("patterns are relative to {}; check that the logs are present", folder.display()));
     config.at(silent.first().copied().unwrap_or_default(), diagnostic)
 }
 

@@ -64,7 +64,7 @@ def load(config: Settings = _USUAL) -> Config:
     ...     freeplay.load("nowhere.toml")
     ... except freeplay.ConfigError as error:
     ...     print(error.code, "|", error.help)
-    config_unreadable | `freeplay init` writes one; `--config FILE` or FREEPLAY_CONFIG names another
+    config_unreadable | create one with `freeplay init`, or select another with `--config FILE` or FREEPLAY_CONFIG
     """
     if isinstance(config, Config):
         return config

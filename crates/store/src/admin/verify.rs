@@ -70,7 +70,7 @@ fn wrong_with(table: &Table, file: &DataFile) -> Option<Diagnostic> {
     let length = match table.location.length(&file.path) {
         Ok(Some(length)) => length,
         Ok(None) => {
-            let what = "a data file that was committed is not there";
+            let what = "a committed data file is missing";
             return Some(
                 diagnostic("store_file_missing", what).hint("restore it from a backup of the store"),
             );

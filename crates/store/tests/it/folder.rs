@@ -33,7 +33,7 @@ fn another_format_is_refused_by_number_and_a_torn_mark_by_its_text() {
     drop(writer(dir.path()));
     let mark = dir.path().join("store.json");
     for (text, expected) in
-        [("{\"freeplay_store\":7}", "has format 7, and"), ("{\"free", "is torn: it holds `{\"free`")]
+        [("{\"freeplay_store\":7}", "has format 7;"), ("{\"free", "is truncated: it holds `{\"free`")]
     {
         std::fs::write(&mark, text).unwrap();
         let error = Store::open(dir.path()).unwrap_err().to_string();
