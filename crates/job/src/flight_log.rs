@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use ingest::log::identity::IdentityFields;
 use ingest::{ActuatorChannels, ActuatorColumns, Channels, Identity, Log, LogFiles, Mapping};
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use records::{
     Diagnostic, Flight, GapEstimate, GapRecord, Installation, Installations, PartNumber, Position, Provenance,
 };
@@ -15,6 +15,9 @@ use records::{
 use crate::config::Config;
 use crate::config::part::Part;
 use crate::{estimate, panic};
+
+/// Time zones and clocks that drift explain no more than this.
+const MAX_AHEAD: SignedDuration = SignedDuration::from_hours(24);
 
 /// What a run writes on everything it makes.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,6 +59,7 @@ impl FlightLog {
         let complain = |e: ingest::Error| e.diagnostic().in_file(display_name);
         let log = Log::open(files, config.base_mapping()).map_err(complain)?;
         let identity = identity_of(&log, files, config).map_err(complain)?;
+        check_not_ahead(&identity, Timestamp::now()).map_err(|d| d.in_file(display_name))?;
         let log = log.with_mapping(&config.mapping(&identity.tail_number, None));
         let map_actuators = map_actuators(&log, &identity, config, installations).map_err(complain)?;
         let used: Vec<_> = map_actuators.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
@@ -365,6 +369,18 @@ pub fn identify_companion(
     })
 }
 
+/// A departure after the machine's clock is a wrong date in the log or a wrong clock; taken at its word it would move
+/// the date of every assessment, and with it silence the fleet.
+fn check_not_ahead(identity: &Identity, now: Timestamp) -> Result<(), Diagnostic> {
+    let departure_utc = identity.departure_utc;
+    if departure_utc.duration_since(now) <= MAX_AHEAD {
+        return Ok(());
+    }
+    let what = format!("the departure {departure_utc} is after this machine's clock, {now:.0}");
+    let hint = "fix the date in the log, `clock.unit` or `identity`, or the clock of this machine; then `freeplay run --retry`";
+    Err(Diagnostic::new("departure_ahead", what).hint(hint))
+}
+
 /// What a log says of itself, and what the flights table adds.
 fn identity_of(log: &Log, files: &LogFiles, config: &Config) -> Result<Identity, ingest::Error> {
     let path = files.main.first().map_or(Path::new(""), PathBuf::as_path);
@@ -455,4 +471,28 @@ pub fn catch_panic<T>(
             .in_file(display_name)
             .hint("the file is probably corrupt; please report this message with the file"))
     })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use records::{FlightId, TailNumber};
+
+    use super::*;
+
+    #[test]
+    fn a_departure_more_than_a_day_after_the_clock_is_an_error() {
+        let now: Timestamp = "2026-03-01T12:00:00Z".parse().unwrap();
+        let departure = |utc: &str| Identity {
+            tail_number: TailNumber::new("N1").unwrap(),
+            flight_id: FlightId::new("F1").unwrap(),
+            departure_utc: utc.parse().unwrap(),
+            position: None,
+            flight_hours: None,
+            tail_hours_end: None,
+        };
+        assert!(check_not_ahead(&departure("2026-03-02T11:00:00Z"), now).is_ok());
+        let error = check_not_ahead(&departure("2062-03-01T12:00:00Z"), now).unwrap_err();
+        assert_eq!(error.code, "departure_ahead");
+    }
 }

@@ -86,6 +86,13 @@ pub fn trends() -> SchemaRef {
         Field::new("likely_utc", utc(), true),
         Field::new("not_after_utc", utc(), true),
         real("check_probability"),
+        real("hours_per_day"),
+        real("hours_per_day_se"),
+        real("flights_per_day"),
+        real("hours_per_flight"),
+        text("usage_source"),
+        real("stale_days"),
+        Field::new("removed_utc", utc(), true),
         text("state"),
         text("reason"),
     ]))

@@ -120,6 +120,65 @@ fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
     }
 }
 
+/// Silent for sixty days: what remains is flown from the date of the assessment on, not in days that have gone.
+#[test]
+fn dates_count_from_the_date_of_the_assessment() {
+    let as_of = day(259);
+    for row in said(&flown(200), as_of) {
+        let dates = [row.not_before_utc, row.likely_utc, row.not_after_utc];
+        assert!(dates.into_iter().flatten().all(|date| date >= as_of), "{dates:?}");
+        let hours = row.likely_utc.unwrap().duration_since(as_of).as_secs_f64() / 3600.0;
+        let expected = row.crossing_hours_p50.unwrap() / HOURS_A_DAY * 24.0;
+        assert!((hours / expected - 1.0).abs() < 1e-3, "{hours} h, {expected} h");
+    }
+}
+
+/// Every third flight has a log, and the aircraft's meter counts all of them: 2 h a day.
+#[test]
+fn utilisation_counts_the_flights_that_left_no_log() {
+    let mut rows = flown(200);
+    rows.retain(|row| row.said.departure_utc.duration_since(day(0)).as_hours() / 24 % 3 == 0);
+    let metered = &said(&rows, day(199))[0];
+    assert!((metered.hours_per_day.unwrap() - HOURS_A_DAY).abs() < 1e-9, "{metered:?}");
+    assert_eq!(metered.usage_source.as_deref(), Some("tail_hours"));
+    rows.iter_mut().for_each(|row| row.said.tail_hours_end = None);
+    let logged = &said(&rows, day(199))[0];
+    assert!((logged.hours_per_day.unwrap() - HOURS_A_DAY / 3.0).abs() < 1e-9, "{logged:?}");
+    assert_eq!(logged.usage_source.as_deref(), Some("logged_flights"));
+    // Sixty-odd or thirty flights in ninety days.
+    assert!(logged.hours_per_day_se.unwrap() / logged.hours_per_day.unwrap() > 0.15, "{logged:?}");
+}
+
+#[test]
+fn a_removed_unit_has_no_state_no_dates_and_says_when_it_left() {
+    let config = config();
+    let rows = flown(200);
+    let table = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
+    let mut text = "tail_number,position,part_number,serial_number,installed_utc,removed_utc\n".to_owned();
+    for unit in 0..14 {
+        let removed = if unit == 3 { "2024-07-20" } else { "" };
+        text += &format!("T{unit:02},place_{unit},EMA-27-1040,S{unit:02},2023-12-01,{removed}\n");
+    }
+    std::fs::write(table.path(), text).unwrap();
+    let installations =
+        ingest::tables::installations(table.path(), &config.document.columns.installations).unwrap();
+    let ask = UnitSelection { as_of_utc: Some(day(259)), ..UnitSelection::default() };
+    let rows =
+        assess::assess_histories(&config, &installations, gathering(&rows).into_store(), &ask).unwrap();
+    for row in &rows {
+        let is_removed = row.serial_number == "S03";
+        assert_eq!(row.state.is_none(), is_removed, "{row:?}");
+        assert_eq!(row.crossing_hours_p50.is_none() && row.likely_utc.is_none(), is_removed);
+        assert_eq!(row.check_probability.is_none(), is_removed);
+    }
+    let removed = &rows[3];
+    assert_eq!(removed.reason.as_deref(), Some("removed from place_3 of T03 on 2024-07-20"));
+    assert!(removed.gap_m.is_some() && removed.removed_utc.is_some() && removed.stale_days.is_none());
+    // Those that stay keep their state, marked with its age.
+    assert_eq!(rows[4].stale_days, Some(60.0));
+    assert!(rows[4].reason.as_deref().unwrap().ends_with("; no estimate for 60 days"), "{:?}", rows[4]);
+}
+
 #[test]
 fn a_fleet_that_no_unit_of_has_failed_is_held_against_the_levels_it_has_reached() {
     let past = backtest::of_histories(&config(), &Installations::default(), &histories(&flown(700))).unwrap();

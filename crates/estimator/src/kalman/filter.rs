@@ -173,14 +173,20 @@ impl Filter {
         Ok(self.radius_at(&self.steady_state_gain()?.0))
     }
 
-    /// ρ at a gain.
+    /// ρ at a gain; infinite where the eigenvalues cannot be found.
     pub(crate) fn radius_at(&self, gain: &Vector3<f64>) -> f64 {
         let mut keep = Matrix3::<f64>::identity();
         for row in 0..3 {
             keep[(row, 0)] -= gain[row];
         }
-        let poles = (keep * self.discrete.a_d).complex_eigenvalues();
-        poles.iter().map(|pole| pole.modulus()).fold(0.0, f64::max)
+        // Without a bound the iteration never ends on matrices that are not finite, or barely so.
+        const MAX_ITERATIONS: usize = 1000;
+        let error = keep * self.discrete.a_d;
+        let schur = nalgebra::Schur::try_new(error, f64::EPSILON, MAX_ITERATIONS);
+        match schur.filter(|_| error.iter().all(|entry| entry.is_finite())) {
+            Some(schur) => schur.complex_eigenvalues().iter().map(|pole| pole.modulus()).fold(0.0, f64::max),
+            None => f64::INFINITY,
+        }
     }
 }
 

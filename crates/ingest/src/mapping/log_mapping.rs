@@ -70,7 +70,7 @@ pub struct GroupMapping {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IdentityMapping {
-    /// Key-value metadata of the Parquet footer: fact → key. IdentityFields: `tail_number`, `flight_id`,
+    /// Key-value metadata of the Parquet footer: fact → key. Fields: `tail_number`, `flight_id`,
     /// `departure_utc`, `position`, `flight_hours`, `tail_hours_end`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub metadata: BTreeMap<IdentityField, String>,

@@ -207,7 +207,7 @@ pub struct TrendSettings {
     pub planning_horizon_hours: f64,
     /// Beyond these hours a crossing is not stated. Default 20 000.
     pub horizon_hours: f64,
-    /// Without an estimate for so many days there is no state. Default 30.
+    /// After so many days without an estimate a state is marked as stale. Default 30.
     pub stale_after_days: f64,
     /// Hours until the next check, for the probability of meeting the limit before it. Default 300.
     pub next_check_hours: f64,

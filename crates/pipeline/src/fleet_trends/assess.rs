@@ -18,6 +18,7 @@ use crate::fleet_trends::trend_row::{self, TrendRow};
 use crate::history::builder::HistoryBuilder;
 use crate::history::external_estimates::AsOfQuery;
 use crate::history::histories::{Histories, History, UnitKey};
+use crate::history::installation_index::InstallationIndex;
 use crate::history::merge::of_parts;
 use crate::history::usage::UsageSources;
 use crate::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
@@ -166,6 +167,8 @@ pub(crate) struct ReportAssessments {
     pub(crate) drawn: Vec<trend::Forecast>,
     /// Statements of so many days before, by days.
     pub(crate) before: BTreeMap<i64, Vec<TrendRow>>,
+    /// The forecasts of those days for the day of the report, by days and unit.
+    pub(crate) past: BTreeMap<i64, BTreeMap<UnitKey, trend::Interval>>,
     /// What each part's units had taught, and by when.
     pub(crate) priors: Vec<(Option<String>, Timestamp, FleetPrior)>,
 }
@@ -193,6 +196,10 @@ pub(crate) fn assess_for_report(
         now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
     let drawn =
         names.par_iter().zip(&now).map(|(name, row)| fleet.outlook(name, row)).collect::<Result<_, _>>()?;
+    let past = earlier
+        .iter()
+        .map(|(days, at)| Ok((*days, fleet.forecasts(&names, *at, as_of)?)))
+        .collect::<Result<_, Error>>()?;
     let then = |(days, at): (i64, Timestamp)| Ok((days, fleet.statements(names.iter(), at)?));
     let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
     let asked: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
@@ -201,7 +208,7 @@ pub(crate) fn assess_for_report(
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = asked.into_iter().filter_map(priors).collect();
-    Ok(ReportAssessments { now, drawn, before, priors })
+    Ok(ReportAssessments { now, drawn, before, past, priors })
 }
 
 /// One statement for each query, from nothing later than its date.
@@ -276,13 +283,15 @@ pub(crate) struct FleetContext<'a> {
     priors: FleetPriors<'a>,
     /// What moved on whole aircraft beside gaps.
     moved: Vec<RecorderChange>,
+    /// Installations of the store's own units; of external tables none apply.
+    installations: Option<InstallationIndex<'a>>,
 }
 
 impl<'a> FleetContext<'a> {
     /// Reads all histories and learns by the turn before each of the `days`, each from nothing later.
     pub(crate) fn new(
         config: &'a Config,
-        installations: &Installations,
+        installations: &'a Installations,
         histories: &'a Histories,
         days: &[Timestamp],
     ) -> Result<Self, Error> {
@@ -292,7 +301,7 @@ impl<'a> FleetContext<'a> {
     /// The same where nobody else needs the histories: of each flight what is in its series is forgotten.
     fn consuming(
         config: &'a Config,
-        installations: &Installations,
+        installations: &'a Installations,
         histories: &'a mut Histories,
         days: &[Timestamp],
     ) -> Result<Self, Error> {
@@ -305,13 +314,14 @@ impl<'a> FleetContext<'a> {
         };
         let units: Vec<_> = histories.iter_mut().collect();
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        Ok(Self::of(config, histories, series).taught_by(days))
+        let installations = is_booked.then(|| InstallationIndex::new(installations));
+        Ok(Self { installations, ..Self::of(config, histories, series) }.taught_by(days))
     }
 
     /// Reads all histories and learns nothing.
     fn read(
         config: &'a Config,
-        installations: &Installations,
+        installations: &'a Installations,
         histories: &'a Histories,
     ) -> Result<Self, Error> {
         let books = UsageSources::read(config, installations)?;
@@ -319,14 +329,21 @@ impl<'a> FleetContext<'a> {
         let units: Vec<_> = histories.iter().collect();
         let read = |(name, history)| books.series(name, history, is_booked);
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        Ok(Self::of(config, histories, series))
+        let installations = is_booked.then(|| InstallationIndex::new(installations));
+        Ok(Self { installations, ..Self::of(config, histories, series) })
     }
 
     /// Histories, and what each adds up to.
     fn of(config: &'a Config, histories: &'a Histories, series: Vec<Series>) -> Self {
         let units = histories.iter().zip(series);
         let units = units.map(|((name, history), series)| (name, (history, series))).collect();
-        Self { limits: Limits(config), units, priors: FleetPriors::default(), moved: Vec::new() }
+        Self {
+            limits: Limits(config),
+            units,
+            priors: FleetPriors::default(),
+            moved: Vec::new(),
+            installations: None,
+        }
     }
 
     /// The same with what was learned by the turn before each of the days.
@@ -426,8 +443,30 @@ impl<'a> FleetContext<'a> {
         let limit_m = self.limits.stated_m(name.0.as_deref());
         let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
         let usage_axis = prior.map(|prior| prior.axis().to_string());
-        let row = trend_row::row(name, history, series, limit_m, trend, as_of, wide);
+        let removal = self.installations.as_ref().and_then(|index| index.removal(name, as_of));
+        let row = trend_row::row(name, history, series, limit_m, trend, as_of, wide, removal);
         TrendRow { usage_axis, ..row }
+    }
+
+    /// The forecast that was made of some units on a day, for the hours they have flown by a later one.
+    fn forecasts(
+        &self,
+        names: &[UnitKey],
+        at: Timestamp,
+        later: Timestamp,
+    ) -> Result<BTreeMap<UnitKey, trend::Interval>, Error> {
+        let forecast = |name: &UnitKey| {
+            let Some(series) = self.series(name) else { return Ok(None) };
+            let hours_until = |day: Timestamp| Some(series.flights_until(day.as_microsecond()).last()?.hours);
+            let Some(hours) = hours_until(at).zip(hours_until(later)).map(|(a, b)| b - a) else {
+                return Ok(None);
+            };
+            let (settings, prior) = (self.settings(name), self.prior(name, at));
+            let made = trend::forecast(series, at.as_microsecond(), &settings, prior, [hours])?;
+            Ok(made.ahead.first().map(|(_, interval)| (name.clone(), *interval)))
+        };
+        let made: Vec<Option<_>> = names.par_iter().map(forecast).collect::<Result<_, Error>>()?;
+        Ok(made.into_iter().flatten().collect())
     }
 
     /// What is drawn beside a statement: as far ahead as its crossing, within sight of what was flown.

@@ -1,6 +1,7 @@
 //! A unit's statement, as the contract names its columns.
 
 use jiff::Timestamp;
+use records::Installation;
 use serde::Serialize;
 use trend::{Assessment, Series, classic};
 
@@ -68,6 +69,17 @@ pub struct TrendRow {
     pub likely_utc: Option<Timestamp>,
     pub not_after_utc: Option<Timestamp>,
     pub check_probability: Option<f64>,
+    /// Utilisation by which hours become flights and dates.
+    pub hours_per_day: Option<f64>,
+    pub hours_per_day_se: Option<f64>,
+    pub flights_per_day: Option<f64>,
+    pub hours_per_flight: Option<f64>,
+    /// Where the hours are known from: `flights_table`, `tail_hours` or `logged_flights`.
+    pub usage_source: Option<String>,
+    /// Days since the last estimate, where they are too many; the state is then that of the last estimate.
+    pub stale_days: Option<f64>,
+    /// When the unit was removed, where the installations table has no installation on the date.
+    pub removed_utc: Option<Timestamp>,
     pub state: Option<&'static str>,
     pub reason: Option<String>,
     /// The estimated gaps in order of flights, at most a hundred means of neighbours, m: a sketch for people.
@@ -97,14 +109,16 @@ pub(crate) fn row(
     trend: &Assessment,
     as_of: Timestamp,
     wide: &TailWide,
+    removal: Option<&Installation>,
 ) -> TrendRow {
     let last = history.until(as_of).last().map(|flown| history.place(flown));
     let gaps_m = series.map(|series| series.gaps_until(trend.as_of_us)).unwrap_or_default();
-    let crossing = trend.crossing.filter(|_| limit_m.is_some());
-    let flights = |hours: Option<f64>| Some(hours? / trend.utilization?.hours_per_flight);
-    let last_flown = series.and_then(|series| series.flights_until(trend.as_of_us).last());
-    let last_flown = last_flown.and_then(|f| Timestamp::from_microsecond(f.departure_us).ok());
-    let day = |hours: Option<f64>| after(last_flown?, hours? / trend.utilization?.hours_per_day);
+    // A removed unit wears no more: it has no state, no date and no place among the expected removals.
+    let is_judged = limit_m.is_some() && removal.is_none();
+    let crossing = trend.crossing.filter(|_| is_judged);
+    let use_now = trend.utilization;
+    let flights = |hours: Option<f64>| Some(hours? / use_now?.hours_per_flight);
+    let day = |hours: Option<f64>| after(as_of, hours? / use_now?.hours_per_day);
     TrendRow {
         part_number: name.0.clone(),
         serial_number: name.1.clone(),
@@ -142,11 +156,19 @@ pub(crate) fn row(
         not_before_utc: day(crossing.and_then(|c| c.p05_hours)),
         likely_utc: day(crossing.and_then(|c| c.p50_hours)),
         not_after_utc: day(crossing.and_then(|c| c.p95_hours)),
-        check_probability: trend.check_probability.filter(|_| limit_m.is_some()),
-        state: trend.state.filter(|_| limit_m.is_some()).map(state_word),
-        reason: Some(match limit_m {
-            Some(_) => reason(trend, history, wide),
-            None => "no limit is configured".into(),
+        check_probability: trend.check_probability.filter(|_| is_judged),
+        hours_per_day: use_now.map(|u| u.hours_per_day),
+        hours_per_day_se: use_now.map(|u| u.hours_per_day_se),
+        flights_per_day: use_now.map(|u| u.flights_per_day),
+        hours_per_flight: use_now.map(|u| u.hours_per_flight),
+        usage_source: use_now.and(series).map(|series| series.usage_source().to_string()),
+        stale_days: trend.stale_days.filter(|_| removal.is_none()),
+        removed_utc: removal.and_then(|installation| installation.removed_utc),
+        state: trend.state.filter(|_| is_judged).map(state_word),
+        reason: Some(match (removal, limit_m) {
+            (Some(installation), _) => removed(installation),
+            (None, Some(_)) => reason(trend, history, wide),
+            (None, None) => "no limit is configured".into(),
         }),
         sketch_m: sketched(&gaps_m),
     }
@@ -158,8 +180,23 @@ fn after(from: Timestamp, days: f64) -> Option<Timestamp> {
     from.checked_add(jiff::SignedDuration::try_from_secs_f64((days * DAY_S).round()).ok()?).ok()
 }
 
-/// Why a state; a change that the tail's other units made as well is named for what it is.
+/// Why a removed unit has no state.
+fn removed(last: &Installation) -> String {
+    let date = last.removed_utc.map(|at| at.strftime("%Y-%m-%d").to_string()).unwrap_or_default();
+    format!("removed from {} of {} on {date}", last.position, last.tail_number)
+}
+
+/// Why a state, and how old it is where no estimate has followed.
 fn reason(trend: &Assessment, history: &History, wide: &TailWide) -> String {
+    let reason = reason_of_state(trend, history, wide);
+    match trend.stale_days {
+        Some(days) => format!("{reason}; no estimate for {days:.0} days"),
+        None => reason,
+    }
+}
+
+/// Why a state; a change that the tail's other units made as well is named for what it is.
+fn reason_of_state(trend: &Assessment, history: &History, wide: &TailWide) -> String {
     let unknown = trend.changes.iter().rev().find(|c| c.kind != trend::ChangePointKind::Recorded);
     match (trend.reason, unknown.and_then(|change| wide.tail(change, history))) {
         (trend::Reason::Changed { kind, days }, Some(tail)) => format!(

@@ -197,9 +197,10 @@ impl Histories {
         self.units.get(name)
     }
 
-    /// The last departure of all.
+    /// The last departure of all, but no later than now: a record dated ahead must not make all others stale.
     pub fn newest_utc(&self) -> Option<Timestamp> {
-        self.units.values().filter_map(|history| history.flights.last()).map(FlightRow::departure_utc).max()
+        let last = self.units.values().filter_map(|history| history.flights.last());
+        Some(last.map(FlightRow::departure_utc).max()?.min(Timestamp::now()))
     }
 
     /// The last departure of all but the flights that others hold.
@@ -213,7 +214,7 @@ impl Histories {
                 .find(|f| !held.contains(&history.key(f)))
                 .map(FlightRow::departure_utc)
         };
-        self.units.iter().filter_map(last).max()
+        Some(self.units.iter().filter_map(last).max()?.min(Timestamp::now()))
     }
 
     /// The histories of some units without the flights that others hold; a unit left with none goes.

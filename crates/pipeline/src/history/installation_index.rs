@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use jiff::Timestamp;
 use records::{Installation, Installations};
 
 use crate::history::histories::UnitKey;
@@ -17,6 +18,14 @@ impl<'a> InstallationIndex<'a> {
         }
         by_serial.values_mut().for_each(|stays| stays.sort_by_key(|stay| stay.installed_utc));
         Self(by_serial)
+    }
+
+    /// The last installation of a unit that is in none on a date; nothing of a unit without installations before it.
+    pub(crate) fn removal(&self, name: &UnitKey, as_of: Timestamp) -> Option<&'a Installation> {
+        let mut before = self.of(name);
+        before.retain(|installation| installation.installed_utc <= as_of);
+        let is_open = |i: &&Installation| i.removed_utc.is_none_or(|removed| removed > as_of);
+        if before.iter().any(is_open) { None } else { before.into_iter().max_by_key(|i| i.removed_utc) }
     }
 
     /// A unit's stays; where its part number is not known, its serial number says so.

@@ -28,6 +28,11 @@ impl<'a> UnloggedFlights<'a> {
         Self { by_tail }
     }
 
+    /// Whether the flights table has flights of an aircraft.
+    pub(crate) fn has_tail(&self, tail: &str) -> bool {
+        self.by_tail.contains_key(tail)
+    }
+
     /// The flights of a unit's stays for which it has no row, each with its stay.
     ///
     /// Histories of which no row belongs to a stay are taken as they are.

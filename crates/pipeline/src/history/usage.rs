@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 use job::Config;
 use records::{Installation, Installations};
-use trend::{Observation, Series, UsageDefaults};
+use trend::{Observation, Series, UsageDefaults, UsageSource};
 
 use crate::error::Error;
 use crate::history::flight_row::FlightRow;
@@ -30,6 +30,18 @@ impl<'a> UsageSources<'a> {
         })
     }
 
+    /// Where the hours of a unit are known from.
+    fn source(&self, history: &History) -> UsageSource {
+        let has_meter = || history.flights().iter().any(|f| history.extras(f).tail_hours_end().is_some());
+        if history.tails().any(|tail| self.unlogged.has_tail(tail)) {
+            UsageSource::FlightsTable
+        } else if has_meter() {
+            UsageSource::TailHourMeter
+        } else {
+            UsageSource::LoggedFlights
+        }
+    }
+
     /// A unit's flights, added up.
     pub(crate) fn series(&self, name: &UnitKey, history: &History, is_booked: bool) -> Result<Series, Error> {
         let stays = self.stays.of(name);
@@ -37,7 +49,8 @@ impl<'a> UsageSources<'a> {
         let first = stays.iter().min_by_key(|stay| stay.installed_utc);
         let unit_hours_at_start = first.and_then(|stay| stay.unit_hours_at_install);
         let observations = observations(history, booked, &self.unlogged.of_unit(history, booked));
-        let usage = UsageDefaults { unit_hours_at_start, ..UsageDefaults::default() };
+        let source = self.source(history);
+        let usage = UsageDefaults { unit_hours_at_start, source, ..UsageDefaults::default() };
         Ok(Series::new(observations, &usage)?.with_maintenance(maintenance_events(&self.maintenance, name)))
     }
 }

@@ -50,7 +50,7 @@ pub fn compose(
     let as_of = ask.as_of_utc.or(newest_departure_utc);
     let moved = as_of.map(|as_of| detect_changes_in_store(store, as_of)).transpose()?.unwrap_or_default();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
-    let ReportAssessments { now, drawn, before, priors } =
+    let ReportAssessments { now, drawn, before, past, priors } =
         assess::assess_for_report(config, installations, &histories, ask, &days, moved)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
@@ -59,6 +59,7 @@ pub fn compose(
     let compose = ReportComposer {
         config,
         before: &by_name(before),
+        past: &past,
         checks: checks.as_deref().unwrap_or(&[]),
         stays: &InstallationIndex::new(installations),
     };
@@ -196,6 +197,7 @@ fn by_name(before: BTreeMap<i64, Vec<TrendRow>>) -> PastAssessments {
 struct ReportComposer<'a> {
     config: &'a Config,
     before: &'a PastAssessments,
+    past: &'a BTreeMap<i64, BTreeMap<Name, trend::Interval>>,
     checks: &'a [InspectionRow],
     stays: &'a InstallationIndex<'a>,
 }
@@ -211,11 +213,11 @@ impl ReportComposer<'_> {
                 .iter()
                 .filter_map(|(us, b)| timed_interval(Timestamp::from_microsecond(*us).ok(), b))
                 .collect(),
-            forecast: forecast(drawn, history),
+            forecast: forecast(drawn, row),
             assessment: self.statement(row, history, &name),
             quality: quality(history, rest, row.as_of_utc),
             events: events(row, &stays),
-            past_forecasts: self.past(row, history, &name),
+            past_forecasts: self.past(row, &name),
             inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.extras(flown)).collect(),
             flights: flown.iter().map(|flown| flight(history, flown, &rest[flown.row as usize])).collect(),
             installations: stays,
@@ -230,9 +232,6 @@ impl ReportComposer<'_> {
         let part = name.0.as_ref().and_then(|part| PartNumber::new(part).ok());
         let part = part.and_then(|part| self.config.parts.get(&part));
         let records = history.flights();
-        let utilization = utilization(history);
-        let last = records.last().map_or(row.as_of_utc, FlownRow::departure_utc);
-        let at = |hours: Option<f64>| date(last, hours? / utilization?.0);
         Assessment {
             state: row.state.map(str::to_owned),
             reason: row.reason.clone(),
@@ -249,11 +248,11 @@ impl ReportComposer<'_> {
             crossing_hours_p05: row.crossing_hours_p05,
             crossing_hours_p50: row.crossing_hours_p50,
             crossing_hours_p95: row.crossing_hours_p95,
-            not_before_utc: row.not_before_utc.or_else(|| at(row.crossing_hours_p05)),
-            likely_utc: row.likely_utc.or_else(|| at(row.crossing_hours_p50)),
-            not_after_utc: row.not_after_utc.or_else(|| at(row.crossing_hours_p95)),
-            hours_per_day: utilization.map(|p| p.0),
-            hours_per_flight: utilization.map(|p| p.1),
+            not_before_utc: row.not_before_utc,
+            likely_utc: row.likely_utc,
+            not_after_utc: row.not_after_utc,
+            hours_per_day: row.hours_per_day,
+            hours_per_flight: row.hours_per_flight,
             check_probability: row.check_probability,
             law: row.wear_law.clone(),
             axis: row.usage_axis.clone(),
@@ -270,11 +269,21 @@ impl ReportComposer<'_> {
         }
     }
 
-    /// What was foreseen for today, and what is found.
-    fn past(&self, row: &TrendRow, history: &History, name: &Name) -> Vec<PastForecast> {
+    /// The forecasts that were made for the date of the report, and the level found.
+    fn past(&self, row: &TrendRow, name: &Name) -> Vec<PastForecast> {
         let of_day = |days: &i64| {
             let then = self.before.get(days)?.get(name)?;
-            linear_forecast(then, row, flown_hours(history, then.as_of_utc)?, *days)
+            let forecast = self.past.get(days)?.get(name)?;
+            Some(PastForecast {
+                as_of_utc: then.as_of_utc,
+                days_ago: *days,
+                state: then.state.map(str::to_owned),
+                gap_m: then.gap_m?,
+                predicted_low_m: forecast.p05_m,
+                predicted_m: forecast.m,
+                predicted_high_m: forecast.p95_m,
+                found_m: row.gap_m?,
+            })
         };
         LOOK_BACK_DAYS.iter().filter_map(of_day).collect()
     }
@@ -289,47 +298,12 @@ fn stay(of: &records::Installation) -> Installation {
     }
 }
 
-/// The level then, grown at the rate then over the hours since; the errors of both levels and the
-/// interval of the rate are independent of each other.
-fn linear_forecast(then: &TrendRow, now: &TrendRow, hours: f64, days_ago: i64) -> Option<PastForecast> {
-    let gap_m = then.gap_m?;
-    let rate = then.rate_m_per_hour?;
-    let level = 1.645 * then.gap_se_m?.hypot(now.gap_se_m?);
-    let foreseen_m = gap_m + rate * hours;
-    Some(PastForecast {
-        as_of_utc: then.as_of_utc,
-        days_ago,
-        state: then.state.map(str::to_owned),
-        gap_m,
-        predicted_low_m: foreseen_m - level.hypot((rate - then.rate_p05_m_per_hour?) * hours),
-        predicted_m: foreseen_m,
-        predicted_high_m: foreseen_m + level.hypot((then.rate_p95_m_per_hour? - rate) * hours),
-        found_m: now.gap_m?,
-    })
-}
-
-/// Hours flown after a day; nothing when a flight does not say its length.
-fn flown_hours(history: &History, after: Timestamp) -> Option<f64> {
-    let since = history.flights().iter().filter(|r| r.departure_utc() > after);
-    since.map(|r| history.extras(r).flight_hours()).sum()
-}
-
-/// Hours a day and hours a flight over the last ninety days of flights.
-fn utilization(history: &History) -> Option<(f64, f64)> {
-    let records = history.flights();
-    let last = records.last()?.departure_utc();
-    let from = records.partition_point(|r| days(r.departure_utc(), last) > 90.0);
-    let (first, since) = records[from..].split_first()?;
-    let hours: f64 = since.iter().map(|r| history.extras(r).flight_hours()).sum::<Option<f64>>()?;
-    let days = days(first.departure_utc(), last);
-    (hours > 0.0 && days > 0.0).then(|| (hours / days, hours / since.len() as f64))
-}
-
-/// The fan on the calendar, at this unit's use; nothing where that is not known.
-fn forecast(drawn: &Forecast, history: &History) -> Vec<TimedInterval> {
-    let last = history.flights().last();
-    let Some((last, (hours_per_day, _))) = last.zip(utilization(history)) else { return Vec::new() };
-    let at = |hours: f64| date(last.departure_utc(), hours / hours_per_day);
+/// The fan on the calendar, at this unit's utilisation; nothing where that is not known or the unit was removed.
+fn forecast(drawn: &Forecast, row: &TrendRow) -> Vec<TimedInterval> {
+    let Some(hours_per_day) = row.hours_per_day.filter(|_| row.removed_utc.is_none()) else {
+        return Vec::new();
+    };
+    let at = |hours: f64| date(row.as_of_utc, hours / hours_per_day);
     drawn.ahead.iter().filter_map(|(hours, band)| timed_interval(at(*hours), band)).collect()
 }
 

@@ -32,17 +32,21 @@ pub struct DiscoveredLogs {
 /// [`Error::Refused`] when a pattern fits no file, or is no pattern.
 pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
     let mut seen = SeenObjects::new();
-    let main = matching(config, &config.document.logs.files, &mut seen)?;
+    let mut unlisted = BTreeMap::new();
+    let main = matching(config, &config.document.logs.files, &mut seen, &mut unlisted)?;
     let mut companions = Vec::new();
     for (name, group) in &config.document.group {
-        companions
-            .extend(matching(config, &group.files, &mut seen)?.into_iter().map(|file| (name.as_str(), file)));
+        let files = matching(config, &group.files, &mut seen, &mut unlisted)?;
+        companions.extend(files.into_iter().map(|file| (name.as_str(), file)));
     }
-    if companions.is_empty() && !config.document.logs.pieces {
+    let mut found = if companions.is_empty() && !config.document.logs.pieces {
         let logs = main.into_iter().map(|(shown, path)| (shown, LogFiles::one(path))).collect();
-        return Ok(DiscoveredLogs { logs, seen, ..DiscoveredLogs::default() });
-    }
-    Ok(DiscoveredLogs { seen, ..group_files(config, main, companions) })
+        DiscoveredLogs { logs, ..DiscoveredLogs::default() }
+    } else {
+        group_files(config, main, companions)
+    };
+    found.faulty.append(&mut unlisted);
+    Ok(DiscoveredLogs { seen, ..found })
 }
 
 /// The whole log that a file given by hand belongs to.
@@ -141,6 +145,7 @@ fn matching(
     config: &Config,
     patterns: &[String],
     seen: &mut SeenObjects,
+    unlisted: &mut BTreeMap<String, (PathBuf, Diagnostic)>,
 ) -> Result<Vec<(String, PathBuf)>, Error> {
     let mut found = BTreeMap::new();
     let mut silent = BTreeSet::new();
@@ -173,8 +178,23 @@ fn matching(
         let folder = glob::Pattern::escape(&config.folder.to_string_lossy());
         let full = Path::new(&folder).join(pattern);
         let paths = glob::glob(&full.to_string_lossy()).map_err(|e| invalid(pattern, &e.msg))?;
-        let files: Vec<PathBuf> = paths.flatten().filter(|path| path.is_file() && !ours(path)).collect();
-        if files.is_empty() {
+        let mut files = Vec::new();
+        let faults = unlisted.len();
+        for path in paths {
+            let listed =
+                path.map_err(|e| (e.path().to_owned(), e.into())).and_then(|path| match is_file(&path) {
+                    Ok(is_file) => Ok((path, is_file)),
+                    Err(e) => Err((path, e)),
+                });
+            match listed {
+                Ok((path, is_file)) => files.extend((is_file && !ours(&path)).then_some(path)),
+                Err((path, e)) => {
+                    let shown = shown(config, &path);
+                    unlisted.insert(shown.clone(), (path.clone(), unreadable(&path, &shown, &e)));
+                }
+            }
+        }
+        if files.is_empty() && unlisted.len() == faults {
             silent.insert(pattern.as_str());
         }
         found.extend(files.into_iter().map(|path| (shown(config, &path), path)));
@@ -187,6 +207,24 @@ fn matching(
     }
 }
 
+/// Whether a path is a file; links that lead nowhere are errors, files that were deleted meanwhile are none.
+fn is_file(path: &Path) -> std::io::Result<bool> {
+    match std::fs::metadata(path) {
+        Ok(data) => Ok(data.is_file()),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound && path.symlink_metadata().is_err() => Ok(false),
+        Err(e) => Err(e),
+    }
+}
+
+/// A folder that cannot be listed may hold any number of logs: it is an error and not an empty folder.
+fn unreadable(path: &Path, shown: &str, error: &std::io::Error) -> Diagnostic {
+    let (code, kind) =
+        if path.is_dir() { ("folder_unreadable", "folder") } else { ("file_unreadable", "file") };
+    Diagnostic::new(code, format!("the {kind} {shown} cannot be listed: {error}"))
+        .in_file(shown)
+        .hint("check its owner and mode, or the link; then `freeplay run --retry`")
+}
+
 fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
     let patterns = silent.iter().map(|p| format!("`{p}`")).collect::<Vec<_>>().join(", ");
     let folder = if config.folder.as_os_str().is_empty() { Path::new(".") } else { &config.folder };
@@ -197,4 +235,27 @@ fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
 
 fn shown(config: &Config, path: &Path) -> String {
     path.strip_prefix(&config.folder).unwrap_or(path).to_string_lossy().replace('\\', "/")
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    /// A link to itself stands for whatever cannot be listed, which no test that runs as root can otherwise make.
+    #[cfg(unix)]
+    #[test]
+    fn what_cannot_be_listed_is_an_error_and_not_left_out() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("logs")).unwrap();
+        std::fs::write(folder.path().join("logs/a.parquet"), "").unwrap();
+        std::os::unix::fs::symlink("b.parquet", folder.path().join("logs/b.parquet")).unwrap();
+        let text = include_str!("../../../../pipeline.toml").replace("logs/**/*.parquet", "logs/*.parquet");
+        let config = Config::parse(&text, Path::new("pipeline.toml"), folder.path()).unwrap();
+        let (mut seen, mut unlisted) = (SeenObjects::new(), BTreeMap::new());
+        let found = matching(&config, &["logs/*.parquet".to_owned()], &mut seen, &mut unlisted).unwrap();
+        assert_eq!(found.iter().map(|(shown, _)| shown.as_str()).collect::<Vec<_>>(), ["logs/a.parquet"]);
+        let (path, error) = &unlisted["logs/b.parquet"];
+        assert_eq!((error.code.as_str(), path.ends_with("b.parquet")), ("file_unreadable", true));
+    }
 }

@@ -77,6 +77,8 @@ pub enum WorkReason {
     Retry,
     /// It could not be fetched from its object store before.
     Unfetched,
+    /// It cannot be listed, so nothing is known of it.
+    Unlisted,
     /// `--redo` asks for it.
     Asked,
     /// `--verify-content` asks whether it is still what was read.
@@ -93,6 +95,7 @@ impl WorkReason {
             Self::OwnerGone => "its flight has no other log now",
             Self::Retry => "in error, asked again",
             Self::Unfetched => "could not be fetched before",
+            Self::Unlisted => "cannot be listed",
             Self::Asked => "asked again",
             Self::Verify => "content to be compared",
         }
@@ -211,6 +214,9 @@ pub fn flight_of(account: &LogRecord) -> Option<Flight> {
     })
 }
 
+/// Codes of paths that cannot be listed: each run looks anew, and says so again.
+const UNLISTED: [&str; 2] = ["folder_unreadable", "file_unreadable"];
+
 /// What becomes of one log tonight.
 enum Verdict {
     Known,
@@ -245,7 +251,9 @@ impl Judge<'_> {
         before: Option<&LogRecord>,
     ) -> Verdict {
         let stat = FileStat::of_log(files, self.seen);
-        let Some(why) = self.reason(before, stat.as_ref()) else { return Verdict::Known };
+        let is_unlisted = fault.as_ref().is_some_and(|fault| UNLISTED.contains(&fault.code.as_str()));
+        let why = self.reason(before, stat.as_ref()).or(is_unlisted.then_some(WorkReason::Unlisted));
+        let Some(why) = why else { return Verdict::Known };
         // A log that cannot be identified is done whatever was asked, or its fault would never be told.
         let flight = || {
             before

@@ -74,8 +74,8 @@ pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
 /// what was committed before is intact, and the rest runs next time.
 pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<RunSummary, Error> {
     let workers = workers(request);
-    execute_run(config, request, context, workers, |shop, intent, writer, report| {
-        shop.work(workers, intent, writer, report)
+    execute_run(config, request, context, workers, |worker_context, intent, writer, report| {
+        worker_context.work(workers, intent, writer, report)
     })
 }
 
@@ -112,7 +112,7 @@ pub(crate) fn execute_run(
     let run_id = report.run_id.clone();
     let budget = MemoryBudget::new(config.document.run.memory_mib);
     let intent = RunPlanRows { run: report.row(context.program_version, &config_path, None), to_do };
-    let shop = WorkerContext {
+    let worker_context = WorkerContext {
         config,
         installations: &installations,
         context,
@@ -120,12 +120,12 @@ pub(crate) fn execute_run(
         run_id: &run_id,
         budget,
     };
-    let touched = work(&shop, &intent, &mut writer, &mut report)?;
+    let touched = work(&worker_context, &intent, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
     let (run_id, counts_all) = (&report.run_id, request.counts_all);
-    let execute_run = assess::assess_run(config, &installations, &store, &touched, run_id, counts_all)?;
-    report.add_assessments(execute_run);
+    let assessments = assess::assess_run(config, &installations, &store, &touched, run_id, counts_all)?;
+    report.add_assessments(assessments);
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
     if store.needs_compaction()? {

@@ -31,11 +31,35 @@ pub struct UsageDefaults {
     pub nominal_flight_hours: f64,
     /// The unit's hours when its first flight here began, if known.
     pub unit_hours_at_start: Option<f64>,
+    /// Where the unit's hours are known from.
+    pub source: UsageSource,
+}
+
+/// Where the hours of a unit are known from, the most complete source first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum UsageSource {
+    /// The flights table: every flight of the aircraft, with or without a log.
+    FlightsTable,
+    /// The hour meter of the aircraft, which also counts flights without a log.
+    TailHourMeter,
+    /// The lengths of the logged flights alone: flights without a log are missing.
+    #[default]
+    LoggedFlights,
+}
+
+impl std::fmt::Display for UsageSource {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::FlightsTable => "flights_table",
+            Self::TailHourMeter => "tail_hours",
+            Self::LoggedFlights => "logged_flights",
+        })
+    }
 }
 
 impl Default for UsageDefaults {
     fn default() -> Self {
-        Self { nominal_flight_hours: 1.5, unit_hours_at_start: None }
+        Self { nominal_flight_hours: 1.5, unit_hours_at_start: None, source: UsageSource::default() }
     }
 }
 
@@ -99,6 +123,7 @@ impl MaintenanceEvent {
 pub struct Series {
     flights: Vec<Flight>,
     unit_hours_at_start: Option<f64>,
+    source: UsageSource,
     maintenance: Vec<MaintenanceEvent>,
     /// After the last flight.
     meter: UsageAccumulator,
@@ -118,7 +143,13 @@ impl Series {
         let rows = in_order(rows)?;
         let mut meter = UsageAccumulator::new(nominal);
         let flights = rows.iter().map(|row| meter.fly(row)).collect();
-        Ok(Self { flights, unit_hours_at_start: usage.unit_hours_at_start, maintenance: Vec::new(), meter })
+        Ok(Self {
+            flights,
+            unit_hours_at_start: usage.unit_hours_at_start,
+            source: usage.source,
+            maintenance: Vec::new(),
+            meter,
+        })
     }
 
     /// The same with what the maintenance book says of the unit, in any order.
@@ -153,6 +184,11 @@ impl Series {
     /// are asked about.
     pub fn gaps_until(&self, as_of_us: i64) -> Vec<f64> {
         self.flights_until(as_of_us).iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect()
+    }
+
+    /// Where the unit's hours are known from.
+    pub fn usage_source(&self) -> UsageSource {
+        self.source
     }
 
     /// The unit's own hours when its first flight here began, if known.

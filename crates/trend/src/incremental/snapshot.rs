@@ -191,6 +191,9 @@ impl UnitSnapshot {
             utilization: self.utilization(),
             outliers_us: [&self.checkpoint.outliers_us[..], &tail.outliers_us[..]].concat(),
             noise_factor: self.checkpoint.scatter.noise_factor,
+            stale_days: last_gap_us
+                .map(|last_us| (as_of_us - last_us) as f64 / DAY_US as f64)
+                .filter(|days| *days > settings.stale_after_days),
             state,
             reason,
         }
@@ -245,9 +248,12 @@ impl UnitSnapshot {
         let days = |mark: &UsageSample| (last.departure_us - mark.departure_us) as f64 / DAY_US as f64;
         let first = marks.into_iter().find(|mark| days(mark) <= UTILIZATION_DAYS as f64)?;
         let (hours, days) = (last.hours - first.hours, days(&first));
+        let flights = last.flights - first.flights;
         (hours > 0.0 && days > 0.0).then(|| Utilization {
             hours_per_day: hours / days,
-            hours_per_flight: hours / (last.flights - first.flights),
+            hours_per_day_se: hours / days / flights.max(1.0).sqrt(),
+            flights_per_day: flights / days,
+            hours_per_flight: hours / flights,
         })
     }
 }

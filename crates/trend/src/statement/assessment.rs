@@ -36,7 +36,10 @@ pub struct Assessment {
     pub outliers_us: Vec<i64>,
     /// Variance found between flights over the variance stated.
     pub noise_factor: f64,
-    /// What to do; nothing when no recent estimate supports a state.
+    /// Days since the last estimate where they are more than [`Settings::stale_after_days`]: the state is then that of
+    /// the last estimate. Silence clears no alarm.
+    pub stale_days: Option<f64>,
+    /// What to do; nothing when no estimate supports a state.
     pub state: Option<State>,
     /// Why this state, or why none.
     pub reason: Reason,

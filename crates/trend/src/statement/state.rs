@@ -32,8 +32,6 @@ pub enum State {
 pub enum Reason {
     /// No flight before the day, or none with a gap.
     NoEstimate,
-    /// The last estimate is too old.
-    Stale { days: f64 },
     /// Too few estimates.
     TooFew { estimates: usize },
     /// No curve that explains the history has the gap where the last estimates are.
@@ -55,7 +53,6 @@ impl fmt::Display for Reason {
         let um = |m: f64| m * 1e6;
         match *self {
             Self::NoEstimate => write!(f, "no estimate yet"),
-            Self::Stale { days } => write!(f, "no estimate for {days:.0} days"),
             Self::TooFew { estimates } => {
                 let noun = if estimates == 1 { "estimate" } else { "estimates" };
                 write!(f, "only {estimates} {noun}; at least {MIN_ESTIMATES} are needed")
@@ -114,10 +111,6 @@ pub(crate) fn alert_state(
         return (None, Reason::NoEstimate);
     };
     let days_since = |departure_us: i64| (evidence.as_of_us - departure_us) as f64 / DAY_US;
-    let days = days_since(last_gap_us);
-    if days > settings.stale_after_days {
-        return (None, Reason::Stale { days });
-    }
     let (Some(Level { gap_m, .. }), Some(crossing)) = (evidence.level, evidence.crossing) else {
         let few = Reason::TooFew { estimates: evidence.estimates };
         let unsupported = |(gap_m, recent_m)| Reason::Unsupported { gap_m, recent_m };
@@ -139,7 +132,9 @@ pub(crate) fn alert_state(
     let unknown = |change: &&ChangePoint| change.kind != ChangePointKind::Recorded;
     if let Some(change) = evidence.changes.iter().rev().find(unknown) {
         let days = days_since(change.departure_us);
-        if days <= settings.change_watch_days {
+        // Counted to the last estimate: that no flight follows clears nothing.
+        let days_until_estimate = days - days_since(last_gap_us);
+        if days_until_estimate <= settings.change_watch_days {
             return (Some(State::Watch), Reason::Changed { kind: change.kind, days });
         }
     }

@@ -39,12 +39,19 @@ pub struct Crossing {
     pub p95_hours: Option<f64>,
 }
 
-/// The unit's recent use: over its last ninety days of flights.
+/// Recent utilisation of a unit, from the last ninety days of its flights.
+///
+/// Dates, forecasts, removals and probabilities all convert flight hours by this one figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Utilization {
-    /// Flight hours a day.
+    /// Flight hours per day.
     pub hours_per_day: f64,
-    /// Flight hours a flight.
+    /// Standard error of the flight hours per day: flights arrive at random, so it falls with the square root of their
+    /// number.
+    pub hours_per_day_se: f64,
+    /// Flights per day, those without a row included as far as the hour meter or the flights table shows them.
+    pub flights_per_day: f64,
+    /// Flight hours per flight.
     pub hours_per_flight: f64,
 }
 

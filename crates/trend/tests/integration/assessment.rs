@@ -80,14 +80,27 @@ fn a_unit_that_meets_its_limit_soon_is_planned() {
     assert_eq!(assessment.state, Some(State::Plan), "{assessment:?}");
 }
 
+/// A unit at its limit whose aircraft sends nothing is still at its limit.
 #[test]
-fn no_state_stands_on_old_or_on_few_estimates() {
+fn silence_clears_no_alarm() {
+    for (series, state) in [
+        (unit(400, |h| 20.0 + 0.15 * h), State::Act),
+        (unit(400, |h| 30.0 + 0.06 * h), State::Plan),
+        (unit(400, |h| 20.0 + 0.02 * h + if h > 770.0 { 12.0 } else { 0.0 }), State::Watch),
+    ] {
+        let (last, silent) = (state_of(&series, 399), state_of(&series, 500));
+        assert_eq!((last.state, last.stale_days), (Some(state), None), "{last:?}");
+        assert_eq!((silent.state, silent.stale_days), (Some(state), Some(101.0)), "{silent:?}");
+        assert_eq!((silent.level, silent.crossing), (last.level, last.crossing));
+    }
+}
+
+#[test]
+fn no_state_stands_on_few_estimates() {
     let series = unit(400, |h| 20.0 + 0.02 * h);
-    let stale = state_of(&series, 500);
-    assert_eq!((stale.state, stale.reason.to_string().as_str()), (None, "no estimate for 101 days"));
     let young = state_of(&series, 3);
     assert_eq!((young.state, young.reason), (None, Reason::TooFew { estimates: 4 }));
-    assert_eq!(state_of(&series, 0).reason.to_string(), "only 1 estimate, 8 are needed");
+    assert_eq!(state_of(&series, 0).reason.to_string(), "only 1 estimate; at least 8 are needed");
     assert_eq!(state_of(&series, -1).reason, Reason::NoEstimate);
 }
 
