@@ -83,11 +83,13 @@ pub struct RunAssessments {
     pub changed: Vec<UnitChange>,
     /// What the last months say beside gaps, of all tails.
     pub recent: RecentDiagnostics,
-    /// How many units of the whole fleet are in which state, where that was asked.
+    /// How many units of the whole fleet are in which state.
     pub states: BTreeMap<&'static str, usize>,
+    /// Units of the whole fleet in state `watch`, `plan` or `act`, touched by the run or not.
+    pub work_list: Vec<TrendRow>,
 }
 
-/// States what is known of units whose records a run changed; with `counts_all`, counts the states of all.
+/// Assesses the fleet after a run: the units whose records it changed, and the work list of all units.
 ///
 /// # Errors
 /// As [`assess_store`].
@@ -97,21 +99,17 @@ pub fn assess_run(
     store: &Store,
     units: &[Unit],
     run_id: &str,
-    counts_all: bool,
 ) -> Result<RunAssessments, Error> {
-    if units.is_empty() && !counts_all {
-        return Ok(RunAssessments::default());
-    }
     let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
     let (all, of_run) = (load_histories(store)?, gathered(store, &query)?);
     let recent =
         all.newest_utc().map(|newest| recent_diagnostics(store, newest)).transpose()?.unwrap_or_default();
     let moved = detect_changes(&recent);
-    let run = assess_run_from(config, installations, all, &of_run, units, moved, counts_all)?;
+    let run = assess_run_from(config, installations, all, &of_run, units, moved)?;
     Ok(RunAssessments { recent, ..run })
 }
 
-/// The same of all flights that are known after a night, and those of the night.
+/// The same from all flights that are known after a run, and those of the run.
 ///
 /// # Errors
 /// As [`assess_histories`].
@@ -122,7 +120,6 @@ pub fn assess_run_from(
     of_run: &Histories,
     units: &[Unit],
     moved: Vec<RecorderChange>,
-    counts_all: bool,
 ) -> Result<RunAssessments, Error> {
     let names: BTreeSet<UnitKey> =
         units.iter().map(|(part, serial)| (Some(part.to_string()), serial.to_string())).collect();
@@ -135,16 +132,14 @@ pub fn assess_run_from(
         config.flights.iter().next().is_none() && before_utc.is_none_or(|before| of_run.all_after(before));
     let earlier = if is_later { Histories::default() } else { all.without(&names, of_run) };
     let fleet = FleetContext::consuming(config, installations, &mut all, &days)?.with_recorder_changes(moved);
-    let stated: Vec<&UnitKey> =
-        if counts_all { fleet.units.keys().copied().collect() } else { names.iter().collect() };
-    let mut now = fleet.statements(stated.into_iter(), as_of)?;
+    let mut now = fleet.statements(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
     let mut run = RunAssessments::default();
-    if counts_all {
-        let states = now.iter().filter_map(|row| row.state);
-        states.for_each(|state| *run.states.entry(state).or_default() += 1);
-        now.retain(|row| names.contains(&row.name()));
-    }
+    let states = now.iter().filter_map(|row| row.state);
+    states.for_each(|state| *run.states.entry(state).or_default() += 1);
+    let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != "normal");
+    run.work_list = now.iter().filter(needs_attention).cloned().collect();
+    now.retain(|row| names.contains(&row.name()));
     let Some(before_utc) = before_utc else { return Ok(RunAssessments { now, ..run }) };
     let before = if is_later {
         fleet.statements(names.iter(), before_utc)?

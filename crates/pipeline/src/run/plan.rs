@@ -36,8 +36,6 @@ pub struct Request {
     pub redo: bool,
     /// The content of known logs too, though nothing about their files has changed.
     pub verify_content: bool,
-    /// The states of the whole fleet, counted.
-    pub counts_all: bool,
 }
 
 impl Request {
@@ -138,10 +136,36 @@ pub struct Plan {
     pub not_asked: usize,
     /// Logs left by the limit.
     pub left: usize,
+    /// Logs in error of earlier runs that are not done again, by name.
+    pub standing_errors: Vec<StandingError>,
     /// Files of groups whose flight has no main log.
     pub strays: Vec<String>,
     /// The files of every log that was found; nothing without work.
     pub files: BTreeMap<String, LogFiles>,
+}
+
+/// An error of an earlier run whose log has not changed since: it stands until the log or a setting is fixed.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct StandingError {
+    /// The log.
+    pub log: String,
+    /// Code of its first error.
+    pub code: String,
+    /// What is wrong: all its errors as text.
+    pub detail: String,
+    /// The run that met it.
+    pub run_id: String,
+}
+
+impl StandingError {
+    fn of(account: &LogRecord) -> Self {
+        Self {
+            log: account.log_path.clone(),
+            code: account.error_code.clone().unwrap_or_default(),
+            detail: account.error_detail.clone().unwrap_or_default(),
+            run_id: account.run_id.clone(),
+        }
+    }
 }
 
 /// What was read of a log, and under which settings.
@@ -185,8 +209,25 @@ pub fn plan(
     work.truncate(request.limit.unwrap_or(usize::MAX));
     let left = wanted - work.len();
     let known = found.len() - wanted - not_asked;
-    let mut plan =
-        Plan { found: found.len(), known, work, accounts, gone, not_asked, left, strays, ..Plan::default() };
+    let to_do: HashSet<&str> = work.iter().map(|work| work.shown.as_str()).collect();
+    let standing_errors = accounts
+        .values()
+        .filter(|account| account.outcome == LogOutcome::Error && !to_do.contains(account.log_path.as_str()))
+        .map(StandingError::of)
+        .collect();
+    drop(to_do);
+    let mut plan = Plan {
+        found: found.len(),
+        known,
+        work,
+        accounts,
+        gone,
+        not_asked,
+        left,
+        strays,
+        standing_errors,
+        ..Plan::default()
+    };
     if !plan.work.is_empty() {
         plan.here = plan.accounts.values().filter_map(digests).collect();
         plan.files = found.into_iter().map(|(shown, (files, _))| (shown, files)).collect();

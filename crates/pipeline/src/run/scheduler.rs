@@ -123,8 +123,7 @@ pub(crate) fn execute_run(
     let touched = work(&worker_context, &intent, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
-    let (run_id, counts_all) = (&report.run_id, request.counts_all);
-    let assessments = assess::assess_run(config, &installations, &store, &touched, run_id, counts_all)?;
+    let assessments = assess::assess_run(config, &installations, &store, &touched, &report.run_id)?;
     report.add_assessments(assessments);
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));

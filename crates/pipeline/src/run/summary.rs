@@ -11,7 +11,7 @@ use crate::fleet_trends::changes::UnitChange;
 use crate::fleet_trends::trend_row::TrendRow;
 use crate::monitoring::innovations::{self, InnovationOutlier};
 use crate::monitoring::recorder_change::{self, RecorderChange};
-use crate::run::plan::{Plan, WorkItem};
+use crate::run::plan::{Plan, StandingError, WorkItem};
 
 /// One log's trouble.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -116,7 +116,11 @@ pub struct RunSummary {
     pub trends: Vec<TrendRow>,
     /// Those of them of which something else is said than without this run's records.
     pub changed: Vec<UnitChange>,
-    /// How many units of the whole fleet are in which state, where that was asked.
+    /// Logs in error of earlier runs, which stand until they are fixed.
+    pub standing_errors: Vec<StandingError>,
+    /// Units of the whole fleet in state `watch`, `plan` or `act`, also when the run had nothing new.
+    pub work_list: Vec<TrendRow>,
+    /// How many units of the whole fleet are in which state.
     #[serde(skip)]
     pub states: BTreeMap<&'static str, usize>,
     /// What came of each log; the last word on it counts, whoever was faster.
@@ -158,14 +162,16 @@ impl RunSummary {
             workers,
             trends: Vec::new(),
             changed: Vec::new(),
+            standing_errors: plan.standing_errors.clone(),
+            work_list: Vec::new(),
             states: BTreeMap::new(),
             logs: BTreeMap::new(),
         }
     }
 
     /// Takes what the run's units say now, and what is new on their aircraft beside their gaps.
-    pub(crate) fn add_assessments(&mut self, night: RunAssessments) {
-        let RunAssessments { now, changed, recent, states } = night;
+    pub(crate) fn add_assessments(&mut self, assessments: RunAssessments) {
+        let RunAssessments { now, changed, recent, states, work_list } = assessments;
         let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
         let touched = |tail: &String| tails.contains(tail.as_str());
         self.recorder_moved = recorder_change::detect_changes(&recent)
@@ -175,6 +181,7 @@ impl RunSummary {
         self.innovations_unlike =
             innovations::find_outliers(&recent).into_iter().filter(|u| touched(&u.tail_number)).collect();
         (self.trends, self.changed, self.states) = (now, changed, states);
+        self.work_list = work_list;
     }
 
     pub(crate) fn count(&mut self, account: &LogRecord, records: &[GapRecord], diagnostics: &[Diagnostic]) {

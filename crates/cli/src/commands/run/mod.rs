@@ -93,7 +93,6 @@ fn request(args: &RunArgs) -> Result<Request, Failure> {
         retry: args.retry,
         redo: args.redo,
         verify_content: args.verify_content,
-        counts_all: args.fail_on.is_some(),
     })
 }
 
@@ -153,6 +152,27 @@ fn code(report: &RunSummary, reached: bool, stopped: bool) -> Code {
         Code::StateReached
     } else {
         Code::Success
+    }
+}
+
+/// Logs that failed in earlier runs and have not changed since.
+fn standing_errors(report: &RunSummary, page: &mut String) {
+    const MAX_SHOWN: usize = 5;
+    let logs = &report.standing_errors;
+    if logs.is_empty() {
+        return;
+    }
+    let text =
+        format!("{} of earlier runs; after fixing them: `freeplay run --retry`", count(logs.len(), "log"));
+    line(page, "still failed", &text);
+    for error in logs.iter().take(MAX_SHOWN) {
+        // A duplicate names the log that owns its flight.
+        let detail = error.detail.lines().find(|line| line.contains("another log holds the same flight"));
+        let detail = detail.map(|line| format!("  {}", escape(line.trim()))).unwrap_or_default();
+        line(page, "", &format!("{}  {}{detail}", escape(&error.log), error.code));
+    }
+    if let Some(more @ 1..) = logs.len().checked_sub(MAX_SHOWN) {
+        line(page, "", &format!("and {more} more, all in `freeplay run --json`"));
     }
 }
 
@@ -227,6 +247,7 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     if report.errors.len() > 10 {
         line(&mut page, "", &format!("and {} more, all in `freeplay run --json`", report.errors.len() - 10));
     }
+    standing_errors(report, &mut page);
     if report.not_reached > 0 {
         line(
             &mut page,
@@ -271,7 +292,7 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
             ),
         );
     }
-    page.push_str(&work_list_section(&report.trends));
+    page.push_str(&work_list_section(&report.trends, &report.work_list));
     page.push_str(&changes_section(&report.changed));
     if code == Code::LogsInError {
         page.push_str(&format!(
@@ -310,24 +331,29 @@ fn line(page: &mut String, label: &str, text: &str) {
 }
 
 /// Lists the units that need attention, most urgent first, and counts the others.
-fn work_list_section(rows: &[TrendRow]) -> String {
-    if rows.is_empty() {
+fn work_list_section(rows: &[TrendRow], work_list: &[TrendRow]) -> String {
+    if rows.is_empty() && work_list.is_empty() {
         return String::new();
     }
     let urgency = |row: &TrendRow| ["act", "plan", "watch"].iter().position(|s| row.state == Some(*s));
-    let mut urgent: Vec<&TrendRow> = rows.iter().filter(|r| urgency(r).is_some()).collect();
+    let mut urgent: Vec<&TrendRow> = work_list.iter().collect();
     urgent.sort_by(|a, b| {
         let hours = |r: &TrendRow| r.crossing_hours_p05.unwrap_or(f64::INFINITY);
         urgency(a).cmp(&urgency(b)).then_with(|| hours(a).total_cmp(&hours(b)))
     });
     let silent = rows.iter().filter(|r| r.state.is_none()).count();
-    let normal = rows.len() - urgent.len() - silent;
-    let mut page = format!(
-        "\n{} updated: {} need attention, {normal} normal, {silent} not assessed{}\n",
-        count(rows.len(), "unit"),
-        urgent.len(),
-        if silent > 0 { " (see `freeplay trend`)" } else { "" }
-    );
+    let normal = rows.iter().filter(|r| r.state == Some("normal")).count();
+    let mut page = if rows.is_empty() {
+        format!("\nno unit updated; {} in the fleet need attention\n", count(urgent.len(), "unit"))
+    } else {
+        format!(
+            "\n{} updated: {} need attention, {normal} normal, {silent} not assessed{}; {} in the fleet need attention\n",
+            count(rows.len(), "unit"),
+            rows.len() - normal - silent,
+            if silent > 0 { " (see `freeplay trend`)" } else { "" },
+            count(urgent.len(), "unit")
+        )
+    };
     if !urgent.is_empty() {
         let columns = [
             text("state", 0),
