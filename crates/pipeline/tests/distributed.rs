@@ -136,4 +136,12 @@ fn a_broken_log_is_an_answer() {
     let accounts = Store::open(config.store()).unwrap().accounts().unwrap();
     let in_error = accounts.iter().filter(|account| account.error_code.is_some()).count();
     assert_eq!(in_error, 1);
+    // The next run has nothing new, and still names the log and the units that need attention.
+    let next = with_context(|context| scheduler::run(&config, &Request::default(), context)).unwrap();
+    assert_eq!((next.done, next.errors.len(), next.standing_errors.len()), (0, 0, 1));
+    assert_eq!(next.standing_errors[0].code, "not_parquet");
+    assert!(next.standing_errors[0].log.ends_with(&*log.file_name().unwrap().to_string_lossy()));
+    let urgent: usize =
+        next.states.iter().filter(|(state, _)| **state != "normal").map(|(_, count)| count).sum();
+    assert_eq!((next.trends.len(), next.work_list.len()), (0, urgent));
 }
