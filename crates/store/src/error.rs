@@ -40,6 +40,9 @@ pub enum Error {
     /// A data file is not the one that was committed.
     #[error("a data file is corrupt: its digest is {}…, but {}… was committed", short(found), short(wanted))]
     Damaged { path: PathBuf, found: String, wanted: String },
+    /// A file of the Delta log is not the one that was written.
+    #[error("the log of a table is damaged: {problem}")]
+    LogDamaged { path: PathBuf, problem: String },
     /// The bucket it lies in does not give or take a file.
     #[error(transparent)]
     Object(#[from] object_io::Error),
@@ -80,7 +83,7 @@ impl Error {
             Self::Itself { .. } => "store_itself",
             Self::Io { .. } => "store_io",
             Self::Table { .. } => "store_table",
-            Self::Damaged { .. } => "store_damaged",
+            Self::Damaged { .. } | Self::LogDamaged { .. } => "store_damaged",
             Self::Object(error) => error.code(),
             Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) => "store_value",
             Self::Frame(_) | Self::Parquet(_) => "store_unreadable",
@@ -94,7 +97,7 @@ impl Error {
             | Self::Name { dir, .. }
             | Self::Itself { dir } => Some(dir),
             Self::Format { file, .. } | Self::Torn { file, .. } => Some(file),
-            Self::Io { path, .. } | Self::Damaged { path, .. } => Some(path),
+            Self::Io { path, .. } | Self::Damaged { path, .. } | Self::LogDamaged { path, .. } => Some(path),
             _ => None,
         }
     }
@@ -119,6 +122,9 @@ impl Error {
                  one, remove it and run its logs again"
             }
             Self::Table { .. } => "is the disk full, or does another program write into this table?",
+            Self::LogDamaged { .. } => {
+                "restore this file, or the whole store, from a backup; data files are not affected"
+            }
             Self::Object(error) => error.remedy(),
             Self::Damaged { .. } => {
                 "restore this file from a backup; without one, remove the store and run its logs again"

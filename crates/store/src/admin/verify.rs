@@ -1,40 +1,48 @@
-//! Is the store still what was committed? Every file against its log, its digest and its rows.
+//! Verification: log files and data files against their digests, statistics against content, log records against gap
+//! records.
 
+use std::collections::BTreeMap;
 use std::fs::File;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use records::Diagnostic;
 
 use crate::delta::data_file;
+use crate::delta::file_stats::{self, Stats};
 use crate::delta::snapshot::DataFile;
 use crate::delta::table::Table;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::polars_scan::{self, ScanRequest};
 use crate::read::store_read::files_of;
+use crate::rows::accounts::LogRecord;
 use crate::rows::gap_columns;
 use crate::write::writer::keys;
 use records::RecordKey;
 
-/// So many alike are named; the rest is counted.
+/// Maximum number of similar findings that are listed; the others are counted.
 const NAMED: usize = 3;
 
 impl Store {
-    /// What is wrong with the store; nothing when all is well.
+    /// Everything that is wrong with the store; empty when it is intact.
     ///
-    /// Each data file must be there, as long as its log says, with the content its digest says and as
-    /// many rows; and no record may be there twice.
+    /// Each log file must match its digest. Each data file must exist with the committed length, digest and number of
+    /// rows, and its statistics must cover its content. No record may be stored twice, and the records of each log must
+    /// be stored.
     pub fn verify(&self) -> Vec<Diagnostic> {
         let tables = self.tables();
         let mut findings: Vec<Diagnostic> = tables.into_iter().flat_map(wrong_in).collect();
-        if findings.is_empty() {
-            findings.extend(self.duplicates().unwrap_or_else(|error| vec![error.diagnostic()]));
+        // A foreign file does not keep the records from being read.
+        if findings.iter().all(|finding| finding.code == "store_file_foreign") {
+            findings.extend(self.wrong_records().unwrap_or_else(|error| vec![error.diagnostic()]));
         }
         findings
     }
 
-    fn duplicates(&self) -> Result<Vec<Diagnostic>, Error> {
+    /// Records that are stored twice, and logs whose records are not all stored.
+    fn wrong_records(&self) -> Result<Vec<Diagnostic>, Error> {
         let files: Vec<PathBuf> = files_of(&self.gaps)?;
         let schema = polars_scan::only(&gap_columns::schema(), &RecordKey::COLUMNS)?;
         let order = &RecordKey::COLUMNS;
@@ -46,8 +54,48 @@ impl Store {
             let more = format!("{} more records are stored twice", twice.len() - NAMED);
             findings.push(Diagnostic::new("store_duplicate", more));
         }
+        let logs = self.accounts()?;
+        let incomplete = incomplete_logs(&logs, &keys);
+        findings.extend(incomplete.iter().take(NAMED).map(|(log, stored)| incomplete_log(log, *stored)));
+        if incomplete.len() > NAMED {
+            let more = format!("{} more logs lack records", incomplete.len() - NAMED);
+            findings.push(Diagnostic::new("store_records_missing", more));
+        }
         Ok(findings)
     }
+}
+
+/// A flight: tail, flight and departure.
+type FlightKey<'a> = (&'a str, &'a str, i64);
+
+/// Logs with more records than are stored of their flight, and the number that is stored. A flight with several logs is
+/// left out: a later log may have replaced records of an earlier one.
+fn incomplete_logs<'a>(logs: &'a [LogRecord], keys: &[RecordKey]) -> Vec<(&'a LogRecord, i64)> {
+    let mut stored: BTreeMap<FlightKey<'_>, i64> = BTreeMap::new();
+    for key in keys {
+        *stored.entry((&key.tail_number, &key.flight_id, key.departure_us)).or_default() += 1;
+    }
+    let mut by_flight: BTreeMap<FlightKey<'_>, Vec<&LogRecord>> = BTreeMap::new();
+    for log in logs {
+        let (Some(tail), Some(flight), Some(at)) = (&log.tail_number, &log.flight_id, log.departure_utc)
+        else {
+            continue;
+        };
+        by_flight.entry((tail, flight, at.as_microsecond())).or_default().push(log);
+    }
+    let single = by_flight.into_iter().filter_map(|(flight, logs)| match logs.as_slice() {
+        [log] => Some((*log, stored.get(&flight).copied().unwrap_or_default())),
+        _ => None,
+    });
+    single.filter(|(log, stored)| log.outcome.is_success() && log.estimated + log.refused > *stored).collect()
+}
+
+fn incomplete_log(log: &LogRecord, stored: i64) -> Diagnostic {
+    let mut found =
+        Diagnostic::new("store_records_missing", "records of a log are not stored").in_file(&log.log_path);
+    (found.found, found.expected) =
+        (Some(format!("{stored} records")), Some(format!("{} records", log.estimated + log.refused)));
+    found.hint("restore the store from a backup, or estimate the log again with `freeplay run --redo`")
 }
 
 fn duplicate(key: &RecordKey) -> Diagnostic {
@@ -57,10 +105,26 @@ fn duplicate(key: &RecordKey) -> Diagnostic {
 }
 
 fn wrong_in(table: &Table) -> Vec<Diagnostic> {
-    match table.snapshot() {
-        Ok(snapshot) => snapshot.files.iter().filter_map(|file| wrong_with(table, file)).collect(),
+    let mut findings = match table.damaged_log_files() {
+        Ok((damaged, foreign)) => {
+            let foreign = foreign.iter().map(|file| foreign_commit(table, file));
+            damaged.iter().map(Error::diagnostic).chain(foreign).collect()
+        }
         Err(error) => vec![error.diagnostic()],
+    };
+    match table.snapshot() {
+        Ok(snapshot) => findings.extend(snapshot.files.iter().filter_map(|file| wrong_with(table, file))),
+        // A damaged log file is named already.
+        Err(Error::LogDamaged { .. }) if !findings.is_empty() => {}
+        Err(error) => findings.push(error.diagnostic()),
     }
+    findings
+}
+
+fn foreign_commit(table: &Table, file: &Path) -> Diagnostic {
+    Diagnostic::new("store_file_foreign", "a commit was written by another program and carries no digest")
+        .in_file(table.location.display_path(file).display())
+        .hint("let only Freeplay write into the store; compare the records with the logs")
 }
 
 fn wrong_with(table: &Table, file: &DataFile) -> Option<Diagnostic> {
@@ -96,10 +160,31 @@ fn wrong_with(table: &Table, file: &DataFile) -> Option<Diagnostic> {
             (Some(rows.to_string()), file.stats.num_records.map(|n| n.to_string()));
         return Some(wrong.hint("restore it from a backup of the store"));
     }
-    (!file.has_digest()).then(|| {
+    if !file.has_digest() {
+        return Some(
         diagnostic("store_file_foreign", "a data file was written by another program and carries no digest")
             .hint("`freeplay store compact` writes its rows anew, with digests; compare them with the logs first")
-    })
+        );
+    }
+    match missed_by_statistics(table, file) {
+        Ok(None) => None,
+        Ok(Some(column)) => {
+            let what = format!("the statistics of a data file do not cover its content: {column}");
+            Some(
+                diagnostic("store_damaged", &what)
+                    .hint("restore the log of the table from a backup of the store"),
+            )
+        }
+        Err(error) => Some(error.diagnostic()),
+    }
+}
+
+/// The column by which a reader would skip a file that holds matching rows.
+fn missed_by_statistics(table: &Table, file: &DataFile) -> Result<Option<String>, Error> {
+    let files = std::slice::from_ref(&file.path);
+    let schema = Arc::clone(&table.schema);
+    let content = ScanRequest { files, schema, condition: None, order: &[], last: None }.collect()?;
+    Ok(file.stats.missed_by(&Stats::parse(Some(&file_stats::of(&content)))))
 }
 
 fn bytes(count: u64) -> String {

@@ -1,5 +1,6 @@
 //! What Delta's log says about a file's content without opening it: rows, and bounds of its columns.
 
+use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
 use arrow::array::{Array, AsArray, RecordBatch};
@@ -45,6 +46,30 @@ impl Stats {
         listed.is_none_or(|units| units.contains(value))
             && bound(&self.min_values).is_none_or(|low| low.as_str() <= value)
             && bound(&self.max_values).is_none_or(|high| value <= high.as_str())
+    }
+
+    /// Which column has values outside the statistics; `None` when they cover the content of the file.
+    pub(crate) fn missed_by(&self, content: &Self) -> Option<String> {
+        if self.num_records.is_some() && self.num_records != content.num_records {
+            return Some("the number of rows".to_owned());
+        }
+        let is_outside = |bounds: &Map<String, Value>, of: &Map<String, Value>, order: Ordering| {
+            let outside = |(name, bound): (&String, &Value)| {
+                let (found, bound) = (of.get(name)?.as_str()?, bound.as_str()?);
+                let compared = match (milliseconds(found), milliseconds(bound)) {
+                    (Some(found), Some(bound)) => found.cmp(&bound),
+                    _ => found.cmp(bound),
+                };
+                (compared == order).then(|| name.clone())
+            };
+            bounds.iter().find_map(outside)
+        };
+        let units = self.freeplay_serials.as_ref().zip(content.freeplay_serials.as_ref());
+        is_outside(&self.min_values, &content.min_values, Ordering::Less)
+            .or_else(|| is_outside(&self.max_values, &content.max_values, Ordering::Greater))
+            .or_else(|| {
+                units.is_some_and(|(listed, held)| !held.is_subset(listed)).then(|| UNITS.0.to_owned())
+            })
     }
 
     /// Whether every value of the text column is this one.
@@ -118,6 +143,11 @@ fn bounds(array: &dyn Array) -> Option<(Value, Value)> {
         }
         _ => None,
     }
+}
+
+/// A bound of time; a checkpoint may write it in another form.
+fn milliseconds(text: &str) -> Option<i64> {
+    text.parse::<Timestamp>().ok().map(Timestamp::as_millisecond)
 }
 
 /// Years of four digits only: others are written differently by every engine.

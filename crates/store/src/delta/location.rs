@@ -16,6 +16,7 @@ use object_io::{Address, Client, block_on};
 use tokio::runtime::{Builder, Handle, Runtime};
 use url::Url;
 
+use crate::delta::digested_log::DigestedLog;
 use crate::delta::durable_fs::{self, DurableFiles};
 use crate::error::Error;
 
@@ -102,10 +103,13 @@ impl Location {
         let Some(bucket) = &self.bucket else {
             let url = Url::from_directory_path(&self.dir).map_err(|()| invalid())?;
             let builder = DeltaTableBuilder::from_url(url.clone())?;
-            return builder.with_storage_backend(Arc::new(DurableFiles::default()), url).build_storage();
+            return builder
+                .with_storage_backend(Arc::new(DigestedLog::new(DurableFiles::default())), url)
+                .build_storage();
         };
         let url = Url::parse(&bucket.address.to_string()).map_err(|_| invalid())?;
-        let below = Arc::new(PrefixStore::new(Arc::clone(&bucket.client), bucket.address.key()));
+        let below = PrefixStore::new(Arc::clone(&bucket.client), bucket.address.key());
+        let below = Arc::new(DigestedLog::new(below));
         Ok(default_logstore(below, Arc::clone(&bucket.client), &url, &StorageConfig::default()))
     }
 

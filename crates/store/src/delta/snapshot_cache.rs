@@ -10,11 +10,9 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
+use crate::delta::digested_log::LOG;
 use crate::delta::location::Location;
 use crate::delta::snapshot::Snapshot;
-
-/// Where a table's log lies.
-const LOG: &str = "_delta_log";
 
 /// A snapshot that is kept, shared by all who hold the table.
 #[derive(Clone, Default)]
@@ -64,6 +62,11 @@ impl SnapshotCache {
         let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let CachedSnapshot { snapshot, log } = kept.as_ref()?;
         (LogListing::of(&location.dir().join(LOG)).as_ref() == Some(log)).then(|| snapshot.clone())
+    }
+
+    /// Forgets the snapshot.
+    pub(crate) fn clear(&self) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     /// Keeps a snapshot in place of the one before; none that another commit has overtaken. In a bucket a look costs

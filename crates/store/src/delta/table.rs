@@ -17,8 +17,10 @@ use futures::TryStreamExt;
 use jiff::Timestamp;
 
 use crate::delta::data_file;
+use crate::delta::digested_log::LOG;
 use crate::delta::file_stats::Stats;
 use crate::delta::location::Location;
+use crate::delta::log_digests::{self, LogDigests};
 use crate::delta::snapshot::{DataFile, Snapshot};
 use crate::delta::snapshot_cache::{SnapshotCache, commit_file};
 use crate::error::Error;
@@ -141,10 +143,38 @@ impl Table {
             delta.load().await?;
             self.keep(delta)
         };
-        self.location.block_on(load).map_err(|error| match self.location.unreadable("_delta_log") {
-            Some(cause) => cause,
-            None => self.failed("read")(error),
-        })
+        let loaded = self.location.block_on(load);
+        if let (Err(_), Some(cause)) = (&loaded, self.location.unreadable(LOG)) {
+            return Err(cause);
+        }
+        // A damaged file is named before the library's own error about it.
+        if let Err(damaged) = self.check_log() {
+            self.latest.clear();
+            return Err(damaged);
+        }
+        loaded.map_err(self.failed("read"))
+    }
+
+    /// Checks the log files that the current version is read from. In a bucket they would be fetched twice: there
+    /// [`Table::damaged_log_files`] checks them on request.
+    fn check_log(&self) -> Result<(), Error> {
+        if self.location.is_bucket() {
+            return Ok(());
+        }
+        let log = LogDigests::list(&self.location)?;
+        log.current().try_for_each(|file| log.check(file))
+    }
+
+    /// Every log file that is damaged, or that another program wrote and that has no digest.
+    pub(crate) fn damaged_log_files(&self) -> Result<(Vec<Error>, Vec<PathBuf>), Error> {
+        let log = LogDigests::list(&self.location)?;
+        let (mut damaged, mut foreign) = (Vec::new(), Vec::new());
+        for file in log.files() {
+            self.location.fetch(file)?;
+            damaged.extend(log.check(file).err());
+            foreign.extend(log.is_foreign(file).then(|| file.to_owned()));
+        }
+        Ok((damaged, foreign))
     }
 
     /// What a loaded table says, kept for those who ask next.
@@ -239,6 +269,7 @@ impl Table {
                 deleted += 1;
             }
         }
+        log_digests::prune(&self.location)?;
         Ok(deleted)
     }
 

@@ -102,8 +102,8 @@ fn a_torn_log_is_an_error_that_names_the_table() {
     let writer = filled(dir.path());
     fs::write(dir.path().join("gaps/_delta_log/00000000000000000003.json"), "{\"add\":{\"pa").unwrap();
     let error = writer.store().records(&Query::default()).unwrap_err().to_string();
-    assert!(error.starts_with("table `gaps` cannot be read: "), "{error}");
-    assert_eq!(codes(writer.store()), ["store_table"]);
+    assert!(error.starts_with("the log of a table is damaged: "), "{error}");
+    assert_eq!(codes(writer.store()), ["store_damaged"]);
 }
 
 #[test]
@@ -129,9 +129,10 @@ fn verify_finds_records_that_are_there_twice() {
     fs::copy(dir.path().join("gaps").join(name), dir.path().join("gaps").join(&copy)).unwrap();
     fs::write(log.join("00000000000000000007.json"), add.replace(name, &copy)).unwrap();
     let findings = writer.store().verify();
-    assert_eq!(findings.len(), 4);
-    assert_eq!(findings[0].message, "N1 F0005 aileron_left is stored twice");
-    assert_eq!(findings[3].message, "3 more records are stored twice");
+    assert_eq!(findings.len(), 5);
+    assert_eq!(findings[0].message, "a commit was written by another program and carries no digest");
+    assert_eq!(findings[1].message, "N1 F0005 aileron_left is stored twice");
+    assert_eq!(findings[4].message, "3 more records are stored twice");
 }
 
 #[test]
@@ -174,4 +175,87 @@ fn superseded_files_are_kept_for_readers_until_they_are_old() {
     assert!(before.iter().all(|file| !file.exists()));
     assert_eq!(writer.store().verify(), []);
     assert_eq!(writer.store().records(&Query::default()).unwrap().len(), 36);
+}
+
+/// The files of a table's log that hold its content: commits and checkpoints.
+fn log_files(dir: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(dir.join("gaps/_delta_log")).unwrap().map(|entry| entry.unwrap().path());
+    let mut files: Vec<PathBuf> = entries.filter(|path| !path.ends_with("_last_checkpoint")).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn one_changed_byte_of_the_log_is_found_wherever_it_is() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = filled(dir.path());
+    (20..36).for_each(|flight| writer.commit(&[result(flight, 0, 1e-6)]).unwrap());
+    let files = log_files(dir.path());
+    assert!(files.iter().any(|file| file.to_str().unwrap().contains("checkpoint.parquet")), "{files:?}");
+    assert_eq!(writer.store().verify(), []);
+    for file in files {
+        let whole = fs::read(&file).unwrap();
+        for at in [10, whole.len() / 3, whole.len() / 2, whole.len() - 10] {
+            let mut changed = whole.clone();
+            changed[at] ^= 1;
+            fs::write(&file, changed).unwrap();
+            let findings = Store::open(dir.path()).unwrap().verify();
+            assert!(
+                findings.iter().any(|found| found.code == "store_damaged"),
+                "{file:?}, byte {at}: {findings:?}"
+            );
+        }
+        fs::write(&file, whole).unwrap();
+    }
+    assert_eq!(writer.store().verify(), []);
+}
+
+/// Readers skip what they do not know, so a changed name removes a file's rows without an error.
+#[test]
+fn a_changed_action_is_refused_by_readers_with_and_without_a_digest() {
+    for has_digests in [true, false] {
+        let dir = tempfile::tempdir().unwrap();
+        drop(filled(dir.path()));
+        let file = dir.path().join("gaps/_delta_log/00000000000000000003.json");
+        let text = fs::read_to_string(&file).unwrap();
+        fs::write(&file, text.replacen("{\"add\":", "{\"aed\":", 1)).unwrap();
+        if !has_digests {
+            fs::remove_dir_all(dir.path().join("gaps/_digests")).unwrap();
+        }
+        let store = Store::open(dir.path()).unwrap();
+        let error = store.records(&Query::default()).unwrap_err();
+        assert!(matches!(error, store::Error::LogDamaged { .. }), "{error}");
+        assert_eq!(codes(&store), ["store_damaged"]);
+    }
+}
+
+/// Stores of earlier releases have no digests of their commits: there the content of the files is compared.
+#[test]
+fn statistics_that_do_not_cover_the_content_are_found_without_a_digest() {
+    for (from, to) in [
+        ("\\\"tail_number\\\":\\\"N2\\\"", "\\\"tail_number\\\":\\\"N1\\\""),
+        ("freeplaySerials\\\":[\\\"", "freeplaySerials\\\":[\\\"x"),
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        drop(filled(dir.path()));
+        fs::remove_dir_all(dir.path().join("gaps/_digests")).unwrap();
+        let file = dir.path().join("gaps/_delta_log/00000000000000000003.json");
+        let text = fs::read_to_string(&file).unwrap();
+        assert!(text.contains(from), "{text}");
+        fs::write(&file, text.replace(from, to)).unwrap();
+        assert_eq!(codes(&Store::open(dir.path()).unwrap()), ["store_damaged"], "{to}");
+    }
+}
+
+/// A table of records put back to an earlier state, under log records of the present one.
+#[test]
+fn log_records_are_compared_with_the_records() {
+    let dir = tempfile::tempdir().unwrap();
+    drop(filled(dir.path()));
+    let table = dir.path().join("gaps");
+    for name in ["_delta_log/00000000000000000006.json"] {
+        fs::remove_file(table.join(name)).unwrap();
+    }
+    let found = codes(&Store::open(dir.path()).unwrap());
+    assert!(!found.is_empty() && found.iter().all(|code| code == "store_records_missing"), "{found:?}");
 }

@@ -125,6 +125,7 @@ fn a_table_always_has_a_file() {
     let position = |name| store::RecordKey::of(&record(1, 0, name, 0.0));
     retired.retires = crate::made::POSITIONS.map(position).to_vec();
     retired.records.clear();
+    (retired.account.estimated, retired.account.refused) = (0, 0);
     writer.commit(&[retired]).unwrap();
     assert_eq!(writer.store().records(&Query::default()).unwrap(), []);
     assert_eq!(writer.store().files().unwrap().len(), 1);
