@@ -97,8 +97,10 @@ pub enum QualityFlag {
     StiffnessImplausible,
     /// The 95 % load is under three times the friction.
     FrictionHeavy,
-    /// Flanks are soft at low load; the gap is read off a curve.
+    /// Flanks are soft at low load: a fit of higher loads alone reads another gap.
     SoftContact,
+    /// The gap is negative by more than two standard errors, which no gap can be.
+    GapNegative,
     /// The standard error exceeds a tenth of the wind-up.
     Imprecise,
 }
@@ -111,19 +113,22 @@ impl QualityFlag {
             Self::StiffnessImplausible => "stiffness_implausible",
             Self::FrictionHeavy => "friction_heavy",
             Self::SoftContact => "soft_contact",
+            Self::GapNegative => "gap_negative",
             Self::Imprecise => "imprecise",
         }
     }
 }
 
-pub(super) fn flags(found: &ContactEstimate, frame: &Scaling, is_curved: bool) -> Vec<QualityFlag> {
+pub(super) fn flags(found: &ContactEstimate, frame: &Scaling, is_soft: bool) -> Vec<QualityFlag> {
     let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * frame.windup_m());
+    let is_negative = found.gap_m < -SEEN * found.gap_se_m;
     let compliance = frame.stiffness_n_per_m / found.stiffness_n_per_m;
     let doubts = [
-        (QualityFlag::BelowDetection, found.gap_m < least_m),
+        (QualityFlag::GapNegative, is_negative),
+        (QualityFlag::BelowDetection, found.gap_m < least_m && !is_negative),
         (QualityFlag::StiffnessImplausible, (compliance - 1.0).abs() > IMPLAUSIBLE),
         (QualityFlag::FrictionHeavy, found.friction.is_heavy(found.load_p95_n)),
-        (QualityFlag::SoftContact, is_curved),
+        (QualityFlag::SoftContact, is_soft),
         (QualityFlag::Imprecise, found.gap_se_m > VAGUE * frame.windup_m()),
     ];
     doubts.into_iter().filter_map(|(flag, holds)| holds.then_some(flag)).collect()

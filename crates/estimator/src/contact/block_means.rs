@@ -1,17 +1,21 @@
-//! A flight in blocks of 20 ms: means of whole samples, without the missing and the wild.
+//! A flight in blocks of about 4 ms: means of whole samples, without missing ones and spikes.
 
 use std::ops::Range;
 
 use crate::Samples;
-use crate::simd::dispatch::{Lanes, simd_dispatch as widest};
+use crate::simd::dispatch::{Lanes, simd_dispatch};
 
-use super::SHORTEST_S;
+use super::{PartPrior, SHORTEST_S};
 use super::acceptance::Rejection;
 use super::design_matrix::middle_and_half;
 use super::spikes::SpikeThreshold;
 
-/// Length of a block, s: short against the load's changes, long enough to calm the noise.
-const PERIOD_S: f64 = 0.02;
+/// Length of a block, s: short against vibration of the load, which would mix both flanks in one mean.
+const PERIOD_S: f64 = 0.004;
+/// Half of the time over which the speed of the motor is taken, s.
+const SPEED_S: f64 = 0.03;
+/// v_s: speed at which most of the excess of friction at rest is gone, m/s.
+const STRIBECK_M_PER_S: f64 = 3e-3;
 
 /// A screw that moves by less than this share of the motor's travel does not move: what is left is rounding.
 const STILL: f64 = 1e-9;
@@ -26,9 +30,11 @@ const STRETCH_S: f64 = 2.0;
 const SPAN: usize = 16;
 
 /// Blocks that the search begins with, in windows of this many.
-const EXCERPT_BLOCKS: usize = 6000;
-/// See [`EXCERPT_BLOCKS`]: ten seconds.
-const WINDOW_BLOCKS: usize = 500;
+const EXCERPT_BLOCKS: usize = 10_000;
+/// See [`EXCERPT_BLOCKS`]: four seconds.
+const WINDOW_BLOCKS: usize = 1000;
+/// Share of the 95 % load that a reversal passes on either side.
+const REVERSAL_SHARE: f64 = 0.15;
 
 /// Means over blocks; NaN where fewer than half of a block's samples are sound.
 #[derive(Debug, Default)]
@@ -43,10 +49,14 @@ pub(super) struct BlockMeans {
     pub(super) motor_m: Vec<f64>,
     /// δX, m: as logged, then with the screw's channel brought to the motor's clock.
     pub(super) dx_m: Vec<f64>,
-    /// F, N.
+    /// F, N: as logged, then brought to the motor's clock.
     pub(super) load_n: Vec<f64>,
+    /// e^−(v/v_s)²: how near the motor is to rest.
+    pub(super) slowness: Vec<f64>,
     /// X₂ as it was logged, m.
     screw_m: Vec<f64>,
+    /// F as it was logged, N.
+    logged_n: Vec<f64>,
 }
 
 impl BlockMeans {
@@ -54,7 +64,7 @@ impl BlockMeans {
     ///
     /// # Errors
     /// [`Rejection::ChannelConstant`], [`Rejection::TooShort`].
-    pub(super) fn gather(&mut self, samples: &Samples<'_>) -> Result<(), Rejection> {
+    pub(super) fn gather(&mut self, samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Rejection> {
         let each = ((PERIOD_S / samples.step_s).round() as usize).max(1);
         let watch = SpikeGate::over(samples)?;
         self.clear(samples.dx_m.len() / each, each as f64 * samples.step_s);
@@ -72,7 +82,9 @@ impl BlockMeans {
             }
         }
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
-        if self.is_still() {
+        self.logged_n.extend_from_slice(&self.load_n);
+        self.find_slowness();
+        if !prior.output_locked && self.is_still() {
             return Err(Rejection::ChannelConstant);
         }
         let sound = self.dx_m.iter().filter(|y| y.is_finite()).count();
@@ -81,8 +93,8 @@ impl BlockMeans {
 
     /// No block, and room for so many.
     fn clear(&mut self, blocks: usize, period_s: f64) {
-        let Self { starts, time_s, motor_m, screw_m, dx_m, load_n, .. } = self;
-        for column in [time_s, motor_m, screw_m, dx_m, load_n] {
+        let Self { starts, time_s, motor_m, screw_m, dx_m, load_n, slowness, logged_n, .. } = self;
+        for column in [time_s, motor_m, screw_m, dx_m, load_n, slowness, logged_n] {
             column.clear();
             column.reserve(blocks);
         }
@@ -152,52 +164,121 @@ impl BlockMeans {
         rates.is_some_and(|(motor_m, load_n)| is_sound(self.time_s[k], self.dx_m[k], &motor_m, &load_n))
     }
 
-    /// Takes in a part of a long flight, in windows spread over it: enough to begin a search with, and to see how far
-    /// δX travels. Nothing of a short flight. δX is there once it is [realigned](Self::realign).
-    pub(super) fn cut_from(&mut self, whole: &Self) {
-        let (every, window) = (whole.len() / EXCERPT_BLOCKS, WINDOW_BLOCKS);
-        self.clear(whole.len() / every.max(1), whole.period_s);
-        if every < 2 {
+    /// Takes in a part of a long flight: windows in which the load changes sides most often, and others spread over the
+    /// flight. Nothing of a short flight. δX and the load are there once [delays are applied](Self::apply_delays).
+    pub(super) fn excerpt_of(&mut self, whole: &Self, load_n: f64) {
+        self.clear(EXCERPT_BLOCKS.min(whole.len()), whole.period_s);
+        if whole.len() < 2 * EXCERPT_BLOCKS {
             return;
         }
-        for segment in whole.segments() {
-            for from in segment.clone().step_by(every * window) {
-                self.starts.push(self.len());
-                let kept = from..segment.end.min(from + window);
-                self.time_s.extend_from_slice(&whole.time_s[kept.clone()]);
-                self.motor_m.extend_from_slice(&whole.motor_m[kept.clone()]);
-                self.screw_m.extend_from_slice(&whole.screw_m[kept.clone()]);
-                self.load_n.extend_from_slice(&whole.load_n[kept]);
-            }
+        for window in whole.windows(load_n) {
+            self.starts.push(self.len());
+            self.time_s.extend_from_slice(&whole.time_s[window.clone()]);
+            self.motor_m.extend_from_slice(&whole.motor_m[window.clone()]);
+            self.screw_m.extend_from_slice(&whole.screw_m[window.clone()]);
+            self.slowness.extend_from_slice(&whole.slowness[window.clone()]);
+            self.logged_n.extend_from_slice(&whole.logged_n[window]);
         }
         self.dx_m.resize(self.len(), f64::NAN);
+        self.load_n.resize(self.len(), f64::NAN);
     }
 
-    /// Central difference over two blocks, per second; NaN at the ends.
-    pub(super) fn rate(&self, values: &[f64], at: usize) -> f64 {
-        if at == 0 || at + 1 >= values.len() {
-            return f64::NAN;
-        }
-        (values[at + 1] - values[at - 1]) / (2.0 * self.period_s)
+    /// The windows of an excerpt in order of time: one half by the number of load reversals in them, the other evenly
+    /// among the rest. The load alone selects, so that what is estimated does not select its own data.
+    fn windows(&self, load_n: f64) -> Vec<Range<usize>> {
+        let windows: Vec<Range<usize>> = self
+            .segments()
+            .flat_map(|segment| {
+                let end = segment.end;
+                segment.step_by(WINDOW_BLOCKS).map(move |from| from..end.min(from + WINDOW_BLOCKS))
+            })
+            .filter(|window| window.len() == WINDOW_BLOCKS)
+            .collect();
+        let count = EXCERPT_BLOCKS / WINDOW_BLOCKS;
+        let mut by_reversals: Vec<(usize, usize)> = windows
+            .iter()
+            .map(|window| reversals(&self.logged_n[window.clone()], REVERSAL_SHARE * load_n))
+            .enumerate()
+            .collect();
+        by_reversals.sort_by_key(|&(number, reversals)| (std::cmp::Reverse(reversals), number));
+        let busy = by_reversals.len().min(count / 2);
+        let mut rest: Vec<usize> = by_reversals.split_off(busy).into_iter().map(|(number, _)| number).collect();
+        rest.sort_unstable();
+        let stride = rest.len().div_ceil((count - busy).max(1)).max(1);
+        let mut chosen: Vec<usize> = rest.into_iter().step_by(stride).collect();
+        chosen.extend(by_reversals.into_iter().map(|(number, _)| number));
+        chosen.sort_unstable();
+        chosen.into_iter().map(|number| windows[number].clone()).collect()
     }
 
-    /// Reads the screw's channel τ later, by a cubic through four blocks (Catmull–Rom), so that δX is
-    /// the difference of two positions of one moment.
-    pub(super) fn realign(&mut self, skew_s: f64) {
-        let shift = skew_s / self.period_s;
-        let (whole, part) = (shift.floor(), shift - shift.floor());
-        let weights = cubic(part);
-        let (from, len) = ((whole as isize).saturating_sub(1), self.dx_m.len());
-        // The blocks for which all four lie within the flight.
-        let begin = len.min(from.saturating_neg().max(0) as usize);
-        let end = len.saturating_sub(from.saturating_add(3).max(0) as usize).max(begin);
-        self.dx_m[..begin].fill(f64::NAN);
-        self.dx_m[end..].fill(f64::NAN);
-        for k in begin..end {
-            let first = k.wrapping_add_signed(from);
-            let read_m = |j: usize| weights[j] * self.screw_m[first + j];
-            self.dx_m[k] = read_m(0) + read_m(1) + read_m(2) + read_m(3) - self.motor_m[k];
+    /// Speed of the motor by the difference over [`SPEED_S`] on either side, m/s; NaN at the ends and near gaps.
+    pub(super) fn speed_m_per_s(&self, at: usize) -> f64 {
+        let reach = ((SPEED_S / self.period_s).round() as usize).max(1);
+        let Some(from) = at.checked_sub(reach) else { return f64::NAN };
+        let to_m = self.motor_m.get(at + reach).copied().unwrap_or(f64::NAN);
+        (to_m - self.motor_m[from]) / (2.0 * reach as f64 * self.period_s)
+    }
+
+    /// Reads the screw's channel and the load a delay later, by a cubic through four blocks (Catmull–Rom), so that all
+    /// three channels belong to one moment.
+    pub(super) fn apply_delays(&mut self, skew_s: f64, load_delay_s: f64, load_lag_s: f64) {
+        read_later(&self.screw_m, skew_s / self.period_s, &mut self.dx_m);
+        self.dx_m.iter_mut().zip(&self.motor_m).for_each(|(dx, x)| *dx -= x);
+        read_later(&self.logged_n, load_delay_s / self.period_s, &mut self.load_n);
+        if load_lag_s != 0.0 {
+            let weight = 0.5 * load_lag_s / self.period_s;
+            let mut before = f64::NAN;
+            for k in 0..self.load_n.len() {
+                let after = self.load_n.get(k + 1).copied().unwrap_or(f64::NAN);
+                let here = self.load_n[k];
+                self.load_n[k] = here + weight * (after - before);
+                before = here;
+            }
         }
+    }
+
+    /// e^−(v/v_s)² of every block, v by the difference over [`SPEED_S`] on either side.
+    fn find_slowness(&mut self) {
+        let reach = ((SPEED_S / self.period_s).round() as usize).max(1);
+        self.slowness.clear();
+        self.slowness.resize(self.len(), 0.0);
+        let segments: Vec<Range<usize>> = self.segments().collect();
+        for segment in segments {
+            for k in segment.clone() {
+                let (from, to) = (k.saturating_sub(reach).max(segment.start), (k + reach).min(segment.end - 1));
+                let travel_m = self.motor_m[to] - self.motor_m[from];
+                let speed = travel_m / ((to - from).max(1) as f64 * self.period_s * STRIBECK_M_PER_S);
+                self.slowness[k] = if speed.is_finite() { (-speed * speed).exp() } else { 0.0 };
+            }
+        }
+    }
+}
+
+/// How often a load changes sides, at least so far to either.
+fn reversals(load_n: &[f64], least_n: f64) -> usize {
+    let (mut side, mut count) = (0.0, 0);
+    for load_n in load_n.iter().filter(|load_n| load_n.abs() > least_n) {
+        let here = load_n.signum();
+        count += usize::from(side * here < 0.0);
+        side = here;
+    }
+    count
+}
+
+/// A channel read so many blocks later; NaN where that lies outside the flight.
+fn read_later(logged: &[f64], shift: f64, read: &mut [f64]) {
+    let (whole, part) = (shift.floor(), shift - shift.floor());
+    let weights = cubic(part);
+    let (from, len) = ((whole as isize).saturating_sub(1), logged.len());
+    // The blocks for which all four lie within the flight.
+    let begin = len.min(from.saturating_neg().max(0) as usize);
+    let end = len.saturating_sub(from.saturating_add(3).max(0) as usize).max(begin);
+    read[..begin].fill(f64::NAN);
+    read[end..].fill(f64::NAN);
+    for k in begin..end {
+        let first = k.wrapping_add_signed(from);
+        let read_at = |j: usize| weights[j] * logged[first + j];
+        read[k] = read_at(0) + read_at(1) + read_at(2) + read_at(3);
     }
 }
 
@@ -208,7 +289,7 @@ pub(super) fn is_sound(time_s: f64, dx_m: f64, motor_m: &[f64; 3], load_n: &[f64
     (time_s > START_S) & (all.abs() < f64::INFINITY)
 }
 
-widest! {
+simd_dispatch! {
     /// The furthest that a value lies from the one before it; a missing one lies nowhere.
     fn furthest_leap(values: &[f64]) -> f64 {
         let (mut furthest, mut done) = (Lanes::ZERO, 0);

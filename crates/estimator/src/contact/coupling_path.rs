@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use super::block_means::{BlockMeans, is_sound};
-use super::design_matrix::{FIRM_SHARE, Flank, Scaling};
-use super::friction_model::{CouplingForce, CouplingIntegrator, CouplingParams, FrictionState, ScrewState};
-use crate::simd::dispatch::{Lanes, simd_dispatch as widest};
+use super::design_matrix::{FIRM_SHARE, Flank, RowSource, Scaling};
+use super::friction_model::{CouplingForce, CouplingIntegrator, CouplingParams, Drive, FrictionState, ScrewState};
+use crate::simd::dispatch::{Lanes, simd_dispatch};
 
 /// Blocks before one that must keep its flank and firmness; one after it must as well.
 const BEFORE: usize = 2;
@@ -26,74 +26,89 @@ impl Touch {
         if self.0 & Self::UPPER == 0 { Flank::Lower } else { Flank::Upper }
     }
 
-    pub(super) fn is_firm(self) -> bool {
-        self.0 & Self::FIRM != 0
+    /// A number for each flank, loaded or lightly loaded: 0 to 3.
+    pub(super) fn index(self) -> usize {
+        usize::from(self.flank() == Flank::Lower) + 2 * usize::from(self.0 & Self::FIRM != 0)
+    }
+
+    /// Whether an [index](Self::index) is of loaded contact.
+    pub(super) fn is_firm_index(index: usize) -> bool {
+        index >= 2
     }
 }
 
-/// The coupling of every block as a state has it.
+/// The coupling of every block under one set of parameters.
 #[derive(Debug, Default)]
 pub(super) struct CouplingPath {
-    /// c, N; NaN where a channel is missing.
-    pub(super) force_n: Vec<f64>,
-    /// ∂c/∂F_d.
-    pub(super) by_dry: Vec<f64>,
-    /// ∂c/∂η, N.
-    pub(super) by_share_n: Vec<f64>,
+    pub(super) columns: PathColumns,
     touches: Vec<Touch>,
-    /// Touches of the blocks that keep flank and firmness, and of which nothing is missing.
+    /// Touches of the complete blocks whose neighbours have the same contact state.
     kept: Vec<Touch>,
 }
 
+/// One value for each block.
+#[derive(Debug, Default)]
+pub(super) struct PathColumns {
+    /// c, N; NaN where a channel is missing.
+    pub(super) force_n: Vec<f64>,
+    /// ∂c/∂F_d.
+    pub(super) dforce_ddry: Vec<f64>,
+    /// ∂c/∂η, N.
+    pub(super) dforce_dloss_n: Vec<f64>,
+    /// ∂c/∂p, N.
+    pub(super) dforce_dstribeck_n: Vec<f64>,
+    /// Relative position from the middle of the gap, m.
+    pub(super) relative_m: Vec<f64>,
+}
+
 impl CouplingPath {
-    /// Follows the coupling over all segments, in the memory of the course before.
-    pub(super) fn follow(&mut self, blocks: &BlockMeans, state: &FrictionState) {
-        for column in [&mut self.force_n, &mut self.by_dry, &mut self.by_share_n] {
-            column.resize(blocks.len(), f64::NAN);
-        }
-        let ways = CouplingParams::new(state);
+    /// Integrates the coupling over all segments.
+    pub(super) fn integrate(&mut self, source: RowSource<'_>, state: &FrictionState) {
+        let RowSource { blocks, scaling } = source;
+        self.columns.resize(blocks.len());
+        let params = CouplingParams::new(state, scaling.motor_sense);
         for segment in blocks.segments() {
-            self.follow_segment(blocks, ways, segment);
+            self.integrate_segment(blocks, params, segment);
         }
     }
 
-    /// Eight parts abreast, each from where nothing is known; then from the true beginning into each, until the walk
-    /// is on what was found there.
-    fn follow_segment(&mut self, blocks: &BlockMeans, ways: CouplingParams, segment: Range<usize>) {
-        let (motor_m, load_n) = (&blocks.motor_m[segment.clone()], &blocks.load_n[segment.clone()]);
-        let mut found = Found {
-            force_n: &mut self.force_n[segment.clone()],
-            by_dry: &mut self.by_dry[segment.clone()],
-            by_share_n: &mut self.by_share_n[segment.clone()],
+    /// Integrates eight parts in parallel lanes, each from an arbitrary state; then from the true start of each part
+    /// until the sequential integration meets what the lane found.
+    fn integrate_segment(&mut self, blocks: &BlockMeans, params: CouplingParams, segment: Range<usize>) {
+        let channels = Channels {
+            motor_m: &blocks.motor_m[segment.clone()],
+            load_n: &blocks.load_n[segment.clone()],
+            slowness: &blocks.slowness[segment.clone()],
         };
+        let mut found = self.columns.segment(segment.clone());
         let part = segment.len() / Lanes::COUNT;
-        // Nobody walks here before, and what another course left is no answer.
+        // No lane covers the rest of the segment; values of an earlier integration are no result.
         found.force_n[Lanes::COUNT * part..].fill(f64::NAN);
-        let ends = abreast(ways, (motor_m, load_n), part, &mut found);
-        let mut walk = CouplingIntegrator::new(ways);
+        let ends = integrate_lanes(params, channels, part, &mut found);
+        let mut integrator = CouplingIntegrator::new(params);
         for number in 0..Lanes::COUNT {
             let part = number * part..(number + 1) * part;
-            if found.catch_up(&mut walk, (motor_m, load_n), part) {
-                walk.set(ends.get(number));
+            if found.recompute_until_match(&mut integrator, channels, part) {
+                integrator.set(ends.get(number));
             }
         }
-        found.catch_up(&mut walk, (motor_m, load_n), Lanes::COUNT * part..segment.len());
+        found.recompute_until_match(&mut integrator, channels, Lanes::COUNT * part..segment.len());
     }
 
-    /// Finds the blocks that keep flank and firmness, so that no row mixes flank and gap.
-    pub(super) fn keep(&mut self, blocks: &BlockMeans, frame: &Scaling) {
+    /// Marks the blocks that keep flank and contact state, so that no row mixes flank and gap.
+    pub(super) fn mark_stable(&mut self, blocks: &BlockMeans, scaling: &Scaling) {
         self.touches.resize(blocks.len(), Touch::NONE);
-        touches(&self.force_n, FIRM_SHARE * frame.load_n, &mut self.touches);
+        touches(&self.columns.force_n, FIRM_SHARE * scaling.load_n, &mut self.touches);
         self.kept.clear();
         self.kept.resize(blocks.len(), Touch::NONE);
         for segment in blocks.segments() {
             kept(&self.touches[segment.clone()], &mut self.kept[segment]);
         }
-        drop_unsound(blocks, &mut self.kept);
+        clear_incomplete(blocks, &mut self.kept);
     }
 
-    /// The next blocks in a row that keep one touch, no more than so many and of one stretch.
-    pub(super) fn next_kept(
+    /// The next run of stable blocks with one contact state: no longer than `most`, and within one correlation block.
+    pub(super) fn next_stable_run(
         &self,
         blocks: &BlockMeans,
         within: Range<usize>,
@@ -111,111 +126,153 @@ impl CouplingPath {
     }
 }
 
-/// What was found of a segment.
-struct Found<'a> {
-    force_n: &'a mut [f64],
-    by_dry: &'a mut [f64],
-    by_share_n: &'a mut [f64],
-}
-
-impl Found<'_> {
-    /// Walks through a part until all that follows is there already: where the screw has slipped, its force tells all
-    /// of its state. False where it has walked to the end.
-    fn catch_up(
-        &mut self,
-        walk: &mut CouplingIntegrator,
-        (motor_m, load_n): (&[f64], &[f64]),
-        part: Range<usize>,
-    ) -> bool {
-        for k in part {
-            let here = walk.step(motor_m[k], load_n[k]);
-            let is_there = self.force_n[k].to_bits() == here.force_n.to_bits()
-                && self.by_dry[k].to_bits() == here.by_dry.to_bits();
-            if is_there && here.force_n.is_finite() && walk.has_slipped() {
-                return true;
-            }
-            (self.force_n[k], self.by_dry[k], self.by_share_n[k]) =
-                (here.force_n, here.by_dry, here.by_share_n);
+impl PathColumns {
+    fn resize(&mut self, blocks: usize) {
+        let Self { force_n, dforce_ddry, dforce_dloss_n, dforce_dstribeck_n, relative_m } = self;
+        for column in [force_n, dforce_ddry, dforce_dloss_n, dforce_dstribeck_n, relative_m] {
+            column.resize(blocks, f64::NAN);
         }
-        false
+    }
+
+    fn segment(&mut self, segment: Range<usize>) -> SegmentColumns<'_> {
+        SegmentColumns {
+            force_n: &mut self.force_n[segment.clone()],
+            dforce_ddry: &mut self.dforce_ddry[segment.clone()],
+            dforce_dloss_n: &mut self.dforce_dloss_n[segment.clone()],
+            dforce_dstribeck_n: &mut self.dforce_dstribeck_n[segment.clone()],
+            relative_m: &mut self.relative_m[segment],
+        }
     }
 }
 
-/// Eight screws side by side: number k of each array is the k-th's.
-struct ScrewStates8 {
-    motor_m: [f64; Lanes::COUNT],
-    relative_m: [f64; Lanes::COUNT],
-    force_n: [f64; Lanes::COUNT],
-    by_dry: [f64; Lanes::COUNT],
-    by_share_n: [f64; Lanes::COUNT],
+/// The channels of a segment that drive the model.
+#[derive(Debug, Clone, Copy)]
+struct Channels<'a> {
+    motor_m: &'a [f64],
+    load_n: &'a [f64],
+    slowness: &'a [f64],
 }
 
-#[allow(clippy::inline_always, reason = "see `widest`")]
+impl Channels<'_> {
+    #[inline(always)]
+    #[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+    fn at(&self, k: usize) -> Drive {
+        Drive { motor_m: self.motor_m[k], load_n: self.load_n[k], slowness: self.slowness[k] }
+    }
+}
+
+/// The columns of a segment.
+struct SegmentColumns<'a> {
+    force_n: &'a mut [f64],
+    dforce_ddry: &'a mut [f64],
+    dforce_dloss_n: &'a mut [f64],
+    dforce_dstribeck_n: &'a mut [f64],
+    relative_m: &'a mut [f64],
+}
+
+#[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+impl SegmentColumns<'_> {
+    /// Integrates through a part until its values are those found before: once the screw has slipped, its force
+    /// determines all of its state. False where it integrated to the end.
+    fn recompute_until_match(
+        &mut self,
+        integrator: &mut CouplingIntegrator,
+        channels: Channels<'_>,
+        part: Range<usize>,
+    ) -> bool {
+        for k in part {
+            let (here, relative_m) = integrator.step(channels.at(k));
+            let is_same = self.force_n[k].to_bits() == here.force_n.to_bits()
+                && self.dforce_ddry[k].to_bits() == here.dforce_ddry.to_bits();
+            if is_same && here.force_n.is_finite() && integrator.has_slipped() {
+                return true;
+            }
+            self.put(k, &here, relative_m);
+        }
+        false
+    }
+
+    #[inline(always)]
+    fn put(&mut self, k: usize, coupling: &CouplingForce, relative_m: f64) {
+        self.force_n[k] = coupling.force_n;
+        self.dforce_ddry[k] = coupling.dforce_ddry;
+        self.dforce_dloss_n[k] = coupling.dforce_dloss_n;
+        self.dforce_dstribeck_n[k] = coupling.dforce_dstribeck_n;
+        self.relative_m[k] = relative_m;
+    }
+}
+
+/// Eight screws in parallel lanes.
+#[derive(Clone, Copy)]
+struct ScrewStates8 {
+    motor_m: [f64; Lanes::COUNT],
+    anchor_m: [f64; Lanes::COUNT],
+    memory: [[f64; Lanes::COUNT]; 3],
+}
+
+#[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
 impl ScrewStates8 {
-    const NOWHERE: Self = Self {
+    const ZERO: Self = Self {
         motor_m: [0.0; Lanes::COUNT],
-        relative_m: [0.0; Lanes::COUNT],
-        force_n: [0.0; Lanes::COUNT],
-        by_dry: [0.0; Lanes::COUNT],
-        by_share_n: [0.0; Lanes::COUNT],
+        anchor_m: [0.0; Lanes::COUNT],
+        memory: [[0.0; Lanes::COUNT]; 3],
     };
 
     #[inline(always)]
     fn get(&self, lane: usize) -> ScrewState {
-        let coupling = CouplingForce {
-            force_n: self.force_n[lane],
-            by_dry: self.by_dry[lane],
-            by_share_n: self.by_share_n[lane],
-        };
         ScrewState {
             motor_m: self.motor_m[lane],
-            relative_m: self.relative_m[lane],
-            coupling,
+            anchor_m: self.anchor_m[lane],
+            memory: [self.memory[0][lane], self.memory[1][lane], self.memory[2][lane]],
+            coupling: CouplingForce::UNKNOWN,
+            relative_m: f64::NAN,
             has_slipped: false,
         }
     }
 
     #[inline(always)]
-    fn set(&mut self, lane: usize, is_known: bool, screw: ScrewState) {
-        let ScrewState { motor_m, relative_m, coupling, .. } = screw;
-        let CouplingForce { force_n, by_dry, by_share_n } = coupling;
-        self.motor_m[lane] = if is_known { motor_m } else { self.motor_m[lane] };
-        self.relative_m[lane] = if is_known { relative_m } else { self.relative_m[lane] };
-        self.force_n[lane] = if is_known { force_n } else { self.force_n[lane] };
-        self.by_dry[lane] = if is_known { by_dry } else { self.by_dry[lane] };
-        self.by_share_n[lane] = if is_known { by_share_n } else { self.by_share_n[lane] };
+    fn set(&mut self, lane: usize, is_known: bool, screw: &ScrewState) {
+        self.motor_m[lane] = if is_known { screw.motor_m } else { self.motor_m[lane] };
+        self.anchor_m[lane] = if is_known { screw.anchor_m } else { self.anchor_m[lane] };
+        for (kept, new) in self.memory.iter_mut().zip(screw.memory) {
+            kept[lane] = if is_known { new } else { kept[lane] };
+        }
     }
 }
 
-widest! {
-    /// Eight parts of a segment, all of one length, each walked from nowhere; where the walks end.
-    fn abreast(ways: CouplingParams, channels: (&[f64], &[f64]), part: usize, found: &mut Found<'_>) -> ScrewStates8 {
-        let (motor_m, load_n) = channels;
-        let mut screws = ScrewStates8::NOWHERE;
+simd_dispatch! {
+    /// Integrates eight parts of a segment, all of one length, each from an arbitrary state; the final states.
+    fn integrate_lanes(
+        params: CouplingParams,
+        channels: Channels<'_>,
+        part: usize,
+        found: &mut SegmentColumns<'_>,
+    ) -> ScrewStates8 {
+        let mut screws = ScrewStates8::ZERO;
         for k in 0..part {
-            let (mut motor, mut load) = ([0.0; Lanes::COUNT], [0.0; Lanes::COUNT]);
+            let mut drives = [Drive { motor_m: 0.0, load_n: 0.0, slowness: 0.0 }; Lanes::COUNT];
             for lane in 0..Lanes::COUNT {
-                motor[lane] = motor_m[lane * part + k];
-                load[lane] = load_n[lane * part + k];
+                drives[lane] = channels.at(lane * part + k);
             }
             let mut is_known = [false; Lanes::COUNT];
+            let mut couplings = [(CouplingForce::UNKNOWN, f64::NAN); Lanes::COUNT];
             for lane in 0..Lanes::COUNT {
-                is_known[lane] = (motor[lane] + load[lane]).abs() < f64::INFINITY;
-                let screw = ways.moved(&screws.get(lane), motor[lane], load[lane]);
-                screws.set(lane, is_known[lane], screw);
+                is_known[lane] = (drives[lane].motor_m + drives[lane].load_n).abs() < f64::INFINITY;
+                let screw = params.step(&screws.get(lane), drives[lane]);
+                screws.set(lane, is_known[lane], &screw);
+                couplings[lane] = (screw.coupling, screw.relative_m);
             }
-            for (lane, is_known) in is_known.into_iter().enumerate() {
-                let at = lane * part + k;
-                found.force_n[at] = if is_known { screws.force_n[lane] } else { f64::NAN };
-                found.by_dry[at] = if is_known { screws.by_dry[lane] } else { 0.0 };
-                found.by_share_n[at] = if is_known { screws.by_share_n[lane] } else { 0.0 };
+            for lane in 0..Lanes::COUNT {
+                let (coupling, relative_m) = couplings[lane];
+                let known = if is_known[lane] { coupling } else { CouplingForce::UNKNOWN };
+                found.put(lane * part + k, &known, if is_known[lane] { relative_m } else { f64::NAN });
             }
         }
         screws
     }
 }
 
-widest! {
+simd_dispatch! {
     fn touches(force_n: &[f64], firm_n: f64, touches: &mut [Touch]) {
         for (&force_n, touch) in force_n.iter().zip(touches) {
             let (upper, lower) = (u8::from(force_n > 0.0), u8::from(force_n < 0.0));
@@ -225,7 +282,7 @@ widest! {
     }
 }
 
-widest! {
+simd_dispatch! {
     /// Of the blocks of a segment.
     fn kept(touches: &[Touch], kept: &mut [Touch]) {
         for (around, kept) in touches.array_windows::<KEPT>().zip(kept.iter_mut().skip(BEFORE)) {
@@ -237,9 +294,9 @@ widest! {
     }
 }
 
-widest! {
+simd_dispatch! {
     /// Drops the blocks of which something is missing or whose neighbours do, and those at the very beginning.
-    fn drop_unsound(blocks: &BlockMeans, kept: &mut [Touch]) {
+    fn clear_incomplete(blocks: &BlockMeans, kept: &mut [Touch]) {
         let inner = 1..kept.len().max(2) - 1;
         let (time_s, dx_m) = (&blocks.time_s[inner.clone()], &blocks.dx_m[inner.clone()]);
         let rates = blocks.motor_m.array_windows::<3>().zip(blocks.load_n.array_windows::<3>());
@@ -250,49 +307,3 @@ widest! {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use proptest::prelude::*;
-
-    use super::super::friction_model::Friction;
-    use super::*;
-
-    proptest! {
-        /// However a flight is cut, and whatever is missing of it, eight walks abreast are one walk, bit for bit. Motors
-        /// that rest leave the screw stuck for long; so does friction beyond any load.
-        #[test]
-        fn walks_abreast_are_one_walk(
-            steps in proptest::collection::vec((-3_i32..4, -40_i32..41, 0_u8..30), 1..400),
-            cuts in proptest::collection::vec(0.0_f64..1.0, 0..4),
-            gap_m in 0.0_f64..1e-4, dry_n in prop_oneof![0.0_f64..300.0, Just(1e5)], lost_share in 0.0_f64..0.2,
-        ) {
-            let mut place_m = 0.0;
-            let mut blocks = BlockMeans::default();
-            for &(step, load, chance) in &steps {
-                place_m += f64::from(step) * 1.3e-5;
-                let missing = |which: u8| if chance == which { f64::NAN } else { 0.0 };
-                blocks.put([place_m + missing(0), 0.0, f64::from(load) * 51.7 + missing(1)]);
-            }
-            let mut starts: Vec<usize> = cuts.iter().map(|cut| (cut * steps.len() as f64) as usize).collect();
-            starts.push(0);
-            starts.sort_unstable();
-            starts.dedup();
-            blocks.starts = starts;
-            let friction = Friction { dry_n, lost_share };
-            let state = FrictionState { stiffness_n_per_m: 5e7, gap_m, friction, skew_s: 0.0 };
-            // In the memory of a course that knew another gap.
-            let mut course = CouplingPath::default();
-            course.follow(&blocks, &FrictionState { gap_m: gap_m + 1e-5, stiffness_n_per_m: 4e7, ..state });
-            course.follow(&blocks, &state);
-            for segment in blocks.segments() {
-                let mut walk = CouplingIntegrator::new(CouplingParams::new(&state));
-                for k in segment {
-                    let one = walk.step(blocks.motor_m[k], blocks.load_n[k]);
-                    let wanted = [one.force_n, one.by_dry, one.by_share_n].map(f64::to_bits);
-                    let found = [course.force_n[k], course.by_dry[k], course.by_share_n[k]].map(f64::to_bits);
-                    prop_assert_eq!(found, wanted, "block {}", k);
-                }
-            }
-        }
-    }
-}

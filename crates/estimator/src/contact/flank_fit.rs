@@ -1,13 +1,19 @@
-//! Straight flanks, or soft ones: which of the two the samples at low load speak for.
+//! The fit of both flanks: gap, stiffness and their standard errors.
+//!
+//! The gap is the distance of the two flanks, extrapolated along their stiff part to zero load. Flanks that are soft at
+//! low load bend inwards there, so that a fit of higher loads alone reads a wider gap. Both fits are made; the closer
+//! they agree within their jackknife error, the more the one of more data counts.
+
+use std::ops::Range;
 
 use super::ContactWorkspace;
 use super::acceptance::Rejection;
 use super::design_matrix::{
-    self, BEND, CURVED, DesignRow, FIRM_SHARE, FORCE, GAP, LINEAR, ORIGIN, RowSource, SPEED, SPEED_M_PER_S,
-    Scaling, bends,
+    COLUMNS, DesignRow, FIRM_SHARE, FORCE, GAP, LATE_S, LOAD_RATE, ORIGIN, RowSource, SPEED, SPEED_M_PER_S, Scaling,
 };
 use super::friction_model::FrictionState;
-use super::gauss_newton::{Found, search, start};
+use super::gauss_newton::{GaussNewtonResult, search};
+use super::parameter_search::{ParameterSearch, SearchResult};
 
 /// Blocks looked at to see how far δX travels.
 const LOOKS: usize = 4000;
@@ -15,145 +21,289 @@ const LOOKS: usize = 4000;
 /// did by 3 % at most, with positions that freeze for seconds by 15 %; over the flights that were given a wrong
 /// gap before by 50 % and more. Of 3,000 sound flights of the study twelve are refused for it.
 const UNEXPLAINED: f64 = 0.25;
-/// IterationLimits of the search over straight flanks, and over soft ones from there.
-const STRAIGHT: IterationLimits = IterationLimits { excerpt: 3, whole: 2, alone: 5 };
-/// See [`STRAIGHT`].
-const BENT: IterationLimits = IterationLimits { excerpt: 4, whole: 2, alone: 4 };
-/// The low-load samples leave the straight line by this many standard errors before a curve is tried.
-const SUSPICION: f64 = 2.0;
-/// Light rows further out than this share of the wind-up are in the gap, not on a soft flank; they count no more.
-const CLIP: f64 = 0.05;
-/// The two gaps differ by this many standard errors when flanks are soft. Over 700 simulated flights with
-/// straight flanks none reached 3.7; with soft ones none stayed under 4.6.
-const SOFT: f64 = 4.0;
-/// Doubt left by the choice of a curve, over what it changes.
-const CURVE_DOUBT: f64 = 0.13;
-/// What a friction law that is not equation 1 may cost, over the wind-up under friction.
-const FRICTION_DOUBT: f64 = 0.012;
-/// What no flight is long enough to average out: over the wind-up, and over the gap itself. These and the
-/// doubts above make nine in ten intervals hold over the study's wide scenarios.
-const FLOOR: (f64, f64) = (3e-4, 2e-4);
+/// Gauss–Newton iterations over the whole flight after a search in an excerpt: while that is cheap, and beyond.
+const WHOLE_ITERATIONS: (usize, usize) = (3, 1);
+/// Blocks up to which more iterations are cheap.
+const SHORT_BLOCKS: usize = 60_000;
+/// Share of the 95 % load beyond which flanks are stiff.
+const STIFF_SHARE: f64 = 0.3;
+/// Groups of rows that the jackknife leaves out in turn.
+const GROUPS: usize = 30;
+/// The two fits count alike when they differ by so many jackknife errors, squared.
+const ALIKE: f64 = 2.0;
+/// Difference that is never significant, m.
+const LEAST_DIFFERENCE_M: f64 = 5e-8;
+/// The two fits differ by this many jackknife errors where flanks are soft.
+const SOFT_CONTACT_SIGMA: f64 = 2.3;
 
-/// IterationLimits of a search, at most: over an excerpt of a long flight, over the whole from there, and over a whole flight
-/// of which no excerpt told anything.
-struct IterationLimits {
-    excerpt: usize,
-    whole: usize,
-    alone: usize,
+/// How much each part of the doubt about a gap weighs; see [`Doubt`].
+const WEIGHTS: Doubt = Doubt {
+    jackknife_m: 0.97,
+    search_m: 1.1,
+    residual_m: 0.06,
+    stiff_m: 2.4,
+    choice_m: 0.55,
+    vibration_m: 0.008,
+    light_m: 0.1,
+    friction_m: 0.0058,
+    floor_m: 0.5,
+};
+
+/// Parts of the doubt about a gap, m; its variance is the sum of their squares, each weighted. The weights are fitted
+/// so that intervals hold over simulated flights of all classes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Doubt {
+    /// Jackknife error of the gap over groups of rows.
+    pub(super) jackknife_m: f64,
+    /// Spread of the gaps of all candidates of the parameter search.
+    pub(super) search_m: f64,
+    /// Rms of the residuals.
+    pub(super) residual_m: f64,
+    /// Jackknife error of the difference of the two fits, as far as that difference counts.
+    pub(super) stiff_m: f64,
+    /// What hangs on the choice between the two fits.
+    pub(super) choice_m: f64,
+    /// Rms second difference of the load over the stiffness: what happens between two samples.
+    pub(super) vibration_m: f64,
+    /// How far lightly loaded rows lie off the line.
+    pub(super) light_m: f64,
+    /// Wind-up under the friction.
+    pub(super) friction_m: f64,
+    /// What no flight averages out.
+    pub(super) floor_m: f64,
 }
 
-/// How the flanks answer, and what was found with them.
+impl Doubt {
+    fn parts(&self) -> [f64; 9] {
+        [
+            self.jackknife_m,
+            self.search_m,
+            self.residual_m,
+            self.stiff_m,
+            self.choice_m,
+            self.vibration_m,
+            self.light_m,
+            self.friction_m,
+            self.floor_m,
+        ]
+    }
+
+    fn standard_error_m(&self) -> f64 {
+        self.parts().iter().zip(WEIGHTS.parts()).map(|(part_m, weight)| (part_m * weight).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+/// The fitted flanks.
 #[derive(Debug)]
-pub(super) struct Contact {
+pub(super) struct FlankFit {
     /// ΔS and its standard error, m.
     pub(super) gap_m: (f64, f64),
     /// 1/K and its standard error, m/N.
     pub(super) compliance_m_per_n: (f64, f64),
     pub(super) skew_se_s: f64,
+    pub(super) load_zero_se_n: f64,
+    pub(super) load_delay_se_s: f64,
     pub(super) touched_s: (f64, f64),
     /// Length of a block, s.
     pub(super) period_s: f64,
     pub(super) state: FrictionState,
-    /// Coefficients of soft flanks, m, where low loads asked for them.
-    pub(super) curve: Option<[f64; CURVED]>,
-    /// The straight fit and its rows, for the witnesses.
-    pub(super) straight: Found<LINEAR>,
+    /// Whether higher loads alone read another gap.
+    pub(super) is_soft: bool,
+    /// What the gap of the stiff part adds to that of the line, m.
+    pub(super) toe_m: f64,
+    /// The fit and its rows.
+    pub(super) line: GaussNewtonResult,
 }
 
-impl Contact {
-    /// δX on a flank, m, under a force over the 95 % load: straight or bent. The side is +1, −1, or 0 in the gap.
+impl FlankFit {
+    /// δX on a flank, m, under a force over the 95 % load. The side is +1, −1, or 0 in the gap.
     pub(super) fn flank_m(&self, side: f64, force: f64) -> f64 {
-        let on = |beta: &[f64], bent_m: f64| {
-            beta[ORIGIN] + side * (0.5 * beta[GAP] + force * beta[FORCE] + bent_m)
-        };
-        match &self.curve {
-            None => on(&self.straight.fit.beta, 0.0),
-            Some(curve) => on(curve, curve[BEND..].iter().zip(bends(force)).map(|(b, x)| b * x).sum()),
-        }
+        let beta = &self.line.fit.beta;
+        beta[ORIGIN] + side * (0.5 * beta[GAP] + force * beta[FORCE])
     }
 
-    /// What lies in δX beside gap and wind-up, m: drift, skew, transducer error and wrong friction.
-    pub(super) fn beside_m(&self, row: &DesignRow<LINEAR>) -> f64 {
-        (FORCE + 1..LINEAR).map(|column| self.straight.fit.beta[column] * row.x[column]).sum()
+    /// What δX holds in addition to gap and wind-up, m: drift, skew, transducer error and wrong friction.
+    pub(super) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
+        (FORCE + 1..COLUMNS).map(|column| self.line.fit.beta[column] * row.x[column]).sum()
     }
 }
 
-/// Fits straight flanks, and soft ones where low loads ask for them.
+/// Fits the flanks.
 ///
 /// # Errors
 /// As [`search`], and [`Rejection::MotionUnexplained`].
-pub(super) fn fit(room: &mut ContactWorkspace, frame: &Scaling) -> Result<Contact, Rejection> {
-    room.excerpt.cut_from(&room.whole);
-    let straight: Found<LINEAR> = coarse_to_fine(room, frame, start(frame), &STRAIGHT)?;
-    let error_m = |column: usize| straight.fit.standard_error_m(column, &straight.design.firm);
-    let (line_m, line_se_m) = (straight.fit.beta[GAP], error_m(GAP));
-    // Under heavy friction the forces at low load are friction's to say, not the flank's.
-    let heavy = straight.state.friction.is_heavy(frame.load_n);
-    let bent = if !heavy && low_loads_deviate(&straight, frame) {
-        let curve = coarse_to_fine(room, frame, straight.state, &BENT);
-        curve.ok().and_then(|curve| soft(&curve, (line_m, line_se_m)))
-    } else {
-        None
-    };
-    let (gap_m, se_m) = bent.map_or((line_m, line_se_m), |(beta, se_m)| (beta[GAP], se_m));
-    let friction_m = straight.state.friction.at_n(frame.load_n) / straight.state.stiffness_n_per_m;
-    let floor_m = (FLOOR.0 * frame.windup_m()).hypot(FLOOR.1 * gap_m);
-    let doubt_m = se_m.hypot(FRICTION_DOUBT * friction_m).hypot(floor_m);
-    let contact = Contact {
-        gap_m: (gap_m, doubt_m),
-        compliance_m_per_n: (straight.fit.beta[FORCE] / frame.load_n, error_m(FORCE) / frame.load_n),
+pub(super) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
+    workspace.excerpt.excerpt_of(&workspace.whole, scaling.load_n);
+    let SearchResult { found: line, spread_m, load_zero_se_n } = coarse_to_fine(workspace, scaling)?;
+    let error_m = |column: usize| line.fit.standard_error_m(column, &line.design.firm);
+    let windup_m = scaling.windup_m();
+    let vibration_n = second_difference_rms(&workspace.whole.load_n);
+    let (gap_m, doubt, sigma) = gap_and_doubt(&line, spread_m, windup_m, vibration_n, scaling.load_n);
+    let fit = FlankFit {
+        gap_m: (gap_m, doubt.standard_error_m()),
+        compliance_m_per_n: (line.fit.beta[FORCE] / scaling.load_n, error_m(FORCE) / scaling.load_n),
         skew_se_s: error_m(SPEED) / SPEED_M_PER_S,
-        touched_s: straight.design.touched_s,
-        period_s: room.whole.period_s,
-        state: straight.state,
-        curve: bent.map(|(beta, _)| beta),
-        straight,
+        load_zero_se_n,
+        load_delay_se_s: error_m(LOAD_RATE) * LATE_S / line.fit.beta[FORCE],
+        touched_s: line.design.touched_s,
+        period_s: workspace.whole.period_s,
+        state: line.state,
+        is_soft: sigma > SOFT_CONTACT_SIGMA,
+        toe_m: gap_m - line.fit.beta[GAP],
+        line,
     };
-    if is_explained(room, frame, &contact) { Ok(contact) } else { Err(Rejection::MotionUnexplained) }
+    if is_explained(workspace, scaling, &fit) { Ok(fit) } else { Err(Rejection::MotionUnexplained) }
 }
 
-/// IterationLimits from a state over an excerpt, where the flight is long enough for one, and from there over the whole.
-fn coarse_to_fine<const N: usize>(
-    room: &mut ContactWorkspace,
-    frame: &Scaling,
-    from: FrictionState,
-    turns: &IterationLimits,
-) -> Result<Found<N>, Rejection> {
-    let ContactWorkspace { whole, excerpt, course } = room;
-    let guess = if excerpt.is_empty() {
-        None
-    } else {
-        let found: Result<Found<N>, _> = search((excerpt, course), frame, from, turns.excerpt);
-        found.ok().map(|found| found.state)
-    };
-    match guess {
-        Some(state) => search((whole, course), frame, state, turns.whole),
-        None => search((whole, course), frame, from, turns.alone),
+/// Searches an excerpt of a long flight, and iterates over the whole from there.
+fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<SearchResult, Rejection> {
+    let ContactWorkspace { whole, excerpt, path } = workspace;
+    if !excerpt.is_empty()
+        && let Ok(best) = ParameterSearch::new(excerpt, path, scaling).run()
+    {
+        let (most, least) = WHOLE_ITERATIONS;
+        let iterations = if whole.len() < SHORT_BLOCKS { most } else { least };
+        let found = search((whole, path), scaling, best.found.state, iterations)?;
+        return Ok(SearchResult { found, ..best });
     }
+    ParameterSearch::new(whole, path, scaling).run()
+}
+
+/// The gap, the doubt about it, and by how many errors the fit of higher loads differs.
+fn gap_and_doubt(
+    line: &GaussNewtonResult,
+    search_m: f64,
+    windup_m: f64,
+    vibration_n: f64,
+    load_n: f64,
+) -> (f64, Doubt, f64) {
+    let rows = &line.design.firm;
+    let groups = groups(rows);
+    let refit = |least: f64| line.fit.leave_one_out(GAP, rows, &groups, (FORCE, least));
+    let line_m = line.fit.beta[GAP];
+    let standard_error_m = line.fit.standard_error_m(GAP, rows);
+    let low = refit(FIRM_SHARE);
+    let high = refit(STIFF_SHARE).filter(|_| has_both_flanks(rows));
+    let jackknife_m = low.as_ref().map_or(standard_error_m, |(_, parts)| jackknife_m(parts.iter().copied()));
+    let (difference_m, error_m) = match (&low, &high) {
+        (Some((low_m, lows)), Some((high_m, highs))) => {
+            (high_m - low_m, jackknife_m_of_difference(lows, highs))
+        }
+        _ => (0.0, 0.0),
+    };
+    let sigma = difference_m.abs() / (error_m + LEAST_DIFFERENCE_M);
+    let weight = sigma * sigma / (sigma * sigma + ALIKE);
+    let stiffness_n_per_m = line.state.stiffness_n_per_m;
+    let rms = rows.iter().map(|row| line.fit.residual_m(row).powi(2)).sum::<f64>() / rows.len() as f64;
+    let mut outward_m: Vec<f64> =
+        line.design.light.iter().map(|row| line.fit.residual_m(row) * row.x[GAP].signum()).collect();
+    let gap_m = line_m + weight * difference_m;
+    let doubt = Doubt {
+        jackknife_m,
+        search_m,
+        residual_m: rms.sqrt(),
+        stiff_m: weight * error_m,
+        choice_m: weight * (1.0 - weight) * difference_m,
+        vibration_m: vibration_n / stiffness_n_per_m,
+        light_m: (1.0 - weight) * median(&mut outward_m),
+        friction_m: line.state.friction.at_n(load_n) / stiffness_n_per_m,
+        floor_m: (3e-4 * windup_m).hypot(2e-4 * gap_m),
+    };
+    (gap_m, doubt, sigma)
+}
+
+/// Rows of even numbers of correlation blocks, in order of time.
+fn groups(rows: &[DesignRow<COLUMNS>]) -> Vec<Range<usize>> {
+    let mut groups = Vec::with_capacity(GROUPS);
+    let mut first = 0;
+    for number in 1..=GROUPS {
+        let mut end = (rows.len() * number / GROUPS).max(first);
+        while end > first && end < rows.len() && rows[end].stretch == rows[end - 1].stretch {
+            end += 1;
+        }
+        if end > first {
+            groups.push(first..end);
+            first = end;
+        }
+    }
+    groups
+}
+
+/// Whether enough rows of either flank are loaded beyond the stiff share.
+fn has_both_flanks(rows: &[DesignRow<COLUMNS>]) -> bool {
+    let (mut upper, mut lower) = (0.0, 0.0);
+    for row in rows.iter().filter(|row| row.x[FORCE].abs() >= STIFF_SHARE) {
+        if row.x[GAP] > 0.0 { upper += row.blocks } else { lower += row.blocks }
+    }
+    let all: f64 = rows.iter().map(|row| row.blocks).sum();
+    upper.min(lower) > 0.05 * all
+}
+
+/// Jackknife error of a statistic from its values with one group left out (Tukey 1958).
+fn jackknife_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
+    let count = parts_m.clone().count() as f64;
+    let mean_m = parts_m.clone().sum::<f64>() / count;
+    ((count - 1.0) / count * parts_m.map(|part_m| (part_m - mean_m).powi(2)).sum::<f64>()).sqrt()
+}
+
+fn jackknife_m_of_difference(lows_m: &[f64], highs_m: &[f64]) -> f64 {
+    jackknife_m(lows_m.iter().zip(highs_m).map(|(low_m, high_m)| high_m - low_m))
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Rms of the second difference of a channel, which slow loads do not show.
+fn second_difference_rms(values: &[f64]) -> f64 {
+    let (mut squares, mut count) = (0.0, 0_usize);
+    for [before, here, after] in values.array_windows() {
+        let difference = before - 2.0 * here + after;
+        if difference.is_finite() {
+            squares += difference * difference;
+            count += 1;
+        }
+    }
+    (squares / count.max(1) as f64).sqrt()
 }
 
 /// Whether gap and wind-up travel as far as δX does. A screw that friction holds within its gap, or a load
 /// that is another actuator's, leaves travel over that no flank accounts for.
-fn is_explained(room: &mut ContactWorkspace, frame: &Scaling, contact: &Contact) -> bool {
-    let (seen_m, expected_m, noise_m) = travels_m(room, frame, contact);
+fn is_explained(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit) -> bool {
+    let (seen_m, expected_m, noise_m) = travels_m(workspace, scaling, fit);
     // A bad fit leaves noise enough to explain anything: it may explain only so much.
     let blurred_m = expected_m.hypot(noise_m.min(0.5 * expected_m));
     seen_m - blurred_m <= UNEXPLAINED * expected_m
 }
 
-/// How far δX travels, m: as seen once all that is beside gap and wind-up is taken off, as gap and wind-up
-/// say it should, and by noise alone; each from the 5 % to the 95 % quantile.
-fn travels_m(room: &mut ContactWorkspace, frame: &Scaling, contact: &Contact) -> (f64, f64, f64) {
-    let blocks = if room.excerpt.is_empty() { &mut room.whole } else { &mut room.excerpt };
-    blocks.realign(contact.state.skew_s);
+/// How far δX travels, m: as seen once everything else is taken off, as gap and wind-up predict, and by noise alone;
+/// each from the 5 % to the 95 % quantile.
+fn travels_m(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit) -> (f64, f64, f64) {
+    let ContactWorkspace { whole, excerpt, path } = workspace;
+    let blocks = if excerpt.is_empty() { whole } else { excerpt };
+    let state = &fit.line.at;
+    blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
+    let source = RowSource { blocks, scaling };
+    path.integrate(source, state);
     let stride = blocks.len().div_ceil(LOOKS).max(1);
-    let rows = design_matrix::every(RowSource { blocks, frame }, &contact.state, &mut room.course, stride);
-    let flank_m = |row: &DesignRow<LINEAR>| contact.flank_m(2.0 * row.x[GAP], row.x[FORCE].abs());
-    let seen_m = span_m(rows.iter().map(|row| row.y_m - contact.beside_m(row)).collect());
-    let expected_m = span_m(rows.iter().map(flank_m).collect());
-    let firm = &contact.straight.design.firm;
-    let noise_m = span_m(firm.iter().map(|row| contact.straight.fit.residual_m(row)).collect());
-    (seen_m, expected_m, noise_m)
+    let (mut seen_m, mut expected_m) = (Vec::new(), Vec::new());
+    for k in (0..blocks.len()).step_by(stride).filter(|&k| blocks.is_sound(k)) {
+        let force_n = path.columns.force_n[k];
+        if !force_n.is_finite() {
+            continue;
+        }
+        let side = if force_n == 0.0 { 0.0 } else { force_n.signum() };
+        let row = source.sum(&path.columns, k..k + 1, side);
+        seen_m.push(row.y_m - fit.other_m(&row));
+        expected_m.push(fit.flank_m(side, row.x[FORCE].abs()));
+    }
+    let firm = &fit.line.design.firm;
+    let noise_m = span_m(firm.iter().map(|row| fit.line.fit.residual_m(row)).collect());
+    (span_m(seen_m), span_m(expected_m), noise_m)
 }
 
 fn span_m(mut values: Vec<f64>) -> f64 {
@@ -165,32 +315,4 @@ fn span_m(mut values: Vec<f64>) -> f64 {
         *values.select_nth_unstable_by(k, f64::total_cmp).1
     };
     at(0.95) - at(0.05)
-}
-
-/// Whether the rows that the straight fit never saw lie inside its line, beyond the spread of their
-/// stretches; the lighter the touch the more a row counts. Friction, not softness, throws them outside.
-fn low_loads_deviate(straight: &Found<LINEAR>, frame: &Scaling) -> bool {
-    let most_m = CLIP * frame.windup_m();
-    let (mut total, mut squares, mut sum_m, mut stretch) = (0.0, 0.0, 0.0, None);
-    for row in &straight.design.light {
-        if stretch != Some(row.stretch) {
-            (total, squares) = (total + sum_m, squares + sum_m * sum_m);
-            (stretch, sum_m) = (Some(row.stretch), 0.0);
-        }
-        let lightness = 1.0 - row.x[FORCE].abs() / FIRM_SHARE;
-        sum_m += lightness * (straight.fit.residual_m(row) * row.x[GAP].signum()).clamp(-most_m, most_m);
-    }
-    (total, squares) = (total + sum_m, squares + sum_m * sum_m);
-    total < -SUSPICION * squares.sqrt()
-}
-
-/// Coefficients of soft flanks and the standard error of their gap, where they differ from the straight ones for certain.
-///
-/// The straight fit is the sharper one when flanks are straight, the curve right either way; so their
-/// difference has the variance of the curve less that of the line (Hausman 1978).
-fn soft(curve: &Found<CURVED>, line_m: (f64, f64)) -> Option<([f64; CURVED], f64)> {
-    let (gap_m, se_m) = (curve.fit.beta[GAP], curve.fit.standard_error_m(GAP, &curve.design.firm));
-    let spread_m = (se_m.powi(2) - line_m.1.powi(2)).max(0.25 * se_m.powi(2)).sqrt();
-    let change_m = line_m.0 - gap_m;
-    (change_m > SOFT * spread_m).then_some((curve.fit.beta, se_m.hypot(CURVE_DOUBT * change_m)))
 }

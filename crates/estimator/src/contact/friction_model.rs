@@ -1,18 +1,19 @@
-//! The force in the coupling: the load less a friction that sticks and slips (equation 1, as it is meant).
+//! Quasi-static stick–slip model of the force in the coupling (equation 1, corrected).
 //!
-//! The screw moves when the force on it exceeds F_d + η|F|, and is held below. In quasi-static terms:
-//! hold the screw, let the motor move under it, and see what the coupling would then press; if load and
-//! coupling differ by more than friction can hold, the screw slips until they do not.
+//! The screw slips when the force on it exceeds the friction level and is held below. While it is held, bristles of
+//! compliance a bend under the friction force (pre-sliding displacement; Dahl 1968, Canudas de Wit et al. 1995).
+//! One step, with w the anchor of the bristles relative to the motor and F the load less the zero of its cell:
 //!
 //! ```text
-//! z ← z − ΔX₁                             the motor moves under a held screw
-//! c ← K·dead_zone(z, ΔS)                  what the coupling then presses
-//! c ← clamp(c, F − F_f, F + F_f)          the screw slips as far as it must; z follows
+//! w ← w − ΔX₁                                   the motor moves under a held screw
+//! c ← dead_zone(w + a·F, ΔS) / (1/K + a)        force in the coupling while the screw is held
+//! c ← clamp(c, F − F_f, F + F_f)                the screw slips as far as the friction level asks
+//! F_f = (F_d + η·|F|)·(1 + p·e^−(v/v_s)²)       v_s = 3 mm/s (Stribeck effect)
 //! ```
-//! So a moving screw has c = F − F_f·sgn Ẋ₂, a resting one keeps its c, and a flexing one (load changes,
-//! motor at rest) shows the loop that a sign of the motor's speed cannot.
+//! A moving screw has c = F − F_f·sgn Ẋ₂, a resting one keeps its c, and a flexing one (load changes, motor at rest)
+//! shows the loop that the sign of the motor's speed cannot show.
 
-/// Dry friction of the screw and the share of the load lost (equation 1).
+/// Dry friction of the screw and the share of the load that is lost (equation 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Friction {
     /// `F_d`, N.
@@ -27,111 +28,168 @@ impl Friction {
         self.dry_n + self.lost_share * load_n.abs()
     }
 
-    /// Whether a load is under three times the friction it meets.
+    /// Whether a load is less than three times the friction it meets.
     pub(super) fn is_heavy(&self, load_n: f64) -> bool {
         load_n < HEAVY * self.at_n(load_n)
     }
 }
 
-/// Load over friction below which friction rules what is seen.
+/// Load over friction below which friction dominates the relative position.
 const HEAVY: f64 = 3.0;
 
-/// What the screw and its coupling are thought to be.
+/// Parameters of the screw, its coupling and the channels that the regression iterates over.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrictionState {
     pub(super) stiffness_n_per_m: f64,
     pub(super) gap_m: f64,
     pub(super) friction: Friction,
+    /// p, the excess of the friction level at rest over that in motion.
+    pub(super) stribeck: f64,
+    /// a, compliance of the bristles, m/N; zero for a screw that is held rigidly.
+    pub(super) bristle_m_per_n: f64,
+    /// F₀, reading of the load cell under no load, N.
+    pub(super) load_zero_n: f64,
+    /// τ in `load_logged(t) = F(t − τ)`, s.
+    pub(super) load_delay_s: f64,
+    /// Time constant of the load channel's first-order lag, s.
+    pub(super) load_lag_s: f64,
+    /// τ in `screw_logged(t) = X₂(t − τ)`, s.
     pub(super) skew_s: f64,
 }
 
-/// Force in the coupling, and how it answers to friction.
+/// Force in the coupling, and its derivatives by the parameters of friction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CouplingForce {
     /// c, N; NaN where a channel is missing.
     pub(super) force_n: f64,
     /// ∂c/∂F_d.
-    pub(super) by_dry: f64,
+    pub(super) dforce_ddry: f64,
     /// ∂c/∂η, N.
-    pub(super) by_share_n: f64,
+    pub(super) dforce_dloss_n: f64,
+    /// ∂c/∂p, N.
+    pub(super) dforce_dstribeck_n: f64,
 }
 
 impl CouplingForce {
     /// Where a channel is missing.
-    pub(super) const UNKNOWN: Self = Self { force_n: f64::NAN, by_dry: 0.0, by_share_n: 0.0 };
+    pub(super) const UNKNOWN: Self =
+        Self { force_n: f64::NAN, dforce_ddry: 0.0, dforce_dloss_n: 0.0, dforce_dstribeck_n: 0.0 };
 }
 
-/// What a walk's steps depend on.
+/// One block of the channels that drive the model.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Drive {
+    pub(super) motor_m: f64,
+    pub(super) load_n: f64,
+    /// e^−(v/v_s)².
+    pub(super) slowness: f64,
+}
+
+/// Constants of an integration.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CouplingParams {
-    stiffness_n_per_m: f64,
     compliance_m_per_n: f64,
+    bristle_m_per_n: f64,
+    /// 1/(1/K + a).
+    held_n_per_m: f64,
     half_gap_m: f64,
     friction: Friction,
-}
-
-/// The coupling followed from block to block; each segment starts at rest, its friction unknown.
-#[derive(Debug)]
-pub(super) struct CouplingIntegrator {
-    ways: CouplingParams,
-    screw: Option<ScrewState>,
+    stribeck: f64,
+    load_zero_n: f64,
+    motor_sense: f64,
 }
 
 /// The screw between two blocks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ScrewState {
     pub(super) motor_m: f64,
+    /// w: anchor of the bristles relative to the motor, from the middle of the gap, m.
+    pub(super) anchor_m: f64,
+    /// ∂c/∂F_d, ∂c/∂η and ∂c/∂p once the screw presses a flank, kept since it slipped last.
+    pub(super) memory: [f64; 3],
+    pub(super) coupling: CouplingForce,
     /// Relative position from the middle of the gap, m.
     pub(super) relative_m: f64,
-    pub(super) coupling: CouplingForce,
-    /// Whether it slipped last, so that nothing before tells what comes after.
+    /// Whether it slipped last, so that no earlier state matters.
     pub(super) has_slipped: bool,
 }
 
 impl CouplingParams {
-    pub(super) fn new(state: &FrictionState) -> Self {
+    pub(super) fn new(state: &FrictionState, motor_sense: f64) -> Self {
+        let compliance_m_per_n = state.stiffness_n_per_m.recip();
         Self {
-            stiffness_n_per_m: state.stiffness_n_per_m,
-            compliance_m_per_n: state.stiffness_n_per_m.recip(),
+            compliance_m_per_n,
+            bristle_m_per_n: state.bristle_m_per_n,
+            held_n_per_m: (compliance_m_per_n + state.bristle_m_per_n).recip(),
             half_gap_m: 0.5 * state.gap_m,
             friction: state.friction,
+            stribeck: state.stribeck,
+            load_zero_n: state.load_zero_n,
+            motor_sense,
         }
     }
 
-    /// The screw a block later. Both what holds and what slips is found, and one of the two taken: so that it can be
-    /// asked of several at once.
+    /// The screw a block later. Both the held and the slipping solution are computed and one is selected, so that
+    /// several screws can be integrated in parallel lanes.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "see `widest`")]
-    pub(super) fn moved(&self, before: &ScrewState, motor_m: f64, load_n: f64) -> ScrewState {
-        let held_m = before.relative_m - (motor_m - before.motor_m);
-        let above_m = if held_m < -self.half_gap_m { -self.half_gap_m } else { held_m };
-        let free_m = if above_m > self.half_gap_m { self.half_gap_m } else { above_m };
-        let held_n = self.stiffness_n_per_m * (held_m - free_m);
-        let friction_n = self.friction.at_n(load_n);
+    #[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+    pub(super) fn step(&self, before: &ScrewState, drive: Drive) -> ScrewState {
+        let load_n = drive.load_n - self.load_zero_n;
+        let anchor_m = before.anchor_m - self.motor_sense * (drive.motor_m - before.motor_m);
+        let free_m = anchor_m + self.bristle_m_per_n * load_n;
+        let above_m = if free_m < -self.half_gap_m { -self.half_gap_m } else { free_m };
+        let inside_m = if above_m > self.half_gap_m { self.half_gap_m } else { above_m };
+        let held_n = self.held_n_per_m * (free_m - inside_m);
+        let size_n = load_n.abs();
+        let level_n = self.friction.dry_n + self.friction.lost_share * size_n;
+        let excess = 1.0 + self.stribeck * drive.slowness;
+        let friction_n = level_n * excess;
         let (low_n, high_n) = (load_n - friction_n, load_n + friction_n);
         let (is_low, is_high) = (held_n < low_n, held_n > high_n);
         let has_slipped = is_low | is_high;
         let force_n = if is_low { low_n } else { held_n };
         let force_n = if is_high { high_n } else { force_n };
         let way = if is_low { -1.0 } else { 1.0 };
-        let is_touching = held_n * before.coupling.force_n > 0.0;
-        let held_by_dry = if is_touching { before.coupling.by_dry } else { 0.0 };
-        let held_by_share_n = if is_touching { before.coupling.by_share_n } else { 0.0 };
+        let touch = if force_n == 0.0 { 0.0 } else { 1.0 };
+        let slipping = [way * excess, way * size_n * excess, way * level_n * drive.slowness];
+        let mut memory = before.memory;
+        for (kept, now) in memory.iter_mut().zip(slipping) {
+            *kept = if has_slipped { now } else { *kept };
+        }
+        let bent_m = self.bristle_m_per_n * (load_n - force_n);
+        let relative_m = if has_slipped { self.relative_m(force_n) } else { anchor_m + bent_m };
         ScrewState {
-            motor_m,
-            relative_m: if has_slipped { self.relative_m(force_n) } else { held_m },
+            motor_m: drive.motor_m,
+            anchor_m: if has_slipped { relative_m - bent_m } else { anchor_m },
+            memory,
             coupling: CouplingForce {
                 force_n,
-                by_dry: if has_slipped { way } else { held_by_dry },
-                by_share_n: if has_slipped { way * load_n.abs() } else { held_by_share_n },
+                dforce_ddry: touch * memory[0],
+                dforce_dloss_n: touch * memory[1],
+                dforce_dstribeck_n: touch * memory[2],
             },
+            relative_m,
             has_slipped,
         }
     }
 
-    /// Where the screw stands against the motor under a force, m.
+    /// The screw at the start of a segment: at rest, its friction unknown.
+    pub(super) fn rest(&self, drive: Drive) -> ScrewState {
+        let force_n = drive.load_n - self.load_zero_n;
+        let relative_m = self.relative_m(force_n);
+        ScrewState {
+            motor_m: drive.motor_m,
+            anchor_m: relative_m,
+            memory: [0.0; 3],
+            coupling: CouplingForce { force_n, ..CouplingForce::UNKNOWN },
+            relative_m,
+            has_slipped: false,
+        }
+    }
+
+    /// Relative position on a flank under a force, m.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "see `widest`")]
+    #[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
     fn relative_m(&self, force_n: f64) -> f64 {
         let above_m = if force_n > 0.0 { self.half_gap_m } else { 0.0 };
         let flank_m = if force_n < 0.0 { -self.half_gap_m } else { above_m };
@@ -139,10 +197,17 @@ impl CouplingParams {
     }
 }
 
+/// The coupling integrated from block to block; each segment starts at rest.
+#[derive(Debug)]
+pub(super) struct CouplingIntegrator {
+    params: CouplingParams,
+    screw: Option<ScrewState>,
+}
+
 impl CouplingIntegrator {
-    /// At rest, where nothing is known of the friction.
-    pub(super) fn new(ways: CouplingParams) -> Self {
-        Self { ways, screw: None }
+    /// At rest.
+    pub(super) fn new(params: CouplingParams) -> Self {
+        Self { params, screw: None }
     }
 
     /// Whether the screw slipped last.
@@ -150,27 +215,20 @@ impl CouplingIntegrator {
         self.screw.is_some_and(|screw| screw.has_slipped)
     }
 
-    /// Goes on from elsewhere.
+    /// Continues from another state.
     pub(super) fn set(&mut self, screw: ScrewState) {
         self.screw = Some(screw);
     }
 
-    /// The coupling at the next block. One with a channel missing is passed over.
+    /// The coupling and the relative position at the next block. A block with a missing channel is skipped.
     #[inline]
-    pub(super) fn step(&mut self, motor_m: f64, load_n: f64) -> CouplingForce {
-        if !(motor_m + load_n).is_finite() {
-            return CouplingForce::UNKNOWN;
+    pub(super) fn step(&mut self, drive: Drive) -> (CouplingForce, f64) {
+        if !(drive.motor_m + drive.load_n).is_finite() {
+            return (CouplingForce::UNKNOWN, f64::NAN);
         }
-        let screw = self.screw.map_or_else(
-            || ScrewState {
-                motor_m,
-                relative_m: self.ways.relative_m(load_n),
-                coupling: CouplingForce { force_n: load_n, by_dry: 0.0, by_share_n: 0.0 },
-                has_slipped: false,
-            },
-            |before| self.ways.moved(&before, motor_m, load_n),
-        );
+        let screw =
+            self.screw.map_or_else(|| self.params.rest(drive), |before| self.params.step(&before, drive));
         self.screw = Some(screw);
-        screw.coupling
+        (screw.coupling, screw.relative_m)
     }
 }

@@ -1,74 +1,82 @@
-//! Gauss–Newton over what the force in the coupling depends on: friction, stiffness, gap and skew.
+//! Gauss–Newton iteration over the parameters that the force in the coupling depends on.
 
 use super::acceptance::Rejection;
 use super::block_means::BlockMeans;
 use super::coupling_path::CouplingPath;
 use super::design_matrix::{
-    self, BEND, CURVED, DRIFT, DRY, DesignMatrix, FORCE, GAP, LATE_S, LOAD_RATE, ORIGIN, PLACE, RowSource,
-    SHARE, SPEED, SPEED_M_PER_S, Scaling,
+    self, COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LATE_S, LOAD_RATE, ORIGIN, PERIODIC, PLACE,
+    RowSource, SHARE, SPEED, SPEED_M_PER_S, STRIBECK, Scaling,
 };
 use super::friction_model::{Friction, FrictionState};
 use super::robust_regression::{GaussianPrior, RobustFit, fit};
-use super::{BRIEF_S, TOUCH_S};
+use super::{MIN_CONTACT_S, REQUIRED_CONTACT_S};
 
-/// What the design of any actuator says: 1/K within 15 % of the part's.
+/// Relative spread of 1/K about the part's.
 const COMPLIANCE: f64 = 0.15;
 /// Dry friction over the 95 % load, and the share of load lost: most likely value and spread.
 const FRICTION_DRY: (f64, f64) = (0.02, 0.06);
 /// See [`FRICTION_DRY`].
 const FRICTION_SHARE: (f64, f64) = (0.03, 0.06);
-/// Spread of the skews between channels, s.
+/// Spread of the excess of friction at rest.
+const STRIBECK_EXCESS: f64 = 0.3;
+/// Spread of the delays between channels, s.
 const SKEW_S: f64 = 5e-3;
-/// Spread of the drift within a flight, straight and bent, m.
+/// Spread of the drift within a flight, linear and quadratic, m.
 const DRIFT_M: [f64; 2] = [50e-6, 20e-6];
 /// Spread of the transducer's error at the ends of the stroke, m.
 const PLACE_M: f64 = 60e-6;
-/// Spread of the deflections that soft flanks add, m.
-const BEND_M: f64 = 50e-6;
-/// Stiffness may move by this factor between turns, lest one bad turn ruins the next.
-const STRETCH: f64 = 3.0;
-/// Friction beyond this share of the load leaves nothing to see.
-const MOST_FRICTION: f64 = 0.5;
-/// A gap wider than this many wind-ups is kept from misleading the search.
-const WIDEST: f64 = 20.0;
-/// A turn that moves the state by less than this share of the gap's standard error is the last: the next one would
-/// seldom move the gap by more than a fifth of that.
-const SETTLED: f64 = 0.05;
-/// Rounds of reweighting within a turn.
-const ROUNDS: usize = 5;
+/// Spread of errors periodic in position, m.
+const PERIODIC_M: f64 = 20e-6;
+/// Spread of the change of 1/K from the middle of a flight to its end, relative.
+const COMPLIANCE_DRIFT: f64 = 0.03;
+/// Stiffness moves by this factor at most in an iteration.
+const MAX_STIFFNESS_STEP: f64 = 3.0;
+/// Greatest friction over the load.
+const MAX_FRICTION_SHARE: f64 = 0.5;
+/// Greatest excess of friction at rest.
+const MAX_STRIBECK: f64 = 1.2;
+/// Longest delay of the load, s.
+const MAX_LOAD_DELAY_S: f64 = 0.04;
+/// Widest gap in wind-ups that the iteration assumes.
+const MAX_GAP_WINDUPS: f64 = 20.0;
+/// An iteration that moves the state by less than this share of the gap's standard error is the last.
+const CONVERGENCE_SHARE: f64 = 0.05;
+/// Reweightings within an iteration.
+const IRLS_ITERATIONS: usize = 5;
 
-/// The last turn: rows, coefficients, and the state they were made with.
+/// The last iteration: rows, coefficients, and the parameters they were made with and lead to.
 #[derive(Debug)]
-pub(super) struct Found<const N: usize> {
-    pub(super) design: DesignMatrix<N>,
-    pub(super) fit: RobustFit<N>,
+pub(super) struct GaussNewtonResult {
+    pub(super) design: DesignMatrix,
+    pub(super) fit: RobustFit<COLUMNS>,
+    /// Parameters of the design's rows.
+    pub(super) at: FrictionState,
+    /// Parameters that the fit asks for.
     pub(super) state: FrictionState,
 }
 
-/// IterationLimits from a state: rows of that state, a fit, and the state the fit asks for.
+/// Iterates from a state: rows of that state, a fit, and the state the fit asks for.
 ///
 /// # Errors
 /// [`Rejection::NoLoadReversal`], [`Rejection::OneSideBrief`], [`Rejection::TooShort`].
-pub(super) fn search<const N: usize>(
-    (blocks, course): (&mut BlockMeans, &mut CouplingPath),
-    frame: &Scaling,
+pub(super) fn search(
+    (blocks, path): (&mut BlockMeans, &mut CouplingPath),
+    scaling: &Scaling,
     mut state: FrictionState,
-    turns: usize,
-) -> Result<Found<N>, Rejection> {
+    iterations: usize,
+) -> Result<GaussNewtonResult, Rejection> {
     let mut found = None;
-    for turn in 1..=turns {
-        blocks.realign(state.skew_s);
-        let mut design = design_matrix::rows(RowSource { blocks, frame }, &state, course);
-        touched(&design)?;
-        if N == CURVED {
-            design.firm.append(&mut design.light);
-        }
-        let fit = fit(&design.firm, &beliefs(frame, &state), ROUNDS).ok_or(Rejection::TooShort)?;
-        let after = next(frame, &state, &fit);
-        let moved_m = frame.windup_m() * step(frame, blocks.period_s, &state, &after);
-        let is_last = turn == turns || moved_m < SETTLED * fit.standard_error_m(GAP, &design.firm);
+    for iteration in 1..=iterations {
+        blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
+        let design = design_matrix::rows(RowSource { blocks, scaling }, &state, path);
+        check_contact(&design)?;
+        let fit = fit(&design.firm, &priors(scaling, &state), IRLS_ITERATIONS).ok_or(Rejection::TooShort)?;
+        let after = next(scaling, &state, &fit);
+        let moved_m = scaling.windup_m() * step(scaling, &state, &after);
+        let is_last =
+            iteration == iterations || moved_m < CONVERGENCE_SHARE * fit.standard_error_m(GAP, &design.firm);
+        found = Some(GaussNewtonResult { design, fit, at: state, state: after });
         state = after;
-        found = Some(Found { design, fit, state });
         if is_last {
             break;
         }
@@ -76,78 +84,91 @@ pub(super) fn search<const N: usize>(
     found.ok_or(Rejection::TooShort)
 }
 
-/// How far a turn moved the state, over what each of its numbers is about.
-fn step(frame: &Scaling, period_s: f64, before: &FrictionState, after: &FrictionState) -> f64 {
+/// How far an iteration moved the state, over what each of its numbers is about.
+fn step(scaling: &Scaling, before: &FrictionState, after: &FrictionState) -> f64 {
     let (was, is) = (&before.friction, &after.friction);
     [
         after.stiffness_n_per_m / before.stiffness_n_per_m - 1.0,
-        (after.gap_m - before.gap_m) / frame.windup_m(),
-        (is.dry_n - was.dry_n) / frame.load_n,
+        (after.gap_m - before.gap_m) / scaling.windup_m(),
+        (is.dry_n - was.dry_n) / scaling.load_n,
         is.lost_share - was.lost_share,
-        (after.skew_s - before.skew_s) / period_s,
+        (after.skew_s - before.skew_s) / 0.02,
+        (after.load_delay_s - before.load_delay_s) / 0.02,
+        0.1 * (after.stribeck - before.stribeck),
     ]
     .into_iter()
     .fold(0.0, |most, part| part.abs().max(most))
 }
 
-/// Where a search starts: the part's stiffness, usual friction, no gap and no skew.
-pub(super) fn start(frame: &Scaling) -> FrictionState {
+/// The start of a search: the part's stiffness, a usual friction, no gap and no delays.
+pub(super) fn start(scaling: &Scaling) -> FrictionState {
     FrictionState {
-        stiffness_n_per_m: frame.stiffness_n_per_m,
+        stiffness_n_per_m: scaling.stiffness_n_per_m,
         gap_m: 0.0,
-        friction: Friction { dry_n: FRICTION_DRY.0 * frame.load_n, lost_share: FRICTION_SHARE.0 },
+        friction: Friction { dry_n: FRICTION_DRY.0 * scaling.load_n, lost_share: FRICTION_SHARE.0 },
+        stribeck: 0.0,
+        bristle_m_per_n: 0.0,
+        load_zero_n: 0.0,
+        load_delay_s: 0.0,
+        load_lag_s: 0.0,
         skew_s: 0.0,
     }
 }
 
-fn touched<const N: usize>(design: &DesignMatrix<N>) -> Result<(), Rejection> {
+fn check_contact(design: &DesignMatrix) -> Result<(), Rejection> {
     let least_s = design.touched_s.0.min(design.touched_s.1);
-    if least_s < BRIEF_S {
+    if least_s < MIN_CONTACT_S {
         Err(Rejection::NoLoadReversal)
-    } else if least_s < TOUCH_S {
+    } else if least_s < REQUIRED_CONTACT_S {
         Err(Rejection::OneSideBrief)
     } else {
         Ok(())
     }
 }
 
-fn beliefs<const N: usize>(frame: &Scaling, state: &FrictionState) -> [GaussianPrior; N] {
-    let windup_m = frame.windup_m();
-    let lack = |(usual, spread): (f64, f64), now: f64| {
-        let windup_m = frame.load_n / state.stiffness_n_per_m;
-        GaussianPrior { mean: (usual - now) * windup_m, sd: spread * windup_m }
-    };
+fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior; COLUMNS] {
+    let windup_m = scaling.windup_m();
+    let here_m = scaling.load_n / state.stiffness_n_per_m;
+    let lack =
+        |(usual, spread): (f64, f64), now: f64| GaussianPrior { mean: (usual - now) * here_m, sd: spread * here_m };
     let zero = |sd: f64| GaussianPrior { mean: 0.0, sd };
-    let compliance = if N == CURVED { 2.0 * COMPLIANCE } else { COMPLIANCE };
     std::array::from_fn(|column| match column {
         ORIGIN | GAP => GaussianPrior::NONE,
-        FORCE => GaussianPrior { mean: windup_m, sd: compliance * windup_m },
-        DRY => lack(FRICTION_DRY, state.friction.dry_n / frame.load_n),
+        FORCE => GaussianPrior { mean: windup_m, sd: COMPLIANCE * windup_m },
+        DRY => lack(FRICTION_DRY, state.friction.dry_n / scaling.load_n),
         SHARE => lack(FRICTION_SHARE, state.friction.lost_share),
-        // What is left of the skew once the channels are realigned.
+        STRIBECK => lack((0.0, STRIBECK_EXCESS), state.stribeck),
+        // The delays that remain once the channels are realigned.
         SPEED => GaussianPrior { mean: state.skew_s * SPEED_M_PER_S, sd: SKEW_S * SPEED_M_PER_S },
-        LOAD_RATE => zero(SKEW_S / LATE_S * windup_m),
+        LOAD_RATE => GaussianPrior {
+            mean: -(state.load_delay_s + state.load_lag_s) / LATE_S * here_m,
+            sd: SKEW_S / LATE_S * here_m,
+        },
+        FORCE_DRIFT => zero(COMPLIANCE_DRIFT * windup_m),
         _ if column < PLACE => zero(DRIFT_M[column - DRIFT]),
-        _ if column < LOAD_RATE => zero(PLACE_M),
-        _ => zero(BEND_M),
+        _ if column >= PERIODIC => zero(PERIODIC_M),
+        _ => zero(PLACE_M),
     })
 }
 
-fn next<const N: usize>(frame: &Scaling, state: &FrictionState, fit: &RobustFit<N>) -> FrictionState {
+fn next(scaling: &Scaling, state: &FrictionState, fit: &RobustFit<COLUMNS>) -> FrictionState {
     let beta = &fit.beta;
-    // The secant at the 95 % load: bends included, or a soft flank would make the force too stiff.
-    let secant_m: f64 =
-        beta[FORCE] + beta.iter().skip(BEND).zip(design_matrix::bends(1.0)).map(|(b, x)| b * x).sum::<f64>();
-    let stiffness = frame.load_n / secant_m.clamp(frame.windup_m() / STRETCH, frame.windup_m() * STRETCH);
-    let lacking = |column: usize| beta[column] * stiffness / frame.load_n;
+    let windup_m = scaling.windup_m();
+    let stiffness = scaling.load_n
+        / beta[FORCE].clamp(windup_m / MAX_STIFFNESS_STEP, windup_m * MAX_STIFFNESS_STEP);
+    let lacking = |column: usize| beta[column] * stiffness / scaling.load_n;
+    let late_s = lacking(LOAD_RATE) * LATE_S;
     FrictionState {
         stiffness_n_per_m: stiffness,
-        gap_m: beta[GAP].clamp(0.0, WIDEST * frame.windup_m()),
+        gap_m: beta[GAP].clamp(0.0, MAX_GAP_WINDUPS * windup_m),
         friction: Friction {
-            dry_n: frame.load_n
-                * (state.friction.dry_n / frame.load_n + lacking(DRY)).clamp(0.0, MOST_FRICTION),
-            lost_share: (state.friction.lost_share + lacking(SHARE)).clamp(0.0, MOST_FRICTION),
+            dry_n: scaling.load_n
+                * (state.friction.dry_n / scaling.load_n + lacking(DRY)).clamp(0.0, MAX_FRICTION_SHARE),
+            lost_share: (state.friction.lost_share + lacking(SHARE)).clamp(0.0, MAX_FRICTION_SHARE),
         },
+        stribeck: (state.stribeck + lacking(STRIBECK)).clamp(0.0, MAX_STRIBECK),
+        load_delay_s: (state.load_delay_s + late_s).clamp(-MAX_LOAD_DELAY_S, MAX_LOAD_DELAY_S),
         skew_s: state.skew_s - beta[SPEED] / SPEED_M_PER_S,
+        ..*state
     }
 }

@@ -1,7 +1,7 @@
 //! Lost motion measured rather than extrapolated: at zero load, and at a reference load.
 
-use super::design_matrix::{DesignRow, FORCE, Flank, GAP, LINEAR, Scaling};
-use super::flank_fit::Contact;
+use super::design_matrix::{DesignRow, FORCE, Flank, GAP, COLUMNS, Scaling};
+use super::flank_fit::FlankFit;
 
 /// Rows this near to the reference load count, as a share of it.
 const NEAR: f64 = 0.25;
@@ -14,12 +14,12 @@ const FEWEST_ROWS: usize = 5;
 
 /// Lost motion at zero load and its standard error, m, from the lightly loaded rows, which the straight fit
 /// never saw.
-pub(super) fn loop_width_m(contact: &Contact) -> Option<(f64, f64)> {
-    let light = &contact.straight.design.light;
+pub(super) fn loop_width_m(contact: &FlankFit) -> Option<(f64, f64)> {
+    let light = &contact.line.design.light;
     let beyond_m = |flank| beyond_m(contact, light.iter(), flank);
     Some(put_together(
         contact,
-        contact.straight.fit.beta[GAP],
+        contact.line.fit.beta[GAP],
         beyond_m(Flank::Upper)?,
         beyond_m(Flank::Lower)?,
     ))
@@ -27,32 +27,32 @@ pub(super) fn loop_width_m(contact: &Contact) -> Option<(f64, f64)> {
 
 /// Relative travel between + and − a load in the coupling and its standard error, m: rows near it on either
 /// flank, drift, skew and transducer error taken off, brought to the load itself along the fitted line.
-pub(super) fn lost_motion_m(contact: &Contact, frame: &Scaling, load_n: f64) -> Option<(f64, f64)> {
+pub(super) fn lost_motion_m(contact: &FlankFit, frame: &Scaling, load_n: f64) -> Option<(f64, f64)> {
     let load = load_n / frame.load_n;
-    let near = |row: &&DesignRow<LINEAR>| (row.x[FORCE].abs() - load).abs() < NEAR * load;
-    let rows = &contact.straight.design;
+    let near = |row: &&DesignRow<COLUMNS>| (row.x[FORCE].abs() - load).abs() < NEAR * load;
+    let rows = &contact.line.design;
     let beyond_m = |flank| beyond_m(contact, rows.firm.iter().chain(&rows.light).filter(near), flank);
-    let beta = &contact.straight.fit.beta;
+    let beta = &contact.line.fit.beta;
     let line_m = beta[GAP] + 2.0 * load * beta[FORCE];
     Some(put_together(contact, line_m, beyond_m(Flank::Upper)?, beyond_m(Flank::Lower)?))
 }
 
 /// A travel along the fitted line, and what both flanks lie beyond it. What is doubted of the gap (drift,
 /// transducer, friction) is doubted here as well; the medians' own scatter comes on top.
-fn put_together(contact: &Contact, line_m: f64, upper: (f64, f64), lower: (f64, f64)) -> (f64, f64) {
+fn put_together(contact: &FlankFit, line_m: f64, upper: (f64, f64), lower: (f64, f64)) -> (f64, f64) {
     (line_m + upper.0 + lower.0, contact.gap_m.1.hypot(upper.1.hypot(lower.1)))
 }
 
 /// How far outwards of the fitted line the rows of a flank lie, m: their median, and its standard error with
 /// the rows of one stretch taken as one.
 fn beyond_m<'a>(
-    contact: &Contact,
-    rows: impl Iterator<Item = &'a DesignRow<LINEAR>>,
+    contact: &FlankFit,
+    rows: impl Iterator<Item = &'a DesignRow<COLUMNS>>,
     flank: Flank,
 ) -> Option<(f64, f64)> {
     let (mut outward_m, mut stretches): (Vec<f64>, Vec<u32>) = rows
         .filter(|row| row.x[GAP] * flank.sign() > 0.0)
-        .map(|row| (flank.sign() * contact.straight.fit.residual_m(row), row.stretch))
+        .map(|row| (flank.sign() * contact.line.fit.residual_m(row), row.stretch))
         .unzip();
     if outward_m.len() < FEWEST_ROWS {
         return None;

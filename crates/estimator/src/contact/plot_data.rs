@@ -1,8 +1,8 @@
 //! What the estimate stands on, as one would draw it: δX against the force in the coupling.
 
 pub use super::design_matrix::Flank;
-use super::design_matrix::{DesignRow, FORCE, GAP, LINEAR, Scaling};
-use super::flank_fit::Contact;
+use super::design_matrix::{DesignRow, FORCE, GAP, COLUMNS, Scaling};
+use super::flank_fit::FlankFit;
 
 /// Points of a flank's line.
 const POINTS: usize = 60;
@@ -36,10 +36,10 @@ pub struct ContactPlot {
 }
 
 impl ContactPlot {
-    pub(super) fn of(frame: &Scaling, contact: &Contact) -> Self {
-        let design = &contact.straight.design;
+    pub(super) fn of(frame: &Scaling, contact: &FlankFit) -> Self {
+        let design = &contact.line.design;
         let firm =
-            design.firm.iter().zip(contact.straight.fit.trusts(&design.firm)).map(|(r, t)| (r, Some(t)));
+            design.firm.iter().zip(contact.line.fit.trusts(&design.firm)).map(|(r, t)| (r, Some(t)));
         let light = design.light.iter().map(|row| (row, None));
         let touches: Vec<Touch> =
             firm.chain(light).map(|(row, trust)| touch(frame, contact, row, trust)).collect();
@@ -52,19 +52,19 @@ impl ContactPlot {
     }
 }
 
-fn touch(frame: &Scaling, contact: &Contact, row: &DesignRow<LINEAR>, trust: Option<f64>) -> Touch {
+fn touch(frame: &Scaling, contact: &FlankFit, row: &DesignRow<COLUMNS>, trust: Option<f64>) -> Touch {
     Touch {
         time_s: frame.moment_s(row),
         duration_s: row.blocks * contact.period_s,
         flank: if row.x[GAP] > 0.0 { Flank::Upper } else { Flank::Lower },
         force_n: row.x[FORCE] * frame.load_n,
-        dx_m: row.y_m - contact.beside_m(row),
+        dx_m: row.y_m - contact.other_m(row),
         trust,
     }
 }
 
 /// δX of a flank over the force that presses it, straight or bent.
-fn line(frame: &Scaling, contact: &Contact, flank: Flank, most_n: f64) -> Vec<(f64, f64)> {
+fn line(frame: &Scaling, contact: &FlankFit, flank: Flank, most_n: f64) -> Vec<(f64, f64)> {
     let side = flank.sign();
     let at = |k: usize| most_n * k as f64 / (POINTS - 1) as f64;
     (0..POINTS)

@@ -1,9 +1,11 @@
 //! Robust regression with Gaussian priors, and standard errors that know residuals to be dependent.
 
+use std::ops::Range;
+
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
 use super::design_matrix::DesignRow;
-use crate::simd::dispatch::{Lanes, simd_dispatch as widest};
+use crate::simd::dispatch::{Lanes, simd_dispatch};
 
 /// Residuals beyond this many times their spread lose weight (Huber).
 const HUBER: f64 = 2.0;
@@ -126,7 +128,7 @@ struct NormalEquations {
     right: [Lanes; 2],
 }
 
-widest! {
+simd_dispatch! {
     /// Whole squares: what is above the diagonal comes for nothing, and would come apart if it were left out.
     fn products<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> NormalEquations {
         let mut squares = [[Lanes::ZERO; Lanes::COUNT]; 3];
@@ -148,7 +150,7 @@ widest! {
 
 /// Adds a product to each entry of a square's first lines: lines by columns.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "see `widest`")]
+#[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
 fn add_products(square: &mut [Lanes; Lanes::COUNT], count: usize, lines: Lanes, columns: Lanes) {
     for (sum, line) in square.iter_mut().zip(lines.0).take(count) {
         *sum = sum.plus(Lanes::all(line).times(columns));
@@ -162,8 +164,19 @@ fn solve<const N: usize>(
     lent: [f64; N],
 ) -> Option<RobustFit<N>> {
     let (normal, right) = normal_equations(rows, &weights);
-    let mut normal = SMatrix::<f64, N, N>::from_fn(|i, j| normal[i][j]);
-    let mut right = SVector::<f64, N>::from(right);
+    let normal = SMatrix::<f64, N, N>::from_fn(|i, j| normal[i][j]);
+    let (beta, factor) = solve_normal(normal, SVector::<f64, N>::from(right), beliefs, &lent)?;
+    Some(RobustFit { beta: beta.into(), inverse: factor.inverse(), weights, lent, beliefs: *beliefs })
+}
+
+/// The coefficients of normal equations to which the priors are added.
+#[allow(clippy::type_complexity, reason = "a vector and the factor it came from")]
+fn solve_normal<const N: usize>(
+    mut normal: SMatrix<f64, N, N>,
+    mut right: SVector<f64, N>,
+    beliefs: &[GaussianPrior; N],
+    lent: &[f64; N],
+) -> Option<(SVector<f64, N>, Cholesky<f64, Const<N>>)> {
     for i in 0..N {
         normal[(i, i)] += lent[i];
         right[i] += lent[i] * beliefs[i].mean;
@@ -173,8 +186,7 @@ fn solve<const N: usize>(
         }
     }
     let factor: Cholesky<f64, Const<N>> = normal.cholesky()?;
-    let beta = factor.solve(&right);
-    Some(RobustFit { beta: beta.into(), inverse: factor.inverse(), weights, lent, beliefs: *beliefs })
+    Some((factor.solve(&right), factor))
 }
 
 impl<const N: usize> RobustFit<N> {
@@ -184,6 +196,36 @@ impl<const N: usize> RobustFit<N> {
 
     pub(super) fn residual_m(&self, row: &DesignRow<N>) -> f64 {
         row.y_m - self.predict_m(&row.x)
+    }
+
+    /// A coefficient refitted with the weights of this fit: over all rows whose column `by` is at least `least` in
+    /// size, and with one group of them left out in turn. None where too little remains.
+    pub(super) fn leave_one_out(
+        &self,
+        column: usize,
+        rows: &[DesignRow<N>],
+        groups: &[Range<usize>],
+        (by, least): (usize, f64),
+    ) -> Option<(f64, Vec<f64>)> {
+        let parts: Vec<_> = groups
+            .iter()
+            .map(|group| {
+                let chosen = rows[group.clone()].iter().zip(&self.weights[group.clone()]);
+                let weights: Vec<f64> =
+                    chosen.map(|(row, w)| if row.x[by].abs() < least { 0.0 } else { *w }).collect();
+                let (normal, right) = normal_equations(&rows[group.clone()], &weights);
+                (SMatrix::<f64, N, N>::from_fn(|i, j| normal[i][j]), SVector::<f64, N>::from(right))
+            })
+            .collect();
+        let mut total = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
+        for (normal, right) in &parts {
+            total = (total.0 + normal, total.1 + right);
+        }
+        let refitted = |(normal, right)| solve_normal(normal, right, &self.beliefs, &self.lent).map(|f| f.0[column]);
+        let whole = refitted(total)?;
+        let parts: Option<Vec<f64>> =
+            parts.iter().map(|part| refitted((total.0 - part.0, total.1 - part.1))).collect();
+        Some((whole, parts?))
     }
 
     /// How far each row was believed: its weight over that of a row no residual of which is large.

@@ -18,6 +18,8 @@ const RATIO: f64 = 0.01;
 /// Less than this at the ends of the travel may be the transducer's own error, m.
 const TRANSDUCER_M: f64 = 60e-6;
 
+/// A fault of the mapping is stated beyond this many standard errors.
+const SIGNIFICANT: f64 = 4.0;
 /// Rounds of reweighting.
 const ROUNDS: usize = 4;
 
@@ -41,10 +43,14 @@ pub(super) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<(), Rejectio
         (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, frame, k)).collect();
     let Some(found) = fit(&rows, &[GaussianPrior::NONE; COLUMNS], ROUNDS) else { return Ok(()) };
     let beta = &found.beta;
-    if beta[PLACE].abs() > (RATIO * frame.place_m.1).max(TRANSDUCER_M) {
+    let error_m = |column: usize| found.standard_error_m(column, &rows);
+    let least_m = (RATIO * frame.place_m.1).max(TRANSDUCER_M);
+    if beta[PLACE].abs() - SIGNIFICANT * error_m(PLACE) > least_m {
         return Err(Rejection::PositionRatio);
     }
-    if beta[SIDE] + beta[LOAD] > -FLIPPED * frame.windup_m() {
+    let windup_m = beta[SIDE] + beta[LOAD];
+    let doubt_m = SIGNIFICANT * error_m(SIDE).hypot(error_m(LOAD));
+    if windup_m + doubt_m > -FLIPPED * frame.windup_m() {
         return Ok(());
     }
     let drag_m = beta[SLIP] + beta[SPEED];
@@ -52,10 +58,10 @@ pub(super) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<(), Rejectio
 }
 
 fn row(blocks: &BlockMeans, frame: &Scaling, k: usize) -> Option<DesignRow<COLUMNS>> {
-    let (load, speed) = (blocks.load_n[k] / frame.load_n, blocks.rate(&blocks.motor_m, k));
+    let (load, speed) = (blocks.load_n[k] / frame.load_n, blocks.speed_m_per_s(k));
     let place = (blocks.motor_m[k] - frame.place_m.0) / frame.place_m.1;
     let slip = if speed.abs() > SLIP_M_PER_S { speed.signum() } else { 0.0 };
     let x = [1.0, 0.5 * load.signum(), load, slip, speed / SPEED_M_PER_S, place];
-    let row = DesignRow { x, y_m: blocks.dx_m[k], blocks: 1.0, stretch: 0 };
+    let row = DesignRow { x, y_m: blocks.dx_m[k], blocks: 1.0, stretch: blocks.stretch(k) };
     (row.y_m + speed + load + place).is_finite().then_some(row)
 }
