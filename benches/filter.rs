@@ -136,7 +136,7 @@ fn contact_regression(bencher: Bencher) {
         .collect();
     let segments = std::slice::from_ref(&whole);
     let samples = Samples { step_s: 0.004, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
-    let prior = PartPrior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
+    let prior = PartPrior::of_stiffness(5e7);
     let mut room = contact::FilterWorkspace::default();
     bencher
         .counter(ItemsCount::new(OUT_OF_CACHE))

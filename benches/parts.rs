@@ -52,7 +52,7 @@ fn run(part: &str, count: usize) -> Result<(), Error> {
     let whole = 0..count;
     let segments = std::slice::from_ref(&whole);
     let samples = Samples { step_s: STEP_S, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
-    let prior = PartPrior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
+    let prior = PartPrior::of_stiffness(5e7);
     let filter = filter()?;
     match part {
         "schedule" => drop(black_box(GainSchedule::new(&filter))),

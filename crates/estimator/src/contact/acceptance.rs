@@ -93,6 +93,8 @@ impl Rejection {
 pub enum QualityFlag {
     /// The gap is under two standard errors, or under a hundredth of the wind-up: read the upper bound.
     BelowDetection,
+    /// The published statistic at the fitted stiffness differs by more than both methods explain.
+    EstimatorsDisagree,
     /// 1/K lies more than three spreads from the part's.
     StiffnessImplausible,
     /// The 95 % load is under three times the friction.
@@ -110,6 +112,7 @@ impl QualityFlag {
     pub fn code(self) -> &'static str {
         match self {
             Self::BelowDetection => "below_detection",
+            Self::EstimatorsDisagree => "estimators_disagree",
             Self::StiffnessImplausible => "stiffness_implausible",
             Self::FrictionHeavy => "friction_heavy",
             Self::SoftContact => "soft_contact",
@@ -119,13 +122,14 @@ impl QualityFlag {
     }
 }
 
-pub(super) fn flags(found: &ContactEstimate, frame: &Scaling, is_soft: bool) -> Vec<QualityFlag> {
+pub(super) fn flags(found: &ContactEstimate, frame: &Scaling, is_soft: bool, agrees: bool) -> Vec<QualityFlag> {
     let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * frame.windup_m());
     let is_negative = found.gap_m < -SEEN * found.gap_se_m;
     let compliance = frame.stiffness_n_per_m / found.stiffness_n_per_m;
     let doubts = [
         (QualityFlag::GapNegative, is_negative),
-        (QualityFlag::BelowDetection, found.gap_m < least_m && !is_negative),
+        (QualityFlag::BelowDetection, found.gap_m < least_m && !is_negative && agrees),
+        (QualityFlag::EstimatorsDisagree, !agrees),
         (QualityFlag::StiffnessImplausible, (compliance - 1.0).abs() > IMPLAUSIBLE),
         (QualityFlag::FrictionHeavy, found.friction.is_heavy(found.load_p95_n)),
         (QualityFlag::SoftContact, is_soft),

@@ -158,10 +158,10 @@ impl BlockMeans {
     }
 
     /// Whether nothing of a block or its neighbours is missing and the flight has more than begun.
-    pub(super) fn is_sound(&self, k: usize) -> bool {
+    pub(super) fn is_complete(&self, k: usize) -> bool {
         let around = |values: &[f64]| values.get(k.wrapping_sub(1)..k + 2)?.as_array().copied();
         let rates = around(&self.motor_m).zip(around(&self.load_n));
-        rates.is_some_and(|(motor_m, load_n)| is_sound(self.time_s[k], self.dx_m[k], &motor_m, &load_n))
+        rates.is_some_and(|(motor_m, load_n)| is_complete(self.time_s[k], self.dx_m[k], &motor_m, &load_n))
     }
 
     /// Takes in a part of a long flight: windows in which the load changes sides most often, and others spread over the
@@ -284,7 +284,7 @@ fn read_later(logged: &[f64], shift: f64, read: &mut [f64]) {
 
 /// Whether δX of a block and the rates of the other two channels are known, and the flight has more than begun.
 #[inline]
-pub(super) fn is_sound(time_s: f64, dx_m: f64, motor_m: &[f64; 3], load_n: &[f64; 3]) -> bool {
+pub(super) fn is_complete(time_s: f64, dx_m: f64, motor_m: &[f64; 3], load_n: &[f64; 3]) -> bool {
     let all = dx_m + (motor_m[2] - motor_m[0]) + (load_n[2] - load_n[0]);
     (time_s > START_S) & (all.abs() < f64::INFINITY)
 }

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::block_means::{BlockMeans, is_sound};
+use super::block_means::{BlockMeans, is_complete};
 use super::design_matrix::{FIRM_SHARE, Flank, RowSource, Scaling};
 use super::friction_model::{CouplingForce, CouplingIntegrator, CouplingParams, Drive, FrictionState, ScrewState};
 use crate::simd::dispatch::{Lanes, simd_dispatch};
@@ -302,7 +302,7 @@ simd_dispatch! {
         let rates = blocks.motor_m.array_windows::<3>().zip(blocks.load_n.array_windows::<3>());
         for (((motor_m, load_n), (time_s, dx_m)), kept) in rates.zip(time_s.iter().zip(dx_m)).zip(&mut kept[inner])
         {
-            *kept = Touch(kept.0 * u8::from(is_sound(*time_s, *dx_m, motor_m, load_n)));
+            *kept = Touch(kept.0 * u8::from(is_complete(*time_s, *dx_m, motor_m, load_n)));
         }
     }
 }

@@ -130,6 +130,9 @@ pub struct ContactEstimate {
     pub touched_s: (f64, f64),
     /// Load magnitude that one sample in twenty exceeds, N.
     pub load_p95_n: f64,
+    /// The published mid-range statistic of the same flight with stiffness, load zero, delays, drift and transducer
+    /// error as found here, m: a check by another method.
+    pub midrange_at_fit_m: Option<f64>,
     /// Doubts that do not forbid the number.
     pub flags: Vec<QualityFlag>,
 }
@@ -174,7 +177,10 @@ pub fn estimate_with(
 ) -> Result<ContactOutcome, Error> {
     check(samples, prior)?;
     Ok(match look(samples, prior, room) {
-        Ok((frame, contact)) => ContactOutcome::Estimated(Box::new(report(&frame, prior, &contact))),
+        Ok((frame, contact)) => {
+            let midrange_m = flank_fit::midrange_at_fit_m(room, &frame, &contact, prior.unknown_force_n);
+            ContactOutcome::Estimated(Box::new(report(&frame, prior, &contact, midrange_m)))
+        }
         Err(refusal) => ContactOutcome::Refused(refusal),
     })
 }
@@ -216,7 +222,12 @@ fn look(
     Ok((frame, contact))
 }
 
-fn report(frame: &Scaling, prior: &PartPrior, contact: &FlankFit) -> ContactEstimate {
+fn report(
+    frame: &Scaling,
+    prior: &PartPrior,
+    contact: &FlankFit,
+    midrange_at_fit_m: Option<f64>,
+) -> ContactEstimate {
     let (gap_m, gap_se_m) = contact.gap_m;
     let (compliance, compliance_se) = contact.compliance_m_per_n;
     let loop_width = lost_motion::loop_width_m(contact);
@@ -241,9 +252,11 @@ fn report(frame: &Scaling, prior: &PartPrior, contact: &FlankFit) -> ContactEsti
         lost_motion_se_m: lost_motion.map(|(_, se_m)| se_m),
         touched_s: contact.touched_s,
         load_p95_n: frame.load_n,
+        midrange_at_fit_m,
         flags: Vec::new(),
     };
-    found.flags = acceptance::flags(&found, frame, contact.is_soft);
+    let agrees = found.agrees_with_midrange(prior.unknown_force_n.unwrap_or(0.0));
+    found.flags = acceptance::flags(&found, frame, contact.is_soft, agrees);
     found
 }
 
@@ -253,20 +266,15 @@ impl ContactEstimate {
         self.friction.at_n(self.load_p95_n)
     }
 
-    /// Whether the published mid-range statistic, computed with the stiffness fitted in this flight, agrees with the gap
-    /// as far as its own errors go.
+    /// Whether the published statistic at the fitted parameters agrees with the gap as far as its own errors go.
     ///
-    /// That statistic reads friction as backlash, about twice F_f/K, and half of it again where the screw rests; a gap of
-    /// zero as some noise and unknown force over K; and under vibration of the load up to a third too little.
-    pub fn agrees_with_midrange(&self, midrange_m: f64, noise_m: f64) -> bool {
+    /// That statistic reads friction as backlash, about twice F_f/K, a gap of zero as the unknown force over K, and under
+    /// vibration of the load up to a third too little.
+    fn agrees_with_midrange(&self, unknown_force_n: f64) -> bool {
+        let Some(midrange_m) = self.midrange_at_fit_m else { return true };
         let larger_m = midrange_m.abs().max(self.gap_m.abs());
-        let friction_m = self.friction_n() / self.stiffness_n_per_m;
-        let allowed_m = MIDRANGE_SHARE * larger_m + 2.0 * friction_m + 4.0 * noise_m + 3.0 * self.gap_se_m;
+        let force_n = self.friction_n() + 2.0 * unknown_force_n;
+        let allowed_m = MIDRANGE_SHARE * larger_m + 2.0 * force_n / self.stiffness_n_per_m + 3.0 * self.gap_se_m;
         (midrange_m - self.gap_m).abs() <= allowed_m
-    }
-
-    /// Withdraws the claim that the gap is below detection: the published statistic contradicts it.
-    pub fn withdraw_below_detection(&mut self) {
-        self.flags.retain(|flag| *flag != QualityFlag::BelowDetection);
     }
 }

@@ -43,6 +43,8 @@ pub(super) struct SearchResult {
     pub(super) found: GaussNewtonResult,
     /// Spread of the gaps of all candidates about the best one's, each weighted by its misfit, m.
     pub(super) spread_m: f64,
+    /// Scale of the residuals of single blocks, m.
+    pub(super) scale_m: f64,
     /// Standard error of the load zero, N.
     pub(super) load_zero_se_n: f64,
 }
@@ -95,6 +97,7 @@ impl<'a> ParameterSearch<'a> {
         Ok(SearchResult {
             found: best.found,
             spread_m: (squares / total.max(f64::MIN_POSITIVE)).sqrt(),
+            scale_m: self.scale_m,
             load_zero_se_n,
         })
     }
@@ -279,7 +282,7 @@ fn linear_parts(source: RowSource<'_>, beta: &[f64; COLUMNS], parts_m: &mut Vec<
     }
     parts_m.clear();
     parts_m.extend((0..source.blocks.len()).map(|k| {
-        if !source.blocks.is_sound(k) {
+        if !source.blocks.is_complete(k) {
             return f64::NAN;
         }
         let (x, y_m) = source.slow_columns(k);

@@ -45,7 +45,7 @@ impl Case {
         let samples =
             Samples { step_s: self.profile.sample_rate_hz.recip(), motor_m, dx_m, load_n, segments };
         let stiffness_n_per_m = self.plant.contact.stiffness_n_per_m * self.assumed_stiffness;
-        let prior = PartPrior { stiffness_n_per_m, reference_load_n: Some(4000.0), unknown_force_n: None };
+        let prior = PartPrior { reference_load_n: Some(4000.0), ..PartPrior::of_stiffness(stiffness_n_per_m) };
         contact::estimate(&samples, &prior).unwrap()
     }
 
@@ -163,7 +163,7 @@ fn a_flight_in_two_segments_with_missing_samples_shows_the_same_gap() {
         load_n: &flight.load_n,
         segments: &segments,
     };
-    let prior = PartPrior { stiffness_n_per_m: 5e7, reference_load_n: None, unknown_force_n: None };
+    let prior = PartPrior::of_stiffness(5e7);
     let found = gap(contact::estimate(&samples, &prior).unwrap());
     assert!((found.gap_m / 100e-6 - 1.0).abs() < 5e-3, "{found:?}");
 }
@@ -231,7 +231,7 @@ proptest! {
         let segments = [0..0, 0..3, 3..4000, 4100..8000];
         let samples =
             Samples { step_s: rate_hz.recip(), motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments: &segments };
-        let prior = PartPrior { stiffness_n_per_m: 5e7, reference_load_n: Some(1e3), unknown_force_n: None };
+        let prior = PartPrior { reference_load_n: Some(1e3), ..PartPrior::of_stiffness(5e7) };
         if let ContactOutcome::Estimated(gap) = contact::estimate(&samples, &prior).unwrap() {
             prop_assert!(gap.gap_m.is_finite() && gap.gap_se_m > 0.0 && gap.stiffness_n_per_m.is_finite());
         }
@@ -241,7 +241,7 @@ proptest! {
 #[test]
 fn a_prior_that_cannot_be_is_an_error() {
     let samples = Samples { step_s: 0.01, motor_m: &[], dx_m: &[], load_n: &[], segments: &[] };
-    let prior = PartPrior { stiffness_n_per_m: 0.0, reference_load_n: None, unknown_force_n: None };
+    let prior = PartPrior::of_stiffness(0.0);
     assert!(matches!(contact::estimate(&samples, &prior), Err(Error::Parameter { .. })));
     let nothing = contact::estimate(&samples, &PartPrior { stiffness_n_per_m: 5e7, ..prior });
     assert_eq!(nothing, Ok(ContactOutcome::Refused(Rejection::ChannelConstant)));
@@ -263,7 +263,7 @@ fn a_picture_shows_the_flanks_a_gap_apart_and_the_stretches_on_them() {
         segments: std::slice::from_ref(&whole),
     };
     let stiffness_n_per_m = case.plant.contact.stiffness_n_per_m;
-    let prior = PartPrior { stiffness_n_per_m, reference_load_n: None, unknown_force_n: None };
+    let prior = PartPrior::of_stiffness(stiffness_n_per_m);
     let picture = contact::plot_data(&samples, &prior).unwrap().unwrap();
     let (upper, lower) = (picture.upper[0], picture.lower[0]);
     assert_eq!((upper.0, lower.0.abs()), (0.0, 0.0));
