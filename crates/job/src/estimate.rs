@@ -40,7 +40,7 @@ pub fn estimate(
                 };
             let outcome = contact::estimate_with(&samples(channels), &prior, &mut workspaces.contact)
                 .map_err(failed)?;
-            Ok(combine_methods(published.as_ref(), &outcome, &prior, settings.method))
+            Ok(combine_methods(published.as_ref(), &outcome, settings.method))
         })?
     };
     estimate.temperature_c = channels.temperature_c;
@@ -120,6 +120,11 @@ pub fn prior(part: &Part) -> PartPrior {
         stiffness_n_per_m: part.actuator.stiffness_n_per_m(),
         reference_load_n: part.reference_load_n,
         unknown_force_n,
+        period_m: match part.geometry {
+            Geometry::Linear { lead_m_per_rev } => lead_m_per_rev,
+            Geometry::Rotary { .. } => None,
+        },
+        output_locked: false,
     }
 }
 
@@ -143,7 +148,6 @@ fn pre_check_rejection(channels: &ActuatorChannels) -> Option<&'static str> {
 fn combine_methods(
     published: Option<&MidRangeEstimate>,
     outcome: &ContactOutcome,
-    prior: &PartPrior,
     method: Method,
 ) -> GapEstimate {
     let mut estimate = match outcome {
@@ -159,10 +163,7 @@ fn combine_methods(
     estimate.load_p05_n = Some(published.load.p05_n);
     estimate.load_p95_n = Some(published.load.p95_n);
     estimate.nis = Some(published.nis);
-    if let ContactOutcome::Estimated(found) = outcome {
-        if !found.explains(published.gap.gap_m, prior) {
-            estimate.flags.push("estimators_disagree".into());
-        }
+    if estimate.status == Status::Estimated {
         if method == Method::Midrange {
             estimate.gap_m = Some(published.gap.gap_m);
             // The naive standard error of this statistic covers 4–21 %: none is better.
@@ -190,6 +191,12 @@ fn from_contact(found: &ContactEstimate) -> GapEstimate {
         loop_width_se_m: found.loop_width_se_m,
         lost_motion_m: found.lost_motion_m,
         lost_motion_se_m: found.lost_motion_se_m,
+        load_zero_n: Some(found.load_zero_n),
+        load_zero_se_n: Some(found.load_zero_se_n),
+        load_delay_s: Some(found.load_delay_s),
+        load_delay_se_s: Some(found.load_delay_se_s),
+        friction_n: Some(found.friction_n()),
+        gap_midrange_fitted_m: found.midrange_at_fit_m,
         reason: None,
         ..GapEstimate::refused("")
     }

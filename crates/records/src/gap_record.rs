@@ -80,6 +80,18 @@ pub struct GapEstimate {
     pub lost_motion_m: Option<f64>,
     /// Its standard error, m.
     pub lost_motion_se_m: Option<f64>,
+    /// Zero of the load channel fitted in this flight, N: what it reads under no load.
+    pub load_zero_n: Option<f64>,
+    /// Its standard error, N.
+    pub load_zero_se_n: Option<f64>,
+    /// Estimated and corrected delay of the load channel relative to the motor channel, s.
+    pub load_delay_s: Option<f64>,
+    /// Its standard error, s.
+    pub load_delay_se_s: Option<f64>,
+    /// Friction of the screw in motion at the 95 % load, N.
+    pub friction_n: Option<f64>,
+    /// ΔS by equations 29–31 with the stiffness, load zero and delays fitted in this flight, m: a check of `gap_m`.
+    pub gap_midrange_fitted_m: Option<f64>,
     /// Reference radius of a purely rotary part: metres of gap per radian, m/rad.
     pub reference_radius_m: Option<f64>,
     /// Number of load reversals.
@@ -120,6 +132,12 @@ impl GapEstimate {
             loop_width_se_m: None,
             lost_motion_m: None,
             lost_motion_se_m: None,
+            load_zero_n: None,
+            load_zero_se_n: None,
+            load_delay_s: None,
+            load_delay_se_s: None,
+            friction_n: None,
+            gap_midrange_fitted_m: None,
             reference_radius_m: None,
             load_reversals: 0,
             samples: 0,

@@ -122,7 +122,12 @@ impl QualityFlag {
     }
 }
 
-pub(super) fn flags(found: &ContactEstimate, frame: &Scaling, is_soft: bool, agrees: bool) -> Vec<QualityFlag> {
+pub(super) fn flags(
+    found: &ContactEstimate,
+    frame: &Scaling,
+    is_soft: bool,
+    agrees: bool,
+) -> Vec<QualityFlag> {
     let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * frame.windup_m());
     let is_negative = found.gap_m < -SEEN * found.gap_se_m;
     let compliance = frame.stiffness_n_per_m / found.stiffness_n_per_m;

@@ -5,10 +5,10 @@ use std::ops::Range;
 use crate::Samples;
 use crate::simd::dispatch::{Lanes, simd_dispatch};
 
-use super::{PartPrior, SHORTEST_S};
 use super::acceptance::Rejection;
 use super::design_matrix::middle_and_half;
 use super::spikes::SpikeThreshold;
+use super::{PartPrior, SHORTEST_S};
 
 /// Length of a block, s: short against vibration of the load, which would mix both flanks in one mean.
 const PERIOD_S: f64 = 0.004;
@@ -57,6 +57,8 @@ pub(super) struct BlockMeans {
     screw_m: Vec<f64>,
     /// F as it was logged, N.
     logged_n: Vec<f64>,
+    /// Sine and cosine of the screw's position within the period of its errors; empty where none are looked for.
+    pub(super) phases: Vec<[f64; 2]>,
 }
 
 impl BlockMeans {
@@ -99,6 +101,7 @@ impl BlockMeans {
             column.reserve(blocks);
         }
         starts.clear();
+        self.phases.clear();
         self.period_s = period_s;
     }
 
@@ -202,7 +205,8 @@ impl BlockMeans {
             .collect();
         by_reversals.sort_by_key(|&(number, reversals)| (std::cmp::Reverse(reversals), number));
         let busy = by_reversals.len().min(count / 2);
-        let mut rest: Vec<usize> = by_reversals.split_off(busy).into_iter().map(|(number, _)| number).collect();
+        let mut rest: Vec<usize> =
+            by_reversals.split_off(busy).into_iter().map(|(number, _)| number).collect();
         rest.sort_unstable();
         let stride = rest.len().div_ceil((count - busy).max(1)).max(1);
         let mut chosen: Vec<usize> = rest.into_iter().step_by(stride).collect();
@@ -237,6 +241,16 @@ impl BlockMeans {
         }
     }
 
+    /// Sine and cosine of the screw's position, of which one period has 2π over so many metres.
+    pub(super) fn find_phases(&mut self, per_period: f64) {
+        self.phases.clear();
+        let phase = |screw_m: &f64| {
+            let (sine, cosine) = (screw_m * per_period).sin_cos();
+            [sine, cosine]
+        };
+        self.phases.extend(self.screw_m.iter().map(phase));
+    }
+
     /// e^−(v/v_s)² of every block, v by the difference over [`SPEED_S`] on either side.
     fn find_slowness(&mut self) {
         let reach = ((SPEED_S / self.period_s).round() as usize).max(1);
@@ -245,7 +259,8 @@ impl BlockMeans {
         let segments: Vec<Range<usize>> = self.segments().collect();
         for segment in segments {
             for k in segment.clone() {
-                let (from, to) = (k.saturating_sub(reach).max(segment.start), (k + reach).min(segment.end - 1));
+                let (from, to) =
+                    (k.saturating_sub(reach).max(segment.start), (k + reach).min(segment.end - 1));
                 let travel_m = self.motor_m[to] - self.motor_m[from];
                 let speed = travel_m / ((to - from).max(1) as f64 * self.period_s * STRIBECK_M_PER_S);
                 self.slowness[k] = if speed.is_finite() { (-speed * speed).exp() } else { 0.0 };

@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use super::block_means::{BlockMeans, is_complete};
 use super::design_matrix::{FIRM_SHARE, Flank, RowSource, Scaling};
-use super::friction_model::{CouplingForce, CouplingIntegrator, CouplingParams, Drive, FrictionState, ScrewState};
+use super::friction_model::{
+    CouplingForce, CouplingIntegrator, CouplingParams, Drive, FrictionState, ScrewState,
+};
 use crate::simd::dispatch::{Lanes, simd_dispatch};
 
 /// Blocks before one that must keep its flank and firmness; one after it must as well.
@@ -306,4 +308,3 @@ simd_dispatch! {
         }
     }
 }
-

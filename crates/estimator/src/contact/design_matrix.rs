@@ -111,7 +111,8 @@ impl Scaling {
             time_s,
             place_m,
             per_load: load_n.recip(),
-            per_place: place_m.1.max(f64::MIN_POSITIVE).recip(),
+            // A locked screw shows nothing of its transducer.
+            per_place: if prior.output_locked { 0.0 } else { place_m.1.recip() },
             per_time: time_s.1.recip(),
             per_speed: (two_blocks_s * SPEED_M_PER_S).recip(),
             per_load_rate: LATE_S / (two_blocks_s * load_n),
@@ -124,11 +125,6 @@ impl Scaling {
     /// The wind-up of the part at the 95 % load, m.
     pub(super) fn windup_m(&self) -> f64 {
         self.load_n / self.stiffness_n_per_m
-    }
-
-    /// Sine and cosine of a position within the period.
-    fn phase(&self, place_m: f64) -> (f64, f64) {
-        ((place_m - self.place_m.0) * self.per_period).sin_cos()
     }
 
     /// A time from −1 at the start of the flight to 1 at its end.
@@ -213,9 +209,7 @@ pub(super) fn rows(source: RowSource<'_>, state: &FrictionState, path: &mut Coup
     let mut stretch = None;
     for segment in blocks.segments() {
         let mut first = segment.start;
-        while let Some((touch, run)) =
-            path.next_stable_run(blocks, first..segment.end, scaling.row_blocks)
-        {
+        while let Some((touch, run)) = path.next_stable_run(blocks, first..segment.end, scaling.row_blocks) {
             first = run.end;
             let here = blocks.stretch(run.start);
             if stretch != Some(here) {
@@ -295,9 +289,8 @@ impl RowSource<'_> {
         sum.x[PLACE_SQUARE] = sums[8];
         sum.x[PLACE_CUBE] = sums[9];
         sum.x[FORCE_DRIFT] = sums[10] * scaling.per_load;
-        if scaling.per_period > 0.0 {
-            for k in first..end {
-                let (sine, cosine) = scaling.phase(blocks.motor_m[k] + blocks.dx_m[k]);
+        if let Some(phases) = blocks.phases.get(first..end) {
+            for [sine, cosine] in phases {
                 sum.x[PERIODIC] += sine;
                 sum.x[PERIODIC_COSINE] += cosine;
             }
@@ -318,8 +311,8 @@ impl RowSource<'_> {
         x[LOAD_RATE] = (blocks.load_n[k + 1] - blocks.load_n[k - 1]) * scaling.per_load_rate;
         (x[DRIFT], x[DRIFT_SQUARE]) = (time, time * time);
         (x[PLACE], x[PLACE_SQUARE], x[PLACE_CUBE]) = (place, place * place, place * place * place);
-        if scaling.per_period > 0.0 {
-            (x[PERIODIC], x[PERIODIC_COSINE]) = scaling.phase(blocks.motor_m[k] + blocks.dx_m[k]);
+        if let Some([sine, cosine]) = blocks.phases.get(k) {
+            (x[PERIODIC], x[PERIODIC_COSINE]) = (*sine, *cosine);
         }
         (x, blocks.dx_m[k])
     }

@@ -9,7 +9,8 @@ use std::ops::Range;
 use super::ContactWorkspace;
 use super::acceptance::Rejection;
 use super::design_matrix::{
-    COLUMNS, DesignRow, FIRM_SHARE, FORCE, GAP, LATE_S, LOAD_RATE, ORIGIN, RowSource, SPEED, SPEED_M_PER_S, Scaling,
+    COLUMNS, DesignRow, FIRM_SHARE, FORCE, GAP, LATE_S, LOAD_RATE, ORIGIN, PERIODIC, RowSource, SPEED,
+    SPEED_M_PER_S, Scaling,
 };
 use super::friction_model::FrictionState;
 use super::gauss_newton::{GaussNewtonResult, search};
@@ -46,6 +47,9 @@ const MODE_RAD_PER_S: f64 = 2500.0;
 const UNKNOWN_FORCE_SHARE: f64 = 0.02;
 /// Bandwidth of the backlash in that check, Hz.
 const BANDWIDTH_HZ: f64 = 10.0;
+
+/// Periodic errors that are smaller do not matter, m.
+const LEAST_PERIODIC_M: f64 = 2e-7;
 
 /// How much each part of the doubt about a gap weighs; see [`Doubt`].
 const WEIGHTS: Doubt = Doubt {
@@ -100,7 +104,12 @@ impl Doubt {
     }
 
     fn standard_error_m(&self) -> f64 {
-        self.parts().iter().zip(WEIGHTS.parts()).map(|(part_m, weight)| (part_m * weight).powi(2)).sum::<f64>().sqrt()
+        self.parts()
+            .iter()
+            .zip(WEIGHTS.parts())
+            .map(|(part_m, weight)| (part_m * weight).powi(2))
+            .sum::<f64>()
+            .sqrt()
     }
 }
 
@@ -221,15 +230,30 @@ pub(super) fn midrange_at_fit_m(
 /// Searches an excerpt of a long flight, and iterates over the whole from there.
 fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<SearchResult, Rejection> {
     let ContactWorkspace { whole, excerpt, path } = workspace;
+    let has_period = scaling.per_period > 0.0;
+    if has_period {
+        if excerpt.is_empty() { &mut *whole } else { &mut *excerpt }.find_phases(scaling.per_period);
+    }
     if !excerpt.is_empty()
         && let Ok(best) = ParameterSearch::new(excerpt, path, scaling).run()
     {
+        if has_period && is_periodic(&best.found) {
+            whole.find_phases(scaling.per_period);
+        }
         let (most, least) = WHOLE_ITERATIONS;
         let iterations = if whole.len() < SHORT_BLOCKS { most } else { least };
         let found = search((whole, path), scaling, best.found.state, iterations)?;
         return Ok(SearchResult { found, ..best });
     }
     ParameterSearch::new(whole, path, scaling).run()
+}
+
+/// Whether errors that repeat with the position are there for certain, and matter.
+fn is_periodic(found: &GaussNewtonResult) -> bool {
+    [PERIODIC, PERIODIC + 1].into_iter().any(|column| {
+        let size_m = found.fit.beta[column].abs();
+        size_m > LEAST_PERIODIC_M && size_m > 3.0 * found.fit.standard_error_m(column, &found.design.firm)
+    })
 }
 
 /// The gap, the doubt about it, and by how many errors the fit of higher loads differs.

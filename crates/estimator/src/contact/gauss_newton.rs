@@ -4,8 +4,8 @@ use super::acceptance::Rejection;
 use super::block_means::BlockMeans;
 use super::coupling_path::CouplingPath;
 use super::design_matrix::{
-    self, COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LATE_S, LOAD_RATE, ORIGIN, PERIODIC, PLACE,
-    RowSource, SHARE, SPEED, SPEED_M_PER_S, STRIBECK, Scaling,
+    self, COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LATE_S, LOAD_RATE, ORIGIN, PERIODIC,
+    PLACE, RowSource, SHARE, SPEED, SPEED_M_PER_S, STRIBECK, Scaling,
 };
 use super::friction_model::{Friction, FrictionState};
 use super::robust_regression::{GaussianPrior, RobustFit, fit};
@@ -21,6 +21,8 @@ const FRICTION_SHARE: (f64, f64) = (0.03, 0.06);
 const STRIBECK_EXCESS: f64 = 0.3;
 /// Spread of the delays between channels, s.
 const SKEW_S: f64 = 5e-3;
+/// The same where the output is locked: what is left to viscous friction, s.
+const LOCKED_SKEW_S: f64 = 1e-4;
 /// Spread of the drift within a flight, linear and quadratic, m.
 const DRIFT_M: [f64; 2] = [50e-6, 20e-6];
 /// Spread of the transducer's error at the ends of the stroke, m.
@@ -129,8 +131,10 @@ fn check_contact(design: &DesignMatrix) -> Result<(), Rejection> {
 fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior; COLUMNS] {
     let windup_m = scaling.windup_m();
     let here_m = scaling.load_n / state.stiffness_n_per_m;
-    let lack =
-        |(usual, spread): (f64, f64), now: f64| GaussianPrior { mean: (usual - now) * here_m, sd: spread * here_m };
+    let lack = |(usual, spread): (f64, f64), now: f64| GaussianPrior {
+        mean: (usual - now) * here_m,
+        sd: spread * here_m,
+    };
     let zero = |sd: f64| GaussianPrior { mean: 0.0, sd };
     std::array::from_fn(|column| match column {
         ORIGIN | GAP => GaussianPrior::NONE,
@@ -139,6 +143,8 @@ fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior; COLUMNS] 
         SHARE => lack(FRICTION_SHARE, state.friction.lost_share),
         STRIBECK => lack((0.0, STRIBECK_EXCESS), state.stribeck),
         // The delays that remain once the channels are realigned.
+        // A screw that is locked has no delay.
+        SPEED if scaling.motor_sense < 0.0 => zero(LOCKED_SKEW_S * SPEED_M_PER_S),
         SPEED => GaussianPrior { mean: state.skew_s * SPEED_M_PER_S, sd: SKEW_S * SPEED_M_PER_S },
         LOAD_RATE => GaussianPrior {
             mean: -(state.load_delay_s + state.load_lag_s) / LATE_S * here_m,
@@ -154,8 +160,8 @@ fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior; COLUMNS] 
 fn next(scaling: &Scaling, state: &FrictionState, fit: &RobustFit<COLUMNS>) -> FrictionState {
     let beta = &fit.beta;
     let windup_m = scaling.windup_m();
-    let stiffness = scaling.load_n
-        / beta[FORCE].clamp(windup_m / MAX_STIFFNESS_STEP, windup_m * MAX_STIFFNESS_STEP);
+    let stiffness =
+        scaling.load_n / beta[FORCE].clamp(windup_m / MAX_STIFFNESS_STEP, windup_m * MAX_STIFFNESS_STEP);
     let lacking = |column: usize| beta[column] * stiffness / scaling.load_n;
     let late_s = lacking(LOAD_RATE) * LATE_S;
     FrictionState {

@@ -1,6 +1,6 @@
 //! Lost motion measured rather than extrapolated: at zero load, and at a reference load.
 
-use super::design_matrix::{DesignRow, FORCE, Flank, GAP, COLUMNS, Scaling};
+use super::design_matrix::{COLUMNS, DesignRow, FORCE, Flank, GAP, Scaling};
 use super::flank_fit::FlankFit;
 
 /// Rows this near to the reference load count, as a share of it.
@@ -17,12 +17,7 @@ const FEWEST_ROWS: usize = 5;
 pub(super) fn loop_width_m(contact: &FlankFit) -> Option<(f64, f64)> {
     let light = &contact.line.design.light;
     let beyond_m = |flank| beyond_m(contact, light.iter(), flank);
-    Some(put_together(
-        contact,
-        contact.line.fit.beta[GAP],
-        beyond_m(Flank::Upper)?,
-        beyond_m(Flank::Lower)?,
-    ))
+    Some(put_together(contact, contact.line.fit.beta[GAP], beyond_m(Flank::Upper)?, beyond_m(Flank::Lower)?))
 }
 
 /// Relative travel between + and − a load in the coupling and its standard error, m: rows near it on either

@@ -274,7 +274,8 @@ impl ContactEstimate {
         let Some(midrange_m) = self.midrange_at_fit_m else { return true };
         let larger_m = midrange_m.abs().max(self.gap_m.abs());
         let force_n = self.friction_n() + 2.0 * unknown_force_n;
-        let allowed_m = MIDRANGE_SHARE * larger_m + 2.0 * force_n / self.stiffness_n_per_m + 3.0 * self.gap_se_m;
+        let allowed_m =
+            MIDRANGE_SHARE * larger_m + 2.0 * force_n / self.stiffness_n_per_m + 3.0 * self.gap_se_m;
         (midrange_m - self.gap_m).abs() <= allowed_m
     }
 }

@@ -7,9 +7,7 @@
 use super::acceptance::Rejection;
 use super::block_means::BlockMeans;
 use super::coupling_path::CouplingPath;
-use super::design_matrix::{
-    COLUMNS, DRY, FORCE, FORCE_DRIFT, GAP, RowSource, SHARE, STRIBECK, Scaling,
-};
+use super::design_matrix::{COLUMNS, DRY, FORCE, FORCE_DRIFT, GAP, RowSource, SHARE, STRIBECK, Scaling};
 use super::friction_model::{Friction, FrictionState};
 use super::gauss_newton::{GaussNewtonResult, search, start};
 
@@ -168,12 +166,17 @@ impl<'a> ParameterSearch<'a> {
     fn zero_error_n(&mut self, best: &Candidate) -> f64 {
         let step_n = ZERO_ERROR_STEP * self.scaling.load_n;
         let zero_n = best.found.at.load_zero_n;
-        let around = [zero_n - step_n, zero_n, zero_n + step_n].map(|zero_n| self.misfit(&best.found, zero_n));
+        let around =
+            [zero_n - step_n, zero_n, zero_n + step_n].map(|zero_n| self.misfit(&best.found, zero_n));
         let curvature = (around[0] - 2.0 * around[1] + around[2]) / (step_n * step_n);
         let independent = self.blocks.len() as f64 * (self.blocks.period_s / INDEPENDENT_S).min(1.0);
         let variance_n2 = (curvature * independent).recip();
         let least_n = ZERO_STEPS.1 * self.scaling.load_n;
-        if curvature > 0.0 { variance_n2.sqrt().clamp(least_n, self.scaling.load_n) } else { self.scaling.load_n }
+        if curvature > 0.0 {
+            variance_n2.sqrt().clamp(least_n, self.scaling.load_n)
+        } else {
+            self.scaling.load_n
+        }
     }
 
     fn improve_lag(&mut self, best: &mut Candidate) -> bool {

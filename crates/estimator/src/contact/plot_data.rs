@@ -1,7 +1,7 @@
 //! What the estimate stands on, as one would draw it: δX against the force in the coupling.
 
 pub use super::design_matrix::Flank;
-use super::design_matrix::{DesignRow, FORCE, GAP, COLUMNS, Scaling};
+use super::design_matrix::{COLUMNS, DesignRow, FORCE, GAP, Scaling};
 use super::flank_fit::FlankFit;
 
 /// Points of a flank's line.
@@ -38,8 +38,7 @@ pub struct ContactPlot {
 impl ContactPlot {
     pub(super) fn of(frame: &Scaling, contact: &FlankFit) -> Self {
         let design = &contact.line.design;
-        let firm =
-            design.firm.iter().zip(contact.line.fit.trusts(&design.firm)).map(|(r, t)| (r, Some(t)));
+        let firm = design.firm.iter().zip(contact.line.fit.trusts(&design.firm)).map(|(r, t)| (r, Some(t)));
         let light = design.light.iter().map(|row| (row, None));
         let touches: Vec<Touch> =
             firm.chain(light).map(|(row, trust)| touch(frame, contact, row, trust)).collect();

@@ -221,7 +221,8 @@ impl<const N: usize> RobustFit<N> {
         for (normal, right) in &parts {
             total = (total.0 + normal, total.1 + right);
         }
-        let refitted = |(normal, right)| solve_normal(normal, right, &self.beliefs, &self.lent).map(|f| f.0[column]);
+        let refitted =
+            |(normal, right)| solve_normal(normal, right, &self.beliefs, &self.lent).map(|f| f.0[column]);
         let whole = refitted(total)?;
         let parts: Option<Vec<f64>> =
             parts.iter().map(|part| refitted((total.0 - part.0, total.1 - part.1))).collect();

@@ -45,7 +45,8 @@ impl Case {
         let samples =
             Samples { step_s: self.profile.sample_rate_hz.recip(), motor_m, dx_m, load_n, segments };
         let stiffness_n_per_m = self.plant.contact.stiffness_n_per_m * self.assumed_stiffness;
-        let prior = PartPrior { reference_load_n: Some(4000.0), ..PartPrior::of_stiffness(stiffness_n_per_m) };
+        let prior =
+            PartPrior { reference_load_n: Some(4000.0), ..PartPrior::of_stiffness(stiffness_n_per_m) };
         contact::estimate(&samples, &prior).unwrap()
     }
 

@@ -69,7 +69,8 @@ impl Log {
     fn contact(&self) -> ContactOutcome {
         let whole = 0..self.dx_m.len();
         let stiffness_n_per_m = self.number("assumed", "stiffness_n_per_m");
-        let prior = PartPrior { reference_load_n: Some(3000.0), ..PartPrior::of_stiffness(stiffness_n_per_m) };
+        let prior =
+            PartPrior { reference_load_n: Some(3000.0), ..PartPrior::of_stiffness(stiffness_n_per_m) };
         contact::estimate(&self.samples(std::slice::from_ref(&whole)), &prior).unwrap()
     }
 

@@ -82,6 +82,12 @@ impl RowSchema for GapRecord {
         Column::nullable("skew_se_s", Getter::Number(|r| r.estimate.skew_se_s)),
         Column::nullable("loop_width_se_m", Getter::Number(|r| r.estimate.loop_width_se_m)),
         Column::nullable("lost_motion_se_m", Getter::Number(|r| r.estimate.lost_motion_se_m)),
+        Column::nullable("load_zero_n", Getter::Number(|r| r.estimate.load_zero_n)),
+        Column::nullable("load_zero_se_n", Getter::Number(|r| r.estimate.load_zero_se_n)),
+        Column::nullable("load_delay_s", Getter::Number(|r| r.estimate.load_delay_s)),
+        Column::nullable("load_delay_se_s", Getter::Number(|r| r.estimate.load_delay_se_s)),
+        Column::nullable("friction_n", Getter::Number(|r| r.estimate.friction_n)),
+        Column::nullable("gap_midrange_fitted_m", Getter::Number(|r| r.estimate.gap_midrange_fitted_m)),
     ];
 
     fn from_cells(cells: &mut CellReader<'_>) -> Result<Self, Error> {
@@ -99,7 +105,18 @@ impl RowSchema for GapRecord {
         let unit_hours = cells.number();
         let (estimate, provenance) = (estimate(cells)?, provenance(cells)?);
         let [skew_se_s, loop_width_se_m, lost_motion_se_m] = [cells.number(), cells.number(), cells.number()];
-        let estimate = GapEstimate { skew_se_s, loop_width_se_m, lost_motion_se_m, ..estimate };
+        let estimate = GapEstimate {
+            skew_se_s,
+            loop_width_se_m,
+            lost_motion_se_m,
+            load_zero_n: cells.number(),
+            load_zero_se_n: cells.number(),
+            load_delay_s: cells.number(),
+            load_delay_se_s: cells.number(),
+            friction_n: cells.number(),
+            gap_midrange_fitted_m: cells.number(),
+            ..estimate
+        };
         Ok(Self { flight, position, part_number, serial_number, unit_hours, estimate, provenance })
     }
 }
@@ -117,11 +134,8 @@ fn estimate(cells: &mut CellReader<'_>) -> Result<GapEstimate, Error> {
         stiffness_n_per_m: cells.number(),
         stiffness_se_n_per_m: cells.number(),
         skew_s: cells.number(),
-        skew_se_s: None,
         loop_width_m: cells.number(),
-        loop_width_se_m: None,
         lost_motion_m: cells.number(),
-        lost_motion_se_m: None,
         reference_radius_m: cells.number(),
         load_reversals: cells.count()?,
         samples: cells.count()?,
@@ -131,6 +145,7 @@ fn estimate(cells: &mut CellReader<'_>) -> Result<GapEstimate, Error> {
         load_p95_n: cells.number(),
         temperature_c: cells.number(),
         nis: cells.number(),
+        ..GapEstimate::refused("")
     })
 }
 

@@ -39,7 +39,7 @@ prop_compose! {
         status in prop_oneof![Just(Status::Estimated), Just(Status::Refused)],
         reason in prop::option::of(text()),
         flags in prop::collection::vec(text(), 0..4),
-        n in prop::array::uniform18(number()),
+        n in prop::array::uniform24(number()),
         counts in prop::array::uniform4(any::<i64>()),
     ) -> GapEstimate {
         let [load_reversals, samples, samples_upper, samples_lower] = counts;
@@ -50,6 +50,8 @@ prop_compose! {
             lost_motion_m: n[9], reference_radius_m: n[10],
             load_reversals, samples, samples_upper, samples_lower,
             skew_se_s: n[15], loop_width_se_m: n[16], lost_motion_se_m: n[17],
+            load_zero_n: n[18], load_zero_se_n: n[19], load_delay_s: n[20], load_delay_se_s: n[21],
+            friction_n: n[22], gap_midrange_fitted_m: n[23],
             load_p05_n: n[11], load_p95_n: n[12], temperature_c: n[13], nis: n[14],
         }
     }
@@ -125,7 +127,8 @@ fn the_columns_are_those_of_the_contract_in_its_order() {
         stiffness_n_per_m stiffness_se_n_per_m skew_s loop_width_m lost_motion_m reference_radius_m \
         load_reversals samples samples_upper samples_lower load_p05_n load_p95_n temperature_c nis log_path \
         log_digest config_digest program_version run_id processed_utc";
-    let later = "skew_se_s loop_width_se_m lost_motion_se_m";
+    let later = "skew_se_s loop_width_se_m lost_motion_se_m load_zero_n load_zero_se_n load_delay_s \
+        load_delay_se_s friction_n gap_midrange_fitted_m";
     assert_eq!(names, contract.split_whitespace().chain(later.split_whitespace()).collect::<Vec<_>>());
 }
 
