@@ -181,14 +181,15 @@ pub(super) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
 /// The published mid-range statistic (equations 18–31) of the block means, m, with what the regression found: stiffness,
 /// load zero and delays, drift and transducer error taken off. None where the filter gives none.
 ///
-/// It takes the screw's mass and damping, which move it by less than 0.1 %, from a mode of 400 Hz.
+/// Of a long flight the excerpt is taken. It takes the screw's mass and damping, which move it by less than 0.1 %, from a mode of 400 Hz.
 pub(super) fn midrange_at_fit_m(
     workspace: &mut ContactWorkspace,
     scaling: &Scaling,
     fit: &FlankFit,
     unknown_force_n: Option<f64>,
 ) -> Option<f64> {
-    let blocks = &workspace.whole;
+    let ContactWorkspace { whole, excerpt, .. } = workspace;
+    let blocks = if excerpt.is_empty() { whole } else { excerpt };
     let mut beta = fit.line.fit.beta;
     beta[ORIGIN] = 0.0;
     let source = RowSource { blocks, scaling };
