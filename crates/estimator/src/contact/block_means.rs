@@ -133,7 +133,8 @@ impl BlockMeans {
 
     /// One more block, of which all is known but its time.
     #[cfg(test)]
-    pub(super) fn put(&mut self, [motor_m, dx_m, load_n]: [f64; 3]) {
+    pub(super) fn put(&mut self, [motor_m, dx_m, load_n]: [f64; 3], slowness: f64) {
+        self.slowness.push(slowness);
         self.time_s.push(self.len() as f64 * PERIOD_S);
         self.push(Some([motor_m, dx_m, load_n]));
     }
@@ -268,7 +269,8 @@ impl BlockMeans {
                 let speed = travel_m / ((to - from).max(1) as f64 * self.period_s * STRIBECK_M_PER_S);
                 let square = speed * speed;
                 // The exponential's own series up to the fourth power, below: no more than 0.02 off, and no call.
-                let series = 1.0 + square * (1.0 + square * (0.5 + square * (SIXTH + square * TWENTY_FOURTH)));
+                let series =
+                    1.0 + square * (1.0 + square * (0.5 + square * (SIXTH + square * TWENTY_FOURTH)));
                 self.slowness[k] = if square.is_finite() { series.recip() } else { 0.0 };
             }
         }

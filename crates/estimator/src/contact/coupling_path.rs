@@ -308,3 +308,73 @@ simd_dispatch! {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::friction_model::Friction;
+    use super::*;
+
+    proptest! {
+        /// However a flight is cut, and whatever is missing of it, eight integrations in parallel lanes are bitwise one
+        /// sequential integration. Motors that rest leave the screw held for long; so does friction beyond any load.
+        #[test]
+        fn parallel_lanes_are_one_integration(
+            steps in proptest::collection::vec((-3_i32..4, -40_i32..41, 0_u8..30), 1..400),
+            cuts in proptest::collection::vec(0.0_f64..1.0, 0..4),
+            gap_m in 0.0_f64..1e-4, dry_n in prop_oneof![0.0_f64..300.0, Just(1e5)], lost_share in 0.0_f64..0.2,
+            bristle in prop_oneof![Just(0.0), 0.1_f64..3.0], load_zero_n in -300.0_f64..300.0,
+        ) {
+            let mut place_m = 0.0;
+            let mut blocks = BlockMeans::default();
+            for &(step, load, chance) in &steps {
+                place_m += f64::from(step) * 1.3e-5;
+                let missing = |which: u8| if chance == which { f64::NAN } else { 0.0 };
+                let slowness = f64::from(chance % 5) / 5.0;
+                blocks.put([place_m + missing(0), 0.0, f64::from(load) * 51.7 + missing(1)], slowness);
+            }
+            let mut starts: Vec<usize> = cuts.iter().map(|cut| (cut * steps.len() as f64) as usize).collect();
+            starts.push(0);
+            starts.sort_unstable();
+            starts.dedup();
+            blocks.starts = starts;
+            let state = FrictionState {
+                stiffness_n_per_m: 5e7,
+                gap_m,
+                friction: Friction { dry_n, lost_share },
+                stribeck: 0.3,
+                bristle_m_per_n: bristle / 5e7,
+                load_zero_n,
+                load_delay_s: 0.0,
+                load_lag_s: 0.0,
+                skew_s: 0.0,
+            };
+            // In the memory of an integration with another gap.
+            let mut path = CouplingPath::default();
+            path.columns.resize(blocks.len());
+            for gap_m in [gap_m + 1e-5, gap_m] {
+                let params = CouplingParams::new(&FrictionState { gap_m, ..state }, 1.0);
+                for segment in blocks.segments() {
+                    path.integrate_segment(&blocks, params, segment);
+                }
+            }
+            for segment in blocks.segments() {
+                let mut integrator = CouplingIntegrator::new(CouplingParams::new(&state, 1.0));
+                for k in segment {
+                    let drive = Drive {
+                        motor_m: blocks.motor_m[k],
+                        load_n: blocks.load_n[k],
+                        slowness: blocks.slowness[k],
+                    };
+                    let (one, relative_m) = integrator.step(drive);
+                    let columns = &path.columns;
+                    let expected = [one.force_n, one.dforce_ddry, one.dforce_dloss_n, relative_m].map(f64::to_bits);
+                    let found =
+                        [columns.force_n[k], columns.dforce_ddry[k], columns.dforce_dloss_n[k], columns.relative_m[k]];
+                    prop_assert_eq!(found.map(f64::to_bits), expected, "block {}", k);
+                }
+            }
+        }
+    }
+}

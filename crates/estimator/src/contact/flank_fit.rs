@@ -131,8 +131,6 @@ pub(super) struct FlankFit {
     pub(super) state: FrictionState,
     /// Whether higher loads alone read another gap.
     pub(super) is_soft: bool,
-    /// What the gap of the stiff part adds to that of the line, m.
-    pub(super) toe_m: f64,
     /// The fit and its rows.
     pub(super) line: GaussNewtonResult,
 }
@@ -172,7 +170,6 @@ pub(super) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         period_s: workspace.whole.period_s,
         state: line.state,
         is_soft: sigma > SOFT_CONTACT_SIGMA,
-        toe_m: gap_m - line.fit.beta[GAP],
         line,
     };
     if is_explained(workspace, scaling, &fit) { Ok(fit) } else { Err(Rejection::MotionUnexplained) }
@@ -214,7 +211,7 @@ pub(super) fn midrange_at_fit_m(
         screw_resolution_m: 0.0,
         motor_rms_m: 0.0,
         motor_resolution_m: 0.0,
-        unknown_force_n: unknown_force_n.unwrap_or(UNKNOWN_FORCE_SHARE * scaling.load_n),
+        unknown_force_n: self::unknown_force_n(unknown_force_n, scaling),
         bandwidth_hz: BANDWIDTH_HZ,
     });
     let filter = Filter::new(&actuator.ok()?, blocks.period_s, &noise).ok()?;
@@ -226,6 +223,11 @@ pub(super) fn midrange_at_fit_m(
         segments: &segments,
     };
     midrange::estimate(&samples, &filter).ok().map(|found| found.gap.gap_m)
+}
+
+/// Rms of the force that the model does not know, N: the part's, or a share of the load.
+pub(super) fn unknown_force_n(of_part_n: Option<f64>, scaling: &Scaling) -> f64 {
+    of_part_n.unwrap_or(UNKNOWN_FORCE_SHARE * scaling.load_n)
 }
 
 /// Searches an excerpt of a long flight, and iterates over the whole from there.

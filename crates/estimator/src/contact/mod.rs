@@ -255,7 +255,7 @@ fn report(
         midrange_at_fit_m,
         flags: Vec::new(),
     };
-    let agrees = found.agrees_with_midrange(prior.unknown_force_n.unwrap_or(0.0));
+    let agrees = found.agrees_with_midrange(flank_fit::unknown_force_n(prior.unknown_force_n, frame));
     found.flags = acceptance::flags(&found, frame, contact.is_soft, agrees);
     found
 }
