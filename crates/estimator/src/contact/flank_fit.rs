@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use super::ContactWorkspace;
 use super::acceptance::Rejection;
+use super::block_means::BlockMeans;
 use super::design_matrix::{
     COLUMNS, DesignRow, FIRM_SHARE, FORCE, GAP, LATE_S, LOAD_RATE, ORIGIN, PERIODIC, RowSource, SPEED,
     SPEED_M_PER_S, Scaling,
@@ -45,6 +46,8 @@ const SOFT_CONTACT_SIGMA: f64 = 2.3;
 const MODE_RAD_PER_S: f64 = 2500.0;
 /// Force that the model does not know over the 95 % load, where the part does not say.
 const UNKNOWN_FORCE_SHARE: f64 = 0.02;
+/// Least noise of the positions in that check over the wind-up under the unknown force.
+const LEAST_NOISE: f64 = 0.5;
 /// Bandwidth of the backlash in that check, Hz.
 const BANDWIDTH_HZ: f64 = 10.0;
 
@@ -178,15 +181,28 @@ pub(super) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
 /// The published mid-range statistic (equations 18–31) of the block means, m, with what the regression found: stiffness,
 /// load zero and delays, drift and transducer error taken off. None where the filter gives none.
 ///
-/// Of a long flight the excerpt is taken. It takes the screw's mass and damping, which move it by less than 0.1 %, from a mode of 400 Hz.
+/// One outlying stretch of S moves the mid-range: of the whole flight, where it is short, and of its excerpt the nearer
+/// value to the gap is taken. The statistic takes the screw's mass and damping, which move it by less than 0.1 %, from a mode of 400 Hz.
 pub(super) fn midrange_at_fit_m(
-    workspace: &mut ContactWorkspace,
+    workspace: &ContactWorkspace,
     scaling: &Scaling,
     fit: &FlankFit,
     unknown_force_n: Option<f64>,
 ) -> Option<f64> {
     let ContactWorkspace { whole, excerpt, .. } = workspace;
-    let blocks = if excerpt.is_empty() { whole } else { excerpt };
+    let of = |blocks: &BlockMeans| midrange_of_m(blocks, scaling, fit, unknown_force_n);
+    let of_whole = if whole.len() < SHORT_BLOCKS { of(whole) } else { None };
+    let of_excerpt = if excerpt.is_empty() { None } else { of(excerpt) };
+    let off_m = |midrange_m: &f64| (midrange_m - fit.gap_m.0).abs();
+    of_whole.into_iter().chain(of_excerpt).min_by(|a, b| off_m(a).total_cmp(&off_m(b)))
+}
+
+fn midrange_of_m(
+    blocks: &BlockMeans,
+    scaling: &Scaling,
+    fit: &FlankFit,
+    unknown_force_n: Option<f64>,
+) -> Option<f64> {
     let mut beta = fit.line.fit.beta;
     beta[ORIGIN] = 0.0;
     let source = RowSource { blocks, scaling };
@@ -206,12 +222,14 @@ pub(super) fn midrange_at_fit_m(
         0.1 * stiffness_n_per_m / MODE_RAD_PER_S,
         stiffness_n_per_m / (MODE_RAD_PER_S * MODE_RAD_PER_S),
     );
+    let unknown_force_n = self::unknown_force_n(unknown_force_n, scaling);
     let noise = NoiseModel::Sensors(SensorNoise {
-        screw_rms_m: fit.residual_rms_m,
+        // A filter that trusts its positions too far follows every force that the model does not know.
+        screw_rms_m: fit.residual_rms_m.max(LEAST_NOISE * unknown_force_n / stiffness_n_per_m),
         screw_resolution_m: 0.0,
         motor_rms_m: 0.0,
         motor_resolution_m: 0.0,
-        unknown_force_n: self::unknown_force_n(unknown_force_n, scaling),
+        unknown_force_n,
         bandwidth_hz: BANDWIDTH_HZ,
     });
     let filter = Filter::new(&actuator.ok()?, blocks.period_s, &noise).ok()?;

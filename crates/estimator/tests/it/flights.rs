@@ -110,7 +110,7 @@ fn contact_regression_finds_the_true_gap() {
         assert!(error.abs() < tolerance, "{name}: {error:+.5} with {found:?}");
         let stiffness = found.stiffness_n_per_m / log.number("truth", "K");
         assert!((stiffness - 1.0).abs() < 3e-3, "{name}: stiffness {stiffness} times the true one");
-        assert!(found.flags.is_empty(), "{name}: {:?}", found.flags);
+        assert!(found.flags.is_empty(), "{name}: {found:?}");
     }
 }
 
