@@ -46,8 +46,6 @@ const SOFT_CONTACT_SIGMA: f64 = 2.3;
 const MODE_RAD_PER_S: f64 = 2500.0;
 /// Force that the model does not know over the 95 % load, where the part does not say.
 const UNKNOWN_FORCE_SHARE: f64 = 0.02;
-/// Least noise of the positions in that check over the wind-up under the unknown force.
-const LEAST_NOISE: f64 = 0.5;
 /// Bandwidth of the backlash in that check, Hz.
 const BANDWIDTH_HZ: f64 = 10.0;
 
@@ -224,8 +222,7 @@ fn midrange_of_m(
     );
     let unknown_force_n = self::unknown_force_n(unknown_force_n, scaling);
     let noise = NoiseModel::Sensors(SensorNoise {
-        // A filter that trusts its positions too far follows every force that the model does not know.
-        screw_rms_m: fit.residual_rms_m.max(LEAST_NOISE * unknown_force_n / stiffness_n_per_m),
+        screw_rms_m: fit.residual_rms_m,
         screw_resolution_m: 0.0,
         motor_rms_m: 0.0,
         motor_resolution_m: 0.0,
