@@ -44,6 +44,8 @@ const SOFT_CONTACT_SIGMA: f64 = 2.3;
 
 /// Natural frequency of the screw on its coupling in the check by the published statistic, rad/s.
 const MODE_RAD_PER_S: f64 = 2500.0;
+/// Twice its damping ratio: a mode that rings between two samples would outlast them.
+const DAMPING: f64 = 1.4;
 /// Force that the model does not know over the 95 % load, where the part does not say.
 const UNKNOWN_FORCE_SHARE: f64 = 0.02;
 /// Bandwidth of the backlash in that check, Hz.
@@ -217,7 +219,7 @@ fn midrange_of_m(
     let stiffness_n_per_m = fit.compliance_m_per_n.0.recip();
     let actuator = ActuatorModel::linear(
         stiffness_n_per_m,
-        0.1 * stiffness_n_per_m / MODE_RAD_PER_S,
+        DAMPING * stiffness_n_per_m / MODE_RAD_PER_S,
         stiffness_n_per_m / (MODE_RAD_PER_S * MODE_RAD_PER_S),
     );
     let unknown_force_n = self::unknown_force_n(unknown_force_n, scaling);
