@@ -230,9 +230,14 @@ impl BlockMeans {
     /// Reads the screw's channel and the load a delay later, by a cubic through four blocks (Catmull–Rom), so that all
     /// three channels belong to one moment.
     pub(super) fn apply_delays(&mut self, skew_s: f64, load_delay_s: f64, load_lag_s: f64) {
-        read_later(&self.screw_m, skew_s / self.period_s, &mut self.dx_m);
+        // Nothing is read across the end of a segment.
+        let segments: Vec<Range<usize>> = self.segments().collect();
+        for segment in segments {
+            let (screw_m, logged_n) = (&self.screw_m[segment.clone()], &self.logged_n[segment.clone()]);
+            read_later(screw_m, skew_s / self.period_s, &mut self.dx_m[segment.clone()]);
+            read_later(logged_n, load_delay_s / self.period_s, &mut self.load_n[segment]);
+        }
         self.dx_m.iter_mut().zip(&self.motor_m).for_each(|(dx, x)| *dx -= x);
-        read_later(&self.logged_n, load_delay_s / self.period_s, &mut self.load_n);
         if load_lag_s != 0.0 {
             let weight = 0.5 * load_lag_s / self.period_s;
             let mut before = f64::NAN;
