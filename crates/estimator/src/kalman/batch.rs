@@ -202,7 +202,7 @@ impl FilterPass<'_> {
         load_n: &[f64],
         at: usize,
     ) -> usize {
-        let (from, load_n) = (map.to_transformed(x), &load_n[..y_m.len()]);
+        let (from, load_n) = (map.transform(x), &load_n[..y_m.len()]);
         let s_m = &mut self.room.s_m[at..at + y_m.len()];
         let (done, last, squares_m2) = match self.innovations.as_deref_mut() {
             None => {
@@ -223,7 +223,7 @@ impl FilterPass<'_> {
             }
         };
         if done > 0 {
-            *x = map.from_transformed(last);
+            *x = map.inverse_transform(last);
         }
         self.nis += squares_m2 / map.variance_m2;
         self.measured += done;
@@ -299,7 +299,7 @@ fn starts(
     let mut states = x.map(|entry| [entry; PARTS]);
     for part in 1..PARTS {
         let before = cut.start(part) - 1;
-        let guess = map.to_transformed(&filter.initial_state(y_m[before], load_n[before]).x);
+        let guess = map.transform(&filter.initial_state(y_m[before], load_n[before]).x);
         states.iter_mut().zip(&guess).for_each(|(entry, guess)| entry[part] = *guess);
     }
     states

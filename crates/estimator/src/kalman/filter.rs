@@ -175,15 +175,15 @@ impl Filter {
 
     /// ρ at a gain; infinite where the eigenvalues cannot be found.
     pub(crate) fn radius_at(&self, gain: &Vector3<f64>) -> f64 {
+        // Without a bound the iteration never ends on matrices that are not finite, or barely so.
+        const MAX_ITERATIONS: usize = 1000;
         let mut keep = Matrix3::<f64>::identity();
         for row in 0..3 {
             keep[(row, 0)] -= gain[row];
         }
-        // Without a bound the iteration never ends on matrices that are not finite, or barely so.
-        const MAX_ITERATIONS: usize = 1000;
         let error = keep * self.discrete.a_d;
         let schur = nalgebra::Schur::try_new(error, f64::EPSILON, MAX_ITERATIONS);
-        match schur.filter(|_| error.iter().all(|entry| entry.is_finite())) {
+        match schur.filter(|_| error.iter().all(|entry: &f64| f64::is_finite(*entry))) {
             Some(schur) => schur.complex_eigenvalues().iter().map(|pole| pole.modulus()).fold(0.0, f64::max),
             None => f64::INFINITY,
         }

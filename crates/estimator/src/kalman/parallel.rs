@@ -363,7 +363,7 @@ mod tests {
                         let ended = |x: SteadyState| {
                             steady_state::run(&map, x, 0.0, columns, &mut vec![0.0; lead], &mut []).0
                         };
-                        let start = map.to_transformed(&filter.initial_state(y_m[from], load_n[from]).x);
+                        let start = map.transform(&filter.initial_state(y_m[from], load_n[from]).x);
                         starts += 1;
                         remembered += u32::from(!same(ended(start), ended([1e-4, 1e-5, -1e-4])));
                     }

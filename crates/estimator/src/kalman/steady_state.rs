@@ -94,12 +94,12 @@ impl SteadyStateFilter {
     }
 
     /// From the state after a sample.
-    pub(crate) fn to_transformed(&self, x: &Vector3<f64>) -> SteadyState {
+    pub(crate) fn transform(&self, x: &Vector3<f64>) -> SteadyState {
         [x[0] - x[2], self.speed_to_way_s * x[1], x[2]]
     }
 
     /// Back to the state. A speed that does not outlast a step moves nothing, and is told as zero.
-    pub(crate) fn from_transformed(&self, [z_m, v_m, s_m]: SteadyState) -> Vector3<f64> {
+    pub(crate) fn inverse_transform(&self, [z_m, v_m, s_m]: SteadyState) -> Vector3<f64> {
         Vector3::new(z_m + s_m, v_m * self.way_to_speed_per_s, s_m)
     }
 

@@ -61,9 +61,9 @@ impl Stream {
         let Some(state) = &mut self.state else { return self.start(y_m) };
         let whole = self.settled && !(y_m + before_n).is_nan();
         if let Some(folded) = self.folded.as_ref().filter(|_| whole) {
-            let bent = self.bent.get_or_insert_with(|| folded.to_transformed(&state.x));
+            let bent = self.bent.get_or_insert_with(|| folded.transform(&state.x));
             steady_state::step(folded, bent, y_m, before_n);
-            state.x = folded.from_transformed(*bent);
+            state.x = folded.inverse_transform(*bent);
             return Ok(bent[2]);
         }
         self.bent = None;

@@ -28,7 +28,7 @@ const VERSION_DIGITS: usize = 20;
 /// The name of a commit or checkpoint; `None` for another file of the log.
 pub(crate) fn log_file(path: &FsPath) -> Option<&str> {
     let name = path.file_name()?.to_str()?;
-    let is_log = name.ends_with(".json") || name.ends_with(".parquet");
+    let is_log = path.extension().is_some_and(|kind| kind == "json" || kind == "parquet");
     (is_log && version(name).is_some()).then_some(name)
 }
 
