@@ -1,77 +1,229 @@
-//! How noisy a channel is, from the channel itself: what is left where motion is smoothest.
+//! White noise of a channel, estimated from the channel itself by differences of high order.
+//!
+//! A difference of order m suppresses smooth motion and multiplies the variance of white noise by the binomial
+//! coefficient C(2m, m). Its mean square over short blocks is therefore the noise variance where motion is smooth
+//! enough, and larger elsewhere. The noise is the scale of the quietest blocks: the smallest σ at which the counts of
+//! blocks below two of its χ² quantiles stand in the ratio that white noise gives (Wilson and Hilferty 1931,
+//! <https://doi.org/10.1073/pnas.17.12.684>), whatever the share of quiet blocks.
 
-/// Samples of a window.
-const WINDOW: usize = 64;
-/// Of the windows, from the quietest on, this share is passed over: motion is in the rest.
-const QUIET: f64 = 0.25;
-/// Variance of the third difference of white noise over its own: 1² + 3² + 3² + 1².
-const THIRD: f64 = 20.0;
-/// A quarter of the windows lie below this share of the true variance, by chance alone: third differences of
-/// 64 samples overlap, and scatter as 26 free ones would.
-const QUARTILE: f64 = 0.80;
-
-/// Rms of the white noise of a channel, without what its resolution alone would make; none where no window of
-/// 64 samples is whole.
-///
-/// Third differences leave of a motion of 1 mm at 1 Hz no more than 0.02 µm at 250 samples a second, 0.5 µm at
-/// 50. Rounding to steps adds step²/12 to the variance, as the noise model has it; where that is all there is,
-/// the noise is zero.
-pub fn white_noise_rms(values: &[f64], resolution: Option<f64>) -> Option<f64> {
-    let mut variances: Vec<f64> = values.chunks_exact(WINDOW).filter_map(variance).collect();
-    if variances.is_empty() {
-        return None;
-    }
-    let at = ((variances.len() - 1) as f64 * QUIET) as usize;
-    let quiet = *variances.select_nth_unstable_by(at, f64::total_cmp).1 / QUARTILE;
-    let rounding = resolution.map_or(0.0, |step| step * step / 12.0);
-    Some((quiet - rounding).max(0.0).sqrt())
+/// White noise of a channel and its uncertainty, in the channel's unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WhiteNoise {
+    /// Root mean square, without the rounding to the channel's resolution.
+    pub rms: f64,
+    /// Standard uncertainty of `rms`.
+    pub uncertainty: f64,
 }
 
-/// Variance of a window's noise; none where a sample is missing.
-fn variance(window: &[f64]) -> Option<f64> {
-    let thirds = window.windows(4).map(|w| w[3] - w[0] - 3.0 * (w[2] - w[1]));
-    let sum: f64 = thirds.map(|d| d * d).sum();
-    sum.is_finite().then(|| sum / (THIRD * (window.len() - 3) as f64))
+/// Samples of a block.
+const BLOCK: usize = 32;
+/// Samples on either side of a block that must move with it where the channel is quantised.
+const MARGIN: usize = 16;
+/// Orders of difference that are compared, the lowest first.
+const ORDERS: [usize; 4] = [3, 5, 7, 9];
+/// Standard normal deviates of the two probabilities at which blocks are counted, and these probabilities.
+const LOW: (f64, f64) = (-0.8416, 0.2);
+const HIGH: (f64, f64) = (0.2533, 0.6);
+/// The counts' ratio may fall short of that of pure noise by this factor: louder blocks reach below the upper quantile.
+const RATIO_SHARE: f64 = 0.9;
+/// Fewest quiet blocks, as a number and as a share of all.
+const MIN_BLOCKS: usize = 40;
+const MIN_SHARE: f64 = 0.02;
+/// Most blocks that are read; a longer channel is subsampled.
+const MAX_BLOCKS: usize = 8000;
+/// A quantised channel must span this many steps about a block; where it rests on one step, rounding is not white.
+const MIN_STEPS: f64 = 3.0;
+/// Relative uncertainty that remains however many blocks there are.
+const SYSTEMATIC: f64 = 0.03;
+
+/// White noise of a channel; `None` where too few blocks are complete, or move by more than the resolution.
+///
+/// Rounding to steps adds step²/12 to the variance and is subtracted. A channel that repeats every value k times, or
+/// holds one in k rows, is taken at its own rate. NaN marks a missing sample.
+pub fn white_noise(values: &[f64], resolution: Option<f64>) -> Option<WhiteNoise> {
+    let own = own_samples(values);
+    let blocks = block_variances(own.as_deref().unwrap_or(values), resolution.unwrap_or(0.0));
+    let levels: Vec<Level> =
+        ORDERS.iter().zip(blocks).filter_map(|(order, variances)| quiet_level(*order, variances)).collect();
+    let mut best = *levels.first()?;
+    let mut fall = 0.0;
+    // A higher order is taken while it shows less motion.
+    for level in levels.get(1..)? {
+        if level.rms >= best.rms * (1.0 - 0.7 * level.relative) {
+            break;
+        }
+        fall = best.rms / level.rms - 1.0;
+        best = *level;
+    }
+    let rounding = resolution.map_or(0.0, |step| step * step / 12.0);
+    let rms = (best.rms * best.rms - rounding).max(0.0).sqrt();
+    let share = best.relative.hypot(SYSTEMATIC).hypot(0.5 * fall);
+    // dσ = (total/σ) d(total); near zero the rounding bounds it.
+    let uncertainty = share * best.rms * (best.rms / rms.max(0.5 * best.rms));
+    Some(WhiteNoise { rms, uncertainty })
+}
+
+/// Noise scale of the quietest blocks at one order of difference.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    rms: f64,
+    relative: f64,
+}
+
+/// The samples of a channel recorded every k-th row: those that are present, or the first of each k equal ones.
+fn own_samples(values: &[f64]) -> Option<Vec<f64>> {
+    const MAX_INTERVAL: usize = 20;
+    const MOST: f64 = 0.95;
+    let missing = values.iter().filter(|v| v.is_nan()).count();
+    if 5 * missing >= 2 * values.len() {
+        return Some(values.iter().copied().filter(|v| !v.is_nan()).collect());
+    }
+    let changes: Vec<usize> =
+        (1..values.len()).filter(|&i| values[i].to_bits() != values[i - 1].to_bits()).collect();
+    if 3 * changes.len() > 2 * values.len() || changes.len() < MIN_BLOCKS {
+        return None;
+    }
+    let at_one_phase = |every: usize| {
+        let mut counts = vec![0_usize; every];
+        changes.iter().for_each(|i| counts[i % every] += 1);
+        let phase = (0..every).max_by_key(|&phase| counts[phase])?;
+        (counts[phase] as f64 >= MOST * changes.len() as f64).then_some((every, phase))
+    };
+    let (every, phase) = (2..=MAX_INTERVAL).rev().find_map(at_one_phase)?;
+    Some(values.iter().skip(phase).step_by(every).copied().collect())
+}
+
+/// Noise variances of all blocks, for each order; blocks with a missing sample, or at rest, are left out.
+fn block_variances(values: &[f64], step: f64) -> [Vec<f64>; ORDERS.len()] {
+    let mut found: [Vec<f64>; ORDERS.len()] = std::array::from_fn(|_| Vec::new());
+    let count = values.len().saturating_sub(BLOCK) / (BLOCK / 2) + 1;
+    let stride = (BLOCK / 2) * count.div_ceil(MAX_BLOCKS);
+    for start in (0..(values.len() + 1).saturating_sub(BLOCK)).step_by(stride) {
+        let about = &values[start.saturating_sub(MARGIN)..values.len().min(start + BLOCK + MARGIN)];
+        if step > 0.0 && span(about) < MIN_STEPS * step {
+            continue;
+        }
+        let mut differences: [f64; BLOCK] = std::array::from_fn(|k| values[start + k]);
+        let (mut order, mut factor) = (0, 1.0);
+        for (at, into) in ORDERS.iter().zip(&mut found) {
+            while order < *at {
+                order += 1;
+                factor *= (4 * order - 2) as f64 / order as f64;
+                (0..BLOCK - order).for_each(|k| differences[k] = differences[k + 1] - differences[k]);
+            }
+            let squares: f64 = differences[..BLOCK - order].iter().map(|d| d * d).sum();
+            let variance = squares / (factor * (BLOCK - order) as f64);
+            if variance.is_finite() {
+                into.push(variance);
+            }
+        }
+    }
+    found
+}
+
+fn span(values: &[f64]) -> f64 {
+    let (low, high) = values
+        .iter()
+        .filter(|v| !v.is_nan())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+    high - low
+}
+
+/// The smallest σ at which the counts of blocks below its two quantiles stand in the ratio that noise gives.
+fn quiet_level(order: usize, mut variances: Vec<f64>) -> Option<Level> {
+    let fewest = MIN_BLOCKS.max((MIN_SHARE * variances.len() as f64) as usize);
+    if variances.len() < fewest {
+        return None;
+    }
+    variances.sort_unstable_by(f64::total_cmp);
+    let freedom = degrees_of_freedom(order);
+    let (low, high) = (chi_squared_share(freedom, LOW.0), chi_squared_share(freedom, HIGH.0));
+    let ratio = RATIO_SHARE * LOW.1 / HIGH.1;
+    let is_noise = |&last: &usize| {
+        let limit = variances[last] * low / high;
+        variances[..last].partition_point(|v| *v < limit) as f64 >= ratio * (last + 1) as f64
+    };
+    let stride = (variances.len() / 1000).max(1);
+    let last = (fewest - 1..variances.len()).step_by(stride).find(is_noise).unwrap_or(variances.len() - 1);
+    // Blocks overlap by half.
+    let relative = 0.8 / (0.5 * (last + 1) as f64 * freedom).sqrt();
+    Some(Level { rms: (variances[last] / high).sqrt(), relative })
+}
+
+/// Degrees of freedom of a block's mean square: differences of white noise are correlated with their neighbours by
+/// C(2m, m+k)/C(2m, m).
+fn degrees_of_freedom(order: usize) -> f64 {
+    let samples = (BLOCK - order) as f64;
+    let (mut correlation, mut sum) = (1.0, samples);
+    for lag in 1..=order {
+        correlation *= (order - lag + 1) as f64 / (order + lag) as f64;
+        sum += 2.0 * (samples - lag as f64).max(0.0) * correlation * correlation;
+    }
+    samples * samples / sum
+}
+
+/// Quantile of χ² over its degrees of freedom at a standard normal deviate (Wilson and Hilferty).
+fn chi_squared_share(freedom: f64, deviate: f64) -> f64 {
+    let spread = 2.0 / (9.0 * freedom);
+    (1.0 - spread + deviate * spread.sqrt()).powi(3)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// White noise of a given rms: sums of twelve even numbers, the same in every run.
+    /// White noise of a given rms: sums of twelve uniform numbers, the same in every run.
     fn noise(count: usize, rms: f64) -> Vec<f64> {
         let mut state = 42_u64;
-        let mut even = || {
+        let mut uniform = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
-        (0..count).map(|_| rms * ((0..12).map(|_| even()).sum::<f64>() - 6.0)).collect()
+        (0..count).map(|_| rms * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0)).collect()
+    }
+
+    fn near(values: &[f64], resolution: Option<f64>, wanted: f64) {
+        let found = white_noise(values, resolution).unwrap();
+        assert!((found.rms / wanted - 1.0).abs() < 0.1, "{found:?}");
+        assert!((found.rms - wanted).abs() < 3.0 * found.uncertainty, "{found:?}");
     }
 
     #[test]
     fn noise_is_found_beneath_a_motion_ten_thousand_times_larger() {
-        let values: Vec<f64> = noise(30_000, 2e-6)
-            .iter()
-            .enumerate()
-            .map(|(k, n)| n + 0.02 * (0.004 * k as f64).sin())
-            .collect();
-        let found = white_noise_rms(&values, None).unwrap();
-        assert!((found / 2e-6 - 1.0).abs() < 0.1, "{found}");
+        let motion = |k: usize| 0.02 * (0.004 * k as f64).sin();
+        let values: Vec<f64> = noise(30_000, 2e-6).iter().enumerate().map(|(k, n)| n + motion(k)).collect();
+        near(&values, None, 2e-6);
     }
 
     #[test]
     fn rounding_is_not_noise() {
-        let rounded: Vec<f64> =
-            (0..20_000).map(|k| ((0.02 * (0.003 * f64::from(k)).sin()) / 1e-6).round() * 1e-6).collect();
-        assert!(white_noise_rms(&rounded, Some(1e-6)).unwrap() < 0.2e-6);
+        let motion = |k: usize| 0.02 * (0.003 * k as f64).sin();
+        let rounded: Vec<f64> = (0..20_000).map(|k| (motion(k) / 1e-6).round() * 1e-6).collect();
+        assert!(white_noise(&rounded, Some(1e-6)).unwrap().rms < 0.2e-6);
         let both: Vec<f64> = noise(20_000, 3e-6).iter().map(|n| (n / 2e-6).round() * 2e-6).collect();
-        let found = white_noise_rms(&both, Some(2e-6)).unwrap();
-        assert!((found / 3e-6 - 1.0).abs() < 0.1, "{found}");
+        near(&both, Some(2e-6), 3e-6);
+    }
+
+    /// Every value four times, and every value once in four rows.
+    #[test]
+    fn a_slow_channel_is_taken_at_its_own_rate() {
+        let own = noise(8000, 5e-6);
+        let held: Vec<f64> = own.iter().flat_map(|v| [*v; 4]).collect();
+        near(&held, None, 5e-6);
+        let sparse: Vec<f64> = own.iter().flat_map(|v| [*v, f64::NAN, f64::NAN, f64::NAN]).collect();
+        near(&sparse, None, 5e-6);
     }
 
     #[test]
-    fn without_a_whole_window_nothing_is_said() {
-        assert_eq!(white_noise_rms(&[f64::NAN; 200], None), None);
-        assert_eq!(white_noise_rms(&[1.0; 63], None), None);
+    fn without_enough_whole_blocks_there_is_no_estimate() {
+        assert_eq!(white_noise(&[f64::NAN; 200], None), None);
+        assert_eq!(white_noise(&noise(300, 1.0), None), None);
+        assert_eq!(white_noise(&[1.0; 20_000], Some(0.1)), None);
+    }
+
+    /// By hand: order 1 has correlations 1, −1/2; 31 differences give 31²/(31 + 2·30/4) = 20.9.
+    #[test]
+    fn overlapping_differences_count_for_less() {
+        assert!((degrees_of_freedom(1) - 31.0 * 31.0 / 46.0).abs() < 1e-9);
     }
 }

@@ -3,7 +3,8 @@
 
 use std::ops::Range;
 
-use crate::channel::stats::{ChannelStats, range, second_difference};
+use crate::channel::noise_floor::white_noise;
+use crate::channel::stats::{ChannelStats, range};
 use crate::mapping::Role;
 use crate::time::zero_order_hold::median_sample_interval;
 
@@ -28,7 +29,7 @@ pub struct Quality {
     pub rate_hz: f64,
     /// Share of samples that stand at the smallest or largest value as if cut off there.
     pub saturated_share: f64,
-    /// Samples that leap away from both their neighbours and back.
+    /// Single samples far from the line of their neighbours.
     pub spikes: usize,
 }
 
@@ -54,7 +55,7 @@ impl Quality {
             frozen_share: share(longest_run),
             rate_hz: (step_s * if missing == 0 { 1 } else { median_sample_interval(values) } as f64).recip(),
             saturated_share: share(saturated(values, seen)),
-            spikes: spikes(values, samples, resolution, seen.max_second_difference),
+            spikes: spikes(values, resolution, seen.max_second_difference, step_s),
         }
     }
 
@@ -164,27 +165,63 @@ fn mean_step(values: &[f64]) -> f64 {
     sum / count.max(1) as f64
 }
 
-/// Samples far from the line between their neighbours, against what is usual for those that count.
-fn spikes(values: &[f64], samples: usize, resolution: Option<f64>, max_second_difference: f64) -> usize {
-    const FAR: f64 = 50.0;
-    const THINNED: usize = 4096;
-    let leap = |w: &[f64]| second_difference(w[0], w[1], w[2]);
-    let every = (samples / THINNED).max(1);
-    let mut usual: Vec<f64> = values.windows(3).step_by(every).map(leap).filter(|d| *d > 0.0).collect();
-    if usual.is_empty() {
+/// Single samples far from the line of their neighbours.
+///
+/// The fourth difference over 6 is an outlier's height; smooth motion hardly shows in it. An outlier gives −4/6, 1,
+/// −4/6 in three neighbouring differences; a step of the position or of its speed does not. The height must exceed 6.5
+/// standard deviations of the channel's noise, four times the impacts that recur every few seconds, and twice what its
+/// surroundings show.
+fn spikes(values: &[f64], resolution: Option<f64>, max_second_difference: f64, step_s: f64) -> usize {
+    const FAR: f64 = 6.5;
+    const IMPACTS: f64 = 4.5;
+    const LOCAL_SHARE: f64 = 0.45;
+    const SHAPE_TOLERANCE: f64 = 0.3;
+    const REACH: usize = 12;
+    let step = resolution.unwrap_or(0.0);
+    let noise = white_noise(values, resolution).map_or(0.0, |noise| noise.rms).hypot(step / 12.0_f64.sqrt());
+    let far = (FAR * DIFFERENCE_NOISE * noise).max(4.0 * step);
+    if max_second_difference <= far || values.len() < 7 {
         return 0;
     }
-    let middle = usual.len() / 2;
-    let median = *usual.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let far = FAR * median.max(resolution.unwrap_or(0.0));
-    if max_second_difference <= far {
+    let height = |i: usize| {
+        let [a, b, c, d, e] = std::array::from_fn(|k| values[i + k - 2]);
+        (a - 4.0 * b + 6.0 * c - 4.0 * d + e) / 6.0
+    };
+    let inner = 3..values.len() - 3;
+    if !inner.clone().any(|i| height(i).abs() > far) {
         return 0;
     }
-    // Its neighbours leap with it, half as far: only the peak of the three counts.
-    let leaps = |i: usize| leap(&values[i - 1..=i + 1]);
-    (2..values.len().saturating_sub(2))
-        .filter(|&i| leaps(i) > far && leaps(i) >= leaps(i - 1) && leaps(i) > leaps(i + 1))
-        .count()
+    let heights: Vec<f64> = inner.clone().map(|i| height(i).abs()).filter(|h| !h.is_nan()).collect();
+    let far = far.max(IMPACTS * recurring_impact(heights, noise, step_s));
+    let is_outlier = |i: usize| {
+        let at = height(i);
+        let (before, after) = (height(i - 1) / at, height(i + 1) / at);
+        let fits = |share: f64| (share + 4.0 / 6.0).abs() < SHAPE_TOLERANCE;
+        let mut around = (i.saturating_sub(REACH).max(2)..(i + REACH + 1).min(values.len() - 2))
+            .filter(|j| j.abs_diff(i) > 2)
+            .map(|j| height(j).abs());
+        fits(before)
+            && fits(after)
+            && (before - after).abs() < SHAPE_TOLERANCE
+            && !around.any(|other| other >= LOCAL_SHARE * at.abs())
+    };
+    inner.filter(|&i| height(i).abs() > far && is_outlier(i)).count()
+}
+
+/// Standard deviation of the fourth difference over 6, for white noise of 1: √70/6.
+const DIFFERENCE_NOISE: f64 = 1.394;
+
+/// Height that fourth differences exceed every six seconds, less what white noise explains of it.
+fn recurring_impact(mut heights: Vec<f64>, noise: f64, step_s: f64) -> f64 {
+    const EVERY_S: f64 = 6.0;
+    const LEAST: usize = 20;
+    let rank = ((heights.len() as f64 * step_s / EVERY_S) as usize).max(LEAST);
+    let Some(at) = heights.len().checked_sub(rank + 1) else { return 0.0 };
+    let level = *heights.select_nth_unstable_by(at, f64::total_cmp).1;
+    // Two-sided tail of the normal distribution, to within 3 % for these ranks.
+    let deviate = (2.0 * (heights.len() as f64 / rank as f64).ln()).sqrt() - 0.35;
+    let explained = deviate.max(0.0) * DIFFERENCE_NOISE * noise;
+    (level * level - explained * explained).max(0.0).sqrt()
 }
 
 /// What the motor, screw and load channels give reason to doubt: stable codes.
