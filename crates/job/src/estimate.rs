@@ -13,6 +13,13 @@ use crate::config::{EstimateSettings, Method};
 /// A filter whose slow pole is further off than this share is not the one that was asked for.
 const BANDWIDTH_TOLERANCE: f64 = 0.25;
 
+/// Longest step between samples that an estimate is made from, s.
+const MAX_STEP_S: f64 = 0.05;
+
+/// Share of samples without a relative position above which the estimate says so; clocks of several files seldom begin
+/// and end together.
+const MISSING_SHARE: f64 = 0.005;
+
 /// Estimates the gap, or says why these channels cannot show one.
 ///
 /// The paper's number is kept in `gap_midrange_m` whatever the method, and also for a flight that is
@@ -25,6 +32,9 @@ pub fn estimate(
     part: &Part,
     settings: &EstimateSettings,
 ) -> Result<GapEstimate, Diagnostic> {
+    if is_too_slow(channels) {
+        return Ok(GapEstimate::refused("rate_too_low"));
+    }
     let schedule = part.filters.of(&filter(channels, part)?);
     let prior = prior(part);
     let failed = |e: estimator::Error| Diagnostic::new("estimate_failed", e);
@@ -48,7 +58,7 @@ pub fn estimate(
         estimate.reference_radius_m = Some(reference_radius_m);
     }
     estimate.flags.extend(channels.flags.iter().cloned());
-    if channels.missing_share > 0.0 {
+    if channels.missing_share > MISSING_SHARE {
         estimate.flags.push("samples_missing".into());
     }
     if bandwidth_differs(&schedule, part) {
@@ -85,6 +95,11 @@ fn with_workspaces<T>(samples: usize, work: impl FnOnce(&mut Workspaces) -> T) -
 /// # Errors
 /// A diagnostic when a noise level or the step cannot be.
 pub fn filter(channels: &ActuatorChannels, part: &Part) -> Result<Filter, Diagnostic> {
+    if is_too_slow(channels) {
+        let rate_hz = channels.step_s.recip();
+        return Err(Diagnostic::new("rate_too_low", format!("{rate_hz:.3} samples a second are too few"))
+            .hint("record at 20 samples a second or more, 50 or more for a small gap"));
+    }
     Filter::new(&part.actuator, channels.step_s, &part.noise)
         .map_err(|e| Diagnostic::new("bad_parameter", e).hint("see the part's settings in the configuration"))
 }
@@ -126,6 +141,11 @@ pub fn prior(part: &Part) -> PartPrior {
         },
         output_locked: false,
     }
+}
+
+/// Whether the samples are too far apart for any filter: the noise model is checked for the others.
+fn is_too_slow(channels: &ActuatorChannels) -> bool {
+    channels.step_s > MAX_STEP_S * (1.0 + 1e-9)
 }
 
 /// Why no statistic could mean anything, seen before any is made.

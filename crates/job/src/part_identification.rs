@@ -3,7 +3,7 @@
 
 use estimator::NoiseModel;
 use estimator::contact::{self, ContactOutcome};
-use ingest::channel::noise_floor;
+use ingest::channel::noise_floor::{WhiteNoise, white_noise};
 use ingest::{ActuatorChannels, Geometry};
 
 use crate::config::part::Part;
@@ -19,10 +19,14 @@ pub struct IdentifiedParams {
     pub stiffness_n_per_m: Option<f64>,
     /// White noise of the screw position, rms, m.
     pub screw_rms_m: Option<f64>,
+    /// Its standard uncertainty, m.
+    pub screw_uncertainty_m: Option<f64>,
     /// Its smallest step, m.
     pub screw_resolution_m: Option<f64>,
     /// White noise of the motor position, rms, m.
     pub motor_rms_m: Option<f64>,
+    /// Its standard uncertainty, m.
+    pub motor_uncertainty_m: Option<f64>,
     /// Its smallest step, m.
     pub motor_resolution_m: Option<f64>,
     /// Friction of the screw at the rms load, N: the force the model does not know.
@@ -36,6 +40,8 @@ pub struct ParamComparison {
     pub key: &'static str,
     /// From the logs, in the key's unit.
     pub identified: f64,
+    /// Standard uncertainty of `identified`, where it is known.
+    pub uncertainty: Option<f64>,
     /// As configured; none where the noise model asks for no such level.
     pub configured: Option<f64>,
 }
@@ -44,17 +50,13 @@ impl IdentifiedParams {
     /// Looks at one actuator. What the flight does not show stays open.
     pub fn of(channels: &ActuatorChannels, part: &Part) -> Self {
         let [motor, screw, _] = &channels.quality;
-        let motor_rms_m = noise_floor::white_noise_rms(&channels.motor_m, motor.resolution);
-        // δX carries the noise of both positions; the motor's is known, the rest is the screw's.
-        let both_m = noise_floor::white_noise_rms(&channels.dx_m, None);
-        let rounding_m2 =
-            [motor, screw].iter().filter_map(|q| q.resolution).map(|r| r * r / 12.0).sum::<f64>();
-        let screw_rms_m = both_m
-            .zip(motor_rms_m)
-            .map(|(both_m, motor_m)| (both_m * both_m - motor_m * motor_m - rounding_m2).max(0.0).sqrt());
+        let motor_noise = white_noise(&channels.motor_m, motor.resolution);
+        let screw_noise = screw_noise(channels, screw.resolution);
         let mut params = Self {
-            motor_rms_m,
-            screw_rms_m,
+            motor_rms_m: motor_noise.map(|noise| noise.rms),
+            motor_uncertainty_m: motor_noise.map(|noise| noise.uncertainty),
+            screw_rms_m: screw_noise.map(|noise| noise.rms),
+            screw_uncertainty_m: screw_noise.map(|noise| noise.uncertainty),
             motor_resolution_m: motor.resolution,
             screw_resolution_m: screw.resolution,
             ..Self::default()
@@ -80,8 +82,10 @@ impl IdentifiedParams {
         Self {
             stiffness_n_per_m: median(|f| f.stiffness_n_per_m),
             screw_rms_m: median(|f| f.screw_rms_m),
+            screw_uncertainty_m: median(|f| f.screw_uncertainty_m),
             screw_resolution_m: median(|f| f.screw_resolution_m),
             motor_rms_m: median(|f| f.motor_rms_m),
+            motor_uncertainty_m: median(|f| f.motor_uncertainty_m),
             motor_resolution_m: median(|f| f.motor_resolution_m),
             unknown_force_n: median(|f| f.unknown_force_n),
         }
@@ -100,48 +104,68 @@ impl IdentifiedParams {
             Geometry::Rotary { reference_radius_m: r } => (1, r.recip(), r, r * r),
         };
         let lines = [
-            (["stiffness_n_per_m", "stiffness_nm_per_rad"], rate, self.stiffness_n_per_m, Some(stiffness)),
+            (
+                ["stiffness_n_per_m", "stiffness_nm_per_rad"],
+                rate,
+                self.stiffness_n_per_m,
+                None,
+                Some(stiffness),
+            ),
             (
                 ["noise.screw_rms_m", "noise.screw_rms_rad"],
                 length,
                 self.screw_rms_m,
+                self.screw_uncertainty_m,
                 sensors.map(|s| s.screw_rms_m),
             ),
             (
                 ["noise.screw_resolution_m", "noise.screw_resolution_rad"],
                 length,
                 self.screw_resolution_m,
+                None,
                 sensors.map(|s| s.screw_resolution_m),
             ),
             (
                 ["noise.motor_rms_m", "noise.motor_rms_rad"],
                 length,
                 self.motor_rms_m,
+                self.motor_uncertainty_m,
                 sensors.map(|s| s.motor_rms_m),
             ),
             (
                 ["noise.motor_resolution_m", "noise.motor_resolution_rad"],
                 length,
                 self.motor_resolution_m,
+                None,
                 sensors.map(|s| s.motor_resolution_m),
             ),
             (
                 ["noise.unknown_force_n", "noise.unknown_torque_nm"],
                 force,
                 self.unknown_force_n,
+                None,
                 sensors.map(|s| s.unknown_force_n),
             ),
         ];
-        let comparison =
-            |(keys, scale, identified, configured): ([&'static str; 2], f64, Option<f64>, Option<f64>)| {
-                Some(ParamComparison {
-                    key: keys[column],
-                    identified: identified? * scale,
-                    configured: configured.map(|v| v * scale),
-                })
-            };
-        lines.into_iter().filter_map(comparison).collect()
+        let comparisons = lines.into_iter().map(|(keys, scale, identified, uncertainty, configured)| {
+            Some(ParamComparison {
+                key: keys[column],
+                identified: identified? * scale,
+                uncertainty: uncertainty.map(|v: f64| v * scale),
+                configured: configured.map(|v| v * scale),
+            })
+        });
+        comparisons.flatten().collect()
     }
+}
+
+/// White noise of the screw channel as it was recorded: the screw's own position, or the relative one.
+fn screw_noise(channels: &ActuatorChannels, resolution: Option<f64>) -> Option<WhiteNoise> {
+    let screw_m: Vec<f64> =
+        channels.dx_m.iter().zip(&channels.motor_m).map(|(dx, motor)| dx + motor).collect();
+    // The channel that was recorded carries the noise of one sensor, the other that of both.
+    let [own, relative] = [&screw_m, &channels.dx_m].map(|values| white_noise(values, resolution));
+    own.into_iter().chain(relative).min_by(|a, b| a.rms.total_cmp(&b.rms))
 }
 
 fn rms_n(load_n: &[f64]) -> f64 {

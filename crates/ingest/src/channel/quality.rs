@@ -35,12 +35,17 @@ pub struct Quality {
 
 impl Quality {
     /// Describes a channel; missing samples are NaN, and so many of them are not asked for.
-    pub(crate) fn of(values: &[f64], step_s: f64, apart: usize) -> Self {
-        Self::seen(values, &ChannelStats::of(values), step_s, apart)
+    pub(crate) fn of(values: &[f64], segments: &[Range<usize>], step_s: f64, apart: usize) -> Self {
+        Self::seen((values, segments), &ChannelStats::of(values), step_s, apart)
     }
 
     /// As [`Quality::of`], of a channel that was looked at already.
-    pub(crate) fn seen(values: &[f64], seen: &ChannelStats, step_s: f64, apart: usize) -> Self {
+    pub(crate) fn seen(
+        (values, segments): (&[f64], &[Range<usize>]),
+        seen: &ChannelStats,
+        step_s: f64,
+        apart: usize,
+    ) -> Self {
         let (samples, missing) = (values.len() - apart, seen.missing - apart);
         let share = |count: usize| count as f64 / samples.max(1) as f64;
         let resolution = resolution(values, seen);
@@ -55,7 +60,7 @@ impl Quality {
             frozen_share: share(longest_run),
             rate_hz: (step_s * if missing == 0 { 1 } else { median_sample_interval(values) } as f64).recip(),
             saturated_share: share(saturated(values, seen)),
-            spikes: spikes(values, resolution, seen.max_second_difference, step_s),
+            spikes: spikes((values, segments), resolution, seen.max_second_difference, step_s),
         }
     }
 
@@ -168,11 +173,16 @@ fn mean_step(values: &[f64]) -> f64 {
 /// Single samples far from the line of their neighbours.
 ///
 /// The fourth difference over 6 is an outlier's height; smooth motion hardly shows in it. An outlier gives −4/6, 1,
-/// −4/6 in three neighbouring differences; a step of the position or of its speed does not. The height must exceed 6.5
+/// −4/6 in three neighbouring differences; a step of the position or of its speed does not. The height must exceed six
 /// standard deviations of the channel's noise, four times the impacts that recur every few seconds, and twice what its
 /// surroundings show.
-fn spikes(values: &[f64], resolution: Option<f64>, max_second_difference: f64, step_s: f64) -> usize {
-    const FAR: f64 = 6.5;
+fn spikes(
+    (values, segments): (&[f64], &[Range<usize>]),
+    resolution: Option<f64>,
+    max_second_difference: f64,
+    step_s: f64,
+) -> usize {
+    const FAR: f64 = 6.0;
     const IMPACTS: f64 = 4.5;
     const LOCAL_SHARE: f64 = 0.45;
     const SHAPE_TOLERANCE: f64 = 0.3;
@@ -187,11 +197,12 @@ fn spikes(values: &[f64], resolution: Option<f64>, max_second_difference: f64, s
         let [a, b, c, d, e] = std::array::from_fn(|k| values[i + k - 2]);
         (a - 4.0 * b + 6.0 * c - 4.0 * d + e) / 6.0
     };
-    let inner = 3..values.len() - 3;
-    if !inner.clone().any(|i| height(i).abs() > far) {
+    // A window across a break in time shows the break.
+    let inner = || segments.iter().flat_map(|s| s.start + 3..s.end.saturating_sub(3));
+    if !inner().any(|i| height(i).abs() > far) {
         return 0;
     }
-    let heights: Vec<f64> = inner.clone().map(|i| height(i).abs()).filter(|h| !h.is_nan()).collect();
+    let heights: Vec<f64> = inner().map(|i| height(i).abs()).filter(|h| !h.is_nan()).collect();
     let far = far.max(IMPACTS * recurring_impact(heights, noise, step_s));
     let is_outlier = |i: usize| {
         let at = height(i);
@@ -205,7 +216,7 @@ fn spikes(values: &[f64], resolution: Option<f64>, max_second_difference: f64, s
             && (before - after).abs() < SHAPE_TOLERANCE
             && !around.any(|other| other >= LOCAL_SHARE * at.abs())
     };
-    inner.filter(|&i| height(i).abs() > far && is_outlier(i)).count()
+    inner().filter(|&i| height(i).abs() > far && is_outlier(i)).count()
 }
 
 /// Standard deviation of the fourth difference over 6, for white noise of 1: √70/6.
@@ -347,11 +358,11 @@ mod tests {
 
     #[test]
     fn a_channel_is_described_as_a_hand_would() {
-        let q = Quality::of(&[1.0, 1.0, 1.0, f64::NAN, 1.5, 1.25, 3.0, 3.0], 0.01, 0);
+        let q = described(&[1.0, 1.0, 1.0, f64::NAN, 1.5, 1.25, 3.0, 3.0], 0.01, 0);
         assert!((q.missing_share - 0.125).abs() < 1e-15);
         assert_eq!((q.min, q.max, q.resolution), (1.0, 3.0, Some(0.25)));
         assert!((q.frozen_share - 3.0 / 8.0).abs() < 1e-15);
-        assert!(Quality::of(&[2.0; 9], 0.01, 0).is_constant());
+        assert!(described(&[2.0; 9], 0.01, 0).is_constant());
     }
 
     #[test]
@@ -368,9 +379,13 @@ mod tests {
     #[test]
     fn a_position_in_steps_as_large_as_a_gap_is_coarse() {
         let stepped: Vec<f64> = wave(0.03).iter().map(|v| (v / 2e-5).round() * 2e-5).collect();
-        let channels = [&wave(0.03), &stepped, &wave(8e3)].map(|values| Quality::of(values, 0.004, 0));
+        let channels = [&wave(0.03), &stepped, &wave(8e3)].map(|values| described(values, 0.004, 0));
         assert_eq!(coarse_resolution(&channels, range(&wave(5e-5))), ["screw_coarse"]);
         assert!(coarse_resolution(&channels, range(&wave(5e-4))).is_empty());
+    }
+
+    fn described(values: &[f64], step_s: f64, apart: usize) -> Quality {
+        Quality::of(values, std::slice::from_ref(&(0..values.len())), step_s, apart)
     }
 
     fn wave(amplitude: f64) -> Vec<f64> {
@@ -382,8 +397,8 @@ mod tests {
     #[test]
     fn a_channel_cut_off_at_a_rail_is_told_from_one_that_rests() {
         let cut: Vec<f64> = wave(1.0).iter().map(|v| v.clamp(-0.8, 0.8)).collect();
-        let whole = Quality::of(&wave(1.0), 0.01, 0);
-        assert!(Quality::of(&cut, 0.01, 0).saturated_share > 0.2);
+        let whole = described(&wave(1.0), 0.01, 0);
+        assert!(described(&cut, 0.01, 0).saturated_share > 0.2);
         assert!(whole.saturated_share == 0.0 && whole.spikes == 0, "{whole:?}");
     }
 
@@ -393,7 +408,7 @@ mod tests {
         for at in [500, 1500, 2500] {
             values[at] += 2e-3;
         }
-        assert_eq!(Quality::of(&values, 0.004, 0).spikes, 3);
+        assert_eq!(described(&values, 0.004, 0).spikes, 3);
     }
 
     /// The motor stands still for 1 s while the screw travels: that is a dead sensor. While the screw moves

@@ -31,7 +31,7 @@ pub(crate) fn assemble(
     let SampleSelection { segments, apart, .. } = selection;
     let quality = [&motor, &screw, &load].map(|read| {
         let seen = read.seen.unwrap_or_else(|| ChannelStats::of(&read.values));
-        Quality::seen(&read.values, &seen, line.step_s, apart)
+        Quality::seen((&read.values, &segments), &seen, line.step_s, apart)
     });
     let (mut motor_m, mut dx_m, mut load_n) = (motor.values, screw.values, load.values);
     flags.extend(quality::quality_flags(&quality, line.step_s));

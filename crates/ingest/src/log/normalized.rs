@@ -94,12 +94,15 @@ impl Normalized {
             let detail = format!("a channel lacks fewer than the {} samples that are left out", self.apart);
             return Err(file.error(ErrorKind::Normalized { detail }));
         }
-        let quality =
-            read.each_ref().map(|(values, seen)| Quality::seen(values, seen, self.step_s, self.apart));
-        let [motor_m, dx_m, load_n] = read.map(|(values, _)| values);
-        if self.segments.iter().any(|s| s.start > s.end || s.end > dx_m.len()) {
-            return Err(file.error(ErrorKind::Normalized { detail: "a stretch lies beyond its rows".into() }));
+        if self.segments.iter().any(|s| s.start > s.end || s.end > read[1].0.len()) {
+            return Err(
+                file.error(ErrorKind::Normalized { detail: "a segment ends after the last row".into() })
+            );
         }
+        let quality = read
+            .each_ref()
+            .map(|(values, seen)| Quality::seen((values, &self.segments), seen, self.step_s, self.apart));
+        let [motor_m, dx_m, load_n] = read.map(|(values, _)| values);
         Ok(ActuatorChannels {
             position,
             step_s: self.step_s,

@@ -75,7 +75,7 @@ pub struct ActuatorChannels {
 impl ActuatorChannels {
     /// What δX looks like.
     pub fn dx_quality(&self) -> Quality {
-        Quality::of(&self.dx_m, self.step_s, self.apart)
+        Quality::of(&self.dx_m, &self.segments, self.step_s, self.apart)
     }
 
     /// Leaves the memory of its channels to the next actuator that this thread reads.

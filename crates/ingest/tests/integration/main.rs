@@ -7,3 +7,4 @@ mod corrupt_files;
 mod foreign_writers;
 mod layouts;
 mod sample_filters;
+mod simulated_channels;

@@ -428,7 +428,8 @@ fn proposals(facts: &Facts, config: &Config) -> String {
             .iter()
             .map(|p| {
                 let stated = p.configured.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
-                vec![p.key.to_owned(), format!("{:.2e}", p.identified), stated]
+                let uncertainty = p.uncertainty.map_or_else(String::new, |v| format!(" ± {v:.1e}"));
+                vec![p.key.to_owned(), format!("{:.2e}{uncertainty}", p.identified), stated]
             })
             .collect();
         let flights = table::count(all.len(), "actuator-flight");
