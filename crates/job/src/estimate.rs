@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use estimator::contact::{self, ContactEstimate, ContactOutcome, ContactPlot, PartPrior};
 use estimator::{Filter, FilterWorkspace, GainSchedule, MidRangeEstimate, Samples, midrange};
-use ingest::{ActuatorChannels, Geometry};
+use ingest::{ActuatorChannels, Geometry, Quality};
 use records::{Diagnostic, GapEstimate, Status};
 
 use crate::config::part::Part;
@@ -156,8 +156,10 @@ fn pre_check_rejection(channels: &ActuatorChannels) -> Option<&'static str> {
         return Some("nothing_selected");
     }
     let rigid = channels.dx_m.iter().all(|dx| dx.is_nan() || Some(dx) == first);
-    let still = motor.is_constant() || screw.is_constant() || load.is_constant() || rigid;
-    let zero = motor.is_zero() || screw.is_zero() || load.is_zero();
+    let needed =
+        || [motor, screw, load].into_iter().filter(|q| !(channels.output_locked && std::ptr::eq(*q, screw)));
+    let still = needed().any(Quality::is_constant) || rigid;
+    let zero = needed().any(Quality::is_zero);
     if zero { Some("channel_zero") } else { still.then_some("channel_constant") }
 }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use ingest::log::identity::IdentityFields;
+use ingest::mapping::Output;
 use ingest::{ActuatorChannels, ActuatorColumns, Channels, Identity, Log, LogFiles, Mapping};
 use jiff::{SignedDuration, Timestamp};
 use records::{
@@ -234,12 +235,15 @@ pub(crate) fn for_each_unidentified(
 ) -> Result<(), Diagnostic> {
     let complain = |e: ingest::Error| e.diagnostic().in_file(display_name);
     let log = Log::open(files, config.base_mapping()).map_err(complain)?;
-    let channels = &config.base_mapping().channels;
+    let mut channels = config.base_mapping().channels.clone();
+    if part.output_locked {
+        channels.output = Output::Locked;
+    }
     // A log of one actuator has no name for it here, but needs one to be asked by.
     let own = Position::new("actuator").map_err(|e| Diagnostic::new("empty_name", e))?;
-    let positions = log.actuators(channels, Some(&own)).map_err(complain)?;
+    let positions = log.actuators(&channels, Some(&own)).map_err(complain)?;
     for at in positions.iter().filter(|at| at.lacking.is_empty()) {
-        let read = log.read_actuator(at, channels, part.geometry).map_err(complain)?;
+        let read = log.read_actuator(at, &channels, part.geometry).map_err(complain)?;
         take(&read).map_err(|diagnostic| diagnostic.in_file(display_name))?;
     }
     Ok(())

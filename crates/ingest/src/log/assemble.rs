@@ -16,6 +16,8 @@ pub(crate) struct RawChannels {
     pub(crate) screw: Channel,
     pub(crate) load: Channel,
     pub(crate) is_relative: bool,
+    /// The screw position is constant because the output is fixed.
+    pub(crate) output_locked: bool,
     pub(crate) selection: SampleSelection,
 }
 
@@ -27,7 +29,7 @@ pub(crate) fn assemble(
     temperature_c: Option<f64>,
     mut flags: Vec<String>,
 ) -> ActuatorChannels {
-    let RawChannels { motor, screw, load, is_relative, selection } = read;
+    let RawChannels { motor, screw, load, is_relative, output_locked, selection } = read;
     let SampleSelection { segments, apart, .. } = selection;
     let quality = [&motor, &screw, &load].map(|read| {
         let seen = read.seen.unwrap_or_else(|| ChannelStats::of(&read.values));
@@ -35,7 +37,7 @@ pub(crate) fn assemble(
     });
     let (mut motor_m, mut dx_m, mut load_n) = (motor.values, screw.values, load.values);
     flags.extend(quality::quality_flags(&quality, line.step_s));
-    if !is_relative {
+    if !is_relative && !output_locked {
         let longest = quality[0].longest_run.max(quality[1].longest_run);
         flags.extend(quality::drop_frozen_samples(&mut motor_m, &mut dx_m, longest, line.step_s));
     }
@@ -53,6 +55,7 @@ pub(crate) fn assemble(
         step_s: line.step_s,
         missing_share: (missing - apart) as f64 / (dx_m.len() - apart).max(1) as f64,
         apart,
+        output_locked,
         motor_m,
         dx_m,
         load_n,

@@ -282,7 +282,12 @@ impl Log {
         let mut columns = [None, None, None, None];
         let mut lacking = Vec::new();
         for (slot, role) in columns.iter_mut().zip(Role::ALL) {
-            let Some(map) = channels.of(role) else { continue };
+            let Some(map) = channels.of(role) else {
+                if role == Role::Screw && !channels.output.is_locked() {
+                    lacking.push("`channel.screw_position`, which is not mapped".to_owned());
+                }
+                continue;
+            };
             let first = self.present(map, &position)?.into_iter().next();
             let name = ColumnPattern::new(&map.column).column_for(position.as_str());
             if first.is_none() && role != Role::Temperature {
@@ -370,13 +375,19 @@ impl Log {
         let sought = ChannelRequest { at, channels, geometry };
         let ReferenceChannel { channel: motor, master, selection, mut flags } = self.motor(sought)?;
         let read = |role: Role, from: &SampleSelection| self.follower(role, sought, &master, from);
-        let (screw, screw_flags) = read(Role::Screw, &selection)?;
+        let output_locked = channels.output.is_locked();
+        let (screw, screw_flags) = if output_locked {
+            (selection.cut(vec![0.0; motor.values.len()].into()), Vec::new())
+        } else {
+            read(Role::Screw, &selection)?
+        };
         let (load, load_flags) = read(Role::Load, &selection)?;
         // The mean of the flight, whatever counts of it.
         let whole = SampleSelection::whole(&master.0.line);
         let temperature = channels.temperature.as_ref().and_then(|_| read(Role::Temperature, &whole).ok());
         flags.extend(screw_flags.into_iter().chain(load_flags));
-        let read = RawChannels { motor, screw, load, is_relative: channels.is_relative(), selection };
+        let read =
+            RawChannels { motor, screw, load, is_relative: channels.is_relative(), output_locked, selection };
         let temperature_c = temperature.and_then(|(read, _)| mean(&read.values));
         Ok(assemble(at.position.clone(), read, &master.0.line, temperature_c, flags))
     }

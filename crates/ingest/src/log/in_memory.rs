@@ -48,8 +48,14 @@ impl ChannelArrays<'_> {
             Timestamps { column: "time_s".into(), seconds, origin: TimeOrigin::Counted(first_s) };
         let line = clock::build_time_base(&mut stamps, &ClockMapping::default()).map_err(fail)?;
         let [motor, screw, load] = named.map(|(_, values)| on(values, line.kept.as_deref()).into());
-        let read =
-            RawChannels { motor, screw, load, is_relative: false, selection: SampleSelection::whole(&line) };
+        let read = RawChannels {
+            motor,
+            screw,
+            load,
+            is_relative: false,
+            output_locked: false,
+            selection: SampleSelection::whole(&line),
+        };
         Ok(assemble(position, read, &line, None, Vec::new()))
     }
 }

@@ -37,6 +37,7 @@ pub(crate) struct Normalized {
     flags: Vec<String>,
     /// Samples that no condition left.
     apart: usize,
+    output_locked: bool,
 }
 
 impl Normalized {
@@ -67,6 +68,7 @@ impl Normalized {
             segments: segments.ok_or_else(|| fail("its stretches cannot be read".into()))?,
             metres_per_radian: number("metres_per_radian"),
             temperature_c: number("temperature_c"),
+            output_locked: text("output_locked").as_deref() == Some("true"),
             apart: text("apart").and_then(|t| t.parse().ok()).unwrap_or(0),
             flags: text("flags").map(|t| t.split(' ').map(str::to_owned).collect()).unwrap_or_default(),
         }))
@@ -107,6 +109,7 @@ impl Normalized {
             position,
             step_s: self.step_s,
             apart: self.apart,
+            output_locked: self.output_locked,
             missing_share: quality[1].missing_share,
             quality,
             motor_m,
@@ -179,6 +182,7 @@ fn footer(
         ("metres_per_radian", number(geometry.metres_per_radian())),
         ("temperature_c", number(channels.temperature_c)),
         ("apart", channels.apart.to_string()),
+        ("output_locked", channels.output_locked.to_string()),
         ("flags", channels.flags.join(" ")),
         ("units", "time_s: s since the first sample; motor_m, dx_m: m at the screw; load_n: N".to_owned()),
     ];

@@ -50,6 +50,8 @@ pub struct ActuatorChannels {
     pub position: Position,
     /// Step between samples, s.
     pub step_s: f64,
+    /// Whether the output is fixed: δX is then minus the motor position.
+    pub output_locked: bool,
     /// Motor position X₁ brought to the screw axis, m; NaN where missing.
     pub motor_m: Vec<f64>,
     /// Relative position δX = X₂ − X₁, m; NaN where either is missing.

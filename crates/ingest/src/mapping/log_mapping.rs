@@ -201,6 +201,9 @@ pub struct Channels {
     /// Screw minus motor, where it is logged instead of the screw's own position.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub relative_position: Option<ChannelMapping>,
+    /// Whether the output moves: `moving` (default), or `locked` where it is fixed and the screw position is constant.
+    #[serde(default, skip_serializing_if = "Output::is_moving")]
+    pub output: Output,
     /// Load on the screw: a force, or a torque. Positive where it drives δX = screw − motor up.
     pub load: ChannelMapping,
     /// Temperature, where logged.
@@ -209,6 +212,30 @@ pub struct Channels {
     /// Conditions on other columns under which samples count; all must hold. Every sample when not given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub when: Vec<SampleFilter>,
+}
+
+/// Whether an actuator's output can move.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Output {
+    /// It moves, and a channel records it.
+    #[default]
+    Moving,
+    /// It is fixed, as on a test bench: the screw position is constant, and no channel is needed for it.
+    Locked,
+}
+
+impl Output {
+    /// Whether it moves.
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
+    pub fn is_moving(&self) -> bool {
+        *self == Self::Moving
+    }
+
+    /// Whether it is fixed.
+    pub fn is_locked(self) -> bool {
+        self == Self::Locked
+    }
 }
 
 /// A channel of an actuator.
@@ -246,6 +273,7 @@ impl Channels {
     pub fn of(&self, role: Role) -> Option<&ChannelMapping> {
         match role {
             Role::Motor => Some(&self.motor_position),
+            Role::Screw if self.output.is_locked() => None,
             Role::Screw => self.screw_position.as_ref().or(self.relative_position.as_ref()),
             Role::Load => Some(&self.load),
             Role::Temperature => self.temperature.as_ref(),
@@ -254,7 +282,7 @@ impl Channels {
 
     /// Whether δX is logged itself.
     pub fn is_relative(&self) -> bool {
-        self.screw_position.is_none()
+        self.screw_position.is_none() && !self.output.is_locked()
     }
 }
 

@@ -7,6 +7,6 @@ pub mod units;
 
 pub use log_mapping::{
     ChannelMapping, Channels, ClockMapping, Epoch, GroupMapping, IdentityField, IdentityMapping, Layout,
-    Mapping, Role,
+    Mapping, Output, Role,
 };
 pub use sample_filter::SampleFilter;

@@ -255,6 +255,11 @@ impl Document {
         }
     }
 
+    /// Whether the output of a part is fixed, so that its logs need no screw position.
+    pub(super) fn has_locked_part(&self) -> bool {
+        self.part.values().any(|part| part.output.is_locked())
+    }
+
     /// Everything that reads well but cannot be meant.
     pub(super) fn check(&self, source: &Source<'_>) -> Vec<Diagnostic> {
         let mut found = Vec::new();
@@ -267,7 +272,16 @@ impl Document {
             let c = Diagnostic::new("empty_name", "`store.path` is not a folder of its own");
             found.push(source.at(&["store", "path"], c.hint("path = \"results\"")));
         }
-        validate_channels::check(&self.channel, &self.layout, &self.group, &["channel"], source, &mut found);
+        let has_locked = self.has_locked_part();
+        validate_channels::check(
+            &self.channel,
+            has_locked,
+            &self.layout,
+            &self.group,
+            &["channel"],
+            source,
+            &mut found,
+        );
         check_clock(&self.clock, &["clock"], source, &mut found);
         check_layout(&self.layout, &["layout"], source, &mut found);
         self.check_groups(source, &mut found);

@@ -79,6 +79,7 @@ impl Overrides {
         if !found.is_empty() {
             return Err(found);
         }
+        overrides.extend(locked_parts(document));
         Ok(Self { base: Arc::new(base), overrides, mappings: Mutex::default(), cached: Mutex::default() })
     }
 
@@ -142,6 +143,16 @@ impl Overrides {
     }
 }
 
+/// What `output = "locked"` of a part changes in its channels.
+fn locked_parts(document: &Document) -> impl Iterator<Item = ValidatedOverride> {
+    let locked = document.part.iter().filter(|(_, settings)| settings.output.is_locked());
+    locked.filter_map(|(number, _)| {
+        let part = glob::Pattern::new(&glob::Pattern::escape(number)).ok()?;
+        let channel = toml::Table::from_iter([("output".to_owned(), toml::Value::from("locked"))]);
+        Some(ValidatedOverride { tails: Vec::new(), parts: vec![part], clock: toml::Table::new(), channel })
+    })
+}
+
 fn validate(settings: &Override) -> Result<ValidatedOverride, Diagnostic> {
     let pattern = |text: &String| {
         glob::Pattern::new(text)
@@ -180,6 +191,7 @@ fn try_alone(
         Ok(channels) => {
             validate_channels::check(
                 &channels,
+                document.has_locked_part(),
                 &document.layout,
                 &document.group,
                 &["override"],

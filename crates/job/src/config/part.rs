@@ -2,6 +2,7 @@
 
 use estimator::SensorNoise;
 use ingest::Geometry;
+use ingest::mapping::Output;
 use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -61,6 +62,9 @@ pub struct PartSettings {
     /// Rotary: the radius at which the gap is stated, m: `gap_m` = radius × radians.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_radius_m: Option<f64>,
+    /// `moving` (default), or `locked` where the output is fixed: the screw position is constant and needs no channel.
+    #[serde(skip_serializing_if = "Output::is_moving")]
+    pub output: Output,
     /// Load between whose positive and negative value lost motion is stated, N.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_load_n: Option<f64>,
@@ -153,6 +157,8 @@ pub struct Part {
     pub geometry: Geometry,
     /// Its noise.
     pub noise: estimator::NoiseModel,
+    /// Whether its output is fixed: the relative position is then minus the motor position.
+    pub output_locked: bool,
     /// Load between whose positive and negative value lost motion is stated, N.
     pub reference_load_n: Option<f64>,
     /// Removal limit, m.
@@ -201,6 +207,7 @@ impl PartSettings {
                 actuator,
                 geometry,
                 noise,
+                output_locked: self.output.is_locked(),
                 reference_load_n: self.reference_load_n,
                 limit_m: self.limit_m,
                 watch_m: self.watch_m,

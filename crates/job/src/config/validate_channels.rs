@@ -13,6 +13,7 @@ use crate::config::limits::positive;
 /// Every diagnostic about the channels, each at its key.
 pub(super) fn check(
     channels: &Channels,
+    has_locked_part: bool,
     layout: &Layout,
     groups: &BTreeMap<String, GroupMapping>,
     path: &[&str],
@@ -47,9 +48,10 @@ pub(super) fn check(
         }
     }
     match (&channels.screw_position, &channels.relative_position) {
+        (None, None) if has_locked_part || channels.output.is_locked() => {}
         (None, None) => {
             let what = "neither `screw_position` nor `relative_position` is mapped";
-            complain(&[], Diagnostic::new("key_missing", what).hint("[channel.screw_position]"));
+            complain(&[], Diagnostic::new("key_missing", what).hint("[channel.screw_position]\n# or, where the output is fixed: [part.\"…\"] output = \"locked\""));
         }
         (Some(_), Some(_)) => {
             let what = "both `screw_position` and `relative_position` are mapped";

@@ -6,3 +6,4 @@ mod config;
 mod part_identification;
 mod reference;
 mod schema;
+mod unusual_parts;

@@ -274,7 +274,11 @@ fn actuator(
         });
     }
     let a = opened.channels(at, part)?;
-    let slope = quality::regression_slope(&a.motor_m, &a.dx_m).map(slope_note);
+    let slope = if a.output_locked {
+        Some("the output is locked: minus the motor position".to_owned())
+    } else {
+        quality::regression_slope(&a.motor_m, &a.dx_m).map(slope_note)
+    };
     let [motor_seen, screw_seen, load_seen] = a.quality;
     let mut found = vec![
         describe(base("motor_position", motor, "m"), motor_seen, &channel_flags(&a, "motor")),
@@ -283,6 +287,9 @@ fn actuator(
         describe(base("load", load, "N"), load_seen, &channel_flags(&a, "load")),
     ];
     found[2].note = found[2].note.take().or(slope);
+    if a.output_locked {
+        found[1].note = None;
+    }
     let says = Some((stay.part_number.clone(), job::part_identification::IdentifiedParams::of(&a, part)));
     Ok(ActuatorCheck { found, clock: Some(clock(&a)), says })
 }
