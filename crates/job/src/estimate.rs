@@ -36,7 +36,7 @@ pub fn estimate(
         return Ok(GapEstimate::refused("rate_too_low"));
     }
     let schedule = part.filters.of(&filter(channels, part)?);
-    let prior = prior(part);
+    let prior = prior(channels, part);
     let failed = |e: estimator::Error| Diagnostic::new("estimate_failed", e);
     let mut estimate = if let Some(reason) = pre_check_rejection(channels) {
         GapEstimate::refused(reason)
@@ -109,7 +109,8 @@ pub fn filter(channels: &ActuatorChannels, part: &Part) -> Result<Filter, Diagno
 /// # Errors
 /// A diagnostic when the settings of the part cannot be.
 pub fn picture(channels: &ActuatorChannels, part: &Part) -> Result<Option<ContactPlot>, Diagnostic> {
-    contact::plot_data(&samples(channels), &prior(part)).map_err(|e| Diagnostic::new("estimate_failed", e))
+    contact::plot_data(&samples(channels), &prior(channels, part))
+        .map_err(|e| Diagnostic::new("estimate_failed", e))
 }
 
 /// The channels as the estimator takes them.
@@ -124,7 +125,7 @@ pub fn samples(channels: &ActuatorChannels) -> Samples<'_> {
 }
 
 /// What is known of a part before its flight is seen.
-pub fn prior(part: &Part) -> PartPrior {
+pub fn prior(channels: &ActuatorChannels, part: &Part) -> PartPrior {
     let unknown_force_n = match part.noise {
         estimator::NoiseModel::Sensors(sensors) => {
             Some(sensors.unknown_force_n).filter(|force_n| *force_n > 0.0)
@@ -139,7 +140,7 @@ pub fn prior(part: &Part) -> PartPrior {
             Geometry::Linear { lead_m_per_rev } => lead_m_per_rev,
             Geometry::Rotary { .. } => None,
         },
-        output_locked: false,
+        output_locked: channels.output_locked,
     }
 }
 

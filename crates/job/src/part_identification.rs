@@ -62,7 +62,7 @@ impl IdentifiedParams {
             ..Self::default()
         };
         if let Ok(ContactOutcome::Estimated(found)) =
-            contact::estimate(&estimate::samples(channels), &estimate::prior(part))
+            contact::estimate(&estimate::samples(channels), &estimate::prior(channels, part))
         {
             params.stiffness_n_per_m = Some(found.stiffness_n_per_m);
             let load_n = rms_n(&channels.load_n);
