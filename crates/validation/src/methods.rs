@@ -28,6 +28,8 @@ pub struct MethodResults {
 /// The methods compared, ours first.
 pub const METHODS: [&str; 4] = ["contact regression", "paper (29–31)", "load lines", "P99 − P1 of δX"];
 
+/// Travel of the screw in one turn of the motor, m.
+const LEAD_M_PER_REV: f64 = 0.005;
 /// The friction that a fleet expects, N.
 const UNKNOWN_FORCE_N: f64 = 200.0;
 
@@ -97,13 +99,14 @@ pub fn part(case: &Case) -> Result<Part, estimator::Error> {
     };
     Ok(Part {
         actuator: ActuatorModel::linear(case.assumed_stiffness_n_per_m(), 2000.0, 8.0)?,
-        geometry: Geometry::Linear { lead_m_per_rev: None },
+        geometry: Geometry::Linear { lead_m_per_rev: Some(LEAD_M_PER_REV) },
         noise: NoiseModel::Sensors(noise),
         reference_load_n: None,
         limit_m: None,
         watch_m: None,
         filters: FilterCache::default(),
         axis: None,
+        output_locked: false,
     })
 }
 
