@@ -1,7 +1,8 @@
-//! Why a sound log cannot show a gap, and what may be doubted about one that does.
+//! Acceptance of an estimate: its quality flags.
 
-use super::design_matrix::Scaling;
-use super::{ContactEstimate, DETECTION_SHARE};
+use super::codes::QualityFlag;
+use super::fit::scaling::Scaling;
+use super::types::{ContactEstimate, DETECTION_SHARE};
 
 /// Standard errors a gap must exceed to count as seen.
 const SEEN: f64 = 2.0;
@@ -10,119 +11,7 @@ const IMPLAUSIBLE: f64 = 0.45;
 /// Relative standard error of the gap's interval beyond which the flight says little, in wind-ups.
 const VAGUE: f64 = 0.1;
 
-/// Why a flight cannot show its gap. Each has a stable code and a remedy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Rejection {
-    /// The load presses on one flank only.
-    NoLoadReversal,
-    /// One flank is touched for less than a second.
-    OneSideBrief,
-    /// The load does not rise above the friction that is to be expected, or above nothing.
-    LoadTooSmall,
-    /// The motor moves less than the wind-up.
-    TravelTooSmall,
-    /// Fewer than 20 samples a second.
-    RateTooLow,
-    /// δX travels further than gap and wind-up account for: friction may hold the screw within the gap.
-    MotionUnexplained,
-    /// Under nine seconds of sound samples, or too few in contact.
-    TooShort,
-    /// A channel never changes.
-    ChannelConstant,
-    /// δX falls with the load, and friction agrees with the positions.
-    LoadSignFlipped,
-    /// δX falls with the load, and friction says motor and screw are exchanged.
-    PositionsSwapped,
-    /// One position is not a multiple of one of the other.
-    PositionRatio,
-}
-
-impl Rejection {
-    /// The code that records keep.
-    pub fn code(self) -> &'static str {
-        match self {
-            Self::NoLoadReversal => "no_load_reversal",
-            Self::OneSideBrief => "one_side_brief",
-            Self::LoadTooSmall => "load_too_small",
-            Self::TravelTooSmall => "travel_too_small",
-            Self::RateTooLow => "rate_too_low",
-            Self::MotionUnexplained => "motion_unexplained",
-            Self::TooShort => "too_short",
-            Self::ChannelConstant => "channel_constant",
-            Self::LoadSignFlipped => "load_sign_flipped",
-            Self::PositionsSwapped => "positions_swapped",
-            Self::PositionRatio => "position_ratio",
-        }
-    }
-
-    /// What somebody can do about it.
-    pub fn remedy(self) -> &'static str {
-        match self {
-            Self::NoLoadReversal => "use a flight, or a ground check, in which the load changes sides",
-            Self::OneSideBrief => {
-                "use a longer flight, or one with more manoeuvres, so that both flanks are pressed"
-            }
-            Self::LoadTooSmall => {
-                "check the load channel and its unit; a surface without airload shows no gap"
-            }
-            Self::TravelTooSmall => {
-                "use a flight in which the actuator moves; friction cannot be told from play at rest"
-            }
-            Self::RateTooLow => "record at 20 samples a second or more, 50 or more for a small gap",
-            Self::MotionUnexplained => {
-                "check that the load is this actuator's; else use a flight with more load, or more travel, so \
-                 that friction does not hold the screw within its gap"
-            }
-            Self::TooShort => "record at least 9 s of valid samples in which the load presses on both flanks",
-            Self::ChannelConstant => "check wiring and mapping: a channel that never changes is not measured",
-            Self::LoadSignFlipped => {
-                "reverse the sign of the load in the mapping: it must be positive along +X"
-            }
-            Self::PositionsSwapped => {
-                "exchange motor and screw position in the mapping, or reverse both signs"
-            }
-            Self::PositionRatio => {
-                "check lead, unit and sign of the positions: screw against motor must have slope 1"
-            }
-        }
-    }
-}
-
-/// A doubt that does not forbid the number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum QualityFlag {
-    /// The gap is under two standard errors, or under a hundredth of the wind-up: read the upper bound.
-    BelowDetection,
-    /// The published statistic at the fitted stiffness differs by more than both methods explain.
-    EstimatorsDisagree,
-    /// 1/K lies more than three spreads from the part's.
-    StiffnessImplausible,
-    /// The 95 % load is under three times the friction.
-    FrictionHeavy,
-    /// Flanks are soft at low load: a fit of higher loads alone reads another gap.
-    SoftContact,
-    /// The gap is negative by more than two standard errors, which no gap can be.
-    GapNegative,
-    /// The standard error exceeds a tenth of the wind-up.
-    Imprecise,
-}
-
-impl QualityFlag {
-    /// The code that records keep.
-    pub fn code(self) -> &'static str {
-        match self {
-            Self::BelowDetection => "below_detection",
-            Self::EstimatorsDisagree => "estimators_disagree",
-            Self::StiffnessImplausible => "stiffness_implausible",
-            Self::FrictionHeavy => "friction_heavy",
-            Self::SoftContact => "soft_contact",
-            Self::GapNegative => "gap_negative",
-            Self::Imprecise => "imprecise",
-        }
-    }
-}
-
-pub(super) fn flags(
+pub(crate) fn flags(
     found: &ContactEstimate,
     frame: &Scaling,
     is_soft: bool,

@@ -1,7 +1,9 @@
 //! Lost motion measured rather than extrapolated: at zero load, and at a reference load.
 
-use super::design_matrix::{COLUMNS, DesignRow, FORCE, Flank, GAP, Scaling};
-use super::flank_fit::FlankFit;
+use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP};
+use crate::contact::fit::flank_fit::FlankFit;
+use crate::contact::fit::scaling::Scaling;
+use crate::contact::friction::flank::Flank;
 
 /// Rows this near to the reference load count, as a share of it.
 const NEAR: f64 = 0.25;
@@ -14,7 +16,7 @@ const FEWEST_ROWS: usize = 5;
 
 /// Lost motion at zero load and its standard error, m, from the lightly loaded rows, which the straight fit
 /// never saw.
-pub(super) fn loop_width_m(contact: &FlankFit) -> Option<(f64, f64)> {
+pub(crate) fn loop_width_m(contact: &FlankFit) -> Option<(f64, f64)> {
     let light = &contact.line.design.light;
     let beyond_m = |flank| beyond_m(contact, light.iter(), flank);
     Some(put_together(contact, contact.line.fit.beta[GAP], beyond_m(Flank::Upper)?, beyond_m(Flank::Lower)?))
@@ -22,7 +24,7 @@ pub(super) fn loop_width_m(contact: &FlankFit) -> Option<(f64, f64)> {
 
 /// Relative travel between + and − a load in the coupling and its standard error, m: rows near it on either
 /// flank, drift, skew and transducer error taken off, brought to the load itself along the fitted line.
-pub(super) fn lost_motion_m(contact: &FlankFit, frame: &Scaling, load_n: f64) -> Option<(f64, f64)> {
+pub(crate) fn lost_motion_m(contact: &FlankFit, frame: &Scaling, load_n: f64) -> Option<(f64, f64)> {
     let load = load_n / frame.load_n;
     let near = |row: &&DesignRow<COLUMNS>| (row.x[FORCE].abs() - load).abs() < NEAR * load;
     let rows = &contact.line.design;

@@ -1,8 +1,9 @@
 //! What the estimate stands on, as one would draw it: δX against the force in the coupling.
 
-pub use super::design_matrix::Flank;
-use super::design_matrix::{COLUMNS, DesignRow, FORCE, GAP, Scaling};
-use super::flank_fit::FlankFit;
+use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP};
+use crate::contact::fit::flank_fit::FlankFit;
+use crate::contact::fit::scaling::Scaling;
+use crate::contact::friction::flank::Flank;
 
 /// Points of a flank's line.
 const POINTS: usize = 60;
@@ -36,7 +37,7 @@ pub struct ContactPlot {
 }
 
 impl ContactPlot {
-    pub(super) fn of(frame: &Scaling, contact: &FlankFit) -> Self {
+    pub(crate) fn of(frame: &Scaling, contact: &FlankFit) -> Self {
         let design = &contact.line.design;
         let firm = design.firm.iter().zip(contact.line.fit.trusts(&design.firm)).map(|(r, t)| (r, Some(t)));
         let light = design.light.iter().map(|row| (row, None));
@@ -53,7 +54,7 @@ impl ContactPlot {
 
 fn touch(frame: &Scaling, contact: &FlankFit, row: &DesignRow<COLUMNS>, trust: Option<f64>) -> Touch {
     Touch {
-        time_s: frame.moment_s(row),
+        time_s: row.moment_s(frame),
         duration_s: row.blocks * contact.period_s,
         flank: if row.x[GAP] > 0.0 { Flank::Upper } else { Flank::Lower },
         force_n: row.x[FORCE] * frame.load_n,

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::block_means::{BlockMeans, is_complete};
-use super::design_matrix::{FIRM_SHARE, Flank, RowSource, Scaling};
-use super::friction_model::{
+use crate::contact::blocks::block_means::{BlockMeans, is_complete};
+use crate::contact::friction::flank::{FIRM_SHARE, Flank};
+use crate::contact::friction::friction_model::{
     CouplingForce, CouplingIntegrator, CouplingParams, Drive, FrictionState, ScrewState,
 };
 use crate::simd::dispatch::{Lanes, simd_dispatch};
@@ -16,7 +16,7 @@ const KEPT: usize = BEFORE + 2;
 
 /// Which flank a block presses, and whether firmly, in bits; none in the gap, or where the force is unknown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Touch(u8);
+pub(crate) struct Touch(u8);
 
 impl Touch {
     const NONE: Self = Self(0);
@@ -24,25 +24,25 @@ impl Touch {
     const LOWER: u8 = 2;
     const FIRM: u8 = 4;
 
-    pub(super) fn flank(self) -> Flank {
+    pub(crate) fn flank(self) -> Flank {
         if self.0 & Self::UPPER == 0 { Flank::Lower } else { Flank::Upper }
     }
 
     /// A number for each flank, loaded or lightly loaded: 0 to 3.
-    pub(super) fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         usize::from(self.flank() == Flank::Lower) + 2 * usize::from(self.0 & Self::FIRM != 0)
     }
 
     /// Whether an [index](Self::index) is of loaded contact.
-    pub(super) fn is_firm_index(index: usize) -> bool {
+    pub(crate) fn is_firm_index(index: usize) -> bool {
         index >= 2
     }
 }
 
 /// The coupling of every block under one set of parameters.
 #[derive(Debug, Default)]
-pub(super) struct CouplingPath {
-    pub(super) columns: PathColumns,
+pub(crate) struct CouplingPath {
+    pub(crate) columns: PathColumns,
     touches: Vec<Touch>,
     /// Touches of the complete blocks whose neighbours have the same contact state.
     kept: Vec<Touch>,
@@ -50,25 +50,24 @@ pub(super) struct CouplingPath {
 
 /// One value for each block.
 #[derive(Debug, Default)]
-pub(super) struct PathColumns {
+pub(crate) struct PathColumns {
     /// c, N; NaN where a channel is missing.
-    pub(super) force_n: Vec<f64>,
+    pub(crate) force_n: Vec<f64>,
     /// ∂c/∂F_d.
-    pub(super) dforce_ddry: Vec<f64>,
+    pub(crate) dforce_ddry: Vec<f64>,
     /// ∂c/∂η, N.
-    pub(super) dforce_dloss_n: Vec<f64>,
+    pub(crate) dforce_dloss_n: Vec<f64>,
     /// ∂c/∂p, N.
-    pub(super) dforce_dstribeck_n: Vec<f64>,
+    pub(crate) dforce_dstribeck_n: Vec<f64>,
     /// Relative position from the middle of the gap, m.
-    pub(super) relative_m: Vec<f64>,
+    pub(crate) relative_m: Vec<f64>,
 }
 
 impl CouplingPath {
     /// Integrates the coupling over all segments.
-    pub(super) fn integrate(&mut self, source: RowSource<'_>, state: &FrictionState) {
-        let RowSource { blocks, scaling } = source;
+    pub(crate) fn integrate(&mut self, blocks: &BlockMeans, state: &FrictionState, motor_sense: f64) {
         self.columns.resize(blocks.len());
-        let params = CouplingParams::new(state, scaling.motor_sense);
+        let params = CouplingParams::new(state, motor_sense);
         for segment in blocks.segments() {
             self.integrate_segment(blocks, params, segment);
         }
@@ -98,9 +97,9 @@ impl CouplingPath {
     }
 
     /// Marks the blocks that keep flank and contact state, so that no row mixes flank and gap.
-    pub(super) fn mark_stable(&mut self, blocks: &BlockMeans, scaling: &Scaling) {
+    pub(crate) fn mark_stable(&mut self, blocks: &BlockMeans, load_n: f64) {
         self.touches.resize(blocks.len(), Touch::NONE);
-        touches(&self.columns.force_n, FIRM_SHARE * scaling.load_n, &mut self.touches);
+        touches(&self.columns.force_n, FIRM_SHARE * load_n, &mut self.touches);
         self.kept.clear();
         self.kept.resize(blocks.len(), Touch::NONE);
         for segment in blocks.segments() {
@@ -110,7 +109,7 @@ impl CouplingPath {
     }
 
     /// The next run of stable blocks with one contact state: no longer than `most`, and within one correlation block.
-    pub(super) fn next_stable_run(
+    pub(crate) fn next_stable_run(
         &self,
         blocks: &BlockMeans,
         within: Range<usize>,
@@ -313,8 +312,8 @@ simd_dispatch! {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::friction_model::Friction;
     use super::*;
+    use crate::contact::friction::friction_model::Friction;
 
     proptest! {
         /// However a flight is cut, and whatever is missing of it, eight integrations in parallel lanes are bitwise one

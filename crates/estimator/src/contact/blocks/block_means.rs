@@ -5,10 +5,10 @@ use std::ops::Range;
 use crate::Samples;
 use crate::simd::dispatch::{Lanes, simd_dispatch};
 
-use super::acceptance::Rejection;
-use super::design_matrix::middle_and_half;
-use super::spikes::SpikeThreshold;
-use super::{PartPrior, SHORTEST_S};
+use crate::contact::blocks::extent::middle_and_half;
+use crate::contact::blocks::spikes::SpikeThreshold;
+use crate::contact::codes::Rejection;
+use crate::contact::types::{PartPrior, SHORTEST_S};
 
 /// Length of a block, s: short against vibration of the load, which would mix both flanks in one mean.
 const PERIOD_S: f64 = 0.004;
@@ -41,27 +41,27 @@ const REVERSAL_SHARE: f64 = 0.15;
 
 /// Means over blocks; NaN where fewer than half of a block's samples are sound.
 #[derive(Debug, Default)]
-pub(super) struct BlockMeans {
+pub(crate) struct BlockMeans {
     /// Length of a block, s.
-    pub(super) period_s: f64,
+    pub(crate) period_s: f64,
     /// The block at which each segment starts.
-    pub(super) starts: Vec<usize>,
+    pub(crate) starts: Vec<usize>,
     /// Middle of each block, s from the first sample of the log.
-    pub(super) time_s: Vec<f64>,
+    pub(crate) time_s: Vec<f64>,
     /// X₁, m.
-    pub(super) motor_m: Vec<f64>,
+    pub(crate) motor_m: Vec<f64>,
     /// δX, m: as logged, then with the screw's channel brought to the motor's clock.
-    pub(super) dx_m: Vec<f64>,
+    pub(crate) dx_m: Vec<f64>,
     /// F, N: as logged, then brought to the motor's clock.
-    pub(super) load_n: Vec<f64>,
+    pub(crate) load_n: Vec<f64>,
     /// e^−(v/v_s)²: how near the motor is to rest.
-    pub(super) slowness: Vec<f64>,
+    pub(crate) slowness: Vec<f64>,
     /// X₂ as it was logged, m.
     screw_m: Vec<f64>,
     /// F as it was logged, N.
     logged_n: Vec<f64>,
     /// Sine and cosine of the screw's position within the period of its errors; empty where none are looked for.
-    pub(super) phases: Vec<[f64; 2]>,
+    pub(crate) phases: Vec<[f64; 2]>,
 }
 
 impl BlockMeans {
@@ -69,7 +69,7 @@ impl BlockMeans {
     ///
     /// # Errors
     /// [`Rejection::ChannelConstant`], [`Rejection::TooShort`].
-    pub(super) fn gather(&mut self, samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Rejection> {
+    pub(crate) fn gather(&mut self, samples: &Samples<'_>, prior: &PartPrior) -> Result<(), Rejection> {
         let each = ((PERIOD_S / samples.step_s).round() as usize).max(1);
         let watch = SpikeGate::over(samples)?;
         self.clear(samples.dx_m.len() / each, each as f64 * samples.step_s);
@@ -133,7 +133,7 @@ impl BlockMeans {
 
     /// One more block, of which all is known but its time.
     #[cfg(test)]
-    pub(super) fn put(&mut self, [motor_m, dx_m, load_n]: [f64; 3], slowness: f64) {
+    pub(crate) fn put(&mut self, [motor_m, dx_m, load_n]: [f64; 3], slowness: f64) {
         self.slowness.push(slowness);
         self.time_s.push(self.len() as f64 * PERIOD_S);
         self.push(Some([motor_m, dx_m, load_n]));
@@ -145,27 +145,27 @@ impl BlockMeans {
         (0.0..=STILL * motor_m).contains(&screw_m)
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.time_s.len()
     }
 
-    pub(super) fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }
 
     /// The blocks of each segment.
-    pub(super) fn segments(&self) -> impl Iterator<Item = Range<usize>> {
+    pub(crate) fn segments(&self) -> impl Iterator<Item = Range<usize>> {
         let ends = self.starts.iter().skip(1).copied().chain(std::iter::once(self.len()));
         self.starts.iter().copied().zip(ends).map(|(start, end)| start..end)
     }
 
     /// The number of the stretch that a block lies in.
-    pub(super) fn stretch(&self, k: usize) -> u32 {
+    pub(crate) fn stretch(&self, k: usize) -> u32 {
         (self.time_s[k] / STRETCH_S) as u32
     }
 
     /// Whether nothing of a block or its neighbours is missing and the flight has more than begun.
-    pub(super) fn is_complete(&self, k: usize) -> bool {
+    pub(crate) fn is_complete(&self, k: usize) -> bool {
         let around = |values: &[f64]| values.get(k.wrapping_sub(1)..k + 2)?.as_array().copied();
         let rates = around(&self.motor_m).zip(around(&self.load_n));
         rates.is_some_and(|(motor_m, load_n)| is_complete(self.time_s[k], self.dx_m[k], &motor_m, &load_n))
@@ -173,7 +173,7 @@ impl BlockMeans {
 
     /// Takes in a part of a long flight: windows in which the load changes sides most often, and others spread over the
     /// flight. Nothing of a short flight. δX and the load are there once [delays are applied](Self::apply_delays).
-    pub(super) fn excerpt_of(&mut self, whole: &Self, load_n: f64) {
+    pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64) {
         self.clear(EXCERPT_BLOCKS.min(whole.len()), whole.period_s);
         if whole.len() < 2 * EXCERPT_BLOCKS {
             return;
@@ -220,7 +220,7 @@ impl BlockMeans {
     }
 
     /// Speed of the motor by the difference over [`SPEED_S`] on either side, m/s; NaN at the ends and near gaps.
-    pub(super) fn speed_m_per_s(&self, at: usize) -> f64 {
+    pub(crate) fn speed_m_per_s(&self, at: usize) -> f64 {
         let reach = ((SPEED_S / self.period_s).round() as usize).max(1);
         let Some(from) = at.checked_sub(reach) else { return f64::NAN };
         let to_m = self.motor_m.get(at + reach).copied().unwrap_or(f64::NAN);
@@ -229,7 +229,7 @@ impl BlockMeans {
 
     /// Reads the screw's channel and the load a delay later, by a cubic through four blocks (Catmull–Rom), so that all
     /// three channels belong to one moment.
-    pub(super) fn apply_delays(&mut self, skew_s: f64, load_delay_s: f64, load_lag_s: f64) {
+    pub(crate) fn apply_delays(&mut self, skew_s: f64, load_delay_s: f64, load_lag_s: f64) {
         // Nothing is read across the end of a segment.
         let segments: Vec<Range<usize>> = self.segments().collect();
         for segment in segments {
@@ -251,7 +251,7 @@ impl BlockMeans {
     }
 
     /// Sine and cosine of the screw's position, of which one period has 2π over so many metres.
-    pub(super) fn find_phases(&mut self, per_period: f64) {
+    pub(crate) fn find_phases(&mut self, per_period: f64) {
         self.phases.clear();
         let phase = |screw_m: &f64| {
             let (sine, cosine) = (screw_m * per_period).sin_cos();
@@ -312,7 +312,7 @@ fn read_later(logged: &[f64], shift: f64, read: &mut [f64]) {
 
 /// Whether δX of a block and the rates of the other two channels are known, and the flight has more than begun.
 #[inline]
-pub(super) fn is_complete(time_s: f64, dx_m: f64, motor_m: &[f64; 3], load_n: &[f64; 3]) -> bool {
+pub(crate) fn is_complete(time_s: f64, dx_m: f64, motor_m: &[f64; 3], load_n: &[f64; 3]) -> bool {
     let all = dx_m + (motor_m[2] - motor_m[0]) + (load_n[2] - load_n[0]);
     (time_s > START_S) & (all.abs() < f64::INFINITY)
 }

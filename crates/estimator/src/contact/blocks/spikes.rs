@@ -11,14 +11,14 @@ const REACH: usize = 4;
 
 /// How far a channel's neighbours lie apart.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SpikeThreshold {
+pub(crate) struct SpikeThreshold {
     /// The longest step that is not looked at twice, in the channel's unit.
-    pub(super) leap: f64,
+    pub(crate) leap: f64,
 }
 
 impl SpikeThreshold {
     /// From the steps within segments that are not zero; none when the channel never moves.
-    pub(super) fn of(values: &[f64], segments: &[Range<usize>]) -> Option<Self> {
+    pub(crate) fn of(values: &[f64], segments: &[Range<usize>]) -> Option<Self> {
         let steps = |stride: usize| -> Vec<f64> {
             let pairs =
                 segments.iter().flat_map(|segment| values[segment.clone()].windows(2).step_by(stride));
@@ -36,7 +36,7 @@ impl SpikeThreshold {
     }
 
     /// Whether a sample stands apart; a step from one level to another does not.
-    pub(super) fn is_wild(self, values: &[f64], at: usize, segment: &Range<usize>) -> bool {
+    pub(crate) fn is_wild(self, values: &[f64], at: usize, segment: &Range<usize>) -> bool {
         let around = at.saturating_sub(REACH).max(segment.start)..(at + REACH + 1).min(segment.end);
         // Where most lie near, so does the median: nothing need be put in order.
         let near = values[around.clone()].iter().filter(|v| (values[at] - **v).abs() <= self.leap).count();

@@ -1,9 +1,10 @@
 //! Are the channels what they are said to be? Signs and ratios, before anything is believed.
 
-use super::acceptance::Rejection;
-use super::block_means::BlockMeans;
-use super::design_matrix::{DesignRow, SPEED_M_PER_S, Scaling};
-use super::robust_regression::{GaussianPrior, fit};
+use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::codes::Rejection;
+use crate::contact::fit::design_matrix::DesignRow;
+use crate::contact::fit::robust_regression::{GaussianPrior, fit};
+use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling};
 
 /// Every fourth block is looked at, and of long flights some so many: a sign needs no more.
 const STRIDE: usize = 4;
@@ -37,7 +38,7 @@ const COLUMNS: usize = 6;
 ///
 /// # Errors
 /// [`Rejection::PositionRatio`], [`Rejection::LoadSignFlipped`], [`Rejection::PositionsSwapped`].
-pub(super) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<(), Rejection> {
+pub(crate) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<(), Rejection> {
     let stride = STRIDE.max(blocks.len() / LOOKS);
     let rows: Vec<DesignRow<COLUMNS>> =
         (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, frame, k)).collect();

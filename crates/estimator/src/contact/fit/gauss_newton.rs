@@ -1,15 +1,16 @@
 //! Gauss–Newton iteration over the parameters that the force in the coupling depends on.
 
-use super::acceptance::Rejection;
-use super::block_means::BlockMeans;
-use super::coupling_path::CouplingPath;
-use super::design_matrix::{
-    self, COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LATE_S, LOAD_RATE, ORIGIN, PERIODIC,
-    PLACE, RowSource, SHARE, SPEED, SPEED_M_PER_S, STRIBECK, Scaling,
+use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::codes::Rejection;
+use crate::contact::fit::design_matrix::{
+    self, COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LOAD_RATE, ORIGIN, PERIODIC, PLACE,
+    RowSource, SHARE, SPEED, STRIBECK,
 };
-use super::friction_model::{Friction, FrictionState};
-use super::robust_regression::{GaussianPrior, RobustFit, fit};
-use super::{MIN_CONTACT_S, REQUIRED_CONTACT_S};
+use crate::contact::fit::robust_regression::{GaussianPrior, RobustFit, fit};
+use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
+use crate::contact::friction::coupling_path::CouplingPath;
+use crate::contact::friction::friction_model::{Friction, FrictionState};
+use crate::contact::types::{MIN_CONTACT_S, REQUIRED_CONTACT_S};
 
 /// Relative spread of 1/K about the part's.
 const COMPLIANCE: f64 = 0.15;
@@ -48,20 +49,20 @@ const IRLS_ITERATIONS: usize = 5;
 
 /// The last iteration: rows, coefficients, and the parameters they were made with and lead to.
 #[derive(Debug)]
-pub(super) struct GaussNewtonResult {
-    pub(super) design: DesignMatrix,
-    pub(super) fit: RobustFit<COLUMNS>,
+pub(crate) struct GaussNewtonResult {
+    pub(crate) design: DesignMatrix,
+    pub(crate) fit: RobustFit<COLUMNS>,
     /// Parameters of the design's rows.
-    pub(super) at: FrictionState,
+    pub(crate) at: FrictionState,
     /// Parameters that the fit asks for.
-    pub(super) state: FrictionState,
+    pub(crate) state: FrictionState,
 }
 
 /// Iterates from a state: rows of that state, a fit, and the state the fit asks for.
 ///
 /// # Errors
 /// [`Rejection::NoLoadReversal`], [`Rejection::OneSideBrief`], [`Rejection::TooShort`].
-pub(super) fn search(
+pub(crate) fn search(
     (blocks, path): (&mut BlockMeans, &mut CouplingPath),
     scaling: &Scaling,
     mut state: FrictionState,
@@ -103,7 +104,7 @@ fn step(scaling: &Scaling, before: &FrictionState, after: &FrictionState) -> f64
 }
 
 /// The start of a search: the part's stiffness, a usual friction, no gap and no delays.
-pub(super) fn start(scaling: &Scaling) -> FrictionState {
+pub(crate) fn start(scaling: &Scaling) -> FrictionState {
     FrictionState {
         stiffness_n_per_m: scaling.stiffness_n_per_m,
         gap_m: 0.0,

@@ -4,12 +4,13 @@
 //! Candidates are compared by their misfit of all complete blocks, in contact or within the gap: which blocks are in
 //! contact depends on the candidate, so that a comparison over contact alone would compare different data.
 
-use super::acceptance::Rejection;
-use super::block_means::BlockMeans;
-use super::coupling_path::CouplingPath;
-use super::design_matrix::{COLUMNS, DRY, FORCE, FORCE_DRIFT, GAP, RowSource, SHARE, STRIBECK, Scaling};
-use super::friction_model::{Friction, FrictionState};
-use super::gauss_newton::{GaussNewtonResult, search, start};
+use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::codes::Rejection;
+use crate::contact::fit::design_matrix::{COLUMNS, DRY, FORCE, FORCE_DRIFT, GAP, RowSource, SHARE, STRIBECK};
+use crate::contact::fit::gauss_newton::{GaussNewtonResult, search, start};
+use crate::contact::fit::scaling::Scaling;
+use crate::contact::friction::coupling_path::CouplingPath;
+use crate::contact::friction::friction_model::{Friction, FrictionState};
 
 /// Normal standard deviations in a median absolute deviation.
 const MAD: f64 = 1.482_602_218_505_602;
@@ -37,18 +38,18 @@ const LEAST_DELAY_S: f64 = 2e-4;
 const COST_SCALE: f64 = 0.01;
 
 /// The best candidate.
-pub(super) struct SearchResult {
-    pub(super) found: GaussNewtonResult,
+pub(crate) struct SearchResult {
+    pub(crate) found: GaussNewtonResult,
     /// Spread of the gaps of all candidates about the best one's, each weighted by its misfit, m.
-    pub(super) spread_m: f64,
+    pub(crate) spread_m: f64,
     /// Scale of the residuals of single blocks, m.
-    pub(super) scale_m: f64,
+    pub(crate) scale_m: f64,
     /// Standard error of the load zero, N.
-    pub(super) load_zero_se_n: f64,
+    pub(crate) load_zero_se_n: f64,
 }
 
 /// The state of a search.
-pub(super) struct ParameterSearch<'a> {
+pub(crate) struct ParameterSearch<'a> {
     blocks: &'a mut BlockMeans,
     path: &'a mut CouplingPath,
     scaling: &'a Scaling,
@@ -65,7 +66,7 @@ struct Candidate {
 }
 
 impl<'a> ParameterSearch<'a> {
-    pub(super) fn new(blocks: &'a mut BlockMeans, path: &'a mut CouplingPath, scaling: &'a Scaling) -> Self {
+    pub(crate) fn new(blocks: &'a mut BlockMeans, path: &'a mut CouplingPath, scaling: &'a Scaling) -> Self {
         Self { blocks, path, scaling, linear_m: Vec::new(), scale_m: f64::INFINITY, tried: Vec::new() }
     }
 
@@ -73,7 +74,7 @@ impl<'a> ParameterSearch<'a> {
     ///
     /// # Errors
     /// As [`search`], when no start leads anywhere.
-    pub(super) fn run(mut self) -> Result<SearchResult, Rejection> {
+    pub(crate) fn run(mut self) -> Result<SearchResult, Rejection> {
         let mut best = self.from_starts()?;
         self.improve_zero(&mut best);
         let is_lagging = self.improve_lag(&mut best);
@@ -249,7 +250,7 @@ impl<'a> ParameterSearch<'a> {
         let Self { blocks, path, scaling, linear_m, .. } = self;
         let state = FrictionState { load_zero_n, ..found.at };
         blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
-        path.integrate(RowSource { blocks, scaling }, &state);
+        path.integrate(blocks, &state, scaling.motor_sense);
         if load_zero_n == found.at.load_zero_n {
             linear_parts(RowSource { blocks, scaling }, &found.fit.beta, linear_m);
         }

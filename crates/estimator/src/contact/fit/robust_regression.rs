@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
-use super::design_matrix::DesignRow;
+use crate::contact::fit::design_matrix::DesignRow;
 use crate::simd::dispatch::{Lanes, simd_dispatch};
 
 /// Residuals beyond this many times their spread lose weight (Huber).
@@ -18,20 +18,20 @@ const LEAST_SPREAD_M: f64 = 1e-12;
 
 /// What a coefficient is believed to be, m.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct GaussianPrior {
-    pub(super) mean: f64,
+pub(crate) struct GaussianPrior {
+    pub(crate) mean: f64,
     /// Infinite where nothing is believed.
-    pub(super) sd: f64,
+    pub(crate) sd: f64,
 }
 
 impl GaussianPrior {
-    pub(super) const NONE: Self = Self { mean: 0.0, sd: f64::INFINITY };
+    pub(crate) const NONE: Self = Self { mean: 0.0, sd: f64::INFINITY };
 }
 
 /// Coefficients of the first N columns, m.
 #[derive(Debug, Clone)]
-pub(super) struct RobustFit<const N: usize> {
-    pub(super) beta: [f64; N],
+pub(crate) struct RobustFit<const N: usize> {
+    pub(crate) beta: [f64; N],
     inverse: SMatrix<f64, N, N>,
     weights: Vec<f64>,
     /// Precision lent by each belief, in units of the rows' weights.
@@ -43,7 +43,7 @@ pub(super) struct RobustFit<const N: usize> {
 ///
 /// A belief counts as residual variance over its own, times the factor by which dependence within
 /// stretches inflates the variance of a mean; otherwise thousands of dependent rows would talk it down.
-pub(super) fn fit<const N: usize>(
+pub(crate) fn fit<const N: usize>(
     rows: &[DesignRow<N>],
     beliefs: &[GaussianPrior; N],
     rounds: usize,
@@ -190,17 +190,17 @@ fn solve_normal<const N: usize>(
 }
 
 impl<const N: usize> RobustFit<N> {
-    pub(super) fn predict_m(&self, x: &[f64; N]) -> f64 {
+    pub(crate) fn predict_m(&self, x: &[f64; N]) -> f64 {
         self.beta.iter().zip(x).map(|(b, x)| b * x).sum()
     }
 
-    pub(super) fn residual_m(&self, row: &DesignRow<N>) -> f64 {
+    pub(crate) fn residual_m(&self, row: &DesignRow<N>) -> f64 {
         row.y_m - self.predict_m(&row.x)
     }
 
     /// A coefficient refitted with the weights of this fit: over all rows whose column `by` is at least `least` in
     /// size, and with one group of them left out in turn. None where too little remains.
-    pub(super) fn leave_one_out(
+    pub(crate) fn leave_one_out(
         &self,
         column: usize,
         rows: &[DesignRow<N>],
@@ -230,7 +230,7 @@ impl<const N: usize> RobustFit<N> {
     }
 
     /// How far each row was believed: its weight over that of a row no residual of which is large.
-    pub(super) fn trusts(&self, rows: &[DesignRow<N>]) -> impl Iterator<Item = f64> {
+    pub(crate) fn trusts(&self, rows: &[DesignRow<N>]) -> impl Iterator<Item = f64> {
         let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len() as f64;
         rows.iter().zip(&self.weights).map(move |(row, w)| w * mean_blocks / row.blocks)
     }
@@ -240,7 +240,7 @@ impl<const N: usize> RobustFit<N> {
     /// ```text
     /// Var β_j = Σ_stretches (Σ w e aᵀx)² · B/(B − N) + Σ_i (a_i λ_i σ_i)²      a = row j of H⁻¹
     /// ```
-    pub(super) fn standard_error_m(&self, column: usize, rows: &[DesignRow<N>]) -> f64 {
+    pub(crate) fn standard_error_m(&self, column: usize, rows: &[DesignRow<N>]) -> f64 {
         let influence: [f64; N] = self.inverse.row(column).transpose().into();
         let (mut total, mut sum, mut stretches) = (0.0, 0.0, 0_usize);
         let mut stretch = None;

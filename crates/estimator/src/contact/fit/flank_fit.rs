@@ -6,16 +6,17 @@
 
 use std::ops::Range;
 
-use super::ContactWorkspace;
-use super::acceptance::Rejection;
-use super::block_means::BlockMeans;
-use super::design_matrix::{
-    COLUMNS, DesignRow, FIRM_SHARE, FORCE, GAP, LATE_S, LOAD_RATE, ORIGIN, PERIODIC, RowSource, SPEED,
-    SPEED_M_PER_S, Scaling,
+use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::codes::Rejection;
+use crate::contact::fit::design_matrix::{
+    COLUMNS, DesignRow, FORCE, GAP, LOAD_RATE, ORIGIN, PERIODIC, RowSource, SPEED,
 };
-use super::friction_model::FrictionState;
-use super::gauss_newton::{GaussNewtonResult, search};
-use super::parameter_search::{ParameterSearch, SearchResult};
+use crate::contact::fit::gauss_newton::{GaussNewtonResult, search};
+use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
+use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
+use crate::contact::fit::workspace::ContactWorkspace;
+use crate::contact::friction::flank::FIRM_SHARE;
+use crate::contact::friction::friction_model::FrictionState;
 use crate::gap::midrange;
 use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
@@ -70,25 +71,25 @@ const WEIGHTS: Doubt = Doubt {
 /// Parts of the doubt about a gap, m; its variance is the sum of their squares, each weighted. The weights are fitted
 /// so that intervals hold over simulated flights of all classes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Doubt {
+pub(crate) struct Doubt {
     /// Jackknife error of the gap over groups of rows.
-    pub(super) jackknife_m: f64,
+    pub(crate) jackknife_m: f64,
     /// Spread of the gaps of all candidates of the parameter search.
-    pub(super) search_m: f64,
+    pub(crate) search_m: f64,
     /// Rms of the residuals.
-    pub(super) residual_m: f64,
+    pub(crate) residual_m: f64,
     /// Jackknife error of the difference of the two fits, as far as that difference counts.
-    pub(super) stiff_m: f64,
+    pub(crate) stiff_m: f64,
     /// What hangs on the choice between the two fits.
-    pub(super) choice_m: f64,
+    pub(crate) choice_m: f64,
     /// Rms second difference of the load over the stiffness: what happens between two samples.
-    pub(super) vibration_m: f64,
+    pub(crate) vibration_m: f64,
     /// How far lightly loaded rows lie off the line.
-    pub(super) light_m: f64,
+    pub(crate) light_m: f64,
     /// Wind-up under the friction.
-    pub(super) friction_m: f64,
+    pub(crate) friction_m: f64,
     /// What no flight averages out.
-    pub(super) floor_m: f64,
+    pub(crate) floor_m: f64,
 }
 
 impl Doubt {
@@ -118,35 +119,35 @@ impl Doubt {
 
 /// The fitted flanks.
 #[derive(Debug)]
-pub(super) struct FlankFit {
+pub(crate) struct FlankFit {
     /// ΔS and its standard error, m.
-    pub(super) gap_m: (f64, f64),
+    pub(crate) gap_m: (f64, f64),
     /// 1/K and its standard error, m/N.
-    pub(super) compliance_m_per_n: (f64, f64),
-    pub(super) skew_se_s: f64,
-    pub(super) load_zero_se_n: f64,
-    pub(super) load_delay_se_s: f64,
-    pub(super) touched_s: (f64, f64),
+    pub(crate) compliance_m_per_n: (f64, f64),
+    pub(crate) skew_se_s: f64,
+    pub(crate) load_zero_se_n: f64,
+    pub(crate) load_delay_se_s: f64,
+    pub(crate) touched_s: (f64, f64),
     /// Rms of the residuals of single blocks, m.
-    pub(super) residual_rms_m: f64,
+    pub(crate) residual_rms_m: f64,
     /// Length of a block, s.
-    pub(super) period_s: f64,
-    pub(super) state: FrictionState,
+    pub(crate) period_s: f64,
+    pub(crate) state: FrictionState,
     /// Whether higher loads alone read another gap.
-    pub(super) is_soft: bool,
+    pub(crate) is_soft: bool,
     /// The fit and its rows.
-    pub(super) line: GaussNewtonResult,
+    pub(crate) line: GaussNewtonResult,
 }
 
 impl FlankFit {
     /// δX on a flank, m, under a force over the 95 % load. The side is +1, −1, or 0 in the gap.
-    pub(super) fn flank_m(&self, side: f64, force: f64) -> f64 {
+    pub(crate) fn flank_m(&self, side: f64, force: f64) -> f64 {
         let beta = &self.line.fit.beta;
         beta[ORIGIN] + side * (0.5 * beta[GAP] + force * beta[FORCE])
     }
 
     /// What δX holds in addition to gap and wind-up, m: drift, skew, transducer error and wrong friction.
-    pub(super) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
+    pub(crate) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
         (FORCE + 1..COLUMNS).map(|column| self.line.fit.beta[column] * row.x[column]).sum()
     }
 }
@@ -155,7 +156,7 @@ impl FlankFit {
 ///
 /// # Errors
 /// As [`search`], and [`Rejection::MotionUnexplained`].
-pub(super) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
+pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
     workspace.excerpt.excerpt_of(&workspace.whole, scaling.load_n);
     let SearchResult { found: line, spread_m, scale_m, load_zero_se_n } = coarse_to_fine(workspace, scaling)?;
     let error_m = |column: usize| line.fit.standard_error_m(column, &line.design.firm);
@@ -183,7 +184,7 @@ pub(super) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
 ///
 /// One outlying stretch of S moves the mid-range: of the whole flight, where it is short, and of its excerpt the nearer
 /// value to the gap is taken. The statistic takes the screw's mass and damping, which move it by less than 0.1 %, from a mode of 400 Hz.
-pub(super) fn midrange_at_fit_m(
+pub(crate) fn midrange_at_fit_m(
     workspace: &ContactWorkspace,
     scaling: &Scaling,
     fit: &FlankFit,
@@ -243,7 +244,7 @@ fn midrange_of_m(
 }
 
 /// Rms of the force that the model does not know, N: the part's, or a share of the load.
-pub(super) fn unknown_force_n(of_part_n: Option<f64>, scaling: &Scaling) -> f64 {
+pub(crate) fn unknown_force_n(of_part_n: Option<f64>, scaling: &Scaling) -> f64 {
     of_part_n.unwrap_or(UNKNOWN_FORCE_SHARE * scaling.load_n)
 }
 
@@ -395,7 +396,7 @@ fn travels_m(workspace: &mut ContactWorkspace, scaling: &Scaling, fit: &FlankFit
     let state = &fit.line.at;
     blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
     let source = RowSource { blocks, scaling };
-    path.integrate(source, state);
+    path.integrate(blocks, state, scaling.motor_sense);
     let stride = blocks.len().div_ceil(LOOKS).max(1);
     let (mut seen_m, mut expected_m) = (Vec::new(), Vec::new());
     for k in (0..blocks.len()).step_by(stride).filter(|&k| blocks.is_complete(k)) {

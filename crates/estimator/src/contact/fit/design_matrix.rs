@@ -1,209 +1,84 @@
 //! Blocks in contact as rows of a regression: averaged over stretches that stay on one flank.
 
-use super::PartPrior;
-use std::f64::consts::TAU;
 use std::ops::Range;
 
-use super::acceptance::Rejection;
-use super::block_means::BlockMeans;
-use super::coupling_path::{CouplingPath, PathColumns, Touch};
-use super::friction_model::FrictionState;
-use crate::gap::load_band::quantiles;
-use crate::gap::statistic::extremes;
+use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::fit::scaling::Scaling;
+use crate::contact::friction::coupling_path::{CouplingPath, PathColumns, Touch};
+use crate::contact::friction::friction_model::FrictionState;
 use crate::simd::dispatch::{Lanes, simd_dispatch};
 
 /// Columns of the regression.
-pub(super) const COLUMNS: usize = 16;
+pub(crate) const COLUMNS: usize = 16;
 
 /// δX₀.
-pub(super) const ORIGIN: usize = 0;
+pub(crate) const ORIGIN: usize = 0;
 /// s/2: its coefficient is the gap.
-pub(super) const GAP: usize = 1;
+pub(crate) const GAP: usize = 1;
 /// c over the 95 % load.
-pub(super) const FORCE: usize = 2;
+pub(crate) const FORCE: usize = 2;
 /// ∂c/∂F_d, whose coefficient is what F_d lacks, over K.
-pub(super) const DRY: usize = 3;
+pub(crate) const DRY: usize = 3;
 /// ∂c/∂η over the 95 % load.
-pub(super) const SHARE: usize = 4;
+pub(crate) const SHARE: usize = 4;
 /// ∂c/∂p over the 95 % load.
-pub(super) const STRIBECK: usize = 5;
+pub(crate) const STRIBECK: usize = 5;
 /// Ẋ₁ over a reference speed: its coefficient is the skew.
-pub(super) const SPEED: usize = 6;
+pub(crate) const SPEED: usize = 6;
 /// Ḟ: a load channel that lags.
-pub(super) const LOAD_RATE: usize = 7;
+pub(crate) const LOAD_RATE: usize = 7;
 /// Drift: t and t², from −1 to 1.
-pub(super) const DRIFT: usize = 8;
+pub(crate) const DRIFT: usize = 8;
 const DRIFT_SQUARE: usize = 9;
 /// Transducer error: X, X² and X³, from −1 to 1.
-pub(super) const PLACE: usize = 10;
+pub(crate) const PLACE: usize = 10;
 const PLACE_SQUARE: usize = 11;
 const PLACE_CUBE: usize = 12;
 /// c·t: a stiffness that drifts within the flight.
-pub(super) const FORCE_DRIFT: usize = 13;
+pub(crate) const FORCE_DRIFT: usize = 13;
 /// Errors periodic in position: sine and cosine.
-pub(super) const PERIODIC: usize = 14;
+pub(crate) const PERIODIC: usize = 14;
 const PERIODIC_COSINE: usize = 15;
-
-/// Forces over the 95 % load below which flanks may be soft.
-pub(super) const FIRM_SHARE: f64 = 0.12;
-/// Speed that scales the skew's column, m/s.
-pub(super) const SPEED_M_PER_S: f64 = 0.02;
-/// Time that scales the load rate's column, s.
-pub(super) const LATE_S: f64 = 0.01;
-/// Blocks in a row, at least and at most; long flights need no finer rows.
-const ROW_BLOCKS: (usize, usize) = (25, 100);
-/// The 95 % load must exceed the force the model does not know by this factor, or friction alone may hold the
-/// screw within the gap for the whole flight.
-const LEAST_LOAD: f64 = 1.5;
-/// Blocks of flight for each block in a row, so that long flights have no more rows than they need.
-const BLOCKS_PER_ROW_BLOCK: usize = 10_000;
-
-/// Wind-ups that the motor must travel: at rest, friction and a gap cannot be told apart.
-const LEAST_TRAVEL: f64 = 3.0;
-/// Periods that the travel must show for their errors to be told apart from a drift.
-const PERIODS: f64 = 3.0;
-
-/// Scales that bring every column to about one.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Scaling {
-    /// 95 % quantile of the load's magnitude, N.
-    pub(super) load_n: f64,
-    /// Stiffness of the part, N/m.
-    pub(super) stiffness_n_per_m: f64,
-    /// Middle and half length of the flight, s.
-    time_s: (f64, f64),
-    /// Middle and half of the stroke seen, m.
-    pub(super) place_m: (f64, f64),
-    /// 1/load, 1/N, and 1/half of the stroke, 1/m: a product is a quarter of a division.
-    per_load: f64,
-    per_place: f64,
-    per_time: f64,
-    /// What brings a difference over two blocks to the column of the speed, 1/m, and of the load's rate, 1/N.
-    per_speed: f64,
-    per_load_rate: f64,
-    row_blocks: usize,
-    /// Sense in which the motor drives the friction model: −1 where the load is the motor's own.
-    pub(super) motor_sense: f64,
-    /// 2π over the travel of a period, 1/m; zero where nothing repeats, or too little of it is seen.
-    pub(super) per_period: f64,
-}
-
-impl Scaling {
-    /// # Errors
-    /// [`Rejection::TooShort`], [`Rejection::LoadTooSmall`], [`Rejection::TravelTooSmall`].
-    pub(super) fn of(blocks: &BlockMeans, prior: &PartPrior) -> Result<Self, Rejection> {
-        let sizes_n: Vec<f64> = blocks.load_n.iter().map(|f| f.abs()).collect();
-        let whole = 0..sizes_n.len();
-        let [load_n] =
-            quantiles(&sizes_n, std::slice::from_ref(&whole), [0.95]).ok_or(Rejection::TooShort)?;
-        if load_n <= prior.unknown_force_n.map_or(0.0, |force_n| LEAST_LOAD * force_n) {
-            return Err(Rejection::LoadTooSmall);
-        }
-        let place_m = middle_and_half(&blocks.motor_m);
-        if !prior.output_locked && 2.0 * place_m.1 < LEAST_TRAVEL * load_n / prior.stiffness_n_per_m {
-            return Err(Rejection::TravelTooSmall);
-        }
-        let (fewest, most) = ROW_BLOCKS;
-        let (time_s, two_blocks_s) = (middle_and_half(&blocks.time_s), 2.0 * blocks.period_s);
-        Ok(Self {
-            load_n,
-            stiffness_n_per_m: prior.stiffness_n_per_m,
-            time_s,
-            place_m,
-            per_load: load_n.recip(),
-            // A locked screw shows nothing of its transducer.
-            per_place: if prior.output_locked { 0.0 } else { place_m.1.recip() },
-            per_time: time_s.1.recip(),
-            per_speed: (two_blocks_s * SPEED_M_PER_S).recip(),
-            per_load_rate: LATE_S / (two_blocks_s * load_n),
-            row_blocks: (blocks.len() / BLOCKS_PER_ROW_BLOCK).clamp(fewest, most),
-            motor_sense: if prior.output_locked { -1.0 } else { 1.0 },
-            per_period: prior.period_m.filter(|m| 2.0 * place_m.1 > PERIODS * m).map_or(0.0, |m| TAU / m),
-        })
-    }
-
-    /// The wind-up of the part at the 95 % load, m.
-    pub(super) fn windup_m(&self) -> f64 {
-        self.load_n / self.stiffness_n_per_m
-    }
-
-    /// A time from −1 at the start of the flight to 1 at its end.
-    pub(super) fn time_share(&self, time_s: f64) -> f64 {
-        (time_s - self.time_s.0) * self.per_time
-    }
-
-    /// The middle of a row, s from the first sample of the log.
-    pub(super) fn moment_s(&self, row: &DesignRow<COLUMNS>) -> f64 {
-        self.time_s.0 + row.x[DRIFT] * self.time_s.1
-    }
-}
-
-/// Middle and half length of what values span; a negative length where there are none.
-pub(super) fn middle_and_half(values: &[f64]) -> (f64, f64) {
-    let (low, high) = extremes(values);
-    let low = low.into_iter().fold(f64::INFINITY, f64::min);
-    let high = high.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    (0.5 * (low + high), 0.5 * (high - low))
-}
 
 /// The mean of some blocks in contact on one flank.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct DesignRow<const N: usize> {
+pub(crate) struct DesignRow<const N: usize> {
     /// Regressors.
-    pub(super) x: [f64; N],
+    pub(crate) x: [f64; N],
     /// δX, m.
-    pub(super) y_m: f64,
+    pub(crate) y_m: f64,
     /// How many blocks.
-    pub(super) blocks: f64,
+    pub(crate) blocks: f64,
     /// Rows of one stretch are taken as dependent.
-    pub(super) stretch: u32,
+    pub(crate) stretch: u32,
 }
 
 /// All rows, and how long each flank was touched.
 #[derive(Debug)]
-pub(super) struct DesignMatrix {
+pub(crate) struct DesignMatrix {
     /// Rows beyond the share of the load below which flanks may be soft.
-    pub(super) firm: Vec<DesignRow<COLUMNS>>,
+    pub(crate) firm: Vec<DesignRow<COLUMNS>>,
     /// Rows below it.
-    pub(super) light: Vec<DesignRow<COLUMNS>>,
+    pub(crate) light: Vec<DesignRow<COLUMNS>>,
     /// Time in firm contact on the upper and the lower flank, s.
-    pub(super) touched_s: (f64, f64),
-}
-
-/// One of the two sides of the gap.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Flank {
-    /// Pressed by a positive force.
-    Upper,
-    /// Pressed by a negative one.
-    Lower,
-}
-
-impl Flank {
-    /// s, +1 for the upper and −1 for the lower.
-    pub fn sign(self) -> f64 {
-        match self {
-            Self::Upper => 1.0,
-            Self::Lower => -1.0,
-        }
-    }
+    pub(crate) touched_s: (f64, f64),
 }
 
 /// Where rows are made from: blocks and the scales.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct RowSource<'a> {
-    pub(super) blocks: &'a BlockMeans,
-    pub(super) scaling: &'a Scaling,
+pub(crate) struct RowSource<'a> {
+    pub(crate) blocks: &'a BlockMeans,
+    pub(crate) scaling: &'a Scaling,
 }
 
 /// Rows of all blocks that keep their flank, none of which mixes flank and gap.
 ///
 /// Under vibration a flank is touched for milliseconds at a time: a row gathers such touches of one flank until it is
 /// full or its correlation block ends.
-pub(super) fn rows(source: RowSource<'_>, state: &FrictionState, path: &mut CouplingPath) -> DesignMatrix {
+pub(crate) fn rows(source: RowSource<'_>, state: &FrictionState, path: &mut CouplingPath) -> DesignMatrix {
     let RowSource { blocks, scaling } = source;
-    path.integrate(source, state);
-    path.mark_stable(blocks, scaling);
+    path.integrate(blocks, state, scaling.motor_sense);
+    path.mark_stable(blocks, scaling.load_n);
     let mut design = DesignMatrix { firm: Vec::new(), light: Vec::new(), touched_s: (0.0, 0.0) };
     let mut open: [DesignRow<COLUMNS>; 4] = [DesignRow::ZERO; 4];
     let mut stretch = None;
@@ -256,7 +131,7 @@ impl DesignMatrix {
 
 impl RowSource<'_> {
     /// The sums of a row of complete blocks.
-    pub(super) fn sum(&self, path: &PathColumns, within: Range<usize>, side: f64) -> DesignRow<COLUMNS> {
+    pub(crate) fn sum(&self, path: &PathColumns, within: Range<usize>, side: f64) -> DesignRow<COLUMNS> {
         let Self { blocks, scaling } = self;
         let (first, end) = (within.start, within.end);
         let mut sum =
@@ -301,7 +176,7 @@ impl RowSource<'_> {
 
 impl RowSource<'_> {
     /// The columns of a block that do not depend on the force in the coupling, and δX, m.
-    pub(super) fn slow_columns(&self, k: usize) -> ([f64; COLUMNS], f64) {
+    pub(crate) fn slow_columns(&self, k: usize) -> ([f64; COLUMNS], f64) {
         let Self { blocks, scaling } = self;
         let time = scaling.time_share(blocks.time_s[k]);
         let place = (blocks.motor_m[k] + blocks.dx_m[k] - scaling.place_m.0) * scaling.per_place;
@@ -395,5 +270,12 @@ impl<const N: usize> DesignRow<N> {
     fn mean(&self) -> Self {
         let share = self.blocks.recip();
         Self { x: self.x.map(|x| x * share), y_m: self.y_m * share, ..*self }
+    }
+}
+
+impl DesignRow<COLUMNS> {
+    /// The middle of a row, s from the first sample of the log.
+    pub(crate) fn moment_s(&self, scaling: &Scaling) -> f64 {
+        scaling.time_s.0 + self.x[DRIFT] * scaling.time_s.1
     }
 }

@@ -29,7 +29,7 @@ impl Friction {
     }
 
     /// Whether a load is less than three times the friction it meets.
-    pub(super) fn is_heavy(&self, load_n: f64) -> bool {
+    pub(crate) fn is_heavy(&self, load_n: f64) -> bool {
         load_n < HEAVY * self.at_n(load_n)
     }
 }
@@ -39,55 +39,55 @@ const HEAVY: f64 = 3.0;
 
 /// Parameters of the screw, its coupling and the channels that the regression iterates over.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct FrictionState {
-    pub(super) stiffness_n_per_m: f64,
-    pub(super) gap_m: f64,
-    pub(super) friction: Friction,
+pub(crate) struct FrictionState {
+    pub(crate) stiffness_n_per_m: f64,
+    pub(crate) gap_m: f64,
+    pub(crate) friction: Friction,
     /// p, the excess of the friction level at rest over that in motion.
-    pub(super) stribeck: f64,
+    pub(crate) stribeck: f64,
     /// a, compliance of the bristles, m/N; zero for a screw that is held rigidly.
-    pub(super) bristle_m_per_n: f64,
+    pub(crate) bristle_m_per_n: f64,
     /// F₀, reading of the load cell under no load, N.
-    pub(super) load_zero_n: f64,
+    pub(crate) load_zero_n: f64,
     /// τ in `load_logged(t) = F(t − τ)`, s.
-    pub(super) load_delay_s: f64,
+    pub(crate) load_delay_s: f64,
     /// Time constant of the load channel's first-order lag, s.
-    pub(super) load_lag_s: f64,
+    pub(crate) load_lag_s: f64,
     /// τ in `screw_logged(t) = X₂(t − τ)`, s.
-    pub(super) skew_s: f64,
+    pub(crate) skew_s: f64,
 }
 
 /// Force in the coupling, and its derivatives by the parameters of friction.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CouplingForce {
+pub(crate) struct CouplingForce {
     /// c, N; NaN where a channel is missing.
-    pub(super) force_n: f64,
+    pub(crate) force_n: f64,
     /// ∂c/∂F_d.
-    pub(super) dforce_ddry: f64,
+    pub(crate) dforce_ddry: f64,
     /// ∂c/∂η, N.
-    pub(super) dforce_dloss_n: f64,
+    pub(crate) dforce_dloss_n: f64,
     /// ∂c/∂p, N.
-    pub(super) dforce_dstribeck_n: f64,
+    pub(crate) dforce_dstribeck_n: f64,
 }
 
 impl CouplingForce {
     /// Where a channel is missing.
-    pub(super) const UNKNOWN: Self =
+    pub(crate) const UNKNOWN: Self =
         Self { force_n: f64::NAN, dforce_ddry: 0.0, dforce_dloss_n: 0.0, dforce_dstribeck_n: 0.0 };
 }
 
 /// One block of the channels that drive the model.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Drive {
-    pub(super) motor_m: f64,
-    pub(super) load_n: f64,
+pub(crate) struct Drive {
+    pub(crate) motor_m: f64,
+    pub(crate) load_n: f64,
     /// e^−(v/v_s)².
-    pub(super) slowness: f64,
+    pub(crate) slowness: f64,
 }
 
 /// Constants of an integration.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CouplingParams {
+pub(crate) struct CouplingParams {
     compliance_m_per_n: f64,
     bristle_m_per_n: f64,
     /// 1/(1/K + a).
@@ -101,21 +101,21 @@ pub(super) struct CouplingParams {
 
 /// The screw between two blocks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ScrewState {
-    pub(super) motor_m: f64,
+pub(crate) struct ScrewState {
+    pub(crate) motor_m: f64,
     /// w: anchor of the bristles relative to the motor, from the middle of the gap, m.
-    pub(super) anchor_m: f64,
+    pub(crate) anchor_m: f64,
     /// ∂c/∂F_d, ∂c/∂η and ∂c/∂p once the screw presses a flank, kept since it slipped last.
-    pub(super) memory: [f64; 3],
-    pub(super) coupling: CouplingForce,
+    pub(crate) memory: [f64; 3],
+    pub(crate) coupling: CouplingForce,
     /// Relative position from the middle of the gap, m.
-    pub(super) relative_m: f64,
+    pub(crate) relative_m: f64,
     /// Whether it slipped last, so that no earlier state matters.
-    pub(super) has_slipped: bool,
+    pub(crate) has_slipped: bool,
 }
 
 impl CouplingParams {
-    pub(super) fn new(state: &FrictionState, motor_sense: f64) -> Self {
+    pub(crate) fn new(state: &FrictionState, motor_sense: f64) -> Self {
         let compliance_m_per_n = state.stiffness_n_per_m.recip();
         Self {
             compliance_m_per_n,
@@ -133,7 +133,7 @@ impl CouplingParams {
     /// several screws can be integrated in parallel lanes.
     #[inline(always)]
     #[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
-    pub(super) fn step(&self, before: &ScrewState, drive: Drive) -> ScrewState {
+    pub(crate) fn step(&self, before: &ScrewState, drive: Drive) -> ScrewState {
         let load_n = drive.load_n - self.load_zero_n;
         let anchor_m = before.anchor_m - self.motor_sense * (drive.motor_m - before.motor_m);
         let free_m = anchor_m + self.bristle_m_per_n * load_n;
@@ -174,7 +174,7 @@ impl CouplingParams {
     }
 
     /// The screw at the start of a segment: at rest, its friction unknown.
-    pub(super) fn rest(&self, drive: Drive) -> ScrewState {
+    pub(crate) fn rest(&self, drive: Drive) -> ScrewState {
         let force_n = drive.load_n - self.load_zero_n;
         let relative_m = self.relative_m(force_n);
         ScrewState {
@@ -199,30 +199,30 @@ impl CouplingParams {
 
 /// The coupling integrated from block to block; each segment starts at rest.
 #[derive(Debug)]
-pub(super) struct CouplingIntegrator {
+pub(crate) struct CouplingIntegrator {
     params: CouplingParams,
     screw: Option<ScrewState>,
 }
 
 impl CouplingIntegrator {
     /// At rest.
-    pub(super) fn new(params: CouplingParams) -> Self {
+    pub(crate) fn new(params: CouplingParams) -> Self {
         Self { params, screw: None }
     }
 
     /// Whether the screw slipped last.
-    pub(super) fn has_slipped(&self) -> bool {
+    pub(crate) fn has_slipped(&self) -> bool {
         self.screw.is_some_and(|screw| screw.has_slipped)
     }
 
     /// Continues from another state.
-    pub(super) fn set(&mut self, screw: ScrewState) {
+    pub(crate) fn set(&mut self, screw: ScrewState) {
         self.screw = Some(screw);
     }
 
     /// The coupling and the relative position at the next block. A block with a missing channel is skipped.
     #[inline]
-    pub(super) fn step(&mut self, drive: Drive) -> (CouplingForce, f64) {
+    pub(crate) fn step(&mut self, drive: Drive) -> (CouplingForce, f64) {
         if !(drive.motor_m + drive.load_n).is_finite() {
             return (CouplingForce::UNKNOWN, f64::NAN);
         }

@@ -1,0 +1,5 @@
+//! A flight in blocks: means of whole samples, without missing ones and spikes.
+
+pub(super) mod block_means;
+pub(super) mod extent;
+mod spikes;

@@ -1,0 +1,96 @@
+//! Scales that bring every column of the regression to about one.
+
+use std::f64::consts::TAU;
+
+use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::blocks::extent::middle_and_half;
+use crate::contact::codes::Rejection;
+use crate::contact::types::PartPrior;
+use crate::gap::load_band::quantiles;
+
+/// Speed that scales the skew's column, m/s.
+pub(crate) const SPEED_M_PER_S: f64 = 0.02;
+/// Time that scales the load rate's column, s.
+pub(crate) const LATE_S: f64 = 0.01;
+/// Blocks in a row, at least and at most; long flights need no finer rows.
+const ROW_BLOCKS: (usize, usize) = (25, 100);
+/// The 95 % load must exceed the force the model does not know by this factor, or friction alone may hold the
+/// screw within the gap for the whole flight.
+const LEAST_LOAD: f64 = 1.5;
+/// Blocks of flight for each block in a row, so that long flights have no more rows than they need.
+const BLOCKS_PER_ROW_BLOCK: usize = 10_000;
+
+/// Wind-ups that the motor must travel: at rest, friction and a gap cannot be told apart.
+const LEAST_TRAVEL: f64 = 3.0;
+/// Periods that the travel must show for their errors to be told apart from a drift.
+const PERIODS: f64 = 3.0;
+
+/// Scales that bring every column to about one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scaling {
+    /// 95 % quantile of the load's magnitude, N.
+    pub(crate) load_n: f64,
+    /// Stiffness of the part, N/m.
+    pub(crate) stiffness_n_per_m: f64,
+    /// Middle and half length of the flight, s.
+    pub(crate) time_s: (f64, f64),
+    /// Middle and half of the stroke seen, m.
+    pub(crate) place_m: (f64, f64),
+    /// 1/load, 1/N, and 1/half of the stroke, 1/m: a product is a quarter of a division.
+    pub(crate) per_load: f64,
+    pub(crate) per_place: f64,
+    pub(crate) per_time: f64,
+    /// What brings a difference over two blocks to the column of the speed, 1/m, and of the load's rate, 1/N.
+    pub(crate) per_speed: f64,
+    pub(crate) per_load_rate: f64,
+    pub(crate) row_blocks: usize,
+    /// Sense in which the motor drives the friction model: −1 where the load is the motor's own.
+    pub(crate) motor_sense: f64,
+    /// 2π over the travel of a period, 1/m; zero where nothing repeats, or too little of it is seen.
+    pub(crate) per_period: f64,
+}
+
+impl Scaling {
+    /// # Errors
+    /// [`Rejection::TooShort`], [`Rejection::LoadTooSmall`], [`Rejection::TravelTooSmall`].
+    pub(crate) fn of(blocks: &BlockMeans, prior: &PartPrior) -> Result<Self, Rejection> {
+        let sizes_n: Vec<f64> = blocks.load_n.iter().map(|f| f.abs()).collect();
+        let whole = 0..sizes_n.len();
+        let [load_n] =
+            quantiles(&sizes_n, std::slice::from_ref(&whole), [0.95]).ok_or(Rejection::TooShort)?;
+        if load_n <= prior.unknown_force_n.map_or(0.0, |force_n| LEAST_LOAD * force_n) {
+            return Err(Rejection::LoadTooSmall);
+        }
+        let place_m = middle_and_half(&blocks.motor_m);
+        if !prior.output_locked && 2.0 * place_m.1 < LEAST_TRAVEL * load_n / prior.stiffness_n_per_m {
+            return Err(Rejection::TravelTooSmall);
+        }
+        let (fewest, most) = ROW_BLOCKS;
+        let (time_s, two_blocks_s) = (middle_and_half(&blocks.time_s), 2.0 * blocks.period_s);
+        Ok(Self {
+            load_n,
+            stiffness_n_per_m: prior.stiffness_n_per_m,
+            time_s,
+            place_m,
+            per_load: load_n.recip(),
+            // A locked screw shows nothing of its transducer.
+            per_place: if prior.output_locked { 0.0 } else { place_m.1.recip() },
+            per_time: time_s.1.recip(),
+            per_speed: (two_blocks_s * SPEED_M_PER_S).recip(),
+            per_load_rate: LATE_S / (two_blocks_s * load_n),
+            row_blocks: (blocks.len() / BLOCKS_PER_ROW_BLOCK).clamp(fewest, most),
+            motor_sense: if prior.output_locked { -1.0 } else { 1.0 },
+            per_period: prior.period_m.filter(|m| 2.0 * place_m.1 > PERIODS * m).map_or(0.0, |m| TAU / m),
+        })
+    }
+
+    /// The wind-up of the part at the 95 % load, m.
+    pub(crate) fn windup_m(&self) -> f64 {
+        self.load_n / self.stiffness_n_per_m
+    }
+
+    /// A time from −1 at the start of the flight to 1 at its end.
+    pub(crate) fn time_share(&self, time_s: f64) -> f64 {
+        (time_s - self.time_s.0) * self.per_time
+    }
+}

@@ -1,0 +1,125 @@
+//! What the contact regression takes and gives.
+
+use super::codes::{QualityFlag, Rejection};
+use super::friction::friction_model::Friction;
+
+/// Blocks that span too little time to hold a flight, s.
+pub(crate) const SHORTEST_S: f64 = 9.0;
+/// Slower logs blur the moment at which a flank is left, s.
+pub(crate) const LONGEST_STEP_S: f64 = 0.05;
+/// Each flank must be touched this long, s.
+pub(crate) const REQUIRED_CONTACT_S: f64 = 1.0;
+/// Below this a flank was not touched at all, s.
+pub(crate) const MIN_CONTACT_S: f64 = 0.1;
+/// Standard normal 95 % quantile.
+pub(crate) const NORMAL_95: f64 = 1.644_853_626_951_472_2;
+/// The published statistic may differ by this share of the larger of the two gaps.
+pub(crate) const MIDRANGE_SHARE: f64 = 0.35;
+/// A gap under this share of the wind-up at the 95 % load drowns in what the model leaves out.
+pub(crate) const DETECTION_SHARE: f64 = 0.01;
+
+/// What is known of the part before its flight is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartPrior {
+    /// K of the part number, N/m; believed to 15 %.
+    pub stiffness_n_per_m: f64,
+    /// Load between whose positive and negative value lost motion is stated, N.
+    pub reference_load_n: Option<f64>,
+    /// Rms of the force the model does not know, mainly friction, N, where it is known: a load that does not rise
+    /// above it presses on no flank for certain.
+    pub unknown_force_n: Option<f64>,
+    /// Travel of the screw in one turn of the motor, m, where errors of the positions may repeat with it.
+    pub period_m: Option<f64>,
+    /// Whether the output is locked, so that the screw's position is a constant and the load is the motor's.
+    pub output_locked: bool,
+}
+
+impl PartPrior {
+    /// A part of which only the stiffness is known, N/m.
+    pub fn of_stiffness(stiffness_n_per_m: f64) -> Self {
+        Self {
+            stiffness_n_per_m,
+            reference_load_n: None,
+            unknown_force_n: None,
+            period_m: None,
+            output_locked: false,
+        }
+    }
+}
+
+/// The gap by contact regression, and what was found on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContactEstimate {
+    /// ΔS, m; not clipped at zero.
+    pub gap_m: f64,
+    /// Its standard error, m.
+    pub gap_se_m: f64,
+    /// 5 % and 95 % bounds, m.
+    pub gap_bounds_m: (f64, f64),
+    /// K fitted in this flight, N/m: the secant over the loads of the flight.
+    pub stiffness_n_per_m: f64,
+    /// Its standard error, N/m.
+    pub stiffness_se_n_per_m: f64,
+    /// τ in `screw_logged(t) = X_screw(t − τ)`, s. Viscous friction F_v of the screw adds F_v/K.
+    pub skew_s: f64,
+    /// Its standard error, s.
+    pub skew_se_s: f64,
+    /// F₀: what the load cell reads under no load, N. Without a gap, or without lightly loaded samples, its error is
+    /// large.
+    pub load_zero_n: f64,
+    /// Its standard error, N.
+    pub load_zero_se_n: f64,
+    /// τ in `load_logged(t) = F(t − τ)`, s: delay and time constant of a first-order lag together.
+    pub load_delay_s: f64,
+    /// Its standard error, s.
+    pub load_delay_se_s: f64,
+    /// Friction of the screw in motion.
+    pub friction: Friction,
+    /// Lost motion at zero load, m, from lightly loaded samples that the fit leaves out. On soft flanks it is narrower
+    /// than the gap.
+    pub loop_width_m: Option<f64>,
+    /// Its standard error, m.
+    pub loop_width_se_m: Option<f64>,
+    /// Relative travel between + and − the reference load, m, from samples near it.
+    pub lost_motion_m: Option<f64>,
+    /// Its standard error, m.
+    pub lost_motion_se_m: Option<f64>,
+    /// Time in contact on the upper and on the lower flank that the number stands on, s.
+    pub touched_s: (f64, f64),
+    /// Load magnitude that one sample in twenty exceeds, N.
+    pub load_p95_n: f64,
+    /// The published mid-range statistic of the same flight with stiffness, load zero, delays, drift and transducer
+    /// error as found here, m: a check by another method.
+    pub midrange_at_fit_m: Option<f64>,
+    /// Doubts that do not forbid the number.
+    pub flags: Vec<QualityFlag>,
+}
+
+/// The result of a flight.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ContactOutcome {
+    /// Its gap, and what was estimated with it.
+    Estimated(Box<ContactEstimate>),
+    /// Why the flight does not allow an estimate.
+    Refused(Rejection),
+}
+
+impl ContactEstimate {
+    /// Friction at the 95 % load, N.
+    pub fn friction_n(&self) -> f64 {
+        self.friction.at_n(self.load_p95_n)
+    }
+
+    /// Whether the published statistic at the fitted parameters agrees with the gap as far as its own errors go.
+    ///
+    /// That statistic reads friction as backlash, about twice F_f/K, a gap of zero as the unknown force over K, and under
+    /// vibration of the load up to a third too little.
+    pub(crate) fn agrees_with_midrange(&self, unknown_force_n: f64) -> bool {
+        let Some(midrange_m) = self.midrange_at_fit_m else { return true };
+        let larger_m = midrange_m.abs().max(self.gap_m.abs());
+        let force_n = self.friction_n() + 2.0 * unknown_force_n;
+        let allowed_m =
+            MIDRANGE_SHARE * larger_m + 2.0 * force_n / self.stiffness_n_per_m + 3.0 * self.gap_se_m;
+        (midrange_m - self.gap_m).abs() <= allowed_m
+    }
+}
