@@ -226,12 +226,14 @@ const DIFFERENCE_NOISE: f64 = 1.394;
 fn recurring_impact(mut heights: Vec<f64>, noise: f64, step_s: f64) -> f64 {
     const EVERY_S: f64 = 6.0;
     const LEAST: usize = 20;
+    /// For the uncertainty of the noise itself.
+    const MARGIN: f64 = 1.05;
     let rank = ((heights.len() as f64 * step_s / EVERY_S) as usize).max(LEAST);
     let Some(at) = heights.len().checked_sub(rank + 1) else { return 0.0 };
     let level = *heights.select_nth_unstable_by(at, f64::total_cmp).1;
     // Two-sided tail of the normal distribution, to within 3 % for these ranks.
     let deviate = (2.0 * (heights.len() as f64 / rank as f64).ln()).sqrt() - 0.35;
-    let explained = deviate.max(0.0) * DIFFERENCE_NOISE * noise;
+    let explained = MARGIN * deviate.max(0.0) * DIFFERENCE_NOISE * noise;
     (level * level - explained * explained).max(0.0).sqrt()
 }
 
