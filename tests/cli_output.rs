@@ -157,7 +157,7 @@ fn an_estimate_is_drawn_in_the_form_its_ending_names() {
         assert!(std::fs::read(fleet.path(name)).unwrap().starts_with(start), "{name}");
     }
     let page = std::fs::read_to_string(fleet.path("a.html")).unwrap();
-    assert!(page.contains("gap 100.0 µm") && page.contains("refused: no_load_reversal"));
+    assert!(page.contains("gap 99.9 µm") && page.contains("refused: no_load_reversal"));
     let result = fleet.freeplay(&[&logs[..], &["a.pdf"]].concat());
     assert_eq!(result.code, Some(2));
     assert!(result.err.contains(".svg, .png or .html"), "{}", result.err);
