@@ -1,6 +1,7 @@
 //! Statements about a small fleet whose wear is a line: 2 h a day, 20 µm when new, limit 150 µm.
 #![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use jiff::{SignedDuration, Timestamp};
@@ -157,7 +158,7 @@ fn a_removed_unit_has_no_state_no_dates_and_says_when_it_left() {
     let mut text = "tail_number,position,part_number,serial_number,installed_utc,removed_utc\n".to_owned();
     for unit in 0..14 {
         let removed = if unit == 3 { "2024-07-20" } else { "" };
-        text += &format!("T{unit:02},place_{unit},EMA-27-1040,S{unit:02},2023-12-01,{removed}\n");
+        writeln!(text, "T{unit:02},place_{unit},EMA-27-1040,S{unit:02},2023-12-01,{removed}").unwrap();
     }
     std::fs::write(table.path(), text).unwrap();
     let installations =

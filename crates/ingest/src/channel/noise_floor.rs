@@ -218,7 +218,7 @@ mod tests {
     fn without_enough_whole_blocks_there_is_no_estimate() {
         assert_eq!(white_noise(&[f64::NAN; 200], None), None);
         assert_eq!(white_noise(&noise(300, 1.0), None), None);
-        assert_eq!(white_noise(&[1.0; 20_000], Some(0.1)), None);
+        assert_eq!(white_noise(&vec![1.0; 20_000], Some(0.1)), None);
     }
 
     /// By hand: order 1 has correlations 1, −1/2; 31 differences give 31²/(31 + 2·30/4) = 20.9.

@@ -68,7 +68,7 @@ impl Normalized {
             segments: segments.ok_or_else(|| fail("its stretches cannot be read".into()))?,
             metres_per_radian: number("metres_per_radian"),
             temperature_c: number("temperature_c"),
-            output_locked: text("output_locked").as_deref() == Some("true"),
+            output_locked: text("output_locked") == Some("true"),
             apart: text("apart").and_then(|t| t.parse().ok()).unwrap_or(0),
             flags: text("flags").map(|t| t.split(' ').map(str::to_owned).collect()).unwrap_or_default(),
         }))

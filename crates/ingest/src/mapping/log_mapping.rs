@@ -227,7 +227,6 @@ pub enum Output {
 
 impl Output {
     /// Whether it moves.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
     pub fn is_moving(&self) -> bool {
         *self == Self::Moving
     }

@@ -11,8 +11,8 @@ const RATES_HZ: [f64; 6] = [62.5, 100.0, 125.0, 250.0, 500.0, 1000.0];
 /// Half of the flights vibrate, half have three times the friction and stick.
 fn flight(rate_hz: f64, seed: u64) -> Flight {
     let vibration = Vibration { low_hz: 4.0, high_hz: 8.0, rms: 5e-6, ..Vibration::default() };
-    let motor_vibration = if seed % 2 == 0 { vibration } else { Vibration::default() };
-    let plant = Plant::default().with_friction_factor(if seed % 2 == 0 { 1.0 } else { 3.0 });
+    let motor_vibration = if seed.is_multiple_of(2) { vibration } else { Vibration::default() };
+    let plant = Plant::default().with_friction_factor(if seed.is_multiple_of(2) { 1.0 } else { 3.0 });
     let profile =
         Profile { duration_s: 100.0, sample_rate_hz: rate_hz, motor_vibration, ..Profile::default() };
     simulate(&plant, &profile, &Sensors::default(), seed).unwrap()

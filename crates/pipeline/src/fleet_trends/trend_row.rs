@@ -100,7 +100,8 @@ fn sketched(gaps_m: &[f64]) -> Vec<f64> {
     gaps_m.chunks(gaps_m.len().div_ceil(MOST).max(1)).map(mean).collect()
 }
 
-/// What is known of a unit on a day, put down as the contract has it.
+/// The trend row of a unit at a date.
+#[allow(clippy::too_many_arguments, reason = "each is one source of the row, and all are used once")]
 pub(crate) fn row(
     name: &UnitKey,
     history: &History,

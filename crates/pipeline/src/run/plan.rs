@@ -16,7 +16,6 @@ use crate::run::file_stat::SeenObjects;
 
 /// What is asked of a run.
 #[derive(Debug, Clone, Default)]
-#[expect(clippy::struct_excessive_bools, reason = "each is an option of the command, free of the others")]
 pub struct Request {
     /// Departures from then on.
     pub since_utc: Option<Timestamp>,

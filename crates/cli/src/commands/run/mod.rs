@@ -195,6 +195,7 @@ fn unusual_innovations(report: &RunSummary, page: &mut String) {
 }
 
 /// Run summary as text.
+#[allow(clippy::too_many_lines, reason = "one line of the summary after the other")]
 fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     let mut page = format!(
         "Freeplay {VERSION} · run {} · {config}\n",
@@ -295,10 +296,8 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     page.push_str(&work_list_section(&report.trends, &report.work_list));
     page.push_str(&changes_section(&report.changed));
     if code == Code::LogsInError {
-        page.push_str(&format!(
-            "Exit code 1: {} failed. After fixing them: `freeplay run --retry`\n",
-            count(report.logs_in_error(), "log")
-        ));
+        let failed = count(report.logs_in_error(), "log");
+        let _ = writeln!(page, "Exit code 1: {failed} failed. After fixing them: `freeplay run --retry`");
     }
     page
 }

@@ -303,10 +303,12 @@ fn read_later(logged: &[f64], shift: f64, read: &mut [f64]) {
     let end = len.saturating_sub(from.saturating_add(3).max(0) as usize).max(begin);
     read[..begin].fill(f64::NAN);
     read[end..].fill(f64::NAN);
-    for k in begin..end {
-        let first = k.wrapping_add_signed(from);
-        let read_at = |j: usize| weights[j] * logged[first + j];
-        read[k] = read_at(0) + read_at(1) + read_at(2) + read_at(3);
+    let first = begin.wrapping_add_signed(from);
+    for (read, four) in
+        read[begin..end].iter_mut().zip(logged.get(first..).unwrap_or(&[]).array_windows::<4>())
+    {
+        let [a, b, c, d] = weights;
+        *read = a * four[0] + b * four[1] + c * four[2] + d * four[3];
     }
 }
 

@@ -75,7 +75,7 @@ impl<'a> ParameterSearch<'a> {
     /// # Errors
     /// As [`search`], when no start leads anywhere.
     pub(crate) fn run(mut self) -> Result<SearchResult, Rejection> {
-        let mut best = self.from_starts()?;
+        let mut best = self.best_start()?;
         self.improve_zero(&mut best);
         let is_lagging = self.improve_lag(&mut best);
         let has_bristles = self.improve_bristles(&mut best);
@@ -101,7 +101,7 @@ impl<'a> ParameterSearch<'a> {
         })
     }
 
-    fn from_starts(&mut self) -> Result<Candidate, Rejection> {
+    fn best_start(&mut self) -> Result<Candidate, Rejection> {
         let mut found = Vec::new();
         let mut rejection = Rejection::TooShort;
         for (dry, lost_share) in STARTS {
@@ -146,18 +146,18 @@ impl<'a> ParameterSearch<'a> {
         let (mut zero_n, mut least) = (best.found.at.load_zero_n, best.misfit);
         let mut step_n = ZERO_STEPS.0 * self.scaling.load_n;
         while step_n > ZERO_STEPS.1 * self.scaling.load_n {
-            let before_n = zero_n;
+            let before = least;
             for candidate_n in [zero_n - step_n, zero_n + step_n] {
                 let misfit = self.misfit(&best.found, candidate_n);
                 if misfit < least {
                     (zero_n, least) = (candidate_n, misfit);
                 }
             }
-            if zero_n == before_n {
+            if least >= before {
                 step_n *= 0.5;
             }
         }
-        if zero_n != best.found.at.load_zero_n {
+        if least < best.misfit {
             self.improve(best, FrictionState { load_zero_n: zero_n, ..best.found.state });
         }
     }
@@ -247,11 +247,12 @@ impl<'a> ParameterSearch<'a> {
 
     /// What a candidate with another load zero leaves of δX in every complete block, m.
     fn each_residual(&mut self, found: &GaussNewtonResult, load_zero_n: f64, mut take: impl FnMut(f64)) {
+        let is_own_zero = (load_zero_n - found.at.load_zero_n).abs() < f64::EPSILON;
         let Self { blocks, path, scaling, linear_m, .. } = self;
         let state = FrictionState { load_zero_n, ..found.at };
         blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
         path.integrate(blocks, &state, scaling.motor_sense);
-        if load_zero_n == found.at.load_zero_n {
+        if is_own_zero {
             linear_parts(RowSource { blocks, scaling }, &found.fit.beta, linear_m);
         }
         let beta = &found.fit.beta;

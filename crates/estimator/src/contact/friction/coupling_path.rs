@@ -252,8 +252,8 @@ simd_dispatch! {
         let mut screws = ScrewStates8::ZERO;
         for k in 0..part {
             let mut drives = [Drive { motor_m: 0.0, load_n: 0.0, slowness: 0.0 }; Lanes::COUNT];
-            for lane in 0..Lanes::COUNT {
-                drives[lane] = channels.at(lane * part + k);
+            for (lane, drive) in drives.iter_mut().enumerate() {
+                *drive = channels.at(lane * part + k);
             }
             let mut is_known = [false; Lanes::COUNT];
             let mut couplings = [(CouplingForce::UNKNOWN, f64::NAN); Lanes::COUNT];
