@@ -50,7 +50,7 @@ fn a_full_disk_leaves_the_store_whole_and_the_next_run_finishes() {
     plain.run_ok(&["run"]);
     let wanted = plain.exported();
     let mut full = 0;
-    for kib in [16, 48, 64, 80, 96, 112, 128, 160, 192, 256] {
+    for kib in [16, 64, 96, 128, 192, 256, 384, 512, 1024, 4096] {
         let fleet = small();
         let disk = fleet.path("results");
         let size = format!("size={kib}k");
