@@ -39,7 +39,7 @@ prop_compose! {
         status in prop_oneof![Just(Status::Estimated), Just(Status::Refused)],
         reason in prop::option::of(text()),
         flags in prop::collection::vec(text(), 0..4),
-        n in prop::array::uniform24(number()),
+        n in prop::collection::vec(number(), 24),
         counts in prop::array::uniform4(any::<i64>()),
     ) -> GapEstimate {
         let [load_reversals, samples, samples_upper, samples_lower] = counts;
