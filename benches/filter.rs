@@ -11,9 +11,12 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use estimator::contact::{self, PartPrior};
 use estimator::SensorNoise;
-use estimator::{ActuatorModel, Filter, NoiseModel, FilterWorkspace, StreamingGap, Samples, GainSchedule, Stream, gap, load, midrange};
+use estimator::contact::{self, PartPrior};
+use estimator::{
+    ActuatorModel, Filter, FilterWorkspace, GainSchedule, NoiseModel, Samples, Stream, StreamingGap, gap,
+    midrange,
+};
 
 /// Positions, loads and S of so many samples stay in the second cache.
 const SAMPLES: usize = 16_384;
@@ -121,7 +124,7 @@ fn load_band_out_of_cache(bencher: Bencher) {
     let ((_, load_n), whole) = (channels(OUT_OF_CACHE), 0..OUT_OF_CACHE);
     bencher
         .counter(ItemsCount::new(OUT_OF_CACHE))
-        .bench_local(|| load::band(black_box(&load_n), std::slice::from_ref(&whole)));
+        .bench_local(|| gap::load_band(black_box(&load_n), std::slice::from_ref(&whole)));
 }
 
 /// A screw of K = 5·10⁷ N/m with a gap of 100 µm, 200 N of friction while it moves, and the load of [`channels`].
@@ -137,10 +140,10 @@ fn contact_regression(bencher: Bencher) {
     let segments = std::slice::from_ref(&whole);
     let samples = Samples { step_s: 0.004, motor_m: &motor_m, dx_m: &dx_m, load_n: &load_n, segments };
     let prior = PartPrior::of_stiffness(5e7);
-    let mut room = contact::FilterWorkspace::default();
+    let mut room = contact::ContactWorkspace::default();
     bencher
         .counter(ItemsCount::new(OUT_OF_CACHE))
-        .bench_local(|| contact::estimate_in(black_box(&samples), &prior, &mut room).unwrap());
+        .bench_local(|| contact::estimate_with(black_box(&samples), &prior, &mut room).unwrap());
 }
 
 #[divan::bench(sample_count = 30)]

@@ -7,9 +7,11 @@
 use std::hint::black_box;
 use std::process::ExitCode;
 
-use estimator::contact::{self, PartPrior};
 use estimator::SensorNoise;
-use estimator::{ActuatorModel, Error, Filter, NoiseModel, FilterWorkspace, Samples, GainSchedule, gap, load, midrange};
+use estimator::contact::{self, PartPrior};
+use estimator::{
+    ActuatorModel, Error, Filter, FilterWorkspace, GainSchedule, NoiseModel, Samples, gap, midrange,
+};
 
 const STEP_S: f64 = 0.004;
 /// What can be asked for; `nothing` makes the flight and no more.
@@ -58,9 +60,13 @@ fn run(part: &str, count: usize) -> Result<(), Error> {
         "schedule" => drop(black_box(GainSchedule::new(&filter))),
         "filter" => drop(black_box(filter.track(&samples, None)?)),
         "statistic" => drop(black_box(gap::mid_range(&dx_m)).is_ok()),
-        "load" => drop(black_box(load::band(&load_n, segments)).is_some()),
+        "load" => drop(black_box(gap::load_band(&load_n, segments)).is_some()),
         "published" => {
-            black_box(midrange::estimate_with(&samples, &GainSchedule::new(&filter), &mut FilterWorkspace::default())?);
+            black_box(midrange::estimate_with(
+                &samples,
+                &GainSchedule::new(&filter),
+                &mut FilterWorkspace::default(),
+            )?);
         }
         "contact" => drop(black_box(contact::estimate(&samples, &prior)?)),
         _ => {}
