@@ -28,7 +28,7 @@ pub struct Assessment {
     pub changes: Vec<ChangePoint>,
     /// When the act limit is met.
     pub crossing: Option<Crossing>,
-    /// Probability that it is met before the next check ([`Settings::check_interval_hours`]).
+    /// Probability that it is met before the next check ([`crate::Settings::check_interval_hours`]).
     pub check_probability: Option<f64>,
     /// How the unit is used now, to turn hours into flights and days.
     pub utilization: Option<Utilization>,
@@ -36,7 +36,7 @@ pub struct Assessment {
     pub outliers_us: Vec<i64>,
     /// Variance found between flights over the variance stated.
     pub noise_factor: f64,
-    /// Days since the last estimate where they are more than [`Settings::stale_after_days`]: the state is then that of
+    /// Days since the last estimate where they are more than [`crate::Settings::stale_after_days`]: the state is then that of
     /// the last estimate. Silence clears no alarm.
     pub stale_days: Option<f64>,
     /// What to do; nothing when no estimate supports a state.
