@@ -5,7 +5,7 @@
 //! remedy, and nothing else is affected.
 //!
 //! The way of a log: [`Log::open`] reads the footers, [`Log::identity`] says which flight it was,
-//! [`Log::positions`] which actuators it holds, and [`Log::actuator`] reads the channels of one of them
+//! `Log::actuators` which actuators it holds, and `Log::read_actuator` reads the channels of one of them
 //! on one clock.
 
 pub mod channel;

@@ -145,11 +145,11 @@ fn encode_result(
     Ok(concat_batches(&schema, [&first, &rest])?)
 }
 
-/// As [`crate::run`], with the logs done by an engine: so many at a time are given to it, and stored when it
+/// As [`crate::run()`], with the logs done by an engine: so many at a time are given to it, and stored when it
 /// answers.
 ///
 /// # Errors
-/// As [`crate::run`], and [`Error::Engine`] when the engine fails. What it answered before is stored.
+/// As [`crate::run()`], and [`Error::Engine`] when the engine fails. What it answered before is stored.
 pub fn run(
     config: &Config,
     request: &Request,
