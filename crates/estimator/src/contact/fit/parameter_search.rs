@@ -116,8 +116,7 @@ impl<'a> ParameterSearch<'a> {
         }
         let mut best: Option<Candidate> = None;
         for found in found {
-            let misfit = self.misfit(&found, found.at.load_zero_n);
-            self.tried.push((misfit, found.fit.beta[GAP]));
+            let misfit = self.judge(&found);
             if best.as_ref().is_none_or(|best| misfit < best.misfit) {
                 best = Some(Candidate { found, misfit });
             }
@@ -132,8 +131,7 @@ impl<'a> ParameterSearch<'a> {
     /// Takes a state's fit when it fits better.
     fn improve(&mut self, best: &mut Candidate, state: FrictionState) -> bool {
         let Ok(found) = self.search(state, ITERATIONS.1) else { return false };
-        let misfit = self.misfit(&found, found.at.load_zero_n);
-        self.tried.push((misfit, found.fit.beta[GAP]));
+        let misfit = self.judge(&found);
         let is_better = misfit < best.misfit;
         if is_better {
             *best = Candidate { found, misfit };
@@ -143,6 +141,7 @@ impl<'a> ParameterSearch<'a> {
 
     /// A pattern search for the zero of the load cell. In contact it merges with δX₀; it shows where the flank is left.
     fn improve_zero(&mut self, best: &mut Candidate) {
+        self.prepare(&best.found);
         let (mut zero_n, mut least) = (best.found.at.load_zero_n, best.misfit);
         let mut step_n = ZERO_STEPS.0 * self.scaling.load_n;
         while step_n > ZERO_STEPS.1 * self.scaling.load_n {
@@ -167,6 +166,7 @@ impl<'a> ParameterSearch<'a> {
     fn zero_error_n(&mut self, best: &Candidate) -> f64 {
         let step_n = ZERO_ERROR_STEP * self.scaling.load_n;
         let zero_n = best.found.at.load_zero_n;
+        self.prepare(&best.found);
         let around =
             [zero_n - step_n, zero_n, zero_n + step_n].map(|zero_n| self.misfit(&best.found, zero_n));
         let curvature = (around[0] - 2.0 * around[1] + around[2]) / (step_n * step_n);
@@ -220,6 +220,7 @@ impl<'a> ParameterSearch<'a> {
 
     /// Median size of a candidate's residuals, as a standard deviation, m.
     fn scale_m(&mut self, found: &GaussNewtonResult) -> f64 {
+        self.prepare(found);
         let mut sizes_m: Vec<f64> = Vec::new();
         self.each_residual(found, found.at.load_zero_n, |e_m| sizes_m.push(e_m.abs()));
         if sizes_m.is_empty() {
@@ -229,7 +230,16 @@ impl<'a> ParameterSearch<'a> {
         (MAD * *sizes_m.select_nth_unstable_by(middle, f64::total_cmp).1).max(LEAST_SCALE_M)
     }
 
-    /// Mean of ln(1 + (e/s)²) over all complete blocks: a bounded influence for each (Cauchy's likelihood).
+    /// The misfit of a candidate that is judged for the first time.
+    fn judge(&mut self, found: &GaussNewtonResult) -> f64 {
+        self.prepare(found);
+        let misfit = self.misfit(found, found.at.load_zero_n);
+        self.tried.push((misfit, found.fit.beta[GAP]));
+        misfit
+    }
+
+    /// Mean of ln(1 + (e/s)²) over all complete blocks of the [prepared](Self::prepare) candidate: a bounded influence
+    /// for each (Cauchy's likelihood).
     fn misfit(&mut self, found: &GaussNewtonResult, load_zero_n: f64) -> f64 {
         let per_scale = self.scale_m.recip();
         let (mut product, mut logarithms, mut blocks) = (1.0, 0.0, 0_usize);
@@ -245,16 +255,17 @@ impl<'a> ParameterSearch<'a> {
         (logarithms + product.ln()) / blocks.max(1) as f64
     }
 
-    /// What a candidate with another load zero leaves of δX in every complete block, m.
+    /// Takes a candidate's delays off the channels, and its linear parts off δX: what no load zero changes.
+    fn prepare(&mut self, found: &GaussNewtonResult) {
+        let Self { blocks, scaling, linear_m, .. } = self;
+        blocks.apply_delays(found.at.skew_s, found.at.load_delay_s, found.at.load_lag_s);
+        linear_parts(RowSource { blocks, scaling }, &found.fit.beta, linear_m);
+    }
+
+    /// What the [prepared](Self::prepare) candidate with another load zero leaves of δX in every complete block, m.
     fn each_residual(&mut self, found: &GaussNewtonResult, load_zero_n: f64, mut take: impl FnMut(f64)) {
-        let is_own_zero = (load_zero_n - found.at.load_zero_n).abs() < f64::EPSILON;
         let Self { blocks, path, scaling, linear_m, .. } = self;
-        let state = FrictionState { load_zero_n, ..found.at };
-        blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
-        path.integrate(blocks, &state, scaling.motor_sense);
-        if is_own_zero {
-            linear_parts(RowSource { blocks, scaling }, &found.fit.beta, linear_m);
-        }
+        path.integrate(blocks, &FrictionState { load_zero_n, ..found.at }, scaling.motor_sense);
         let beta = &found.fit.beta;
         // In contact a zero is an offset of δX.
         let shift_m = (load_zero_n - found.at.load_zero_n) * beta[FORCE] / scaling.load_n;
