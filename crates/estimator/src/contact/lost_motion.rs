@@ -4,11 +4,10 @@ use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP};
 use crate::contact::fit::flank_fit::FlankFit;
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::flank::Flank;
+use crate::contact::stats::{MAD, median};
 
 /// Rows this near to the reference load count, as a share of it.
 const NEAR: f64 = 0.25;
-/// Normal standard deviations in a median absolute deviation.
-const MAD: f64 = 1.482_602_218_505_602;
 /// A median of a normal sample scatters so much more than its mean: √(π/2).
 const MEDIAN: f64 = 1.253_314_137_315_5;
 /// Rows on each flank below which a median says nothing.
@@ -60,9 +59,4 @@ fn beyond_m<'a>(
     outward_m.iter_mut().for_each(|e| *e = (*e - median_m).abs());
     let spread_m = MAD * median(&mut outward_m);
     Some((median_m, MEDIAN * spread_m / (stretches.len() as f64).sqrt()))
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

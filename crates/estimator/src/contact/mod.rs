@@ -27,6 +27,7 @@ mod fit;
 mod friction;
 mod lost_motion;
 mod plot_data;
+mod stats;
 mod types;
 
 pub use codes::{QualityFlag, Rejection};

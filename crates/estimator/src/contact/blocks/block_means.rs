@@ -5,9 +5,9 @@ use std::ops::Range;
 use crate::Samples;
 use crate::simd::dispatch::{Lanes, simd_dispatch};
 
-use crate::contact::blocks::extent::middle_and_half;
 use crate::contact::blocks::spikes::SpikeThreshold;
 use crate::contact::codes::Rejection;
+use crate::contact::stats::middle_and_half;
 use crate::contact::types::{PartPrior, SHORTEST_S};
 
 /// Length of a block, s: short against vibration of the load, which would mix both flanks in one mean.

@@ -1,5 +1,4 @@
 //! A flight in blocks: means of whole samples, without missing ones and spikes.
 
 pub(super) mod block_means;
-pub(super) mod extent;
 mod spikes;

@@ -17,6 +17,7 @@ use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use crate::contact::fit::workspace::ContactWorkspace;
 use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::FrictionState;
+use crate::contact::stats::median;
 use crate::gap::midrange;
 use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
@@ -356,14 +357,6 @@ fn jackknife_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
 
 fn jackknife_m_of_difference(lows_m: &[f64], highs_m: &[f64]) -> f64 {
     jackknife_m(lows_m.iter().zip(highs_m).map(|(low_m, high_m)| high_m - low_m))
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Rms of the second difference of a channel, which slow loads do not show.

@@ -11,9 +11,8 @@ use crate::contact::fit::gauss_newton::{GaussNewtonResult, search, start};
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::coupling_path::CouplingPath;
 use crate::contact::friction::friction_model::{Friction, FrictionState};
+use crate::contact::stats::{MAD, median};
 
-/// Normal standard deviations in a median absolute deviation.
-const MAD: f64 = 1.482_602_218_505_602;
 /// The least scale of residuals, m.
 const LEAST_SCALE_M: f64 = 1e-9;
 /// Starts of the friction: dry over the 95 % load, and lost share.
@@ -223,11 +222,7 @@ impl<'a> ParameterSearch<'a> {
         self.prepare(found);
         let mut sizes_m: Vec<f64> = Vec::new();
         self.each_residual(found, found.at.load_zero_n, |e_m| sizes_m.push(e_m.abs()));
-        if sizes_m.is_empty() {
-            return LEAST_SCALE_M;
-        }
-        let middle = sizes_m.len() / 2;
-        (MAD * *sizes_m.select_nth_unstable_by(middle, f64::total_cmp).1).max(LEAST_SCALE_M)
+        (MAD * median(&mut sizes_m)).max(LEAST_SCALE_M)
     }
 
     /// The misfit of a candidate that is judged for the first time.

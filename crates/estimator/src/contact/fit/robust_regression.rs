@@ -5,14 +5,13 @@ use std::ops::Range;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
 use crate::contact::fit::design_matrix::DesignRow;
+use crate::contact::stats::{MAD, median};
 use crate::simd::dispatch::{Lanes, simd_dispatch};
 
 /// Residuals beyond this many times their spread lose weight (Huber).
 const HUBER: f64 = 2.0;
 /// Beyond this many they lose all of it: a frozen channel is no noise.
 const WILD: f64 = 10.0;
-/// Normal standard deviations in a median absolute deviation.
-const MAD: f64 = 1.482_602_218_505_602;
 /// The least spread of residuals, m; below any sensor's, it keeps exact data from dividing by zero.
 const LEAST_SPREAD_M: f64 = 1e-12;
 
@@ -83,9 +82,7 @@ fn trust(deviation: f64, last: bool) -> f64 {
 
 fn spread_m(residuals_m: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = residuals_m.iter().map(|e| e.abs()).collect();
-    let middle = sizes.len() / 2;
-    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-    (MAD * median).max(LEAST_SPREAD_M)
+    (MAD * median(&mut sizes)).max(LEAST_SPREAD_M)
 }
 
 /// Residual variance of a row of weight one, inflated by dependence within stretches.

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use crate::contact::blocks::block_means::BlockMeans;
-use crate::contact::blocks::extent::middle_and_half;
 use crate::contact::codes::Rejection;
+use crate::contact::stats::middle_and_half;
 use crate::contact::types::PartPrior;
 use crate::gap::load_band::quantiles;
 

@@ -1,0 +1,23 @@
+//! Order statistics of a channel or of residuals.
+
+use crate::gap::statistic::extremes;
+
+/// Middle and half length of what values span; a negative length where there are none.
+pub(crate) fn middle_and_half(values: &[f64]) -> (f64, f64) {
+    let (low, high) = extremes(values);
+    let low = low.into_iter().fold(f64::INFINITY, f64::min);
+    let high = high.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    (0.5 * (low + high), 0.5 * (high - low))
+}
+
+/// Normal standard deviations in a median absolute deviation.
+pub(crate) const MAD: f64 = 1.482_602_218_505_602;
+
+/// The upper median of values, which are put in another order; zero of none.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
