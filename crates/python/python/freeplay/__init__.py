@@ -88,7 +88,7 @@ def estimate(
     >>> table["position"].to_pylist()
     ['aileron_left', 'aileron_right', 'elevator_left', 'elevator_right']
     >>> [f"{1e6 * gap:.1f} um" for gap in table["gap_m"].to_pylist()][:2]
-    ['93.2 um', '76.0 um']
+    ['93.4 um', '76.3 um']
 
     Raises :class:`LogError` when a log, or an actuator in it, cannot be used; its ``answer`` is the table of the
     others.
@@ -158,7 +158,7 @@ def trend(
     ['1040-0009', '1040-0013']
     """
     is_foreign = estimates is not None and config is _USUAL and not exists(_USUAL)
-    judging = Config.of_no_logs() if is_foreign else load(config)
+    judging = Config.without_logs() if is_foreign else load(config)
     if limit_m is not None:
         judging = judging.replaced(limit_m=limit_m)
     return _freeplay.trend(estimates, judging, tail, serial, part, _text(as_of), queries, statistics)
