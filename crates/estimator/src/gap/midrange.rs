@@ -1,4 +1,4 @@
-//! The published estimate in one call: filter, statistic, and what they stand on.
+//! The published estimate in one call: filter, statistic, and their inputs.
 
 use crate::error::Error;
 use crate::gap::load_band::{self, LoadBand};
@@ -8,7 +8,7 @@ use crate::kalman::filter::Filter;
 use crate::kalman::gain_schedule::GainSchedule;
 use crate::samples::Samples;
 
-/// The paper's number with everything a record says about it.
+/// The paper's estimate (equations 29–31) with the quantities of its record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MidRangeEstimate {
     /// ΔS and its two sets.

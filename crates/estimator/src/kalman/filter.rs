@@ -152,7 +152,7 @@ impl Filter {
     }
 
     /// The bandwidth at which the settled filter lets S move, Hz: its slowest pole, −ln ρ/(2π Ts) with ρ
-    /// the spectral radius of (I − K C) A_d. To be held against the bandwidth that was asked for.
+    /// the spectral radius of (I − K C) A_d. Compare it with the configured bandwidth.
     ///
     /// # Errors
     /// As [`Filter::steady_state_gain`].

@@ -8,9 +8,9 @@ use crate::kalman::steady_state::SteadyStateFilter;
 
 /// Steps of a start that are kept, at most; a sound tuning settles in far fewer.
 const MOST_STEPS: usize = 4096;
-/// What is left of a start where it counts as forgotten to the last bit. Of 4800 starts under 120 tunings of 50 to
-/// 5000 Hz half had come to the same bits at 1e-16 of it, nine in ten at 1e-22; one in seventy, of parts that ring or
-/// are very soft beside the asked bandwidth, had not at 1e-48, and is caught up with.
+/// Relative size of an initial-state error below which it is forgotten to the last bit. Of 4800 starts under 120
+/// tunings of 50 to 5000 Hz half had become bitwise identical at 1e-16, nine in ten at 1e-22. One in seventy, of parts
+/// with a weakly damped mode or very soft compared with the bandwidth, had not at 1e-48, and is recomputed.
 const FORGOTTEN: f64 = 1e-24;
 /// A tuning that forgets more slowly is not cut into parts.
 const LONGEST_LEAD: usize = 65_536;

@@ -1,4 +1,4 @@
-//! Noise levels nobody has to guess: from sensor facts and a bandwidth, or as given.
+//! Process and measurement noise, from sensor data and a bandwidth, or as given.
 
 use core::f64::consts::TAU;
 
@@ -20,8 +20,8 @@ pub enum NoiseModel {
         /// V_d, m².
         v_d_m2: f64,
     },
-    /// Exact from white densities. A trap where the structural mode lies above Nyquist: it is rung by
-    /// noise that sampling cannot see, and the gap comes out 9–15 % low at 100 Hz.
+    /// Exact discretisation of white densities. Not suitable where the structural mode is above Nyquist: the mode is
+    /// excited by noise above Nyquist, and the gap is 9–15 % low at 100 Hz.
     Continuous {
         /// Density of the unknown force, N²·s.
         force_psd_n2_s: f64,

@@ -26,9 +26,9 @@ fn track(filter: &Filter, dx_m: &[f64], load_n: &[f64], segments: &[std::ops::Ra
     filter.track(&samples, None).unwrap().s_m
 }
 
-/// The settled pole sits where it was asked: within a tenth at the rates of real logs.
+/// The slowest pole of the steady-state filter is within a tenth of the configured bandwidth at the rates of real logs.
 #[test]
-fn the_bandwidth_asked_for_is_the_bandwidth_got() {
+fn the_configured_bandwidth_is_reached() {
     for rate_hz in [100.0, 250.0, 1000.0] {
         let got = filter(f64::recip(rate_hz), 10.0).bandwidth_hz().unwrap();
         assert!((got / 10.0 - 1.0).abs() < 0.1, "{got} Hz at {rate_hz} Hz");
@@ -115,7 +115,7 @@ proptest! {
         }
     }
 
-    /// However samples are missing, S stays a number and the settled shortcut tells what the plain recursion tells.
+    /// With any missing samples, S stays finite and the steady-state filter agrees with the plain recursion.
     #[test]
     fn missing_samples_never_poison_the_track(dx in vec(prop_oneof![5 => (-1e-4..1e-4).boxed(), 1 => Just(f64::NAN).boxed()], 300..900)) {
         prop_assume!(dx.iter().any(|y| !y.is_nan()));
@@ -134,11 +134,11 @@ proptest! {
         }
     }
 
-    /// Soft or stiff, slow or fast beside the step, ringing or not: the settled shortcut tells what the plain recursion
-    /// tells, to 1e-12 of the peak of what goes in or comes out.
+    /// Soft or stiff, slow or fast compared with the step, weakly damped or not: the steady-state filter agrees with
+    /// the plain recursion to 1e-12 of the largest input or output.
     ///
-    /// Not of a part that rings, hardly damped, at a multiple of the sample rate: it seems to stand still, so that its
-    /// motion and the backlash cannot be told apart, and what the plain covariance rounds does not die out.
+    /// Excluded is a weakly damped part whose mode is at a multiple of the sample rate: it appears constant, so its
+    /// motion and the backlash are not separable, and rounding errors of the plain covariance do not decay.
     #[test]
     fn the_shortcut_agrees_with_the_plain_recursion_for_any_actuator(
         (stiffness, damping, mass) in (6.5..9.0_f64, 1.0..4.5_f64, 0.0..2.5_f64),
