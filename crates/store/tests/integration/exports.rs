@@ -8,7 +8,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use records::GapRecord;
 use store::{Format, Query, columns};
 
-use crate::made::{record, result, writer};
+use crate::fixtures::{record, result, writer};
 
 fn exported(format: Format, results: &[store::LogResult]) -> Vec<u8> {
     let dir = tempfile::tempdir().unwrap();
@@ -60,7 +60,9 @@ fn parquet_reads_back_as_the_same_records() {
     let records = columns::from_batch(&batch).unwrap();
     let expected: Vec<GapRecord> = [(0, 40e-6), (1, 41e-6)]
         .into_iter()
-        .flat_map(|(flight, gap_m)| crate::made::POSITIONS.map(|position| record(1, flight, position, gap_m)))
+        .flat_map(|(flight, gap_m)| {
+            crate::fixtures::POSITIONS.map(|position| record(1, flight, position, gap_m))
+        })
         .collect();
     assert_eq!(records, expected);
 }

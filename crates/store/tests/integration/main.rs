@@ -1,15 +1,15 @@
-//! The public door of the store.
+//! Public API of the store.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
-#![allow(clippy::print_stdout, reason = "what was measured is for people")]
+#![allow(clippy::print_stdout, reason = "measurements are printed")]
 
-mod care;
 mod commits;
+mod crash_recovery;
 mod exports;
+mod fixtures;
 mod folder;
-mod kills;
-mod made;
-mod measure;
+mod maintenance;
 mod queries;
 mod round_trip;
 mod runs;
+mod timings;

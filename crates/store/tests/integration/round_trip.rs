@@ -8,7 +8,7 @@ use records::{
 };
 use store::{LogResult, Query, columns};
 
-use crate::made::{account, record, writer};
+use crate::fixtures::{account, record, writer};
 
 /// Names keep no white space around them, and hold anything else.
 fn name() -> impl Strategy<Value = String> {
@@ -86,7 +86,7 @@ prop_compose! {
 }
 
 fn bits(records: &[GapRecord]) -> Vec<String> {
-    // The debug form of an f64 is its shortest exact one, and tells -0.0 from 0.0.
+    // The debug form of an f64 is its shortest exact one, and separates -0.0 from 0.0.
     records.iter().map(|record| format!("{record:?}")).collect()
 }
 
