@@ -1,10 +1,10 @@
 //! Flight logs in, canonical channels out: SI units, one clock, one actuator at a time.
 //!
-//! Only this crate knows what a column is called and in which unit it was logged; nobody after it
+//! Only this crate knows the names and units of logged columns; no later crate
 //! converts a unit. A log that cannot be used becomes an [`Error`] that names file, column, row and
 //! remedy, and nothing else is affected.
 //!
-//! The way of a log: [`Log::open`] reads the footers, [`Log::identity`] says which flight it was,
+//! The way of a log: [`Log::open`] reads the footers, [`Log::identity`] identifies the flight,
 //! `Log::actuators` which actuators it holds, and `Log::read_actuator` reads the channels of one of them
 //! on one clock.
 

@@ -167,7 +167,7 @@ pub enum TimeUnit {
     /// Nanoseconds.
     #[serde(rename = "ns")]
     Nanosecond,
-    /// SampleSelector: a counter that goes up by one with every row; `clock.rate_hz` says how fast.
+    /// Row counter that increases by one with every row; `clock.rate_hz` gives the rate.
     #[serde(rename = "count")]
     Count,
 }
