@@ -1,9 +1,9 @@
-//! What a statement costs: time per serial against the length of its history, on one and two threads.
+//! Cost of an assessment: time per serial against the length of its history, on one and two threads.
 //!
-//! `cost [SERIALS]` makes wearing units of 100 to 10,000 flights and prints the time for the series, the
-//! statement and the prior: of the processor, which other programs lengthen less, and by the clock. Then
-//! each unit flies 64 times more, and from its kept state a statement is made every night: the time of
-//! that, how many of these nights asked for the history, and the size of the state.
+//! `timings [SERIALS]` makes wearing units of 100 to 10,000 flights and prints the time for the series, the
+//! assessment and the prior: processor time, which other programs affect less, and wall time. Then
+//! each unit flies 64 times more, and is assessed from its snapshot in every run: the time of
+//! an assessment, how many of the runs needed the history, and the size of the snapshot.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a developer's tool, which may fail loudly")]
 
 mod random;
@@ -43,7 +43,7 @@ fn rows(seed: u64, flights: usize) -> Vec<Observation> {
         .collect()
 }
 
-/// Time this thread has had on a processor, or, where nobody counts it, the time that went by, seconds.
+/// Processor time of this thread, or wall time where the system does not count it, seconds.
 fn busy_s(began: Instant) -> f64 {
     let counted = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let ns = counted.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
@@ -58,7 +58,7 @@ fn cost<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (busy_s(began) - before_s, made)
 }
 
-/// Workers that share what there is to do, as a night's do.
+/// Threads that share the work, as those of a run do.
 struct Threads(rayon::ThreadPool);
 
 impl Threads {
@@ -112,7 +112,7 @@ impl Unit {
         Series::new(self.rows[..self.flown].iter().copied(), &UsageDefaults::default()).unwrap()
     }
 
-    /// Flies once more and says what is known then.
+    /// Adds one flight and assesses the unit.
     fn night(&mut self, prior: &FleetPrior, settings: &Settings, asked: &mut Evaluated) {
         let row = self.rows[self.flown];
         self.flown += 1;
@@ -139,7 +139,7 @@ impl Unit {
     }
 }
 
-/// A fleet of units on some threads, each unit one night: wall seconds.
+/// A fleet of units on some threads, one run for each unit: wall seconds.
 fn flown(fleet: &mut [Unit], prior: &FleetPrior, threads: &Threads) -> f64 {
     let settings = &Settings::for_limit(LIMIT_M);
     let began = Instant::now();

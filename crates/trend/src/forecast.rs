@@ -29,8 +29,8 @@ pub struct Interval {
     pub p95_m: f64,
 }
 
-/// What lies behind a statement and before it, to be drawn; offsets of the measurement are undone, as
-/// they are in the statement's own gap.
+/// Past levels and forecast of an assessment, for plots. Offsets of the measurement are removed, as
+/// they are in the assessed gap.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Forecast {
     /// The smoothed level at mean departures of neighbouring flights, microseconds since 1970 UTC.
@@ -106,7 +106,7 @@ impl Interval {
     }
 }
 
-/// The level at each bin of a segment: the mean curve, and beside it a walk, smoothed.
+/// The level at each bin of a segment: the mean curve plus a smoothed random walk.
 fn levels(segment: &Segment<'_>, fitted: &Posterior, prior: &FleetPrior) -> Vec<(i64, Interval)> {
     let bins = bins::bin(segment.estimates, BINS);
     let grown_m = |usage: f64| mean_growth(&fitted.components, usage);

@@ -1,4 +1,4 @@
-//! A state that remembers: held by what the unit's own last flights said, and by no statement that was made.
+//! Alert hysteresis: a state is held by the states of the unit's last flights, independent of earlier assessments.
 
 use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::error::Error;
@@ -8,16 +8,16 @@ use crate::settings::Settings;
 use crate::statement::assessment::Assessment;
 use crate::statement::state::{Evidence, State, alert_state};
 
-/// Flights with a gap that are asked what their state was: more than what one wave of the level lasts. With
-/// eight of them 7 of 360 simulated units that wore through a limit went back once, with 24 none.
+/// Number of last flights with a gap whose state is evaluated: more than one excursion of the level lasts. With
+/// eight of them 7 of 360 simulated units that wore through a limit changed back once, with 24 none.
 const RECALLED: usize = 24;
 
-/// States what is known of a unit on a day as [`assess`](crate::assess()) does, its previous state being the most urgent
-/// one of its last 24 flights with a gap before.
+/// Assesses a unit at a date as [`assess`](crate::assess()) does, with the most urgent state of its last 24 flights
+/// with a gap as its previous state.
 ///
-/// The state of a night so follows from the flights alone: the same flights give the same state whether
-/// or not a statement was made every night, and a unit at its limit does not change its state from night
-/// to night. Earlier flights are judged by the same prior, and only where a memory could matter.
+/// The state so follows from the flights alone: the same flights give the same state for any dates of earlier
+/// assessments, and a unit at its limit does not change its state from run to run. Earlier flights are assessed
+/// with the same prior, and only where hysteresis can change the state.
 ///
 /// # Errors
 /// As [`assess`](crate::assess()).
@@ -96,13 +96,13 @@ impl UnitSnapshot {
     }
 }
 
-/// Departures of the flights that are asked what their state was.
+/// Departures of the flights whose state is evaluated.
 fn lookback_departures(flights: &[Flight]) -> Vec<i64> {
     let seen = flights.iter().rev().filter(|flight| flight.gap.is_some());
     seen.skip(1).take(RECALLED).map(|flight| flight.departure_us).collect()
 }
 
-/// Whether any previous state would change what is said.
+/// Whether any previous state would change the assessment.
 fn hysteresis_applies(assessment: &Assessment, last_gap_us: Option<i64>, settings: &Settings) -> bool {
     alert_state(&evidence(assessment, last_gap_us), settings, Some(State::Act)).0 != assessment.state
 }

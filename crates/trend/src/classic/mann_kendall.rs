@@ -78,7 +78,7 @@ fn test(y: &[f64], inflation: f64) -> MannKendall {
     MannKendall { s, variance, z, p_value: two_sided(z), tau: s / (0.5 * n * (n - 1.0)) }
 }
 
-/// Sorts the values and counts the pairs that stood strictly in falling order.
+/// Sorts the values and counts the pairs in strictly falling order.
 fn inversions(values: &mut [f64], spare: &mut [f64]) -> u64 {
     let half = values.len() / 2;
     if half == 0 {

@@ -20,8 +20,8 @@ pub struct TheilSen {
 /// Theil–Sen slope and its limits at `confidence` (0.95 for 95 %), Sen 1968 equation 2.6 with ties
 /// in x and in y corrected for.
 ///
-/// Every pair is looked at, so time grows with n²; memory does not, since a bracket from a thin
-/// sample of pairs decides which slopes are worth keeping. The result is exact either way.
+/// All pairs are compared, so time grows with n²; memory does not, since a bracket from a
+/// subsample of pairs decides which slopes are kept. The result is exact either way.
 ///
 /// # Errors
 /// [`Error::TooFew`] below two points, [`Error::Lengths`], [`Error::Values`] for values that are not

@@ -38,7 +38,7 @@ pub(crate) struct CleanedSeries {
     pub(crate) estimates: Vec<WeightedGap>,
     /// Flights whose gap is an outlier.
     pub(crate) outliers: Vec<usize>,
-    /// By what they were told apart.
+    /// The noise scale by which outliers were found.
     pub(crate) scatter: NoiseScale,
 }
 
@@ -49,7 +49,7 @@ pub(crate) struct NoiseScale {
     pub(crate) noise_factor: f64,
     /// The stated error of a gap that states none, metres.
     pub(crate) typical_m: f64,
-    /// The last gaps, as many as the window of another one reaches back.
+    /// The last gaps, as far back as the window of a new one reaches.
     pub(crate) recent: Vec<OutlierResult>,
 }
 
@@ -133,7 +133,7 @@ impl NoiseScale {
     }
 }
 
-/// Whether a gap lies far from what its neighbours say it is, worn or not.
+/// Whether a gap is far from the level of its neighbours, with or without wear.
 fn is_outlier(gaps: &[f64], at: usize, variance: f64) -> bool {
     let reach_m = OUTLIER_SIGMA * variance.sqrt();
     is_far_from_median(gaps, at, reach_m) && (gaps[at] - on_local_line(gaps, at)).abs() > reach_m
@@ -170,8 +170,8 @@ fn typical_error(stated: &[(usize, Gap)]) -> f64 {
     if errors.is_empty() { 1e-6 } else { median(&mut errors) }
 }
 
-/// A stated error no smaller than half the typical one: a between-flight scatter that nobody states
-/// bounds what a single flight can be worth.
+/// Standard error of a gap, at least half the typical one: an unknown between-flight scatter
+/// bounds the weight of a single flight.
 fn error(gap: Gap, typical_m: f64) -> f64 {
     let stated_m = if gap.se_m.is_finite() { gap.se_m.max(0.5 * typical_m) } else { typical_m };
     stated_m.clamp(LEAST_ERROR_M, LARGEST_ERROR_M)
@@ -190,20 +190,20 @@ fn noise_factor(gaps: &[f64], errors: &[f64]) -> f64 {
         return 1.0;
     }
     let count = ratios.len() as f64;
-    // Wear that shows from one flight to the next is no noise: it moves all differences alike.
+    // Wear that shows from one flight to the next is no noise: it moves all differences equally.
     let wear = median(&mut ratios);
     ratios.iter_mut().for_each(|ratio| *ratio = (*ratio - wear).abs());
     let found = (1.4826 * median(&mut ratios)).powi(2);
-    // Errors stated ten times too large were not meant; that gaps repeat to the last digit says nothing.
+    // A common factor of the stated errors is limited; exactly repeating gaps carry no information about it.
     let stated = if found > 0.0 { (100.0 * found).min(1.0) } else { 1.0 };
     ((found * count + PRIOR_COUNT * stated) / (count + PRIOR_COUNT)).max(0.05 * stated)
 }
 
-/// What the flights around one say it should be, if they wear evenly: the median of their pairwise
+/// Level of a flight from its neighbours under even wear: the median of their pairwise
 /// slopes through the median of their levels (Theil 1950).
 ///
 /// A running median lags behind a unit that wears fast, most of all at the ends of its history, and
-/// would call its wear a row of outliers. Only where it does is this looked at.
+/// would mark its wear as outliers. This line is computed only there.
 fn on_local_line(gaps: &[f64], at: usize) -> f64 {
     let (first, window) = window(gaps, at);
     let width = window.len();

@@ -24,7 +24,7 @@ pub struct Observation {
     pub gap_se_m: Option<f64>,
 }
 
-/// What stands in where usage is not known, and where a unit's own hours begin.
+/// Defaults for unknown usage, and the start of a unit's own hours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UsageDefaults {
     /// Length of a flight that states none and has no hour meter, hours.
@@ -152,7 +152,7 @@ impl Series {
         })
     }
 
-    /// The same with what the maintenance book says of the unit, in any order.
+    /// The same with the recorded maintenance of the unit, in any order.
     #[must_use]
     pub fn with_maintenance(mut self, mut maintenance: Vec<MaintenanceEvent>) -> Self {
         maintenance.sort_unstable_by_key(MaintenanceEvent::order);
@@ -180,8 +180,7 @@ impl Series {
         &self.flights[..self.flights.partition_point(|flight| flight.departure_us <= as_of_us)]
     }
 
-    /// The gaps known on a day, in order of departure: what the [classic statistics](crate::classic)
-    /// are asked about.
+    /// The gaps known on a day, in order of departure: input of the [classic statistics](crate::classic).
     pub fn gaps_until(&self, as_of_us: i64) -> Vec<f64> {
         self.flights_until(as_of_us).iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect()
     }

@@ -1,7 +1,7 @@
-//! What a unit's flights say until a checkpoint: all that a later statement needs of them.
+//! Checkpoint: the result of a unit's flights up to a count, sufficient for later assessments.
 //!
-//! Checkpoints lie where the count of flights says, so a state that was kept night by night and one made
-//! from the whole history stand on the same flights.
+//! Checkpoints follow from the count of flights, so an incremental snapshot and a computation
+//! from the whole history use the same flights.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,8 +20,8 @@ use crate::statement::types::{ChangePoint, ChangePointKind};
 /// Flights of the shortest history that is not judged whole every time.
 const SHORTEST: usize = 64;
 
-/// A checkpoint lies at every so many flights: the largest power of two in this share of the history, within
-/// bounds. Twice the share, and laws with two knees are seen too late: 90 % intervals held 1 to 2 % less.
+/// Checkpoints are at multiples of the largest power of two in this share of the history, within
+/// bounds. With twice the share, laws with two knees are found too late: 90 % intervals held 1 to 2 % less.
 const SHARE: usize = 32;
 const SHORTEST_STRIDE: usize = 4;
 const LONGEST_STRIDE: usize = 64;
@@ -46,7 +46,7 @@ pub(crate) fn before(flights: usize) -> usize {
     flights / stride * stride
 }
 
-/// What the flights until a checkpoint say.
+/// Result of the flights until a checkpoint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Checkpoint {
     pub(crate) flights: usize,
@@ -110,7 +110,7 @@ pub(crate) struct RecentUsage {
     pub(crate) since_here: (f64, f64),
 }
 
-/// What the last segment says at its end.
+/// Posterior of the last segment at its end.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) enum SegmentPosterior {
     /// Nothing: it has no estimate, or no usage.
@@ -123,7 +123,7 @@ pub(crate) enum SegmentPosterior {
     By(Mixture),
 }
 
-/// Flights, and what the books say of them.
+/// Flights, and recorded maintenance.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HistoryView<'a> {
     pub(crate) flights: &'a [Flight],
@@ -132,7 +132,7 @@ pub(crate) struct HistoryView<'a> {
 }
 
 impl HistoryView<'_> {
-    /// What was known when only so many flights had been made.
+    /// The view after the given number of flights.
     pub(crate) fn first(&self, flights: usize) -> Self {
         let flights = &self.flights[..flights];
         let maintenance =

@@ -6,8 +6,8 @@ use crate::incremental::snapshot::UnitSnapshot;
 use crate::math::fnv::fnv1a;
 use crate::prior::fleet_prior::FleetPrior;
 
-/// The number of the form. A change of what is kept, or of how statements are made of it, asks for the
-/// next one: a state of another form is made anew.
+/// Version of the encoding. It changes with the content, and with the computation of assessments from it:
+/// a snapshot of another version is computed again.
 const FORM: u8 = 3;
 
 /// Bytes of the digest.

@@ -16,13 +16,13 @@ use crate::statement::level;
 use crate::statement::state::{Evidence, State, alert_state};
 use crate::statement::types::{ChangePoint, ChangePointKind, MIN_ESTIMATES, Utilization, WearStatus};
 
-/// A unit's flights until a checkpoint as they were judged, and those after it as they were flown.
+/// Incremental state of a unit: the result of its flights until a checkpoint, and the flights after it.
 ///
-/// A statement stands on both: the checkpoint's curves, weighed and moved on by the few estimates that
-/// follow. Where those do not go on as was foretold (a step shows, an outlier was none, they lie too far
-/// off) it stands on the whole history. Checkpoints follow from the count of flights alone, and
-/// [`assess`](crate::assess()) makes its statements in this way too: what is said from a state that was kept
-/// is what is said from nothing, bit for bit, whatever the nights and the order of arrival.
+/// An assessment uses both: the checkpoint's mixture, updated by the few estimates that
+/// follow. Where those do not follow the forecast (a step, an outlier that was none, a large
+/// deviation), the assessment uses the whole history. Checkpoints follow from the count of flights alone, and
+/// [`assess`](crate::assess()) computes assessments in this way too: the assessment from a snapshot
+/// is bitwise identical to the one from the series, whatever the dates of the runs and the order of arrival.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitSnapshot {
     pub(crate) checkpoint: Checkpoint,
@@ -35,16 +35,16 @@ pub struct UnitSnapshot {
     pub(crate) prior: u64,
 }
 
-/// What the last segment says now, or the level that was not stated and what the last estimates say.
+/// Current posterior of the last segment, or the unsupported level and that of the last estimates.
 pub(crate) struct CurrentFit {
     tail: Tail,
     fitted: Result<(Posterior, bool), Option<(f64, f64)>>,
 }
 
 impl UnitSnapshot {
-    /// Judges a unit's flights until a day, by a prior learned from nothing later.
+    /// Computes the state of a unit at a date, with a prior learned from earlier data.
     ///
-    /// For what [`assess`](crate::assess()) says without a prior it is [`FleetPrior::uninformative`] of the limit.
+    /// Where [`assess`](crate::assess()) has no prior, use [`FleetPrior::uninformative`] of the limit.
     pub fn from_series(series: &Series, as_of_us: i64, prior: &FleetPrior) -> Self {
         Self::current(series, as_of_us, prior).0
     }
@@ -109,11 +109,11 @@ impl UnitSnapshot {
         })
     }
 
-    /// States what is known of the unit on a day, as [`assess`](crate::assess()) does from its whole history.
+    /// Assesses the unit at a date, as [`assess`](crate::assess()) does from its whole history.
     ///
-    /// `maintenance` is all that the maintenance book says of the unit, in any order. Nothing where the history is
-    /// needed: the last flights do not go on as was foretold, the day is before the last of them, or prior
-    /// or book are not those that the state was made with.
+    /// `maintenance` is the recorded maintenance of the unit, in any order. Nothing where the history is
+    /// needed: the last flights do not follow the forecast, the date is before the last of them, or prior
+    /// or maintenance differ from those of the snapshot.
     ///
     /// # Errors
     /// As [`assess`](crate::assess()).
@@ -143,7 +143,7 @@ impl UnitSnapshot {
         Ok(current.map(|current| self.statement(current, as_of_us, maintenance, settings, prior, previous)))
     }
 
-    /// What is said of where the unit stands; the book is ordered, and ends on the day.
+    /// Assessment from the current fit; the maintenance is sorted, and ends on the date.
     pub(crate) fn statement(
         &self,
         current: CurrentFit,
@@ -258,8 +258,8 @@ impl UnitSnapshot {
     }
 }
 
-/// The checkpoint at a count of flights and where the unit stands after the rest; nothing where the rest
-/// does not go on as was foretold.
+/// The checkpoint at a count of flights and the fit after the remaining flights; nothing where those
+/// do not follow the forecast.
 fn fit_from_checkpoint(
     known: &HistoryView<'_>,
     count: usize,
@@ -284,7 +284,7 @@ impl CurrentFit {
         Self { tail: Tail::default(), fitted }
     }
 
-    /// What the last segment says, and whether without the fleet.
+    /// Posterior of the last segment, and whether it uses the single-unit prior.
     pub(crate) fn fitted(&self) -> Option<(&Posterior, bool)> {
         self.fitted.as_ref().ok().map(|(posterior, is_single_unit)| (posterior, *is_single_unit))
     }

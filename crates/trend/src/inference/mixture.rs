@@ -38,14 +38,14 @@ pub(crate) struct Mixture {
 }
 
 impl Mixture {
-    /// Keeps what a posterior says at the end of its segment.
+    /// Compresses a posterior at the end of its segment.
     pub(crate) fn of(posterior: &Posterior, span: f64, is_single_unit: bool) -> Self {
         let Posterior { since, level_m2, growth_m2, seasonal_m2, level_seasonal_m2, .. } = *posterior;
         let components = thin(&posterior.components);
         Self { is_single_unit, span, since, level_m2, growth_m2, seasonal_m2, level_seasonal_m2, components }
     }
 
-    /// The posterior that was kept; its evidence and its guesses, which only a fleet's lesson asks, are not.
+    /// The stored posterior, without its evidence and age assumptions, which only the learning of a fleet prior uses.
     pub(crate) fn posterior(&self, prior: &FleetPrior) -> Posterior {
         let component = |component: &StoredComponent| {
             let age_begin = f64::from(component.age_begin);

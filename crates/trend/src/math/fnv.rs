@@ -1,4 +1,4 @@
-//! A number that tells two rows of numbers apart.
+//! FNV-1a hash of numbers.
 
 /// Fowler, Noll and Vo's 64-bit hash, a word at a time and its upper half folded in.
 pub(crate) fn fnv1a(words: impl IntoIterator<Item = u64>) -> u64 {

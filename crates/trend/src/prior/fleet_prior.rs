@@ -1,4 +1,4 @@
-//! What the units of one part number teach about the next (empirical Bayes).
+//! Fleet prior: distribution of the parameters of a new unit of one part number (empirical Bayes).
 
 use std::fmt;
 
@@ -96,7 +96,7 @@ pub struct FleetPrior {
 }
 
 impl FleetPrior {
-    /// What is assumed of a part number nobody has seen: a new gap of a fifth of the limit, lives around
+    /// Prior of a part number without data: a new gap of a fifth of the limit, lives around
     /// 4,000 h within a factor of ten, any law.
     pub fn uninformative(limit_m: f64) -> Self {
         let mut shares = [0.28 / POWERS as f64; FAMILIES];
@@ -123,8 +123,8 @@ impl FleetPrior {
         }
     }
 
-    /// What is assumed of a unit that the fleet says nothing of: the fleet's axis, and else as little as
-    /// of a part number nobody has seen.
+    /// Prior of a unit without support from its fleet: the fleet's axis, and else the wide distributions
+    /// of a part number without data.
     pub(crate) fn single_unit(&self) -> Self {
         let Self { axis, hours_per_unit, .. } = *self;
         Self { axis, hours_per_unit, ..Self::uninformative(self.span_m / (1.0 - NEW_SHARE)) }
@@ -157,7 +157,7 @@ impl FleetPrior {
         0.5 * (self.calibration.high - self.calibration.low) / USUAL_WIDTH
     }
 
-    /// What tells it from another prior.
+    /// Hash that identifies it.
     pub(crate) fn digest(&self) -> u64 {
         let Self {
             axis,
@@ -229,7 +229,7 @@ pub(crate) struct LogPrior<'a> {
     shape: f64,
 }
 
-/// What a law's own time says of a life: the density of ln life.
+/// Prior of a law's time constant given a life: the density of ln life.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TimeConstantPrior {
     ln_life: f64,

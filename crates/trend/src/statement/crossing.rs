@@ -85,10 +85,10 @@ impl RulDistribution {
         }
     }
 
-    /// Its 5 %, 50 % and 95 % quantiles, after what the fleet's past says of such forecasts.
+    /// Its 5 %, 50 % and 95 % quantiles, with the calibration of the fleet's past forecasts.
     ///
-    /// Growth above what was foretold is time below it: the widths on the logarithm of the time are
-    /// those that growth was found to need. A limit that is likely over, or likely beyond the horizon,
+    /// Growth above the forecast is time below it: the widths on the logarithm of the time are
+    /// those that growth was found to need. A limit that is likely reached already, or likely beyond the horizon,
     /// has no width to be corrected.
     pub(crate) fn crossing(&self) -> Crossing {
         let [p05_hours, p50_hours, p95_hours] = [0.05, 0.5, 0.95].map(|p| self.quantile(p));

@@ -98,7 +98,7 @@ pub(crate) struct Candidate {
     pub(crate) age_spread: f64,
     /// ln of the time by which its law runs, where its life has to do with that.
     pub(crate) ln_time_constant_hours: Option<f64>,
-    /// The sequence its heights are a multiple of, beside a line and a constant, if they are.
+    /// The sequence of which its basis values are a multiple, plus a line and a constant, if there is one.
     pub(crate) basis: Option<(usize, BasisCoefficients)>,
 }
 
@@ -261,7 +261,7 @@ impl CandidateBank {
     /// those that are to be tried.
     ///
     /// A unit that may have worn before gets every age of the grid; onsets lie on a grid of starts
-    /// within what was seen. Starts later than now are the business of whoever asks for the future.
+    /// within the observed usage. Later starts are handled by the forecast.
     pub(crate) fn new(
         fresh: bool,
         known_age: Option<f64>,
@@ -328,7 +328,7 @@ impl StaticCandidates {
     }
 }
 
-/// A curve that begins at birth; its law is still to be said.
+/// A curve that begins at birth; its law is set afterwards.
 const BIRTH: Candidate = Candidate {
     law: WearLaw::None,
     age: 0.0,
@@ -389,7 +389,7 @@ fn grid() -> Vec<Candidate> {
 /// settling     1 − e^(−(u + a)/τ) = 1 − e^(−a/τ) · e^(−u/τ)
 /// bend         s (u + a) + (1 − s) max(0, u − k)     k the knee, counted from first sight
 /// ```
-/// So each of these is one of a few sequences, its *part*, times a factor, beside a line and a constant.
+/// So each of these is a multiple of one of a few sequences, its *basis*, plus a line and a constant.
 pub(crate) struct BasisMatrix {
     usages: Vec<f64>,
     roots: Vec<Vec<[f64; 4]>>,

@@ -1,4 +1,4 @@
-//! A state kept from night to night says what the whole history says.
+//! An incremental snapshot gives the assessment of the whole history.
 
 use proptest::prelude::*;
 use trend::{
@@ -57,7 +57,7 @@ impl Life {
         }
     }
 
-    /// The nights' rows, in the order of their arrival.
+    /// The rows of each run, in the order of their arrival.
     fn nights(&self) -> Vec<Vec<Observation>> {
         let mut random = Random::new(self.seed);
         let mut nights = vec![Vec::new(); self.flights + 9];
@@ -102,7 +102,7 @@ struct Evaluated {
     histories: usize,
 }
 
-/// A unit's nights, each stated from its kept state and from nothing, which must be alike to the last bit.
+/// A unit assessed in each run from its snapshot and from its series, which must be bitwise identical.
 fn compare(life: &Life, prior: &FleetPrior, from: usize) -> Evaluated {
     let settings = Settings::for_limit(LIMIT_M);
     let (mut rows, mut bytes) = (Vec::new(), Vec::new());
@@ -179,9 +179,9 @@ fn lives() -> impl Strategy<Value = Life> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Worn, stepped, reset, refused, booked, late or twice: the nights' states say what the flights say.
+    /// Worn, stepped, reset, rejected, recorded, late or duplicated: snapshots and flights give the same assessments.
     #[test]
-    fn a_state_kept_night_by_night_says_what_the_whole_history_says_to_the_last_bit(
+    fn an_incremental_state_equals_the_whole_history_bitwise(
         life in lives(), from in 0_usize..250,
     ) {
         compare(&life, &FleetPrior::uninformative(LIMIT_M), from);
@@ -216,10 +216,10 @@ fn a_quiet_unit_of_a_thousand_flights_seldom_needs_its_history() {
     assert!(nights == 100 && histories <= 8, "{histories} of {nights}");
 }
 
-/// At its watch limit, where it does not wear, what a unit's last flights said matters; the tail knows
-/// them, once it has 25.
+/// At its watch limit, without wear, the states of a unit's last flights matter; the tail holds
+/// them from 25 flights on.
 #[test]
-fn a_kept_state_remembers_what_the_last_flights_said() {
+fn a_snapshot_applies_the_hysteresis_of_the_last_flights() {
     let prior = FleetPrior::uninformative(LIMIT_M);
     let life = Life { outliers: 0.0, um_per_hour: 0.0, ..Life::quiet(5, 2100) };
     let rows: Vec<Observation> = life.nights().into_iter().flatten().collect();
