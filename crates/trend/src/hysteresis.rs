@@ -1,6 +1,6 @@
 //! Alert hysteresis: a state is held by the states of the unit's last flights, independent of earlier assessments.
 
-use crate::data::series::{Flight, MaintenanceEvent, Series};
+use crate::data::series::{Flight, Series};
 use crate::error::Error;
 use crate::incremental::snapshot::UnitSnapshot;
 use crate::prior::fleet_prior::FleetPrior;
@@ -39,61 +39,21 @@ pub fn assess_with_hysteresis(
     }
     let mut previous = None;
     for departure_us in lookback_departures(series.flights_until(as_of_us)) {
-        let earlier = snapshot.truncate(departure_us);
-        let earlier = earlier
-            .map(|snapshot| snapshot.assess(departure_us, series.maintenance(), settings, prior, None));
-        let earlier = earlier.transpose()?.flatten().unwrap_or_else(|| {
-            // From the checkpoint before, on which still earlier flights may stand, too.
+        let maintenance = series.maintenance_until(departure_us);
+        let assess = |snapshot: &UnitSnapshot, current| {
+            snapshot.statement(current, departure_us, maintenance, settings, prior, None)
+        };
+        let truncated = snapshot.truncate(departure_us);
+        let earlier = truncated.and_then(|snapshot| Some(assess(&snapshot, snapshot.fit(prior)?)));
+        let earlier = earlier.unwrap_or_else(|| {
+            // From the checkpoint before, which still earlier flights may share.
             let current;
             (snapshot, current) = UnitSnapshot::current(series, departure_us, prior);
-            snapshot.statement(
-                current,
-                departure_us,
-                series.maintenance_until(departure_us),
-                settings,
-                prior,
-                None,
-            )
+            assess(&snapshot, current)
         });
         previous = previous.max(earlier.state);
     }
     Ok(apply_hysteresis(assessment, last_gap_us, settings, previous))
-}
-
-impl UnitSnapshot {
-    /// States what is known of the unit on a day as [`assess_with_hysteresis`] does from its whole history.
-    ///
-    /// Nothing as [`UnitSnapshot::assess`], and where a memory could matter that goes back beyond the last checkpoint.
-    ///
-    /// # Errors
-    /// As [`assess`](crate::assess()).
-    pub fn assess_with_hysteresis(
-        &self,
-        as_of_us: i64,
-        maintenance: &[MaintenanceEvent],
-        settings: &Settings,
-        prior: &FleetPrior,
-    ) -> Result<Option<Assessment>, Error> {
-        let Some(assessment) = self.assess(as_of_us, maintenance, settings, prior, None)? else {
-            return Ok(None);
-        };
-        if !hysteresis_applies(&assessment, self.last_gap_us(), settings) {
-            return Ok(Some(assessment));
-        }
-        let asked = lookback_departures(&self.tail);
-        if asked.len() < RECALLED {
-            return Ok(None);
-        }
-        let mut previous = None;
-        for departure_us in asked {
-            let Some(snapshot) = self.truncate(departure_us) else { return Ok(None) };
-            let Some(earlier) = snapshot.assess(departure_us, maintenance, settings, prior, None)? else {
-                return Ok(None);
-            };
-            previous = previous.max(earlier.state);
-        }
-        Ok(Some(apply_hysteresis(assessment, self.last_gap_us(), settings, previous)))
-    }
 }
 
 /// Departures of the flights whose state is evaluated.
@@ -118,7 +78,7 @@ fn apply_hysteresis(
     Assessment { state, reason, ..assessment }
 }
 
-/// What a statement's state was judged by.
+/// Inputs of the state of an assessment.
 fn evidence(assessment: &Assessment, last_gap_us: Option<i64>) -> Evidence<'_> {
     Evidence {
         last_gap_us,

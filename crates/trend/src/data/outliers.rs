@@ -1,7 +1,5 @@
 //! A unit's estimates made ready: outliers marked, and how large the scatter really is.
 
-use serde::{Deserialize, Serialize};
-
 use crate::classic::median;
 use crate::data::series::{Flight, Gap};
 
@@ -19,7 +17,7 @@ const LEAST_ERROR_M: f64 = 1e-9;
 const LARGEST_ERROR_M: f64 = 1.0;
 
 /// One estimate that takes part.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WeightedGap {
     /// Index of its flight.
     pub(crate) flight: usize,
@@ -43,7 +41,7 @@ pub(crate) struct CleanedSeries {
 }
 
 /// How a unit's gaps scatter: enough to clean the gaps of the flights that follow.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NoiseScale {
     /// Variance found over variance stated.
     pub(crate) noise_factor: f64,
@@ -54,7 +52,7 @@ pub(crate) struct NoiseScale {
 }
 
 /// A gap that was cleaned.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct OutlierResult {
     pub(crate) gap_m: f64,
     pub(crate) error_m: f64,
@@ -63,8 +61,9 @@ pub(crate) struct OutlierResult {
 
 /// Marks outliers against the median of their neighbours and rescales the stated standard errors.
 ///
-/// The factor is that of [`classic::dispersion`](crate::classic::dispersion); errors that were not
-/// stated, or stated far too small for their neighbours, count as the unit's median one.
+/// The factor is the variance factor from successive differences,
+/// (1.4826 · median |y(k+1) − y(k)| / √(se(k)² + se(k+1)²))². Errors that are missing, or far too small for their
+/// neighbours, count as the unit's median one.
 pub(crate) fn mark_outliers(flights: &[Flight]) -> CleanedSeries {
     let stated: Vec<(usize, Gap)> =
         flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?))).collect();

@@ -1,7 +1,5 @@
 //! A mixture over the bank made small: of many nodes some, in single precision.
 
-use serde::{Deserialize, Serialize};
-
 use crate::inference::posterior::{AgeAssumption, Component, Posterior};
 use crate::prior::fleet_prior::FleetPrior;
 use crate::wear::bank::WearLaw;
@@ -10,7 +8,7 @@ use crate::wear::bank::WearLaw;
 const MOST: usize = 96;
 
 /// A node's law, its age in hours, and its numbers in metres.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StoredComponent {
     pub(crate) law: WearLaw,
     pub(crate) onset_pending: bool,
@@ -23,7 +21,7 @@ pub(crate) struct StoredComponent {
 }
 
 /// What the nodes of a [`Posterior`] share, and those that stand for all.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Mixture {
     /// Judged without the fleet.
     pub(crate) is_single_unit: bool,

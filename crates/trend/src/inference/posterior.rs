@@ -159,6 +159,7 @@ fn likeliest(believed: &[(usize, Component)]) -> Vec<Component> {
         components.truncate(FEW);
     }
     let total: f64 = components.iter().map(|n| n.weight).sum();
+    debug_assert!(total > 0.0 && total < 1.0 + 1e-9, "weights of components add up to {total}");
     for component in &mut components {
         component.weight /= total;
     }

@@ -38,6 +38,7 @@ pub(crate) fn learn_calibration(
     let pseudo = LONG_QUANTILES.map(|z| (USUAL_WIDTH * z, PSEUDO_CUTS / LONG_QUANTILES.len() as f64));
     let errors = WeightedSamples::new(errors.chain(pseudo));
     let [low, middle, high] = [0.05, 0.5, 0.95].map(|share| errors.quantile(share));
+    debug_assert!(low <= middle && middle <= high, "quantiles {low}, {middle}, {high}");
     CalibrationParams { low: low.min(usual.low), middle, high: high.max(usual.high) }
 }
 

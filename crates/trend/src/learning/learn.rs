@@ -31,8 +31,12 @@ const LESS_WEAR_NOISE: f64 = 0.7;
 const MORE_WEAR_NOISE: [f64; 2] = [1.5, 2.2];
 
 impl FleetPrior {
-    /// Learns how units wear from what was known of them on a day: which usage wear follows, the shares
-    /// of the laws, the spread of lives, a new unit's gap, the season, and what an installation adds.
+    /// Learns the fleet prior from the data of units until a day: the usage axis, the shares
+    /// of the laws, the spread of lives, a new unit's gap, the season, and the effect of an installation.
+    ///
+    /// Parametric empirical Bayes (Morris 1983, <https://doi.org/10.1080/01621459.1983.10477920>) by
+    /// expectation–maximisation (Dempster, Laird and Rubin 1977). The limit is in metres, the day in microseconds since
+    /// 1970 UTC.
     ///
     /// The units should be of one design: a part number, or several that differ in life by a factor of
     /// two at most, which then share a prior. Of a large fleet 150 units are used. The

@@ -6,7 +6,6 @@ use crate::prior::calibration_params::{CalibrationParams, USUAL_WIDTH};
 
 use crate::data::segment::Segment;
 use crate::data::series::Flight;
-use crate::math::fnv::fnv1a;
 use crate::math::quadrature::WAIT_QUANTILES;
 use crate::prior::season_params::SeasonParams;
 use crate::wear::bank::{BENDS, Candidate, FAMILIES, LIFE_CURVES, LINEAR, POWERS, WearLaw};
@@ -135,12 +134,13 @@ impl FleetPrior {
         self.axis
     }
 
-    /// The median life from new to the act limit, flight hours at the fleet's mean usage.
+    /// Median life from new to the act limit, flight hours at the fleet's mean usage: the median of the log-normal prior
+    /// of lives.
     pub fn median_life_hours(&self) -> f64 {
         self.ln_life.exp()
     }
 
-    /// 5 % and 95 % of the lives it expects, flight hours at the fleet's mean usage.
+    /// 5 % and 95 % quantiles of the log-normal prior of lives, flight hours at the fleet's mean usage.
     pub fn life_range_hours(&self) -> (f64, f64) {
         let reach = 1.645 * self.ln_life_sd;
         ((self.ln_life - reach).exp(), (self.ln_life + reach).exp())
@@ -151,36 +151,10 @@ impl FleetPrior {
         (self.new_m, self.new_sd_m)
     }
 
-    /// How much wider forecasts are stated than is usual, by what the fleet's own past forecasts missed; one
-    /// for a fleet whose past asks for nothing.
+    /// Factor by which forecast intervals are wider than usual, from the errors of the fleet's past forecasts, no unit;
+    /// one for a fleet without past forecasts (method: `docs/prognostics.md`).
     pub fn interval_scale(&self) -> f64 {
         0.5 * (self.calibration.high - self.calibration.low) / USUAL_WIDTH
-    }
-
-    /// Hash that identifies it.
-    pub(crate) fn digest(&self) -> u64 {
-        let Self {
-            axis,
-            hours_per_unit,
-            span_m,
-            new_m,
-            new_sd_m,
-            ln_life,
-            ln_life_sd,
-            shares,
-            season,
-            fresh_share,
-            onsets_per_hour,
-            wear_noise_m,
-            drift_m2_per_hour,
-            bias_sd_m,
-            calibration,
-        } = self;
-        let numbers = [hours_per_unit, span_m, new_m, new_sd_m, ln_life, ln_life_sd, fresh_share];
-        let noises = [onsets_per_hour, wear_noise_m, drift_m2_per_hour, bias_sd_m];
-        let numbers = numbers.into_iter().chain(noises).chain(shares).copied();
-        let all = numbers.chain(season.numbers()).chain(calibration.numbers());
-        fnv1a(all.map(f64::to_bits).chain([*axis as u64]))
     }
 
     /// The usage of a unit up to a flight, hours' worth.

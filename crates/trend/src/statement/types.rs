@@ -1,7 +1,5 @@
 //! Result types of an assessment.
 
-use serde::{Deserialize, Serialize};
-
 use std::fmt;
 
 /// Number of estimates below which an assessment holds only a level.
@@ -94,7 +92,7 @@ pub enum WearStatus {
 }
 
 /// A change that wear does not make.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangePoint {
     /// The first flight after it, microseconds since 1970 UTC.
     pub departure_us: i64,
@@ -110,7 +108,7 @@ pub struct ChangePoint {
 }
 
 /// Kinds of change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ChangePointKind {
     /// The measurement moved: re-rigging, another reference. The wear did not.
     Step,

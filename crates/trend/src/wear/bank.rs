@@ -17,8 +17,6 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use serde::{Deserialize, Serialize};
-
 use crate::wear::life_curve::{self, LifeCurve};
 
 /// Age that a power law's amplitude refers to, hours, and its logarithm.
@@ -63,7 +61,7 @@ pub(crate) const LIFE_CURVES: Range<usize> = BENDS.end..BENDS.end + life_curve::
 pub(crate) const LINEAR: usize = FAMILIES - POWERS + 4;
 
 /// A law's form.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum WearLaw {
     /// No wear.
     None,
@@ -113,18 +111,6 @@ impl WearLaw {
             Self::Bend { index, .. } => BENDS.start + index,
             Self::LifeCurve { shape, .. } => LIFE_CURVES.start + shape,
             Self::Power { index } => FAMILIES - POWERS + index,
-        }
-    }
-
-    /// Whether it is one of the bank's.
-    pub(crate) fn is_valid(self) -> bool {
-        match self {
-            Self::None | Self::Onset { .. } => true,
-            Self::Bend { index, .. } => index < BEND_RATIOS.len(),
-            Self::Exponential { index } => index < TIME_CONSTANTS.len(),
-            Self::Settling { index } => index < SETTLING.len(),
-            Self::LifeCurve { shape, life } => shape < life_curve::COUNT && life < life_curve::LIVES.len(),
-            Self::Power { index } => index < POWERS,
         }
     }
 
