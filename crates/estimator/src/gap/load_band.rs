@@ -18,11 +18,15 @@ pub struct LoadBand {
     pub reversals: usize,
 }
 
-/// Describes the load over the segments; nothing when they are empty.
+/// Load band over the segments: 5 % and 95 % quantiles, N, and the number of reversals; `None` when they are empty.
 ///
-/// A reversal is a change from beyond +12 % of the greater of the two quantiles to beyond −12 %, or back.
+/// `load_n` has one value per sample, N; NaN is skipped. A quantile p is the order statistic nearest to p (n − 1), counted
+/// from zero, without interpolation (method 3 of Hyndman and Fan 1996 is close; <https://doi.org/10.2307/2684934>). A
+/// reversal is a change from beyond +12 % of the greater of the two quantiles to beyond −12 %, or back: a definition of
+/// this project. Both are part of each record, since gaps of different load bands are not comparable.
 pub fn load_band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
     let [p05_n, p95_n] = quantiles(load_n, segments, [0.05, 0.95])?;
+    debug_assert!(p05_n <= p95_n, "quantiles {p05_n} and {p95_n} N");
     let threshold = SIDE_SHARE * p05_n.abs().max(p95_n.abs());
     let reversals = segments.iter().map(|segment| reversals(&load_n[segment.clone()], threshold)).sum();
     Some(LoadBand { p05_n, p95_n, reversals })

@@ -81,7 +81,7 @@ impl<const BINS: usize> StreamingGap<BINS> {
         Ok(Self { bin_m, origin_m: f64::NAN, least_m: inf, greatest_m: -inf, bins })
     }
 
-    /// Adds S, m; NaN is passed over.
+    /// Adds one sample of S, m; NaN is skipped.
     pub fn push(&mut self, s_m: f64) {
         if s_m.is_nan() {
             return;
@@ -93,7 +93,7 @@ impl<const BINS: usize> StreamingGap<BINS> {
         self.bins[self.place(relative_m)].add(&HistogramBin { count: 1, sum_m: relative_m });
     }
 
-    /// ΔS of everything so far, with the bounds of the batch's.
+    /// ΔS (29–31) of all samples so far, m, with bounds of the batch result.
     ///
     /// # Errors
     /// [`Error::NothingMeasured`] before the first sample; [`Error::Constant`] while S has not moved.

@@ -27,7 +27,7 @@ pub struct FilterOutput {
     pub measured: usize,
 }
 
-/// What a batch may hand out for each sample.
+/// Innovations of a batch, one value per sample.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct InnovationBuffers {
     /// e, m; NaN where nothing was measured.
@@ -37,9 +37,9 @@ pub struct InnovationBuffers {
 }
 
 impl GainSchedule {
-    /// Runs over all segments, each from a start of its own, and hands out S(t).
+    /// Filters all segments (24–28), each from its own initial state, and returns S at each sample, m.
     ///
-    /// A missing load (NaN) is taken to be the one before it.
+    /// Channels have one value per sample: δX in m and load in N. A missing load (NaN) is replaced by the one before.
     ///
     /// # Errors
     /// [`Error::Lengths`] for channels that do not fit, [`Error::NothingMeasured`] when no segment
@@ -54,8 +54,8 @@ impl GainSchedule {
         Ok(FilterOutput { s_m: room.s_m, nis, measured })
     }
 
-    /// As [`GainSchedule::track`] with S left in the room: the mean normalised innovation squared, and how many samples
-    /// were measured.
+    /// As [`GainSchedule::track`], with S in the workspace. Returns the mean normalised innovation squared (NIS,
+    /// e²/(C P Cᵀ + V_d), Bar-Shalom, Li and Kirubarajan 2001, section 5.4) and the number of measured samples.
     ///
     /// # Errors
     /// As [`GainSchedule::track`].
@@ -86,7 +86,7 @@ impl GainSchedule {
 }
 
 impl Filter {
-    /// [`GainSchedule::track`] for a single flight.
+    /// [`GainSchedule::track`] (24–28) for a single flight.
     ///
     /// # Errors
     /// As there.

@@ -1,4 +1,4 @@
-//! What a filter does whatever is measured: gains and covariances, found once for all series of one tuning.
+//! Gain schedule: gains and covariances, which depend on no measurement, computed once per tuning.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -24,8 +24,8 @@ pub(crate) struct TransientGain {
     pub(crate) p: Matrix3<f64>,
 }
 
-/// The gains of one filter from a start until they settle, and the settled map: the covariance depends on no
-/// measurement, so one schedule serves every series of these parameters, this step and this noise.
+/// Gains of one filter from the initial state until the steady state, and the steady-state filter: the covariance
+/// depends on no measurement, so one schedule serves every series of these parameters, this step and this noise.
 #[derive(Debug, Clone)]
 pub struct GainSchedule {
     pub(crate) filter: Filter,
@@ -39,7 +39,7 @@ pub struct GainSchedule {
 }
 
 impl GainSchedule {
-    /// Runs the covariance ahead.
+    /// Iterates the covariance (25, 26, 28) from P₀ until the steady state.
     pub fn new(filter: &Filter) -> Self {
         let settled = filter.steady_state_gain();
         let radius = settled.as_ref().map(|(gain, _)| filter.radius_at(gain)).map_err(Clone::clone);
@@ -61,7 +61,7 @@ impl GainSchedule {
         &self.filter
     }
 
-    /// As [`Filter::bandwidth_hz`], found already.
+    /// As [`Filter::bandwidth_hz`], stored.
     ///
     /// # Errors
     /// As [`Filter::steady_state_gain`].

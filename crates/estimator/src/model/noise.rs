@@ -59,7 +59,8 @@ pub struct NoiseCovariances {
 }
 
 impl SensorNoise {
-    /// σ_y² = both noise variances plus resolution²/12 each, m².
+    /// σ_y² = both noise variances plus resolution²/12 each, m² (quantisation noise: Bennett 1948,
+    /// <https://doi.org/10.1002/j.1538-7305.1948.tb01340.x>).
     pub fn variance_m2(&self) -> f64 {
         let square = |v: f64| v * v;
         square(self.screw_rms_m)
@@ -96,7 +97,10 @@ impl SensorNoise {
 }
 
 impl NoiseModel {
-    /// W_d and V_d at a step.
+    /// W_d, 3×3 in the units of [m, m/s, m], and V_d, m², at a step, s (4, 9, 10, 22).
+    ///
+    /// `Sensors` and `PerStep` as in `docs/equations.md`, "Discretisation"; `Continuous` by van Loan 1978
+    /// (<https://doi.org/10.1109/TAC.1978.1101743>).
     ///
     /// # Errors
     /// [`Error::Parameter`] for a level that is negative or not finite, or a measurement without noise.

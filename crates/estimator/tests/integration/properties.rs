@@ -1,7 +1,7 @@
-//! Laws that hold for any input: offset, scale, sign, restarts, missing samples, the asked bandwidth.
+//! Properties for any input: offset, scale, sign, restarts, missing samples, the configured bandwidth.
 
 use estimator::SensorNoise;
-use estimator::{ActuatorModel, Error, Filter, NoiseModel, Samples, gap, model};
+use estimator::{ActuatorModel, Error, Filter, NoiseModel, Samples, gap};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -43,25 +43,6 @@ fn the_statistic_is_the_difference_of_two_means() {
     assert_eq!((found.upper, found.lower), (1, 3));
     assert_eq!(gap::mid_range(&[2.0; 3]), Err(Error::Constant { samples: 3, s_m: 2.0 }));
     assert_eq!(gap::mid_range(&[f64::NAN]), Err(Error::NothingMeasured));
-}
-
-/// By hand: 0.002 kg·m² behind a 5 mm lead weighs 0.002·(2π/0.005)² = 3158.27 kg; a quarter turn is 1.25 mm.
-#[test]
-fn motor_angle_and_inertia_come_to_the_screw() {
-    assert!((model::motor_position_m(std::f64::consts::FRAC_PI_2, 0.005) - 0.00125).abs() < 1e-18);
-    assert!((model::reflected_mass_kg(0.002, 0.005) - 3_158.273_408_348_595).abs() < 1e-9);
-}
-
-/// Equation 1 by hand: 500 N·s/m · 0.02 m/s + 120 N + 0.05 · 8000 N = 530 N, against the motion, whatever the load's sign.
-#[test]
-fn friction_is_viscous_dry_and_proportional_to_the_load() {
-    let friction_n = |speed_m_per_s, load_n| model::friction_n(speed_m_per_s, load_n, 500.0, 120.0, 0.05);
-    for (speed_m_per_s, expected_n) in [(0.02, 530.0), (-0.02, -530.0), (0.0, 0.0)] {
-        for load_n in [8000.0, -8000.0] {
-            let found_n: f64 = friction_n(speed_m_per_s, load_n);
-            assert!((found_n - expected_n).abs() < 1e-9, "{found_n} N at {speed_m_per_s} m/s");
-        }
-    }
 }
 
 /// Equations 11 and 12 by hand: K/m = 5·10⁷/8 = 6.25·10⁶ 1/s², f/m = 2000/8 = 250 1/s, 1/m = 0.125 1/kg.
