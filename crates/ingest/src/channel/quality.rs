@@ -324,8 +324,8 @@ pub(crate) fn load_frozen(
     runs(load_n, least).any(froze).then(|| format!("{}_frozen", Role::Load.as_str()))
 }
 
-/// Slope of one position on the other, by least squares about their means: 1 when both are mapped
-/// right, −1 when a sign is wrong, another number when a ratio is.
+/// Least-squares slope of one position on the other about their means (ordinary least squares, 1 + Σxy/Σx²), m per m:
+/// 1 when both are mapped correctly, −1 when a sign is wrong, another number when a ratio is.
 ///
 /// Nothing when the motor does not move.
 pub fn regression_slope(motor_m: &[f64], dx_m: &[f64]) -> Option<f64> {

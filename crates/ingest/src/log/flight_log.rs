@@ -116,11 +116,6 @@ impl Log {
         self.main.rows()
     }
 
-    /// Whether this is a log that Freeplay itself wrote with `normalize`.
-    pub fn is_normalized(&self) -> bool {
-        self.normalized.is_some()
-    }
-
     /// Names and types of all columns, for `check`.
     pub fn column_types(&self) -> Vec<(String, String)> {
         let leaves = self.main.files.iter().flat_map(LogFile::leaves);

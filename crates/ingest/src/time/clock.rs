@@ -163,7 +163,10 @@ pub fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<
     let unstamped = t.iter().filter(|s| s.is_nan()).count();
     let repairs =
         TimestampRepairs { unstamped, filled, out_of_order: falls, repeated: t.len() - unstamped - count };
-    Ok(TimeBase { step_s, rows: t.len(), segments: split_at(count, &breaks), kept, repairs })
+    let segments = split_at(count, &breaks);
+    let is_sorted = |segment: &Range<usize>| (segment.start + 1..segment.end).all(|i| step(i) > 0.0);
+    debug_assert!(segments.iter().all(is_sorted), "timestamps of a segment increase");
+    Ok(TimeBase { step_s, rows: t.len(), segments, kept, repairs })
 }
 
 /// The declared step, where one is and the stamps do not contradict it; else the one that was seen.
