@@ -139,6 +139,8 @@ impl<'a> OwnershipLedger<'a> {
         self.touched.extend(records.iter().map(unit));
         let retires = self.stale_records(&account, &records);
         self.insert(account.clone());
+        let is_owner = |r: &GapRecord| self.owners.get(&RecordKey::of(r)) == Some(&account.log_path);
+        debug_assert!(records.iter().all(is_owner), "{} owns its flights", account.log_path);
         LogResult { account, records, retires }
     }
 

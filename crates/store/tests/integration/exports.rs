@@ -6,7 +6,7 @@ use arrow::array::RecordBatch;
 use arrow::compute::concat_batches;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use records::GapRecord;
-use store::{Format, Query, columns};
+use store::{Format, Query, RecordKey, columns};
 
 use crate::fixtures::{record, result, writer};
 
@@ -31,7 +31,7 @@ fn json_holds_every_column_of_every_record_and_the_same_bits() {
     assert!(rows[0]["tail_hours_end"].is_null());
     let read: Vec<GapRecord> = serde_json::from_slice(&text).unwrap();
     let mut expected: Vec<GapRecord> = results.into_iter().flat_map(|r| r.records).collect();
-    expected.sort_by_key(GapRecord::canonical_key);
+    expected.sort_by_key(RecordKey::of);
     assert_eq!(read, expected);
 }
 
