@@ -8,7 +8,7 @@ pub(crate) fn positive(key: &str, value: Option<f64>) -> Option<Diagnostic> {
     Some(Diagnostic::new("not_positive", format!("`{key}` is {value}, which must be a number above zero")))
 }
 
-/// A gap of which nobody speaks, m: a limit beyond it was given in another unit.
+/// Largest plausible gap, m: a limit beyond it was given in another unit.
 pub const MAX_PLAUSIBLE_LIMIT_M: f64 = 0.01;
 
 /// A limit that an aircraft may be grounded by, m.

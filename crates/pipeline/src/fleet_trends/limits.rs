@@ -10,7 +10,7 @@ use trend::UsageAxis;
 pub(crate) struct Limits<'a>(pub(crate) &'a Config);
 
 impl<'a> Limits<'a> {
-    /// What wear of a part is said to follow; nothing where its histories decide.
+    /// Configured usage axis of a part's wear; nothing where its histories decide.
     pub(crate) fn axis(self, part: Option<&str>) -> Option<UsageAxis> {
         let configured = self.part(part).and_then(|p| p.axis).or(self.0.document.trend.axis)?;
         Some(match configured {

@@ -15,10 +15,10 @@ use crate::history::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
 /// Rows of a block: its 32 MiB are more than what any allocator keeps to itself once they are given up.
 const BLOCK_ROWS: usize = 1 << 19;
 
-/// Histories while their rows come in.
+/// Builder of histories from rows.
 ///
-/// Most rows are of another unit than the row before. So they are put down in the order of arrival, and each unit's
-/// are brought together at the end, when it is known how many there are: nothing grows, and no row is moved twice.
+/// Most rows belong to another unit than the row before. So rows are stored in the order of arrival, and each unit's
+/// rows are collected at the end, when their number is known: no buffer grows, and no row is moved twice.
 #[derive(Debug, Default)]
 pub struct HistoryBuilder {
     /// Units by serial number; a serial number is unique only with its part number.
@@ -30,7 +30,7 @@ pub struct HistoryBuilder {
     pub(crate) blocks: Vec<RowBlock>,
 }
 
-/// A unit, and how much was put down of it.
+/// A unit, and the number of its stored rows.
 #[derive(Debug)]
 pub(crate) struct UnitEntry {
     pub(crate) name: UnitKey,
@@ -47,7 +47,7 @@ pub(crate) struct RowBlock {
     pub(crate) names: String,
 }
 
-/// A row that was put down.
+/// A stored row.
 #[derive(Debug)]
 pub(crate) struct StagedRow {
     pub(crate) unit: u32,
@@ -79,7 +79,7 @@ impl HistoryBuilder {
         "gap_se_m",
     ];
 
-    /// Puts down the rows of a chunk.
+    /// Adds the rows of a batch.
     ///
     /// # Errors
     /// When a column that must be there is not, and the first cell that cannot be read.
@@ -88,7 +88,7 @@ impl HistoryBuilder {
         self.rows(chunk, &KeyColumns::of(chunk)?, &TextColumn::of(chunk, &["flight_id"])?)
     }
 
-    /// Puts down rows of the store.
+    /// Adds rows of the store.
     ///
     /// # Errors
     /// The first cell that cannot be read.
@@ -139,7 +139,7 @@ impl HistoryBuilder {
         Ok(())
     }
 
-    /// Puts down a flight.
+    /// Adds a flight.
     pub fn put(&mut self, who: RowKey<'_>, row: &FlightInput<'_>) {
         let seat = self.seat(who);
         self.push_row(seat, row);
@@ -165,7 +165,7 @@ impl HistoryBuilder {
         unit.bytes += name.len();
     }
 
-    /// Puts down what a record says.
+    /// Adds the flight of a record.
     pub(crate) fn push_record(&mut self, push_record: &GapRecord) {
         let GapRecord { flight, estimate, .. } = push_record;
         let who = RowKey {
@@ -191,7 +191,7 @@ impl HistoryBuilder {
         RowTarget { unit, place: self.units[unit].places.number(who.tail_number, who.position) }
     }
 
-    /// Where a unit is kept. Most tables have one unit's rows together, or the units in one order every night.
+    /// Index of a unit. Most tables have one unit's rows together, or the units in one order in every run.
     fn unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
         let is = |(part, serial): &UnitKey| serial == serial_number && part.as_deref() == part_number;
         let units = &self.units;

@@ -1,4 +1,4 @@
-//! The public door of `trend`.
+//! Public API of `trend`.
 
 #![allow(
     clippy::unwrap_used,
@@ -7,10 +7,10 @@
 )]
 
 mod assessment;
+mod checkpoints;
 mod classic;
 mod degenerate;
 mod fleet;
 mod forecast;
-mod incremental;
 mod random;
 mod series;
