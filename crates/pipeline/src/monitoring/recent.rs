@@ -1,4 +1,5 @@
-//! Recent diagnostics of the last months in addition to gaps, by position: skew, stiffness and innovations.
+//! Recent diagnostics of the last months in addition to gaps, by position: skew, stiffness, zero and delay of the
+//! load, and innovations.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +18,7 @@ use crate::history::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
 const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
 
 /// One flight of one place.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 #[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
 pub struct FlightDiagnostics {
     pub departure_utc: Timestamp,
@@ -25,6 +26,11 @@ pub struct FlightDiagnostics {
     pub skew_s: Option<f64>,
     pub stiffness_n_per_m: Option<f64>,
     pub nis: Option<f64>,
+    pub load_zero_n: Option<f64>,
+    pub load_zero_se_n: Option<f64>,
+    pub load_delay_s: Option<f64>,
+    pub load_delay_se_s: Option<f64>,
+    pub load_p95_n: Option<f64>,
 }
 
 /// Where which unit sits.
@@ -45,7 +51,7 @@ pub type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
 /// # Errors
 /// When the store cannot be read.
 pub fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagnostics, Error> {
-    const COLUMNS: [&str; 9] = [
+    const COLUMNS: [&str; 14] = [
         "tail_number",
         "position",
         "part_number",
@@ -55,6 +61,11 @@ pub fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagn
         "skew_s",
         "stiffness_n_per_m",
         "nis",
+        "load_zero_n",
+        "load_zero_se_n",
+        "load_delay_s",
+        "load_delay_se_s",
+        "load_p95_n",
     ];
     let since_utc = until.checked_sub(LOOKED_BACK).ok();
     let until_utc = until.checked_add(SignedDuration::from_micros(1)).ok();
@@ -76,8 +87,11 @@ impl Found {
         let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
         let (seats, flights) = (KeyColumns::of(&chunk)?, TextColumn::of(&chunk, &["flight_id"])?);
         let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
-        let [skews_s, stiffnesses, surprises] = ["skew_s", "stiffness_n_per_m", "nis"].map(numbers);
-        let (skews_s, stiffnesses, surprises) = (skews_s?, stiffnesses?, surprises?);
+        let (skews_s, stiffnesses, nis) =
+            (numbers("skew_s")?, numbers("stiffness_n_per_m")?, numbers("nis")?);
+        let (zeros_n, zero_ses_n) = (numbers("load_zero_n")?, numbers("load_zero_se_n")?);
+        let (delays_s, delay_ses_s) = (numbers("load_delay_s")?, numbers("load_delay_se_s")?);
+        let loads_n = numbers("load_p95_n")?;
         let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
         let mut seen = KeyCache::default();
         for row in 0..chunk.len() {
@@ -93,7 +107,12 @@ impl Found {
                 flight_id: flights.get(row).unwrap_or_default().into(),
                 skew_s: at(&skews_s, row),
                 stiffness_n_per_m: at(&stiffnesses, row),
-                nis: at(&surprises, row),
+                nis: at(&nis, row),
+                load_zero_n: at(&zeros_n, row),
+                load_zero_se_n: at(&zero_ses_n, row),
+                load_delay_s: at(&delays_s, row),
+                load_delay_se_s: at(&delay_ses_s, row),
+                load_p95_n: at(&loads_n, row),
             });
         }
         Ok(())

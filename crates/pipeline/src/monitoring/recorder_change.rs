@@ -1,5 +1,6 @@
 //! Changes that wear does not make: the delay between the positions jumps when a recorder, a sensor or its
-//! wiring is changed, and the fitted stiffness of all actuators of an aircraft when what measures load is.
+//! wiring is changed, the fitted stiffness of all actuators of an aircraft when what measures load is, and the zero and
+//! the delay of a load channel when its cell or its wiring is.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +10,9 @@ use store::Store;
 
 use crate::days::days;
 use crate::error::Error;
-use crate::monitoring::recent::{FlightDiagnostics, RecentDiagnostics, newest_utc, recent_diagnostics};
+use crate::monitoring::recent::{
+    FlightDiagnostics, PositionKey, RecentDiagnostics, newest_utc, recent_diagnostics,
+};
 
 /// What moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -19,6 +22,10 @@ pub enum Quantity {
     SkewS,
     /// The fitted stiffness, N/m.
     StiffnessNPerM,
+    /// The zero of the load cell, N.
+    LoadZeroN,
+    /// The delay of the load's channel against the positions, s.
+    LoadDelayS,
 }
 
 /// A quantity that moved, on one aircraft.
@@ -74,6 +81,10 @@ struct Bounds {
 const SKEW_S: Bounds = Bounds { least_step: 0.5e-3, least_scatter: 0.05e-3 };
 /// Of the logarithm: 4 %, which no unit's stiffness does from one flight to the next.
 const LN_STIFFNESS: Bounds = Bounds { least_step: 0.04, least_scatter: 0.005 };
+/// A load that is a millisecond late widens the loop of δX over the load by a per cent or so; less is let pass.
+const LOAD_DELAY_S: Bounds = Bounds { least_step: 1e-3, least_scatter: 0.1e-3 };
+/// Shares of the 95 % load: a zero that moves by less leaves the gap alone.
+const LOAD_ZERO: Bounds = Bounds { least_step: 0.02, least_scatter: 0.002 };
 
 /// What moved within the last month before a day that the store holds.
 ///
@@ -89,6 +100,7 @@ pub(crate) fn detect_changes_in_store(store: &Store, as_of: Timestamp) -> Result
 pub fn detect_changes(recent_diagnostics: &RecentDiagnostics) -> Vec<RecorderChange> {
     let (skews, stiffnesses) = (skews_s(recent_diagnostics), ln_stiffnesses(recent_diagnostics));
     let newest = newest_utc(recent_diagnostics);
+    let (zeros, delays) = (load_zeros(recent_diagnostics), load_delays_s(recent_diagnostics));
     let mut found = of_quantity(&skews, Quantity::SkewS, SKEW_S);
     found.extend(of_quantity(&stiffnesses, Quantity::StiffnessNPerM, LN_STIFFNESS).into_iter().filter_map(
         |m| {
@@ -96,6 +108,12 @@ pub fn detect_changes(recent_diagnostics: &RecentDiagnostics) -> Vec<RecorderCha
             m.everywhere.then_some(RecorderChange { from, to, ..m })
         },
     ));
+    found.extend(of_quantity(&delays, Quantity::LoadDelayS, LOAD_DELAY_S));
+    found.extend(of_quantity(&zeros, Quantity::LoadZeroN, LOAD_ZERO).into_iter().map(|m| {
+        let load_n =
+            m.positions.first().map_or(f64::NAN, |p| usual_load_n(recent_diagnostics, &m.tail_number, p));
+        RecorderChange { from: m.from * load_n, to: m.to * load_n, ..m }
+    }));
     found.retain(|detect_changes| {
         newest.is_some_and(|newest| days(detect_changes.since_utc, newest) <= REPORTED_DAYS)
     });
@@ -119,10 +137,26 @@ fn values(diagnostics: &[FlightDiagnostics], value: impl Fn(&FlightDiagnostics) 
 
 /// A delay is the position's, whichever unit sits there.
 fn skews_s(recent_diagnostics: &RecentDiagnostics) -> Tails<'_> {
+    by_place(recent_diagnostics, |diagnostics| diagnostics.skew_s)
+}
+
+/// Delays of the load that are certain enough to show a step.
+fn load_delays_s(recent_diagnostics: &RecentDiagnostics) -> Tails<'_> {
+    let is_certain = |se_s: &f64| *se_s < LOAD_DELAY_S.least_step;
+    by_place(recent_diagnostics, |diagnostics| {
+        diagnostics.load_delay_se_s.filter(is_certain).and(diagnostics.load_delay_s)
+    })
+}
+
+/// The values of each place, whichever unit sits there, in order of time.
+fn by_place(
+    recent_diagnostics: &RecentDiagnostics,
+    value: impl Fn(&FlightDiagnostics) -> Option<f64>,
+) -> Tails<'_> {
     let mut places: BTreeMap<(&str, &str), Values> = BTreeMap::new();
     for (position, diagnostics) in recent_diagnostics {
         let place = places.entry((&position.tail_number, &position.position)).or_default();
-        place.extend(values(diagnostics, |diagnostics| diagnostics.skew_s));
+        place.extend(values(diagnostics, &value));
     }
     let mut tails = Tails::new();
     for ((tail, position), mut values) in places {
@@ -130,6 +164,31 @@ fn skews_s(recent_diagnostics: &RecentDiagnostics) -> Tails<'_> {
         tails.entry(tail).or_default().push((position, values));
     }
     tails
+}
+
+/// The zero of the load cell as a share of the usual 95 % load, where it is certain enough; the cell is the unit's.
+fn load_zeros(recent_diagnostics: &RecentDiagnostics) -> Tails<'_> {
+    let mut tails = Tails::new();
+    for (position, diagnostics) in recent_diagnostics {
+        let load_n = usual_load_n(recent_diagnostics, &position.tail_number, &position.position);
+        let values = values(diagnostics, |diagnostics| {
+            let se_n = diagnostics.load_zero_se_n?;
+            (se_n < LOAD_ZERO.least_step * load_n).then_some(diagnostics.load_zero_n? / load_n)
+        });
+        tails.entry(&position.tail_number).or_default().push((&position.position, values));
+    }
+    tails
+}
+
+/// The median 95 % load of a place, N.
+fn usual_load_n(recent_diagnostics: &RecentDiagnostics, tail_number: &str, position: &str) -> f64 {
+    let is_here = |key: &PositionKey| key.tail_number == tail_number && key.position == position;
+    let loads_n: Vec<f64> = recent_diagnostics
+        .iter()
+        .filter(|(key, _)| is_here(key))
+        .flat_map(|(_, flights)| flights.iter().filter_map(|flight| flight.load_p95_n.map(f64::abs)))
+        .collect();
+    if loads_n.is_empty() { f64::NAN } else { median(loads_n) }
 }
 
 /// A stiffness is the unit's, wherever it sits.
@@ -215,7 +274,6 @@ pub(crate) fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::monitoring::recent::PositionKey;
 
     /// Scatter of ± 0.2 ms, the same in every run.
     fn flights(count: i64, seed: u64, level: impl Fn(i64) -> f64) -> Vec<(Timestamp, f64)> {
@@ -268,7 +326,7 @@ mod tests {
                     8e7 * (1.0 + 100.0 * (skew_s - 0.1e-3))
                         * if k as i64 >= changes_at { factor } else { 1.0 },
                 ),
-                nis: None,
+                ..FlightDiagnostics::default()
             };
             skews.into_iter().enumerate().map(diagnostics).collect()
         };
@@ -295,5 +353,33 @@ mod tests {
         assert!(change.explains("N1", change.since_utc) && !change.explains("N2", change.since_utc));
         assert_eq!(detect_changes(&recent_diagnostics(&[("a", 1.1), ("b", 1.0), ("c", 1.0)], 45)), []);
         assert_eq!(detect_changes(&recent_diagnostics(&[("a", 1.1)], 45)), []);
+    }
+
+    #[test]
+    fn a_load_cell_whose_zero_moves_is_named_in_newtons_and_an_uncertain_zero_shows_nothing() {
+        let flights = |se_n: f64| -> RecentDiagnostics {
+            let flight = |(k, (departure_utc, scatter)): (usize, (Timestamp, f64))| FlightDiagnostics {
+                departure_utc,
+                // The scatter of ± 0.2 ms stands for one of 20 N.
+                load_zero_n: Some(if k < 30 { 50.0 } else { 450.0 } + 1e5 * scatter),
+                load_zero_se_n: Some(se_n),
+                load_p95_n: Some(7_000.0),
+                ..FlightDiagnostics::default()
+            };
+            let key = PositionKey {
+                tail_number: "N1".into(),
+                position: "ail_l".into(),
+                part_number: "EMA".into(),
+                serial_number: "1".into(),
+            };
+            let flights = super::tests::flights(40, 11, |_| 0.0);
+            BTreeMap::from([(key, flights.into_iter().enumerate().map(flight).collect())])
+        };
+        let [change] = &detect_changes(&flights(30.0))[..] else {
+            panic!("{:?}", detect_changes(&flights(30.0)))
+        };
+        assert_eq!((change.quantity, change.everywhere), (Quantity::LoadZeroN, false));
+        assert!((change.from - 50.0).abs() < 20.0 && (change.to - 450.0).abs() < 30.0, "{change:?}");
+        assert_eq!(detect_changes(&flights(500.0)), []);
     }
 }

@@ -305,6 +305,8 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
 fn recorder_moved(moved: &RecorderChange) -> String {
     let change = match moved.quantity {
         Quantity::SkewS => format!("delay {:.1} → {:.1} ms", moved.from * 1e3, moved.to * 1e3),
+        Quantity::LoadZeroN => format!("load zero {:+.0} → {:+.0} N", moved.from, moved.to),
+        Quantity::LoadDelayS => format!("load delay {:.1} → {:.1} ms", moved.from * 1e3, moved.to * 1e3),
         Quantity::StiffnessNPerM => format!("stiffness {:+.0} %", (moved.to / moved.from - 1.0) * 100.0),
     };
     let whole = if moved.everywhere { "all of " } else { "" };
