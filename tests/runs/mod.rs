@@ -3,6 +3,10 @@
 #[cfg(target_os = "linux")]
 mod disk_faults;
 mod incremental_runs;
+#[cfg(target_os = "linux")]
+mod injected_faults;
 mod interruption;
 mod killed_run_recovery;
 mod old_store_formats;
+#[cfg(target_os = "linux")]
+mod quiet_failures;

@@ -3,6 +3,7 @@
 use std::io::{self, IsTerminal, Write};
 
 use records::Diagnostic;
+use records::sanitize::{escape_cell, escape_invisible};
 
 use pipeline::Event;
 
@@ -57,12 +58,20 @@ impl Output {
         self.verbose > 0
     }
 
-    /// Writes a result to stdout.
+    /// Writes a result for people to stdout, its invisible characters as code points.
+    ///
+    /// # Errors
+    /// If stdout is closed or full.
+    pub(crate) fn write_result(&self, text: &str) -> Result<(), Failure> {
+        self.write_exact(&escape_invisible(text))
+    }
+
+    /// Writes a result for programs to stdout, character by character.
     ///
     /// # Errors
     /// If stdout is closed or full.
     #[expect(clippy::unused_self, reason = "only who holds the voice may speak")]
-    pub(crate) fn write_result(&self, text: &str) -> Result<(), Failure> {
+    pub(crate) fn write_exact(&self, text: &str) -> Result<(), Failure> {
         let mut out = io::stdout().lock();
         out.write_all(text.as_bytes())?;
         Ok(out.flush()?)
@@ -71,7 +80,11 @@ impl Output {
     /// Writes a note to stderr.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
-            self.err(&if self.is_json() { json_log::note(text) } else { text.to_owned() });
+            self.err(&if self.is_json() {
+                json_log::note(text)
+            } else {
+                escape_invisible(text).into_owned()
+            });
         }
     }
 
@@ -87,7 +100,7 @@ impl Output {
         if self.is_json() {
             return self.err(&json_log::diagnostic(diagnostic));
         }
-        let text = escape(&diagnostic.to_string());
+        let text = diagnostic.to_string();
         self.err(&if self.color_err { painted(&text) } else { text });
     }
 
@@ -135,11 +148,9 @@ impl Output {
     }
 }
 
-/// Escapes control characters: a name from a log must not move the cursor or change colours.
+/// A name from a log or table on its line: it must not move the cursor, change colours or reverse other text.
 pub(crate) fn escape(text: &str) -> String {
-    let shown =
-        |c: char| if c.is_control() && c != '\n' { c.escape_default().to_string() } else { c.to_string() };
-    text.chars().map(shown).collect()
+    escape_cell(text).into_owned()
 }
 
 fn painted(text: &str) -> String {

@@ -12,6 +12,7 @@ use arrow::json::writer::{JsonArray, WriterBuilder as JsonWriter};
 use parquet::arrow::ArrowWriter;
 pub(crate) use pipeline::rows::utc;
 use records::Diagnostic;
+use records::sanitize::escape_invisible;
 use serde::Serialize;
 
 use crate::args::{Format, RowFormatArgs};
@@ -30,7 +31,9 @@ pub(crate) fn write_rows(
 ) -> Result<(), Failure> {
     match (format.format(), &format.output) {
         (Format::Table, None) => output.write_result(&table()),
-        (Format::Table, Some(file)) => to_file(file, |out| Ok(out.write_all(table().as_bytes())?)),
+        (Format::Table, Some(file)) => {
+            to_file(file, |out| Ok(out.write_all(escape_invisible(&table()).as_bytes())?))
+        }
         (Format::Parquet, None) if io::stdout().is_terminal() => Err(Failure::usage(
             "binary_output",
             "Parquet is binary and is not written to a terminal",
@@ -84,7 +87,7 @@ fn write(batch: &RecordBatch, format: Format, out: &mut (impl Write + Send)) -> 
         Format::Csv => CsvWriter::new()
             .with_header(true)
             .build(&mut *out)
-            .write(&flat(batch)?)
+            .write(&store::csv_safe(&flat(batch)?).map_err(|e| broken(&e))?)
             .map_err(|e| broken(&e))?,
         Format::Parquet => {
             let fail = |e: parquet::errors::ParquetError| broken(&e.into());

@@ -5,7 +5,16 @@ use std::path::{Path, PathBuf};
 
 use records::Diagnostic;
 
+use crate::io::transient;
 use crate::mapping::column_pattern::PLACEHOLDER;
+
+/// Code of a read that failed for a cause which may pass by itself.
+const READ_FAILED: &str = "read_failed";
+
+/// Whether an error of this code may pass although nothing is changed here, so that the log is worth another attempt.
+pub fn is_passing(code: &str) -> bool {
+    code == READ_FAILED
+}
 
 /// One file's trouble.
 #[derive(Debug, thiserror::Error)]
@@ -19,7 +28,9 @@ pub struct Error {
 }
 
 impl Error {
+    /// A failed read in place of what a parser made of it.
     pub(crate) fn new(file: &Path, kind: ErrorKind) -> Self {
+        let kind = transient::take_failed_read().map_or(kind, |source| ErrorKind::Unreadable { source });
         Self { file: file.to_owned(), kind: Box::new(kind) }
     }
 
@@ -87,6 +98,9 @@ pub enum ErrorKind {
     /// The timestamps give another rate than the declared one.
     #[error("timestamps give {seen_hz} Hz but `clock.rate_hz` = {declared_hz}")]
     RateContradicts { column: String, declared_hz: f64, seen_hz: f64 },
+    /// The clock gives a first stamp or a step that no recorder has.
+    #[error("the clock is not plausible: {what} is {value_s:e} s")]
+    TimeImplausible { column: String, what: &'static str, value_s: f64, least_s: f64, most_s: f64 },
     /// No two stamps differ.
     #[error("time does not advance")]
     TimeStandsStill { column: String, rows: u64 },
@@ -117,6 +131,7 @@ impl ErrorKind {
     /// The stable code; `docs/errors.md` has a paragraph for each.
     pub fn code(&self) -> &'static str {
         match self {
+            Self::Unreadable { source } if transient::is_transient(source) => READ_FAILED,
             Self::Unreadable { .. } => "unreadable",
             Self::Object(source) => source.code(),
             Self::Empty => "empty_log",
@@ -134,6 +149,7 @@ impl ErrorKind {
             Self::NoClock => "no_clock",
             Self::TimeGoesBack { .. } => "time_goes_back",
             Self::RateContradicts { .. } => "rate_contradicts",
+            Self::TimeImplausible { .. } => "time_implausible",
             Self::TimeStandsStill { .. } => "time_stands_still",
             Self::AllMissing { .. } => "channel_empty",
             Self::UnitForPart { .. } => "unit_for_part",
@@ -165,6 +181,7 @@ impl ErrorKind {
             | Self::ColumnType { column, .. }
             | Self::TimeUnit { column, .. }
             | Self::RateContradicts { column, .. }
+            | Self::TimeImplausible { column, .. }
             | Self::TimeStandsStill { column, .. }
             | Self::AllMissing { column, .. }
             | Self::ListLengths { column, .. }
@@ -202,6 +219,7 @@ impl ErrorKind {
             Self::TimeGoesBack { max_back_s, .. } => {
                 Some(format!("stamps that fall by no more than {max_back_s} s (`clock.max_back_s`)"))
             }
+            Self::TimeImplausible { least_s, most_s, .. } => Some(format!("{least_s:e} to {most_s:e} s")),
             Self::RateContradicts { declared_hz, .. } => Some(format!("{declared_hz} Hz (`clock.rate_hz`)")),
             Self::TimeUnit { .. } => {
                 Some("`clock.unit` = \"s\", \"ms\", \"us\", \"ns\", or \"count\" with `clock.rate_hz`".into())
@@ -259,6 +277,9 @@ impl ErrorKind {
             Self::RateContradicts { .. } => {
                 "check `clock.unit`; omit `clock.rate_hz` to use the rate of the timestamps"
             }
+            Self::TimeImplausible { .. } => {
+                "check `clock.column` and `clock.unit`, and that the file is intact"
+            }
             Self::TimeStandsStill { .. } => "map the column with the time, or give only `clock.rate_hz`",
             Self::AllMissing { .. } => "check the sensor, or map the redundant channel",
             Self::UnitForPart { .. } => {
@@ -290,6 +311,7 @@ fn missing_remedy(source: &io::Error) -> String {
         io::ErrorKind::NotFound => "check the name, and that the disk or share is mounted",
         io::ErrorKind::PermissionDenied => "run as a user with read access, or change the file mode",
         io::ErrorKind::IsADirectory => "name the file, or the files in it: `FOLDER/*.parquet`",
+        _ if transient::is_transient(source) => "check the disk or share; the next run tries again",
         _ => "check the disk",
     }
     .into()

@@ -14,16 +14,22 @@ pub struct FilterCache(Arc<Mutex<Vec<Arc<GainSchedule>>>>);
 impl FilterCache {
     /// The schedule of a filter, made now unless it is there.
     pub fn of(&self, filter: &Filter) -> Arc<GainSchedule> {
-        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(schedule) = known.iter().find(|schedule| schedule.filter() == filter) {
-            return Arc::clone(schedule);
+        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let find = |known: &[Arc<GainSchedule>]| known.iter().find(|s| s.filter() == filter).cloned();
+        if let Some(schedule) = find(&known()) {
+            return schedule;
+        }
+        // Made without the lock: a filter that takes long delays no other log. Two workers may both make it.
+        let made = Arc::new(GainSchedule::new(filter));
+        let mut known = known();
+        if let Some(schedule) = find(&known) {
+            return schedule;
         }
         if known.len() == CAPACITY {
             known.remove(0);
         }
-        let schedule = Arc::new(GainSchedule::new(filter));
-        known.push(Arc::clone(&schedule));
-        schedule
+        known.push(Arc::clone(&made));
+        made
     }
 }
 

@@ -44,3 +44,8 @@ impl Error {
         Self::Refused(vec![diagnostic])
     }
 }
+
+/// Whether the cause of a log's error may pass without a change of the log or a setting: each run tries the log again.
+pub(crate) fn is_passing(code: &str) -> bool {
+    code == "log_timeout" || ingest::is_passing(code) || object_io::Error::is_passing(code)
+}

@@ -6,6 +6,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
+use crate::sanitize::{MAX_FIELD_CHARS, escape_invisible, limit_length};
 use serde::{Deserialize, Serialize, Serializer};
 
 /// One error in one file, with a hint that its owner can act on.
@@ -26,7 +27,7 @@ pub struct Diagnostic {
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub text: Option<String>,
     /// The column of a table or log.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub column: Option<String>,
     /// The row: of a log from 0, of a table from 1, header excluded.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -38,10 +39,15 @@ pub struct Diagnostic {
     #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub found: Option<String>,
     /// The value that was expected.
-    #[serde(rename = "wanted", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        rename = "wanted",
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "serialize_masked_option"
+    )]
     pub expected: Option<String>,
     /// Instruction that resolves the error.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", serialize_with = "serialize_masked_option")]
     pub hint: Option<String>,
 }
 
@@ -107,40 +113,46 @@ pub fn mask_credentials(text: &str) -> Cow<'_, str> {
 }
 
 fn serialize_masked<S: Serializer>(text: &str, to: S) -> Result<S::Ok, S::Error> {
-    to.serialize_str(&mask_credentials(text))
+    to.serialize_str(&mask_credentials(&limit_length(text, MAX_FIELD_CHARS)))
 }
 
 #[expect(clippy::ref_option, reason = "serde passes the field")]
 fn serialize_masked_option<S: Serializer>(text: &Option<String>, to: S) -> Result<S::Ok, S::Error> {
     match text {
-        Some(text) => to.serialize_some(&mask_credentials(text)),
+        Some(text) => to.serialize_some(&mask_credentials(&limit_length(text, MAX_FIELD_CHARS))),
         None => to.serialize_none(),
     }
+}
+
+/// A field as people see it: without credentials, invisible characters, or more text than they can take in.
+fn readable(text: &str) -> String {
+    let masked = mask_credentials(text);
+    escape_invisible(&limit_length(&masked, MAX_FIELD_CHARS)).into_owned()
 }
 
 /// The layout of `docs/errors.md`, without colour: the first line is the error, the other lines are indented.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "error[{}]: {}", self.code, mask_credentials(&self.message))?;
-        let file = self.file.as_deref().map(mask_credentials);
+        write!(f, "error[{}]: {}", self.code, readable(&self.message))?;
+        let file = self.file.as_deref().map(readable);
         if let (Some(file), Some((line, column))) = (&file, self.line) {
             write!(f, "\n  {file}:{line}:{column}")?;
             if let Some(text) = &self.text {
-                write!(f, "   {}", mask_credentials(text.trim()))?;
+                write!(f, "   {}", readable(text.trim()))?;
             }
         } else if let Some(file) = &file {
             write!(f, "\n  file    {file}")?;
         }
         if let Some(location) = self.location() {
-            write!(f, "\n  at      {location}")?;
+            write!(f, "\n  at      {}", readable(&location))?;
         }
         for (label, value) in [("found ", &self.found), ("wanted", &self.expected)] {
             if let Some(value) = value {
-                write!(f, "\n  {label}  {}", mask_credentials(value))?;
+                write!(f, "\n  {label}  {}", readable(value))?;
             }
         }
         if let Some(hint) = &self.hint {
-            write!(f, "\nhint: {}", mask_credentials(hint))?;
+            write!(f, "\nhint: {}", readable(hint))?;
         }
         Ok(())
     }
@@ -181,5 +193,26 @@ mod tests {
             );
         }
         assert!(matches!(mask_credentials("s3://fleet/a@b.parquet"), Cow::Borrowed(_)));
+    }
+
+    /// A mapped column may be called anything, also 64 MiB of it; the first characters tell which it is.
+    #[test]
+    fn a_long_or_hostile_name_leaves_a_short_and_harmless_message() {
+        let name = "\u{1b}[2J\u{202e}".to_owned() + &"x".repeat(64 << 20);
+        let diagnostic = Diagnostic {
+            column: Some(name.clone()),
+            text: Some(name.clone()),
+            line: Some((1, 1)),
+            found: Some(name.clone()),
+            ..Diagnostic::new("column_missing", format!("no column `{name}`"))
+                .in_file("a.parquet")
+                .hint(&name)
+        };
+        for shown in [diagnostic.to_string(), serde_json::to_string(&diagnostic).unwrap()] {
+            assert!(shown.len() < 20_000, "{} bytes", shown.len());
+            assert!(shown.contains("more characters"));
+        }
+        let shown = diagnostic.to_string();
+        assert!(shown.contains("[U+001B][2J[U+202E]xxx") && !shown.contains('\u{1b}'));
     }
 }

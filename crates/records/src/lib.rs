@@ -8,6 +8,7 @@ pub mod flight;
 pub mod gap_record;
 pub mod ids;
 pub mod installation;
+pub mod sanitize;
 
 pub use diagnostic::Diagnostic;
 pub use flight::Flight;

@@ -1,7 +1,5 @@
 //! Number and date formatting; missing values are shown as "no data".
 
-use std::fmt::Write as _;
-
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 
@@ -88,27 +86,6 @@ pub(crate) fn month_name(t: Timestamp) -> String {
     t.strftime("%Y-%m").to_string()
 }
 
-/// Replaces invisible characters by their code points: controls, direction marks and overrides, zero widths.
-///
-/// Otherwise a serial number with a right-to-left override would display 47 µm as 74.
-pub(crate) fn escape_invisible(text: &str) -> String {
-    let unseen = |c: char| {
-        (c.is_control() && !matches!(c, '\n' | '\t'))
-            || matches!(c, '\u{61c}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{feff}')
-            || ('\u{2028}'..='\u{202e}').contains(&c)
-            || ('\u{2060}'..='\u{206f}').contains(&c)
-    };
-    let mut shown = String::with_capacity(text.len());
-    for c in text.chars() {
-        if unseen(c) {
-            let _ = write!(shown, "[U+{:04X}]", u32::from(c));
-        } else {
-            shown.push(c);
-        }
-    }
-    shown
-}
-
 /// Days between two instants.
 pub(crate) fn days_between(from: Timestamp, to: Timestamp) -> f64 {
     to.duration_since(from).as_secs_f64() / 86_400.0
@@ -129,13 +106,6 @@ mod tests {
     fn a_missing_value_reads_no_data() {
         assert_eq!(level(None, Some(1e-6)), "no data");
         assert_eq!(micrometres_or(None), "no data");
-    }
-
-    /// U+202E is RIGHT-TO-LEFT OVERRIDE (Unicode Standard Annex 9).
-    #[test]
-    fn a_name_cannot_reverse_the_text_after_it() {
-        assert_eq!(escape_invisible("S1\u{202e} (47.1)\n"), "S1[U+202E] (47.1)\n");
-        assert_eq!(escape_invisible("1\u{202f}205 µm 🛩"), "1\u{202f}205 µm 🛩");
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! One file of a report: its path, its content, and the errors of writing it.
 
 use crate::file_names::file_stem;
-use crate::format::escape_invisible;
 use crate::model::UnitView;
+use records::sanitize::escape_invisible;
 
 /// One file of a report.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -16,7 +16,7 @@ pub struct Page {
 impl Page {
     /// Makes an HTML page; invisible characters are escaped so that no name can disguise itself as another.
     pub(crate) fn html(path: String, html: &str) -> Self {
-        Self { path, body: escape_invisible(html).into_bytes() }
+        Self { path, body: escape_invisible(html).into_owned().into_bytes() }
     }
 }
 

@@ -74,6 +74,21 @@ fn a_hostile_name_is_shown_and_not_run() {
     }
 }
 
+/// Content Security Policy Level 3: without `unsafe-inline` no script in a page's own text is executed.
+#[test]
+fn every_page_forbids_scripts_that_are_not_files_of_the_report() {
+    let report = report(vec![unit("1040-0009", Some("plan"))]);
+    let mut pages = fleet_pages(&report).unwrap();
+    pages.push(unit_page(&report, &RateSpreads::of(&report), &report.units[0]).unwrap());
+    pages.push(tail_page(&report, &report.tails[0]).unwrap());
+    for page in pages.iter().filter(|p| p.path != "report.json") {
+        let html = text(page);
+        let (_, policy) = html.split_once("http-equiv=\"Content-Security-Policy\" content=\"").unwrap();
+        let (policy, _) = policy.split_once('"').unwrap();
+        assert!(policy.contains("default-src 'none'; script-src 'self';"), "{}: {policy}", page.path);
+    }
+}
+
 #[test]
 fn a_unit_without_a_statement_is_never_called_normal() {
     let report = report(vec![unit("A", None)]);

@@ -42,7 +42,7 @@ mod rows;
 mod store_dir;
 mod write;
 
-pub use admin::export::Format;
+pub use admin::export::{Format, csv_safe};
 pub use admin::info::Info;
 pub use error::Error;
 pub use handle::Store;

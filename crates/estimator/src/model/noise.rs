@@ -49,6 +49,9 @@ pub struct SensorNoise {
     pub bandwidth_hz: f64,
 }
 
+/// A bandwidth above the sample rate cannot be had: the process noise it needs grows as e^(2π f_S Ts) without end.
+const MAX_BANDWIDTH_PER_RATE: f64 = 1.0;
+
 /// W_d and V_d of one sample rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseCovariances {
@@ -86,6 +89,9 @@ impl SensorNoise {
             not_negative(name, value)?;
         }
         positive("bandwidth_hz", self.bandwidth_hz)?;
+        if self.bandwidth_hz * step_s > MAX_BANDWIDTH_PER_RATE {
+            return Err(Error::Parameter { name: "bandwidth_hz", value: self.bandwidth_hz });
+        }
         let v_d_m2 = self.variance_m2();
         positive("measurement variance", v_d_m2)?;
         let g = -ComplexField::exp_m1(-TAU * self.bandwidth_hz * step_s);

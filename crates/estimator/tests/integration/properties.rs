@@ -70,7 +70,126 @@ fn a_rotary_part_is_a_linear_one_at_its_radius() {
     assert!(ActuatorModel::rotary(2e4, 1.5, 0.02, 0.0).is_err());
 }
 
+/// First stamps of −1e50 s, steps of 1e50 s, stiffnesses of 5e77 N/m and masses of 5e−324 kg once kept the eigenvalue
+/// iteration from ending. Such settings are refused before; a filter must end on them all the same.
+#[test]
+fn no_settings_keep_a_filter_from_ending() {
+    let (done, ended) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        for step_s in [0.004, 1e50, 1e-300] {
+            for (stiffness, mass) in [(5e77, 8.0), (5e7, 5e-324), (5e77, 5e-324), (5e7, 8.0)] {
+                let Ok(actuator) = ActuatorModel::linear(stiffness, 2000.0, mass) else { continue };
+                let noise = NoiseModel::Sensors(SensorNoise {
+                    screw_rms_m: 3e-6,
+                    screw_resolution_m: 2.3e-6,
+                    motor_rms_m: 1e-6,
+                    motor_resolution_m: 3e-7,
+                    unknown_force_n: 200.0,
+                    bandwidth_hz: 10.0,
+                });
+                if let Ok(filter) = Filter::new(&actuator, step_s, &noise) {
+                    let _ = estimator::GainSchedule::new(&filter).bandwidth_hz();
+                }
+            }
+        }
+        done.send(()).unwrap();
+    });
+    assert!(ended.recv_timeout(std::time::Duration::from_mins(2)).is_ok(), "a filter did not end");
+}
+
 proptest! {
+    /// Superposition: the track of two sums is the sum of two tracks.
+    #[test]
+    fn the_track_is_linear_in_position_and_load_together(
+        one in vec((-1e-4..1e-4, -8e3..8e3), 200), other in vec((-1e-4..1e-4, -8e3..8e3), 200), scale in -3.0..3.0,
+    ) {
+        let f = filter(0.004, 10.0);
+        let whole = 0..one.len();
+        let track_of = |pairs: &[(f64, f64)]| {
+            let (dx, load): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
+            track(&f, &dx, &load, std::slice::from_ref(&whole))
+        };
+        let sum: Vec<(f64, f64)> =
+            one.iter().zip(&other).map(|(a, b): (&(f64, f64), &(f64, f64))| (a.0 + scale * b.0, a.1 + scale * b.1)).collect();
+        let (one, other, sum) = (track_of(&one), track_of(&other), track_of(&sum));
+        for k in 0..sum.len() {
+            prop_assert!(f64::abs(one[k] + scale * other[k] - sum[k]) < 1e-12, "row {}", k);
+        }
+    }
+
+    /// δX₀ (eq 3) and the origin of time are unknown: an offset of the position moves S by itself, and samples before
+    /// a break move nothing.
+    #[test]
+    fn the_track_is_invariant_to_shifts_of_position_and_time(
+        dx in vec(-1e-4..1e-4, 50..200), load in vec(-8e3..8e3, 200), offset_m in -1e-3..1e-3, later in 1..500_usize,
+    ) {
+        let f = filter(0.004, 10.0);
+        let (load, whole) = (&load[..dx.len()], 0..dx.len());
+        let plain = track(&f, &dx, load, std::slice::from_ref(&whole));
+        let moved: Vec<f64> = dx.iter().map(|x| x + offset_m).collect();
+        for (moved, plain) in track(&f, &moved, load, std::slice::from_ref(&whole)).iter().zip(&plain) {
+            prop_assert!(f64::abs(moved - plain - offset_m) < 1e-12);
+        }
+        let padded = [vec![1e-5; later], dx.clone()].concat();
+        let padded_load = [vec![300.0; later], load.to_vec()].concat();
+        let found = track(&f, &padded, &padded_load, &[0..later, later..padded.len()]);
+        prop_assert_eq!(&found[later..], &plain[..]);
+    }
+
+    /// ΔS is a difference of means of sets: the order of the samples is no part of it, nor where a list is cut.
+    #[test]
+    fn the_gap_is_invariant_to_order(
+        upper_m in vec(40e-6..60e-6, 1..200), lower_m in vec(-60e-6..-40e-6, 1..200), turn in 0..400_usize,
+    ) {
+        let s_m = [upper_m.clone(), lower_m.clone()].concat();
+        let mut turned = s_m.clone();
+        turned.rotate_left(turn % s_m.len());
+        let reversed: Vec<f64> = s_m.iter().rev().copied().collect();
+        let wanted_m = gap::mid_range(&s_m).unwrap().gap_m;
+        for other in [turned, reversed] {
+            prop_assert!((gap::mid_range(&other).unwrap().gap_m - wanted_m).abs() < 1e-17);
+        }
+    }
+
+    /// P is a covariance: whatever plausible part, rate and bandwidth, no variance falls below zero and no correlation
+    /// passes one, while the start is forgotten and long after.
+    #[test]
+    fn the_covariance_stays_one_over_the_plausible_box(
+        (stiffness, damping, mass) in (3.0..12.0_f64, -1.0..9.0_f64, -4.0..6.0_f64),
+        (rate_hz, bandwidth_hz) in (1.3..4.0_f64, -4.0..4.0_f64),
+    ) {
+        let ten = |power: f64| 10_f64.powf(power);
+        let actuator = ActuatorModel::linear(ten(stiffness), ten(damping), ten(mass)).unwrap();
+        let noise = NoiseModel::Sensors(SensorNoise {
+            screw_rms_m: 3e-6,
+            screw_resolution_m: 2.3e-6,
+            motor_rms_m: 1e-6,
+            motor_resolution_m: 3e-7,
+            unknown_force_n: 200.0,
+            bandwidth_hz: ten(bandwidth_hz),
+        });
+        // A step or bandwidth that a model refuses has no covariance.
+        let Ok(f) = Filter::new(&actuator, ten(-rate_hz), &noise) else { return Ok(()) };
+        let mut state = f.initial_state(0.0, 0.0);
+        for k in 0..3000 {
+            // Every seventh sample is missing.
+            let Ok(step) = f.update(&state, if k % 7 == 3 { f64::NAN } else { 0.0 }) else {
+                prop_assert!(false, "the innovation has no variance in step {}", k);
+                return Ok(());
+            };
+            for p in [step.prior.p, step.posterior.p] {
+                for i in 0..3 {
+                    prop_assert!(p[(i, i)] >= 0.0, "variance {} is {:e} in step {}", i, p[(i, i)], k);
+                    for j in 0..i {
+                        let bound = (p[(i, i)] * p[(j, j)]).sqrt();
+                        prop_assert!(p[(i, j)].abs() <= bound * (1.0 + 1e-6), "correlation {}, {} in step {}", i, j, k);
+                    }
+                }
+            }
+            state = f.predict(&step.posterior, 0.0);
+        }
+    }
+
     /// δX₀ (eq 3) is unknown in service: it enters S as a constant, which a difference of means must not see.
     #[test]
     fn a_constant_offset_leaves_the_gap_alone(

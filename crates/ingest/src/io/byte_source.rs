@@ -10,6 +10,7 @@ use std::path::Path;
 use object_io::{Address, ObjectFile};
 
 use crate::error::ErrorKind;
+use crate::io::transient;
 
 /// An open file or object.
 #[derive(Debug)]
@@ -22,7 +23,7 @@ impl ByteSource {
     pub(crate) fn open(path: &Path) -> Result<Self, ErrorKind> {
         match Address::parse(path)? {
             Some(address) => Ok(Self::Object(Box::new(ObjectFile::open(&address)?))),
-            None => Ok(Self::Local(File::open(path).map_err(|source| ErrorKind::Unreadable { source })?)),
+            None => Ok(Self::Local(open_local(path)?)),
         }
     }
 
@@ -47,5 +48,9 @@ pub(crate) fn whole(path: &Path) -> Result<File, ErrorKind> {
     if object_io::is_address(path) {
         return Ok(object_io::read_all(path)?);
     }
-    File::open(path).map_err(|source| ErrorKind::Unreadable { source })
+    open_local(path)
+}
+
+fn open_local(path: &Path) -> Result<File, ErrorKind> {
+    transient::with_retry(|| File::open(path)).map_err(|source| ErrorKind::Unreadable { source })
 }

@@ -3,3 +3,4 @@
 pub(crate) mod byte_source;
 pub(crate) mod digest;
 pub(crate) mod read_at;
+pub(crate) mod transient;

@@ -10,6 +10,8 @@ use bytes::Bytes;
 use parquet::errors::Result;
 use parquet::file::reader::{ChunkReader, Length};
 
+use crate::io::transient;
+
 /// A file for Parquet's readers.
 #[derive(Debug)]
 pub(crate) struct PreadFile(pub(crate) File);
@@ -68,13 +70,18 @@ pub(crate) fn read_exact(file: &File, mut buffer: &mut [u8], mut at: u64) -> io:
     Ok(())
 }
 
-#[cfg(unix)]
+/// Reads some bytes; a transient error is retried.
 pub(crate) fn read_at(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
+    transient::with_retry(|| read_once(file, buffer, at))
+}
+
+#[cfg(unix)]
+fn read_once(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
     std::os::unix::fs::FileExt::read_at(file, buffer, at)
 }
 
 #[cfg(windows)]
-pub(crate) fn read_at(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
+fn read_once(file: &File, buffer: &mut [u8], at: u64) -> io::Result<usize> {
     std::os::windows::fs::FileExt::seek_read(file, buffer, at)
 }
 

@@ -19,6 +19,7 @@ use crate::error::{Error, ErrorKind};
 use crate::io::byte_source::ByteSource;
 use crate::io::digest::Digest;
 use crate::io::read_at::{self, PreadFile};
+use crate::io::transient;
 use crate::mapping::column_pattern::nearest;
 use crate::parquet::fast_decode;
 use crate::parquet::leaf_columns::{self, LeafColumn};
@@ -60,7 +61,8 @@ impl LogFile {
         let fail = |fault| Error::new(path, fault);
         let source = ByteSource::open(path).map_err(fail)?;
         let file = source.file();
-        let length = file.metadata().map_err(|source| fail(ErrorKind::Unreadable { source }))?;
+        let length = transient::with_retry(|| file.metadata())
+            .map_err(|source| fail(ErrorKind::Unreadable { source }))?;
         if length.is_dir() {
             let source = std::io::Error::from(std::io::ErrorKind::IsADirectory);
             return Err(fail(ErrorKind::Unreadable { source }));
@@ -71,8 +73,14 @@ impl LogFile {
         want_footer(&source, length.len()).map_err(fail)?;
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let footer = ArrowReaderMetadata::load(file, options)
-            .map_err(|e| fail(ErrorKind::NotParquet { detail: footer_error(&source, &e) }))?;
+        // Parquet's own reader of files neither reads at a position nor repeats a read.
+        let reader = file.try_clone().map_err(|source| fail(ErrorKind::Unreadable { source }))?;
+        let footer = ArrowReaderMetadata::load(&PreadFile(reader), options).map_err(|e| {
+            fail(match transient::take_failed_read() {
+                Some(source) => ErrorKind::Unreadable { source },
+                None => ErrorKind::NotParquet { detail: footer_error(&source, &e) },
+            })
+        })?;
         let leaves = leaf_columns::leaves(footer.schema().fields());
         let opened = Self { path: path.to_owned(), source, footer, leaves };
         if opened.rows() == 0 {
@@ -311,7 +319,7 @@ impl LogFile {
     pub(crate) fn feed(&self, names: &[&str], digest: &mut Digest) -> Result<(), Error> {
         let unreadable = |source| self.error(ErrorKind::Unreadable { source });
         let file = self.source.file();
-        let length = file.metadata().map_err(unreadable)?.len();
+        let length = transient::with_retry(|| file.metadata()).map_err(unreadable)?.len();
         let wanted: Vec<&LeafColumn> =
             self.leaves.iter().filter(|l| names.contains(&l.name.as_str())).collect();
         self.want(&wanted)?;

@@ -3,7 +3,7 @@
 //! A fleet's history has tens of millions of rows, so nothing is turned into text that is a number already.
 
 use std::fs::File;
-use std::io::{Cursor, Read};
+use std::io::{Cursor, Read, Seek};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -24,6 +24,7 @@ use parquet::errors::ParquetError;
 use crate::error::{Error, ErrorKind};
 use crate::io::byte_source::whole;
 use crate::io::read_at::PreadFile;
+use crate::io::transient;
 use crate::tables::cell::{bad_cell, missing, number, position, utc};
 
 /// Rows of a batch.
@@ -317,7 +318,13 @@ enum Rows {
 impl Rows {
     fn csv(file: &Path) -> Result<(Self, Arc<Schema>), ErrorKind> {
         let mut text = Vec::new();
-        whole(file)?.read_to_end(&mut text).map_err(|source| ErrorKind::Unreadable { source })?;
+        let mut opened = whole(file)?;
+        transient::with_retry(|| {
+            text.clear();
+            opened.rewind()?;
+            opened.read_to_end(&mut text)
+        })
+        .map_err(|source| ErrorKind::Unreadable { source })?;
         // Spreadsheets open their UTF-8 with a byte order mark.
         let mark = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
         let mut text = Cursor::new(text);

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use jiff::Timestamp;
 use records::{Installation, Installations};
 
 use crate::error::{Error, ErrorKind};
@@ -58,11 +59,22 @@ impl InstallationColumns {
             part_number: table.required(row, part, name)?,
             serial_number: table.required(row, serial, name)?,
             installed_utc: table.required(row, installed, utc)?,
-            removed_utc: table.optional(row, self.removed, utc)?,
+            removed_utc: table.optional(row, self.removed, removal)?.flatten(),
             unit_hours_at_install: table.optional(row, self.hours[0], number)?,
             tail_hours_at_install: table.optional(row, self.hours[1], number)?,
         })
     }
+}
+
+/// The removal of a unit; none for the values that databases write for a unit that is still installed: the year 9999
+/// (the last day of most calendars lies beyond the last instant that can be stored) and words such as `open`.
+fn removal(text: &str) -> Result<Option<Timestamp>, String> {
+    const OPEN: [&str; 9] = ["open", "null", "none", "nan", "nat", "n/a", "na", "-", "infinity"];
+    let text = text.trim();
+    if text.starts_with("9999-") || OPEN.iter().any(|open| text.eq_ignore_ascii_case(open)) {
+        return Ok(None);
+    }
+    utc(text).map(Some)
 }
 
 #[cfg(test)]
@@ -85,6 +97,18 @@ mod tests {
         let stay = stays.iter().next().unwrap();
         assert_eq!(stay.installed_utc.to_string(), "2026-01-01T00:00:00Z");
         assert_eq!(stay.removed_utc.unwrap().to_string(), "2026-02-01T06:00:00Z");
+    }
+
+    /// 9999-12-31 is what SAP and most SQL schemas write for "until further notice".
+    #[test]
+    fn a_removal_in_the_year_9999_or_the_word_open_is_none() {
+        for open in ["9999-12-31", "9999-12-31T23:59:59Z", "9999-12-31 00:00", "open", "NULL", "-", "N/A"] {
+            let (_dir, file) = table(&format!("{HEADER}N1,aileron,EMA,17,2026-01-01,{open}\n"));
+            let stays = installations(&file, &ColumnAliases::new()).unwrap();
+            assert_eq!(stays.iter().next().unwrap().removed_utc, None, "{open}");
+        }
+        let (_dir, file) = table(&format!("{HEADER}N1,aileron,EMA,17,2026-01-01,later\n"));
+        assert!(installations(&file, &ColumnAliases::new()).is_err());
     }
 
     #[test]

@@ -19,6 +19,12 @@ pub(crate) const BREAK_STEPS: f64 = 1.5;
 /// A declared rate and the stamps may differ by this share: more is another rate, not a better one.
 const RATE_TOLERANCE: f64 = 0.25;
 
+/// Shortest and longest usual step that a recorder of positions can have, s.
+const PLAUSIBLE_STEP_S: (f64, f64) = (1e-6, 1e5);
+
+/// The largest first stamp of a clock of numbers, s: more than three thousand years.
+const MAX_FIRST_STAMP_S: f64 = 1e11;
+
 /// How far stamps may fall back by default, s.
 const MAX_BACK_S: f64 = 1.0;
 
@@ -130,8 +136,11 @@ pub fn uniform(rows: usize, rate_hz: f64) -> TimeBase {
 /// # Errors
 /// [`ErrorKind::TimeGoesBack`] when stamps fall by more than `max_back_s` and the log is not to be split
 /// there; [`ErrorKind::TimeStandsStill`] when fewer than two differ; [`ErrorKind::RateContradicts`] when they
-/// give another rate than the declared one.
+/// give another rate than the declared one; [`ErrorKind::TimeImplausible`] when the first stamp or the step cannot be.
 pub fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<TimeBase, ErrorKind> {
+    if let TimeOrigin::Counted(first_s) = stamps.origin {
+        plausible(first_s, "the first stamp", (-MAX_FIRST_STAMP_S, MAX_FIRST_STAMP_S), &stamps.column)?;
+    }
     if clock.tick_s.is_none()
         && let Some(seen) = UniformClock::of(&stamps.seconds)
     {
@@ -176,7 +185,20 @@ fn checked_step(seen_s: f64, clock: &ClockMapping, column: &str) -> Result<f64, 
         let (column, declared_hz) = (column.to_owned(), step_s.recip());
         return Err(ErrorKind::RateContradicts { column, declared_hz, seen_hz: seen_s.recip() });
     }
-    Ok(step_s)
+    plausible(step_s, "the step", PLAUSIBLE_STEP_S, column)
+}
+
+/// A time within a range.
+fn plausible(
+    value_s: f64,
+    what: &'static str,
+    (least_s, most_s): (f64, f64),
+    column: &str,
+) -> Result<f64, ErrorKind> {
+    if (least_s..=most_s).contains(&value_s) {
+        return Ok(value_s);
+    }
+    Err(ErrorKind::TimeImplausible { column: column.to_owned(), what, value_s, least_s, most_s })
 }
 
 /// A clock with equal steps, which most logs have; two passes over the timestamps determine it.
@@ -463,6 +485,19 @@ mod tests {
         let split = line(&t, &ClockMapping { split_at_jumps: true, ..usual() }).unwrap();
         assert_eq!(split.segments, [0..2, 2..4, 4..7]);
         assert_eq!(split.repairs.out_of_order, 0);
+    }
+
+    /// A first stamp of −1e50, and steps of 1e50 s and 1e−300 s: no recorder has them, and no filter survives them.
+    #[test]
+    fn a_clock_that_no_recorder_has_is_refused() {
+        for step_s in [1e50, 1e-300, 1e6] {
+            let t: Vec<f64> = (0..1000).map(|k| f64::from(k) * step_s).collect();
+            assert!(matches!(line(&t, &usual()), Err(ErrorKind::TimeImplausible { .. })), "{step_s}");
+        }
+        let mut early = stamps(&[0.0, 0.01, 0.02]);
+        early.origin = TimeOrigin::Counted(-1e50);
+        let refused = build_time_base(&mut early, &usual());
+        assert!(matches!(refused, Err(ErrorKind::TimeImplausible { what: "the first stamp", .. })));
     }
 
     #[test]

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::layers::Source;
 use super::validate_channels;
-use crate::config::limits::positive;
+use crate::config::limits::{implausible, positive};
 use crate::config::part::{PartSettings, WearAxis};
 
 /// The whole file.
@@ -133,13 +133,20 @@ impl Default for StoreSettings {
 }
 
 /// `[run]`.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
 pub struct RunSettings {
     /// An actuator is not begun while those in work would need more memory with it, MiB; one is always let
     /// in. No limit by default.
-    #[serde(default)]
     pub memory_mib: Option<u64>,
+    /// A log that takes longer than this, s, ends as an error of that log, and the run goes on. Default 600.
+    pub log_timeout_s: f64,
+}
+
+impl Default for RunSettings {
+    fn default() -> Self {
+        Self { memory_mib: None, log_timeout_s: 600.0 }
+    }
 }
 
 /// `[objects]`.
@@ -292,9 +299,11 @@ impl Document {
             ("stale_after_days", self.trend.stale_after_days),
             ("next_check_hours", self.trend.next_check_hours),
         ] {
-            found.extend(positive(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
+            found.extend(bounded(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
         }
-        found.extend(positive("limit_m", self.trend.limit_m).map(|c| source.at(&["trend", "limit_m"], c)));
+        found.extend(bounded("limit_m", self.trend.limit_m).map(|c| source.at(&["trend", "limit_m"], c)));
+        let timeout = bounded("log_timeout_s", Some(self.run.log_timeout_s));
+        found.extend(timeout.map(|c| source.at(&["run", "log_timeout_s"], c)));
         for (key, seconds) in [("timeout_s", self.objects.timeout_s), ("give_up_s", self.objects.give_up_s)] {
             found.extend(positive(key, Some(seconds)).map(|c| source.at(&["objects", key], c)));
         }
@@ -391,6 +400,11 @@ pub(super) fn check_clock(
         ("tick_s", clock.tick_s),
         ("wraps_at", clock.wraps_at),
     ] {
-        found.extend(positive(key, value).map(|c| source.at(&at(key), c)));
+        found.extend(bounded(key, value).map(|c| source.at(&at(key), c)));
     }
+}
+
+/// A value that is not above zero, or not plausible.
+fn bounded(key: &str, value: Option<f64>) -> Option<Diagnostic> {
+    positive(key, value).or_else(|| implausible(key, value))
 }

@@ -8,6 +8,67 @@ pub(crate) fn positive(key: &str, value: Option<f64>) -> Option<Diagnostic> {
     Some(Diagnostic::new("not_positive", format!("`{key}` is {value}, which must be a number above zero")))
 }
 
+/// Least and largest plausible value of each physical setting, by key: one to several orders of magnitude beyond any
+/// actuator, sensor or recorder. A value outside was given in another unit, and could leave the numbers of a filter.
+/// A least value of zero bounds the amount only from above; keys with a sign are compared by their amount.
+pub const PLAUSIBLE: &[(&str, f64, f64)] = &[
+    ("stiffness_n_per_m", 1e3, 1e12),
+    ("damping_n_s_per_m", 0.0, 1e9),
+    ("screw_mass_kg", 1e-4, 1e6),
+    ("lead_m_per_rev", 1e-5, 10.0),
+    ("stiffness_nm_per_rad", 1e-2, 1e12),
+    ("damping_nm_s_per_rad", 0.0, 1e10),
+    ("inertia_kg_m2", 1e-9, 1e8),
+    ("reference_radius_m", 1e-4, 100.0),
+    ("reference_load_n", 1e-3, 1e9),
+    ("limit_m", 1e-8, MAX_PLAUSIBLE_LIMIT_M),
+    ("watch_m", 1e-8, MAX_PLAUSIBLE_LIMIT_M),
+    ("screw_rms_m", 0.0, 0.1),
+    ("screw_resolution_m", 0.0, 0.1),
+    ("motor_rms_m", 0.0, 0.1),
+    ("motor_resolution_m", 0.0, 0.1),
+    ("unknown_force_n", 0.0, 1e8),
+    ("screw_rms_rad", 0.0, 1.0),
+    ("screw_resolution_rad", 0.0, 1.0),
+    ("motor_rms_rad", 0.0, 1.0),
+    ("motor_resolution_rad", 0.0, 1.0),
+    ("unknown_torque_nm", 0.0, 1e8),
+    ("bandwidth_hz", 1e-4, 1e4),
+    ("v_d_m2", 1e-26, 1e-2),
+    ("w_d", 0.0, 1e6),
+    ("force_psd_n2_s", 0.0, 1e15),
+    ("backlash_rate_psd_m2_per_s", 0.0, 1.0),
+    ("rate_hz", 1e-6, 1e6),
+    ("max_back_s", 1e-9, 1e9),
+    ("tick_s", 1e-9, 1e4),
+    ("wraps_at", 1e-6, 1e20),
+    ("gear_ratio", 1e-6, 1e6),
+    ("scale", 1e-12, 1e12),
+    ("offset", 0.0, 1e12),
+    ("latency_s", 0.0, 1e3),
+    ("instant_s", 0.0, 1e3),
+    ("planning_horizon_hours", 1e-3, 1e7),
+    ("horizon_hours", 1e-3, 1e7),
+    ("stale_after_days", 1e-3, 1e5),
+    ("next_check_hours", 1e-3, 1e7),
+    ("log_timeout_s", 1e-3, 86_400.0),
+];
+
+/// A value outside the plausible range of its key. Zero, negative and non-finite values have diagnostics of their own.
+pub(crate) fn implausible(key: &str, value: Option<f64>) -> Option<Diagnostic> {
+    let value = value.filter(|value| value.is_finite() && *value != 0.0)?;
+    let (_, least, most) = PLAUSIBLE.iter().find(|(name, ..)| *name == key)?;
+    let is_signed = *least == 0.0 || key == "scale";
+    if (*least..=*most).contains(&value.abs()) || (value < 0.0 && !is_signed) {
+        return None;
+    }
+    let what = format!("`{key}` is {value:e}, outside the plausible range {least:e} to {most:e}");
+    Some(Diagnostic::new("out_of_range", what).hint(match key {
+        "limit_m" | "watch_m" => "limits are in metres: 150 µm is 150e-6",
+        _ => "check the unit that ends the key's name; ranges are in docs/configuration.md",
+    }))
+}
+
 /// Largest plausible gap, m: a limit beyond it was given in another unit.
 pub const MAX_PLAUSIBLE_LIMIT_M: f64 = 0.01;
 

@@ -7,6 +7,7 @@ use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::config::limits::implausible;
 use crate::filter_cache::FilterCache;
 
 /// How a part moves.
@@ -187,6 +188,7 @@ impl PartSettings {
     pub(crate) fn check(&self) -> Result<Part, Vec<SettingError>> {
         let mut keys = SettingsValidator::default();
         self.check_kind(&mut keys);
+        self.check_ranges(&mut keys);
         keys.positive(&["reference_load_n"], self.reference_load_n);
         keys.positive(&["limit_m"], self.limit_m);
         keys.positive(&["watch_m"], self.watch_m);
@@ -215,6 +217,28 @@ impl PartSettings {
                 axis: self.axis,
             }),
             _ => Err(keys.found),
+        }
+    }
+
+    /// Every number that no actuator, sensor or limit can have.
+    fn check_ranges(&self, keys: &mut SettingsValidator) {
+        let part: [(&'static [&'static str], Option<f64>); 11] = [
+            (&["stiffness_n_per_m"], self.stiffness_n_per_m),
+            (&["damping_n_s_per_m"], self.damping_n_s_per_m),
+            (&["screw_mass_kg"], self.screw_mass_kg),
+            (&["lead_m_per_rev"], self.lead_m_per_rev),
+            (&["stiffness_nm_per_rad"], self.stiffness_nm_per_rad),
+            (&["damping_nm_s_per_rad"], self.damping_nm_s_per_rad),
+            (&["inertia_kg_m2"], self.inertia_kg_m2),
+            (&["reference_radius_m"], self.reference_radius_m),
+            (&["reference_load_n"], self.reference_load_n),
+            (&["limit_m"], self.limit_m),
+            (&["watch_m"], self.watch_m),
+        ];
+        let noise = self.noise.as_ref().map(NoiseSettings::numbers);
+        for (key, value) in part.into_iter().chain(noise.into_iter().flatten()) {
+            let name = key.last().copied().unwrap_or_default();
+            keys.found.extend(implausible(name, value).map(|c| (key, c)));
         }
     }
 
@@ -302,6 +326,28 @@ impl PartSettings {
 }
 
 impl NoiseSettings {
+    /// Every number with its key; of a matrix its largest entry.
+    fn numbers(&self) -> [(&'static [&'static str], Option<f64>); 15] {
+        let largest = |w_d: [[f64; 3]; 3]| w_d.into_iter().flatten().map(f64::abs).fold(0.0, f64::max);
+        [
+            (&["noise", "screw_rms_m"], self.screw_rms_m),
+            (&["noise", "screw_resolution_m"], self.screw_resolution_m),
+            (&["noise", "motor_rms_m"], self.motor_rms_m),
+            (&["noise", "motor_resolution_m"], self.motor_resolution_m),
+            (&["noise", "unknown_force_n"], self.unknown_force_n),
+            (&["noise", "screw_rms_rad"], self.screw_rms_rad),
+            (&["noise", "screw_resolution_rad"], self.screw_resolution_rad),
+            (&["noise", "motor_rms_rad"], self.motor_rms_rad),
+            (&["noise", "motor_resolution_rad"], self.motor_resolution_rad),
+            (&["noise", "unknown_torque_nm"], self.unknown_torque_nm),
+            (&["noise", "bandwidth_hz"], self.bandwidth_hz),
+            (&["noise", "w_d"], self.w_d.map(largest)),
+            (&["noise", "v_d_m2"], self.v_d_m2),
+            (&["noise", "force_psd_n2_s"], self.force_psd_n2_s),
+            (&["noise", "backlash_rate_psd_m2_per_s"], self.backlash_rate_psd_m2_per_s),
+        ]
+    }
+
     /// Sensor facts at the screw axis; a rotary part's are in radians and newton metres.
     fn sensors(&self, part: &PartSettings, keys: &mut SettingsValidator) -> Option<SensorNoise> {
         let bandwidth_hz = keys.required(&["noise", "bandwidth_hz"], self.bandwidth_hz);

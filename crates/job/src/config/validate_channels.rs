@@ -8,7 +8,7 @@ use ingest::{ChannelMapping, Channels, GroupMapping, Layout, SampleFilter};
 use records::Diagnostic;
 
 use super::layers::Source;
-use crate::config::limits::positive;
+use crate::config::limits::{implausible, positive};
 
 /// Every diagnostic about the channels, each at its key.
 pub(super) fn check(
@@ -131,14 +131,16 @@ fn one(
         ("wraps_at", channel.wraps_at),
         ("rate_hz", channel.rate_hz),
     ] {
-        found.extend(positive(key, value).map(|c| (key, c)));
+        found.extend(positive(key, value).or_else(|| implausible(key, value)).map(|c| (key, c)));
     }
+    found.extend(implausible("scale", Some(channel.scale)).map(|c| ("scale", c)));
     for (key, value) in
         [("latency_s", channel.latency_s), ("instant_s", channel.instant_s), ("offset", channel.offset)]
     {
         if !value.is_finite() {
             found.push((key, Diagnostic::new("bad_parameter", format!("`{key}` is {value}, not a number"))));
         }
+        found.extend(implausible(key, Some(value)).map(|c| (key, c)));
     }
     found.extend(unknown_group(name, channel, groups).map(|c| ("group", c)));
     found

@@ -101,10 +101,41 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
         ("unit = \"mm\"", "unit = \"inches\"", "bad_toml"),
         ("[logs]", "[logs", "bad_toml"),
         ("column = \"t\"", "column = \"t\"\nrate_hz = 0.0", "not_positive"),
+        ("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 5.0e77", "out_of_range"),
+        ("screw_mass_kg = 8.0", "screw_mass_kg = 5e-324", "out_of_range"),
+        ("damping_n_s_per_m = 2000.0", "damping_n_s_per_m = 1e300", "out_of_range"),
+        ("lead_m_per_rev = 0.005", "lead_m_per_rev = 5e-7", "out_of_range"),
+        ("limit_m = 150e-6", "limit_m = 150.0", "out_of_range"),
+        ("screw_rms_m = 3e-6", "screw_rms_m = 3.0", "out_of_range"),
+        ("bandwidth_hz = 10.0", "bandwidth_hz = 1e9", "out_of_range"),
+        ("column = \"t\"", "column = \"t\"\nrate_hz = 1e12", "out_of_range"),
+        ("unit = \"deg\"", "unit = \"deg\"\ngear_ratio = 1e-30", "out_of_range"),
+        ("unit = \"deg\"", "unit = \"deg\"\nscale = 1e99", "out_of_range"),
+        ("unit = \"deg\"", "unit = \"deg\"\nlatency_s = -1e5", "out_of_range"),
     ];
     for (line, by, code) in cases {
         let found = diagnostics(line, by);
         assert_eq!(found.iter().map(|c| c.0.as_str()).collect::<Vec<_>>(), [code], "{by}: {found:?}");
+    }
+}
+
+#[test]
+fn a_value_out_of_range_is_refused_with_key_value_and_range() {
+    let text = GOOD.replacen("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 5.0e77", 1);
+    let found = parse(&text).unwrap_err();
+    assert_eq!(found[0].message, "`stiffness_n_per_m` is 5e77, outside the plausible range 1e3 to 1e12");
+    let text = format!("{GOOD}\n[run]\nlog_timeout_s = 1e9\n");
+    assert_eq!(parse(&text).unwrap_err()[0].code, "out_of_range");
+    assert!(parse(&format!("{GOOD}\n[run]\nlog_timeout_s = 30\n")).is_ok());
+}
+
+/// The page lists the ranges that are checked.
+#[test]
+fn the_documentation_lists_every_range() {
+    let page = include_str!("../../../../docs/configuration.md");
+    for (key, least, most) in job::config::limits::PLAUSIBLE {
+        let row = format!("| `{key}` | {least:e} | {most:e} |");
+        assert!(page.contains(&row), "docs/configuration.md lacks the row {row}");
     }
 }
 

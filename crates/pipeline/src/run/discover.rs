@@ -9,7 +9,7 @@ use job::flight_log::{identify, identify_companion};
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, Position, TailNumber};
 
-use crate::error::Error;
+use crate::error::{Error, is_passing};
 use crate::run::discover_remote::{self};
 use crate::run::file_stat::SeenObjects;
 
@@ -77,14 +77,22 @@ fn group_files(
 ) -> DiscoveredLogs {
     let known: Vec<_> = main
         .into_par_iter()
-        .map(|(shown, path)| (identify(&LogFiles::one(&path), &shown, config).ok(), shown, path))
+        .map(|(shown, path)| (identify(&LogFiles::one(&path), &shown, config), shown, path))
         .collect();
     let mut found = DiscoveredLogs::default();
     let mut whose = IdentityIndex::new();
     for (who, shown, path) in known {
-        let Some(who) = who else {
-            found.logs.insert(shown, LogFiles::one(path));
-            continue;
+        let who = match who {
+            Ok(who) => who,
+            // Without its companions it would be an error of another kind, which no run would try again.
+            Err(diagnostic) if is_passing(&diagnostic.code) => {
+                found.faulty.insert(shown, (path, diagnostic));
+                continue;
+            }
+            Err(_) => {
+                found.logs.insert(shown, LogFiles::one(path));
+                continue;
+            }
         };
         let on_tail = whose.entry(who.0.tail_number.clone()).or_default();
         let is_piece = |(other, _): &&(FlightIdentity, String)| config.document.logs.pieces && *other == who;

@@ -8,7 +8,6 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use arrow::array::{Array, ArrayRef, AsArray, RecordBatch, StringArray, new_null_array};
 use arrow::compute::{cast, concat_batches, filter_record_batch, is_null};
@@ -18,7 +17,7 @@ use jiff::Timestamp;
 use job::Config;
 use records::{Diagnostic, GapRecord, Installations};
 use serde::{Deserialize, Serialize};
-use store::{Holder, LogOutcome, LogRecord, LogResult, RecordKey, Writer};
+use store::{LogOutcome, LogRecord, LogResult, RecordKey, Writer};
 
 use crate::error::Error;
 use crate::fleet_trends::assess;
@@ -28,6 +27,7 @@ use crate::run::memory_budget::MemoryBudget;
 use crate::run::plan::{Plan, Request, WorkItem, WorkReason};
 use crate::run::scheduler::{Context, WorkerContext, execute_run};
 use crate::run::summary::{self, RunSummary};
+use crate::run::worker_pool::StepCount;
 
 /// One log to be done elsewhere.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -85,12 +85,9 @@ pub fn process_task(
     task: &Task,
     program_version: &str,
 ) -> Result<RecordBatch, Error> {
-    let stop = AtomicBool::new(false);
-    let (holder, plan) = (Holder::this_process(), Plan::default());
-    let context = Context { program_version, holder, wait: None, stop: &stop, watch: &|_| {} };
-    let (context, plan, run_id) = (&context, &plan, task.run_id.as_str());
-    let budget = MemoryBudget::new(config.document.run.memory_mib);
-    let shop = WorkerContext { config, installations, context, plan, run_id, budget };
+    let (plan, budget) = (Plan::default(), MemoryBudget::new(config.document.run.memory_mib));
+    let (plan, budget, steps, run_id) = (&plan, &budget, &StepCount::default(), task.run_id.as_str());
+    let shop = WorkerContext { config, installations, program_version, plan, run_id, budget, steps };
     let files = LogFiles { main: task.main.clone(), groups: task.groups.clone() };
     let shown = task.log_path.clone();
     let work = WorkItem { files, fault: None, shown, stat: None, why: WorkReason::New, before: None };
@@ -157,12 +154,15 @@ pub fn run(
     at_a_time: usize,
     engine: &mut Engine<'_>,
 ) -> Result<RunSummary, Error> {
-    execute_run(config, request, context, 0, |shop, intent, writer, report| {
+    execute_run(config, request, context, 0, |inputs, intent, writer, report| {
         intent.state(writer)?;
+        let budget = MemoryBudget::new(config.document.run.memory_mib);
+        let steps = StepCount::default();
+        let shop = &inputs.worker(&budget, &steps);
         let mut book = OwnershipLedger::of(shop.plan, shop.config, shop.installations);
         report.not_reached = 0;
         for works in shop.plan.work.chunks(at_a_time.max(1)) {
-            some(shop, works, engine, (writer, &mut book, report))?;
+            some((shop, context), works, engine, (writer, &mut book, report))?;
         }
         report.not_reached = report.not_reached_logs.len();
         report.quiet = summary::quiet(book.accounts(), shop.config.document.trend.stale_after_days);
@@ -172,7 +172,7 @@ pub fn run(
 
 /// One batch of logs: those with a known error are reported here, the others go to the engine.
 fn some(
-    shop: &WorkerContext<'_>,
+    (shop, context): (&WorkerContext<'_>, &Context<'_>),
     works: &[WorkItem],
     engine: &mut Engine<'_>,
     (writer, book, report): (&mut Writer, &mut OwnershipLedger<'_>, &mut RunSummary),
@@ -191,12 +191,12 @@ fn some(
                 continue;
             }
         };
-        (shop.context.watch)(done.event(work));
+        (context.watch)(done.event(work));
         results.extend(book.resolve(done, report));
     }
     if !results.is_empty() {
         writer.commit(&results)?;
-        (shop.context.watch)(Event::Stored { logs: results.len() });
+        (context.watch)(Event::Stored { logs: results.len() });
     }
     Ok(())
 }

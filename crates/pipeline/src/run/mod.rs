@@ -10,3 +10,4 @@ mod memory_budget;
 pub mod plan;
 pub mod scheduler;
 pub mod summary;
+mod worker_pool;

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
 use store::{LogOutcome, LogRecord, RecordKey};
 
+use crate::error::is_passing;
 use crate::run::discover::DiscoveredLogs;
 use crate::run::file_stat::FileStat;
 use crate::run::file_stat::SeenObjects;
@@ -72,7 +73,7 @@ pub enum WorkReason {
     OwnerGone,
     /// It was in error, and `--retry` asks for it.
     Retry,
-    /// It could not be fetched from its object store before.
+    /// It could not be fetched or read completely before, for a cause that may pass by itself.
     Unfetched,
     /// It cannot be listed, so nothing is known of it.
     Unlisted,
@@ -91,7 +92,7 @@ impl WorkReason {
             Self::SettingChanged => "setting changed",
             Self::OwnerGone => "its flight has no other log now",
             Self::Retry => "in error, asked again",
-            Self::Unfetched => "could not be fetched before",
+            Self::Unfetched => "could not be read completely before",
             Self::Unlisted => "cannot be listed",
             Self::Asked => "asked again",
             Self::Verify => "content to be compared",
@@ -331,7 +332,7 @@ impl Judge<'_> {
             Some(WorkReason::SettingChanged)
         } else if self.is_orphan(account) {
             Some(WorkReason::OwnerGone)
-        } else if account.error_code.as_deref().is_some_and(object_io::Error::is_passing) {
+        } else if account.error_code.as_deref().is_some_and(is_passing) {
             Some(WorkReason::Unfetched)
         } else if self.request.retry && account.outcome == LogOutcome::Error {
             Some(WorkReason::Retry)

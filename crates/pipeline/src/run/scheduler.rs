@@ -5,8 +5,8 @@
 //! whole flights at a time, so an interrupted run keeps what it finished. Workers without a log left
 //! take actuators of the logs that are still in work.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use ingest::ActuatorColumns;
@@ -25,9 +25,12 @@ use crate::run::flight_ownership::{LogOutcomeData, OwnershipLedger};
 use crate::run::memory_budget::MemoryBudget;
 use crate::run::plan::{self, Plan, Request, WorkItem, WorkReason};
 use crate::run::summary::{self, KilledRun, RunSummary};
+use crate::run::worker_pool::{Next, PoolSettings, StepCount, WorkerPool};
 
 /// Finished flights wait this long at most for company in a commit: each commit is a file and a log entry.
 const BATCH_WAIT: Duration = Duration::from_millis(500);
+/// A log whose file could not be read is opened again after these delays: a stale handle never recovers.
+const READ_AGAIN_AFTER: [Duration; 2] = [Duration::from_millis(300), Duration::from_millis(1500)];
 /// So many finished logs are committed without waiting.
 const BATCH_LOGS: usize = 256;
 
@@ -74,8 +77,8 @@ pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
 /// what was committed before is intact, and the rest runs next time.
 pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<RunSummary, Error> {
     let workers = workers(request);
-    execute_run(config, request, context, workers, |worker_context, intent, writer, report| {
-        worker_context.work(workers, intent, writer, report)
+    execute_run(config, request, context, workers, |inputs, intent, writer, report| {
+        process_all(inputs, context, workers, (intent, writer, report))
     })
 }
 
@@ -86,7 +89,7 @@ pub(crate) fn execute_run(
     context: &Context<'_>,
     workers: usize,
     work: impl FnOnce(
-        &WorkerContext<'_>,
+        &Arc<RunInputs>,
         &RunPlanRows,
         &mut Writer,
         &mut RunSummary,
@@ -109,21 +112,18 @@ pub(crate) fn execute_run(
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
 
-    let run_id = report.run_id.clone();
-    let budget = MemoryBudget::new(config.document.run.memory_mib);
     let intent = RunPlanRows { run: report.row(context.program_version, &config_path, None), to_do };
-    let worker_context = WorkerContext {
-        config,
-        installations: &installations,
-        context,
-        plan: &plan,
-        run_id: &run_id,
-        budget,
-    };
-    let touched = work(&worker_context, &intent, &mut writer, &mut report)?;
+    let inputs = Arc::new(RunInputs {
+        config: config.clone(),
+        installations,
+        plan,
+        run_id: report.run_id.clone(),
+        program_version: context.program_version.to_owned(),
+    });
+    let touched = work(&inputs, &intent, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
-    let assessments = assess::assess_run(config, &installations, &store, &touched, &report.run_id)?;
+    let assessments = assess::assess_run(config, &inputs.installations, &store, &touched, &report.run_id)?;
     report.add_assessments(assessments);
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
@@ -190,76 +190,122 @@ fn raise_mmap_threshold() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(BOUND_BYTES)));
 }
 
-/// Everything a worker may look at.
-pub(crate) struct WorkerContext<'a> {
-    pub(crate) config: &'a Config,
-    pub(crate) installations: &'a Installations,
-    pub(crate) context: &'a Context<'a>,
-    pub(crate) plan: &'a Plan,
-    pub(crate) run_id: &'a str,
-    pub(crate) budget: MemoryBudget,
+/// What a run works from; owned, since workers that were abandoned outlive it.
+pub(crate) struct RunInputs {
+    pub(crate) config: Config,
+    pub(crate) installations: Installations,
+    pub(crate) plan: Plan,
+    pub(crate) run_id: String,
+    pub(crate) program_version: String,
 }
 
-impl WorkerContext<'_> {
-    /// Lets the workers loose and writes what they bring; returns the units whose records changed.
-    fn work(
-        &self,
-        workers: usize,
-        intent: &RunPlanRows,
-        writer: &mut Writer,
-        report: &mut RunSummary,
-    ) -> Result<Vec<assess::Unit>, Error> {
-        raise_mmap_threshold();
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build()?;
-        let (next, taken) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let halt = AtomicBool::new(false);
-        let (sender, receiver) = channel();
-        std::thread::scope(|scope| {
-            let (next, taken, halt) = (&next, &taken, &halt);
-            scope.spawn(move || {
-                pool.scope(|pool_scope| {
-                    for _ in 0..workers {
-                        let sender = sender.clone();
-                        pool_scope.spawn(move |_| self.worker_loop(next, taken, halt, &sender));
-                    }
-                });
-            });
-            // The workers read meanwhile; what they bring waits.
-            let written = intent.state(writer).and_then(|()| self.write(&receiver, writer, report));
-            // A store that fails must stop the workers early.
-            halt.store(written.is_err(), Ordering::Relaxed);
-            drop(receiver);
-            // Logs are taken in order, so those after the last one taken were not reached.
-            let reached = taken.load(Ordering::Relaxed).min(self.plan.work.len());
-            report.not_reached_logs =
-                self.plan.work[reached..].iter().map(|work| work.shown.clone()).collect();
-            report.not_reached = report.not_reached_logs.len();
-            written
-        })
-    }
-
-    /// One worker: takes the next log until there is none, or until it is stopped.
-    fn worker_loop(
-        &self,
-        next: &AtomicUsize,
-        taken: &AtomicUsize,
-        halt: &AtomicBool,
-        done: &Sender<LogOutcomeData>,
-    ) {
-        while !(halt.load(Ordering::Relaxed) || self.context.stop.load(Ordering::Relaxed)) {
-            let Some(work) = self.plan.work.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
-            taken.fetch_add(1, Ordering::Relaxed);
-            (self.context.watch)(Event::Started { log: work.shown.clone() });
-            let finished = self.process_log(work);
-            (self.context.watch)(finished.event(work));
-            if done.send(finished).is_err() {
-                return;
-            }
+impl RunInputs {
+    /// What a worker looks at.
+    pub(crate) fn worker<'a>(&'a self, budget: &'a MemoryBudget, steps: &'a StepCount) -> WorkerContext<'a> {
+        WorkerContext {
+            config: &self.config,
+            installations: &self.installations,
+            program_version: &self.program_version,
+            plan: &self.plan,
+            run_id: &self.run_id,
+            budget,
+            steps,
         }
     }
 
-    /// One log; a panic in it is an error row like any other.
+    /// The outcome of a log that was given up after some seconds.
+    pub(crate) fn failed(&self, work: &WorkItem, diagnostic: Diagnostic, after_s: f64) -> LogOutcomeData {
+        let (budget, steps) = (MemoryBudget::new(None), StepCount::default());
+        let mut failed = self.worker(&budget, &steps).failed(work, diagnostic);
+        if let LogOutcomeData::Read { account, .. } = &mut failed {
+            account.duration_s = after_s;
+        }
+        failed
+    }
+}
+
+/// Lets the workers loose and writes what they bring; returns the units whose records changed.
+fn process_all(
+    inputs: &Arc<RunInputs>,
+    context: &Context<'_>,
+    workers: usize,
+    (intent, writer, report): (&RunPlanRows, &mut Writer, &mut RunSummary),
+) -> Result<Vec<assess::Unit>, Error> {
+    raise_mmap_threshold();
+    let shared = Arc::clone(inputs);
+    let process_log = move |log: usize, budget: &MemoryBudget, steps: &StepCount| {
+        shared.worker(budget, steps).process_log(&shared.plan.work[log])
+    };
+    let run = &inputs.config.document.run;
+    let settings = PoolSettings {
+        plan: &inputs.plan,
+        workers,
+        limit: Duration::try_from_secs_f64(run.log_timeout_s).unwrap_or(Duration::MAX),
+        memory_mib: run.memory_mib,
+        stop: context.stop,
+        watch: context.watch,
+        fail: &|work, diagnostic, after_s| inputs.failed(work, diagnostic, after_s),
+    };
+    let mut pool = WorkerPool::start(settings, Box::new(process_log))?;
+    // The workers read meanwhile; what they bring waits.
+    let written = intent.state(writer).and_then(|()| write(inputs, context, &mut pool, writer, report));
+    report.not_reached_logs = pool.not_reached();
+    report.not_reached = report.not_reached_logs.len();
+    written
+}
+
+/// The writer's side: gathers, settles who owns a flight, commits.
+fn write(
+    inputs: &RunInputs,
+    context: &Context<'_>,
+    pool: &mut WorkerPool<'_>,
+    writer: &mut Writer,
+    report: &mut RunSummary,
+) -> Result<Vec<assess::Unit>, Error> {
+    let mut book = OwnershipLedger::of(&inputs.plan, &inputs.config, &inputs.installations);
+    while let Next::Log(first) = pool.next(None)? {
+        let gathered = collect_batch(*first, pool)?.into_iter();
+        let results: Vec<LogResult> = gathered.flat_map(|done| book.resolve(done, report)).collect();
+        if !results.is_empty() {
+            writer.commit(&results)?;
+            (context.watch)(Event::Stored { logs: results.len() });
+        }
+    }
+    report.quiet = summary::quiet(book.accounts(), inputs.config.document.trend.stale_after_days);
+    Ok(book.touched.into_iter().collect())
+}
+
+/// Everything a worker may look at.
+#[derive(Clone, Copy)]
+pub(crate) struct WorkerContext<'a> {
+    pub(crate) config: &'a Config,
+    pub(crate) installations: &'a Installations,
+    pub(crate) program_version: &'a str,
+    pub(crate) plan: &'a Plan,
+    pub(crate) run_id: &'a str,
+    pub(crate) budget: &'a MemoryBudget,
+    pub(crate) steps: &'a StepCount,
+}
+
+impl WorkerContext<'_> {
+    /// One log; when a read of it failed for a cause that may pass, it is read again as a whole.
     pub(crate) fn process_log(&self, work: &WorkItem) -> LogOutcomeData {
+        for delay in READ_AGAIN_AFTER {
+            let done = self.process_once(work);
+            match &done {
+                LogOutcomeData::Read { diagnostics, .. }
+                    if diagnostics.iter().any(|diagnostic| ingest::is_passing(&diagnostic.code)) =>
+                {
+                    std::thread::sleep(delay);
+                }
+                _ => return done,
+            }
+        }
+        self.process_once(work)
+    }
+
+    /// One log; a panic in it is an error row like any other.
+    fn process_once(&self, work: &WorkItem) -> LogOutcomeData {
         let clock = Instant::now();
         let done = catch_panic(&work.shown, || Ok(self.open(work)));
         let done = done.unwrap_or_else(|diagnostic| self.failed(work, diagnostic));
@@ -287,6 +333,7 @@ impl WorkerContext<'_> {
         if let Some(fault) = &work.fault {
             return self.failed(work, fault.clone());
         }
+        let step = self.steps.begin();
         let opened = match FlightLog::open(&work.files, &work.shown, self.config, self.installations) {
             Ok(opened) => opened,
             Err(diagnostic) => return self.failed(work, diagnostic),
@@ -305,6 +352,7 @@ impl WorkerContext<'_> {
             account.outcome = LogOutcome::Known;
             return LogOutcomeData::Same(Box::new(account));
         }
+        drop(step);
         self.read(&opened, account)
     }
 
@@ -324,7 +372,7 @@ impl WorkerContext<'_> {
     fn read(&self, opened: &FlightLog, mut account: LogRecord) -> LogOutcomeData {
         let stamp = ProvenanceStamp {
             run_id: self.run_id.to_owned(),
-            program_version: self.context.program_version.to_owned(),
+            program_version: self.program_version.to_owned(),
             processed_utc: Timestamp::now(),
         };
         let (records, diagnostics) = self.records(opened, &stamp);
@@ -341,6 +389,7 @@ impl WorkerContext<'_> {
         let bytes = MemoryBudget::actuator_bytes(opened.rows());
         let process_log = |at: &&ActuatorColumns| {
             let _held = self.budget.take(bytes);
+            let _step = self.steps.begin();
             opened.record(at, self.config, self.installations, stamp)
         };
         let (mut records, mut diagnostics) = (Vec::new(), Vec::new());
@@ -352,38 +401,17 @@ impl WorkerContext<'_> {
         }
         (records, diagnostics)
     }
-
-    /// The writer's side: gathers, settles who owns a flight, commits.
-    fn write(
-        &self,
-        done: &Receiver<LogOutcomeData>,
-        writer: &mut Writer,
-        report: &mut RunSummary,
-    ) -> Result<Vec<assess::Unit>, Error> {
-        let mut book = OwnershipLedger::of(self.plan, self.config, self.installations);
-        while let Ok(first) = done.recv() {
-            let gathered = collect_batch(first, done).into_iter();
-            let results: Vec<LogResult> = gathered.flat_map(|done| book.resolve(done, report)).collect();
-            if !results.is_empty() {
-                writer.commit(&results)?;
-                (self.context.watch)(Event::Stored { logs: results.len() });
-            }
-        }
-        report.quiet = summary::quiet(book.accounts(), self.config.document.trend.stale_after_days);
-        Ok(book.touched.into_iter().collect())
-    }
 }
 
 /// What is finished within a short while, or nothing but the first when nothing follows.
-fn collect_batch(first: LogOutcomeData, done: &Receiver<LogOutcomeData>) -> Vec<LogOutcomeData> {
+fn collect_batch(first: LogOutcomeData, pool: &mut WorkerPool<'_>) -> Result<Vec<LogOutcomeData>, Error> {
     let deadline = Instant::now() + BATCH_WAIT;
     let mut gathered = vec![first];
     while gathered.len() < BATCH_LOGS {
-        let left = deadline.saturating_duration_since(Instant::now());
-        match done.recv_timeout(left) {
-            Ok(next) => gathered.push(next),
-            Err(_) => break,
+        match pool.next(Some(deadline))? {
+            Next::Log(next) => gathered.push(*next),
+            Next::Nothing | Next::End => break,
         }
     }
-    gathered
+    Ok(gathered)
 }

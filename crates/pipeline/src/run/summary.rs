@@ -6,6 +6,7 @@ use jiff::Timestamp;
 use records::{Diagnostic, GapRecord, Status};
 use store::{LogOutcome, LogRecord, RunRecord};
 
+use crate::error::is_passing;
 use crate::fleet_trends::assess::RunAssessments;
 use crate::fleet_trends::changes::UnitChange;
 use crate::fleet_trends::trend_row::TrendRow;
@@ -283,9 +284,11 @@ pub(crate) fn not_reached(work: &WorkItem, run_id: &str) -> LogRecord {
     LogRecord { outcome: LogOutcome::NotReached, ..of_log(work, run_id) }
 }
 
-/// Writes diagnostics into an account: the first one's code, all of their text.
+/// Writes diagnostics into an account: the code of the first, and all of their text. A cause that may pass goes before
+/// the others, since the next run tries the log again for it.
 pub(crate) fn complain(account: &mut LogRecord, diagnostics: &[Diagnostic]) {
-    let Some(first) = diagnostics.first() else { return };
+    let passing = diagnostics.iter().find(|diagnostic| is_passing(&diagnostic.code));
+    let Some(first) = passing.or(diagnostics.first()) else { return };
     account.outcome = LogOutcome::Error;
     account.error_code = Some(first.code.clone());
     let all: Vec<String> = diagnostics.iter().map(ToString::to_string).collect();

@@ -114,9 +114,15 @@ pub fn estimate_plot_html(plots: &[EstimatePlot]) -> Result<String, Error> {
         chart_style: include_str!("../../assets/uplot.css"),
         chart: include_str!("../../assets/uplot.js"),
         glue: include_str!("../../assets/estimate_plot.js"),
+        script_hashes: SCRIPT_HASHES,
     };
     Ok(page.render()?)
 }
+
+/// SHA-256 of `uplot.js` and `estimate_plot.js`: the only scripts that a browser executes in the page
+/// (Content Security Policy Level 3, hash sources).
+const SCRIPT_HASHES: &str = "'sha256-GcjUxq2Ikpp59K5J1vcWFWbf0Lo9FcxJXpdPeH63jx8=' \
+                             'sha256-aX3DKBiq4JRApQJxsM38SWfL3ZGYePPDnAPa8PQ7YX0='";
 
 #[derive(Template)]
 #[template(path = "estimate_plot.html")]
@@ -126,6 +132,7 @@ struct EstimatePlotPage<'a> {
     chart_style: &'static str,
     chart: &'static str,
     glue: &'static str,
+    script_hashes: &'static str,
 }
 
 struct Section<'a> {
@@ -383,6 +390,16 @@ mod tests {
             contacts: (0..20).map(contact).collect(),
             flanks: [vec![(0.0, 5e-5), (5e3, 1.5e-4)], vec![(0.0, -5e-5), (-5e3, -1.5e-4)]],
             dx_m,
+        }
+    }
+
+    #[test]
+    fn the_page_names_the_digests_of_its_scripts() {
+        use base64::Engine;
+        use sha2::Digest;
+        for script in [include_str!("../../assets/uplot.js"), include_str!("../../assets/estimate_plot.js")] {
+            let digest = base64::prelude::BASE64_STANDARD.encode(sha2::Sha256::digest(script));
+            assert!(SCRIPT_HASHES.contains(&format!("'sha256-{digest}'")), "it is now {digest}");
         }
     }
 

@@ -1,12 +1,15 @@
 //! Export: the records as one file others read, the same bytes for the same records.
 
+use std::borrow::Cow;
 use std::io::Write;
 
 use arrow::array::{Array, ArrayRef, AsArray, RecordBatch, StringArray};
 use arrow::datatypes::{DataType, Field, Schema, TimestampMicrosecondType};
+use arrow::error::ArrowError;
 use arrow::json::writer::{JsonArray, WriterBuilder};
 use jiff::Timestamp;
 use parquet::arrow::ArrowWriter;
+use records::sanitize::csv_cell;
 use std::sync::Arc;
 
 use crate::delta::snapshot::Snapshot;
@@ -90,7 +93,7 @@ impl<W: Write + Send> ExportWriter<W> {
 
     fn write(&mut self, batch: &RecordBatch) -> Result<(), Error> {
         match self {
-            Self::Csv(writer) => writer.write(&joined(batch)?)?,
+            Self::Csv(writer) => writer.write(&csv_safe(&joined(batch)?)?)?,
             Self::Json(writer) => writer.write(batch)?,
             Self::Parquet(writer) => writer.write(batch)?,
         }
@@ -105,6 +108,22 @@ impl<W: Write + Send> ExportWriter<W> {
         }
         Ok(())
     }
+}
+
+/// The same rows with text that no spreadsheet takes for a formula, for a CSV file.
+///
+/// # Errors
+/// Never for a batch that holds together.
+pub fn csv_safe(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+    let safe = |array: &ArrayRef| -> ArrayRef {
+        let Some(texts) = array.as_string_opt::<i32>() else { return Arc::clone(array) };
+        let is_changed = |text: &str| matches!(csv_cell(text), Cow::Owned(_));
+        if !texts.iter().flatten().any(is_changed) {
+            return Arc::clone(array);
+        }
+        Arc::new(texts.iter().map(|text| text.map(csv_cell)).collect::<StringArray>())
+    };
+    RecordBatch::try_new(batch.schema(), batch.columns().iter().map(safe).collect())
 }
 
 /// A list has no form in CSV: its texts become one, joined by semicolons.

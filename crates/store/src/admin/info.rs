@@ -74,16 +74,55 @@ impl Store {
             files: files.len(),
             bytes: snapshot.files.iter().map(|file| file.size_bytes).sum(),
             version: snapshot.version,
-            last_completed: runs
-                .iter()
-                .filter(|run| completed(run))
-                .max_by_key(|run| run.finished_utc)
-                .cloned(),
+            last_completed: last_completed(&runs, Timestamp::now()).cloned(),
             last: runs.last().cloned(),
         })
     }
 }
 
+/// The completed run that ended last. A clock that was ahead when a run ended hides no other run: one that ended after
+/// `now` counts only where there is no other.
+fn last_completed(runs: &[RunRecord], now: Timestamp) -> Option<&RunRecord> {
+    let key = |run: &&RunRecord| (run.finished_utc <= Some(now), run.finished_utc);
+    runs.iter().filter(|run| completed(run)).max_by_key(key)
+}
+
 fn completed(run: &RunRecord) -> bool {
     matches!(run.exit_code, Some(0 | 1))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    fn run(run_id: &str, finished_utc: &str) -> RunRecord {
+        let at: Timestamp = finished_utc.parse().unwrap();
+        RunRecord {
+            run_id: run_id.to_owned(),
+            started_utc: at,
+            finished_utc: Some(at),
+            program_version: "0".to_owned(),
+            config_path: String::new(),
+            found: 0,
+            known: 0,
+            done: 0,
+            estimated: 0,
+            refused: 0,
+            errors: 0,
+            not_reached: 0,
+            exit_code: Some(0),
+        }
+    }
+
+    #[test]
+    fn a_run_under_a_clock_that_was_ahead_does_not_hide_the_runs_after_it() {
+        let now: Timestamp = "2026-03-03T06:00:00Z".parse().unwrap();
+        let ahead = run("ahead", "2031-01-01T04:00:00Z");
+        let runs = [ahead.clone(), run("old", "2026-03-01T04:00:00Z"), run("new", "2026-03-03T04:00:00Z")];
+        assert_eq!(last_completed(&runs, now).unwrap().run_id, "new");
+        assert_eq!(last_completed(&[ahead], now).unwrap().run_id, "ahead");
+        let back = run("ten years back", "2016-03-03T05:00:00Z");
+        assert_eq!(last_completed(&[runs[1].clone(), back], now).unwrap().run_id, "old");
+    }
 }

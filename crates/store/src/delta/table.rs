@@ -256,21 +256,38 @@ impl Table {
 
 impl Table {
     /// Deletes files that no snapshot younger than `kept` needs, and counts them.
+    ///
+    /// Ages are summed over the intervals between the table's commits, each counted as two days at most: a clock that
+    /// was once ahead or back ages no file by more than that, and a file is kept that much longer. After a clock that
+    /// runs back nothing is deleted until the log has forgotten it.
     pub(crate) fn vacuum(&self, kept: Duration) -> Result<usize, Error> {
         let snapshot = self.snapshot()?;
         let active: HashSet<&Path> = snapshot.files.iter().map(|file| file.path.as_path()).collect();
         let superseded = self.superseded(&snapshot).map_err(self.failed("read"))?;
-        let horizon = SystemTime::now().checked_sub(kept).unwrap_or(SystemTime::UNIX_EPOCH);
+        let commits = self.commit_times()?;
+        let is_due = |since| kept.is_zero() || is_older(since, &commits, kept);
         let mut deleted = 0;
         for (path, written) in self.location.entries()?.into_iter().filter(|(path, _)| is_data(path)) {
             let since = superseded.get(&path).copied().unwrap_or(written);
-            if !active.contains(path.as_path()) && since <= horizon {
+            if !active.contains(path.as_path()) && is_due(since) {
                 self.location.delete(&path)?;
                 deleted += 1;
             }
         }
         log_digests::prune(&self.location)?;
         Ok(deleted)
+    }
+
+    /// When the commits that the log remembers were written, in their order, and the time now.
+    fn commit_times(&self) -> Result<Vec<SystemTime>, Error> {
+        let log = self.location.join("_delta_log").entries()?;
+        let commit = |(path, written): (PathBuf, SystemTime)| {
+            let name = path.file_name()?.to_str()?.strip_suffix(".json")?.parse::<u64>().ok()?;
+            Some((name, written))
+        };
+        let mut commits: Vec<(u64, SystemTime)> = log.into_iter().filter_map(commit).collect();
+        commits.sort_unstable();
+        Ok(commits.into_iter().map(|(_, written)| written).chain([SystemTime::now()]).collect())
     }
 
     /// When each file that the log still remembers was superseded.
@@ -285,6 +302,25 @@ impl Table {
         };
         Ok(tombstones.iter().filter_map(entry).collect())
     }
+}
+
+/// An interval between two commits counts as this long at most: longer ones may be a clock that was set.
+const LONGEST_INTERVAL: Duration = Duration::from_hours(48);
+/// File systems and buckets have clocks of their own, which differ by less than this.
+const CLOCK_TOLERANCE: Duration = Duration::from_hours(1);
+
+/// Whether a file was superseded longer ago than `kept`, by any clock that wrote these commits.
+fn is_older(since: SystemTime, commits: &[SystemTime], kept: Duration) -> bool {
+    let runs_back = commits.windows(2).any(|pair| pair[1] + CLOCK_TOLERANCE < pair[0]);
+    if runs_back {
+        return false;
+    }
+    let before = [since].into_iter().filter(|since| commits.first().is_some_and(|first| since < first));
+    let instants: Vec<SystemTime> = before.chain(commits.iter().copied()).collect();
+    let counted = |pair: &[SystemTime]| {
+        pair[1].duration_since(pair[0].max(since)).unwrap_or_default().min(LONGEST_INTERVAL)
+    };
+    instants.windows(2).map(counted).sum::<Duration>() >= kept + LONGEST_INTERVAL
 }
 
 /// Whether a file is a data file, or one half written.
@@ -328,6 +364,24 @@ mod tests {
         let names = StringArray::from_iter_values(numbers.iter().map(|n| format!("n{n:02}")));
         let at = TimestampMicrosecondArray::from(numbers).with_timezone("UTC");
         RecordBatch::try_new(schema(), vec![Arc::new(names), Arc::new(at)]).unwrap()
+    }
+
+    /// A file that was superseded one minute ago, under clocks that were right, ahead and ten years back.
+    #[test]
+    fn no_clock_makes_a_file_old() {
+        const DAY: Duration = Duration::from_hours(24);
+        let start = UNIX_EPOCH + 20_000 * DAY;
+        let nights = |count: u32| (0..count).map(|night| start + night * DAY).collect::<Vec<_>>();
+        let week = 7 * DAY;
+        assert!(is_older(start, &nights(11), week));
+        assert!(!is_older(start, &nights(7), week), "six days");
+        let mut back = nights(20);
+        let superseded = start.checked_sub(3650 * DAY).unwrap();
+        back.extend([superseded, start + 20 * DAY, start + 21 * DAY]);
+        assert!(!is_older(superseded, &back, week), "the clock was ten years back when it was superseded");
+        let mut ahead = nights(6);
+        ahead.push(start + 3650 * DAY);
+        assert!(!is_older(start, &ahead, week), "the clock is ten years ahead now");
     }
 
     fn append(table: &Table, n: i64) {

@@ -8,7 +8,6 @@ use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use ingest::channel::quality;
 use ingest::{ActuatorChannels, ActuatorColumns, LogFiles, Quality};
 use job::Config;
-use job::config::limits::MAX_PLAUSIBLE_LIMIT_M;
 use job::flight_log::{FlightLog, catch_panic};
 use pipeline::run::discover;
 use records::{Diagnostic, Installations, PartNumber};
@@ -40,7 +39,6 @@ const NOTHING: &str = "  no actuator could be checked; see errors above\n";
 /// If configuration or tables are wrong. Failed logs make the exit code 1.
 pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
-    warn_implausible_limits(&config, output);
     let logs = logs(args, &config, output)?;
     let (mut channels, mut diagnostics, mut page) = (Vec::new(), Vec::new(), String::new());
     let mut schemas = ColumnTypes::default();
@@ -80,21 +78,6 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
     }
     output.diagnostics(&diagnostics);
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
-}
-
-/// Warns about limits that seem to be in another unit.
-fn warn_implausible_limits(config: &Config, output: &Output) {
-    let of_part = |(number, part): (&String, &job::config::part::PartSettings)| {
-        [("limit_m", part.limit_m), ("watch_m", part.watch_m)]
-            .map(|(key, m)| (format!("part {number}"), key, m))
-    };
-    let of_all = ("trend".to_owned(), "limit_m", config.document.trend.limit_m);
-    for (whose, key, limit_m) in config.document.part.iter().flat_map(of_part).chain([of_all]) {
-        if let Some(limit_m) = limit_m.filter(|limit_m| *limit_m > MAX_PLAUSIBLE_LIMIT_M) {
-            let meant = "limits are in metres: 150 µm is 150e-6";
-            output.note(&format!("{whose}: `{key}` = {limit_m} is implausibly large; {meant}"));
-        }
-    }
 }
 
 fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<Vec<(LogFiles, String)>, Failure> {

@@ -35,7 +35,7 @@ pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> R
             "settings": { "part": settings, "config_digest": &*digest, "is_current": *digest == *record.provenance.config_digest },
             "replay": { "verdict": verdict.code(), "says": verdict.to_string() },
         });
-        output.write_result(&format!("{value:#}\n"))?;
+        output.write_exact(&format!("{value:#}\n"))?;
     } else {
         output.write_result(&page(&record, &config, &replayed, &verdict))?;
     }

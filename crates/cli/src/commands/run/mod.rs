@@ -73,7 +73,7 @@ pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Co
     }
     if args.json {
         let text = serde_json::to_string_pretty(&report).map_err(std::io::Error::from)?;
-        output.write_result(&(text + "\n"))?;
+        output.write_exact(&(text + "\n"))?;
     } else {
         output.write_result(&summary_text(&report, &config.file.display().to_string(), code))?;
     }

@@ -13,7 +13,7 @@ use crate::output::Output;
 pub(crate) fn completions(args: &CompletionsArgs, output: &Output) -> Result<Code, Failure> {
     let mut text = Vec::new();
     clap_complete::generate(args.shell, &mut Args::command(), "freeplay", &mut text);
-    output.write_result(&String::from_utf8_lossy(&text))?;
+    output.write_exact(&String::from_utf8_lossy(&text))?;
     Ok(Code::Success)
 }
 
@@ -29,6 +29,6 @@ pub(crate) fn man(output: &Output) -> Result<Code, Failure> {
         clap_mangen::Man::new(sub.clone()).render_description_section(&mut text)?;
         clap_mangen::Man::new(sub.clone()).render_options_section(&mut text)?;
     }
-    output.write_result(&String::from_utf8_lossy(&text))?;
+    output.write_exact(&String::from_utf8_lossy(&text))?;
     Ok(Code::Success)
 }

@@ -52,7 +52,7 @@ fn info(store: &Store, max_age: Option<Duration>, as_json: bool, output: &Output
     let found = store.info()?;
     let age = found.last_completed.as_ref().and_then(age);
     if as_json {
-        output.write_result(&format!("{:#}\n", in_json(store, &found, age)?))?;
+        output.write_exact(&format!("{:#}\n", in_json(store, &found, age)?))?;
     } else {
         output.write_result(&(in_words(store, &found, age) + &unfinished(store, &found)?))?;
     }
@@ -62,12 +62,18 @@ fn info(store: &Store, max_age: Option<Duration>, as_json: bool, output: &Output
         Some(age) => {
             format!("the last completed run ended {} ago, more than {}", span(age), span(allowed))
         }
-        None => "no completed run".to_owned(),
+        None => match found.last_completed.as_ref().and_then(|run| run.finished_utc) {
+            Some(ended) => {
+                let now = Timestamp::now();
+                format!("the last completed run ended at {ended:.0}, after this machine's clock, {now:.0}")
+            }
+            None => "no completed run".to_owned(),
+        },
     };
-    output.diagnostic(
-        &Diagnostic::new("run_overdue", what)
-            .hint("check that the timer starts `freeplay run` and that it exits with code 0 or 1"),
-    );
+    output
+        .diagnostic(&Diagnostic::new("run_overdue", what).hint(
+            "check the clock, that the timer starts `freeplay run` and that it exits with code 0 or 1",
+        ));
     Ok(Code::LogsInError)
 }
 

@@ -1,0 +1,109 @@
+//! Errors of local files that may pass by themselves: retried, and remembered when they do not pass.
+//!
+//! A disk or a network share may fail a read once and serve the next. A parser that stands between the read and the
+//! caller turns the cause into "not Parquet" or "a page cannot be decoded". The cause is therefore kept per thread
+//! until the next read succeeds, and [`Error`](crate::Error) reports it in place of what the parser made of it.
+
+use std::cell::RefCell;
+use std::io;
+use std::time::Duration;
+
+/// Waits between attempts; a log that still fails is read again as a whole by the run.
+const DELAYS: [Duration; 3] =
+    [Duration::from_millis(10), Duration::from_millis(40), Duration::from_millis(160)];
+
+/// `EIO`, which [`io::ErrorKind`] does not know.
+const INPUT_OUTPUT_ERROR: i32 = 5;
+/// `EREMOTEIO` of Linux.
+const REMOTE_INPUT_OUTPUT_ERROR: i32 = 121;
+
+thread_local! {
+    static FAILED_READ: RefCell<Option<io::Error>> = const { RefCell::new(None) };
+}
+
+/// Whether the same operation may succeed later although nothing is changed here.
+pub(crate) fn is_transient(error: &io::Error) -> bool {
+    use io::ErrorKind as Kind;
+    let by_kind = matches!(
+        error.kind(),
+        Kind::Interrupted
+            | Kind::WouldBlock
+            | Kind::TimedOut
+            | Kind::StaleNetworkFileHandle
+            | Kind::ResourceBusy
+            | Kind::NetworkDown
+            | Kind::NetworkUnreachable
+            | Kind::HostUnreachable
+            | Kind::ConnectionReset
+            | Kind::ConnectionAborted
+            | Kind::NotConnected
+    );
+    let by_number = [INPUT_OUTPUT_ERROR, REMOTE_INPUT_OUTPUT_ERROR].map(Some).contains(&error.raw_os_error());
+    by_kind || (cfg!(unix) && by_number)
+}
+
+/// Repeats an operation while its error is transient, and remembers the last such error of this thread.
+pub(crate) fn with_retry<T>(mut operation: impl FnMut() -> io::Result<T>) -> io::Result<T> {
+    let mut delays = DELAYS.into_iter();
+    loop {
+        let error = match operation() {
+            Ok(value) => {
+                FAILED_READ.take();
+                return Ok(value);
+            }
+            Err(error) => error,
+        };
+        if !is_transient(&error) {
+            return Err(error);
+        }
+        let Some(delay) = delays.next() else {
+            FAILED_READ.set(Some(copy(&error)));
+            return Err(error);
+        };
+        std::thread::sleep(delay);
+    }
+}
+
+/// The transient error that the latest read of this thread ended with; it is forgotten.
+pub(crate) fn take_failed_read() -> Option<io::Error> {
+    FAILED_READ.take()
+}
+
+fn copy(error: &io::Error) -> io::Error {
+    error.raw_os_error().map_or_else(|| error.kind().into(), io::Error::from_raw_os_error)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    /// Numbers of Linux, `errno(3)`.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn errors_of_a_share_that_comes_back_are_transient_and_missing_files_are_not() {
+        let [eintr, eio, eagain, ebusy, etimedout, estale] = [4, 5, 11, 16, 110, 116];
+        for number in [eintr, eio, eagain, ebusy, etimedout, estale] {
+            assert!(is_transient(&io::Error::from_raw_os_error(number)), "{number}");
+        }
+        let [enoent, eacces, eisdir, enospc] = [2, 13, 21, 28];
+        for number in [enoent, eacces, eisdir, enospc] {
+            assert!(!is_transient(&io::Error::from_raw_os_error(number)), "{number}");
+        }
+    }
+
+    #[test]
+    fn one_failure_is_not_seen_and_a_lasting_one_is_remembered_once() {
+        let mut tries = 0;
+        let once = with_retry(|| {
+            tries += 1;
+            if tries == 1 { Err(io::Error::from_raw_os_error(INPUT_OUTPUT_ERROR)) } else { Ok(tries) }
+        });
+        assert_eq!((once.unwrap(), take_failed_read().is_none()), (2, true));
+        with_retry(|| Err::<(), _>(io::ErrorKind::TimedOut.into())).unwrap_err();
+        assert_eq!(take_failed_read().unwrap().kind(), io::ErrorKind::TimedOut);
+        assert!(take_failed_read().is_none());
+        with_retry(|| Err::<(), _>(io::ErrorKind::NotFound.into())).unwrap_err();
+        assert!(take_failed_read().is_none());
+    }
+}
