@@ -8,7 +8,7 @@ use crate::prior::fleet_prior::FleetPrior;
 
 /// The number of the form. A change of what is kept, or of how statements are made of it, asks for the
 /// next one: a state of another form is made anew.
-const FORM: u8 = 3;
+const FORM: u8 = 4;
 
 /// Bytes of the digest.
 const DIGEST: usize = 8;

@@ -13,4 +13,6 @@ mod fleet;
 mod forecast;
 mod incremental;
 mod random;
+mod scale;
 mod series;
+mod steps;
