@@ -5,4 +5,5 @@ mod disk_faults;
 mod incremental_runs;
 mod interruption;
 mod killed_run_recovery;
+mod mapping_faults;
 mod old_store_formats;

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::layers::Source;
 use super::validate_channels;
-use crate::config::limits::positive;
+use crate::config::limits::{plausible_limit, positive};
 use crate::config::part::{PartSettings, WearAxis};
 
 /// The whole file.
@@ -294,7 +294,9 @@ impl Document {
         ] {
             found.extend(positive(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
         }
-        found.extend(positive("limit_m", self.trend.limit_m).map(|c| source.at(&["trend", "limit_m"], c)));
+        found.extend(
+            plausible_limit("limit_m", self.trend.limit_m).map(|c| source.at(&["trend", "limit_m"], c)),
+        );
         for (key, seconds) in [("timeout_s", self.objects.timeout_s), ("give_up_s", self.objects.give_up_s)] {
             found.extend(positive(key, Some(seconds)).map(|c| source.at(&["objects", key], c)));
         }

@@ -171,6 +171,13 @@ pub struct Part {
     pub axis: Option<WearAxis>,
 }
 
+/// Axial stiffness of electromechanical actuators, N/m, from the smallest of models to the largest; a value given in
+/// another unit is outside.
+const STIFFNESS_N_PER_M: (f64, f64) = (1e4, 1e11);
+
+/// Travel for one turn of the motor, m: a gear in front of the screw makes it small.
+const LEAD_M_PER_REV: (f64, f64) = (1e-6, 0.5);
+
 /// A key below the part's table, and what is wrong with it.
 pub(crate) type SettingError = (&'static [&'static str], Diagnostic);
 
@@ -188,8 +195,8 @@ impl PartSettings {
         let mut keys = SettingsValidator::default();
         self.check_kind(&mut keys);
         keys.positive(&["reference_load_n"], self.reference_load_n);
-        keys.positive(&["limit_m"], self.limit_m);
-        keys.positive(&["watch_m"], self.watch_m);
+        keys.limit(&["limit_m"], self.limit_m);
+        keys.limit(&["watch_m"], self.watch_m);
         if let Some((watch, limit)) = self.watch_m.zip(self.limit_m).filter(|(watch, limit)| watch > limit) {
             let what = format!("`watch_m` {watch} is above `limit_m` {limit}");
             keys.complain(
@@ -251,6 +258,8 @@ impl PartSettings {
         let damping = keys.required(&["damping_n_s_per_m"], self.damping_n_s_per_m);
         let mass = keys.required(&["screw_mass_kg"], self.screw_mass_kg);
         keys.positive(&["lead_m_per_rev"], self.lead_m_per_rev);
+        keys.in_range(&["stiffness_n_per_m"], self.stiffness_n_per_m, STIFFNESS_N_PER_M, "N/m");
+        keys.in_range(&["lead_m_per_rev"], self.lead_m_per_rev, LEAD_M_PER_REV, "m");
         let actuator =
             keys.made(&["stiffness_n_per_m"], estimator::ActuatorModel::linear(stiffness?, damping?, mass?))?;
         Some((actuator, Geometry::Linear { lead_m_per_rev: self.lead_m_per_rev }))
@@ -367,6 +376,23 @@ impl SettingsValidator {
     fn positive(&mut self, key: &'static [&'static str], value: Option<f64>) {
         let name = key.last().copied().unwrap_or_default();
         self.found.extend(crate::config::limits::positive(name, value).map(|c| (key, c)));
+    }
+
+    fn limit(&mut self, key: &'static [&'static str], value: Option<f64>) {
+        let name = key.last().copied().unwrap_or_default();
+        self.found.extend(crate::config::limits::plausible_limit(name, value).map(|c| (key, c)));
+    }
+
+    fn in_range(
+        &mut self,
+        key: &'static [&'static str],
+        value: Option<f64>,
+        (least, most): (f64, f64),
+        unit: &str,
+    ) {
+        let name = key.last().copied().unwrap_or_default();
+        self.found
+            .extend(crate::config::limits::in_range(name, value, &(least..=most), unit).map(|c| (key, c)));
     }
 
     fn made<T>(&mut self, key: &'static [&'static str], made: Result<T, estimator::Error>) -> Option<T> {

@@ -13,7 +13,7 @@ const DAYS: i64 = 260;
 fn rows(seed: u64) -> Vec<Observation> {
     let mut random = Random::new(seed);
     let um_per_hour = 0.02 * (0.5 * random.normal()).exp();
-    let (mut gap_um, states_errors) = (20.0 + 3.0 * random.normal(), seed % 5 != 0);
+    let (mut gap_um, states_errors) = (20.0 + 3.0 * random.normal(), !seed.is_multiple_of(5));
     (0..2 * DAYS)
         .filter_map(|flight| {
             let mean_um = 1.7 * um_per_hour;
@@ -25,7 +25,7 @@ fn rows(seed: u64) -> Vec<Observation> {
             let se_um = random.between(1.0, 3.0);
             let outlier_um = if random.uniform() < 0.02 { 40.0 } else { 0.0 };
             let measured_um = gap_um + rig_um + se_um * random.normal() + outlier_um;
-            let installation = u32::from(seed % 3 == 0 && flight > 200);
+            let installation = u32::from(seed.is_multiple_of(3) && flight > 200);
             (random.uniform() < 0.8).then_some(Observation {
                 departure_us: flight * DAY_US / 2,
                 installation,

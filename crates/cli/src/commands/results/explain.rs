@@ -32,6 +32,7 @@ pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> R
     if args.json {
         let value = json!({
             "record": record,
+            "remedy": super::query::remedy(&record.estimate),
             "settings": { "part": settings, "config_digest": &*digest, "is_current": *digest == *record.provenance.config_digest },
             "replay": { "verdict": verdict.code(), "says": verdict.to_string() },
         });
@@ -187,6 +188,9 @@ fn page(
     );
     let flags = super::query::flags_text(e);
     line("flags", if flags.is_empty() { "none" } else { &flags });
+    if let Some(remedy) = super::query::remedy(e) {
+        line("remedy", remedy);
+    }
     let newtons = |v: Option<f64>| v.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
     line(
         "fitted",
