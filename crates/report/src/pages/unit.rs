@@ -282,7 +282,7 @@ fn prior(report: &Report, unit: &UnitView) -> String {
                 "Past forecast coverage was adequate; intervals not widened.".to_owned()
             };
             format!(
-                "Learned from {part} until {}: a new unit has {} ± {} µm; time from new to the act limit: median {} FH, \
+                "Learned from {part} until {}: a new unit has {} ± {} µm (90 %); time from new to the act limit: median {} FH, \
                  90 % of units between {} and {} FH; wear follows {}. {wider}",
                 date(p.learned_until_utc),
                 micrometres(p.new_m),

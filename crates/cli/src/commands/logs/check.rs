@@ -27,6 +27,9 @@ const SLOPE_TOLERANCE: f64 = 0.02;
 /// Usual logging rates; a rate outside mostly means a wrong unit of time.
 const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=20e3;
 
+/// Half the width of a 90 % interval, in standard errors.
+const Z90: f64 = 1.645;
+
 /// Note on the slope of screw on motor.
 const RATIO: &str = "screw/motor ratio";
 
@@ -452,7 +455,7 @@ impl ColumnTypes {
 
 /// Compares the parameters identified from the logs with the configured ones, by part number.
 fn proposals(facts: &Facts, config: &Config) -> String {
-    let columns = [text("key", 0), number("identified", 0), number("configured", 0)];
+    let columns = [text("key", 0), number("identified (± 90 %)", 0), number("configured", 0)];
     let mut page = String::new();
     for (number, all) in facts {
         let Some(part) = config.parts.get(number) else { continue };
@@ -461,7 +464,7 @@ fn proposals(facts: &Facts, config: &Config) -> String {
             .iter()
             .map(|p| {
                 let stated = p.configured.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
-                let uncertainty = p.uncertainty.map_or_else(String::new, |v| format!(" ± {v:.1e}"));
+                let uncertainty = p.uncertainty.map_or_else(String::new, |v| format!(" ± {:.1e}", Z90 * v));
                 vec![p.key.to_owned(), format!("{:.2e}{uncertainty}", p.identified), stated]
             })
             .collect();

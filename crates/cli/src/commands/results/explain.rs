@@ -73,6 +73,9 @@ fn find(args: &ExplainArgs, store: &Store) -> Result<GapRecord, Failure> {
     }
 }
 
+/// Half the width of a 90 % interval, in standard errors.
+const Z90: f64 = 1.645;
+
 /// Result of recomputing a record.
 struct Recomputation {
     digest: String,
@@ -195,9 +198,9 @@ fn page(
     line(
         "fitted",
         &format!(
-            "stiffness {} ± {} N/m, skew {} ms, loop {} µm, lost motion {} µm",
+            "stiffness {} ± {} N/m (90 %), skew {} ms, loop {} µm, lost motion {} µm",
             newtons(e.stiffness_n_per_m),
-            newtons(e.stiffness_se_n_per_m),
+            newtons(e.stiffness_se_n_per_m.map(|se| Z90 * se)),
             e.skew_s.map_or_else(table::empty_cell, |s| format!("{:.2}", s * 1e3)),
             table::micrometres(e.loop_width_m),
             table::micrometres(e.lost_motion_m)
