@@ -19,6 +19,8 @@ pub struct EstimatePlot {
     pub estimate: GapEstimate,
     /// Time between samples, s.
     pub step_s: f64,
+    /// The first sample after each break of the clock, and its time, s.
+    pub breaks: Vec<(usize, f64)>,
     /// δX, m; NaN where missing.
     pub dx_m: Vec<f64>,
     /// Load, N.
@@ -40,6 +42,7 @@ impl EstimatePlot {
             position: channels.position.clone(),
             estimate: estimate::estimate(channels, part, &config.document.estimate)?,
             step_s: channels.step_s,
+            breaks: channels.breaks.clone(),
             dx_m: channels.dx_m.clone(),
             load_n: channels.load_n.clone(),
             midrange: gap::mid_range(&track.s_m).ok(),

@@ -11,6 +11,7 @@ pub mod flight_log;
 pub mod normalize;
 pub mod panic;
 pub mod part_identification;
+pub mod rejection;
 pub mod trace;
 
 pub use config::Config;

@@ -57,7 +57,7 @@ impl Trace {
             .track(&estimate::samples(channels), Some(&mut seen))
             .map_err(|e| Diagnostic::new("estimate_failed", e))?;
         let count = track.s_m.len();
-        let time_s = (0..count).map(|k| k as f64 * channels.step_s).collect();
+        let time_s = (0..count).map(|k| channels.time_s(k)).collect();
         Ok(Self {
             log: vec![log.to_owned(); count],
             position: vec![channels.position.to_string(); count],

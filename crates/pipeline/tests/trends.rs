@@ -80,6 +80,7 @@ fn flown(days: i32) -> Vec<Row> {
             load_reversals: Some(100),
             gap_m: Some(gap_um * 1e-6),
             gap_se_m: Some(1e-6),
+            disagreeing_gap_m: None,
         };
         Row { unit, tail: format!("T{unit:02}"), flight_id: format!("{unit}-{at}"), assess }
     };
@@ -394,4 +395,44 @@ fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
     let alone =
         assess::assess_histories(&config(), &Installations::default(), histories(&rows), &ask).unwrap();
     assert_eq!(alone, assess[2..3]);
+}
+
+/// The last six gaps are 3.5 µm too high, and the other estimator says so.
+#[test]
+fn gaps_whose_estimators_disagree_hardly_move_a_level_and_the_reason_names_them() {
+    let with = |off_um: f64, is_flagged: bool| {
+        let mut rows = flown(200);
+        for row in rows.iter_mut().filter(|row| row.unit == 3 && row.assess.departure_utc > day(193)) {
+            let gap_m = row.assess.gap_m.unwrap();
+            row.assess.gap_m = Some(gap_m + off_um * 1e-6);
+            row.assess.disagreeing_gap_m = is_flagged.then_some(gap_m);
+        }
+        assess(&rows, day(199)).into_iter().find(|row| row.serial_number == "S03").unwrap()
+    };
+    let (sound, off, flagged) = (with(0.0, false), with(3.5, false), with(3.5, true));
+    let moved_um = |row: &TrendRow| (row.gap_m.unwrap() - sound.gap_m.unwrap()) * 1e6;
+    assert!(moved_um(&off) > 0.3, "{}", moved_um(&off));
+    assert!(moved_um(&flagged).abs() < 0.3 * moved_um(&off), "{} {}", moved_um(&flagged), moved_um(&off));
+    assert_eq!(flagged.state, sound.state);
+    let reason = flagged.reason.unwrap();
+    assert!(reason.contains("6 of the latest 12 gaps") && reason.contains("estimators_disagree"), "{reason}");
+}
+
+/// Two rows of one flight that differ: the smaller gap used to win in silence.
+#[test]
+fn conflicting_rows_of_an_estimates_table_are_an_error_that_names_both() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |rows: &str| {
+        let file = folder.path().join("estimates.csv");
+        std::fs::write(&file, format!("serial_number,departure_utc,flight_id,gap_m\n{rows}")).unwrap();
+        pipeline::history::external_estimates::read(&file)
+    };
+    let error = read("S1,2026-01-01T06:00:00Z,A,30e-6\nS1,2026-01-01T06:00:00Z,A,42e-6\n").unwrap_err();
+    let text = format!("{error:?}");
+    assert!(
+        ["conflicting_rows", "S1", "30.00 µm", "42.00 µm"].iter().all(|part| text.contains(part)),
+        "{text}"
+    );
+    assert!(read("S1,2026-01-01T06:00:00Z,A,30e-6\nS1,2026-01-01T06:00:00Z,A,30e-6\n").is_ok());
+    assert!(read("S1,2026-01-01T06:00:00Z,A,30e-6\nS2,2026-01-01T06:00:00Z,A,42e-6\n").is_ok());
 }

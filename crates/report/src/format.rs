@@ -20,10 +20,10 @@ pub(crate) fn micrometres_cell(m: Option<f64>) -> String {
     m.map(micrometres).unwrap_or_default()
 }
 
-/// `118.0 ± 4.1 µm`; the interval is half of the 90 % interval.
+/// `118.0 ± 4.1 µm (90 %)`: the gap and half the width of its 90 % interval.
 pub(crate) fn level(gap_m: Option<f64>, se_m: Option<f64>) -> String {
     match (gap_m, se_m) {
-        (Some(gap), Some(se)) => format!("{} ± {} µm", micrometres(gap), micrometres(1.645 * se)),
+        (Some(gap), Some(se)) => format!("{} ± {} µm (90 %)", micrometres(gap), micrometres(1.645 * se)),
         (Some(gap), None) => format!("{} µm", micrometres(gap)),
         _ => NO_DATA.to_owned(),
     }

@@ -1,5 +1,7 @@
 //! View model of a report: plain values in SI, composed by `pipeline`.
 
+use std::collections::BTreeMap;
+
 use jiff::Timestamp;
 use serde::Serialize;
 
@@ -155,6 +157,8 @@ pub struct Quality {
     pub refused: usize,
     /// Rejection reasons and their counts, most frequent first.
     pub reasons: Vec<(String, usize)>,
+    /// Remedy of each of them.
+    pub remedies: BTreeMap<String, String>,
     #[serde(rename = "doubts")]
     pub flags: Vec<(String, usize)>,
     pub last_estimate_utc: Option<Timestamp>,

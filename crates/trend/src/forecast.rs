@@ -89,7 +89,7 @@ pub fn forecast(
     };
     let prior = if is_single_unit { &single_unit } else { prior };
     let ratio = snapshot.hours_per_usage(prior);
-    let variance_m2 = history.offset_m2 + prior.bias_sd_m.powi(2);
+    let variance_m2 = history.offset_m2 + history.kind_m2 + prior.bias_sd_m.powi(2);
     let after = |hours: f64| {
         let [p05_m, m, p95_m] = forecast_quantiles(fitted, hours / ratio, variance_m2, prior);
         let band = Interval { p05_m, m, p95_m };

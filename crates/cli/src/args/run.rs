@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 use jiff::Timestamp;
 
-use super::parse::{parse_span, parse_utc};
+use super::parse::{parse_count, parse_span, parse_utc};
 
 /// `run`.
 #[derive(Debug, ClapArgs)]
@@ -24,7 +24,7 @@ pub(crate) struct RunArgs {
     #[arg(long)]
     pub serial: Option<String>,
     /// Process at most N logs.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = parse_count)]
     pub limit: Option<usize>,
     /// Use N workers; default: one per core.
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]

@@ -1,9 +1,14 @@
 //! Loading of configuration and tables, common to all commands.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
+use jiff::Timestamp;
 use job::Config;
+use pipeline::fleet_trends::assess;
+use pipeline::history::histories::Histories;
 use records::Installations;
+use store::Store;
 
 use crate::args::{CONFIG, ExternalEstimatesArgs, Global};
 use crate::exit::Failure;
@@ -41,6 +46,99 @@ pub(crate) fn load_trend_context(
     };
     config.document.trend.limit_m = external.limit_m.or(config.document.trend.limit_m);
     Ok((config, installations))
+}
+
+/// Refuses a range of departures without any instant.
+pub(crate) fn check_range(since: Option<Timestamp>, until: Option<Timestamp>) -> Result<(), Failure> {
+    match since.zip(until).filter(|(since, until)| since >= until) {
+        Some((since, until)) => Err(Failure::usage(
+            "empty_range",
+            format!("no departure is at or after {since} and before {until}"),
+            "set `--until` later than `--since`",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a name that is not among the known ones, with the nearest of them.
+pub(crate) fn check_name<'n>(
+    what: &str,
+    name: Option<&str>,
+    known: impl IntoIterator<Item = &'n str>,
+) -> Result<(), Failure> {
+    let known: BTreeSet<&str> = known.into_iter().collect();
+    let Some(name) = name.filter(|name| !known.contains(name)) else { return Ok(()) };
+    let hint = match ingest::mapping::column_pattern::nearest(name, known.iter().copied()) {
+        Some(nearest) => format!("the nearest known {what} is `{nearest}`"),
+        None => "list the contents of the store with `freeplay store info`".to_owned(),
+    };
+    Err(Failure::usage(
+        "unknown_name",
+        format!("no {what} `{name}` in the store and the installations table ({} searched)", known.len()),
+        &hint,
+    ))
+}
+
+/// Names in the store and in the installations table.
+pub(crate) struct KnownNames {
+    histories: Histories,
+    installations: Installations,
+}
+
+impl KnownNames {
+    /// Names of a store and a table.
+    pub(crate) fn new(histories: Histories, installations: Installations) -> Self {
+        Self { histories, installations }
+    }
+
+    /// Reads the names of a store; a missing store or table has none.
+    pub(crate) fn read(config: &Config) -> Self {
+        let histories =
+            Store::open(config.store()).ok().and_then(|store| assess::load_histories(&store).ok());
+        let installations = pipeline::run::scheduler::installations(config).unwrap_or_default();
+        Self { histories: histories.unwrap_or_default(), installations }
+    }
+
+    /// Tail numbers.
+    pub(crate) fn tails(&self) -> impl Iterator<Item = &str> {
+        self.histories.tails().chain(self.installations.iter().map(|stay| stay.tail_number.as_str()))
+    }
+
+    /// Positions.
+    pub(crate) fn positions(&self) -> impl Iterator<Item = &str> {
+        self.histories.positions().chain(self.installations.iter().map(|stay| stay.position.as_str()))
+    }
+
+    /// Serial numbers.
+    pub(crate) fn serials(&self) -> impl Iterator<Item = &str> {
+        let stored = self.histories.names().map(|(_, serial)| serial.as_str());
+        stored.chain(self.installations.iter().map(|stay| stay.serial_number.as_str()))
+    }
+
+    /// Part numbers.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = &str> {
+        let stored = self.histories.names().filter_map(|(part, _)| part.as_deref());
+        stored.chain(self.installations.iter().map(|stay| stay.part_number.as_str()))
+    }
+
+    /// Flights.
+    pub(crate) fn flights(&self) -> impl Iterator<Item = &str> {
+        self.histories.iter().flat_map(|(_, history)| {
+            history.flights().iter().filter_map(move |flown| history.flight_id(flown))
+        })
+    }
+
+    /// Refuses the first name of a selection of units that is unknown.
+    pub(crate) fn check_units(
+        &self,
+        tail: Option<&str>,
+        serial: Option<&str>,
+        part: Option<&str>,
+    ) -> Result<(), Failure> {
+        check_name("tail", tail, self.tails())?;
+        check_name("serial number", serial, self.serials())?;
+        check_name("part number", part, self.parts())
+    }
 }
 
 /// Path as text for messages.

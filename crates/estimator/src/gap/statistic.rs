@@ -46,7 +46,10 @@ pub fn mid_range(s_m: &[f64]) -> Result<GapStatistic, Error> {
         return Err(Error::Constant { samples: upper, s_m: max });
     }
     let (upper_m, lower_m) = (upper_sum / upper as f64, lower_sum / lower as f64);
-    debug_assert!(!(upper_m < lower_m), "means {upper_m} m above and {lower_m} m below the mid-range");
+    debug_assert!(
+        upper_m >= lower_m || upper_m.is_nan() || lower_m.is_nan(),
+        "means {upper_m} m above and {lower_m} m below the mid-range"
+    );
     Ok(GapStatistic {
         gap_m: upper_m - lower_m,
         upper_m: upper_m + mid_range_m,

@@ -220,7 +220,7 @@ pub(crate) fn distance(p: &Matrix3<f64>, other: &Matrix3<f64>) -> f64 {
 
 /// Whether no variance is negative by more than rounding of the variances before.
 fn has_positive_variances(p: &Matrix3<f64>, before: &Matrix3<f64>) -> bool {
-    (0..3).all(|k| !(p[(k, k)] < -1e-9 * before[(k, k)].abs()))
+    (0..3).all(|k| p[(k, k)].is_nan() || p[(k, k)] >= -1e-9 * before[(k, k)].abs())
 }
 
 fn symmetric(p: &Matrix3<f64>) -> Matrix3<f64> {

@@ -60,6 +60,7 @@ pub(crate) fn assemble(
         dx_m,
         load_n,
         segments,
+        breaks: line.breaks.clone(),
         temperature_c,
         quality,
         flags,

@@ -32,6 +32,7 @@ pub(crate) struct Normalized {
     pub(crate) facts: IdentityFields,
     step_s: f64,
     segments: Vec<Range<usize>>,
+    breaks: Vec<(usize, f64)>,
     metres_per_radian: Option<f64>,
     temperature_c: Option<f64>,
     flags: Vec<String>,
@@ -66,6 +67,7 @@ impl Normalized {
             facts,
             step_s,
             segments: segments.ok_or_else(|| fail("its stretches cannot be read".into()))?,
+            breaks: text("breaks").and_then(breaks_from).unwrap_or_default(),
             metres_per_radian: number("metres_per_radian"),
             temperature_c: number("temperature_c"),
             output_locked: text("output_locked") == Some("true"),
@@ -116,6 +118,7 @@ impl Normalized {
             dx_m,
             load_n,
             segments: self.segments.clone(),
+            breaks: self.breaks.clone(),
             temperature_c: self.temperature_c,
             flags: self.flags.clone(),
             repairs: TimestampRepairs::default(),
@@ -139,6 +142,15 @@ fn segments_from(text: &str) -> Option<Vec<Range<usize>>> {
     text.split(' ').map(range).collect()
 }
 
+/// `ROW:SECONDS` of each break, separated by blanks.
+fn breaks_from(text: &str) -> Option<Vec<(usize, f64)>> {
+    let one = |text: &str| {
+        let (row, seconds) = text.split_once(':')?;
+        Some((row.parse().ok()?, seconds.parse().ok()?))
+    };
+    text.split(' ').map(one).collect()
+}
+
 /// Writes one actuator's flight as a normalized log, with its `provenance`.
 ///
 /// # Errors
@@ -151,7 +163,7 @@ pub fn write(
     provenance: &BTreeMap<String, String>,
     encoding: Encoding,
 ) -> Result<(), Error> {
-    let time_s = (0..channels.dx_m.len()).map(|k| k as f64 * channels.step_s).collect();
+    let time_s = (0..channels.dx_m.len()).map(|k| channels.time_s(k)).collect();
     let columns = [
         ("time_s", Column::Real(time_s)),
         ("motor_m", Column::Real(channels.motor_m.clone())),
@@ -170,6 +182,7 @@ fn footer(
 ) -> Vec<(String, String)> {
     let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
     let segments: Vec<String> = channels.segments.iter().map(|s| format!("{}..{}", s.start, s.end)).collect();
+    let breaks: Vec<String> = channels.breaks.iter().map(|(row, s)| format!("{row}:{s}")).collect();
     let own = [
         ("tail_number", identity.tail_number.to_string()),
         ("flight_id", identity.flight_id.to_string()),
@@ -179,6 +192,7 @@ fn footer(
         ("tail_hours_end", number(identity.tail_hours_end)),
         ("step_s", channels.step_s.to_string()),
         ("segments", segments.join(" ")),
+        ("breaks", breaks.join(" ")),
         ("metres_per_radian", number(geometry.metres_per_radian())),
         ("temperature_c", number(channels.temperature_c)),
         ("apart", channels.apart.to_string()),

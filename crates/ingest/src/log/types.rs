@@ -60,6 +60,8 @@ pub struct ActuatorChannels {
     pub load_n: Vec<f64>,
     /// Unbroken stretches with a load.
     pub segments: Vec<Range<usize>>,
+    /// The first sample after each break of the clock, and its time since the first sample by the log's stamps, s.
+    pub breaks: Vec<(usize, f64)>,
     /// Mean temperature, °C.
     pub temperature_c: Option<f64>,
     /// Samples that no condition leaves: NaN in every channel.
@@ -75,6 +77,13 @@ pub struct ActuatorChannels {
 }
 
 impl ActuatorChannels {
+    /// Time of a sample since the first one, s: the step within a segment, the log's own stamps at breaks.
+    pub fn time_s(&self, sample: usize) -> f64 {
+        let passed = self.breaks.partition_point(|(first, _)| *first <= sample);
+        let (first, begin_s) = passed.checked_sub(1).map_or((0, 0.0), |last| self.breaks[last]);
+        begin_s + (sample - first) as f64 * self.step_s
+    }
+
     /// What δX looks like.
     pub fn dx_quality(&self) -> Quality {
         Quality::of(&self.dx_m, &self.segments, self.step_s, self.apart)

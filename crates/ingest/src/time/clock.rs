@@ -42,6 +42,8 @@ pub struct TimeBase {
     pub kept: Option<Vec<u32>>,
     /// Unbroken stretches, in kept rows.
     pub segments: Vec<Range<usize>>,
+    /// The first row after each break, and its time since the first row by the stamps, s.
+    pub breaks: Vec<(usize, f64)>,
     /// Repairs made.
     pub repairs: TimestampRepairs,
 }
@@ -127,6 +129,7 @@ pub fn uniform(rows: usize, rate_hz: f64) -> TimeBase {
         rows,
         kept: None,
         segments: std::iter::once(0..rows).collect(),
+        breaks: Vec::new(),
         repairs: TimestampRepairs::default(),
     }
 }
@@ -175,7 +178,8 @@ pub fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<
     let segments = split_at(count, &breaks);
     let is_sorted = |segment: &Range<usize>| (segment.start + 1..segment.end).all(|i| step(i) > 0.0);
     debug_assert!(segments.iter().all(is_sorted), "timestamps of a segment increase");
-    Ok(TimeBase { step_s, rows: t.len(), segments, kept, repairs })
+    let breaks = breaks.into_iter().map(|row| (row, at(row) - at(0))).collect();
+    Ok(TimeBase { step_s, rows: t.len(), segments, breaks, kept, repairs })
 }
 
 /// The declared step, where one is and the stamps do not contradict it; else the one that was seen.
@@ -537,6 +541,7 @@ mod tests {
         assert!((holed.seconds[2] - 0.2).abs() < 1e-12);
         assert_eq!((line.repairs.filled, line.repairs.unstamped), (2, 1));
         assert_eq!(line.segments, [0..4, 4..6]);
+        assert_eq!(line.breaks, [(4, 9.0)]);
     }
 
     /// Clocks of many kinds: where the quick way gives a step, it is that of the slow one, to the bit.

@@ -65,6 +65,7 @@ pub(crate) fn implausible(key: &str, value: Option<f64>) -> Option<Diagnostic> {
     let what = format!("`{key}` is {value:e}, outside the plausible range {least:e} to {most:e}");
     Some(Diagnostic::new("out_of_range", what).hint(match key {
         "limit_m" | "watch_m" => "limits are in metres: 150 µm is 150e-6",
+        "stiffness_n_per_m" => "stiffness is in N/m: 50 N/µm is 5e7; ranges are in docs/configuration.md",
         _ => "check the unit that ends the key's name; ranges are in docs/configuration.md",
     }))
 }
@@ -80,6 +81,6 @@ pub fn plausible_limit_m(limit_m: f64) -> Result<f64, String> {
     if limit_m > 0.0 && limit_m <= MAX_PLAUSIBLE_LIMIT_M {
         Ok(limit_m)
     } else {
-        Err(format!("{limit_m} m is no limit of free play: 150 µm is 150e-6"))
+        Err(format!("{limit_m} m is not a plausible limit of free play: 150 µm is 150e-6"))
     }
 }

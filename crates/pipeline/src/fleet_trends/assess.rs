@@ -10,7 +10,7 @@ use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series, UsageDefaults, classic};
 
 use crate::error::Error;
-use crate::fleet_trends::changes::{UnitChange, changed};
+use crate::fleet_trends::changes::{UnitChange, changed, since_states};
 use crate::fleet_trends::limits::Limits;
 use crate::fleet_trends::priors::FleetPriors;
 use crate::fleet_trends::tail_wide_steps::TailWide;
@@ -21,6 +21,7 @@ use crate::history::histories::{Histories, History, UnitKey};
 use crate::history::installation_index::InstallationIndex;
 use crate::history::merge::of_parts;
 use crate::history::usage::UsageSources;
+use crate::monitoring::mapping_faults::{self, MappingFault};
 use crate::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
 use crate::monitoring::recorder_change::{RecorderChange, detect_changes, detect_changes_in_store};
 
@@ -87,9 +88,24 @@ pub struct RunAssessments {
     pub states: BTreeMap<&'static str, usize>,
     /// Units of the whole fleet in state `watch`, `plan` or `act`, touched by the run or not.
     pub work_list: Vec<TrendRow>,
+    /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
+    pub mapping_faults: Vec<MappingFault>,
 }
 
-/// Assesses the fleet after a run: the units whose records it changed, and the work list of all units.
+/// The states of all units of a store.
+pub(crate) type States = BTreeMap<UnitKey, &'static str>;
+
+/// The present states of all units of a store, by its own records.
+///
+/// # Errors
+/// As [`assess_store`].
+pub(crate) fn states(config: &Config, installations: &Installations, store: &Store) -> Result<States, Error> {
+    let rows = assess_store(config, installations, store, &UnitSelection::default())?;
+    Ok(rows.into_iter().filter_map(|row| Some((row.name(), row.state?))).collect())
+}
+
+/// Assesses the fleet after a run: the units whose records it changed, and the work list of all units. `before` holds
+/// the states of units before the run computed records of theirs again.
 ///
 /// # Errors
 /// As [`assess_store`].
@@ -99,14 +115,20 @@ pub fn assess_run(
     store: &Store,
     units: &[Unit],
     run_id: &str,
+    before: &States,
 ) -> Result<RunAssessments, Error> {
     let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
     let (all, of_run) = (load_histories(store)?, gathered(store, &query)?);
     let recent =
         all.newest_utc().map(|newest| recent_diagnostics(store, newest)).transpose()?.unwrap_or_default();
     let moved = detect_changes(&recent);
+    let latest =
+        all.newest_utc().map(|newest| mapping_faults::latest_rejections(store, newest)).transpose()?;
+    let touched = units.iter().map(|(part, serial)| (part.to_string(), serial.to_string())).collect();
+    let mapping_faults = mapping_faults::detect(&latest.unwrap_or_default(), &touched);
     let run = assess_run_from(config, installations, all, &of_run, units, moved)?;
-    Ok(RunAssessments { recent, ..run })
+    let changed = since_states(run.changed, before, &run.now);
+    Ok(RunAssessments { changed, recent, mapping_faults, ..run })
 }
 
 /// The same from all flights that are known after a run, and those of the run.
@@ -244,8 +266,11 @@ pub fn load_histories(store: &Store) -> Result<Histories, Error> {
 }
 
 fn gathered(store: &Store, query: &Query) -> Result<Histories, Error> {
-    let stored: Vec<&str> =
-        HistoryBuilder::COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name)).collect();
+    let stored: Vec<&str> = HistoryBuilder::COLUMNS
+        .into_iter()
+        .filter(|name| !["serial", "tail"].contains(name))
+        .chain(HistoryBuilder::STORE_COLUMNS)
+        .collect();
     let parts = store.scan_columns(query, &stored)?;
     of_parts(parts.len(), true, |gathering, some| {
         for part in some {
@@ -330,15 +355,10 @@ impl<'a> FleetContext<'a> {
 
     /// Histories, and what each adds up to.
     fn of(config: &'a Config, histories: &'a Histories, series: Vec<Series>) -> Self {
+        let limits = Limits::new(config, series.iter());
         let units = histories.iter().zip(series);
         let units = units.map(|((name, history), series)| (name, (history, series))).collect();
-        Self {
-            limits: Limits(config),
-            units,
-            priors: FleetPriors::default(),
-            moved: Vec::new(),
-            installations: None,
-        }
+        Self { limits, units, priors: FleetPriors::default(), moved: Vec::new(), installations: None }
     }
 
     /// The same with what was learned by the turn before each of the days.

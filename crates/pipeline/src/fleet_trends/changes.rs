@@ -35,6 +35,38 @@ pub(crate) fn changed(before: &BTreeMap<UnitKey, TrendRow>, now: &[TrendRow]) ->
     now.iter().filter_map(|row| of_unit(before.get(&row.name()), row)).collect()
 }
 
+/// Adds the changes against the states that units had before a run computed their records again.
+pub(crate) fn since_states(
+    mut changed: Vec<UnitChange>,
+    before: &BTreeMap<UnitKey, &'static str>,
+    now: &[TrendRow],
+) -> Vec<UnitChange> {
+    for row in now {
+        let Some(from) = before.get(&row.name()).copied().filter(|from| row.state != Some(*from)) else {
+            continue;
+        };
+        let is_unit = |change: &&mut UnitChange| {
+            change.part_number == row.part_number && change.serial_number == row.serial_number
+        };
+        if let Some(change) = changed.iter_mut().find(is_unit) {
+            change.from = Some(from);
+        } else {
+            changed.push(UnitChange {
+                part_number: row.part_number.clone(),
+                serial_number: row.serial_number.clone(),
+                tail_number: row.tail_number.clone(),
+                position: row.position.clone(),
+                from: Some(from),
+                to: row.state,
+                reason: row.reason.clone(),
+                new_events: Vec::new(),
+                cleared_events: Vec::new(),
+            });
+        }
+    }
+    changed
+}
+
 fn of_unit(before: Option<&TrendRow>, now: &TrendRow) -> Option<UnitChange> {
     let known = before.map_or(&[][..], |row| &row.change_points);
     let new_events = beyond(&now.change_points, known);

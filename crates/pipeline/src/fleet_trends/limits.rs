@@ -3,16 +3,41 @@
 use job::Config;
 use job::config::part::WearAxis;
 use records::PartNumber;
-use trend::UsageAxis;
+use trend::{Series, UsageAxis};
+
+/// Gaps of the fleet, by departure, that give its scale where no limit does.
+const FIRST_GAPS: usize = 11;
+
+/// A limit over the gap of a new unit, as the prior assumes it.
+const LIMIT_OVER_NEW_GAP: f64 = 5.0;
 
 /// Limits, axes and settings of part numbers, as they are configured.
 #[derive(Clone, Copy)]
-pub(crate) struct Limits<'a>(pub(crate) &'a Config);
+pub(crate) struct Limits<'a> {
+    config: &'a Config,
+    /// Scale of the gaps of parts without a limit, m.
+    scale_m: f64,
+}
 
 impl<'a> Limits<'a> {
+    /// The limits of a configuration; the fleet's first gaps replace those that are not configured.
+    pub(crate) fn new<'s>(config: &'a Config, fleet: impl Iterator<Item = &'s Series>) -> Self {
+        let first = |series: &'s Series| {
+            let gaps = series.flights().iter().filter_map(|f| Some((f.departure_us, f.gap?.gap_m.abs())));
+            gaps.take(FIRST_GAPS)
+        };
+        let mut gaps: Vec<(i64, f64)> = fleet.flat_map(first).collect();
+        gaps.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut first_m: Vec<f64> = gaps.into_iter().take(FIRST_GAPS).map(|(_, m)| m).collect();
+        first_m.sort_by(f64::total_cmp);
+        let median_m = first_m.get(first_m.len() / 2).copied().filter(|m| *m > 0.0);
+        // Without a gap above zero nothing depends on the scale: any number does.
+        Self { config, scale_m: LIMIT_OVER_NEW_GAP * median_m.unwrap_or(1e-5) }
+    }
+
     /// Configured usage axis of a part's wear; nothing where its histories decide.
     pub(crate) fn axis(self, part: Option<&str>) -> Option<UsageAxis> {
-        let configured = self.part(part).and_then(|p| p.axis).or(self.0.document.trend.axis)?;
+        let configured = self.part(part).and_then(|p| p.axis).or(self.config.document.trend.axis)?;
         Some(match configured {
             WearAxis::Hours => UsageAxis::Hours,
             WearAxis::Flights => UsageAxis::Flights,
@@ -22,7 +47,7 @@ impl<'a> Limits<'a> {
 
     /// The act limit, m; none where neither the part nor the configuration states one.
     pub(crate) fn stated_m(self, part: Option<&str>) -> Option<f64> {
-        self.part(part).and_then(|p| p.limit_m).or(self.0.document.trend.limit_m)
+        self.part(part).and_then(|p| p.limit_m).or(self.config.document.trend.limit_m)
     }
 
     /// The act limit, m, or its stand-in.
@@ -32,16 +57,16 @@ impl<'a> Limits<'a> {
 
     /// What is configured of a part.
     fn part(self, number: Option<&str>) -> Option<&'a job::Part> {
-        number.and_then(|number| PartNumber::new(number).ok()).and_then(|number| self.0.parts.get(&number))
+        number
+            .and_then(|number| PartNumber::new(number).ok())
+            .and_then(|number| self.config.parts.get(&number))
     }
 
     /// What a unit of a part is judged by. Without a limit there is still a level and a rate; only crossings and
     /// states need one.
     pub(crate) fn settings(self, part: Option<&str>) -> trend::Settings {
-        /// A gap no actuator has: a stand-in that is never met and never shown.
-        const NEVER_M: f64 = 1.0;
-        let of = &self.0.document.trend;
-        let base = trend::Settings::for_limit(self.stated_m(part).unwrap_or(NEVER_M));
+        let of = &self.config.document.trend;
+        let base = trend::Settings::for_limit(self.stated_m(part).unwrap_or(self.scale_m));
         let watch_m = self.part(part).and_then(|p| p.watch_m).unwrap_or(base.watch_m);
         trend::Settings {
             // A part's own may lie above a limit that is everybody's.

@@ -168,7 +168,7 @@ pub(crate) fn row(
         state: trend.state.filter(|_| is_judged).map(state_word),
         reason: Some(match (removal, limit_m) {
             (Some(installation), _) => removed(installation),
-            (None, Some(_)) => reason(trend, history, wide),
+            (None, Some(_)) => reason(trend, history, wide, as_of),
             (None, None) => "no limit is configured".into(),
         }),
         sketch_m: sketched(&gaps_m),
@@ -188,8 +188,14 @@ fn removed(last: &Installation) -> String {
 }
 
 /// Why a state, and how old it is where no estimate has followed.
-fn reason(trend: &Assessment, history: &History, wide: &TailWide) -> String {
-    let reason = reason_of_state(trend, history, wide);
+fn reason(trend: &Assessment, history: &History, wide: &TailWide, as_of: Timestamp) -> String {
+    const LATEST: usize = 12;
+    let mut reason = reason_of_state(trend, history, wide);
+    if let (disputed @ 1.., gaps) = history.disputed(as_of, LATEST) {
+        reason = format!(
+            "{reason}; {disputed} of the latest {gaps} gaps have little weight (estimators_disagree)"
+        );
+    }
     match trend.stale_days {
         Some(days) => format!("{reason}; no estimate for {days:.0} days"),
         None => reason,
@@ -203,6 +209,9 @@ fn reason_of_state(trend: &Assessment, history: &History, wide: &TailWide) -> St
         (trend::Reason::Changed { kind, days }, Some(tail)) => format!(
             "{kind} {days:.0} days ago with all actuators of {tail} at once: a sensor or recorder, not wear"
         ),
+        (trend::Reason::NoEstimate, _) if trend.flights > 0 => {
+            format!("no estimate: all of {} flights are without a gap", trend.flights)
+        }
         (other, _) => other.to_string(),
     }
 }

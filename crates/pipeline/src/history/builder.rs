@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use arrow::array::{Array, Float64Array, RecordBatch};
+use arrow::array::{Array, AsArray, Float64Array, ListArray, RecordBatch};
 use ingest::tables::TableBatch;
 use jiff::Timestamp;
 use records::GapRecord;
@@ -14,6 +14,10 @@ use crate::history::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
 
 /// Rows of a block: its 32 MiB are more than what any allocator keeps to itself once they are given up.
 const BLOCK_ROWS: usize = 1 << 19;
+
+/// The flag of a record whose two estimators disagree, and the column with the gap of the other one.
+const DISAGREE: &str = "estimators_disagree";
+const OTHER_GAP: &str = "gap_midrange_fitted_m";
 
 /// Builder of histories from rows.
 ///
@@ -79,13 +83,20 @@ impl HistoryBuilder {
         "gap_se_m",
     ];
 
+    /// What the store's own rows bring in addition.
+    pub(crate) const STORE_COLUMNS: [&'static str; 2] = ["flags", OTHER_GAP];
+
     /// Adds the rows of a batch.
     ///
     /// # Errors
     /// When a column that must be there is not, and the first cell that cannot be read.
     pub fn add(&mut self, chunk: &TableBatch) -> Result<(), ingest::Error> {
+        self.add_with_flags(chunk, None)
+    }
+
+    fn add_with_flags(&mut self, chunk: &TableBatch, flags: Option<&ListArray>) -> Result<(), ingest::Error> {
         chunk.column(&["serial_number", "serial"])?;
-        self.rows(chunk, &KeyColumns::of(chunk)?, &TextColumn::of(chunk, &["flight_id"])?)
+        self.rows(chunk, &KeyColumns::of(chunk)?, &TextColumn::of(chunk, &["flight_id"])?, flags)
     }
 
     /// Adds rows of the store.
@@ -93,7 +104,8 @@ impl HistoryBuilder {
     /// # Errors
     /// The first cell that cannot be read.
     pub(crate) fn add_store_batch(&mut self, batch: RecordBatch) -> Result<(), ingest::Error> {
-        self.add(&TableBatch::new(Path::new("results"), batch, 0))
+        let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>()).cloned();
+        self.add_with_flags(&TableBatch::new(Path::new("results"), batch, 0), flags.as_ref())
     }
 
     fn rows(
@@ -101,6 +113,7 @@ impl HistoryBuilder {
         chunk: &TableBatch,
         seats: &KeyColumns,
         flights: &TextColumn,
+        flags: Option<&ListArray>,
     ) -> Result<(), ingest::Error> {
         let column = |names: &[&str]| chunk.column(names).map(Some);
         let (serial, departure) = (chunk.find(&["serial_number", "serial"]), column(&["departure_utc"])?);
@@ -110,6 +123,7 @@ impl HistoryBuilder {
             ["flight_hours", "tail_hours_end", "load_reversals", "gap_se_m"]
                 .map(|name| chunk.numbers(chunk.find(&[name])));
         let (hours, meters, reversals, errors_m) = (hours?, meters?, reversals?, errors_m?);
+        let others_m = chunk.numbers(chunk.find(&[OTHER_GAP]))?;
         let mut seen = KeyCache::default();
         for row in 0..chunk.len() {
             let empty = |column| chunk.error(row, column, "it is empty".into());
@@ -133,6 +147,8 @@ impl HistoryBuilder {
                 load_reversals: at(&reversals, row).map(|n| n as u64),
                 gap_m: at(&gaps_m, row),
                 gap_se_m: at(&errors_m, row),
+                disagreeing_gap_m: at(&others_m, row)
+                    .filter(|_| flags.is_some_and(|flags| disagree(flags, row))),
             };
             self.push_row(seat, &said);
         }
@@ -182,6 +198,9 @@ impl HistoryBuilder {
             load_reversals: u64::try_from(estimate.load_reversals).ok(),
             gap_m: estimate.gap_m,
             gap_se_m: estimate.gap_se_m,
+            disagreeing_gap_m: estimate
+                .gap_midrange_fitted_m
+                .filter(|_| estimate.flags.iter().any(|flag| flag == DISAGREE)),
         };
         self.put(who, &row);
     }
@@ -225,7 +244,54 @@ struct RowTarget {
     place: u32,
 }
 
+/// Whether the flags of a row hold the disagreement of the estimators.
+fn disagree(flags: &ListArray, row: usize) -> bool {
+    if flags.is_null(row) || flags.value_length(row) == 0 {
+        return false;
+    }
+    let flags = flags.value(row);
+    flags.as_string_opt::<i32>().is_some_and(|flags| flags.iter().any(|flag| flag == Some(DISAGREE)))
+}
+
 /// The number of a row.
 pub(crate) fn at(numbers: &Float64Array, row: usize) -> Option<f64> {
     numbers.is_valid(row).then(|| numbers.value(row))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow::array::{ArrayRef, ListBuilder, StringArray, StringBuilder, TimestampMicrosecondArray};
+
+    use super::*;
+
+    /// A standard error of 3 µm and a distance of 4 µm between the estimators make 5 µm.
+    #[test]
+    fn stored_gaps_with_the_flag_have_an_error_that_spans_both_estimators() {
+        let mut flags = ListBuilder::new(StringBuilder::new());
+        for of_row in [&["estimators_disagree"][..], &["soft_contact"], &[]] {
+            of_row.iter().for_each(|flag| flags.values().append_value(flag));
+            flags.append(true);
+        }
+        let departures = TimestampMicrosecondArray::from(vec![1, 2, 3]).with_timezone("UTC");
+        let numbers = |values: [f64; 3]| Arc::new(Float64Array::from(values.to_vec())) as ArrayRef;
+        let columns: [(&str, ArrayRef); 6] = [
+            ("serial_number", Arc::new(StringArray::from(vec!["S"; 3]))),
+            ("departure_utc", Arc::new(departures)),
+            ("gap_m", numbers([30e-6; 3])),
+            ("gap_se_m", numbers([3e-6; 3])),
+            (OTHER_GAP, numbers([34e-6; 3])),
+            ("flags", Arc::new(flags.finish())),
+        ];
+        let mut builder = HistoryBuilder::default();
+        builder.add_store_batch(RecordBatch::try_from_iter(columns).unwrap()).unwrap();
+        let histories = builder.into_store();
+        let history = histories.get(&(None, "S".into())).unwrap();
+        let errors: Vec<f64> =
+            history.flights().iter().map(|flown| history.extras(flown).gap_se_m().unwrap() * 1e6).collect();
+        assert!((errors[0] - 5.0).abs() < 1e-9 && (errors[1] - 3.0).abs() < 1e-9, "{errors:?}");
+        let at = |us| Timestamp::from_microsecond(us).unwrap();
+        assert_eq!((history.disputed(at(3), 12), history.disputed(at(3), 2)), ((1, 3), (0, 2)));
+    }
 }

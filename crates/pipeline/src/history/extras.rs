@@ -81,6 +81,7 @@ mod tests {
             load_reversals: None,
             gap_m: None,
             gap_se_m: None,
+            disagreeing_gap_m: None,
         })
     }
 

@@ -13,6 +13,8 @@ pub struct FlightInput<'a> {
     pub load_reversals: Option<u64>,
     pub gap_m: Option<f64>,
     pub gap_se_m: Option<f64>,
+    /// The gap by the other estimator where the record has the flag `estimators_disagree`.
+    pub disagreeing_gap_m: Option<f64>,
 }
 
 /// A flight as a unit's history keeps it, in 32 bytes.
@@ -71,6 +73,7 @@ pub struct FlightExtras {
     /// Numbers; `NaN` for none.
     flight_hours: f64,
     tail_hours_end: f64,
+    /// Negative where the estimators disagree.
     gap_se_m: f64,
     /// The largest number for none.
     load_reversals: u64,
@@ -81,7 +84,7 @@ impl FlightExtras {
         Self {
             flight_hours: row.flight_hours.unwrap_or(f64::NAN),
             tail_hours_end: row.tail_hours_end.unwrap_or(f64::NAN),
-            gap_se_m: row.gap_se_m.unwrap_or(f64::NAN),
+            gap_se_m: signed_error(row),
             load_reversals: row.load_reversals.unwrap_or(u64::MAX),
         }
     }
@@ -115,9 +118,22 @@ impl FlightExtras {
         (self.load_reversals != u64::MAX).then_some(self.load_reversals)
     }
 
-    /// The gap's standard error, m.
+    /// The gap's standard error, m; it spans both estimators where they disagree.
     pub fn gap_se_m(&self) -> Option<f64> {
-        known(self.gap_se_m)
+        known(self.gap_se_m.abs())
+    }
+
+    /// Whether the estimators disagree.
+    pub(crate) fn is_disputed(&self) -> bool {
+        self.gap_se_m < 0.0
+    }
+}
+
+/// The standard error of a gap; where the estimators disagree, with the distance between them, and negative.
+fn signed_error(row: &FlightInput<'_>) -> f64 {
+    match row.gap_m.zip(row.disagreeing_gap_m) {
+        Some((gap_m, other_m)) => -row.gap_se_m.unwrap_or(0.0).hypot(gap_m - other_m),
+        None => row.gap_se_m.unwrap_or(f64::NAN),
     }
 }
 

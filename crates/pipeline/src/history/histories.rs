@@ -68,6 +68,8 @@ pub struct History {
     extras: UnitExtras,
     /// The flights' names, one after the other.
     names: String,
+    /// Departures of the flights whose estimators disagree, µs since 1970 UTC, in order.
+    disputed_us: Vec<i64>,
 }
 
 impl History {
@@ -84,6 +86,15 @@ impl History {
     /// Those that departed at or before a time.
     pub(crate) fn until(&self, as_of: Timestamp) -> &[FlightRow] {
         &self.flights[..self.flights.partition_point(|f| f.departure_utc() <= as_of)]
+    }
+
+    /// Of the latest gaps at a time, how many have estimators that disagree, and how many there are.
+    pub(crate) fn disputed(&self, as_of: Timestamp, latest: usize) -> (usize, usize) {
+        let gaps = self.until(as_of).iter().rev().filter(|flown| flown.gap_m().is_some()).take(latest);
+        gaps.fold((0, 0), |(disputed, count), flown| {
+            let is_disputed = self.disputed_us.binary_search(&flown.departure_us()).is_ok();
+            (disputed + usize::from(is_disputed), count + 1)
+        })
     }
 
     /// The one that departed then.
@@ -134,6 +145,7 @@ impl History {
             flights: Vec::with_capacity(flights),
             extras: UnitExtras::default(),
             names: String::with_capacity(names),
+            disputed_us: Vec::new(),
         }
     }
 
@@ -154,6 +166,8 @@ impl History {
         if !self.flights.is_sorted_by(|a, b| order(a, b) != Ordering::Greater) {
             self.flights.sort_by(order);
         }
+        let is_disputed = |flown: &&FlightRow| self.extras(flown).is_disputed();
+        self.disputed_us = self.flights.iter().filter(is_disputed).map(FlightRow::departure_us).collect();
         self
     }
 }
@@ -192,6 +206,17 @@ impl Histories {
         self.units.keys()
     }
 
+    /// The tails of all flights; a tail may come several times.
+    pub fn tails(&self) -> impl Iterator<Item = &str> {
+        self.units.values().flat_map(History::tails)
+    }
+
+    /// The positions of all flights; a position may come several times.
+    pub fn positions(&self) -> impl Iterator<Item = &str> {
+        let places = self.units.values().flat_map(|history| &history.places);
+        places.filter_map(|place| place.position.as_deref())
+    }
+
     /// A unit's flights.
     pub fn get(&self, name: &UnitKey) -> Option<&History> {
         self.units.get(name)
@@ -227,6 +252,7 @@ impl Histories {
                 flights: flights.copied().collect(),
                 extras: history.extras.clone(),
                 names: history.names.clone(),
+                disputed_us: history.disputed_us.clone(),
             };
             (!left.flights.is_empty()).then(|| (name.clone(), left))
         };

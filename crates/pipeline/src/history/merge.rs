@@ -253,6 +253,7 @@ mod tests {
                 load_reversals: gap_m.map(|gap| gap as u64),
                 gap_m: *gap_m,
                 gap_se_m: None,
+                disagreeing_gap_m: None,
             };
             gathering.put(who, &row);
         }

@@ -43,6 +43,18 @@ pub struct PositionKey {
     pub serial_number: String,
 }
 
+impl PositionKey {
+    pub(crate) fn of(who: RowKey<'_>) -> Self {
+        let text = |name: Option<&str>| name.unwrap_or_default().to_owned();
+        Self {
+            tail_number: text(who.tail_number),
+            position: text(who.position),
+            part_number: text(who.part_number),
+            serial_number: who.serial_number.to_owned(),
+        }
+    }
+}
+
 /// The flights of a unit in a seat, by departure.
 pub type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
 
@@ -119,13 +131,7 @@ impl Found {
     }
 
     fn of_position(&mut self, who: RowKey<'_>) -> usize {
-        let text = |name: Option<&str>| name.unwrap_or_default().to_owned();
-        let position = PositionKey {
-            tail_number: text(who.tail_number),
-            position: text(who.position),
-            part_number: text(who.part_number),
-            serial_number: who.serial_number.to_owned(),
-        };
+        let position = PositionKey::of(who);
         let diagnostics = &mut self.diagnostics;
         *self.by_seat.entry(position).or_insert_with(|| {
             diagnostics.push(Vec::new());

@@ -372,7 +372,7 @@ mod tests {
                 part_number: "EMA".into(),
                 serial_number: "1".into(),
             };
-            let flights = super::tests::flights(40, 11, |_| 0.0);
+            let flights = flights(40, 11, |_| 0.0);
             BTreeMap::from([(key, flights.into_iter().enumerate().map(flight).collect())])
         };
         let [change] = &detect_changes(&flights(30.0))[..] else {

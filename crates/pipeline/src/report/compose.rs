@@ -369,6 +369,10 @@ fn quality(history: &History, rest: &[FlightExtras], as_of: Timestamp) -> Qualit
     Quality {
         estimated: count,
         refused: records.len() - count,
+        remedies: reasons
+            .keys()
+            .filter_map(|code: &String| Some((code.clone(), job::rejection::remedy(code)?.to_owned())))
+            .collect(),
         reasons: ranked(reasons),
         flags: ranked(doubts),
         last_estimate_utc: last,

@@ -13,7 +13,7 @@ use store::{LogOutcome, LogRecord, LogResult, RecordKey};
 use crate::fleet_trends::assess::Unit;
 use crate::run::event::Event;
 use crate::run::plan::{Plan, WorkItem};
-use crate::run::summary::{self, RunSummary};
+use crate::run::summary::{self, DuplicateLog, RunSummary};
 
 /// What came of one log.
 pub(crate) enum LogOutcomeData {
@@ -81,6 +81,16 @@ impl<'a> OwnershipLedger<'a> {
         match done {
             LogOutcomeData::Same(account) => {
                 report.known += 1;
+                let keys = account.record_keys();
+                let owner = keys
+                    .iter()
+                    .find_map(|key| self.owners.get(key))
+                    .filter(|owner| **owner != account.log_path);
+                if let Some(owner) = owner.filter(|_| account.estimated + account.refused == 0) {
+                    report
+                        .duplicates
+                        .push(DuplicateLog { log: account.log_path.clone(), owner: owner.clone() });
+                }
                 self.insert((*account).clone());
                 vec![LogResult { account: *account, records: Vec::new(), retires: Vec::new() }]
             }
@@ -102,6 +112,15 @@ impl<'a> OwnershipLedger<'a> {
         };
         let same =
             account.log_digest == competing_log.log_digest || self.holds_the_same(&account, &competing_log);
+        if same {
+            let (log, owner) = if competing_log.log_path < account.log_path {
+                (&account, &competing_log)
+            } else {
+                (&competing_log, &account)
+            };
+            let (log, owner) = (log.log_path.clone(), owner.log_path.clone());
+            report.duplicates.push(DuplicateLog { log, owner });
+        }
         if competing_log.log_path < account.log_path {
             let (account, diagnostics) = superseded(account, &competing_log, same);
             return vec![self.store(account, Vec::new(), &diagnostics, report)];
@@ -163,6 +182,7 @@ fn superseded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> (LogR
     (account.estimated, account.refused) = (0, 0);
     account.outcome = LogOutcome::Done;
     if is_same {
+        account.error_detail = Some(format!("copy of {}", owner.log_path));
         return (account, Vec::new());
     }
     let diagnostic = Diagnostic::new(

@@ -112,6 +112,15 @@ pub(crate) fn execute_run(
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
 
+    // Records that are computed again replace those by which the present states are known.
+    let is_again = |work: &WorkItem| {
+        work.before.is_some() && !matches!(work.why, WorkReason::Retry | WorkReason::Unfetched)
+    };
+    let before = if plan.work.iter().any(is_again) {
+        assess::states(config, &installations, &store)?
+    } else {
+        assess::States::new()
+    };
     let intent = RunPlanRows { run: report.row(context.program_version, &config_path, None), to_do };
     let inputs = Arc::new(RunInputs {
         config: config.clone(),
@@ -123,8 +132,13 @@ pub(crate) fn execute_run(
     let touched = work(&inputs, &intent, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
-    let assessments = assess::assess_run(config, &inputs.installations, &store, &touched, &report.run_id)?;
+    let assessments =
+        assess::assess_run(config, &inputs.installations, &store, &touched, &report.run_id, &before)?;
     report.add_assessments(assessments);
+    if report.is_partial() {
+        // A run that left logs out cannot determine which tails have no data.
+        report.quiet.clear();
+    }
     report.close(clock.elapsed().as_secs_f64());
     let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
     if store.needs_compaction()? {
@@ -149,7 +163,7 @@ fn acquire_lock(store: &Store, context: &Context<'_>) -> Result<Writer, Error> {
 }
 
 fn exit_code(report: &RunSummary, stopped: bool) -> i64 {
-    match (stopped && report.not_reached > 0, report.errors.is_empty()) {
+    match (stopped && report.not_reached > 0, report.errors.is_empty() && !report.has_mapping_fault()) {
         (true, _) => 130,
         (false, false) => 1,
         (false, true) => 0,

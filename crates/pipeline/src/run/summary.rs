@@ -11,6 +11,7 @@ use crate::fleet_trends::assess::RunAssessments;
 use crate::fleet_trends::changes::UnitChange;
 use crate::fleet_trends::trend_row::TrendRow;
 use crate::monitoring::innovations::{self, InnovationOutlier};
+use crate::monitoring::mapping_faults::MappingFault;
 use crate::monitoring::recorder_change::{self, RecorderChange};
 use crate::run::plan::{Plan, StandingError, WorkItem};
 
@@ -22,6 +23,26 @@ pub struct LogError {
     /// What is wrong with it.
     #[serde(rename = "complaint")]
     pub diagnostic: Diagnostic,
+}
+
+/// Records without a gap for one reason.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Refusals {
+    /// Rejection code.
+    pub reason: String,
+    /// Number of records.
+    pub count: usize,
+    /// What to do about it.
+    pub remedy: Option<&'static str>,
+}
+
+/// A log with the same samples as another one, which owns the flight.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct DuplicateLog {
+    /// The log.
+    pub log: String,
+    /// The log whose records are stored.
+    pub owner: String,
 }
 
 /// An aircraft that sends nothing while others do.
@@ -94,6 +115,12 @@ pub struct RunSummary {
     pub estimated: usize,
     /// Records of sound logs that cannot show one, by reason.
     pub refused: BTreeMap<String, usize>,
+    /// The same with the remedy of each reason.
+    pub refusals: Vec<Refusals>,
+    /// Logs of this run that are copies of other logs.
+    pub duplicates: Vec<DuplicateLog>,
+    /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
+    pub mapping_faults: Vec<MappingFault>,
     /// Logs in error, in the order of their names.
     pub errors: Vec<LogError>,
     /// Logs the run has not come to, or was stopped before.
@@ -152,6 +179,9 @@ impl RunSummary {
             flights: 0,
             estimated: 0,
             refused: BTreeMap::new(),
+            refusals: Vec::new(),
+            duplicates: Vec::new(),
+            mapping_faults: Vec::new(),
             errors: Vec::new(),
             not_reached: plan.work.len(),
             not_reached_logs: Vec::new(),
@@ -172,7 +202,7 @@ impl RunSummary {
 
     /// Adds the assessments of the run's units, and the recorder changes of their aircraft.
     pub(crate) fn add_assessments(&mut self, assessments: RunAssessments) {
-        let RunAssessments { now, changed, recent, states, work_list } = assessments;
+        let RunAssessments { now, changed, recent, states, work_list, mapping_faults } = assessments;
         let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
         let touched = |tail: &String| tails.contains(tail.as_str());
         self.recorder_moved = recorder_change::detect_changes(&recent)
@@ -182,7 +212,7 @@ impl RunSummary {
         self.innovations_unlike =
             innovations::find_outliers(&recent).into_iter().filter(|u| touched(&u.tail_number)).collect();
         (self.trends, self.changed, self.states) = (now, changed, states);
-        self.work_list = work_list;
+        (self.work_list, self.mapping_faults) = (work_list, mapping_faults);
     }
 
     pub(crate) fn count(&mut self, account: &LogRecord, records: &[GapRecord], diagnostics: &[Diagnostic]) {
@@ -207,6 +237,7 @@ impl RunSummary {
     pub(crate) fn close(&mut self, took_s: f64) {
         self.took_s = took_s;
         self.done = self.logs.len();
+        self.duplicates.sort_by(|a, b| a.log.cmp(&b.log));
         for (log, counted) in &self.logs {
             self.flights += usize::from(counted.estimated > 0 || !counted.refused.is_empty());
             self.estimated += counted.estimated;
@@ -220,11 +251,27 @@ impl RunSummary {
                 self.slowest = Some((log.clone(), counted.duration_s));
             }
         }
+        let refusals = |(reason, count): (&String, &usize)| Refusals {
+            reason: reason.clone(),
+            count: *count,
+            remedy: job::rejection::remedy(reason),
+        };
+        self.refusals = self.refused.iter().map(refusals).collect();
     }
 
     /// Records without a gap.
     pub fn refusals(&self) -> usize {
         self.refused.values().sum()
+    }
+
+    /// Whether logs were left out: by the request, its limit, or because the run stopped.
+    pub fn is_partial(&self) -> bool {
+        self.not_reached + self.left + self.not_asked > 0
+    }
+
+    /// Whether a wrong mapping shows in flights of this run.
+    pub fn has_mapping_fault(&self) -> bool {
+        self.mapping_faults.iter().any(|fault| fault.is_of_run)
     }
 
     /// Logs in error; one log may have several diagnostics.

@@ -36,6 +36,8 @@ pub struct EstimatePlot {
     pub summary: String,
     /// Time between samples, s.
     pub step_s: f64,
+    /// The first sample after each break of the clock, and its time, s.
+    pub breaks: Vec<(usize, f64)>,
     /// δX, m; NaN where missing.
     pub dx_m: Vec<f64>,
     /// Load, N; NaN where missing.
@@ -48,6 +50,15 @@ pub struct EstimatePlot {
     pub contacts: Vec<ContactInterval>,
     /// Fitted flanks, upper and lower: force in the coupling, N, and δX, m.
     pub flanks: [Vec<(f64, f64)>; 2],
+}
+
+impl EstimatePlot {
+    /// Time of a position among the samples, s: the step within a segment, the log's own time after a break.
+    pub fn time_s(&self, sample: f64) -> f64 {
+        let passed = self.breaks.partition_point(|(first, _)| *first as f64 <= sample);
+        let (first, begin_s) = passed.checked_sub(1).map_or((0, 0.0), |last| self.breaks[last]);
+        begin_s + (sample - first as f64) * self.step_s
+    }
 }
 
 /// An interval of samples in which one flank is in contact.
@@ -151,7 +162,7 @@ fn data(plot: &EstimatePlot) -> Result<String, Error> {
     let pick = |values: &[f64], scale: &dyn Fn(f64) -> Option<f64>| -> Vec<Option<f64>> {
         min_max_buckets(values, buckets).into_iter().map(|(_, v)| scale(v)).collect()
     };
-    let time: Vec<f64> = bucket_positions(plot.s_m.len(), buckets).map(|k| k * plot.step_s).collect();
+    let time: Vec<f64> = bucket_positions(plot.s_m.len(), buckets).map(|k| plot.time_s(k)).collect();
     let kn = |v: f64| (!v.is_nan()).then(|| v.round() / 1e3);
     Ok(serde_json::to_string(&serde_json::json!({
         "time_s": time,
@@ -181,7 +192,7 @@ fn draw_one(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
     line(&plot.summary, 13, 30)?;
     let (timed, flanks) = body.split_horizontally(TIME_PLOTS_WIDTH);
     let (positions, load) = timed.split_vertically((SIZE.1 - HEADING) * 2 / 3);
-    let end_s = (plot.s_m.len() as f64 * plot.step_s).max(1.0);
+    let end_s = plot.time_s(plot.s_m.len() as f64).max(1.0);
     draw_positions(&positions, plot, end_s)?;
     draw_load(&load, plot, end_s)?;
     draw_flanks(&flanks, plot)
@@ -194,7 +205,7 @@ fn draw_positions(area: &Area<'_>, plot: &EstimatePlot, end_s: f64) -> Result<()
     let floor = low - 0.06 * (high - low);
     let mut chart =
         axes(area, (0.0, end_s), (floor - 0.04 * (high - low), high), ("", "backlash S, δX [µm]"))?;
-    let curve = |values: &[f64]| curve(values, plot.step_s, to_um);
+    let curve = |values: &[f64]| curve(values, |at| plot.time_s(at), to_um);
     for piece in curve(&plot.dx_m) {
         chart.draw_series(LineSeries::new(piece, FAINT))?;
     }
@@ -222,7 +233,7 @@ fn draw_load(area: &Area<'_>, plot: &EstimatePlot, end_s: f64) -> Result<(), Dra
     let kn = |v: f64| v / 1e3;
     let (low, high) = span(plot.load_n.iter().map(|v| kn(*v)));
     let mut chart = axes(area, (0.0, end_s), (low, high), ("time [s]", "load [kN]"))?;
-    for piece in curve(&plot.load_n, plot.step_s, kn) {
+    for piece in curve(&plot.load_n, |at| plot.time_s(at), kn) {
         chart.draw_series(LineSeries::new(piece, INK))?;
     }
     Ok(())
@@ -354,12 +365,12 @@ fn bucket_positions(samples: usize, buckets: usize) -> impl Iterator<Item = f64>
 }
 
 /// Segments without missing values of a downsampled curve, against time in s.
-fn curve(values: &[f64], step_s: f64, scale: impl Fn(f64) -> f64) -> Vec<Vec<(f64, f64)>> {
+fn curve(values: &[f64], time_s: impl Fn(f64) -> f64, scale: impl Fn(f64) -> f64) -> Vec<Vec<(f64, f64)>> {
     let points = min_max_buckets(values, buckets(values.len()));
     points
         .split(|(_, v)| v.is_nan())
         .filter(|piece| !piece.is_empty())
-        .map(|piece| piece.iter().map(|(at, v)| (at * step_s, scale(*v))).collect())
+        .map(|piece| piece.iter().map(|(at, v)| (time_s(*at), scale(*v))).collect())
         .collect()
 }
 
@@ -384,6 +395,7 @@ mod tests {
             title: "<script>alert(1)</script> & co".to_owned(),
             summary: "gap 100.0 µm".to_owned(),
             step_s: 0.01,
+            breaks: Vec::new(),
             load_n: (0..samples).map(|k| 5e3 * wave(k)).collect(),
             s_m: (0..samples).map(|k| 5e-5 * wave(k).signum()).collect(),
             bounds_m: Some((5e-5, -5e-5)),
@@ -433,5 +445,14 @@ mod tests {
     fn the_page_needs_nothing_beside_it() {
         let page = estimate_plot_html(&[plot()]).unwrap();
         assert!(!page.contains("src=\"") && !page.contains("<link rel=\"stylesheet\""));
+    }
+
+    /// A pause of 1.6 s after sample 3000, which the stamps show.
+    #[test]
+    fn times_after_a_break_are_the_log_s_own() {
+        let plot = EstimatePlot { step_s: 0.004, breaks: vec![(3000, 13.6)], ..EstimatePlot::default() };
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(close(plot.time_s(2999.0), 11.996) && close(plot.time_s(3000.0), 13.6));
+        assert!(close(plot.time_s(3001.5), 13.606));
     }
 }

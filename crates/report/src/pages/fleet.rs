@@ -409,7 +409,7 @@ fn inspection_agreement(report: &Report) -> (String, Pairs) {
     let pairs = inspection_pairs(report);
     let words = match Agreement::of(&pairs) {
         Some(a) => format!(
-            "Estimate minus inspection over {}: bias {} ± {} µm (95 %), limits of agreement {} to {} µm.",
+            "Estimate minus inspection over {}: bias {} ± {} µm (90 %), limits of agreement (95 % of differences) {} to {} µm.",
             counted(a.pairs, "pair"),
             micrometres(a.bias_m),
             micrometres(a.bias_half_width_m),

@@ -192,10 +192,13 @@ fn quality(unit: &UnitView) -> Facts {
         let words: Vec<String> = of.iter().map(|(word, n)| format!("{word} {}", count(*n))).collect();
         if words.is_empty() { "none".to_owned() } else { words.join(", ") }
     };
+    let remedies: Vec<String> = q.remedies.iter().map(|(code, remedy)| format!("{code}: {remedy}")).collect();
+    let remedies = if remedies.is_empty() { "nothing".to_owned() } else { remedies.join("; ") };
     vec![
         ("Flights used", count(q.estimated)),
         ("Flights rejected", count(q.refused)),
         ("Rejection reasons", list(&q.reasons)),
+        ("What to do", remedies),
         ("Quality flags", list(&q.flags)),
         ("Last estimate", date_or(q.last_estimate_utc)),
         ("Days since", q.days_since_estimate.map_or_else(|| NO_DATA.to_owned(), |d| format!("{d:.0}"))),
@@ -279,7 +282,7 @@ fn prior(report: &Report, unit: &UnitView) -> String {
                 "Past forecast coverage was adequate; intervals not widened.".to_owned()
             };
             format!(
-                "Learned from {part} until {}: a new unit has {} ± {} µm; time from new to the act limit: median {} FH, \
+                "Learned from {part} until {}: a new unit has {} ± {} µm (90 %); time from new to the act limit: median {} FH, \
                  90 % of units between {} and {} FH; wear follows {}. {wider}",
                 date(p.learned_until_utc),
                 micrometres(p.new_m),

@@ -9,12 +9,19 @@ const OUTLIER_SIGMA: f64 = 4.0;
 /// Flights of the running median.
 const WINDOW: usize = 11;
 
+/// Flights on one side of a gap that vouch for it.
+const SIDE: usize = WINDOW / 2;
+
 /// Gaps before another one that its window, or the window of one in that window, reaches back to.
 const RECENT: usize = WINDOW - 1;
 
-/// Standard errors are taken to lie between these, metres: their squares must be numbers to reckon with.
-const LEAST_ERROR_M: f64 = 1e-9;
-const LARGEST_ERROR_M: f64 = 1.0;
+/// Standard errors are taken to lie between these, shares of the limit: their squares must be numbers to
+/// reckon with.
+const LEAST_ERROR: f64 = 1e-5;
+const LARGEST_ERROR: f64 = 1e4;
+
+/// The error of gaps that state none, a share of the limit, which the noise factor corrects.
+const UNSTATED_ERROR: f64 = 0.01;
 
 /// One estimate that takes part.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,6 +54,8 @@ pub(crate) struct NoiseScale {
     pub(crate) noise_factor: f64,
     /// The stated error of a gap that states none, metres.
     pub(crate) typical_m: f64,
+    /// The act limit, metres.
+    pub(crate) limit_m: f64,
     /// The last gaps, as far back as the window of a new one reaches.
     pub(crate) recent: Vec<OutlierResult>,
 }
@@ -64,14 +73,14 @@ pub(crate) struct OutlierResult {
 /// The factor is the variance factor from successive differences,
 /// (1.4826 · median |y(k+1) − y(k)| / √(se(k)² + se(k+1)²))². Errors that are missing, or far too small for their
 /// neighbours, count as the unit's median one.
-pub(crate) fn mark_outliers(flights: &[Flight]) -> CleanedSeries {
+pub(crate) fn mark_outliers(flights: &[Flight], limit_m: f64) -> CleanedSeries {
     let stated: Vec<(usize, Gap)> =
         flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?))).collect();
-    let typical_m = typical_error(&stated);
-    let errors: Vec<f64> = stated.iter().map(|(_, gap)| error(*gap, typical_m)).collect();
+    let typical_m = typical_error(&stated, limit_m);
+    let errors: Vec<f64> = stated.iter().map(|(_, gap)| error(*gap, typical_m, limit_m)).collect();
     let gaps: Vec<f64> = stated.iter().map(|(_, gap)| gap.gap_m).collect();
     let noise_factor = noise_factor(&gaps, &errors);
-    let scatter = NoiseScale { noise_factor, typical_m, recent: Vec::new() };
+    let scatter = NoiseScale { noise_factor, typical_m, limit_m, recent: Vec::new() };
     let mut mark_outliers =
         CleanedSeries { estimates: Vec::with_capacity(gaps.len()), outliers: Vec::new(), scatter };
     for (k, &(flight, _)) in stated.iter().enumerate() {
@@ -116,7 +125,7 @@ impl NoiseScale {
         }
         let (mut estimates, mut outliers) = (Vec::with_capacity(stated.len()), Vec::new());
         for (k, &(flight, gap)) in (RECENT..).zip(&stated) {
-            let variance = self.variance(error(gap, self.typical_m));
+            let variance = self.variance(error(gap, self.typical_m, self.limit_m));
             if is_outlier(&gaps, k, variance) {
                 outliers.push(flight);
             } else {
@@ -128,14 +137,24 @@ impl NoiseScale {
 
     /// A gap's variance, with the scatter that was found.
     fn variance(&self, error_m: f64) -> f64 {
-        (self.noise_factor * error_m * error_m).max(LEAST_ERROR_M * LEAST_ERROR_M)
+        (self.noise_factor * error_m * error_m).max((LEAST_ERROR * self.limit_m).powi(2))
     }
 }
 
 /// Whether a gap is far from the level of its neighbours, with or without wear.
 fn is_outlier(gaps: &[f64], at: usize, variance: f64) -> bool {
     let reach_m = OUTLIER_SIGMA * variance.sqrt();
-    is_far_from_median(gaps, at, reach_m) && (gaps[at] - on_local_line(gaps, at)).abs() > reach_m
+    is_far_from_median(gaps, at, reach_m)
+        && (gaps[at] - on_local_line(gaps, at)).abs() > reach_m
+        && !continues_one_side(gaps, at, reach_m)
+}
+
+/// Whether a gap continues the line of the five before it, or of the five after it: next to a step a line through
+/// both sides is no guide, and the flights next to the step are not outliers.
+fn continues_one_side(gaps: &[f64], at: usize, reach_m: f64) -> bool {
+    let before = at.checked_sub(SIDE).map(|from| on_line(&gaps[from..at], SIDE as f64));
+    let after = gaps.get(at + 1..=at + SIDE).map(|window| on_line(window, -1.0));
+    [before, after].into_iter().flatten().any(|line_m| (gaps[at] - line_m).abs() <= reach_m)
 }
 
 /// Whether a value lies further than this from the median of the eleven around it, of the nearest eleven at
@@ -163,17 +182,17 @@ fn estimate(flights: &[Flight], flight: usize, gap_m: f64, variance: f64) -> Wei
     WeightedGap { flight, installation, departure_us, usage, gap_m, weight: variance.recip() }
 }
 
-/// The median stated error; where nothing is stated, a micrometre, which the noise factor corrects.
-fn typical_error(stated: &[(usize, Gap)]) -> f64 {
+/// The median stated error; where nothing is stated, a share of the limit.
+fn typical_error(stated: &[(usize, Gap)], limit_m: f64) -> f64 {
     let mut errors: Vec<f64> = stated.iter().map(|(_, gap)| gap.se_m).filter(|se| se.is_finite()).collect();
-    if errors.is_empty() { 1e-6 } else { median(&mut errors) }
+    if errors.is_empty() { UNSTATED_ERROR * limit_m } else { median(&mut errors) }
 }
 
 /// Standard error of a gap, at least half the typical one: an unknown between-flight scatter
 /// bounds the weight of a single flight.
-fn error(gap: Gap, typical_m: f64) -> f64 {
+fn error(gap: Gap, typical_m: f64, limit_m: f64) -> f64 {
     let stated_m = if gap.se_m.is_finite() { gap.se_m.max(0.5 * typical_m) } else { typical_m };
-    stated_m.clamp(LEAST_ERROR_M, LARGEST_ERROR_M)
+    stated_m.clamp(LEAST_ERROR * limit_m, LARGEST_ERROR * limit_m)
 }
 
 /// Found over stated variance from successive differences, drawn to one while they are few.
@@ -205,9 +224,15 @@ fn noise_factor(gaps: &[f64], errors: &[f64]) -> f64 {
 /// would mark its wear as outliers. This line is computed only there.
 fn on_local_line(gaps: &[f64], at: usize) -> f64 {
     let (first, window) = window(gaps, at);
+    on_line(window, (at - first) as f64)
+}
+
+/// The median of pairwise slopes through the median of the levels of eleven values at most, at a place counted
+/// from their first.
+fn on_line(window: &[f64], at: f64) -> f64 {
     let width = window.len();
     if width < 2 {
-        return gaps[at];
+        return window[0];
     }
     let mut slopes = [0.0; WINDOW * (WINDOW - 1) / 2];
     let mut count = 0;
@@ -221,9 +246,9 @@ fn on_local_line(gaps: &[f64], at: usize) -> f64 {
     let slope = median(&mut slopes[..count]);
     let mut levels = [0.0; WINDOW];
     for (k, (level, gap)) in levels.iter_mut().zip(window).enumerate() {
-        *level = gap - slope * (first + k) as f64;
+        *level = gap - slope * k as f64;
     }
-    median(&mut levels[..width]) + slope * at as f64
+    median(&mut levels[..width]) + slope * at
 }
 
 #[cfg(test)]
@@ -251,7 +276,7 @@ mod tests {
     /// Three micrometres a flight at a third of one of noise: wear, all of it.
     #[test]
     fn a_unit_that_wears_fast_is_no_row_of_outliers() {
-        let found = mark_outliers(&flights(&wearing(10, 3.0)));
+        let found = mark_outliers(&flights(&wearing(10, 3.0)), 1e-4);
         assert!(found.outliers.is_empty(), "{:?}", found.outliers);
         assert!(found.scatter.noise_factor < 3.0, "{}", found.scatter.noise_factor);
     }
@@ -279,7 +304,7 @@ mod tests {
         let mut gaps = wearing(60, 0.1);
         gaps[47] += 40.0;
         let (before, after) = gaps.split_at(40);
-        let scatter = mark_outliers(&flights(before)).scatter;
+        let scatter = mark_outliers(&flights(before), 1e-4).scatter;
         let (estimates, outliers) = scatter.mark_outliers(&flights(after)).unwrap();
         assert_eq!((estimates.len(), outliers), (19, vec![7]));
     }
@@ -289,10 +314,22 @@ mod tests {
     fn later_flights_that_make_an_outlier_none_are_not_cleaned_apart() {
         let gaps: Vec<f64> = (0..48).map(|k| wearing(48, 0.0)[k] + if k < 37 { 0.0 } else { 40.0 }).collect();
         let (before, after) = gaps.split_at(40);
-        let known = mark_outliers(&flights(before));
+        let known = mark_outliers(&flights(before), 1e-4);
         assert_eq!(known.outliers, [37, 38, 39]);
         assert!(known.scatter.mark_outliers(&flights(after)).is_none());
         assert!(known.scatter.mark_outliers(&flights(&[])).is_some());
+    }
+
+    /// Two micrometres a flight and a fall of forty: a line through both sides misses the flights next to it.
+    #[test]
+    fn flights_beside_a_step_of_a_wearing_unit_are_no_outliers() {
+        let gaps: Vec<f64> = wearing(30, 2.0)
+            .into_iter()
+            .enumerate()
+            .map(|(k, um)| um - if k < 12 { 0.0 } else { 40.0 })
+            .collect();
+        let found = mark_outliers(&flights(&gaps), 1e-4);
+        assert!(found.outliers.is_empty(), "{:?}", found.outliers);
     }
 
     #[test]
@@ -300,7 +337,7 @@ mod tests {
         for slope in [0.0, 3.0] {
             let mut gaps = wearing(20, slope);
             gaps[7] += 40.0;
-            assert_eq!(mark_outliers(&flights(&gaps)).outliers, [7]);
+            assert_eq!(mark_outliers(&flights(&gaps), 1e-4).outliers, [7]);
         }
     }
 }

@@ -27,25 +27,35 @@ const SIDE: usize = 60;
 const NEAR_BELIEVED: f64 = 3.5;
 const NEAR_SHARE: f64 = 0.6;
 
-/// What the common slope is drawn to zero by, h²/m²: a spread of the wear rates of 5e-8 m/h.
-const SLOPE_INFORMATION: f64 = 4e14;
+/// Estimates on each side of a found step among which its place is sought.
+const LOCATE: usize = 10;
 
-/// Variance of the wear per metre of wear between the middles of both sides, metres: wear comes in
+/// Fewest estimates on either side of a located step.
+const LEAST_SIDE: usize = 3;
+
+/// Spread of the wear rates that a slope is drawn to zero by, shares of the limit per hour.
+const RATE_SPREAD: f64 = 5e-4;
+
+/// Variance of the wear per wear between the middles of both sides, a share of the limit: wear comes in
 /// spurts, which must not pass for steps.
-const WEAR_NOISE_M: f64 = 0.2e-6;
+const WEAR_NOISE: f64 = 0.002;
 
 /// A step of the measured gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StepChange {
     /// The first estimate after it.
     pub(crate) at: usize,
+    /// Its size and standard error, the wear going on as before.
     pub(crate) step_m: f64,
     pub(crate) se_m: f64,
+    /// Its size and standard error where the wear after it has a rate of its own, as after a reset.
+    pub(crate) jump_m: f64,
+    pub(crate) jump_se_m: f64,
 }
 
 /// All steps of a history, by place: the largest first, then what it left on either side.
-pub(crate) fn detect_steps(estimates: &[WeightedGap]) -> Vec<StepChange> {
-    let sums = PrefixSums::new(estimates);
+pub(crate) fn detect_steps(estimates: &[WeightedGap], limit_m: f64) -> Vec<StepChange> {
+    let sums = PrefixSums::new(estimates, limit_m);
     let mut found = Vec::new();
     let mut open = vec![(0, estimates.len())];
     while let Some((low, high)) = open.pop() {
@@ -60,32 +70,40 @@ pub(crate) fn detect_steps(estimates: &[WeightedGap]) -> Vec<StepChange> {
 
 /// Whether a step shows at one of the places from which the estimates from `since` on are in reach, the
 /// first estimate being the first one since the last step.
-pub(crate) fn has_step(estimates: &[WeightedGap], since: usize) -> bool {
-    PrefixSums::new(estimates).largest(0, since.saturating_sub(FARTHEST), estimates.len()).is_some()
+pub(crate) fn has_step(estimates: &[WeightedGap], since: usize, limit_m: f64) -> bool {
+    PrefixSums::new(estimates, limit_m).largest(0, since.saturating_sub(FARTHEST), estimates.len()).is_some()
 }
 
 /// Squared steps at changes of installation, less what their errors explain, and how many there are.
 ///
 /// Half of the mean is the variance of what one installation adds to every gap measured in it.
-pub(crate) fn installation_steps(estimates: &[WeightedGap]) -> (f64, f64) {
+pub(crate) fn installation_steps(estimates: &[WeightedGap], limit_m: f64) -> (f64, f64) {
     const REACH: usize = 60;
-    let sums = PrefixSums::new(estimates);
+    let largest_m = LARGEST_BIAS * limit_m;
+    let sums = PrefixSums::new(estimates, limit_m);
     let changes = (MIN_ESTIMATES..estimates.len().saturating_sub(MIN_ESTIMATES))
         .filter(|&i| estimates[i].installation != estimates[i - 1].installation);
     changes.fold((0.0, 0.0), |(squares, count), at| {
         let (step, _) = sums.step_at(at.saturating_sub(REACH), at, (at + REACH).min(estimates.len()));
-        if step.step_m.abs() > LARGEST_BIAS_M || step.se_m > 0.5 * LARGEST_BIAS_M {
+        if step.step_m.abs() > largest_m || step.se_m > 0.5 * largest_m {
             return (squares, count);
         }
         (squares + step.step_m * step.step_m - step.se_m * step.se_m, count + 1.0)
     })
 }
 
-/// A step larger than this at a change of installation was more than the change, metres.
-const LARGEST_BIAS_M: f64 = 8e-6;
+/// A step larger than this share of the limit at a change of installation was more than the change.
+const LARGEST_BIAS: f64 = 0.08;
 
 /// Weighted sums up to each estimate, from which a line over any stretch follows at once.
-struct PrefixSums(Vec<[f64; 5]>);
+struct PrefixSums {
+    sums: Vec<[f64; 6]>,
+    usages: Vec<f64>,
+    /// What a slope is drawn to zero by, h²/m².
+    slope_information: f64,
+    /// Variance of the wear per metre of wear, metres.
+    wear_noise_m: f64,
+}
 
 /// A stretch's variance, means, and centred squares.
 struct WindowStats {
@@ -94,36 +112,40 @@ struct WindowStats {
     y: f64,
     xx: f64,
     xy: f64,
+    yy: f64,
 }
 
 impl PrefixSums {
-    fn new(estimates: &[WeightedGap]) -> Self {
+    fn new(estimates: &[WeightedGap], limit_m: f64) -> Self {
         let origin = estimates.first().map_or((0.0, 0.0), |e| (e.usage, e.gap_m));
         let mut sums = Vec::with_capacity(estimates.len() + 1);
-        let mut sum = [0.0; 5];
+        let mut sum = [0.0; 6];
         sums.push(sum);
         for e in estimates {
             let (w, x, y) = (e.weight, e.usage - origin.0, e.gap_m - origin.1);
-            for (s, term) in sum.iter_mut().zip([w, w * x, w * y, w * x * x, w * x * y]) {
+            for (s, term) in sum.iter_mut().zip([w, w * x, w * y, w * x * x, w * x * y, w * y * y]) {
                 *s += term;
             }
             sums.push(sum);
         }
-        Self(sums)
+        let slope_information = (RATE_SPREAD * limit_m).powi(-2);
+        let usages = estimates.iter().map(|e| e.usage - origin.0).collect();
+        Self { sums, usages, slope_information, wear_noise_m: WEAR_NOISE * limit_m }
     }
 
     fn window_stats(&self, from: usize, to: usize) -> WindowStats {
-        let (a, b) = (&self.0[from], &self.0[to]);
+        let (a, b) = (&self.sums[from], &self.sums[to]);
         let weight = b[0] - a[0];
         let variance = weight.recip();
         let (x, y) = ((b[1] - a[1]) * variance, (b[2] - a[2]) * variance);
-        WindowStats { variance, x, y, xx: b[3] - a[3] - weight * x * x, xy: b[4] - a[4] - weight * x * y }
+        let centred = |i: usize, square: f64| b[i] - a[i] - weight * square;
+        WindowStats { variance, x, y, xx: centred(3, x * x), xy: centred(4, x * y), yy: centred(5, y * y) }
     }
 
     /// Step between the stretches around `at`, with one slope for both, its variance, and that slope.
     fn step_with_slope(&self, low: usize, at: usize, high: usize) -> (f64, f64, f64) {
         let (left, right) = (self.window_stats(low, at), self.window_stats(at, high));
-        let slope_variance = (left.xx + right.xx + SLOPE_INFORMATION).recip();
+        let slope_variance = (left.xx + right.xx + self.slope_information).recip();
         let slope = (left.xy + right.xy) * slope_variance;
         let apart = right.x - left.x;
         let variance = left.variance + right.variance + apart * apart * slope_variance;
@@ -133,7 +155,8 @@ impl PrefixSums {
     /// The same as a jump, and its slope.
     fn step_at(&self, low: usize, at: usize, high: usize) -> (StepChange, f64) {
         let (step_m, variance, slope) = self.step_with_slope(low, at, high);
-        (StepChange { at, step_m, se_m: variance.sqrt() }, slope)
+        let se_m = variance.sqrt();
+        (StepChange { at, step_m, se_m, jump_m: step_m, jump_se_m: se_m }, slope)
     }
 
     /// Whether the step is more than the measurement's errors and a spurt of the wear explain.
@@ -143,7 +166,7 @@ impl PrefixSums {
             self.window_stats(step.at, (step.at + NEAR).min(high)),
         );
         let worn_m = (slope * (right.x - left.x)).abs();
-        step.step_m.powi(2) > BELIEVED * BELIEVED * (step.se_m.powi(2) + WEAR_NOISE_M * worn_m)
+        step.step_m.powi(2) > BELIEVED * BELIEVED * (step.se_m.powi(2) + self.wear_noise_m * worn_m)
     }
 
     /// Whether the step is there between the nearest flights too, whichever slope is taken off: the
@@ -168,7 +191,7 @@ impl PrefixSums {
     /// Slope of one side, drawn to another so far as it is uncertain.
     fn slope(&self, from: usize, to: usize, other: f64) -> f64 {
         let side = self.window_stats(from, to);
-        (side.xy + SLOPE_INFORMATION * other) / (side.xx + SLOPE_INFORMATION)
+        (side.xy + self.slope_information * other) / (side.xx + self.slope_information)
     }
 
     /// The step with the largest ratio to its standard error, over all places from one on and all window lengths.
@@ -189,12 +212,50 @@ impl PrefixSums {
         all.dedup();
         all.into_iter()
             .filter(|at| places.contains(at))
-            .flat_map(|at| {
-                REACHES
-                    .map(|reach| self.step_at(at.saturating_sub(reach).max(low), at, (at + reach).min(high)))
-            })
-            .filter(|found| self.is_beyond_wear(low, high, found) && self.is_near(low, high, found))
-            .map(|(step, _)| step)
-            .max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+            .flat_map(|at| REACHES.map(|reach| (self.within_reach(low, at, high, reach), reach)))
+            .filter(|(found, _)| self.is_beyond_wear(low, high, found) && self.is_near(low, high, found))
+            .max_by(|((a, _), _), ((b, _), _)| ratio(a).total_cmp(&ratio(b)))
+            .map(|((step, _), reach)| self.located(low, step.at, high, reach))
+    }
+
+    /// The step at a place, by as many estimates on each side.
+    fn within_reach(&self, low: usize, at: usize, high: usize, reach: usize) -> (StepChange, f64) {
+        self.step_at(at.saturating_sub(reach).max(low), at, (at + reach).min(high))
+    }
+
+    /// The step at the place near a found one where two lines leave the smallest squares, and its size there.
+    ///
+    /// The largest ratio of a step to its error lies up to three flights from where the step happened: next to
+    /// it the common slope takes up a part of the step.
+    fn located(&self, low: usize, found: usize, high: usize, reach: usize) -> StepChange {
+        let (from, to) = (found.saturating_sub(NEAR).max(low), (found + NEAR).min(high));
+        let places = found.saturating_sub(LOCATE).max(from + LEAST_SIDE)
+            ..=(found + LOCATE).min(to.saturating_sub(LEAST_SIDE));
+        let squares = |at: usize| self.squares_about_line(from, at) + self.squares_about_line(at, to);
+        let at = places.min_by(|a, b| squares(*a).total_cmp(&squares(*b))).unwrap_or(found);
+        let (step, slope) = self.within_reach(low, at, high, reach);
+        let (jump_m, jump_se_m) = self.jump(low, at, high, slope);
+        StepChange { jump_m, jump_se_m, ..step }
+    }
+
+    /// Weighted squares that a line of a stretch's own leaves.
+    fn squares_about_line(&self, from: usize, to: usize) -> f64 {
+        let WindowStats { xx, xy, yy, .. } = self.window_stats(from, to);
+        yy - xy * xy / (xx + self.slope_information)
+    }
+
+    /// The step between the lines of both sides, each with a slope of its own, where they meet in time: the
+    /// growth from one flight to the next is no part of it.
+    fn jump(&self, low: usize, at: usize, high: usize, common: f64) -> (f64, f64) {
+        let (from, to) = (at.saturating_sub(SIDE).max(low), (at + SIDE).min(high));
+        let x = self.usages[at - 1].midpoint(self.usages[at]);
+        let end = |from: usize, to: usize| {
+            let side = self.window_stats(from, to);
+            let away = x - side.x;
+            let variance = side.variance + away * away / (side.xx + self.slope_information);
+            (side.y + away * self.slope(from, to, common), variance)
+        };
+        let ((before_m, before_m2), (after_m, after_m2)) = (end(from, at), end(at, to));
+        (after_m - before_m, (before_m2 + after_m2).sqrt())
     }
 }

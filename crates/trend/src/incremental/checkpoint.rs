@@ -56,8 +56,10 @@ pub(crate) struct Checkpoint {
     pub(crate) changes: Vec<ChangePoint>,
     pub(crate) outliers_us: Vec<i64>,
     pub(crate) scatter: NoiseScale,
-    /// Variance that undone offsets leave in the level, m², and what has been taken off the gaps, metres.
+    /// Variance that undone offsets leave in the level and that of what the steps were, m², and what has been
+    /// taken off the gaps, metres.
     pub(crate) offset_m2: f64,
+    pub(crate) kind_m2: f64,
     pub(crate) undone_m: f64,
     /// Estimates of the last segment.
     pub(crate) in_segment: usize,
@@ -157,6 +159,7 @@ impl Checkpoint {
             outliers_us: history.outliers.iter().map(|&flight| flights[flight].departure_us).collect(),
             scatter: history.scatter.clone(),
             offset_m2: history.offset_m2,
+            kind_m2: history.kind_m2,
             undone_m: history.undone_m,
             in_segment,
             near: near(&history, flights),

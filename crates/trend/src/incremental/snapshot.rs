@@ -91,7 +91,7 @@ impl UnitSnapshot {
     ) -> Assessment {
         let CurrentFit { tail, fitted } = current;
         let estimates = self.checkpoint.estimates + tail.len();
-        let offset_m2 = self.checkpoint.offset_m2;
+        let offset_m2 = self.checkpoint.offset_m2 + self.checkpoint.kind_m2;
         let single_unit = prior.single_unit();
         let unsupported = fitted.as_ref().err().copied().flatten();
         let changes = self.changes(maintenance, fitted.as_ref().ok().map(|(posterior, _)| posterior));
@@ -102,7 +102,8 @@ impl UnitSnapshot {
             prior
         };
         let fitted = fitted.map(|(posterior, _)| posterior);
-        let growth_probability = fitted.as_ref().map(level::growth_probability);
+        let growth_probability = fitted.as_ref().map(|p| level::growth_probability(p, prior.limit_m()));
+        let wear = wear_status(growth_probability);
         let ratio = self.hours_per_usage(prior);
         let remaining = fitted.as_ref().map(|p| RulDistribution::new(p, prior, settings, ratio, offset_m2));
         let level = fitted.as_ref().map(|p| level::level(p, prior, offset_m2));
@@ -118,9 +119,9 @@ impl UnitSnapshot {
             unit_hours: self.unit_hours_at_start.zip(self.last()).map(|(start, last)| start + last.hours),
             level,
             rate: fitted.as_ref().map(|p| level::rate(p, ratio)),
-            wear: wear(growth_probability),
+            wear,
             growth_probability,
-            law: fitted.as_ref().and_then(level::law),
+            law: fitted.as_ref().and_then(|p| level::law(p, wear == WearStatus::Wearing)),
             changes,
             crossing,
             check_probability: remaining.as_ref().map(|r| r.within(settings.check_interval_hours)),
@@ -235,10 +236,11 @@ impl CurrentFit {
     }
 }
 
-fn wear(growth_probability: Option<f64>) -> WearStatus {
+/// Between one half and 95 % neither growth nor its absence is reported.
+fn wear_status(growth_probability: Option<f64>) -> WearStatus {
     match growth_probability {
         Some(probability) if probability > 0.95 => WearStatus::Wearing,
-        Some(_) => WearStatus::Steady,
-        None => WearStatus::Unknown,
+        Some(probability) if probability < 0.5 => WearStatus::Steady,
+        _ => WearStatus::Unknown,
     }
 }

@@ -43,7 +43,7 @@ impl Tail {
         for estimate in &mut estimates {
             estimate.gap_m -= checkpoint.undone_m;
         }
-        if is_broken(checkpoint, &estimates) {
+        if is_broken(checkpoint, &estimates, prior.limit_m()) {
             return None;
         }
         for estimate in &mut estimates {
@@ -75,7 +75,7 @@ impl Tail {
 }
 
 /// Whether a step shows, that the flights until the checkpoint did not show.
-fn is_broken(checkpoint: &Checkpoint, tail: &[WeightedGap]) -> bool {
+fn is_broken(checkpoint: &Checkpoint, tail: &[WeightedGap], limit_m: f64) -> bool {
     let Some(first) = tail.first() else { return false };
     let near = checkpoint.near.iter().map(|near| WeightedGap {
         usage: f64::from(near.hours),
@@ -84,5 +84,5 @@ fn is_broken(checkpoint: &Checkpoint, tail: &[WeightedGap]) -> bool {
         ..*first
     });
     let estimates: Vec<WeightedGap> = near.chain(tail.iter().copied()).collect();
-    has_step(&estimates, checkpoint.near.len())
+    has_step(&estimates, checkpoint.near.len(), limit_m)
 }

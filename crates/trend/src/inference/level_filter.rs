@@ -11,8 +11,9 @@
 
 use crate::data::bins::Bin;
 
-/// Initial standard deviation of the level, metres: far larger than any gap, so that the data determine the level.
-const DIFFUSE_M: f64 = 1e-3;
+/// Initial standard deviation of the level, a share of the limit: far larger than any gap, so that the data determine
+/// the level.
+const DIFFUSE: f64 = 10.0;
 
 /// What the gains are made of at one bin.
 #[derive(Debug, Clone, Copy)]
@@ -56,9 +57,10 @@ pub(crate) struct Regression {
 }
 
 impl Filter {
-    /// Gains for bins and the variance by which the level walks before each (the first is not used).
-    pub(crate) fn new(bins: &[Bin], walk_m2: &[f64]) -> Self {
-        let start = DIFFUSE_M * DIFFUSE_M;
+    /// Gains for bins and the variance by which the level walks before each (the first is not used), of a unit
+    /// with an act limit.
+    pub(crate) fn new(bins: &[Bin], walk_m2: &[f64], limit_m: f64) -> Self {
+        let start = (DIFFUSE * limit_m).powi(2);
         let (mut p, mut reach, mut start_m2, mut log_variance) = (start, 1.0, start, 0.0);
         let mut steps = Vec::with_capacity(bins.len());
         for (k, bin) in bins.iter().enumerate() {
@@ -143,7 +145,7 @@ mod tests {
             gap_m: um * 1e-6,
             variance_m2: 1e-12,
         });
-        let filter = Filter::new(&bins, &[0.0; 2]);
+        let filter = Filter::new(&bins, &[0.0; 2], 1e-4);
         let pass = filter.pass(bins.iter().map(|b| b.gap_m));
         assert!((pass.start - 2e-6).abs() < 1e-11 && (pass.end - 2e-6).abs() < 1e-11, "{pass:?}");
         assert!(

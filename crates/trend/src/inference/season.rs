@@ -12,10 +12,13 @@ use crate::inference::level_filter::Pass;
 use crate::inference::posterior::Posterior;
 use crate::inference::segment_fit::{SegmentFit, linear_growth};
 use crate::prior::fleet_prior::FleetPrior;
-use crate::prior::season_params::{PSEUDO_SD_M, SeasonParams, YEAR_US};
+use crate::prior::season_params::{PSEUDO_SD, SeasonParams, YEAR_US};
 
 /// Weight of the assumption of no seasonal component, in units.
 const PSEUDO_UNITS: f64 = 4.0;
+
+/// Spread of the units' amplitudes while their mean is sought, a share of the limit.
+const UNIT_SPREAD: f64 = 0.005;
 
 /// Standard errors beyond which the fleet's mean swing is believed.
 const BELIEVED: f64 = 3.0;
@@ -34,11 +37,12 @@ pub(crate) fn waves(departure_us: f64) -> [f64; 2] {
 }
 
 /// Learns phase and amplitude from the fits of the units, each weighted by its error and the spread among units.
-pub(crate) fn learn_season(seasonal_fits: &[SeasonalFit]) -> SeasonParams {
+pub(crate) fn learn_season(seasonal_fits: &[SeasonalFit], limit_m: f64) -> SeasonParams {
+    let spread_m2 = (UNIT_SPREAD * limit_m).powi(2);
     let mean = |component: usize, variance: usize| {
         let weights = seasonal_fits
             .iter()
-            .map(|s| (s.amplitude_m[component], 1.0 / (s.covariance_m2[variance] + 0.25e-12)));
+            .map(|s| (s.amplitude_m[component], 1.0 / (s.covariance_m2[variance] + spread_m2)));
         let (sum, total) = weights.fold((0.0, 0.0), |(sum, total), (x, w)| (sum + w * x, total + w));
         if total > 0.0 { (sum / total, 1.0 / total) } else { (0.0, f64::INFINITY) }
     };
@@ -53,14 +57,14 @@ pub(crate) fn learn_season(seasonal_fits: &[SeasonalFit]) -> SeasonParams {
             (c * w.amplitude_m[0] + s * w.amplitude_m[1], c * c * xx + 2.0 * c * s * xy + s * s * yy)
         })
         .collect();
-    amplitude_distribution(phase, &along, believed)
+    amplitude_distribution(phase, &along, believed, PSEUDO_SD * limit_m)
 }
 
 /// Mean and spread by expectation–maximisation; the mean is zero unless the seasonal component is significant.
-fn amplitude_distribution(phase: f64, along: &[(f64, f64)], believed: bool) -> SeasonParams {
-    let (mut mean_m, mut sd_m) = (0.0, PSEUDO_SD_M);
+fn amplitude_distribution(phase: f64, along: &[(f64, f64)], believed: bool, pseudo_m: f64) -> SeasonParams {
+    let (mut mean_m, mut sd_m) = (0.0, pseudo_m);
     for _ in 0..30 {
-        let (mut sum, mut squares, mut count) = (0.0, PSEUDO_UNITS * PSEUDO_SD_M.powi(2), PSEUDO_UNITS);
+        let (mut sum, mut squares, mut count) = (0.0, PSEUDO_UNITS * pseudo_m.powi(2), PSEUDO_UNITS);
         for &(amplitude_m, error_m2) in along {
             let share = sd_m * sd_m / (sd_m * sd_m + error_m2);
             let own = mean_m + share * (amplitude_m - mean_m);

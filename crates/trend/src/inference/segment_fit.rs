@@ -34,7 +34,8 @@ impl<'a> SegmentFit<'a> {
         bins: Vec<Bin>,
         growth_m: impl Fn(f64) -> f64,
     ) -> Self {
-        let filter = Filter::new(&bins, &process_variance(&bins, segment.begin, prior, growth_m));
+        let walk_m2 = process_variance(&bins, segment.begin, prior, growth_m);
+        let filter = Filter::new(&bins, &walk_m2, prior.limit_m());
         let seasonal: Vec<f64> = bins.iter().map(|b| prior.season.wave(b.departure_us)).collect();
         let wave = filter.pass(seasonal.iter().copied());
         let mut gaps =

@@ -20,8 +20,8 @@ const CUTS: [f64; 3] = [0.3, 0.5, 0.7];
 /// Estimates below which a history is not cut.
 const MIN_ESTIMATES: usize = 60;
 
-/// Forecast growth below which a cut carries no information on wear, metres.
-const VISIBLE_M: f64 = 3e-6;
+/// Forecast growth below which a cut carries no information on wear, a share of the limit.
+const VISIBLE: f64 = 0.03;
 
 /// Cuts that the usual miss is worth: enough that thirty units may outvote it.
 const PSEUDO_CUTS: f64 = 20.0;
@@ -64,7 +64,7 @@ fn normalised_error(segment: &Segment<'_>, share: f64, prior: &FleetPrior) -> Op
     let level_m: f64 = fitted.components.iter().map(|n| n.weight * n.level_m).sum();
     let off_m = end.gap_m - middle_m;
     let width_m = if off_m > 0.0 { high_m - middle_m } else { middle_m - low_m };
-    (middle_m - level_m > VISIBLE_M && width_m > 0.0).then(|| off_m / width_m)
+    (middle_m - level_m > VISIBLE * prior.limit_m() && width_m > 0.0).then(|| off_m / width_m)
 }
 
 /// 5 %, 50 % and 95 % bounds of the gap after more usage, as measured with some variance.

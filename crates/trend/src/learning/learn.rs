@@ -123,11 +123,11 @@ impl<'a> TrainingSet<'a> {
 /// are of the measurement whatever wear follows.
 fn assumed(training_set: &TrainingSet<'_>, limit_m: f64, executor: &impl Executor) -> FleetPrior {
     let mut assumed = FleetPrior::uninformative(limit_m);
-    assumed.bias_sd_m = bias(&training_set.histories, assumed.bias_sd_m);
+    assumed.bias_sd_m = bias(&training_set.histories, assumed.bias_sd_m, limit_m);
     let of_segment = |s: &Segment<'_>| seasonal_fit(s, &assumed, &posterior(s, &assumed)?);
     let seasonal_fits = executor.map(&segments(&training_set.histories), of_segment);
     let seasonal_fits: Vec<SeasonalFit> = seasonal_fits.into_iter().flatten().collect();
-    assumed.season = learn_season(&seasonal_fits);
+    assumed.season = learn_season(&seasonal_fits, limit_m);
     assumed
 }
 
@@ -254,11 +254,11 @@ fn segments(histories: &[History]) -> Vec<Segment<'_>> {
 }
 
 /// Spread of what an installation adds: half the mean square of the steps between installations.
-fn bias(histories: &[History], assumed_m: f64) -> f64 {
+fn bias(histories: &[History], assumed_m: f64, limit_m: f64) -> f64 {
     let assumed = (PSEUDO_CHANGES * 2.0 * assumed_m * assumed_m, PSEUDO_CHANGES);
     let (squares, count) = histories
         .iter()
-        .map(|history| installation_steps(&history.estimates))
+        .map(|history| installation_steps(&history.estimates, limit_m))
         .fold(assumed, |sum, found| (sum.0 + found.0, sum.1 + found.1));
     (0.5 * squares / count).max(0.0).sqrt()
 }

@@ -18,6 +18,14 @@ const OVERDUE: f64 = 20.0;
 /// The gap of a new unit as a share of the limit, while nothing is known.
 const NEW_SHARE: f64 = 0.2;
 
+/// What is assumed of the measurement and of the wear while nothing is known, shares of the limit: the spread of
+/// a new gap, variance of the wear per wear, variance of the level per hour (of the limit's square), and the spread
+/// of what an installation adds. Every length of this crate is a share of the limit: results do not depend on its unit.
+const NEW_SPREAD: f64 = 0.05;
+const WEAR_NOISE: f64 = 0.002;
+const DRIFT_PER_HOUR: f64 = 1e-8;
+const BIAS_SPREAD: f64 = 0.015;
+
 /// A life over the time by which its law runs: its logarithm is normal with this mean and spread. Of the
 /// exponential law, whose time constant it is, and of a course, whose nominal life.
 const LN_CONSTANTS: (f64, f64) = (1.1, 0.5);
@@ -108,16 +116,16 @@ impl FleetPrior {
             hours_per_unit: 1.0,
             span_m: (1.0 - NEW_SHARE) * limit_m,
             new_m: NEW_SHARE * limit_m,
-            new_sd_m: 0.05 * limit_m,
+            new_sd_m: NEW_SPREAD * limit_m,
             ln_life: 4000.0_f64.ln(),
             ln_life_sd: 0.8,
             shares,
-            season: SeasonParams::unknown(),
+            season: SeasonParams::unknown(limit_m),
             fresh_share: 0.3,
             onsets_per_hour: 1.0 / 2000.0,
-            wear_noise_m: 0.2e-6,
-            drift_m2_per_hour: 1e-16,
-            bias_sd_m: 1.5e-6,
+            wear_noise_m: WEAR_NOISE * limit_m,
+            drift_m2_per_hour: DRIFT_PER_HOUR * limit_m * limit_m,
+            bias_sd_m: BIAS_SPREAD * limit_m,
             calibration: CalibrationParams::USUAL,
         }
     }
@@ -126,7 +134,12 @@ impl FleetPrior {
     /// of a part number without data.
     pub(crate) fn single_unit(&self) -> Self {
         let Self { axis, hours_per_unit, .. } = *self;
-        Self { axis, hours_per_unit, ..Self::uninformative(self.span_m / (1.0 - NEW_SHARE)) }
+        Self { axis, hours_per_unit, ..Self::uninformative(self.limit_m()) }
+    }
+
+    /// The act limit that the prior was made for, metres.
+    pub(crate) fn limit_m(&self) -> f64 {
+        self.span_m / (1.0 - NEW_SHARE)
     }
 
     /// What wear follows.

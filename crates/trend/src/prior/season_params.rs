@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 /// A tropical year, microseconds.
 pub(crate) const YEAR_US: f64 = 365.242_2 * 86_400e6;
 
-/// Spread of the amplitude from unit to unit while no fleet is known, metres.
-pub(crate) const PSEUDO_SD_M: f64 = 0.3e-6;
+/// Spread of the amplitude from unit to unit while no fleet is known, a share of the limit.
+pub(crate) const PSEUDO_SD: f64 = 0.003;
 
 /// Seasonal component of a part number's fleet.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,8 +19,8 @@ pub(crate) struct SeasonParams {
 
 impl SeasonParams {
     /// Parameters while no fleet is known: no mean amplitude.
-    pub(crate) fn unknown() -> Self {
-        Self { phase: 0.0, mean_m: 0.0, sd_m: PSEUDO_SD_M }
+    pub(crate) fn unknown(limit_m: f64) -> Self {
+        Self { phase: 0.0, mean_m: 0.0, sd_m: PSEUDO_SD * limit_m }
     }
 
     /// The component of unit amplitude at a time.

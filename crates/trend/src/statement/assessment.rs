@@ -20,7 +20,7 @@ pub struct Assessment {
     pub rate: Option<Rate>,
     /// Does it wear?
     pub wear: WearStatus,
-    /// Probability that the gap has grown by 2 µm or more since it was new here, or reset.
+    /// Probability that the gap has grown by 2 % of the limit or more since it was new here, or reset.
     pub growth_probability: Option<f64>,
     /// The law most believed in, and how much.
     pub law: Option<(WearClass, f64)>,

@@ -132,7 +132,7 @@ impl RulDistribution {
         let place = hours.max(1.0).ln() * self.scale;
         let whole = (place as usize).min(CELLS);
         let part = self.cells.get(whole).map_or(0.0, |cell| cell * (place - whole as f64));
-        self.over + self.cells[..whole].iter().sum::<f64>() + part
+        (self.over + self.cells[..whole].iter().sum::<f64>() + part).min(1.0)
     }
 }
 

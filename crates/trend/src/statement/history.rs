@@ -8,8 +8,12 @@ use crate::math::distributions;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
-/// A step larger than this is never a matter of rigging, metres: a fall made the unit new, a rise is damage.
-const MAX_RIGGING_STEP_M: f64 = 15e-6;
+/// A step larger than this share of the limit is never a matter of rigging: a fall made the unit new, a rise is
+/// damage.
+const MAX_RIGGING_STEP: f64 = 0.15;
+
+/// Least probability that a fall within rigging's reach was the other of reset and re-rigging.
+const LEAST_DOUBT: f64 = 0.02;
 
 /// Flights from a change of installation within which a step is the books' own.
 const RECORD_FLIGHTS: usize = 3;
@@ -21,8 +25,10 @@ pub(crate) struct History {
     pub(crate) outliers: Vec<usize>,
     pub(crate) scatter: NoiseScale,
     pub(crate) changes: Vec<ChangePoint>,
-    /// Variance that undone offsets leave in the level, m².
+    /// Variance that the sizes of undone offsets leave in the level, m².
     pub(crate) offset_m2: f64,
+    /// Variance of the level from the uncertain kinds of the last segment's steps, m².
+    pub(crate) kind_m2: f64,
     begins: Vec<SegmentStart>,
     /// What has been taken off the last estimates, metres.
     pub(crate) undone_m: f64,
@@ -49,8 +55,8 @@ pub(crate) fn read_history(
     prior: &FleetPrior,
 ) -> History {
     let now = flights.last().map_or(0.0, |f| prior.usage(f));
-    let CleanedSeries { mut estimates, outliers, scatter } = mark_outliers(flights);
-    let found = detect_steps(&estimates);
+    let CleanedSeries { mut estimates, outliers, scatter } = mark_outliers(flights, prior.limit_m());
+    let found = detect_steps(&estimates, prior.limit_m());
     for estimate in &mut estimates {
         estimate.usage = prior.usage(&flights[estimate.flight]);
     }
@@ -60,6 +66,7 @@ pub(crate) fn read_history(
         scatter,
         changes: Vec::new(),
         offset_m2: 0.0,
+        kind_m2: 0.0,
         begins: vec![SegmentStart { estimate: 0, usage: 0.0, fresh: false }],
         undone_m: 0.0,
         last_step: found.last().map_or(0, |step| step.at),
@@ -109,17 +116,19 @@ impl History {
             ChangePointKind::Recorded => 1.0,
             _ => distributions::cdf(step.step_m.abs() / step.se_m),
         };
-        self.changes.push(ChangePoint {
-            departure_us,
-            kind,
-            step_m: step.step_m,
-            se_m: step.se_m,
-            certainty,
-        });
         let renewed = entries.any(|entry| entry.renews) && step.step_m < 0.0;
-        if kind == ChangePointKind::Reset || renewed {
+        let begins_anew = kind == ChangePointKind::Reset || renewed;
+        let (step_m, se_m) =
+            if begins_anew { (step.jump_m, step.jump_se_m) } else { (step.step_m, step.se_m) };
+        self.changes.push(ChangePoint { departure_us, kind, step_m, se_m, certainty });
+        let kind_m2 = match kind {
+            ChangePointKind::Recorded => 0.0,
+            _ => self.kind_variance(step, prior),
+        };
+        if begins_anew {
             self.begin(step.at, true);
-        } else if self.undone_m + step.step_m > MAX_RIGGING_STEP_M {
+            self.kind_m2 = kind_m2;
+        } else if self.undone_m + step.step_m > MAX_RIGGING_STEP * prior.limit_m() {
             // To undo what may be damage would hide it.
             let hidden_m = std::mem::take(&mut self.undone_m);
             self.shift(step.at, hidden_m);
@@ -128,13 +137,14 @@ impl History {
             self.undone_m += step.step_m;
             self.shift(step.at, -step.step_m);
             self.offset_m2 += step.se_m * step.se_m;
+            self.kind_m2 += kind_m2;
         }
     }
 
     /// Begins a segment, which knows nothing of what was undone before.
     fn begin(&mut self, estimate: usize, fresh: bool) {
         self.begins.push(SegmentStart { estimate, usage: self.estimates[estimate - 1].usage, fresh });
-        self.offset_m2 = 0.0;
+        (self.offset_m2, self.kind_m2) = (0.0, 0.0);
     }
 
     /// Moves every estimate from one on.
@@ -144,15 +154,39 @@ impl History {
         }
     }
 
-    /// A fall to where a new unit's gap is likelier than one of an arbitrary size within rigging's reach.
+    /// Whether a fall is likelier a reset than a re-rigging.
     fn is_reset(&self, step: &StepChange, prior: &FleetPrior) -> bool {
+        self.reset_probability(step, prior) > 0.5
+    }
+
+    /// Variance of the level for what a step may have been: where it was the other of reset and re-rigging, the
+    /// level is wrong by the whole step.
+    fn kind_variance(&self, step: &StepChange, prior: &FleetPrior) -> f64 {
+        let reset = self.reset_probability(step, prior);
+        if reset > 0.0 && reset < 1.0 {
+            let other = reset.min(1.0 - reset).max(LEAST_DOUBT);
+            other * (1.0 - other) * step.step_m * step.step_m
+        } else {
+            0.0
+        }
+    }
+
+    /// Probability that a step made the unit new: how likely the gap after it is a new unit's, against a step of
+    /// an arbitrary size within rigging's reach.
+    fn reset_probability(&self, step: &StepChange, prior: &FleetPrior) -> f64 {
+        let largest_m = MAX_RIGGING_STEP * prior.limit_m();
+        if step.step_m >= 0.0 {
+            return 0.0;
+        }
+        if step.step_m < -largest_m {
+            return 1.0;
+        }
         let after = &self.estimates[step.at..self.estimates.len().min(step.at + 20)];
         let level_m = after.iter().map(|e| e.gap_m).sum::<f64>() / after.len() as f64;
         let sd_m = prior.new_sd_m.hypot(step.se_m);
         let z = (level_m - prior.new_m) / sd_m;
         let new = (-0.5 * z * z).exp() / (sd_m * (2.0 * std::f64::consts::PI).sqrt());
-        let rigging = 0.5 / MAX_RIGGING_STEP_M;
-        step.step_m < 0.0 && (new > rigging || step.step_m < -MAX_RIGGING_STEP_M)
+        new / (new + 0.5 / largest_m)
     }
 
     /// The segments, oldest first.

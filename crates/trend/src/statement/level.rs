@@ -9,8 +9,8 @@ use crate::statement::types::{Level, Rate, WearClass};
 use crate::wear::bank::WearLaw;
 use crate::wear::life_curve::LifeCurve;
 
-/// Growth that counts as visible, metres.
-const VISIBLE_M: f64 = 2e-6;
+/// Growth that counts as visible, a share of the limit.
+const VISIBLE: f64 = 0.02;
 
 /// Exponents up to this slow down, and from that speed up; so does a course, by its next tenth's rate over this.
 const SLOWING: f64 = 0.9;
@@ -33,10 +33,11 @@ pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64) -> Rate {
 }
 
 /// Probability of visible growth since the segment began.
-pub(crate) fn growth_probability(posterior: &Posterior) -> f64 {
+pub(crate) fn growth_probability(posterior: &Posterior, limit_m: f64) -> f64 {
+    let visible_m = VISIBLE * limit_m;
     let sd_m = posterior.growth_m2.sqrt();
     let grown_m = |n: &Component| n.level_m - n.new_m - n.amplitude_m * n.law.value(n.age_begin);
-    let grown = |n: &Component| n.weight * distributions::cdf((grown_m(n) - VISIBLE_M) / sd_m);
+    let grown = |n: &Component| n.weight * distributions::cdf((grown_m(n) - visible_m) / sd_m);
     probability(posterior.components.iter().map(grown).sum())
 }
 
@@ -58,11 +59,14 @@ pub(crate) fn onset_usage(component: &Component) -> Option<f64> {
     if let WearLaw::Onset { start } = component.law { Some(start) } else { None }
 }
 
-/// The law most believed in, and how much.
-pub(crate) fn law(posterior: &Posterior) -> Option<(WearClass, f64)> {
+/// The law most believed in, and how much; of a unit that wears, the one of those by which it can.
+pub(crate) fn law(posterior: &Posterior, is_wearing: bool) -> Option<(WearClass, f64)> {
     let mut shares: Vec<(WearClass, f64)> = Vec::new();
     for component in &posterior.components {
         let law = name(component);
+        if is_wearing && law == WearClass::None {
+            continue;
+        }
         match shares.iter_mut().find(|(known, _)| *known == law) {
             Some((_, share)) => *share += component.weight,
             None => shares.push((law, component.weight)),

@@ -64,6 +64,13 @@ impl fmt::Display for Reason {
                     "fit ends at {gap_um:.1} µm but the latest estimates average {recent_um:.1} µm: not assessed"
                 )
             }
+            Self::AtLimit { gap_m, limit_m } if gap_m < limit_m => write!(
+                f,
+                "gap {:.1} µm was at the limit of {:.1} µm; `act` holds until it is below {:.1} µm",
+                um(gap_m),
+                um(limit_m),
+                um(GAP_MARGIN * limit_m)
+            ),
             Self::AtLimit { gap_m, limit_m } => {
                 write!(f, "gap {:.1} µm is at or above the limit of {:.1} µm", um(gap_m), um(limit_m))
             }
@@ -73,14 +80,31 @@ impl fmt::Display for Reason {
                     "may already be at the limit (5 % point); planning horizon {planning_horizon_hours:.0} FH"
                 )
             }
+            Self::CrossesSoon { p05_hours, planning_horizon_hours } if p05_hours > planning_horizon_hours => {
+                let held_hours = HORIZON_MARGIN * planning_horizon_hours;
+                write!(
+                    f,
+                    "could reach the limit in {p05_hours:.0} FH (5 % point); `plan` holds until that exceeds {held_hours:.0} FH"
+                )
+            }
             Self::CrossesSoon { p05_hours, planning_horizon_hours } => {
                 write!(
                     f,
                     "could reach the limit within {p05_hours:.0} FH (5 % point); planning horizon {planning_horizon_hours:.0} FH"
                 )
             }
+            Self::AtWatch { gap_m, watch_m } if gap_m < watch_m => write!(
+                f,
+                "gap {:.1} µm was above the watch limit of {:.1} µm; `watch` holds until it is below {:.1} µm",
+                um(gap_m),
+                um(watch_m),
+                um(GAP_MARGIN * watch_m)
+            ),
             Self::AtWatch { gap_m, watch_m } => {
                 write!(f, "gap {:.1} µm is above the watch limit of {:.1} µm", um(gap_m), um(watch_m))
+            }
+            Self::Changed { kind: ChangePointKind::Onset, days } => {
+                write!(f, "wear began or sped up {days:.0} days ago")
             }
             Self::Changed { kind, days } => write!(f, "{kind} {days:.0} days ago, not on record"),
             Self::Clear => write!(f, "below all limits"),

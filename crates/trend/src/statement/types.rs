@@ -83,11 +83,11 @@ impl fmt::Display for WearClass {
 /// Whether a unit wears.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WearStatus {
-    /// It has grown by 2 µm or more with a probability above 95 %.
+    /// It has grown by 2 % of the limit or more with a probability above 95 %.
     Wearing,
-    /// That much growth is not certain.
+    /// It has not grown that much, more likely than not.
     Steady,
-    /// Too little is known.
+    /// Too little is known, or growth is likely and not certain.
     Unknown,
 }
 

@@ -210,8 +210,10 @@ fn units_that_do_not_wear_are_seldom_called_wearing() {
 fn a_state_once_given_is_left_only_clearly_past_its_limit() {
     // 500 flights end at 28.5 µm; the watch limit is set a hair above the level.
     let series = Series::new(rows(5, |_, gap| gap), &UsageDefaults::default()).unwrap();
-    let level_m = assessment(&series, 250 * DAY_US, None).level.unwrap().gap_m;
-    let settings = Settings { watch_m: 1.01 * level_m, ..Settings::for_limit(1e-3) };
+    let settings = Settings::for_limit(1e-3);
+    let assessment = assess(&series, 250 * DAY_US, &settings, None, None).unwrap();
+    let level_m = assessment.level.unwrap().gap_m;
+    let settings = Settings { watch_m: 1.01 * level_m, ..settings };
     let state = |previous| assess(&series, 250 * DAY_US, &settings, None, previous).unwrap().state;
     assert_eq!(state(None), Some(State::Normal));
     assert_eq!(state(Some(State::Watch)), Some(State::Watch));

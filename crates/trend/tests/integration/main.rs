@@ -13,4 +13,6 @@ mod degenerate;
 mod fleet;
 mod forecast;
 mod random;
+mod scale;
 mod series;
+mod steps;

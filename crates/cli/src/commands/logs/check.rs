@@ -1,4 +1,4 @@
-//! `check`: shows how logs are mapped, channel by channel, without computing or writing anything.
+//! `check`: shows how logs are mapped, channel by channel, and what would be refused; reports no gap, writes nothing.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -7,10 +7,10 @@ use std::sync::Arc;
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use ingest::channel::quality;
 use ingest::{ActuatorChannels, ActuatorColumns, LogFiles, Quality};
-use job::Config;
 use job::flight_log::{FlightLog, catch_panic};
+use job::{Config, estimate, rejection};
 use pipeline::run::discover;
-use records::{Diagnostic, Installations, PartNumber};
+use records::{Diagnostic, Installations, PartNumber, Status};
 use serde::Serialize;
 
 use crate::args::{CheckArgs, Format, Global};
@@ -27,6 +27,9 @@ const SLOPE_TOLERANCE: f64 = 0.02;
 /// Usual logging rates; a rate outside mostly means a wrong unit of time.
 const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=20e3;
 
+/// Half the width of a 90 % interval, in standard errors.
+const Z90: f64 = 1.645;
+
 /// Note on the slope of screw on motor.
 const RATIO: &str = "screw/motor ratio";
 
@@ -41,6 +44,7 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
     let (config, installations) = load_with_installations(global)?;
     let logs = logs(args, &config, output)?;
     let (mut channels, mut diagnostics, mut page) = (Vec::new(), Vec::new(), String::new());
+    let mut rejections = Rejections::new();
     let mut schemas = ColumnTypes::default();
     let mut facts = Facts::new();
     for (files, name) in &logs {
@@ -55,6 +59,7 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
                 &mut CheckSummary {
                     channels: &mut channels,
                     facts: &mut facts,
+                    rejections: &mut rejections,
                     diagnostics: &mut diagnostics,
                 },
                 &mut page,
@@ -63,12 +68,14 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
         });
         diagnostics.extend(looked.err());
     }
+    let failed = diagnostics.len();
+    diagnostics.extend(mapping_faults(&rejections));
     let table = || {
         format!(
             "{page}{}{}{}",
             schemas.drift(),
             proposals(&facts, &config),
-            summary(logs.len(), &channels, &diagnostics)
+            summary(logs.len(), &channels, &diagnostics[..failed])
         )
     };
     if args.rows.format() == Format::Table && args.rows.output.is_none() {
@@ -126,17 +133,36 @@ struct Channel {
 struct CheckSummary<'s> {
     channels: &'s mut Vec<Channel>,
     facts: &'s mut Facts,
+    rejections: &'s mut Rejections,
     diagnostics: &'s mut Vec<Diagnostic>,
 }
 
 /// Identified parameters by part number.
 type Facts = BTreeMap<PartNumber, Vec<job::part_identification::IdentifiedParams>>;
 
+/// Rejection codes of the checked actuator-flights by part number; `None` for an accepted one.
+type Rejections = BTreeMap<PartNumber, Vec<Option<String>>>;
+
+/// One error for each part number most of whose actuator-flights would be refused for a wrong mapping.
+fn mapping_faults(rejections: &Rejections) -> Vec<Diagnostic> {
+    let fault = |(part, codes): (&PartNumber, &Vec<Option<String>>)| {
+        let mut counts = BTreeMap::<&str, usize>::new();
+        codes.iter().flatten().for_each(|code| *counts.entry(code).or_default() += 1);
+        let (code, refused) = counts.into_iter().max_by_key(|(_, count)| *count)?;
+        let remedy = rejection::part_remedy(code).filter(|_| 2 * refused > codes.len())?;
+        let flights = table::count(codes.len(), "checked actuator-flight");
+        let what = format!("part {part}: {refused} of {flights} would be refused");
+        Some(Diagnostic::new(code, what).hint(remedy))
+    };
+    rejections.iter().filter_map(fault).collect()
+}
+
 /// Findings of one actuator.
 struct ActuatorCheck {
     found: Vec<Channel>,
     clock: Option<String>,
     says: Option<(PartNumber, job::part_identification::IdentifiedParams)>,
+    rejection: Option<String>,
 }
 
 fn one(
@@ -148,14 +174,15 @@ fn one(
     page: &mut String,
 ) {
     let id = &opened.identity;
-    let CheckSummary { channels, facts, diagnostics } = seen;
+    let CheckSummary { channels, facts, rejections, diagnostics } = seen;
     let (first, mut clocks) = (channels.len(), Vec::new());
     for at in opened.actuators(installations) {
         match actuator(opened, name, at, config, installations) {
-            Ok(ActuatorCheck { found, clock, says }) => {
+            Ok(ActuatorCheck { found, clock, says, rejection }) => {
                 channels.extend(found);
                 clocks.extend(clock);
                 if let Some((part, says)) = says {
+                    rejections.entry(part.clone()).or_default().push(rejection);
                     facts.entry(part).or_default().push(says);
                 }
             }
@@ -254,6 +281,7 @@ fn actuator(
             found: vec![Channel { note, ..base("all", motor, "") }],
             clock: None,
             says: None,
+            rejection: None,
         });
     }
     let a = opened.channels(at, part)?;
@@ -273,8 +301,26 @@ fn actuator(
     if a.output_locked {
         found[1].note = None;
     }
+    // The estimator's own tests of sign, exchange, ratio and rate; its gap is dropped.
+    let tested = estimate::estimate(&a, part, &config.document.estimate)?;
+    let rejection = tested.reason.filter(|_| tested.status == Status::Refused);
+    if let Some(code) = &rejection {
+        let remedy = rejection::remedy(code).map(|remedy| format!(": {remedy}")).unwrap_or_default();
+        let before = found[tested_channel(code)].note.take().filter(|note| !note.starts_with(RATIO));
+        let before = before.map(|note| format!("{note}; ")).unwrap_or_default();
+        found[tested_channel(code)].note = Some(format!("{before}would be refused, {code}{remedy}"));
+    }
     let says = Some((stay.part_number.clone(), job::part_identification::IdentifiedParams::of(&a, part)));
-    Ok(ActuatorCheck { found, clock: Some(clock(&a)), says })
+    Ok(ActuatorCheck { found, clock: Some(clock(&a)), says, rejection })
+}
+
+/// Row of the channel that a rejection concerns: motor, screw, their difference, load.
+fn tested_channel(code: &str) -> usize {
+    match code {
+        "positions_swapped" | "position_ratio" | "motion_unexplained" => 2,
+        "load_sign_flipped" | "load_too_small" | "no_load_reversal" | "one_side_brief" => 3,
+        _ => 0,
+    }
 }
 
 /// Quality flags of one channel.
@@ -409,7 +455,7 @@ impl ColumnTypes {
 
 /// Compares the parameters identified from the logs with the configured ones, by part number.
 fn proposals(facts: &Facts, config: &Config) -> String {
-    let columns = [text("key", 0), number("identified", 0), number("configured", 0)];
+    let columns = [text("key", 0), number("identified (± 90 %)", 0), number("configured", 0)];
     let mut page = String::new();
     for (number, all) in facts {
         let Some(part) = config.parts.get(number) else { continue };
@@ -418,7 +464,7 @@ fn proposals(facts: &Facts, config: &Config) -> String {
             .iter()
             .map(|p| {
                 let stated = p.configured.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
-                let uncertainty = p.uncertainty.map_or_else(String::new, |v| format!(" ± {v:.1e}"));
+                let uncertainty = p.uncertainty.map_or_else(String::new, |v| format!(" ± {:.1e}", Z90 * v));
                 vec![p.key.to_owned(), format!("{:.2e}{uncertainty}", p.identified), stated]
             })
             .collect();

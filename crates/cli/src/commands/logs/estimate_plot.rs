@@ -69,24 +69,27 @@ fn drawn(log: &str, look: EstimatePlot) -> report::EstimatePlot {
         Some(picture) => (picture.upper, picture.lower, picture.touches),
         None => Default::default(),
     };
-    let stretches = touches.into_iter().map(|touch| ContactInterval {
-        time_s: touch.time_s,
-        is_upper: touch.flank.sign() > 0.0,
-        is_used: touch.trust.is_some_and(|trust| trust > 0.0),
-        force_n: touch.force_n,
-        dx_m: touch.dx_m,
-    });
-    report::EstimatePlot {
+    let mut plot = report::EstimatePlot {
         title: format!("{} in {log}", look.position),
         summary: words(&look.estimate),
         step_s: look.step_s,
-        contacts: stretches.collect(),
+        breaks: look.breaks,
+        contacts: Vec::new(),
         bounds_m: look.midrange.map(|gap| (gap.upper_m, gap.lower_m)),
         flanks: [upper, lower],
         dx_m: look.dx_m,
         load_n: look.load_n,
         s_m: look.s_m,
-    }
+    };
+    let intervals = touches.into_iter().map(|touch| ContactInterval {
+        time_s: plot.time_s(touch.time_s / plot.step_s),
+        is_upper: touch.flank.sign() > 0.0,
+        is_used: touch.trust.is_some_and(|trust| trust > 0.0),
+        force_n: touch.force_n,
+        dx_m: touch.dx_m,
+    });
+    plot.contacts = intervals.collect();
+    plot
 }
 
 fn words(e: &records::GapEstimate) -> String {

@@ -32,6 +32,7 @@ pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> R
     if args.json {
         let value = json!({
             "record": record,
+            "remedy": super::query::remedy(&record.estimate),
             "settings": { "part": settings, "config_digest": &*digest, "is_current": *digest == *record.provenance.config_digest },
             "replay": { "verdict": verdict.code(), "says": verdict.to_string() },
         });
@@ -71,6 +72,9 @@ fn find(args: &ExplainArgs, store: &Store) -> Result<GapRecord, Failure> {
         }
     }
 }
+
+/// Half the width of a 90 % interval, in standard errors.
+const Z90: f64 = 1.645;
 
 /// Result of recomputing a record.
 struct Recomputation {
@@ -187,13 +191,16 @@ fn page(
     );
     let flags = super::query::flags_text(e);
     line("flags", if flags.is_empty() { "none" } else { &flags });
+    if let Some(remedy) = super::query::remedy(e) {
+        line("remedy", remedy);
+    }
     let newtons = |v: Option<f64>| v.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
     line(
         "fitted",
         &format!(
-            "stiffness {} ± {} N/m, skew {} ms, loop {} µm, lost motion {} µm",
+            "stiffness {} ± {} N/m (90 %), skew {} ms, loop {} µm, lost motion {} µm",
             newtons(e.stiffness_n_per_m),
-            newtons(e.stiffness_se_n_per_m),
+            newtons(e.stiffness_se_n_per_m.map(|se| Z90 * se)),
             e.skew_s.map_or_else(table::empty_cell, |s| format!("{:.2}", s * 1e3)),
             table::micrometres(e.loop_width_m),
             table::micrometres(e.lost_motion_m)

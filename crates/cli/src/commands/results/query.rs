@@ -1,7 +1,10 @@
 //! `query`: lists stored records by tail, serial, flight or position.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
+use arrow::array::{RecordBatch, StringArray};
+use arrow::datatypes::{DataType, Field, Schema};
 use records::GapRecord;
 use store::{Query, Store};
 
@@ -12,7 +15,7 @@ use crate::row_output;
 use crate::sparkline::sparkline;
 use crate::table::{self, count, number, text};
 
-use crate::commands::context::load_config;
+use crate::commands::context::{KnownNames, check_name, check_range, load_config};
 
 /// Minimum number of estimates for a history line.
 const LEAST_HISTORY: usize = 3;
@@ -22,22 +25,47 @@ const LEAST_HISTORY: usize = 3;
 /// # Errors
 /// If configuration or store cannot be read.
 pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
-    let store = Store::open(load_config(global)?.store())?;
-    let records = store.records(&asked(args))?;
+    check_range(args.since, args.until)?;
+    let config = load_config(global)?;
+    let records = Store::open(config.store())?.records(&asked(args))?;
+    if records.is_empty() {
+        check_names(args, &KnownNames::read(&config))?;
+    }
     row_output::write_rows(
         &args.rows,
         output,
-        || Ok(store::columns::to_batch(&records)?),
+        || with_remedies(store::columns::to_batch(&records)?, &records),
         || page(&records),
     )?;
     if records.is_empty() {
         output.note(&format!(
-            "no record of {} `{}`; list the store's contents with `freeplay store info`",
+            "no record of {} `{}`{}; list the store's contents with `freeplay store info`",
             word(args.by),
-            args.id
+            args.id,
+            range(args)
         ));
     }
     Ok(Code::Success)
+}
+
+/// Refuses an unknown name of the selection.
+fn check_names(args: &QueryArgs, known: &KnownNames) -> Result<(), Failure> {
+    let id = Some(args.id.as_str());
+    match args.by {
+        QueryKey::Tail => check_name("tail", id, known.tails())?,
+        QueryKey::Serial => check_name("serial number", id, known.serials())?,
+        QueryKey::Flight => check_name("flight", id, known.flights())?,
+        QueryKey::Position => check_name("position", id, known.positions())?,
+    }
+    check_name("part number", args.part.as_deref(), known.parts())
+}
+
+/// The searched range as text.
+fn range(args: &QueryArgs) -> String {
+    let part = args.part.as_ref().map(|part| format!(" with part number {part}"));
+    let since = args.since.map(|since| format!(" from {since}"));
+    let until = args.until.map(|until| format!(" before {until}"));
+    [part, since, until].into_iter().flatten().collect()
 }
 
 fn word(by: QueryKey) -> &'static str {
@@ -99,8 +127,38 @@ pub(crate) fn page(records: &[GapRecord]) -> String {
     if records.is_empty() {
         head
     } else {
-        head + &table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>()) + &sketches(records)
+        let table = table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>());
+        head + &table + &remedies(records) + &sketches(records)
     }
+}
+
+/// One line per rejection code of these records, with its remedy.
+fn remedies(records: &[GapRecord]) -> String {
+    let codes: BTreeSet<&str> = records.iter().filter_map(|r| rejection_code(&r.estimate)).collect();
+    let line = |code: &str| Some(format!("{code}: {}\n", job::rejection::remedy(code)?));
+    let lines: String = codes.into_iter().filter_map(line).collect();
+    if lines.is_empty() { lines } else { format!("\n{lines}") }
+}
+
+/// Rejection code of an estimate.
+fn rejection_code(e: &records::GapEstimate) -> Option<&str> {
+    e.reason.as_deref().filter(|_| e.status == records::Status::Refused)
+}
+
+/// Remedy of a rejected estimate.
+pub(crate) fn remedy(e: &records::GapEstimate) -> Option<&'static str> {
+    rejection_code(e).and_then(job::rejection::remedy)
+}
+
+/// The rows with the remedy of each rejection as last column.
+fn with_remedies(batch: RecordBatch, records: &[GapRecord]) -> Result<RecordBatch, Failure> {
+    let remedies: StringArray = records.iter().map(|r| remedy(&r.estimate)).collect();
+    let (schema, mut columns, _) = batch.into_parts();
+    let mut fields: Vec<_> = schema.fields().iter().cloned().collect();
+    fields.push(Arc::new(Field::new("remedy", DataType::Utf8, true)));
+    columns.push(Arc::new(remedies));
+    let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), columns);
+    batch.map_err(|e| Failure::from(std::io::Error::other(e)))
 }
 
 /// One line per unit with a history in these records: sparkline, first and last gap.

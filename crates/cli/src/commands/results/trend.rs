@@ -2,6 +2,7 @@
 
 use pipeline::fleet_trends::assess::{self, UnitSelection};
 use pipeline::fleet_trends::trend_row::TrendRow;
+use records::Installations;
 use store::Store;
 
 use crate::args::{Global, TrendArgs};
@@ -11,7 +12,7 @@ use crate::row_output;
 use crate::sparkline::sparkline;
 use crate::table::{self, count, number, state_mark, text};
 
-use crate::commands::context::load_trend_context;
+use crate::commands::context::{KnownNames, load_trend_context};
 
 /// Prints one row per unit, or per query.
 ///
@@ -42,16 +43,34 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
             }
         }
     };
+    if found.is_empty() && args.queries.is_none() {
+        let known = match &args.external.estimates {
+            Some(file) => {
+                KnownNames::new(pipeline::history::external_estimates::read(file)?, Installations::default())
+            }
+            None => KnownNames::read(&config),
+        };
+        known.check_units(args.tail.as_deref(), args.serial.as_deref(), args.part.as_deref())?;
+    }
     row_output::write_rows(
         &args.rows,
         output,
         || row_output::batch(&pipeline::rows::trends(), &found),
-        || page(&found),
+        || page(&found, args),
     )?;
     Ok(Code::Success)
 }
 
-fn page(found: &[TrendRow]) -> String {
+/// The selection as text.
+fn selection(args: &TrendArgs) -> String {
+    let named = |what: &str, name: &Option<String>| name.as_ref().map(|name| format!(" of {what} {name}"));
+    let as_of = args.as_of.map(|as_of| format!(" until {as_of}"));
+    let parts =
+        [named("tail", &args.tail), named("serial number", &args.serial), named("part number", &args.part)];
+    parts.into_iter().chain([as_of]).flatten().collect()
+}
+
+fn page(found: &[TrendRow], args: &TrendArgs) -> String {
     let columns = [
         text("state", 0),
         text("part / serial", 0),
@@ -92,7 +111,12 @@ fn page(found: &[TrendRow]) -> String {
     };
     let as_of = found.iter().map(|r| r.as_of_utc).max();
     let head = as_of.map_or_else(
-        || "no unit matches the selection; list the store's contents with `freeplay store info`\n".to_owned(),
+        || {
+            format!(
+                "no unit{} has flown; list the store's contents with `freeplay store info`\n",
+                selection(args)
+            )
+        },
         |as_of| format!("{} as of {}\n", count(found.len(), "unit"), as_of.strftime("%Y-%m-%d %H:%M UTC")),
     );
     if found.is_empty() {

@@ -51,7 +51,15 @@ fn text(report: &RunSummary, code: Code) -> String {
         "Actuator-flights for which no gap could be determined.",
         report.refusals() as f64,
     );
-    gauge("tails_quiet", "Tails with no new logs for unusually long.", report.quiet.len() as f64);
+    gauge(
+        "mapping_faults",
+        "Parts, tails and actuators most of whose flights are refused for a wrong mapping.",
+        report.mapping_faults.len() as f64,
+    );
+    // A run that left logs out cannot determine which tails have no data.
+    if !report.is_partial() {
+        gauge("tails_quiet", "Tails with no new logs for unusually long.", report.quiet.len() as f64);
+    }
     for state in ["normal", "watch", "plan", "act"] {
         let name = format!("units_touched_{state}");
         gauge(&name, "Units updated by this run that are in this state.", states(state));

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use pipeline::fleet_trends::changes::UnitChange;
 use pipeline::fleet_trends::trend_row::TrendRow;
+use pipeline::history::histories::Histories;
 use pipeline::monitoring::recorder_change::{Quantity, RecorderChange};
 use pipeline::run::scheduler::{self, Context};
 use pipeline::{Event, Plan, Request, RunSummary};
@@ -21,7 +22,7 @@ use crate::output::{Output, escape};
 use crate::progress::{Progress, span};
 use crate::table::{self, count, number, state_mark, text};
 
-use crate::commands::context::{VERSION, load_config};
+use crate::commands::context::{KnownNames, VERSION, check_range, load_config};
 
 /// Maximum number of flights with unusual filter innovations in the summary.
 const MAX_UNUSUAL_SHOWN: usize = 5;
@@ -34,8 +35,14 @@ const MAX_CHANGES_SHOWN: usize = 20;
 /// # Errors
 /// If nothing could be run, or the store failed.
 pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    check_range(args.since, args.until)?;
     let config = load_config(global)?;
     let request = request(args)?;
+    if args.tail.is_some() || args.serial.is_some() {
+        let installations = scheduler::installations(&config)?;
+        let names = KnownNames::new(Histories::default(), installations);
+        names.check_units(args.tail.as_deref(), args.serial.as_deref(), None)?;
+    }
     if args.dry_run {
         return dry_run(&config, &request, output);
     }
@@ -146,12 +153,45 @@ fn is_reached(report: &RunSummary, least: FailOn) -> bool {
 fn code(report: &RunSummary, reached: bool, stopped: bool) -> Code {
     if stopped && report.not_reached > 0 {
         Code::Interrupted
-    } else if !report.errors.is_empty() {
+    } else if !report.errors.is_empty() || report.has_mapping_fault() {
         Code::LogsInError
     } else if reached {
         Code::StateReached
     } else {
         Code::Success
+    }
+}
+
+/// Lists the scopes whose flights are rejected for a wrong mapping.
+fn mapping_faults(report: &RunSummary, page: &mut String) {
+    for fault in &report.mapping_faults {
+        let text = format!(
+            "{}: {} on {} of the latest {}; {}",
+            escape(&fault.scope()),
+            fault.reason,
+            fault.refused,
+            count(fault.flights, "flight"),
+            fault.remedy
+        );
+        line(page, "mapping", &text);
+    }
+}
+
+/// Lists the logs that are copies of others.
+fn duplicates(report: &RunSummary, page: &mut String) {
+    const MAX_SHOWN: usize = 5;
+    for (at, copy) in report.duplicates.iter().take(MAX_SHOWN).enumerate() {
+        if at == 0 {
+            let text = format!(
+                "{} with the samples of another log; not used",
+                count(report.duplicates.len(), "log")
+            );
+            line(page, "duplicates", &text);
+        }
+        line(page, "", &format!("{}  copy of {}", escape(&copy.log), escape(&copy.owner)));
+    }
+    if let Some(more @ 1..) = report.duplicates.len().checked_sub(MAX_SHOWN) {
+        line(page, "", &format!("and {more} more, all in `freeplay run --json`"));
     }
 }
 
@@ -234,6 +274,12 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
             refused(report)
         ),
     );
+    for refusals in &report.refusals {
+        let remedy = refusals.remedy.map(|remedy| format!(": {remedy}")).unwrap_or_default();
+        line(&mut page, "refused", &format!("{} {}{remedy}", refusals.reason, refusals.count));
+    }
+    mapping_faults(report, &mut page);
+    duplicates(report, &mut page);
     if !report.errors.is_empty() {
         line(
             &mut page,
@@ -266,8 +312,7 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
             );
         }
     }
-    // A run that left logs out cannot determine which tails have no data.
-    if !report.quiet.is_empty() && report.not_reached + report.left + report.not_asked == 0 {
+    if !report.quiet.is_empty() {
         let tails: Vec<String> = report
             .quiet
             .iter()
@@ -295,9 +340,14 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     }
     page.push_str(&work_list_section(&report.trends, &report.work_list));
     page.push_str(&changes_section(&report.changed));
-    if code == Code::LogsInError {
+    if code == Code::LogsInError && !report.errors.is_empty() {
         let failed = count(report.logs_in_error(), "log");
         let _ = writeln!(page, "Exit code 1: {failed} failed. After fixing them: `freeplay run --retry`");
+    } else if code == Code::LogsInError {
+        let _ = writeln!(
+            page,
+            "Exit code 1: most flights are refused for a wrong mapping. After fixing pipeline.toml: `freeplay run`"
+        );
     }
     page
 }

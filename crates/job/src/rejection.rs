@@ -1,0 +1,93 @@
+//! Remedies of rejection codes, and the codes that point to a fault of the mapping.
+
+use estimator::contact::Rejection;
+
+/// Rejections by the estimator.
+const BY_ESTIMATOR: [Rejection; 11] = [
+    Rejection::NoLoadReversal,
+    Rejection::OneSideBrief,
+    Rejection::LoadTooSmall,
+    Rejection::TravelTooSmall,
+    Rejection::RateTooLow,
+    Rejection::MotionUnexplained,
+    Rejection::TooShort,
+    Rejection::ChannelConstant,
+    Rejection::LoadSignFlipped,
+    Rejection::PositionsSwapped,
+    Rejection::PositionRatio,
+];
+
+/// Rejections before the estimator, with their remedies.
+const BEFORE_ESTIMATOR: [(&str, &str); 3] = [
+    ("nothing_selected", "check column and values of each `[[channel.when]]`: no sample meets all of them"),
+    ("channel_zero", "check wiring and mapping: a channel that is zero throughout is not connected"),
+    ("channel_unmapped", "map the missing channel, or exclude the actuator from `{position}`"),
+];
+
+/// Codes of a wrong sign, exchange, ratio, rate, selection or missing channel.
+const MAPPING: [&str; 7] = [
+    "load_sign_flipped",
+    "positions_swapped",
+    "position_ratio",
+    "rate_too_low",
+    "nothing_selected",
+    "channel_zero",
+    "channel_unmapped",
+];
+
+/// Codes that single flights have for other causes; on most flights of a part number, a unit is wrong.
+const UNIT: [(&str, &str); 2] = [
+    (
+        "load_too_small",
+        "check `unit` and `scale` of the load channel (N against kN), and `unknown_force_n` of the part",
+    ),
+    (
+        "travel_too_small",
+        "check `unit` and `scale` of the load channel (N against kN), the part's stiffness, and the units of the \
+         positions: the wind-up by this load exceeds the travel",
+    ),
+];
+
+/// Remedy of a rejection; `None` for an unknown code.
+pub fn remedy(code: &str) -> Option<&'static str> {
+    let by_estimator = BY_ESTIMATOR.iter().find(|rejection| rejection.code() == code);
+    let before = || BEFORE_ESTIMATOR.iter().find(|(known, _)| *known == code);
+    by_estimator.map(|rejection| rejection.remedy()).or_else(|| before().map(|(_, remedy)| *remedy))
+}
+
+/// Whether a rejection of most flights of an actuator points to a fault of its mapping.
+pub fn is_mapping_fault(code: &str) -> bool {
+    MAPPING.contains(&code)
+}
+
+/// Remedy of a rejection of most flights of a part number, where it points to a wrong mapping or unit.
+pub fn part_remedy(code: &str) -> Option<&'static str> {
+    let unit = UNIT.iter().find(|(known, _)| *known == code).map(|(_, remedy)| *remedy);
+    unit.or_else(|| remedy(code).filter(|_| is_mapping_fault(code)))
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+
+    /// Against the table of codes in the documentation.
+    #[test]
+    fn every_documented_rejection_has_a_remedy() {
+        let page = include_str!("../../../docs/errors.md");
+        let section = page.split("## Rejections").nth(1).unwrap().split("\n## ").next().unwrap();
+        let codes: Vec<&str> =
+            section.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect();
+        assert!(codes.len() >= 14, "{codes:?}");
+        for code in codes {
+            assert!(remedy(code).is_some(), "{code}");
+        }
+    }
+
+    #[test]
+    fn codes_of_the_mapping_have_a_remedy_for_a_part_and_those_of_a_flight_have_none() {
+        assert!(MAPPING.iter().all(|code| part_remedy(code).is_some()));
+        assert!(part_remedy("travel_too_small").unwrap().contains("kN"));
+        assert_eq!((part_remedy("no_load_reversal"), part_remedy("too_short")), (None, None));
+    }
+}

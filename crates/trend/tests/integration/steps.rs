@@ -1,0 +1,73 @@
+//! Steps and resets: when they happened, how large they were, and what doubt of them does to the level.
+
+use trend::{ChangePointKind, Observation, Series, Settings, UsageDefaults, assess};
+
+use crate::random::Random;
+
+const DAY_US: i64 = 86_400_000_000;
+const NOISE_UM: f64 = 1.0;
+
+/// A sparsely logged unit: one log in eleven days, in which it wears by `growth_um`, with a fall before a flight.
+fn series(seed: u64, flights: i64, growth_um: f64, (at, fall_um): (i64, f64)) -> Series {
+    let mut random = Random::new(seed);
+    let row = |flight: i64| {
+        let gap_um = 30.0 + growth_um * flight as f64 - if flight < at { 0.0 } else { fall_um };
+        Observation {
+            departure_us: 11 * flight * DAY_US,
+            installation: 0,
+            flight_hours: Some(2.0),
+            tail_hours_end: Some(44.0 * (flight + 1) as f64),
+            load_reversals: Some(100),
+            gap_m: Some((gap_um + NOISE_UM * random.normal()) * 1e-6),
+            gap_se_m: Some(NOISE_UM * 1e-6),
+        }
+    };
+    let rows: Vec<Observation> = (0..flights).map(row).collect();
+    Series::new(rows, &UsageDefaults::default()).unwrap()
+}
+
+/// Dates of at least 95 of 100 falls within one flight of where they happened, and sizes without the growth from one
+/// flight to the next.
+#[test]
+fn falls_beyond_five_standard_errors_are_dated_at_their_flight_and_sized_without_growth() {
+    for (fall_um, growth_um) in [(12.0, 0.25), (40.0, 2.0), (76.0, 2.0)] {
+        let (mut found, mut near, mut sizes) = (0, 0, Vec::new());
+        for seed in 0..100 {
+            let flights = 24 + (seed % 3) as i64 * 12;
+            let at = 8 + (seed * 7 % 9) as i64;
+            let series = series(seed, flights, growth_um, (at, fall_um));
+            let settings = Settings::for_limit(2e-4);
+            let assessment = assess(&series, i64::MAX / 2, &settings, None, None).unwrap();
+            let change = assessment.changes.iter().filter(|change| change.step_m < 0.0);
+            let Some(change) = change.min_by(|a, b| a.step_m.total_cmp(&b.step_m)) else { continue };
+            found += 1;
+            near += usize::from((change.departure_us / (11 * DAY_US) - at).abs() <= 1);
+            sizes.push((change.step_m * 1e6 + fall_um, change.se_m * 1e6));
+        }
+        let mean_um = sizes.iter().map(|s| s.0).sum::<f64>() / sizes.len() as f64;
+        let within = sizes.iter().filter(|(off, se)| off.abs() <= 3.0 * se).count();
+        println!(
+            "{fall_um} µm: found {found}, within one flight {near}, off by {mean_um:.2} µm, {within} within 3 se"
+        );
+        assert!(found >= if fall_um > 15.0 { 95 } else { 50 }, "{fall_um}: {found}");
+        assert!(near * 100 >= found * 95, "{fall_um}: {near} of {found}");
+        assert!(mean_um.abs() < 0.5 && within * 100 >= found * 90, "{fall_um}: {mean_um} {within}");
+    }
+}
+
+/// A fall of 10 of 100 µm to 24 µm is a re-rigging or a reset: whichever it was, the level has an error that allows
+/// for the other.
+#[test]
+fn a_fall_that_may_be_re_rigging_or_reset_leaves_its_doubt_in_the_level() {
+    let settings = Settings::for_limit(1e-4);
+    let se_um = |fall_um: f64| {
+        let series = series(3, 60, 0.2, (30, fall_um));
+        let assessment = assess(&series, i64::MAX / 2, &settings, None, None).unwrap();
+        let kinds: Vec<ChangePointKind> = assessment.changes.iter().map(|change| change.kind).collect();
+        (assessment.level.unwrap().se_m * 1e6, kinds)
+    };
+    let ((still_um, none), (moved_um, one)) = (se_um(0.0), se_um(10.0));
+    assert_eq!((none.len(), one.len()), (0, 1));
+    // Five standard errors reach the other reading of the fall.
+    assert!(still_um < 1.9 && 5.0 * moved_um >= 9.0, "{still_um} {moved_um}");
+}

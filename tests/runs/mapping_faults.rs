@@ -1,0 +1,131 @@
+//! A wrong mapping is reported by every command: with its scope, its remedy and exit code 1.
+
+use serde_json::Value;
+
+use crate::harness::TestFleet;
+
+fn rows(text: &str) -> Vec<Value> {
+    serde_json::from_str(text).unwrap()
+}
+
+/// Units and their states by `freeplay trend`.
+fn states(fleet: &TestFleet) -> Vec<(String, Value)> {
+    let trends = rows(&fleet.run_ok(&["trend", "--json"]));
+    trends
+        .iter()
+        .map(|row| (row["serial_number"].as_str().unwrap().to_owned(), row["state"].clone()))
+        .collect()
+}
+
+#[test]
+fn a_reversed_load_sign_is_an_error_of_the_parts_and_names_the_units_that_lose_their_state() {
+    const REMEDY: &str = "reverse the sign of the load";
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run"]);
+    let before = states(&fleet);
+    fleet.configure("[channel.load]\n", "[channel.load]\nsign = -1\n");
+
+    let checked = fleet.freeplay(&["check"]);
+    assert_eq!(checked.code, Some(1), "{checked:?}");
+    assert!(checked.out.contains("would be refused, load_sign_flipped"), "{}", checked.out);
+    assert!(
+        checked.err.contains("error[load_sign_flipped]") && checked.err.contains(REMEDY),
+        "{}",
+        checked.err
+    );
+
+    let result = fleet.freeplay(&["run", "--json"]);
+    assert_eq!(result.code, Some(1), "{result:?}");
+    let summary: Value = serde_json::from_str(&result.out).unwrap();
+    let faults = summary["mapping_faults"].as_array().unwrap();
+    let parts: Vec<&str> = faults.iter().filter_map(|fault| fault["part_number"].as_str()).collect();
+    assert_eq!(parts, ["EMA-27-1040", "EMA-27-1060"], "{faults:?}");
+    assert!(
+        faults
+            .iter()
+            .all(|f| f["reason"] == "load_sign_flipped" && f["remedy"].as_str().unwrap().contains(REMEDY))
+    );
+    let refusals = summary["refusals"].as_array().unwrap();
+    assert!(refusals.iter().all(|r| r["remedy"].is_string()), "{refusals:?}");
+    let changed = summary["changed"].as_array().unwrap();
+    for (serial, state) in before.iter().filter(|(_, state)| state.is_string()) {
+        let change = changed.iter().find(|change| change["serial_number"] == **serial).unwrap();
+        assert_eq!((&change["from"], &change["to"]), (state, &Value::Null), "{change}");
+    }
+    assert!(before.iter().any(|(_, state)| state.is_string()), "the fleet has no state to lose");
+
+    // Nothing is new: the fault is shown all the same, and is no error of this run.
+    let again = fleet.run_ok(&["run"]);
+    assert!(again.contains("mapping") && again.contains(REMEDY), "{again}");
+
+    let stored = rows(&fleet.run_ok(&["query", "tail", "N412FP", "--json"]));
+    let refused = stored.iter().find(|row| row["reason"] == "load_sign_flipped").unwrap();
+    assert!(refused["remedy"].as_str().unwrap().contains(REMEDY), "{refused}");
+    assert!(fleet.run_ok(&["query", "tail", "N412FP"]).contains(REMEDY));
+    let (flight, position) = (refused["flight_id"].as_str().unwrap(), refused["position"].as_str().unwrap());
+    assert!(fleet.run_ok(&["explain", flight, position]).contains(REMEDY));
+    fleet.run_ok(&["report", "--output", "pages"]);
+    let page = std::fs::read_to_string(fleet.path("pages/report.json")).unwrap();
+    assert!(page.contains(REMEDY));
+}
+
+#[test]
+fn a_limit_of_150_metres_is_refused_by_every_command() {
+    let fleet = TestFleet::sample();
+    fleet.configure("limit_m = 150e-6", "limit_m = 150");
+    for args in [&["run"][..], &["check"], &["trend"], &["store", "info"]] {
+        let result = fleet.freeplay(args);
+        assert_eq!(result.code, Some(2), "{args:?}: {result:?}");
+        assert!(
+            result.err.contains("error[out_of_range]") && result.err.contains("150e-6"),
+            "{}",
+            result.err
+        );
+    }
+    fleet.configure("limit_m = 150", "limit_m = 150e-6");
+    fleet.configure("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 50");
+    let result = fleet.freeplay(&["run"]);
+    assert_eq!(result.code, Some(2), "{result:?}");
+    assert!(result.err.contains("error[out_of_range]") && result.err.contains("N/m"), "{}", result.err);
+}
+
+#[test]
+fn a_copy_of_a_log_is_counted_and_named_with_the_log_that_owns_the_flight() {
+    let fleet = TestFleet::sample();
+    let log = &fleet.logs()[3];
+    std::fs::copy(log, log.with_file_name("zcopy.parquet")).unwrap();
+    let account = fleet.run_ok(&["run"]);
+    let owner = log.file_name().unwrap().to_str().unwrap();
+    let line = account.lines().find(|line| line.contains("copy of")).unwrap_or_else(|| panic!("{account}"));
+    assert!(line.contains("zcopy.parquet") && line.contains(owner), "{line}");
+    assert!(account.contains("duplicates"), "{account}");
+}
+
+#[test]
+fn names_and_ranges_that_cannot_be_are_errors_with_the_nearest_name() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run"]);
+    let is_refused = |args: &[&str], code: &str, hint: &str| {
+        let result = fleet.freeplay(args);
+        assert_eq!(result.code, Some(2), "{args:?}: {result:?}");
+        assert!(
+            result.err.contains(&format!("error[{code}]")) && result.err.contains(hint),
+            "{}",
+            result.err
+        );
+    };
+    is_refused(&["query", "tail", "n412fp"], "unknown_name", "N412FP");
+    is_refused(&["trend", "--tail", "N412F"], "unknown_name", "N412FP");
+    is_refused(&["trend", "--part", "EMA-27-1041"], "unknown_name", "EMA-27-1040");
+    is_refused(&["run", "--tail", "n412fp"], "unknown_name", "N412FP");
+    is_refused(&["report", "--tail", "n412fp", "--output", "pages"], "unknown_name", "N412FP");
+    let range = ["--since", "2026-10-01", "--until", "2026-09-01"];
+    is_refused(&[&["query", "tail", "N412FP"][..], &range].concat(), "empty_range", "--until");
+    is_refused(&[&["run"][..], &range].concat(), "empty_range", "--until");
+    let limited = fleet.freeplay(&["run", "--limit", "0"]);
+    assert_eq!(limited.code, Some(2), "{limited:?}");
+    // A known tail without a record in the range is an empty result, which names the search.
+    let empty = fleet.freeplay(&["query", "tail", "N412FP", "--since", "2030-01-01"]);
+    assert_eq!(empty.code, Some(0), "{empty:?}");
+    assert!(empty.err.contains("N412FP") && empty.err.contains("2030-01-01"), "{}", empty.err);
+}
