@@ -1,6 +1,7 @@
 //! Text tables: fitted to the terminal by hiding the least important columns first.
 
 use comfy_table::{CellAlignment, Table as Grid};
+use report::StateBadge;
 
 use crate::output::escape;
 
@@ -154,13 +155,7 @@ pub(crate) fn count(n: usize, what: &str) -> String {
 
 /// State as shape and word, distinguishable without colour.
 pub(crate) fn state_mark(state: Option<&str>) -> String {
-    let shape = match state {
-        Some("act") => "◆",
-        Some("plan") => "▲",
-        Some("watch") => "●",
-        Some("normal") => "○",
-        _ => "–",
-    };
+    let shape = StateBadge::from_state(state).shape();
     state.map_or_else(|| shape.to_owned(), |word| format!("{shape} {word}"))
 }
 

@@ -20,4 +20,5 @@ pub use error::Error;
 pub use run::event::Event;
 pub use run::plan::{Plan, Request, WorkReason};
 pub use run::scheduler::run;
-pub use run::summary::RunSummary;
+pub use run::summary::{RunEnd, RunSummary};
+pub use trend::State;

@@ -1,71 +1,64 @@
 //! State badge: word, shape and colour of a unit's state, so that no reader depends on colour.
 
-use serde::Serialize;
+use trend::State;
 
-/// State of a unit, most urgent first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum StateBadge {
-    /// Replace the unit.
-    Act,
-    /// Plan the replacement.
-    Plan,
-    /// Inspect or monitor the unit.
-    Watch,
-    /// Not assessed, for lack of data; must never be read as normal.
-    NotAssessed,
-    /// No action.
-    Normal,
-}
+/// State of a unit as readers see it. Not assessed, for lack of data, must never be read as normal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StateBadge(Option<State>);
 
 impl StateBadge {
+    /// No action.
+    pub(crate) const NORMAL: Self = Self(Some(State::Normal));
+
     /// All states, in the order of the counts at the top of the fleet page.
-    pub const ALL: [Self; 5] = [Self::Act, Self::Plan, Self::Watch, Self::Normal, Self::NotAssessed];
+    pub const ALL: [Self; 5] =
+        [Self(Some(State::Act)), Self(Some(State::Plan)), Self(Some(State::Watch)), Self::NORMAL, Self(None)];
 
     /// Parses the `state` of an assessment; `None` or an unknown word means not assessed.
     pub fn from_state(word: Option<&str>) -> Self {
-        match word {
-            Some("act") => Self::Act,
-            Some("plan") => Self::Plan,
-            Some("watch") => Self::Watch,
-            Some("normal") => Self::Normal,
-            _ => Self::NotAssessed,
+        Self(word.and_then(State::from_word))
+    }
+
+    /// Rank by urgency, the most urgent first. A unit that is not assessed comes before a normal one.
+    pub fn rank(self) -> u8 {
+        match self.0 {
+            Some(State::Act) => 0,
+            Some(State::Plan) => 1,
+            Some(State::Watch) => 2,
+            None => 3,
+            Some(State::Normal) => 4,
         }
     }
 
     /// Word shown to readers.
     pub fn word(self) -> &'static str {
-        match self {
-            Self::Act => "act",
-            Self::Plan => "plan",
-            Self::Watch => "watch",
-            Self::Normal => "normal",
-            Self::NotAssessed => "not assessed",
-        }
+        self.0.map_or("not assessed", State::as_str)
     }
 
     /// Shape, distinguishable without colour.
     pub fn shape(self) -> &'static str {
-        match self {
-            Self::Act => "◆",
-            Self::Plan => "▲",
-            Self::Watch => "●",
-            Self::Normal => "○",
-            Self::NotAssessed => "–",
+        match self.0 {
+            Some(State::Act) => "◆",
+            Some(State::Plan) => "▲",
+            Some(State::Watch) => "●",
+            Some(State::Normal) => "○",
+            None => "–",
         }
     }
 
     /// CSS class that sets the colour.
     pub fn class(self) -> &'static str {
-        match self {
-            Self::NotAssessed => "unstated",
-            other => other.word(),
-        }
+        self.0.map_or("unstated", State::as_str)
+    }
+
+    /// Whether the unit must be replaced now.
+    pub(crate) fn is_act(self) -> bool {
+        self.0 == Some(State::Act)
     }
 
     /// Whether the unit belongs on the work list.
     pub fn needs_action(self) -> bool {
-        matches!(self, Self::Act | Self::Plan | Self::Watch)
+        self.0.is_some_and(|state| state > State::Normal)
     }
 }
 
@@ -75,7 +68,7 @@ mod tests {
 
     #[test]
     fn a_missing_or_unknown_word_is_never_normal() {
-        assert_eq!(StateBadge::from_state(None), StateBadge::NotAssessed);
-        assert_eq!(StateBadge::from_state(Some("fine")), StateBadge::NotAssessed);
+        assert_eq!(StateBadge::from_state(None), StateBadge(None));
+        assert_eq!(StateBadge::from_state(Some("fine")), StateBadge(None));
     }
 }

@@ -7,7 +7,7 @@ use job::Config;
 use rayon::prelude::*;
 use records::{Installations, PartNumber, SerialNumber};
 use store::{Query, Store};
-use trend::{Assessment, FleetPrior, Series, UsageDefaults, classic};
+use trend::{Assessment, FleetPrior, Series, State, UsageDefaults, classic};
 
 use crate::error::Error;
 use crate::fleet_trends::changes::{UnitChange, changed, since_states};
@@ -159,7 +159,7 @@ pub fn assess_run_from(
     let mut run = RunAssessments::default();
     let states = now.iter().filter_map(|row| row.state);
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
-    let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != "normal");
+    let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
     run.work_list = now.iter().filter(needs_attention).cloned().collect();
     now.retain(|row| names.contains(&row.name()));
     let Some(before_utc) = before_utc else { return Ok(RunAssessments { now, ..run }) };

@@ -165,7 +165,7 @@ pub(crate) fn row(
         usage_source: use_now.and(series).map(|series| series.usage_source().to_string()),
         stale_days: trend.stale_days.filter(|_| removal.is_none()),
         removed_utc: removal.and_then(|installation| installation.removed_utc),
-        state: trend.state.filter(|_| is_judged).map(state_word),
+        state: trend.state.filter(|_| is_judged).map(trend::State::as_str),
         reason: Some(match (removal, limit_m) {
             (Some(installation), _) => removed(installation),
             (None, Some(_)) => reason(trend, history, wide, as_of),
@@ -240,14 +240,5 @@ fn wear(wear: trend::WearStatus) -> &'static str {
         trend::WearStatus::Wearing => "wearing",
         trend::WearStatus::Steady => "steady",
         trend::WearStatus::Unknown => "unknown",
-    }
-}
-
-fn state_word(state: trend::State) -> &'static str {
-    match state {
-        trend::State::Normal => "normal",
-        trend::State::Watch => "watch",
-        trend::State::Plan => "plan",
-        trend::State::Act => "act",
     }
 }

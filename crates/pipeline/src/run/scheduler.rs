@@ -140,7 +140,7 @@ pub(crate) fn execute_run(
         report.quiet.clear();
     }
     report.close(clock.elapsed().as_secs_f64());
-    let exit_code = exit_code(&report, context.stop.load(Ordering::Relaxed));
+    let exit_code = report.end(context.stop.load(Ordering::Relaxed)).exit_code();
     if store.needs_compaction()? {
         writer.compact()?;
     }
@@ -159,14 +159,6 @@ fn acquire_lock(store: &Store, context: &Context<'_>) -> Result<Writer, Error> {
                 if left.is_some_and(|left| left > TURN) && !context.stop.load(Ordering::Relaxed) => {}
             ended => return Ok(ended?),
         }
-    }
-}
-
-fn exit_code(report: &RunSummary, stopped: bool) -> i64 {
-    match (stopped && report.not_reached > 0, report.errors.is_empty() && !report.has_mapping_fault()) {
-        (true, _) => 130,
-        (false, false) => 1,
-        (false, true) => 0,
     }
 }
 

@@ -165,6 +165,28 @@ struct LogCounts {
     duration_s: f64,
 }
 
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RunEnd {
+    /// Every log was processed.
+    Complete,
+    /// Every log was processed, and some failed or are mapped wrongly.
+    LogsInError,
+    /// An interrupt left logs for the next run.
+    Interrupted,
+}
+
+impl RunEnd {
+    /// Exit code of the run's record.
+    pub fn exit_code(self) -> i64 {
+        match self {
+            Self::Complete => 0,
+            Self::LogsInError => 1,
+            Self::Interrupted => 130,
+        }
+    }
+}
+
 impl RunSummary {
     pub(crate) fn begin(run_id: String, started_utc: Timestamp, plan: &Plan, workers: usize) -> Self {
         Self {
@@ -279,6 +301,15 @@ impl RunSummary {
         let mut logs: Vec<&str> = self.errors.iter().map(|e| e.log.as_str()).collect();
         logs.dedup();
         logs.len()
+    }
+
+    /// How the run ended; `stopped` when it received an interrupt.
+    pub fn end(&self, stopped: bool) -> RunEnd {
+        match (stopped && self.not_reached > 0, self.errors.is_empty() && !self.has_mapping_fault()) {
+            (true, _) => RunEnd::Interrupted,
+            (false, false) => RunEnd::LogsInError,
+            (false, true) => RunEnd::Complete,
+        }
     }
 
     /// The row kept in the store.

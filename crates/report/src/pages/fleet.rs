@@ -246,9 +246,9 @@ fn work(report: &Report) -> Vec<&UnitView> {
     units
 }
 
-fn urgency(unit: &UnitView) -> (f64, StateBadge, String) {
+fn urgency(unit: &UnitView) -> (f64, u8, String) {
     let days = unit.assessment.not_before_utc.map(|t| t.as_second() as f64);
-    (if unit.badge() == StateBadge::Act { 0.0 } else { days.unwrap_or(f64::MAX) }, unit.badge(), unit.name())
+    (if unit.badge().is_act() { 0.0 } else { days.unwrap_or(f64::MAX) }, unit.badge().rank(), unit.name())
 }
 
 fn grouped(units: &[&UnitView]) -> Vec<Group> {
@@ -275,7 +275,7 @@ fn changes(report: &Report) -> Vec<(String, String, String, String)> {
             let was = StateBadge::from_state(before.as_deref());
             let now = unit.badge();
             add(
-                if now < was { "worse" } else { "cleared" }.to_owned(),
+                if now.rank() < was.rank() { "worse" } else { "cleared" }.to_owned(),
                 format!("{} → {}", was.word(), now.word()),
             );
         }
@@ -299,13 +299,13 @@ fn changes(report: &Report) -> Vec<(String, String, String, String)> {
 }
 
 fn most_urgent_tails(report: &Report) -> Vec<&str> {
-    let mut worst: BTreeMap<&str, StateBadge> = BTreeMap::new();
+    let mut worst: BTreeMap<&str, u8> = BTreeMap::new();
     for unit in &report.units {
         let Some(tail) = unit.tail_number.as_deref() else { continue };
-        let badge = worst.entry(tail).or_insert(StateBadge::Normal);
-        *badge = unit.badge().min(*badge);
+        let rank = worst.entry(tail).or_insert(StateBadge::NORMAL.rank());
+        *rank = unit.badge().rank().min(*rank);
     }
-    let mut tails: Vec<(StateBadge, &str)> = worst.into_iter().map(|(tail, s)| (s, tail)).collect();
+    let mut tails: Vec<(u8, &str)> = worst.into_iter().map(|(tail, s)| (s, tail)).collect();
     tails.sort_unstable();
     tails.into_iter().take(FEW).map(|(_, tail)| tail).collect()
 }

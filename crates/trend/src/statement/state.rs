@@ -1,4 +1,4 @@
-//! One word of what to do, and why.
+//! Alert state of a unit, and its reason.
 
 use std::fmt;
 
@@ -13,17 +13,37 @@ const DAY_US: f64 = 86_400e6;
 const GAP_MARGIN: f64 = 0.97;
 const HORIZON_MARGIN: f64 = 1.15;
 
-/// What to do, from least to most urgent.
+/// Alert state of a unit, from least to most urgent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum State {
-    /// Nothing.
+    /// No action.
     Normal,
-    /// Look at it.
+    /// Inspect or monitor the unit.
     Watch,
-    /// Plan the change.
+    /// Plan the replacement.
     Plan,
-    /// Change it.
+    /// Replace the unit.
     Act,
+}
+
+impl State {
+    /// All states, from least to most urgent.
+    pub const ALL: [Self; 4] = [Self::Normal, Self::Watch, Self::Plan, Self::Act];
+
+    /// Its word in columns, keys and messages.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Normal => "normal",
+            Self::Watch => "watch",
+            Self::Plan => "plan",
+            Self::Act => "act",
+        }
+    }
+
+    /// The state with this word.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|state| state.as_str() == word)
+    }
 }
 
 /// Why a state, or none.

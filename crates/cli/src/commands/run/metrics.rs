@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use jiff::Timestamp;
-use pipeline::RunSummary;
+use pipeline::{RunSummary, State};
 
 use crate::exit::{Code, Failure};
 use crate::row_output::to_file;
@@ -60,7 +60,7 @@ fn text(report: &RunSummary, code: Code) -> String {
     if !report.is_partial() {
         gauge("tails_quiet", "Tails with no new logs for unusually long.", report.quiet.len() as f64);
     }
-    for state in ["normal", "watch", "plan", "act"] {
+    for state in State::ALL.map(State::as_str) {
         let name = format!("units_touched_{state}");
         gauge(&name, "Units updated by this run that are in this state.", states(state));
     }

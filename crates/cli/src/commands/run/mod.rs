@@ -12,8 +12,9 @@ use pipeline::fleet_trends::trend_row::TrendRow;
 use pipeline::history::histories::Histories;
 use pipeline::monitoring::recorder_change::{Quantity, RecorderChange};
 use pipeline::run::scheduler::{self, Context};
-use pipeline::{Event, Plan, Request, RunSummary};
+use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
 use records::{SerialNumber, TailNumber};
+use report::StateBadge;
 use store::Holder;
 
 use crate::args::{FailOn, Global, RunArgs};
@@ -142,23 +143,21 @@ fn follow(event: &Event, progress: &Progress<'_>) {
 
 /// Whether any unit of the store is in a state or worse, updated by this run or not.
 fn is_reached(report: &RunSummary, least: FailOn) -> bool {
-    let at_or_past: &[&str] = match least {
-        FailOn::Watch => &["watch", "plan", "act"],
-        FailOn::Plan => &["plan", "act"],
-        FailOn::Act => &["act"],
+    let least = match least {
+        FailOn::Watch => State::Watch,
+        FailOn::Plan => State::Plan,
+        FailOn::Act => State::Act,
     };
-    at_or_past.iter().any(|state| report.states.contains_key(state))
+    State::ALL.iter().any(|state| *state >= least && report.states.contains_key(state.as_str()))
 }
 
+/// Exit code of a finished run: that of its record, or the state of a unit where the record has none.
 fn code(report: &RunSummary, reached: bool, stopped: bool) -> Code {
-    if stopped && report.not_reached > 0 {
-        Code::Interrupted
-    } else if !report.errors.is_empty() || report.has_mapping_fault() {
-        Code::LogsInError
-    } else if reached {
-        Code::StateReached
-    } else {
-        Code::Success
+    match report.end(stopped) {
+        RunEnd::Interrupted => Code::Interrupted,
+        RunEnd::LogsInError => Code::LogsInError,
+        RunEnd::Complete if reached => Code::StateReached,
+        RunEnd::Complete => Code::Success,
     }
 }
 
@@ -386,14 +385,14 @@ fn work_list_section(rows: &[TrendRow], work_list: &[TrendRow]) -> String {
     if rows.is_empty() && work_list.is_empty() {
         return String::new();
     }
-    let urgency = |row: &TrendRow| ["act", "plan", "watch"].iter().position(|s| row.state == Some(*s));
+    let urgency = |row: &TrendRow| StateBadge::from_state(row.state).rank();
     let mut urgent: Vec<&TrendRow> = work_list.iter().collect();
     urgent.sort_by(|a, b| {
         let hours = |r: &TrendRow| r.crossing_hours_p05.unwrap_or(f64::INFINITY);
         urgency(a).cmp(&urgency(b)).then_with(|| hours(a).total_cmp(&hours(b)))
     });
     let silent = rows.iter().filter(|r| r.state.is_none()).count();
-    let normal = rows.iter().filter(|r| r.state == Some("normal")).count();
+    let normal = rows.iter().filter(|r| r.state == Some(State::Normal.as_str())).count();
     let mut page = if rows.is_empty() {
         format!("\nno unit updated; {} in the fleet need attention\n", count(urgent.len(), "unit"))
     } else {
