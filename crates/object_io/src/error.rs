@@ -13,7 +13,7 @@ pub enum Error {
     #[error("{place} cannot be asked: {detail}")]
     Settings { place: String, detail: String },
     /// The object or bucket does not exist.
-    #[error("{address} is not there")]
+    #[error("{address} does not exist")]
     Missing { address: String },
     /// Authentication failed or access is denied.
     #[error("{address} may not be read or written by these credentials: {detail}")]
@@ -22,7 +22,7 @@ pub enum Error {
     #[error("{address} was replaced while it was read")]
     Changed { address: String },
     /// The object already exists.
-    #[error("{address} is there already")]
+    #[error("{address} already exists")]
     Exists { address: String },
     /// No complete response within the retry time.
     #[error("{address} cannot be reached, tried for {tried_s:.0} s: {detail}")]

@@ -155,7 +155,7 @@ fn io_remedy(kind: ErrorKind) -> &'static str {
         }
         ErrorKind::NotADirectory => "name a folder, not a file, as `path` under `[store]`",
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            "make room and run again: what was stored before is whole"
+            "free space and run again; earlier results are intact"
         }
         _ => {
             "check the disk or the mount, and run again: the system could not read or write, which says nothing about \

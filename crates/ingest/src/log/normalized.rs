@@ -57,7 +57,7 @@ impl Normalized {
         }
         let text = |key: &str| file.metadata(&format!("freeplay.{key}")).filter(|t| !t.is_empty());
         let number = |key: &str| text(key).and_then(|t| t.parse::<f64>().ok());
-        let step_s = number("step_s").ok_or_else(|| fail("its step is not there".into()))?;
+        let step_s = number("step_s").ok_or_else(|| fail("`step_s` is missing".into()))?;
         let segments = text("segments").map_or_else(|| Some(Vec::new()), segments_from);
         let facts = IdentityField::ALL
             .iter()

@@ -116,7 +116,7 @@ pub(crate) fn from_batch<R: RowSchema>(batch: &RecordBatch) -> Result<Vec<R>, Er
 
 fn typed<'a, R>(batch: &'a RecordBatch, column: &Column<R>) -> Result<TypedArray<'a>, Error> {
     let problem = |problem: String| Error::Column { column: column.name.to_owned(), problem };
-    let array = batch.column_by_name(column.name).ok_or_else(|| problem("is not there".to_owned()))?;
+    let array = batch.column_by_name(column.name).ok_or_else(|| problem("is missing".to_owned()))?;
     let typed = match column.get {
         Getter::Text(_) => array.as_string_opt().map(TypedArray::Text),
         Getter::Texts(_) => array.as_list_opt().map(TypedArray::Texts),

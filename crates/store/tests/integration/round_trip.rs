@@ -148,5 +148,5 @@ fn a_time_beyond_the_calendar_is_an_error_and_never_wraps() {
 fn a_missing_column_is_named() {
     let batch = columns::to_batch(&[]).unwrap().project(&[0, 1]).unwrap();
     let error = columns::from_batch(&batch).unwrap_err().to_string();
-    assert_eq!(error, "column `part_number` is not there");
+    assert_eq!(error, "column `part_number` is missing");
 }
