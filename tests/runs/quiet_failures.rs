@@ -1,4 +1,4 @@
-//! Twenty ways for a night to go quietly wrong: each is planted, and must be noticed by name.
+//! Twenty ways for a run to fail without an error: each is injected, and must be reported by its code.
 
 use std::path::{Path, PathBuf};
 

@@ -49,7 +49,7 @@ pub fn escape_cell(text: &str) -> Cow<'_, str> {
     escape(text, |c| is_invisible(c) || matches!(c, '\n' | '\t'))
 }
 
-/// Cuts a text to so many characters and says how many are left out.
+/// Truncates a text to a number of characters, and appends how many were omitted.
 ///
 /// ```
 /// # use records::sanitize::limit_length;
