@@ -134,7 +134,7 @@ impl Injector {
     }
 }
 
-/// The calls to try: all, or as many as the gate does, spread evenly.
+/// The calls to try: all, or the sample of the gate, spread evenly.
 fn calls(count: usize) -> Vec<usize> {
     let step = if std::env::var("FREEPLAY_FAULTS").is_ok_and(|which| which == "all") {
         1
@@ -161,7 +161,7 @@ fn grown() -> TestFleet {
 }
 
 /// Runs with a fault at each call, and then without: the second run must end with every record, and the first must
-/// have said so if it had not.
+/// have reported what is missing.
 fn survives(
     make: fn() -> TestFleet,
     under: &'static str,

@@ -1,4 +1,4 @@
-//! Twenty ways for a night to go quietly wrong: each is planted, and must be noticed by name.
+//! Twenty ways for a run to go quietly wrong: each is planted, and must be noticed by name.
 
 use std::path::{Path, PathBuf};
 
@@ -254,7 +254,7 @@ const WAYS: &[Way] = &[
 ];
 
 #[test]
-fn a_night_that_goes_quietly_wrong_is_noticed_by_name() {
+fn a_run_that_goes_quietly_wrong_is_noticed_by_name() {
     let Some(injector) = Injector::new() else { return };
     let mut missed = Vec::new();
     for (way, plant, code, name) in WAYS {

@@ -195,7 +195,7 @@ mod tests {
         assert!(matches!(mask_credentials("s3://fleet/a@b.parquet"), Cow::Borrowed(_)));
     }
 
-    /// A mapped column may be called anything, also 64 MiB of it; the first characters tell which it is.
+    /// A mapped column may be called anything, also 64 MiB of it; the first characters identify it.
     #[test]
     fn a_long_or_hostile_name_leaves_a_short_and_harmless_message() {
         let name = "\u{1b}[2J\u{202e}".to_owned() + &"x".repeat(64 << 20);

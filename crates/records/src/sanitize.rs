@@ -49,7 +49,7 @@ pub fn escape_cell(text: &str) -> Cow<'_, str> {
     escape(text, |c| is_invisible(c) || matches!(c, '\n' | '\t'))
 }
 
-/// Cuts a text to so many characters and says how many are left out.
+/// Cuts a text to so many characters and states how many are left out.
 ///
 /// ```
 /// # use records::sanitize::limit_length;

@@ -1,4 +1,4 @@
-//! Where dependencies come from and under which licences: what `deny.toml` says, checked without a tool to install.
+//! Where dependencies come from and under which licences: the rules of `deny.toml`, checked without a tool to install.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::Path;

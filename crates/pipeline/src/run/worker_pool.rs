@@ -2,7 +2,7 @@
 //!
 //! No thread can be ended from outside. A log that takes longer than `run.log_timeout_s` is therefore reported as an
 //! error and its workers are abandoned: they end with the process. New workers take the logs that are left, and those
-//! that the abandoned workers held beside it: a worker that waits for the actuators of its log does those of other logs
+//! that the abandoned workers held in addition: a worker that waits for the actuators of its log does those of other logs
 //! meanwhile, so the log with a step in progress is the late one, and the logs without one wait for it.
 
 use std::collections::{BTreeMap, VecDeque};
@@ -19,10 +19,10 @@ use crate::run::flight_ownership::LogOutcomeData;
 use crate::run::memory_budget::MemoryBudget;
 use crate::run::plan::{Plan, WorkItem};
 
-/// How often the clock is looked at while no worker reports anything.
+/// How often the clock is read while no worker reports anything.
 const TURN: Duration = Duration::from_millis(100);
 
-/// Logs in progress have this long to finish after the run was asked to stop.
+/// Logs in progress have this long to finish after a signal stops the run.
 const STOP_GRACE: Duration = Duration::from_secs(5);
 
 /// Abandoned workers still use processor time: a run in which more logs than this pass their limit ends.
@@ -252,12 +252,12 @@ impl<'a> WorkerPool<'a> {
         Next::Log(outcome)
     }
 
-    /// A log that has passed its limit; looked for when all messages are read. One that only waits for another log
+    /// A log that has passed its limit; determined when all messages are read. One that only waits for another log
     /// is late when it has waited twice as long.
     fn overdue(&self) -> Option<usize> {
         let is_late = |(log, held): &(&usize, &InProgress)| {
             let is_at_work = self.shared.steps[**log].0.load(Ordering::Relaxed) > 0;
-            held.since.elapsed() > self.settings.limit * if is_at_work { 1 } else { 2 }
+            held.since.elapsed() > self.settings.limit.saturating_mul(if is_at_work { 1 } else { 2 })
         };
         self.in_progress.iter().find(is_late).map(|(log, _)| *log)
     }
