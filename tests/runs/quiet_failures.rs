@@ -254,7 +254,7 @@ const WAYS: &[Way] = &[
 ];
 
 #[test]
-fn a_night_that_goes_quietly_wrong_is_noticed_by_name() {
+fn a_run_that_goes_quietly_wrong_is_noticed_by_name() {
     let Some(injector) = Injector::new() else { return };
     let mut missed = Vec::new();
     for (way, plant, code, name) in WAYS {

@@ -257,7 +257,7 @@ impl<'a> WorkerPool<'a> {
     fn overdue(&self) -> Option<usize> {
         let is_late = |(log, held): &(&usize, &InProgress)| {
             let is_at_work = self.shared.steps[**log].0.load(Ordering::Relaxed) > 0;
-            held.since.elapsed() > self.settings.limit * if is_at_work { 1 } else { 2 }
+            held.since.elapsed() > self.settings.limit.saturating_mul(if is_at_work { 1 } else { 2 })
         };
         self.in_progress.iter().find(is_late).map(|(log, _)| *log)
     }

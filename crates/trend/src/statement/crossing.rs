@@ -127,7 +127,7 @@ impl RulDistribution {
         None
     }
 
-    /// Probability that the limit is met within some hours.
+    /// Probability that the limit is met within some hours; the sum of the cells may round to more than one.
     pub(crate) fn within(&self, hours: f64) -> f64 {
         let place = hours.max(1.0).ln() * self.scale;
         let whole = (place as usize).min(CELLS);
