@@ -1,9 +1,9 @@
-//! Time of each way through the filter for 16 384 samples, in cache, beside the floors of the machine measured
-//! on the spot: the shortest chain of operations a step must wait for, a sum in the order of the samples, and
+//! Time of each implementation of the filter for 16 384 samples in cache, with the lower bounds of the machine measured
+//! in the same run: the shortest chain of dependent operations of a step, a sum in the order of the samples, and
 //! memory.
 //!
-//! `batch_in_a_room` has memory for S already and the gains found; what it costs beyond the lanes is the early start
-//! of eight parts and what is left over, one sample after the other.
+//! `batch_in_a_room` reuses its memory and the gains; its cost in addition to the lanes is the warm-up
+//! of eight chunks and the remaining samples, one after the other.
 //!
 //! `even_unsettled` restarts before the gain settles, `even` runs on long after: a step takes the same.
 

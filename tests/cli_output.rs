@@ -1,4 +1,4 @@
-//! How the program speaks: codes, forms, quiet pipes, and help that a stranger can use.
+//! Output of the program: exit codes, formats, pipes without noise, and help for new users.
 
 use std::io::Read;
 
@@ -60,7 +60,8 @@ fn init_writes_a_configuration_that_is_good_and_never_overwrites() {
     assert!(silent.err.contains("error[no_log_matched]"), "{}", silent.err);
 }
 
-/// Logs that say nothing of themselves but by their path: what `init` proposes is checked and run as it stands.
+/// Logs without metadata, identified by their path only: the mapping that `init` proposes passes `check` and `run`
+/// unchanged.
 #[test]
 fn what_init_proposes_for_foreign_logs_runs_as_it_stands() {
     let fleet = TestFleet::sample();
@@ -115,7 +116,7 @@ fn rows_come_as_table_json_csv_and_parquet() {
     );
     assert_eq!(csv.lines().count(), 13);
     let gap: f64 = csv.lines().nth(1).unwrap().split(',').nth(12).unwrap().parse().unwrap();
-    assert_eq!(Some(gap), json[0]["gap_m"].as_f64(), "both forms hold the same bits");
+    assert_eq!(Some(gap), json[0]["gap_m"].as_f64(), "both formats hold bitwise identical values");
     fleet.run_ok(&["store", "export", "--format", "parquet", "--output", "all.parquet"]);
     assert_eq!(crate::harness::Table::read(&fleet.path("all.parquet")).rows(), 12);
     assert!(fleet.run_ok(&["trend"]).contains(" units as of "));
@@ -185,7 +186,7 @@ fn an_estimate_is_drawn_in_the_form_its_ending_names() {
     assert!(result.err.contains(".svg, .png or .html"), "{}", result.err);
     let result = fleet.freeplay(&["estimate", "nowhere.parquet", "--part", "A", "--plot", "none.png"]);
     assert!(result.err.contains("none.png was not written"), "{}", result.err);
-    assert!(!fleet.path("none.png").exists(), "an empty picture says nothing");
+    assert!(!fleet.path("none.png").exists(), "no plot without data");
 }
 
 /// A reader that closes the pipe after a line ends the program quietly.
@@ -274,14 +275,14 @@ fn a_table_made_elsewhere_is_judged_without_a_configuration() {
         let rows: Vec<serde_json::Value> = serde_json::from_str(&result.out).unwrap();
         (rows[0].clone(), result.err)
     };
-    let (without, said) = judged(&[]);
+    let (without, errors) = judged(&[]);
     assert!(without["state"].is_null() && without["rate_m_per_hour"].as_f64().unwrap() > 0.4e-6, "{without}");
-    assert!(said.contains("--limit-m"), "{said}");
-    let (with, said) = judged(&["--limit-m", "100e-6"]);
+    assert!(errors.contains("--limit-m"), "{errors}");
+    let (with, errors) = judged(&["--limit-m", "100e-6"]);
     let hours = |name: &str| with[name].as_f64().unwrap();
     assert!((hours("crossing_hours_p05")..=hours("crossing_hours_p95")).contains(&120.0), "{with}");
-    assert_eq!((with["state"].as_str(), said.as_str()), (Some("plan"), ""));
-    // In micrometres nobody would ever hear of it.
+    assert_eq!((with["state"].as_str(), errors.as_str()), (Some("plan"), ""));
+    // A limit given in micrometres would never be reached.
     let result = fleet.freeplay(&["trend", "--estimates", "history.csv", "--limit-m", "100"]);
     assert_eq!(result.code, Some(2), "{result:?}");
     assert!(result.err.contains("150e-6"), "{}", result.err);
@@ -366,7 +367,7 @@ fn a_configuration_elsewhere_is_read_from_there() {
     assert!(odd.join("results").exists());
 }
 
-/// A stranger's first step: the proposal from the logs reads those very logs.
+/// First step of a new user: the mapping that `init` proposes from the logs reads those logs.
 #[test]
 fn a_proposal_from_logs_reads_them() {
     let fleet = TestFleet::sample();

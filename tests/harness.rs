@@ -9,7 +9,7 @@ use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Float64Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
-/// Says a figure past the test runner, which keeps what tests print to itself.
+/// Prints a measurement past the test runner, which captures what tests print.
 pub(crate) fn print_line(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
@@ -158,7 +158,7 @@ impl Table {
 /// Key-value pairs of a footer.
 pub(crate) type Facts = Vec<(String, String)>;
 
-/// The footer's metadata that says which flight a log is.
+/// The identity of a log from the metadata of its footer.
 pub(crate) fn facts(log: &Path) -> Facts {
     use parquet::file::reader::{FileReader, SerializedFileReader};
     let reader = SerializedFileReader::new(std::fs::File::open(log).unwrap()).unwrap();
@@ -170,7 +170,7 @@ pub(crate) fn facts(log: &Path) -> Facts {
         .collect()
 }
 
-/// Writes some columns and rows of a log anew, as doubles, under an identity.
+/// Rewrites some columns and rows of a log as doubles, under an identity.
 pub(crate) fn rewrite(
     from: &Path,
     to: &Path,

@@ -23,7 +23,7 @@ pub(crate) struct Page {
 pub(crate) struct Block {
     /// What stands behind the fence: `sh`, `console`, `toml`.
     pub(crate) language: String,
-    /// Where its text lies in the page.
+    /// Byte range of its text in the page.
     pub(crate) span: Range<usize>,
     pub(crate) text: String,
     /// The comments right above it, such as `not run: needs systemd`.
@@ -31,7 +31,7 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    /// What a mark of this name says.
+    /// Value of the mark with this name.
     pub(crate) fn mark(&self, name: &str) -> Option<&str> {
         self.marks.iter().find_map(|mark| mark.strip_prefix(name)).map(str::trim)
     }
@@ -82,7 +82,7 @@ impl Page {
     }
 }
 
-/// What an HTML comment says.
+/// Text of an HTML comment.
 fn comment(html: &str) -> Option<String> {
     Some(html.trim().strip_prefix("<!--")?.strip_suffix("-->")?.trim().to_owned())
 }

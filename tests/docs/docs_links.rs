@@ -48,7 +48,7 @@ fn plain(path: &Path) -> PathBuf {
     plain
 }
 
-/// A page that is in no contents is read by nobody.
+/// Readers do not find a page that is missing from the contents.
 #[test]
 fn every_page_is_in_the_contents_once() {
     let pages = all();
@@ -59,6 +59,6 @@ fn every_page_is_in_the_contents_once() {
         .filter(|page| page.name.starts_with("docs/") && page.name != contents.name)
         .map(|page| page.name.clone())
         .collect();
-    assert_eq!(listed, written, "docs/SUMMARY.md beside the pages of docs/");
-    assert_eq!(listed.len(), contents.links.len(), "a page stands twice in docs/SUMMARY.md");
+    assert_eq!(listed, written, "docs/SUMMARY.md against the pages of docs/");
+    assert_eq!(listed.len(), contents.links.len(), "a page is listed twice in docs/SUMMARY.md");
 }

@@ -1,10 +1,11 @@
-//! Every command that the README and the book show is run, and must say what is shown below it.
+//! Every command that the README and the documentation show is run, and its output must match the page.
 //!
-//! A page starts in a copy of the sample fleet, and its blocks of `sh` and `console` are run one after the other.
-//! Comments above a block say what is otherwise: `first: COMMAND` is run before it and not shown, `exit 1` is how its
-//! last command ends, `output` (above a block of `text`) is what the block before it says, and `not run: WHY` exempts
-//! it. A line `…` stands for lines that are left out; times, sizes and digests may differ.
-//! `FREEPLAY_BLESS=1 cargo test -p cli documented_commands` writes what was said into the pages, where nothing is left out.
+//! Each page starts in a copy of the sample fleet; its blocks of `sh` and `console` run one after the other.
+//! Comments above a block change the defaults: `first: COMMAND` runs before it and is not shown, `exit 1` is the
+//! expected exit code of its last command, `output` (above a block of `text`) marks the output of the block before,
+//! and `not run: WHY` exempts a block. A line `…` replaces omitted lines; times, sizes and digests may differ.
+//! `FREEPLAY_BLESS=1 cargo test -p cli documented_commands` writes the output into the pages, except where lines are
+//! omitted.
 
 use std::fs;
 use std::ops::Range;
@@ -43,7 +44,7 @@ fn runs(block: &Block) -> bool {
     block.language == "console" || (block.language == "sh" && block.text.lines().any(ours))
 }
 
-/// One command, where what it says is shown, and how it must end.
+/// One command, the place of its output in the page, and its expected exit code.
 struct Step {
     script: String,
     shown: Option<Range<usize>>,
@@ -63,15 +64,15 @@ impl<'p> Try<'p> {
     /// Runs a page from its first block to its last.
     fn of(page: &'p Page) -> Vec<String> {
         let mut tried = Self { page, fleet: TestFleet::sample(), faults: Vec::new(), blessed: Vec::new() };
-        let mut said = String::new();
+        let mut output = String::new();
         for block in &page.blocks {
             if let Some(command) = block.mark("first:") {
                 tried.run(&Step { script: command.to_owned(), shown: None, code: 0 });
             }
             if block.marks.iter().any(|mark| mark == "output") {
-                tried.compare(&block.span, &said);
+                tried.compare(&block.span, &output);
             } else if runs(block) && block.mark("not run:").is_none() {
-                said = steps(block).iter().map(|step| tried.run(step)).collect();
+                output = steps(block).iter().map(|step| tried.run(step)).collect();
             }
         }
         tried.bless();
@@ -90,29 +91,31 @@ impl<'p> Try<'p> {
             fs::write(folder.join(".here"), folder.to_str().unwrap()).unwrap();
         }
         let result = shell(&folder, &script).output().unwrap();
-        let said = String::from_utf8_lossy(&result.stdout).replace(&*folder.to_string_lossy(), "/srv/fleet");
-        let said: String = said.split_inclusive('\n').filter(|line| !line.contains(" % elapsed ")).collect();
+        let output =
+            String::from_utf8_lossy(&result.stdout).replace(&*folder.to_string_lossy(), "/srv/fleet");
+        let output: String =
+            output.split_inclusive('\n').filter(|line| !line.contains(" % elapsed ")).collect();
         if result.status.code() != Some(step.code) {
             let (name, code) = (&self.page.name, result.status.code());
             self.faults
-                .push(format!("{name}: `{}` ended with {code:?}, not {}:\n{said}", step.script, step.code));
+                .push(format!("{name}: `{}` ended with {code:?}, not {}:\n{output}", step.script, step.code));
         } else if let Some(span) = &step.shown {
-            self.compare(span, &said);
+            self.compare(span, &output);
         }
-        said
+        output
     }
 
-    /// Holds what is shown against what was said.
-    fn compare(&mut self, span: &Range<usize>, said: &str) {
+    /// Compares the shown output with the real one.
+    fn compare(&mut self, span: &Range<usize>, output: &str) {
         let shown = &self.page.text[span.clone()];
-        let said = trimmed(said);
-        if fits(&masked(shown), &masked(&said)) {
+        let output = trimmed(output);
+        if fits(&masked(shown), &masked(&output)) {
             return;
         }
         if std::env::var_os("FREEPLAY_BLESS").is_some() && !shown.lines().any(|line| line == "…") {
-            self.blessed.push((span.clone(), said));
+            self.blessed.push((span.clone(), output));
         } else {
-            self.faults.push(format!("{}: shown\n{shown}\nsaid\n{said}", self.page.name));
+            self.faults.push(format!("{}: shown\n{shown}\noutput\n{output}", self.page.name));
         }
     }
 
@@ -122,8 +125,8 @@ impl<'p> Try<'p> {
         }
         let mut text = self.page.text.clone();
         self.blessed.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
-        for (span, said) in &self.blessed {
-            text.replace_range(span.clone(), said);
+        for (span, output) in &self.blessed {
+            text.replace_range(span.clone(), output);
         }
         fs::write(top().join(&self.page.name), text).unwrap();
     }
@@ -169,8 +172,8 @@ fn steps(block: &Block) -> Vec<Step> {
 }
 
 /// Lines without what trails, and the last one whole.
-fn trimmed(said: &str) -> String {
-    said.lines().flat_map(|line| [line.trim_end(), "\n"]).collect()
+fn trimmed(output: &str) -> String {
+    output.lines().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
 /// Lines in which what differs between two runs of the same logs is left out.
@@ -195,11 +198,11 @@ fn masked(text: &str) -> Vec<String> {
     text.lines().map(line).collect()
 }
 
-/// Whether what is shown is what was said, `…` standing for any lines.
-fn fits(shown: &[String], said: &[String]) -> bool {
-    let Some((first, rest)) = shown.split_first() else { return said.is_empty() };
+/// Whether the shown lines match the output; `…` matches any lines.
+fn fits(shown: &[String], output: &[String]) -> bool {
+    let Some((first, rest)) = shown.split_first() else { return output.is_empty() };
     if first == "…" {
-        return (0..=said.len()).any(|skipped| fits(rest, &said[skipped..]));
+        return (0..=output.len()).any(|skipped| fits(rest, &output[skipped..]));
     }
-    said.split_first().is_some_and(|(line, after)| line == first && fits(rest, after))
+    output.split_first().is_some_and(|(line, after)| line == first && fits(rest, after))
 }

@@ -1,6 +1,6 @@
-//! Every word of what the program says when it refuses, as a stranger reads it: `tests/data/errors.txt`.
+//! All error messages of the program as a user reads them: `tests/data/errors.txt`.
 //!
-//! `FREEPLAY_BLESS=1 cargo test -p cli error_messages` writes that file anew; read the difference before it is kept.
+//! `FREEPLAY_BLESS=1 cargo test -p cli error_messages` rewrites that file; read the difference before you commit it.
 
 use std::fmt::Write;
 use std::fs;
@@ -128,7 +128,7 @@ const ARGUMENTS: &[(&str, &[&str])] = &[
     ("no store", &["query", "tail", "N412FP"]),
     ("no store to compare", &["diff", "results", "results-trial"]),
     ("no log of that name", &["check", "sample-data/logs/N412FP/1.parquet"]),
-    ("a log cut short", &["check", "cut.parquet"]),
+    ("a truncated log", &["check", "cut.parquet"]),
     ("a folder for a log", &["check", "sample-data/logs"]),
     ("a folder for the configuration", &["check", "--config", "sample-data"]),
     ("an empty log", &["check", "empty.parquet"]),
@@ -140,23 +140,23 @@ const ARGUMENTS: &[(&str, &[&str])] = &[
     ("a store that is a file", &["store", "info", "--config", "file-store.toml"]),
 ];
 
-/// What was typed, the exit code, and all that was said, with the folder's own name left out.
-fn said(fleet: &TestFleet, name: &str, args: &[&str], told: &mut String) {
+/// The typed command, its exit code and its output, without the path of the temporary folder.
+fn record_output(fleet: &TestFleet, name: &str, args: &[&str], text: &mut String) {
     let result = fleet.command(args).env("COLUMNS", "100").output().unwrap();
     let folder = fs::canonicalize(fleet.path("")).unwrap();
     let words = String::from_utf8(result.stderr).unwrap().replace(&*folder.to_string_lossy(), "FLEET");
     let code = result.status.code().unwrap();
     assert!(code != 0 && words.contains("error"), "{name}: exit {code}, {words}");
-    writeln!(told, "## {name}\n$ freeplay {}\n{}\nexit {code}\n", args.join(" "), words.trim_end()).unwrap();
+    writeln!(text, "## {name}\n$ freeplay {}\n{}\nexit {code}\n", args.join(" "), words.trim_end()).unwrap();
 }
 
-fn slips(fleet: &TestFleet, slips: &[Slip], told: &mut String) {
+fn slips(fleet: &TestFleet, slips: &[Slip], text: &mut String) {
     for (name, file, from, to, args) in slips {
         let path = fleet.path(file);
         let sound = fs::read_to_string(&path).unwrap();
         assert!(sound.contains(from), "{name}: {from} is not in {file}");
         fs::write(&path, sound.replacen(from, to, 1)).unwrap();
-        said(fleet, name, args, told);
+        record_output(fleet, name, args, text);
         fs::write(&path, sound).unwrap();
     }
 }
@@ -181,7 +181,7 @@ const STORES: &[Spoil] = &[
         &["query", "tail", "N412FP"],
     ),
     (
-        "a store whose mark is torn",
+        "a store whose format marker is truncated",
         |fleet| fs::write(fleet.path("results/store.json"), "{\"freepl").unwrap(),
         &["store", "info"],
     ),
@@ -191,7 +191,7 @@ const STORES: &[Spoil] = &[
         &["store", "info"],
     ),
     (
-        "a table whose log is torn",
+        "a table whose commit file is truncated",
         |fleet| tear(&newest(fleet, "results/gaps/_delta_log/*.json")),
         &["query", "tail", "N412FP"],
     ),
@@ -234,18 +234,18 @@ fn flip(file: &Path) {
     fs::write(file, whole).unwrap();
 }
 
-/// What a spoilt store makes the program say, without what differs from run to run: holder and digests.
-fn stores(told: &mut String) {
+/// Messages about damaged stores, without parts that differ from run to run (holder, digests).
+fn stores(text: &mut String) {
     let fleet = TestFleet::sample();
     fleet.run_ok(&["run", "--limit", "2"]);
     let sound = tempfile::tempdir().unwrap();
     copy(&fleet.path("results"), sound.path());
     let lock = fs::File::options().write(true).open(fleet.path("results/lock")).unwrap();
     lock.lock().unwrap();
-    let mut said_of_stores = String::new();
+    let mut store_output = String::new();
     for (name, spoil, args) in STORES {
         spoil(&fleet);
-        said(&fleet, name, args, &mut said_of_stores);
+        record_output(&fleet, name, args, &mut store_output);
         fs::remove_dir_all(fleet.path("results")).unwrap();
         copy(sound.path(), &fleet.path("results"));
     }
@@ -255,35 +255,35 @@ fn stores(told: &mut String) {
         (r"[0-9a-f]{12}…", "DIGEST…"),
         (r" at line \d+ column \d+", ""),
     ] {
-        said_of_stores = Regex::new(differs).unwrap().replace_all(&said_of_stores, word).into_owned();
+        store_output = Regex::new(differs).unwrap().replace_all(&store_output, word).into_owned();
     }
-    told.push_str(&said_of_stores);
+    text.push_str(&store_output);
 }
 
 #[test]
 fn errors_read_as_they_were_last_read_by_a_person() {
     let fleet = TestFleet::sample();
     spoilt(&fleet);
-    let mut told = String::new();
-    slips(&fleet, CONFIGURATION, &mut told);
-    slips(&fleet, LOGS_AND_TABLES, &mut told);
+    let mut text = String::new();
+    slips(&fleet, CONFIGURATION, &mut text);
+    slips(&fleet, LOGS_AND_TABLES, &mut text);
     for (name, args) in ARGUMENTS {
-        said(&fleet, name, args, &mut told);
+        record_output(&fleet, name, args, &mut text);
     }
     assert!(!fleet.path("results").exists(), "an error stores nothing");
-    stores(&mut told);
+    stores(&mut text);
     let kept = top().join("tests/data/errors.txt");
     if std::env::var_os("FREEPLAY_BLESS").is_some() {
-        fs::write(&kept, &told).unwrap();
+        fs::write(&kept, &text).unwrap();
     }
     let kept = fs::read_to_string(kept).unwrap();
     let codes = Regex::new(r"error\[(\w+)\]").unwrap();
     let page = fs::read_to_string(top().join("docs/errors.md")).unwrap();
-    for code in codes.captures_iter(&told).map(|found| format!("`{}`", &found[1])) {
+    for code in codes.captures_iter(&text).map(|found| format!("`{}`", &found[1])) {
         assert!(page.contains(&code), "{code} is not explained in docs/errors.md");
     }
-    for (now, before) in told.split("## ").zip(kept.split("## ")) {
+    for (now, before) in text.split("## ").zip(kept.split("## ")) {
         assert_eq!(now, before);
     }
-    assert_eq!(told.len(), kept.len(), "an error was added or left out");
+    assert_eq!(text.len(), kept.len(), "an error was added or left out");
 }

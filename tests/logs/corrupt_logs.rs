@@ -2,7 +2,7 @@
 
 use crate::harness::TestFleet;
 
-/// Cut short, empty, no Parquet, a flipped byte in a page, a stranger's tail: five logs, five codes.
+/// Truncated, empty, not Parquet, a flipped byte in a page, an unknown tail: five logs, five codes.
 fn spoil(fleet: &TestFleet) {
     let logs = fleet.logs();
     let bytes = std::fs::read(&logs[0]).unwrap();

@@ -30,7 +30,7 @@ fn one_worker_and_two_store_the_same_bytes() {
     assert_eq!(one.run_ok(&["trend", "--json"]), two.run_ok(&["trend", "--json"]));
 }
 
-/// The serial that changed tails keeps its history, and the logs say nothing of serials.
+/// The serial that changed tails keeps its history, although the logs hold no serial numbers.
 #[test]
 fn a_swapped_serial_keeps_its_history_across_tails() {
     let fleet = TestFleet::sample();

@@ -42,15 +42,15 @@ fn logs(fleet: &TestFleet) -> Vec<PathBuf> {
 fn normalized_logs_give_the_same_gaps_bit_for_bit() {
     for encoding in ["split", "compatible"] {
         let fleet = one_tail();
-        let said = fleet.run_ok(&["normalize", "--output", "normalized", "--encoding", encoding]);
-        assert!(said.contains("40 normalized logs of 10 logs"), "{said}");
+        let output = fleet.run_ok(&["normalize", "--output", "normalized", "--encoding", encoding]);
+        assert!(output.contains("40 normalized logs of 10 logs"), "{output}");
         fleet.configure("sample-data/logs/N414FP/*.parquet", "normalized/**/*.parquet");
         fleet.run_ok(&["run"]);
         assert_eq!(numbers(&fleet), plain(), "{encoding}");
         let one = glob::glob(fleet.path("normalized/N414FP/*/*.parquet").to_str().unwrap()).unwrap();
-        let said = facts(&one.flatten().next().unwrap());
+        let output = facts(&one.flatten().next().unwrap());
         for key in ["freeplay.source_log", "freeplay.source_digest", "freeplay.step_s", "freeplay.units"] {
-            assert!(said.iter().any(|(k, v)| k == key && !v.is_empty()), "{key}");
+            assert!(output.iter().any(|(k, v)| k == key && !v.is_empty()), "{key}");
         }
     }
 }
@@ -125,7 +125,7 @@ fn loads_in_files_of_their_own_find_their_flights() {
 }
 
 #[test]
-fn a_broken_file_of_a_group_and_one_without_a_flight_are_told() {
+fn a_broken_file_of_a_group_and_one_without_a_flight_are_reported() {
     let fleet = one_tail();
     for log in logs(&fleet) {
         let name = log.file_name().unwrap();
@@ -142,7 +142,7 @@ fn a_broken_file_of_a_group_and_one_without_a_flight_are_told() {
         let found = glob::glob(fleet.path(&format!("{folder}/*.parquet")).to_str().unwrap()).unwrap();
         found.flatten().collect::<Vec<_>>()
     };
-    std::fs::write(&all("loads")[0], b"PAR1 torn").unwrap();
+    std::fs::write(&all("loads")[0], b"PAR1 truncated").unwrap();
     std::fs::remove_file(&all("positions")[1]).unwrap();
     let result = fleet.freeplay(&["run"]);
     assert_eq!(result.code, Some(1), "{result:?}");
@@ -177,21 +177,21 @@ fn a_misspelled_override_is_refused_with_its_line() {
     assert!(result.err.contains("error[unknown_key]") && result.err.contains("`sign`?"), "{}", result.err);
 }
 
-/// A column that is renamed half-way through the years: each log is read as it is, and `check` says so.
+/// A column is renamed after some years: each log is read with its own schema, and `check` reports the change.
 #[test]
-fn columns_that_change_are_told() {
+fn changed_columns_are_reported() {
     let fleet = one_tail();
     let log = &logs(&fleet)[0];
     rewrite(log, &log.with_file_name("x.parquet"), &facts(log), |c| c != "aileron_left_load_n", |_| true);
     std::fs::rename(log.with_file_name("x.parquet"), log).unwrap();
-    let said = fleet.run_ok(&["check"]);
-    assert!(said.contains("missing or whose type differs between 10 logs"), "{said}");
-    assert!(said.contains("`aileron_left_load_n`: Float32 in 9"), "{said}");
+    let output = fleet.run_ok(&["check"]);
+    assert!(output.contains("missing or whose type differs between 10 logs"), "{output}");
+    assert!(output.contains("`aileron_left_load_n`: Float32 in 9"), "{output}");
     assert!(
-        said.contains("`aileron_left_motor_deg`: Float32 in 9") && said.contains("Float64 in 1"),
-        "{said}"
+        output.contains("`aileron_left_motor_deg`: Float32 in 9") && output.contains("Float64 in 1"),
+        "{output}"
     );
-    assert!(said.contains("channel_unmapped: the log lacks aileron_left_load_n"), "{said}");
+    assert!(output.contains("channel_unmapped: the log lacks aileron_left_load_n"), "{output}");
     let account = fleet.run_ok(&["run"]);
     assert!(account.contains("40 records") && account.contains("channel_unmapped 1"), "{account}");
 }

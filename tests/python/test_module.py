@@ -179,7 +179,7 @@ def test_a_broken_log_is_told_in_the_commands_words_and_the_others_are_answered(
         freeplay.estimate(["torn.parquet", logs[1]])
     told = command("estimate", "torn.parquet", logs[1], "--no-progress", code=caught.value.exit_code).stderr
     assert str(caught.value) == told.strip()
-    assert (caught.value.code, caught.value.complaints[0]["file"]) == ("not_parquet", "torn.parquet")
+    assert (caught.value.code, caught.value.diagnostics[0]["file"]) == ("not_parquet", "torn.parquet")
     assert caught.value.help in told
     assert caught.value.answer.num_rows == 4
 

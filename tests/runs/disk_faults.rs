@@ -1,6 +1,6 @@
 //! Disks that are full, and disks whose power is cut.
 //!
-//! Both need file systems of their own, which only root may mount: without the right to, the tests say that
+//! Both need file systems of their own, which only root may mount: without that right, the tests report that
 //! they were skipped, and why. A copy of a mounted disk image is what a power cut at that moment leaves: what
 //! was not synced is still in the kernel's memory and not in the image, and mounting the copy replays its
 //! journal.
@@ -20,7 +20,7 @@ const CONTROL_CUTS: usize = 4;
 struct Mounted(PathBuf);
 
 impl Mounted {
-    /// Mounts, or says why that is not possible here.
+    /// Mounts the file system, or returns why it cannot be mounted here.
     fn new(args: &[&str], at: &Path) -> Result<Self, String> {
         std::fs::create_dir_all(at).unwrap();
         done(Command::new("mount").args(args).arg(at))?;
@@ -35,15 +35,15 @@ impl Drop for Mounted {
     }
 }
 
-/// Runs a command that must end well, or says what it said.
+/// Runs a command that must succeed, or returns its output.
 fn done(command: &mut Command) -> Result<(), String> {
     let result = command.stdin(Stdio::null()).output().map_err(|e| format!("{command:?}: {e}"))?;
-    let said = String::from_utf8_lossy(&result.stderr);
-    if result.status.success() { Ok(()) } else { Err(format!("{command:?}: {}", said.trim())) }
+    let errors = String::from_utf8_lossy(&result.stderr);
+    if result.status.success() { Ok(()) } else { Err(format!("{command:?}: {}", errors.trim())) }
 }
 
-/// A disk that is full at some byte: the run says so with code 3, what was stored before stays whole, and with
-/// room again the next run ends where it would have.
+/// A disk that is full at some byte: the run reports it with code 3, earlier results stay whole, and with
+/// free space again the next run finishes.
 #[test]
 fn a_full_disk_leaves_the_store_whole_and_the_next_run_finishes() {
     let plain = small();
@@ -71,7 +71,7 @@ fn a_full_disk_leaves_the_store_whole_and_the_next_run_finishes() {
     assert!((3..10).contains(&full), "{full} runs met a full disk");
 }
 
-/// A disk in a file, whose journal is written by nobody but who syncs.
+/// A disk in a file. Its journal is written only by processes that sync.
 struct Disk<'b> {
     fleet: &'b TestFleet,
     image: PathBuf,
@@ -109,8 +109,8 @@ impl<'b> Disk<'b> {
     }
 }
 
-/// One cut: some runs that result, then a cut at a random instant of another, or right after the last one result.
-/// Says how many records are there after it, or what is wrong with them.
+/// One power cut: some runs that finish, then a cut at a random instant of another run, or right after the last one.
+/// Returns how many records the store holds afterwards, or what is wrong with them.
 fn cut(disk: &mut Disk<'_>, chance: &mut Chance, preload: Option<&Path>, mid: bool) -> Result<usize, String> {
     let run = || {
         let mut command = disk.fleet.command(&["run", "--jobs", "1", "--limit", "3", "-q"]);
@@ -139,8 +139,8 @@ fn cut(disk: &mut Disk<'_>, chance: &mut Chance, preload: Option<&Path>, mid: bo
     state(disk.fleet, runs * 3 * 4, !mid)
 }
 
-/// What the store holds, when that is whole and not less than what runs had said was stored; a run that ended
-/// had said that it did.
+/// Number of stored records, if the store is whole and holds at least what finished runs had reported as stored.
+/// A run that finished must have recorded its exit code.
 fn state(fleet: &TestFleet, promised: usize, ended: bool) -> Result<usize, String> {
     let store = match store::Store::open(fleet.path("disk/results")) {
         Err(error) if error.diagnostic().code == "store_missing" && promised == 0 => return Ok(0),
@@ -156,7 +156,7 @@ fn state(fleet: &TestFleet, promised: usize, ended: bool) -> Result<usize, Strin
     }
     let runs = store.runs().map_err(|e| e.to_string())?;
     if ended && runs.last().is_none_or(|run| run.exit_code != Some(0)) {
-        return Err("the last run had result, and its account does not say so".to_owned());
+        return Err("the last run finished, and its run record does not hold it".to_owned());
     }
     let found = store.verify();
     if found.is_empty() { Ok(records.len()) } else { Err(format!("{found:?}")) }

@@ -56,9 +56,9 @@ fn a_renamed_or_touched_log_is_recognised_by_its_content() {
     assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 new or changed, 30 already processed"));
 }
 
-/// A changed byte that neither size nor date betray: it is found when contents are asked for, and only then.
+/// A changed byte that changes neither size nor date: found only when contents are compared.
 #[test]
-fn content_is_compared_when_it_is_asked_for() {
+fn content_is_compared_on_request() {
     let fleet = TestFleet::sample();
     fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
     fleet.run_ok(&["run"]);
@@ -153,9 +153,9 @@ fn a_copy_speaks_when_the_first_log_breaks() {
     assert!(to_do(&fleet.run_ok(&["run"])).ends_with("31 logs: 0 new or changed, 31 already processed"));
 }
 
-/// What is asked for is found out before the limit cuts, also of logs never seen.
+/// The selection applies before the limit, also to logs that are not in the store yet.
 #[test]
-fn a_limit_counts_only_what_was_asked_for() {
+fn a_limit_counts_only_selected_logs() {
     let fleet = TestFleet::sample();
     let account = fleet.run_ok(&["run", "--tail", "N414FP", "--limit", "3"]);
     assert!(account.contains("3 new or changed, 0 already processed, 20 excluded by --tail/--serial/--since/--until, 7 left for later by --limit"), "{account}");
@@ -192,9 +192,9 @@ fn a_record_is_explained_and_recomputed_bitwise() {
     let fleet = TestFleet::sample();
     fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*0003.parquet");
     fleet.run_ok(&["run"]);
-    let told = fleet.run_ok(&["explain", "N412FP-0003", "aileron_left"]);
+    let output = fleet.run_ok(&["explain", "N412FP-0003", "aileron_left"]);
     for part in ["bit-identical", "stiffness_n_per_m = 50000000.0", "motor [m]", "computed by Freeplay"] {
-        assert!(told.contains(part), "{part} is not in {told}");
+        assert!(output.contains(part), "{part} is not in {output}");
     }
     let json = fleet.run_ok(&["explain", "N412FP-0003", "aileron_left", "--json"]);
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
@@ -218,8 +218,8 @@ fn two_methods_live_side_by_side_and_are_compared() {
     fleet.configure("path = \"results\"", "path = \"trial\"");
     fleet.configure("method = \"contact\"", "method = \"midrange\"");
     fleet.run_ok(&["run"]);
-    let told = fleet.run_ok(&["diff", "results", "trial"]);
-    assert!(told.starts_with("40 of 40 actuator-flights differ"), "{told}");
+    let output = fleet.run_ok(&["diff", "results", "trial"]);
+    assert!(output.starts_with("40 of 40 actuator-flights differ"), "{output}");
     let few = fleet.run_ok(&["diff", "results", "trial", "--min-change-um", "1000"]);
     assert!(few.starts_with("0 of 40"), "{few}");
     let rows = fleet.run_ok(&["diff", "results", "trial", "--format", "csv"]);
@@ -238,8 +238,8 @@ fn a_trial_is_adopted_and_what_it_did_not_see_stays() {
     fleet.run_ok(&["run", "--tail", "N412FP"]);
     let trial = fleet.exported();
     fleet.configure("path = \"trial\"", "path = \"results\"");
-    let told = fleet.run_ok(&["store", "adopt", "trial"]);
-    assert!(told.starts_with("adopted 16 records of 4 logs"), "{told}");
+    let output = fleet.run_ok(&["store", "adopt", "trial"]);
+    assert!(output.starts_with("adopted 16 records of 4 logs"), "{output}");
     assert!(fleet.run_ok(&["diff", "results", "trial"]).contains("differ"));
 
     let now = fleet.exported();
@@ -296,9 +296,9 @@ fn a_tail_that_went_quiet_is_named() {
     assert!(account.contains("no data     from 1 tail: N414FP since"), "{account}");
 }
 
-/// The screw channel of one aircraft comes 4 ms later from one night on: the run says so, and the gap stays.
+/// The screw channel of one aircraft is 4 ms late from some flight on: the run reports it, and the gap stays.
 #[test]
-fn a_recorder_that_was_changed_is_told_from_wear() {
+fn a_recorder_change_is_distinguished_from_wear() {
     let fleet = TestFleet::sample();
     fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
     let late: Vec<_> =

@@ -1,4 +1,4 @@
-//! Cut short in the middle: what was finished is kept, and the next run ends where an uninterrupted one does.
+//! Interrupted runs: finished flights are kept, and the next run reaches the same store as an uninterrupted one.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ fn stored(fleet: &TestFleet) -> usize {
 enum When {
     /// So long after its start: nothing may be there yet.
     After(Duration),
-    /// As soon as so many commits of records stand in the log of the table.
+    /// As soon as the log of the table has this many commits of records.
     Committed(usize),
 }
 
@@ -54,10 +54,10 @@ fn a_killed_run_keeps_whole_flights_and_the_next_one_finishes() {
     }
 }
 
-/// A run that was asked to stop finishes the flights in hand and says so.
+/// A run that receives an interrupt finishes the flights in progress and reports it.
 #[cfg(unix)]
 #[test]
-fn an_interrupted_run_says_130_and_the_next_one_does_the_rest() {
+fn an_interrupted_run_exits_with_130_and_the_next_one_finishes() {
     let fleet = TestFleet::sample();
     let child = fleet.command(&["run", "--jobs", "1"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
     std::thread::sleep(Duration::from_millis(250));
@@ -85,7 +85,7 @@ fn two_hundred_kills_lose_nothing_and_double_nothing() {
     let plain = small();
     plain.run_ok(&["run", "--jobs", "1"]);
     let wanted = plain.exported();
-    // The machine may be busy with other tests: the quickest of three runs says how long one takes.
+    // The machine may be busy with other tests: the fastest of three runs is the duration.
     let took = |_| {
         let fleet = small();
         let started = std::time::Instant::now();
@@ -164,7 +164,7 @@ impl Chance {
     }
 }
 
-/// A file that may not grow: the write fails at some byte, the run says so with code 3, and what was stored
+/// A file that may not grow: the write fails at some byte, the run reports it with code 3, and what was stored
 /// before stays whole. With room again the next run finishes.
 #[cfg(unix)]
 #[test]
@@ -176,7 +176,7 @@ fn a_writer_that_fails_at_any_byte_leaves_the_store_whole() {
     for blocks in [0, 1, 2, 4, 6, 8, 12, 16, 24, 32] {
         let fleet = small();
         let program = env!("CARGO_BIN_EXE_freeplay");
-        // Blocks of 512 bytes: the limit strikes inside data files and inside the log alike.
+        // Blocks of 512 bytes: the limit takes effect inside data files and inside the table's log.
         let limited = format!("ulimit -f {blocks}; exec '{program}' run --jobs 1");
         let result = std::process::Command::new("sh")
             .args(["-c", &limited])
@@ -184,10 +184,10 @@ fn a_writer_that_fails_at_any_byte_leaves_the_store_whole() {
             .env_remove("FREEPLAY_CONFIG")
             .output()
             .unwrap();
-        let said = String::from_utf8_lossy(&result.stderr);
-        assert!(matches!(result.status.code(), Some(0 | 3)), "{blocks} blocks: {:?} {said}", result.status);
+        let errors = String::from_utf8_lossy(&result.stderr);
+        assert!(matches!(result.status.code(), Some(0 | 3)), "{blocks} blocks: {:?} {errors}", result.status);
         failed += usize::from(result.status.code() == Some(3));
-        assert!(result.status.code() != Some(3) || said.contains("error["), "{blocks} blocks: {said}");
+        assert!(result.status.code() != Some(3) || errors.contains("error["), "{blocks} blocks: {errors}");
         whole_flights(&fleet);
         fleet.run_ok(&["run"]);
         assert_eq!(fleet.exported(), wanted, "{blocks} blocks");
@@ -207,11 +207,11 @@ fn two_runs_at_once_store_each_flight_once() {
     let children = [run(&["run"]), run(&["run"]), run(&["run", "--wait", "2m"])];
     for child in children {
         let result = child.wait_with_output().unwrap();
-        let said = String::from_utf8_lossy(&result.stderr).into_owned();
+        let errors = String::from_utf8_lossy(&result.stderr).into_owned();
         match result.status.code() {
             Some(0) => {}
-            Some(3) => assert!(said.contains("pid"), "{said}"),
-            code => panic!("{code:?}: {said}"),
+            Some(3) => assert!(errors.contains("pid"), "{errors}"),
+            code => panic!("{code:?}: {errors}"),
         }
     }
     assert_eq!(whole_flights(&fleet), 40);

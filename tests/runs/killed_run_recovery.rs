@@ -1,4 +1,4 @@
-//! The morning after a night that was killed: what became of each log is known, and nothing is forgotten.
+//! The run after a killed run: the status of each log is known, and no log is skipped.
 
 use serde_json::Value;
 
@@ -8,7 +8,7 @@ fn json(fleet: &TestFleet, args: &[&str]) -> Value {
     serde_json::from_str(&fleet.run_ok(args)).unwrap()
 }
 
-/// A run with one log in error, killed as soon as records of its first commit stand in the store.
+/// A run with one log in error, killed as soon as the store holds records of its first commit.
 fn killed() -> TestFleet {
     let fleet = TestFleet::sample();
     std::fs::write(&fleet.logs()[0], b"broken").unwrap();
@@ -22,7 +22,7 @@ fn killed() -> TestFleet {
     fleet
 }
 
-/// What the records of the store say by themselves.
+/// Number of records in the store, from the records alone.
 fn records(fleet: &TestFleet) -> usize {
     fleet.run_ok(&["store", "export", "--format", "csv"]).lines().count() - 1
 }
@@ -47,9 +47,9 @@ fn a_killed_night_has_its_account_too() {
     assert_eq!(with("not_reached"), figure("not_reached"));
     assert_eq!(with("done") + with("refused") + with("unaccounted") + with("error"), figure("done"));
 
-    let told = fleet.run_ok(&["store", "info"]);
+    let output = fleet.run_ok(&["store", "info"]);
     let left = format!("{} not processed; `freeplay run` processes them", figure("not_reached"));
-    assert!(told.contains("did not exit cleanly") && told.contains(&left), "{told}");
+    assert!(output.contains("did not exit cleanly") && output.contains(&left), "{output}");
     assert_eq!(json(&fleet, &["store", "info", "--json"])["last_run"]["ended"], "killed");
 }
 
@@ -72,7 +72,7 @@ fn the_run_after_a_killed_one_says_so_and_does_the_rest() {
     let logs = json(&fleet, &["store", "runs", "--run", first, "--json"]);
     assert_eq!(logs.as_array().unwrap().len(), 30, "its account stays");
     let result = fleet.freeplay(&["run"]);
-    assert!(!result.out.contains("did not finish"), "it is told once: {}", result.out);
+    assert!(!result.out.contains("did not finish"), "it is reported once: {}", result.out);
     assert_eq!(records(&fleet), 116, "29 sound logs of four actuators");
 }
 
@@ -99,7 +99,7 @@ fn the_list_of_files_holds_every_row_once() {
 }
 
 #[test]
-fn the_logs_of_a_run_are_told_by_class_and_reason() {
+fn the_logs_of_a_run_are_reported_by_class_and_reason() {
     let fleet = TestFleet::sample();
     fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
     std::fs::write(&fleet.logs()[0], b"broken").unwrap();

@@ -22,9 +22,9 @@ fn an_older_store_is_read_as_it_is() {
     assert!(info.contains("3 logs processed (12 estimated, 0 refused, 0 failed), 0 not processed"), "{info}");
     assert!(fleet.run_ok(&["query", "tail", "N412FP"]).starts_with("40 records"));
     let runs: serde_json::Value = serde_json::from_str(&fleet.run_ok(&["store", "runs", "--json"])).unwrap();
-    let told: Vec<_> =
+    let counts: Vec<_> =
         runs.as_array().unwrap().iter().map(|r| (r["done"].as_i64(), r["errors"].as_i64())).collect();
-    assert_eq!(told, [(2, 0), (9, 1), (1, 0), (3, 0)].map(|(done, errors)| (Some(done), Some(errors))));
+    assert_eq!(counts, [(2, 0), (9, 1), (1, 0), (3, 0)].map(|(done, errors)| (Some(done), Some(errors))));
     assert_eq!(std::fs::read(fleet.path("results/store.json")).unwrap(), mark, "reading changes nothing");
 }
 
@@ -60,9 +60,9 @@ fn files_of_two_releases_are_one_table() {
     fleet.run_ok(&["run", "--limit", "3"]);
     let rows: serde_json::Value =
         serde_json::from_str(&fleet.run_ok(&["query", "tail", "N412FP", "--json"])).unwrap();
-    let told = |row: &serde_json::Value| row["skew_se_s"].is_number();
+    let has_skew_se = |row: &serde_json::Value| row["skew_se_s"].is_number();
     let rows = rows.as_array().unwrap();
-    assert!(rows.iter().any(told) && !rows.iter().all(told), "old rows and new ones");
+    assert!(rows.iter().any(has_skew_se) && !rows.iter().all(has_skew_se), "old rows and new ones");
     assert!(rows.iter().all(|row| row["gap_m"].is_number() == (row["status"] == "estimated")));
     let log = fleet.path("results/gaps/_delta_log");
     let schemas: Vec<String> = std::fs::read_dir(log)
@@ -70,7 +70,7 @@ fn files_of_two_releases_are_one_table() {
         .filter_map(|entry| std::fs::read_to_string(entry.unwrap().path()).ok())
         .filter(|text| text.contains("\"metaData\"") && text.contains("skew_se_s"))
         .collect();
-    assert_eq!(schemas.len(), 1, "the table was told once of its new columns");
+    assert_eq!(schemas.len(), 1, "the table's new columns were committed once");
     assert!(fleet.run_ok(&["store", "verify"]).ends_with("OK: all data files present and unchanged\n"));
     fleet.run_ok(&["store", "compact"]);
     let after: serde_json::Value =

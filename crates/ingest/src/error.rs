@@ -39,13 +39,13 @@ pub enum ErrorKind {
         #[source]
         source: io::Error,
     },
-    /// It lies in an object store, which does not give it.
+    /// The object store does not return it.
     #[error(transparent)]
     Object(#[from] object_io::Error),
     /// It has no bytes, or no rows.
     #[error("the log has no rows")]
     Empty,
-    /// It is not Parquet, or its footer is torn.
+    /// It is not Parquet, or its footer is truncated.
     #[error("cannot read as Parquet: {detail}")]
     NotParquet { detail: String },
     /// The footer is sound, a page is not.
@@ -57,7 +57,7 @@ pub enum ErrorKind {
     /// A mapped column is not in the file.
     #[error("the log has no column `{column}`")]
     ColumnMissing { column: String, nearest: Option<String> },
-    /// A channel lies in a group of files, and no file of that group belongs to this flight.
+    /// A channel is mapped to a group of files, and no file of that group belongs to this flight.
     #[error("no file of group `{group}` belongs to this flight")]
     GroupMissing { group: String },
     /// Two lists that should hold the samples of one row side by side do not.
@@ -84,7 +84,7 @@ pub enum ErrorKind {
     /// Stamps fall further than allowed.
     #[error("time runs backwards")]
     TimeGoesBack { column: String, row: u64, before_s: f64, after_s: f64, max_back_s: f64, times: u64 },
-    /// The stamps tell of another rate than was declared.
+    /// The timestamps give another rate than the declared one.
     #[error("timestamps give {seen_hz} Hz but `clock.rate_hz` = {declared_hz}")]
     RateContradicts { column: String, declared_hz: f64, seen_hz: f64 },
     /// No two stamps differ.
@@ -191,7 +191,7 @@ impl ErrorKind {
             }
             Self::TimeStandsStill { rows, .. } => Some(format!("{rows} rows with one stamp")),
             Self::RateContradicts { seen_hz, .. } => Some(format!("{seen_hz:.6} Hz by the median step")),
-            Self::IdentityMissing { looked, .. } => Some(format!("looked in {}", told(looked))),
+            Self::IdentityMissing { looked, .. } => Some(format!("looked in {}", join_places(looked))),
             Self::IdentityChanges { found, before, .. } => Some(format!("`{found}` after `{before}`")),
             _ => None,
         }
@@ -275,7 +275,7 @@ impl ErrorKind {
     }
 }
 
-/// What the system said, in words of our own for the two cases that everybody meets.
+/// Message of the operating system, reworded for the two most common cases.
 fn unreadable(source: &io::Error) -> String {
     match source.kind() {
         io::ErrorKind::NotFound => "no such file".into(),
@@ -295,8 +295,8 @@ fn missing_remedy(source: &io::Error) -> String {
     .into()
 }
 
-/// The places where a fact was looked for.
-fn told(places: &[String]) -> String {
+/// The places where an identity field was searched.
+fn join_places(places: &[String]) -> String {
     if places.is_empty() { "nowhere: `[identity]` has no source for it".into() } else { places.join(", ") }
 }
 

@@ -1,4 +1,4 @@
-//! One actuator's channels to its estimate: both numbers beside each other, the configured one as the gap.
+//! Estimate of one actuator from its channels: both methods run, the configured one gives the gap.
 
 use std::cell::RefCell;
 
@@ -10,20 +10,20 @@ use records::{Diagnostic, GapEstimate, Status};
 use crate::config::part::Part;
 use crate::config::{EstimateSettings, Method};
 
-/// A filter whose slow pole is further off than this share is not the one that was asked for.
+/// Largest relative difference between the slow pole of a filter and the configured bandwidth.
 const BANDWIDTH_TOLERANCE: f64 = 0.25;
 
 /// Longest step between samples that an estimate is made from, s.
 const MAX_STEP_S: f64 = 0.05;
 
-/// Share of samples without a relative position above which the estimate says so; clocks of several files seldom begin
-/// and end together.
+/// Share of samples without a relative position above which the estimate is flagged. Clocks of several files seldom
+/// begin and end together.
 const MISSING_SHARE: f64 = 0.005;
 
-/// Estimates the gap, or says why these channels cannot show one.
+/// Estimates the gap, or returns the reason why the channels do not allow an estimate.
 ///
 /// The paper's number is kept in `gap_midrange_m` whatever the method, and also for a flight that is
-/// refused; what the contact regression fits beside its gap is kept whenever it gives one.
+/// rejected; secondary results of the contact regression are kept whenever it returns any.
 ///
 /// # Errors
 /// A diagnostic when the settings of the part do not fit the step of the log.
@@ -104,7 +104,7 @@ pub fn filter(channels: &ActuatorChannels, part: &Part) -> Result<Filter, Diagno
         .map_err(|e| Diagnostic::new("bad_parameter", e).hint("see the part's settings in the configuration"))
 }
 
-/// What the contact regression stands on, for a person who wants to look; none where it refused.
+/// Plot data of the contact regression; `None` where it rejects the flight.
 ///
 /// # Errors
 /// A diagnostic when the settings of the part cannot be.
@@ -164,10 +164,10 @@ fn pre_check_rejection(channels: &ActuatorChannels) -> Option<&'static str> {
     if zero { Some("channel_zero") } else { still.then_some("channel_constant") }
 }
 
-/// The configured method decides; the other stands beside it.
+/// The configured method gives the gap; the other method's result is kept in its own column.
 ///
-/// The published statistic never refuses, so under either method a flight that the regression finds
-/// blind is refused: its mid-range number is kept, and is not given as the gap.
+/// The published statistic never rejects a flight. So under either method a flight without usable contact, as the
+/// regression finds it, is rejected: its mid-range value is kept, and is not given as the gap.
 fn combine_methods(
     published: Option<&MidRangeEstimate>,
     outcome: &ContactOutcome,

@@ -29,7 +29,7 @@ pub struct EstimatePlot {
     pub s_m: Vec<f64>,
     /// The published statistic of S, where it moves.
     pub midrange: Option<GapStatistic>,
-    /// What the contact regression stands on; none where it refused.
+    /// Plot data of the contact regression; `None` where it rejected the flight.
     pub picture: Option<ContactPlot>,
 }
 

@@ -147,7 +147,7 @@ impl FlightLog {
     /// The unit that sat in a position that day, and the settings of its part.
     ///
     /// # Errors
-    /// A diagnostic when nobody is booked there, or the part is not configured.
+    /// A diagnostic when no unit is installed there, or the part is not configured.
     pub fn unit<'u>(
         &self,
         at: &ActuatorColumns,
@@ -161,7 +161,7 @@ impl FlightLog {
         Ok((installation, part_of(config, &installation.part_number)?))
     }
 
-    /// Estimates one actuator as a given part, whoever is booked there.
+    /// Estimates one actuator as a given part, regardless of the installations table.
     ///
     /// # Errors
     /// A diagnostic when its channels cannot be read.
@@ -204,7 +204,7 @@ impl FlightLog {
     }
 }
 
-/// Estimates every actuator of a log that says nothing of its flight, as one part.
+/// Estimates every actuator of a log without flight identity, as one part.
 ///
 /// # Errors
 /// A diagnostic when the log cannot be read or put on one clock.
@@ -225,7 +225,7 @@ pub fn estimate_unidentified(
     Ok(found)
 }
 
-/// Hands over the channels of every actuator of a log that says nothing of its flight, as one part.
+/// Passes on the channels of every actuator of a log without flight identity, as one part.
 pub(crate) fn for_each_unidentified(
     files: &LogFiles,
     display_name: &str,
@@ -249,10 +249,10 @@ pub(crate) fn for_each_unidentified(
     Ok(())
 }
 
-/// Hands over the channels of every actuator of a log with its part: as booked, or all as one part.
+/// Passes on the channels of every actuator of a log with its part: as installed, or all as one part.
 ///
 /// # Errors
-/// A diagnostic when the log or an actuator in it cannot be read, or `take` complains.
+/// A diagnostic when the log or an actuator in it cannot be read, or when `take` fails.
 pub(crate) fn for_each_actuator(
     files: &LogFiles,
     display_name: &str,
@@ -293,7 +293,7 @@ fn no_installation(id: &Identity, position: &Position, installations: &Installat
     } else {
         let what = format!("the installations table does not know tail {tail}");
         Diagnostic::new("tail_unknown", what)
-            .hint("is the tail spelled alike in logs and table? Then `freeplay run --retry`")
+            .hint("compare the spelling of the tail in logs and table; then `freeplay run --retry`")
     }
 }
 
@@ -309,7 +309,7 @@ pub fn config_digest(
     let mut hash = blake3::Hasher::new();
     for position in positions {
         let installation = installations.installed_at(&flight.tail_number, position, flight.departure_utc);
-        // The whole stay, its hours included: they stand in the record too.
+        // The whole installation with its hours, which are columns of the record too.
         let stay_text = installation.map(|s| serde_json::to_string(s).unwrap_or_default());
         let digest = installation.map(|s| config.digest(&flight.tail_number, &s.part_number));
         for text in [Some(position.as_str()), stay_text.as_deref(), digest.as_deref()] {
@@ -318,7 +318,7 @@ pub fn config_digest(
         }
     }
     hash.update(config.mapping_text(&flight.tail_number).as_bytes());
-    // Hours stand in the record too, and the flights table may learn them later.
+    // Hours are columns of the record too, and the flights table may supply them later.
     if let Some(fallback) = config.flights.of(flight) {
         let hours =
             [fallback.flight_hours, fallback.tail_hours_end].map(|h| h.map_or(0, f64::to_bits).to_le_bytes());
@@ -327,7 +327,7 @@ pub fn config_digest(
     hash.finalize().to_hex().to_string()
 }
 
-/// Stands in for [`config_digest`] where a log could not be identified: of everything that might mend it.
+/// Replaces [`config_digest`] where a log has no identity: a digest of everything that can supply one.
 pub fn digest_without_identity(config: &Config, installations: &Installations) -> String {
     let mut hash = blake3::Hasher::new();
     hash.update(&crate::METHOD_VERSION.to_le_bytes());
@@ -385,7 +385,7 @@ fn check_not_ahead(identity: &Identity, now: Timestamp) -> Result<(), Diagnostic
     Err(Diagnostic::new("departure_ahead", what).hint(hint))
 }
 
-/// What a log says of itself, and what the flights table adds.
+/// The identity that the log holds, completed from the flights table.
 fn identity_of(log: &Log, files: &LogFiles, config: &Config) -> Result<Identity, ingest::Error> {
     let path = files.main.first().map_or(Path::new(""), PathBuf::as_path);
     log.identity(|said| config.flights.facts(path, said, &config.document.identity))

@@ -1,5 +1,5 @@
-//! What logs themselves say of a part: stiffness, noise of its sensors, friction. To be held against the data
-//! sheet, so that nobody has to guess a noise level.
+//! Part parameters identified from logs: stiffness, sensor noise, friction. Compare them with the data sheet; they
+//! also replace a guess of the noise levels.
 
 use estimator::NoiseModel;
 use estimator::contact::{self, ContactOutcome};
@@ -9,10 +9,10 @@ use ingest::{ActuatorChannels, Geometry};
 use crate::config::part::Part;
 use crate::estimate;
 
-/// Friction below this share of the load is not told from none.
+/// Friction below this share of the load is not distinguishable from none.
 const MIN_FRICTION_SHARE: f64 = 0.01;
 
-/// What one actuator in one flight says of its part, or the medians of many; SI at the screw axis.
+/// Parameters identified from one actuator in one flight, or the medians of many; SI at the screw axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct IdentifiedParams {
     /// K that the contact regression fitted, N/m.
@@ -33,7 +33,7 @@ pub struct IdentifiedParams {
     pub unknown_force_n: Option<f64>,
 }
 
-/// A key of `[part."…"]`, what the logs say of it, and what the configuration says.
+/// A key of `[part."…"]`, its identified value, and its configured value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParamComparison {
     /// The key, below the part.

@@ -92,7 +92,7 @@ impl Address {
     }
 }
 
-/// Parameters of a signed address, which grant access to whoever reads them.
+/// Parameters of a signed address. They grant access to every reader of the address, so output hides them.
 const SECRET_PARAMETERS: [&str; 6] = [
     "sig=",
     "signature=",

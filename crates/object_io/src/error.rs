@@ -51,12 +51,12 @@ impl Error {
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Address { .. } => "write it as s3://bucket/key, gs://bucket/key or az://container/key",
-            Self::Settings { .. } => "docs/objects.md says which variables and profiles are read",
+            Self::Settings { .. } => "docs/objects.md lists the variables and profiles that are read",
             Self::Missing { .. } => "are bucket, key and region right? `aws s3 ls` shows what is there",
             Self::Denied { .. } => {
                 "are the credentials of the right account, not expired, and allowed to list and read here?"
             }
-            Self::Changed { .. } => "is it still being uploaded? The next run reads it anew",
+            Self::Changed { .. } => "the object may still be uploading; the next run reads it again",
             Self::Exists { .. } => "does another run write into this store?",
             Self::Unreachable { .. } => {
                 "is the network up, and the endpoint right? The next run tries again; `[objects]` sets how long"

@@ -92,7 +92,7 @@ impl ObjectFile {
         if given == range {
             return Ok(bytes);
         }
-        let detail = format!("bytes {given:?} came where {range:?} were asked for");
+        let detail = format!("bytes {range:?} were requested, bytes {given:?} received");
         Err(Error::Unreachable { address: self.address.to_string(), tried_s: 0.0, detail })
     }
 }

@@ -1,9 +1,9 @@
-//! A made-up fleet's store, for trying the report at any size: `large_fleet DIR UNITS FLIGHTS`.
+//! Store of a simulated fleet, to test the report at any size: `large_fleet DIR UNITS FLIGHTS`.
 //!
 //! Writes `pipeline.toml`, the tables it names, and a store with a record for each unit and flight: four
-//! units to a tail, a flight of two hours a day, each with its own law of wear and its own scatter. Some
-//! units are steady, some step, some flights are refused, some logs are in error. The first tail and the
-//! names on it attack whoever shows them unescaped. The same arguments make the same records.
+//! units per tail, one flight of two hours a day, each unit with its own wear law and scatter. Some
+//! units are steady, some step, some flights are rejected, some logs are in error. The first tail and the
+//! names on it are an attack on pages that do not escape them. Equal arguments make equal records.
 
 use std::error::Error;
 use std::fmt::Write as _;

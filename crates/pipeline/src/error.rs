@@ -6,7 +6,7 @@ use records::Diagnostic;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// Configuration, tables or the request are wrong: nothing was run.
-    #[error("{} complaints about configuration or tables", .0.len())]
+    #[error("{} errors in configuration or tables", .0.len())]
     Refused(Vec<Diagnostic>),
     /// The store cannot be read or written: what was stored before is intact.
     #[error(transparent)]

@@ -124,7 +124,7 @@ fn booked(
     Ok(rows)
 }
 
-/// Estimates channels that somebody holds in memory, as a part.
+/// Estimates in-memory channels as a part.
 ///
 /// # Errors
 /// A diagnostic when the part is not configured, or the arrays are no channels.

@@ -45,12 +45,12 @@ struct Row {
     tail: String,
     flight_id: String,
     /// All but its name.
-    said: FlightInput<'static>,
+    assess: FlightInput<'static>,
 }
 
 fn gathering(rows: &[Row]) -> HistoryBuilder {
     let mut gathering = HistoryBuilder::default();
-    for Row { unit, tail, flight_id, said } in rows {
+    for Row { unit, tail, flight_id, assess } in rows {
         let (serial, position) = (format!("S{unit:02}"), format!("place_{unit}"));
         let who = RowKey {
             part_number: Some("EMA-27-1040"),
@@ -58,7 +58,7 @@ fn gathering(rows: &[Row]) -> HistoryBuilder {
             tail_number: Some(tail),
             position: Some(&position),
         };
-        gathering.put(who, &FlightInput { flight_id: Some(flight_id), ..*said });
+        gathering.put(who, &FlightInput { flight_id: Some(flight_id), ..*assess });
     }
     gathering
 }
@@ -72,7 +72,7 @@ fn flown(days: i32) -> Vec<Row> {
     let flight = |unit: i32, at: i32| {
         let hours = HOURS_A_DAY * f64::from(at + 1);
         let gap_um = 20.0 + (15.0 + f64::from(unit)) * hours / 1000.0 + scatter_um(unit, at);
-        let said = FlightInput {
+        let assess = FlightInput {
             flight_id: None,
             departure_utc: day(at),
             flight_hours: Some(HOURS_A_DAY),
@@ -82,38 +82,38 @@ fn flown(days: i32) -> Vec<Row> {
             gap_se_m: Some(1e-6),
             disagreeing_gap_m: None,
         };
-        Row { unit, tail: format!("T{unit:02}"), flight_id: format!("{unit}-{at}"), said }
+        Row { unit, tail: format!("T{unit:02}"), flight_id: format!("{unit}-{at}"), assess }
     };
     (0..14).flat_map(|unit| (0..days).map(move |at| flight(unit, at))).collect()
 }
 
-fn said(flown: &[Row], as_of: Timestamp) -> Vec<TrendRow> {
+fn assess(flown: &[Row], as_of: Timestamp) -> Vec<TrendRow> {
     let ask = UnitSelection { as_of_utc: Some(as_of), ..UnitSelection::default() };
     assess::assess_histories(&config(), &Installations::default(), histories(flown), &ask).unwrap()
 }
 
 #[test]
 fn neither_later_flights_nor_the_order_of_arrival_change_a_bit_of_a_statement() {
-    let known = said(&flown(200), day(199));
-    assert_eq!(said(&flown(330), day(199)), known);
+    let known = assess(&flown(200), day(199));
+    assert_eq!(assess(&flown(330), day(199)), known);
     let mut late = flown(330);
     late.reverse();
-    assert_eq!(said(&late, day(199)), known);
+    assert_eq!(assess(&late, day(199)), known);
 }
 
 #[test]
-fn any_number_of_threads_says_the_same_to_the_last_bit() {
+fn any_number_of_threads_gives_bitwise_identical_assessments() {
     let rows = flown(150);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| said(&rows, day(149)))
+        pool.install(|| assess(&rows, day(149)))
     };
     assert_eq!(on(1), on(3));
 }
 
 #[test]
 fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
-    for row in said(&flown(300), day(299)) {
+    for row in assess(&flown(300), day(299)) {
         let hours = row.crossing_hours_p50.unwrap();
         assert!((row.crossing_flights_p50.unwrap() - hours / HOURS_A_DAY).abs() < 1e-6, "{row:?}");
         let days = (row.likely_utc.unwrap() - day(299)).total(jiff::Unit::Hour).unwrap() / 24.0;
@@ -126,7 +126,7 @@ fn hours_left_are_flights_and_days_at_the_pace_the_unit_is_flown() {
 #[test]
 fn dates_count_from_the_date_of_the_assessment() {
     let as_of = day(259);
-    for row in said(&flown(200), as_of) {
+    for row in assess(&flown(200), as_of) {
         let dates = [row.not_before_utc, row.likely_utc, row.not_after_utc];
         assert!(dates.into_iter().flatten().all(|date| date >= as_of), "{dates:?}");
         let hours = row.likely_utc.unwrap().duration_since(as_of).as_secs_f64() / 3600.0;
@@ -139,12 +139,12 @@ fn dates_count_from_the_date_of_the_assessment() {
 #[test]
 fn utilisation_counts_the_flights_that_left_no_log() {
     let mut rows = flown(200);
-    rows.retain(|row| row.said.departure_utc.duration_since(day(0)).as_hours() / 24 % 3 == 0);
-    let metered = &said(&rows, day(199))[0];
+    rows.retain(|row| row.assess.departure_utc.duration_since(day(0)).as_hours() / 24 % 3 == 0);
+    let metered = &assess(&rows, day(199))[0];
     assert!((metered.hours_per_day.unwrap() - HOURS_A_DAY).abs() < 1e-9, "{metered:?}");
     assert_eq!(metered.usage_source.as_deref(), Some("tail_hours"));
-    rows.iter_mut().for_each(|row| row.said.tail_hours_end = None);
-    let logged = &said(&rows, day(199))[0];
+    rows.iter_mut().for_each(|row| row.assess.tail_hours_end = None);
+    let logged = &assess(&rows, day(199))[0];
     assert!((logged.hours_per_day.unwrap() - HOURS_A_DAY / 3.0).abs() < 1e-9, "{logged:?}");
     assert_eq!(logged.usage_source.as_deref(), Some("logged_flights"));
     // Sixty-odd or thirty flights in ninety days.
@@ -152,7 +152,7 @@ fn utilisation_counts_the_flights_that_left_no_log() {
 }
 
 #[test]
-fn a_removed_unit_has_no_state_no_dates_and_says_when_it_left() {
+fn a_removed_unit_has_no_state_no_dates_and_its_removal_date() {
     let config = config();
     let rows = flown(200);
     let table = tempfile::NamedTempFile::with_suffix(".csv").unwrap();
@@ -204,7 +204,7 @@ fn booked(file: &str) -> Config {
 }
 
 #[test]
-fn what_the_maintenance_book_says_is_a_change_point_once_its_day_has_come() {
+fn recorded_maintenance_is_a_change_point_from_its_date_on() {
     let nobody = Installations::default();
     let ask = UnitSelection { as_of_utc: Some(day(199)), ..UnitSelection::default() };
     let rows =
@@ -232,7 +232,7 @@ fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
     assert!(text.contains("painted") && text.contains("overhaul"), "{text}");
 }
 
-fn told(axis: &str) -> Config {
+fn configured_axis(axis: &str) -> Config {
     let text =
         include_str!("../../../pipeline.toml").replace("[trend]", &format!("[trend]\naxis = \"{axis}\""));
     Config::parse(&text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
@@ -247,7 +247,7 @@ fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
                 .unwrap();
         rows.into_iter().map(|row| row.usage_axis).collect::<std::collections::BTreeSet<_>>()
     };
-    assert_eq!(axes(&told("flights")), [Some("flights".to_owned())].into());
+    assert_eq!(axes(&configured_axis("flights")), [Some("flights".to_owned())].into());
     let text = include_str!("../../../pipeline.toml")
         .replace("[trend]", "[trend]\naxis = \"flights\"")
         .replace("[part.\"EMA-27-1040\"]", "[part.\"EMA-27-1040\"]\naxis = \"reversals\"");
@@ -256,7 +256,7 @@ fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
 }
 
 /// The fleet of [`flown`], of which every second flight left no log and no hour meter is read: the flights
-/// table alone knows of it. Each flight is two hours, whoever tells it.
+/// table alone has it. Each flight takes two hours in both tables.
 #[test]
 fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     const UNITS: i32 = 14;
@@ -281,14 +281,14 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     };
     let installations = Installations::new((0..UNITS).map(stay).collect()).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(DAYS - 1)), ..UnitSelection::default() };
-    let said = |config: &Config| {
+    let assess = |config: &Config| {
         let mut logged = flown(DAYS);
         logged.retain(|row| row.flight_id.ends_with(['1', '3', '5', '7', '9']));
-        logged.iter_mut().for_each(|row| row.said.tail_hours_end = None);
+        logged.iter_mut().for_each(|row| row.assess.tail_hours_end = None);
         assess::assess_histories(config, &installations, gathering(&logged).into_store(), &ask).unwrap()
     };
     let mut ratios = 0.0;
-    for (unit, (with, without)) in said(&config_with).iter().zip(said(&config())).enumerate() {
+    for (unit, (with, without)) in assess(&config_with).iter().zip(assess(&config())).enumerate() {
         assert_eq!((with.flights, with.unit_hours), (300, Some(700.0)));
         assert_eq!((without.flights, without.unit_hours), (150, Some(400.0)));
         let truth = (15.0 + unit as f64) * 1e-9;
@@ -308,15 +308,15 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
 fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     let nobody = Installations::default();
     let mut rows = flown(228);
-    for row in rows.iter_mut().filter(|row| row.unit == 5 && row.said.departure_utc >= day(200)) {
-        row.said.gap_m = row.said.gap_m.map(|gap| gap - 12e-6);
+    for row in rows.iter_mut().filter(|row| row.unit == 5 && row.assess.departure_utc >= day(200)) {
+        row.assess.gap_m = row.assess.gap_m.map(|gap| gap - 12e-6);
     }
     let name = |serial: &str| {
         (records::PartNumber::new("EMA-27-1040").unwrap(), records::SerialNumber::new(serial).unwrap())
     };
     let units = [name("S03"), name("S05")];
     let all = || histories(&rows);
-    let tonight: Vec<Row> = rows.iter().filter(|row| row.said.departure_utc >= day(200)).cloned().collect();
+    let tonight: Vec<Row> = rows.iter().filter(|row| row.assess.departure_utc >= day(200)).cloned().collect();
     let night = |tonight: &Histories| {
         assess::assess_run_from(&config(), &nobody, all(), tonight, &units, Vec::new()).unwrap()
     };
@@ -339,7 +339,7 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     assert!(news[0].cleared_events.is_empty());
     assert_eq!((news[0].from, news[0].to), (Some("normal"), Some("watch")));
     // A flight of another unit that arrives late has the days before read from what was known then.
-    let late = rows.iter().find(|row| row.unit == 9 && row.said.departure_utc == day(100)).unwrap();
+    let late = rows.iter().find(|row| row.unit == 9 && row.assess.departure_utc == day(100)).unwrap();
     let with_late = histories(&[&tonight[..], std::slice::from_ref(late)].concat());
     assert_eq!(of_night(&with_late), (now, news));
     assert!(of_night(&all()).1.is_empty());
@@ -350,17 +350,17 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
 fn who_flies_on_after_a_day_does_not_decide_whether_a_step_is_a_tails() {
     let mut rows = flown(228);
     for row in rows.iter_mut().filter(|row| row.unit < 6) {
-        let at = row.said.departure_utc;
+        let at = row.assess.departure_utc;
         row.tail = "T77".into();
-        row.said.gap_m = match row.unit {
-            4.. => row.said.gap_m.filter(|_| at < day(200) || at > day(215)),
-            _ => row.said.gap_m.map(|gap| if at >= day(203) { gap + 8e-6 } else { gap }),
+        row.assess.gap_m = match row.unit {
+            4.. => row.assess.gap_m.filter(|_| at < day(200) || at > day(215)),
+            _ => row.assess.gap_m.map(|gap| if at >= day(203) { gap + 8e-6 } else { gap }),
         };
     }
-    let known: Vec<Row> = rows.iter().filter(|row| row.said.departure_utc <= day(215)).cloned().collect();
-    let said_then = said(&known, day(215));
+    let known: Vec<Row> = rows.iter().filter(|row| row.assess.departure_utc <= day(215)).cloned().collect();
+    let said_then = assess(&known, day(215));
     assert!(said_then[0].change_points.iter().any(|change| change.tail_wide), "{:?}", said_then[0]);
-    assert_eq!(said(&rows, day(215)), said_then);
+    assert_eq!(assess(&rows, day(215)), said_then);
 }
 
 /// Four units of one tail rise by 8 µm with one flight, and so does one unit of another tail.
@@ -371,22 +371,22 @@ fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
         if row.unit < 4 {
             row.tail = "T77".into();
         }
-        if (row.unit < 4 || row.unit == 9) && row.said.departure_utc >= day(205) {
-            row.said.gap_m = row.said.gap_m.map(|gap| gap + 8e-6);
+        if (row.unit < 4 || row.unit == 9) && row.assess.departure_utc >= day(205) {
+            row.assess.gap_m = row.assess.gap_m.map(|gap| gap + 8e-6);
         }
     }
-    let said = said(&rows, day(227));
+    let assess = assess(&rows, day(227));
     for unit in [0, 1, 2, 3, 9] {
-        let [change] = &said[unit].change_points[..] else { panic!("{:?}", said[unit]) };
+        let [change] = &assess[unit].change_points[..] else { panic!("{:?}", assess[unit]) };
         assert_eq!((change.kind, change.tail_wide), ("step", unit < 4), "{unit}");
-        let reason = said[unit].reason.as_deref().unwrap();
+        let reason = assess[unit].reason.as_deref().unwrap();
         assert_eq!(
             reason.contains("all actuators of T77 at once: a sensor or recorder"),
             unit < 4,
             "{reason}"
         );
     }
-    // Asked for alone, a unit is told the same.
+    // Asked for alone, a unit is configured_axis the same.
     let ask = UnitSelection {
         as_of_utc: Some(day(227)),
         serial_number: Some("S02".into()),
@@ -394,20 +394,20 @@ fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
     };
     let alone =
         assess::assess_histories(&config(), &Installations::default(), histories(&rows), &ask).unwrap();
-    assert_eq!(alone, said[2..3]);
+    assert_eq!(alone, assess[2..3]);
 }
 
-/// The last six gaps are 3.5 µm too high, and the other estimator says so.
+/// The last six gaps are 3.5 µm too high, and the other estimator reports it.
 #[test]
 fn gaps_whose_estimators_disagree_hardly_move_a_level_and_the_reason_names_them() {
     let with = |off_um: f64, is_flagged: bool| {
         let mut rows = flown(200);
-        for row in rows.iter_mut().filter(|row| row.unit == 3 && row.said.departure_utc > day(193)) {
-            let gap_m = row.said.gap_m.unwrap();
-            row.said.gap_m = Some(gap_m + off_um * 1e-6);
-            row.said.disagreeing_gap_m = is_flagged.then_some(gap_m);
+        for row in rows.iter_mut().filter(|row| row.unit == 3 && row.assess.departure_utc > day(193)) {
+            let gap_m = row.assess.gap_m.unwrap();
+            row.assess.gap_m = Some(gap_m + off_um * 1e-6);
+            row.assess.disagreeing_gap_m = is_flagged.then_some(gap_m);
         }
-        said(&rows, day(199)).into_iter().find(|row| row.serial_number == "S03").unwrap()
+        assess(&rows, day(199)).into_iter().find(|row| row.serial_number == "S03").unwrap()
     };
     let (sound, off, flagged) = (with(0.0, false), with(3.5, false), with(3.5, true));
     let moved_um = |row: &TrendRow| (row.gap_m.unwrap() - sound.gap_m.unwrap()) * 1e6;

@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_complaint_reads_from_what_to_remedy() {
+    fn a_diagnostic_is_displayed_from_message_to_remedy() {
         let c = Diagnostic {
             column: Some("t_ns".into()),
             row: Some(9),

@@ -173,16 +173,6 @@ pub struct GapRecord {
     pub provenance: Provenance,
 }
 
-impl GapRecord {
-    /// Sort key of shown and exported records: departure, then tail, flight and position.
-    ///
-    /// The key depends only on the flights, so the table does not depend on the number of workers.
-    pub fn canonical_key(&self) -> impl Ord + use<> {
-        let f = &self.flight;
-        (f.departure_utc, f.tail_number.clone(), f.flight_id.clone(), self.position.clone())
-    }
-}
-
 /// Key of a record: one actuator has one record per flight.
 ///
 /// Its order is the order in which records are shown and exported.

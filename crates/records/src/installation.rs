@@ -227,7 +227,7 @@ mod tests {
     }
 
     proptest! {
-        /// The table is a set: the order in which a clerk typed it changes nothing that is asked of it.
+        /// The table is a set: no query depends on the order of its rows.
         #[test]
         fn row_order_does_not_matter(order in Just((0..6).collect::<Vec<usize>>()).prop_shuffle(), day in 0_i64..180) {
             let months: Vec<String> = (1..=7).map(|m| format!("2026-{m:02}-01T00:00:00Z")).collect();

@@ -1,14 +1,14 @@
-//! Fills a store of millions of rows, and times what people ask of it.
+//! Fills a store of millions of rows, and measures the time of common queries.
 //!
 //! ```sh
-//! cargo run -p store --release --example large -- fill FOLDER [NIGHTS]
-//! cargo run -p store --release --example large -- ask FOLDER [NIGHTS]
+//! cargo run -p store --release --example large -- fill FOLDER [DAYS]
+//! cargo run -p store --release --example large -- ask FOLDER [DAYS]
 //! ```
-//! 500 tails fly five flights a night with eight actuators each; a unit moves to another tail every 250
-//! nights. A thousand nights are 20 million rows. All but the last 30 nights lie as compaction leaves them,
-//! sorted by tail; the last 30 as the runs of a month leave them, one file a night.
+//! 500 tails fly five flights a day with eight actuators each; a unit moves to another tail every 250
+//! days. A thousand days are 20 million rows. All but the last 30 days are stored as after a compaction,
+//! sorted by tail; the last 30 as after daily runs, one file per run.
 
-#![allow(clippy::print_stdout, reason = "an example that measures says what it found")]
+#![allow(clippy::print_stdout, reason = "an example that prints measurements")]
 
 use std::error::Error;
 use std::path::Path;

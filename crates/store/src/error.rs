@@ -22,7 +22,7 @@ pub enum Error {
     /// The folder was written by another release.
     #[error("{} has format {found}; this release supports format {known}", file.display())]
     Format { file: PathBuf, found: String, known: u32 },
-    /// The file that says which format the folder has cannot be read.
+    /// The format marker of the folder cannot be read.
     #[error("{} is truncated: it holds `{found}`", file.display())]
     Torn { file: PathBuf, found: String },
     /// Another process writes.
@@ -43,7 +43,7 @@ pub enum Error {
     /// A file of the Delta log is not the one that was written.
     #[error("the log of a table is damaged: {problem}")]
     LogDamaged { path: PathBuf, problem: String },
-    /// The bucket it lies in does not give or take a file.
+    /// The bucket does not return or accept a file.
     #[error(transparent)]
     Object(#[from] object_io::Error),
     /// A column is not there or has another type.
@@ -130,9 +130,9 @@ impl Error {
                 "restore this file from a backup; without one, remove the store and run its logs again"
             }
             Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) => {
-                "was the table changed by another program? `freeplay store verify` says more"
+                "was the table changed by another program? `freeplay store verify` shows details"
             }
-            Self::Frame(_) | Self::Parquet(_) => "`freeplay store verify` says which files are wrong",
+            Self::Frame(_) | Self::Parquet(_) => "`freeplay store verify` lists the damaged files",
         }
     }
 
@@ -176,12 +176,12 @@ fn io_cause(error: &DeltaTableError) -> Option<&std::io::Error> {
     None
 }
 
-/// The libraries underneath add where in their code it happened, which helps nobody here.
+/// First line of the message. The libraries add the location in their own code, which does not help users.
 fn first_line(error: &DeltaTableError) -> String {
     error.to_string().lines().next().unwrap_or_default().to_owned()
 }
 
-/// As much of a digest as tells it from another.
+/// Leading characters of a digest, enough to distinguish it from others.
 fn short(digest: &str) -> &str {
     digest.get(..12).unwrap_or(digest)
 }

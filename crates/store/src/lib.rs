@@ -16,6 +16,22 @@
 //! One process writes at a time ([`Store::lock`]). Any number of processes read at the same time; each query reads
 //! one version of a table and therefore sees whole commits only. A commit is on disk when it returns.
 //! `docs/store.md` explains the choice of Delta Lake, the layout and the guarantees.
+//!
+//! ```
+//! use store::{Holder, LogResult, Query, Store};
+//!
+//! let dir = tempfile::tempdir()?;
+//! let store = Store::create_or_open(dir.path().join("results"))?;
+//! // One writer at a time, which holds the lock until it is dropped.
+//! let mut writer = store.lock(&Holder::this_process(), None)?;
+//! assert!(store.lock(&Holder::this_process(), None).is_err());
+//! let results: Vec<LogResult> = Vec::new();
+//! writer.commit(&results)?;
+//!
+//! let query = Query { tail_number: Some("N412FP".into()), ..Query::default() };
+//! assert!(store.records(&query)?.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod admin;
 mod delta;

@@ -1,9 +1,7 @@
-//! What a statement costs: time per serial against the length of its history, on one and two threads.
+//! Cost of an assessment: time per serial against the length of its history, on one and two threads.
 //!
-//! `cost [SERIALS]` makes wearing units of 100 to 10,000 flights and prints the time for the series, the
-//! statement and the prior: of the processor, which other programs lengthen less, and by the clock. Then
-//! each unit flies 64 times more, and from its kept state a statement is made every night: the time of
-//! that, how many of these nights asked for the history, and the size of the state.
+//! `timings [SERIALS]` makes wearing units of 100 to 10,000 flights and prints the time for the series, the
+//! assessment and the prior: processor time, which other programs affect less, and wall time.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a developer's tool, which may fail loudly")]
 
 mod random;
@@ -12,13 +10,10 @@ use std::time::Instant;
 
 use random::Random;
 use rayon::prelude::*;
-use trend::{Executor, FleetPrior, Observation, Series, Settings, UnitSnapshot, UsageDefaults, assess};
+use trend::{Executor, FleetPrior, Observation, Series, Settings, UsageDefaults, assess};
 
 const LIMIT_M: f64 = 1e-4;
-const NIGHT_US: i64 = 30_000_000_000;
-
-/// Nights over which increments are averaged: those between two checkpoints of a long history.
-const NIGHTS: usize = 64;
+const FLIGHT_US: i64 = 30_000_000_000;
 
 fn rows(seed: u64, flights: usize) -> Vec<Observation> {
     let mut random = Random::new(seed);
@@ -31,7 +26,7 @@ fn rows(seed: u64, flights: usize) -> Vec<Observation> {
             let outlier = if random.uniform() < 0.02 { 30.0 } else { 0.0 };
             let gap_um = 20.0 + 80.0 * age.powf(exponent) + 3.0 * random.normal() + outlier;
             Observation {
-                departure_us: flight as i64 * NIGHT_US,
+                departure_us: flight as i64 * FLIGHT_US,
                 installation: 0,
                 flight_hours: Some(1.7),
                 tail_hours_end: Some(hours),
@@ -43,14 +38,14 @@ fn rows(seed: u64, flights: usize) -> Vec<Observation> {
         .collect()
 }
 
-/// Time this thread has had on a processor, or, where nobody counts it, the time that went by, seconds.
+/// Processor time of this thread, or wall time where the system does not count it, seconds.
 fn busy_s(began: Instant) -> f64 {
     let counted = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let ns = counted.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
     ns.map_or_else(|| began.elapsed().as_secs_f64(), |ns| ns * 1e-9)
 }
 
-/// What some work costs, seconds, and its result.
+/// Processor time of some work, seconds, and its result.
 fn cost<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let began = Instant::now();
     let before_s = busy_s(began);
@@ -58,7 +53,7 @@ fn cost<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (busy_s(began) - before_s, made)
 }
 
-/// Workers that share what there is to do, as a night's do.
+/// Threads that share the work, as those of a run do.
 struct Threads(rayon::ThreadPool);
 
 impl Threads {
@@ -80,8 +75,8 @@ fn learned(fleet: &[Series], as_of_us: i64, threads: &Threads) -> f64 {
     began.elapsed().as_secs_f64()
 }
 
-/// Statements of a fleet on some threads: wall seconds.
-fn stated(fleet: &[Series], as_of_us: i64, prior: &FleetPrior, threads: &Threads) -> f64 {
+/// Assessments of a fleet on some threads: wall seconds.
+fn assess_fleet(fleet: &[Series], as_of_us: i64, prior: &FleetPrior, threads: &Threads) -> f64 {
     let settings = Settings::for_limit(LIMIT_M);
     let state = |series: &Series| {
         std::hint::black_box(assess(series, as_of_us, &settings, Some(prior), None).unwrap());
@@ -91,111 +86,17 @@ fn stated(fleet: &[Series], as_of_us: i64, prior: &FleetPrior, threads: &Threads
     began.elapsed().as_secs_f64()
 }
 
-/// A unit's rows, of which some have been flown, and its state then.
-struct Unit {
-    rows: Vec<Observation>,
-    flown: usize,
-    state: Vec<u8>,
-}
-
-/// What nights have asked for.
-#[derive(Default)]
-struct Evaluated {
-    nights: f64,
-    histories: f64,
-    history_s: f64,
-    largest: usize,
-}
-
-impl Unit {
-    fn series(&self) -> Series {
-        Series::new(self.rows[..self.flown].iter().copied(), &UsageDefaults::default()).unwrap()
-    }
-
-    /// Flies once more and says what is known then.
-    fn night(&mut self, prior: &FleetPrior, settings: &Settings, asked: &mut Evaluated) {
-        let row = self.rows[self.flown];
-        self.flown += 1;
-        let snapshot = UnitSnapshot::from_bytes(&self.state, prior).unwrap().append([row]).unwrap();
-        let assessment =
-            |snapshot: &UnitSnapshot| snapshot.assess(row.departure_us, &[], settings, prior, None).unwrap();
-        if let Some((assessment, snapshot)) =
-            snapshot.and_then(|snapshot| Some((assessment(&snapshot)?, snapshot)))
-        {
-            std::hint::black_box(assessment);
-            self.state = snapshot.to_bytes();
-        } else {
-            let (history_s, state) = cost(|| {
-                let snapshot = UnitSnapshot::from_series(&self.series(), row.departure_us, prior);
-                std::hint::black_box(assessment(&snapshot).unwrap());
-                snapshot.to_bytes()
-            });
-            asked.histories += 1.0;
-            asked.history_s += history_s;
-            self.state = state;
-        }
-        asked.nights += 1.0;
-        asked.largest = asked.largest.max(self.state.len());
-    }
-}
-
-/// A fleet of units on some threads, each unit one night: wall seconds.
-fn flown(fleet: &mut [Unit], prior: &FleetPrior, threads: &Threads) -> f64 {
-    let settings = &Settings::for_limit(LIMIT_M);
-    let began = Instant::now();
-    let night = |unit: &mut Unit| unit.night(prior, settings, &mut Evaluated::default());
-    threads.0.install(|| fleet.par_iter_mut().for_each(night));
-    began.elapsed().as_secs_f64()
-}
-
-/// Nights of units that have flown so often.
-fn nights(serials: u64, flights: usize, threads: &[Threads; 2]) {
-    let all: Vec<Vec<Observation>> = (0..serials).map(|seed| rows(seed, flights + 3 * NIGHTS)).collect();
-    let series = |rows: &Vec<Observation>| {
-        Series::new(rows[..flights].iter().copied(), &UsageDefaults::default()).unwrap()
-    };
-    let histories: Vec<Series> = all.iter().map(series).collect();
-    let as_of_us = flights as i64 * NIGHT_US;
-    let prior = FleetPrior::learn(&histories, as_of_us, LIMIT_M, None);
-    let unit = |(rows, series)| Unit {
-        rows,
-        flown: flights,
-        state: UnitSnapshot::from_series(series, as_of_us, &prior).to_bytes(),
-    };
-    let mut fleet: Vec<Unit> = all.into_iter().zip(&histories).map(unit).collect();
-    let bytes = fleet.iter().map(|unit| unit.state.len()).sum::<usize>() / fleet.len();
-    let (settings, mut asked) = (Settings::for_limit(LIMIT_M), Evaluated::default());
-    let (nights_s, ()) = cost(|| {
-        for unit in &mut fleet {
-            (0..NIGHTS).for_each(|_| unit.night(&prior, &settings, &mut asked));
-        }
-    });
-    let [one_s, two_s] = threads
-        .each_ref()
-        .map(|threads| (0..NIGHTS).map(|_| flown(&mut fleet, &prior, threads)).sum::<f64>());
-    let us = 1e6 / asked.nights;
-    println!(
-        "{flights:7}  {:8.1}  {:20.1}  {:9.2} %  {bytes:6} {:8}  {:11.1}  {:9.1}",
-        nights_s * us,
-        1e6 * (nights_s - asked.history_s) / (asked.nights - asked.histories),
-        100.0 * asked.histories / asked.nights,
-        asked.largest,
-        one_s * us,
-        two_s * us,
-    );
-}
-
 fn main() {
     let serials: u64 = std::env::args().nth(1).map_or(200, |n| n.parse().unwrap());
     let threads = [1, 2].map(Threads::new);
-    println!("processor time of a serial, µs    by the clock, a statement, µs, on    the prior, ms, on");
-    println!("flights    series  statement             1 thread  2 threads         1 thread  2 threads");
+    println!("processor time of a serial, µs    by the clock, an assessment, µs, on    the prior, ms, on");
+    println!("flights    series  assessment            1 thread  2 threads         1 thread  2 threads");
     for flights in [100, 300, 1000, 3000, 10_000] {
         let rows: Vec<Vec<Observation>> = (0..serials).map(|seed| rows(seed, flights)).collect();
         let us = 1e6 / serials as f64;
         let unit = |rows| Series::new(rows, &UsageDefaults::default()).unwrap();
         let (series_s, fleet) = cost(|| rows.into_iter().map(unit).collect::<Vec<Series>>());
-        let as_of_us = flights as i64 * NIGHT_US;
+        let as_of_us = flights as i64 * FLIGHT_US;
         let prior = FleetPrior::learn(&fleet, as_of_us, LIMIT_M, None);
         let settings = Settings::for_limit(LIMIT_M);
         let (statement_s, ()) = cost(|| {
@@ -203,7 +104,7 @@ fn main() {
                 std::hint::black_box(assess(series, as_of_us, &settings, Some(&prior), None).unwrap());
             }
         });
-        let stated_s = threads.each_ref().map(|threads| stated(&fleet, as_of_us, &prior, threads) * us);
+        let stated_s = threads.each_ref().map(|threads| assess_fleet(&fleet, as_of_us, &prior, threads) * us);
         let learned_s = threads.each_ref().map(|threads| learned(&fleet, as_of_us, threads) * 1e3);
         println!(
             "{flights:7}  {:8.1}  {:9.1}  {:19.1}  {:9.1}  {:15.0}  {:9.0}",
@@ -214,10 +115,5 @@ fn main() {
             learned_s[0],
             learned_s[1]
         );
-    }
-    println!("\na night more of a serial, µs of the processor          state, bytes    by the clock, µs, on");
-    println!("flights  in all  without the history  which it asks   mean  largest    1 thread  2 threads");
-    for flights in [100, 300, 1000, 3000, 10_000] {
-        nights(serials, flights, &threads);
     }
 }

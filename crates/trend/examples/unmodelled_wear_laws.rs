@@ -1,9 +1,9 @@
-//! Fleets that wear by laws the bank does not contain, judged: how wrong, and how honest about it.
+//! Fleets with wear laws outside the bank: accuracy and coverage of their assessments.
 //!
-//! `foreign [SERIALS] [SEED]` makes nine fleets, asks each unit thrice, and scores what was said of the
-//! hours left. Wear walks about its law (Wiener, not gamma), stated errors are wrong by a factor of up to
-//! 1.6, gaps swing with the season by up to 2 µm, tails add a bias, and a tenth of the units is replaced
-//! without a word.
+//! `unmodelled_wear_laws [SERIALS] [SEED]` makes nine fleets, assesses each unit three times, and scores the forecast
+//! of the remaining hours. Wear deviates from its law (Wiener, not gamma), stated errors are wrong by a factor of up to
+//! 1.6, gaps vary with the season by up to 2 µm, tails add a bias, and a tenth of the units is replaced
+//! without a record.
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a developer's tool, which may fail loudly")]
 
 mod random;
@@ -106,7 +106,7 @@ const FLEETS: [&str; 9] = [
     "logarithm",
 ];
 
-/// A day on which a unit is asked about, and what came true.
+/// A date at which a unit is assessed, and the outcome.
 struct Question {
     as_of_us: i64,
     left_hours: f64,

@@ -8,7 +8,11 @@ use crate::settings::Settings;
 use crate::statement::assessment::Assessment;
 use crate::statement::state::State;
 
-/// Assesses a unit at a date from its flights until then.
+/// Assesses a unit at a date from its flights until then: posterior of a bank of wear laws by Bayesian model averaging
+/// (Hoeting et al. 1999, <https://doi.org/10.1214/ss/1009212519>), the level as a random walk behind a Kalman filter.
+///
+/// Dates are microseconds since 1970 UTC, gaps metres, usage flight hours; `docs/prognostics.md` describes the method.
+/// The crate page has an example.
 ///
 /// `prior` is the prior of the part number's fleet, learned from nothing later than the same date; without one the
 /// unit is assessed by its own data alone. `previous` is the unit's previous state, which it leaves only when it is

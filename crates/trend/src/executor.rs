@@ -1,8 +1,8 @@
-//! The same work on many things, by whoever has threads: this crate has none.
+//! Executor: applies one function to many items, on the caller's threads. This crate has none of its own.
 
 /// Does one piece of work on each of some things.
 ///
-/// Results stand in the order of the things, so that who does the work, and when, moves no bit.
+/// Results are in the order of the items, so the assignment of items to threads does not change them.
 pub trait Executor {
     /// The result for each thing, in their order.
     fn map<T: Sync, R: Send>(&self, things: &[T], work: impl Fn(&T) -> R + Send + Sync) -> Vec<R>;

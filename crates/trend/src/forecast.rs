@@ -1,4 +1,4 @@
-//! The picture of a statement: the level through the flights, and where the gap may go.
+//! Plotted forecast of an assessment: smoothed past levels, and quantiles of the future gap.
 
 use crate::data::bins::{self, BINS, Bin};
 use crate::data::segment::Segment;
@@ -29,8 +29,8 @@ pub struct Interval {
     pub p95_m: f64,
 }
 
-/// What lies behind a statement and before it, to be drawn; offsets of the measurement are undone, as
-/// they are in the statement's own gap.
+/// Past levels and forecast of an assessment, for plots. Offsets of the measurement are removed, as
+/// they are in the assessed gap.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Forecast {
     /// The smoothed level at mean departures of neighbouring flights, microseconds since 1970 UTC.
@@ -39,10 +39,11 @@ pub struct Forecast {
     pub ahead: Vec<(f64, Interval)>,
 }
 
-/// Draws what [`crate::assess()`] states: the level through each segment's flights, and the quantiles of
-/// the gap after more hours, from the same mixture and the same calibration as the crossing.
+/// Past levels and forecast of an assessment: the level through each segment's flights by a fixed-interval smoother
+/// (Rauch, Tung and Striebel 1965, <https://doi.org/10.2514/3.3166>), m, and the 5, 50 and 95 % quantiles of the gap, m,
+/// after more `hours`, flight hours, from the same mixture and calibration as the crossing.
 ///
-/// Nothing of a unit with too few estimates for a statement.
+/// Empty for a unit with too few estimates for an assessment.
 ///
 /// # Errors
 /// As [`crate::assess()`].
@@ -102,11 +103,13 @@ impl Interval {
     fn calibrated(self, CalibrationParams { low, middle, high }: CalibrationParams) -> Self {
         let at =
             |width: f64| self.m + width * if width > 0.0 { self.p95_m - self.m } else { self.m - self.p05_m };
-        Self { p05_m: at(low), m: at(middle), p95_m: at(high) }
+        let interval = Self { p05_m: at(low), m: at(middle), p95_m: at(high) };
+        debug_assert!([interval.p05_m, interval.m, interval.p95_m].is_sorted(), "{interval:?}");
+        interval
     }
 }
 
-/// The level at each bin of a segment: the mean curve, and beside it a walk, smoothed.
+/// The level at each bin of a segment: the mean curve plus a smoothed random walk.
 fn levels(segment: &Segment<'_>, fitted: &Posterior, prior: &FleetPrior) -> Vec<(i64, Interval)> {
     let bins = bins::bin(segment.estimates, BINS);
     let grown_m = |usage: f64| mean_growth(&fitted.components, usage);

@@ -15,7 +15,7 @@ pub struct Settings {
     pub horizon_hours: f64,
     /// Flight hours until the next check, for the probability of passing the limit before it.
     pub check_interval_hours: f64,
-    /// A change that no book knows is watched for this many days.
+    /// An unrecorded change is reported for this many days.
     pub change_watch_days: f64,
     /// Without an estimate for this many days there is no state.
     pub stale_after_days: f64,

@@ -46,7 +46,7 @@ use types::{LONGEST_STEP_S, NORMAL_95};
 
 /// Estimates the gap of one flight, over all its segments together, or says why it cannot be seen.
 ///
-/// Time is linear in the samples; memory is some twenty numbers for each block of about 4 ms and a row of nineteen for
+/// Time is linear in the samples; memory is some twenty numbers for each block of about 4 ms and a row of twenty for
 /// each tenth of a second or more.
 ///
 /// # Errors

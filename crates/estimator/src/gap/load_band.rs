@@ -18,17 +18,21 @@ pub struct LoadBand {
     pub reversals: usize,
 }
 
-/// Describes the load over the segments; nothing when they are empty.
+/// Load band over the segments: 5 % and 95 % quantiles, N, and the number of reversals; `None` when they are empty.
 ///
-/// A reversal is a change from beyond +12 % of the greater of the two quantiles to beyond −12 %, or back.
+/// `load_n` has one value per sample, N; NaN is skipped. A quantile p is the order statistic nearest to p (n − 1), counted
+/// from zero, without interpolation (method 3 of Hyndman and Fan 1996 is close; <https://doi.org/10.2307/2684934>). A
+/// reversal is a change from beyond +12 % of the greater of the two quantiles to beyond −12 %, or back: a definition of
+/// this project. Both are part of each record, since gaps of different load bands are not comparable.
 pub fn load_band(load_n: &[f64], segments: &[Range<usize>]) -> Option<LoadBand> {
     let [p05_n, p95_n] = quantiles(load_n, segments, [0.05, 0.95])?;
+    debug_assert!(p05_n <= p95_n, "quantiles {p05_n} and {p95_n} N");
     let threshold = SIDE_SHARE * p05_n.abs().max(p95_n.abs());
     let reversals = segments.iter().map(|segment| reversals(&load_n[segment.clone()], threshold)).sum();
     Some(LoadBand { p05_n, p95_n, reversals })
 }
 
-/// Loads that are looked at together. Plain counts over more than a few become vectors as wide as there are.
+/// Loads that are counted together. Counts of two or more quantiles over a block are vectorized.
 const BLOCK: usize = 64;
 
 /// Changes from beyond one side of a threshold to beyond the other.
@@ -72,10 +76,10 @@ const WORTH_LOOKING: usize = 16;
 /// Half width of a bracket in the order of those loads: five standard deviations of a rank, or somewhat more.
 const HALF_BRACKET: usize = 50;
 
-/// Quantiles: elements, nothing between them. None when there is no load; NaN is none.
+/// Quantiles: elements, no interpolation. `None` without a load; NaN is skipped.
 ///
-/// Only what lies about each is put in order, in brackets that a few loads tell; where a bracket misses its
-/// quantile, everything is.
+/// Only the loads near each quantile are sorted, in brackets from a subsample; where a bracket misses its
+/// quantile, all loads are.
 pub(crate) fn quantiles<const N: usize>(
     load_n: &[f64],
     segments: &[Range<usize>],
@@ -162,7 +166,7 @@ impl QuantileBracket {
         self.within.extend(block.iter().filter(|f| **f >= self.least && **f <= self.greatest));
     }
 
-    /// None where it lies outside.
+    /// `None` where it is outside the bracket.
     fn quantile(mut self, last: usize) -> Option<f64> {
         let at = rank(last, self.share).checked_sub(self.below as usize)?;
         (at < self.within.len()).then(|| *self.within.select_nth_unstable_by(at, f64::total_cmp).1)
@@ -213,7 +217,7 @@ mod tests {
         }
     }
 
-    /// Looks fall on every forty-ninth load: on none but these, which tell nothing of the rest.
+    /// The subsample is every forty-ninth load: here only these differ from the rest.
     #[test]
     fn quantiles_hold_where_the_looks_mislead() {
         let stride = 100_000 / LOOKS + 1;

@@ -20,7 +20,15 @@ pub struct GapStatistic {
     pub lower: usize,
 }
 
-/// ΔS of a track; NaN samples are passed over, and samples equal to the mid-range go to the upper set.
+/// Gap statistic ΔS = mean{S ≥ m} − mean{S < m}, m = (max S + min S)/2 (29–31).
+///
+/// `s_m` is S at each sample, m; NaN is skipped, and samples equal to the mid-range belong to the upper set.
+///
+/// ```
+/// let gap = estimator::gap::mid_range(&[0.0, 100e-6, 2e-6, 98e-6])?;
+/// assert!((gap.gap_m - 98e-6).abs() < 1e-12);
+/// # Ok::<(), estimator::Error>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::Constant`] when S does not move, so that the lower set is empty; [`Error::NothingMeasured`]
@@ -38,6 +46,7 @@ pub fn mid_range(s_m: &[f64]) -> Result<GapStatistic, Error> {
         return Err(Error::Constant { samples: upper, s_m: max });
     }
     let (upper_m, lower_m) = (upper_sum / upper as f64, lower_sum / lower as f64);
+    debug_assert!(!(upper_m < lower_m), "means {upper_m} m above and {lower_m} m below the mid-range");
     Ok(GapStatistic {
         gap_m: upper_m - lower_m,
         upper_m: upper_m + mid_range_m,

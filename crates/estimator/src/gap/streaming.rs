@@ -1,10 +1,10 @@
-//! The gap statistic as the samples come, in memory that does not grow.
+//! Streaming gap statistic in bounded memory.
 //!
 //! The batch needs S twice: for its mid-range, then for the means above and below. Here S is kept as
-//! counts and sums in bins of one width, beside its exact extremes. All bins but the one that holds the
-//! mid-range then fall whole on one side, and their sums are exact; what that one bin may hide is
-//! bounded, and every reading carries the bounds. Adding a sample touches one bin; reading goes once
-//! over all of them. Neither takes longer for one flight than for another.
+//! counts and sums in bins of one width, with its exact extremes. All bins but the one that holds the
+//! mid-range are on one side, and their sums are exact. The error from that one bin is
+//! bounded, and every reading carries the bounds. Adding a sample updates one bin; a reading visits all bins once.
+//! The time of both does not depend on the length of the flight.
 //!
 //! Measured against the batch on 48 simulated flights of a minute (friction half to three times the
 //! nominal, 50 and 125 Hz), largest error as a share of ΔS:
@@ -46,7 +46,7 @@ pub struct BoundedGap {
     pub least_m: f64,
     /// The batch's ΔS is no greater, m.
     pub greatest_m: f64,
-    /// Samples it stands on.
+    /// Number of samples.
     pub samples: u64,
 }
 
@@ -69,8 +69,8 @@ impl HistogramBin {
 }
 
 impl<const BINS: usize> StreamingGap<BINS> {
-    /// Empty, with bins so wide, m: together they should span what S may move in, and one should be small
-    /// beside the gap.
+    /// Empty, with this width of the bins, m: the bins should span the range of S, and one bin should be small
+    /// compared with the gap.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a width that is not positive and finite.
@@ -81,7 +81,7 @@ impl<const BINS: usize> StreamingGap<BINS> {
         Ok(Self { bin_m, origin_m: f64::NAN, least_m: inf, greatest_m: -inf, bins })
     }
 
-    /// Adds S, m; NaN is passed over.
+    /// Adds one sample of S, m; NaN is skipped.
     pub fn push(&mut self, s_m: f64) {
         if s_m.is_nan() {
             return;
@@ -93,7 +93,7 @@ impl<const BINS: usize> StreamingGap<BINS> {
         self.bins[self.place(relative_m)].add(&HistogramBin { count: 1, sum_m: relative_m });
     }
 
-    /// ΔS of everything so far, with the bounds of the batch's.
+    /// ΔS (29–31) of all samples so far, m, with bounds of the batch result.
     ///
     /// # Errors
     /// [`Error::NothingMeasured`] before the first sample; [`Error::Constant`] while S has not moved.
@@ -137,7 +137,7 @@ impl<const BINS: usize> StreamingGap<BINS> {
         }
     }
 
-    /// What lies in the bins below, at and above one.
+    /// Content of the bins below, at and above one.
     fn split(&self, at: usize) -> (HistogramBin, HistogramBin, HistogramBin) {
         let sum = |bins: &[HistogramBin]| {
             bins.iter().fold(HistogramBin::default(), |mut sum, bin| {

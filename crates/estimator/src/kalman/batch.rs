@@ -27,7 +27,7 @@ pub struct FilterOutput {
     pub measured: usize,
 }
 
-/// What a batch may hand out for each sample.
+/// Innovations of a batch, one value per sample.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct InnovationBuffers {
     /// e, m; NaN where nothing was measured.
@@ -37,9 +37,9 @@ pub struct InnovationBuffers {
 }
 
 impl GainSchedule {
-    /// Runs over all segments, each from a start of its own, and hands out S(t).
+    /// Filters all segments (24–28), each from its own initial state, and returns S at each sample, m.
     ///
-    /// A missing load (NaN) is taken to be the one before it.
+    /// Channels have one value per sample: δX in m and load in N. A missing load (NaN) is replaced by the one before.
     ///
     /// # Errors
     /// [`Error::Lengths`] for channels that do not fit, [`Error::NothingMeasured`] when no segment
@@ -54,8 +54,8 @@ impl GainSchedule {
         Ok(FilterOutput { s_m: room.s_m, nis, measured })
     }
 
-    /// As [`GainSchedule::track`] with S left in the room: the mean normalised innovation squared, and how many samples
-    /// were measured.
+    /// As [`GainSchedule::track`], with S in the workspace. Returns the mean normalised innovation squared (NIS,
+    /// e²/(C P Cᵀ + V_d), Bar-Shalom, Li and Kirubarajan 2001, section 5.4) and the number of measured samples.
     ///
     /// # Errors
     /// As [`GainSchedule::track`].
@@ -75,7 +75,7 @@ impl GainSchedule {
         room.s_m.resize(count, 0.0);
         for_each_uncovered(samples.segments, count, |gap| room.s_m[gap].fill(f64::NAN));
         let mut pass =
-            FilterPass { schedule: self, innovations, room, nis: 0.0, measured: 0, doubtful_until: 0 };
+            FilterPass { schedule: self, innovations, room, nis: 0.0, measured: 0, checked_until: 0 };
         for segment in samples.segments {
             let (y_m, load_n) = (&samples.dx_m[segment.clone()], &samples.load_n[segment.clone()]);
             pass.segment(y_m, load_n, segment.start)?;
@@ -86,7 +86,7 @@ impl GainSchedule {
 }
 
 impl Filter {
-    /// [`GainSchedule::track`] for a single flight.
+    /// [`GainSchedule::track`] (24–28) for a single flight.
     ///
     /// # Errors
     /// As there.
@@ -99,7 +99,7 @@ impl Filter {
     }
 }
 
-/// Memory for S(t), to be used again for the next series instead of being asked for anew.
+/// Memory for S(t), reused for the next series.
 #[derive(Debug, Default)]
 pub struct FilterWorkspace {
     s_m: Vec<f64>,
@@ -133,8 +133,8 @@ struct FilterPass<'f> {
     room: &'f mut FilterWorkspace,
     nis: f64,
     measured: usize,
-    /// Samples are looked at for missing ones before this one.
-    doubtful_until: usize,
+    /// Samples before this one are checked for missing values.
+    checked_until: usize,
 }
 
 impl FilterPass<'_> {
@@ -206,10 +206,10 @@ impl FilterPass<'_> {
         let s_m = &mut self.room.s_m[at..at + y_m.len()];
         let (done, last, squares_m2) = match self.innovations.as_deref_mut() {
             None => {
-                let doubt = self.doubtful_until.saturating_sub(at);
+                let doubt = self.checked_until.saturating_sub(at);
                 let mut stretch = SampleRun { schedule: self.schedule, map, y_m, load_n, s_m, doubt };
                 let found = stretch.run(from, &mut self.room.squares_m2);
-                self.doubtful_until = at + stretch.doubt;
+                self.checked_until = at + stretch.doubt;
                 found
             }
             Some(out) => {
@@ -231,9 +231,9 @@ impl FilterPass<'_> {
     }
 }
 
-/// For so many times the samples in which one was missing, they are looked at before they are worked on: a look takes a
-/// tenth of the time of work that was for nothing.
-const DOUBT: usize = 16;
+/// Number of samples that are checked before they are filtered, per sample in which a value was missing. The check
+/// takes a tenth of the time of filtering.
+const RESCAN_FACTOR: usize = 16;
 
 /// Samples under a settled gain, and the room for their S.
 struct SampleRun<'a> {
@@ -242,7 +242,7 @@ struct SampleRun<'a> {
     y_m: &'a [f64],
     load_n: &'a [f64],
     s_m: &'a mut [f64],
-    /// So many from the first on are looked at before they are worked on, since some were missing.
+    /// Number of samples, from the first on, that are checked before they are filtered, since some were missing.
     doubt: usize,
 }
 
@@ -268,7 +268,7 @@ impl SampleRun<'_> {
                 at = all.end;
                 continue;
             }
-            self.doubt = at + DOUBT * cut.samples();
+            self.doubt = at + RESCAN_FACTOR * cut.samples();
             let whole = whole_until(&y_m[..cut.samples()], &load_n[..cut.samples()]);
             if whole == cut.samples() {
                 break; // Nothing is missing, and something not finite.
@@ -317,7 +317,7 @@ fn whole_until(y_m: &[f64], load_n: &[f64]) -> usize {
     whole + rest.clone().position(|(y, u)| (y + u).is_nan()).unwrap_or(rest.len())
 }
 
-/// Samples that are looked at together: without a way out of the loop it runs in vectors.
+/// Samples that are checked together: a loop without early exit is vectorized.
 const BLOCK: usize = 64;
 
 simd_dispatch! {
@@ -346,7 +346,7 @@ mod tests {
     use crate::{ActuatorModel, NoiseModel};
     use nalgebra::{Matrix3, Vector3};
 
-    /// However early the parts start, too late included, or in one piece: the same bits.
+    /// Chunks with any length of warm-up, too short ones included, and a single chunk give bitwise identical results.
     #[test]
     fn a_lead_that_is_too_short_costs_time_and_no_bit() {
         let w_d = Matrix3::from_diagonal(&Vector3::new(1e-14, 1e-8, 1e-12));

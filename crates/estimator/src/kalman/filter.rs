@@ -51,7 +51,23 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Brings model and noise to the step.
+    /// Discretises model (20, 21) and noise (22) for a step, s.
+    ///
+    /// ```
+    /// use estimator::{ActuatorModel, Filter, NoiseModel};
+    ///
+    /// let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0)?;
+    /// let noise = NoiseModel::Continuous {
+    ///     force_psd_n2_s: 100.0,
+    ///     backlash_rate_psd_m2_per_s: 1e-9,
+    ///     v_d_m2: 1e-11,
+    /// };
+    /// let filter = Filter::new(&actuator, 0.004, &noise)?;
+    /// // δX = 0.1 mm under 4 kN: S = δX − F/K = 20 µm.
+    /// let state = filter.initial_state(1e-4, 4e3);
+    /// assert!((state.x[2] - 20e-6).abs() < 1e-12);
+    /// # Ok::<(), estimator::Error>(())
+    /// ```
     ///
     /// # Errors
     /// [`Error::Parameter`] for a step or noise level that no log can have.
@@ -71,9 +87,11 @@ impl Filter {
         &self.noise
     }
 
-    /// The state before anything is measured, from the first measurement and its load:
-    /// x₀ = [y, 0, y − u/K], P₀ = diag(V_d, 10⁻⁴, 10⁻⁶). Starting at zero instead costs +650 % of the
-    /// gap where δX carries an offset of a millimetre.
+    /// Initial state from the first measurement, m, and its load, N:
+    /// x₀ = [y, 0, y − u/K], P₀ = diag(V_d, 10⁻⁴, 10⁻⁶) in m², (m/s)², m².
+    ///
+    /// The paper gives none (`docs/equations.md`, "The filter"). x₀ = 0 adds 650 % to the
+    /// gap where δX has an offset of a millimetre.
     pub fn initial_state(&self, y_m: f64, load_n: f64) -> KalmanState {
         let (speed, backlash) = INITIAL_VARIANCE;
         KalmanState {
@@ -85,10 +103,9 @@ impl Filter {
     /// One step ahead under a held load (24, 25): x = A_d x + B_d u, P = A_d P A_dᵀ + W_d.
     pub fn predict(&self, posterior: &KalmanState, load_n: f64) -> KalmanState {
         let a_d = &self.discrete.a_d;
-        KalmanState {
-            x: self.predict_state(&posterior.x, load_n),
-            p: symmetric(&(a_d * posterior.p * a_d.transpose() + self.noise.w_d)),
-        }
+        let p = symmetric(&(a_d * posterior.p * a_d.transpose() + self.noise.w_d));
+        debug_assert!(has_positive_variances(&p, &p), "P(k+1/k) = {p}");
+        KalmanState { x: self.predict_state(&posterior.x, load_n), p }
     }
 
     /// x = A_d x + B_d u.
@@ -127,11 +144,13 @@ impl Filter {
         let gain = prior.p.column(0) / s_m2;
         let innovation_m = y_m - prior.x[0];
         let p = symmetric(&(prior.p - gain * prior.p.row(0)));
+        debug_assert!(has_positive_variances(&p, &prior.p), "P(k+1/k+1) = {p}");
         let posterior = KalmanState { x: prior.x + gain * innovation_m, p };
         Ok(FilterStep { prior, posterior, innovation_m, innovation_variance_m2, gain })
     }
 
-    /// The gain once every sample is measured, 3×1, with P(k+1/k) it belongs to.
+    /// Steady-state gain, 3×1 [1, s⁻¹, 1], and its P(k+1/k), 3×3: the fixed point of 25, 26 and 28 (discrete algebraic
+    /// Riccati equation; Anderson and Moore 1979, *Optimal Filtering*, section 4.4), by iteration.
     ///
     /// # Errors
     /// [`Error::Unsettled`] when it does not settle; [`Error::InnovationCovariance`].
@@ -151,8 +170,8 @@ impl Filter {
         Err(Error::Unsettled { steps: SETTLING_STEPS })
     }
 
-    /// The bandwidth at which the settled filter lets S move, Hz: its slowest pole, −ln ρ/(2π Ts) with ρ
-    /// the spectral radius of (I − K C) A_d. To be held against the bandwidth that was asked for.
+    /// Bandwidth of the steady-state filter, Hz: its slowest pole z = e^(s Ts), so f = −ln ρ/(2π Ts) with ρ
+    /// the spectral radius of (I − K C) A_d. Compare it with the configured bandwidth.
     ///
     /// # Errors
     /// As [`Filter::steady_state_gain`].
@@ -165,7 +184,8 @@ impl Filter {
         -ComplexField::ln(radius) / (core::f64::consts::TAU * self.step_s)
     }
 
-    /// ρ of (I − K C) A_d: a wrong start is forgotten by this factor at each step.
+    /// Spectral radius ρ of (I − K C) A_d, no unit: an initial-state error decays by this factor per step
+    /// (error dynamics of 24 and 27).
     ///
     /// # Errors
     /// As [`Filter::steady_state_gain`].
@@ -196,6 +216,11 @@ pub(crate) fn distance(p: &Matrix3<f64>, other: &Matrix3<f64>) -> f64 {
     let entry =
         |i: usize, j: usize| (p[(i, j)] - other[(i, j)]).abs() / ComplexField::sqrt(p[(i, i)] * p[(j, j)]);
     (0..9).map(|k| entry(k / 3, k % 3)).fold(0.0, f64::max)
+}
+
+/// Whether no variance is negative by more than rounding of the variances before.
+fn has_positive_variances(p: &Matrix3<f64>, before: &Matrix3<f64>) -> bool {
+    (0..3).all(|k| !(p[(k, k)] < -1e-9 * before[(k, k)].abs()))
 }
 
 fn symmetric(p: &Matrix3<f64>) -> Matrix3<f64> {

@@ -1,4 +1,4 @@
-//! What a filter does whatever is measured: gains and covariances, found once for all series of one tuning.
+//! Gain schedule: gains and covariances, which depend on no measurement, computed once per tuning.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,9 +8,9 @@ use crate::kalman::steady_state::SteadyStateFilter;
 
 /// Steps of a start that are kept, at most; a sound tuning settles in far fewer.
 const MOST_STEPS: usize = 4096;
-/// What is left of a start where it counts as forgotten to the last bit. Of 4800 starts under 120 tunings of 50 to
-/// 5000 Hz half had come to the same bits at 1e-16 of it, nine in ten at 1e-22; one in seventy, of parts that ring or
-/// are very soft beside the asked bandwidth, had not at 1e-48, and is caught up with.
+/// Relative size of an initial-state error below which it is forgotten to the last bit. Of 4800 starts under 120
+/// tunings of 50 to 5000 Hz half had become bitwise identical at 1e-16, nine in ten at 1e-22. One in seventy, of parts
+/// with a weakly damped mode or very soft compared with the bandwidth, had not at 1e-48, and is recomputed.
 const FORGOTTEN: f64 = 1e-24;
 /// A tuning that forgets more slowly is not cut into parts.
 const LONGEST_LEAD: usize = 65_536;
@@ -24,8 +24,8 @@ pub(crate) struct TransientGain {
     pub(crate) p: Matrix3<f64>,
 }
 
-/// The gains of one filter from a start until they settle, and the settled map: the covariance depends on no
-/// measurement, so one schedule serves every series of these parameters, this step and this noise.
+/// Gains of one filter from the initial state until the steady state, and the steady-state filter: the covariance
+/// depends on no measurement, so one schedule serves every series of these parameters, this step and this noise.
 #[derive(Debug, Clone)]
 pub struct GainSchedule {
     pub(crate) filter: Filter,
@@ -39,7 +39,7 @@ pub struct GainSchedule {
 }
 
 impl GainSchedule {
-    /// Runs the covariance ahead.
+    /// Iterates the covariance (25, 26, 28) from P₀ until the steady state.
     pub fn new(filter: &Filter) -> Self {
         let settled = filter.steady_state_gain();
         let radius = settled.as_ref().map(|(gain, _)| filter.radius_at(gain)).map_err(Clone::clone);
@@ -61,7 +61,7 @@ impl GainSchedule {
         &self.filter
     }
 
-    /// As [`Filter::bandwidth_hz`], found already.
+    /// As [`Filter::bandwidth_hz`], stored.
     ///
     /// # Errors
     /// As [`Filter::steady_state_gain`].

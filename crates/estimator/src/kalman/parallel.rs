@@ -1,10 +1,10 @@
-//! A long stretch in eight parts at once, with the bits of one sample after the other.
+//! Steady-state Kalman filter over eight overlapping chunks in parallel, bitwise identical to the sequential filter.
 //!
-//! The settled filter forgets how it started, and not nearly but wholly: two runs over the same samples come to
-//! the same bits, since rounding leaves nothing between neighbouring numbers for a difference to live on. So
-//! each part starts early, from a guess. Where the state in which it arrives at its own first sample is, bit
-//! for bit, the one in which the part before it ended, it goes on as the plain recursion would have; where
-//! it is not, the plain recursion goes on until it meets the part at one of a few marks, or does all of it.
+//! The steady-state filter forgets its initial state exactly: after enough samples, two runs over the same samples have
+//! bitwise identical states, since rounding removes the last difference. So each chunk starts early (warm-up) from a
+//! guessed state. Where its state at its own first sample equals the final state of the chunk before it,
+//! the result is that of the sequential recursion. Where it differs, the sequential recursion continues until it meets
+//! the chunk at one of a few checkpoints, or to the end of the chunk.
 
 #[cfg(target_arch = "x86_64")]
 use core::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
@@ -98,7 +98,7 @@ impl ChunkIo<'_> {
         let mut marks = [arrived; MARKS];
         let mut reached = arrived;
         for (mark, states) in marks.iter_mut().enumerate() {
-            // A part's end is written after the early start of the next, which lies in the same place.
+            // A chunk's end is written after the warm-up of the next, which uses the same memory.
             reached = self.advance_chunks(reached, self.cut.between(mark));
             *states = reached;
         }
@@ -176,10 +176,10 @@ fn advance_avx2(work: &mut ChunkIo<'_>, states: ChunkStates, within: Range<usize
     advance_chunks::<Avx2F64x8>(work, states, within)
 }
 
-/// Tells the processor that numbers will be needed.
+/// Prefetches numbers into the cache.
 #[inline(always)]
 #[allow(clippy::inline_always, reason = "see `f64x8`")]
-#[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables, reason = "no way to tell"))]
+#[cfg_attr(not(target_arch = "x86_64"), expect(unused_variables, reason = "no prefetch instruction"))]
 fn prefetch(numbers: &[f64]) {
     #[cfg(target_arch = "x86_64")]
     for line in numbers.iter().step_by(TILE) {

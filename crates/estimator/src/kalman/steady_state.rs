@@ -98,7 +98,7 @@ impl SteadyStateFilter {
         [x[0] - x[2], self.speed_to_way_s * x[1], x[2]]
     }
 
-    /// Back to the state. A speed that does not outlast a step moves nothing, and is told as zero.
+    /// Transforms back to the state. A velocity that decays within one step moves nothing, and is returned as zero.
     pub(crate) fn inverse_transform(&self, [z_m, v_m, s_m]: SteadyState) -> Vector3<f64> {
         Vector3::new(z_m + s_m, v_m * self.way_to_speed_per_s, s_m)
     }

@@ -1,16 +1,31 @@
-//! The filter as the samples come: one at a time, in bounded time and without allocating.
+//! Sample-by-sample filter in bounded time, without allocation.
 //!
-//! The step loops over nothing and decides nothing by the value of a sample, but for one question: is it
-//! there? [`Stream::constant_time`] runs the whole recursion at each step, before it has settled and after, so
-//! the longest step takes as many operations as the mean one (a missing sample, fewer).
-//! [`Stream::steady_state`] takes the settled shortcut of the batch and gives its bits; its longest step is
-//! the even one.
+//! A step has no loop, and its only branch on a sample is whether the sample is missing.
+//! [`Stream::constant_time`] runs the whole recursion at each step, so the longest step takes as many operations as the
+//! mean one (a missing sample, fewer). [`Stream::steady_state`] switches to the steady-state filter as the batch does,
+//! and is bitwise identical to it; its longest step is that of the constant-time filter.
 
 use crate::error::Error;
 use crate::kalman::filter::{Filter, KalmanState};
 use crate::kalman::steady_state::{self, SteadyState, SteadyStateFilter};
 
-/// A filter under way.
+/// Kalman filter (24–28) with its current state.
+///
+/// ```
+/// use estimator::{ActuatorModel, Filter, NoiseModel, Stream};
+///
+/// let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0)?;
+/// let noise = NoiseModel::Continuous {
+///     force_psd_n2_s: 100.0,
+///     backlash_rate_psd_m2_per_s: 1e-9,
+///     v_d_m2: 1e-11,
+/// };
+/// let mut stream = Stream::constant_time(&Filter::new(&actuator, 0.004, &noise)?);
+/// // δX = 40 µm without load: S = 40 µm.
+/// let s_m = (0..500).map(|_| stream.push(40e-6, 0.0)).last().unwrap_or(Ok(f64::NAN))?;
+/// assert!((s_m - 40e-6).abs() < 1e-9);
+/// # Ok::<(), estimator::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct Stream {
     filter: Filter,
@@ -27,7 +42,7 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// The whole recursion at each step: worst time equals mean time, and nothing is computed ahead.
+    /// The whole recursion (24–28) at each step: worst time equals mean time, and nothing is computed ahead.
     ///
     /// Differs from the batch by less than 1e-12 of the peak of S.
     pub fn constant_time(filter: &Filter) -> Self {
@@ -36,20 +51,20 @@ impl Stream {
         Self { filter, folded, state, settled: false, bent, last_load_n: nan, held_load_n: 0.0 }
     }
 
-    /// The batch's bits: the whole recursion until the gain has settled, one constant map from there.
+    /// Bitwise identical to the batch: the whole recursion (24–28) until the steady state, one constant map afterwards.
     ///
-    /// Where the gain never settles it goes on as [`Stream::constant_time`], like the batch.
+    /// Without a steady state it continues as [`Stream::constant_time`], like the batch.
     pub fn steady_state(filter: &Filter) -> Self {
         let folded =
             filter.steady_state_gain().ok().map(|(gain, p)| SteadyStateFilter::new(filter, &gain, &p));
         Self { folded, ..Self::constant_time(filter) }
     }
 
-    /// Takes the next sample, and gives S, m: relative position `y_m` in m and load in N, NaN where missing.
+    /// Filters the next sample and returns S, m, from the relative position `y_m`, m, and the load, N; NaN where missing.
     ///
-    /// A missing load is taken to be the one before it. S is NaN until a first position is measured. There
-    /// alone the batch knows more: it looks ahead, and starts at the segment's first row from the first
-    /// measurement; this filter starts at that measurement, and is the batch of what follows.
+    /// A missing load is replaced by the one before it. S is NaN until a first position is measured. Only there the
+    /// batch differs: it starts at the segment's first row from the first
+    /// measurement; this filter starts at that measurement.
     ///
     /// # Errors
     /// [`Error::InnovationCovariance`], for noise levels that contradict each other.
@@ -71,13 +86,13 @@ impl Stream {
         self.correct(prior, y_m)
     }
 
-    /// The state after the last sample, once a position was measured. In the settled shortcut its
-    /// covariance stays that of the step before it.
+    /// The state after the last sample, once a position was measured. In the steady state its
+    /// covariance stays that of the last transient step.
     pub fn estimate(&self) -> Option<&KalmanState> {
         self.state.as_ref()
     }
 
-    /// Forgets all samples: the next is the first of a new segment.
+    /// Restarts the filter: the next sample is the first of a new segment.
     pub fn restart(&mut self) {
         *self = Self { folded: self.folded, ..Self::constant_time(&self.filter) };
     }

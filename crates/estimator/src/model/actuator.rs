@@ -1,24 +1,8 @@
-//! The actuator brought to the screw axis, and its relative dynamics (equations 1–17).
+//! Actuator parameters at the screw axis, and the relative dynamics (equations 3–17).
 
-use core::f64::consts::TAU;
-
-use nalgebra::{ComplexField, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use crate::error::Error;
-
-/// Motor position brought to the screw axis: X₁ = θ·r/2π, m.
-///
-/// `lead_m_per_rev` is the travel for one turn; the paper calls it reduction ratio.
-pub fn motor_position_m(angle_rad: f64, lead_m_per_rev: f64) -> f64 {
-    angle_rad * lead_m_per_rev / TAU
-}
-
-/// Motor inertia seen at the screw axis: m_m = J_m (2π/r)², kg.
-///
-/// The paper prints J_m (r/2π)², which is no mass (kg·m⁴).
-pub fn reflected_mass_kg(inertia_kg_m2: f64, lead_m_per_rev: f64) -> f64 {
-    inertia_kg_m2 * ComplexField::powi(TAU / lead_m_per_rev, 2)
-}
 
 /// Stiffness, damping and screw mass of an actuator at the screw axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +13,7 @@ pub struct ActuatorModel {
 }
 
 impl ActuatorModel {
-    /// A linear actuator: K in N/m, f in N·s/m, m_s in kg.
+    /// Linear actuator with the parameters of equation 3: K in N/m, f in N·s/m, m_s in kg.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a value that is not finite, a stiffness or mass that is not positive,
@@ -43,7 +27,9 @@ impl ActuatorModel {
         Ok(Self { stiffness_n_per_m, damping_n_s_per_m, screw_mass_kg })
     }
 
-    /// A part that only turns, seen at a radius r: x = rθ, so K = k/r², f = c/r², m = J/r².
+    /// Rotary part at a radius r, m: x = r θ and F = T/r in equation 3, so K = k/r², f = c/r², m = J/r².
+    ///
+    /// `k` in N·m/rad, `c` in N·m·s/rad, `J` in kg·m².
     ///
     /// # Errors
     /// As [`ActuatorModel::linear`], and for a radius that is not positive.
@@ -58,7 +44,7 @@ impl ActuatorModel {
         Self::linear(stiffness_nm_per_rad / square, damping_nm_s_per_rad / square, inertia_kg_m2 / square)
     }
 
-    /// K, N/m.
+    /// K of equation 3, N/m.
     pub fn stiffness_n_per_m(&self) -> f64 {
         self.stiffness_n_per_m
     }
@@ -70,25 +56,10 @@ impl ActuatorModel {
         Matrix3::new(0.0, 1.0, 0.0, -k, -f, k, 0.0, 0.0, 0.0)
     }
 
-    /// B, 3×1, of the load (12).
+    /// B, 3×1, of the load in N (12).
     pub fn b(&self) -> Vector3<f64> {
         Vector3::new(0.0, self.screw_mass_kg.recip(), 0.0)
     }
-}
-
-/// Friction of equation 1, N, at a speed that is not zero: F_v Ẋ + sign(Ẋ)(F_dry + η|F_l|).
-///
-/// η is the fraction of the load lost, about 1 − efficiency; the paper prints "efficiency". At rest the
-/// sign is set-valued: a stopped screw holds any force within ±(F_dry + η|F_l|), here returned as zero.
-pub fn friction_n(
-    speed_m_per_s: f64,
-    load_n: f64,
-    viscous_n_s_per_m: f64,
-    dry_n: f64,
-    lost_fraction: f64,
-) -> f64 {
-    let side = if speed_m_per_s == 0.0 { 0.0 } else { speed_m_per_s.signum() };
-    viscous_n_s_per_m * speed_m_per_s + side * (dry_n + lost_fraction * load_n.abs())
 }
 
 pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), Error> {

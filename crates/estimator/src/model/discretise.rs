@@ -1,4 +1,4 @@
-//! From continuous to sampled: the load held over a step (equations 18–23).
+//! Discretisation with the load held over a step (equations 18–23).
 
 use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3};
 
@@ -16,9 +16,10 @@ pub struct DiscreteModel {
 }
 
 impl DiscreteModel {
-    /// Exact for a load that is constant over each step.
+    /// A_d (20) and B_d (21) at a step, s: exact for a load that is constant over each step.
     ///
-    /// Both come out of one exponential: exp([A B; 0 0]·Ts) = [A_d B_d; 0 1] (van Loan 1978).
+    /// Both come out of one exponential: exp([A B; 0 0]·Ts) = [A_d B_d; 0 1] (van Loan 1978,
+    /// <https://doi.org/10.1109/TAC.1978.1101743>).
     ///
     /// # Errors
     /// [`Error::Parameter`] for a step that is not positive and finite.

@@ -4,7 +4,7 @@ use nalgebra::SMatrix;
 #[cfg(any(test, not(feature = "std")))]
 use nalgebra::linalg::balancing::{balance_parlett_reinsch, unbalance};
 
-/// e^M, by Padé approximants; results on record stand on its bits.
+/// Matrix exponential e^M by Padé approximants (Higham 2005). Stored results depend on its exact bits.
 #[cfg(feature = "std")]
 pub(crate) fn exponential<const N: usize>(m: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N>
 where

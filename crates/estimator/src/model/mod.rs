@@ -5,7 +5,7 @@ mod discretise;
 mod matrix_exp;
 mod noise;
 
+pub use actuator::ActuatorModel;
 pub(crate) use actuator::positive;
-pub use actuator::{ActuatorModel, friction_n, motor_position_m, reflected_mass_kg};
 pub use discretise::DiscreteModel;
 pub use noise::{NoiseCovariances, NoiseModel, SensorNoise};

@@ -1,4 +1,4 @@
-//! Noise levels nobody has to guess: from sensor facts and a bandwidth, or as given.
+//! Process and measurement noise, from sensor data and a bandwidth, or as given.
 
 use core::f64::consts::TAU;
 
@@ -20,8 +20,8 @@ pub enum NoiseModel {
         /// V_d, m².
         v_d_m2: f64,
     },
-    /// Exact from white densities. A trap where the structural mode lies above Nyquist: it is rung by
-    /// noise that sampling cannot see, and the gap comes out 9–15 % low at 100 Hz.
+    /// Exact discretisation of white densities. Not suitable where the structural mode is above Nyquist: the mode is
+    /// excited by noise above Nyquist, and the gap is 9–15 % low at 100 Hz.
     Continuous {
         /// Density of the unknown force, N²·s.
         force_psd_n2_s: f64,
@@ -59,7 +59,8 @@ pub struct NoiseCovariances {
 }
 
 impl SensorNoise {
-    /// σ_y² = both noise variances plus resolution²/12 each, m².
+    /// σ_y² = both noise variances plus resolution²/12 each, m² (quantisation noise: Bennett 1948,
+    /// <https://doi.org/10.1002/j.1538-7305.1948.tb01340.x>).
     pub fn variance_m2(&self) -> f64 {
         let square = |v: f64| v * v;
         square(self.screw_rms_m)
@@ -96,7 +97,10 @@ impl SensorNoise {
 }
 
 impl NoiseModel {
-    /// W_d and V_d at a step.
+    /// W_d, 3×3 in the units of [m, m/s, m], and V_d, m², at a step, s (4, 9, 10, 22).
+    ///
+    /// `Sensors` and `PerStep` as in `docs/equations.md`, "Discretisation"; `Continuous` by van Loan 1978
+    /// (<https://doi.org/10.1109/TAC.1978.1101743>).
     ///
     /// # Errors
     /// [`Error::Parameter`] for a level that is negative or not finite, or a measurement without noise.

@@ -1,8 +1,8 @@
-//! One body compiled several times, for the widest vectors that the machine turns out to have.
+//! Runtime SIMD dispatch: one body compiled several times, for the widest vectors of the machine.
 //!
-//! Vectors change no result: lanes run the same operations in the same order as one number would, and a product is
-//! fused with a sum where the body says so, on every machine, and nowhere else. So every machine gives the same bits,
-//! and no record has to say which of the bodies it came from. Machines without such extensions, and those whose
+//! Vectors change no result: each lane runs the same operations in the same order as scalar code, and a product is
+//! fused with a sum exactly where the body has `mul_add`, on every machine. So results are bitwise identical on every
+//! machine, and records do not hold the instruction set. Machines without such extensions, and those whose
 //! vectors need none (NEON), run the plain body.
 
 /// Defines a function whose body runs with AVX-512 or AVX2, and fused products, where the processor has them.

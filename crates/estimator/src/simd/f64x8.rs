@@ -18,7 +18,7 @@ pub(crate) trait F64x8: FmaScalar {
     }
 }
 
-/// Eight lines of a column, from `first` on and so far apart: looked at once whether they are all within it.
+/// Eight rows of a column, from `first` on with distance `apart`: one bounds check for all.
 #[inline(always)]
 #[allow(clippy::inline_always, reason = "all must be compiled within one function")]
 #[allow(unsafe_code, reason = "eight looks for each line take as long as the lines")]

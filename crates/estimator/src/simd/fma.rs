@@ -1,7 +1,7 @@
-//! Numbers of one series, or of several side by side: the same sums and fused products, one by one.
+//! Arithmetic on one series, or on several in parallel: the same sums and fused products, element by element.
 //!
-//! A product that is fused with a sum is rounded once, by every processor alike: by one instruction, or where it has
-//! none, by many.
+//! A fused product and sum is rounded once on every processor: by one instruction, or in software where it has
+//! none.
 
 use nalgebra::ComplexField;
 

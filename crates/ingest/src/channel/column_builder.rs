@@ -1,4 +1,4 @@
-//! A column while it is read: its numbers, brought to SI and looked at while they are in the cache.
+//! Column builder: converts values to SI and updates their statistics while they are in the cache.
 
 use crate::channel::buffer_pool;
 use crate::channel::si_conversion::SiConversion;
@@ -12,7 +12,7 @@ pub(crate) const BATCH: usize = 2048;
 pub(crate) struct ColumnBuilder {
     to_si: Option<SiConversion>,
     values: Vec<f64>,
-    /// None where nobody wants to know.
+    /// `None` where the statistics are not needed.
     scanner: Option<StatsAccumulator>,
 }
 
@@ -29,7 +29,7 @@ impl ColumnBuilder {
         Self { to_si, values: buffer_pool::acquire(values), scanner: None }
     }
 
-    /// The same, looked at as it grows.
+    /// The same, with statistics of the appended values.
     pub(crate) fn with_stats(self) -> Self {
         Self { scanner: Some(StatsAccumulator::new()), ..self }
     }
@@ -53,7 +53,7 @@ impl ColumnBuilder {
         self.scanner = mark.scanner;
     }
 
-    /// The numbers, and what was seen of them where they were looked at.
+    /// The values, and their statistics where requested.
     pub(crate) fn finish(self) -> (Vec<f64>, Option<ChannelStats>) {
         let seen = self.scanner.map(|scanner| scanner.end(&self.values));
         (self.values, seen)

@@ -3,7 +3,7 @@
 //! A difference of order m suppresses smooth motion and multiplies the variance of white noise by the binomial
 //! coefficient C(2m, m). Its mean square over short blocks is therefore the noise variance where motion is smooth
 //! enough, and larger elsewhere. The noise is the scale of the quietest blocks: the smallest σ at which the counts of
-//! blocks below two of its χ² quantiles stand in the ratio that white noise gives (Wilson and Hilferty 1931,
+//! blocks below two of its χ² quantiles have the ratio that white noise gives (Wilson and Hilferty 1931,
 //! <https://doi.org/10.1073/pnas.17.12.684>), whatever the share of quiet blocks.
 
 /// White noise of a channel and its uncertainty, in the channel's unit.
@@ -129,7 +129,7 @@ fn span(values: &[f64]) -> f64 {
     high - low
 }
 
-/// The smallest σ at which the counts of blocks below its two quantiles stand in the ratio that noise gives.
+/// The smallest σ at which the counts of blocks below its two quantiles have the ratio that noise gives.
 fn quiet_level(order: usize, mut variances: Vec<f64>) -> Option<Level> {
     let fewest = MIN_BLOCKS.max((MIN_SHARE * variances.len() as f64) as usize);
     if variances.len() < fewest {

@@ -27,7 +27,7 @@ pub struct Quality {
     pub frozen_share: f64,
     /// How often a value comes, Hz: the rate actually seen.
     pub rate_hz: f64,
-    /// Share of samples that stand at the smallest or largest value as if cut off there.
+    /// Share of samples at the smallest or largest value, as if clipped there.
     pub saturated_share: f64,
     /// Single samples far from the line of their neighbours.
     pub spikes: usize,
@@ -39,7 +39,7 @@ impl Quality {
         Self::seen((values, segments), &ChannelStats::of(values), step_s, apart)
     }
 
-    /// As [`Quality::of`], of a channel that was looked at already.
+    /// As [`Quality::of`], with channel statistics that exist already.
     pub(crate) fn seen(
         (values, segments): (&[f64], &[Range<usize>]),
         seen: &ChannelStats,
@@ -151,7 +151,7 @@ fn saturated(values: &[f64], seen: &ChannelStats) -> usize {
     let mut samples = 0;
     for run in at_rails {
         let at = values[run.start];
-        // Two samples away, since the step that meets the rail is cut short.
+        // Two samples away, since the step that reaches the limit is shortened.
         let before = run.start.checked_sub(2).map(|i| values[i]);
         let (Some(before), Some(after)) = (before, values.get(run.end + 1)) else { continue };
         let cut = (before - at).abs() >= speed && (after - at).abs() >= speed;
@@ -237,7 +237,7 @@ fn recurring_impact(mut heights: Vec<f64>, noise: f64, step_s: f64) -> f64 {
     (level * level - explained * explained).max(0.0).sqrt()
 }
 
-/// What the motor, screw and load channels give reason to doubt: stable codes.
+/// Quality flags of the motor, screw and load channels: stable codes.
 pub(crate) fn quality_flags(channels: &[Quality; 3], step_s: f64) -> Vec<String> {
     const SATURATED: f64 = 0.002;
     const MISSING: f64 = 0.2;
@@ -254,8 +254,8 @@ pub(crate) fn quality_flags(channels: &[Quality; 3], step_s: f64) -> Vec<String>
     found
 }
 
-/// Positions whose smallest step is large beside what they have to show: a twentieth of all that the relative
-/// position does in the flight.
+/// Positions whose resolution is coarse: the smallest step exceeds a twentieth of the range of the relative
+/// position in the flight.
 pub(crate) fn coarse_resolution(channels: &[Quality; 3], travel_m: f64) -> Vec<String> {
     const LARGEST_SHARE: f64 = 0.05;
     let most_m = LARGEST_SHARE * travel_m;
@@ -293,8 +293,8 @@ fn min_frozen_run(step_s: f64) -> usize {
     ((0.5 / step_s).ceil() as usize).max(3)
 }
 
-/// Where a position stands still for half a second at least while its partner travels a millimetre and a
-/// twentieth of its range. A channel that never moves is another matter, and refused as a whole.
+/// Segments in which a position is constant for at least half a second while the other position moves a millimetre and
+/// a twentieth of its range. A channel that never moves is rejected as a whole elsewhere.
 fn frozen_ranges(values: &[f64], partner: &[f64], least: usize) -> Vec<Range<usize>> {
     const LEAST_TRAVEL_M: f64 = 1e-3;
     const LEAST_SHARE: f64 = 0.05;
@@ -306,7 +306,7 @@ fn frozen_ranges(values: &[f64], partner: &[f64], least: usize) -> Vec<Range<usi
         .collect()
 }
 
-/// Whether a load stood still for ten seconds in which the actuator travelled a fifth of its range.
+/// Whether the load was constant for ten seconds in which the actuator moved a fifth of its range.
 pub(crate) fn load_frozen(
     load_n: &[f64],
     motor_m: &[f64],
@@ -324,8 +324,8 @@ pub(crate) fn load_frozen(
     runs(load_n, least).any(froze).then(|| format!("{}_frozen", Role::Load.as_str()))
 }
 
-/// Slope of one position on the other, by least squares about their means: 1 when both are mapped
-/// right, −1 when a sign is wrong, another number when a ratio is.
+/// Least-squares slope of one position on the other about their means (ordinary least squares, 1 + Σxy/Σx²), m per m:
+/// 1 when both are mapped correctly, −1 when a sign is wrong, another number when a ratio is.
 ///
 /// Nothing when the motor does not move.
 pub fn regression_slope(motor_m: &[f64], dx_m: &[f64]) -> Option<f64> {
@@ -397,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn a_channel_cut_off_at_a_rail_is_told_from_one_that_rests() {
+    fn a_clipped_channel_is_distinguished_from_a_resting_one() {
         let cut: Vec<f64> = wave(1.0).iter().map(|v| v.clamp(-0.8, 0.8)).collect();
         let whole = described(&wave(1.0), 0.01, 0);
         assert!(described(&cut, 0.01, 0).saturated_share > 0.2);
@@ -413,7 +413,7 @@ mod tests {
         assert_eq!(described(&values, 0.004, 0).spikes, 3);
     }
 
-    /// The motor stands still for 1 s while the screw travels: that is a dead sensor. While the screw moves
+    /// A motor that is constant for 1 s while the screw moves is a dead sensor. While the screw moves
     /// within the gap, it is the gap.
     #[test]
     fn a_frozen_position_is_no_measurement() {

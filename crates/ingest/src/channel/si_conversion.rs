@@ -1,4 +1,4 @@
-//! From a raw reading to SI at the screw axis: one straight line, and the turns that a resolver forgets.
+//! Conversion of raw readings to SI at the screw axis: a linear map, and unwrapping of resolver angles.
 
 use multiversion::multiversion;
 
@@ -6,7 +6,7 @@ use crate::error::ErrorKind;
 use crate::mapping::ChannelMapping;
 use crate::mapping::units::{Dimension, Unit};
 
-/// What brings a part's angles and torques to the screw axis.
+/// Geometry that converts a part's angles and torques to the screw axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Geometry {
     /// A part that pushes: x = θ·lead/2π (the paper's X₁ = θ·r/2π).
@@ -22,7 +22,14 @@ pub enum Geometry {
 }
 
 impl Geometry {
-    /// Metres at the screw axis for a radian, where it is known.
+    /// Metres at the screw axis per radian, where it is known: r/2π of X₁ = θ·r/2π (the paper, section 2), or the radius of
+    /// a rotary part.
+    ///
+    /// ```
+    /// let screw = ingest::Geometry::Linear { lead_m_per_rev: Some(0.005) };
+    /// let quarter_turn_m = screw.metres_per_radian().map(|m| m * std::f64::consts::FRAC_PI_2);
+    /// assert!(quarter_turn_m.is_some_and(|m| (m - 0.00125).abs() < 1e-15));
+    /// ```
     pub fn metres_per_radian(self) -> Option<f64> {
         match self {
             Self::Linear { lead_m_per_rev } => lead_m_per_rev.map(|lead| lead / std::f64::consts::TAU),
@@ -41,7 +48,7 @@ pub(crate) struct SiConversion {
 }
 
 impl SiConversion {
-    /// An infinite reading is no reading.
+    /// SI value of a raw reading; an infinite reading is missing (NaN).
     #[inline]
     pub(crate) fn apply(self, raw: f64) -> f64 {
         let value = (raw * self.scale + self.offset) * self.factor + self.shift;

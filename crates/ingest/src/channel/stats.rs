@@ -8,7 +8,7 @@ use multiversion::multiversion;
 
 /// Samples in a group.
 const LANES: usize = 8;
-/// Samples whose repeats are looked at together.
+/// Samples whose repeats are found together.
 const BLOCK: usize = 64;
 
 /// Figures of a channel; missing samples are NaN, and compare as nothing.
@@ -40,7 +40,7 @@ impl ChannelStats {
 pub(crate) struct StatsAccumulator {
     lanes: LaneStats,
     run: RepeatCounter,
-    /// Samples that were looked at; the last ones wait for what follows them.
+    /// Samples processed so far; the last ones wait for their successors.
     done: usize,
 }
 
@@ -107,7 +107,7 @@ pub(crate) fn range(values: &[f64]) -> f64 {
     span.length()
 }
 
-/// What values span, told piece by piece.
+/// Range of the values, updated block by block.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct MinMax {
     low: [f64; LANES],
@@ -244,7 +244,7 @@ fn repeat_mask(group: &[f64; LANES + 2]) -> u8 {
     same
 }
 
-/// Whether so many ones stand in a row, one at least: each that ends a row of some stays where a row of some more ends.
+/// Whether there are `ones` consecutive set bits, at least one: each shift keeps the bits that end a longer run.
 #[inline]
 fn has_ones_run(bits: u64, ones: usize) -> bool {
     if ones > BLOCK {

@@ -1,6 +1,6 @@
 //! Where the bytes of a file come from: this machine, or an object store.
 //!
-//! An object is a temporary file too, into which the ranges are copied that were asked for: everything that
+//! An object is mirrored in a temporary file, into which the requested ranges are copied: every
 //! reads files reads it the same way, once its bytes are [wanted](ByteSource::want).
 
 use std::fs::File;
@@ -33,7 +33,7 @@ impl ByteSource {
         }
     }
 
-    /// Has these bytes at hand: a local file has them all.
+    /// Fetches these bytes: a local file has them all.
     pub(crate) fn want(&self, ranges: impl IntoIterator<Item = Range<u64>>) -> Result<(), ErrorKind> {
         match self {
             Self::Local(_) => Ok(()),

@@ -84,7 +84,7 @@ mod tests {
 
     use super::*;
 
-    /// Each byte says where it stands; eight readers of one file jump about in it.
+    /// Each byte encodes its offset; eight readers read one file at random offsets.
     #[test]
     fn readers_of_one_file_do_not_move_each_other() {
         let mut file = tempfile::tempfile().unwrap();

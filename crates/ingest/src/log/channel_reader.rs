@@ -69,7 +69,7 @@ impl<'s> ChannelSampling<'s> {
     /// Puts the rows of a channel on one clock.
     ///
     /// # Errors
-    /// When there is no clock, or it cannot be mended.
+    /// When there is no clock, or it cannot be repaired.
     pub(crate) fn new(
         sheet: &'s RowTable,
         map: &ChannelMapping,
@@ -128,7 +128,7 @@ impl<'s> ChannelSampling<'s> {
         self.time_column.is_some() || self.sheet.layout.name_column.is_some()
     }
 
-    /// A channel that stands in rows of its own has a rate of its own.
+    /// A channel with rows of its own has a rate of its own.
     fn clock(&self, map: &ChannelMapping) -> Cow<'s, ClockMapping> {
         if !self.is_apart() || self.sheet.clock.rate_hz == map.rate_hz {
             return Cow::Borrowed(&self.sheet.clock);

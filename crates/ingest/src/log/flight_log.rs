@@ -36,7 +36,7 @@ pub struct Log {
     selected: Mutex<Option<(SelectionKey, SampleSelection)>>,
 }
 
-/// Conditions, which samples and stamps of this log they were asked of, and the clock they were asked on.
+/// Cache key of a sample selection: the filters, the samples and timestamps they apply to, and their clock.
 #[derive(Debug, PartialEq)]
 struct SelectionKey {
     when: Vec<SampleFilter>,
@@ -114,11 +114,6 @@ impl Log {
     /// Rows the footers of the main log declare.
     pub fn rows(&self) -> usize {
         self.main.rows()
-    }
-
-    /// Whether this is a log that Freeplay itself wrote with `normalize`.
-    pub fn is_normalized(&self) -> bool {
-        self.normalized.is_some()
     }
 
     /// Names and types of all columns, for `check`.
@@ -392,7 +387,7 @@ impl Log {
         Ok(assemble(at.position.clone(), read, &master.0.line, temperature_c, flags))
     }
 
-    /// The stretches of the motor's clock in which every condition holds; as before, where the same was asked.
+    /// The segments of the motor's clock in which every sample filter holds; cached for equal keys.
     fn selected(
         &self,
         sought: ChannelRequest<'_>,
@@ -550,10 +545,10 @@ struct ChannelRequest<'c> {
     geometry: Geometry,
 }
 
-/// How the motor position lies in time, and by which mapping it is read.
+/// Sampling of the motor position, and the mapping of its channel.
 type ReferenceClock<'s, 'c> = (ChannelSampling<'s>, &'c ChannelMapping);
 
-/// The motor position's values, how they lie in time, what counts of them, and doubts about them.
+/// The motor position's values, their sampling, the selected samples, and quality flags.
 struct ReferenceChannel<'s, 'c> {
     channel: Channel,
     master: ReferenceClock<'s, 'c>,
@@ -561,7 +556,7 @@ struct ReferenceChannel<'s, 'c> {
     flags: Vec<String>,
 }
 
-/// What a sheet's files say of their flight.
+/// Identity fields in the files of a row table.
 fn facts(sheet: &RowTable, map: &crate::mapping::IdentityMapping) -> Result<IdentityFields, Error> {
     let first = &sheet.files[0];
     let mut facts: IdentityFields = map.values.clone();
@@ -578,7 +573,7 @@ fn facts(sheet: &RowTable, map: &crate::mapping::IdentityMapping) -> Result<Iden
     Ok(facts)
 }
 
-/// What a file of a group says of its flight, so that it finds its main log.
+/// Identity fields in a file of a group, from which its main log is found.
 ///
 /// # Errors
 /// As [`Log::open`] and [`Log::identity`].

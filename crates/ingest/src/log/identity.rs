@@ -10,7 +10,7 @@ use records::{FlightId, Position, TailNumber};
 use crate::error::ErrorKind;
 use crate::mapping::{IdentityField, IdentityMapping};
 
-/// What a log says about its flight.
+/// Identity of the flight of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identity {
     /// The aircraft.
@@ -19,7 +19,7 @@ pub struct Identity {
     pub flight_id: FlightId,
     /// Departure, UTC.
     pub departure_utc: Timestamp,
-    /// The place of the one actuator in the log, where its columns do not say.
+    /// Position of the only actuator in the log, where its columns do not name it.
     pub position: Option<Position>,
     /// Length of the flight, hours.
     pub flight_hours: Option<f64>,
@@ -149,7 +149,7 @@ pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp
             Ok(instant) => return Ok(instant),
             Err(_) => text.parse::<civil::DateTime>().map_err(|_| {
                 invalid(
-                    "it is no time such as 2026-11-19T04:13:00Z; `departure_format` says how others are read"
+                    "expected a time such as 2026-11-19T04:13:00Z; set `departure_format` for other forms"
                         .into(),
                 )
             })?,
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_does_not_say_its_tail_is_told_where_we_looked() {
+    fn a_log_without_a_tail_reports_where_it_was_searched() {
         let mut m = mapping(None, None);
         m.metadata.insert(IdentityField::TailNumber, "ac_reg".into());
         let fault = read(&IdentityFields::new(), &m, None).unwrap_err();

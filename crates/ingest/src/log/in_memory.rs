@@ -1,4 +1,4 @@
-//! Channels that somebody holds in memory already: SI, at the screw axis, one row for each stamp.
+//! In-memory channels: SI, at the screw axis, one row for each timestamp.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub struct ChannelArrays<'a> {
 }
 
 impl ChannelArrays<'_> {
-    /// The channels as a log of the same numbers would give them: put on one clock, looked at, and δX made.
+    /// The channels as a log of the same numbers gives them: on one clock, with statistics and δX.
     ///
     /// # Errors
     /// When the arrays differ in length, the stamps are no clock, or a channel holds no number.
@@ -35,7 +35,7 @@ impl ChannelArrays<'_> {
         for (column, values) in named {
             let (rows, wanted) = (values.len(), self.time_s.len());
             if rows != wanted {
-                let detail = format!("{rows} values beside {wanted} stamps");
+                let detail = format!("{rows} values for {wanted} timestamps");
                 return Err(fail(ErrorKind::Table { row: None, column: Some(column.into()), detail }));
             }
             if !values.iter().any(|value| value.is_finite()) {

@@ -1,8 +1,8 @@
 //! A first mapping, guessed from the names in a log for a person to confirm.
 //!
-//! Names of flight parameters are made of words: a channel, a unit, a place. A word that says which
-//! channel a column is, and one that says its unit, are recognised; what is left over and differs
-//! between columns of one channel is the position. Nothing that is proposed here is ever used unseen.
+//! Names of flight parameters consist of words: a channel, a unit, a position. Words that name a
+//! channel or a unit are recognised; the remaining words that differ
+//! between columns of one channel are the position. A person confirms every inferred mapping.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -18,9 +18,9 @@ use crate::parquet::log_file::LogFile;
 /// What a log seems to offer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InferredMapping {
-    /// The time column, and its unit where its name tells; instants need none.
+    /// The time column, and its unit where the name holds one; timestamp types need none.
     pub clock: Option<(String, Option<&'static str>)>,
-    /// Channel → its column with `{position}` in it, and its unit where the name tells.
+    /// Channel → its column with `{position}` in it, and its unit where the name holds one.
     pub channels: BTreeMap<Role, (String, Option<Unit>)>,
     /// The positions found.
     pub positions: BTreeSet<String>,
@@ -32,7 +32,7 @@ pub struct InferredMapping {
     pub others: Vec<String>,
 }
 
-/// How a departure may stand in a file's name, and its `strftime` pattern; the longest first.
+/// Forms of a departure in a file name, and their `strftime` patterns; the longest first.
 const DEPARTURES: [(&str, &str); 9] = [
     (r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d", "%Y-%m-%dT%H-%M-%S"),
     (r"\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d", "%Y-%m-%d_%H-%M-%S"),
@@ -124,7 +124,7 @@ const ROLES: [(Role, &[&str]); 4] = [
     (Role::Temperature, &["temp", "temperature"]),
 ];
 
-/// Words that say nothing more.
+/// Words without information.
 const FILLERS: [&str; 8] = ["position", "pos", "angle", "displacement", "cell", "sensor", "meas", "value"];
 
 fn unit_of(word: &str) -> Option<Unit> {
@@ -240,7 +240,7 @@ fn metadata(file: &LogFile) -> BTreeMap<IdentityField, String> {
 mod tests {
     use super::*;
 
-    fn told(name: &str) -> Option<(Role, String, Option<String>, Option<Unit>)> {
+    fn inferred(name: &str) -> Option<(Role, String, Option<String>, Option<Unit>)> {
         ParsedName::of(name).map(|g| (g.role, g.pattern, g.position, g.unit))
     }
 
@@ -268,9 +268,9 @@ mod tests {
             ("resolver angle rudder", Role::Motor, "resolver angle {position}", place("rudder"), None),
         ];
         for (name, role, pattern, position, unit) in cases {
-            assert_eq!(told(name), Some((role, pattern.to_owned(), position, unit)), "{name}");
+            assert_eq!(inferred(name), Some((role, pattern.to_owned(), position, unit)), "{name}");
         }
-        assert_eq!(told("airspeed_kt"), None);
+        assert_eq!(inferred("airspeed_kt"), None);
     }
 
     #[test]

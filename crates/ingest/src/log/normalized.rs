@@ -1,7 +1,7 @@
 //! The normalized log: one actuator's channels in SI on one clock, as the estimator takes them.
 //!
-//! `docs/normalized.md` is its description. Numbers are kept in full, the step and the stretches stand in
-//! the footer, so that reading it back gives every sample, and hence every gap, bit for bit.
+//! `docs/normalized.md` describes it. Values keep full precision, and step and segments are in
+//! the footer, so the samples read back, and the gap from them, are bitwise identical.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -25,7 +25,7 @@ use crate::time::clock::TimestampRepairs;
 const VERSION: &str = "1";
 const KEY: &str = "freeplay.normalized";
 
-/// What the footer of a normalized log says.
+/// Content of the footer of a normalized log.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Normalized {
     /// Which flight it is, and which actuator.
@@ -45,7 +45,7 @@ impl Normalized {
     /// The columns, in the order of [`crate::ActuatorColumns`].
     pub(crate) const COLUMNS: [&'static str; 4] = ["motor_m", "dx_m", "load_n", "temperature_c"];
 
-    /// What a file says of itself, if Freeplay normalized it.
+    /// The footer content of a file, if Freeplay normalized it.
     ///
     /// # Errors
     /// [`ErrorKind::Normalized`] when it was written by a version that this one does not know.
@@ -151,7 +151,7 @@ fn breaks_from(text: &str) -> Option<Vec<(usize, f64)>> {
     text.split(' ').map(one).collect()
 }
 
-/// Writes one actuator's flight as a normalized log; `provenance` is told beside it.
+/// Writes one actuator's flight as a normalized log, with its `provenance`.
 ///
 /// # Errors
 /// When the file cannot be written.

@@ -59,7 +59,7 @@ impl RowTable {
         self.files.iter().any(|file| file.leaf(leaf).is_ok_and(|leaf| leaf.is_listed))
     }
 
-    /// A fault of the whole sheet is told of its first file.
+    /// An error of the whole table names its first file.
     pub(crate) fn error(&self, fault: ErrorKind) -> Error {
         self.files[0].error(fault)
     }
@@ -80,7 +80,7 @@ impl RowTable {
         }
     }
 
-    /// The actuators that rows are said to belong to, where rows say so.
+    /// The positions in the position column, if the layout has one.
     ///
     /// # Errors
     /// When that column cannot be read.

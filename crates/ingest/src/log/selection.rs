@@ -30,7 +30,7 @@ impl SampleSelection {
         if self.apart == 0 { RowSelection::ALL } else { RowSelection::of(&self.segments) }
     }
 
-    /// Takes out what does not count, so that nothing is made of it however the file lies in pages.
+    /// Removes samples that do not count, so the result does not depend on the page layout.
     pub(crate) fn cut(&self, mut channel: Channel) -> Channel {
         if self.apart == 0 {
             return channel;

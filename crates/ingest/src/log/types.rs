@@ -70,9 +70,9 @@ pub struct ActuatorChannels {
     pub missing_share: f64,
     /// What each channel looked like before anything was made of it: motor, screw, load.
     pub quality: [Quality; 3],
-    /// Doubts about the channels: stable codes.
+    /// Quality flags of the channels: stable codes.
     pub flags: Vec<String>,
-    /// What had to be mended in the clock.
+    /// Repairs of the clock.
     pub repairs: TimestampRepairs,
 }
 

@@ -36,7 +36,7 @@ pub struct Layout {
     /// Where the value of such a row stands.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value_column: Option<String>,
-    /// A row belongs to one actuator, and this column says to which.
+    /// Each row belongs to one actuator, and this column names its position.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_column: Option<String>,
 }
@@ -47,7 +47,7 @@ impl Layout {
     }
 }
 
-/// A further kind of file: what it does not say itself it shares with the main logs.
+/// Another kind of file. Identity that it does not hold is shared with the main logs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroupMapping {
@@ -59,7 +59,7 @@ pub struct GroupMapping {
     /// Its layout; a row for each sample of every channel when not given.
     #[serde(default, skip_serializing_if = "Layout::is_wide")]
     pub layout: Layout,
-    /// Where it says which flight it is; as the main logs do when not given.
+    /// How its flight is identified; as for the main logs when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identity: Option<IdentityMapping>,
 }
@@ -84,7 +84,7 @@ pub struct IdentityMapping {
     /// Folders called `name=value`, as Hive partitions are: fact → name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub folders: BTreeMap<IdentityField, String>,
-    /// What holds for every log that does not say otherwise: fact → value.
+    /// Values for logs that do not hold them: field → value.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub values: BTreeMap<IdentityField, String>,
     /// How departures are written, by `strftime` signs; ISO 8601 when not given.
@@ -115,7 +115,7 @@ pub enum IdentityField {
 }
 
 impl IdentityField {
-    /// Every fact, in the order in which they are looked for.
+    /// All fields, in the order in which they are read.
     pub const ALL: [Self; 6] = [
         Self::TailNumber,
         Self::FlightId,
@@ -172,7 +172,7 @@ pub struct ClockMapping {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Epoch {
-    /// From a zero that the log does not tell.
+    /// From an unknown zero.
     #[default]
     None,
     /// From 1970-01-01T00:00:00Z.
@@ -190,7 +190,7 @@ impl Epoch {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Channels {
-    /// Only these positions; all that column names tell of when not given.
+    /// Only these positions; all positions found in column names when not given.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub positions: Vec<String>,
     /// Motor position: an angle at the motor, or already a length at the screw.
@@ -313,7 +313,7 @@ pub struct ChannelMapping {
     /// Turns of this sensor to one turn of the screw, where a gear lies between. Default 1.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub gear_ratio: f64,
-    /// A column that says whether the sample is valid; `{position}` as in `column`.
+    /// A column that marks valid samples; `{position}` as in `column`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub valid_column: Option<String>,
     /// The values of `valid_column` that mean yes. Default `[1]`, which is also *true*.
@@ -325,7 +325,7 @@ pub struct ChannelMapping {
     /// The channel's own time column, in the unit of the clock of its file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_column: Option<String>,
-    /// The channel's own rate, Hz, where it is recorded more slowly than the rows it stands in.
+    /// The channel's own rate, Hz, where it is recorded more slowly than its rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     /// How long after the stamp of its row the channel is sampled, s.

@@ -1,4 +1,4 @@
-//! Log mapping: what `pipeline.toml` says about the columns, clock and identity of a log.
+//! Log mapping: columns, clock and identity of a log as configured in `pipeline.toml`.
 
 pub mod column_pattern;
 mod log_mapping;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `[[channel.when]]`: samples count only while a column is as said, e.g. airborne, or powered.
+/// `[[channel.when]]`: samples count only while a column meets a condition, e.g. airborne, or powered.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SampleFilter {
@@ -29,14 +29,14 @@ pub struct SampleFilter {
     /// The column's own time column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_column: Option<String>,
-    /// The column's own rate, Hz, where it is recorded more slowly than the rows it stands in.
+    /// The column's own rate, Hz, where it is recorded more slowly than its rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
 }
 
 impl SampleFilter {
-    /// Whether anything is asked of the column.
-    pub fn asks(&self) -> bool {
+    /// Whether the filter has a condition on its column.
+    pub fn has_condition(&self) -> bool {
         !self.equals.is_empty() || self.at_least.is_some() || self.at_most.is_some()
     }
 

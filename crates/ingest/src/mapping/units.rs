@@ -109,7 +109,8 @@ impl Unit {
         }
     }
 
-    /// `SI = value · factor + offset`; temperatures go to °C.
+    /// Factor and offset of `SI = value · factor + offset`; temperatures are converted to °C. Factors are exact by
+    /// definition (NIST SP 811, 2008, appendix B: 1 in = 25.4 mm, 1 lbf = 4.448 221 615 260 5 N).
     pub fn to_si(self) -> (f64, f64) {
         match self {
             Self::Metre | Self::Radian | Self::Newton | Self::NewtonMetre | Self::Celsius => (1.0, 0.0),
@@ -167,13 +168,13 @@ pub enum TimeUnit {
     /// Nanoseconds.
     #[serde(rename = "ns")]
     Nanosecond,
-    /// SampleSelector: a counter that goes up by one with every row; `clock.rate_hz` says how fast.
+    /// Row counter that increases by one with every row; `clock.rate_hz` gives the rate.
     #[serde(rename = "count")]
     Count,
 }
 
 impl TimeUnit {
-    /// How many of them make a second; none for a counter, whose rate is given apart.
+    /// Units per second; `None` for a counter, whose rate is a separate key.
     pub fn per_second(self) -> Option<f64> {
         Some(match self {
             Self::Count => return None,

@@ -6,7 +6,7 @@ use crate::channel::column_builder::{BATCH, ColumnBuilder};
 
 /// Zeros that must follow the codes, so that each can be read as part of a whole word.
 pub(crate) const PADDING_BYTES: usize = 8;
-/// More values than codes of so many bits can tell apart are in no page.
+/// Largest bit width of dictionary indices in the format.
 const MAX_BITS: u8 = 32;
 
 /// The codes of a page that are yet to be taken.

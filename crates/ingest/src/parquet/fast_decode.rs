@@ -1,9 +1,8 @@
-//! Chunks of plain numbers, straight from their pages into a channel.
+//! Fast path for numeric column chunks: pages are decoded into a channel without the parquet crate's reader.
 //!
-//! Most logs hold doubles or floats, as they are, split by bytes or as codes of a dictionary, compressed by zstd or not
-//! at all. These need none of what Parquet's own reader makes for each page and batch: a context, buffers, levels, an array. Whatever is of
-//! another kind, or does not hold what it claims, is left to that reader, which says what is wrong with it.
-
+//! Most logs hold doubles or floats, plain, byte-stream-split or dictionary-encoded, compressed by zstd or not
+//! at all. These need none of what the parquet crate makes for each page and batch: a context, buffers, levels, an
+//! array. Other encodings, and chunks that do not match their metadata, are left to that reader and its error messages.
 use std::cell::RefCell;
 use std::fs::File;
 use std::ops::Range;
@@ -209,7 +208,7 @@ enum ValueEncoding {
     Dictionary,
 }
 
-/// What a page's header says of the numbers in it.
+/// Layout of the values in a page, from its header.
 #[derive(Debug, Clone, Copy)]
 struct PageLayout {
     /// Numbers, missing ones included.
@@ -345,8 +344,8 @@ impl ValueReader<'_> {
         }
     }
 
-    /// Hands over some of the page's `count` numbers, batch by batch, brought together from their streams: byte k of
-    /// every number lies in stream k.
+    /// Interleaves `count` byte-stream-split values of a page, batch by batch: byte k of every value is in
+    /// stream k.
     fn interleave_batches<const WIDTH: usize, T: Copy + Default>(
         self,
         numbers: Range<usize>,

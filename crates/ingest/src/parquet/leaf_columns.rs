@@ -1,6 +1,6 @@
-//! Where a named channel lies in a file: a column of its own, or inside structs and lists.
+//! Leaf columns of named channels: top-level columns, or fields inside structs and lists.
 //!
-//! `motor.angle_deg` is first looked for as the plain name of a column, since `SYSTEM.CHANNEL` is an
+//! `motor.angle_deg` is first read as the plain name of a column, since `SYSTEM.CHANNEL` is an
 //! ordinary name in flight logs; else as field `angle_deg` of struct `motor`. Lists are passed through
 //! without a name of their own: a list is simply more samples in one row.
 
@@ -20,7 +20,7 @@ pub(crate) struct LeafColumn {
     pub(crate) name: String,
     /// Its number among the file's leaves.
     pub(crate) index: usize,
-    /// The number of the column it lies in.
+    /// Number of the top-level column that contains it.
     pub(crate) root: usize,
     /// The type of one of its values.
     pub(crate) kind: DataType,
@@ -142,7 +142,7 @@ pub(crate) fn align_lengths(names: &[&str], flats: Vec<FlatLeaf>) -> Result<Vec<
         None => take(&flat.values, &rows, None).map_err(|_| ErrorKind::ColumnType {
             column: (*name).to_owned(),
             found: flat.values.data_type().to_string(),
-            wanted: "plain values beside lists",
+            wanted: "no plain values next to lists",
         }),
     };
     names.iter().zip(flats).map(spread).collect()

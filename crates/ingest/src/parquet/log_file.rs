@@ -32,8 +32,8 @@ const BATCH_ROWS: usize = 8192;
 /// So much of an object's end is fetched at first: most footers are shorter.
 const USUAL_FOOTER: u64 = 64 << 10;
 
-/// Why a footer could not be read: what the file begins with tells more than where its reader gave up.
-fn torn(source: &ByteSource, error: &ParquetError) -> String {
+/// Reason why a footer could not be read, from the first bytes of the file where those identify another format.
+fn footer_error(source: &ByteSource, error: &ParquetError) -> String {
     let mut head = [0; 4];
     let length = source.want(once(0..4)).map(|()| read_at::read_at(source.file(), &mut head, 0));
     match (length, &head) {
@@ -72,7 +72,7 @@ impl LogFile {
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let footer = ArrowReaderMetadata::load(file, options)
-            .map_err(|e| fail(ErrorKind::NotParquet { detail: torn(&source, &e) }))?;
+            .map_err(|e| fail(ErrorKind::NotParquet { detail: footer_error(&source, &e) }))?;
         let leaves = leaf_columns::leaves(footer.schema().fields());
         let opened = Self { path: path.to_owned(), source, footer, leaves };
         if opened.rows() == 0 {
@@ -132,11 +132,11 @@ impl LogFile {
         pairs.into_iter().flatten().map(|pair| pair.key.as_str()).collect()
     }
 
-    /// Hands the values of some leaves, batch by batch and sample by sample beside each other, to `take`.
+    /// Passes the values of some leaves, batch by batch and aligned by sample, to `take`.
     ///
     /// # Errors
-    /// When a leaf is missing, a page claims what cannot be, a page cannot be decoded, or other rows
-    /// come than were declared; and what `take` complains of.
+    /// When a leaf is missing, a page claims what cannot be, a page cannot be decoded, the number of rows
+    /// differs from the declared one, or `take` fails.
     pub(crate) fn each_batch(
         &self,
         names: &[&str],
@@ -200,7 +200,7 @@ impl LogFile {
         self.all_rows(rows, name)
     }
 
-    /// Whether as many rows came as were declared.
+    /// Checks that the declared number of rows was read.
     fn all_rows(&self, rows: usize, column: &str) -> Result<(), Error> {
         if rows == self.rows() {
             return Ok(());
@@ -292,7 +292,7 @@ impl LogFile {
         self.footer.metadata().row_group(group).column(leaf.index)
     }
 
-    /// Has every chunk of these leaves at hand.
+    /// Fetches every chunk of these leaves.
     fn want(&self, leaves: &[&LeafColumn]) -> Result<(), Error> {
         let groups = 0..self.footer.metadata().num_row_groups();
         let chunks = groups.flat_map(|group| leaves.iter().map(move |leaf| self.chunk(group, leaf)));
@@ -306,7 +306,7 @@ impl LogFile {
 
     /// Feeds the footer and the chunks of the named leaves, in the order of the file, into a digest.
     ///
-    /// It says that what was read is what was read before, whatever the file is called now and
+    /// Equal digests mean equal data read, whatever the name of the file and whatever
     /// whatever else was added to it.
     pub(crate) fn feed(&self, names: &[&str], digest: &mut Digest) -> Result<(), Error> {
         let unreadable = |source| self.error(ErrorKind::Unreadable { source });
@@ -335,12 +335,12 @@ fn range_of(chunk: &ColumnChunkMetaData) -> Range<u64> {
     start..start.saturating_add(bytes)
 }
 
-/// Has the footer at hand, however long it is.
+/// Fetches the whole footer.
 fn want_footer(source: &ByteSource, length: u64) -> Result<(), ErrorKind> {
     source.want(once(length.saturating_sub(USUAL_FOOTER)..length))?;
     match footer_bytes(source.file(), length) {
         Ok(footer) => source.want(once(length - footer..length)),
-        // Shorter than a trailer: what reads the footer says so.
+        // Shorter than a trailer: the reader of the footer returns the error.
         Err(_) => Ok(()),
     }
 }

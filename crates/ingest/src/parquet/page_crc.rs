@@ -1,7 +1,7 @@
 //! Page checksums: the writer of the Arrow library leaves them out, so they are put in afterwards.
 //!
 //! A page header gets the CRC-32 of its body (Parquet format, `PageHeader.crc`), which makes it a few
-//! bytes longer; so chunks move, and the footer is written anew with their new places.
+//! bytes longer; so chunks move, and the footer is rewritten with their new offsets.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};

@@ -1,5 +1,5 @@
-//! Page headers, read before anything is decoded: what they claim is bounded, and whether they carry a
-//! checksum is told.
+//! Page headers, read before anything is decoded: claimed sizes are bounded, and the presence of a
+//! checksum is reported.
 //!
 //! A file of 8 kB may ask for 2 GiB, and an allocation that fails cannot be caught; so a page must fit
 //! its chunk, its values must fit the page, and no page is larger than any writer makes.

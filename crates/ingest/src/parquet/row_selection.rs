@@ -1,11 +1,11 @@
-//! Which rows of a table are asked for: all, or those of the stretches that conditions leave.
+//! Row selection: all rows of a table, or the segments in which the sample filters hold.
 //!
-//! Nothing is made of the other rows, so neither are their pages unpacked. Whether a page is unpacked moves no number:
-//! what lies outside the stretches is taken out of pages that hold both.
+//! Pages without a selected row are not decompressed. Whether a page is decompressed changes no value:
+//! rows outside the segments are removed from pages that hold both.
 
 use std::ops::Range;
 
-/// Rows that are asked for.
+/// Selected rows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowSelection<'a> {
     /// Rows, in order and apart from each other; none when all are wanted.

@@ -1,4 +1,5 @@
-//! Parquet out: simulated logs, truth tables, traces. Written beside and renamed, so no reader meets half a file.
+//! Parquet writer for simulated logs, truth tables and traces. Files are written under another name and renamed, so no
+//! reader sees a partial file.
 
 use std::fs::{self, File};
 use std::path::Path;

@@ -31,7 +31,7 @@ pub(super) fn position(header: &[String], name: &str) -> Option<usize> {
 
 /// A column that is not there, with the nearest that is.
 pub(super) fn missing(file: &Path, wanted: &str, header: &[String]) -> Error {
-    // A column that is one of ours already stands for what it says.
+    // A column with a name of ours keeps its meaning.
     let others = header.iter().filter(|h| !KNOWN.contains(&h.trim()));
     let nearest = nearest(wanted, others.map(String::as_str)).map(str::to_owned);
     Error::new(file, ErrorKind::TableColumn { column: wanted.to_owned(), nearest })
@@ -61,7 +61,7 @@ pub fn number(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Reads an instant; in a column that says UTC, a date or a time without zone is UTC.
+/// Parses an instant. In a column whose name holds UTC, a date or a time without zone is UTC.
 ///
 /// # Errors
 /// When it is neither a date nor a time.

@@ -112,7 +112,7 @@ impl TableBatch {
         let wanted = DataType::Float64;
         let Some(index) = column.filter(|c| !is_numeric(self.batch.column(*c))) else {
             let numbers: Float64Array = self.cast(column, &wanted)?.as_primitive::<Float64Type>().clone();
-            // What lies under an empty cell may be anything.
+            // The value under a null is undefined.
             if numbers.values().iter().all(|value| value.is_finite()) {
                 return Ok(numbers);
             }
@@ -185,7 +185,7 @@ pub fn batches(file: &Path, wanted: Option<&[&str]>) -> Result<TableBatches, Err
 /// as CSV in one.
 pub struct TableSplits {
     file: PathBuf,
-    /// Of Parquet: the file, what its footer says in the form wanted, and the columns.
+    /// For Parquet: the file, its metadata with the requested schema, and the columns.
     parquet: Option<(File, ArrowReaderMetadata, ProjectionMask)>,
 }
 
@@ -194,7 +194,7 @@ impl TableSplits {
     /// ones, which repeat, stay codes.
     ///
     /// # Errors
-    /// When the file cannot be opened, or is not the table its name says.
+    /// When the file cannot be opened, or its content does not match its extension.
     pub fn open(file: &Path, wanted: Option<&[&str]>, coded: &[&str]) -> Result<Self, Error> {
         let is_parquet = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
         let parquet = is_parquet.then(|| parquet(file, wanted, coded)).transpose();
@@ -409,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn only_columns_that_are_wanted_are_read_and_one_that_lacks_is_told() {
+    fn only_columns_that_are_wanted_are_read_and_a_missing_one_is_reported() {
         let column = |n: i64| Arc::new(Int64Array::from(vec![n])) as ArrayRef;
         let (_dir, file) = parquet(&batch(vec![("a", column(1)), ("gap_mm", column(2)), ("c", column(3))]));
         let batch = batches(&file, Some(&["c", "gap_mm"])).unwrap().next().unwrap().unwrap();

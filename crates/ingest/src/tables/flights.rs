@@ -1,4 +1,4 @@
-//! The flights table: what an operator knows of its flights beside the logs, and of flights without one.
+//! The flights table: an operator's own data about flights, with and without logs.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::mapping::{IdentityField, IdentityMapping};
 use crate::tables::cell::{self, name, number};
 use crate::tables::table::{ColumnAliases, Table};
 
-/// Flights, found by the path of their log, or by what the log says of itself.
+/// Flights, found by the path of their log, or by the identity in the log.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Flights {
     rows: Vec<Row>,
@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_log_finds_its_flight_by_path_or_by_what_it_says() {
+    fn a_log_finds_its_flight_by_path_or_by_its_identity() {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("flights.csv");
         let text = "reg,leg,off,flight_hours,path\nN1,0413,2026-11-19T04:13:00Z,2.5,N1/a.parquet\nN1,0500,2026-11-20 05:00,,\n";

@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_column_is_told_with_its_neighbour() {
+    fn a_missing_column_is_reported_with_the_nearest_name() {
         let (_dir, file) = table("tail_number,position,part_number,serial_no,installed_utc\n");
         let errors = installations(&file, &ColumnAliases::new()).unwrap_err();
         assert!(errors[0].diagnostic().hint.unwrap().starts_with("`serial_no`?"));

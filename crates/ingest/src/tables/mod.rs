@@ -1,4 +1,4 @@
-//! Tables given beside the logs (CSV or Parquet): installations, flights, maintenance, estimates.
+//! Tables in addition to the logs (CSV or Parquet): installations, flights, maintenance, estimates.
 //!
 //! A small table is read whole as text ([`Table`]), a long one in batches with typed columns ([`TableBatch`]).
 

@@ -25,7 +25,7 @@ impl Table {
     /// Reads a `.parquet` file as Parquet and anything else as CSV.
     ///
     /// # Errors
-    /// When the file cannot be read, or is not the table its name says.
+    /// When the file cannot be read, or its content does not match its extension.
     pub fn read(file: &Path) -> Result<Self, Error> {
         let mut table = Self::empty(file);
         for batch in batches(file, None)? {

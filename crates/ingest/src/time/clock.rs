@@ -1,8 +1,7 @@
 //! One clock for a log: which rows count, in which order, at which step, and where time breaks.
 //!
 //! The rule for damaged time (`docs/equations.md`, "Time"): rows without a stamp are left out, unless
-//! the rate is declared and they are as many as fit between their neighbours; rows out of order are put
-//! in order by a stable sort; of repeated stamps the first row is kept, unless the clock is declared to
+//! the rate is declared and their number fits between their neighbours; rows out of order are put
 //! tick coarsely; where a step exceeds one and a half times the usual one, time broke, and the filter
 //! starts again. Rows that are in order pass untouched.
 
@@ -39,11 +38,11 @@ pub struct TimeBase {
     pub segments: Vec<Range<usize>>,
     /// The first row after each break, and its time since the first row by the stamps, s.
     pub breaks: Vec<(usize, f64)>,
-    /// What had to be mended.
+    /// Repairs made.
     pub repairs: TimestampRepairs,
 }
 
-/// What had to be mended to put a log on one clock.
+/// Repairs that were needed to put a log on one clock.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct TimestampRepairs {
     /// Rows without a stamp, left out.
@@ -57,7 +56,7 @@ pub struct TimestampRepairs {
 }
 
 impl TimestampRepairs {
-    /// Whether nothing had to be mended.
+    /// Whether no repair was needed.
     pub fn none(&self) -> bool {
         *self == Self::default()
     }
@@ -129,12 +128,12 @@ pub fn uniform(rows: usize, rate_hz: f64) -> TimeBase {
     }
 }
 
-/// Puts stamped rows on one clock, and mends the stamps themselves where the mapping says how.
+/// Puts timestamped rows on one clock, and repairs the timestamps where the mapping defines how.
 ///
 /// # Errors
 /// [`ErrorKind::TimeGoesBack`] when stamps fall by more than `max_back_s` and the log is not to be split
 /// there; [`ErrorKind::TimeStandsStill`] when fewer than two differ; [`ErrorKind::RateContradicts`] when they
-/// tell of another rate than was declared.
+/// give another rate than the declared one.
 pub fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<TimeBase, ErrorKind> {
     if clock.tick_s.is_none()
         && let Some(seen) = UniformClock::of(&stamps.seconds)
@@ -168,6 +167,8 @@ pub fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<
     let repairs =
         TimestampRepairs { unstamped, filled, out_of_order: falls, repeated: t.len() - unstamped - count };
     let segments = split_at(count, &breaks);
+    let is_sorted = |segment: &Range<usize>| (segment.start + 1..segment.end).all(|i| step(i) > 0.0);
+    debug_assert!(segments.iter().all(is_sorted), "timestamps of a segment increase");
     let breaks = breaks.into_iter().map(|row| (row, at(row) - at(0))).collect();
     Ok(TimeBase { step_s, rows: t.len(), segments, breaks, kept, repairs })
 }
@@ -182,7 +183,7 @@ fn checked_step(seen_s: f64, clock: &ClockMapping, column: &str) -> Result<f64, 
     Ok(step_s)
 }
 
-/// A clock that every row moves on by about the same: most clocks, for which two passes tell all there is.
+/// A clock with equal steps, which most logs have; two passes over the timestamps determine it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct UniformClock {
     /// The usual step, as [`usual_step`] has it.
@@ -191,7 +192,7 @@ struct UniformClock {
 }
 
 impl UniformClock {
-    /// Nothing where a stamp is missing, does not rise, or steps are not all alike.
+    /// `None` where a timestamp is missing or does not increase, or where steps differ.
     fn of(seconds: &[f64]) -> Option<Self> {
         let StepStats { least_s, longest_s, rising } = StepStats::of(seconds);
         if rising == 0 || rising + 1 < seconds.len() || longest_s - least_s > COARSE_TICK_SHARE * least_s {
@@ -211,7 +212,7 @@ struct StepStats {
     rising: usize,
 }
 
-/// Steps that are looked at side by side.
+/// Steps that are compared side by side.
 const LANES: usize = 8;
 
 impl StepStats {
@@ -234,7 +235,7 @@ impl StepStats {
     }
 }
 
-/// Least, longest and rising steps of each lane; how many steps were looked at.
+/// Smallest, largest and increasing steps of each lane; the number of compared steps.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
 fn steps_in_lanes(
     seconds: &[f64],
@@ -388,7 +389,7 @@ const COARSE_TICK_SHARE: f64 = 0.02;
 
 /// The usual step: the lower median, which is an element of the steps, so that none is invented.
 ///
-/// Where stamps are rounded to ticks that are coarse beside the step (milliseconds at 400 Hz: 2, 3, 2, 3),
+/// Where stamps are rounded to ticks that are coarse compared with the step (milliseconds at 400 Hz: 2, 3, 2, 3),
 /// no element is right; then it is the mean of the steps that are no breaks.
 fn usual_step(mut steps: Vec<f64>) -> f64 {
     /// Rounding of the stamps themselves, s.
@@ -497,7 +498,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_without_a_stamp_get_one_where_the_rate_says_which() {
+    fn rows_without_a_timestamp_get_one_from_the_rate() {
         let nan = f64::NAN;
         let clock = ClockMapping { rate_hz: Some(10.0), ..usual() };
         let mut holed = stamps(&[0.0, nan, nan, 0.3, nan, 9.0, 9.1]);

@@ -8,8 +8,8 @@ use crate::time::clock::BREAK_STEPS;
 pub(crate) enum Interpolation {
     /// It moves: a straight line to the next sample, if that is at most a step and a half away.
     Line,
-    /// It stands until the next one comes: a sample is given at the first instant at or after its own,
-    /// and whoever uses it holds it from there.
+    /// Zero-order hold: a sample is returned at the first instant at or after its own, and the caller
+    /// holds it until the next one.
     First,
 }
 

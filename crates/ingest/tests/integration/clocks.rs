@@ -1,4 +1,4 @@
-//! Channels with clocks, rates, latencies and doubts of their own, brought to the motor's instants.
+//! Channels with clocks, rates, latencies and quality flags of their own, on the motor's clock.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Files that are torn, empty or lie: each becomes a reason with a stable code, never a number.
+//! Truncated, empty or inconsistent files: each gives an error with a stable code, never a number.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ fn code(result: Result<Log, Error>) -> String {
 }
 
 #[test]
-fn what_is_no_log_is_told_apart() {
+fn files_that_are_no_logs_are_distinguished() {
     let dir = tempfile::tempdir().unwrap();
     let m = plain();
     let at = |name: &str, bytes: &[u8]| {
@@ -51,7 +51,7 @@ fn what_is_no_log_is_told_apart() {
 }
 
 #[test]
-fn a_log_without_rows_says_so() {
+fn a_log_without_rows_is_reported() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("none.parquet");
     let none: ArrayRef = Arc::new(Float64Array::from(Vec::<f64>::new()));

@@ -327,7 +327,7 @@ fn a_dot_in_a_name_is_part_of_the_name() {
 
 /// Istanbul is three hours ahead: a clock that names no zone is local, and never taken for UTC.
 #[test]
-fn a_local_clock_takes_the_mapped_zone_or_says_nothing() {
+fn a_local_clock_takes_the_mapped_zone_or_gives_no_departure() {
     let mut m = mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
     let start = |m: &Mapping| {
         let dir = tempfile::tempdir().unwrap();

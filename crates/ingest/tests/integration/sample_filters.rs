@@ -1,4 +1,4 @@
-//! Stretches that conditions select: what lies outside is neither read nor seen, however the file lies in pages.
+//! Segments selected by sample filters: data outside are neither read nor used, in any page layout.
 
 use std::fs::{self, File};
 use std::ops::Range;
@@ -115,7 +115,7 @@ proptest! {
     }
 }
 
-/// Overwrites the second half of some pages of a column, of which their rows tell which.
+/// Overwrites the second half of some pages of a column, selected by their rows.
 fn spoilt(file: &Path, column: usize, which: impl Fn(Range<usize>) -> bool) -> PathBuf {
     let footer = ParquetMetaDataReader::new()
         .with_page_index_policy(PageIndexPolicy::Required)
@@ -139,7 +139,7 @@ fn spoilt(file: &Path, column: usize, which: impl Fn(Range<usize>) -> bool) -> P
     spoilt
 }
 
-/// A page of which nothing is selected may hold anything: nobody looks. One of which something is, may not.
+/// A page without a selected row may be corrupt, since it is not read; a page with a selected row may not.
 #[test]
 fn pages_outside_of_every_stretch_are_not_unpacked() {
     let folder = tempfile::tempdir().unwrap();
@@ -160,7 +160,7 @@ fn pages_outside_of_every_stretch_are_not_unpacked() {
     }
 }
 
-/// A condition that is never met leaves nothing, and says no more than that.
+/// A condition that is never met leaves no sample, and gives no other error.
 #[test]
 fn a_condition_that_is_never_met_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
@@ -172,10 +172,10 @@ fn a_condition_that_is_never_met_leaves_nothing() {
     assert!(read.motor_m.iter().chain(&read.dx_m).all(|v| v.is_nan()) && read.missing_share == 0.0);
 }
 
-/// Each actuator is asked its own column where the condition names one, and all the same where it does not.
+/// Each actuator uses its own column where the condition names one, and a common column where it does not.
 #[test]
 #[expect(clippy::single_range_in_vec_init, reason = "one stretch is a list of one")]
-fn conditions_are_asked_of_each_actuator() {
+fn conditions_apply_to_each_actuator() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("N1_20261119T041300Z.parquet");
     let column = |value: fn(usize) -> f64| -> ArrayRef {

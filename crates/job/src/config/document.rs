@@ -1,4 +1,4 @@
-//! What `pipeline.toml` may say, as it is written.
+//! Structure of `pipeline.toml`.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -21,7 +21,7 @@ use crate::config::part::{PartSettings, WearAxis};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Document {
-    /// Which logs, and which tables beside them.
+    /// Log files, and the tables that belong to them.
     pub logs: LogSettings,
     /// Where results are kept.
     #[serde(default)]
@@ -29,10 +29,10 @@ pub struct Document {
     /// What a run may use of the machine.
     #[serde(default)]
     pub run: RunSettings,
-    /// How patiently object stores are asked.
+    /// Timeouts and retries of object stores.
     #[serde(default)]
     pub objects: ObjectSettings,
-    /// Where a log says which flight it is.
+    /// How the flight of a log is identified.
     #[serde(default)]
     pub identity: IdentityMapping,
     /// The clock of the logs.
@@ -43,21 +43,21 @@ pub struct Document {
     pub layout: Layout,
     /// The channels of an actuator.
     pub channel: Channels,
-    /// Files of other kinds that belong to the same flight, by a name of your own.
+    /// Files of other kinds that belong to the same flight, by a name of your choice.
     #[serde(default)]
     pub group: BTreeMap<String, GroupMapping>,
-    /// What is otherwise on some aircraft or for some parts; a later one wins.
+    /// Settings that differ on some aircraft or for some parts; a later one wins.
     #[serde(default, rename = "override")]
     pub overrides: Vec<Override>,
-    /// What your tables call their columns.
+    /// Column names of your tables.
     #[serde(default)]
     pub columns: TableNames,
     /// How the gap is estimated.
     #[serde(default)]
     pub estimate: EstimateSettings,
-    /// The designs, by part number.
+    /// The part designs, by part number.
     pub part: BTreeMap<String, PartSettings>,
-    /// How gaps become statements about a unit.
+    /// How the trend of a unit is assessed.
     #[serde(default)]
     pub trend: TrendSettings,
 }
@@ -71,7 +71,7 @@ pub struct LogSettings {
     pub files: Vec<String>,
     /// The installations table, CSV or Parquet.
     pub installations: String,
-    /// The flights table, CSV or Parquet: what is known of flights beside their logs.
+    /// The flights table, CSV or Parquet: facts about flights that the logs do not hold.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flights: Option<String>,
     /// Whether files of one flight are its pieces, one after the other. Without it a second file of the
@@ -161,8 +161,8 @@ impl Default for ObjectSettings {
 }
 
 impl ObjectSettings {
-    /// The same for those who ask; nobody waits longer than a day.
-    pub(super) fn patience(&self) -> object_io::Settings {
+    /// As settings of an object store. No timeout is longer than a day.
+    pub(super) fn retry_settings(&self) -> object_io::Settings {
         const DAY_S: f64 = 86_400.0;
         let [timeout, give_up] =
             [self.timeout_s, self.give_up_s].map(|s| Duration::from_secs_f64(s.clamp(1e-3, DAY_S)));
@@ -306,7 +306,7 @@ impl Document {
     fn check_identity(&self, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
         match self.identity.path.as_ref().map(|p| regex::Regex::new(p)) {
             Some(Err(e)) => {
-                // The reader draws the expression over several lines; the last of them says what is wrong.
+                // The parser prints the expression over several lines; the last one holds the error.
                 let e = e.to_string();
                 let why = e.lines().last().unwrap_or_default().trim_start_matches("error: ");
                 let what = format!("`identity.path` is not a valid regular expression: {why}");
@@ -352,7 +352,7 @@ impl Document {
     }
 }
 
-/// A zone that nobody knows, with the one that was probably meant.
+/// An unknown time zone, with the zone that was probably meant.
 fn no_zone(name: &str) -> Diagnostic {
     let known: Vec<String> = jiff::tz::db().available().map(|zone| zone.to_string()).collect();
     let diagnostic = Diagnostic::new("bad_zone", format!("unknown time zone `{name}`"));

@@ -1,4 +1,4 @@
-//! The text of a configuration, in one file or in several laid over each other, and where in it a key stands.
+//! The text of a configuration, in one file or several that override each other, and the location of its keys.
 
 use std::ops::Range;
 
@@ -13,14 +13,13 @@ use super::toml_errors;
 #[derive(Debug)]
 pub(super) struct ConfigLayer {
     file: String,
-    /// Its text behind as many empty lines as the files before have bytes: so a span says of itself in which
-    /// file it lies.
+    /// Its text, after as many empty lines as the files before have bytes: a span then identifies its file.
     text: String,
     start: usize,
 }
 
 impl ConfigLayer {
-    /// Names and texts of files, each laid over those before it.
+    /// Names and texts of files; each overrides those before it.
     pub(super) fn stack(files: impl IntoIterator<Item = (String, String)>) -> Vec<Self> {
         let mut start = 0;
         let layer = |(file, text): (String, String)| {
@@ -39,7 +38,7 @@ pub(super) struct Source<'t> {
 }
 
 impl<'t> Source<'t> {
-    /// Keys of a later layer replace those before; tables are laid over key by key, lists are replaced.
+    /// Keys of a later layer override those before. Tables are merged key by key, lists are replaced.
     pub(super) fn parse(layers: &'t [ConfigLayer]) -> Result<Self, Box<Diagnostic>> {
         let mut whole: Option<Spanned<DeTable<'t>>> = None;
         for layer in layers {

@@ -36,7 +36,7 @@ pub(crate) fn in_range(
     Some(Diagnostic::new("implausible_parameter", what).hint(format!("give `{key}` in {unit}")))
 }
 
-/// A gap of which nobody speaks, m: a limit beyond it was given in another unit.
+/// Largest plausible gap, m: a limit beyond it was given in another unit.
 pub const MAX_PLAUSIBLE_LIMIT_M: f64 = 0.01;
 
 /// A limit that an aircraft may be grounded by, m.

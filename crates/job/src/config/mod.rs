@@ -34,7 +34,7 @@ pub struct Config {
     pub file: PathBuf,
     /// The folder that relative paths in it start from.
     pub folder: PathBuf,
-    /// What it says.
+    /// The parsed document.
     pub document: Document,
     /// Its parts, checked.
     pub parts: BTreeMap<PartNumber, Part>,
@@ -53,7 +53,7 @@ impl Config {
         Self::read_layers(&[file.to_owned()])
     }
 
-    /// That of nobody's logs: defaults, to judge tables that were made elsewhere.
+    /// A configuration without logs: defaults, to assess tables that other programs made.
     pub fn without_logs() -> Self {
         Self {
             file: PathBuf::new(),
@@ -66,7 +66,7 @@ impl Config {
         }
     }
 
-    /// Reads files, each laid over those before it, checks the whole, and reads the flights table that it
+    /// Reads files, each of which overrides those before it, checks the result, and reads the flights table that it
     /// names. Relative paths start from the first file's folder.
     ///
     /// # Errors
@@ -94,7 +94,7 @@ impl Config {
         let file = PathBuf::from(shown.join(" + "));
         let mut config = Self::from_layers(ConfigLayer::stack(texts), &file, &folder)?;
         // Before the first table is read: it may lie in an object store.
-        object_io::configure(config.document.objects.patience());
+        object_io::configure(config.document.objects.retry_settings());
         if let Some(table) = &config.document.logs.flights {
             let names = &config.document.columns.flights;
             let read = Flights::read(&config.path(table), names, &config.document.identity);
@@ -142,7 +142,7 @@ impl Config {
         }
     }
 
-    /// Names the line on which a text stands in the configuration, in a diagnostic about it.
+    /// Adds to a diagnostic the line of the configuration that holds a text.
     pub fn at(&self, text: &str, diagnostic: Diagnostic) -> Diagnostic {
         layers::at_text(&self.layers, text, diagnostic)
     }
@@ -184,7 +184,7 @@ impl Config {
         self.overrides.cached(tail, None, |mapping| serde_json::to_string(mapping).unwrap_or_default())
     }
 
-    /// The same for a log that says nothing of its aircraft.
+    /// The same for a log whose aircraft is unknown.
     pub fn digest_of_part(&self, part: &PartNumber) -> String {
         self.digest_with(self.base_mapping(), part)
     }

@@ -1,4 +1,4 @@
-//! Settings of logs that are otherwise on some aircraft or for some parts: overrides, laid over the rest.
+//! Settings that differ on some aircraft or for some parts: overrides of the common settings.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,14 +11,14 @@ use super::document::{Document, Override, check_clock};
 use super::layers::Source;
 use super::validate_channels;
 
-/// The overrides of a configuration, checked, and every mapping that was asked of them.
+/// The checked overrides of a configuration, and the mappings that were derived from them.
 #[derive(Debug)]
 pub(super) struct Overrides {
     base: Arc<Mapping>,
     overrides: Vec<ValidatedOverride>,
     /// By the numbers of the overrides that apply.
     mappings: Mutex<BTreeMap<Vec<usize>, Arc<Mapping>>>,
-    /// What was told of them, by the same numbers and the part.
+    /// Cached mappings, by the numbers of the overrides and the part.
     cached: Mutex<MappingCache>,
 }
 
@@ -94,7 +94,7 @@ impl Overrides {
         Arc::clone(mappings.entry(numbers.clone()).or_insert_with(make))
     }
 
-    /// A text about the same, made once: a night asks for it as often as there are logs.
+    /// The text for the same key, made once: a run needs it once per log.
     pub(super) fn cached(
         &self,
         tail: &TailNumber,
@@ -184,7 +184,7 @@ fn try_alone(
 ) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     let at = |key: &'static str, e: String| {
-        let what = format!("`{key}` of override {} cannot be laid over `[{key}]`: {e}", number + 1);
+        let what = format!("`{key}` of override {} cannot override `[{key}]`: {e}", number + 1);
         source.at(&["override"], Diagnostic::new("bad_toml", what))
     };
     match merge_into::<Channels>(&base.channels, &one.channel) {
@@ -208,7 +208,7 @@ fn try_alone(
     found
 }
 
-/// Keys that are given replace those below; tables are laid over key by key.
+/// Given keys replace those below; tables are merged key by key.
 fn merge_into<T: serde::Serialize + DeserializeOwned>(base: &T, over: &toml::Table) -> Result<T, String> {
     let mut table = toml::Table::try_from(base).map_err(|e| e.to_string())?;
     merge(&mut table, over);

@@ -95,7 +95,7 @@ pub enum NoiseModel {
     Continuous,
 }
 
-/// `[part."…".noise]`: there are no default noise levels; whoever runs a fleet chooses them.
+/// `[part."…".noise]`: noise levels have no defaults; the operator of the fleet sets them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseSettings {
@@ -354,7 +354,7 @@ impl NoiseSettings {
     }
 }
 
-/// Collects complaints about keys.
+/// Collects diagnostics about keys.
 #[derive(Default)]
 struct SettingsValidator {
     found: Vec<SettingError>,

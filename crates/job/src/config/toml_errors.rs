@@ -1,4 +1,4 @@
-//! What the TOML reader complains of, in words of the file and not of the program.
+//! Errors of the TOML parser, in terms of the file instead of the program.
 
 use ingest::mapping::column_pattern::nearest;
 use records::Diagnostic;
@@ -42,7 +42,7 @@ fn other_type(message: &str) -> Option<Diagnostic> {
     let (wanted, hint) = match wanted {
         "f64" => ("a number", Some("a plain number such as `8.0`; its unit is in the key's name")),
         "a string" => ("text", Some("put text in quotes: `\"…\"`")),
-        "a sequence" => ("a list", Some("a list stands in brackets: `[\"…\"]`")),
+        "a sequence" => ("a list", Some("write a list in brackets: `[\"…\"]`")),
         other => (other, None),
     };
     let diagnostic = Diagnostic::new("bad_toml", format!("expected {wanted}, found {found}"));

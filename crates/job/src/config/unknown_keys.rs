@@ -1,6 +1,6 @@
-//! Keys that no type knows: all of them at once, each with the key that was probably meant.
+//! Unknown keys: all of them at once, each with the key that was probably meant.
 //!
-//! The types themselves say which keys exist, through their JSON Schema, so this list cannot drift.
+//! The known keys come from the JSON Schema of the types, so no second list exists.
 
 use ingest::mapping::column_pattern::nearest;
 use records::Diagnostic;
@@ -18,7 +18,7 @@ pub(super) fn keys(source: &Source<'_>, schema: &Value) -> Vec<Diagnostic> {
     found
 }
 
-/// The whole schema, in which a type that holds its own kind is told by reference.
+/// The whole schema; a type that contains its own kind is given by reference.
 struct Types<'s>(&'s Value);
 
 impl Types<'_> {
@@ -48,7 +48,7 @@ impl Types<'_> {
         }
     }
 
-    /// The object in a schema, also where it may be absent or stands in a list.
+    /// The object in a schema, also where it is optional or an element of a list.
     fn object_shape<'v>(&'v self, schema: &'v Value) -> Option<&'v Value> {
         if let Some(reference) = schema.get("$ref").and_then(Value::as_str) {
             return self.object_shape(self.0.pointer(reference.trim_start_matches('#'))?);

@@ -1,4 +1,4 @@
-//! What `[channel]` says and cannot mean.
+//! Validation of `[channel]`.
 
 use std::collections::BTreeMap;
 
@@ -113,7 +113,7 @@ fn one(
     }
     if layout.position_column.is_some() && channel.group.is_none() && channel.column.contains(PLACEHOLDER) {
         let what = format!(
-            "`{}` speaks of {PLACEHOLDER}, which `layout.position_column` already tells",
+            "`{}` contains {PLACEHOLDER}, but `layout.position_column` already gives the position",
             channel.column
         );
         found.push(("column", Diagnostic::new("bad_pattern", what)));
@@ -165,7 +165,7 @@ fn conditions(condition: &SampleFilter, groups: &BTreeMap<String, GroupMapping>)
     if column.trim().is_empty() {
         found.push(Diagnostic::new("empty_name", "a condition of `channel.when` names no column"));
     }
-    if !condition.asks() {
+    if !condition.has_condition() {
         let what = format!("the condition on `{column}` asks nothing of it");
         found.push(Diagnostic::new("key_missing", what).hint("equals = [1]"));
     }
@@ -193,7 +193,7 @@ fn unknown_group(
     let group = channel.group.as_ref().filter(|group| !groups.contains_key(*group))?;
     let c = Diagnostic::new(
         "unknown_key",
-        format!("`channel.{name}` lies in `{group}`, and there is no `[group.{group}]`"),
+        format!("`channel.{name}` names group `{group}`, and there is no `[group.{group}]`"),
     );
     Some(match nearest(group, groups.keys().map(String::as_str)) {
         Some(near) => c.hint(format!("`{near}`?")),

@@ -44,7 +44,7 @@ fn parse(text: &str) -> Result<Config, Vec<Diagnostic>> {
     Config::parse(text, Path::new("pipeline.toml"), Path::new("fleet"))
 }
 
-/// The complaints about the good text with one of its lines replaced.
+/// The diagnostics of the good text with one of its lines replaced.
 fn diagnostics(line: &str, by: &str) -> Vec<(String, usize, String)> {
     assert!(GOOD.contains(line), "{line} is not in the text");
     let found = parse(&GOOD.replacen(line, by, 1)).unwrap_err();
@@ -72,7 +72,7 @@ fn a_misspelled_key_is_named_with_its_line_and_neighbour() {
 }
 
 #[test]
-fn all_unknown_keys_are_told_at_once() {
+fn all_unknown_keys_are_reported_at_once() {
     let text = GOOD.replace("unit = \"s\"", "unitt = \"s\"").replace("bandwidth_hz", "bandwith_hz");
     let text = format!("{text}\n[treend]\nx = 1\n");
     let codes: Vec<_> = parse(&text).unwrap_err().into_iter().map(|c| (c.code, c.hint.unwrap())).collect();
@@ -109,7 +109,7 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
 }
 
 #[test]
-fn an_unreadable_file_says_how_to_get_one() {
+fn an_unreadable_file_is_reported_with_a_remedy() {
     let found = Config::read(Path::new("no/such/pipeline.toml")).unwrap_err();
     assert_eq!(found[0].code, "config_unreadable");
     assert!(found[0].hint.as_ref().unwrap().contains("freeplay init"));
@@ -221,7 +221,7 @@ fn a_second_file_is_laid_over_the_first_key_by_key() {
 }
 
 #[test]
-fn a_complaint_names_the_file_and_line_of_the_layer_that_made_it() {
+fn a_diagnostic_names_the_file_and_line_of_its_layer() {
     let over = "# for the bench\n\n[store]\npaht = \"trial\"\n";
     let (_folder, files) = written(&[("pipeline.toml", GOOD), ("trial.toml", over)]);
     let found = Config::read_layers(&files).unwrap_err();

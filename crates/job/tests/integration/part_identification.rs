@@ -1,4 +1,4 @@
-//! What logs say of a part, against what another engine's logs were made with.
+//! Part parameters identified from logs, against the parameters with which another engine made the logs.
 
 use std::path::{Path, PathBuf};
 

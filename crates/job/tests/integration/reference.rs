@@ -14,22 +14,22 @@ fn the_reference_of_keys_is_what_the_types_say() {
                     reference`), so it cannot drift; a test compares it.\n[configuration.md](configuration.md) \
                     explains, this page lists.\n"
         .to_owned();
-    section(&mut page, "", &Document::schema(), &mut Told::new());
+    section(&mut page, "", &Document::schema(), &mut Tables::new());
     if std::env::var_os("FREEPLAY_BLESS").is_some() {
         std::fs::write(&file, &page).unwrap();
     }
     let found = std::fs::read_to_string(&file).unwrap();
     assert!(
         found == page,
-        "docs/keys.md is not what the types say: FREEPLAY_BLESS=1 cargo test -p job reference"
+        "docs/keys.md differs from the types: FREEPLAY_BLESS=1 cargo test -p job reference"
     );
 }
 
-/// Tables so far, and where each stands first: kinds that come again are told once.
-type Told = BTreeMap<String, String>;
+/// Tables so far, and where each is first written: repeated types are written once.
+type Tables = BTreeMap<String, String>;
 
 /// A table of the keys of one object, then a section for each object below it.
-fn section(page: &mut String, path: &str, schema: &Value, told: &mut Told) {
+fn section(page: &mut String, path: &str, schema: &Value, tables: &mut Tables) {
     let Some(keys) = schema.get("properties").and_then(Value::as_object) else { return };
     if !path.is_empty() {
         let _ = write!(page, "\n## `{path}`\n\n{}\n", text(schema));
@@ -43,14 +43,14 @@ fn section(page: &mut String, path: &str, schema: &Value, told: &mut Told) {
         let _ = writeln!(table, "| `{key}` | {}{needed} | {} |", kind(value), text(value));
         below.extend(inner(key, value, path));
     }
-    if let Some(first) = told.get(&table) {
+    if let Some(first) = tables.get(&table) {
         let _ = writeln!(page, "\nKeys as in `{first}`.");
         return;
     }
     let _ = write!(page, "\n| key | is | meaning |\n|---|---|---|\n{table}");
-    told.insert(table, path.to_owned());
+    tables.insert(table, path.to_owned());
     for (path, schema) in below {
-        section(page, &path, schema, told);
+        section(page, &path, schema, tables);
     }
 }
 
@@ -109,11 +109,11 @@ fn kind(value: &Value) -> String {
     if kinds.is_empty() { "table".to_owned() } else { kinds.join(" or ") }
 }
 
-/// The words that may stand there.
+/// The allowed words.
 fn words(value: &Value) -> Option<String> {
     let listed =
         value.get("enum").and_then(Value::as_array).map(|all| all.iter().filter_map(Value::as_str).collect());
-    let told = || {
+    let values = || {
         let all = value.get("oneOf")?.as_array()?;
         let each = |v: &'_ Value| -> Vec<String> {
             let one = v.get("const").and_then(Value::as_str).map(str::to_owned);
@@ -127,7 +127,7 @@ fn words(value: &Value) -> Option<String> {
             let listed: Vec<&str> = listed;
             listed.into_iter().map(str::to_owned).collect()
         }
-        None => told()?,
+        None => values()?,
     };
     Some(words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", "))
 }

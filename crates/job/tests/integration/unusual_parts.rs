@@ -20,7 +20,7 @@ fn parse(text: &str) -> Config {
     Config::parse(text, &flights().join("pipeline.toml"), &flights()).unwrap()
 }
 
-/// One sample a second: no noise model is asked, and the reason names the rate.
+/// One sample a second: the flight is rejected for its rate, before any noise model is made.
 #[test]
 fn a_slow_log_is_rejected_for_its_rate() {
     let config = parse(&config_text());

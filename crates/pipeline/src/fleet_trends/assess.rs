@@ -28,7 +28,7 @@ use crate::monitoring::recorder_change::{RecorderChange, detect_changes, detect_
 /// A unit, by part and serial number.
 pub type Unit = (PartNumber, SerialNumber);
 
-/// Which units, and of which day, a statement is asked for.
+/// Which units to assess, and at which date.
 #[derive(Debug, Clone, Default)]
 pub struct UnitSelection {
     /// Units on this tail at the end of the records only.
@@ -44,13 +44,13 @@ pub struct UnitSelection {
 }
 
 impl UnitSelection {
-    /// Whether a unit of that name is asked for, wherever it flies.
+    /// Whether a unit of that name is selected, on any tail.
     fn names(&self, name: &UnitKey) -> bool {
         self.serial_number.as_ref().is_none_or(|s| *s == name.1)
             && (self.part_number.is_none() || self.part_number == name.0)
     }
 
-    /// Whether a statement of a unit so named is asked for: it has flown, and on the tail that is meant.
+    /// Whether an assessed unit is selected: it has flown, and on the selected tail.
     fn fits(&self, row: &TrendRow) -> bool {
         row.flights > 0 && (self.tail_number.is_none() || row.tail_number == self.tail_number)
     }
@@ -66,7 +66,7 @@ pub fn assess_store(
     store: &Store,
     ask: &UnitSelection,
 ) -> Result<Vec<TrendRow>, Error> {
-    // A statement leans on what the part's other units teach, so what is asked selects rows, not records.
+    // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
     let mut histories = load_histories(store)?;
     let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
     let moved = detect_changes_in_store(store, as_of)?;
@@ -75,14 +75,14 @@ pub fn assess_store(
     fleet.asked(ask, as_of)
 }
 
-/// What a run's units say.
+/// Assessments of the units of a run.
 #[derive(Debug, Default)]
 pub struct RunAssessments {
     /// Statements of the newest day in the store.
     pub now: Vec<TrendRow>,
     /// What of them is otherwise than without the run's records. Where the store holds no others, nothing is.
     pub changed: Vec<UnitChange>,
-    /// What the last months say beside gaps, of all tails.
+    /// Recent diagnostics in addition to gaps, of all tails.
     pub recent: RecentDiagnostics,
     /// How many units of the whole fleet are in which state.
     pub states: BTreeMap<&'static str, usize>,
@@ -148,7 +148,7 @@ pub fn assess_run_from(
     let Some(as_of) = all.newest_utc() else { return Ok(RunAssessments::default()) };
     let before_utc = all.newest_without_utc(of_run);
     let days: Vec<Timestamp> = before_utc.into_iter().chain([as_of]).collect();
-    // Flights later than all others change nothing of what is said of a day before them; but where a flights
+    // Flights later than all others do not change an assessment at an earlier date; but where a flights
     // table is given, those without a row are counted from a unit's rows.
     let is_later =
         config.flights.iter().next().is_none() && before_utc.is_none_or(|before| of_run.all_after(before));
@@ -175,18 +175,18 @@ pub fn assess_run_from(
     Ok(RunAssessments { now, changed, ..run })
 }
 
-/// All that a report says of the asked units.
+/// Assessments of the selected units with everything that a report shows.
 #[derive(Default)]
 pub(crate) struct ReportAssessments {
     /// Statements of the day.
     pub(crate) now: Vec<TrendRow>,
-    /// What is drawn beside each of them.
+    /// Plotted forecast of each of them.
     pub(crate) drawn: Vec<trend::Forecast>,
     /// Statements of so many days before, by days.
     pub(crate) before: BTreeMap<i64, Vec<TrendRow>>,
     /// The forecasts of those days for the day of the report, by days and unit.
     pub(crate) past: BTreeMap<i64, BTreeMap<UnitKey, trend::Interval>>,
-    /// What each part's units had taught, and by when.
+    /// Fleet prior of each part, and its training cut-off.
     pub(crate) priors: Vec<(Option<String>, Timestamp, FleetPrior)>,
 }
 
@@ -212,7 +212,7 @@ pub(crate) fn assess_for_report(
     let names: Vec<UnitKey> =
         now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
     let drawn =
-        names.par_iter().zip(&now).map(|(name, row)| fleet.outlook(name, row)).collect::<Result<_, _>>()?;
+        names.par_iter().zip(&now).map(|(name, row)| fleet.forecast(name, row)).collect::<Result<_, _>>()?;
     let past = earlier
         .iter()
         .map(|(days, at)| Ok((*days, fleet.forecasts(&names, *at, as_of)?)))
@@ -296,12 +296,12 @@ pub fn assess_histories(
     FleetContext::consuming(config, installations, &mut histories, &[as_of])?.asked(ask, as_of)
 }
 
-/// All units, and what each part's units had taught about the next by each turn.
+/// All units, and the fleet prior of each part by training cut-off.
 pub(crate) struct FleetContext<'a> {
     limits: Limits<'a>,
     units: BTreeMap<&'a UnitKey, (&'a History, Series)>,
     priors: FleetPriors<'a>,
-    /// What moved on whole aircraft beside gaps.
+    /// Recorder changes of whole aircraft.
     moved: Vec<RecorderChange>,
     /// Installations of the store's own units; of external tables none apply.
     installations: Option<InstallationIndex<'a>>,
@@ -318,7 +318,7 @@ impl<'a> FleetContext<'a> {
         Ok(Self::read(config, installations, histories)?.taught_by(days))
     }
 
-    /// The same where nobody else needs the histories: of each flight what is in its series is forgotten.
+    /// The same for a caller that no longer needs the histories: columns that the series hold are dropped.
     fn consuming(
         config: &'a Config,
         installations: &'a Installations,
@@ -383,12 +383,12 @@ impl<'a> FleetContext<'a> {
         Some(self.priors.of(name.0.as_deref(), as_of)?.1)
     }
 
-    /// The same, with what moved on whole aircraft beside gaps.
+    /// The same, with recorder changes of whole aircraft.
     pub(crate) fn with_recorder_changes(self, moved: Vec<RecorderChange>) -> Self {
         Self { moved, ..self }
     }
 
-    /// The statements that are asked for, with the statistics if they are.
+    /// The selected assessments, with classic statistics if selected.
     fn asked(&self, ask: &UnitSelection, as_of: Timestamp) -> Result<Vec<TrendRow>, Error> {
         let names = self.units.keys().copied();
         let mut rows = self.statements(names.filter(|name| ask.names(name)), as_of)?;
@@ -484,8 +484,8 @@ impl<'a> FleetContext<'a> {
         Ok(made.into_iter().flatten().collect())
     }
 
-    /// What is drawn beside a statement: as far ahead as its crossing, within sight of what was flown.
-    fn outlook(&self, name: &UnitKey, row: &TrendRow) -> Result<trend::Forecast, Error> {
+    /// Plotted forecast of an assessment: to its crossing, limited to a multiple of the observed time.
+    fn forecast(&self, name: &UnitKey, row: &TrendRow) -> Result<trend::Forecast, Error> {
         const STEPS: u32 = 24;
         let Some(series) = self.series(name) else { return Ok(trend::Forecast::default()) };
         let as_of_us = row.as_of_utc.as_microsecond();

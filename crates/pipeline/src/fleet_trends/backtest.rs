@@ -1,8 +1,8 @@
-//! Past statements against what came true: each history is cut, judged by what was known then, and asked
-//! when it would reach what it has reached since.
+//! Backtest: each history is cut at several dates, assessed with the data known then, and its crossing forecast is
+//! compared with the later data.
 //!
-//! Where a unit met its limit that is the question; where none has, yet, it is the level it stands at now,
-//! so that a fleet is calibrated before its first failure.
+//! For a unit that reached its limit the target is the limit; otherwise it is its current level,
+//! so that a fleet can be calibrated before its first failure.
 
 use jiff::Timestamp;
 use job::Config;
@@ -16,7 +16,7 @@ use crate::fleet_trends::assess::FleetContext;
 use crate::history::flight_row::FlightRow;
 use crate::history::histories::{Histories, History, UnitKey};
 
-/// Shares of a unit's estimates after which it is asked.
+/// Shares of a unit's estimates at which a backtest cuts its history.
 const CUTS: [f64; 3] = [0.3, 0.5, 0.75];
 
 /// Estimates below which a history is not cut.
@@ -32,7 +32,7 @@ pub struct BacktestRow {
     pub part_number: Option<String>,
     pub serial_number: String,
     pub as_of_utc: Timestamp,
-    /// `limit` where the act limit was met, `level` where the last level is asked for.
+    /// `limit` where the act limit was reached, `level` where the target is the last level.
     pub target: &'static str,
     pub target_m: f64,
     /// Share of the way to the target that was behind the unit, by hours.
@@ -42,7 +42,7 @@ pub struct BacktestRow {
     pub hours_p50: f64,
     pub hours_p95: f64,
     pub relative_error: f64,
-    /// `held`, `late` (it came sooner than was said) or `early` (it came later).
+    /// `held`, `late` (the target was reached sooner than forecast) or `early` (later than forecast).
     pub interval: &'static str,
 }
 
@@ -66,7 +66,7 @@ pub fn of_histories(
     Ok(pasts.collect::<Result<Vec<_>, Error>>()?.into_iter().flatten().collect())
 }
 
-/// The days on which a unit is asked.
+/// Cut dates of a unit.
 fn cuts(history: &History) -> impl Iterator<Item = Timestamp> {
     let estimated = history.flights().iter().filter(|f| f.gap_m().is_some());
     let days: Vec<Timestamp> = estimated.map(FlightRow::departure_utc).collect();
@@ -74,7 +74,7 @@ fn cuts(history: &History) -> impl Iterator<Item = Timestamp> {
     asked.iter().map(move |share| days[(share * days.len() as f64) as usize])
 }
 
-/// What was said of a unit on a day, against what came true; nothing where nothing can be told.
+/// Past forecast of a unit at a date, compared with the outcome; nothing where no comparison is possible.
 fn past(fleet: &FleetContext<'_>, name: &UnitKey, day: Timestamp) -> Result<Option<BacktestRow>, Error> {
     let Some(series) = fleet.series(name) else { return Ok(None) };
     let settings = fleet.settings(name);

@@ -1,8 +1,7 @@
-//! What a night's flights changed: states and events of units, with them and without them.
+//! Changes in a run: states and events of units with and without the run's flights.
 //!
-//! Both statements are made now, by one prior, so nothing is kept from night to night and the month's turn
-//! of a prior is no news.
-
+//! Both assessments are computed now with one prior, so nothing is stored between runs, and a new training cut-off
+//! of a prior changes no state by itself.
 use std::collections::BTreeMap;
 
 use serde::Serialize;
@@ -14,7 +13,7 @@ use crate::history::histories::UnitKey;
 /// An event of one kind is the same one when its date moved by no more than this: dates are estimates.
 const SAME_EVENT_DAYS: f64 = 60.0;
 
-/// A unit of which something else is said than without the night's flights.
+/// A unit whose assessment differs from the one without the run's flights.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[expect(missing_docs, reason = "each field is named for what it holds")]
 pub struct UnitChange {
@@ -22,7 +21,7 @@ pub struct UnitChange {
     pub serial_number: String,
     pub tail_number: Option<String>,
     pub position: Option<String>,
-    /// The state without the night's flights, and with them.
+    /// The state without the run's flights, and with them.
     pub from: Option<&'static str>,
     pub to: Option<&'static str>,
     /// Why the state is what it is now.

@@ -35,7 +35,7 @@ impl<'a> Limits<'a> {
         Self { config, scale_m: LIMIT_OVER_NEW_GAP * median_m.unwrap_or(1e-5) }
     }
 
-    /// What wear of a part is said to follow; nothing where its histories decide.
+    /// Configured usage axis of a part's wear; nothing where its histories decide.
     pub(crate) fn axis(self, part: Option<&str>) -> Option<UsageAxis> {
         let configured = self.part(part).and_then(|p| p.axis).or(self.config.document.trend.axis)?;
         Some(match configured {

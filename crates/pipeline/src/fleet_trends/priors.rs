@@ -1,4 +1,4 @@
-//! What each part's units had taught about the next, turn by turn.
+//! Fleet prior of each part by training cut-off.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -41,7 +41,7 @@ impl TrainingCutoffs {
 /// Part numbers that share a prior.
 type Parts<'a> = Vec<Option<&'a str>>;
 
-/// What was taught by each turn that was asked for.
+/// The fleet priors trained so far, by cut-off.
 #[derive(Default)]
 pub(crate) struct FleetPriors<'a> {
     cutoffs: TrainingCutoffs,
@@ -96,7 +96,7 @@ impl<'a> PriorTrainer<'a, '_> {
         })
     }
 
-    /// What the parts had taught by a turn, those alike together.
+    /// Fleet priors of the parts at a cut-off; similar parts share one.
     fn trained(&self, cutoff_us: i64) -> Vec<(Parts<'a>, FleetPrior)> {
         let pool_similar_parts = self.pool_similar_parts(cutoff_us);
         pool_similar_parts
@@ -105,10 +105,10 @@ impl<'a> PriorTrainer<'a, '_> {
             .collect()
     }
 
-    /// Parts in groups that share what they teach: of one limit, along one axis where that is configured,
+    /// Groups of parts that share one fleet prior: of one limit, along one axis where that is configured,
     /// with lives within a factor of two.
     ///
-    /// Two part numbers of one design have the same laws, and more units tell them better: pooling took
+    /// Two part numbers of one design have the same laws, and more units identify them better: pooling reduced
     /// the median error on one simulated fleet of two designs from 23 to 21 %.
     fn pool_similar_parts(&self, cutoff_us: i64) -> Vec<Parts<'a>> {
         let is_of_one_kind = |a: &_, b: &_| self.kind(*a) == self.kind(*b);
@@ -118,7 +118,7 @@ impl<'a> PriorTrainer<'a, '_> {
         kinds.into_par_iter().flat_map(|kind| self.group_by_life(cutoff_us, kind)).collect()
     }
 
-    /// By what parts are told apart before their lives are looked at: limit, m, as bits, and axis.
+    /// Key by which parts are grouped before their lives are compared: limit, m, as bits, and axis.
     fn kind(&self, part: Option<&str>) -> (u64, Option<UsageAxis>) {
         (self.limits.limit_m(part).to_bits(), self.limits.axis(part))
     }

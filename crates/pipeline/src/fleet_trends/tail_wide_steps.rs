@@ -29,7 +29,7 @@ struct Made<'a> {
 }
 
 impl TailWide {
-    /// Looks over units that fly together. What no book knows counts: a step of several units at once, and a
+    /// Searches the units of one tail. Unrecorded changes count: a step of several units at once, and a
     /// step or reset when what is fitted of all of them `moved`.
     pub(crate) fn new(judged: &[(&History, &Assessment)], moved: &[RecorderChange]) -> Self {
         let made: Vec<Made<'_>> =

@@ -21,7 +21,7 @@ pub struct ChangePoint {
     pub step_m: f64,
     /// Standard error of its size, m.
     pub step_se_m: f64,
-    /// Probability that it is one; 1 where the books say so.
+    /// Probability that it is one; 1 for a recorded event.
     pub certainty: f64,
     /// Whether the tail's other actuators changed with it, or what is fitted of all of them did: a matter of a
     /// sensor or a recorder, not of wear.

@@ -19,10 +19,10 @@ const BLOCK_ROWS: usize = 1 << 19;
 const DISAGREE: &str = "estimators_disagree";
 const OTHER_GAP: &str = "gap_midrange_fitted_m";
 
-/// Histories while their rows come in.
+/// Builder of histories from rows.
 ///
-/// Most rows are of another unit than the row before. So they are put down in the order of arrival, and each unit's
-/// are brought together at the end, when it is known how many there are: nothing grows, and no row is moved twice.
+/// Most rows belong to another unit than the row before. So rows are stored in the order of arrival, and each unit's
+/// rows are collected at the end, when their number is known: no buffer grows, and no row is moved twice.
 #[derive(Debug, Default)]
 pub struct HistoryBuilder {
     /// Units by serial number; a serial number is unique only with its part number.
@@ -34,7 +34,7 @@ pub struct HistoryBuilder {
     pub(crate) blocks: Vec<RowBlock>,
 }
 
-/// A unit, and how much was put down of it.
+/// A unit, and the number of its stored rows.
 #[derive(Debug)]
 pub(crate) struct UnitEntry {
     pub(crate) name: UnitKey,
@@ -51,7 +51,7 @@ pub(crate) struct RowBlock {
     pub(crate) names: String,
 }
 
-/// A row that was put down.
+/// A stored row.
 #[derive(Debug)]
 pub(crate) struct StagedRow {
     pub(crate) unit: u32,
@@ -86,7 +86,7 @@ impl HistoryBuilder {
     /// What the store's own rows bring in addition.
     pub(crate) const STORE_COLUMNS: [&'static str; 2] = ["flags", OTHER_GAP];
 
-    /// Puts down the rows of a chunk.
+    /// Adds the rows of a batch.
     ///
     /// # Errors
     /// When a column that must be there is not, and the first cell that cannot be read.
@@ -99,7 +99,7 @@ impl HistoryBuilder {
         self.rows(chunk, &KeyColumns::of(chunk)?, &TextColumn::of(chunk, &["flight_id"])?, flags)
     }
 
-    /// Puts down rows of the store.
+    /// Adds rows of the store.
     ///
     /// # Errors
     /// The first cell that cannot be read.
@@ -155,7 +155,7 @@ impl HistoryBuilder {
         Ok(())
     }
 
-    /// Puts down a flight.
+    /// Adds a flight.
     pub fn put(&mut self, who: RowKey<'_>, row: &FlightInput<'_>) {
         let seat = self.seat(who);
         self.push_row(seat, row);
@@ -181,7 +181,7 @@ impl HistoryBuilder {
         unit.bytes += name.len();
     }
 
-    /// Puts down what a record says.
+    /// Adds the flight of a record.
     pub(crate) fn push_record(&mut self, push_record: &GapRecord) {
         let GapRecord { flight, estimate, .. } = push_record;
         let who = RowKey {
@@ -210,7 +210,7 @@ impl HistoryBuilder {
         RowTarget { unit, place: self.units[unit].places.number(who.tail_number, who.position) }
     }
 
-    /// Where a unit is kept. Most tables have one unit's rows together, or the units in one order every night.
+    /// Index of a unit. Most tables have one unit's rows together, or the units in one order in every run.
     fn unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
         let is = |(part, serial): &UnitKey| serial == serial_number && part.as_deref() == part_number;
         let units = &self.units;

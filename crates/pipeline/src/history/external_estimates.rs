@@ -16,11 +16,11 @@ use records::Diagnostic;
 /// A unit and a day.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AsOfQuery {
-    /// The design, where the table says it.
+    /// The part number, where the table has it.
     pub part_number: Option<String>,
     /// The unit.
     pub serial_number: String,
-    /// The day; nothing later is looked at.
+    /// The date of the assessment; later data are ignored.
     pub as_of_utc: Timestamp,
 }
 

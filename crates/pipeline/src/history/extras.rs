@@ -1,5 +1,5 @@
-//! What rows say beside their gaps, of many units on one shelf: given up whole, so that the system has it back while
-//! the next shelf is still needed.
+//! Secondary columns of the rows of many units, in one arena that is freed as a whole while
+//! the next one is still needed.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use crate::history::flight_row::FlightExtras;
 /// Rows of a full shelf: its 32 MiB are more than what any allocator keeps to itself.
 const SHELF_ROWS: usize = 1 << 20;
 
-/// What a row says, as bits: a shelf of nothing but zeros is had from the system for nothing.
+/// Secondary columns of a row, as bits: the system provides a zeroed arena without writing it.
 type PackedExtras = [u64; 4];
 
 /// Shelves while rows are put on them.
@@ -26,7 +26,7 @@ pub(crate) struct UnitExtras {
 }
 
 impl ExtrasArena {
-    /// Room for so many rows of each unit.
+    /// An arena with the given number of rows of each unit.
     pub(crate) fn with_room(rows: impl Iterator<Item = usize>) -> Self {
         let (mut lengths, mut units): (Vec<usize>, _) = (Vec::new(), Vec::new());
         for rows in rows {
@@ -43,7 +43,7 @@ impl ExtrasArena {
         Self { arena: lengths.into_iter().map(|rows| vec![[0; 4]; rows]).collect(), units }
     }
 
-    /// Puts down a unit's row of that number.
+    /// Stores a row of a unit by its number.
     pub(crate) fn put(&mut self, unit: usize, row: u32, extras: FlightExtras) {
         let (index, first) = self.units[unit];
         self.arena[index][first + row as usize] = extras.to_bits();

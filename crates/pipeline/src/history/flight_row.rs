@@ -2,7 +2,7 @@
 
 use jiff::Timestamp;
 
-/// What a row says of one flight of one unit, wherever its gap was estimated.
+/// One flight of one unit, from the store or from an external table of estimates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
 pub struct FlightInput<'a> {
@@ -37,7 +37,7 @@ impl FlightRow {
         Self { departure_us, gap_m, place, row, name: [0, 0] }
     }
 
-    /// The same with its name, which is put down behind those of its unit's others.
+    /// The same with its name, which is appended to the names of the unit's other flights.
     pub(crate) fn named(self, name: &str, names: &mut String) -> Self {
         let begin = names.len() as u32;
         names.push_str(name);
@@ -57,7 +57,7 @@ impl FlightRow {
 
     /// Departure, to the microsecond.
     pub fn departure_utc(&self) -> Timestamp {
-        // It was an instant when it was put down, so it is one now.
+        // Parsed as an instant when it was stored, so it is valid here.
         Timestamp::from_microsecond(self.departure_us).unwrap_or_default()
     }
 
@@ -67,7 +67,7 @@ impl FlightRow {
     }
 }
 
-/// What else a row says of a flight, in 32 bytes: a statement needs it only until usage is added up.
+/// Secondary columns of a flight, in 32 bytes: needed only until usage is accumulated.
 #[derive(Debug, Clone, Copy)]
 pub struct FlightExtras {
     /// Numbers; `NaN` for none.

@@ -15,7 +15,7 @@ use crate::history::flight_row::{FlightExtras, FlightRow};
 /// Part number where known, and serial number.
 pub type UnitKey = (Option<String>, String);
 
-/// Where a unit sat, as far as its rows say.
+/// Position of a unit, as far as its rows hold it.
 #[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[expect(missing_docs, reason = "each field is named for the contract's column")]
 pub struct TailPosition {
@@ -64,7 +64,7 @@ impl Positions {
 pub struct History {
     places: Vec<TailPosition>,
     flights: Vec<FlightRow>,
-    /// What else their rows say; nothing once it was [forgotten](History::forget).
+    /// Their secondary columns; empty once they were [dropped](History::drop_secondary).
     extras: UnitExtras,
     /// The flights' names, one after the other.
     names: String,
@@ -108,12 +108,12 @@ impl History {
         flown.name_in(&self.names)
     }
 
-    /// What else the row of one of them says.
+    /// Secondary columns of one of them.
     pub fn extras(&self, flown: &FlightRow) -> FlightExtras {
         self.extras.row(flown.row)
     }
 
-    /// Makes room: from now on nobody asks what else the rows say.
+    /// Frees the secondary columns, which are not needed from now on.
     pub(crate) fn drop_secondary(&mut self) {
         self.extras = UnitExtras::default();
     }
@@ -138,7 +138,7 @@ impl History {
         (flown.departure_us(), self.place(flown), self.flight_id(flown))
     }
 
-    /// One with places, and room for so many flights and so many bytes of their names.
+    /// One with positions, and capacity for a number of flights and bytes of their names.
     pub(crate) fn with_room(places: Positions, flights: usize, names: usize) -> Self {
         Self {
             places: places.0,
@@ -149,12 +149,12 @@ impl History {
         }
     }
 
-    /// Puts down a flight behind the others.
+    /// Appends a flight.
     pub(crate) fn put(&mut self, flown: FlightRow, name: &str) {
         self.flights.push(flown.named(name, &mut self.names));
     }
 
-    /// With what else the rows say, and the same whatever order they came in.
+    /// Adds the secondary columns, and sorts the rows, so that the result does not depend on their order of arrival.
     pub(crate) fn finish(mut self, extras: UnitExtras) -> Self {
         self.extras = extras;
         let (places, names) = (&self.places, &self.names);

@@ -28,7 +28,7 @@ impl<'a> InstallationIndex<'a> {
         if before.iter().any(is_open) { None } else { before.into_iter().max_by_key(|i| i.removed_utc) }
     }
 
-    /// A unit's stays; where its part number is not known, its serial number says so.
+    /// A unit's installations; where its part number is unknown, by its serial number.
     pub(crate) fn of(&self, (part, serial): &UnitKey) -> Vec<&'a Installation> {
         let is_of =
             |stay: &&&Installation| part.as_deref().is_none_or(|part| stay.part_number.as_str() == part);

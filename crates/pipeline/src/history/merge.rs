@@ -1,4 +1,4 @@
-//! What several workers put down, brought together unit by unit.
+//! Merge of the history builders of several workers, unit by unit.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -15,10 +15,10 @@ use crate::history::histories::{Histories, History, Positions, UnitKey};
 /// Shares of a table that a worker is given: the slower one leaves some of its own to the others.
 const SHARES: usize = 4;
 
-/// Histories of the rows of all, as if one had put them down in this order.
+/// Histories of the rows of all builders, as if one builder had received them in this order.
 ///
-/// Each worker takes the rows of its own units, so that nobody waits for another one's, and a block is given up
-/// once nobody needs it any more.
+/// Each worker takes the rows of its own units, so no worker waits for another, and a block is freed
+/// after its last use.
 pub(crate) fn merge(gathered: Vec<HistoryBuilder>, is_booked: bool) -> Histories {
     let mut rooms = rooms(&gathered);
     let homes: Vec<TargetMap> = gathered.iter().map(|one| TargetMap::of(&one.units, &mut rooms)).collect();
@@ -81,7 +81,7 @@ impl TargetMap {
     }
 }
 
-/// As many sections as there are workers, of about as many rows each; the units of one follow each other by name.
+/// One section per worker, with about equal numbers of rows; the units of one section follow each other by name.
 fn sections(rooms: BTreeMap<UnitKey, UnitCapacity>) -> Vec<Vec<(UnitKey, UnitCapacity)>> {
     let rows: usize = rooms.values().map(|room| room.rows).sum();
     let most = rows.div_ceil(rayon::current_num_threads());
@@ -153,8 +153,8 @@ impl HistoryBuilder {
     }
 }
 
-/// The histories of a table in so many parts, `put` down in shares by all workers: the same as if one had put down
-/// all of them in order.
+/// The histories of a table in several parts, added by all workers in shares: the same result as if one worker had
+/// added all parts in order.
 ///
 /// # Errors
 /// The first of the parts' errors.
@@ -270,13 +270,13 @@ mod tests {
             stored.add_store_batch(batch(some, &coded)).unwrap();
             plain.add(&TableBatch::new("table".as_ref(), batch(some, &DataType::Utf8), 0)).unwrap();
         }
-        let expected = told(&one_by_one(&rows));
-        assert_eq!(told(&stored.into_store()), expected);
-        assert_eq!(told(&plain.into_store()), expected);
+        let expected = row_texts(&one_by_one(&rows));
+        assert_eq!(row_texts(&stored.into_store()), expected);
+        assert_eq!(row_texts(&plain.into_store()), expected);
     }
 
     /// All that is known of all units.
-    fn told(histories: &Histories) -> Vec<String> {
+    fn row_texts(histories: &Histories) -> Vec<String> {
         let of_unit = |(name, history): (&UnitKey, &History)| {
             let flight = |f: &FlightRow| {
                 format!("{f:?} {:?} {:?} {:?}", history.place(f), history.flight_id(f), history.extras(f))
@@ -290,7 +290,7 @@ mod tests {
     #[test]
     fn any_number_of_workers_brings_together_what_one_does() {
         let rows = rows();
-        let expected = told(&one_by_one(&rows));
+        let expected = row_texts(&one_by_one(&rows));
         let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
         for (rows_of_part, workers) in [(600, 1), (600, 7), (90, 2), (41, 3), (7, 5)] {
             let parts: Vec<RecordBatch> = rows.chunks(rows_of_part).map(|some| batch(some, &coded)).collect();
@@ -301,14 +301,14 @@ mod tests {
             };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(workers).build().unwrap();
             let found = pool.install(|| of_parts(parts.len(), true, put)).unwrap();
-            assert!(told(&found) == expected, "{rows_of_part} rows a part, {workers} workers");
+            assert!(row_texts(&found) == expected, "{rows_of_part} rows a part, {workers} workers");
         }
         assert_eq!(of_parts(0, true, |_, _| Ok(())).unwrap().names().count(), 0);
     }
 
-    /// Whoever is first, it is the table's first error that is told.
+    /// Independent of the order of the workers, the first error of the table is returned.
     #[test]
-    fn of_several_errors_the_first_is_told() {
+    fn of_several_errors_the_first_is_returned() {
         let refuse = |_: &mut HistoryBuilder, some: Range<usize>| match some.start {
             0 => Ok(()),
             first => Err(Error::refused(
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_without_a_serial_number_is_told_by_its_number() {
+    fn a_row_without_a_serial_number_is_reported_by_its_number() {
         let mut rows = rows();
         rows[17].0[1] = Some("  ".into());
         let coded = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));

@@ -1,4 +1,4 @@
-//! Who flew and where, row by row, found once for the many rows that say the same.
+//! Row keys (part, serial, tail, position), resolved once for the many rows that share them.
 
 use arrow::array::{Array, AsArray, DictionaryArray, StringArray};
 use arrow::datatypes::Int32Type;

@@ -1,4 +1,4 @@
-//! What a unit's flights add up to: its rows, those that left none, and what the books say.
+//! Accumulated usage of a unit: its rows, flights without a row, and recorded maintenance.
 
 use jiff::Timestamp;
 use job::Config;
@@ -12,7 +12,7 @@ use crate::history::installation_index::InstallationIndex;
 use crate::history::maintenance_log;
 use crate::history::unlogged_flights::UnloggedFlights;
 
-/// What the books say of units beside their rows.
+/// Sources of usage in addition to rows: installations, maintenance, flights without a log.
 pub(crate) struct UsageSources<'a> {
     maintenance: maintenance_log::MaintenanceLog,
     unlogged: UnloggedFlights<'a>,
@@ -55,7 +55,7 @@ impl<'a> UsageSources<'a> {
     }
 }
 
-/// What the maintenance book says of a unit; of one whose part number is not known, nothing.
+/// Recorded maintenance of a unit; nothing for a unit without a part number.
 fn maintenance_events(
     book: &maintenance_log::MaintenanceLog,
     (part, serial): &UnitKey,

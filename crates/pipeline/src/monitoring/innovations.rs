@@ -32,14 +32,14 @@ const BEFORE: (usize, usize) = (10, 50);
 const SPREADS: f64 = 6.0;
 /// and beyond this factor: a spread seen in few flights may be small by chance.
 const FACTOR: f64 = 2.0;
-/// A flight is told of for so many days.
-const TOLD_DAYS: f64 = 30.0;
+/// Number of days for which a flight is reported.
+const REPORTED_DAYS: f64 = 30.0;
 
 /// The unlike flights of the last month of these.
 pub fn find_outliers(recent_diagnostics: &RecentDiagnostics) -> Vec<InnovationOutlier> {
     let newest = newest_utc(recent_diagnostics);
     let recent = |at: Timestamp| {
-        newest.is_some_and(|newest| newest.duration_since(at).as_secs_f64() <= TOLD_DAYS * 86_400.0)
+        newest.is_some_and(|newest| newest.duration_since(at).as_secs_f64() <= REPORTED_DAYS * 86_400.0)
     };
     let mut found = Vec::new();
     for (position, diagnostics) in recent_diagnostics {
@@ -53,7 +53,7 @@ pub fn find_outliers(recent_diagnostics: &RecentDiagnostics) -> Vec<InnovationOu
         {
             let before = &logs[k.saturating_sub(BEFORE.1)..k];
             found.extend(
-                median_ln_nis(before, logs[k]).map(|usual| told(position, diagnostics, logs[k], usual)),
+                median_ln_nis(before, logs[k]).map(|usual| outlier(position, diagnostics, logs[k], usual)),
             );
         }
     }
@@ -73,7 +73,12 @@ fn median_ln_nis(before: &[f64], this: f64) -> Option<f64> {
     ((this - usual).abs() > (SPREADS * spread).max(FACTOR.ln())).then_some(usual)
 }
 
-fn told(position: &PositionKey, diagnostics: &FlightDiagnostics, this: f64, usual: f64) -> InnovationOutlier {
+fn outlier(
+    position: &PositionKey,
+    diagnostics: &FlightDiagnostics,
+    this: f64,
+    usual: f64,
+) -> InnovationOutlier {
     InnovationOutlier {
         tail_number: position.tail_number.clone(),
         position: position.position.clone(),

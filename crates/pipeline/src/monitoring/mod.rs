@@ -1,4 +1,4 @@
-//! Diagnostics besides the gap: filter innovations and recorder changes.
+//! Diagnostics in addition to the gap: filter innovations and recorder changes.
 
 pub mod innovations;
 pub mod mapping_faults;

@@ -1,4 +1,4 @@
-//! What the last months' flights say beside gaps: delay, stiffness and surprise, place by place.
+//! Recent diagnostics of the last months in addition to gaps, by position: skew, stiffness and innovations.
 
 use std::collections::BTreeMap;
 use std::path::Path;

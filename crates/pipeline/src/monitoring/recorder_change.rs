@@ -50,17 +50,17 @@ impl RecorderChange {
     }
 }
 
-/// So many flights before a change, and after it, are the least that show one.
+/// Least numbers of flights before a change, and after it, from which it is detected.
 const LEAST_BEFORE: usize = 5;
 const LEAST_AFTER: usize = 3;
-/// The latest flights of a place that are looked at.
-const LOOKED_AT: usize = 200;
+/// Largest number of latest flights of a position that are tested.
+const MAX_FLIGHTS: usize = 200;
 /// Least change in standard errors of a difference of medians.
 const LEAST_CERTAINTY: f64 = 8.0;
 /// Changes of one aircraft this close together are one, days.
 const SAME_DAYS: f64 = 3.0;
-/// A change is told for so many days.
-const TOLD_DAYS: f64 = 30.0;
+/// Number of days for which a change is reported.
+const REPORTED_DAYS: f64 = 30.0;
 
 /// What of a change is believed.
 #[derive(Debug, Clone, Copy)]
@@ -85,7 +85,7 @@ pub(crate) fn detect_changes_in_store(store: &Store, as_of: Timestamp) -> Result
 
 /// The delays, and the stiffnesses of whole aircraft, that moved within the last month of these flights.
 ///
-/// One unit's stiffness moves with the unit; that of all of them at once says something of what records them.
+/// One unit's stiffness changes with the unit; a change of all of them at once is a change of the recorder.
 pub fn detect_changes(recent_diagnostics: &RecentDiagnostics) -> Vec<RecorderChange> {
     let (skews, stiffnesses) = (skews_s(recent_diagnostics), ln_stiffnesses(recent_diagnostics));
     let newest = newest_utc(recent_diagnostics);
@@ -97,7 +97,7 @@ pub fn detect_changes(recent_diagnostics: &RecentDiagnostics) -> Vec<RecorderCha
         },
     ));
     found.retain(|detect_changes| {
-        newest.is_some_and(|newest| days(detect_changes.since_utc, newest) <= TOLD_DAYS)
+        newest.is_some_and(|newest| days(detect_changes.since_utc, newest) <= REPORTED_DAYS)
     });
     found.sort_by(|a, b| {
         (&a.tail_number, a.quantity, a.since_utc).cmp(&(&b.tail_number, b.quantity, b.since_utc))
@@ -150,7 +150,7 @@ fn of_quantity(tails: &Tails<'_>, quantity: Quantity, bounds: Bounds) -> Vec<Rec
     for (&tail, places) in tails {
         let from = found.len();
         for (position, values) in places {
-            let latest = &values[values.len().saturating_sub(LOOKED_AT)..];
+            let latest = &values[values.len().saturating_sub(MAX_FLIGHTS)..];
             let Some((since_utc, from_value, to)) = step(latest, bounds) else { continue };
             let is_same = |m: &&mut RecorderChange| days(m.since_utc, since_utc).abs() <= SAME_DAYS;
             match found[from..].iter_mut().find(is_same) {

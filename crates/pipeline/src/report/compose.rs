@@ -1,4 +1,4 @@
-//! What a report says, composed from the store: statements now and before, flights, stays, inspections.
+//! Composes a report from the store: assessments now and before, flights, installations, inspections.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,13 +23,13 @@ use crate::history::histories::{Histories, History, UnitKey as Name};
 use crate::history::installation_index::InstallationIndex;
 use crate::monitoring::recorder_change::detect_changes_in_store;
 
-/// Days before the report of which statements are held against what came.
+/// Days before the report whose forecasts are compared with the outcome.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
-/// An installation within so many days explains a change.
+/// An installation within this number of days explains a change.
 const BOOKED_WITHIN_DAYS: f64 = 7.0;
-/// Estimates beside an inspection: so many at most, within so many days before it.
-const BESIDE: usize = 10;
-const BESIDE_DAYS: f64 = 30.0;
+/// Estimates compared with an inspection: at most this many, from at most this many days before it.
+const MAX_COMPARED: usize = 10;
+const MAX_COMPARED_DAYS: f64 = 30.0;
 
 /// Composes the report of the asked units.
 ///
@@ -132,7 +132,7 @@ struct StoreContents {
     store_version: u64,
 }
 
-/// What a page shows of a flight beside what statements are made from.
+/// Columns of a flight that a page shows in addition to those used by the assessment.
 #[derive(Debug, Clone)]
 struct FlightExtras {
     unit_hours: Option<f64>,
@@ -481,13 +481,13 @@ impl InspectionRow {
         self.serial_number == name.1 && (self.part_number.is_none() || self.part_number == name.0)
     }
 
-    /// The check beside the median of the last estimates before it: what follows may be another gap.
+    /// The inspection with the median of the last estimates before it: later estimates may be of another gap.
     fn extras(&self, records: &[FlownRow]) -> Inspection {
         let near = records
             .iter()
             .rev()
-            .filter(|r| (0.0..=BESIDE_DAYS).contains(&days(r.departure_utc(), self.date_utc)));
-        let mut gaps: Vec<f64> = near.filter_map(FlownRow::gap_m).take(BESIDE).collect();
+            .filter(|r| (0.0..=MAX_COMPARED_DAYS).contains(&days(r.departure_utc(), self.date_utc)));
+        let mut gaps: Vec<f64> = near.filter_map(FlownRow::gap_m).take(MAX_COMPARED).collect();
         gaps.sort_by(f64::total_cmp);
         let middle = gaps.len() / 2;
         let median = gaps

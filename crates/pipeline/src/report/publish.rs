@@ -1,4 +1,4 @@
-//! A report on disk: written whole beside its place, then put there by renaming.
+//! Publishes a report folder: written completely under a temporary name, then renamed.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -45,7 +45,7 @@ pub fn write(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Re
     Ok(written)
 }
 
-/// A folder that holds files but no `report.json` is somebody's work.
+/// Refuses a folder with files but without `report.json`: it belongs to the user.
 fn refuse_foreign(dir: &Path) -> Result<(), Error> {
     let holds = fs::read_dir(dir).is_ok_and(|mut entries| entries.next().is_some());
     if !holds || dir.join("report.json").exists() {

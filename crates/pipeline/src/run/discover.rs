@@ -1,4 +1,4 @@
-//! Which files make a log: usually one; with groups or pieces, those that say they are of one flight.
+//! Log discovery: usually one file per log; with groups or pieces, the files of one flight.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ pub struct DiscoveredLogs {
     pub faulty: BTreeMap<String, (PathBuf, Diagnostic)>,
     /// Files of groups whose flight has no main log.
     pub strays: Vec<String>,
-    /// What listings of object stores told of them, by address.
+    /// File status of objects from listings, by address.
     pub(crate) seen: SeenObjects,
 }
 
@@ -52,7 +52,7 @@ pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
 /// The whole log that a file given by hand belongs to.
 ///
 /// # Errors
-/// As [`discover`], where groups or pieces have to be looked for.
+/// As [`discover`], where groups or pieces must be searched.
 pub fn log_containing(config: &Config, path: &Path) -> Result<LogFiles, Error> {
     if config.document.group.is_empty() && !config.document.logs.pieces {
         return Ok(LogFiles::one(path));

@@ -1,4 +1,4 @@
-//! Logs in an object store: which keys fit a pattern, and what a listing tells of them.
+//! Log discovery in object stores: keys that match a pattern, with the metadata of the listing.
 
 use std::path::Path;
 

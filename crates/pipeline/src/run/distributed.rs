@@ -45,7 +45,7 @@ pub struct Task {
 /// What does some tasks, and brings their answers in any order.
 pub type Engine<'a> = dyn FnMut(&[Task]) -> Result<Vec<RecordBatch>, String> + 'a;
 
-/// What is said of a log besides its records.
+/// Status of a processed log, without its records.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct TaskResult {
     log_digest: Option<String>,
@@ -62,8 +62,8 @@ struct TaskResult {
     diagnostics: Vec<Diagnostic>,
 }
 
-/// The columns of an answer: those of a record, and three more. Each log has one row that says what became of
-/// it (`account`, and `error_code` with `error_detail` where it has a fault), and one for each record.
+/// The columns of a result: those of a record, and three more. Each log has one row with its status
+/// (`account`, and `error_code` with `error_detail` where it failed), and one row for each record.
 pub fn schema() -> SchemaRef {
     let records = store::columns::schema();
     let record = records.fields().iter().map(|field| field.as_ref().clone().with_nullable(true));
@@ -110,7 +110,7 @@ fn encode_result(
     records: &[GapRecord],
     diagnostics: Vec<Diagnostic>,
 ) -> Result<RecordBatch, Error> {
-    let said = TaskResult {
+    let results = TaskResult {
         log_digest: account.log_digest.clone(),
         config_digest: account.config_digest.clone(),
         tail_number: account.tail_number.clone(),
@@ -123,14 +123,14 @@ fn encode_result(
         processed_utc: account.processed_utc,
         diagnostics,
     };
-    let said = serde_json::to_string(&said).map_err(|e| Error::Engine(e.to_string()))?;
+    let results = serde_json::to_string(&results).map_err(|e| Error::Engine(e.to_string()))?;
     let schema = schema();
     let head = |field: &Arc<Field>| -> ArrayRef {
         let text = match field.name().as_str() {
             "log_path" => Some(account.log_path.as_str()),
             "error_code" => account.error_code.as_deref(),
             "error_detail" => account.error_detail.as_deref(),
-            "account" => Some(said.as_str()),
+            "account" => Some(results.as_str()),
             _ => return new_null_array(field.data_type(), 1),
         };
         Arc::new(StringArray::from(vec![text]))
@@ -145,8 +145,8 @@ fn encode_result(
     Ok(concat_batches(&schema, [&first, &rest])?)
 }
 
-/// As [`crate::run()`], with the logs done by an engine: so many at a time are given to it, and stored when it
-/// answers.
+/// As [`crate::run()`], with the logs processed by an engine: it receives batches of logs, and the results are stored
+/// as they arrive.
 ///
 /// # Errors
 /// As [`crate::run()`], and [`Error::Engine`] when the engine fails. What it answered before is stored.
@@ -170,7 +170,7 @@ pub fn run(
     })
 }
 
-/// Some logs: those whose fault is known already are told here, the others are asked for.
+/// One batch of logs: those with a known error are reported here, the others go to the engine.
 fn some(
     shop: &WorkerContext<'_>,
     works: &[WorkItem],
@@ -184,7 +184,7 @@ fn some(
     let mut results: Vec<LogResult> = Vec::new();
     for work in works {
         let done = match answers.remove(&work.shown) {
-            Some((said, records)) => to_log_result(shop, work, said, records),
+            Some((results, records)) => to_log_result(shop, work, results, records),
             None if work.fault.is_some() => shop.process_log(work),
             None => {
                 report.not_reached_logs.push(work.shown.clone());
@@ -214,36 +214,36 @@ fn task(work: &WorkItem, run_id: &str) -> Task {
 fn to_log_result(
     shop: &WorkerContext<'_>,
     work: &WorkItem,
-    said: TaskResult,
+    results: TaskResult,
     records: Vec<GapRecord>,
 ) -> LogOutcomeData {
     let mut account = LogRecord {
-        log_digest: said.log_digest,
-        config_digest: said.config_digest,
-        tail_number: said.tail_number,
-        flight_id: said.flight_id,
-        departure_utc: said.departure_utc,
-        positions: said.positions,
-        estimated: said.estimated,
-        refused: said.refused,
-        duration_s: said.duration_s,
-        processed_utc: said.processed_utc,
+        log_digest: results.log_digest,
+        config_digest: results.config_digest,
+        tail_number: results.tail_number,
+        flight_id: results.flight_id,
+        departure_utc: results.departure_utc,
+        positions: results.positions,
+        estimated: results.estimated,
+        refused: results.refused,
+        duration_s: results.duration_s,
+        processed_utc: results.processed_utc,
         ..summary::of_log(work, shop.run_id)
     };
     if let Some((estimated, refused)) = shop.already_recorded(work, &account) {
         let already_recorded = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account };
         return LogOutcomeData::Same(Box::new(already_recorded));
     }
-    summary::complain(&mut account, &said.diagnostics);
-    LogOutcomeData::Read { account: Box::new(account), records, diagnostics: said.diagnostics }
+    summary::complain(&mut account, &results.diagnostics);
+    LogOutcomeData::Read { account: Box::new(account), records, diagnostics: results.diagnostics }
 }
 
 type TaskResults = HashMap<String, (TaskResult, Vec<GapRecord>)>;
 
-/// Answers by log, in whatever order their rows come. Of two rows that say the same the first counts; an answer
-/// that lacks records is none.
+/// Results by log, with rows in any order. The first of equal rows counts; a result
+/// that lacks records is ignored.
 fn read(batches: &[RecordBatch]) -> Result<TaskResults, Error> {
-    let mut said: HashMap<String, TaskResult> = HashMap::new();
+    let mut results: HashMap<String, TaskResult> = HashMap::new();
     let mut records: HashMap<String, BTreeMap<RecordKey, GapRecord>> = HashMap::new();
     for batch in batches {
         let batch = typed(batch)?;
@@ -251,7 +251,7 @@ fn read(batches: &[RecordBatch]) -> Result<TaskResults, Error> {
         for row in (0..batch.num_rows()).filter(|row| accounts.is_valid(*row)) {
             let process_log =
                 serde_json::from_str(accounts.value(row)).map_err(|e| Error::Engine(e.to_string()))?;
-            said.entry(logs.value(row).to_owned()).or_insert(process_log);
+            results.entry(logs.value(row).to_owned()).or_insert(process_log);
         }
         let rest = filter_record_batch(&batch, &is_null(accounts)?)?;
         for record in store::columns::from_batch(&rest)? {
@@ -259,9 +259,9 @@ fn read(batches: &[RecordBatch]) -> Result<TaskResults, Error> {
             of_log.entry(RecordKey::of(&record)).or_insert(record);
         }
     }
-    let whole = said.into_iter().filter_map(|(log, said)| {
+    let whole = results.into_iter().filter_map(|(log, results)| {
         let records: Vec<GapRecord> = records.remove(&log).unwrap_or_default().into_values().collect();
-        (records.len() as i64 == said.estimated + said.refused).then_some((log, (said, records)))
+        (records.len() as i64 == results.estimated + results.refused).then_some((log, (results, records)))
     });
     Ok(whole.collect())
 }

@@ -1,11 +1,11 @@
-//! What happens while a run goes on, for whoever wants to watch.
+//! Events of a run, for observers.
 
 use records::Diagnostic;
 
 /// One thing that happened. Events of different logs may come in any order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
-    /// The plan stands: so many logs of so many bytes will be read.
+    /// The plan is complete: number and bytes of the logs to read.
     Planned {
         /// Logs to do.
         logs: usize,
@@ -30,7 +30,7 @@ pub enum Event {
         /// What is wrong with it.
         diagnostics: Vec<Diagnostic>,
     },
-    /// So many logs are now safe in the store.
+    /// Number of logs that are now safe in the store.
     Stored {
         /// Logs in this commit.
         logs: usize,

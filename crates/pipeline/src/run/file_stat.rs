@@ -7,10 +7,10 @@ use ingest::LogFiles;
 use object_io::ListEntry;
 use store::LogRecord;
 
-/// What listings told of the objects that fit: a million keys are not asked for once more, one by one.
+/// File status of listed objects: it avoids one request per key for millions of keys.
 pub(crate) type SeenObjects = HashMap<PathBuf, FileStat>;
 
-/// What tells a file apart without opening it.
+/// Identity and version of a file without opening it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileStat {
     /// Bytes.

@@ -1,7 +1,7 @@
-//! Who owns a flight: two logs may claim the same one, and the answer must not depend on who came first.
+//! Flight ownership: two logs may hold the same flight, and the owner must not depend on the order of arrival.
 //!
-//! The log whose name sorts first owns it. A copy of the same content is known and says nothing; a
-//! log of the same flight with other content is in error and names its rival.
+//! The log whose name sorts first owns the flight. A copy with the same content is skipped without an error; a
+//! log of the same flight with other content is in error, and the error names the owner.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -158,6 +158,8 @@ impl<'a> OwnershipLedger<'a> {
         self.touched.extend(records.iter().map(unit));
         let retires = self.stale_records(&account, &records);
         self.insert(account.clone());
+        let is_owner = |r: &GapRecord| self.owners.get(&RecordKey::of(r)) == Some(&account.log_path);
+        debug_assert!(records.iter().all(is_owner), "{} owns its flights", account.log_path);
         LogResult { account, records, retires }
     }
 
@@ -188,7 +190,7 @@ fn superseded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> (LogR
         format!("another log holds the same flight: {}", owner.log_path),
     )
     .in_file(&account.log_path)
-    .hint("the log whose name sorts first is used; remove one of them, or map what tells the flights apart");
+    .hint("the log whose name sorts first is used; remove one of them, or map an identity that separates the flights");
     summary::complain(&mut account, std::slice::from_ref(&diagnostic));
     (account, vec![diagnostic])
 }

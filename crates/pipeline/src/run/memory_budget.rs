@@ -33,7 +33,7 @@ impl MemoryBudget {
         (samples as u64).saturating_mul(BYTES_PER_SAMPLE)
     }
 
-    /// Waits until so many bytes fit beside those in use, or nothing is in use.
+    /// Waits until these bytes fit in addition to those in use, or nothing is in use.
     pub(crate) fn take(&self, bytes: u64) -> MemoryPermit<'_> {
         let too_much = |in_use: &mut u64| *in_use > 0 && in_use.saturating_add(bytes) > self.limit_bytes;
         let in_use = self.in_use_bytes.lock().unwrap_or_else(PoisonError::into_inner);
@@ -89,7 +89,7 @@ mod tests {
         std::thread::scope(|scope| {
             let small = scope.spawn(|| {
                 let _held = budget.take(1);
-                assert_eq!(is_over.load(Ordering::SeqCst), 1, "it was let in beside work over the budget");
+                assert_eq!(is_over.load(Ordering::SeqCst), 1, "admitted in spite of work over the budget");
             });
             std::thread::sleep(std::time::Duration::from_millis(20));
             is_over.store(1, Ordering::SeqCst);
@@ -100,7 +100,7 @@ mod tests {
 
     /// A panic while estimating must not keep its share for ever.
     #[test]
-    fn a_panic_gives_back_what_it_held_and_becomes_a_complaint() {
+    fn a_panic_releases_its_permit_and_becomes_a_diagnostic() {
         let budget = MemoryBudget::new(Some(1));
         let ended = job::flight_log::catch_panic("a.parquet", || {
             let _held = budget.take(1 << 20);

@@ -14,7 +14,7 @@ use crate::run::discover::DiscoveredLogs;
 use crate::run::file_stat::FileStat;
 use crate::run::file_stat::SeenObjects;
 
-/// What is asked of a run.
+/// Options of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
     /// Departures from then on.
@@ -25,9 +25,9 @@ pub struct Request {
     pub tail_number: Option<TailNumber>,
     /// Logs of flights on which this unit flew only.
     pub serial_number: Option<SerialNumber>,
-    /// So many logs at most.
+    /// Process at most this number of logs.
     pub limit: Option<usize>,
-    /// Workers; as many as cores when not given.
+    /// Number of workers; one per core when not given.
     pub jobs: Option<usize>,
     /// Logs in error again.
     pub retry: bool,
@@ -38,7 +38,7 @@ pub struct Request {
 }
 
 impl Request {
-    /// Whether anything but all flights is asked for.
+    /// Whether the options select less than all flights.
     fn is_narrow(&self) -> bool {
         self.since_utc.is_some()
             || self.until_utc.is_some()
@@ -46,7 +46,7 @@ impl Request {
             || self.serial_number.is_some()
     }
 
-    /// Whether a flight is asked for.
+    /// Whether a flight is selected.
     pub fn wants(&self, flight: &Flight, installations: &Installations) -> bool {
         let at = flight.departure_utc;
         let flew = |serial: &SerialNumber| {
@@ -106,9 +106,9 @@ pub struct WorkItem {
     pub files: LogFiles,
     /// Why it cannot be read, where that is known already.
     pub fault: Option<Diagnostic>,
-    /// Its name in records and messages: relative to the configuration where it lies below it.
+    /// Its name in records and messages: relative to the configuration's folder where it is inside it.
     pub shown: String,
-    /// What tells its file apart; none when it vanished since it was found.
+    /// File status; none when the file vanished since it was found.
     pub stat: Option<FileStat>,
     /// Why it is done.
     pub why: WorkReason,
@@ -116,7 +116,7 @@ pub struct WorkItem {
     pub before: Option<LogRecord>,
 }
 
-/// The night's plan.
+/// Plan of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
     /// Logs that fit the patterns.
@@ -254,10 +254,10 @@ pub fn flight_of(account: &LogRecord) -> Option<Flight> {
     })
 }
 
-/// Codes of paths that cannot be listed: each run looks anew, and says so again.
+/// Codes of paths that cannot be listed: each run lists them again and reports them again.
 const UNLISTED: [&str; 2] = ["folder_unreadable", "file_unreadable"];
 
-/// What becomes of one log tonight.
+/// Decision about one log in this run.
 enum Verdict {
     Known,
     NotAsked,
@@ -294,7 +294,7 @@ impl Judge<'_> {
         let is_unlisted = fault.as_ref().is_some_and(|fault| UNLISTED.contains(&fault.code.as_str()));
         let why = self.reason(before, stat.as_ref()).or(is_unlisted.then_some(WorkReason::Unlisted));
         let Some(why) = why else { return Verdict::Known };
-        // A log that cannot be identified is done whatever was asked, or its fault would never be told.
+        // A log that cannot be identified is always processed, or its error would never be reported.
         let flight = || {
             before
                 .and_then(flight_of)
@@ -309,7 +309,7 @@ impl Judge<'_> {
         Verdict::Process(Box::new(WorkItem { files, fault, shown, stat, why, before: before.cloned() }))
     }
 
-    /// Why this log is done tonight, or nothing when it is accounted for.
+    /// Why this log is processed in this run, or nothing when it is up to date.
     fn reason(&self, account: Option<&LogRecord>, stat: Option<&FileStat>) -> Option<WorkReason> {
         let Some(account) = account else { return Some(WorkReason::New) };
         let settings = flight_of(account).map_or_else(

@@ -2,7 +2,7 @@
 //!
 //! Workers pull the next log from one list, so the longest are begun first and no worker waits for
 //! another. What they finish goes to the one thread that writes: it commits whatever has gathered,
-//! whole flights at a time, so a run that is cut short keeps what it finished. Workers without a log left
+//! whole flights at a time, so an interrupted run keeps what it finished. Workers without a log left
 //! take actuators of the logs that are still in work.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -31,7 +31,7 @@ const BATCH_WAIT: Duration = Duration::from_millis(500);
 /// So many finished logs are committed without waiting.
 const BATCH_LOGS: usize = 256;
 
-/// What a run needs besides its configuration.
+/// Inputs of a run in addition to its configuration.
 pub struct Context<'a> {
     /// The version written into every record.
     pub program_version: &'a str,
@@ -39,9 +39,9 @@ pub struct Context<'a> {
     pub holder: Holder,
     /// How long to wait for another run that holds it.
     pub wait: Option<Duration>,
-    /// Set from outside to end the run after the flights in hand.
+    /// Set from outside to end the run after the flights in progress.
     pub stop: &'a AtomicBool,
-    /// Told of everything that happens.
+    /// Receives every event.
     pub watch: &'a (dyn Fn(Event) + Sync),
 }
 
@@ -55,7 +55,7 @@ pub fn installations(config: &Config) -> Result<Installations, Error> {
         .map_err(|found| Error::Refused(found.iter().map(ingest::Error::diagnostic).collect()))
 }
 
-/// Says what a run would do, and does nothing.
+/// Dry run: returns the plan of a run without executing it.
 ///
 /// # Errors
 /// As [`run`], except that no store is needed.
@@ -79,7 +79,7 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     })
 }
 
-/// A run from plan to account, whoever does the logs between.
+/// A run from plan to summary; `work` processes the logs.
 pub(crate) fn execute_run(
     config: &Config,
     request: &Request,
@@ -169,7 +169,7 @@ fn exit_code(report: &RunSummary, stopped: bool) -> i64 {
     }
 }
 
-/// As many as cores, also for one log: its actuators are spread over them.
+/// Number of workers: one per core, also for one log, whose actuators are spread over them.
 fn workers(request: &Request) -> usize {
     request
         .jobs
@@ -182,7 +182,7 @@ fn run_id(started_utc: Timestamp) -> String {
     format!("{}-{:08x}", started_utc.strftime("%Y%m%dT%H%M%S%3fZ"), std::process::id())
 }
 
-/// What a run means to do, which stands in the store before anything of it is done there.
+/// Planned log rows of a run, which are stored before its first result.
 pub(crate) struct RunPlanRows {
     run: RunRecord,
     to_do: Vec<LogRecord>,
@@ -195,9 +195,9 @@ impl RunPlanRows {
     }
 }
 
-/// Has what an estimate frees kept for the next one. The GNU allocator gives anything of 128 KiB or more back to the
-/// system as soon as it is freed, and each page of it costs a fault when it is asked for anew, until it has seen a
-/// greater piece freed: from then on that is its bound (mallopt(3), `M_MMAP_THRESHOLD`). Elsewhere this is nothing.
+/// Keeps freed memory for the next estimate. The GNU allocator returns blocks of 128 KiB or more to the
+/// system as soon as they are freed, and each page costs a fault when it is allocated again, until a
+/// larger block was freed: its size is the new threshold (mallopt(3), `M_MMAP_THRESHOLD`). Other systems: no effect.
 fn raise_mmap_threshold() {
     const BOUND_BYTES: usize = 4 << 20;
     drop(std::hint::black_box(Vec::<u8>::with_capacity(BOUND_BYTES)));
@@ -239,7 +239,7 @@ impl WorkerContext<'_> {
             });
             // The workers read meanwhile; what they bring waits.
             let written = intent.state(writer).and_then(|()| self.write(&receiver, writer, report));
-            // A store that fails must not keep the workers reading through the night.
+            // A store that fails must stop the workers early.
             halt.store(written.is_err(), Ordering::Relaxed);
             drop(receiver);
             // Logs are taken in order, so those after the last one taken were not reached.

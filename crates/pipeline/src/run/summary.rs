@@ -65,7 +65,7 @@ pub(crate) fn quiet<'a>(accounts: impl Iterator<Item = &'a LogRecord>, days: f64
     late.map(|(tail, since_utc)| SilentTail { tail_number: tail.to_owned(), since_utc }).collect()
 }
 
-/// An earlier run that ended without a word: it was killed, or its disk failed.
+/// An earlier run without an end: it was killed, or its disk failed.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct KilledRun {
     /// Its name.
@@ -96,7 +96,7 @@ pub struct RunSummary {
     pub run_id: String,
     /// When it began.
     pub started_utc: Timestamp,
-    /// Runs before it that ended without a word.
+    /// Earlier runs that were killed.
     pub cut_short: Vec<KilledRun>,
     /// Logs that fit the patterns.
     pub found: usize,
@@ -141,7 +141,7 @@ pub struct RunSummary {
     pub workers: usize,
     /// Units whose records changed, with the statement made of each.
     pub trends: Vec<TrendRow>,
-    /// Those of them of which something else is said than without this run's records.
+    /// Units whose assessment differs from the one without this run's records.
     pub changed: Vec<UnitChange>,
     /// Logs in error of earlier runs, which stand until they are fixed.
     pub standing_errors: Vec<StandingError>,
@@ -150,7 +150,7 @@ pub struct RunSummary {
     /// How many units of the whole fleet are in which state.
     #[serde(skip)]
     pub states: BTreeMap<&'static str, usize>,
-    /// What came of each log; the last word on it counts, whoever was faster.
+    /// Status of each log; the last update counts, independent of the order of the workers.
     #[serde(skip)]
     logs: BTreeMap<String, LogCounts>,
 }
@@ -199,7 +199,7 @@ impl RunSummary {
         }
     }
 
-    /// Takes what the run's units say now, and what is new on their aircraft beside their gaps.
+    /// Adds the assessments of the run's units, and the recorder changes of their aircraft.
     pub(crate) fn add_assessments(&mut self, assessments: RunAssessments) {
         let RunAssessments { now, changed, recent, states, work_list, mapping_faults } = assessments;
         let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
@@ -258,7 +258,7 @@ impl RunSummary {
         self.refusals = self.refused.iter().map(refusals).collect();
     }
 
-    /// Records that say no gap.
+    /// Records without a gap.
     pub fn refusals(&self) -> usize {
         self.refused.values().sum()
     }

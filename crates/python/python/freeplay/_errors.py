@@ -1,4 +1,4 @@
-"""Exceptions with the codes, the sentences and the remedies of the command line."""
+"""Exceptions with the codes, messages and remedies of the command line."""
 
 from __future__ import annotations
 
@@ -12,27 +12,32 @@ class FreeplayError(Exception):
     The text is what the command prints. ``docs/errors.md`` explains every code.
     """
 
-    #: What the command would have exited with.
+    #: Exit code of the command for the same error.
     exit_code: int = 3
 
-    def __init__(self, text: str, complaints: str = "[]") -> None:
-        super().__init__(text, complaints)
+    def __init__(self, text: str, diagnostics: str = "[]") -> None:
+        super().__init__(text, diagnostics)
         #: All diagnostics with their fields: ``code``, ``what`` and, where known, ``file``, ``line``, ``column``,
         #: ``row``, ``row_group``, ``found``, ``wanted``, ``hint``.
-        self.complaints: list[dict[str, Any]] = json.loads(complaints)
+        self.diagnostics: list[dict[str, Any]] = json.loads(diagnostics)
 
     def __str__(self) -> str:
         return str(self.args[0])
 
     @property
+    def complaints(self) -> list[dict[str, Any]]:
+        """Former name of ``diagnostics``."""
+        return self.diagnostics
+
+    @property
     def code(self) -> str | None:
         """Stable code of the first diagnostic."""
-        return self.complaints[0]["code"] if self.complaints else None
+        return self.diagnostics[0]["code"] if self.diagnostics else None
 
     @property
     def help(self) -> str | None:
         """Remedy of the first diagnostic."""
-        return self.complaints[0].get("hint") if self.complaints else None
+        return self.diagnostics[0].get("hint") if self.diagnostics else None
 
 
 class ConfigError(FreeplayError):

@@ -105,14 +105,14 @@ def _same(files: tuple[str, ...], digest: str) -> Config:
     """The configuration as a worker reads it, which must be the driver's."""
     config = freeplay.load(files)
     if config.digest() != digest:
-        complaint = {
+        diagnostic = {
             "code": "worker_differs",
             "what": "this worker's configuration, tables or version of Freeplay differ from the driver's",
             "file": files[0],
             "hint": "give driver and workers the same files and the same wheel, then run again",
         }
-        text = f"error[{complaint['code']}]: {complaint['what']}\n  file    {files[0]}\nhint: {complaint['hint']}"
-        raise RunError(text, json.dumps([complaint]))
+        text = f"error[{diagnostic['code']}]: {diagnostic['what']}\n  file    {files[0]}\nhint: {diagnostic['hint']}"
+        raise RunError(text, json.dumps([diagnostic]))
     return config
 
 

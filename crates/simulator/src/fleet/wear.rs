@@ -97,7 +97,7 @@ mod tests {
     use crate::seeded_streams::seeded_rng;
 
     #[test]
-    fn every_law_starts_from_nothing_and_grows_as_its_formula_says() {
+    fn every_law_starts_from_zero_and_follows_its_formula() {
         let power = WearLaw::Power { amplitude_m: 2e-5, life_hours: 100.0, exponent: 2.0 };
         assert_eq!((power.growth_m(0.0), power.growth_m(50.0)), (0.0, 5e-6));
         let onset = WearLaw::Onset { onset_hours: 10.0, rate_m_per_hour: 1e-6 };

@@ -49,13 +49,6 @@ impl Plant {
         self
     }
 
-    /// The same actuator with another stiffness.
-    #[must_use]
-    pub fn with_stiffness_n_per_m(mut self, stiffness_n_per_m: f64) -> Self {
-        self.contact.stiffness_n_per_m = stiffness_n_per_m;
-        self
-    }
-
     /// The same actuator with dry and load-dependent friction of both masses times a factor.
     #[must_use]
     pub fn with_friction_factor(mut self, factor: f64) -> Self {

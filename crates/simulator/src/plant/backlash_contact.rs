@@ -293,7 +293,7 @@ mod tests {
 
     /// Beyond the toe, soft and exponential flanks are `p = F/K + (1 − share) depth`.
     #[test]
-    fn a_toe_below_the_band_adds_what_its_asymptote_says() {
+    fn a_toe_below_the_band_adds_its_asymptote() {
         let soft = contact(ContactLaw::Soft { share: 0.4, depth_m: 20e-6 });
         let toe = Contact { lower_law: Some(ContactLaw::Toe { share: 0.5, depth_m: 5e-6 }), ..soft };
         assert!((soft.extrapolated_gap_m(2400.0, 8000.0) - 124e-6).abs() < 1e-12);

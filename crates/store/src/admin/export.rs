@@ -31,9 +31,9 @@ pub enum Format {
 }
 
 impl Store {
-    /// Writes the records that fit, by departure, tail, flight and position, and says how many there are.
+    /// Writes the matching records by departure, tail, flight and position, and returns their number.
     ///
-    /// Numbers are written so that reading them gives the same bits. Two stores of the same logs
+    /// Written numbers read back bitwise identical. Two stores of the same logs
     /// differ in `run_id`, `processed_utc` and `log_path` only.
     ///
     /// # Errors
@@ -51,7 +51,7 @@ impl Store {
         Ok(rows)
     }
 
-    /// The query cut into spans of departures of about as many rows each, one after the other.
+    /// The query split into consecutive spans of departures with about equal numbers of rows.
     fn windows(&self, snapshot: &Snapshot, query: &Query) -> Result<Vec<Query>, Error> {
         if query.last.is_some() {
             return Ok(vec![query.clone()]);

@@ -1,8 +1,8 @@
-//! What a run did, log by log: also of a run that was killed before it could say so.
+//! Log of runs: what each run did with each log, also for a run that was killed.
 //!
-//! When a run begins it writes every log it means to do as *not reached*; each log's own account follows
-//! with the commit of its records. So the tables say at any instant what became of each. Between the two
-//! commits of a batch a log has records and no account yet: it is read as *unaccounted*.
+//! When a run begins it records every planned log as *not reached*. The final status of a log follows in the commit of
+//! its records, so the tables hold the status of every log at any instant. Between the two
+//! commits of a batch a log has records and no status yet: it is read as *unaccounted*.
 
 use std::collections::BTreeMap;
 use std::slice;
@@ -60,10 +60,10 @@ impl Store {
         Ok(runs)
     }
 
-    /// Whether somebody writes just now; in a bucket, whether a run without an end gave a sign of life lately.
+    /// Whether a run holds the store now; in a bucket, whether a run without an end sent a heartbeat recently.
     ///
     /// # Errors
-    /// [`Error::Io`] when the lock cannot be looked at.
+    /// [`Error::Io`] when the lock cannot be read.
     pub fn is_held(&self) -> Result<bool, Error> {
         match self.lock_file() {
             Some(file) => Lock::is_held(&file),
@@ -71,7 +71,7 @@ impl Store {
         }
     }
 
-    /// Whether a run without an end may still go, where no lock says so.
+    /// Whether a run without an end may still be active, where no lock exists.
     fn may_live(&self, run: &RunRecord) -> bool {
         let signs =
             || self.run_logs(&run.run_id).unwrap_or_default().into_iter().map(|log| log.processed_utc);

@@ -101,7 +101,7 @@ fn incomplete_log(log: &LogRecord, stored: i64) -> Diagnostic {
 fn duplicate(key: &RecordKey) -> Diagnostic {
     let RecordKey { tail_number, flight_id, position, .. } = key;
     Diagnostic::new("store_duplicate", format!("{tail_number} {flight_id} {position} is stored twice"))
-        .hint("did another program compact the table while a run was writing? `freeplay run --redo` mends it")
+        .hint("did another program compact the table while a run was writing? `freeplay run --redo` fixes it")
 }
 
 fn wrong_in(table: &Table) -> Vec<Diagnostic> {
@@ -162,8 +162,13 @@ fn wrong_with(table: &Table, file: &DataFile) -> Option<Diagnostic> {
     }
     if !file.has_digest() {
         return Some(
-        diagnostic("store_file_foreign", "a data file was written by another program and carries no digest")
-            .hint("`freeplay store compact` writes its rows anew, with digests; compare them with the logs first")
+            diagnostic(
+                "store_file_foreign",
+                "a data file was written by another program and carries no digest",
+            )
+            .hint(
+                "`freeplay store compact` rewrites its rows with digests; compare them with the logs first",
+            ),
         );
     }
     match missed_by_statistics(table, file) {

@@ -1,7 +1,7 @@
 //! A data file: Parquet whose name carries the digest of its content.
 //!
-//! The digest stands in the name, not in the action's tags nor in a sidecar: it survives checkpoints and
-//! log clean-up, which may drop tags, it cannot be parted from its file, and `b3sum` checks it by hand.
+//! The digest is in the name, not in the action's tags nor in a sidecar: it survives checkpoints and
+//! log clean-up, which may drop tags, it cannot be separated from its file, and `b3sum` verifies it.
 
 use std::path::Path;
 
@@ -34,7 +34,7 @@ pub(crate) fn write(
 ) -> Result<Add, Error> {
     let content = encode(batch)?;
     let name = format!("{version:012}-{}.parquet", blake3::hash(&content).to_hex());
-    // An attempt that was cut short may have left the same content under the same name.
+    // An interrupted attempt may have left the same content under the same name.
     location.create(&location.dir().join(&name), &content)?;
     Ok(Add {
         path: name,

@@ -2,7 +2,7 @@
 //!
 //! Delta Lake stores no checksum of its log. A changed byte can turn `{"add":` into an action that every reader skips,
 //! or narrow the bounds by which files are skipped: rows then disappear without an error. So each log file
-//! `_delta_log/NAME` has an empty file `_digests/NAME.DIGEST` beside the log, where `DIGEST` is the blake3 of its
+//! `_delta_log/NAME` has an empty file `_digests/NAME.DIGEST` next to the log, where `DIGEST` is the blake3 of its
 //! content. Other engines ignore folders whose names begin with an underscore.
 //!
 //! The digest is written before the log file, so a log file never lacks it. Two writers that race for one version leave

@@ -60,7 +60,7 @@ fn replace_parts(path: &FsPath, parts: &[&[u8]]) -> io::Result<()> {
 
 /// Creates a folder and its parents.
 ///
-/// `create_dir_all` returns `AlreadyExists` when the folder exists and its `stat` fails. That error says nothing about
+/// `create_dir_all` returns `AlreadyExists` when the folder exists and its `stat` fails. That error does not concern
 /// the file to be written, so the error of the `stat` is returned instead.
 pub(crate) fn create_folder(dir: &FsPath) -> io::Result<()> {
     match std::fs::create_dir_all(dir) {
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_that_is_taken_is_told_from_one_that_holds_the_same() {
+    fn an_existing_file_is_distinguished_from_one_with_the_same_content() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a");
         assert!(create(&path, b"one").unwrap());

@@ -1,4 +1,4 @@
-//! What Delta's log says about a file's content without opening it: rows, and bounds of its columns.
+//! Statistics of data files in the Delta log: number of rows, and bounds of the columns.
 
 use std::cmp::Ordering;
 use std::collections::BTreeSet;
@@ -13,7 +13,7 @@ use serde_json::{Map, Value, json};
 /// Bounds of times are kept in whole milliseconds: other engines cut them there.
 const MILLI_US: i64 = 1_000;
 
-/// Of so few units at most their numbers are listed: files sorted by tail hold few, a night's file holds all.
+/// Largest number of units listed per file. Files sorted by tail hold few units, the file of a run holds all.
 const LISTED_UNITS: usize = 256;
 
 /// The column of units, and where in the statistics its values stand. Every engine passes over names it does

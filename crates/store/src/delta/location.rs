@@ -55,7 +55,7 @@ impl Location {
         Ok(Self { dir, bucket, runtime })
     }
 
-    /// A folder that exists. Delta's library is asynchronous; one worker beside the caller's thread serves it.
+    /// A folder that exists. The Delta library is asynchronous and gets one worker thread of its own.
     fn folder(path: &Path) -> Result<Self, Error> {
         let dir = std::fs::canonicalize(path).map_err(Error::io(path, "opened"))?;
         let own = Builder::new_multi_thread().worker_threads(1).thread_name("store").enable_all().build();
@@ -169,7 +169,7 @@ impl Location {
         std::fs::read_to_string(&path).map_err(Error::io(path, "read"))
     }
 
-    /// Has a file at hand under its path: one in a bucket is copied there.
+    /// Makes a file available under its local path: a file in a bucket is copied there.
     pub(crate) fn fetch(&self, path: &Path) -> Result<(), Error> {
         let Some(bucket) = &self.bucket else { return Ok(()) };
         let content = bucket.ask(&self.key(bucket, path), async |location| {

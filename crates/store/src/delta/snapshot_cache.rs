@@ -1,7 +1,7 @@
-//! The newest snapshot of a table that this process has seen: good for as long as the table's log is what it was.
+//! Cache of the newest snapshot of a table, valid as long as the table's log does not change.
 //!
-//! A run asks each table some ten times what it holds, and commits in between. To replay the log every time took
-//! a third of what a run costs whatever its logs; one look into the folder tells whether there is anything new.
+//! A run reads the content of each table some ten times, with commits in between. Replaying the log every time took
+//! a third of the fixed cost of a run; one listing of the folder shows whether the log changed.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -23,13 +23,13 @@ struct CachedSnapshot {
     log: LogListing,
 }
 
-/// The files of a log, each with its bytes and when it was written: one that was torn or put in another's place
-/// has others.
+/// The files of a log, each with its size and modification time: a truncated or replaced file
+/// differs in one of them.
 #[derive(PartialEq, Eq)]
 struct LogListing(BTreeMap<OsString, (u64, SystemTime)>);
 
 impl LogListing {
-    /// None where the folder cannot be read, or nobody says when its files were written.
+    /// None where the folder cannot be read, or its files have no modification time.
     fn of(dir: &Path) -> Option<Self> {
         let mut files = BTreeMap::new();
         for entry in std::fs::read_dir(dir).ok()? {

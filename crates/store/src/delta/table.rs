@@ -25,7 +25,7 @@ use crate::delta::snapshot::{DataFile, Snapshot};
 use crate::delta::snapshot_cache::{SnapshotCache, commit_file};
 use crate::error::Error;
 
-/// Attempts at a change before its error is told, each from a fresh snapshot.
+/// Attempts at a change before its error is returned, each from a fresh snapshot.
 const ATTEMPTS: u32 = 5;
 /// The same in a bucket, where no lock keeps others away.
 const ATTEMPTS_WITHOUT_LOCK: u32 = 30;
@@ -95,7 +95,7 @@ impl Table {
             self.keep(made)
         });
         match made {
-            // Somebody else made it in the meantime.
+            // Another process created it in the meantime.
             Err(_) if self.exists()? => Ok(()),
             made => made.map(drop).map_err(self.failed("created")),
         }
@@ -117,8 +117,8 @@ impl Table {
         })
     }
 
-    /// What the table's description should say, where it lacks a column that came with a later release: older
-    /// files have none, which reads as empty.
+    /// The metadata action that adds missing columns of a later release to the table's schema: older
+    /// files lack them, which reads as null.
     fn wider(&self, snapshot: &Snapshot) -> Result<Option<Action>, DeltaTableError> {
         let state = snapshot.delta.snapshot()?;
         let wanted: StructType = self.schema.as_ref().try_into_kernel().map_err(DeltaTableError::from)?;
@@ -177,7 +177,7 @@ impl Table {
         Ok((damaged, foreign))
     }
 
-    /// What a loaded table says, kept for those who ask next.
+    /// Caches the snapshot of a loaded table.
     fn keep(&self, delta: DeltaTable) -> Result<Snapshot, DeltaTableError> {
         let files = delta.snapshot()?.log_data().iter().map(|view| self.file(view)).collect();
         let snapshot = Snapshot { version: delta.version().unwrap_or_default(), files, delta };
@@ -194,7 +194,7 @@ impl Table {
         }
     }
 
-    /// Plans a change on the newest snapshot and commits it; when others were faster, plans it anew.
+    /// Plans a change on the newest snapshot and commits it; after a concurrent commit, plans it again.
     ///
     /// # Errors
     /// What planning fails with, or [`Error::Table`] when the change cannot be committed.
@@ -376,14 +376,14 @@ mod tests {
         assert_eq!(rows(&table), 3);
     }
 
-    /// What a table says of its files: names, sizes and statistics, in order.
-    fn told(snapshot: &Snapshot) -> Vec<String> {
+    /// Files in the table's log: names, sizes and statistics, in order.
+    fn listed_files(snapshot: &Snapshot) -> Vec<String> {
         let file = |file: &DataFile| format!("{:?} {} {:?}", file.path, file.size_bytes, file.stats);
         snapshot.files.iter().map(file).collect()
     }
 
     #[test]
-    fn what_is_kept_of_a_table_says_what_its_log_says_after_every_commit() {
+    fn the_cached_snapshot_equals_the_log_after_every_commit() {
         let dir = tempfile::tempdir().unwrap();
         let (own, location) = (table(dir.path()), Location::at(dir.path()).unwrap());
         // Past two checkpoints, with files that come and go.
@@ -395,7 +395,7 @@ mod tests {
             let (kept, read) =
                 (own.snapshot().unwrap(), Table::new(&location, "numbers", schema()).snapshot().unwrap());
             assert_eq!(kept.version, read.version);
-            assert_eq!(told(&kept), told(&read), "after {n}");
+            assert_eq!(listed_files(&kept), listed_files(&read), "after {n}");
         }
         let (one, another) = (own.snapshot().unwrap(), own.snapshot().unwrap());
         assert!(Arc::ptr_eq(&one.files, &another.files), "what is known was read again");

@@ -1,7 +1,7 @@
-//! Some columns of the records, file by file: for those who go over all of them.
+//! Scan of selected columns of the records, file by file, for callers that read all records.
 //!
-//! A whole fleet's records are tens of millions of rows whose names repeat, so texts stay dictionaries as they lie
-//! in the files, numbers are not copied, and whoever has threads may read several files at once.
+//! A whole fleet's records are tens of millions of rows with repeated names, so text columns stay dictionaries as
+//! stored, numbers are not copied, and a caller with threads may read several files at once.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -74,7 +74,7 @@ impl ColumnScan {
         rows.map(|batch| Ok(cast_to_schema(&batch?, &self.schema)?)).collect()
     }
 
-    /// The rows that fit, told by the columns that are asked for.
+    /// Row filter on the selected columns.
     fn filter(&self, builder: &ParquetRecordBatchReaderBuilder<File>) -> Result<Option<RowFilter>, Error> {
         let asked: Vec<&str> = self.query.columns().collect();
         if asked.is_empty() {

@@ -27,7 +27,7 @@ pub(crate) struct ScanRequest<'a> {
     pub(crate) condition: Option<Expr>,
     /// The columns to sort by; rows stay as they are stored without any.
     pub(crate) order: &'a [&'a str],
-    /// So many rows at most, the last.
+    /// Only the last N rows.
     pub(crate) last: Option<usize>,
 }
 
@@ -43,10 +43,10 @@ impl ScanRequest<'_> {
         if self.files.is_empty() {
             return Ok(RecordBatch::new_empty(self.schema));
         }
-        // Files of one release are alike, and read as one. Where some lack columns that came later, or have
+        // Files of one release have one schema, and are read together. Where some lack columns that came later, or have
         // some that we do not know, Polars refuses, and each is read by itself.
-        let alike = scan(self.files).and_then(|frame| self.concat_collect(vec![self.with_filter(frame)]));
-        let frame = match alike {
+        let together = scan(self.files).and_then(|frame| self.concat_collect(vec![self.with_filter(frame)]));
+        let frame = match together {
             Ok(frame) => frame,
             Err(_) => self.concat_collect(
                 self.files.iter().map(|file| self.scan_one(file)).collect::<PolarsResult<_>>()?,
@@ -112,7 +112,7 @@ fn scan(files: &[PathBuf]) -> PolarsResult<LazyFrame> {
     LazyFrame::scan_parquet_files(paths.into(), options)
 }
 
-/// Polars keeps text as views; whoever asks gets plain `Utf8`.
+/// Polars keeps text as views; callers get plain `Utf8`.
 fn to_arrow(frame: &DataFrame, schema: &SchemaRef) -> Result<RecordBatch, Error> {
     let arrays = schema.fields().iter().map(|field| array(frame.column(field.name())?, field));
     Ok(RecordBatch::try_new(Arc::clone(schema), arrays.collect::<Result<_, _>>()?)?)

@@ -158,8 +158,8 @@ impl Store {
     }
 }
 
-/// Spans of thirty days that together hold every departure; one without an end where the log does not say
-/// when its files begin and end.
+/// Spans of thirty days that together cover every departure; one unbounded span where the log
+/// has no bounds of the departures of its files.
 fn months(snapshot: &Snapshot) -> Vec<(Option<Timestamp>, Option<Timestamp>)> {
     const MONTH_US: i64 = 30 * 86_400_000_000;
     let times = || snapshot.files.iter().map(|file| file.stats.times_us("departure_utc"));

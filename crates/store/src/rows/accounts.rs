@@ -18,8 +18,8 @@ pub enum LogOutcome {
     /// Its records are stored, and the run was killed before it could account for it: the next run does it
     /// again.
     Unaccounted,
-    /// A run means to do it, or was cut short before it came to it. Written when the run begins, so that
-    /// a run that is killed has its account too.
+    /// Planned by a run, or not started before the run was interrupted. Written when the run begins, so that
+    /// a killed run has a status for it too.
     NotReached,
 }
 
@@ -60,17 +60,17 @@ pub struct LogRecord {
     pub size_bytes: i64,
     /// Nanoseconds since 1970 UTC.
     pub modified_utc_ns: i64,
-    /// What tells the file apart in its file system; empty where there is no such thing.
+    /// Identifier of the file in its file system; empty where there is none.
     pub file_id: String,
     /// blake3 of what was read of it, where it could be read.
     pub log_digest: Option<String>,
     /// blake3 of the settings that touch it.
     pub config_digest: Option<String>,
-    /// The aircraft, where the log told it.
+    /// The aircraft, where the log identifies it.
     pub tail_number: Option<String>,
-    /// The flight, where the log told it.
+    /// The flight, where the log identifies it.
     pub flight_id: Option<String>,
-    /// The departure, where the log told it.
+    /// The departure, where the log holds it.
     pub departure_utc: Option<Timestamp>,
     /// The positions it has channels of.
     pub positions: Vec<String>,
@@ -189,7 +189,7 @@ pub struct RunRecord {
     pub errors: i64,
     /// Logs it has not come to, or was stopped before.
     pub not_reached: i64,
-    /// What it told its caller; none for a run that was killed or still goes.
+    /// Exit code; none for a run that was killed or is still active.
     pub exit_code: Option<i64>,
 }
 

@@ -1,4 +1,4 @@
-//! A row type as a table: every column is told once, and read back in the same order.
+//! Mapping of a row type to a table: every column is declared once, and read back in the same order.
 
 use std::sync::Arc;
 

@@ -8,7 +8,7 @@ use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use crate::error::Error;
 use crate::rows::row_schema::{self, RowSchema};
 
-/// The column that tells newer rows from older ones; clocks may go back, commits do not.
+/// The column that orders versions of a row; clocks may go back, commit numbers do not.
 pub(crate) const COMMIT: &str = "commit";
 
 /// A row type's columns and the number of the commit.

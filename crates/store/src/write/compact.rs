@@ -30,11 +30,11 @@ pub struct Compaction {
     pub before: usize,
     /// Data files after.
     pub after: usize,
-    /// Superseded files that nobody can need any more, and that were deleted.
+    /// Number of deleted files that no snapshot within the retention uses.
     pub deleted: usize,
 }
 
-/// So many files more than the rows need slow every question.
+/// Number of files beyond those that the rows need at which a compaction pays.
 const MANY_FILES: usize = 100;
 
 impl Store {
@@ -91,7 +91,7 @@ impl Writer {
     }
 }
 
-/// How a table is laid out anew.
+/// Plan to rewrite a table.
 struct RewritePlan {
     /// Rows of one value lie together.
     slice_by: &'static str,

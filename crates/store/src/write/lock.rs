@@ -52,7 +52,7 @@ pub(crate) struct Lock {
 impl Lock {
     /// Takes the lock, waiting for as long as is allowed.
     pub(crate) fn take(path: &Path, holder: &Holder, wait: Option<Duration>) -> Result<Self, Error> {
-        // Whoever asks `is_held` has the lock for an instant: that is nobody to be refused for.
+        // `is_held` takes the lock for an instant: this must not fail another run.
         let deadline = Instant::now() + wait.unwrap_or_default().max(LOOK_AGAIN);
         let mut options = OpenOptions::new();
         options.read(true).write(true).create(true).truncate(false);
@@ -69,7 +69,7 @@ impl Lock {
         Ok(Self { _file: file })
     }
 
-    /// Whether somebody has the lock.
+    /// Whether another process holds the lock.
     pub(crate) fn is_held(path: &Path) -> Result<bool, Error> {
         let file = match File::open(path) {
             Ok(file) => file,

@@ -1,4 +1,4 @@
-//! Adoption: what a trial found takes the place of what the store says of the same logs.
+//! Promotion: the results of a trial store replace the results of the same logs in the store.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,9 +21,9 @@ pub struct PromotionSummary {
 }
 
 impl Writer {
-    /// Takes over the records, accounts and runs of another store; flights of logs it does not know stay.
+    /// Takes over the records, log status and runs of another store; flights of logs it does not know stay.
     ///
-    /// `watch` is told each tail that is finished, and how many there are.
+    /// `watch` receives each finished tail, and the number of tails.
     ///
     /// Tail by tail, each in one commit, so memory holds one tail's records. A process that dies in between
     /// leaves whole tails of either method; adopted again, the result is the same. A log counts as done
@@ -68,7 +68,7 @@ impl PromotionSummary {
     }
 }
 
-/// What the trial found of one tail, or of the logs that told none.
+/// The trial's results of one tail, or of the logs without a tail.
 fn results(
     trial: &Store,
     tail: Option<&str>,

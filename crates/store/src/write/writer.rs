@@ -161,7 +161,7 @@ fn rows(files: &[PathBuf], schema: SchemaRef) -> Result<RecordBatch, Error> {
     ScanRequest { files, schema, condition: None, order: &[], last: None }.collect()
 }
 
-/// Which rows nobody speaks of.
+/// Mask of the rows without a merge decision.
 fn stays(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<BooleanArray, Error> {
     let keys = keys(batch)?;
     Ok(keys.iter().map(|key| Some(!decisions.contains_key(key))).collect())

@@ -1,4 +1,4 @@
-//! Mann–Kendall's test of a monotonic trend, and two remedies for values that are not independent.
+//! Mann–Kendall test of a monotonic trend, also for autocorrelated values.
 
 use super::{check, sizes_of_equals, theil_sen};
 use crate::error::Error;
@@ -19,7 +19,11 @@ pub struct MannKendall {
     pub tau: f64,
 }
 
-/// Mann–Kendall test of values in order of time (Mann 1945, Kendall 1975), in O(n log n).
+/// Mann–Kendall test of values in order of time, in O(n log n).
+///
+/// S = Σ_{i<j} sign(y_j − y_i) and its variance with ties: Mann 1945 (<https://doi.org/10.2307/1907187>), Kendall
+/// 1975, *Rank Correlation Methods*; S by counting inversions: Knight 1966. The result has no unit and does not depend
+/// on that of `y`.
 ///
 /// # Errors
 /// [`Error::TooFew`] below two values, [`Error::Values`] for values that are not finite.
@@ -28,7 +32,8 @@ pub fn mann_kendall(y: &[f64]) -> Result<MannKendall, Error> {
     Ok(test(y, 1.0))
 }
 
-/// Mann–Kendall with the variance of an autocorrelated series (Hamed & Rao 1998).
+/// Mann–Kendall with the variance of an autocorrelated series: Hamed and Rao 1998
+/// (<https://doi.org/10.1016/S0022-1694(97)00125-X>).
 ///
 /// The ranks of the series, freed of its Sen slope by index, are autocorrelated at every lag; lags
 /// significant at 5 % scale the variance. (The lags cost O(n²), as the slope does.)
@@ -38,7 +43,7 @@ pub fn mann_kendall(y: &[f64]) -> Result<MannKendall, Error> {
 pub fn hamed_rao(y: &[f64]) -> Result<MannKendall, Error> {
     check("Hamed-Rao", 3, y)?;
     let n = y.len() as f64;
-    let ranks = mean_ranks(&detrended(y)?.0);
+    let ranks = mean_ranks(&detrended(y)?);
     let significant = quantile(0.975) / n.sqrt();
     let correlation = Correlation::new(&ranks);
     let sum: f64 = (1..y.len())
@@ -47,20 +52,6 @@ pub fn hamed_rao(y: &[f64]) -> Result<MannKendall, Error> {
         .map(|(lag, r)| (n - lag) * (n - lag - 1.0) * (n - lag - 2.0) * r)
         .sum();
     Ok(test(y, 1.0 + 2.0 / (n * (n - 1.0) * (n - 2.0)) * sum))
-}
-
-/// Mann–Kendall after trend-free pre-whitening (Yue & Wang 2002): the Sen slope is taken off, the
-/// lag-one correlation of what is left is removed, the slope is put back, n − 1 values are tested.
-///
-/// # Errors
-/// [`Error::TooFew`] below three values, [`Error::Values`] for values that are not finite.
-pub fn trend_free_pre_whitening(y: &[f64]) -> Result<MannKendall, Error> {
-    check("trend-free pre-whitening", 3, y)?;
-    let (flat, slope) = detrended(y)?;
-    let lag_one = Correlation::new(&flat).at(1);
-    let whitened: Vec<f64> =
-        flat.windows(2).enumerate().map(|(i, w)| (w[1] - w[0] * lag_one) + (i + 1) as f64 * slope).collect();
-    Ok(test(&whitened, 1.0))
 }
 
 /// The test, with its variance multiplied by `inflation`.
@@ -78,7 +69,7 @@ fn test(y: &[f64], inflation: f64) -> MannKendall {
     MannKendall { s, variance, z, p_value: two_sided(z), tau: s / (0.5 * n * (n - 1.0)) }
 }
 
-/// Sorts the values and counts the pairs that stood strictly in falling order.
+/// Sorts the values and counts the pairs in strictly falling order.
 fn inversions(values: &mut [f64], spare: &mut [f64]) -> u64 {
     let half = values.len() / 2;
     if half == 0 {
@@ -102,11 +93,11 @@ fn inversions(values: &mut [f64], spare: &mut [f64]) -> u64 {
     count
 }
 
-/// The series less its Sen slope by index counted from one, and that slope.
-fn detrended(y: &[f64]) -> Result<(Vec<f64>, f64), Error> {
+/// The series less its Sen slope by index counted from one.
+fn detrended(y: &[f64]) -> Result<Vec<f64>, Error> {
     let index: Vec<f64> = (0..y.len()).map(|i| i as f64).collect();
     let slope = theil_sen(&index, y, 0.95)?.slope;
-    Ok((y.iter().zip(&index).map(|(y, i)| y - (i + 1.0) * slope).collect(), slope))
+    Ok(y.iter().zip(&index).map(|(y, i)| y - (i + 1.0) * slope).collect())
 }
 
 /// Ranks from one, ties sharing their mean.

@@ -1,19 +1,14 @@
-//! The classic statistics engineers know by name: reported, never used as an alarm.
+//! Classic trend statistics: Theil–Sen slope and Mann–Kendall test. They are reported and raise no alarm.
 //!
-//! Where flights share a bias or a season these tests alarm falsely several times too often, and a
-//! robust line misses the bend of every wear law but one; the statements of this crate come from
-//! elsewhere. These are here because a reader will ask for them.
+//! Where flights share a bias or a season, these tests reject the hypothesis of no trend several times too often, and
+//! a line does not follow the bend of most wear laws. Assessments therefore do not use them.
 
 #![expect(clippy::float_cmp, reason = "a tie is exact equality by definition")]
 
-mod line;
 mod mann_kendall;
-mod noise;
 mod theil_sen;
 
-pub use line::{Line, least_squares, weighted_least_squares};
-pub use mann_kendall::{MannKendall, hamed_rao, mann_kendall, trend_free_pre_whitening};
-pub use noise::dispersion;
+pub use mann_kendall::{MannKendall, hamed_rao, mann_kendall};
 pub use theil_sen::{TheilSen, theil_sen};
 
 use crate::error::Error;

@@ -17,11 +17,19 @@ pub struct TheilSen {
     pub slope_high: f64,
 }
 
-/// Theil–Sen slope and its limits at `confidence` (0.95 for 95 %), Sen 1968 equation 2.6 with ties
-/// in x and in y corrected for.
+/// Theil–Sen slope and its limits at `confidence` (0.95 for 95 %), in units of y per unit of x: Sen 1968
+/// (<https://doi.org/10.1080/01621459.1968.10480934>), equation 2.6, with ties in x and in y corrected for.
 ///
-/// Every pair is looked at, so time grows with n²; memory does not, since a bracket from a thin
-/// sample of pairs decides which slopes are worth keeping. The result is exact either way.
+/// ```
+/// let hours = [0.0, 100.0, 200.0, 300.0, 400.0];
+/// let gaps_m = [50e-6, 52e-6, 54e-6, 90e-6, 58e-6];
+/// let line = trend::classic::theil_sen(&hours, &gaps_m, 0.95)?;
+/// assert!((line.slope - 2e-8).abs() < 1e-12);
+/// # Ok::<(), trend::Error>(())
+/// ```
+///
+/// All pairs are compared, so time grows with n²; memory does not, since a bracket from a
+/// subsample of pairs decides which slopes are kept. The result is exact either way.
 ///
 /// # Errors
 /// [`Error::TooFew`] below two points, [`Error::Lengths`], [`Error::Values`] for values that are not

@@ -1,7 +1,5 @@
 //! A unit's estimates made ready: outliers marked, and how large the scatter really is.
 
-use serde::{Deserialize, Serialize};
-
 use crate::classic::median;
 use crate::data::series::{Flight, Gap};
 
@@ -26,7 +24,7 @@ const LARGEST_ERROR: f64 = 1e4;
 const UNSTATED_ERROR: f64 = 0.01;
 
 /// One estimate that takes part.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct WeightedGap {
     /// Index of its flight.
     pub(crate) flight: usize,
@@ -45,12 +43,12 @@ pub(crate) struct CleanedSeries {
     pub(crate) estimates: Vec<WeightedGap>,
     /// Flights whose gap is an outlier.
     pub(crate) outliers: Vec<usize>,
-    /// By what they were told apart.
+    /// The noise scale by which outliers were found.
     pub(crate) scatter: NoiseScale,
 }
 
 /// How a unit's gaps scatter: enough to clean the gaps of the flights that follow.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct NoiseScale {
     /// Variance found over variance stated.
     pub(crate) noise_factor: f64,
@@ -58,12 +56,12 @@ pub(crate) struct NoiseScale {
     pub(crate) typical_m: f64,
     /// The act limit, metres.
     pub(crate) limit_m: f64,
-    /// The last gaps, as many as the window of another one reaches back.
+    /// The last gaps, as far back as the window of a new one reaches.
     pub(crate) recent: Vec<OutlierResult>,
 }
 
 /// A gap that was cleaned.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct OutlierResult {
     pub(crate) gap_m: f64,
     pub(crate) error_m: f64,
@@ -72,8 +70,9 @@ pub(crate) struct OutlierResult {
 
 /// Marks outliers against the median of their neighbours and rescales the stated standard errors.
 ///
-/// The factor is that of [`classic::dispersion`](crate::classic::dispersion); errors that were not
-/// stated, or stated far too small for their neighbours, count as the unit's median one.
+/// The factor is the variance factor from successive differences,
+/// (1.4826 · median |y(k+1) − y(k)| / √(se(k)² + se(k+1)²))². Errors that are missing, or far too small for their
+/// neighbours, count as the unit's median one.
 pub(crate) fn mark_outliers(flights: &[Flight], limit_m: f64) -> CleanedSeries {
     let stated: Vec<(usize, Gap)> =
         flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?))).collect();
@@ -142,7 +141,7 @@ impl NoiseScale {
     }
 }
 
-/// Whether a gap lies far from what its neighbours say it is, worn or not.
+/// Whether a gap is far from the level of its neighbours, with or without wear.
 fn is_outlier(gaps: &[f64], at: usize, variance: f64) -> bool {
     let reach_m = OUTLIER_SIGMA * variance.sqrt();
     is_far_from_median(gaps, at, reach_m)
@@ -189,8 +188,8 @@ fn typical_error(stated: &[(usize, Gap)], limit_m: f64) -> f64 {
     if errors.is_empty() { UNSTATED_ERROR * limit_m } else { median(&mut errors) }
 }
 
-/// A stated error no smaller than half the typical one: a between-flight scatter that nobody states
-/// bounds what a single flight can be worth.
+/// Standard error of a gap, at least half the typical one: an unknown between-flight scatter
+/// bounds the weight of a single flight.
 fn error(gap: Gap, typical_m: f64, limit_m: f64) -> f64 {
     let stated_m = if gap.se_m.is_finite() { gap.se_m.max(0.5 * typical_m) } else { typical_m };
     stated_m.clamp(LEAST_ERROR * limit_m, LARGEST_ERROR * limit_m)
@@ -209,20 +208,20 @@ fn noise_factor(gaps: &[f64], errors: &[f64]) -> f64 {
         return 1.0;
     }
     let count = ratios.len() as f64;
-    // Wear that shows from one flight to the next is no noise: it moves all differences alike.
+    // Wear that shows from one flight to the next is no noise: it moves all differences equally.
     let wear = median(&mut ratios);
     ratios.iter_mut().for_each(|ratio| *ratio = (*ratio - wear).abs());
     let found = (1.4826 * median(&mut ratios)).powi(2);
-    // Errors stated ten times too large were not meant; that gaps repeat to the last digit says nothing.
+    // A common factor of the stated errors is limited; exactly repeating gaps carry no information about it.
     let stated = if found > 0.0 { (100.0 * found).min(1.0) } else { 1.0 };
     ((found * count + PRIOR_COUNT * stated) / (count + PRIOR_COUNT)).max(0.05 * stated)
 }
 
-/// What the flights around one say it should be, if they wear evenly: the median of their pairwise
+/// Level of a flight from its neighbours under even wear: the median of their pairwise
 /// slopes through the median of their levels (Theil 1950).
 ///
 /// A running median lags behind a unit that wears fast, most of all at the ends of its history, and
-/// would call its wear a row of outliers. Only where it does is this looked at.
+/// would mark its wear as outliers. This line is computed only there.
 fn on_local_line(gaps: &[f64], at: usize) -> f64 {
     let (first, window) = window(gaps, at);
     on_line(window, (at - first) as f64)

@@ -1,7 +1,5 @@
 //! One serial number's flights in order, with the usage behind each gap.
 
-use serde::{Deserialize, Serialize};
-
 use crate::error::Error;
 
 /// One flight of a unit, as a caller knows it; order does not matter.
@@ -24,7 +22,7 @@ pub struct Observation {
     pub gap_se_m: Option<f64>,
 }
 
-/// What stands in where usage is not known, and where a unit's own hours begin.
+/// Defaults for unknown usage, and the start of a unit's own hours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UsageDefaults {
     /// Length of a flight that states none and has no hour meter, hours.
@@ -64,7 +62,7 @@ impl Default for UsageDefaults {
 }
 
 /// A gap and its stated standard error.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {
     /// The gap, metres.
     pub gap_m: f64,
@@ -73,7 +71,7 @@ pub struct Gap {
 }
 
 /// One flight with the unit's usage at its end, counted from the start of its first flight here.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flight {
     /// Departure, microseconds since 1970 UTC.
     pub departure_us: i64,
@@ -89,7 +87,7 @@ pub struct Flight {
     pub gap: Option<Gap>,
 }
 
-/// An entry of the maintenance book.
+/// A recorded maintenance event.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaintenanceEvent {
     /// When it was done, microseconds since 1970 UTC.
@@ -125,8 +123,6 @@ pub struct Series {
     unit_hours_at_start: Option<f64>,
     source: UsageSource,
     maintenance: Vec<MaintenanceEvent>,
-    /// After the last flight.
-    meter: UsageAccumulator,
 }
 
 impl Series {
@@ -142,17 +138,21 @@ impl Series {
         }
         let rows = in_order(rows)?;
         let mut meter = UsageAccumulator::new(nominal);
-        let flights = rows.iter().map(|row| meter.fly(row)).collect();
+        let flights: Vec<Flight> = rows.iter().map(|row| meter.fly(row)).collect();
+        debug_assert!(
+            flights.is_sorted_by_key(|flight| flight.departure_us),
+            "flights are in order of departure"
+        );
+        debug_assert!(flights.is_sorted_by(|a, b| a.hours <= b.hours), "hours do not decrease");
         Ok(Self {
             flights,
             unit_hours_at_start: usage.unit_hours_at_start,
             source: usage.source,
             maintenance: Vec::new(),
-            meter,
         })
     }
 
-    /// The same with what the maintenance book says of the unit, in any order.
+    /// The same with the recorded maintenance of the unit, in any order.
     #[must_use]
     pub fn with_maintenance(mut self, mut maintenance: Vec<MaintenanceEvent>) -> Self {
         maintenance.sort_unstable_by_key(MaintenanceEvent::order);
@@ -160,12 +160,7 @@ impl Series {
         self
     }
 
-    /// All entries of the book.
-    pub(crate) fn maintenance(&self) -> &[MaintenanceEvent] {
-        &self.maintenance
-    }
-
-    /// The entries of the book that were made at or before a date.
+    /// The recorded maintenance at or before a date.
     pub fn maintenance_until(&self, as_of_us: i64) -> &[MaintenanceEvent] {
         &self.maintenance[..self.maintenance.partition_point(|entry| entry.utc_us <= as_of_us)]
     }
@@ -180,8 +175,7 @@ impl Series {
         &self.flights[..self.flights.partition_point(|flight| flight.departure_us <= as_of_us)]
     }
 
-    /// The gaps known on a day, in order of departure: what the [classic statistics](crate::classic)
-    /// are asked about.
+    /// The gaps known on a day, in order of departure: input of the [classic statistics](crate::classic).
     pub fn gaps_until(&self, as_of_us: i64) -> Vec<f64> {
         self.flights_until(as_of_us).iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect()
     }
@@ -195,15 +189,10 @@ impl Series {
     pub fn unit_hours_at_start(&self) -> Option<f64> {
         self.unit_hours_at_start
     }
-
-    /// The usage after the last flight, to go on from.
-    pub(crate) fn meter(&self) -> UsageAccumulator {
-        self.meter
-    }
 }
 
 /// Rows in the order of the flights, each flight once.
-pub(crate) fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<Vec<Observation>, Error> {
+fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<Vec<Observation>, Error> {
     let mut rows: Vec<Observation> = rows.into_iter().collect();
     rows.iter().try_for_each(check)?;
     rows.sort_unstable_by(order);
@@ -211,7 +200,7 @@ pub(crate) fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<Ve
     Ok(rows)
 }
 
-/// Numbers that would poison every sum after them are refused at the door.
+/// Rejects values that are not finite or out of range.
 fn check(row: &Observation) -> Result<(), Error> {
     let numbers = [
         ("flight_hours", row.flight_hours, 0.0),
@@ -240,18 +229,18 @@ fn order(a: &Observation, b: &Observation) -> std::cmp::Ordering {
 }
 
 /// The unit's usage so far, and the hour meter it was last read against.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) struct UsageAccumulator {
-    pub(crate) nominal_flight_hours: f64,
-    pub(crate) hours: f64,
-    pub(crate) flights: f64,
-    pub(crate) reversals: f64,
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct UsageAccumulator {
+    nominal_flight_hours: f64,
+    hours: f64,
+    flights: f64,
+    reversals: f64,
     /// Reversals that were stated, and the hours they were stated for.
-    pub(crate) stated: (f64, f64),
+    stated: (f64, f64),
     /// Hours flown in rows, and how many rows.
-    pub(crate) rows: (f64, f64),
+    rows: (f64, f64),
     /// Installation, meter reading and the unit's hours at the last flight that stated one.
-    pub(crate) anchor: Option<(u32, f64, f64)>,
+    anchor: Option<(u32, f64, f64)>,
 }
 
 impl UsageAccumulator {
@@ -268,7 +257,7 @@ impl UsageAccumulator {
     }
 
     /// Adds a flight.
-    pub(crate) fn fly(&mut self, row: &Observation) -> Flight {
+    fn fly(&mut self, row: &Observation) -> Flight {
         let before = self.hours;
         let metered = self.metered(row);
         let own = row.flight_hours.or(metered.map(|h| h - before)).unwrap_or(self.nominal_flight_hours);

@@ -194,9 +194,9 @@ impl PrefixSums {
         (side.xy + self.slope_information * other) / (side.xx + self.slope_information)
     }
 
-    /// The step with the largest ratio to its error, over all places from one on and all reaches.
+    /// The step with the largest ratio to its standard error, over all places from one on and all window lengths.
     ///
-    /// Every third place is looked at, then all those near one that is half way to belief.
+    /// Every third place is tested first, then all places near those with half the required ratio.
     fn largest(&self, low: usize, from: usize, high: usize) -> Option<StepChange> {
         let ratio = |step: &StepChange| (step.step_m / step.se_m).abs();
         let places = from.max(low + MIN_ESTIMATES)..(high + 1).saturating_sub(MIN_ESTIMATES);

@@ -1,9 +1,7 @@
-//! What a unit's flights say until a checkpoint: all that a later statement needs of them.
+//! Checkpoint: the result of a unit's flights up to a count, sufficient for later assessments.
 //!
-//! Checkpoints lie where the count of flights says, so a state that was kept night by night and one made
-//! from the whole history stand on the same flights.
-
-use serde::{Deserialize, Serialize};
+//! Checkpoints follow from the count of flights, so an incremental snapshot and a computation
+//! from the whole history use the same flights.
 
 use crate::data::outliers::{NoiseScale, WeightedGap};
 use crate::data::segment::Segment;
@@ -20,8 +18,8 @@ use crate::statement::types::{ChangePoint, ChangePointKind};
 /// Flights of the shortest history that is not judged whole every time.
 const SHORTEST: usize = 64;
 
-/// A checkpoint lies at every so many flights: the largest power of two in this share of the history, within
-/// bounds. Twice the share, and laws with two knees are seen too late: 90 % intervals held 1 to 2 % less.
+/// Checkpoints are at multiples of the largest power of two in this share of the history, within
+/// bounds. With twice the share, laws with two knees are found too late: 90 % intervals held 1 to 2 % less.
 const SHARE: usize = 32;
 const SHORTEST_STRIDE: usize = 4;
 const LONGEST_STRIDE: usize = 64;
@@ -46,8 +44,8 @@ pub(crate) fn before(flights: usize) -> usize {
     flights / stride * stride
 }
 
-/// What the flights until a checkpoint say.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// Result of the flights until a checkpoint.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Checkpoint {
     pub(crate) flights: usize,
     pub(crate) estimates: usize,
@@ -56,7 +54,6 @@ pub(crate) struct Checkpoint {
     pub(crate) last_gap_us: Option<i64>,
     /// The changes until then, but for an onset in the last segment.
     pub(crate) changes: Vec<ChangePoint>,
-    #[serde(with = "crate::incremental::departure_deltas")]
     pub(crate) outliers_us: Vec<i64>,
     pub(crate) scatter: NoiseScale,
     /// Variance that undone offsets leave in the level and that of what the steps were, m², and what has been
@@ -76,12 +73,10 @@ pub(crate) struct Checkpoint {
     /// The first flight of the pace's days, and the first one of every few days among them.
     pub(crate) days: Vec<UsageSample>,
     pub(crate) used: RecentUsage,
-    /// Of the entries of the book until the last flight.
-    pub(crate) maintenance: u64,
 }
 
 /// An estimate as the search for steps needs it: its offset undone, metres and m⁻².
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StepWindowEntry {
     pub(crate) hours: f32,
     pub(crate) gap_m: f32,
@@ -89,7 +84,7 @@ pub(crate) struct StepWindowEntry {
 }
 
 /// A flight as the pace needs it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct UsageSample {
     pub(crate) departure_us: i64,
     pub(crate) hours: f64,
@@ -105,15 +100,15 @@ impl UsageSample {
 
 /// How the unit was used of late: flights of its present installation, and hours and usage where the last
 /// flights began, and where those of the installation did.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct RecentUsage {
     pub(crate) here: usize,
     pub(crate) last: (f64, f64),
     pub(crate) since_here: (f64, f64),
 }
 
-/// What the last segment says at its end.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// Posterior of the last segment at its end.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) enum SegmentPosterior {
     /// Nothing: it has no estimate, or no usage.
     Nothing,
@@ -125,7 +120,7 @@ pub(crate) enum SegmentPosterior {
     By(Mixture),
 }
 
-/// Flights, and what the books say of them.
+/// Flights, and recorded maintenance.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HistoryView<'a> {
     pub(crate) flights: &'a [Flight],
@@ -134,7 +129,7 @@ pub(crate) struct HistoryView<'a> {
 }
 
 impl HistoryView<'_> {
-    /// What was known when only so many flights had been made.
+    /// The view after the given number of flights.
     pub(crate) fn first(&self, flights: usize) -> Self {
         let flights = &self.flights[..flights];
         let maintenance =
@@ -173,7 +168,6 @@ impl Checkpoint {
             onsets: Vec::new(),
             days: days(flights),
             used: RecentUsage::of(flights, prior),
-            maintenance: digest_of(maintenance),
         };
         (checkpoint, history)
     }
@@ -283,11 +277,4 @@ impl RecentUsage {
         let ratio = (last.hours - hours) / (prior.usage(last) - usage);
         if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
     }
-}
-
-/// The digest of a book's entries (Fowler, Noll and Vo).
-pub(crate) fn digest_of(maintenance: &[MaintenanceEvent]) -> u64 {
-    crate::math::fnv::fnv1a(
-        maintenance.iter().flat_map(|entry| [entry.utc_us as u64, u64::from(entry.renews)]),
-    )
 }

@@ -1,10 +1,8 @@
-//! What is kept of a unit from night to night, so that a flight more does not ask for all those before.
+//! Assessment of a unit from its last checkpoint and the flights after it.
 
-use crate::data::series::{Flight, MaintenanceEvent, Observation, Series, UsageAccumulator, in_order};
-use crate::error::Error;
+use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::incremental::checkpoint::{
-    self, Checkpoint, DAY_US, HistoryView, SegmentPosterior, UTILIZATION_DAYS, UsageSample, digest_of,
-    events_until,
+    self, Checkpoint, DAY_US, HistoryView, SegmentPosterior, UTILIZATION_DAYS, UsageSample, events_until,
 };
 use crate::incremental::tail::Tail;
 use crate::inference::posterior::Posterior;
@@ -16,40 +14,28 @@ use crate::statement::level;
 use crate::statement::state::{Evidence, State, alert_state};
 use crate::statement::types::{ChangePoint, ChangePointKind, MIN_ESTIMATES, Utilization, WearStatus};
 
-/// A unit's flights until a checkpoint as they were judged, and those after it as they were flown.
+/// Assessed state of a unit: the result of its flights until a checkpoint, and the flights after it.
 ///
-/// A statement stands on both: the checkpoint's curves, weighed and moved on by the few estimates that
-/// follow. Where those do not go on as was foretold (a step shows, an outlier was none, they lie too far
-/// off) it stands on the whole history. Checkpoints follow from the count of flights alone, and
-/// [`assess`](crate::assess()) makes its statements in this way too: what is said from a state that was kept
-/// is what is said from nothing, bit for bit, whatever the nights and the order of arrival.
-#[derive(Debug, Clone, PartialEq)]
-pub struct UnitSnapshot {
-    pub(crate) checkpoint: Checkpoint,
+/// An assessment uses both: the checkpoint's mixture, updated by the few estimates that
+/// follow. Where those do not follow the forecast (a step, an outlier that was none, a large
+/// deviation), the assessment uses the whole history. Checkpoints follow from the count of flights alone, so
+/// assessments at the dates of earlier flights share a checkpoint.
+#[derive(Debug, Clone)]
+pub(crate) struct UnitSnapshot {
+    checkpoint: Checkpoint,
     /// The flights after it.
-    pub(crate) tail: Vec<Flight>,
-    /// The usage after the last flight; nothing where later flights were known when it was made.
-    pub(crate) meter: Option<UsageAccumulator>,
-    pub(crate) unit_hours_at_start: Option<f64>,
-    /// Of the prior it was judged by.
-    pub(crate) prior: u64,
+    tail: Vec<Flight>,
+    unit_hours_at_start: Option<f64>,
 }
 
-/// What the last segment says now, or the level that was not stated and what the last estimates say.
+/// Current posterior of the last segment, or the unsupported level and that of the last estimates.
 pub(crate) struct CurrentFit {
     tail: Tail,
     fitted: Result<(Posterior, bool), Option<(f64, f64)>>,
 }
 
 impl UnitSnapshot {
-    /// Judges a unit's flights until a day, by a prior learned from nothing later.
-    ///
-    /// For what [`assess`](crate::assess()) says without a prior it is [`FleetPrior::uninformative`] of the limit.
-    pub fn from_series(series: &Series, as_of_us: i64, prior: &FleetPrior) -> Self {
-        Self::current(series, as_of_us, prior).0
-    }
-
-    /// The same, and where the unit stands.
+    /// Computes the state of a unit at a date and its current fit, with a prior learned from earlier data.
     pub(crate) fn current(series: &Series, as_of_us: i64, prior: &FleetPrior) -> (Self, CurrentFit) {
         let flights = series.flights_until(as_of_us);
         let known = HistoryView {
@@ -60,9 +46,7 @@ impl UnitSnapshot {
         let snapshot = |checkpoint: Checkpoint| Self {
             tail: flights[checkpoint.flights..].to_vec(),
             checkpoint,
-            meter: (flights.len() == series.flights().len()).then(|| series.meter()),
             unit_hours_at_start: series.unit_hours_at_start(),
-            prior: prior.digest(),
         };
         let count = checkpoint::before(flights.len());
         if count < flights.len()
@@ -76,74 +60,26 @@ impl UnitSnapshot {
         (snapshot(checkpoint), current)
     }
 
-    /// The same with flights that were made since, in any order; nothing where the history is needed: a
-    /// flight is not later than all before, a checkpoint has been passed, or the state was made of a day
-    /// before the last flight that was known.
-    ///
-    /// # Errors
-    /// [`Error::Observation`] as [`Series::new`].
-    pub fn append(&self, rows: impl IntoIterator<Item = Observation>) -> Result<Option<Self>, Error> {
-        let rows = in_order(rows)?;
-        let order = |departure_us: i64, installation: u32| (departure_us, installation);
-        let last = self.last().map(|flight| order(flight.departure_us, flight.installation));
-        let is_late = rows.first().is_some_and(|row| Some(order(row.departure_us, row.installation)) <= last);
-        let count = self.checkpoint.flights + self.tail.len() + rows.len();
-        let Some(mut meter) = self.meter.filter(|_| !is_late) else { return Ok(None) };
-        if !rows.is_empty() && checkpoint::before(count) != self.checkpoint.flights {
-            return Ok(None);
-        }
-        let mut tail = self.tail.clone();
-        tail.extend(rows.iter().map(|row| meter.fly(row)));
-        Ok(Some(Self { tail, meter: Some(meter), ..self.clone() }))
-    }
-
-    /// What was kept on an earlier day since the checkpoint; nothing for one before it.
+    /// The state at an earlier date since the checkpoint; nothing for a date before it.
     pub(crate) fn truncate(&self, as_of_us: i64) -> Option<Self> {
         let flown = self.tail.partition_point(|flight| flight.departure_us <= as_of_us);
         let is_later = self.checkpoint.last.is_some_and(|last| last.departure_us <= as_of_us);
         let count = self.checkpoint.flights + flown;
-        (is_later && checkpoint::before(count) == self.checkpoint.flights).then(|| Self {
-            tail: self.tail[..flown].to_vec(),
-            meter: None,
-            ..self.clone()
-        })
+        (is_later && checkpoint::before(count) == self.checkpoint.flights)
+            .then(|| Self { tail: self.tail[..flown].to_vec(), ..self.clone() })
     }
 
-    /// States what is known of the unit on a day, as [`assess`](crate::assess()) does from its whole history.
-    ///
-    /// `maintenance` is all that the maintenance book says of the unit, in any order. Nothing where the history is
-    /// needed: the last flights do not go on as was foretold, the day is before the last of them, or prior
-    /// or book are not those that the state was made with.
-    ///
-    /// # Errors
-    /// As [`assess`](crate::assess()).
-    pub fn assess(
-        &self,
-        as_of_us: i64,
-        maintenance: &[MaintenanceEvent],
-        settings: &Settings,
-        prior: &FleetPrior,
-        previous: Option<State>,
-    ) -> Result<Option<Assessment>, Error> {
-        settings.check()?;
-        let mut maintenance = maintenance.to_vec();
-        maintenance.sort_unstable_by_key(MaintenanceEvent::order);
-        let maintenance = events_until(&maintenance, as_of_us);
-        let is_later = self.last().is_none_or(|last| last.departure_us <= as_of_us);
-        let read = self.checkpoint.last.map_or(&[][..], |last| events_until(maintenance, last.departure_us));
-        if !is_later || self.prior != prior.digest() || self.checkpoint.maintenance != digest_of(read) {
-            return Ok(None);
+    /// Current fit of a truncated state; nothing where the last flights do not follow the forecast, so that the
+    /// history is needed.
+    pub(crate) fn fit(&self, prior: &FleetPrior) -> Option<CurrentFit> {
+        if self.tail.is_empty() {
+            return Some(CurrentFit::at(&self.checkpoint, prior));
         }
-        let current = if self.tail.is_empty() {
-            Some(CurrentFit::at(&self.checkpoint, prior))
-        } else {
-            Tail::read(&self.checkpoint, &self.tail, prior)
-                .and_then(|tail| CurrentFit::after(&self.checkpoint, tail, &self.tail, prior))
-        };
-        Ok(current.map(|current| self.statement(current, as_of_us, maintenance, settings, prior, previous)))
+        let tail = Tail::read(&self.checkpoint, &self.tail, prior)?;
+        CurrentFit::after(&self.checkpoint, tail, &self.tail, prior)
     }
 
-    /// What is said of where the unit stands; the book is ordered, and ends on the day.
+    /// Assessment from the current fit; the maintenance is sorted, and ends on the date.
     pub(crate) fn statement(
         &self,
         current: CurrentFit,
@@ -259,8 +195,8 @@ impl UnitSnapshot {
     }
 }
 
-/// The checkpoint at a count of flights and where the unit stands after the rest; nothing where the rest
-/// does not go on as was foretold.
+/// The checkpoint at a count of flights and the fit after the remaining flights; nothing where those
+/// do not follow the forecast.
 fn fit_from_checkpoint(
     known: &HistoryView<'_>,
     count: usize,
@@ -285,7 +221,7 @@ impl CurrentFit {
         Self { tail: Tail::default(), fitted }
     }
 
-    /// What the last segment says, and whether without the fleet.
+    /// Posterior of the last segment, and whether it uses the single-unit prior.
     pub(crate) fn fitted(&self) -> Option<(&Posterior, bool)> {
         self.fitted.as_ref().ok().map(|(posterior, is_single_unit)| (posterior, *is_single_unit))
     }

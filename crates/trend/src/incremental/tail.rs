@@ -1,6 +1,6 @@
-//! The flights after a checkpoint: what they say as long as they go on as was foretold.
+//! The flights after a checkpoint, as long as they follow the forecast.
 //!
-//! Where they do not, nothing is said of them apart from the rest: the whole history is to be judged anew.
+//! Where they do not, the whole history is assessed again.
 
 use crate::data::bins::{self, BINS};
 use crate::data::outliers::WeightedGap;

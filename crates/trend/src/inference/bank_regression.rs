@@ -1,7 +1,7 @@
-//! The regressions of all curves of a bank, from few passes of the filter.
+//! Regressions of all candidates of a bank, from few passes of the filter.
 //!
-//! A pass is linear in the heights, and what is left of a curve's squares is quadratic, so the regression
-//! of a curve that is a multiple of a part, beside a line and a constant, follows from theirs.
+//! A pass is linear in the basis values, and the remaining squares of a curve are quadratic. So the regression
+//! of a curve that is a multiple of a basis sequence, plus a line and a constant, follows from theirs.
 
 use crate::inference::level_filter::{Pass, Regression};
 use crate::inference::segment_fit::SegmentFit;

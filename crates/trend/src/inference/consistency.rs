@@ -1,21 +1,21 @@
-//! No statement against the unit's own eyes: the level must be where the last estimates are.
+//! Consistency check: the posterior level must agree with the unit's latest estimates.
 //!
-//! A prior can be so sure of itself that it outvotes a unit: a fleet of which nothing wears, with new gaps
-//! alike to the micrometre, leaves no curve for a unit near its limit. Then the unit is judged by itself,
-//! and where that does not fit either, not at all.
+//! A confident prior can outweigh the data of a unit: a fleet without wear, with equal new gaps,
+//! leaves no candidate for a unit near its limit. Then the unit is assessed with the single-unit prior,
+//! and where that does not agree either, it is not assessed.
 
 use crate::data::outliers::WeightedGap;
 use crate::data::segment::Segment;
 use crate::inference::posterior::{Component, Posterior, posterior};
 use crate::prior::fleet_prior::FleetPrior;
 
-/// Last estimates that are asked.
+/// Number of latest estimates of the check.
 const RECENT: usize = 12;
 
 /// Standard errors beyond which the level is not theirs.
 const REACH: f64 = 5.0;
 
-/// A segment's mixture, and whether it stands on the prior of a unit alone.
+/// A segment's mixture, and whether it uses the single-unit prior.
 pub(crate) struct ConsistentPosterior {
     pub(crate) posterior: Posterior,
     pub(crate) is_single_unit: bool,
@@ -52,7 +52,7 @@ pub(crate) fn fit_consistent(
     Err(why)
 }
 
-/// What the mixture says of the last estimates, and what they say.
+/// Level of the mixture, and level of the latest estimates.
 pub(crate) struct LevelCheck {
     level_m: f64,
     recent_m: f64,
@@ -66,7 +66,7 @@ impl LevelCheck {
     }
 }
 
-/// The last estimates, which are asked.
+/// The latest estimates, which the check uses.
 pub(crate) fn recent_estimates(estimates: &[WeightedGap]) -> &[WeightedGap] {
     &estimates[estimates.len().saturating_sub(RECENT)..]
 }
@@ -90,7 +90,7 @@ pub(crate) fn level_check(
     };
     let systematic_m2 = prior.bias_sd_m.powi(2) + prior.season.sd_m.powi(2) + offset_m2;
     let recent_m = mean(&|e| e.gap_m - season(e));
-    // Errors that were stated too large would let anything pass: the scatter is asked, too.
+    // Stated errors that are too large would accept any level: the scatter is a second criterion.
     let scatter_m2 = mean(&|e| (e.gap_m - season(e) - recent_m).powi(2));
     let error_m2 = weight.recip().min(scatter_m2);
     LevelCheck {

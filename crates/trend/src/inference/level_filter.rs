@@ -11,7 +11,7 @@
 
 use crate::data::bins::Bin;
 
-/// Spread of the level's start, a share of the limit: far wider than any gap, so that the data say where it is.
+/// Spread of the level's start, a share of the limit: far wider than any gap, so that the data determine the level.
 const DIFFUSE: f64 = 10.0;
 
 /// What the gains are made of at one bin.
@@ -92,7 +92,7 @@ impl Filter {
         Pass { weighted, square, end, start }
     }
 
-    /// Runs the heights of some curves through at once, beside the passes of the gaps and of the season.
+    /// Filters the basis values of several curves at once, with the passes of the gaps and of the season.
     ///
     /// Each step of a curve waits for the one before it; other curves fill the time.
     pub(crate) fn regress_lanes<const N: usize>(
@@ -122,7 +122,7 @@ impl Filter {
         })
     }
 
-    /// Runs one sequence through beside two others.
+    /// Filters one sequence, with two other passes.
     pub(crate) fn regress(&self, gaps: &Pass, season: &Pass, basis_values: &[f64]) -> Regression {
         let [regression] = self.regress_lanes(gaps, season, basis_values.as_chunks::<1>().0);
         regression
@@ -133,10 +133,10 @@ impl Filter {
 mod tests {
     use super::*;
 
-    /// Two measurements of a level that stands still: the smoothed first level is their mean, and its
+    /// Two measurements of a constant level: the smoothed first level is their mean, and its
     /// variance the half of one's, by hand.
     #[test]
-    fn a_level_that_stands_still_is_the_mean_of_its_measurements() {
+    fn a_constant_level_is_the_mean_of_its_measurements() {
         let bins = [1.0, 3.0].map(|um| Bin {
             usage: um,
             departure_us: 0.0,

@@ -1,7 +1,5 @@
 //! A mixture over the bank made small: of many nodes some, in single precision.
 
-use serde::{Deserialize, Serialize};
-
 use crate::inference::posterior::{AgeAssumption, Component, Posterior};
 use crate::prior::fleet_prior::FleetPrior;
 use crate::wear::bank::WearLaw;
@@ -10,7 +8,7 @@ use crate::wear::bank::WearLaw;
 const MOST: usize = 96;
 
 /// A node's law, its age in hours, and its numbers in metres.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StoredComponent {
     pub(crate) law: WearLaw,
     pub(crate) onset_pending: bool,
@@ -23,7 +21,7 @@ pub(crate) struct StoredComponent {
 }
 
 /// What the nodes of a [`Posterior`] share, and those that stand for all.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Mixture {
     /// Judged without the fleet.
     pub(crate) is_single_unit: bool,
@@ -38,14 +36,14 @@ pub(crate) struct Mixture {
 }
 
 impl Mixture {
-    /// Keeps what a posterior says at the end of its segment.
+    /// Compresses a posterior at the end of its segment.
     pub(crate) fn of(posterior: &Posterior, span: f64, is_single_unit: bool) -> Self {
         let Posterior { since, level_m2, growth_m2, seasonal_m2, level_seasonal_m2, .. } = *posterior;
         let components = thin(&posterior.components);
         Self { is_single_unit, span, since, level_m2, growth_m2, seasonal_m2, level_seasonal_m2, components }
     }
 
-    /// The posterior that was kept; its evidence and its guesses, which only a fleet's lesson asks, are not.
+    /// The stored posterior, without its evidence and age assumptions, which only the learning of a fleet prior uses.
     pub(crate) fn posterior(&self, prior: &FleetPrior) -> Posterior {
         let component = |component: &StoredComponent| {
             let age_begin = f64::from(component.age_begin);

@@ -1,4 +1,4 @@
-//! What a segment's bins say about every curve of the bank: weights, amplitudes, levels.
+//! Posterior of every candidate of the bank, given a segment's bins: weights, amplitudes, levels.
 
 use crate::data::bins;
 use crate::data::segment::Segment;
@@ -55,7 +55,7 @@ pub(crate) struct Component {
     pub(crate) level_m: f64,
     /// The gap of this unit when new, metres.
     pub(crate) new_m: f64,
-    /// The unit's own swing beside the fleet's mean one, metres.
+    /// The unit's seasonal amplitude in addition to the fleet's mean one, metres.
     pub(crate) seasonal_m: f64,
     /// What had to be guessed of its age at first sight.
     pub(crate) age_assumption: AgeAssumption,
@@ -159,6 +159,7 @@ fn likeliest(believed: &[(usize, Component)]) -> Vec<Component> {
         components.truncate(FEW);
     }
     let total: f64 = components.iter().map(|n| n.weight).sum();
+    debug_assert!(total > 0.0 && total < 1.0 + 1e-9, "weights of components add up to {total}");
     for component in &mut components {
         component.weight /= total;
     }
@@ -222,7 +223,7 @@ fn components(fit: &SegmentFit<'_>, bank: &CandidateBank, tried: LifeGrid) -> Ve
     };
     let mut best = f64::NEG_INFINITY;
     add(top, best, &mut |component| best = best.max(component.weight));
-    // Where the prior forbids what fits best, its bound says nothing of the others.
+    // Where the prior excludes the best fit, its bound does not bound the others.
     let floor = top.bound.min(best + USUAL) - tried.drop - SLACK;
     let flat = bank.candidates.iter().position(|candidate| candidate.law == WearLaw::None);
     for scored_candidate in scored_candidates.iter().filter(|c| c.bound > floor || Some(c.index) == flat) {
@@ -320,7 +321,7 @@ fn try_lives(
 enum AmplitudeGrid {
     /// They fall by one factor, too.
     Falling { next_m: f64, factor: f64 },
-    /// The law is asked for its growth in the next life, hours, which is so much longer than the one before.
+    /// Growth of the law in a further life, hours, which is longer by the factor `longer`.
     Evaluated { law: WearLaw, span_m: f64, life: f64, longer: f64 },
 }
 

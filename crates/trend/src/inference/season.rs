@@ -78,8 +78,8 @@ fn amplitude_distribution(phase: f64, along: &[(f64, f64)], believed: bool, pseu
     SeasonParams { phase, mean_m, sd_m }
 }
 
-/// The season in one segment, beside wear of the likeliest form; nothing where the two cannot be told
-/// apart, as in less than half a year.
+/// The seasonal amplitude in one segment, fitted with wear of the most probable form; nothing where the two are
+/// not separable, as in less than half a year.
 pub(crate) fn seasonal_fit(
     segment: &Segment<'_>,
     prior: &FleetPrior,

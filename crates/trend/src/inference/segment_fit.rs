@@ -1,11 +1,11 @@
-//! One look at a segment: its bins, the filter they share, and what it says of a curve.
+//! Fit of a segment: its bins, their common filter, and the regression of a candidate.
 
 use crate::data::bins::Bin;
 use crate::data::segment::Segment;
 use crate::inference::level_filter::{Filter, Pass, Regression};
 use crate::prior::fleet_prior::{FleetPrior, LogPrior};
 
-/// A segment's bins behind one filter, with the season fitted beside whatever curve is asked about.
+/// A segment's bins behind one filter, with the season fitted together with the candidate.
 pub(crate) struct SegmentFit<'a> {
     pub(crate) segment: &'a Segment<'a>,
     pub(crate) prior: &'a FleetPrior,
@@ -17,7 +17,7 @@ pub(crate) struct SegmentFit<'a> {
     /// Variance of the first level about a new unit's mean gap, and its logarithm.
     pub(crate) new_m2: f64,
     pub(crate) ln_new_m2: f64,
-    /// The season's swing of unit size, and what the gaps alone say of its size.
+    /// The season with unit amplitude, and the estimate of its amplitude from the gaps alone.
     pub(crate) wave: Pass,
     wave_by_gaps: f64,
     wave_information: f64,
@@ -61,7 +61,7 @@ impl<'a> SegmentFit<'a> {
         }
     }
 
-    /// A curve's regression with the unit's own swing, drawn to the fleet's, fitted beside it.
+    /// A candidate's regression, with the unit's own seasonal amplitude fitted and shrunk to the fleet's.
     pub(crate) fn with_season(&self, mut pass: Regression) -> Regression {
         let share = pass.sfs * self.seasonal_m2;
         pass.sff -= share * pass.sfs;
@@ -81,7 +81,7 @@ impl<'a> SegmentFit<'a> {
         -self.wave.end * self.seasonal_m2
     }
 
-    /// The unit's own swing beside a curve, of whose heights it explains a part.
+    /// The unit's own seasonal amplitude with a candidate, whose basis values explain a part of it.
     pub(crate) fn seasonal_m(&self, explained: f64) -> f64 {
         (self.wave_by_gaps - explained) * self.seasonal_m2
     }

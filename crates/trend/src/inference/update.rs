@@ -1,7 +1,7 @@
 //! A mixture moved on by a few estimates that follow: each node's level by a Kalman step, its weight by
 //! Bayes' theorem.
 //!
-//! A node is a curve with one amplitude. Beside it the level walks and the season swings by an amount of
+//! A node is a curve with one amplitude. In addition the level follows a random walk and the season has an amplitude of
 //! the unit's own, so its state is two numbers, and their gains are those of every node:
 //!
 //! ```text
@@ -14,7 +14,7 @@ use crate::data::bins::Bin;
 use crate::inference::posterior::{Component, Posterior};
 use crate::prior::fleet_prior::FleetPrior;
 
-/// Standard deviations by which a bin may miss what the mixture foretells of it.
+/// Standard deviations by which a bin may differ from the forecast of the mixture.
 const REACH: f64 = 4.0;
 
 /// Where a mixture stands: the usage, and the installation of its last estimate.

@@ -1,9 +1,9 @@
-//! A fleet asked about its own past: how far forecasts have missed what was measured since.
+//! Interval calibration: errors of past forecasts, compared with later measurements.
 //!
-//! No unit needs to have failed for this. Each history is cut, judged as if the rest had not been flown,
-//! and asked for the gap at its end. A miss is counted in the forecast's own widths, so what it teaches
-//! holds for time as for growth: where the true law is none of the bank's, intervals widen to where the
-//! fleet has really been, and lean to the side on which it surprised.
+//! No unit needs to have failed for this. Each history is cut, assessed with the data before the cut,
+//! and its gap is forecast at the end. The error is counted in widths of the forecast, so the calibration
+//! applies to time as well as to growth: where the true law is not in the bank, intervals widen to the
+//! observed errors, and shift to the side of the errors.
 
 use crate::data::bins::{self, BINS};
 use crate::data::segment::Segment;
@@ -20,7 +20,7 @@ const CUTS: [f64; 3] = [0.3, 0.5, 0.7];
 /// Estimates below which a history is not cut.
 const MIN_ESTIMATES: usize = 60;
 
-/// Forecast growth below which a cut teaches nothing about wear, a share of the limit.
+/// Forecast growth below which a cut carries no information on wear, a share of the limit.
 const VISIBLE: f64 = 0.03;
 
 /// Cuts that the usual miss is worth: enough that thirty units may outvote it.
@@ -38,6 +38,7 @@ pub(crate) fn learn_calibration(
     let pseudo = LONG_QUANTILES.map(|z| (USUAL_WIDTH * z, PSEUDO_CUTS / LONG_QUANTILES.len() as f64));
     let errors = WeightedSamples::new(errors.chain(pseudo));
     let [low, middle, high] = [0.05, 0.5, 0.95].map(|share| errors.quantile(share));
+    debug_assert!(low <= middle && middle <= high, "quantiles {low}, {middle}, {high}");
     CalibrationParams { low: low.min(usual.low), middle, high: high.max(usual.high) }
 }
 
@@ -47,7 +48,7 @@ const LONG_QUANTILES: [f64; 20] = [
     0.276, 0.363, 0.459, 0.568, 0.699, 0.875, 1.192,
 ];
 
-/// How far the gap at a segment's end lies from what its first estimates foretold, in widths.
+/// Normalised forecast error: the gap at a segment's end minus its forecast from the first estimates, in widths.
 fn normalised_error(segment: &Segment<'_>, share: f64, prior: &FleetPrior) -> Option<f64> {
     let count = segment.estimates.len();
     if count < MIN_ESTIMATES {

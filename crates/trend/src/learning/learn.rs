@@ -1,4 +1,4 @@
-//! A fleet teaches a prior: what its units follow, how long they live, by which laws (empirical Bayes).
+//! Learning of the fleet prior: usage axis, lives and shares of laws of the units (empirical Bayes).
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::prior::fleet_prior::{FleetPrior, UsageAxis};
 use crate::statement::history::{self, History};
 use crate::wear::bank::{FAMILIES, WearLaw};
 
-/// Units looked at, at most: more teach nothing new and cost as much as their own statements.
+/// Largest number of units used: more change the prior little and cost as much as their own assessments.
 const MOST_UNITS: usize = 150;
 
 /// Units a prior of nothing is worth: few, so that thirty units outvote it.
@@ -26,18 +26,22 @@ const PSEUDO_CHANGES: f64 = 4.0;
 /// Rounds of expectation and maximisation.
 const ROUNDS: usize = 8;
 
-/// Noises of wear tried beside the assumed one, as factors of it.
+/// Process noises tried in addition to the assumed one, as factors of it.
 const LESS_WEAR_NOISE: f64 = 0.7;
 const MORE_WEAR_NOISE: [f64; 2] = [1.5, 2.2];
 
 impl FleetPrior {
-    /// Learns how units wear from what was known of them on a day: which usage wear follows, the shares
-    /// of the laws, the spread of lives, a new unit's gap, the season, and what an installation adds.
+    /// Learns the fleet prior from the data of units until a day: the usage axis, the shares
+    /// of the laws, the spread of lives, a new unit's gap, the season, and the effect of an installation.
+    ///
+    /// Parametric empirical Bayes (Morris 1983, <https://doi.org/10.1080/01621459.1983.10477920>) by
+    /// expectation–maximisation (Dempster, Laird and Rubin 1977). The limit is in metres, the day in microseconds since
+    /// 1970 UTC.
     ///
     /// The units should be of one design: a part number, or several that differ in life by a factor of
-    /// two at most, which then share what they teach. Of a large fleet 150 units are looked at. The
-    /// order of the units changes no bit, and nothing later than the day is looked at; a prior of an
-    /// earlier day may stand in for a later one's.
+    /// two at most, which then share a prior. Of a large fleet 150 units are used. The
+    /// order of the units does not change the result, and nothing later than the day is used; a prior of an
+    /// earlier day may replace a later one.
     ///
     /// Wear follows `axis` where it is given and the fleet has counted it, else the likeliest one.
     pub fn learn<'a>(
@@ -49,7 +53,7 @@ impl FleetPrior {
         Self::learn_with(fleet, as_of_us, limit_m, axis, &SerialExecutor)
     }
 
-    /// As [`FleetPrior::learn`], with the work on each unit done by whoever has threads: the same bits.
+    /// As [`FleetPrior::learn`], with the work on each unit done by an executor: bitwise identical.
     pub fn learn_with<'a>(
         fleet: impl IntoIterator<Item = &'a Series>,
         as_of_us: i64,
@@ -67,8 +71,8 @@ impl FleetPrior {
         axis_prior.with_likeliest_wear_noise(executor).em_iterate(executor).with_calibration(executor)
     }
 
-    /// The median life of units, from new to the act limit, flight hours, as their prior would have it at the
-    /// first look: enough to tell designs apart, at a fifth of what [`FleetPrior::learn_with`] costs.
+    /// The median life of units, from new to the act limit, flight hours, from their first-pass
+    /// prior: enough to separate designs, at a fifth of the cost of [`FleetPrior::learn_with`].
     pub fn rough_median_life_hours<'a>(
         fleet: impl IntoIterator<Item = &'a Series>,
         as_of_us: i64,
@@ -82,7 +86,7 @@ impl FleetPrior {
     }
 }
 
-/// The units that are looked at, and what the flights of each show apart from wear, along hours.
+/// The units used, and their flights with influences other than wear, along hours.
 struct TrainingSet<'a> {
     units: Vec<TrainingUnit<'a>>,
     histories: Arc<[History]>,
@@ -98,7 +102,7 @@ impl<'a> TrainingSet<'a> {
         let uninformative = FleetPrior::uninformative(limit_m);
         let units = sample(fleet.into_iter().map(|series| TrainingUnit::on(series, as_of_us)));
         // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
-        // their first hour on teach a fleet that never wears.
+        // their first hour on lead to a fleet prior without wear.
         let training_set =
             |u: &TrainingUnit<'_>| history::read_history(u.flights, u.maintenance, None, &uninformative);
         let histories = executor.map(&units, training_set).into();
@@ -115,7 +119,7 @@ impl<'a> TrainingSet<'a> {
     }
 }
 
-/// What is assumed of a fleet before its laws are asked: what an installation adds, and the season, which
+/// Assumptions before the shares of the laws are learned: the effect of an installation, and the season, which
 /// are of the measurement whatever wear follows.
 fn assumed(training_set: &TrainingSet<'_>, limit_m: f64, executor: &impl Executor) -> FleetPrior {
     let mut assumed = FleetPrior::uninformative(limit_m);
@@ -136,12 +140,12 @@ fn on_axis(training_set: &TrainingSet<'_>, axis: UsageAxis, assumed: &FleetPrior
     hours_per_unit.is_finite().then(|| FleetPrior { axis, hours_per_unit, ..assumed.clone() })
 }
 
-/// The lesson with the largest evidence, the first of equals.
+/// The axis prior with the largest evidence, the first of equals.
 fn argmax_evidence(priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior> {
     priors.reduce(|best, next| if next.evidence > best.evidence { next } else { best })
 }
 
-/// The last lesson of those that have ever more evidence, and more than something has.
+/// The last axis prior of a sequence with increasing evidence above the given one.
 fn ascend_evidence(mut evidence: f64, priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior> {
     let rises =
         |axis_prior: &AxisPrior| std::mem::replace(&mut evidence, axis_prior.evidence) < axis_prior.evidence;
@@ -161,7 +165,7 @@ impl<'a> TrainingUnit<'a> {
     }
 }
 
-/// Units with flights in an order of their own; of many, as many as are looked at, evenly.
+/// Units in an order that does not depend on the input; of a large fleet an even sample.
 fn sample<'a>(fleet: impl Iterator<Item = TrainingUnit<'a>>) -> Vec<TrainingUnit<'a>> {
     let mut fleet: Vec<TrainingUnit<'_>> = fleet.filter(|unit| !unit.flights.is_empty()).collect();
     fleet.sort_by_cached_key(|unit| identity(unit.flights));
@@ -169,18 +173,18 @@ fn sample<'a>(fleet: impl Iterator<Item = TrainingUnit<'a>>) -> Vec<TrainingUnit
     (0..count).map(|i| fleet[i * fleet.len() / count]).collect()
 }
 
-/// What tells two units apart, whatever the order they came in.
+/// Key that identifies a unit independently of the input order.
 fn identity(flights: &[Flight]) -> (i64, usize, [u64; 3]) {
     let last = &flights[flights.len() - 1];
     let gaps: f64 = flights.iter().filter_map(|f| f.gap).map(|g| g.gap_m).sum();
     (flights[0].departure_us, flights.len(), [last.hours, last.reversals, gaps].map(f64::to_bits))
 }
 
-/// What a fleet teaches along one axis.
+/// Prior learned along one axis.
 #[derive(Clone)]
 struct AxisPrior {
     histories: Arc<[History]>,
-    /// Before the fleet was asked, and after.
+    /// Before learning, and after.
     assumed: FleetPrior,
     learned: FleetPrior,
     /// Log evidence of the fleet under what was learned.
@@ -188,7 +192,7 @@ struct AxisPrior {
 }
 
 impl AxisPrior {
-    /// Nothing along an axis on which nobody moved.
+    /// Nothing along an axis without usage.
     fn on_axis(
         training_set: &TrainingSet<'_>,
         axis: UsageAxis,
@@ -227,10 +231,10 @@ impl AxisPrior {
         FleetPrior { calibration, ..self.learned }
     }
 
-    /// Judges every segment by what was learned and learns again, by expectation–maximisation.
+    /// Assesses every segment with the current prior and learns it again, by expectation–maximisation.
     ///
-    /// Within a revision the weights of the laws and lives move; that a new unit's gap is known better
-    /// than was assumed only tells in the next.
+    /// Within an iteration the weights of the laws and lives move; a better known gap of a new unit
+    /// takes effect in the next one.
     fn em_iterate(self, executor: &impl Executor) -> Self {
         let fitted = |segment: &Segment<'_>| Some(posterior(segment, &self.learned)?.drop_negligible());
         let units: Vec<Posterior> =

@@ -1,6 +1,5 @@
-//! Distributions, quadrature rules, weighted quantiles and a hash.
+//! Distributions, quadrature rules and weighted quantiles.
 
 pub(crate) mod distributions;
-pub(crate) mod fnv;
 pub(crate) mod quadrature;
 pub(crate) mod weighted;

@@ -20,9 +20,4 @@ pub(crate) struct CalibrationParams {
 impl CalibrationParams {
     /// Parameters of a fleet without past forecasts.
     pub(crate) const USUAL: Self = Self { low: -USUAL_WIDTH, middle: 0.0, high: USUAL_WIDTH };
-
-    /// All parameters, for a digest.
-    pub(crate) fn numbers(&self) -> [f64; 3] {
-        [self.low, self.middle, self.high]
-    }
 }

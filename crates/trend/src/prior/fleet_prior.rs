@@ -1,4 +1,4 @@
-//! What the units of one part number teach about the next (empirical Bayes).
+//! Fleet prior: distribution of the parameters of a new unit of one part number (empirical Bayes).
 
 use std::fmt;
 
@@ -6,7 +6,6 @@ use crate::prior::calibration_params::{CalibrationParams, USUAL_WIDTH};
 
 use crate::data::segment::Segment;
 use crate::data::series::Flight;
-use crate::math::fnv::fnv1a;
 use crate::math::quadrature::WAIT_QUANTILES;
 use crate::prior::season_params::SeasonParams;
 use crate::wear::bank::{BENDS, Candidate, FAMILIES, LIFE_CURVES, LINEAR, POWERS, WearLaw};
@@ -104,7 +103,7 @@ pub struct FleetPrior {
 }
 
 impl FleetPrior {
-    /// What is assumed of a part number nobody has seen: a new gap of a fifth of the limit, lives around
+    /// Prior of a part number without data: a new gap of a fifth of the limit, lives around
     /// 4,000 h within a factor of ten, any law.
     pub fn uninformative(limit_m: f64) -> Self {
         let mut shares = [0.28 / POWERS as f64; FAMILIES];
@@ -131,8 +130,8 @@ impl FleetPrior {
         }
     }
 
-    /// What is assumed of a unit that the fleet says nothing of: the fleet's axis, and else as little as
-    /// of a part number nobody has seen.
+    /// Prior of a unit without support from its fleet: the fleet's axis, and else the wide distributions
+    /// of a part number without data.
     pub(crate) fn single_unit(&self) -> Self {
         let Self { axis, hours_per_unit, .. } = *self;
         Self { axis, hours_per_unit, ..Self::uninformative(self.limit_m()) }
@@ -148,12 +147,13 @@ impl FleetPrior {
         self.axis
     }
 
-    /// The median life from new to the act limit, flight hours at the fleet's mean usage.
+    /// Median life from new to the act limit, flight hours at the fleet's mean usage: the median of the log-normal prior
+    /// of lives.
     pub fn median_life_hours(&self) -> f64 {
         self.ln_life.exp()
     }
 
-    /// 5 % and 95 % of the lives it expects, flight hours at the fleet's mean usage.
+    /// 5 % and 95 % quantiles of the log-normal prior of lives, flight hours at the fleet's mean usage.
     pub fn life_range_hours(&self) -> (f64, f64) {
         let reach = 1.645 * self.ln_life_sd;
         ((self.ln_life - reach).exp(), (self.ln_life + reach).exp())
@@ -164,36 +164,10 @@ impl FleetPrior {
         (self.new_m, self.new_sd_m)
     }
 
-    /// How much wider forecasts are stated than is usual, by what the fleet's own past forecasts missed; one
-    /// for a fleet whose past asks for nothing.
+    /// Factor by which forecast intervals are wider than usual, from the errors of the fleet's past forecasts, no unit;
+    /// one for a fleet without past forecasts (method: `docs/prognostics.md`).
     pub fn interval_scale(&self) -> f64 {
         0.5 * (self.calibration.high - self.calibration.low) / USUAL_WIDTH
-    }
-
-    /// What tells it from another prior.
-    pub(crate) fn digest(&self) -> u64 {
-        let Self {
-            axis,
-            hours_per_unit,
-            span_m,
-            new_m,
-            new_sd_m,
-            ln_life,
-            ln_life_sd,
-            shares,
-            season,
-            fresh_share,
-            onsets_per_hour,
-            wear_noise_m,
-            drift_m2_per_hour,
-            bias_sd_m,
-            calibration,
-        } = self;
-        let numbers = [hours_per_unit, span_m, new_m, new_sd_m, ln_life, ln_life_sd, fresh_share];
-        let noises = [onsets_per_hour, wear_noise_m, drift_m2_per_hour, bias_sd_m];
-        let numbers = numbers.into_iter().chain(noises).chain(shares).copied();
-        let all = numbers.chain(season.numbers()).chain(calibration.numbers());
-        fnv1a(all.map(f64::to_bits).chain([*axis as u64]))
     }
 
     /// The usage of a unit up to a flight, hours' worth.
@@ -242,7 +216,7 @@ pub(crate) struct LogPrior<'a> {
     shape: f64,
 }
 
-/// What a law's own time says of a life: the density of ln life.
+/// Prior of a law's time constant given a life: the density of ln life.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TimeConstantPrior {
     ln_life: f64,

@@ -23,11 +23,6 @@ impl SeasonParams {
         Self { phase: 0.0, mean_m: 0.0, sd_m: PSEUDO_SD * limit_m }
     }
 
-    /// All parameters, for a digest.
-    pub(crate) fn numbers(&self) -> [f64; 3] {
-        [self.phase, self.mean_m, self.sd_m]
-    }
-
     /// The component of unit amplitude at a time.
     pub(crate) fn wave(&self, departure_us: f64) -> f64 {
         (TAU * departure_us / YEAR_US - self.phase).cos()

@@ -6,7 +6,7 @@ use crate::statement::types::{ChangePoint, Crossing, Level, Rate, Utilization, W
 /// What is known of one unit on one day.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assessment {
-    /// The day of the statement, microseconds since 1970 UTC; nothing later was looked at.
+    /// Date of the assessment, microseconds since 1970 UTC; later data are ignored.
     pub as_of_us: i64,
     /// Flights with a row, refused ones included.
     pub flights: usize,

@@ -85,10 +85,10 @@ impl RulDistribution {
         }
     }
 
-    /// Its 5 %, 50 % and 95 % quantiles, after what the fleet's past says of such forecasts.
+    /// Its 5 %, 50 % and 95 % quantiles, with the calibration of the fleet's past forecasts.
     ///
-    /// Growth above what was foretold is time below it: the widths on the logarithm of the time are
-    /// those that growth was found to need. A limit that is likely over, or likely beyond the horizon,
+    /// Growth above the forecast is time below it: the widths on the logarithm of the time are
+    /// those that growth was found to need. A limit that is likely reached already, or likely beyond the horizon,
     /// has no width to be corrected.
     pub(crate) fn crossing(&self) -> Crossing {
         let [p05_hours, p50_hours, p95_hours] = [0.05, 0.5, 0.95].map(|p| self.quantile(p));
@@ -102,7 +102,13 @@ impl RulDistribution {
             (hours < self.horizon_hours).then_some(if hours > 1.0 { hours } else { 0.0 })
         };
         let CalibrationParams { low, middle: shift, high } = self.calibration;
-        Crossing { p05_hours: at(high), p50_hours: at(shift), p95_hours: p95_hours.and_then(|_| at(low)) }
+        let crossing = Crossing {
+            p05_hours: at(high),
+            p50_hours: at(shift),
+            p95_hours: p95_hours.and_then(|_| at(low)),
+        };
+        debug_assert!(is_ordered(&crossing), "{crossing:?}");
+        crossing
     }
 
     /// The hours by which the limit is met with this probability; nothing when that is beyond the horizon.
@@ -128,4 +134,10 @@ impl RulDistribution {
         let part = self.cells.get(whole).map_or(0.0, |cell| cell * (place - whole as f64));
         (self.over + self.cells[..whole].iter().sum::<f64>() + part).min(1.0)
     }
+}
+
+/// Whether the quantiles increase; one beyond the horizon is larger than all others.
+fn is_ordered(crossing: &Crossing) -> bool {
+    let Crossing { p05_hours, p50_hours, p95_hours } = *crossing;
+    [p05_hours, p50_hours, p95_hours].map(|hours| hours.unwrap_or(f64::INFINITY)).is_sorted()
 }

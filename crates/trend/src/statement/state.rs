@@ -42,7 +42,7 @@ pub enum Reason {
     CrossesSoon { p05_hours: f64, planning_horizon_hours: f64 },
     /// The gap is at its watch limit.
     AtWatch { gap_m: f64, watch_m: f64 },
-    /// Something happened lately that no book knows.
+    /// A recent unrecorded change.
     Changed { kind: ChangePointKind, days: f64 },
     /// Nothing calls for anything.
     Clear,
@@ -121,7 +121,7 @@ pub(crate) struct Evidence<'a> {
     pub(crate) level: Option<Level>,
     pub(crate) crossing: Option<Crossing>,
     pub(crate) changes: &'a [ChangePoint],
-    /// The level that was not stated, and what the last estimates say.
+    /// The unsupported level, and the level of the last estimates.
     pub(crate) unsupported: Option<(f64, f64)>,
 }
 

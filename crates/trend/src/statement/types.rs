@@ -1,10 +1,8 @@
 //! Result types of an assessment.
 
-use serde::{Deserialize, Serialize};
-
 use std::fmt;
 
-/// Estimates below which nothing but a level is said.
+/// Number of estimates below which an assessment holds only a level.
 pub const MIN_ESTIMATES: usize = 8;
 
 /// The gap at the end of the last flight.
@@ -94,7 +92,7 @@ pub enum WearStatus {
 }
 
 /// A change that wear does not make.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangePoint {
     /// The first flight after it, microseconds since 1970 UTC.
     pub departure_us: i64,
@@ -104,13 +102,13 @@ pub struct ChangePoint {
     pub step_m: f64,
     /// Standard error of its size, metres; zero for an onset.
     pub se_m: f64,
-    /// Probability that it is one: of a step that it has the sign it is said to have, of an onset that
-    /// wear began at all, one where the books say so.
+    /// Probability that it is one: of a step that it has the given sign, of an onset that
+    /// wear began at all; one for a recorded event.
     pub certainty: f64,
 }
 
 /// Kinds of change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ChangePointKind {
     /// The measurement moved: re-rigging, another reference. The wear did not.
     Step,
@@ -118,7 +116,7 @@ pub enum ChangePointKind {
     Reset,
     /// Wear began, or sped up.
     Onset,
-    /// In the books: an installation or a maintenance entry; without a step where the gap shows none.
+    /// Recorded: an installation or a maintenance entry; without a step where the gap shows none.
     Recorded,
 }
 

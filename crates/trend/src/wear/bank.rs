@@ -17,8 +17,6 @@
 use std::ops::Range;
 use std::sync::LazyLock;
 
-use serde::{Deserialize, Serialize};
-
 use crate::wear::life_curve::{self, LifeCurve};
 
 /// Age that a power law's amplitude refers to, hours, and its logarithm.
@@ -63,7 +61,7 @@ pub(crate) const LIFE_CURVES: Range<usize> = BENDS.end..BENDS.end + life_curve::
 pub(crate) const LINEAR: usize = FAMILIES - POWERS + 4;
 
 /// A law's form.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum WearLaw {
     /// No wear.
     None,
@@ -98,7 +96,7 @@ pub(crate) struct Candidate {
     pub(crate) age_spread: f64,
     /// ln of the time by which its law runs, where its life has to do with that.
     pub(crate) ln_time_constant_hours: Option<f64>,
-    /// The sequence its heights are a multiple of, beside a line and a constant, if they are.
+    /// The sequence of which its basis values are a multiple, plus a line and a constant, if there is one.
     pub(crate) basis: Option<(usize, BasisCoefficients)>,
 }
 
@@ -113,18 +111,6 @@ impl WearLaw {
             Self::Bend { index, .. } => BENDS.start + index,
             Self::LifeCurve { shape, .. } => LIFE_CURVES.start + shape,
             Self::Power { index } => FAMILIES - POWERS + index,
-        }
-    }
-
-    /// Whether it is one of the bank's.
-    pub(crate) fn is_valid(self) -> bool {
-        match self {
-            Self::None | Self::Onset { .. } => true,
-            Self::Bend { index, .. } => index < BEND_RATIOS.len(),
-            Self::Exponential { index } => index < TIME_CONSTANTS.len(),
-            Self::Settling { index } => index < SETTLING.len(),
-            Self::LifeCurve { shape, life } => shape < life_curve::COUNT && life < life_curve::LIVES.len(),
-            Self::Power { index } => index < POWERS,
         }
     }
 
@@ -261,7 +247,7 @@ impl CandidateBank {
     /// those that are to be tried.
     ///
     /// A unit that may have worn before gets every age of the grid; onsets lie on a grid of starts
-    /// within what was seen. Starts later than now are the business of whoever asks for the future.
+    /// within the observed usage. Later starts are handled by the forecast.
     pub(crate) fn new(
         fresh: bool,
         known_age: Option<f64>,
@@ -328,7 +314,7 @@ impl StaticCandidates {
     }
 }
 
-/// A curve that begins at birth; its law is still to be said.
+/// A curve that begins at birth; its law is set afterwards.
 const BIRTH: Candidate = Candidate {
     law: WearLaw::None,
     age: 0.0,
@@ -389,7 +375,7 @@ fn grid() -> Vec<Candidate> {
 /// settling     1 − e^(−(u + a)/τ) = 1 − e^(−a/τ) · e^(−u/τ)
 /// bend         s (u + a) + (1 − s) max(0, u − k)     k the knee, counted from first sight
 /// ```
-/// So each of these is one of a few sequences, its *part*, times a factor, beside a line and a constant.
+/// So each of these is a multiple of one of a few sequences, its *basis*, plus a line and a constant.
 pub(crate) struct BasisMatrix {
     usages: Vec<f64>,
     roots: Vec<Vec<[f64; 4]>>,

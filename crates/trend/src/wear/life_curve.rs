@@ -1,10 +1,10 @@
-//! Courses of whole lives: wear that turns at a share of the life, and so is known before it turns.
+//! Whole-life wear curves: wear whose rate changes at a share of the life, known before the change.
 //!
-//! A power or an exponential says nothing of a turn to come, and a bend only of one that was seen. These tell
-//! a fleet whose units all wear out late from one whose units do not: the share of each is learned, and a unit
-//! that still wears evenly is foretold what became of the others. Wear in three stages is the textbook's
-//! (running in, steady wear, wearing out). The heights were drawn by hand; which of them stay was decided by how simulated
-//! fleets scored (docs/prognostics.md).
+//! A power or an exponential has no change of rate to come, and a bend only one that was observed. Life curves separate
+//! a fleet whose units all wear out late from one whose units do not: the share of each curve is learned, and a unit
+//! that still wears evenly is forecast from the other units. Wear in three stages is the textbook's
+//! (running in, steady wear, wearing out). The curves were drawn by hand; which of them stay was decided by the
+//! forecast errors on simulated fleets (docs/prognostics.md).
 
 /// Heights at every tenth of a life, as shares of the growth in it; further on in a line.
 const LIFE_CURVES: [[f64; TENTHS + 1]; COUNT] = [
@@ -67,7 +67,7 @@ impl LifeCurve {
         self.derivative(age + self.life / TENTHS as f64) / self.derivative(age)
     }
 
-    /// The tenth of the life that an age lies in, and how far it is past its begin, in tenths.
+    /// The tenth of the life that contains an age, and how far it is past its begin, in tenths.
     fn tenth(self, age: f64) -> (usize, f64) {
         let tenths = (age / self.life * TENTHS as f64).max(0.0);
         let tenth = (tenths as usize).min(TENTHS - 1);

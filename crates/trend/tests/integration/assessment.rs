@@ -105,7 +105,7 @@ fn no_state_stands_on_few_estimates() {
 }
 
 #[test]
-fn nothing_later_than_the_day_is_looked_at() {
+fn later_flights_do_not_change_an_assessment() {
     let long = unit(400, |h| 20.0 + 0.02 * h);
     assert_eq!(state_of(&long, 199), state_of(&unit(200, |h| 20.0 + 0.02 * h), 199));
 }

@@ -1,4 +1,4 @@
-//! Fleets that teach too much or nothing: whatever the prior, a unit is stated where its estimates are.
+//! Fleets with too much or no information: whatever the prior, the level of a unit is where its estimates are.
 
 use proptest::prelude::*;
 use trend::{
@@ -22,7 +22,7 @@ struct Unit {
     flights: i64,
 }
 
-/// What nobody has to guess: a unit that does not wear, as many others.
+/// A unit that does not wear, like many others.
 const STILL: Unit =
     Unit { new_um: 20.0, um_per_hour: 0.0, onset: 0, noise_um: 1.0, stated_um: Some(1.0), flights: 150 };
 
@@ -129,7 +129,7 @@ fn units() -> impl Strategy<Value = Unit> {
             new_um,
             um_per_hour,
             onset,
-            // Where gaps repeat to the last digit, an error is what it is said to be.
+            // Where gaps repeat to the last digit, the stated error is the true one.
             noise_um: if stated_um > Some(100.0) { f64::max(noise_um, 0.1) } else { noise_um },
             stated_um,
             flights,
@@ -140,8 +140,8 @@ fn units() -> impl Strategy<Value = Unit> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// However strange the fleet and the unit, what is said is a number near the unit's last gaps, with bounds in
-    /// order, or nothing and why.
+    /// For any fleet and unit, the assessment is a level near the unit's last gaps with ordered bounds,
+    /// or none with a reason.
     #[test]
     fn whatever_the_fleet_the_level_is_near_the_last_gaps_and_bounds_are_in_order(
         fleet in prop::collection::vec(units(), 1..8), copies in 1_usize..6, unit in units(),

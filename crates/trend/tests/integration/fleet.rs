@@ -80,7 +80,7 @@ fn day_of(hours: f64) -> i64 {
 }
 
 /// Median relative error and coverage of the 90 % interval at shares of life, for a fleet of one law,
-/// each judged by a prior learned when the fleet stood at the same share.
+/// each assessed with a prior learned at the same share.
 fn score(law: WearLaw, shares: &[f64]) -> (f64, f64) {
     let fleet: Vec<Unit> = (0..30).map(|seed| unit(seed, law, 3000)).collect();
     let (mut errors, mut covered) = (Vec::new(), 0.0);
@@ -264,7 +264,7 @@ fn a_prior_is_the_same_to_the_last_bit_whoever_does_the_work() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Whatever gaps a log throws up, the quantiles stand in order and nothing is not a number.
+    /// For any gaps, the quantiles are ordered and every number is finite.
     #[test]
     fn a_statement_is_finite_and_in_order(
         gaps_um in prop::collection::vec(prop::option::of(-20.0..200.0), 0..120), stated in any::<bool>(),
@@ -342,7 +342,7 @@ fn reshimmed(is_booked: bool) -> Vec<Series> {
 }
 
 /// New units begin at 20 µm, re-shimmed ones at 20 + 15 − 8 = 27 µm: 23.5 µm in the mean. Unbooked, the
-/// fall is one of the measurement, and only the 20 µm of the new teach.
+/// fall is a step of the measurement, and only the 20 µm of the new units enter the prior.
 #[test]
 fn a_fleet_learns_from_its_maintenance_book_what_a_reshimmed_gap_is() {
     let new_um = |recorded_um| {
@@ -355,10 +355,10 @@ fn a_fleet_learns_from_its_maintenance_book_what_a_reshimmed_gap_is() {
 }
 
 #[test]
-fn wear_follows_the_axis_it_is_told_to_unless_nobody_counted_it() {
+fn wear_follows_the_configured_axis_unless_it_was_not_counted() {
     let fleet = reshimmed(true);
     let learned = |axis| FleetPrior::learn(&fleet, i64::MAX, LIMIT_M, axis);
     assert_eq!(learned(Some(UsageAxis::Flights)).axis(), UsageAxis::Flights);
-    // No flight states its load reversals; all have one length, so hours and flights say the same.
+    // No flight holds its load reversals; all have one length, so hours and flights are equivalent.
     assert_eq!(learned(Some(UsageAxis::Reversals)), learned(None));
 }

@@ -1,4 +1,4 @@
-//! The picture says what the statement says, and its level runs through the truth.
+//! The plotted forecast agrees with the assessment, and its level follows the true gap.
 
 use trend::series::Observation;
 use trend::{Crossing, Forecast, Series, Settings, UsageDefaults, assess, forecast};
@@ -46,7 +46,7 @@ fn drawn(days: i64, hours: &[f64]) -> (Crossing, Forecast) {
 /// at *not after*. That all but holds: the fan is widened along the gap and the statement along the
 /// logarithm of the time, which differ where growth has gone far.
 #[test]
-fn the_fan_meets_the_limit_when_the_statement_says() {
+fn the_forecast_meets_the_limit_at_the_assessed_crossing() {
     let (Crossing { p05_hours, p50_hours, p95_hours }, _) = drawn(500, &[]);
     let hours = [p05_hours, p50_hours, p95_hours].map(Option::unwrap);
     let (_, Forecast { ahead, .. }) = drawn(500, &hours);

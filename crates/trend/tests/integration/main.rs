@@ -1,4 +1,4 @@
-//! The public door of `trend`.
+//! Public API of `trend`.
 
 #![allow(
     clippy::unwrap_used,
@@ -7,11 +7,11 @@
 )]
 
 mod assessment;
+mod checkpoints;
 mod classic;
 mod degenerate;
 mod fleet;
 mod forecast;
-mod incremental;
 mod random;
 mod scale;
 mod series;

@@ -9,7 +9,7 @@ use crate::contact::friction::friction_model::FrictionState;
 use crate::simd::dispatch::{Lanes, simd_dispatch};
 
 /// Columns of the regression.
-pub(crate) const COLUMNS: usize = 16;
+pub(crate) const COLUMNS: usize = 17;
 
 /// δX₀.
 pub(crate) const ORIGIN: usize = 0;
@@ -39,6 +39,8 @@ pub(crate) const FORCE_DRIFT: usize = 13;
 /// Errors periodic in position: sine and cosine.
 pub(crate) const PERIODIC: usize = 14;
 const PERIODIC_COSINE: usize = 15;
+/// s·c, the size of c: its coefficient is half the difference of the compliances of both flanks.
+pub(crate) const SIDE_FORCE: usize = 16;
 
 /// The mean of some blocks in contact on one flank.
 #[derive(Debug, Clone, Copy)]
@@ -164,6 +166,7 @@ impl RowSource<'_> {
         sum.x[PLACE_SQUARE] = sums[8];
         sum.x[PLACE_CUBE] = sums[9];
         sum.x[FORCE_DRIFT] = sums[10] * scaling.per_load;
+        sum.x[SIDE_FORCE] = side * sum.x[FORCE];
         if let Some(phases) = blocks.phases.get(first..end) {
             for [sine, cosine] in phases {
                 sum.x[PERIODIC] += sine;

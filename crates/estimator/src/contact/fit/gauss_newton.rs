@@ -4,7 +4,7 @@ use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
     self, COLUMNS, DRIFT, DRY, DesignMatrix, FORCE, FORCE_DRIFT, GAP, LOAD_RATE, ORIGIN, PERIODIC, PLACE,
-    RowSource, SHARE, SPEED, STRIBECK,
+    RowSource, SHARE, SIDE_FORCE, SPEED, STRIBECK,
 };
 use crate::contact::fit::robust_regression::{GaussianPrior, RobustFit, fit};
 use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
@@ -32,6 +32,8 @@ const PLACE_M: f64 = 60e-6;
 const PERIODIC_M: f64 = 20e-6;
 /// Spread of the change of 1/K from the middle of a flight to its end, relative.
 const COMPLIANCE_DRIFT: f64 = 0.03;
+/// Spread of half the difference of the compliances of both flanks, relative.
+const COMPLIANCE_SIDE: f64 = 0.05;
 /// Stiffness moves by this factor at most in an iteration.
 const MAX_STIFFNESS_STEP: f64 = 3.0;
 /// Greatest friction over the load.
@@ -151,6 +153,7 @@ fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior; COLUMNS] 
             mean: -(state.load_delay_s + state.load_lag_s) / LATE_S * here_m,
             sd: SKEW_S / LATE_S * here_m,
         },
+        SIDE_FORCE => zero(COMPLIANCE_SIDE * windup_m),
         FORCE_DRIFT => zero(COMPLIANCE_DRIFT * windup_m),
         _ if column < PLACE => zero(DRIFT_M[column - DRIFT]),
         _ if column >= PERIODIC => zero(PERIODIC_M),

@@ -6,7 +6,9 @@
 
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
-use crate::contact::fit::design_matrix::{COLUMNS, DRY, FORCE, FORCE_DRIFT, GAP, RowSource, SHARE, STRIBECK};
+use crate::contact::fit::design_matrix::{
+    COLUMNS, DRY, FORCE, FORCE_DRIFT, GAP, RowSource, SHARE, SIDE_FORCE, STRIBECK,
+};
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, search, start};
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::coupling_path::CouplingPath;
@@ -265,6 +267,7 @@ impl<'a> ParameterSearch<'a> {
         // In contact a zero is an offset of δX.
         let shift_m = (load_zero_n - found.at.load_zero_n) * beta[FORCE] / scaling.load_n;
         let (force, force_drift) = (beta[FORCE] / scaling.load_n, beta[FORCE_DRIFT] / scaling.load_n);
+        let side_force = beta[SIDE_FORCE] / scaling.load_n;
         let (share, stribeck) = (beta[SHARE] / scaling.load_n, beta[STRIBECK] / scaling.load_n);
         let columns = &path.columns;
         for (k, linear_m) in linear_m.iter().enumerate() {
@@ -274,6 +277,7 @@ impl<'a> ParameterSearch<'a> {
             let time = scaling.time_share(blocks.time_s[k]);
             let coupling_m = side * beta[GAP]
                 + force_n * (force + force_drift * time)
+                + force_n.abs() * side_force
                 + beta[DRY] * columns.dforce_ddry[k]
                 + share * columns.dforce_dloss_n[k]
                 + stribeck * columns.dforce_dstribeck_n[k];
@@ -288,7 +292,7 @@ impl<'a> ParameterSearch<'a> {
 /// δX less all that does not depend on the force in the coupling, for every block; NaN where something is missing.
 fn linear_parts(source: RowSource<'_>, beta: &[f64; COLUMNS], parts_m: &mut Vec<f64>) {
     let mut without = *beta;
-    for column in [GAP, FORCE, DRY, SHARE, STRIBECK, FORCE_DRIFT] {
+    for column in [GAP, FORCE, DRY, SHARE, STRIBECK, FORCE_DRIFT, SIDE_FORCE] {
         without[column] = 0.0;
     }
     parts_m.clear();

@@ -111,34 +111,46 @@ fn normal_equations<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> (
     for (i, line) in normal.iter_mut().enumerate() {
         side[i] = right[i / Lanes::COUNT].0[i % Lanes::COUNT];
         for (j, entry) in line.iter_mut().enumerate().take(i + 1) {
-            let square = &squares[i / Lanes::COUNT + j / Lanes::COUNT];
+            let square = &squares[square_index(i / Lanes::COUNT, j / Lanes::COUNT)];
             *entry = square[i % Lanes::COUNT].0[j % Lanes::COUNT];
         }
     }
     (normal, side)
 }
 
-/// Sums over rows: Σ w x xᵀ in squares of eight by eight, filled up with zeros: upper left, lower left, lower right; and
-/// Σ w x y.
+/// Lanes of a row.
+const ROW_LANES: usize = 3;
+/// Squares on and below the diagonal.
+const SQUARES: usize = ROW_LANES * (ROW_LANES + 1) / 2;
+
+/// Where the square of two lanes of a row stands, the second of which is not after the first.
+const fn square_index(line: usize, column: usize) -> usize {
+    line * (line + 1) / 2 + column
+}
+
+/// Sums over rows: Σ w x xᵀ in squares of eight by eight on and below the diagonal, filled up with zeros; and Σ w x y.
 struct NormalEquations {
-    squares: [[Lanes; Lanes::COUNT]; 3],
-    right: [Lanes; 2],
+    squares: [[Lanes; Lanes::COUNT]; SQUARES],
+    right: [Lanes; ROW_LANES],
 }
 
 simd_dispatch! {
     /// Whole squares: what is above the diagonal comes for nothing, and would come apart if it were left out.
     fn products<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> NormalEquations {
-        let mut squares = [[Lanes::ZERO; Lanes::COUNT]; 3];
-        let mut right = [Lanes::ZERO; 2];
+        const { assert!(N <= ROW_LANES * Lanes::COUNT) };
+        let mut squares = [[Lanes::ZERO; Lanes::COUNT]; SQUARES];
+        let mut right = [Lanes::ZERO; ROW_LANES];
         for (row, &w) in rows.iter().zip(weights) {
-            let x = [Lanes::of(&row.x, 0), Lanes::of(&row.x, Lanes::COUNT)];
             let (w, y_m) = (Lanes::all(w), Lanes::all(row.y_m));
-            let wx = [w.times(x[0]), w.times(x[1])];
-            right = [right[0].plus(wx[0].times(y_m)), right[1].plus(wx[1].times(y_m))];
-            add_products(&mut squares[0], N.min(Lanes::COUNT), wx[0], x[0]);
-            if N > Lanes::COUNT {
-                add_products(&mut squares[1], N - Lanes::COUNT, wx[1], x[0]);
-                add_products(&mut squares[2], N - Lanes::COUNT, wx[1], x[1]);
+            let mut x = [Lanes::ZERO; ROW_LANES];
+            for line in 0..N.div_ceil(Lanes::COUNT) {
+                x[line] = Lanes::of(&row.x, line * Lanes::COUNT);
+                let wx = w.times(x[line]);
+                right[line] = right[line].plus(wx.times(y_m));
+                let count = (N - line * Lanes::COUNT).min(Lanes::COUNT);
+                for column in 0..=line {
+                    add_products(&mut squares[square_index(line, column)], count, wx, x[column]);
+                }
             }
         }
         NormalEquations { squares, right }

@@ -151,7 +151,7 @@ fn a_running_gap_agrees_with_the_fifty_digits() {
 }
 
 #[test]
-fn a_running_gap_without_motion_says_why() {
+fn a_streaming_gap_without_motion_reports_the_reason() {
     assert_eq!(running(&[f64::NAN]), Err(Error::NothingMeasured));
     assert_eq!(running(&[2.0; 3]), Err(Error::Constant { samples: 3, s_m: 2.0 }));
     assert!(matches!(Histogram::new(0.0), Err(Error::Parameter { name: "bin_m", .. })));
@@ -167,7 +167,7 @@ fn a_gap_wide_of_the_bins_is_exact() {
 }
 
 proptest! {
-    /// However samples and loads are missing, once the first is there: the same bits.
+    /// With any missing samples and loads after the first sample: bitwise identical.
     #[test]
     fn a_stream_gives_the_bits_of_the_batch(
         dx in vec(prop_oneof![9 => (-1e-4..1e-4).boxed(), 1 => Just(f64::NAN).boxed()], 300..900),

@@ -8,9 +8,9 @@ use std::time::Duration;
 use records::GapRecord;
 use store::{Holder, Query, Store};
 
-use crate::made::{POSITIONS, result, writer};
+use crate::fixtures::{POSITIONS, result, writer};
 
-/// Tells the child in which folder to write; without it, it is a test that has nothing to do.
+/// Folder into which the child writes; without it, the test does nothing.
 const FOLDER: &str = "FREEPLAY_TEST_KILL_FOLDER";
 const KILLS: u64 = 25;
 
@@ -34,7 +34,7 @@ fn a_writer_to_be_killed() {
 
 fn child(dir: &Path) -> Child {
     let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--exact", "kills::a_writer_to_be_killed"]).env(FOLDER, dir);
+    command.args(["--exact", "crash_recovery::a_writer_to_be_killed"]).env(FOLDER, dir);
     command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
 }
 

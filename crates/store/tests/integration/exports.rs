@@ -6,9 +6,9 @@ use arrow::array::RecordBatch;
 use arrow::compute::concat_batches;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use records::GapRecord;
-use store::{Format, Query, columns};
+use store::{Format, Query, RecordKey, columns};
 
-use crate::made::{record, result, writer};
+use crate::fixtures::{record, result, writer};
 
 fn exported(format: Format, results: &[store::LogResult]) -> Vec<u8> {
     let dir = tempfile::tempdir().unwrap();
@@ -31,7 +31,7 @@ fn json_holds_every_column_of_every_record_and_the_same_bits() {
     assert!(rows[0]["tail_hours_end"].is_null());
     let read: Vec<GapRecord> = serde_json::from_slice(&text).unwrap();
     let mut expected: Vec<GapRecord> = results.into_iter().flat_map(|r| r.records).collect();
-    expected.sort_by_key(GapRecord::canonical_key);
+    expected.sort_by_key(RecordKey::of);
     assert_eq!(read, expected);
 }
 
@@ -60,7 +60,9 @@ fn parquet_reads_back_as_the_same_records() {
     let records = columns::from_batch(&batch).unwrap();
     let expected: Vec<GapRecord> = [(0, 40e-6), (1, 41e-6)]
         .into_iter()
-        .flat_map(|(flight, gap_m)| crate::made::POSITIONS.map(|position| record(1, flight, position, gap_m)))
+        .flat_map(|(flight, gap_m)| {
+            crate::fixtures::POSITIONS.map(|position| record(1, flight, position, gap_m))
+        })
         .collect();
     assert_eq!(records, expected);
 }

@@ -1,5 +1,5 @@
-//! Vectors made by mpmath in 50 digits, beside scipy and filterpy; `tests/data/lkf/README.md` says how
-//! they were made and how far to trust them.
+//! Reference vectors by mpmath in 50 digits, compared with scipy and filterpy; `tests/data/lkf/README.md` documents
+//! their origin and accuracy.
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use estimator::{ActuatorModel, Filter, NoiseModel, Samples, gap};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::Value;
 
-use crate::table::columns;
+use crate::parquet_fixture::columns;
 
 pub(crate) const SETS: [&str; 4] =
     ["a_nominal_250hz", "b_stiff_light_1khz", "c_soft_heavy_100hz_missing", "d_rotary_200hz"];
@@ -196,7 +196,7 @@ fn the_settled_gain_and_its_poles_agree() {
     }
 }
 
-/// The batch runs on the settled gain where it can; it must tell the same story as the 50-digit recursion.
+/// The batch uses the steady-state gain where it can; it must agree with the 50-digit recursion.
 #[test]
 fn the_batch_and_the_gap_agree() {
     for name in SETS {

@@ -1,4 +1,4 @@
-//! Care: what the store says of itself, and that merging its files changes no row.
+//! Maintenance: figures about the store, and merging its files changes no row.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use store::{Query, Store, Writer};
 
-use crate::made::{departure, result, run, writer};
+use crate::fixtures::{departure, result, run, writer};
 
 fn filled(dir: &Path) -> Writer {
     let mut writer = writer(dir);
@@ -25,7 +25,7 @@ fn data_file(writer: &Writer) -> PathBuf {
 }
 
 #[test]
-fn a_sound_store_has_no_findings_and_is_told_in_numbers() {
+fn a_sound_store_has_no_findings_and_is_counted() {
     let dir = tempfile::tempdir().unwrap();
     let mut writer = filled(dir.path());
     writer.end_run(&run("a", "2026-11-18T02:00:00Z", Some(0))).unwrap();
@@ -40,8 +40,8 @@ fn a_sound_store_has_no_findings_and_is_told_in_numbers() {
     assert_eq!(info.last_completed.unwrap().run_id, "b");
 }
 
-/// Two commits a night of one row each: after fifty nights the accounts of runs alone ask for it, and the first
-/// compaction settles the matter.
+/// Two commits of one row each per run: after fifty runs the run table alone needs a compaction, and the first
+/// compaction is sufficient.
 #[test]
 fn a_store_is_scattered_once_a_table_has_a_hundred_files_too_many() {
     let dir = tempfile::tempdir().unwrap();
@@ -58,7 +58,7 @@ fn a_store_is_scattered_once_a_table_has_a_hundred_files_too_many() {
 }
 
 #[test]
-fn an_empty_store_is_sound_and_told_in_zeros() {
+fn an_empty_store_is_sound_and_counts_zero() {
     let dir = tempfile::tempdir().unwrap();
     let store = Store::create_or_open(dir.path()).unwrap();
     assert_eq!(store.verify(), []);

@@ -1,9 +1,9 @@
-//! What a run did is known at any instant, also when it was killed before it could say so.
+//! The status of a run is known at any instant, also after it was killed.
 
 use records::Status;
 use store::{Holder, LogOutcome, LogRecord, Query, RunRecord, Store, Writer};
 
-use crate::made::{account, record, result, run, writer};
+use crate::fixtures::{account, record, result, run, writer};
 
 /// The four logs of a run that means to do flights 0 to 3 of tail 1, and does the first three: estimated,
 /// refused in two of its three positions, and broken.
@@ -101,7 +101,7 @@ fn a_log_that_is_not_reached_keeps_what_was_known_of_it() {
 }
 
 #[test]
-fn runs_are_told_in_the_order_in_which_they_began_the_ended_as_they_ended() {
+fn runs_are_listed_by_start_with_their_end() {
     let dir = tempfile::tempdir().unwrap();
     let mut writer = writer(dir.path());
     let whole = run("a", "2026-11-20T02:00:00Z", Some(1));
@@ -123,7 +123,7 @@ fn a_table_always_has_a_file() {
     writer.commit(&[retired.clone()]).unwrap();
     writer.compact().unwrap();
     let position = |name| store::RecordKey::of(&record(1, 0, name, 0.0));
-    retired.retires = crate::made::POSITIONS.map(position).to_vec();
+    retired.retires = crate::fixtures::POSITIONS.map(position).to_vec();
     retired.records.clear();
     (retired.account.estimated, retired.account.refused) = (0, 0);
     writer.commit(&[retired]).unwrap();

@@ -6,9 +6,9 @@ use records::{
     Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
     TailNumber,
 };
-use store::{LogResult, Query, columns};
+use store::{LogResult, Query, RecordKey, columns};
 
-use crate::made::{account, record, writer};
+use crate::fixtures::{account, record, writer};
 
 /// Names keep no white space around them, and hold anything else.
 fn name() -> impl Strategy<Value = String> {
@@ -86,7 +86,7 @@ prop_compose! {
 }
 
 fn bits(records: &[GapRecord]) -> Vec<String> {
-    // The debug form of an f64 is its shortest exact one, and tells -0.0 from 0.0.
+    // The debug form of an f64 is its shortest exact one, and separates -0.0 from 0.0.
     records.iter().map(|record| format!("{record:?}")).collect()
 }
 
@@ -95,8 +95,8 @@ proptest! {
 
     #[test]
     fn every_column_comes_back_from_the_store(mut all in prop::collection::vec(records(), 1..12)) {
-        all.sort_by_key(GapRecord::canonical_key);
-        all.dedup_by_key(|record| store::RecordKey::of(record));
+        all.sort_by_key(RecordKey::of);
+        all.dedup_by_key(|record| RecordKey::of(record));
         let dir = tempfile::tempdir().unwrap();
         let mut writer = writer(dir.path());
         writer.commit(&[LogResult { account: account(0, 0), records: all.clone(), retires: Vec::new() }]).unwrap();

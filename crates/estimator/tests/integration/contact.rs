@@ -241,7 +241,7 @@ fn a_flight_in_two_segments_with_missing_samples_shows_the_same_gap() {
 }
 
 #[test]
-fn channels_that_are_not_what_they_are_said_to_be_are_refused() {
+fn wrongly_mapped_channels_are_rejected() {
     let case = Case::nominal(100e-6);
     let flight = case.fly(5);
     let (motor, screw, load) = (&flight.motor_m, &flight.screw_m, &flight.load_n);

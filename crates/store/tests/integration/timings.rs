@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use store::{Format, LogResult, Query, Store};
 
-use crate::made::{departure, result, run, writer};
+use crate::fixtures::{departure, result, run, writer};
 
 const TAILS: usize = 100;
 const FLIGHTS: i64 = 1_000;

@@ -4,10 +4,10 @@ use std::time::{Duration, Instant};
 
 use store::{Error, Holder, Query, Store};
 
-use crate::made::{result, time, writer};
+use crate::fixtures::{result, time, writer};
 
 #[test]
-fn a_missing_and_an_empty_folder_are_no_store_and_the_remedy_is_told() {
+fn a_missing_and_an_empty_folder_are_no_store_and_the_error_has_a_remedy() {
     let dir = tempfile::tempdir().unwrap();
     for place in [dir.path().join("nowhere"), dir.path().to_owned()] {
         let error = Store::open(&place).unwrap_err();
@@ -68,7 +68,7 @@ fn a_name_that_delta_would_misread_is_refused_before_anything_is_written() {
 }
 
 #[test]
-fn a_second_writer_is_told_who_holds_the_store_and_may_wait() {
+fn a_second_writer_gets_the_holder_of_the_store_and_may_wait() {
     let dir = tempfile::tempdir().unwrap();
     let store = Store::create_or_open(dir.path()).unwrap();
     let holder = Holder { pid: 8812, host: "hangar2".into(), started_utc: time("2026-11-20T02:00:03Z") };

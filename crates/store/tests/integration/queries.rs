@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use records::GapRecord;
 use store::{Query, Store, Writer};
 
-use crate::made::{POSITIONS, departure, result, writer};
+use crate::fixtures::{POSITIONS, departure, result, writer};
 
 fn filled(dir: &std::path::Path) -> Writer {
     let mut writer = writer(dir);
@@ -111,7 +111,7 @@ fn parts_hold_the_rows_that_a_scan_holds() {
     proptest!(config(), |(query in questions())| {
         prop_assert_eq!(parted(writer.store(), &query), wanted(&query));
     });
-    // Nor does it matter whether a night's rows lie together, or a unit's.
+    // Nor does it matter whether files hold the rows of a run, or of a unit.
     writer.compact().unwrap();
     let store = Store::open(dir.path()).unwrap();
     assert_eq!(store.scan_columns(&Query::default(), &["gap_m"]).unwrap().len(), 1);
@@ -160,7 +160,7 @@ fn files_that_cannot_hold_an_answer_are_not_opened() {
     assert!(store.records(&Query::default()).is_err());
 }
 
-/// A unit moves between tails, and its number says nothing of theirs: bounds would rule out no file.
+/// A unit moves between tails, and its number is not ordered by tail: bounds exclude no file.
 #[test]
 fn a_units_life_opens_only_files_that_hold_it_also_after_a_checkpoint() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! One simulated flight: repeatable, loaded as asked, and sampled when it says.
+//! One simulated flight: repeatable, loaded as specified, and sampled at its timestamps.
 
 use simulator::{
     Channel, ContactLaw, ExpectedOutcome, Friction, FrictionLaw, Plant, Profile, Sensors, Vibration, simulate,

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use records::GapRecord;
 use store::{LogOutcome, LogResult, Query, RecordKey, Store};
 
-use crate::made::{POSITIONS, account, record, result, time, writer};
+use crate::fixtures::{POSITIONS, account, record, result, time, writer};
 
 #[test]
 fn what_is_committed_is_read_back_in_canonical_order() {

@@ -1,5 +1,5 @@
-//! Flights of an independent simulator (MuJoCo) whose gap is known, and the reference's answer to each;
-//! `tests/data/flights/README.md` says how they were made.
+//! Flights of an independent simulator (MuJoCo) with known gap, and the reference estimate of each;
+//! `tests/data/flights/README.md` documents them.
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use estimator::contact::{self, ContactEstimate, ContactOutcome, PartPrior, Quali
 use estimator::{ActuatorModel, Filter, NoiseModel, Samples, midrange};
 use serde_json::Value;
 
-use crate::table::columns;
+use crate::parquet_fixture::columns;
 
 const FLIGHTS: [&str; 4] =
     ["A_nominal", "B_worn_stiffness_assumed_15pc_high", "C_new_small_gap", "D_no_reversal"];

@@ -1,0 +1,15 @@
+//! Public API of the store.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::print_stdout, reason = "measurements are printed")]
+
+mod commits;
+mod crash_recovery;
+mod exports;
+mod fixtures;
+mod folder;
+mod maintenance;
+mod queries;
+mod round_trip;
+mod runs;
+mod timings;
