@@ -397,7 +397,7 @@ fn a_step_of_a_whole_tail_is_named_a_matter_of_what_measures_it() {
     assert_eq!(alone, assess[2..3]);
 }
 
-/// The last six gaps are 3.5 µm too high, and the other estimator says so.
+/// The last six gaps are 3.5 µm too high, and the other estimator reports it.
 #[test]
 fn gaps_whose_estimators_disagree_hardly_move_a_level_and_the_reason_names_them() {
     let with = |off_um: f64, is_flagged: bool| {

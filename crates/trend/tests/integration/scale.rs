@@ -1,4 +1,4 @@
-//! Lengths enter by the limit alone: a fleet of parts ten times as large is told the same.
+//! Lengths enter by the limit alone: a fleet of parts ten times as large gets the same results.
 
 use trend::{Assessment, FleetPrior, Observation, Series, Settings, UsageDefaults, assess};
 
@@ -51,7 +51,7 @@ fn assessments(factor: f64) -> Vec<Assessment> {
     let settings = Settings::for_limit(factor * LIMIT_M);
     let prior = FleetPrior::learn(&fleet, DAYS * DAY_US, settings.limit_m, None);
     let assessment = |(unit, series): (usize, &Series)| {
-        // Every sixth unit without the fleet, as a part number nobody has seen.
+        // Every sixth unit without the fleet, as a part number without history.
         let prior = (unit % 6 != 5).then_some(&prior);
         assess(series, DAYS * DAY_US, &settings, prior, None).unwrap()
     };

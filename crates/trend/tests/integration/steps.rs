@@ -1,4 +1,4 @@
-//! Steps and resets: when they happened, how large they were, and what doubt of them does to the level.
+//! Steps and resets: when they happened, how large they were, and how their uncertain kind widens the level.
 
 use trend::{ChangePointKind, Observation, Series, Settings, UsageDefaults, assess};
 
