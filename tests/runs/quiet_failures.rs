@@ -222,7 +222,7 @@ const WAYS: &[Way] = &[
             f.configure("unit = \"N\"", "unit = \"N\"\nscale = 1e-12");
             run(f)
         },
-        0,
+        1,
         "load_too_small",
     ),
     (

@@ -174,9 +174,13 @@ type Results = fn(&GearBenchLog) -> [f64; 2];
 
 /// Against the authors' play: correlation, mean and mean absolute difference, of each method.
 fn gear_bench_table(rows: &[GearBenchLog]) -> String {
-    let mut table = "| method | ramps | correlation | mean difference ° | mean absolute difference ° |\n|---|---|---|---|---|\n".to_owned();
-    let methods: [(&str, Results); 3] =
-        [(METHODS[1], |g| g.midrange_deg), (METHODS[2], |g| g.lines_deg), (METHODS[3], |g| g.spread_deg)];
+    let mut table = "| method | ramps | logs | correlation | mean difference ° | mean absolute difference ° |\n|---|---|---|---|---|---|\n".to_owned();
+    let methods: [(&str, Results); 4] = [
+        (METHODS[0], |g| g.contact_deg),
+        (METHODS[1], |g| g.midrange_deg),
+        (METHODS[2], |g| g.lines_deg),
+        (METHODS[3], |g| g.spread_deg),
+    ];
     for (name, of) in methods {
         for (k, ramps) in ["4 N·m", "4 and 40 N·m"].iter().enumerate() {
             let pairs: Vec<(f64, f64)> =
@@ -187,7 +191,10 @@ fn gear_bench_table(rows: &[GearBenchLog]) -> String {
             let (a, s) = (mean(&|p| p.0), mean(&|p| p.1));
             let correlation = mean(&|p| (p.0 - a) * (p.1 - s))
                 / (mean(&|p| (p.0 - a).powi(2)) * mean(&|p| (p.1 - s).powi(2))).sqrt();
-            let _ = writeln!(table, "| {name} | {ramps} | {correlation:.3} | {difference:+.3} | {size:.3} |");
+            let _ = writeln!(
+                table,
+                "| {name} | {ramps} | {n} | {correlation:.3} | {difference:+.3} | {size:.3} |"
+            );
         }
     }
     let _ = writeln!(table, "\n{} logs.", rows.len());

@@ -2,8 +2,7 @@
 //! friction, hardening flanks. The logs are licensed CC BY-SA and are no part of the project; the
 //! study uses them when `--gears` names their folder.
 //!
-//! A locked output looks like a dead sensor, so our own estimate refuses these logs by design. What
-//! can be compared is the published statistic and the baselines, which never refuse.
+//! The output has no sensor: it is declared as locked, as `output = "locked"` does for a part.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -12,8 +11,8 @@ use std::path::Path;
 use arrow::array::{AsArray, RecordBatch};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type};
-use estimator::SensorNoise;
-use estimator::{ActuatorModel, Filter, NoiseModel, Samples, midrange};
+use estimator::contact::{self, ContactOutcome, PartPrior};
+use estimator::{ActuatorModel, Filter, NoiseModel, Samples, SensorNoise, midrange};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::methods::{load_lines_m, spread_m};
@@ -23,6 +22,8 @@ use crate::methods::{load_lines_m, spread_m};
 pub struct GearBenchLog {
     /// Play of this phase as its authors measured it, over three places of the output.
     pub authors_deg: f64,
+    /// Contact regression over the ramps to 4 N·m, and over all, those to 40 N·m included; NaN where it refuses.
+    pub contact_deg: [f64; 2],
     /// The paper's statistic over the ramps to 4 N·m, and over all, those to 40 N·m included.
     pub midrange_deg: [f64; 2],
     /// Load lines, over the same.
@@ -33,6 +34,10 @@ pub struct GearBenchLog {
 
 /// Stiffness as its authors give it, 0.084 °/(N·m), N·m/rad.
 const STIFFNESS_NM_PER_RAD: f64 = 680.0;
+/// Radius at which angles are stated as lengths and torques as forces, m: about that of the pins.
+const RADIUS_M: f64 = 0.05;
+/// Load between whose positive and negative value lost motion is stated, N.
+const REFERENCE_LOAD_N: f64 = 20.0;
 /// Ramps up to this number go to 4 N·m.
 const LAST_SMALL_RAMP: f64 = 4.0;
 
@@ -84,8 +89,31 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, Str
             midrange::estimate(&samples, &filter).map_or(f64::NAN, |m| m.gap.gap_m.to_degrees()),
         )
     };
+    let motor_m: Vec<f64> = motor_rad.iter().map(|x| x * RADIUS_M).collect();
+    let dx_m: Vec<f64> = dx_rad.iter().map(|x| x * RADIUS_M).collect();
+    let load_n: Vec<f64> = load_nm.iter().map(|t| t / RADIUS_M).collect();
+    let prior = PartPrior {
+        reference_load_n: Some(REFERENCE_LOAD_N),
+        output_locked: true,
+        ..PartPrior::of_stiffness(STIFFNESS_NM_PER_RAD / (RADIUS_M * RADIUS_M))
+    };
+    let regression = |end: usize| {
+        let segment = 0..end;
+        let samples = Samples {
+            step_s,
+            motor_m: &motor_m[..end],
+            dx_m: &dx_m[..end],
+            load_n: &load_n[..end],
+            segments: std::slice::from_ref(&segment),
+        };
+        match contact::estimate(&samples, &prior).map_err(|e| format!("{file}: {e}"))? {
+            ContactOutcome::Estimated(found) => Ok::<f64, String>((found.gap_m / RADIUS_M).to_degrees()),
+            ContactOutcome::Refused(_) => Ok(f64::NAN),
+        }
+    };
     Ok(GearBenchLog {
         authors_deg,
+        contact_deg: [regression(parts[0])?, regression(parts[1])?],
         midrange_deg: [published(parts[0])?, published(parts[1])?],
         lines_deg: parts.map(|end| load_lines_m(&dx_rad[..end], &load_nm[..end]).to_degrees()),
         spread_deg: parts.map(|end| spread_m(&dx_rad[..end]).to_degrees()),

@@ -8,7 +8,7 @@ use super::types::{ContactEstimate, DETECTION_SHARE};
 const SEEN: f64 = 2.0;
 /// Three spreads of 15 %: how far 1/K may lie from the part's.
 const IMPLAUSIBLE: f64 = 0.45;
-/// Relative standard error of the gap's interval beyond which the flight says little, in wind-ups.
+/// Largest relative standard error of a useful gap, in wind-ups.
 const VAGUE: f64 = 0.1;
 
 pub(crate) fn flags(

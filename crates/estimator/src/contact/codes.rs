@@ -21,7 +21,7 @@ pub enum Rejection {
     ChannelConstant,
     /// δX falls with the load, and friction agrees with the positions.
     LoadSignFlipped,
-    /// δX falls with the load, and friction says motor and screw are exchanged.
+    /// δX falls with the load, and the sign of friction shows that motor and screw are exchanged.
     PositionsSwapped,
     /// One position is not a multiple of one of the other.
     PositionRatio,
@@ -45,7 +45,7 @@ impl Rejection {
         }
     }
 
-    /// What somebody can do about it.
+    /// Remedy for the user.
     pub fn remedy(self) -> &'static str {
         match self {
             Self::NoLoadReversal => "use a flight, or a ground check, in which the load changes sides",
@@ -56,7 +56,7 @@ impl Rejection {
                 "check the load channel and its unit; a surface without airload shows no gap"
             }
             Self::TravelTooSmall => {
-                "use a flight in which the actuator moves; friction cannot be told from play at rest"
+                "use a flight in which the actuator moves; at rest, friction and play are not distinguishable"
             }
             Self::RateTooLow => "record at 20 samples a second or more, 50 or more for a small gap",
             Self::MotionUnexplained => {
@@ -78,7 +78,7 @@ impl Rejection {
     }
 }
 
-/// A doubt that does not forbid the number.
+/// A quality flag: a finding that does not prevent the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum QualityFlag {
     /// The gap is under two standard errors, or under a hundredth of the wind-up: read the upper bound.

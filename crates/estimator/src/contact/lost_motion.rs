@@ -10,7 +10,7 @@ use crate::contact::stats::{MAD, median};
 const NEAR: f64 = 0.25;
 /// A median of a normal sample scatters so much more than its mean: √(π/2).
 const MEDIAN: f64 = 1.253_314_137_315_5;
-/// Rows on each flank below which a median says nothing.
+/// Rows on each flank below which a median carries no information.
 const FEWEST_ROWS: usize = 5;
 
 /// Lost motion at zero load and its standard error, m, from the lightly loaded rows, which the straight fit
@@ -33,8 +33,8 @@ pub(crate) fn lost_motion_m(contact: &FlankFit, frame: &Scaling, load_n: f64) ->
     Some(put_together(contact, line_m, beyond_m(Flank::Upper)?, beyond_m(Flank::Lower)?))
 }
 
-/// A travel along the fitted line, and what both flanks lie beyond it. What is doubted of the gap (drift,
-/// transducer, friction) is doubted here as well; the medians' own scatter comes on top.
+/// Lost motion: a travel along the fitted line, and the distances of both flanks beyond it. The uncertainty of the gap
+/// (drift, transducer, friction) applies here too; the scatter of the medians is added.
 fn put_together(contact: &FlankFit, line_m: f64, upper: (f64, f64), lower: (f64, f64)) -> (f64, f64) {
     (line_m + upper.0 + lower.0, contact.gap_m.1.hypot(upper.1.hypot(lower.1)))
 }

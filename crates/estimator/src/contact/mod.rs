@@ -44,7 +44,7 @@ use fit::scaling::Scaling;
 use fit::sign_check;
 use types::{LONGEST_STEP_S, NORMAL_95};
 
-/// Estimates the gap of one flight, over all its segments together, or says why it cannot be seen.
+/// Estimates the gap of one flight, over all its segments together, or returns the reason for its rejection.
 ///
 /// Time is linear in the samples; memory is some twenty numbers for each block of about 4 ms and a row of twenty for
 /// each tenth of a second or more.

@@ -1,4 +1,4 @@
-//! What the estimate stands on, as one would draw it: δX against the force in the coupling.
+//! Plot data of an estimate: δX against the force in the coupling.
 
 use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, FORCE, GAP};
 use crate::contact::fit::flank_fit::FlankFit;

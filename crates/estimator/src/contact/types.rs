@@ -84,14 +84,14 @@ pub struct ContactEstimate {
     pub lost_motion_m: Option<f64>,
     /// Its standard error, m.
     pub lost_motion_se_m: Option<f64>,
-    /// Time in contact on the upper and on the lower flank that the number stands on, s.
+    /// Time in contact on the upper and on the lower flank, s.
     pub touched_s: (f64, f64),
     /// Load magnitude that one sample in twenty exceeds, N.
     pub load_p95_n: f64,
     /// The published mid-range statistic of the same flight with stiffness, load zero, delays, drift and transducer
     /// error as found here, m: a check by another method.
     pub midrange_at_fit_m: Option<f64>,
-    /// Doubts that do not forbid the number.
+    /// Quality flags: findings that do not prevent the estimate.
     pub flags: Vec<QualityFlag>,
 }
 

@@ -33,7 +33,7 @@ impl Read for PreadCursor {
 
 impl Length for PreadFile {
     fn len(&self) -> u64 {
-        self.0.len()
+        file_length(&self.0).unwrap_or(0)
     }
 }
 
@@ -49,6 +49,11 @@ impl ChunkReader for PreadFile {
         read_exact(&self.0, &mut buffer, start)?;
         Ok(buffer.into())
     }
+}
+
+/// Length of a file, bytes; a transient error is retried.
+pub(crate) fn file_length(file: &File) -> io::Result<u64> {
+    Ok(transient::with_retry(|| file.metadata())?.len())
 }
 
 /// Fills the buffer from some byte on.

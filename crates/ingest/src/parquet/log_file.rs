@@ -319,7 +319,7 @@ impl LogFile {
     pub(crate) fn feed(&self, names: &[&str], digest: &mut Digest) -> Result<(), Error> {
         let unreadable = |source| self.error(ErrorKind::Unreadable { source });
         let file = self.source.file();
-        let length = transient::with_retry(|| file.metadata()).map_err(unreadable)?.len();
+        let length = read_at::file_length(file).map_err(unreadable)?;
         let wanted: Vec<&LeafColumn> =
             self.leaves.iter().filter(|l| names.contains(&l.name.as_str())).collect();
         self.want(&wanted)?;

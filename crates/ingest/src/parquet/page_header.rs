@@ -84,7 +84,7 @@ impl<'f> Pages<'f> {
 /// What a header claims that cannot be.
 pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Result<Vec<Page>, String> {
     let (start, bytes) = chunk.byte_range();
-    let length = file.metadata().map_err(|e| e.to_string())?.len();
+    let length = read_at::file_length(file).map_err(|e| e.to_string())?;
     if start.checked_add(bytes).is_none_or(|end| end > length) {
         return Err(format!("its pages would end at byte {start} + {bytes} of a file of {length}"));
     }

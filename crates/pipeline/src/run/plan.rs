@@ -332,7 +332,11 @@ impl Judge<'_> {
             Some(WorkReason::SettingChanged)
         } else if self.is_orphan(account) {
             Some(WorkReason::OwnerGone)
-        } else if account.error_code.as_deref().is_some_and(is_passing) {
+        } else if account
+            .error_code
+            .as_deref()
+            .is_some_and(|code| is_passing(code) || UNLISTED.contains(&code))
+        {
             Some(WorkReason::Unfetched)
         } else if self.request.retry && account.outcome == LogOutcome::Error {
             Some(WorkReason::Retry)

@@ -28,8 +28,8 @@ const START_S: f64 = 1.0;
 /// Residuals are taken as dependent within this time, s.
 const STRETCH_S: f64 = 2.0;
 
-/// Blocks that are looked at, and added up, together: their channels stay in the first cache between the two, and each
-/// channel is read far enough in a row to be fetched ahead.
+/// Blocks that are checked and averaged together: their channels stay in the first cache between the two, and each
+/// channel is read in long enough runs to be prefetched.
 const SPAN: usize = 16;
 
 /// Blocks that the search begins with, in windows of this many.
@@ -60,7 +60,7 @@ pub(crate) struct BlockMeans {
     screw_m: Vec<f64>,
     /// F as it was logged, N.
     logged_n: Vec<f64>,
-    /// Sine and cosine of the screw's position within the period of its errors; empty where none are looked for.
+    /// Sine and cosine of the screw's position within the period of its errors; empty where no period is configured.
     pub(crate) phases: Vec<[f64; 2]>,
 }
 
@@ -159,7 +159,7 @@ impl BlockMeans {
         self.starts.iter().copied().zip(ends).map(|(start, end)| start..end)
     }
 
-    /// The number of the stretch that a block lies in.
+    /// The number of the segment that contains a block.
     pub(crate) fn stretch(&self, k: usize) -> u32 {
         (self.time_s[k] / STRETCH_S) as u32
     }
@@ -379,7 +379,7 @@ fn cubic(u: f64) -> [f64; 4] {
     ]
 }
 
-/// The samples, and how far neighbours of a channel may leap before they are looked at twice.
+/// The samples, and the largest step between neighbours of a channel that needs no spike test.
 #[derive(Debug)]
 struct SpikeGate<'a> {
     samples: &'a Samples<'a>,
@@ -396,7 +396,7 @@ impl<'a> SpikeGate<'a> {
     }
 
     /// Whether nothing leaps within a span, nor from the sample before it; the first span of a log is left to be
-    /// looked at block by block.
+    /// tested block by block.
     fn is_calm(&self, span: &Range<usize>) -> bool {
         if span.start == 0 {
             return false;

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-/// Steps between neighbours are looked at this many times over what counts of a flight.
+/// Size of the subsample of steps between neighbours.
 const LOOKS: usize = 4000;
-/// A sample is wild beyond this many times the step that nine in ten steps stay under.
+/// A sample is a spike beyond this many times the 90 % quantile of the steps.
 const WILD: f64 = 8.0;
 /// SpikeThreshold on either side.
 const REACH: usize = 4;
@@ -12,7 +12,7 @@ const REACH: usize = 4;
 /// How far a channel's neighbours lie apart.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SpikeThreshold {
-    /// The longest step that is not looked at twice, in the channel's unit.
+    /// The longest step that needs no spike test, in the channel's unit.
     pub(crate) leap: f64,
 }
 
@@ -58,7 +58,7 @@ impl SpikeThreshold {
 mod tests {
     use super::*;
 
-    /// Ten rows for each load, and every forty-fifth step looked at: none of them is one of the load's.
+    /// Ten rows for each load, and every forty-fifth step in the subsample: none of them is one of the load's.
     #[test]
     fn a_channel_that_is_held_moves() {
         let held: Vec<f64> = (0..180_000).map(|k| (f64::from(k / 10) * 0.01).sin()).collect();

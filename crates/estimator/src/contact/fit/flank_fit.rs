@@ -23,7 +23,7 @@ use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
 use crate::samples::Samples;
 
-/// Blocks looked at to see how far δX travels.
+/// Size of the subsample of blocks from which the range of δX is found.
 const LOOKS: usize = 4000;
 /// Travel may exceed what is expected by this share. Over some 300 simulated flights that show their gap it
 /// did by 3 % at most, with positions that freeze for seconds by 15 %; over the flights that were given a wrong
@@ -37,7 +37,7 @@ const SHORT_BLOCKS: usize = 60_000;
 const STIFF_SHARE: f64 = 0.3;
 /// Groups of rows that the jackknife leaves out in turn.
 const GROUPS: usize = 10;
-/// The two fits count alike when they differ by so many jackknife errors, squared.
+/// The two fits are equivalent when they differ by at most this many jackknife errors, squared.
 const ALIKE: f64 = 2.0;
 /// Difference that is never significant, m.
 const LEAST_DIFFERENCE_M: f64 = 5e-8;
@@ -48,7 +48,7 @@ const SOFT_CONTACT_SIGMA: f64 = 2.3;
 const MODE_RAD_PER_S: f64 = 2500.0;
 /// Twice its damping ratio: a mode that rings between two samples would outlast them.
 const DAMPING: f64 = 1.4;
-/// Force that the model does not know over the 95 % load, where the part does not say.
+/// Unknown force as a share of the 95 % load, where the part does not give it.
 const UNKNOWN_FORCE_SHARE: f64 = 0.02;
 /// Bandwidth of the backlash in that check, Hz.
 const BANDWIDTH_HZ: f64 = 10.0;
@@ -56,7 +56,7 @@ const BANDWIDTH_HZ: f64 = 10.0;
 /// Periodic errors that are smaller do not matter, m.
 const LEAST_PERIODIC_M: f64 = 2e-7;
 
-/// How much each part of the doubt about a gap weighs; see [`Doubt`].
+/// Weight of each part of the uncertainty of a gap; see [`Doubt`].
 const WEIGHTS: Doubt = Doubt {
     jackknife_m: 0.92,
     search_m: 0.48,
@@ -67,10 +67,10 @@ const WEIGHTS: Doubt = Doubt {
     changes: 0.58,
     friction_share: 1.42,
 };
-/// The doubt grows with the share of friction in the load up to this share.
+/// The uncertainty grows with the share of friction in the load up to this share.
 const MAX_DOUBTED_SHARE: f64 = 0.6;
 
-/// What the doubt about a gap consists of, m: its variance is the sum of the squared parts, each weighted, times the
+/// Parts of the uncertainty of a gap, m: its variance is the sum of the squared parts, each weighted, times the
 /// square of a factor for few changes of the flank and for heavy friction. The weights are fitted by maximum likelihood
 /// (Student's t with five degrees of freedom) to the errors of 4,000 simulated flights of all classes.
 #[derive(Debug, Clone, Copy)]
@@ -277,7 +277,7 @@ fn is_periodic(found: &GaussNewtonResult) -> bool {
     })
 }
 
-/// The gap, the doubt about it, and by how many errors the fit of higher loads differs.
+/// The gap, its uncertainty, and by how many errors the fit of higher loads differs.
 fn gap_and_doubt(
     line: &GaussNewtonResult,
     search_m: f64,

@@ -33,7 +33,7 @@ const ZERO_ERROR_STEP: f64 = 0.02;
 const INDEPENDENT_S: f64 = 0.1;
 /// Shares of the load's delay that are tried as a first-order lag.
 const LAG_SHARES: [f64; 2] = [1.0, 0.5];
-/// A shorter delay of the load is not told apart from a lag, s.
+/// A shorter delay of the load is not distinguishable from a lag, s.
 const LEAST_DELAY_S: f64 = 2e-4;
 /// Candidates this much above the least mean misfit count e⁻¹ in the spread of gaps.
 const COST_SCALE: f64 = 0.01;

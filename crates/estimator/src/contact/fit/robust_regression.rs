@@ -68,8 +68,8 @@ pub(crate) fn fit<const N: usize>(
     Some(found)
 }
 
-/// Weight of a residual. The wild are cut off only in the last round: before, a bad start could take a
-/// whole flank for wild.
+/// Weight of a residual. Outliers are rejected only in the last round: before, a bad start could reject a
+/// whole flank.
 fn trust(deviation: f64, last: bool) -> f64 {
     if last && deviation > WILD {
         0.0
@@ -244,7 +244,7 @@ impl<const N: usize> RobustFit<N> {
         rows.iter().zip(&self.weights).map(move |(row, w)| w * mean_blocks / row.blocks)
     }
 
-    /// Standard error of a coefficient, m: the sandwich over stretches, and what beliefs lend in doubt.
+    /// Standard error of a coefficient, m: the sandwich estimate over segments, and the share of uncertain priors.
     ///
     /// ```text
     /// Var β_j = Σ_stretches (Σ w e aᵀx)² · B/(B − N) + Σ_i (a_i λ_i σ_i)²      a = row j of H⁻¹

@@ -20,9 +20,9 @@ const LEAST_LOAD: f64 = 1.5;
 /// Blocks of flight for each block in a row, so that long flights have no more rows than they need.
 const BLOCKS_PER_ROW_BLOCK: usize = 10_000;
 
-/// Wind-ups that the motor must travel: at rest, friction and a gap cannot be told apart.
+/// Wind-ups that the motor must travel: at rest, friction and a gap are not distinguishable.
 const LEAST_TRAVEL: f64 = 3.0;
-/// Periods that the travel must show for their errors to be told apart from a drift.
+/// Periods that the travel must show for their errors to be distinguishable from a drift.
 const PERIODS: f64 = 3.0;
 
 /// Scales that bring every column to about one.

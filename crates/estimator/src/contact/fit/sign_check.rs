@@ -1,4 +1,4 @@
-//! Are the channels what they are said to be? Signs and ratios, before anything is believed.
+//! Sign and ratio check of the channels, before the regression.
 
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
@@ -6,7 +6,7 @@ use crate::contact::fit::design_matrix::DesignRow;
 use crate::contact::fit::robust_regression::{GaussianPrior, fit};
 use crate::contact::fit::scaling::{SPEED_M_PER_S, Scaling};
 
-/// Every fourth block is looked at, and of long flights some so many: a sign needs no more.
+/// Every fourth block is used, and at most a fixed number on long flights: a sign needs no more.
 const STRIDE: usize = 4;
 /// See [`STRIDE`].
 const LOOKS: usize = 4000;
@@ -34,7 +34,7 @@ const COLUMNS: usize = 6;
 /// Regresses δX on the load, the side it presses to, the sign of the speed, speed and place.
 ///
 /// δX must grow with the load. Where it falls, either the load's sign is flipped or the two positions
-/// are swapped; friction tells which, since it opposes the motion of the screw in either case.
+/// are swapped; friction separates the two cases, since it opposes the motion of the screw in either case.
 ///
 /// # Errors
 /// [`Rejection::PositionRatio`], [`Rejection::LoadSignFlipped`], [`Rejection::PositionsSwapped`].
