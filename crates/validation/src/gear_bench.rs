@@ -41,7 +41,7 @@ const REFERENCE_LOAD_N: f64 = 20.0;
 /// Ramps up to this number go to 4 N·m.
 const LAST_SMALL_RAMP: f64 = 4.0;
 
-/// Reads every log of a folder that its `manifest.csv` lists.
+/// Reads every log of a folder that its `manifest.csv` lists with a published play.
 ///
 /// # Errors
 /// A file that cannot be read or lacks a column, as text.
@@ -57,10 +57,14 @@ pub fn gear_bench_logs(folder: &Path) -> Result<Vec<GearBenchLog>, String> {
     let listed = lines.map(|line| {
         let cell =
             |k: usize| line.split(',').nth(k).ok_or_else(|| format!("manifest.csv: short line {line}"));
+        // Some phases have no published play.
+        if cell(play)?.is_empty() {
+            return Ok(None);
+        }
         let play_deg = cell(play)?.parse().map_err(|e| format!("manifest.csv: {line}: {e}"))?;
-        gear(folder, cell(file)?, play_deg)
+        gear(folder, cell(file)?, play_deg).map(Some)
     });
-    listed.collect()
+    listed.filter_map(Result::transpose).collect()
 }
 
 fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, String> {
