@@ -26,7 +26,7 @@ async function on(file, options, look) {
 }
 
 const um = (m) => { const text = (m * 1e6).toFixed(1); return text === "-0.0" ? "0.0" : text; };
-const level = (s) => (s.gap_m === null ? "no data" : `${um(s.gap_m)} ± ${um(1.645 * s.gap_se_m)} µm`);
+const level = (s) => (s.gap_m === null ? "no data" : `${um(s.gap_m)} ± ${um(1.645 * s.gap_se_m)} µm (90 %)`);
 const name = (u) => (u.part_number === null ? u.serial_number : `${u.part_number} / ${u.serial_number}`);
 const calls = (u) => ["act", "plan", "watch"].includes(u.statement.state);
 // A mark of direction is named in the pages, so that it cannot turn round what stands after it.
