@@ -69,7 +69,7 @@ impl Injector {
         CommandResult { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
     }
 
-    /// A command under a clock that is so many seconds ahead.
+    /// A command under a clock that is ahead by `ahead_s` seconds.
     pub(crate) fn with_clock(&self, fleet: &TestFleet, args: &[&str], ahead_s: i64) -> CommandResult {
         let mut command = fleet.command(args);
         command.env("LD_PRELOAD", &self.library).env("CLOCK_OFFSET_S", ahead_s.to_string());

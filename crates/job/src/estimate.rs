@@ -67,6 +67,28 @@ pub fn estimate(
     Ok(estimate)
 }
 
+/// What the contact regression finds, or the code of the rejection before or by it, without the published statistic.
+///
+/// # Errors
+/// As [`estimate`].
+pub fn contact_regression(
+    channels: &ActuatorChannels,
+    part: &Part,
+) -> Result<Result<Box<ContactEstimate>, &'static str>, Diagnostic> {
+    if is_too_slow(channels) {
+        return Ok(Err("rate_too_low"));
+    }
+    filter(channels, part)?;
+    if let Some(reason) = pre_check_rejection(channels) {
+        return Ok(Err(reason));
+    }
+    match contact::estimate(&samples(channels), &prior(channels, part)) {
+        Ok(ContactOutcome::Estimated(found)) => Ok(Ok(found)),
+        Ok(ContactOutcome::Refused(why)) => Ok(Err(why.code())),
+        Err(e) => Err(Diagnostic::new("estimate_failed", e)),
+    }
+}
+
 /// Longer flights have rooms of their own, lest a thread keep them for ever: samples.
 const MAX_KEPT_SAMPLES: usize = 2 << 20;
 

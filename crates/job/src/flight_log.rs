@@ -57,14 +57,14 @@ impl FlightLog {
         config: &Config,
         installations: &Installations,
     ) -> Result<Self, Diagnostic> {
-        let complain = |e: ingest::Error| e.diagnostic().in_file(display_name);
-        let log = Log::open(files, config.base_mapping()).map_err(complain)?;
-        let identity = identity_of(&log, files, config).map_err(complain)?;
+        let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
+        let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
+        let identity = identity_of(&log, files, config).map_err(in_log)?;
         check_not_ahead(&identity, Timestamp::now()).map_err(|d| d.in_file(display_name))?;
         let log = log.with_mapping(&config.mapping(&identity.tail_number, None));
-        let map_actuators = map_actuators(&log, &identity, config, installations).map_err(complain)?;
+        let map_actuators = map_actuators(&log, &identity, config, installations).map_err(in_log)?;
         let used: Vec<_> = map_actuators.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
-        let digest = log.digest(&used).map_err(complain)?;
+        let digest = log.digest(&used).map_err(in_log)?;
         let mappings =
             map_actuators.iter().map(|(at, mapping)| (at.position.clone(), Arc::clone(mapping))).collect();
         let positions = map_actuators.into_iter().map(|(at, _)| at).collect();
@@ -233,17 +233,17 @@ pub(crate) fn for_each_unidentified(
     part: &Part,
     mut take: impl FnMut(&ActuatorChannels) -> Result<(), Diagnostic>,
 ) -> Result<(), Diagnostic> {
-    let complain = |e: ingest::Error| e.diagnostic().in_file(display_name);
-    let log = Log::open(files, config.base_mapping()).map_err(complain)?;
+    let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
+    let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
     let mut channels = config.base_mapping().channels.clone();
     if part.output_locked {
         channels.output = Output::Locked;
     }
     // A log of one actuator has no name for it here, but needs one to be asked by.
     let own = Position::new("actuator").map_err(|e| Diagnostic::new("empty_name", e))?;
-    let positions = log.actuators(&channels, Some(&own)).map_err(complain)?;
+    let positions = log.actuators(&channels, Some(&own)).map_err(in_log)?;
     for at in positions.iter().filter(|at| at.lacking.is_empty()) {
-        let read = log.read_actuator(at, &channels, part.geometry).map_err(complain)?;
+        let read = log.read_actuator(at, &channels, part.geometry).map_err(in_log)?;
         take(&read).map_err(|diagnostic| diagnostic.in_file(display_name))?;
     }
     Ok(())
@@ -348,9 +348,9 @@ pub fn identify(
     config: &Config,
 ) -> Result<(Flight, Option<Position>), Diagnostic> {
     catch_panic(display_name, || {
-        let complain = |e: ingest::Error| e.diagnostic().in_file(display_name);
-        let log = Log::open(files, config.base_mapping()).map_err(complain)?;
-        let id = identity_of(&log, files, config).map_err(complain)?;
+        let in_log = |e: ingest::Error| e.diagnostic().in_file(display_name);
+        let log = Log::open(files, config.base_mapping()).map_err(in_log)?;
+        let id = identity_of(&log, files, config).map_err(in_log)?;
         Ok((flight_of(&id), id.position))
     })
 }

@@ -2,12 +2,11 @@
 //! also replace a guess of the noise levels.
 
 use estimator::NoiseModel;
-use estimator::contact::{self, ContactOutcome};
+use estimator::contact::ContactEstimate;
 use ingest::channel::noise_floor::{WhiteNoise, white_noise};
 use ingest::{ActuatorChannels, Geometry};
 
 use crate::config::part::Part;
-use crate::estimate;
 
 /// Friction below this share of the load is not distinguishable from none.
 const MIN_FRICTION_SHARE: f64 = 0.01;
@@ -47,8 +46,8 @@ pub struct ParamComparison {
 }
 
 impl IdentifiedParams {
-    /// Looks at one actuator. What the flight does not show stays open.
-    pub fn of(channels: &ActuatorChannels, part: &Part) -> Self {
+    /// Of one actuator, whose flanks the contact regression may have found. What the flight does not show stays open.
+    pub fn of(channels: &ActuatorChannels, found: Option<&ContactEstimate>) -> Self {
         let [motor, screw, _] = &channels.quality;
         let motor_noise = white_noise(&channels.motor_m, motor.resolution);
         let screw_noise = screw_noise(channels, screw.resolution);
@@ -61,9 +60,7 @@ impl IdentifiedParams {
             screw_resolution_m: screw.resolution,
             ..Self::default()
         };
-        if let Ok(ContactOutcome::Estimated(found)) =
-            contact::estimate(&estimate::samples(channels), &estimate::prior(channels, part))
-        {
+        if let Some(found) = found {
             params.stiffness_n_per_m = Some(found.stiffness_n_per_m);
             let load_n = rms_n(&channels.load_n);
             let friction_n = found.friction.at_n(load_n);

@@ -1,5 +1,7 @@
 //! Remedies of rejection codes, and the codes that point to a fault of the mapping.
 
+use std::collections::BTreeMap;
+
 use estimator::contact::Rejection;
 
 /// Rejections by the estimator.
@@ -58,6 +60,13 @@ pub fn remedy(code: &str) -> Option<&'static str> {
 /// Whether a rejection of most flights of an actuator points to a fault of its mapping.
 pub fn is_mapping_fault(code: &str) -> bool {
     MAPPING.contains(&code)
+}
+
+/// The rejection code of more than half of some flights, and of how many of them; each flight has its code or none.
+pub fn majority<'c>(codes: &[Option<&'c str>]) -> Option<(&'c str, usize)> {
+    let mut counts = BTreeMap::<&str, usize>::new();
+    codes.iter().flatten().for_each(|code| *counts.entry(code).or_default() += 1);
+    counts.into_iter().max_by_key(|(_, count)| *count).filter(|(_, count)| 2 * count > codes.len())
 }
 
 /// Remedy of a rejection of most flights of a part number, where it points to a wrong mapping or unit.

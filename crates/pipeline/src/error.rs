@@ -47,5 +47,13 @@ impl Error {
 
 /// Whether the cause of a log's error may pass without a change of the log or a setting: each run tries the log again.
 pub(crate) fn is_passing(code: &str) -> bool {
-    code == "log_timeout" || ingest::is_passing(code) || object_io::Error::is_passing(code)
+    code == "log_timeout"
+        || is_unlisted(code)
+        || ingest::is_passing(code)
+        || object_io::Error::is_passing(code)
+}
+
+/// Whether an error is of a path that cannot be listed: each run lists it again, and reports it again.
+pub(crate) fn is_unlisted(code: &str) -> bool {
+    ["folder_unreadable", "file_unreadable"].contains(&code)
 }

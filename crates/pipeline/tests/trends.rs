@@ -316,16 +316,17 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     };
     let units = [name("S03"), name("S05")];
     let all = || histories(&rows);
-    let tonight: Vec<Row> = rows.iter().filter(|row| row.assess.departure_utc >= day(200)).cloned().collect();
-    let night = |tonight: &Histories| {
-        assess::assess_run_from(&config(), &nobody, all(), tonight, &units, Vec::new()).unwrap()
+    let of_last_run: Vec<Row> =
+        rows.iter().filter(|row| row.assess.departure_utc >= day(200)).cloned().collect();
+    let night = |of_last_run: &Histories| {
+        assess::assess_run_from(&config(), &nobody, all(), of_last_run, &units, Vec::new()).unwrap()
     };
-    let of_night = |tonight: &Histories| {
-        let night = night(tonight);
+    let of_night = |of_last_run: &Histories| {
+        let night = night(of_last_run);
         (night.now, night.changed)
     };
-    let (now, news) = of_night(&histories(&tonight));
-    let counted = night(&histories(&tonight));
+    let (now, news) = of_night(&histories(&of_last_run));
+    let counted = night(&histories(&of_last_run));
     let mut states = std::collections::BTreeMap::new();
     for row in assess::assess_histories(&config(), &nobody, all(), &UnitSelection::default()).unwrap() {
         row.state.into_iter().for_each(|state| *states.entry(state).or_default() += 1);
@@ -340,7 +341,7 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     assert_eq!((news[0].from, news[0].to), (Some("normal"), Some("watch")));
     // A flight of another unit that arrives late has the days before read from what was known then.
     let late = rows.iter().find(|row| row.unit == 9 && row.assess.departure_utc == day(100)).unwrap();
-    let with_late = histories(&[&tonight[..], std::slice::from_ref(late)].concat());
+    let with_late = histories(&[&of_last_run[..], std::slice::from_ref(late)].concat());
     assert_eq!(of_night(&with_late), (now, news));
     assert!(of_night(&all()).1.is_empty());
 }

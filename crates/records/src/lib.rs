@@ -8,6 +8,7 @@ pub mod flight;
 pub mod gap_record;
 pub mod ids;
 pub mod installation;
+mod sample_time;
 pub mod sanitize;
 
 pub use diagnostic::Diagnostic;
@@ -15,3 +16,4 @@ pub use flight::Flight;
 pub use gap_record::{GapEstimate, GapRecord, Provenance, RecordKey, Status};
 pub use ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 pub use installation::{Installation, Installations};
+pub use sample_time::sample_time_s;

@@ -81,13 +81,7 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, Str
     let parts = [small, dx_rad.len()];
     let published = |end: usize| {
         let segment = 0..end;
-        let samples = Samples {
-            step_s,
-            motor_m: &motor_rad[..end],
-            dx_m: &dx_rad[..end],
-            load_n: &load_nm[..end],
-            segments: std::slice::from_ref(&segment),
-        };
+        let samples = samples(step_s, [&motor_rad, &dx_rad, &load_nm], &segment);
         let filter = filter(step_s).map_err(|e| format!("{file}: {e}"))?;
         Ok::<f64, String>(
             midrange::estimate(&samples, &filter).map_or(f64::NAN, |m| m.gap.gap_m.to_degrees()),
@@ -103,13 +97,7 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, Str
     };
     let regression = |end: usize| {
         let segment = 0..end;
-        let samples = Samples {
-            step_s,
-            motor_m: &motor_m[..end],
-            dx_m: &dx_m[..end],
-            load_n: &load_n[..end],
-            segments: std::slice::from_ref(&segment),
-        };
+        let samples = samples(step_s, [&motor_m, &dx_m, &load_n], &segment);
         match contact::estimate(&samples, &prior).map_err(|e| format!("{file}: {e}"))? {
             ContactOutcome::Estimated(found) => Ok::<f64, String>((found.gap_m / RADIUS_M).to_degrees()),
             ContactOutcome::Refused(_) => Ok(f64::NAN),
@@ -122,6 +110,22 @@ fn gear(folder: &Path, file: &str, authors_deg: f64) -> Result<GearBenchLog, Str
         lines_deg: parts.map(|end| load_lines_m(&dx_rad[..end], &load_nm[..end]).to_degrees()),
         spread_deg: parts.map(|end| spread_m(&dx_rad[..end]).to_degrees()),
     })
+}
+
+/// The beginning of a log as the estimators take it: motor, relative position and load.
+fn samples<'a>(
+    step_s: f64,
+    [motor, dx, load]: [&'a [f64]; 3],
+    segment: &'a std::ops::Range<usize>,
+) -> Samples<'a> {
+    let end = segment.end;
+    Samples {
+        step_s,
+        motor_m: &motor[..end],
+        dx_m: &dx[..end],
+        load_n: &load[..end],
+        segments: std::slice::from_ref(segment),
+    }
 }
 
 fn filter(step_s: f64) -> Result<Filter, estimator::Error> {

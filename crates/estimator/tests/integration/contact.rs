@@ -36,20 +36,38 @@ impl Case {
         simulate(&self.plant, &self.profile, &self.sensors, seed).unwrap()
     }
 
+    fn prior(&self) -> PartPrior {
+        PartPrior::of_stiffness(self.plant.contact.stiffness_n_per_m * self.assumed_stiffness)
+    }
+
     fn outcome(&self, flight: &Flight) -> ContactOutcome {
-        let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
-        self.look(&flight.motor_m, &dx_m, &flight.load_n)
+        self.with_samples_of(flight, |samples| self.estimate(samples))
     }
 
     fn look(&self, motor_m: &[f64], dx_m: &[f64], load_n: &[f64]) -> ContactOutcome {
+        self.with_samples(motor_m, dx_m, load_n, |samples| self.estimate(samples))
+    }
+
+    fn estimate(&self, samples: &Samples<'_>) -> ContactOutcome {
+        let prior = PartPrior { reference_load_n: Some(4000.0), ..self.prior() };
+        contact::estimate(samples, &prior).unwrap()
+    }
+
+    fn with_samples_of<T>(&self, flight: &Flight, take: impl FnOnce(&Samples<'_>) -> T) -> T {
+        let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
+        self.with_samples(&flight.motor_m, &dx_m, &flight.load_n, take)
+    }
+
+    fn with_samples<T>(
+        &self,
+        motor_m: &[f64],
+        dx_m: &[f64],
+        load_n: &[f64],
+        take: impl FnOnce(&Samples<'_>) -> T,
+    ) -> T {
         let whole = 0..dx_m.len();
         let segments = std::slice::from_ref(&whole);
-        let samples =
-            Samples { step_s: self.profile.sample_rate_hz.recip(), motor_m, dx_m, load_n, segments };
-        let stiffness_n_per_m = self.plant.contact.stiffness_n_per_m * self.assumed_stiffness;
-        let prior =
-            PartPrior { reference_load_n: Some(4000.0), ..PartPrior::of_stiffness(stiffness_n_per_m) };
-        contact::estimate(&samples, &prior).unwrap()
+        take(&Samples { step_s: self.profile.sample_rate_hz.recip(), motor_m, dx_m, load_n, segments })
     }
 
     fn gap(&self, seed: u64) -> Box<ContactEstimate> {
@@ -190,19 +208,10 @@ fn errors_periodic_in_position_become_terms() {
         c.sensors.screw.periodic = PeriodicErrors::try_from(vec![error]).unwrap();
     });
     let flight = case.fly(3);
-    let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
-    let whole = 0..dx_m.len();
-    let samples = Samples {
-        step_s: case.profile.sample_rate_hz.recip(),
-        motor_m: &flight.motor_m,
-        dx_m: &dx_m,
-        load_n: &flight.load_n,
-        segments: std::slice::from_ref(&whole),
-    };
-    let stiffness_n_per_m = case.plant.contact.stiffness_n_per_m;
-    let with = PartPrior { period_m: Some(5e-3), ..PartPrior::of_stiffness(stiffness_n_per_m) };
-    let found = gap(contact::estimate(&samples, &with).unwrap());
-    let without = gap(contact::estimate(&samples, &PartPrior::of_stiffness(stiffness_n_per_m)).unwrap());
+    let fit =
+        |prior| gap(case.with_samples_of(&flight, |samples| contact::estimate(samples, &prior)).unwrap());
+    let found = fit(PartPrior { period_m: Some(5e-3), ..case.prior() });
+    let without = fit(case.prior());
     assert!((found.gap_m - 100e-6).abs() < 0.6e-6, "{found:?}");
     assert!(found.gap_se_m < 0.7 * without.gap_se_m, "{found:?} against {without:?}");
 }
@@ -324,19 +333,9 @@ fn a_prior_that_cannot_be_is_an_error() {
 #[test]
 fn a_picture_shows_the_flanks_a_gap_apart_and_the_stretches_on_them() {
     let case = Case::with(100e-6, |c| (c.sensors.screw.drift, c.sensors.screw.delay_s) = (50e-6, 3e-3));
-    let flight = case.fly(7);
-    let dx_m: Vec<f64> = flight.screw_m.iter().zip(&flight.motor_m).map(|(s, m)| s - m).collect();
-    let whole = 0..dx_m.len();
-    let samples = Samples {
-        step_s: case.profile.sample_rate_hz.recip(),
-        motor_m: &flight.motor_m,
-        dx_m: &dx_m,
-        load_n: &flight.load_n,
-        segments: std::slice::from_ref(&whole),
-    };
     let stiffness_n_per_m = case.plant.contact.stiffness_n_per_m;
-    let prior = PartPrior::of_stiffness(stiffness_n_per_m);
-    let picture = contact::plot_data(&samples, &prior).unwrap().unwrap();
+    let plot = |samples: &Samples<'_>| contact::plot_data(samples, &case.prior());
+    let picture = case.with_samples_of(&case.fly(7), plot).unwrap().unwrap();
     let (upper, lower) = (picture.upper[0], picture.lower[0]);
     assert_eq!((upper.0, lower.0.abs()), (0.0, 0.0));
     assert!((upper.1 - lower.1 - 100e-6).abs() < 0.5e-6, "{upper:?} {lower:?}");

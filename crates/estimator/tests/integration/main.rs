@@ -9,3 +9,17 @@ mod parquet_fixture;
 mod properties;
 mod stream;
 mod vectors;
+
+use estimator::{NoiseModel, SensorNoise};
+
+/// Noise of the sensors of a usual part.
+fn sensor_noise(bandwidth_hz: f64) -> NoiseModel {
+    NoiseModel::Sensors(SensorNoise {
+        screw_rms_m: 3e-6,
+        screw_resolution_m: 2.3e-6,
+        motor_rms_m: 1e-6,
+        motor_resolution_m: 3e-7,
+        unknown_force_n: 200.0,
+        bandwidth_hz,
+    })
+}

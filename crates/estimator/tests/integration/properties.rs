@@ -1,24 +1,17 @@
 //! Properties for any input: offset, scale, sign, restarts, missing samples, the configured bandwidth.
 
-use estimator::SensorNoise;
-use estimator::{ActuatorModel, Error, Filter, NoiseModel, Samples, gap};
+use estimator::{ActuatorModel, Error, Filter, Samples, gap};
 use proptest::collection::vec;
 use proptest::prelude::*;
+
+use crate::sensor_noise;
 
 fn filter(step_s: f64, bandwidth_hz: f64) -> Filter {
     filter_of(&ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap(), step_s, bandwidth_hz)
 }
 
 fn filter_of(actuator: &ActuatorModel, step_s: f64, bandwidth_hz: f64) -> Filter {
-    let noise = NoiseModel::Sensors(SensorNoise {
-        screw_rms_m: 3e-6,
-        screw_resolution_m: 2.3e-6,
-        motor_rms_m: 1e-6,
-        motor_resolution_m: 3e-7,
-        unknown_force_n: 200.0,
-        bandwidth_hz,
-    });
-    Filter::new(actuator, step_s, &noise).unwrap()
+    Filter::new(actuator, step_s, &sensor_noise(bandwidth_hz)).unwrap()
 }
 
 fn track(filter: &Filter, dx_m: &[f64], load_n: &[f64], segments: &[std::ops::Range<usize>]) -> Vec<f64> {
@@ -79,14 +72,7 @@ fn no_settings_keep_a_filter_from_ending() {
         for step_s in [0.004, 1e50, 1e-300] {
             for (stiffness, mass) in [(5e77, 8.0), (5e7, 5e-324), (5e77, 5e-324), (5e7, 8.0)] {
                 let Ok(actuator) = ActuatorModel::linear(stiffness, 2000.0, mass) else { continue };
-                let noise = NoiseModel::Sensors(SensorNoise {
-                    screw_rms_m: 3e-6,
-                    screw_resolution_m: 2.3e-6,
-                    motor_rms_m: 1e-6,
-                    motor_resolution_m: 3e-7,
-                    unknown_force_n: 200.0,
-                    bandwidth_hz: 10.0,
-                });
+                let noise = sensor_noise(10.0);
                 if let Ok(filter) = Filter::new(&actuator, step_s, &noise) {
                     let _ = estimator::GainSchedule::new(&filter).bandwidth_hz();
                 }
@@ -160,14 +146,7 @@ proptest! {
     ) {
         let ten = |power: f64| 10_f64.powf(power);
         let actuator = ActuatorModel::linear(ten(stiffness), ten(damping), ten(mass)).unwrap();
-        let noise = NoiseModel::Sensors(SensorNoise {
-            screw_rms_m: 3e-6,
-            screw_resolution_m: 2.3e-6,
-            motor_rms_m: 1e-6,
-            motor_resolution_m: 3e-7,
-            unknown_force_n: 200.0,
-            bandwidth_hz: ten(bandwidth_hz),
-        });
+        let noise = sensor_noise(ten(bandwidth_hz));
         // A step or bandwidth that a model refuses has no covariance.
         let Ok(f) = Filter::new(&actuator, ten(-rate_hz), &noise) else { return Ok(()) };
         let mut state = f.initial_state(0.0, 0.0);

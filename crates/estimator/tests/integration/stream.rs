@@ -1,11 +1,11 @@
 //! The filter and the statistic as the samples come, against the batch that has them all.
 
-use estimator::SensorNoise as Noises;
-use estimator::{ActuatorModel, BoundedGap, Error, Filter, NoiseModel, Samples, Stream, StreamingGap, gap};
+use estimator::{ActuatorModel, BoundedGap, Error, Filter, Samples, Stream, StreamingGap, gap};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use simulator::{Flight, Plant, Profile, Sensors, simulate};
 
+use crate::sensor_noise;
 use crate::vectors::{SETS, Set};
 
 /// 256 bins of 2 µm: 4 KiB, for gaps from 30 to 300 µm.
@@ -14,14 +14,7 @@ const BIN_M: f64 = 2e-6;
 
 fn filter(rate_hz: f64, bandwidth_hz: f64) -> Filter {
     let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap();
-    let noise = NoiseModel::Sensors(Noises {
-        screw_rms_m: 3e-6,
-        screw_resolution_m: 2.3e-6,
-        motor_rms_m: 1e-6,
-        motor_resolution_m: 3e-7,
-        unknown_force_n: 200.0,
-        bandwidth_hz,
-    });
+    let noise = sensor_noise(bandwidth_hz);
     Filter::new(&actuator, rate_hz.recip(), &noise).unwrap()
 }
 

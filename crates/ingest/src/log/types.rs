@@ -79,9 +79,7 @@ pub struct ActuatorChannels {
 impl ActuatorChannels {
     /// Time of a sample since the first one, s: the step within a segment, the log's own stamps at breaks.
     pub fn time_s(&self, sample: usize) -> f64 {
-        let passed = self.breaks.partition_point(|(first, _)| *first <= sample);
-        let (first, begin_s) = passed.checked_sub(1).map_or((0, 0.0), |last| self.breaks[last]);
-        begin_s + (sample - first) as f64 * self.step_s
+        records::sample_time_s(sample as f64, self.step_s, &self.breaks)
     }
 
     /// What δX looks like.

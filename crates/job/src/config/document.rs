@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::layers::Source;
 use super::validate_channels;
-use crate::config::limits::{implausible, positive};
+use crate::config::limits::{bounded, positive};
 use crate::config::part::{PartSettings, WearAxis};
 
 /// The whole file.
@@ -402,9 +402,4 @@ pub(super) fn check_clock(
     ] {
         found.extend(bounded(key, value).map(|c| source.at(&at(key), c)));
     }
-}
-
-/// A value that is not above zero, or not plausible.
-fn bounded(key: &str, value: Option<f64>) -> Option<Diagnostic> {
-    positive(key, value).or_else(|| implausible(key, value))
 }

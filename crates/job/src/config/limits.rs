@@ -70,6 +70,11 @@ pub(crate) fn implausible(key: &str, value: Option<f64>) -> Option<Diagnostic> {
     }))
 }
 
+/// A value that is not above zero, or not plausible.
+pub(crate) fn bounded(key: &str, value: Option<f64>) -> Option<Diagnostic> {
+    positive(key, value).or_else(|| implausible(key, value))
+}
+
 /// Largest plausible gap, m: a limit beyond it was given in another unit.
 pub const MAX_PLAUSIBLE_LIMIT_M: f64 = 0.01;
 

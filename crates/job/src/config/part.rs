@@ -194,7 +194,7 @@ impl PartSettings {
         keys.positive(&["watch_m"], self.watch_m);
         if let Some((watch, limit)) = self.watch_m.zip(self.limit_m).filter(|(watch, limit)| watch > limit) {
             let what = format!("`watch_m` {watch} is above `limit_m` {limit}");
-            keys.complain(
+            keys.report(
                 &["watch_m"],
                 Diagnostic::new("limit_order", what).hint("set `watch_m` below `limit_m`"),
             );
@@ -262,7 +262,7 @@ impl PartSettings {
         };
         for (key, _) in stray.into_iter().filter(|(_, value)| value.is_some()) {
             let what = format!("`{}` is not a key of a {kind} part", key[0]);
-            keys.complain(
+            keys.report(
                 key,
                 Diagnostic::new("key_of_other_kind", what)
                     .hint("`kind` is \"linear\" (default) or \"rotary\""),
@@ -293,7 +293,7 @@ impl PartSettings {
     fn check_noise(&self, keys: &mut SettingsValidator) -> Option<estimator::NoiseModel> {
         let Some(noise) = &self.noise else {
             let hint = "[part.\"…\".noise] needs screw_rms_m, motor_rms_m, unknown_force_n and bandwidth_hz; see docs/configuration.md";
-            keys.complain(
+            keys.report(
                 &[],
                 Diagnostic::new("key_missing", "the part has no `noise`, and there are no default levels")
                     .hint(hint),
@@ -377,7 +377,7 @@ impl NoiseSettings {
         keys.positive(&["noise", "bandwidth_hz"], self.bandwidth_hz);
         for level in levels.into_iter().flatten().filter(|level| !(level.is_finite() && *level >= 0.0)) {
             let what = format!("a noise level is {level}, which must be a number of at least zero");
-            keys.complain(&["noise"], Diagnostic::new("bad_parameter", what));
+            keys.report(&["noise"], Diagnostic::new("bad_parameter", what));
         }
         let [screw_rms, screw_resolution, motor_rms, motor_resolution, force] = levels;
         Some(SensorNoise {
@@ -398,14 +398,14 @@ struct SettingsValidator {
 }
 
 impl SettingsValidator {
-    fn complain(&mut self, key: &'static [&'static str], diagnostic: Diagnostic) {
+    fn report(&mut self, key: &'static [&'static str], diagnostic: Diagnostic) {
         self.found.push((key, diagnostic));
     }
 
     fn required<T>(&mut self, key: &'static [&'static str], value: Option<T>) -> Option<T> {
         if value.is_none() {
             let name = key.join(".");
-            self.complain(key, Diagnostic::new("key_missing", format!("the part has no `{name}`")));
+            self.report(key, Diagnostic::new("key_missing", format!("the part has no `{name}`")));
         }
         value
     }
@@ -416,6 +416,6 @@ impl SettingsValidator {
     }
 
     fn made<T>(&mut self, key: &'static [&'static str], made: Result<T, estimator::Error>) -> Option<T> {
-        made.map_err(|e| self.complain(key, Diagnostic::new("bad_parameter", e))).ok()
+        made.map_err(|e| self.report(key, Diagnostic::new("bad_parameter", e))).ok()
     }
 }

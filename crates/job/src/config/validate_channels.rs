@@ -8,7 +8,7 @@ use ingest::{ChannelMapping, Channels, GroupMapping, Layout, SampleFilter};
 use records::Diagnostic;
 
 use super::layers::Source;
-use crate::config::limits::{implausible, positive};
+use crate::config::limits::{bounded, implausible, positive};
 
 /// Every diagnostic about the channels, each at its key.
 pub(super) fn check(
@@ -20,14 +20,14 @@ pub(super) fn check(
     source: &Source<'_>,
     found: &mut Vec<Diagnostic>,
 ) {
-    let mut complain = |keys: &[&str], c: Diagnostic| {
+    let mut report = |keys: &[&str], c: Diagnostic| {
         let whole: Vec<&str> = path.iter().chain(keys).copied().collect();
         found.push(source.at(&whole, c));
     };
     let mut columns: BTreeMap<(&str, Option<&str>), &str> = BTreeMap::new();
     for (name, channel, wanted) in named(channels) {
         for (key, c) in diagnostics(name, channel, wanted, layout, groups) {
-            complain(&[name, key], c);
+            report(&[name, key], c);
         }
         for choice in channel.choices() {
             if let Some(other) = columns.insert((&choice.column, choice.group.as_deref()), name) {
@@ -38,26 +38,26 @@ pub(super) fn check(
                     what
                 };
                 let c = Diagnostic::new("column_twice", what).hint("two channels cannot share a column");
-                complain(&[name, "column"], c);
+                report(&[name, "column"], c);
             }
         }
     }
     for condition in &channels.when {
         for c in conditions(condition, groups) {
-            complain(&["when"], c);
+            report(&["when"], c);
         }
     }
     match (&channels.screw_position, &channels.relative_position) {
         (None, None) if has_locked_part || channels.output.is_locked() => {}
         (None, None) => {
             let what = "neither `screw_position` nor `relative_position` is mapped";
-            complain(&[], Diagnostic::new("key_missing", what).hint("[channel.screw_position]\n# or, where the output is fixed: [part.\"…\"] output = \"locked\""));
+            report(&[], Diagnostic::new("key_missing", what).hint("[channel.screw_position]\n# or, where the output is fixed: [part.\"…\"] output = \"locked\""));
         }
         (Some(_), Some(_)) => {
             let what = "both `screw_position` and `relative_position` are mapped";
             let c = Diagnostic::new("key_of_other_kind", what)
                 .hint("the relative position is screw − motor: map one of them");
-            complain(&["relative_position"], c);
+            report(&["relative_position"], c);
         }
         _ => {}
     }
@@ -131,7 +131,7 @@ fn one(
         ("wraps_at", channel.wraps_at),
         ("rate_hz", channel.rate_hz),
     ] {
-        found.extend(positive(key, value).or_else(|| implausible(key, value)).map(|c| (key, c)));
+        found.extend(bounded(key, value).map(|c| (key, c)));
     }
     found.extend(implausible("scale", Some(channel.scale)).map(|c| ("scale", c)));
     for (key, value) in

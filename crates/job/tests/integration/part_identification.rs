@@ -27,7 +27,9 @@ fn noise_resolution_and_stiffness_are_read_off_the_logs() {
         let opened = FlightLog::open(&LogFiles::one(file), log, &config, &installations).unwrap();
         let part = flight_log::part_of(&config, &PartNumber::new(part).unwrap()).unwrap();
         let at = opened.actuators(&installations).next().unwrap();
-        let facts = IdentifiedParams::of(&opened.channels(at, part).unwrap(), part);
+        let channels = opened.channels(at, part).unwrap();
+        let found = job::estimate::contact_regression(&channels, part).unwrap();
+        let facts = IdentifiedParams::of(&channels, found.as_deref().ok());
         let near = |found: Option<f64>, wanted: f64, share: f64| {
             assert!(
                 (found.unwrap() / wanted - 1.0).abs() < share,

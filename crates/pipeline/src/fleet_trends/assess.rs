@@ -122,10 +122,8 @@ pub fn assess_run(
     let recent =
         all.newest_utc().map(|newest| recent_diagnostics(store, newest)).transpose()?.unwrap_or_default();
     let moved = detect_changes(&recent);
-    let latest =
-        all.newest_utc().map(|newest| mapping_faults::latest_rejections(store, newest)).transpose()?;
     let touched = units.iter().map(|(part, serial)| (part.to_string(), serial.to_string())).collect();
-    let mapping_faults = mapping_faults::detect(&latest.unwrap_or_default(), &touched);
+    let mapping_faults = mapping_faults::detect(&recent, &touched);
     let run = assess_run_from(config, installations, all, &of_run, units, moved)?;
     let changed = since_states(run.changed, before, &run.now);
     Ok(RunAssessments { changed, recent, mapping_faults, ..run })

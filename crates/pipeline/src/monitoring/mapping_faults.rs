@@ -1,31 +1,17 @@
 //! Rejections of most flights of an actuator, a tail or a part number: a wrong mapping, not a matter of the flights.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
-use arrow::array::RecordBatch;
-use ingest::tables::TableBatch;
-use jiff::{SignedDuration, Timestamp};
 use job::rejection;
 use serde::Serialize;
-use store::{Query, Store};
 
-use crate::error::Error;
-use crate::history::parallel_scan::read_each;
-use crate::history::row_keys::{KeyCache, KeyColumns, TextColumn};
-use crate::monitoring::recent::PositionKey;
-
-/// Reach of the search before the newest flight.
-const WINDOW: SignedDuration = SignedDuration::from_hours(24 * 120);
+use crate::monitoring::recent::{PositionKey, RecentDiagnostics};
 
 /// Latest flights of an actuator that count.
 const LATEST: usize = 5;
 
 /// Fewest flights of a scope that show a fault.
 const MIN_FLIGHTS: usize = 3;
-
-/// The latest flights of an actuator by departure, each with its rejection code.
-pub(crate) type LatestRejections = BTreeMap<PositionKey, Vec<(Timestamp, Option<String>)>>;
 
 /// A wrong mapping, sign, unit or rate, by its effect: most of the latest flights of a scope are rejected for it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -60,77 +46,17 @@ impl MappingFault {
     }
 }
 
-/// Reads the latest flights of each actuator.
-///
-/// # Errors
-/// When the store cannot be read.
-pub(crate) fn latest_rejections(store: &Store, until: Timestamp) -> Result<LatestRejections, Error> {
-    const COLUMNS: [&str; 7] =
-        ["tail_number", "position", "part_number", "serial_number", "departure_utc", "status", "reason"];
-    let since_utc = until.checked_sub(WINDOW).ok();
-    let until_utc = until.checked_add(SignedDuration::from_micros(1)).ok();
-    let query = Query { since_utc, until_utc, ..Query::default() };
-    let mut found = LatestRejections::new();
-    read_each(&store.scan_columns(&query, &COLUMNS)?, |batch| add(&mut found, batch))?;
-    for flights in found.values_mut() {
-        flights.sort();
-        flights.drain(..flights.len().saturating_sub(LATEST));
-    }
-    Ok(found)
-}
-
-fn add(found: &mut LatestRejections, batch: &RecordBatch) -> Result<(), ingest::Error> {
-    let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
-    let keys = KeyColumns::of(&chunk)?;
-    let (statuses, reasons) = (TextColumn::of(&chunk, &["status"])?, TextColumn::of(&chunk, &["reason"])?);
-    let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
-    let (mut seen, mut known) = (KeyCache::default(), Vec::<(PositionKey, Vec<_>)>::new());
-    for row in 0..chunk.len() {
-        let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) else { continue };
-        let Some(who) = keys.who(row) else { continue };
-        let key = seen.get(&keys, row).unwrap_or_else(|| {
-            known.push((PositionKey::of(who), Vec::new()));
-            seen.put(&keys, row, known.len() - 1);
-            known.len() - 1
-        });
-        let is_refused = statuses.get(row) == Some("refused");
-        let reason = reasons.get(row).filter(|_| is_refused).map(str::to_owned);
-        known[key].1.push((departure_utc, reason));
-    }
-    for (key, flights) in known {
-        found.entry(key).or_default().extend(flights);
-    }
-    Ok(())
-}
-
-/// Rejections for one code, and flights, of some actuators.
+/// Rejections of the latest flights of some actuators.
 #[derive(Default)]
 struct Tally<'a> {
-    flights: usize,
-    by_reason: BTreeMap<&'a str, usize>,
+    codes: Vec<Option<&'a str>>,
     members: BTreeSet<&'a PositionKey>,
-}
-
-impl<'a> Tally<'a> {
-    fn add(&mut self, key: &'a PositionKey, flights: &'a [(Timestamp, Option<String>)]) {
-        self.flights += flights.len();
-        self.members.insert(key);
-        for reason in flights.iter().filter_map(|(_, reason)| reason.as_deref()) {
-            *self.by_reason.entry(reason).or_default() += 1;
-        }
-    }
-
-    /// The code of more than half of the flights.
-    fn majority(&self) -> Option<(&'a str, usize)> {
-        let most = self.by_reason.iter().max_by_key(|(_, count)| **count)?;
-        (self.flights >= MIN_FLIGHTS && 2 * most.1 > self.flights).then_some((*most.0, *most.1))
-    }
 }
 
 /// The faults of the mapping, the widest scope first: a part number, a tail, an actuator.
 ///
 /// `touched` holds the part and serial numbers whose records this run changed.
-pub(crate) fn detect(latest: &LatestRejections, touched: &BTreeSet<(String, String)>) -> Vec<MappingFault> {
+pub(crate) fn detect(recent: &RecentDiagnostics, touched: &BTreeSet<(String, String)>) -> Vec<MappingFault> {
     type Scope = fn(&PositionKey) -> (Option<&String>, Option<&String>, Option<&String>);
     let scopes: [Scope; 3] = [
         |key| (Some(&key.part_number), None, None),
@@ -140,12 +66,16 @@ pub(crate) fn detect(latest: &LatestRejections, touched: &BTreeSet<(String, Stri
     let (mut found, mut explained) = (Vec::new(), BTreeSet::<&PositionKey>::new());
     for (width, scope) in scopes.into_iter().enumerate() {
         let mut tallies: BTreeMap<_, Tally<'_>> = BTreeMap::new();
-        for (key, flights) in latest.iter().filter(|(key, _)| !explained.contains(key)) {
-            tallies.entry(scope(key)).or_default().add(key, flights);
+        for (key, flights) in recent.iter().filter(|(key, _)| !explained.contains(key)) {
+            let tally = tallies.entry(scope(key)).or_default();
+            let latest = &flights[flights.len().saturating_sub(LATEST)..];
+            tally.codes.extend(latest.iter().map(|flight| flight.rejection.as_deref()));
+            tally.members.insert(key);
         }
         let is_wide = width < 2;
         for ((part, tail, position), tally) in tallies {
-            let Some((reason, refused)) = tally.majority() else { continue };
+            let majority = rejection::majority(&tally.codes).filter(|_| tally.codes.len() >= MIN_FLIGHTS);
+            let Some((reason, refused)) = majority else { continue };
             let remedy = match width {
                 0 => rejection::part_remedy(reason),
                 _ => rejection::remedy(reason).filter(|_| rejection::is_mapping_fault(reason)),
@@ -159,7 +89,7 @@ pub(crate) fn detect(latest: &LatestRejections, touched: &BTreeSet<(String, Stri
                 position: position.cloned(),
                 reason: reason.to_owned(),
                 refused,
-                flights: tally.flights,
+                flights: tally.codes.len(),
                 remedy,
                 is_of_run: tally.members.iter().any(|key| is_touched(key)),
             });
@@ -171,7 +101,10 @@ pub(crate) fn detect(latest: &LatestRejections, touched: &BTreeSet<(String, Stri
 
 #[cfg(test)]
 mod tests {
+    use jiff::{SignedDuration, Timestamp};
+
     use super::*;
+    use crate::monitoring::recent::FlightDiagnostics;
 
     fn key(tail: &str, position: &str, part: &str) -> PositionKey {
         PositionKey {
@@ -182,16 +115,18 @@ mod tests {
         }
     }
 
-    fn flights(reasons: [Option<&str>; 5]) -> Vec<(Timestamp, Option<String>)> {
-        let flight = |(k, reason): (usize, Option<&str>)| {
-            (Timestamp::UNIX_EPOCH + SignedDuration::from_hours(k as i64), reason.map(str::to_owned))
+    fn flights(reasons: [Option<&str>; 5]) -> Vec<FlightDiagnostics> {
+        let flight = |(k, reason): (usize, Option<&str>)| FlightDiagnostics {
+            departure_utc: Timestamp::UNIX_EPOCH + SignedDuration::from_hours(k as i64),
+            rejection: reason.map(Into::into),
+            ..FlightDiagnostics::default()
         };
         reasons.into_iter().enumerate().map(flight).collect()
     }
 
     const SIGN: Option<&str> = Some("load_sign_flipped");
 
-    fn scopes(latest: &LatestRejections) -> Vec<String> {
+    fn scopes(latest: &RecentDiagnostics) -> Vec<String> {
         detect(latest, &BTreeSet::new()).iter().map(MappingFault::scope).collect()
     }
 

@@ -1,5 +1,5 @@
 //! Recent diagnostics of the last months in addition to gaps, by position: skew, stiffness, zero and delay of the
-//! load, and innovations.
+//! load, innovations and rejections.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,6 +7,7 @@ use std::path::Path;
 use arrow::array::RecordBatch;
 use ingest::tables::TableBatch;
 use jiff::{SignedDuration, Timestamp};
+use records::Status;
 use store::{Query, Store};
 
 use crate::error::Error;
@@ -31,6 +32,8 @@ pub struct FlightDiagnostics {
     pub load_delay_s: Option<f64>,
     pub load_delay_se_s: Option<f64>,
     pub load_p95_n: Option<f64>,
+    /// Rejection code of a flight without a gap.
+    pub rejection: Option<Box<str>>,
 }
 
 /// Where which unit sits.
@@ -43,18 +46,6 @@ pub struct PositionKey {
     pub serial_number: String,
 }
 
-impl PositionKey {
-    pub(crate) fn of(who: RowKey<'_>) -> Self {
-        let text = |name: Option<&str>| name.unwrap_or_default().to_owned();
-        Self {
-            tail_number: text(who.tail_number),
-            position: text(who.position),
-            part_number: text(who.part_number),
-            serial_number: who.serial_number.to_owned(),
-        }
-    }
-}
-
 /// The flights of a unit in a seat, by departure.
 pub type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
 
@@ -63,7 +54,7 @@ pub type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
 /// # Errors
 /// When the store cannot be read.
 pub fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagnostics, Error> {
-    const COLUMNS: [&str; 14] = [
+    const COLUMNS: [&str; 16] = [
         "tail_number",
         "position",
         "part_number",
@@ -78,6 +69,8 @@ pub fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagn
         "load_delay_s",
         "load_delay_se_s",
         "load_p95_n",
+        "status",
+        "reason",
     ];
     let since_utc = until.checked_sub(LOOKED_BACK).ok();
     let until_utc = until.checked_add(SignedDuration::from_micros(1)).ok();
@@ -104,6 +97,8 @@ impl Found {
         let (zeros_n, zero_ses_n) = (numbers("load_zero_n")?, numbers("load_zero_se_n")?);
         let (delays_s, delay_ses_s) = (numbers("load_delay_s")?, numbers("load_delay_se_s")?);
         let loads_n = numbers("load_p95_n")?;
+        let (statuses, reasons) =
+            (TextColumn::of(&chunk, &["status"])?, TextColumn::of(&chunk, &["reason"])?);
         let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
         let mut seen = KeyCache::default();
         for row in 0..chunk.len() {
@@ -125,13 +120,23 @@ impl Found {
                 load_delay_s: at(&delays_s, row),
                 load_delay_se_s: at(&delay_ses_s, row),
                 load_p95_n: at(&loads_n, row),
+                rejection: reasons
+                    .get(row)
+                    .filter(|_| statuses.get(row) == Some(Status::Refused.as_str()))
+                    .map(Into::into),
             });
         }
         Ok(())
     }
 
     fn of_position(&mut self, who: RowKey<'_>) -> usize {
-        let position = PositionKey::of(who);
+        let text = |name: Option<&str>| name.unwrap_or_default().to_owned();
+        let position = PositionKey {
+            tail_number: text(who.tail_number),
+            position: text(who.position),
+            part_number: text(who.part_number),
+            serial_number: who.serial_number.to_owned(),
+        };
         let diagnostics = &mut self.diagnostics;
         *self.by_seat.entry(position).or_insert_with(|| {
             diagnostics.push(Vec::new());

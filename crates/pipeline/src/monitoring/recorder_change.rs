@@ -10,9 +10,7 @@ use store::Store;
 
 use crate::days::days;
 use crate::error::Error;
-use crate::monitoring::recent::{
-    FlightDiagnostics, PositionKey, RecentDiagnostics, newest_utc, recent_diagnostics,
-};
+use crate::monitoring::recent::{FlightDiagnostics, RecentDiagnostics, newest_utc, recent_diagnostics};
 
 /// What moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -100,7 +98,8 @@ pub(crate) fn detect_changes_in_store(store: &Store, as_of: Timestamp) -> Result
 pub fn detect_changes(recent_diagnostics: &RecentDiagnostics) -> Vec<RecorderChange> {
     let (skews, stiffnesses) = (skews_s(recent_diagnostics), ln_stiffnesses(recent_diagnostics));
     let newest = newest_utc(recent_diagnostics);
-    let (zeros, delays) = (load_zeros(recent_diagnostics), load_delays_s(recent_diagnostics));
+    let usual_n = usual_loads_n(recent_diagnostics);
+    let (zeros, delays) = (load_zeros(recent_diagnostics, &usual_n), load_delays_s(recent_diagnostics));
     let mut found = of_quantity(&skews, Quantity::SkewS, SKEW_S);
     found.extend(of_quantity(&stiffnesses, Quantity::StiffnessNPerM, LN_STIFFNESS).into_iter().filter_map(
         |m| {
@@ -109,10 +108,9 @@ pub fn detect_changes(recent_diagnostics: &RecentDiagnostics) -> Vec<RecorderCha
         },
     ));
     found.extend(of_quantity(&delays, Quantity::LoadDelayS, LOAD_DELAY_S));
-    found.extend(of_quantity(&zeros, Quantity::LoadZeroN, LOAD_ZERO).into_iter().map(|m| {
-        let load_n =
-            m.positions.first().map_or(f64::NAN, |p| usual_load_n(recent_diagnostics, &m.tail_number, p));
-        RecorderChange { from: m.from * load_n, to: m.to * load_n, ..m }
+    found.extend(of_quantity(&zeros, Quantity::LoadZeroN, LOAD_ZERO).into_iter().filter_map(|m| {
+        let load_n = usual_n.get(&(m.tail_number.as_str(), m.positions.first()?.as_str()))?;
+        Some(RecorderChange { from: m.from * load_n, to: m.to * load_n, ..m })
     }));
     found.retain(|detect_changes| {
         newest.is_some_and(|newest| days(detect_changes.since_utc, newest) <= REPORTED_DAYS)
@@ -167,10 +165,11 @@ fn by_place(
 }
 
 /// The zero of the load cell as a share of the usual 95 % load, where it is certain enough; the cell is the unit's.
-fn load_zeros(recent_diagnostics: &RecentDiagnostics) -> Tails<'_> {
+fn load_zeros<'a>(recent_diagnostics: &'a RecentDiagnostics, usual_n: &UsualLoads<'_>) -> Tails<'a> {
     let mut tails = Tails::new();
     for (position, diagnostics) in recent_diagnostics {
-        let load_n = usual_load_n(recent_diagnostics, &position.tail_number, &position.position);
+        let place = (position.tail_number.as_str(), position.position.as_str());
+        let Some(&load_n) = usual_n.get(&place) else { continue };
         let values = values(diagnostics, |diagnostics| {
             let se_n = diagnostics.load_zero_se_n?;
             (se_n < LOAD_ZERO.least_step * load_n).then_some(diagnostics.load_zero_n? / load_n)
@@ -180,15 +179,16 @@ fn load_zeros(recent_diagnostics: &RecentDiagnostics) -> Tails<'_> {
     tails
 }
 
-/// The median 95 % load of a place, N.
-fn usual_load_n(recent_diagnostics: &RecentDiagnostics, tail_number: &str, position: &str) -> f64 {
-    let is_here = |key: &PositionKey| key.tail_number == tail_number && key.position == position;
-    let loads_n: Vec<f64> = recent_diagnostics
-        .iter()
-        .filter(|(key, _)| is_here(key))
-        .flat_map(|(_, flights)| flights.iter().filter_map(|flight| flight.load_p95_n.map(f64::abs)))
-        .collect();
-    if loads_n.is_empty() { f64::NAN } else { median(loads_n) }
+/// Median 95 % load by tail and position, N.
+type UsualLoads<'a> = BTreeMap<(&'a str, &'a str), f64>;
+
+fn usual_loads_n(recent_diagnostics: &RecentDiagnostics) -> UsualLoads<'_> {
+    let mut loads_n: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
+    for (position, diagnostics) in recent_diagnostics {
+        let place = loads_n.entry((&position.tail_number, &position.position)).or_default();
+        place.extend(diagnostics.iter().filter_map(|flight| flight.load_p95_n.map(f64::abs)));
+    }
+    loads_n.into_iter().filter(|(_, all)| !all.is_empty()).map(|(place, all)| (place, median(all))).collect()
 }
 
 /// A stiffness is the unit's, wherever it sits.
@@ -274,6 +274,7 @@ pub(crate) fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::monitoring::recent::PositionKey;
 
     /// Scatter of ± 0.2 ms, the same in every run.
     fn flights(count: i64, seed: u64, level: impl Fn(i64) -> f64) -> Vec<(Timestamp, f64)> {

@@ -234,7 +234,7 @@ fn to_log_result(
         let already_recorded = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account };
         return LogOutcomeData::Same(Box::new(already_recorded));
     }
-    summary::complain(&mut account, &results.diagnostics);
+    summary::set_error(&mut account, &results.diagnostics);
     LogOutcomeData::Read { account: Box::new(account), records, diagnostics: results.diagnostics }
 }
 

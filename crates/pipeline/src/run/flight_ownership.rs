@@ -191,6 +191,6 @@ fn superseded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> (LogR
     )
     .in_file(&account.log_path)
     .hint("the log whose name sorts first is used; remove one of them, or map an identity that separates the flights");
-    summary::complain(&mut account, std::slice::from_ref(&diagnostic));
+    summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
     (account, vec![diagnostic])
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Installations, Position, SerialNumber, TailNumber};
 use store::{LogOutcome, LogRecord, RecordKey};
 
-use crate::error::is_passing;
+use crate::error::{is_passing, is_unlisted};
 use crate::run::discover::DiscoveredLogs;
 use crate::run::file_stat::FileStat;
 use crate::run::file_stat::SeenObjects;
@@ -255,9 +255,6 @@ pub fn flight_of(account: &LogRecord) -> Option<Flight> {
     })
 }
 
-/// Codes of paths that cannot be listed: each run lists them again and reports them again.
-const UNLISTED: [&str; 2] = ["folder_unreadable", "file_unreadable"];
-
 /// Decision about one log in this run.
 enum Verdict {
     Known,
@@ -292,7 +289,7 @@ impl Judge<'_> {
         before: Option<&LogRecord>,
     ) -> Verdict {
         let stat = FileStat::of_log(files, self.seen);
-        let is_unlisted = fault.as_ref().is_some_and(|fault| UNLISTED.contains(&fault.code.as_str()));
+        let is_unlisted = fault.as_ref().is_some_and(|fault| is_unlisted(&fault.code));
         let why = self.reason(before, stat.as_ref()).or(is_unlisted.then_some(WorkReason::Unlisted));
         let Some(why) = why else { return Verdict::Known };
         // A log that cannot be identified is always processed, or its error would never be reported.
@@ -332,11 +329,7 @@ impl Judge<'_> {
             Some(WorkReason::SettingChanged)
         } else if self.is_orphan(account) {
             Some(WorkReason::OwnerGone)
-        } else if account
-            .error_code
-            .as_deref()
-            .is_some_and(|code| is_passing(code) || UNLISTED.contains(&code))
-        {
+        } else if account.error_code.as_deref().is_some_and(is_passing) {
             Some(WorkReason::Unfetched)
         } else if self.request.retry && account.outcome == LogOutcome::Error {
             Some(WorkReason::Retry)

@@ -327,7 +327,7 @@ impl WorkerContext<'_> {
     fn failed(&self, work: &WorkItem, diagnostic: Diagnostic) -> LogOutcomeData {
         let mut account = summary::of_log(work, self.run_id);
         account.config_digest = Some(digest_without_identity(self.config, self.installations));
-        summary::complain(&mut account, std::slice::from_ref(&diagnostic));
+        summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
         LogOutcomeData::Read {
             account: Box::new(account),
             records: Vec::new(),
@@ -385,7 +385,7 @@ impl WorkerContext<'_> {
         let refused = records.iter().filter(|r| r.estimate.status == Status::Refused).count();
         account.refused = refused as i64;
         account.estimated = (records.len() - refused) as i64;
-        summary::complain(&mut account, &diagnostics);
+        summary::set_error(&mut account, &diagnostics);
         LogOutcomeData::Read { account: Box::new(account), records, diagnostics }
     }
 

@@ -364,7 +364,7 @@ pub(crate) fn not_reached(work: &WorkItem, run_id: &str) -> LogRecord {
 
 /// Writes diagnostics into an account: the code of the first, and all of their text. A cause that may pass goes before
 /// the others, since the next run tries the log again for it.
-pub(crate) fn complain(account: &mut LogRecord, diagnostics: &[Diagnostic]) {
+pub(crate) fn set_error(account: &mut LogRecord, diagnostics: &[Diagnostic]) {
     let passing = diagnostics.iter().find(|diagnostic| is_passing(&diagnostic.code));
     let Some(first) = passing.or(diagnostics.first()) else { return };
     account.outcome = LogOutcome::Error;

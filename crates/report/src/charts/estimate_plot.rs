@@ -55,9 +55,7 @@ pub struct EstimatePlot {
 impl EstimatePlot {
     /// Time of a position among the samples, s: the step within a segment, the log's own time after a break.
     pub fn time_s(&self, sample: f64) -> f64 {
-        let passed = self.breaks.partition_point(|(first, _)| *first as f64 <= sample);
-        let (first, begin_s) = passed.checked_sub(1).map_or((0, 0.0), |last| self.breaks[last]);
-        begin_s + (sample - first as f64) * self.step_s
+        records::sample_time_s(sample, self.step_s, &self.breaks)
     }
 }
 

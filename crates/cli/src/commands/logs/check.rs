@@ -10,7 +10,7 @@ use ingest::{ActuatorChannels, ActuatorColumns, LogFiles, Quality};
 use job::flight_log::{FlightLog, catch_panic};
 use job::{Config, estimate, rejection};
 use pipeline::run::discover;
-use records::{Diagnostic, Installations, PartNumber, Status};
+use records::{Diagnostic, Installations, PartNumber};
 use serde::Serialize;
 
 use crate::args::{CheckArgs, Format, Global};
@@ -141,15 +141,13 @@ struct CheckSummary<'s> {
 type Facts = BTreeMap<PartNumber, Vec<job::part_identification::IdentifiedParams>>;
 
 /// Rejection codes of the checked actuator-flights by part number; `None` for an accepted one.
-type Rejections = BTreeMap<PartNumber, Vec<Option<String>>>;
+type Rejections = BTreeMap<PartNumber, Vec<Option<&'static str>>>;
 
 /// One error for each part number most of whose actuator-flights would be refused for a wrong mapping.
 fn mapping_faults(rejections: &Rejections) -> Vec<Diagnostic> {
-    let fault = |(part, codes): (&PartNumber, &Vec<Option<String>>)| {
-        let mut counts = BTreeMap::<&str, usize>::new();
-        codes.iter().flatten().for_each(|code| *counts.entry(code).or_default() += 1);
-        let (code, refused) = counts.into_iter().max_by_key(|(_, count)| *count)?;
-        let remedy = rejection::part_remedy(code).filter(|_| 2 * refused > codes.len())?;
+    let fault = |(part, codes): (&PartNumber, &Vec<Option<&'static str>>)| {
+        let (code, refused) = rejection::majority(codes)?;
+        let remedy = rejection::part_remedy(code)?;
         let flights = table::count(codes.len(), "checked actuator-flight");
         let what = format!("part {part}: {refused} of {flights} would be refused");
         Some(Diagnostic::new(code, what).hint(remedy))
@@ -162,7 +160,7 @@ struct ActuatorCheck {
     found: Vec<Channel>,
     clock: Option<String>,
     says: Option<(PartNumber, job::part_identification::IdentifiedParams)>,
-    rejection: Option<String>,
+    rejection: Option<&'static str>,
 }
 
 fn one(
@@ -302,15 +300,16 @@ fn actuator(
         found[1].note = None;
     }
     // The estimator's own tests of sign, exchange, ratio and rate; its gap is dropped.
-    let tested = estimate::estimate(&a, part, &config.document.estimate)?;
-    let rejection = tested.reason.filter(|_| tested.status == Status::Refused);
-    if let Some(code) = &rejection {
+    let tested = estimate::contact_regression(&a, part)?;
+    let rejection = tested.as_ref().err().copied();
+    if let Some(code) = rejection {
         let remedy = rejection::remedy(code).map(|remedy| format!(": {remedy}")).unwrap_or_default();
         let before = found[tested_channel(code)].note.take().filter(|note| !note.starts_with(RATIO));
         let before = before.map(|note| format!("{note}; ")).unwrap_or_default();
         found[tested_channel(code)].note = Some(format!("{before}would be refused, {code}{remedy}"));
     }
-    let says = Some((stay.part_number.clone(), job::part_identification::IdentifiedParams::of(&a, part)));
+    let params = job::part_identification::IdentifiedParams::of(&a, tested.as_deref().ok());
+    let says = Some((stay.part_number.clone(), params));
     Ok(ActuatorCheck { found, clock: Some(clock(&a)), says, rejection })
 }
 

@@ -1,0 +1,15 @@
+//! Times of samples on a uniform clock with breaks.
+
+/// Time of a position among the samples since the first one, s: the step within a segment, and at each of the `breaks`
+/// (first sample after it, its time in s) the log's own time.
+///
+/// ```
+/// # use records::sample_time_s;
+/// let breaks = [(4, 9.0)];
+/// assert_eq!([3.0, 4.0, 5.5].map(|k| sample_time_s(k, 0.5, &breaks)), [1.5, 9.0, 9.75]);
+/// ```
+pub fn sample_time_s(sample: f64, step_s: f64, breaks: &[(usize, f64)]) -> f64 {
+    let passed = breaks.partition_point(|(first, _)| *first as f64 <= sample);
+    let (first, begin_s) = passed.checked_sub(1).map_or((0, 0.0), |last| breaks[last]);
+    begin_s + (sample - first as f64) * step_s
+}
