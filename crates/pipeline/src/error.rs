@@ -37,6 +37,9 @@ pub enum Error {
     /// Workers cannot be started.
     #[error("the workers cannot be started: {0}")]
     Workers(#[from] rayon::ThreadPoolBuildError),
+    /// The system allows no further thread.
+    #[error("a worker cannot be started: {0}")]
+    Thread(std::io::Error),
 }
 
 impl Error {

@@ -90,14 +90,22 @@ impl Shared {
             .or_else(|| Some(self.next.fetch_add(1, Ordering::Relaxed)).filter(|log| *log < self.steps.len()))
     }
 
-    fn worker_loop(&self, generation: usize, budget: &MemoryBudget, done: &Sender<Message>) {
+    /// One worker: one log at a time, in the threads that all workers share for actuators. A thread that waits for an
+    /// actuator may take a log of another worker meanwhile, but never that worker's loop.
+    fn worker_loop(
+        &self,
+        generation: usize,
+        actuators: &rayon::ThreadPool,
+        budget: &MemoryBudget,
+        done: &Sender<Message>,
+    ) {
         let _ended = EndMessage { generation, done };
         while let Some(log) = self.take(generation) {
             let started = Message::Started { log, generation, at: Instant::now() };
             if done.send(started).is_err() {
                 return;
             }
-            let outcome = Box::new((self.process_log)(log, budget, &self.steps[log]));
+            let outcome = actuators.install(|| Box::new((self.process_log)(log, budget, &self.steps[log])));
             if done.send(Message::Finished { log, outcome }).is_err() {
                 return;
             }
@@ -182,14 +190,16 @@ impl<'a> WorkerPool<'a> {
     /// Workers with threads and a memory budget of their own.
     fn start_generation(&mut self) -> Result<(), Error> {
         let workers = self.settings.workers;
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(workers).panic_handler(|_| {}).build()?;
+        let actuators = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(workers).build()?);
         let budget = Arc::new(MemoryBudget::new(self.settings.memory_mib));
         let generation = self.shared.generation.load(Ordering::Relaxed);
         self.running = workers;
         for _ in 0..workers {
-            let (shared, budget, sender) =
-                (Arc::clone(&self.shared), Arc::clone(&budget), self.messages.0.clone());
-            threads.spawn(move || shared.worker_loop(generation, &budget, &sender));
+            let (shared, sender) = (Arc::clone(&self.shared), self.messages.0.clone());
+            let (actuators, budget) = (Arc::clone(&actuators), Arc::clone(&budget));
+            std::thread::Builder::new()
+                .spawn(move || shared.worker_loop(generation, &actuators, &budget, &sender))
+                .map_err(Error::Thread)?;
         }
         Ok(())
     }
@@ -300,5 +310,59 @@ impl Drop for WorkerPool<'_> {
     /// A store that fails must not keep the workers reading.
     fn drop(&mut self) {
         self.shared.is_stopped.store(true, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod tests {
+    use super::*;
+    use crate::run::plan::WorkReason;
+    use crate::run::summary::not_reached;
+
+    /// A worker that waits for an actuator helps other workers by a log or two, and does not do the rest of the run.
+    #[test]
+    fn no_log_waits_for_the_rest_of_the_run() {
+        const LOGS: usize = 60;
+        let work = |k: usize| WorkItem {
+            files: ingest::LogFiles::one(format!("{k}.parquet")),
+            fault: None,
+            shown: k.to_string(),
+            stat: None,
+            why: WorkReason::New,
+            before: None,
+        };
+        let plan = Plan { work: (0..LOGS).map(work).collect(), ..Plan::default() };
+        for _ in 0..5 {
+            let longest = Arc::new(Mutex::new(Duration::ZERO));
+            let (accounts, seen) = (plan.work.clone(), Arc::clone(&longest));
+            let process_log = move |log: usize, _: &MemoryBudget, _: &StepCount| {
+                let begun = Instant::now();
+                let actuator = || std::thread::sleep(Duration::from_millis(2));
+                rayon::join(actuator, || rayon::join(actuator, actuator));
+                let mut longest = seen.lock().unwrap();
+                *longest = begun.elapsed().max(*longest);
+                LogOutcomeData::Same(Box::new(not_reached(&accounts[log], "run")))
+            };
+            let fail = |_: &WorkItem, _: Diagnostic, _: f64| unreachable!("no log is late");
+            let settings = PoolSettings {
+                plan: &plan,
+                workers: 2,
+                limit: Duration::from_mins(1),
+                memory_mib: None,
+                stop: &AtomicBool::new(false),
+                watch: &|_| {},
+                fail: &fail,
+            };
+            let begun = Instant::now();
+            let mut pool = WorkerPool::start(settings, Box::new(process_log)).unwrap();
+            let mut done = 0;
+            while let Next::Log(_) = pool.next(None).unwrap() {
+                done += 1;
+            }
+            let (longest, whole) = (*longest.lock().unwrap(), begun.elapsed());
+            assert_eq!(done, LOGS);
+            assert!(4 * longest < whole, "a log took {longest:?} of {whole:?}");
+        }
     }
 }
