@@ -237,7 +237,7 @@ fn flip(file: &Path) {
 /// Messages about damaged stores, without parts that differ from run to run (holder, digests).
 fn stores(text: &mut String) {
     let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--limit", "2"]);
+    fleet.run_ok(&["run", "--tail", "N412FP", "--limit", "2"]);
     let sound = tempfile::tempdir().unwrap();
     copy(&fleet.path("results"), sound.path());
     let lock = fs::File::options().write(true).open(fleet.path("results/lock")).unwrap();

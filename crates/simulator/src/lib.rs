@@ -25,7 +25,7 @@ pub use fleet::fleet_plan_types::{
     ActuatorLog, ActuatorTruth, ChannelUnit, Installation, Plan, PlannedFlight, SimulatedFlight,
 };
 pub use fleet::fleet_spec::{
-    MotorLogFormat, ParameterSpread, Part, Place, Position, SAMPLE_SPEC, Spec, Swap, UnitSpec,
+    Aircraft, MotorLogFormat, ParameterSpread, Part, Place, Position, SAMPLE_SPEC, Spec, Swap, UnitSpec,
 };
 pub use fleet::wear::WearLaw;
 pub use flight::{ExpectedOutcome, Flight, simulate};

@@ -189,6 +189,7 @@ static CLASSES: &[Class] = &[
     }),
     drawn("load-cell lag", |c, rng| c.sensors.load.lag_s = log_uniform(rng, 1e-3..30e-3)),
     drawn("load-cell hysteresis", hysteresis),
+    drawn("load-cell nonlinearity", nonlinear_load),
     drawn("buffet", buffet),
     drawn("structural lines", lines),
     drawn("turbulence", turbulence),
@@ -369,6 +370,10 @@ fn hysteresis(case: &mut Case, rng: &mut ChaCha8Rng) {
     load.hysteresis_length = rng.random_range(0.05..0.3) * case.profile.load_n;
 }
 
+fn nonlinear_load(case: &mut Case, rng: &mut ChaCha8Rng) {
+    case.sensors.load.nonlinearity = rng.random_range(-0.02..0.02) * case.profile.load_n;
+}
+
 fn buffet(case: &mut Case, rng: &mut ChaCha8Rng) {
     let low_hz = log_uniform(rng, 5.0..50.0);
     let high_hz = log_uniform(rng, 1.3 * low_hz..101.0);
@@ -478,12 +483,13 @@ fn toe(rng: &mut ChaCha8Rng) -> ContactLaw {
 }
 
 /// Faults of which each flight of *everything* has about two.
-const FAULTS: [fn(&mut Case, &mut ChaCha8Rng); 9] = [
+const FAULTS: [fn(&mut Case, &mut ChaCha8Rng); 10] = [
     buffet,
     lines,
     turbulence,
     motor_vibration,
     hysteresis,
+    nonlinear_load,
     periodic,
     coloured,
     |case, rng| case.profile.reversals = Some(rng.random_range(2..=8)),

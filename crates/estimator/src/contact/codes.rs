@@ -11,7 +11,7 @@ pub enum Rejection {
     LoadTooSmall,
     /// The motor moves less than the wind-up.
     TravelTooSmall,
-    /// Fewer than 20 samples a second.
+    /// Fewer than 20 samples a second, or a load that vibrates faster than it is sampled.
     RateTooLow,
     /// δX travels further than gap and wind-up account for: friction may hold the screw within the gap.
     MotionUnexplained,
@@ -58,7 +58,10 @@ impl Rejection {
             Self::TravelTooSmall => {
                 "use a flight in which the actuator moves; at rest, friction and play are not distinguishable"
             }
-            Self::RateTooLow => "record at 20 samples a second or more, 50 or more for a small gap",
+            Self::RateTooLow => {
+                "record at 20 samples a second or more, 50 or more for a small gap, and at twice the frequency of \
+                 any strong vibration of the load"
+            }
             Self::MotionUnexplained => {
                 "check that the load is this actuator's; else use a flight with more load, or more travel, so \
                  that friction does not hold the screw within its gap"

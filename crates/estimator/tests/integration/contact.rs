@@ -121,6 +121,53 @@ fn eightfold_friction_costs_under_one_per_cent() {
     }
 }
 
+/// A load cell that departs from its line bends the flanks: 2 % at full load move a gap by some 2 µm. A bend that noise
+/// hides does not widen the interval, so half of the flights must hold; without the term for it one of eight does.
+#[test]
+fn a_nonlinear_load_cell_widens_the_interval() {
+    let off = |seed: u64| {
+        let share = [-0.02, 0.02][seed as usize % 2];
+        let found = Case::with(100e-6, |c| c.sensors.load.nonlinearity = share * c.profile.load_n).gap(seed);
+        assert!((found.gap_m - 100e-6).abs() < 5e-6 && found.gap_se_m < 3e-6, "{share}: {found:?}");
+        (found.gap_m - 100e-6).abs() / found.gap_se_m
+    };
+    let held = (0..8).filter(|&seed| off(seed) < 3.0).count();
+    assert!(held >= 4, "{held} of 8 lie within three standard errors");
+}
+
+/// Buffet above half the sample rate puts neighbouring samples on different flanks: the interval holds, or the flight is
+/// rejected.
+#[test]
+fn vibration_beyond_the_sample_rate_is_not_taken_for_a_small_gap() {
+    for (rms, seed) in [(0.15, 0), (0.25, 1), (0.25, 2), (0.35, 3), (0.45, 4), (0.45, 5)] {
+        let case = Case::with(89e-6, |c| {
+            c.profile.sample_rate_hz = 54.0;
+            c.profile.buffet = Vibration { low_hz: 40.0, high_hz: 80.0, rms, ..Vibration::default() };
+        });
+        match case.outcome(&case.fly(seed)) {
+            ContactOutcome::Estimated(found) => {
+                let off = (found.gap_m - 89e-6).abs() / found.gap_se_m;
+                assert!(off < 3.0, "{rms}: {off} of {found:?}");
+            }
+            ContactOutcome::Refused(reason) => assert_eq!(reason, Rejection::RateTooLow),
+        }
+    }
+}
+
+/// A soft coupling and a screw with hardly any mass in such a vibration: residuals of a third of the wind-up.
+#[test]
+fn flanks_that_are_mixed_beyond_use_are_rejected() {
+    let case = Case::with(89e-6, |c| {
+        c.plant.contact.stiffness_n_per_m = 3e7;
+        c.profile.sample_rate_hz = 54.0;
+        c.profile.load_n = 6e3;
+        c.profile.buffet = Vibration { low_hz: 41.0, high_hz: 78.0, rms: 0.5, ..Vibration::default() };
+        c.sensors.load.delay_s = 8e-3;
+    });
+    let outcome = case.outcome(&case.fly(7));
+    assert!(matches!(outcome, ContactOutcome::Refused(Rejection::RateTooLow)), "{outcome:?}");
+}
+
 #[test]
 fn a_true_zero_is_declared_below_detection() {
     for seed in 0..4 {

@@ -190,6 +190,10 @@ impl<'a> Planner<'a> {
         plant = plant.with_friction_factor((spread.friction * normal(&mut of_flight)).exp());
         let mut profile = spec.profile;
         profile.load_n *= place.load_factor;
+        for aircraft in spec.aircraft.iter().filter(|aircraft| aircraft.tail == *tail) {
+            sensors.load.bias += aircraft.load_bias_n;
+            profile.buffet = aircraft.buffet.unwrap_or(profile.buffet);
+        }
         profile.no_reversal |= place.no_reversal || of_flight.random_bool(spread.no_reversal_share);
         Assignment { plant, profile, sensors, part: unit.part }
     }

@@ -6,6 +6,7 @@ use crate::error::{Error, finite, not_negative, positive, within};
 use crate::fleet::calendar::midnight_us;
 use crate::fleet::wear::WearLaw;
 use crate::load::flight_profile::Profile;
+use crate::load::vibration::Vibration;
 use crate::plant::actuator_plant::Plant;
 use crate::sensors::sensor::Sensors;
 
@@ -58,6 +59,9 @@ pub struct Spec {
     /// Exchanges of two units.
     #[serde(default)]
     pub swaps: Vec<Swap>,
+    /// Aircraft whose load cells or structure differ from the others'.
+    #[serde(default)]
+    pub aircraft: Vec<Aircraft>,
 }
 
 fn default_seed() -> u64 {
@@ -225,6 +229,20 @@ pub struct Swap {
     pub to: Place,
 }
 
+/// What differs on all actuators of one tail.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Aircraft {
+    /// The tail.
+    pub tail: String,
+    /// Zero error of its load cells, N, added to the sensors' own. Default 0.
+    #[serde(default)]
+    pub load_bias_n: f64,
+    /// Vibration of its loads in place of the profile's. Default the profile's.
+    #[serde(default)]
+    pub buffet: Option<Vibration>,
+}
+
 /// A tail and a position on it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -257,7 +275,8 @@ impl Spec {
         self.parts.iter().try_for_each(Part::check)?;
         self.positions.iter().try_for_each(|place| self.check_position(place))?;
         self.units.iter().try_for_each(|unit| self.check_unit(unit))?;
-        self.swaps.iter().try_for_each(|swap| self.check_swap(swap))
+        self.swaps.iter().try_for_each(|swap| self.check_swap(swap))?;
+        self.aircraft.iter().try_for_each(|aircraft| self.check_aircraft(aircraft))
     }
 
     fn check_names(&self) -> Result<(), Error> {
@@ -306,10 +325,22 @@ impl Spec {
         self.check_place("a swap", &swap.to.tail, &swap.to.position)
     }
 
-    fn check_place(&self, who: &str, tail: &str, position: &str) -> Result<(), Error> {
-        if !self.tails.iter().any(|known| known == tail) {
-            return Err(unknown(who, "tail", tail, self.tails.iter().map(String::as_str)));
+    fn check_aircraft(&self, aircraft: &Aircraft) -> Result<(), Error> {
+        let tail = &aircraft.tail;
+        self.check_tail("an aircraft", tail)?;
+        finite(&format!("aircraft {tail} load_bias_n"), aircraft.load_bias_n)?;
+        aircraft.buffet.map_or(Ok(()), |buffet| buffet.check(&format!("aircraft {tail} buffet")))
+    }
+
+    fn check_tail(&self, who: &str, tail: &str) -> Result<(), Error> {
+        if self.tails.iter().any(|known| known == tail) {
+            return Ok(());
         }
+        Err(unknown(who, "tail", tail, self.tails.iter().map(String::as_str)))
+    }
+
+    fn check_place(&self, who: &str, tail: &str, position: &str) -> Result<(), Error> {
+        self.check_tail(who, tail)?;
         let mut positions = self.positions.iter().map(|place| place.position.as_str());
         if positions.clone().all(|known| known != position) {
             return Err(unknown(who, "position", position, &mut positions));

@@ -115,7 +115,8 @@ pub struct Channel {
     pub bias: f64,
     /// Added in proportion to time, this much by the end of the flight.
     pub drift: f64,
-    /// Peak of an S-shaped error over the stroke, zero at its middle and ends; positions only.
+    /// Positions: peak of an S-shaped error over the stroke, zero at its middle and ends. Load cell: error at `load_n`,
+    /// which grows with the square of the load and turns over with its sign.
     pub nonlinearity: f64,
     /// The reading shows the truth of so long ago, seconds, −0.5 to 0.5; any part of a sample.
     pub delay_s: f64,
@@ -179,6 +180,28 @@ impl Default for Channel {
     }
 }
 
+/// Over which range a channel is nonlinear.
+#[derive(Debug, Clone, Copy)]
+enum Range {
+    /// A position over its stroke, either way.
+    Position { stroke_m: f64 },
+    /// A load, either way.
+    Load { load_n: f64 },
+}
+
+impl Range {
+    /// The error of a channel whose nonlinearity is one.
+    fn nonlinearity_at(self, value: f64) -> f64 {
+        match self {
+            Self::Position { stroke_m } => {
+                let u = (value / stroke_m).clamp(-1.0, 1.0);
+                (u - u.powi(3)) / CUBIC_PEAK
+            }
+            Self::Load { load_n } => value * value.abs() / (load_n * load_n),
+        }
+    }
+}
+
 /// Mean length of a burst of missing samples.
 const BURST: f64 = 5.0;
 
@@ -227,7 +250,12 @@ impl Channel {
         let coloured =
             self.coloured(values.len(), rate_hz, &mut seeded_rng(seed, &["sensor", name, "coloured"]));
         let rng = &mut seeded_rng(seed, &["sensor", name]);
-        let read = self.read(values, &coloured, rate_hz, profile.stroke_m, rng);
+        let range = if name == "load" {
+            Range::Load { load_n: profile.load_n }
+        } else {
+            Range::Position { stroke_m: profile.stroke_m }
+        };
+        let read = self.read(values, &coloured, rate_hz, range, rng);
         if rate_hz < profile.sample_rate_hz {
             let hold = |k| read[held_index(k, profile.sample_rate_hz, rate_hz)];
             return (0..profile.samples()).map(hold).collect();
@@ -266,13 +294,12 @@ impl Channel {
         mut values: Vec<f64>,
         coloured: &[f64],
         rate_hz: f64,
-        stroke_m: f64,
+        range: Range,
         rng: &mut ChaCha8Rng,
     ) -> Vec<f64> {
         let last = (values.len().max(2) - 1) as f64;
         for (k, value) in values.iter_mut().enumerate() {
-            let u = (*value / stroke_m).clamp(-1.0, 1.0);
-            let bent = self.nonlinearity * (u - u.powi(3)) / CUBIC_PEAK
+            let bent = self.nonlinearity * range.nonlinearity_at(*value)
                 + self.periodic.at(*value)
                 + coloured.get(k).copied().unwrap_or(0.0);
             let white: f64 = StandardNormal.sample(rng);
@@ -419,7 +446,8 @@ mod tests {
     use super::*;
 
     fn read(channel: Channel, value: f64, samples: usize) -> Vec<f64> {
-        channel.read(vec![value; samples], &[], 100.0, 1.0, &mut seeded_rng(3, &["sensor"]))
+        let range = Range::Position { stroke_m: 1.0 };
+        channel.read(vec![value; samples], &[], 100.0, range, &mut seeded_rng(3, &["sensor"]))
     }
 
     /// First-order noise: autocorrelation `e^(−2πft)`; flicker: equal power in each decade.
@@ -481,6 +509,17 @@ mod tests {
         let channel = Channel { nonlinearity: 20e-6, ..Channel::default() };
         let at = |u: f64| read(channel, u, 1)[0] - u;
         assert!((at(1.0 / 3f64.sqrt()) - 20e-6).abs() < 1e-12 && at(1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_load_cell_departs_from_its_line_with_the_square_of_the_load() {
+        let profile = Profile { load_n: 8e3, ..Profile::default() };
+        let channel = Channel { nonlinearity: 80.0, ..Channel::default() };
+        let loads = vec![-8e3, -4e3, 0.0, 4e3, 8e3];
+        assert_eq!(
+            channel.read_log(loads, &profile, 1, "load")[..5],
+            [-8080.0, -4020.0, 0.0, 4020.0, 8080.0]
+        );
     }
 
     #[test]

@@ -53,6 +53,16 @@ const UNKNOWN_FORCE_SHARE: f64 = 0.02;
 /// Bandwidth of the backlash in that check, Hz.
 const BANDWIDTH_HZ: f64 = 10.0;
 
+/// Flanks count as bent where the two fits differ by more than about this many jackknife errors.
+const BEND_SIGMA: f64 = 2.0;
+/// Difference of the two fits, over the wind-up, above which flanks are softer than any load cell is nonlinear: 3 % of
+/// its range bends them by 1 %.
+const NONLINEAR_SHARE: f64 = 0.012;
+/// A load whose rms second difference exceeds this share of the 95 % load turns between two samples ...
+const ALIASED_LOAD: f64 = 0.3;
+/// ... and has mixed both flanks beyond use where residuals exceed this share of the wind-up.
+const ALIASED_RESIDUAL: f64 = 0.16;
+
 /// Periodic errors that are smaller do not matter, m.
 const LEAST_PERIODIC_M: f64 = 2e-7;
 
@@ -61,8 +71,10 @@ const WEIGHTS: Doubt = Doubt {
     jackknife_m: 0.92,
     search_m: 0.48,
     choice_m: 2.65,
+    bend_m: 3.0,
     light_m: 0.095,
     vibration_m: 0.36,
+    aliased_m: 0.5,
     floor_m: 1.13,
     changes: 0.58,
     friction_share: 1.42,
@@ -81,11 +93,16 @@ pub(crate) struct Doubt {
     pub(crate) search_m: f64,
     /// What hangs on the choice between the two fits.
     pub(crate) choice_m: f64,
+    /// Bend of the flanks that a load cell's nonlinearity may make: the difference of the two fits as far as it is
+    /// significant and small.
+    pub(crate) bend_m: f64,
     /// How far lightly loaded rows lie off the line.
     pub(crate) light_m: f64,
     /// Friction between two samples that the load's slow part does not show: the lost share of the load's rms second
     /// difference, over the stiffness.
     pub(crate) vibration_m: f64,
+    /// Flanks that are mixed because the load vibrates faster than it is sampled.
+    pub(crate) aliased_m: f64,
     /// What no flight averages out.
     pub(crate) floor_m: f64,
     /// One over the root of the number of changes from flank to flank.
@@ -101,8 +118,10 @@ impl Doubt {
                 doubt.jackknife_m,
                 doubt.search_m,
                 doubt.choice_m,
+                doubt.bend_m,
                 doubt.light_m,
                 doubt.vibration_m,
+                doubt.aliased_m,
                 doubt.floor_m,
             ]
         };
@@ -155,14 +174,19 @@ impl FlankFit {
 /// Fits the flanks.
 ///
 /// # Errors
-/// As [`search`], and [`Rejection::MotionUnexplained`].
+/// As [`search`]; [`Rejection::RateTooLow`] for a load that vibrates faster than it is sampled, so that neighbouring
+/// samples lie on different flanks; and [`Rejection::MotionUnexplained`].
 pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<FlankFit, Rejection> {
     workspace.excerpt.excerpt_of(&workspace.whole, scaling.load_n);
     let SearchResult { found: line, spread_m, scale_m, load_zero_se_n } = coarse_to_fine(workspace, scaling)?;
     let error_m = |column: usize| line.fit.standard_error_m(column, &line.design.firm);
     let windup_m = scaling.windup_m();
     let vibration_n = second_difference_rms(&workspace.whole.load_n);
-    let (gap_m, doubt, sigma) = gap_and_doubt(&line, spread_m, windup_m, vibration_n, scaling.load_n);
+    if vibration_n > ALIASED_LOAD * scaling.load_n && scale_m > ALIASED_RESIDUAL * windup_m {
+        return Err(Rejection::RateTooLow);
+    }
+    let (gap_m, mut doubt, sigma) = gap_and_doubt(&line, spread_m, windup_m, vibration_n, scaling.load_n);
+    doubt.aliased_m = aliased_share(vibration_n / scaling.load_n, scale_m / windup_m) * windup_m;
     let fit = FlankFit {
         gap_m: (gap_m, doubt.standard_error_m()),
         compliance_m_per_n: (line.fit.beta[FORCE] / scaling.load_n, error_m(FORCE) / scaling.load_n),
@@ -301,6 +325,7 @@ fn gap_and_doubt(
     };
     let sigma = difference_m.abs() / (error_m + LEAST_DIFFERENCE_M);
     let weight = sigma * sigma / (sigma * sigma + ALIKE);
+    let bend = sigma.powi(4) / (sigma.powi(4) + BEND_SIGMA.powi(4));
     let FrictionState { stiffness_n_per_m, friction, .. } = line.state;
     let changes = rows.array_windows().filter(|[before, row]| before.x[GAP] * row.x[GAP] < 0.0).count();
     let mut outward_m: Vec<f64> =
@@ -310,13 +335,22 @@ fn gap_and_doubt(
         jackknife_m,
         search_m,
         choice_m: weight * (1.0 - weight) * difference_m,
+        bend_m: bend * difference_m / (1.0 + (difference_m / (NONLINEAR_SHARE * windup_m)).powi(2)),
         light_m: (1.0 - weight) * median(&mut outward_m),
         vibration_m: friction.lost_share * vibration_n / stiffness_n_per_m,
+        aliased_m: 0.0,
         floor_m: (3e-4 * windup_m).hypot(2e-4 * gap_m),
         changes: (changes.max(1) as f64).sqrt().recip(),
         friction_share: friction.at_n(load_n) / load_n,
     };
     (gap_m, doubt, sigma)
+}
+
+/// Error of the gap under a load that vibrates faster than it is sampled, as a share of the wind-up: about the fourth
+/// power of the residual's share of it, as simulated at 50 to 100 samples a second under vibration of 20 to 80 Hz.
+fn aliased_share(load_share: f64, residual_share: f64) -> f64 {
+    let vibrates = load_share.powi(4) / (load_share.powi(4) + ALIASED_LOAD.powi(4));
+    vibrates * (residual_share / ALIASED_RESIDUAL).min(1.0).powi(4)
 }
 
 /// Rows of even numbers of correlation blocks, in order of time.
