@@ -33,6 +33,12 @@ fn a_reversed_load_sign_is_an_error_of_the_parts_and_names_the_units_that_lose_t
         "{}",
         checked.err
     );
+    let channels = rows(&fleet.freeplay(&["check", "--json"]).out);
+    let refused = channels.iter().filter(|row| row["remedy"].as_str().is_some_and(|r| r.contains(REMEDY)));
+    assert!(
+        refused.clone().count() > 0 && refused.clone().all(|row| row["channel"] == "load"),
+        "{channels:?}"
+    );
 
     let result = fleet.freeplay(&["run", "--json"]);
     assert_eq!(result.code, Some(1), "{result:?}");

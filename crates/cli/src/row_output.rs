@@ -7,13 +7,12 @@ use std::sync::Arc;
 use arrow::array::{Array, AsArray, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::csv::WriterBuilder as CsvWriter;
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use arrow::datatypes::{DataType, Field, Schema};
 use arrow::json::writer::{JsonArray, WriterBuilder as JsonWriter};
 use parquet::arrow::ArrowWriter;
-pub(crate) use pipeline::rows::utc;
 use records::Diagnostic;
+use records::row_schema::{Row, to_nullable_batch};
 use records::sanitize::escape_invisible;
-use serde::Serialize;
 
 use crate::args::{Format, RowFormatArgs};
 use crate::exit::Failure;
@@ -136,10 +135,10 @@ fn joined(column: &Arc<dyn Array>) -> Result<Arc<dyn Array>, Failure> {
     Ok(Arc::new(StringArray::from(rows)))
 }
 
-/// Converts serialisable rows to a batch of a schema.
+/// Rows as a batch, every column nullable.
 ///
 /// # Errors
-/// If a value does not fit its column.
-pub(crate) fn batch<T: Serialize>(schema: &SchemaRef, rows: &[T]) -> Result<RecordBatch, Failure> {
-    pipeline::rows::batch(schema, rows).map_err(|e| broken(&e))
+/// If there are more rows than a batch can hold.
+pub(crate) fn batch<R: Row>(rows: &[R]) -> Result<RecordBatch, Failure> {
+    to_nullable_batch(rows).map_err(|e| Failure::failed(Diagnostic::new("output_failed", e)))
 }

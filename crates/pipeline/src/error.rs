@@ -42,6 +42,12 @@ pub enum Error {
     Thread(std::io::Error),
 }
 
+impl From<records::row_schema::RowError> for Error {
+    fn from(error: records::row_schema::RowError) -> Self {
+        Self::Store(error.into())
+    }
+}
+
 impl Error {
     pub(crate) fn refused(diagnostic: Diagnostic) -> Self {
         Self::Refused(vec![diagnostic])

@@ -6,30 +6,33 @@ use ingest::LogFiles;
 use ingest::log::in_memory::ChannelArrays;
 use job::Config;
 use job::flight_log::{FlightLog, catch_panic, estimate_unidentified, part_of};
-use records::{Diagnostic, GapEstimate, Installations, PartNumber, Position};
-use serde::Serialize;
+use records::row_schema::Row;
+use records::{Diagnostic, GapEstimate, GapRecord, Installations, PartNumber, Position};
 
 use crate::error::Error;
 use crate::run::discover;
 
-/// A record without provenance of a run; what is not known of an unbooked log is null.
-#[derive(Debug, Clone, Serialize)]
-#[expect(missing_docs, reason = "each field is named for the contract's column")]
-pub struct EstimateRow {
-    pub tail_number: Option<String>,
-    pub position: Option<String>,
-    pub part_number: Option<String>,
-    pub serial_number: Option<String>,
-    pub flight_id: Option<String>,
-    pub departure_utc: Option<jiff::Timestamp>,
-    pub flight_hours: Option<f64>,
-    pub tail_hours_end: Option<f64>,
-    #[serde(flatten)]
-    pub estimate: GapEstimate,
-    pub log_path: Option<String>,
-    pub log_digest: Option<String>,
-    pub config_digest: String,
-    pub program_version: String,
+records::row! {
+    /// An estimate without a store: the columns of a record except those of a run. Columns of an unidentified log are
+    /// null.
+    #[derive(Debug, Clone)]
+    #[expect(missing_docs, reason = "each field is the column of a record")]
+    pub struct EstimateRow {
+        pub tail_number: Option<String>,
+        pub position: Option<String>,
+        pub part_number: Option<String>,
+        pub serial_number: Option<String>,
+        pub flight_id: Option<String>,
+        pub departure_utc: Option<jiff::Timestamp>,
+        pub flight_hours: Option<f64>,
+        pub tail_hours_end: Option<f64>,
+        pub estimate: GapEstimate,
+        pub log_path: Option<String>,
+        pub log_digest: Option<String>,
+        pub config_digest: String,
+        pub program_version: String,
+    }
+    order = <GapRecord as Row>::order
 }
 
 /// Estimates every actuator of a log: as booked, or all as one part. What is wrong with the log, or with single

@@ -12,7 +12,6 @@ pub mod history;
 pub mod monitoring;
 pub mod normalize;
 pub mod report;
-pub mod rows;
 pub mod run;
 pub mod simulate;
 

@@ -8,12 +8,12 @@ use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::fleet_trends::assess::{self, UnitSelection};
 use pipeline::fleet_trends::backtest;
-use pipeline::fleet_trends::trend_row::TrendRow;
 use pipeline::history::builder::HistoryBuilder;
 use pipeline::history::flight_row::FlightInput;
 use pipeline::history::histories::Histories;
 use pipeline::history::row_keys::RowKey;
 use records::Installations;
+use records::TrendRow;
 
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;

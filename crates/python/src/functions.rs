@@ -5,16 +5,17 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
+use ::records::TrendRow;
+use ::records::row_schema::to_nullable_batch;
 use ::records::{Diagnostic, Installations, PartNumber};
 use arrow::array::RecordBatch;
 use ingest::log::in_memory::ChannelArrays;
 use ingest::parquet::writer::Encoding;
 use ingest::tables::{Table as Cells, TableBatch};
+use pipeline::Request;
 use pipeline::fleet_trends::assess::{self, UnitSelection};
-use pipeline::fleet_trends::trend_row::TrendRow;
 use pipeline::history::external_estimates;
 use pipeline::run::scheduler::Context;
-use pipeline::{Request, rows};
 use pyo3::prelude::*;
 use store::{Holder, Query, Store};
 
@@ -66,7 +67,7 @@ pub(crate) fn estimate(
         });
         found.extend(read.map_err(|error| to_run_exception(py, error))?);
     }
-    let batch = rows::batch(&rows::estimates(), &found).map_err(|e| arrow_error(&e))?;
+    let batch = to_nullable_batch(&found).map_err(|e| to_run_exception(py, e.into()))?;
     Ok(partial_result(py, batch, &diagnostics))
 }
 
@@ -89,7 +90,7 @@ pub(crate) fn estimate_arrays(
         pipeline::estimate::of_arrays(&arrays, &config.inner, &number, VERSION)
     });
     let found = found.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?;
-    Ok(Table::of(rows::batch(&rows::estimates(), &[found]).map_err(|e| arrow_error(&e))?))
+    Ok(Table::of(to_nullable_batch(&[found]).map_err(|e| to_run_exception(py, e.into()))?))
 }
 
 /// What the filter saw of a log, sample by sample.
@@ -136,7 +137,7 @@ pub(crate) fn trend(
     let found =
         py.detach(|| assess(&config.inner, installations, estimate_batches, queries_table.as_ref(), &ask));
     let found = found.map_err(|error| to_run_exception(py, error))?;
-    Ok(Table::of(rows::batch(&rows::trends(), &found).map_err(|e| arrow_error(&e))?))
+    Ok(Table::of(to_nullable_batch(&found).map_err(|e| to_run_exception(py, e.into()))?))
 }
 
 fn to_table(table: &Bound<'_, PyAny>, name: &str) -> PyResult<Cells> {

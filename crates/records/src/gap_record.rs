@@ -1,18 +1,22 @@
 //! Gap record: the estimated gap of one actuator in one flight, and its provenance.
 
+use arrow::datatypes::SchemaRef;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use crate::flight::Flight;
 use crate::ids::{PartNumber, Position, SerialNumber};
+use crate::row_schema::{self, Cells as _, text_cell};
+use crate::stored_row;
 
 /// Whether the flight allows an estimate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
     /// `gap_m` holds a number.
     Estimated,
     /// The log is readable, but allows no estimate; `reason` holds the rejection code.
+    #[default]
     Refused,
 }
 
@@ -24,153 +28,160 @@ impl Status {
             Self::Refused => "refused",
         }
     }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let known = [Self::Estimated, Self::Refused].into_iter().find(|status| status.as_str() == text);
+        known.ok_or_else(|| format!("`{text}` is no status"))
+    }
 }
 
-/// Everything needed to reproduce the estimate bitwise.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Provenance {
-    /// Path of the log; relative to the configuration file if the log is stored below it.
-    pub log_path: String,
-    /// blake3 of the footer and of the column chunks that were read, hexadecimal.
-    pub log_digest: String,
-    /// blake3 of every setting that affects the estimate, hexadecimal.
-    pub config_digest: String,
-    /// Version of Freeplay that computed the estimate.
-    pub program_version: String,
-    /// The run that computed the estimate.
-    pub run_id: String,
-    /// Time of computation, UTC.
-    pub processed_utc: Timestamp,
+text_cell!(Status, Status::parse);
+
+stored_row! {
+    /// Everything needed to reproduce the estimate bitwise.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    pub struct Provenance {
+        /// Path of the log; relative to the configuration file if the log is stored below it.
+        pub log_path: String,
+        /// blake3 of the footer and of the column chunks that were read, hexadecimal.
+        pub log_digest: String,
+        /// blake3 of every setting that affects the estimate, hexadecimal.
+        pub config_digest: String,
+        /// Version of Freeplay that computed the estimate.
+        pub program_version: String,
+        /// The run that computed the estimate. Compare two runs without `run_id`, `processed_utc` and `log_path`.
+        pub run_id: String,
+        /// Time of computation.
+        pub processed_utc: Timestamp,
+    }
 }
 
-/// GapEstimate of one actuator in one flight: the gap or the rejection reason, with its diagnostics.
-///
-/// It holds no identity: an unidentified log gives the same numbers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GapEstimate {
-    /// Whether `gap_m` holds a number.
-    pub status: Status,
-    /// Stable code: the rejection reason, or the most severe quality flag.
-    pub reason: Option<String>,
-    /// Stable codes of quality flags that do not reject the estimate.
-    pub flags: Vec<String>,
-    /// ΔS by the configured method, m.
-    pub gap_m: Option<f64>,
-    /// Its standard error, m.
-    pub gap_se_m: Option<f64>,
-    /// Its 5 % bound, m.
-    pub gap_p05_m: Option<f64>,
-    /// Its 95 % bound, m.
-    pub gap_p95_m: Option<f64>,
-    /// ΔS by equations 29–31, m.
-    pub gap_midrange_m: Option<f64>,
-    /// Stiffness fitted in this flight, N/m.
-    pub stiffness_n_per_m: Option<f64>,
-    /// Its standard error, N/m.
-    pub stiffness_se_n_per_m: Option<f64>,
-    /// Estimated and corrected delay of the screw channel relative to the motor channel, s.
-    pub skew_s: Option<f64>,
-    /// Its standard error, s.
-    pub skew_se_s: Option<f64>,
-    /// Lost motion at zero load, m.
-    pub loop_width_m: Option<f64>,
-    /// Its standard error, m.
-    pub loop_width_se_m: Option<f64>,
-    /// Relative travel between plus and minus the part's reference load, m.
-    pub lost_motion_m: Option<f64>,
-    /// Its standard error, m.
-    pub lost_motion_se_m: Option<f64>,
-    /// Zero of the load channel fitted in this flight, N: what it reads under no load.
-    pub load_zero_n: Option<f64>,
-    /// Its standard error, N.
-    pub load_zero_se_n: Option<f64>,
-    /// Estimated and corrected delay of the load channel relative to the motor channel, s.
-    pub load_delay_s: Option<f64>,
-    /// Its standard error, s.
-    pub load_delay_se_s: Option<f64>,
-    /// Friction of the screw in motion at the 95 % load, N.
-    pub friction_n: Option<f64>,
-    /// ΔS by equations 29–31 with the stiffness, load zero and delays fitted in this flight, m: a check of `gap_m`.
-    pub gap_midrange_fitted_m: Option<f64>,
-    /// Reference radius of a purely rotary part: metres of gap per radian, m/rad.
-    pub reference_radius_m: Option<f64>,
-    /// Number of load reversals.
-    pub load_reversals: i64,
-    /// Number of samples used.
-    pub samples: i64,
-    /// Samples in the upper set of equation 30.
-    pub samples_upper: i64,
-    /// Samples in the lower set of equation 31.
-    pub samples_lower: i64,
-    /// 5 % quantile of the load, N.
-    pub load_p05_n: Option<f64>,
-    /// 95 % quantile of the load, N.
-    pub load_p95_n: Option<f64>,
-    /// Mean temperature, °C, where a channel is mapped.
-    pub temperature_c: Option<f64>,
-    /// Mean normalised innovation squared (NIS), to compare with the unit's own history.
-    pub nis: Option<f64>,
+stored_row! {
+    /// Estimate of one actuator in one flight: the gap or the rejection reason, with its diagnostics.
+    ///
+    /// It holds no identity: an unidentified log gives the same numbers.
+    #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+    pub struct GapEstimate {
+        /// `estimated`, `refused`.
+        pub status: Status,
+        /// Code of the rejection, or of the most severe flag.
+        pub reason: Option<String>,
+        /// Codes of the quality flags, which do not reject the estimate.
+        pub flags: Vec<String>,
+        /// ΔS by the configured method, m.
+        pub gap_m: Option<f64>,
+        /// Standard error of `gap_m`, m; of the contact regression, none for the mid-range estimate.
+        pub gap_se_m: Option<f64>,
+        /// 5 % bound of `gap_m`, m; of the contact regression.
+        pub gap_p05_m: Option<f64>,
+        /// 95 % bound of `gap_m`, m; of the contact regression.
+        pub gap_p95_m: Option<f64>,
+        /// ΔS by equations 29–31, m; also present for rejected flights.
+        pub gap_midrange_m: Option<f64>,
+        /// Stiffness fitted in this flight, N/m; none where the method fits none.
+        pub stiffness_n_per_m: Option<f64>,
+        /// Standard error of `stiffness_n_per_m`, N/m.
+        pub stiffness_se_n_per_m: Option<f64>,
+        /// Time skew fitted in this flight, s: delay of the screw channel relative to the motor channel.
+        pub skew_s: Option<f64>,
+        /// Loop width at zero load, m.
+        pub loop_width_m: Option<f64>,
+        /// Lost motion between plus and minus the part's reference load, m.
+        pub lost_motion_m: Option<f64>,
+        /// Reference radius of a rotary part: metres of gap per radian, m/rad.
+        pub reference_radius_m: Option<f64>,
+        /// Load reversals: from beyond +12 % of the load's 95 % magnitude to beyond −12 %, or back.
+        pub load_reversals: i64,
+        /// Samples used.
+        pub samples: i64,
+        /// Samples in the upper set of equation 30.
+        pub samples_upper: i64,
+        /// Samples in the lower set of equation 31.
+        pub samples_lower: i64,
+        /// 5 % quantile of the load, N.
+        pub load_p05_n: Option<f64>,
+        /// 95 % quantile of the load, N.
+        pub load_p95_n: Option<f64>,
+        /// Mean temperature, °C, where a channel is mapped.
+        pub temperature_c: Option<f64>,
+        /// Mean normalised innovation squared (NIS); compare it with the unit's own history only.
+        pub nis: Option<f64>,
+        /// Standard error of `skew_s`, s.
+        pub skew_se_s: Option<f64>,
+        /// Standard error of `loop_width_m`, m.
+        pub loop_width_se_m: Option<f64>,
+        /// Standard error of `lost_motion_m`, m.
+        pub lost_motion_se_m: Option<f64>,
+        /// Load zero fitted in this flight, N: reading of the load channel under no load.
+        pub load_zero_n: Option<f64>,
+        /// Standard error of `load_zero_n`, N.
+        pub load_zero_se_n: Option<f64>,
+        /// Delay of the load channel relative to the motor channel fitted in this flight, s; a lag included.
+        pub load_delay_s: Option<f64>,
+        /// Standard error of `load_delay_s`, s.
+        pub load_delay_se_s: Option<f64>,
+        /// Friction of the screw in motion at the 95 % load, N.
+        pub friction_n: Option<f64>,
+        /// ΔS by equations 29–31 with the stiffness, load zero and delays fitted in this flight, m: a check of `gap_m`.
+        pub gap_midrange_fitted_m: Option<f64>,
+    }
 }
 
 impl GapEstimate {
     /// The estimate of a rejected flight, with its rejection code.
     pub fn refused(reason: &str) -> Self {
-        Self {
-            status: Status::Refused,
-            reason: Some(reason.to_owned()),
-            flags: Vec::new(),
-            gap_m: None,
-            gap_se_m: None,
-            gap_p05_m: None,
-            gap_p95_m: None,
-            gap_midrange_m: None,
-            stiffness_n_per_m: None,
-            stiffness_se_n_per_m: None,
-            skew_s: None,
-            skew_se_s: None,
-            loop_width_m: None,
-            loop_width_se_m: None,
-            lost_motion_m: None,
-            lost_motion_se_m: None,
-            load_zero_n: None,
-            load_zero_se_n: None,
-            load_delay_s: None,
-            load_delay_se_s: None,
-            friction_n: None,
-            gap_midrange_fitted_m: None,
-            reference_radius_m: None,
-            load_reversals: 0,
-            samples: 0,
-            samples_upper: 0,
-            samples_lower: 0,
-            load_p05_n: None,
-            load_p95_n: None,
-            temperature_c: None,
-            nis: None,
-        }
+        Self { reason: Some(reason.to_owned()), ..Self::default() }
     }
 }
 
-/// One row of the results: one actuator, one flight. The flattened field names are the column names.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct GapRecord {
-    /// Tail, flight, departure and duration.
-    #[serde(flatten)]
-    pub flight: Flight,
-    /// Position on the aircraft.
-    pub position: Position,
-    /// Part number of the installed unit.
-    pub part_number: PartNumber,
-    /// The installed unit.
-    pub serial_number: SerialNumber,
-    /// Age of the unit after this flight, hours, if known.
-    pub unit_hours: Option<f64>,
-    /// The estimate.
-    #[serde(flatten)]
-    pub estimate: GapEstimate,
-    /// Provenance of the estimate.
-    #[serde(flatten)]
-    pub provenance: Provenance,
+stored_row! {
+    /// One row of the results: one actuator, one flight.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    pub struct GapRecord {
+        /// Tail, flight, departure and duration.
+        #[serde(flatten)]
+        pub flight: Flight,
+        /// Position on the aircraft.
+        pub position: Position,
+        /// Part number of the unit.
+        pub part_number: PartNumber,
+        /// Serial number of the unit.
+        pub serial_number: SerialNumber,
+        /// The unit's hours after this flight.
+        pub unit_hours: Option<f64>,
+        /// The estimate.
+        #[serde(flatten)]
+        pub estimate: GapEstimate,
+        /// Provenance of the estimate.
+        #[serde(flatten)]
+        pub provenance: Provenance,
+    }
+    order = column_order
+}
+
+impl GapRecord {
+    /// Schema of the records table.
+    pub fn schema() -> SchemaRef {
+        row_schema::schema::<Self>()
+    }
+}
+
+/// Order of the columns of a record: identity, estimate, provenance, and then the columns of later releases, so that a
+/// new column leaves the order of the others as it is. New fields of [`GapEstimate`] are declared last.
+fn column_order(column: &str) -> usize {
+    const IDENTITY: [&str; 4] = ["tail_number", "position", "part_number", "serial_number"];
+    const LAST_OF_FIRST_RELEASE: &str = "nis";
+    let (provenance, estimate) = (Provenance::columns("", ""), GapEstimate::columns("", ""));
+    let place = |name: &str| estimate.iter().position(|c| c.name == name);
+    if let Some(place) = IDENTITY.iter().position(|name| *name == column) {
+        place
+    } else if provenance.iter().any(|c| c.name == column) {
+        IDENTITY.len() + 1
+    } else if place(column) > place(LAST_OF_FIRST_RELEASE) {
+        IDENTITY.len() + 2
+    } else {
+        IDENTITY.len()
+    }
 }
 
 /// Key of a record: one actuator has one record per flight.

@@ -1,4 +1,4 @@
-//! Contract types shared by every crate: identifiers, installations, the gap record and the diagnostic.
+//! Contract types shared by every crate: identifiers, installations, row types with their Arrow columns, diagnostics.
 //!
 //! This crate holds no mathematics and opens no file. Identifiers are distinct types, so a tail number cannot
 //! be passed where a serial number is expected.
@@ -8,12 +8,19 @@ pub mod flight;
 pub mod gap_record;
 pub mod ids;
 pub mod installation;
+pub mod log_record;
+pub mod row_schema;
+pub mod run_record;
 mod sample_time;
 pub mod sanitize;
+pub mod trend_row;
 
 pub use diagnostic::Diagnostic;
 pub use flight::Flight;
 pub use gap_record::{GapEstimate, GapRecord, Provenance, RecordKey, Status};
 pub use ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 pub use installation::{Installation, Installations};
+pub use log_record::{LogOutcome, LogRecord};
+pub use run_record::RunRecord;
 pub use sample_time::sample_time_s;
+pub use trend_row::{ChangePoint, TrendRow};

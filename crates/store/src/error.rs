@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use deltalake::DeltaTableError;
 use records::Diagnostic;
+use records::row_schema::RowError;
 
 /// Why the store could not be opened, read or written.
 #[derive(Debug, thiserror::Error)]
@@ -61,6 +62,16 @@ pub enum Error {
     /// A Parquet file could not be written or read.
     #[error("Parquet: {0}")]
     Parquet(#[from] parquet::errors::ParquetError),
+}
+
+impl From<RowError> for Error {
+    fn from(error: RowError) -> Self {
+        match error {
+            RowError::Column { column, problem } => Self::Column { column: column.to_owned(), problem },
+            RowError::Value { column, row, problem } => Self::Value { column, row, problem },
+            RowError::Arrow(error) => Self::Arrow(error),
+        }
+    }
 }
 
 impl Error {

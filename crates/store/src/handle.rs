@@ -9,9 +9,9 @@ use records::GapRecord;
 use crate::delta::data_file;
 use crate::delta::location::Location;
 use crate::delta::table::Table;
+use crate::delta::versioned;
 use crate::error::Error;
-use crate::rows::accounts::{LogRecord, RunRecord};
-use crate::rows::{row_schema, versioned};
+use records::{LogRecord, RunRecord};
 
 const LOCK: &str = "lock";
 
@@ -30,7 +30,7 @@ pub struct Store {
 impl Store {
     pub(crate) fn at(location: Location) -> Self {
         let table = |name, schema| Table::new(&location, name, schema);
-        let gaps = table("gaps", row_schema::schema::<GapRecord>());
+        let gaps = table("gaps", GapRecord::schema());
         let logs = table("logs", versioned::schema::<LogRecord>());
         let runs = table("runs", versioned::schema::<RunRecord>());
         let display_path = location.display_path(location.dir());

@@ -38,7 +38,6 @@ mod delta;
 mod error;
 mod handle;
 mod read;
-mod rows;
 mod store_dir;
 mod write;
 
@@ -48,9 +47,7 @@ pub use error::Error;
 pub use handle::Store;
 pub use read::column_scan::ColumnScan;
 pub use read::query::Query;
-pub use records::RecordKey;
-pub use rows::accounts::{LogOutcome, LogRecord, RunRecord};
-pub use rows::gap_columns as columns;
+pub use records::{LogOutcome, LogRecord, RecordKey, RunRecord};
 pub use write::compact::Compaction;
 pub use write::lock::Holder;
 pub use write::promote::PromotionSummary;

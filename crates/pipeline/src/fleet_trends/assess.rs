@@ -14,7 +14,7 @@ use crate::fleet_trends::changes::{UnitChange, changed, since_states};
 use crate::fleet_trends::limits::Limits;
 use crate::fleet_trends::priors::FleetPriors;
 use crate::fleet_trends::tail_wide_steps::TailWide;
-use crate::fleet_trends::trend_row::{self, TrendRow};
+use crate::fleet_trends::trend_row;
 use crate::history::builder::HistoryBuilder;
 use crate::history::external_estimates::AsOfQuery;
 use crate::history::histories::{Histories, History, UnitKey};
@@ -24,6 +24,7 @@ use crate::history::usage::UsageSources;
 use crate::monitoring::mapping_faults::{self, MappingFault};
 use crate::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
 use crate::monitoring::recorder_change::{RecorderChange, detect_changes, detect_changes_in_store};
+use records::TrendRow;
 
 /// A unit, by part and serial number.
 pub type Unit = (PartNumber, SerialNumber);
@@ -101,7 +102,7 @@ pub(crate) type States = BTreeMap<UnitKey, &'static str>;
 /// As [`assess_store`].
 pub(crate) fn states(config: &Config, installations: &Installations, store: &Store) -> Result<States, Error> {
     let rows = assess_store(config, installations, store, &UnitSelection::default())?;
-    Ok(rows.into_iter().filter_map(|row| Some((row.name(), row.state?))).collect())
+    Ok(rows.into_iter().filter_map(|row| Some((row.unit(), row.state?))).collect())
 }
 
 /// Assesses the fleet after a run: the units whose records it changed, and the work list of all units. `before` holds
@@ -159,7 +160,7 @@ pub fn assess_run_from(
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
     run.work_list = now.iter().filter(needs_attention).cloned().collect();
-    now.retain(|row| names.contains(&row.name()));
+    now.retain(|row| names.contains(&row.unit()));
     let Some(before_utc) = before_utc else { return Ok(RunAssessments { now, ..run }) };
     let before = if is_later {
         fleet.statements(names.iter(), before_utc)?
@@ -168,7 +169,7 @@ pub fn assess_run_from(
         let fleet = FleetContext { priors: fleet.priors, ..read };
         fleet.statements(earlier.names(), before_utc)?
     };
-    let before = before.into_iter().filter(|row| row.flights > 0).map(|row| (row.name(), row)).collect();
+    let before = before.into_iter().filter(|row| row.flights > 0).map(|row| (row.unit(), row)).collect();
     let changed = changed(&before, &now);
     Ok(RunAssessments { now, changed, ..run })
 }
@@ -429,7 +430,7 @@ impl<'a> FleetContext<'a> {
     /// What engineers know, and no alarm is made from.
     fn add_statistics(&self, rows: &mut [TrendRow], are_asked: bool) {
         let add = |row: &mut TrendRow| {
-            let Some(series) = self.series(&row.name()) else { return };
+            let Some(series) = self.series(&row.unit()) else { return };
             let known = series.flights_until(row.as_of_utc.as_microsecond()).iter();
             let (hours, gaps_m): (Vec<f64>, Vec<f64>) =
                 known.filter_map(|f| Some((f.hours, f.gap?.gap_m))).unzip();

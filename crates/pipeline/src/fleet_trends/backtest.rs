@@ -8,7 +8,6 @@ use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
 use records::Installations;
-use serde::Serialize;
 use trend::{ChangePointKind, Series, WearStatus};
 
 use crate::error::Error;
@@ -25,25 +24,35 @@ const FEWEST: usize = 40;
 /// Flights of the running median by which a limit counts as met.
 const WINDOW: usize = 21;
 
-/// One past statement, and what came true.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "each field is named for its column, with its unit")]
-pub struct BacktestRow {
-    pub part_number: Option<String>,
-    pub serial_number: String,
-    pub as_of_utc: Timestamp,
-    /// `limit` where the act limit was reached, `level` where the target is the last level.
-    pub target: &'static str,
-    pub target_m: f64,
-    /// Share of the way to the target that was behind the unit, by hours.
-    pub used_share: f64,
-    pub true_hours: f64,
-    pub hours_p05: f64,
-    pub hours_p50: f64,
-    pub hours_p95: f64,
-    pub relative_error: f64,
-    /// `held`, `late` (the target was reached sooner than forecast) or `early` (later than forecast).
-    pub interval: &'static str,
+records::row! {
+    /// A past forecast and its outcome.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct BacktestRow {
+        /// Part number of the unit.
+        pub part_number: Option<String>,
+        /// Serial number of the unit.
+        pub serial_number: String,
+        /// Date of the forecast.
+        pub as_of_utc: Timestamp,
+        /// `limit` where the act limit was reached, `level` where the target is the last level.
+        pub target: &'static str,
+        /// Gap of the target, m.
+        pub target_m: f64,
+        /// Share of the hours to the target that had passed at the date of the forecast.
+        pub used_share: f64,
+        /// Hours from the forecast to the target.
+        pub true_hours: f64,
+        /// Forecast hours to the target, earliest (5 %).
+        pub hours_p05: f64,
+        /// Forecast hours to the target, median.
+        pub hours_p50: f64,
+        /// Forecast hours to the target, latest (95 %).
+        pub hours_p95: f64,
+        /// |median ÷ true − 1|.
+        pub relative_error: f64,
+        /// `held`, `late` (the target was reached sooner than forecast) or `early` (later than forecast).
+        pub interval: &'static str,
+    }
 }
 
 /// Every past statement of the units that were seen to wear, by part, serial number and day.

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::days::days;
-use crate::fleet_trends::trend_row::{ChangePoint, TrendRow};
 use crate::history::histories::UnitKey;
+use records::{ChangePoint, TrendRow};
 
 /// An event of one kind is the same one when its date moved by no more than this: dates are estimates.
 const SAME_EVENT_DAYS: f64 = 60.0;
@@ -32,7 +32,7 @@ pub struct UnitChange {
 
 /// The units whose state or events differ, in the order of `now`.
 pub(crate) fn changed(before: &BTreeMap<UnitKey, TrendRow>, now: &[TrendRow]) -> Vec<UnitChange> {
-    now.iter().filter_map(|row| of_unit(before.get(&row.name()), row)).collect()
+    now.iter().filter_map(|row| of_unit(before.get(&row.unit()), row)).collect()
 }
 
 /// Adds the changes against the states that units had before a run computed their records again.
@@ -42,7 +42,7 @@ pub(crate) fn since_states(
     now: &[TrendRow],
 ) -> Vec<UnitChange> {
     for row in now {
-        let Some(from) = before.get(&row.name()).copied().filter(|from| row.state != Some(*from)) else {
+        let Some(from) = before.get(&row.unit()).copied().filter(|from| row.state != Some(*from)) else {
             continue;
         };
         let is_unit = |change: &&mut UnitChange| {

@@ -6,4 +6,4 @@ pub mod changes;
 mod limits;
 mod priors;
 mod tail_wide_steps;
-pub mod trend_row;
+pub(crate) mod trend_row;

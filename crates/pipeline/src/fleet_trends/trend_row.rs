@@ -1,103 +1,18 @@
-//! A unit's statement, as the contract names its columns.
+//! Trend row of a unit, from its assessment and history.
 
 use jiff::Timestamp;
-use records::Installation;
-use serde::Serialize;
+use records::row_schema::NoColumn;
+use records::{ChangePoint, Installation, TrendRow};
 use trend::{Assessment, Series, classic};
 
 use crate::fleet_trends::tail_wide_steps::TailWide;
 use crate::history::histories::{History, UnitKey};
 
-/// A change point, as the contract names its fields.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ChangePoint {
-    /// The first flight after it.
-    pub departure_utc: Timestamp,
-    /// That flight.
-    pub flight_id: Option<String>,
-    /// `step`, `reset`, `onset` or `recorded`.
-    pub kind: &'static str,
-    /// Its size, m.
-    pub step_m: f64,
-    /// Standard error of its size, m.
-    pub step_se_m: f64,
-    /// Probability that it is one; 1 for a recorded event.
-    pub certainty: f64,
-    /// Whether the tail's other actuators changed with it, or what is fitted of all of them did: a matter of a
-    /// sensor or a recorder, not of wear.
-    pub tail_wide: bool,
-}
-
-/// One unit's statement, as the contract names its columns.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[expect(missing_docs, reason = "each field is named for the contract's column, with its unit")]
-pub struct TrendRow {
-    pub part_number: Option<String>,
-    pub serial_number: String,
-    pub tail_number: Option<String>,
-    pub position: Option<String>,
-    pub as_of_utc: Timestamp,
-    pub flights: i64,
-    pub unit_hours: Option<f64>,
-    pub gap_m: Option<f64>,
-    pub gap_se_m: Option<f64>,
-    pub estimates: i64,
-    pub outliers: i64,
-    pub noise_factor: f64,
-    pub rate_m_per_hour: Option<f64>,
-    pub rate_p05_m_per_hour: Option<f64>,
-    pub rate_p95_m_per_hour: Option<f64>,
-    pub trend: &'static str,
-    pub growth_probability: Option<f64>,
-    pub wear_law: Option<String>,
-    pub wear_law_probability: Option<f64>,
-    pub usage_axis: Option<String>,
-    pub trend_p_value: Option<f64>,
-    pub sen_rate_m_per_hour: Option<f64>,
-    pub sen_low_m_per_hour: Option<f64>,
-    pub sen_high_m_per_hour: Option<f64>,
-    pub hamed_rao_p_value: Option<f64>,
-    pub change_points: Vec<ChangePoint>,
-    pub limit_m: Option<f64>,
-    pub crossing_hours_p05: Option<f64>,
-    pub crossing_hours_p50: Option<f64>,
-    pub crossing_hours_p95: Option<f64>,
-    pub crossing_flights_p05: Option<f64>,
-    pub crossing_flights_p50: Option<f64>,
-    pub crossing_flights_p95: Option<f64>,
-    pub not_before_utc: Option<Timestamp>,
-    pub likely_utc: Option<Timestamp>,
-    pub not_after_utc: Option<Timestamp>,
-    pub check_probability: Option<f64>,
-    /// Utilisation by which hours become flights and dates.
-    pub hours_per_day: Option<f64>,
-    pub hours_per_day_se: Option<f64>,
-    pub flights_per_day: Option<f64>,
-    pub hours_per_flight: Option<f64>,
-    /// Where the hours are known from: `flights_table`, `tail_hours` or `logged_flights`.
-    pub usage_source: Option<String>,
-    /// Days since the last estimate, where they are too many; the state is then that of the last estimate.
-    pub stale_days: Option<f64>,
-    /// When the unit was removed, where the installations table has no installation on the date.
-    pub removed_utc: Option<Timestamp>,
-    pub state: Option<&'static str>,
-    pub reason: Option<String>,
-    /// The estimated gaps in order of flights, at most a hundred means of neighbours, m: a sketch for people.
-    #[serde(skip)]
-    pub sketch_m: Vec<f64>,
-}
-
-impl TrendRow {
-    pub(crate) fn name(&self) -> UnitKey {
-        (self.part_number.clone(), self.serial_number.clone())
-    }
-}
-
-/// Means of neighbours, at most so many.
-fn sketched(gaps_m: &[f64]) -> Vec<f64> {
+/// Means of neighbours, at most a hundred.
+fn sketched(gaps_m: &[f64]) -> NoColumn<Vec<f64>> {
     const MOST: usize = 100;
     let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
-    gaps_m.chunks(gaps_m.len().div_ceil(MOST).max(1)).map(mean).collect()
+    NoColumn(gaps_m.chunks(gaps_m.len().div_ceil(MOST).max(1)).map(mean).collect())
 }
 
 /// The trend row of a unit at a date.

@@ -16,12 +16,12 @@ use trend::Forecast;
 use crate::days::days;
 use crate::error::Error;
 use crate::fleet_trends::assess::{self, ReportAssessments, UnitSelection};
-use crate::fleet_trends::trend_row::{ChangePoint, TrendRow};
 use crate::history::builder::HistoryBuilder;
 use crate::history::flight_row::FlightRow as FlownRow;
 use crate::history::histories::{Histories, History, UnitKey as Name};
 use crate::history::installation_index::InstallationIndex;
 use crate::monitoring::recorder_change::detect_changes_in_store;
+use records::{ChangePoint, TrendRow};
 
 /// Days before the report whose forecasts are compared with the outcome.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];

@@ -15,6 +15,7 @@ use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use ingest::LogFiles;
 use jiff::Timestamp;
 use job::Config;
+use records::row_schema::{from_batch, to_batch};
 use records::{Diagnostic, GapRecord, Installations};
 use serde::{Deserialize, Serialize};
 use store::{LogOutcome, LogRecord, LogResult, RecordKey, Writer};
@@ -65,7 +66,7 @@ struct TaskResult {
 /// The columns of a result: those of a record, and three more. Each log has one row with its status
 /// (`account`, and `error_code` with `error_detail` where it failed), and one row for each record.
 pub fn schema() -> SchemaRef {
-    let records = store::columns::schema();
+    let records = GapRecord::schema();
     let record = records.fields().iter().map(|field| field.as_ref().clone().with_nullable(true));
     let text = |name: &&str| Field::new(*name, DataType::Utf8, true);
     Arc::new(Schema::new(record.chain(OURS.iter().map(text)).collect::<Vec<_>>()))
@@ -133,7 +134,7 @@ fn encode_result(
         Arc::new(StringArray::from(vec![text]))
     };
     let first = RecordBatch::try_new(Arc::clone(&schema), schema.fields().iter().map(head).collect())?;
-    let records = store::columns::to_batch(records)?;
+    let records = to_batch(records)?;
     let rest = |field: &Arc<Field>| {
         let column = records.column_by_name(field.name()).cloned();
         column.unwrap_or_else(|| new_null_array(field.data_type(), records.num_rows()))
@@ -254,7 +255,7 @@ fn read(batches: &[RecordBatch]) -> Result<TaskResults, Error> {
             results.entry(logs.value(row).to_owned()).or_insert(process_log);
         }
         let rest = filter_record_batch(&batch, &is_null(accounts)?)?;
-        for record in store::columns::from_batch(&rest)? {
+        for record in from_batch::<GapRecord>(&rest)? {
             let of_log = records.entry(record.provenance.log_path.clone()).or_default();
             of_log.entry(RecordKey::of(&record)).or_insert(record);
         }

@@ -9,11 +9,11 @@ use store::{LogOutcome, LogRecord, RunRecord};
 use crate::error::is_passing;
 use crate::fleet_trends::assess::RunAssessments;
 use crate::fleet_trends::changes::UnitChange;
-use crate::fleet_trends::trend_row::TrendRow;
 use crate::monitoring::innovations::{self, InnovationOutlier};
 use crate::monitoring::mapping_faults::MappingFault;
 use crate::monitoring::recorder_change::{self, RecorderChange};
 use crate::run::plan::{Plan, StandingError, WorkItem};
+use records::TrendRow;
 
 /// One log's trouble.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

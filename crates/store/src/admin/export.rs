@@ -1,5 +1,6 @@
 //! Export: the records as one file others read, the same bytes for the same records.
 
+use records::GapRecord;
 use std::borrow::Cow;
 use std::io::Write;
 
@@ -17,7 +18,6 @@ use crate::error::Error;
 use crate::handle::Store;
 use crate::read::polars_scan;
 use crate::read::query::Query;
-use crate::rows::gap_columns;
 
 /// Rows held in memory at a time; flights of one instant stay together.
 const WINDOW_ROWS: usize = 500_000;
@@ -29,7 +29,7 @@ pub enum Format {
     Csv,
     /// An array of objects that name every column, empty ones as `null`.
     Json,
-    /// Parquet with the columns of [`gap_columns::schema`].
+    /// Parquet with the columns of [`GapRecord`].
     Parquet,
 }
 
@@ -46,7 +46,7 @@ impl Store {
         let mut sink = ExportWriter::new(format, to)?;
         let mut rows = 0;
         for window in self.windows(&snapshot, query)? {
-            let batch = self.select(&snapshot, &window, gap_columns::schema())?;
+            let batch = self.select(&snapshot, &window, GapRecord::schema())?;
             rows += batch.num_rows();
             sink.write(&batch)?;
         }
@@ -59,7 +59,7 @@ impl Store {
         if query.last.is_some() {
             return Ok(vec![query.clone()]);
         }
-        let schema = polars_scan::only(&gap_columns::schema(), &["departure_utc"])?;
+        let schema = polars_scan::only(&GapRecord::schema(), &["departure_utc"])?;
         let departures = self.select(snapshot, query, schema)?;
         let departures = departures.column(0).as_primitive::<TimestampMicrosecondType>();
         let edges = (1..departures.len().div_ceil(WINDOW_ROWS)).map(|i| departures.value(i * WINDOW_ROWS));
@@ -87,7 +87,7 @@ impl<W: Write + Send> ExportWriter<W> {
         Ok(match format {
             Format::Csv => Self::Csv(arrow::csv::Writer::new(to)),
             Format::Json => Self::Json(WriterBuilder::new().with_explicit_nulls(true).build(to)),
-            Format::Parquet => Self::Parquet(ArrowWriter::try_new(to, gap_columns::schema(), None)?),
+            Format::Parquet => Self::Parquet(ArrowWriter::try_new(to, GapRecord::schema(), None)?),
         })
     }
 

@@ -1,5 +1,6 @@
 //! What the store holds, and when it was last fed.
 
+use records::GapRecord;
 use std::collections::{BTreeSet, HashSet};
 use std::path::PathBuf;
 
@@ -10,8 +11,7 @@ use jiff::Timestamp;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::polars_scan::{self, ScanRequest};
-use crate::rows::accounts::{LogOutcome, RunRecord};
-use crate::rows::gap_columns;
+use records::{LogOutcome, RunRecord};
 
 /// A store in numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +54,7 @@ impl Store {
         let files: Vec<PathBuf> = snapshot.files.iter().map(|file| file.path.clone()).collect();
         self.check(&files)?;
         let names = ["departure_utc", "tail_number", "flight_id", "part_number", "serial_number"];
-        let schema = polars_scan::only(&gap_columns::schema(), &names)?;
+        let schema = polars_scan::only(&GapRecord::schema(), &names)?;
         let batch =
             ScanRequest { files: &files, schema, condition: None, order: &[], last: None }.collect()?;
         let departures = batch.column(0).as_primitive::<TimestampMicrosecondType>();

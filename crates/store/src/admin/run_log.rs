@@ -14,9 +14,9 @@ use crate::error::Error;
 use crate::handle::Store;
 use crate::read::latest_rows::TextFilter;
 use crate::read::query::Query;
-use crate::rows::accounts::{LogOutcome, LogRecord, RunRecord};
 use crate::write::lock::Lock;
 use crate::write::writer::{self, Writer};
+use records::{LogOutcome, LogRecord, RunRecord};
 
 /// A run in a bucket that gave no sign of life for so long was killed: it stores each log as it is finished.
 const SILENT: SignedDuration = SignedDuration::from_hours(1);

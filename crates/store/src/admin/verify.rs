@@ -1,6 +1,7 @@
 //! Verification: log files and data files against their digests, statistics against content, log records against gap
 //! records.
 
+use records::GapRecord;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -17,9 +18,8 @@ use crate::error::Error;
 use crate::handle::Store;
 use crate::read::polars_scan::{self, ScanRequest};
 use crate::read::store_read::files_of;
-use crate::rows::accounts::LogRecord;
-use crate::rows::gap_columns;
 use crate::write::writer::keys;
+use records::LogRecord;
 use records::RecordKey;
 
 /// Maximum number of similar findings that are listed; the others are counted.
@@ -44,7 +44,7 @@ impl Store {
     /// Records that are stored twice, and logs whose records are not all stored.
     fn wrong_records(&self) -> Result<Vec<Diagnostic>, Error> {
         let files: Vec<PathBuf> = files_of(&self.gaps)?;
-        let schema = polars_scan::only(&gap_columns::schema(), &RecordKey::COLUMNS)?;
+        let schema = polars_scan::only(&GapRecord::schema(), &RecordKey::COLUMNS)?;
         let order = &RecordKey::COLUMNS;
         let batch = ScanRequest { files: &files, schema, condition: None, order, last: None }.collect()?;
         let keys = keys(&batch)?;

@@ -9,3 +9,4 @@ pub(crate) mod log_digests;
 pub(crate) mod snapshot;
 pub(crate) mod snapshot_cache;
 pub(crate) mod table;
+pub(crate) mod versioned;

@@ -345,12 +345,12 @@ mod tests {
     use arrow::datatypes::{DataType, Field, Schema};
 
     use super::*;
-    use crate::rows::row_schema::time;
+    use records::row_schema::time_type;
 
     fn schema() -> SchemaRef {
         Arc::new(Schema::new(vec![
             Field::new("name", DataType::Utf8, false),
-            Field::new("at", time(), false),
+            Field::new("at", time_type(), false),
         ]))
     }
 

@@ -3,6 +3,7 @@
 //! A whole fleet's records are tens of millions of rows with repeated names, so text columns stay dictionaries as
 //! stored, numbers are not copied, and a caller with threads may read several files at once.
 
+use records::GapRecord;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,7 +22,6 @@ use crate::error::Error;
 use crate::handle::Store;
 use crate::read::polars_scan;
 use crate::read::query::Query;
-use crate::rows::gap_columns;
 
 /// Files that may hold records that fit, of one version of the table.
 #[derive(Debug)]
@@ -90,7 +90,7 @@ impl ColumnScan {
 
 /// Some columns of the records, in the form they have in a part.
 fn schema_of(names: &[&str]) -> Result<SchemaRef, Error> {
-    let wanted = polars_scan::only(&gap_columns::schema(), names)?;
+    let wanted = polars_scan::only(&GapRecord::schema(), names)?;
     Ok(Arc::new(Schema::new(wanted.fields().iter().map(|field| coded(field)).collect::<Vec<_>>())))
 }
 

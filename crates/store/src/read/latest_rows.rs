@@ -13,10 +13,10 @@ use arrow::datatypes::{Int64Type, SchemaRef};
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 
 use crate::delta::data_file::GROUP_ROWS;
+use crate::delta::versioned;
 use crate::error::Error;
 use crate::read::column_scan::{cast_to_schema, mask};
-use crate::rows::row_schema::{self, RowSchema};
-use crate::rows::versioned;
+use records::row_schema::{self, FromCells, Row};
 
 /// Rows in which a text column holds what is wanted; one that is empty there is not.
 #[derive(Clone, Copy)]
@@ -28,7 +28,7 @@ pub(crate) struct TextFilter<'a> {
 /// Rows by name, and the commit that each came with.
 pub(crate) struct LatestRows<R>(BTreeMap<String, (i64, R)>);
 
-impl<R: RowSchema> LatestRows<R> {
+impl<R: Row + FromCells> LatestRows<R> {
     pub(crate) fn new() -> Self {
         Self(BTreeMap::new())
     }
@@ -94,7 +94,7 @@ mod tests {
     use parquet::arrow::ArrowWriter;
 
     use super::*;
-    use crate::rows::accounts::RunRecord;
+    use records::RunRecord;
 
     /// Runs as another program may write them: long texts, nanoseconds, columns in another order and one of its own,
     /// and none of those that may be empty.

@@ -15,7 +15,7 @@ use polars::prelude::{
 };
 
 use crate::error::Error;
-use crate::rows::row_schema::element;
+use records::row_schema::list_element;
 
 /// What is read of data files.
 pub(crate) struct ScanRequest<'a> {
@@ -136,7 +136,7 @@ fn array(column: &Column, field: &Field) -> Result<ArrayRef, Error> {
 }
 
 fn lists(column: &Column) -> Result<ArrayRef, Error> {
-    let mut lists = ListBuilder::new(StringBuilder::new()).with_field(element());
+    let mut lists = ListBuilder::new(StringBuilder::new()).with_field(list_element());
     for texts in column.list()?.amortized_iter() {
         match texts {
             Some(texts) => lists.append_value(texts.as_ref().str()?.iter()),

@@ -16,10 +16,9 @@ use crate::handle::Store;
 use crate::read::latest_rows::{LatestRows, TextFilter};
 use crate::read::polars_scan::{self, ScanRequest};
 use crate::read::query::Query;
-use crate::rows::accounts::{LogOutcome, LogRecord};
-use crate::rows::gap_columns;
-use crate::rows::row_schema::RowSchema;
 use records::RecordKey;
+use records::row_schema::{FromCells, Row, from_batch};
+use records::{LogOutcome, LogRecord};
 
 impl Store {
     /// The records that fit, as columns, by departure, tail, flight and position.
@@ -31,7 +30,7 @@ impl Store {
     /// [`Error::Table`] when the log cannot be read, [`Error::Damaged`] when a file is not the one that
     /// was committed, [`Error::Frame`] when it cannot be decoded.
     pub fn scan(&self, query: &Query) -> Result<RecordBatch, Error> {
-        self.select(&self.gaps.snapshot()?, query, gap_columns::schema())
+        self.select(&self.gaps.snapshot()?, query, GapRecord::schema())
     }
 
     /// The same as rows.
@@ -39,7 +38,7 @@ impl Store {
     /// # Errors
     /// As [`Store::scan`]; [`Error::Value`] when a cell cannot be what it stands for.
     pub fn records(&self, query: &Query) -> Result<Vec<GapRecord>, Error> {
-        gap_columns::from_batch(&self.scan(query)?)
+        Ok(from_batch(&self.scan(query)?)?)
     }
 
     /// Hands over every record, earliest departure first, and returns the version they are of.
@@ -53,7 +52,7 @@ impl Store {
         let snapshot = self.gaps.snapshot()?;
         for (since_utc, until_utc) in months(&snapshot) {
             let month = Query { since_utc, until_utc, ..Query::default() };
-            gap_columns::from_batch(&self.select(&snapshot, &month, gap_columns::schema())?)?
+            from_batch(&self.select(&snapshot, &month, GapRecord::schema())?)?
                 .into_iter()
                 .for_each(&mut take);
         }
@@ -67,7 +66,7 @@ impl Store {
     pub fn serials(&self) -> Result<Vec<(PartNumber, SerialNumber)>, Error> {
         let files = files_of(&self.gaps)?;
         self.check(&files)?;
-        let schema = polars_scan::only(&gap_columns::schema(), &["part_number", "serial_number"])?;
+        let schema = polars_scan::only(&GapRecord::schema(), &["part_number", "serial_number"])?;
         let units =
             ScanRequest { files: &files, schema, condition: None, order: &[], last: None }.collect()?;
         let [parts, serials] = [0, 1].map(|column| units.column(column).as_string::<i32>());
@@ -141,7 +140,7 @@ impl Store {
     }
 
     /// Of the rows that fit, the newest of each name, by name; files that cannot hold one are passed over.
-    pub(crate) fn newest<R: RowSchema>(
+    pub(crate) fn newest<R: Row + FromCells>(
         &self,
         table: &Table,
         wanted: Option<TextFilter<'_>>,

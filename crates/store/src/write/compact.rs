@@ -11,10 +11,10 @@ use polars::prelude::{Expr, col, lit};
 use crate::delta::data_file;
 use crate::delta::snapshot::{DataFile, Snapshot};
 use crate::delta::table::{Change, Table};
+use crate::delta::versioned;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::polars_scan::{self, ScanRequest};
-use crate::rows::versioned;
 use crate::write::writer::Writer;
 
 /// Rows of a full file: many enough to open few, few enough to copy one for a flight estimated again.

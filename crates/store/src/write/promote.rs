@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::query::Query;
-use crate::rows::accounts::LogRecord;
 use crate::write::writer::{self, LogResult, Writer};
+use records::LogRecord;
 use records::RecordKey;
 
 /// What was taken over.

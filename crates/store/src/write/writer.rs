@@ -13,16 +13,15 @@ use records::GapRecord;
 use crate::delta::data_file;
 use crate::delta::snapshot::{DataFile, Snapshot};
 use crate::delta::table::{Change, Table};
+use crate::delta::versioned;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::polars_scan::{self, ScanRequest};
-use crate::rows::accounts::LogRecord;
-use crate::rows::gap_columns;
-use crate::rows::row_schema::RowSchema;
-use crate::rows::versioned;
 use crate::store_dir::{FORMAT, MARKER, check_marker, write_marker};
 use crate::write::lock::{Holder, Lock};
+use records::LogRecord;
 use records::RecordKey;
+use records::row_schema::{FromCells, Row, to_batch};
 
 /// What came of one log.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,7 +107,7 @@ impl Writer {
         }
         let new: Vec<GapRecord> = decisions.values().copied().flatten().cloned().collect();
         if !new.is_empty() {
-            change.add.push(data_file::write(location, version, &gap_columns::to_batch(&new)?, true)?);
+            change.add.push(data_file::write(location, version, &to_batch(&new)?, true)?);
         }
         Ok(change)
     }
@@ -117,17 +116,17 @@ impl Writer {
     fn without(&self, file: &DataFile, decisions: &MergeDecisions<'_>) -> Result<Option<RecordBatch>, Error> {
         let files = slice::from_ref(&file.path);
         self.store.check(files)?;
-        let keys = polars_scan::only(&gap_columns::schema(), &RecordKey::COLUMNS)?;
+        let keys = polars_scan::only(&GapRecord::schema(), &RecordKey::COLUMNS)?;
         if stays(&rows(files, keys)?, decisions)?.false_count() == 0 {
             return Ok(None);
         }
-        let all = rows(files, gap_columns::schema())?;
+        let all = rows(files, GapRecord::schema())?;
         Ok(Some(filter_record_batch(&all, &stays(&all, decisions)?)?))
     }
 }
 
 /// Appends rows to a table of which the newest counts.
-pub(crate) fn account<R: RowSchema>(table: &Table, rows: &[R]) -> Result<(), Error> {
+pub(crate) fn account<R: Row + FromCells>(table: &Table, rows: &[R]) -> Result<(), Error> {
     table.change(|snapshot| {
         let version = snapshot.version + 1;
         let add = data_file::write(&table.location, version, &versioned::to_batch(rows, version)?, true)?;

@@ -6,7 +6,8 @@ use arrow::array::RecordBatch;
 use arrow::compute::concat_batches;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use records::GapRecord;
-use store::{Format, Query, RecordKey, columns};
+use records::row_schema::from_batch;
+use store::{Format, Query, RecordKey};
 
 use crate::fixtures::{record, result, writer};
 
@@ -27,7 +28,7 @@ fn json_holds_every_column_of_every_record_and_the_same_bits() {
     let results = [result(2, 1, 0.1 + 0.2), result(1, 1, 5e-324), result(1, 0, 40e-6)];
     let text = exported(Format::Json, &results);
     let rows: Vec<serde_json::Map<String, serde_json::Value>> = serde_json::from_slice(&text).unwrap();
-    assert!(rows.iter().all(|row| row.len() == columns::schema().fields().len()));
+    assert!(rows.iter().all(|row| row.len() == GapRecord::schema().fields().len()));
     assert!(rows[0]["tail_hours_end"].is_null());
     let read: Vec<GapRecord> = serde_json::from_slice(&text).unwrap();
     let mut expected: Vec<GapRecord> = results.into_iter().flat_map(|r| r.records).collect();
@@ -56,8 +57,8 @@ fn parquet_reads_back_as_the_same_records() {
     file.write_all(&bytes).unwrap();
     let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap().build().unwrap();
     let batches: Vec<RecordBatch> = reader.map(Result::unwrap).collect();
-    let batch = concat_batches(&columns::schema(), &batches).unwrap();
-    let records = columns::from_batch(&batch).unwrap();
+    let batch = concat_batches(&GapRecord::schema(), &batches).unwrap();
+    let records: Vec<GapRecord> = from_batch(&batch).unwrap();
     let expected: Vec<GapRecord> = [(0, 40e-6), (1, 41e-6)]
         .into_iter()
         .flat_map(|(flight, gap_m)| {

@@ -2,16 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::sync::Arc;
 
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use ingest::channel::quality;
 use ingest::{ActuatorChannels, ActuatorColumns, LogFiles, Quality};
 use job::flight_log::{FlightLog, catch_panic};
 use job::{Config, estimate, rejection};
 use pipeline::run::discover;
 use records::{Diagnostic, Installations, PartNumber};
-use serde::Serialize;
 
 use crate::args::{CheckArgs, Format, Global};
 use crate::exit::{Code, Failure};
@@ -81,7 +78,7 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
     if args.rows.format() == Format::Table && args.rows.output.is_none() {
         output.write_result(&table())?;
     } else {
-        row_output::write_rows(&args.rows, output, || row_output::batch(&schema(), &channels), table)?;
+        row_output::write_rows(&args.rows, output, || row_output::batch(&channels), table)?;
     }
     output.diagnostics(&diagnostics);
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
@@ -106,27 +103,31 @@ fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<Vec<(LogFi
     Ok(logs)
 }
 
-/// One channel of one actuator of one log.
-#[derive(Debug, Serialize)]
-struct Channel {
-    log: String,
-    tail_number: String,
-    flight_id: String,
-    position: String,
-    serial_number: Option<String>,
-    channel: &'static str,
-    column: String,
-    unit: &'static str,
-    samples: i64,
-    missing_share: Option<f64>,
-    min: Option<f64>,
-    max: Option<f64>,
-    resolution: Option<f64>,
-    rate_hz: Option<f64>,
-    frozen_share: Option<f64>,
-    saturated_share: Option<f64>,
-    spikes: Option<i64>,
-    note: Option<String>,
+records::row! {
+    /// One channel of one actuator of one log.
+    #[derive(Debug)]
+    struct Channel {
+        log: String,
+        tail_number: String,
+        flight_id: String,
+        position: String,
+        serial_number: Option<String>,
+        channel: &'static str,
+        column: String,
+        unit: &'static str,
+        samples: i64,
+        missing_share: Option<f64>,
+        min: Option<f64>,
+        max: Option<f64>,
+        resolution: Option<f64>,
+        rate_hz: Option<f64>,
+        frozen_share: Option<f64>,
+        saturated_share: Option<f64>,
+        spikes: Option<i64>,
+        note: Option<String>,
+        /// What to do about a rejection.
+        remedy: Option<&'static str>,
+    }
 }
 
 /// Findings of all logs so far.
@@ -270,13 +271,18 @@ fn actuator(
         saturated_share: None,
         spikes: None,
         note: None,
+        remedy: None,
     };
     let [motor, screw, load, _] = &at.columns;
     if !at.lacking.is_empty() {
         let note =
             Some(format!("would be refused, channel_unmapped: the log lacks {}", at.lacking.join(", ")));
         return Ok(ActuatorCheck {
-            found: vec![Channel { note, ..base("all", motor, "") }],
+            found: vec![Channel {
+                note,
+                remedy: rejection::remedy("channel_unmapped"),
+                ..base("all", motor, "")
+            }],
             clock: None,
             says: None,
             rejection: None,
@@ -303,10 +309,11 @@ fn actuator(
     let tested = estimate::contact_regression(&a, part)?;
     let rejection = tested.as_ref().err().copied();
     if let Some(code) = rejection {
-        let remedy = rejection::remedy(code).map(|remedy| format!(": {remedy}")).unwrap_or_default();
-        let before = found[tested_channel(code)].note.take().filter(|note| !note.starts_with(RATIO));
+        let channel = &mut found[tested_channel(code)];
+        let before = channel.note.take().filter(|note| !note.starts_with(RATIO));
         let before = before.map(|note| format!("{note}; ")).unwrap_or_default();
-        found[tested_channel(code)].note = Some(format!("{before}would be refused, {code}{remedy}"));
+        channel.note = Some(format!("{before}would be refused, {code}"));
+        channel.remedy = rejection::remedy(code);
     }
     let params = job::part_identification::IdentifiedParams::of(&a, tested.as_deref().ok());
     let says = Some((stay.part_number.clone(), params));
@@ -396,7 +403,7 @@ fn layout(channels: &[Channel]) -> String {
             share(c.missing_share),
             share(c.frozen_share),
             c.spikes.map_or_else(table::empty_cell, |n| n.to_string()),
-            c.note.clone().unwrap_or_default(),
+            c.note.iter().map(String::as_str).chain(c.remedy).collect::<Vec<_>>().join(": "),
         ]
     };
     table::layout(&columns, &channels.iter().map(cells).collect::<Vec<_>>())
@@ -491,29 +498,4 @@ fn summary(logs: usize, channels: &[Channel], diagnostics: &[Diagnostic]) -> Str
         files.len(),
         warned.len()
     )
-}
-
-fn schema() -> SchemaRef {
-    let text = |name: &str| Field::new(name, DataType::Utf8, true);
-    let real = |name: &str| Field::new(name, DataType::Float64, true);
-    Arc::new(Schema::new(vec![
-        text("log"),
-        text("tail_number"),
-        text("flight_id"),
-        text("position"),
-        text("serial_number"),
-        text("channel"),
-        text("column"),
-        text("unit"),
-        Field::new("samples", DataType::Int64, true),
-        real("missing_share"),
-        real("min"),
-        real("max"),
-        real("resolution"),
-        real("rate_hz"),
-        real("frozen_share"),
-        real("saturated_share"),
-        Field::new("spikes", DataType::Int64, true),
-        text("note"),
-    ]))
 }

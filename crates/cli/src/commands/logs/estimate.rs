@@ -44,7 +44,7 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
             output,
         )?;
     }
-    let batch = || row_output::batch(&pipeline::rows::estimates(), &found);
+    let batch = || row_output::batch(&found);
     row_output::write_rows(&args.rows, output, batch, || page(&found))?;
     output.diagnostics(&diagnostics);
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })

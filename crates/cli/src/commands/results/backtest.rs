@@ -1,8 +1,5 @@
 //! `backtest`: scores past forecasts against later measurements, by share of life used.
 
-use std::sync::Arc;
-
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use pipeline::fleet_trends::assess;
 use pipeline::fleet_trends::backtest::{self, BacktestRow};
 use store::Store;
@@ -34,7 +31,7 @@ pub(crate) fn backtest(args: &BacktestArgs, global: &Global, output: &Output) ->
         None => assess::load_histories(&Store::open(config.store())?)?,
     };
     let found = backtest::of_histories(&config, &installations, &histories)?;
-    row_output::write_rows(&args.rows, output, || row_output::batch(&schema(), &found), || page(&found))?;
+    row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found))?;
     Ok(Code::Success)
 }
 
@@ -84,23 +81,4 @@ fn line(
         ended("early"),
         per_cent(errors.iter().filter(|e| **e <= 0.2).count()),
     ])
-}
-
-fn schema() -> SchemaRef {
-    let text = |name: &str| Field::new(name, DataType::Utf8, true);
-    let real = |name: &str| Field::new(name, DataType::Float64, true);
-    Arc::new(Schema::new(vec![
-        text("part_number"),
-        text("serial_number"),
-        Field::new("as_of_utc", row_output::utc(), true),
-        text("target"),
-        real("target_m"),
-        real("used_share"),
-        real("true_hours"),
-        real("hours_p05"),
-        real("hours_p50"),
-        real("hours_p95"),
-        real("relative_error"),
-        text("interval"),
-    ]))
 }

@@ -3,11 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
-use std::sync::Arc;
 
-use arrow::datatypes::{DataType, Field, Schema};
 use records::{GapEstimate, GapRecord};
-use serde::Serialize;
 use store::{Query, Store};
 
 use crate::args::DiffArgs;
@@ -16,21 +13,23 @@ use crate::output::Output;
 use crate::row_output;
 use crate::table::{self, count, number, text};
 
-/// An actuator-flight whose results differ between the stores.
-#[derive(Debug, Serialize)]
-struct Row {
-    tail_number: String,
-    flight_id: String,
-    position: String,
-    departure_utc: String,
-    part_number: String,
-    serial_number: String,
-    status_before: Option<String>,
-    status_after: Option<String>,
-    gap_m_before: Option<f64>,
-    gap_m_after: Option<f64>,
-    gap_change_m: Option<f64>,
-    se_m: Option<f64>,
+records::row! {
+    /// An actuator-flight whose results differ between the stores.
+    #[derive(Debug)]
+    struct Row {
+        tail_number: String,
+        flight_id: String,
+        position: String,
+        departure_utc: String,
+        part_number: String,
+        serial_number: String,
+        status_before: Option<String>,
+        status_after: Option<String>,
+        gap_m_before: Option<f64>,
+        gap_m_after: Option<f64>,
+        gap_change_m: Option<f64>,
+        se_m: Option<f64>,
+    }
 }
 
 /// Compares two stores.
@@ -43,7 +42,7 @@ pub(crate) fn diff(args: &DiffArgs, output: &Output) -> Result<Code, Failure> {
     let rows: Vec<Row> = keys.iter().filter_map(|key| row(before.get(*key), after.get(*key))).collect();
     let shown: Vec<Row> = rows.into_iter().filter(|row| differs(row, args.min_change_um * 1e-6)).collect();
     let page = || page(&shown, keys.len(), &before, &after);
-    row_output::write_rows(&args.rows, output, || row_output::batch(&schema(), &shown), page)?;
+    row_output::write_rows(&args.rows, output, || row_output::batch(&shown), page)?;
     Ok(Code::Success)
 }
 
@@ -144,21 +143,4 @@ fn page(
         ]
     };
     head + &table::layout(&columns, &rows.iter().map(cells).collect::<Vec<_>>())
-}
-
-fn schema() -> Arc<Schema> {
-    let texts = [
-        "tail_number",
-        "flight_id",
-        "position",
-        "departure_utc",
-        "part_number",
-        "serial_number",
-        "status_before",
-        "status_after",
-    ];
-    let reals = ["gap_m_before", "gap_m_after", "gap_change_m", "se_m"];
-    let text = texts.map(|name| Field::new(name, DataType::Utf8, true));
-    let real = reals.map(|name| Field::new(name, DataType::Float64, true));
-    Arc::new(Schema::new(text.into_iter().chain(real).collect::<Vec<_>>()))
 }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use arrow::array::{RecordBatch, StringArray};
 use arrow::datatypes::{DataType, Field, Schema};
 use records::GapRecord;
+use records::row_schema::to_batch;
 use store::{Query, Store};
 
 use crate::args::{Global, QueryArgs, QueryKey};
@@ -34,7 +35,7 @@ pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Resul
     row_output::write_rows(
         &args.rows,
         output,
-        || with_remedies(store::columns::to_batch(&records)?, &records),
+        || with_remedies(to_batch(&records).map_err(store::Error::from)?, &records),
         || page(&records),
     )?;
     if records.is_empty() {

@@ -1,8 +1,8 @@
 //! `trend`: current gap, wear rate, time to limit and state of each unit.
 
 use pipeline::fleet_trends::assess::{self, UnitSelection};
-use pipeline::fleet_trends::trend_row::TrendRow;
 use records::Installations;
+use records::TrendRow;
 use store::Store;
 
 use crate::args::{Global, TrendArgs};
@@ -52,12 +52,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
         };
         known.check_units(args.tail.as_deref(), args.serial.as_deref(), args.part.as_deref())?;
     }
-    row_output::write_rows(
-        &args.rows,
-        output,
-        || row_output::batch(&pipeline::rows::trends(), &found),
-        || page(&found, args),
-    )?;
+    row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found, args))?;
     Ok(Code::Success)
 }
 
@@ -98,7 +93,7 @@ fn page(found: &[TrendRow], args: &TrendArgs) -> String {
             r.flights.to_string(),
             table::micrometres(r.gap_m),
             table::micrometres(r.gap_se_m),
-            sparkline(&r.sketch_m),
+            sparkline(&r.sketch_m.0),
             r.rate_m_per_hour.map_or_else(table::empty_cell, |v| format!("{:.1}", v * 1e9)),
             r.trend.to_owned(),
             table::micrometres(r.limit_m),

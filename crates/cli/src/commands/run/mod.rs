@@ -8,11 +8,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use pipeline::fleet_trends::changes::UnitChange;
-use pipeline::fleet_trends::trend_row::TrendRow;
 use pipeline::history::histories::Histories;
 use pipeline::monitoring::recorder_change::{Quantity, RecorderChange};
 use pipeline::run::scheduler::{self, Context};
 use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
+use records::TrendRow;
 use records::{SerialNumber, TailNumber};
 use report::StateBadge;
 use store::Holder;

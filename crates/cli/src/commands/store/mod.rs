@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 use records::Diagnostic;
+use records::row_schema::to_batch;
 use serde_json::json;
 use store::{Holder, Info, Query, RunRecord, Store};
 
@@ -221,7 +222,7 @@ fn export(store: &Store, format: &RowFormatArgs, output: &Output) -> Result<Code
         row_output::write_rows(
             format,
             output,
-            || Ok(store::columns::to_batch(&records)?),
+            || Ok(to_batch(&records).map_err(store::Error::from)?),
             || query::page(&records),
         )?;
     } else {

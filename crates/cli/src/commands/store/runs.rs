@@ -1,12 +1,9 @@
 //! `store runs`: recent runs, or the logs of one run; killed runs included.
 
-use std::sync::Arc;
 use std::time::Duration;
 
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use jiff::Timestamp;
 use records::Status;
-use serde::Serialize;
 use store::{LogOutcome, LogRecord, Query, RunRecord, Store};
 
 use crate::args::RowFormatArgs;
@@ -16,38 +13,40 @@ use crate::progress::span;
 use crate::row_output;
 use crate::table::{self, count, number, text};
 
-/// A run as an output row.
-#[derive(Serialize)]
-struct Run<'a> {
-    run_id: &'a str,
-    started_utc: Timestamp,
-    finished_utc: Option<Timestamp>,
-    ended: &'static str,
-    exit_code: Option<i64>,
-    found: i64,
-    known: i64,
-    done: i64,
-    estimated: i64,
-    refused: i64,
-    errors: i64,
-    not_reached: i64,
-    program_version: &'a str,
-    config_path: &'a str,
+records::row! {
+    /// A run as an output row.
+    struct Run {
+        run_id: String,
+        started_utc: Timestamp,
+        finished_utc: Option<Timestamp>,
+        ended: &'static str,
+        exit_code: Option<i64>,
+        found: i64,
+        known: i64,
+        done: i64,
+        estimated: i64,
+        refused: i64,
+        errors: i64,
+        not_reached: i64,
+        program_version: String,
+        config_path: String,
+    }
 }
 
-/// A log of a run as an output row.
-#[derive(Serialize)]
-struct Log<'a> {
-    log_path: &'a str,
-    class: &'static str,
-    reason: Option<String>,
-    tail_number: Option<&'a str>,
-    flight_id: Option<&'a str>,
-    departure_utc: Option<Timestamp>,
-    estimated: i64,
-    refused: i64,
-    duration_s: f64,
-    error_detail: Option<&'a str>,
+records::row! {
+    /// A log of a run as an output row.
+    struct Log {
+        log_path: String,
+        class: &'static str,
+        reason: Option<String>,
+        tail_number: Option<String>,
+        flight_id: Option<String>,
+        departure_utc: Option<Timestamp>,
+        estimated: i64,
+        refused: i64,
+        duration_s: f64,
+        error_detail: Option<String>,
+    }
 }
 
 /// Lists the last runs, or the logs of one.
@@ -99,14 +98,14 @@ pub(crate) fn status_text(status: &'static str) -> &'static str {
 
 fn all(store: &Store, runs: &[RunRecord], format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
     let is_held = store.is_held()?;
-    let answer: Vec<Run<'_>> = runs.iter().map(|run| in_row(run, is_held)).collect();
-    row_output::write_rows(format, output, || row_output::batch(&run_schema(), &answer), || page(&answer))?;
+    let answer: Vec<Run> = runs.iter().map(|run| in_row(run, is_held)).collect();
+    row_output::write_rows(format, output, || row_output::batch(&answer), || page(&answer))?;
     Ok(Code::Success)
 }
 
-fn in_row(run: &RunRecord, is_held: bool) -> Run<'_> {
+fn in_row(run: &RunRecord, is_held: bool) -> Run {
     Run {
-        run_id: &run.run_id,
+        run_id: run.run_id.clone(),
         started_utc: run.started_utc,
         finished_utc: run.finished_utc,
         ended: run_status(run, is_held),
@@ -118,23 +117,12 @@ fn in_row(run: &RunRecord, is_held: bool) -> Run<'_> {
         refused: run.refused,
         errors: run.errors,
         not_reached: run.not_reached,
-        program_version: &run.program_version,
-        config_path: &run.config_path,
+        program_version: run.program_version.clone(),
+        config_path: run.config_path.clone(),
     }
 }
 
-fn run_schema() -> SchemaRef {
-    let field = |name: &str, kind: DataType| Field::new(name, kind, true);
-    let counts = ["exit_code", "found", "known", "done", "estimated", "refused", "errors", "not_reached"];
-    let mut fields = vec![field("run_id", DataType::Utf8)];
-    fields.extend(["started_utc", "finished_utc"].map(|name| field(name, row_output::utc())));
-    fields.push(field("ended", DataType::Utf8));
-    fields.extend(counts.map(|name| field(name, DataType::Int64)));
-    fields.extend(["program_version", "config_path"].map(|name| field(name, DataType::Utf8)));
-    Arc::new(Schema::new(fields))
-}
-
-fn page(runs: &[Run<'_>]) -> String {
+fn page(runs: &[Run]) -> String {
     let columns = [
         text("run", 0),
         text("ended", 0),
@@ -147,13 +135,13 @@ fn page(runs: &[Run<'_>]) -> String {
         number("failed", 0),
         number("not processed", 1),
     ];
-    let cells = |run: &Run<'_>| {
+    let cells = |run: &Run| {
         let counts =
             [run.found, run.known, run.done, run.estimated, run.refused, run.errors, run.not_reached];
         let took = run.finished_utc.map_or_else(table::empty_cell, |end| {
             span(Duration::try_from(end.duration_since(run.started_utc)).unwrap_or_default())
         });
-        let words = [run.run_id.to_owned(), status_text(run.ended).to_owned(), took];
+        let words = [run.run_id.clone(), status_text(run.ended).to_owned(), took];
         words.into_iter().chain(counts.map(|n| n.to_string())).collect()
     };
     let head = format!("{}\n", count(runs.len(), "run"));
@@ -168,14 +156,9 @@ fn logs(store: &Store, run: &RunRecord, format: &RowFormatArgs, output: &Output)
     let found = store.run_logs(&run.run_id)?;
     let reasons = reasons(store, &run.run_id)?;
     let reason = |log: &LogRecord| log.error_code.clone().or_else(|| reasons.get(&log.log_path).map(words));
-    let answer: Vec<Log<'_>> = found.iter().map(|log| in_log(log, reason(log))).collect();
+    let answer: Vec<Log> = found.iter().map(|log| in_log(log, reason(log))).collect();
     let head = format!("run {}, {}: ", run.run_id, status_text(run_status(run, store.is_held()?)));
-    row_output::write_rows(
-        format,
-        output,
-        || row_output::batch(&log_schema(), &answer),
-        || head + &log_page(&answer),
-    )?;
+    row_output::write_rows(format, output, || row_output::batch(&answer), || head + &log_page(&answer))?;
     Ok(Code::Success)
 }
 
@@ -199,18 +182,18 @@ fn words(reasons: &Reasons) -> String {
     words.join(", ")
 }
 
-fn in_log(log: &LogRecord, reason: Option<String>) -> Log<'_> {
+fn in_log(log: &LogRecord, reason: Option<String>) -> Log {
     Log {
-        log_path: &log.log_path,
+        log_path: log.log_path.clone(),
         class: class(log),
         reason,
-        tail_number: log.tail_number.as_deref(),
-        flight_id: log.flight_id.as_deref(),
+        tail_number: log.tail_number.clone(),
+        flight_id: log.flight_id.clone(),
         departure_utc: log.departure_utc,
         estimated: log.estimated,
         refused: log.refused,
         duration_s: log.duration_s,
-        error_detail: log.error_detail.as_deref(),
+        error_detail: log.error_detail.clone(),
     }
 }
 
@@ -222,18 +205,7 @@ fn class(log: &LogRecord) -> &'static str {
     }
 }
 
-fn log_schema() -> SchemaRef {
-    let field = |name: &str, kind: DataType| Field::new(name, kind, true);
-    let texts = ["log_path", "class", "reason", "tail_number", "flight_id"];
-    let mut fields: Vec<Field> = texts.map(|name| field(name, DataType::Utf8)).into();
-    fields.push(field("departure_utc", row_output::utc()));
-    fields.extend(["estimated", "refused"].map(|name| field(name, DataType::Int64)));
-    fields.push(field("duration_s", DataType::Float64));
-    fields.push(field("error_detail", DataType::Utf8));
-    Arc::new(Schema::new(fields))
-}
-
-fn log_page(logs: &[Log<'_>]) -> String {
+fn log_page(logs: &[Log]) -> String {
     let columns = [
         text("class", 0),
         text("log", 0),
@@ -244,14 +216,14 @@ fn log_page(logs: &[Log<'_>]) -> String {
         number("refused", 2),
         number("time [s]", 5),
     ];
-    let cells = |log: &Log<'_>| {
+    let cells = |log: &Log| {
         let name = |text: Option<&str>| text.map_or_else(table::empty_cell, str::to_owned);
         vec![
             log.class.replace('_', " "),
-            log.log_path.to_owned(),
+            log.log_path.clone(),
             log.reason.clone().unwrap_or_default(),
-            name(log.tail_number),
-            name(log.flight_id),
+            name(log.tail_number.as_deref()),
+            name(log.flight_id.as_deref()),
             log.estimated.to_string(),
             log.refused.to_string(),
             format!("{:.1}", log.duration_s),

@@ -6,13 +6,13 @@ use arrow::array::{Int64Array, RecordBatch};
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 
 use crate::error::Error;
-use crate::rows::row_schema::{self, RowSchema};
+use records::row_schema::{self, FromCells, Row};
 
 /// The column that orders versions of a row; clocks may go back, commit numbers do not.
 pub(crate) const COMMIT: &str = "commit";
 
 /// A row type's columns and the number of the commit.
-pub(crate) fn schema<R: RowSchema>() -> SchemaRef {
+pub(crate) fn schema<R: Row + FromCells>() -> SchemaRef {
     let columns = row_schema::schema::<R>();
     let fields =
         columns.fields().iter().cloned().chain([Arc::new(Field::new(COMMIT, DataType::Int64, false))]);
@@ -20,7 +20,7 @@ pub(crate) fn schema<R: RowSchema>() -> SchemaRef {
 }
 
 /// Rows as columns, all of one commit.
-pub(crate) fn to_batch<R: RowSchema>(rows: &[R], commit: u64) -> Result<RecordBatch, Error> {
+pub(crate) fn to_batch<R: Row + FromCells>(rows: &[R], commit: u64) -> Result<RecordBatch, Error> {
     let batch = row_schema::to_batch(rows)?;
     let mut arrays = batch.columns().to_vec();
     arrays.push(Arc::new(Int64Array::from(vec![commit as i64; rows.len()])));

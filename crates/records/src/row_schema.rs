@@ -1,0 +1,503 @@
+//! Row schema: the one mapping between row types and Arrow columns.
+//!
+//! [`row!`](crate::row) and [`stored_row!`](crate::stored_row) declare a row type. Each field is a column: its name
+//! is the column's name, its type the column's type, its doc comment the column's documentation. A field whose type
+//! is itself a row type stands for the columns of that type.
+//!
+//! ```
+//! use records::row_schema;
+//!
+//! records::stored_row! {
+//!     /// Length of a flight.
+//!     #[derive(Debug, PartialEq)]
+//!     pub struct Length {
+//!         /// The flight.
+//!         pub flight_id: String,
+//!         /// Duration, hours.
+//!         pub flight_hours: Option<f64>,
+//!     }
+//! }
+//!
+//! let rows = [Length { flight_id: "F1".into(), flight_hours: Some(1.5) }];
+//! let batch = row_schema::to_batch(&rows)?;
+//! assert!(!batch.schema().field(0).is_nullable() && batch.schema().field(1).is_nullable());
+//! assert_eq!(row_schema::from_batch::<Length>(&batch)?, rows);
+//! # Ok::<(), row_schema::RowError>(())
+//! ```
+
+use std::sync::Arc;
+
+use arrow::array::{
+    Array, ArrayRef, AsArray, BooleanArray, Float64Array, Int64Array, ListArray, ListBuilder, RecordBatch,
+    StringArray, StringBuilder, StructArray, TimestampMicrosecondArray,
+};
+use arrow::buffer::OffsetBuffer;
+use arrow::datatypes::{
+    DataType, Field, Fields, Float64Type, Int64Type, Schema, SchemaRef, TimeUnit, TimestampMicrosecondType,
+};
+use arrow::error::ArrowError;
+use jiff::Timestamp;
+
+use crate::ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
+
+/// Why rows cannot be converted to columns, or columns to rows.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
+pub enum RowError {
+    /// A column is missing or has another type.
+    #[error("column `{column}` {problem}")]
+    Column { column: &'static str, problem: String },
+    /// A cell is empty or out of range.
+    #[error("column `{column}`, row {row}: {problem}")]
+    Value { column: &'static str, row: usize, problem: String },
+    /// The columns do not form a batch.
+    #[error("rows cannot be converted to columns: {0}")]
+    Arrow(#[from] ArrowError),
+}
+
+/// A column of a row type.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Name; a unit is its last part.
+    pub name: &'static str,
+    /// Arrow type.
+    pub data_type: DataType,
+    /// Whether cells may be empty.
+    pub nullable: bool,
+    /// Documentation, in Markdown.
+    pub doc: &'static str,
+}
+
+impl Column {
+    fn field(&self) -> Field {
+        Field::new(self.name, self.data_type.clone(), self.nullable)
+    }
+}
+
+/// Arrays of some columns.
+pub type Arrays = Vec<ArrayRef>;
+
+/// A type of field: one column, or the columns of a nested row.
+pub trait Cells: Sized {
+    /// Columns of a field, from the field's name and documentation.
+    fn columns(name: &'static str, doc: &'static str) -> Vec<Column>;
+
+    /// Arrays of these columns.
+    fn arrays(cells: &[&Self]) -> Arrays;
+}
+
+/// A type of field that is also read.
+pub trait FromCells: Cells {
+    /// Reads the next cell, or the next cells of a nested row.
+    ///
+    /// # Errors
+    /// [`RowError::Value`] when a cell is empty where a value is required, or out of range.
+    fn read(cells: &mut CellReader<'_>) -> Result<Self, RowError>;
+}
+
+/// A row type, declared by [`row!`](crate::row) or [`stored_row!`](crate::stored_row).
+pub trait Row: Cells {
+    /// Sort key of a column in the table. Columns of equal keys are in the order of declaration.
+    fn order(_column: &str) -> usize {
+        0
+    }
+}
+
+/// Declares a row type whose fields are the columns of a table: see [`row_schema`](mod@crate::row_schema).
+///
+/// A function after the struct (`order = path`) gives the sort key of each column.
+#[macro_export]
+macro_rules! row {
+    (
+        $(#[$attribute:meta])*
+        $vis:vis struct $name:ident {
+            $(
+                $(#[doc = $doc:literal])*
+                $(#[serde($($serde:tt)*)])?
+                $field_vis:vis $field:ident: $type:ty
+            ),* $(,)?
+        }
+        $(order = $order:expr)?
+    ) => {
+        $(#[$attribute])*
+        $vis struct $name {
+            $(
+                $(#[doc = $doc])*
+                $(#[serde($($serde)*)])?
+                $field_vis $field: $type,
+            )*
+        }
+
+        impl $crate::row_schema::Cells for $name {
+            fn columns(_: &'static str, _: &'static str) -> Vec<$crate::row_schema::Column> {
+                let mut columns = Vec::new();
+                $(
+                    columns.extend(<$type as $crate::row_schema::Cells>::columns(
+                        stringify!($field),
+                        concat!($($doc),*).trim_ascii(),
+                    ));
+                )*
+                columns
+            }
+
+            fn arrays(rows: &[&Self]) -> $crate::row_schema::Arrays {
+                let mut arrays = Vec::new();
+                $(
+                    let cells: Vec<&$type> = rows.iter().map(|row| &row.$field).collect();
+                    arrays.extend(<$type as $crate::row_schema::Cells>::arrays(&cells));
+                )*
+                arrays
+            }
+        }
+
+        impl $crate::row_schema::Row for $name {
+            $(
+                fn order(column: &str) -> usize {
+                    ($order)(column)
+                }
+            )?
+        }
+    };
+}
+
+/// Declares a row type like [`row!`](crate::row) that is also read back from its table.
+#[macro_export]
+macro_rules! stored_row {
+    (
+        $(#[$attribute:meta])*
+        $vis:vis struct $name:ident {
+            $(
+                $(#[doc = $doc:literal])*
+                $(#[serde($($serde:tt)*)])?
+                $field_vis:vis $field:ident: $type:ty
+            ),* $(,)?
+        }
+        $(order = $order:expr)?
+    ) => {
+        $crate::row! {
+            $(#[$attribute])*
+            $vis struct $name {
+                $(
+                    $(#[doc = $doc])*
+                    $(#[serde($($serde)*)])?
+                    $field_vis $field: $type
+                ),*
+            }
+            $(order = $order)?
+        }
+
+        impl $crate::row_schema::FromCells for $name {
+            fn read(
+                cells: &mut $crate::row_schema::CellReader<'_>,
+            ) -> Result<Self, $crate::row_schema::RowError> {
+                Ok(Self { $($field: <$type as $crate::row_schema::FromCells>::read(cells)?,)* })
+            }
+        }
+    };
+}
+
+/// Columns of a row type, in the order of its table.
+pub fn columns<R: Row>() -> Vec<Column> {
+    let mut columns = R::columns("", "");
+    columns.sort_by_key(|column| R::order(column.name));
+    columns
+}
+
+/// Schema of a row type's table.
+pub fn schema<R: Row>() -> SchemaRef {
+    Arc::new(Schema::new(columns::<R>().iter().map(Column::field).collect::<Vec<_>>()))
+}
+
+/// Rows as columns. Times are cut to whole microseconds; every number keeps its bits.
+///
+/// # Errors
+/// [`RowError::Arrow`] when there are more rows than a batch can hold.
+pub fn to_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
+    Ok(RecordBatch::try_new(schema::<R>(), sorted_arrays(rows))?)
+}
+
+/// As [`to_batch`], with every column nullable: the schema of tables for users.
+///
+/// # Errors
+/// As [`to_batch`].
+pub fn to_nullable_batch<R: Row>(rows: &[R]) -> Result<RecordBatch, RowError> {
+    let schema = schema::<R>();
+    let fields = schema.fields().iter().map(|field| field.as_ref().clone().with_nullable(true));
+    Ok(RecordBatch::try_new(Arc::new(Schema::new(fields.collect::<Vec<_>>())), sorted_arrays(rows))?)
+}
+
+fn sorted_arrays<R: Row>(rows: &[R]) -> Arrays {
+    let declared = R::columns("", "");
+    let mut arrays: Vec<(usize, ArrayRef)> = declared
+        .iter()
+        .map(|column| R::order(column.name))
+        .zip(R::arrays(&rows.iter().collect::<Vec<_>>()))
+        .collect();
+    arrays.sort_by_key(|(order, _)| *order);
+    arrays.into_iter().map(|(_, array)| array).collect()
+}
+
+/// Columns as rows; other columns are ignored.
+///
+/// # Errors
+/// [`RowError::Column`] when a column is missing or has another type; [`RowError::Value`] when a cell is out of range,
+/// or empty where a value is required.
+pub fn from_batch<R: Row + FromCells>(batch: &RecordBatch) -> Result<Vec<R>, RowError> {
+    let columns = R::columns("", "");
+    let arrays = columns.iter().map(|column| typed(batch, column)).collect::<Result<Vec<_>, _>>()?;
+    (0..batch.num_rows())
+        .map(|row| R::read(&mut CellReader { columns: &columns, arrays: &arrays, row, next: 0 }))
+        .collect()
+}
+
+fn typed<'a>(batch: &'a RecordBatch, column: &Column) -> Result<TypedArray<'a>, RowError> {
+    let problem = |problem: String| RowError::Column { column: column.name, problem };
+    let array = batch.column_by_name(column.name).ok_or_else(|| problem("is missing".to_owned()))?;
+    let typed = match column.data_type {
+        DataType::Utf8 => array.as_string_opt().map(TypedArray::Text),
+        DataType::List(_) => array.as_list_opt().map(TypedArray::Texts),
+        DataType::Float64 => array.as_primitive_opt::<Float64Type>().map(TypedArray::Number),
+        DataType::Int64 => array.as_primitive_opt::<Int64Type>().map(TypedArray::Count),
+        DataType::Timestamp(..) => array.as_primitive_opt::<TimestampMicrosecondType>().map(TypedArray::Time),
+        _ => None,
+    };
+    typed.ok_or_else(|| problem(format!("holds {}, where {} is wanted", array.data_type(), column.data_type)))
+}
+
+enum TypedArray<'a> {
+    Text(&'a StringArray),
+    Texts(&'a ListArray),
+    Number(&'a Float64Array),
+    Count(&'a Int64Array),
+    Time(&'a TimestampMicrosecondArray),
+}
+
+/// Reads the cells of one row, in the order of the declared columns.
+pub struct CellReader<'a> {
+    columns: &'a [Column],
+    arrays: &'a [TypedArray<'a>],
+    row: usize,
+    next: usize,
+}
+
+impl<'a> CellReader<'a> {
+    fn take(&mut self) -> &'a TypedArray<'a> {
+        self.next += 1;
+        &self.arrays[self.next - 1]
+    }
+
+    /// An error in the cell taken last.
+    fn problem(&self, problem: impl Into<String>) -> RowError {
+        RowError::Value { column: self.columns[self.next - 1].name, row: self.row, problem: problem.into() }
+    }
+
+    fn required<T>(&self, value: Option<T>) -> Result<T, RowError> {
+        value.ok_or_else(|| self.problem("is empty, where a value is wanted"))
+    }
+
+    fn text(&mut self) -> Option<&'a str> {
+        match self.take() {
+            TypedArray::Text(array) => array.is_valid(self.row).then(|| array.value(self.row)),
+            _ => None,
+        }
+    }
+
+    /// Reads a text that is parsed: an identifier, a status.
+    ///
+    /// # Errors
+    /// [`RowError::Value`] when the cell is empty or cannot be parsed.
+    pub fn parse<T, E: ToString>(
+        &mut self,
+        parse: impl FnOnce(&'a str) -> Result<T, E>,
+    ) -> Result<T, RowError> {
+        let text = self.text();
+        parse(self.required(text)?).map_err(|problem| self.problem(problem.to_string()))
+    }
+
+    fn texts(&mut self) -> Vec<String> {
+        match self.take() {
+            TypedArray::Texts(lists) if lists.is_valid(self.row) => {
+                let list = lists.value(self.row);
+                list.as_string_opt::<i32>().into_iter().flatten().flatten().map(str::to_owned).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn number(&mut self) -> Option<f64> {
+        match self.take() {
+            TypedArray::Number(array) => array.is_valid(self.row).then(|| array.value(self.row)),
+            _ => None,
+        }
+    }
+
+    fn count(&mut self) -> Option<i64> {
+        match self.take() {
+            TypedArray::Count(array) => array.is_valid(self.row).then(|| array.value(self.row)),
+            _ => None,
+        }
+    }
+
+    fn time(&mut self) -> Result<Option<Timestamp>, RowError> {
+        let micros = match self.take() {
+            TypedArray::Time(array) => array.is_valid(self.row).then(|| array.value(self.row)),
+            _ => None,
+        };
+        let time = micros.map(Timestamp::from_microsecond).transpose();
+        time.map_err(|e| {
+            self.problem(format!("{} µs since 1970 is no time: {e}", micros.unwrap_or_default()))
+        })
+    }
+}
+
+/// Implements [`Cells`] for a type of cell: its Arrow type, whether it may be empty, and its array.
+macro_rules! cell {
+    ($type:ty, $data_type:expr, nullable: $nullable:literal, |$cells:ident| $array:expr) => {
+        impl Cells for $type {
+            fn columns(name: &'static str, doc: &'static str) -> Vec<Column> {
+                vec![Column { name, data_type: $data_type, nullable: $nullable, doc }]
+            }
+
+            fn arrays($cells: &[&Self]) -> Arrays {
+                vec![Arc::new($array)]
+            }
+        }
+    };
+}
+
+/// Implements [`FromCells`] for a type of cell.
+macro_rules! read_cell {
+    ($type:ty, |$reader:ident| $read:expr) => {
+        impl FromCells for $type {
+            fn read($reader: &mut CellReader<'_>) -> Result<Self, RowError> {
+                $read
+            }
+        }
+    };
+}
+
+/// Implements both for a type that is a text: `as_str`, and a function that parses it.
+macro_rules! text_cell {
+    ($type:ty, $parse:path) => {
+        impl $crate::row_schema::Cells for $type {
+            fn columns(name: &'static str, doc: &'static str) -> Vec<$crate::row_schema::Column> {
+                <&'static str as $crate::row_schema::Cells>::columns(name, doc)
+            }
+
+            fn arrays(cells: &[&Self]) -> $crate::row_schema::Arrays {
+                let texts = cells.iter().map(|cell| Some(cell.as_str()));
+                vec![std::sync::Arc::new(texts.collect::<arrow::array::StringArray>())]
+            }
+        }
+
+        impl $crate::row_schema::FromCells for $type {
+            fn read(
+                cells: &mut $crate::row_schema::CellReader<'_>,
+            ) -> Result<Self, $crate::row_schema::RowError> {
+                cells.parse($parse)
+            }
+        }
+    };
+}
+pub(crate) use text_cell;
+
+cell!(&'static str, DataType::Utf8, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<StringArray>());
+cell!(Option<&'static str>, DataType::Utf8, nullable: true, |cells| cells.iter().map(|c| **c).collect::<StringArray>());
+cell!(String, DataType::Utf8, nullable: false, |cells| cells.iter().map(Some).collect::<StringArray>());
+cell!(Option<String>, DataType::Utf8, nullable: true, |cells| cells
+    .iter()
+    .map(|c| c.as_deref())
+    .collect::<StringArray>());
+cell!(Vec<String>, DataType::List(list_element()), nullable: false, |cells| texts(cells));
+cell!(f64, DataType::Float64, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<Float64Array>());
+cell!(Option<f64>, DataType::Float64, nullable: true, |cells| cells.iter().map(|c| **c).collect::<Float64Array>());
+cell!(i64, DataType::Int64, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<Int64Array>());
+cell!(Option<i64>, DataType::Int64, nullable: true, |cells| cells.iter().map(|c| **c).collect::<Int64Array>());
+cell!(bool, DataType::Boolean, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<BooleanArray>());
+cell!(Timestamp, time_type(), nullable: false, |cells| times(cells.iter().map(|c| Some(**c))));
+cell!(Option<Timestamp>, time_type(), nullable: true, |cells| times(cells.iter().map(|c| **c)));
+
+read_cell!(String, |cells| cells.parse(|text| Ok::<_, String>(text.to_owned())));
+read_cell!(Option<String>, |cells| Ok(cells.text().map(str::to_owned)));
+read_cell!(Vec<String>, |cells| Ok(cells.texts()));
+read_cell!(f64, |cells| {
+    let number = cells.number();
+    cells.required(number)
+});
+read_cell!(Option<f64>, |cells| Ok(cells.number()));
+read_cell!(i64, |cells| {
+    let count = cells.count();
+    cells.required(count)
+});
+read_cell!(Option<i64>, |cells| Ok(cells.count()));
+read_cell!(Timestamp, |cells| {
+    let time = cells.time()?;
+    cells.required(time)
+});
+read_cell!(Option<Timestamp>, |cells| cells.time());
+
+text_cell!(TailNumber, TailNumber::new);
+text_cell!(Position, Position::new);
+text_cell!(PartNumber, PartNumber::new);
+text_cell!(SerialNumber, SerialNumber::new);
+text_cell!(FlightId, FlightId::new);
+
+/// Rows of another type in each row: a list of structs.
+impl<R: Row> Cells for Vec<R> {
+    fn columns(name: &'static str, doc: &'static str) -> Vec<Column> {
+        let data_type = DataType::List(struct_element::<R>());
+        vec![Column { name, data_type, nullable: false, doc }]
+    }
+
+    fn arrays(cells: &[&Self]) -> Arrays {
+        let rows: Vec<&R> = cells.iter().flat_map(|rows| rows.iter()).collect();
+        let structs = StructArray::new(struct_fields::<R>(), R::arrays(&rows), None);
+        let lengths = OffsetBuffer::from_lengths(cells.iter().map(|rows| rows.len()));
+        vec![Arc::new(ListArray::new(struct_element::<R>(), lengths, Arc::new(structs), None))]
+    }
+}
+
+fn struct_fields<R: Row>() -> Fields {
+    R::columns("", "").iter().map(|column| column.field().with_nullable(true)).collect()
+}
+
+fn struct_element<R: Row>() -> Arc<Field> {
+    Arc::new(Field::new("item", DataType::Struct(struct_fields::<R>()), true))
+}
+
+/// A field of a row type that is no column.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct NoColumn<T>(pub T);
+
+impl<T> Cells for NoColumn<T> {
+    fn columns(_: &'static str, _: &'static str) -> Vec<Column> {
+        Vec::new()
+    }
+
+    fn arrays(_: &[&Self]) -> Arrays {
+        Vec::new()
+    }
+}
+
+/// Element of a list of texts, as Delta Lake names it.
+pub fn list_element() -> Arc<Field> {
+    Arc::new(Field::new("element", DataType::Utf8, true))
+}
+
+/// Type of every time: microseconds, UTC.
+pub fn time_type() -> DataType {
+    DataType::Timestamp(TimeUnit::Microsecond, Some("UTC".into()))
+}
+
+fn times(times: impl Iterator<Item = Option<Timestamp>>) -> TimestampMicrosecondArray {
+    let micros = times.map(|time| time.map(Timestamp::as_microsecond));
+    micros.collect::<TimestampMicrosecondArray>().with_timezone("UTC")
+}
+
+fn texts(cells: &[&Vec<String>]) -> ListArray {
+    let mut lists = ListBuilder::new(StringBuilder::new()).with_field(list_element());
+    for texts in cells {
+        lists.append_value(texts.iter().map(Some));
+    }
+    lists.finish()
+}
