@@ -65,6 +65,7 @@ impl FlightLog {
         let map_actuators = map_actuators(&log, &identity, config, installations).map_err(in_log)?;
         let used: Vec<_> = map_actuators.iter().map(|(at, mapping)| (&mapping.channels, at)).collect();
         let digest = log.digest(&used).map_err(in_log)?;
+        log.announce(&used).map_err(in_log)?;
         let mappings =
             map_actuators.iter().map(|(at, mapping)| (at.position.clone(), Arc::clone(mapping))).collect();
         let positions = map_actuators.into_iter().map(|(at, _)| at).collect();
@@ -242,6 +243,9 @@ pub(crate) fn for_each_unidentified(
     // A log of one actuator has no name for it here, but needs one to be asked by.
     let own = Position::new("actuator").map_err(|e| Diagnostic::new("empty_name", e))?;
     let positions = log.actuators(&channels, Some(&own)).map_err(in_log)?;
+    let used: Vec<_> =
+        positions.iter().filter(|at| at.lacking.is_empty()).map(|at| (&channels, at)).collect();
+    log.announce(&used).map_err(in_log)?;
     for at in positions.iter().filter(|at| at.lacking.is_empty()) {
         let read = log.read_actuator(at, &channels, part.geometry).map_err(in_log)?;
         take(&read).map_err(|diagnostic| diagnostic.in_file(display_name))?;

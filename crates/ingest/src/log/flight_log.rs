@@ -311,26 +311,58 @@ impl Log {
 
     /// The leaves that these actuators need, sheet by sheet.
     fn leaves(&self, used: &[(&Channels, &ActuatorColumns)]) -> Vec<(&RowTable, BTreeSet<String>)> {
-        let sheets =
-            std::iter::once((None, &self.main)).chain(self.groups.iter().map(|(n, s)| (Some(n.as_str()), s)));
-        let needed = |(group, sheet): (Option<&str>, &RowTable)| {
-            let mut leaves = BTreeSet::new();
-            for (channels, at) in used {
-                let conditions: Vec<ChannelMapping> =
-                    channels.when.iter().map(ChannelMapping::from).collect();
-                let maps = Role::ALL.iter().filter_map(|role| channels.of(*role));
-                let maps = maps.flat_map(ChannelMapping::choices).chain(&conditions);
-                for map in maps.filter(|m| m.group.as_deref() == group) {
-                    let named = |column: &String| ColumnPattern::new(column).column_for(at.position.as_str());
-                    for name in std::iter::once(&map.column).chain(&map.valid_column).map(named) {
-                        leaves.extend(sheet.leaves_of(&sheet.samples(&name, at.position.as_str())));
-                    }
-                    leaves.extend(map.time_column.iter().map(named));
+        let sheets = std::iter::once(&self.main).chain(self.groups.values());
+        let mut found: Vec<_> = sheets.map(|sheet| (sheet, BTreeSet::new())).collect();
+        self.each_use(used, |sheet, _, samples| {
+            let of_sheet = found.iter_mut().find(|(other, _)| std::ptr::eq(*other, sheet));
+            of_sheet.into_iter().for_each(|(_, leaves)| leaves.extend(sheet.leaves_of(samples)));
+        });
+        found
+    }
+
+    /// Announces the samples of actuators that will be read. Where rows belong to actuators or channels, one pass
+    /// over the files then gathers the rows of all of them.
+    ///
+    /// # Errors
+    /// When channels are named by a column, and it cannot be read.
+    pub fn announce(&self, used: &[(&Channels, &ActuatorColumns)]) -> Result<(), Error> {
+        for table in std::iter::once(&self.main).chain(self.groups.values()) {
+            if table.layout.name_column.is_some() {
+                table.names()?;
+            }
+        }
+        self.each_use(used, |sheet, position, samples| {
+            if sheet.holds(samples) {
+                sheet.announce(samples, position);
+            }
+        });
+        Ok(())
+    }
+
+    /// Hands over the samples that these actuators need, with their table and their position.
+    fn each_use(
+        &self,
+        used: &[(&Channels, &ActuatorColumns)],
+        mut take: impl FnMut(&RowTable, &str, &SampleSelector),
+    ) {
+        for (channels, at) in used {
+            let position = at.position.as_str();
+            let conditions: Vec<ChannelMapping> = channels.when.iter().map(ChannelMapping::from).collect();
+            let maps = Role::ALL.iter().filter_map(|role| channels.of(*role));
+            for map in maps.flat_map(ChannelMapping::choices).chain(&conditions) {
+                let Some(sheet) = self.sheet(map) else { continue };
+                let named = |column: &String| ColumnPattern::new(column).column_for(position);
+                let samples = sheet.samples(&named(&map.column), position);
+                take(sheet, position, &samples);
+                if let Some(valid) = &map.valid_column {
+                    take(sheet, position, &sheet.samples(&named(valid), position));
+                }
+                // The channel's own stamps lie in the rows of the channel.
+                if let Some(time) = &map.time_column {
+                    take(sheet, position, &SampleSelector { leaf: named(time), ..samples });
                 }
             }
-            leaves
-        };
-        sheets.map(|(group, sheet)| (sheet, needed((group, sheet)))).collect()
+        }
     }
 
     /// blake3 of the footers and the chunks of every column that the positions, the clock and the
@@ -367,7 +399,15 @@ impl Log {
         if let Some(normalized) = &self.normalized {
             return normalized.read_actuator(&self.main.files[0], at.position.clone(), geometry);
         }
-        let sought = ChannelRequest { at, channels, geometry };
+        let read = self.read_channels(ChannelRequest { at, channels, geometry });
+        for sheet in std::iter::once(&self.main).chain(self.groups.values()) {
+            sheet.release(at.position.as_str());
+        }
+        read
+    }
+
+    fn read_channels(&self, sought: ChannelRequest<'_>) -> Result<ActuatorChannels, Error> {
+        let ChannelRequest { at, channels, .. } = sought;
         let ReferenceChannel { channel: motor, master, selection, mut flags } = self.motor(sought)?;
         let read = |role: Role, from: &SampleSelection| self.follower(role, sought, &master, from);
         let output_locked = channels.output.is_locked();

@@ -7,6 +7,7 @@ pub mod identity;
 pub mod in_memory;
 pub mod infer_mapping;
 pub mod normalized;
+mod row_partition;
 mod row_table;
 mod selection;
 mod timestamps;

@@ -4,22 +4,24 @@
 //! each moment, for each actuator at each moment, or for each channel at each moment. After this room
 //! there are only names of channels and lists of samples.
 
-use std::collections::BTreeSet;
-use std::sync::OnceLock;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use arrow::array::{Array, ArrayRef, AsArray};
-use arrow::datatypes::DataType;
+use arrow::array::{Array, ArrayRef, AsArray, Scalar};
+use arrow::compute::kernels::cmp;
+use arrow::datatypes::{DataType, Int32Type};
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::si_conversion::SiConversion;
 use crate::channel::stats::ChannelStats;
 use crate::error::{Error, ErrorKind};
+use crate::log::row_partition::{LONG_BATCH_ROWS, Partition, RowKeys};
 use crate::log::timestamps::{TickEpoch, TickFormat, TimestampParser};
 use crate::mapping::column_pattern::nearest;
 use crate::mapping::units::TimeUnit;
 use crate::mapping::{ClockMapping, Epoch, Layout};
-use crate::parquet::log_file::LogFile;
-use crate::parquet::numeric::{append, append_where, as_text};
+use crate::parquet::log_file::{LogFile, Scan};
+use crate::parquet::numeric::{append, as_text};
 use crate::parquet::row_selection::RowSelection;
 use crate::time::clock::{TimeBase, Timestamps};
 
@@ -31,6 +33,10 @@ pub(crate) struct RowTable {
     pub(crate) layout: Layout,
     /// The clock of its rows, once it was read.
     pub(crate) line: OnceLock<TimeBase>,
+    /// The texts of columns that name channels or positions, once they were read.
+    texts: Mutex<BTreeMap<String, Arc<BTreeSet<String>>>>,
+    /// The rows of each channel or actuator, where rows belong to one.
+    partition: Partition,
 }
 
 /// Which samples are meant: the leaf that holds them, and the rows in which it does.
@@ -45,13 +51,14 @@ pub(crate) struct SampleSelector {
 impl RowTable {
     /// Some files read as one table.
     pub(crate) fn new(files: Vec<LogFile>, clock: ClockMapping, layout: Layout) -> Self {
-        Self { files, clock, layout, line: OnceLock::new() }
+        let (line, texts, partition) = (OnceLock::new(), Mutex::default(), Partition::default());
+        Self { files, clock, layout, line, texts, partition }
     }
 
     /// The same files by another clock and layout.
     pub(crate) fn remap(&mut self, clock: &ClockMapping, layout: &Layout) {
         (self.clock, self.layout) = (clock.clone(), layout.clone());
-        self.line = OnceLock::new();
+        (self.line, self.partition) = (OnceLock::new(), Partition::default());
     }
 
     /// Whether a row holds a list of this leaf's samples in any file.
@@ -75,7 +82,7 @@ impl RowTable {
     /// When channels are named by a column, and it cannot be read.
     pub(crate) fn names(&self) -> Result<BTreeSet<String>, Error> {
         match &self.layout.name_column {
-            Some(column) => self.texts(column),
+            Some(column) => self.texts(column).map(|texts| texts.as_ref().clone()),
             None => Ok(self.files.iter().flat_map(|f| f.leaves().iter().map(|l| l.name.clone())).collect()),
         }
     }
@@ -85,7 +92,8 @@ impl RowTable {
     /// # Errors
     /// When that column cannot be read.
     pub(crate) fn row_positions(&self) -> Result<Option<BTreeSet<String>>, Error> {
-        self.layout.position_column.as_deref().map(|column| self.texts(column)).transpose()
+        let column = self.layout.position_column.as_deref();
+        column.map(|column| self.texts(column).map(|texts| texts.as_ref().clone())).transpose()
     }
 
     /// The samples of a channel, of one actuator where rows belong to one.
@@ -129,10 +137,7 @@ impl RowTable {
             }
             return Ok(values.finish());
         }
-        self.each(samples, &samples.leaf, |array, wanted| match wanted {
-            None => append(&samples.leaf, array, &mut values),
-            Some(wanted) => append_where(&samples.leaf, array, wanted, &mut values),
-        })?;
+        self.each(samples, &samples.leaf, |array| append(&samples.leaf, array, &mut values))?;
         Ok(values.finish())
     }
 
@@ -141,46 +146,83 @@ impl RowTable {
         self.files.iter().try_for_each(|file| file.check_pages(leaf))
     }
 
-    /// Hands over one leaf of the rows meant, batch by batch, with a mark for each that is.
+    /// Whether a channel's name is here, as a leaf or in the column of names.
+    pub(crate) fn holds(&self, samples: &SampleSelector) -> bool {
+        let named = samples.rows.first().filter(|_| self.layout.name_column.is_some());
+        match named {
+            Some((column, name)) => self.texts(column).is_ok_and(|texts| texts.contains(name)),
+            None => self.files.iter().any(|file| file.has(&samples.leaf)),
+        }
+    }
+
+    /// Announces samples that will be read for a position, so that one pass over the files gathers them all.
+    pub(crate) fn announce(&self, samples: &SampleSelector, position: &str) {
+        if !samples.rows.is_empty() {
+            let leaves = std::iter::once(&samples.leaf).chain(&self.clock.column);
+            self.partition.announce(&RowKeys::of(samples), leaves.cloned(), position);
+        }
+    }
+
+    /// Frees what was gathered for a position alone.
+    pub(crate) fn release(&self, position: &str) {
+        self.partition.release(position);
+    }
+
+    /// Hands over one leaf of the samples meant, batch by batch.
     fn each(
         &self,
         samples: &SampleSelector,
         leaf: &str,
-        mut take: impl FnMut(&ArrayRef, Option<&[bool]>) -> Result<(), ErrorKind>,
+        mut take: impl FnMut(&ArrayRef) -> Result<(), ErrorKind>,
     ) -> Result<(), Error> {
-        // The channel's own leaf comes along: a list in it gives a row its samples.
-        let mut names: Vec<&str> = vec![leaf];
-        names.extend(samples.rows.iter().map(|(column, _)| column.as_str()));
-        let is_listed = |file: &LogFile| file.leaf(&samples.leaf).is_ok_and(|leaf| leaf.is_listed);
+        if !samples.rows.is_empty() {
+            let gathered = self.partition.samples(&self.files, samples, leaf)?;
+            return gathered.iter().try_for_each(take).map_err(|fault| self.error(fault));
+        }
         for file in &self.files {
-            let mut names = names.clone();
-            if leaf != samples.leaf && is_listed(file) {
-                names.push(&samples.leaf);
-            }
-            file.each_batch(&names, |arrays| {
-                let wanted = wanted(&samples.rows, &arrays[1..])?;
-                take(&arrays[0], wanted.as_deref())
-            })?;
+            // The channel's own leaf comes along: a list in it gives a row its samples.
+            let is_listed = file.leaf(&samples.leaf).is_ok_and(|leaf| leaf.is_listed);
+            let own = (leaf != samples.leaf && is_listed).then_some(samples.leaf.as_str());
+            let names: Vec<&str> = std::iter::once(leaf).chain(own).collect();
+            file.each_batch(&names, |arrays| take(&arrays[0]))?;
         }
         Ok(())
     }
 
-    /// Every text that a column holds.
-    fn texts(&self, column: &str) -> Result<BTreeSet<String>, Error> {
+    /// Every text that a column holds; a row group that holds but one, by its statistics, is not read.
+    fn texts(&self, column: &str) -> Result<Arc<BTreeSet<String>>, Error> {
+        let known = |texts: &BTreeMap<String, Arc<BTreeSet<String>>>| texts.get(column).cloned();
+        if let Some(texts) = known(&self.texts.lock().unwrap_or_else(PoisonError::into_inner)) {
+            return Ok(texts);
+        }
         let mut found = BTreeSet::new();
         for file in &self.files {
-            file.each_batch(&[column], |arrays| {
-                let text = as_text(column, &arrays[0])?;
-                let mut last: Option<&str> = None;
-                for value in text.as_string::<i32>().iter().flatten() {
-                    if last != Some(value) && !found.contains(value) {
-                        found.insert(value.to_owned());
+            let only = |group: usize| file.text_bounds(column, group)?.only().map(str::to_owned);
+            found.extend(file.groups().filter_map(only));
+            let scan = Scan {
+                batch_rows: LONG_BATCH_ROWS,
+                as_codes: true,
+                wants_group: &|group| only(group).is_none(),
+            };
+            file.scan(&[column], scan, |arrays| {
+                let (array, mut used) = (&arrays[0], Vec::new());
+                let Some(codes) = array.as_dictionary_opt::<Int32Type>() else {
+                    return add_texts(column, array, &mut found);
+                };
+                used.resize(codes.values().len(), false);
+                codes.keys().iter().flatten().for_each(|code| used[code as usize] = true);
+                let texts = codes.values().as_string::<i32>();
+                for code in (0..used.len()).filter(|code| used[*code] && texts.is_valid(*code)) {
+                    if !found.contains(texts.value(code)) {
+                        found.insert(texts.value(code).to_owned());
                     }
-                    last = Some(value);
                 }
                 Ok(())
             })?;
         }
+        let found = Arc::new(found);
+        let mut texts = self.texts.lock().unwrap_or_else(PoisonError::into_inner);
+        texts.insert(column.to_owned(), Arc::clone(&found));
         Ok(found)
     }
 
@@ -189,8 +231,11 @@ impl RowTable {
         let mut first: Option<String> = None;
         let mut row = 0_u64;
         for file in self.files.iter().filter(|file| file.has(column)) {
-            file.each_batch(&[column], |arrays| {
-                let text = as_text(column, &arrays[0])?;
+            file.scan(&[column], Scan { as_codes: true, ..Scan::PLAIN }, |arrays| {
+                let array =
+                    if is_uniform(&arrays[0]) { arrays[0].slice(0, 1) } else { Arc::clone(&arrays[0]) };
+                let text = as_text(column, &array)?;
+                let begun = row;
                 for value in text.as_string::<i32>() {
                     match (value, &first) {
                         (Some(value), Some(before)) if value != before => {
@@ -203,6 +248,7 @@ impl RowTable {
                     }
                     row += 1;
                 }
+                row = begun + arrays[0].len() as u64;
                 Ok(())
             })?;
         }
@@ -240,7 +286,7 @@ impl RowTable {
             return Ok(reader.stamps());
         }
         let mut reader = TimestampParser::new(column, ticks, self.rows());
-        self.each(samples, column, |array, wanted| reader.append(array, wanted))?;
+        self.each(samples, column, |array| reader.append(array))?;
         Ok(reader.stamps())
     }
 
@@ -255,7 +301,7 @@ impl RowTable {
         let (mut reader, mut bursts) = (TimestampParser::new(column, ticks, self.rows()), Vec::new());
         for file in &self.files {
             file.each_flat(&[column, &samples.leaf], |_, flats| {
-                reader.append(&flats[0].values, None)?;
+                reader.append(&flats[0].values)?;
                 bursts.extend(flats[1].lengths.clone().unwrap_or_default());
                 Ok(())
             })?;
@@ -280,8 +326,8 @@ impl RowTable {
             return Ok(self.rows());
         }
         let mut count = 0;
-        self.each(samples, &samples.leaf, |array, wanted| {
-            count += wanted.map_or(array.len(), |marks| marks.iter().filter(|m| **m).count());
+        self.each(samples, &samples.leaf, |array| {
+            count += array.len();
             Ok(())
         })?;
         Ok(count)
@@ -321,16 +367,20 @@ impl RowTable {
     }
 }
 
-/// Marks the rows that hold the wanted text in every column; none when all rows are meant.
-fn wanted(rows: &[(String, String)], arrays: &[ArrayRef]) -> Result<Option<Vec<bool>>, ErrorKind> {
-    if rows.is_empty() {
-        return Ok(None);
+/// Whether all rows of a batch hold the same.
+fn is_uniform(array: &ArrayRef) -> bool {
+    let first = Scalar::new(array.slice(0, array.len().min(1)));
+    !array.is_empty() && cmp::distinct(array, &first).is_ok_and(|differs| differs.true_count() == 0)
+}
+
+fn add_texts(column: &str, array: &ArrayRef, found: &mut BTreeSet<String>) -> Result<(), ErrorKind> {
+    let text = as_text(column, array)?;
+    let mut last: Option<&str> = None;
+    for value in text.as_string::<i32>().iter().flatten() {
+        if last != Some(value) && !found.contains(value) {
+            found.insert(value.to_owned());
+        }
+        last = Some(value);
     }
-    let mut marks = vec![true; arrays.first().map_or(0, Array::len)];
-    for ((column, wanted), array) in rows.iter().zip(arrays) {
-        let text = as_text(column, array)?;
-        let fits = text.as_string::<i32>().iter().map(|value| value == Some(wanted));
-        marks.iter_mut().zip(fits).for_each(|(mark, fits)| *mark &= fits);
-    }
-    Ok(Some(marks))
+    Ok(())
 }

@@ -75,12 +75,10 @@ impl<'a> TimestampParser<'a> {
         Self { column, ticks, first: None, turns: 0.0, before: f64::NAN, seconds, is_zoned: false }
     }
 
-    pub(crate) fn append(&mut self, array: &ArrayRef, wanted: Option<&[bool]>) -> Result<(), ErrorKind> {
-        let is_wanted = |row: usize| wanted.is_none_or(|marks| marks[row]);
+    pub(crate) fn append(&mut self, array: &ArrayRef) -> Result<(), ErrorKind> {
         if self.ticks.is_text {
             let text = as_text(self.column, array)?;
-            for (row, value) in text.as_string::<i32>().iter().enumerate().filter(|(row, _)| is_wanted(*row))
-            {
+            for (row, value) in text.as_string::<i32>().iter().enumerate() {
                 let tick = value.map(|value| self.parsed(value, row)).transpose()?;
                 self.push_whole(tick);
             }
@@ -88,19 +86,11 @@ impl<'a> TimestampParser<'a> {
             let whole =
                 cast(array, &DataType::Int64).map_err(|_| wrong_type(self.column, array, "time stamps"))?;
             let whole: &PrimitiveArray<Int64Type> = whole.as_primitive();
-            whole
-                .iter()
-                .enumerate()
-                .filter(|(row, _)| is_wanted(*row))
-                .for_each(|(_, tick)| self.push_whole(tick));
+            whole.iter().for_each(|tick| self.push_whole(tick));
         } else {
             let mut reals = Vec::with_capacity(array.len());
             append(self.column, array, &mut reals)?;
-            reals
-                .iter()
-                .enumerate()
-                .filter(|(row, _)| is_wanted(*row))
-                .for_each(|(_, &tick)| self.push_real(tick));
+            reals.iter().for_each(|&tick| self.push_real(tick));
         }
         Ok(())
     }

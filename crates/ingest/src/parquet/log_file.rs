@@ -4,13 +4,15 @@ use std::fs::File;
 use std::iter::once;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use arrow::array::ArrayRef;
-use arrow::datatypes::DataType;
+use arrow::datatypes::{DataType, Field, Schema};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
 };
+use parquet::basic::Encoding;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ColumnChunkMetaData;
 
@@ -53,7 +55,25 @@ pub(crate) struct LogFile {
     path: PathBuf,
     source: ByteSource,
     footer: ArrowReaderMetadata,
+    /// The same footer, by which text columns are read as the codes of their dictionary.
+    coded: OnceLock<Option<ArrowReaderMetadata>>,
     leaves: Vec<LeafColumn>,
+}
+
+/// How columns are scanned.
+#[derive(Clone, Copy)]
+pub(crate) struct Scan<'s> {
+    /// Rows decoded at a time.
+    pub(crate) batch_rows: usize,
+    /// Whether text that is stored as codes of a dictionary stays so.
+    pub(crate) as_codes: bool,
+    /// The row groups that are read, by their number; those left out must hold no row that is asked for.
+    pub(crate) wants_group: &'s dyn Fn(usize) -> bool,
+}
+
+impl Scan<'_> {
+    /// Every row group in small batches, text as text.
+    pub(crate) const PLAIN: Self = Self { batch_rows: BATCH_ROWS, as_codes: false, wants_group: &|_| true };
 }
 
 impl LogFile {
@@ -82,7 +102,7 @@ impl LogFile {
             })
         })?;
         let leaves = leaf_columns::leaves(footer.schema().fields());
-        let opened = Self { path: path.to_owned(), source, footer, leaves };
+        let opened = Self { path: path.to_owned(), source, footer, coded: OnceLock::new(), leaves };
         if opened.rows() == 0 {
             return Err(opened.error(ErrorKind::Empty));
         }
@@ -150,25 +170,66 @@ impl LogFile {
         names: &[&str],
         mut take: impl FnMut(&[ArrayRef]) -> Result<(), ErrorKind>,
     ) -> Result<(), Error> {
-        self.each_flat(names, |names, flats| take(&leaf_columns::align_lengths(names, flats)?))
+        self.scan(names, Scan::PLAIN, |arrays| take(arrays))
+    }
+
+    /// As [`LogFile::each_batch`], of some row groups, in batches of another size, or as codes.
+    pub(crate) fn scan(
+        &self,
+        names: &[&str],
+        scan: Scan<'_>,
+        mut take: impl FnMut(&[ArrayRef]) -> Result<(), ErrorKind>,
+    ) -> Result<(), Error> {
+        self.scan_flat(names, scan, |names, flats| take(&leaf_columns::align_lengths(names, flats)?))
     }
 
     /// As [`LogFile::each_batch`], before lists and single values are brought together.
     pub(crate) fn each_flat(
         &self,
         names: &[&str],
+        take: impl FnMut(&[&str], Vec<leaf_columns::FlatLeaf>) -> Result<(), ErrorKind>,
+    ) -> Result<(), Error> {
+        self.scan_flat(names, Scan::PLAIN, take)
+    }
+
+    fn scan_flat(
+        &self,
+        names: &[&str],
+        scan: Scan<'_>,
         mut take: impl FnMut(&[&str], Vec<leaf_columns::FlatLeaf>) -> Result<(), ErrorKind>,
     ) -> Result<(), Error> {
         let leaves = names.iter().map(|name| self.leaf(name)).collect::<Result<Vec<_>, _>>()?;
-        self.want(&leaves)?;
-        let mut rows = 0;
-        for group in 0..self.footer.metadata().num_row_groups() {
+        let groups = 0..self.footer.metadata().num_row_groups();
+        let wanted: Vec<bool> = groups.clone().map(scan.wants_group).collect();
+        let chunks = groups.clone().filter(|group| wanted[*group]);
+        let chunks = chunks.flat_map(|group| leaves.iter().map(move |leaf| self.chunk(group, leaf)));
+        self.source.want(chunks.map(range_of)).map_err(|fault| self.error(fault))?;
+        let mut rows = 0_usize;
+        for group in groups {
+            if !wanted[group] {
+                rows = rows.saturating_add(self.rows_of(group));
+                continue;
+            }
             leaves.iter().try_for_each(|leaf| self.pages(group, leaf).map(drop))?;
-            rows += self.each_row_group(group, &leaves, |columns| {
+            let read = self.each_row_group(group, &leaves, scan, |columns| {
                 take(names, columns.iter().map(leaf_columns::flatten).collect())
             })?;
+            rows = rows.saturating_add(read);
         }
         self.all_rows(rows, names.first().copied().unwrap_or_default())
+    }
+
+    /// The least and the greatest text of a column in each row group, as far as its statistics hold them; both are
+    /// bounds, and the texts themselves where `is_exact`.
+    pub(crate) fn text_bounds(&self, name: &str, group: usize) -> Option<TextBounds<'_>> {
+        let leaf = self.find(name).filter(|leaf| leaf.kind == DataType::Utf8 && !leaf.is_listed)?;
+        let statistics = self.chunk(group, leaf).statistics()?;
+        if statistics.is_min_max_deprecated() {
+            return None;
+        }
+        let (least, greatest) = (statistics.min_bytes_opt()?, statistics.max_bytes_opt()?);
+        let is_exact = statistics.min_is_exact() && statistics.max_is_exact();
+        Some(TextBounds { least, greatest, is_exact })
     }
 
     /// Appends the numbers of a leaf, sample by sample; a null is NaN. So is what is not wanted: row groups and pages
@@ -201,7 +262,7 @@ impl LogFile {
                 rows += into.len() - before;
                 continue;
             }
-            rows += self.each_row_group(group, &[leaf], |columns| {
+            rows += self.each_row_group(group, &[leaf], Scan::PLAIN, |columns| {
                 append(name, &leaf_columns::flatten(&columns[0]).values, into)
             })?;
         }
@@ -223,16 +284,17 @@ impl LogFile {
         &self,
         group: usize,
         leaves: &[&LeafColumn],
+        scan: Scan<'_>,
         mut take: impl FnMut(&[ArrayRef]) -> Result<(), ErrorKind>,
     ) -> Result<usize, Error> {
         let mut columns =
-            leaves.iter().map(|leaf| self.column(group, leaf)).collect::<Result<Vec<_>, _>>()?;
+            leaves.iter().map(|leaf| self.column(group, leaf, scan)).collect::<Result<Vec<_>, _>>()?;
         let mut rows = 0;
         loop {
             let mut batch: Vec<ArrayRef> = Vec::with_capacity(columns.len());
             for (reader, leaf) in columns.iter_mut().zip(leaves) {
                 match reader.next() {
-                    Some(Ok(found)) => batch.push(std::sync::Arc::clone(found.column(0))),
+                    Some(Ok(found)) => batch.push(Arc::clone(found.column(0))),
                     Some(Err(e)) => return Err(self.decode(leaf, group, e.to_string())),
                     None => {}
                 }
@@ -247,14 +309,40 @@ impl LogFile {
         }
     }
 
-    fn column(&self, group: usize, leaf: &LeafColumn) -> Result<BatchIter, Error> {
+    fn column(&self, group: usize, leaf: &LeafColumn, scan: Scan<'_>) -> Result<BatchIter, Error> {
         let file =
             self.source.file().try_clone().map_err(|source| self.error(ErrorKind::Unreadable { source }))?;
-        let builder =
-            ParquetRecordBatchReaderBuilder::new_with_metadata(PreadFile(file), self.footer.clone());
+        let is_coded = scan.as_codes && self.is_coded(group, leaf);
+        let footer = if is_coded { self.coded_footer() } else { None }.unwrap_or(&self.footer);
+        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(PreadFile(file), footer.clone());
         let mask = ProjectionMask::leaves(builder.parquet_schema(), [leaf.index]);
-        let reader = builder.with_projection(mask).with_row_groups(vec![group]).with_batch_size(BATCH_ROWS);
+        let reader =
+            builder.with_projection(mask).with_row_groups(vec![group]).with_batch_size(scan.batch_rows);
         reader.build().map_err(|e| self.decode(leaf, group, e.to_string()))
+    }
+
+    /// Whether a chunk is a text column of its own whose values are codes of a dictionary.
+    fn is_coded(&self, group: usize, leaf: &LeafColumn) -> bool {
+        let is_code = |e: Encoding| matches!(e, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY);
+        let has_dictionary = self.chunk(group, leaf).encodings().any(is_code);
+        has_dictionary && self.footer.schema().field(leaf.root).data_type() == &DataType::Utf8
+    }
+
+    /// The footer with every text column as codes of a dictionary; none where the reader refuses it.
+    fn coded_footer(&self) -> Option<&ArrowReaderMetadata> {
+        let coded = || {
+            let field = |field: &Arc<Field>| match field.data_type() {
+                DataType::Utf8 => {
+                    let kind = DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8));
+                    Arc::new(field.as_ref().clone().with_data_type(kind))
+                }
+                _ => Arc::clone(field),
+            };
+            let schema = Schema::new(self.footer.schema().fields().iter().map(field).collect::<Vec<_>>());
+            let options = ArrowReaderOptions::new().with_schema(Arc::new(schema));
+            ArrowReaderMetadata::try_new(Arc::clone(self.footer.metadata()), options).ok()
+        };
+        self.coded.get_or_init(coded).as_ref()
     }
 
     /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
@@ -270,8 +358,13 @@ impl LogFile {
         self.all_rows(rows, name)
     }
 
+    /// Row groups of the file.
+    pub(crate) fn groups(&self) -> Range<usize> {
+        0..self.footer.metadata().num_row_groups()
+    }
+
     /// Rows that a row group declares.
-    fn rows_of(&self, group: usize) -> usize {
+    pub(crate) fn rows_of(&self, group: usize) -> usize {
         usize::try_from(self.footer.metadata().row_group(group).num_rows()).unwrap_or(0)
     }
 
@@ -332,6 +425,29 @@ impl LogFile {
         }
         let start = length.saturating_sub(footer_bytes(file, length).map_err(unreadable)?);
         digest.take(file, start..length).map_err(unreadable)
+    }
+}
+
+/// Bounds of the texts of a column in a row group.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TextBounds<'f> {
+    /// No text is less.
+    pub(crate) least: &'f [u8],
+    /// No text is greater.
+    pub(crate) greatest: &'f [u8],
+    /// Whether both are texts of the column, and not cut short.
+    pub(crate) is_exact: bool,
+}
+
+impl TextBounds<'_> {
+    /// Whether a text may be among them.
+    pub(crate) fn may_hold(&self, text: &str) -> bool {
+        self.least <= text.as_bytes() && text.as_bytes() <= self.greatest
+    }
+
+    /// The only text, where there is but one.
+    pub(crate) fn only(&self) -> Option<&str> {
+        if self.is_exact && self.least == self.greatest { std::str::from_utf8(self.least).ok() } else { None }
     }
 }
 

@@ -16,20 +16,6 @@ pub(crate) fn append(column: &str, array: &ArrayRef, into: &mut impl Extend<f64>
     Ok(())
 }
 
-/// Appends the rows that are marked.
-pub(crate) fn append_where(
-    column: &str,
-    array: &ArrayRef,
-    wanted: &[bool],
-    into: &mut impl Extend<f64>,
-) -> Result<(), ErrorKind> {
-    let real = real(column, array)?;
-    let values = real.as_primitive::<Float64Type>();
-    let marked = values.iter().zip(wanted).filter(|(_, wanted)| **wanted);
-    into.extend(marked.map(|(value, _)| value.unwrap_or(f64::NAN)));
-    Ok(())
-}
-
 fn real(column: &str, array: &ArrayRef) -> Result<ArrayRef, ErrorKind> {
     let kind = array.data_type();
     let is_number = kind.is_numeric() || matches!(kind, DataType::Boolean | DataType::Dictionary(..));
