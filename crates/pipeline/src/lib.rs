@@ -15,6 +15,7 @@ pub mod report;
 pub mod rows;
 pub mod run;
 pub mod simulate;
+pub mod time_limit;
 
 pub use error::Error;
 pub use run::event::Event;
