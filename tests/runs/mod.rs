@@ -7,6 +7,7 @@ mod incremental_runs;
 mod injected_faults;
 mod interruption;
 mod killed_run_recovery;
+mod large_inputs;
 mod mapping_faults;
 mod old_store_formats;
 #[cfg(target_os = "linux")]

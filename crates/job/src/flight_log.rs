@@ -1,6 +1,6 @@
 //! One flight, from log to records: the room where all floors below meet.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -412,7 +412,11 @@ fn map_actuators(
         Ok(found) => at.extend(found.into_iter().map(|p| (p.position.clone(), (p, Arc::clone(&usual))))),
         Err(error) => failed = Some(error),
     }
-    for part in config.parts_with_overrides() {
+    let installed: BTreeSet<&PartNumber> = installations
+        .units_on_tail(&id.tail_number, id.departure_utc)
+        .map(|stay| &stay.part_number)
+        .collect();
+    for part in installed.into_iter().filter(|part| config.has_overrides(part)) {
         let mapping = config.mapping(&id.tail_number, Some(part));
         let Ok(found) = log.actuators(&mapping.channels, id.position.as_ref()) else { continue };
         let sits = |p: &ActuatorColumns| {

@@ -14,6 +14,7 @@ pub mod normalize;
 pub mod report;
 pub mod run;
 pub mod simulate;
+pub mod time_limit;
 
 pub use error::Error;
 pub use run::event::Event;

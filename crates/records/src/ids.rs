@@ -17,7 +17,7 @@ macro_rules! identifier {
         $(#[$doc])*
         #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
         #[serde(try_from = "String", into = "String")]
-        pub struct $name(String);
+        pub struct $name(Box<str>);
 
         impl $name {
             /// Creates the identifier from text; surrounding white space is removed.
@@ -29,7 +29,7 @@ macro_rules! identifier {
                 if text.is_empty() {
                     return Err(EmptyIdError { what: $what });
                 }
-                Ok(Self(text.to_owned()))
+                Ok(Self(text.into()))
             }
 
             /// The identifier as logged.
@@ -59,7 +59,7 @@ macro_rules! identifier {
 
         impl From<$name> for String {
             fn from(name: $name) -> Self {
-                name.0
+                name.0.into_string()
             }
         }
     };

@@ -3,8 +3,6 @@
 //! Logs identify actuators by position, not by serial number; this table maps one to the other. The whole table
 //! is validated first: a unit cannot be in two positions at once, nor two units in one position.
 
-use std::collections::BTreeMap;
-
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
@@ -66,10 +64,10 @@ pub enum Error {
     UnitTwice { row: usize, other: usize, part: PartNumber, serial: SerialNumber, at: Timestamp },
 }
 
-/// The validated installations table, indexed by tail and position.
+/// The validated installations table: rows by tail, position and date, found by bisection.
 #[derive(Debug, Clone, Default)]
 pub struct Installations {
-    by_place: BTreeMap<TailNumber, BTreeMap<Position, Vec<Installation>>>,
+    rows: Vec<Installation>,
 }
 
 impl Installations {
@@ -77,22 +75,20 @@ impl Installations {
     ///
     /// # Errors
     /// Every contradiction, in row order: see [`Error`].
-    pub fn new(rows: Vec<Installation>) -> Result<Self, Vec<Error>> {
+    pub fn new(mut rows: Vec<Installation>) -> Result<Self, Vec<Error>> {
         let mut errors: Vec<Error> =
             rows.iter().enumerate().filter_map(|(i, r)| reversed(i + 1, r)).collect();
-        errors.extend(clashes(&rows, |r| (r.tail_number.as_str(), r.position.as_str(), "")).map(
-            |(row, other)| {
-                let later = &rows[other - 1];
-                Error::PositionTaken {
-                    row,
-                    other,
-                    tail: later.tail_number.clone(),
-                    position: later.position.clone(),
-                    at: later.installed_utc,
-                }
-            },
-        ));
-        errors.extend(clashes(&rows, |r| (r.part_number.as_str(), r.serial_number.as_str(), "unit")).map(
+        errors.extend(clashes(&rows, |r| (&r.tail_number, &r.position)).into_iter().map(|(row, other)| {
+            let later = &rows[other - 1];
+            Error::PositionTaken {
+                row,
+                other,
+                tail: later.tail_number.clone(),
+                position: later.position.clone(),
+                at: later.installed_utc,
+            }
+        }));
+        errors.extend(clashes(&rows, |r| (&r.part_number, &r.serial_number)).into_iter().map(
             |(row, other)| {
                 let later = &rows[other - 1];
                 Error::UnitTwice {
@@ -107,15 +103,8 @@ impl Installations {
         if !errors.is_empty() {
             return Err(errors);
         }
-        let mut table = Self::default();
-        for row in rows {
-            let places = table.by_place.entry(row.tail_number.clone()).or_default();
-            places.entry(row.position.clone()).or_default().push(row);
-        }
-        for stays in table.by_place.values_mut().flat_map(BTreeMap::values_mut) {
-            stays.sort_by_key(|stay| stay.installed_utc);
-        }
-        Ok(table)
+        rows.sort_unstable_by(|a, b| place(a).cmp(&place(b)).then_with(|| period(a).cmp(&period(b))));
+        Ok(Self { rows })
     }
 
     /// The unit installed in that position at that instant.
@@ -125,24 +114,40 @@ impl Installations {
         position: &Position,
         at: Timestamp,
     ) -> Option<&Installation> {
-        self.by_place.get(tail)?.get(position)?.iter().find(|stay| stay.covers(at))
+        let rows = &self.rows[self.rows.partition_point(|stay| place(stay) < (tail, position))..];
+        rows.iter().take_while(|stay| place(stay) == (tail, position)).find(|stay| stay.covers(at))
     }
 
     /// Every unit installed on that tail at that instant, by position.
     pub fn units_on_tail(&self, tail: &TailNumber, at: Timestamp) -> impl Iterator<Item = &Installation> {
-        let places = self.by_place.get(tail).into_iter().flat_map(BTreeMap::values);
-        places.filter_map(move |stays| stays.iter().find(|stay| stay.covers(at)))
+        // No two stays in one position cover one instant.
+        self.of_tail(tail).iter().filter(move |stay| stay.covers(at))
     }
 
     /// Whether the table has an installation on that tail.
     pub fn contains_tail(&self, tail: &TailNumber) -> bool {
-        self.by_place.contains_key(tail)
+        !self.of_tail(tail).is_empty()
     }
 
     /// Every installation, by tail, position and date.
     pub fn iter(&self) -> impl Iterator<Item = &Installation> {
-        self.by_place.values().flat_map(BTreeMap::values).flatten()
+        self.rows.iter()
     }
+
+    fn of_tail(&self, tail: &TailNumber) -> &[Installation] {
+        let first = self.rows.partition_point(|stay| stay.tail_number < *tail);
+        let count = self.rows[first..].partition_point(|stay| stay.tail_number == *tail);
+        &self.rows[first..first + count]
+    }
+}
+
+fn place(stay: &Installation) -> (&TailNumber, &Position) {
+    (&stay.tail_number, &stay.position)
+}
+
+/// Start and end, the end of a unit that is still installed last: a stay without length is before one that follows.
+fn period(stay: &Installation) -> (Timestamp, Timestamp) {
+    (stay.installed_utc, stay.removed_utc.unwrap_or(Timestamp::MAX))
 }
 
 fn reversed(row: usize, stay: &Installation) -> Option<Error> {
@@ -155,19 +160,19 @@ fn reversed(row: usize, stay: &Installation) -> Option<Error> {
 fn clashes<'a, K: Ord + 'a>(
     rows: &'a [Installation],
     key: impl Fn(&'a Installation) -> K,
-) -> impl Iterator<Item = (usize, usize)> {
-    let mut groups: BTreeMap<K, Vec<usize>> = BTreeMap::new();
-    for (i, row) in rows.iter().enumerate() {
-        groups.entry(key(row)).or_default().push(i);
-    }
-    let mut found = Vec::new();
-    for mut group in groups.into_values() {
-        group.sort_by_key(|&i| rows[i].installed_utc);
-        let pairs = group.windows(2).filter(|pair| rows[pair[0]].overlaps(&rows[pair[1]]));
-        found.extend(pairs.map(|pair| (pair[0] + 1, pair[1] + 1)));
-    }
+) -> Vec<(usize, usize)> {
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    order.sort_by(|&a, &b| {
+        key(&rows[a]).cmp(&key(&rows[b])).then_with(|| period(&rows[a]).cmp(&period(&rows[b])))
+    });
+    let is_clash = |pair: &&[usize]| {
+        let [earlier, later] = [&rows[pair[0]], &rows[pair[1]]];
+        key(earlier) == key(later) && earlier.overlaps(later)
+    };
+    let mut found: Vec<_> =
+        order.windows(2).filter(is_clash).map(|pair| (pair[0] + 1, pair[1] + 1)).collect();
     found.sort_unstable();
-    found.into_iter()
+    found
 }
 
 #[cfg(test)]

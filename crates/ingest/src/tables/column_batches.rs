@@ -41,6 +41,7 @@ pub struct TableBatch {
 }
 
 /// The texts of a column: trimmed, an empty one none.
+#[derive(Debug, Clone)]
 pub struct StringColumn(StringArray);
 
 impl StringColumn {

@@ -17,7 +17,7 @@ use crate::tables::table::{ColumnAliases, Table};
 pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations, Vec<Error>> {
     let table = Table::read(file).map_err(|e| vec![e])?.with_aliases(names);
     let columns = InstallationColumns::find(&table)?;
-    let (mut rows, mut errors) = (Vec::new(), Vec::new());
+    let (mut rows, mut errors) = (Vec::with_capacity(table.len()), Vec::new());
     for row in 0..table.len() {
         match columns.installation(&table, row) {
             Ok(stay) => rows.push(stay),
@@ -27,6 +27,8 @@ pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations
     if !errors.is_empty() {
         return Err(errors);
     }
+    // A million rows of text are not kept beside what they say.
+    drop(table);
     let contradiction = |e: records::installation::Error| {
         Error::new(file, ErrorKind::Table { row: None, column: None, detail: e.to_string() })
     };

@@ -1,4 +1,4 @@
-//! Small tables read whole, every cell as text.
+//! Tables read whole, every cell as text.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,14 +7,16 @@ use arrow::array::RecordBatch;
 
 use crate::error::Error;
 use crate::tables::cell::{bad_cell, missing, position};
-use crate::tables::column_batches::{TableBatch, batches};
+use crate::tables::column_batches::{StringColumn, TableBatch, batches};
 
-/// A small table, every cell text; an empty cell is none.
-#[derive(Debug, Clone, PartialEq)]
+/// A table, every cell text; an empty cell is none.
+#[derive(Debug, Clone)]
 pub struct Table {
     file: std::path::PathBuf,
     header: Vec<String>,
-    rows: Vec<Vec<Option<String>>>,
+    batches: Vec<Vec<StringColumn>>,
+    /// Rows up to the end of each batch.
+    ends: Vec<usize>,
     names: ColumnAliases,
 }
 
@@ -45,15 +47,20 @@ impl Table {
     }
 
     fn empty(file: &Path) -> Self {
-        Self { file: file.to_owned(), header: Vec::new(), rows: Vec::new(), names: ColumnAliases::new() }
+        Self {
+            file: file.to_owned(),
+            header: Vec::new(),
+            batches: Vec::new(),
+            ends: Vec::new(),
+            names: ColumnAliases::new(),
+        }
     }
 
     fn extend(&mut self, batch: &TableBatch) -> Result<(), Error> {
         self.header = batch.header().to_vec();
         let columns = (0..self.header.len()).map(|column| batch.texts(Some(column)));
-        let columns = columns.collect::<Result<Vec<_>, _>>()?;
-        let row = |row| columns.iter().map(|texts| texts.get(row).map(str::to_owned)).collect();
-        self.rows.extend((0..batch.len()).map(row));
+        self.batches.push(columns.collect::<Result<_, _>>()?);
+        self.ends.push(self.len() + batch.len());
         Ok(())
     }
 
@@ -66,12 +73,12 @@ impl Table {
 
     /// Rows without the header.
     pub fn len(&self) -> usize {
-        self.rows.len()
+        self.ends.last().copied().unwrap_or(0)
     }
 
     /// Whether there is no row.
     pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
+        self.len() == 0
     }
 
     /// Where a column stands, if it is there under one of its names.
@@ -91,7 +98,9 @@ impl Table {
 
     /// The text of a cell.
     pub fn text(&self, row: usize, column: usize) -> Option<&str> {
-        self.rows[row].get(column)?.as_deref()
+        let batch = self.ends.partition_point(|end| *end <= row);
+        let before = if batch == 0 { 0 } else { self.ends[batch - 1] };
+        self.batches[batch].get(column)?.get(row - before)
     }
 
     /// A cell that must hold something, read as `T`.

@@ -9,6 +9,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::toml_errors;
 
+/// Bytes of a line that a diagnostic shows at most.
+const MAX_CONTENT: usize = 4096;
+
 /// A file of the configuration.
 #[derive(Debug)]
 pub(super) struct ConfigLayer {
@@ -16,6 +19,8 @@ pub(super) struct ConfigLayer {
     /// Its text, after as many empty lines as the files before have bytes: a span then identifies its file.
     text: String,
     start: usize,
+    /// Where each line of its own text starts.
+    lines: Vec<usize>,
 }
 
 impl ConfigLayer {
@@ -23,7 +28,8 @@ impl ConfigLayer {
     pub(super) fn stack(files: impl IntoIterator<Item = (String, String)>) -> Vec<Self> {
         let mut start = 0;
         let layer = |(file, text): (String, String)| {
-            let layer = Self { file, text: "\n".repeat(start) + &text, start };
+            let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+            let layer = Self { file, text: "\n".repeat(start) + &text, start, lines };
             start = layer.text.len() + 1;
             layer
         };
@@ -74,7 +80,7 @@ impl<'t> Source<'t> {
     fn locate(&self, path: &[&str]) -> Option<Range<usize>> {
         let (mut table, mut span) = (self.table(), None);
         for name in path {
-            let Some((key, value)) = table.iter().find(|(key, _)| key.get_ref() == name) else { break };
+            let Some((key, value)) = table.get_key_value(*name) else { break };
             span = Some(key.span());
             match value.get_ref() {
                 DeValue::Table(inner) => table = inner,
@@ -120,10 +126,12 @@ fn from_toml(layers: &[ConfigLayer], error: &toml::de::Error) -> Diagnostic {
 fn at_span_of(layers: &[ConfigLayer], span: &Range<usize>, diagnostic: Diagnostic) -> Diagnostic {
     let Some(layer) = layers.iter().rfind(|layer| layer.start <= span.start) else { return diagnostic };
     let text = &layer.text[layer.start..];
-    let before = &text[..(span.start - layer.start).min(text.len())];
-    let line_start = before.rfind('\n').map_or(0, |i| i + 1);
-    let line = before.matches('\n').count() + 1;
-    let column = before[line_start..].chars().count() + 1;
-    let content = text[line_start..].lines().next().unwrap_or_default().to_owned();
+    let at = (span.start - layer.start).min(text.len());
+    let line = layer.lines.partition_point(|start| *start <= at);
+    let line_start = layer.lines[line - 1];
+    let column = text[line_start..at].chars().count() + 1;
+    // Each diagnostic has its own copy.
+    let content = text[line_start..].lines().next().unwrap_or_default();
+    let content = content[..content.floor_char_boundary(MAX_CONTENT)].to_owned();
     Diagnostic { line: Some((line, column)), text: Some(content), ..diagnostic.in_file(&layer.file) }
 }

@@ -167,9 +167,9 @@ impl Config {
         self.overrides.mapping(tail, part)
     }
 
-    /// The configured parts whose channels are read otherwise somewhere.
-    pub(crate) fn parts_with_overrides(&self) -> impl Iterator<Item = &PartNumber> {
-        self.parts.keys().filter(|part| self.overrides.applies_to_part(part))
+    /// Whether a part is configured, and its channels are read otherwise somewhere.
+    pub(crate) fn has_overrides(&self, part: &PartNumber) -> bool {
+        self.parts.contains_key(part) && self.overrides.applies_to_part(part)
     }
 
     /// blake3 of every setting that can move a number of this part on this aircraft: the mapping, the

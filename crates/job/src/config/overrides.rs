@@ -1,6 +1,6 @@
 //! Settings that differ on some aircraft or for some parts: overrides of the common settings.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ingest::{Channels, ClockMapping, Mapping};
@@ -39,16 +39,21 @@ impl Clone for Overrides {
 struct ValidatedOverride {
     tails: Vec<glob::Pattern>,
     parts: Vec<glob::Pattern>,
+    /// Part numbers that are not patterns: there may be many, so each is looked up.
+    exact_parts: BTreeSet<PartNumber>,
     clock: toml::Table,
     channel: toml::Table,
 }
 
 impl ValidatedOverride {
     fn is_for(&self, tail: &TailNumber, part: Option<&PartNumber>) -> bool {
-        let fits = |patterns: &[glob::Pattern], text: &str| patterns.iter().any(|p| p.matches(text));
-        let tail_fits = self.tails.is_empty() || fits(&self.tails, tail.as_str());
-        let part_fits = self.parts.is_empty() || part.is_some_and(|part| fits(&self.parts, part.as_str()));
-        tail_fits && part_fits
+        let tail_fits = self.tails.is_empty() || self.tails.iter().any(|p| p.matches(tail.as_str()));
+        let is_for_all = self.parts.is_empty() && self.exact_parts.is_empty();
+        tail_fits && (is_for_all || part.is_some_and(|part| self.names_part(part)))
+    }
+
+    fn names_part(&self, part: &PartNumber) -> bool {
+        self.exact_parts.contains(part) || self.parts.iter().any(|p| p.matches(part.as_str()))
     }
 }
 
@@ -119,8 +124,7 @@ impl Overrides {
 
     /// Whether anything is otherwise for a part.
     pub(super) fn applies_to_part(&self, part: &PartNumber) -> bool {
-        let fits = |one: &ValidatedOverride| one.parts.iter().any(|p| p.matches(part.as_str()));
-        self.overrides.iter().any(fits)
+        self.overrides.iter().any(|one| one.names_part(part))
     }
 
     fn merged_mapping(&self, numbers: &[usize]) -> Mapping {
@@ -143,14 +147,15 @@ impl Overrides {
     }
 }
 
-/// What `output = "locked"` of a part changes in its channels.
-fn locked_parts(document: &Document) -> impl Iterator<Item = ValidatedOverride> {
+/// What `output = "locked"` changes in the channels of the parts that have it.
+fn locked_parts(document: &Document) -> Option<ValidatedOverride> {
     let locked = document.part.iter().filter(|(_, settings)| settings.output.is_locked());
-    locked.filter_map(|(number, _)| {
-        let part = glob::Pattern::new(&glob::Pattern::escape(number)).ok()?;
-        let channel = toml::Table::from_iter([("output".to_owned(), toml::Value::from("locked"))]);
-        Some(ValidatedOverride { tails: Vec::new(), parts: vec![part], clock: toml::Table::new(), channel })
-    })
+    let exact_parts: BTreeSet<PartNumber> =
+        locked.filter_map(|(number, _)| PartNumber::new(number).ok()).collect();
+    let channel = toml::Table::from_iter([("output".to_owned(), toml::Value::from("locked"))]);
+    let clock = toml::Table::new();
+    let one = ValidatedOverride { tails: Vec::new(), parts: Vec::new(), exact_parts, clock, channel };
+    (!one.exact_parts.is_empty()).then_some(one)
 }
 
 fn validate(settings: &Override) -> Result<ValidatedOverride, Diagnostic> {
@@ -170,6 +175,7 @@ fn validate(settings: &Override) -> Result<ValidatedOverride, Diagnostic> {
     Ok(ValidatedOverride {
         tails: patterns(&settings.tails)?,
         parts: patterns(&settings.parts)?,
+        exact_parts: BTreeSet::new(),
         clock: settings.clock.clone().unwrap_or_default(),
         channel: settings.channel.clone().unwrap_or_default(),
     })

@@ -18,6 +18,7 @@ use crate::run::event::Event;
 use crate::run::flight_ownership::LogOutcomeData;
 use crate::run::memory_budget::MemoryBudget;
 use crate::run::plan::{Plan, WorkItem};
+use crate::time_limit::log_timeout;
 
 /// Interval at which the time limits are checked while no worker reports.
 const TURN: Duration = Duration::from_millis(100);
@@ -291,10 +292,7 @@ impl<'a> WorkerPool<'a> {
             self.start_generation()?;
         }
         let work = &self.settings.plan.work[log];
-        let what = format!("the log was not finished within {} s", self.settings.limit.as_secs_f64());
-        let diagnostic = Diagnostic::new("log_timeout", what).in_file(&work.shown).hint(
-            "check its disk or share and its size, or raise `run.log_timeout_s`; the next run tries it again",
-        );
+        let diagnostic = log_timeout(&work.shown, self.settings.limit.as_secs_f64());
         let outcome = (self.settings.fail)(work, diagnostic, self.settings.limit.as_secs_f64());
         Ok(self.finished(log, Box::new(outcome)))
     }

@@ -5,9 +5,10 @@ use std::fmt::Write as _;
 
 use ingest::channel::quality;
 use ingest::{ActuatorChannels, ActuatorColumns, LogFiles, Quality};
-use job::flight_log::{FlightLog, catch_panic};
+use job::flight_log::FlightLog;
 use job::{Config, estimate, rejection};
 use pipeline::run::discover;
+use pipeline::time_limit::within_time_limit;
 use records::{Diagnostic, Installations, PartNumber};
 
 use crate::args::{CheckArgs, Format, Global};
@@ -40,31 +41,24 @@ const NOTHING: &str = "  no actuator could be checked; see errors above\n";
 pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
     let logs = logs(args, &config, output)?;
-    let (mut channels, mut diagnostics, mut page) = (Vec::new(), Vec::new(), String::new());
-    let mut rejections = Rejections::new();
-    let mut schemas = ColumnTypes::default();
-    let mut facts = Facts::new();
-    for (files, name) in &logs {
-        let looked = catch_panic(name, || {
-            let opened = FlightLog::open(files, name, &config, &installations)?;
-            schemas.enter(name, &opened.column_types());
-            one(
-                &opened,
-                name,
-                &config,
-                &installations,
-                &mut CheckSummary {
-                    channels: &mut channels,
-                    facts: &mut facts,
-                    rejections: &mut rejections,
-                    diagnostics: &mut diagnostics,
-                },
-                &mut page,
-            );
-            Ok(())
+    let count = logs.len();
+    let (config, installations) = (Arc::new(config), Arc::new(installations));
+    let (mut seen, mut schemas) = (CheckSummary::default(), ColumnTypes::default());
+    for (files, name) in logs {
+        let (of_log, installed, shown) = (Arc::clone(&config), Arc::clone(&installations), name.clone());
+        let looked = within_time_limit(&name, &config, move || {
+            let opened = FlightLog::open(&files, &shown, &of_log, &installed)?;
+            Ok((opened.column_types(), one(&opened, &shown, &of_log, &installed)))
         });
-        diagnostics.extend(looked.err());
+        match looked {
+            Ok((types, found)) => {
+                schemas.enter(&name, &types);
+                seen.extend(found);
+            }
+            Err(diagnostic) => seen.diagnostics.push(diagnostic),
+        }
     }
+    let CheckSummary { channels, facts, rejections, mut diagnostics, page } = seen;
     let failed = diagnostics.len();
     diagnostics.extend(mapping_faults(&rejections));
     let table = || {
@@ -72,7 +66,7 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
             "{page}{}{}{}",
             schemas.drift(),
             proposals(&facts, &config),
-            summary(logs.len(), &channels, &diagnostics[..failed])
+            summary(count, &channels, &diagnostics[..failed])
         )
     };
     if args.rows.format() == Format::Table && args.rows.output.is_none() {
@@ -130,12 +124,28 @@ records::row! {
     }
 }
 
-/// Findings of all logs so far.
-struct CheckSummary<'s> {
-    channels: &'s mut Vec<Channel>,
-    facts: &'s mut Facts,
-    rejections: &'s mut Rejections,
-    diagnostics: &'s mut Vec<Diagnostic>,
+/// Findings of one log, or of all logs so far.
+#[derive(Default)]
+struct CheckSummary {
+    channels: Vec<Channel>,
+    facts: Facts,
+    rejections: Rejections,
+    diagnostics: Vec<Diagnostic>,
+    page: String,
+}
+
+impl CheckSummary {
+    fn extend(&mut self, log: Self) {
+        self.channels.extend(log.channels);
+        self.diagnostics.extend(log.diagnostics);
+        self.page.push_str(&log.page);
+        for (part, found) in log.facts {
+            self.facts.entry(part).or_default().extend(found);
+        }
+        for (part, found) in log.rejections {
+            self.rejections.entry(part).or_default().extend(found);
+        }
+    }
 }
 
 /// Identified parameters by part number.
@@ -164,17 +174,11 @@ struct ActuatorCheck {
     rejection: Option<&'static str>,
 }
 
-fn one(
-    opened: &FlightLog,
-    name: &str,
-    config: &Config,
-    installations: &Installations,
-    seen: &mut CheckSummary<'_>,
-    page: &mut String,
-) {
+fn one(opened: &FlightLog, name: &str, config: &Config, installations: &Installations) -> CheckSummary {
     let id = &opened.identity;
-    let CheckSummary { channels, facts, rejections, diagnostics } = seen;
-    let (first, mut clocks) = (channels.len(), Vec::new());
+    let mut seen = CheckSummary::default();
+    let CheckSummary { channels, facts, rejections, diagnostics, page } = &mut seen;
+    let mut clocks = Vec::new();
     for at in opened.actuators(installations) {
         match actuator(opened, name, at, config, installations) {
             Ok(ActuatorCheck { found, clock, says, rejection }) => {
@@ -211,8 +215,9 @@ fn one(
         id.departure_utc,
         opened.rows(),
     );
-    page.push_str(&if channels.len() > first { layout(&channels[first..]) } else { NOTHING.to_owned() });
+    page.push_str(&if channels.is_empty() { NOTHING.to_owned() } else { layout(channels) });
     page.push('\n');
+    seen
 }
 
 /// Time base of an actuator as text.

@@ -1,11 +1,13 @@
 //! `estimate`: estimates the given logs without storing the results.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use job::Config;
 use job::flight_log::part_of;
 use pipeline::estimate::{self, EstimateRow};
-use records::{Installations, PartNumber};
+use pipeline::time_limit::within_time_limit;
+use records::{Diagnostic, Installations, PartNumber};
 
 use crate::args::{EstimateArgs, Global};
 use crate::exit::{Code, Failure};
@@ -26,28 +28,49 @@ pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) ->
         None => load_with_installations(global)?,
     };
     let part = args.part.as_ref().map(|number| configured(&config, number)).transpose()?;
-    let (mut found, mut diagnostics) = (Vec::new(), Vec::new());
+    let (config, installations) = (Arc::new(config), Arc::new(installations));
+    let (mut found, mut diagnostics, mut finished) = (Vec::new(), Vec::new(), Vec::new());
     for path in &args.logs {
-        let part = part.as_ref();
-        found.extend(estimate::estimate(path, &config, &installations, part, VERSION, &mut diagnostics)?);
+        match estimate_log(path, &config, &installations, part.as_ref()) {
+            Ok(estimated) => {
+                let (rows, of_log) = estimated?;
+                found.extend(rows);
+                diagnostics.extend(of_log);
+                finished.push(path.clone());
+            }
+            // Its trace and its plot would take as long again.
+            Err(diagnostic) => diagnostics.push(diagnostic),
+        }
     }
     if let Some(file) = &args.trace {
-        trace(file, &args.logs, &config, &installations, part.as_ref(), output)?;
+        trace(file, &finished, &config, &installations, part.as_ref(), output)?;
     }
     if let Some(file) = &args.plot {
-        super::estimate_plot::estimate_plot(
-            file,
-            &args.logs,
-            &config,
-            &installations,
-            part.as_ref(),
-            output,
-        )?;
+        super::estimate_plot::estimate_plot(file, &finished, &config, &installations, part.as_ref(), output)?;
     }
     let batch = || row_output::batch(&found);
     row_output::write_rows(&args.rows, output, batch, || page(&found))?;
     output.diagnostics(&diagnostics);
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
+}
+
+type Estimated = Result<(Vec<EstimateRow>, Vec<Diagnostic>), pipeline::Error>;
+
+/// The rows and the diagnostics of one log, or why it was given up.
+fn estimate_log(
+    path: &Path,
+    config: &Arc<Config>,
+    installations: &Arc<Installations>,
+    part: Option<&PartNumber>,
+) -> Result<Estimated, Diagnostic> {
+    let (path, part) = (path.to_owned(), part.cloned());
+    let (of_log, installations) = (Arc::clone(config), Arc::clone(installations));
+    within_time_limit(&display_path(&path.clone()), config, move || {
+        let mut diagnostics = Vec::new();
+        let rows =
+            estimate::estimate(&path, &of_log, &installations, part.as_ref(), VERSION, &mut diagnostics);
+        Ok(rows.map(|rows| (rows, diagnostics)))
+    })
 }
 
 fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
