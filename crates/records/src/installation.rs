@@ -112,8 +112,8 @@ impl Installations {
             let places = table.by_place.entry(row.tail_number.clone()).or_default();
             places.entry(row.position.clone()).or_default().push(row);
         }
-        for stays in table.by_place.values_mut().flat_map(BTreeMap::values_mut) {
-            stays.sort_by_key(|stay| stay.installed_utc);
+        for installations in table.by_place.values_mut().flat_map(BTreeMap::values_mut) {
+            installations.sort_by_key(|installation| installation.installed_utc);
         }
         Ok(table)
     }
@@ -125,13 +125,15 @@ impl Installations {
         position: &Position,
         at: Timestamp,
     ) -> Option<&Installation> {
-        self.by_place.get(tail)?.get(position)?.iter().find(|stay| stay.covers(at))
+        self.by_place.get(tail)?.get(position)?.iter().find(|installation| installation.covers(at))
     }
 
     /// Every unit installed on that tail at that instant, by position.
     pub fn units_on_tail(&self, tail: &TailNumber, at: Timestamp) -> impl Iterator<Item = &Installation> {
         let places = self.by_place.get(tail).into_iter().flat_map(BTreeMap::values);
-        places.filter_map(move |stays| stays.iter().find(|stay| stay.covers(at)))
+        places.filter_map(move |installations| {
+            installations.iter().find(|installation| installation.covers(at))
+        })
     }
 
     /// Whether the table has an installation on that tail.
@@ -145,10 +147,10 @@ impl Installations {
     }
 }
 
-fn reversed(row: usize, stay: &Installation) -> Option<Error> {
-    let removed = stay.removed_utc.filter(|removed| *removed < stay.installed_utc)?;
-    let serial = stay.serial_number.clone();
-    Some(Error::Reversed { row, serial, installed: stay.installed_utc, removed })
+fn reversed(row: usize, installation: &Installation) -> Option<Error> {
+    let removed = installation.removed_utc.filter(|removed| *removed < installation.installed_utc)?;
+    let serial = installation.serial_number.clone();
+    Some(Error::Reversed { row, serial, installed: installation.installed_utc, removed })
 }
 
 /// Pairs of row numbers, counted from 1, that claim the same key at the same time.
@@ -176,7 +178,7 @@ mod tests {
 
     use super::*;
 
-    fn stay(tail: &str, position: &str, serial: &str, from: &str, to: Option<&str>) -> Installation {
+    fn installation(tail: &str, position: &str, serial: &str, from: &str, to: Option<&str>) -> Installation {
         Installation {
             tail_number: TailNumber::new(tail).unwrap(),
             position: Position::new(position).unwrap(),
@@ -195,7 +197,10 @@ mod tests {
 
     #[test]
     fn a_unit_owns_the_instant_it_is_installed_and_not_the_one_it_leaves() {
-        let rows = vec![stay("N1", "aileron", "A", JAN, Some(FEB)), stay("N1", "aileron", "B", FEB, None)];
+        let rows = vec![
+            installation("N1", "aileron", "A", JAN, Some(FEB)),
+            installation("N1", "aileron", "B", FEB, None),
+        ];
         let table = Installations::new(rows).unwrap();
         let tail = TailNumber::new("N1").unwrap();
         let place = Position::new("aileron").unwrap();
@@ -208,21 +213,28 @@ mod tests {
 
     #[test]
     fn two_units_in_one_position_are_named_by_row() {
-        let rows = vec![stay("N1", "aileron", "A", JAN, None), stay("N1", "aileron", "B", FEB, None)];
+        let rows = vec![
+            installation("N1", "aileron", "A", JAN, None),
+            installation("N1", "aileron", "B", FEB, None),
+        ];
         let errors = Installations::new(rows).unwrap_err();
         assert!(matches!(errors[..], [Error::PositionTaken { row: 1, other: 2, .. }]), "{errors:?}");
     }
 
     #[test]
     fn one_unit_in_two_places_is_refused_even_across_tails() {
-        let rows = vec![stay("N1", "aileron", "A", JAN, Some(MAR)), stay("N2", "aileron", "A", FEB, None)];
+        let rows = vec![
+            installation("N1", "aileron", "A", JAN, Some(MAR)),
+            installation("N2", "aileron", "A", FEB, None),
+        ];
         let errors = Installations::new(rows).unwrap_err();
         assert!(matches!(errors[..], [Error::UnitTwice { row: 1, other: 2, .. }]), "{errors:?}");
     }
 
     #[test]
     fn a_stay_that_ends_before_it_begins_is_refused() {
-        let errors = Installations::new(vec![stay("N1", "aileron", "A", MAR, Some(JAN))]).unwrap_err();
+        let errors =
+            Installations::new(vec![installation("N1", "aileron", "A", MAR, Some(JAN))]).unwrap_err();
         assert!(matches!(errors[0], Error::Reversed { row: 1, .. }));
     }
 
@@ -232,7 +244,7 @@ mod tests {
         fn row_order_does_not_matter(order in Just((0..6).collect::<Vec<usize>>()).prop_shuffle(), day in 0_i64..180) {
             let months: Vec<String> = (1..=7).map(|m| format!("2026-{m:02}-01T00:00:00Z")).collect();
             let rows: Vec<_> = (0..6).map(|i| {
-                stay("N1", "aileron", &format!("S{i}"), &months[i], Some(&months[i + 1]))
+                installation("N1", "aileron", &format!("S{i}"), &months[i], Some(&months[i + 1]))
             }).collect();
             let shuffled = order.iter().map(|&i| rows[i].clone()).collect();
             let (one, other) = (Installations::new(rows).unwrap(), Installations::new(shuffled).unwrap());
