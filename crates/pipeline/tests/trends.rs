@@ -1,6 +1,8 @@
 //! Statements about a small fleet whose wear is a line: 2 h a day, 20 µm when new, limit 150 µm.
 #![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
 
+mod scatter;
+
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -15,6 +17,8 @@ use pipeline::history::row_keys::RowKey;
 use records::Installations;
 use records::TrendRow;
 
+use crate::scatter::scatter_um;
+
 const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;
 
@@ -25,17 +29,6 @@ fn config() -> Config {
 
 fn day(count: i32) -> Timestamp {
     "2024-01-01T06:00:00Z".parse::<Timestamp>().unwrap() + DAY * count
-}
-
-/// Scatter of ± 1 µm (1 sd), the same in every run: twelve uniform numbers less six.
-fn scatter_um(unit: i32, day: i32) -> f64 {
-    let mut state = (i64::from(unit) * 100_003 + i64::from(day) + 1) as u64;
-    state = state.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
-    (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
 
 /// A flight of one of the units.
@@ -269,7 +262,7 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     let head = "tail_number,flight_id,departure_utc,flight_hours\n".to_owned();
     std::fs::write(folder.path().join("flights.csv"), rows.fold(head, |all, row| all + &row)).unwrap();
     let config_with = Config::read(&folder.path().join("pipeline.toml")).unwrap();
-    let stay = |unit: i32| records::Installation {
+    let installation = |unit: i32| records::Installation {
         tail_number: records::TailNumber::new(format!("T{unit:02}")).unwrap(),
         position: records::Position::new(format!("place_{unit}")).unwrap(),
         part_number: records::PartNumber::new("EMA-27-1040").unwrap(),
@@ -279,7 +272,7 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
         unit_hours_at_install: Some(100.0),
         tail_hours_at_install: None,
     };
-    let installations = Installations::new((0..UNITS).map(stay).collect()).unwrap();
+    let installations = Installations::new((0..UNITS).map(installation).collect()).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(DAYS - 1)), ..UnitSelection::default() };
     let assess = |config: &Config| {
         let mut logged = flown(DAYS);

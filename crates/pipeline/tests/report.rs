@@ -1,0 +1,259 @@
+//! The report of a partly logged fleet: each of its numbers is that of the assessments.
+//!
+//! The fleet flies 6 h a day, as its hour meters show; one flight in five leaves a log. Wear is a line: 20 µm when new,
+//! limit 150 µm.
+#![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
+
+mod scatter;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use jiff::{SignedDuration, Timestamp};
+use job::Config;
+use pipeline::fleet_trends::assess::{self, UnitSelection};
+use pipeline::report::compose::compose;
+use records::{
+    Flight, FlightId, GapEstimate, GapRecord, Installations, PartNumber, Position, Provenance, SerialNumber,
+    Status, TailNumber, TrendRow,
+};
+use report::{Report, UnitView};
+use store::{Holder, LogOutcome, LogRecord, LogResult, Store};
+
+use crate::scatter::scatter_um;
+
+const DAY: SignedDuration = SignedDuration::from_hours(24);
+const HOURS_A_DAY: f64 = 6.0;
+const DAYS_A_LOG: i32 = 5;
+const UNITS: i32 = 10;
+const DAYS: i32 = 400;
+const LIMIT_M: f64 = 150e-6;
+
+fn config() -> Config {
+    let text = include_str!("../../../pipeline.toml");
+    Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
+}
+
+fn day(count: i32) -> Timestamp {
+    "2024-01-01T06:00:00Z".parse::<Timestamp>().unwrap() + DAY * count
+}
+
+/// The nth unit wears by 20 + 2 n µm in 1,000 h.
+fn record(unit: i32, at: i32) -> GapRecord {
+    let hours = HOURS_A_DAY * f64::from(at + 1);
+    let gap_um = 20.0 + (20.0 + 2.0 * f64::from(unit)) * hours / 1000.0 + scatter_um(unit, at);
+    GapRecord {
+        flight: Flight {
+            tail_number: TailNumber::new(format!("T{unit:02}")).unwrap(),
+            flight_id: FlightId::new(format!("{unit}-{at}")).unwrap(),
+            departure_utc: day(at),
+            flight_hours: Some(1.5),
+            tail_hours_end: Some(500.0 + hours),
+        },
+        position: Position::new("aileron_left").unwrap(),
+        part_number: PartNumber::new("EMA-27-1040").unwrap(),
+        serial_number: SerialNumber::new(format!("S{unit:02}")).unwrap(),
+        unit_hours: None,
+        estimate: GapEstimate {
+            status: Status::Estimated,
+            reason: None,
+            gap_m: Some(gap_um * 1e-6),
+            gap_se_m: Some(1e-6),
+            load_reversals: 100,
+            ..GapEstimate::default()
+        },
+        provenance: Provenance {
+            log_path: format!("{unit}/{at}.parquet"),
+            log_digest: "d".into(),
+            config_digest: "c".into(),
+            program_version: "0".into(),
+            run_id: "run".into(),
+            processed_utc: day(DAYS),
+        },
+    }
+}
+
+fn log(record: &GapRecord) -> LogRecord {
+    LogRecord {
+        log_path: record.provenance.log_path.clone(),
+        size_bytes: 1,
+        modified_utc_ns: 0,
+        file_id: String::new(),
+        log_digest: Some("d".into()),
+        config_digest: Some("c".into()),
+        tail_number: Some(record.flight.tail_number.to_string()),
+        flight_id: Some(record.flight.flight_id.to_string()),
+        departure_utc: Some(record.flight.departure_utc),
+        positions: vec![record.position.to_string()],
+        outcome: LogOutcome::Done,
+        estimated: 1,
+        refused: 0,
+        error_code: None,
+        error_detail: None,
+        duration_s: 0.1,
+        run_id: "run".into(),
+        processed_utc: day(DAYS),
+    }
+}
+
+fn assessed(store: &Store, as_of: Timestamp) -> BTreeMap<String, TrendRow> {
+    let ask = UnitSelection { as_of_utc: Some(as_of), statistics: true, ..UnitSelection::default() };
+    let rows = assess::assess_store(&config(), &Installations::default(), store, &ask).unwrap();
+    rows.into_iter().map(|row| (row.serial_number.clone(), row)).collect()
+}
+
+fn close(a: f64, b: f64, share: f64) -> bool {
+    (a - b).abs() <= share * b.abs()
+}
+
+#[test]
+fn every_number_of_the_report_is_that_of_the_assessments() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::create_or_open(folder.path().join("results")).unwrap();
+    let flown =
+        (0..UNITS).flat_map(|unit| (0..DAYS).step_by(DAYS_A_LOG as usize).map(move |at| record(unit, at)));
+    let results: Vec<LogResult> = flown
+        .map(|record| LogResult { account: log(&record), records: vec![record], retires: Vec::new() })
+        .collect();
+    store.lock(&Holder::this_process(), None).unwrap().commit(&results).unwrap();
+
+    let as_of = day(DAYS - 1);
+    let rows = assessed(&store, as_of);
+    let ask = UnitSelection { as_of_utc: Some(as_of), statistics: true, ..UnitSelection::default() };
+    let report = compose(&config(), &Installations::default(), &store, &ask, as_of, "test").unwrap();
+    assert_eq!((report.units.len(), report.as_of_utc), (UNITS as usize, Some(as_of)));
+    for unit in &report.units {
+        let row = &rows[&unit.serial_number];
+        // The meter counts 6 h a day; the logged flights alone would give 0.3 h.
+        assert!(close(row.hours_per_day.unwrap(), HOURS_A_DAY, 1e-9), "{row:?}");
+        quantities_are_those_of_the_row(unit, row);
+        chart_is_that_of_the_row(unit, row, as_of);
+    }
+    past_forecasts_are_those_of_their_day(&report, &store, as_of);
+    removals_are_those_of_the_rows(&report, &rows, as_of);
+}
+
+fn quantities_are_those_of_the_row(unit: &UnitView, row: &TrendRow) {
+    let a = &unit.assessment;
+    assert_eq!((a.state.as_deref(), &a.reason, a.trend.as_str()), (row.state, &row.reason, row.trend));
+    let shown = [
+        a.unit_hours,
+        a.gap_m,
+        a.gap_se_m,
+        a.limit_m,
+        a.rate_m_per_hour,
+        a.rate_p05_m_per_hour,
+        a.rate_p95_m_per_hour,
+        a.crossing_hours_p05,
+        a.crossing_hours_p50,
+        a.crossing_hours_p95,
+        a.hours_per_day,
+        a.hours_per_flight,
+        a.check_probability,
+        a.mann_kendall_p,
+        a.hamed_rao_p,
+        a.sen_rate_m_per_hour,
+        a.sen_low_m_per_hour,
+        a.sen_high_m_per_hour,
+    ];
+    let stated = [
+        row.unit_hours,
+        row.gap_m,
+        row.gap_se_m,
+        row.limit_m,
+        row.rate_m_per_hour,
+        row.rate_p05_m_per_hour,
+        row.rate_p95_m_per_hour,
+        row.crossing_hours_p05,
+        row.crossing_hours_p50,
+        row.crossing_hours_p95,
+        row.hours_per_day,
+        row.hours_per_flight,
+        row.check_probability,
+        row.trend_p_value,
+        row.hamed_rao_p_value,
+        row.sen_rate_m_per_hour,
+        row.sen_low_m_per_hour,
+        row.sen_high_m_per_hour,
+    ];
+    assert_eq!(shown, stated);
+    assert_eq!(
+        [a.not_before_utc, a.likely_utc, a.not_after_utc],
+        [row.not_before_utc, row.likely_utc, row.not_after_utc]
+    );
+    assert_eq!((&a.law, &a.axis), (&row.wear_law, &row.usage_axis));
+}
+
+/// The drawn median meets the limit on the likely date, the upper bound on the earliest date, the lower on the latest.
+fn chart_is_that_of_the_row(unit: &UnitView, row: &TrendRow, as_of: Timestamp) {
+    let days = |at: Timestamp| at.duration_since(as_of).as_secs_f64() / 86_400.0;
+    let meets = |gap_m: fn(&report::TimedInterval) -> f64| {
+        let crossing = unit.forecast.windows(2).find(|pair| gap_m(&pair[1]) >= LIMIT_M).unwrap();
+        let [from, to] = [&crossing[0], &crossing[1]];
+        let share = (LIMIT_M - gap_m(from)) / (gap_m(to) - gap_m(from));
+        days(from.at_utc) + share * (days(to.at_utc) - days(from.at_utc))
+    };
+    for (drawn, stated) in [
+        (meets(|band| band.p95_m), row.not_before_utc),
+        (meets(|band| band.m), row.likely_utc),
+        (meets(|band| band.p05_m), row.not_after_utc),
+    ] {
+        let stated = days(stated.unwrap());
+        assert!(close(drawn, stated, 0.1), "{}: {drawn} days drawn, {stated} stated", row.serial_number);
+    }
+    // The smoothed level ends at the level that is stated.
+    let last = unit.level.last().unwrap();
+    assert!((last.m - row.gap_m.unwrap()).abs() < 2e-6, "{last:?}, {row:?}");
+}
+
+/// A past forecast starts from the assessment of its day and grows at its rate over the metered hours.
+fn past_forecasts_are_those_of_their_day(report: &Report, store: &Store, as_of: Timestamp) {
+    for days_ago in [30, 90, 180] {
+        let then = assessed(store, as_of - DAY * days_ago);
+        for unit in &report.units {
+            let row = &then[&unit.serial_number];
+            let past = unit.past_forecasts.iter().find(|past| past.days_ago == i64::from(days_ago)).unwrap();
+            assert_eq!((past.state.as_deref(), past.gap_m), (row.state, row.gap_m.unwrap()));
+            assert_eq!(Some(past.found_m), unit.assessment.gap_m);
+            let grown_m = past.predicted_m - past.gap_m;
+            let expected_m = row.rate_m_per_hour.unwrap() * HOURS_A_DAY * f64::from(days_ago);
+            assert!(close(grown_m, expected_m, 0.25), "{past:?}: {expected_m} by {row:?}");
+            assert!(past.predicted_low_m < past.predicted_m && past.predicted_m < past.predicted_high_m);
+        }
+    }
+}
+
+/// Expected removals of a month: the units' probabilities, from straight lines through their three quantiles.
+fn removals_are_those_of_the_rows(report: &Report, rows: &BTreeMap<String, TrendRow>, as_of: Timestamp) {
+    let page = &report::fleet_pages(report).unwrap()[0].body;
+    let page = String::from_utf8(page.clone()).unwrap();
+    let (_, table) = page.split_once("id=\"removals\"").unwrap();
+    let (table, _) = table.split_once("</table>").unwrap();
+    let shown: Vec<(String, f64)> = table
+        .split("<th scope=\"row\">")
+        .skip(1)
+        .map(|row| {
+            let number = row.split("<span>").nth(1).unwrap().split('<').next().unwrap();
+            (row[..7].to_owned(), number.parse().unwrap())
+        })
+        .collect();
+    assert_eq!((shown.len(), shown[0].0.as_str()), (12, "2025-02"));
+    let probability = |row: &TrendRow, hours: f64| {
+        let quantiles =
+            [row.crossing_hours_p05, row.crossing_hours_p50, row.crossing_hours_p95].map(Option::unwrap);
+        let points = [(0.0, 0.0), (quantiles[0], 0.05), (quantiles[1], 0.5), (quantiles[2], 0.95)];
+        points.windows(2).find(|pair| hours < pair[1].0).map_or(0.95, |pair| {
+            pair[0].1 + (pair[1].1 - pair[0].1) * (hours - pair[0].0) / (pair[1].0 - pair[0].0)
+        })
+    };
+    let until = |date: &str| {
+        let days = date.parse::<Timestamp>().unwrap().duration_since(as_of).as_secs_f64() / 86_400.0;
+        rows.values().map(|row| probability(row, days.max(0.0) * row.hours_per_day.unwrap())).sum::<f64>()
+    };
+    for pair in shown.windows(2) {
+        let [(month, expected), (next, _)] = pair else { unreachable!() };
+        let calculated = until(&format!("{next}-01T00:00:00Z")) - until(&format!("{month}-01T00:00:00Z"));
+        assert!((expected - calculated).abs() <= 0.0501, "{month}: {expected} on the page, {calculated}");
+    }
+    assert!(shown.iter().map(|(_, expected)| expected).sum::<f64>() > 3.0, "{shown:?}");
+}
