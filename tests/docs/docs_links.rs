@@ -62,3 +62,27 @@ fn every_page_is_in_the_contents_once() {
     assert_eq!(listed, written, "docs/SUMMARY.md against the pages of docs/");
     assert_eq!(listed.len(), contents.links.len(), "a page is listed twice in docs/SUMMARY.md");
 }
+
+/// A reference is searched; every other page is read.
+#[test]
+fn a_page_that_is_read_has_at_most_1500_words() {
+    let contents = std::fs::read_to_string(top().join("docs/SUMMARY.md")).unwrap();
+    let (mut group, mut long, mut pages) = (String::new(), Vec::new(), 0);
+    for line in contents.lines() {
+        if let Some(heading) = line.strip_prefix("# ") {
+            heading.clone_into(&mut group);
+        }
+        let Some((_, link)) = line.rsplit_once('(') else { continue };
+        let file = format!("docs/{}", link.trim_end_matches(')'));
+        let words = std::fs::read_to_string(top().join(&file)).unwrap().split_whitespace().count();
+        pages += 1;
+        if words > 1500 && !["Reference", "Measurements"].contains(&group.as_str()) {
+            long.push(format!("{file}: {words} words"));
+        }
+    }
+    for file in ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md"] {
+        let words = std::fs::read_to_string(top().join(file)).unwrap().split_whitespace().count();
+        long.extend((words > 1500).then(|| format!("{file}: {words} words")));
+    }
+    assert!(pages > 25 && long.is_empty(), "{long:?}");
+}
