@@ -125,6 +125,9 @@ fn names_and_ranges_that_cannot_be_are_errors_with_the_nearest_name() {
     is_refused(&["trend", "--part", "EMA-27-1041"], "unknown_name", "EMA-27-1040");
     is_refused(&["run", "--tail", "n412fp"], "unknown_name", "N412FP");
     is_refused(&["report", "--tail", "n412fp", "--output", "pages"], "unknown_name", "N412FP");
+    let early = ["report", "--tail", "N412FP", "--as-of", "1999-01-01", "--output", "pages"];
+    is_refused(&early, "nothing_to_report", "no unit of tail N412FP until 1999-01-01T00:00:00Z has flown");
+    is_refused(&early, "nothing_to_report", "the departures in the store are from 20");
     let range = ["--since", "2026-10-01", "--until", "2026-09-01"];
     is_refused(&[&["query", "tail", "N412FP"][..], &range].concat(), "empty_range", "--until");
     is_refused(&[&["run"][..], &range].concat(), "empty_range", "--until");

@@ -68,7 +68,7 @@ fn table<'a>(page: &mut String, args: impl Iterator<Item = &'a Arg>) {
             "| {} | {}.{} |",
             typed(arg),
             help.trim_end_matches('.').replace('|', "\\|"),
-            beside(arg)
+            notes(arg)
         );
     }
 }
@@ -88,19 +88,19 @@ fn typed(arg: &Arg) -> String {
 }
 
 /// The words an option takes, its default, and the variable that gives it.
-fn beside(arg: &Arg) -> String {
-    let mut beside = String::new();
+fn notes(arg: &Arg) -> String {
+    let mut notes = String::new();
     let words: Vec<String> =
         arg.get_possible_values().iter().map(|v| format!("`{}`", v.get_name())).collect();
     if arg.get_action().takes_values() && !words.is_empty() {
-        let _ = write!(beside, " One of {}.", words.join(", "));
+        let _ = write!(notes, " One of {}.", words.join(", "));
     }
     let default: Vec<_> = arg.get_default_values().iter().map(|v| v.to_string_lossy()).collect();
     if arg.get_action().takes_values() && !default.is_empty() {
-        let _ = write!(beside, " Default `{}`.", default.join(" "));
+        let _ = write!(notes, " Default `{}`.", default.join(" "));
     }
     if let Some(variable) = arg.get_env() {
-        let _ = write!(beside, " Also by `{}`.", variable.to_string_lossy());
+        let _ = write!(notes, " Also by `{}`.", variable.to_string_lossy());
     }
-    beside
+    notes
 }

@@ -11,7 +11,7 @@ pub enum Code {
     Success = 0,
     /// Finished, but some logs or a requested check failed.
     LogsInError = 1,
-    /// Wrong usage or configuration: nothing was run.
+    /// Wrong usage or configuration: nothing was processed.
     Usage = 2,
     /// The run itself failed; what was stored before is intact.
     RunFailed = 3,

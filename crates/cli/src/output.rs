@@ -101,7 +101,7 @@ impl Output {
             return self.err(&json_log::diagnostic(diagnostic));
         }
         let text = diagnostic.to_string();
-        self.err(&if self.color_err { painted(&text) } else { text });
+        self.err(&if self.color_err { coloured(&text) } else { text });
     }
 
     /// Shows diagnostics: of each kind the first few whole, and how many more there are.
@@ -153,7 +153,7 @@ pub(crate) fn escape(text: &str) -> String {
     escape_cell(text).into_owned()
 }
 
-fn painted(text: &str) -> String {
+fn coloured(text: &str) -> String {
     let (head, rest) = text.split_once(':').unwrap_or((text, ""));
     format!("\u{1b}[1;31m{head}\u{1b}[0m:{}", rest.replace("\nhint:", "\n\u{1b}[36mhint\u{1b}[0m:"))
 }

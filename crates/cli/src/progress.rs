@@ -27,7 +27,7 @@ struct State {
     refused: usize,
     errors: usize,
     begun: Instant,
-    told: Option<Instant>,
+    reported_at: Option<Instant>,
     in_hand: BTreeSet<String>,
 }
 
@@ -47,7 +47,7 @@ impl<'t> Progress<'t> {
             refused: 0,
             errors: 0,
             begun: now,
-            told: None,
+            reported_at: None,
             in_hand: BTreeSet::new(),
         };
         Self {
@@ -97,7 +97,7 @@ impl<'t> Progress<'t> {
         });
         self.bar.set_message(message);
         self.bar.inc(1);
-        self.tell();
+        self.print_line();
     }
 
     /// Removes the bar before the result is printed.
@@ -111,14 +111,14 @@ impl<'t> Progress<'t> {
     }
 
     /// Prints a plain progress line: the first at once, then every 30 s.
-    fn tell(&self) {
+    fn print_line(&self) {
         if self.terminal || !self.output.shows_progress() {
             return;
         }
         let line = self.update(|state| {
-            let due = state.told.is_none_or(|told| told.elapsed() >= SPARSE);
+            let due = state.reported_at.is_none_or(|reported_at| reported_at.elapsed() >= SPARSE);
             due.then(|| {
-                state.told = Some(Instant::now());
+                state.reported_at = Some(Instant::now());
                 line(self.name, state)
             })
         });

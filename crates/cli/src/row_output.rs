@@ -52,9 +52,9 @@ pub(crate) fn to_file(
     fill: impl FnOnce(&mut File) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
-    let mut beside = shared().tempfile_in(folder).map_err(|e| not_written(file, &e))?;
-    fill(beside.as_file_mut())?;
-    beside.persist(file).map(drop).map_err(|e| not_written(file, &e.error))
+    let mut temporary = shared().tempfile_in(folder).map_err(|e| not_written(file, &e))?;
+    fill(temporary.as_file_mut())?;
+    temporary.persist(file).map(drop).map_err(|e| not_written(file, &e.error))
 }
 
 /// Temporary file with the permissions of the user's umask.

@@ -95,7 +95,7 @@ fn shortened(text: &str, width: usize) -> String {
 /// Column widths: text columns are narrowed, the widest first; numbers are never cut.
 fn widths(columns: &[Column], rows: &[Vec<String>], kept: &[usize], width: usize) -> Vec<usize> {
     let mut widths: Vec<usize> = kept.iter().map(|&i| wide(columns, rows, i)).collect();
-    let least: Vec<usize> = kept.iter().map(|&i| least(columns, rows, i)).collect();
+    let least: Vec<usize> = kept.iter().map(|&i| min_width(columns, rows, i)).collect();
     while widths.iter().map(|w| w + GAP).sum::<usize>() > width.saturating_add(GAP) {
         let text = (0..kept.len()).filter(|&at| widths[at] > least[at]);
         let Some(widest) = text.max_by_key(|&at| widths[at]) else { break };
@@ -105,7 +105,7 @@ fn widths(columns: &[Column], rows: &[Vec<String>], kept: &[usize], width: usize
 }
 
 /// Minimum width of a column: the last digit of every cell stays visible, except in paths, which keep their end.
-fn least(columns: &[Column], rows: &[Vec<String>], i: usize) -> usize {
+fn min_width(columns: &[Column], rows: &[Vec<String>], i: usize) -> usize {
     if columns[i].right {
         return usize::MAX;
     }

@@ -67,7 +67,7 @@ pub fn estimate(
     Ok(estimate)
 }
 
-/// What the contact regression finds, or the code of the rejection before or by it, without the published statistic.
+/// Result of the contact regression, or the code of the rejection before or by it, without the published statistic.
 ///
 /// # Errors
 /// As [`estimate`].
@@ -89,10 +89,10 @@ pub fn contact_regression(
     }
 }
 
-/// Longer flights have rooms of their own, lest a thread keep them for ever: samples.
+/// Flights of more samples get workspaces of their own, so that no thread keeps large ones.
 const MAX_KEPT_SAMPLES: usize = 2 << 20;
 
-/// What the estimates of one actuator after the other are made in.
+/// Reusable workspaces of one thread.
 #[derive(Debug, Default)]
 struct Workspaces {
     published: FilterWorkspace,
@@ -103,7 +103,7 @@ thread_local! {
     static WORKSPACES: RefCell<Workspaces> = RefCell::default();
 }
 
-/// Does something in the rooms of this thread.
+/// Runs a function with the workspaces of this thread.
 fn with_workspaces<T>(samples: usize, work: impl FnOnce(&mut Workspaces) -> T) -> T {
     if samples > MAX_KEPT_SAMPLES {
         work(&mut Workspaces::default())
@@ -130,12 +130,12 @@ pub fn filter(channels: &ActuatorChannels, part: &Part) -> Result<Filter, Diagno
 ///
 /// # Errors
 /// A diagnostic when the settings of the part cannot be.
-pub fn picture(channels: &ActuatorChannels, part: &Part) -> Result<Option<ContactPlot>, Diagnostic> {
+pub fn plot_data(channels: &ActuatorChannels, part: &Part) -> Result<Option<ContactPlot>, Diagnostic> {
     contact::plot_data(&samples(channels), &prior(channels, part))
         .map_err(|e| Diagnostic::new("estimate_failed", e))
 }
 
-/// The channels as the estimator takes them.
+/// The channels as input of the estimator.
 pub fn samples(channels: &ActuatorChannels) -> Samples<'_> {
     Samples {
         step_s: channels.step_s,
@@ -146,7 +146,7 @@ pub fn samples(channels: &ActuatorChannels) -> Samples<'_> {
     }
 }
 
-/// What is known of a part before its flight is seen.
+/// Prior knowledge of a part for the contact regression.
 pub fn prior(channels: &ActuatorChannels, part: &Part) -> PartPrior {
     let unknown_force_n = match part.noise {
         estimator::NoiseModel::Sensors(sensors) => {
@@ -171,7 +171,7 @@ fn is_too_slow(channels: &ActuatorChannels) -> bool {
     channels.step_s > MAX_STEP_S * (1.0 + 1e-9)
 }
 
-/// Why no statistic could mean anything, seen before any is made.
+/// Rejection code of channels without information, before any statistic is computed.
 fn pre_check_rejection(channels: &ActuatorChannels) -> Option<&'static str> {
     let [motor, screw, load] = &channels.quality;
     let first = channels.dx_m.iter().find(|dx| !dx.is_nan());
@@ -247,7 +247,7 @@ fn from_contact(found: &ContactEstimate) -> GapEstimate {
     }
 }
 
-/// A lightly damped mode, or one near Nyquist, puts the pole elsewhere: the number stands, with a flag.
+/// A lightly damped mode, or one near Nyquist, moves the pole: the estimate is kept, with a flag.
 fn bandwidth_differs(schedule: &GainSchedule, part: &Part) -> bool {
     let estimator::NoiseModel::Sensors(asked) = part.noise else { return false };
     schedule.bandwidth_hz().is_ok_and(|got| (got / asked.bandwidth_hz - 1.0).abs() > BANDWIDTH_TOLERANCE)

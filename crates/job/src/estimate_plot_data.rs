@@ -47,24 +47,24 @@ impl EstimatePlot {
             load_n: channels.load_n.clone(),
             midrange: gap::mid_range(&track.s_m).ok(),
             s_m: track.s_m,
-            picture: estimate::picture(channels, part)?,
+            picture: estimate::plot_data(channels, part)?,
         })
     }
 }
 
-/// Looks at every actuator of a log: as booked, or all as one part.
+/// Plot data of every actuator of a log: as installed, or all as one part.
 ///
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read.
 pub fn of_log(
     files: &LogFiles,
-    shown: &str,
+    log_path: &str,
     config: &Config,
     installations: &Installations,
     part: Option<&PartNumber>,
 ) -> Result<Vec<EstimatePlot>, Diagnostic> {
     let mut plots = Vec::new();
-    flight_log::for_each_actuator(files, shown, config, installations, part, |channels, part| {
+    flight_log::for_each_actuator(files, log_path, config, installations, part, |channels, part| {
         plots.push(EstimatePlot::of(channels, part, config)?);
         Ok(())
     })?;

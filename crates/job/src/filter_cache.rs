@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use estimator::{Filter, GainSchedule};
 
-/// Logs whose steps differ in their last digits would fill memory: so many schedules are kept.
+/// Maximum number of schedules kept: logs whose steps differ in the last digits would fill memory.
 const CAPACITY: usize = 16;
 
 /// What has been found so far. Clones share it.

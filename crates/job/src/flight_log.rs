@@ -1,4 +1,4 @@
-//! One flight, from log to records: the room where all floors below meet.
+//! One flight log, from files to gap records.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -102,7 +102,7 @@ impl FlightLog {
         flight_of(&self.identity)
     }
 
-    /// The actuators of the log. A position that lacks a channel is one only where a unit is booked:
+    /// The actuators of the log. A position that lacks a channel counts only where a unit is installed:
     /// `battery_load` may fit a pattern without being an actuator.
     pub fn actuators(&self, installations: &Installations) -> impl Iterator<Item = &ActuatorColumns> {
         let id = &self.identity;
@@ -303,7 +303,7 @@ fn no_installation(id: &Identity, position: &Position, installations: &Installat
 
 /// The log-level digest of settings: of every unit that sat in one of its positions that day.
 ///
-/// It changes when a part's settings change, or another serial number is booked, and with nothing else.
+/// It changes when a part's settings change, or another serial number is installed, and with nothing else.
 pub fn config_digest(
     config: &Config,
     installations: &Installations,
@@ -370,7 +370,8 @@ pub fn identify_companion(
     config: &Config,
 ) -> Result<(Flight, Option<Position>), Diagnostic> {
     catch_panic(display_name, || {
-        let fallback = |said: &IdentityFields| config.flights.facts(path, said, &config.document.identity);
+        let fallback =
+            |fields: &IdentityFields| config.flights.facts(path, fields, &config.document.identity);
         let id = ingest::log::companion_identity(path, config.base_mapping(), group, fallback)
             .map_err(|e| e.diagnostic().in_file(display_name))?;
         Ok((flight_of(&id), id.position))
@@ -392,7 +393,7 @@ fn check_not_ahead(identity: &Identity, now: Timestamp) -> Result<(), Diagnostic
 /// The identity that the log holds, completed from the flights table.
 fn identity_of(log: &Log, files: &LogFiles, config: &Config) -> Result<Identity, ingest::Error> {
     let path = files.main.first().map_or(Path::new(""), PathBuf::as_path);
-    log.identity(|said| config.flights.facts(path, said, &config.document.identity))
+    log.identity(|fields| config.flights.facts(path, fields, &config.document.identity))
 }
 
 type Mapped = (ActuatorColumns, Arc<Mapping>);
@@ -414,7 +415,7 @@ fn map_actuators(
     }
     let installed: BTreeSet<&PartNumber> = installations
         .units_on_tail(&id.tail_number, id.departure_utc)
-        .map(|stay| &stay.part_number)
+        .map(|installation| &installation.part_number)
         .collect();
     for part in installed.into_iter().filter(|part| config.has_overrides(part)) {
         let mapping = config.mapping(&id.tail_number, Some(part));

@@ -18,18 +18,18 @@ use crate::flight_log::{FlightLog, catch_panic};
 /// A diagnostic when the log cannot be read or identified.
 pub fn normalize(
     files: &LogFiles,
-    shown: &str,
+    log_path: &str,
     config: &Config,
     installations: &Installations,
     (folder, encoding): (&Path, Encoding),
 ) -> Result<(Vec<PathBuf>, Vec<Diagnostic>), Diagnostic> {
-    catch_panic(shown, || {
-        let opened = FlightLog::open(files, shown, config, installations)?;
+    catch_panic(log_path, || {
+        let opened = FlightLog::open(files, log_path, config, installations)?;
         let (mut written, mut diagnostics) = (Vec::new(), Vec::new());
         for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
             match one(&opened, at, config, installations, (folder, encoding)) {
                 Ok(file) => written.push(file),
-                Err(diagnostic) => diagnostics.push(diagnostic.in_file(shown)),
+                Err(diagnostic) => diagnostics.push(diagnostic.in_file(log_path)),
             }
         }
         Ok((written, diagnostics))
@@ -43,7 +43,7 @@ fn one(
     installations: &Installations,
     (folder, encoding): (&Path, Encoding),
 ) -> Result<PathBuf, Diagnostic> {
-    let (stay, part) = opened.unit(at, config, installations)?;
+    let (installation, part) = opened.unit(at, config, installations)?;
     let channels = opened.channels(at, part)?;
     let id = &opened.identity;
     let names = [id.tail_number.as_str(), id.flight_id.as_str(), at.position.as_str()].map(file_name);
@@ -51,9 +51,9 @@ fn one(
     let provenance = BTreeMap::from([
         ("source_log".to_owned(), opened.display_name().to_owned()),
         ("source_digest".to_owned(), opened.digest.clone()),
-        ("config_digest".to_owned(), config.digest(&id.tail_number, &stay.part_number).to_string()),
-        ("part_number".to_owned(), stay.part_number.to_string()),
-        ("serial_number".to_owned(), stay.serial_number.to_string()),
+        ("config_digest".to_owned(), config.digest(&id.tail_number, &installation.part_number).to_string()),
+        ("part_number".to_owned(), installation.part_number.to_string()),
+        ("serial_number".to_owned(), installation.serial_number.to_string()),
     ]);
     ingest::log::normalized::write(&file, &channels, id, part.geometry, &provenance, encoding)
         .map_err(|e| e.diagnostic())?;

@@ -46,7 +46,7 @@ pub struct ParamComparison {
 }
 
 impl IdentifiedParams {
-    /// Of one actuator, whose flanks the contact regression may have found. What the flight does not show stays open.
+    /// Parameters of one actuator; `None` for those that the flight does not identify.
     pub fn of(channels: &ActuatorChannels, found: Option<&ContactEstimate>) -> Self {
         let [motor, screw, _] = &channels.quality;
         let motor_noise = white_noise(&channels.motor_m, motor.resolution);

@@ -1,4 +1,4 @@
-//! What the filter saw, per sample: for a person who wants to look.
+//! Trace: inputs and outputs of the filter, sample by sample.
 
 use estimator::InnovationBuffers;
 use ingest::LogFiles;
@@ -78,7 +78,7 @@ impl Trace {
 /// Which flank was pressed at each sample, as the contact regression saw it.
 fn flanks(channels: &ingest::ActuatorChannels, part: &Part, count: usize) -> Result<Vec<f64>, Diagnostic> {
     let mut pressed = vec![0.0; count];
-    for touch in estimate::picture(channels, part)?.iter().flat_map(|picture| &picture.touches) {
+    for touch in estimate::plot_data(channels, part)?.iter().flat_map(|picture| &picture.touches) {
         let at = |time_s: f64| ((time_s / channels.step_s).round().max(0.0) as usize).min(count);
         let half_s = 0.5 * touch.duration_s;
         pressed[at(touch.time_s - half_s)..at(touch.time_s + half_s)].fill(touch.flank.sign());
@@ -86,20 +86,20 @@ fn flanks(channels: &ingest::ActuatorChannels, part: &Part, count: usize) -> Res
     Ok(pressed)
 }
 
-/// Traces every actuator of a log: as booked, or all as one part.
+/// Traces every actuator of a log: as installed, or all as one part.
 ///
 /// # Errors
 /// A diagnostic when the log or an actuator in it cannot be read.
 pub fn of_log(
     files: &LogFiles,
-    shown: &str,
+    log_path: &str,
     config: &Config,
     installations: &Installations,
     part: Option<&PartNumber>,
 ) -> Result<Trace, Diagnostic> {
     let mut whole = Trace::default();
-    flight_log::for_each_actuator(files, shown, config, installations, part, |channels, part| {
-        whole.extend(Trace::of(shown, channels, part)?);
+    flight_log::for_each_actuator(files, log_path, config, installations, part, |channels, part| {
+        whole.extend(Trace::of(log_path, channels, part)?);
         Ok(())
     })?;
     Ok(whole)

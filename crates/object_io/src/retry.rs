@@ -76,10 +76,10 @@ impl RetryingStore {
     /// that a body truncated together with its `Content-Length` is detected.
     async fn without_range(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
         let ranged = GetOptions { range: Some(GetRange::Offset(0)), ..options.clone() };
-        match self.whole(location, ranged).await {
+        match self.complete_body(location, ranged).await {
             // An empty object has no range.
             Err(error @ Error::Generic { .. }) => match self.inner.head(location).await {
-                Ok(meta) if meta.size == 0 => self.whole(location, options).await,
+                Ok(meta) if meta.size == 0 => self.complete_body(location, options).await,
                 _ => Err(error),
             },
             answer => answer,
@@ -87,7 +87,7 @@ impl RetryingStore {
     }
 
     /// One response with its complete body, length checked.
-    async fn whole(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
+    async fn complete_body(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
         let is_head = options.head;
         let answer = self.inner.get_opts(location, options).await?;
         if is_head {
@@ -158,7 +158,7 @@ impl ObjectStore for RetryingStore {
         if options.range.is_none() && !options.head {
             return self.with_retry(|| self.without_range(location, options.clone())).await;
         }
-        self.with_retry(|| self.whole(location, options.clone())).await
+        self.with_retry(|| self.complete_body(location, options.clone())).await
     }
 
     fn delete_stream(&self, locations: BoxStream<'static, Result<Path>>) -> BoxStream<'static, Result<Path>> {

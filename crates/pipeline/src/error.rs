@@ -1,20 +1,20 @@
-//! Why a run could not be made at all; what is wrong with single logs is in its account.
+//! Errors that end a run; errors of single logs are in the run summary.
 
 use records::Diagnostic;
 
-/// What ends a run before or in the middle of its work.
+/// Error that ends a run.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Configuration, tables or the request are wrong: nothing was run.
+    /// Configuration, tables or the request are wrong: nothing was processed.
     #[error("{} errors in configuration or tables", .0.len())]
     Refused(Vec<Diagnostic>),
     /// The store cannot be read or written: what was stored before is intact.
     #[error(transparent)]
     Store(#[from] store::Error),
-    /// An object store does not answer.
+    /// An object store is not reachable.
     #[error(transparent)]
     Objects(#[from] object_io::Error),
-    /// A history or a limit cannot be judged.
+    /// A history or a limit is invalid.
     #[error("a trend cannot be stated: {0}")]
     Trend(#[from] trend::Error),
     /// A page cannot be made.
@@ -31,7 +31,7 @@ pub enum Error {
     /// Rows cannot be made.
     #[error("rows cannot be made: {0}")]
     Rows(#[from] arrow::error::ArrowError),
-    /// The engine that does the logs elsewhere failed, or gave an answer that cannot be read.
+    /// The engine of a distributed run failed, or its result cannot be read.
     #[error("the engine that does the logs failed: {0}")]
     Engine(String),
     /// Workers cannot be started.

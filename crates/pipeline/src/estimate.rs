@@ -1,4 +1,4 @@
-//! Estimates ad hoc: logs, or arrays, to rows without a store.
+//! Estimates without a store: from logs or arrays to rows.
 
 use std::path::Path;
 
@@ -35,8 +35,8 @@ records::row! {
     order = <GapRecord as Row>::order
 }
 
-/// Estimates every actuator of a log: as booked, or all as one part. What is wrong with the log, or with single
-/// actuators of it, goes to `diagnostics`.
+/// Estimates every actuator of a log: as installed, or all as one part. Errors of the log, or of single actuators, go
+/// to `diagnostics`.
 ///
 /// # Errors
 /// As [`discover::log_containing`].
@@ -48,13 +48,13 @@ pub fn estimate(
     program_version: &str,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Result<Vec<EstimateRow>, Error> {
-    let shown = path.display().to_string();
+    let log_path = path.display().to_string();
     let read = match part {
-        Some(number) => catch_panic(&shown, || as_part(path, &shown, config, number, program_version)),
+        Some(number) => catch_panic(&log_path, || as_part(path, &log_path, config, number, program_version)),
         None => {
             let files = discover::log_containing(config, path)?;
-            catch_panic(&shown, || {
-                booked(&files, &shown, config, installations, program_version, diagnostics)
+            catch_panic(&log_path, || {
+                as_installed(&files, &log_path, config, installations, program_version, diagnostics)
             })
         }
     };
@@ -66,12 +66,12 @@ pub fn estimate(
 
 fn as_part(
     path: &Path,
-    shown: &str,
+    log_path: &str,
     config: &Config,
     number: &PartNumber,
     program_version: &str,
 ) -> Result<Vec<EstimateRow>, Diagnostic> {
-    let found = estimate_unidentified(&LogFiles::one(path), shown, config, part_of(config, number)?)?;
+    let found = estimate_unidentified(&LogFiles::one(path), log_path, config, part_of(config, number)?)?;
     let row = |(position, estimate): (Position, GapEstimate)| EstimateRow {
         tail_number: None,
         position: Some(position.to_string()),
@@ -82,7 +82,7 @@ fn as_part(
         flight_hours: None,
         tail_hours_end: None,
         estimate,
-        log_path: Some(shown.to_owned()),
+        log_path: Some(log_path.to_owned()),
         log_digest: None,
         config_digest: config.digest_of_part(number),
         program_version: program_version.to_owned(),
@@ -90,38 +90,38 @@ fn as_part(
     Ok(found.into_iter().map(row).collect())
 }
 
-fn booked(
+fn as_installed(
     files: &LogFiles,
-    shown: &str,
+    log_path: &str,
     config: &Config,
     installations: &Installations,
     program_version: &str,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Result<Vec<EstimateRow>, Diagnostic> {
-    let opened = FlightLog::open(files, shown, config, installations)?;
+    let opened = FlightLog::open(files, log_path, config, installations)?;
     let flight = opened.flight();
     let mut rows = Vec::new();
     for at in opened.actuators(installations) {
         match opened
             .unit(at, config, installations)
-            .and_then(|(stay, part)| Ok((stay, opened.estimate(at, part, config)?)))
+            .and_then(|(installation, part)| Ok((installation, opened.estimate(at, part, config)?)))
         {
-            Ok((stay, estimate)) => rows.push(EstimateRow {
+            Ok((installation, estimate)) => rows.push(EstimateRow {
                 tail_number: Some(flight.tail_number.to_string()),
                 position: Some(at.position.to_string()),
-                part_number: Some(stay.part_number.to_string()),
-                serial_number: Some(stay.serial_number.to_string()),
+                part_number: Some(installation.part_number.to_string()),
+                serial_number: Some(installation.serial_number.to_string()),
                 flight_id: Some(flight.flight_id.to_string()),
                 departure_utc: Some(flight.departure_utc),
                 flight_hours: flight.flight_hours,
                 tail_hours_end: flight.tail_hours_end,
                 estimate,
-                log_path: Some(shown.to_owned()),
+                log_path: Some(log_path.to_owned()),
                 log_digest: Some(opened.digest.clone()),
-                config_digest: config.digest(&flight.tail_number, &stay.part_number).to_string(),
+                config_digest: config.digest(&flight.tail_number, &installation.part_number).to_string(),
                 program_version: program_version.to_owned(),
             }),
-            Err(diagnostic) => diagnostics.push(diagnostic.in_file(shown)),
+            Err(diagnostic) => diagnostics.push(diagnostic.in_file(log_path)),
         }
     }
     Ok(rows)

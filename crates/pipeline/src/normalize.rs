@@ -34,10 +34,10 @@ pub fn normalize(
 ) -> Result<Normalized, Error> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
     watch(Event::Planned { logs: logs.len(), bytes: 0 });
-    let one = |(files, shown): &(LogFiles, String)| {
-        let done = job::normalize::normalize(files, shown, config, installations, (folder, encoding));
+    let one = |(files, log_path): &(LogFiles, String)| {
+        let done = job::normalize::normalize(files, log_path, config, installations, (folder, encoding));
         let done = done.unwrap_or_else(|diagnostic| (Vec::new(), vec![diagnostic]));
-        let (log, diagnostics) = (shown.clone(), done.1.clone());
+        let (log, diagnostics) = (log_path.clone(), done.1.clone());
         watch(Event::Finished { log, bytes: 0, estimated: done.0.len(), refused: 0, diagnostics });
         done
     };

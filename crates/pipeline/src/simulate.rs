@@ -53,7 +53,7 @@ pub fn simulate(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
     pool.install(|| {
         (0..plan.flights.len()).into_par_iter().try_for_each(|index| {
-            let name = fly(&plan, index, folder)?;
+            let name = write_flight(&plan, index, folder)?;
             watch(Event::Finished { log: name, bytes: 0, estimated: 0, refused: 0, diagnostics: Vec::new() });
             Ok::<(), Error>(())
         })
@@ -66,7 +66,7 @@ pub fn simulate(
 }
 
 /// Flies one flight and writes its log: a column for each channel of each actuator.
-fn fly(plan: &Plan, index: usize, folder: &Path) -> Result<String, Error> {
+fn write_flight(plan: &Plan, index: usize, folder: &Path) -> Result<String, Error> {
     let planned = &plan.flights[index];
     let flight = plan.simulate_flight(index).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
     let mut columns = vec![("time_s".to_owned(), Column::Real(flight.time_s))];
@@ -122,18 +122,18 @@ fn recorded(unit: ChannelUnit) -> (&'static str, f64) {
 
 fn installations(plan: &Plan) -> String {
     let mut text = "tail_number,position,part_number,serial_number,installed_utc,removed_utc,unit_hours_at_install,tail_hours_at_install\n".to_owned();
-    for stay in &plan.installations {
-        let removed = stay.removed_us.map(|us| instant(us).to_string()).unwrap_or_default();
+    for installation in &plan.installations {
+        let removed = installation.removed_us.map(|us| instant(us).to_string()).unwrap_or_default();
         let _ = writeln!(
             text,
             "{},{},{},{},{},{removed},{:.1},{:.1}",
-            stay.tail_number,
-            stay.position,
-            stay.part_number,
-            stay.serial_number,
-            instant(stay.installed_us),
-            stay.unit_hours_at_install,
-            stay.tail_hours_at_install
+            installation.tail_number,
+            installation.position,
+            installation.part_number,
+            installation.serial_number,
+            instant(installation.installed_us),
+            installation.unit_hours_at_install,
+            installation.tail_hours_at_install
         );
     }
     text

@@ -136,7 +136,7 @@ fn every_number_of_the_report_is_that_of_the_assessments() {
 fn quantities_are_those_of_the_row(unit: &UnitView, row: &TrendRow) {
     let a = &unit.assessment;
     assert_eq!((a.state.as_deref(), &a.reason, a.trend.as_str()), (row.state, &row.reason, row.trend));
-    let shown = [
+    let log_path = [
         a.unit_hours,
         a.gap_m,
         a.gap_se_m,
@@ -176,7 +176,7 @@ fn quantities_are_those_of_the_row(unit: &UnitView, row: &TrendRow) {
         row.sen_low_m_per_hour,
         row.sen_high_m_per_hour,
     ];
-    assert_eq!(shown, stated);
+    assert_eq!(log_path, stated);
     assert_eq!(
         [a.not_before_utc, a.likely_utc, a.not_after_utc],
         [row.not_before_utc, row.likely_utc, row.not_after_utc]
@@ -229,7 +229,7 @@ fn removals_are_those_of_the_rows(report: &Report, rows: &BTreeMap<String, Trend
     let page = String::from_utf8(page.clone()).unwrap();
     let (_, table) = page.split_once("id=\"removals\"").unwrap();
     let (table, _) = table.split_once("</table>").unwrap();
-    let shown: Vec<(String, f64)> = table
+    let log_path: Vec<(String, f64)> = table
         .split("<th scope=\"row\">")
         .skip(1)
         .map(|row| {
@@ -237,7 +237,7 @@ fn removals_are_those_of_the_rows(report: &Report, rows: &BTreeMap<String, Trend
             (row[..7].to_owned(), number.parse().unwrap())
         })
         .collect();
-    assert_eq!((shown.len(), shown[0].0.as_str()), (12, "2025-02"));
+    assert_eq!((log_path.len(), log_path[0].0.as_str()), (12, "2025-02"));
     let probability = |row: &TrendRow, hours: f64| {
         let quantiles =
             [row.crossing_hours_p05, row.crossing_hours_p50, row.crossing_hours_p95].map(Option::unwrap);
@@ -250,10 +250,10 @@ fn removals_are_those_of_the_rows(report: &Report, rows: &BTreeMap<String, Trend
         let days = date.parse::<Timestamp>().unwrap().duration_since(as_of).as_secs_f64() / 86_400.0;
         rows.values().map(|row| probability(row, days.max(0.0) * row.hours_per_day.unwrap())).sum::<f64>()
     };
-    for pair in shown.windows(2) {
+    for pair in log_path.windows(2) {
         let [(month, expected), (next, _)] = pair else { unreachable!() };
         let calculated = until(&format!("{next}-01T00:00:00Z")) - until(&format!("{month}-01T00:00:00Z"));
         assert!((expected - calculated).abs() <= 0.0501, "{month}: {expected} on the page, {calculated}");
     }
-    assert!(shown.iter().map(|(_, expected)| expected).sum::<f64>() > 3.0, "{shown:?}");
+    assert!(log_path.iter().map(|(_, expected)| expected).sum::<f64>() > 3.0, "{log_path:?}");
 }

@@ -1,4 +1,4 @@
-//! The doors: each function of the module, arguments to a request and answer to a table.
+//! Functions of the module: arguments to a request, result to a table.
 #![expect(clippy::needless_pass_by_value, reason = "Python hands values over")]
 
 use std::path::PathBuf;
@@ -46,7 +46,7 @@ fn instant(py: Python<'_>, text: Option<&str>) -> PyResult<Option<jiff::Timestam
     read.map_err(|what| config_error(py, Diagnostic::new("bad_time", what)))
 }
 
-/// Estimates logs: as installations, or all as one part.
+/// Estimates logs: as installed, or all as one part.
 #[pyfunction]
 #[pyo3(signature = (logs, config, part_number=None))]
 pub(crate) fn estimate(
@@ -93,7 +93,7 @@ pub(crate) fn estimate_arrays(
     Ok(Table::of(to_nullable_batch(&[found]).map_err(|e| to_run_exception(py, e.into()))?))
 }
 
-/// What the filter saw of a log, sample by sample.
+/// Inputs and outputs of the filter of a log, sample by sample.
 #[pyfunction]
 #[pyo3(signature = (log, config, part_number=None))]
 pub(crate) fn trace(
@@ -107,14 +107,14 @@ pub(crate) fn trace(
     let installations = if number.is_some() { &no_installations } else { config.installations(py)? };
     let files = pipeline::run::discover::log_containing(&config.inner, &log)
         .map_err(|error| to_run_exception(py, error))?;
-    let shown = log.display().to_string();
+    let log_path = log.display().to_string();
     let seen =
-        py.detach(|| job::trace::of_log(&files, &shown, &config.inner, installations, number.as_ref()));
+        py.detach(|| job::trace::of_log(&files, &log_path, &config.inner, installations, number.as_ref()));
     let columns = seen.map_err(|diagnostic| to_exception(py, ExceptionClass::Log, &[diagnostic]))?.columns();
     Ok(Table::of(ingest::parquet::writer::batch(&columns).map_err(|e| arrow_error(&e))?))
 }
 
-/// Trends: of the store, or of estimates made elsewhere; one row for each unit, or for each query.
+/// Trends of the store, or of an external estimates table; one row for each unit, or for each query.
 #[pyfunction]
 #[pyo3(signature = (estimates, config, tail, serial, part_number, as_of, queries, statistics))]
 #[expect(clippy::too_many_arguments, reason = "they are Python's keywords")]
@@ -156,7 +156,7 @@ fn assess(
         (None, None) => {
             return assess::assess_store(config, installations, &Store::open(config.store())?, ask);
         }
-        (Some(batches), _) => external_estimates::gathered(&chunks(batches))?,
+        (Some(batches), _) => external_estimates::from_batches(&chunks(batches))?,
         (None, Some(_)) => assess::load_histories(&Store::open(config.store())?)?,
     };
     match queries_table {
@@ -165,7 +165,7 @@ fn assess(
             config,
             installations,
             histories,
-            &external_estimates::asked(queries_table)?,
+            &external_estimates::queries_of(queries_table)?,
             ask.statistics,
         ),
     }

@@ -35,7 +35,7 @@ pub(crate) fn empty_result() -> Table {
     Table::of(RecordBatch::new_empty(distributed::schema()))
 }
 
-/// The nightly run with its logs done by `engine`, which is estimate_batches tasks and brings an Arrow table of answers; the
+/// Run whose logs are processed by `engine`, which receives batches of tasks and returns an Arrow table of results; the
 /// run's account as JSON.
 #[pyfunction]
 #[pyo3(signature = (config, engine, at_a_time, redo, retry, wait_s))]

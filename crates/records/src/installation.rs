@@ -114,14 +114,17 @@ impl Installations {
         position: &Position,
         at: Timestamp,
     ) -> Option<&Installation> {
-        let rows = &self.rows[self.rows.partition_point(|stay| place(stay) < (tail, position))..];
-        rows.iter().take_while(|stay| place(stay) == (tail, position)).find(|stay| stay.covers(at))
+        let rows =
+            &self.rows[self.rows.partition_point(|installation| place(installation) < (tail, position))..];
+        rows.iter()
+            .take_while(|installation| place(installation) == (tail, position))
+            .find(|installation| installation.covers(at))
     }
 
     /// Every unit installed on that tail at that instant, by position.
     pub fn units_on_tail(&self, tail: &TailNumber, at: Timestamp) -> impl Iterator<Item = &Installation> {
-        // No two stays in one position cover one instant.
-        self.of_tail(tail).iter().filter(move |stay| stay.covers(at))
+        // No two installations of one position cover one instant.
+        self.of_tail(tail).iter().filter(move |installation| installation.covers(at))
     }
 
     /// Whether the table has an installation on that tail.
@@ -135,25 +138,25 @@ impl Installations {
     }
 
     fn of_tail(&self, tail: &TailNumber) -> &[Installation] {
-        let first = self.rows.partition_point(|stay| stay.tail_number < *tail);
-        let count = self.rows[first..].partition_point(|stay| stay.tail_number == *tail);
+        let first = self.rows.partition_point(|installation| installation.tail_number < *tail);
+        let count = self.rows[first..].partition_point(|installation| installation.tail_number == *tail);
         &self.rows[first..first + count]
     }
 }
 
-fn place(stay: &Installation) -> (&TailNumber, &Position) {
-    (&stay.tail_number, &stay.position)
+fn place(installation: &Installation) -> (&TailNumber, &Position) {
+    (&installation.tail_number, &installation.position)
 }
 
-/// Start and end, the end of a unit that is still installed last: a stay without length is before one that follows.
-fn period(stay: &Installation) -> (Timestamp, Timestamp) {
-    (stay.installed_utc, stay.removed_utc.unwrap_or(Timestamp::MAX))
+/// Start and end, the end of a unit that is still installed last: an installation without length is before one that follows.
+fn period(installation: &Installation) -> (Timestamp, Timestamp) {
+    (installation.installed_utc, installation.removed_utc.unwrap_or(Timestamp::MAX))
 }
 
-fn reversed(row: usize, stay: &Installation) -> Option<Error> {
-    let removed = stay.removed_utc.filter(|removed| *removed < stay.installed_utc)?;
-    let serial = stay.serial_number.clone();
-    Some(Error::Reversed { row, serial, installed: stay.installed_utc, removed })
+fn reversed(row: usize, installation: &Installation) -> Option<Error> {
+    let removed = installation.removed_utc.filter(|removed| *removed < installation.installed_utc)?;
+    let serial = installation.serial_number.clone();
+    Some(Error::Reversed { row, serial, installed: installation.installed_utc, removed })
 }
 
 /// Pairs of row numbers, counted from 1, that claim the same key at the same time.
@@ -181,7 +184,7 @@ mod tests {
 
     use super::*;
 
-    fn stay(tail: &str, position: &str, serial: &str, from: &str, to: Option<&str>) -> Installation {
+    fn installation(tail: &str, position: &str, serial: &str, from: &str, to: Option<&str>) -> Installation {
         Installation {
             tail_number: TailNumber::new(tail).unwrap(),
             position: Position::new(position).unwrap(),
@@ -200,7 +203,10 @@ mod tests {
 
     #[test]
     fn a_unit_owns_the_instant_it_is_installed_and_not_the_one_it_leaves() {
-        let rows = vec![stay("N1", "aileron", "A", JAN, Some(FEB)), stay("N1", "aileron", "B", FEB, None)];
+        let rows = vec![
+            installation("N1", "aileron", "A", JAN, Some(FEB)),
+            installation("N1", "aileron", "B", FEB, None),
+        ];
         let table = Installations::new(rows).unwrap();
         let tail = TailNumber::new("N1").unwrap();
         let place = Position::new("aileron").unwrap();
@@ -213,21 +219,28 @@ mod tests {
 
     #[test]
     fn two_units_in_one_position_are_named_by_row() {
-        let rows = vec![stay("N1", "aileron", "A", JAN, None), stay("N1", "aileron", "B", FEB, None)];
+        let rows = vec![
+            installation("N1", "aileron", "A", JAN, None),
+            installation("N1", "aileron", "B", FEB, None),
+        ];
         let errors = Installations::new(rows).unwrap_err();
         assert!(matches!(errors[..], [Error::PositionTaken { row: 1, other: 2, .. }]), "{errors:?}");
     }
 
     #[test]
     fn one_unit_in_two_places_is_refused_even_across_tails() {
-        let rows = vec![stay("N1", "aileron", "A", JAN, Some(MAR)), stay("N2", "aileron", "A", FEB, None)];
+        let rows = vec![
+            installation("N1", "aileron", "A", JAN, Some(MAR)),
+            installation("N2", "aileron", "A", FEB, None),
+        ];
         let errors = Installations::new(rows).unwrap_err();
         assert!(matches!(errors[..], [Error::UnitTwice { row: 1, other: 2, .. }]), "{errors:?}");
     }
 
     #[test]
     fn a_stay_that_ends_before_it_begins_is_refused() {
-        let errors = Installations::new(vec![stay("N1", "aileron", "A", MAR, Some(JAN))]).unwrap_err();
+        let errors =
+            Installations::new(vec![installation("N1", "aileron", "A", MAR, Some(JAN))]).unwrap_err();
         assert!(matches!(errors[0], Error::Reversed { row: 1, .. }));
     }
 
@@ -237,7 +250,7 @@ mod tests {
         fn row_order_does_not_matter(order in Just((0..6).collect::<Vec<usize>>()).prop_shuffle(), day in 0_i64..180) {
             let months: Vec<String> = (1..=7).map(|m| format!("2026-{m:02}-01T00:00:00Z")).collect();
             let rows: Vec<_> = (0..6).map(|i| {
-                stay("N1", "aileron", &format!("S{i}"), &months[i], Some(&months[i + 1]))
+                installation("N1", "aileron", &format!("S{i}"), &months[i], Some(&months[i + 1]))
             }).collect();
             let shuffled = order.iter().map(|&i| rows[i].clone()).collect();
             let (one, other) = (Installations::new(rows).unwrap(), Installations::new(shuffled).unwrap());

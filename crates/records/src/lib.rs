@@ -11,9 +11,10 @@ pub mod installation;
 pub mod log_record;
 pub mod row_schema;
 pub mod run_record;
-mod sample_time;
 pub mod sanitize;
+pub mod time;
 pub mod trend_row;
+pub mod uncertainty;
 
 pub use diagnostic::Diagnostic;
 pub use flight::Flight;
@@ -22,5 +23,5 @@ pub use ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 pub use installation::{Installation, Installations};
 pub use log_record::{LogOutcome, LogRecord};
 pub use run_record::RunRecord;
-pub use sample_time::sample_time_s;
+pub use time::sample_time_s;
 pub use trend_row::{ChangePoint, TrendRow};

@@ -2,7 +2,7 @@
 //!
 //! [`row!`](crate::row) and [`stored_row!`](crate::stored_row) declare a row type. Each field is a column: its name
 //! is the column's name, its type the column's type, its doc comment the column's documentation. A field whose type
-//! is itself a row type stands for the columns of that type.
+//! is itself a row type has the columns of that type.
 //!
 //! ```
 //! use records::row_schema;
@@ -143,7 +143,7 @@ macro_rules! row {
             fn arrays(rows: &[&Self]) -> $crate::row_schema::Arrays {
                 let mut arrays = Vec::new();
                 $(
-                    let cells: Vec<&$type> = rows.iter().map(|row| &row.$field).collect();
+                    let cells: Vec<_> = rows.iter().map(|row| &row.$field).collect();
                     arrays.extend(<$type as $crate::row_schema::Cells>::arrays(&cells));
                 )*
                 arrays

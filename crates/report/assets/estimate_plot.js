@@ -32,7 +32,7 @@
         hooks: hooks
       }, [data.time_s].concat(names.map(function (n) { return data[n]; })), live);
     };
-    var charts = [chart(["dx_um", "s_um"], 300, "µm from the middle", { setCursor: [show], draw: [bounds] }), chart(["load_kn"], 180, "load kN", { setCursor: [show] })];
+    var charts = [chart(["dx_um", "s_um"], 300, "backlash S, δX [µm]", { setCursor: [show], draw: [bounds] }), chart(["load_kn"], 180, "load [kN]", { setCursor: [show] })];
     charts.forEach(function (c) { sync(k).sub(c); });
     window.addEventListener("resize", function () { charts.forEach(function (c) { c.setSize({ width: Math.max(live.clientWidth, 260), height: c.height }); }); });
   });

@@ -2,6 +2,7 @@
 
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
+use records::uncertainty::NORMAL_95;
 
 /// Text for a missing value.
 pub(crate) const NO_DATA: &str = "no data";
@@ -23,7 +24,7 @@ pub(crate) fn micrometres_cell(m: Option<f64>) -> String {
 /// `118.0 ± 4.1 µm (90 %)`: the gap and half the width of its 90 % interval.
 pub(crate) fn level(gap_m: Option<f64>, se_m: Option<f64>) -> String {
     match (gap_m, se_m) {
-        (Some(gap), Some(se)) => format!("{} ± {} µm (90 %)", micrometres(gap), micrometres(1.645 * se)),
+        (Some(gap), Some(se)) => format!("{} ± {} µm (90 %)", micrometres(gap), micrometres(NORMAL_95 * se)),
         (Some(gap), None) => format!("{} µm", micrometres(gap)),
         _ => NO_DATA.to_owned(),
     }
@@ -84,11 +85,6 @@ pub(crate) fn month(from: Timestamp, months: i32) -> Option<Timestamp> {
 /// `2026-11`.
 pub(crate) fn month_name(t: Timestamp) -> String {
     t.strftime("%Y-%m").to_string()
-}
-
-/// Days between two instants.
-pub(crate) fn days_between(from: Timestamp, to: Timestamp) -> f64 {
-    to.duration_since(from).as_secs_f64() / 86_400.0
 }
 
 #[cfg(test)]

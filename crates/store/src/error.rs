@@ -1,4 +1,4 @@
-//! What can be wrong with a store, and what to do about it.
+//! Errors of the store, with their remedies.
 
 use std::io::ErrorKind;
 use std::path::PathBuf;
@@ -50,7 +50,7 @@ pub enum Error {
     /// A column is not there or has another type.
     #[error("column `{column}` {problem}")]
     Column { column: String, problem: String },
-    /// A value cannot be what it stands for.
+    /// A value is not valid in its column.
     #[error("column `{column}`, row {row}: {problem}")]
     Value { column: &'static str, row: usize, problem: String },
     /// The engine that reads data files gave up.

@@ -1,4 +1,4 @@
-//! What can be wrong with a history or with the settings it is judged by.
+//! Errors of histories and settings.
 
 /// Why a series, a statistic or a trend could not be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

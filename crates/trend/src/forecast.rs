@@ -9,14 +9,12 @@ use crate::inference::consistency::fit_consistent;
 use crate::inference::posterior::{Posterior, mean_growth};
 use crate::inference::segment_fit::process_variance;
 use crate::learning::calibrate::forecast_quantiles;
+use crate::math::distributions::NORMAL_95;
 use crate::prior::calibration_params::CalibrationParams;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
 use crate::statement::history;
 use crate::statement::types::MIN_ESTIMATES;
-
-/// Standard deviations from the middle to a 5 or 95 % bound.
-const Z90: f64 = 1.645;
 
 /// A gap and its 90 % interval, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +33,7 @@ pub struct Interval {
 pub struct Forecast {
     /// The smoothed level at mean departures of neighbouring flights, microseconds since 1970 UTC.
     pub past: Vec<(i64, Interval)>,
-    /// The gap after so many more flight hours.
+    /// Gap after a number of further flight hours.
     pub ahead: Vec<(f64, Interval)>,
 }
 
@@ -114,13 +112,13 @@ fn levels(segment: &Segment<'_>, fitted: &Posterior, prior: &FleetPrior) -> Vec<
     let bins = bins::bin(segment.estimates, BINS);
     let grown_m = |usage: f64| mean_growth(&fitted.components, usage);
     let curve_m: Vec<f64> = bins.iter().map(|b| grown_m(b.usage - segment.begin)).collect();
-    let beside_m = bins
+    let residual_m = bins
         .iter()
         .zip(&curve_m)
         .map(|(b, curve_m)| b.gap_m - prior.season.mean_m * prior.season.wave(b.departure_us) - curve_m);
-    let smooth = smoothed(&bins, beside_m, &process_variance(&bins, segment.begin, prior, grown_m));
-    let level = |((bin, curve_m), (beside_m, variance_m2)): ((&Bin, &f64), (f64, f64))| {
-        let (m, half_m) = (curve_m + beside_m, Z90 * (variance_m2 + prior.bias_sd_m.powi(2)).sqrt());
+    let smooth = smoothed(&bins, residual_m, &process_variance(&bins, segment.begin, prior, grown_m));
+    let level = |((bin, curve_m), (residual_m, variance_m2)): ((&Bin, &f64), (f64, f64))| {
+        let (m, half_m) = (curve_m + residual_m, NORMAL_95 * (variance_m2 + prior.bias_sd_m.powi(2)).sqrt());
         (bin.departure_us as i64, Interval { p05_m: m - half_m, m, p95_m: m + half_m })
     };
     bins.iter().zip(&curve_m).zip(smooth).map(level).collect()

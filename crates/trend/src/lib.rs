@@ -69,5 +69,6 @@ pub use settings::Settings;
 pub use statement::assessment::Assessment;
 pub use statement::state::{Reason, State};
 pub use statement::types::{
-    ChangePoint, ChangePointKind, Crossing, Level, MIN_ESTIMATES, Rate, Utilization, WearClass, WearStatus,
+    ChangePoint, ChangePointKind, Crossing, Level, MIN_ESTIMATES, Rate, Utilization, WearStatus,
 };
+pub use wear::bank::WearClass;

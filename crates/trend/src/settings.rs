@@ -1,4 +1,4 @@
-//! The limits a trend is judged by.
+//! Limits and horizons of an assessment.
 
 use crate::error::Error;
 
@@ -23,7 +23,7 @@ pub struct Settings {
 
 impl Settings {
     /// Settings for an act limit: watch at 80 % of it, planning 500 h, horizon 20,000 h, checks
-    /// every 300 h, changes watched for 30 days, stale after 45.
+    /// every 300 h, changes watched for 30 days, stale after 30.
     pub fn for_limit(limit_m: f64) -> Self {
         Self {
             limit_m,
@@ -32,11 +32,11 @@ impl Settings {
             horizon_hours: 20_000.0,
             check_interval_hours: 300.0,
             change_watch_days: 30.0,
-            stale_after_days: 45.0,
+            stale_after_days: 30.0,
         }
     }
 
-    /// Refuses settings nothing can be judged by.
+    /// Checks that all settings are positive and ordered.
     ///
     /// # Errors
     /// [`Error::Setting`] for a value that is not positive and finite, [`Error::LimitOrder`].

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use jiff::Timestamp;
 use job::Config;
-use pipeline::fleet_trends::assess;
+use pipeline::fleet_trends::assess::{self, UnitSelection};
 use pipeline::history::histories::Histories;
 use records::Installations;
 use store::Store;
@@ -101,24 +101,28 @@ impl KnownNames {
 
     /// Tail numbers.
     pub(crate) fn tails(&self) -> impl Iterator<Item = &str> {
-        self.histories.tails().chain(self.installations.iter().map(|stay| stay.tail_number.as_str()))
+        self.histories
+            .tails()
+            .chain(self.installations.iter().map(|installation| installation.tail_number.as_str()))
     }
 
     /// Positions.
     pub(crate) fn positions(&self) -> impl Iterator<Item = &str> {
-        self.histories.positions().chain(self.installations.iter().map(|stay| stay.position.as_str()))
+        self.histories
+            .positions()
+            .chain(self.installations.iter().map(|installation| installation.position.as_str()))
     }
 
     /// Serial numbers.
     pub(crate) fn serials(&self) -> impl Iterator<Item = &str> {
         let stored = self.histories.names().map(|(_, serial)| serial.as_str());
-        stored.chain(self.installations.iter().map(|stay| stay.serial_number.as_str()))
+        stored.chain(self.installations.iter().map(|installation| installation.serial_number.as_str()))
     }
 
     /// Part numbers.
     pub(crate) fn parts(&self) -> impl Iterator<Item = &str> {
         let stored = self.histories.names().filter_map(|(part, _)| part.as_deref());
-        stored.chain(self.installations.iter().map(|stay| stay.part_number.as_str()))
+        stored.chain(self.installations.iter().map(|installation| installation.part_number.as_str()))
     }
 
     /// Flights.
@@ -126,6 +130,17 @@ impl KnownNames {
         self.histories.iter().flat_map(|(_, history)| {
             history.flights().iter().filter_map(move |flown| history.flight_id(flown))
         })
+    }
+
+    /// What was searched, as text: the departures in the store.
+    pub(crate) fn searched(&self) -> String {
+        let day = |at: Timestamp| at.strftime("%Y-%m-%d").to_string();
+        match (self.histories.oldest_utc(), self.histories.newest_utc()) {
+            (Some(oldest), Some(newest)) => {
+                format!("the departures in the store are from {} to {}", day(oldest), day(newest))
+            }
+            _ => "the store has no departures".to_owned(),
+        }
     }
 
     /// Refuses the first name of a selection of units that is unknown.
@@ -139,6 +154,18 @@ impl KnownNames {
         check_name("serial number", serial, self.serials())?;
         check_name("part number", part, self.parts())
     }
+}
+
+/// A selection of units as text.
+pub(crate) fn selection(ask: &UnitSelection) -> String {
+    let named = |what: &str, name: &Option<String>| name.as_ref().map(|name| format!(" of {what} {name}"));
+    let parts = [
+        named("tail", &ask.tail_number),
+        named("serial number", &ask.serial_number),
+        named("part number", &ask.part_number),
+        ask.as_of_utc.map(|as_of| format!(" until {as_of}")),
+    ];
+    parts.into_iter().flatten().collect()
 }
 
 /// Path as text for messages.

@@ -51,7 +51,7 @@ fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
 }
 
 simd_dispatch! {
-    /// How many blocks from here stay on a side, or between the two: nearly all.
+    /// Number of blocks from here on that stay on one side, or between the two sides.
     fn run_length_on_side(load_n: &[f64], side: f64) -> usize {
         let (blocks, _) = load_n.as_chunks::<BLOCK>();
         let mut count = 0;
@@ -70,7 +70,7 @@ simd_dispatch! {
 }
 
 /// Loads that brackets are laid by.
-const LOOKS: usize = 2048;
+const SUBSAMPLE_SIZE: usize = 2048;
 /// Fewer loads for each of those are put in order at once.
 const WORTH_LOOKING: usize = 16;
 /// Half width of a bracket in the order of those loads: five standard deviations of a rank, or somewhat more.
@@ -91,14 +91,14 @@ pub(crate) fn quantiles<const N: usize>(
         let last = all.len().checked_sub(1)?;
         Some(shares.map(|share| *all.select_nth_unstable_by(rank(last, share), f64::total_cmp).1))
     };
-    let stride = segments.iter().map(Range::len).sum::<usize>() / LOOKS + 1;
+    let stride = segments.iter().map(Range::len).sum::<usize>() / SUBSAMPLE_SIZE + 1;
     if stride < WORTH_LOOKING {
         return in_order();
     }
     let every = |s: &Range<usize>| load_n[s.clone()].iter().step_by(stride).copied();
-    let mut looks: Vec<f64> = segments.iter().flat_map(every).filter(|f| !f.is_nan()).collect();
-    looks.sort_unstable_by(f64::total_cmp);
-    let mut brackets = shares.map(|share| QuantileBracket::about(share, &looks));
+    let mut subsample: Vec<f64> = segments.iter().flat_map(every).filter(|f| !f.is_nan()).collect();
+    subsample.sort_unstable_by(f64::total_cmp);
+    let mut brackets = shares.map(|share| QuantileBracket::about(share, &subsample));
     let count: usize =
         segments.iter().map(|segment| count_into_brackets(&load_n[segment.clone()], &mut brackets)).sum();
     let last = count.checked_sub(1)?;
@@ -139,10 +139,10 @@ struct QuantileBracket {
 }
 
 impl QuantileBracket {
-    fn about(share: f64, looks: &[f64]) -> Self {
-        let at = rank(looks.len().saturating_sub(1), share);
-        let least = at.checked_sub(HALF_BRACKET).map_or(f64::NEG_INFINITY, |k| looks[k]);
-        let greatest = looks.get(at + HALF_BRACKET).copied().unwrap_or(f64::INFINITY);
+    fn about(share: f64, subsample: &[f64]) -> Self {
+        let at = rank(subsample.len().saturating_sub(1), share);
+        let least = at.checked_sub(HALF_BRACKET).map_or(f64::NEG_INFINITY, |k| subsample[k]);
+        let greatest = subsample.get(at + HALF_BRACKET).copied().unwrap_or(f64::INFINITY);
         Self { share, least, greatest, below: 0, within: Vec::new() }
     }
 
@@ -200,7 +200,7 @@ mod tests {
         check(&all[..77]);
     }
 
-    /// A load that swings ever more slowly under noise, with a hole: one sample after the other, by hand.
+    /// A load that oscillates with a falling frequency under noise, with a gap in the data, counted sample by sample.
     #[test]
     fn reversals_are_those_of_one_sample_after_the_other() {
         for count in [0, 1, 7, 8, 9, 5000] {
@@ -220,7 +220,7 @@ mod tests {
     /// The subsample is every forty-ninth load: here only these differ from the rest.
     #[test]
     fn quantiles_hold_where_the_looks_mislead() {
-        let stride = 100_000 / LOOKS + 1;
+        let stride = 100_000 / SUBSAMPLE_SIZE + 1;
         check(&(0..100_000).map(|k| if k % stride == 0 { 1e6 } else { k as f64 }).collect::<Vec<_>>());
     }
 }

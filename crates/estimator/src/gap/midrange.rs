@@ -64,11 +64,11 @@ pub fn estimate(samples: &Samples<'_>, filter: &Filter) -> Result<MidRangeEstima
 pub fn estimate_with(
     samples: &Samples<'_>,
     schedule: &GainSchedule,
-    room: &mut FilterWorkspace,
+    workspace: &mut FilterWorkspace,
 ) -> Result<MidRangeEstimate, Error> {
     let load = load_band::load_band(samples.load_n, samples.segments);
-    let (nis, _) = schedule.filter_with(samples, None, room)?;
-    let gap = statistic::mid_range(room.s_m())?;
+    let (nis, _) = schedule.filter_with(samples, None, workspace)?;
+    let gap = statistic::mid_range(workspace.s_m())?;
     let load = load.ok_or(Error::NothingMeasured)?;
     Ok(MidRangeEstimate { gap, load, nis, samples: gap.upper + gap.lower })
 }

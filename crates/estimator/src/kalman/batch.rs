@@ -49,9 +49,9 @@ impl GainSchedule {
         samples: &Samples<'_>,
         innovations: Option<&mut InnovationBuffers>,
     ) -> Result<FilterOutput, Error> {
-        let mut room = FilterWorkspace::default();
-        let (nis, measured) = self.filter_with(samples, innovations, &mut room)?;
-        Ok(FilterOutput { s_m: room.s_m, nis, measured })
+        let mut workspace = FilterWorkspace::default();
+        let (nis, measured) = self.filter_with(samples, innovations, &mut workspace)?;
+        Ok(FilterOutput { s_m: workspace.s_m, nis, measured })
     }
 
     /// As [`GainSchedule::track`], with S in the workspace. Returns the mean normalised innovation squared (NIS,
@@ -63,7 +63,7 @@ impl GainSchedule {
         &self,
         samples: &Samples<'_>,
         mut innovations: Option<&mut InnovationBuffers>,
-        room: &mut FilterWorkspace,
+        workspace: &mut FilterWorkspace,
     ) -> Result<(f64, usize), Error> {
         samples.check()?;
         let count = samples.dx_m.len();
@@ -72,10 +72,10 @@ impl GainSchedule {
             out.variance_m2 = vec![f64::NAN; count];
         }
         // What no segment covers is NaN; all else will be written.
-        room.s_m.resize(count, 0.0);
-        for_each_uncovered(samples.segments, count, |gap| room.s_m[gap].fill(f64::NAN));
+        workspace.s_m.resize(count, 0.0);
+        for_each_uncovered(samples.segments, count, |gap| workspace.s_m[gap].fill(f64::NAN));
         let mut pass =
-            FilterPass { schedule: self, innovations, room, nis: 0.0, measured: 0, checked_until: 0 };
+            FilterPass { schedule: self, innovations, workspace, nis: 0.0, measured: 0, checked_until: 0 };
         for segment in samples.segments {
             let (y_m, load_n) = (&samples.dx_m[segment.clone()], &samples.load_n[segment.clone()]);
             pass.segment(y_m, load_n, segment.start)?;
@@ -130,7 +130,7 @@ fn for_each_uncovered(segments: &[Range<usize>], count: usize, mut note: impl Fn
 struct FilterPass<'f> {
     schedule: &'f GainSchedule,
     innovations: Option<&'f mut InnovationBuffers>,
-    room: &'f mut FilterWorkspace,
+    workspace: &'f mut FilterWorkspace,
     nis: f64,
     measured: usize,
     /// Samples before this one are checked for missing values.
@@ -141,7 +141,7 @@ impl FilterPass<'_> {
     fn segment(&mut self, y_m: &[f64], load_n: &[f64], offset: usize) -> Result<(), Error> {
         let GainSchedule { filter, folded, .. } = self.schedule;
         let Some(first) = y_m.iter().position(|y| !y.is_nan()) else {
-            self.room.s_m[offset..offset + y_m.len()].fill(f64::NAN);
+            self.workspace.s_m[offset..offset + y_m.len()].fill(f64::NAN);
             return Ok(());
         };
         let mut state = filter.initial_state(y_m[first], held(load_n, first));
@@ -149,7 +149,7 @@ impl FilterPass<'_> {
         let mut settled = k == self.schedule.transient.len() && self.schedule.settles;
         while k < y_m.len() {
             if let Some(folded) = folded.as_ref().filter(|_| settled) {
-                k += self.stretch(folded, &mut state.x, &y_m[k..], &load_n[k - 1..], offset + k);
+                k += self.filter_run(folded, &mut state.x, &y_m[k..], &load_n[k - 1..], offset + k);
                 settled = false;
                 continue;
             }
@@ -182,7 +182,7 @@ impl FilterPass<'_> {
     }
 
     fn put(&mut self, at: usize, x: &Vector3<f64>, innovation_m: f64, variance_m2: f64) {
-        self.room.s_m[at] = x[2];
+        self.workspace.s_m[at] = x[2];
         if let Some(out) = self.innovations.as_deref_mut() {
             (out.innovation_m[at], out.variance_m2[at]) = (innovation_m, variance_m2);
         }
@@ -194,7 +194,7 @@ impl FilterPass<'_> {
 
     /// Samples until the first that lacks something, under a settled gain; how many. Each goes with the load before
     /// it.
-    fn stretch(
+    fn filter_run(
         &mut self,
         map: &SteadyStateFilter,
         x: &mut Vector3<f64>,
@@ -203,13 +203,13 @@ impl FilterPass<'_> {
         at: usize,
     ) -> usize {
         let (from, load_n) = (map.transform(x), &load_n[..y_m.len()]);
-        let s_m = &mut self.room.s_m[at..at + y_m.len()];
+        let s_m = &mut self.workspace.s_m[at..at + y_m.len()];
         let (done, last, squares_m2) = match self.innovations.as_deref_mut() {
             None => {
-                let doubt = self.checked_until.saturating_sub(at);
-                let mut stretch = SampleRun { schedule: self.schedule, map, y_m, load_n, s_m, doubt };
-                let found = stretch.run(from, &mut self.room.squares_m2);
-                self.checked_until = at + stretch.doubt;
+                let checked = self.checked_until.saturating_sub(at);
+                let mut filter_run = SampleRun { schedule: self.schedule, map, y_m, load_n, s_m, checked };
+                let found = filter_run.run(from, &mut self.workspace.squares_m2);
+                self.checked_until = at + filter_run.checked;
                 found
             }
             Some(out) => {
@@ -235,7 +235,7 @@ impl FilterPass<'_> {
 /// takes a tenth of the time of filtering.
 const RESCAN_FACTOR: usize = 16;
 
-/// Samples under a settled gain, and the room for their S.
+/// Samples under a converged gain, and the output slice for their S.
 struct SampleRun<'a> {
     schedule: &'a GainSchedule,
     map: &'a SteadyStateFilter,
@@ -243,32 +243,32 @@ struct SampleRun<'a> {
     load_n: &'a [f64],
     s_m: &'a mut [f64],
     /// Number of samples, from the first on, that are checked before they are filtered, since some were missing.
-    doubt: usize,
+    checked: usize,
 }
 
 impl SampleRun<'_> {
     /// In eight parts at once while enough is left, then one after the other, until a sample is missing: how many,
     /// the last state, and the sum of the squared innovations, added up in the order of the groups.
     ///
-    /// Whether one is missing is seen by what the parts came to, which costs less than to look before.
-    fn run(&mut self, from: SteadyState, room_m2: &mut Vec<[f64; PARTS]>) -> (usize, SteadyState, f64) {
+    /// A missing sample shows as NaN in the sums of the parts, which costs less than a test of every sample before.
+    fn run(&mut self, from: SteadyState, squares_m2: &mut Vec<[f64; PARTS]>) -> (usize, SteadyState, f64) {
         let Self { schedule, map, y_m, load_n, .. } = *self;
         let (mut x, mut sum_m2, mut at, mut end) = (from, 0.0, 0, y_m.len());
-        if self.doubt > 0 {
+        if self.checked > 0 {
             end = whole_until(y_m, load_n);
         }
         while let Some(cut) = schedule.lead.and_then(|lead| ChunkPlan::new(end - at, lead)) {
             let all = at..at + cut.samples();
             let (y_m, load_n) = (&y_m[at..], &load_n[at..]);
-            room_m2.resize(room_m2.len().max(cut.groups()), [0.0; PARTS]);
+            squares_m2.resize(squares_m2.len().max(cut.groups()), [0.0; PARTS]);
             let states = starts((&schedule.filter, map), cut, x, y_m, load_n);
-            let mut work = ChunkIo { map, cut, y_m, load_n, s_m: &mut self.s_m[at..], squares_m2: room_m2 };
+            let mut work = ChunkIo { map, cut, y_m, load_n, s_m: &mut self.s_m[at..], squares_m2 };
             if let Some(found) = work.run(states, sum_m2) {
                 (x, sum_m2) = found;
                 at = all.end;
                 continue;
             }
-            self.doubt = at + RESCAN_FACTOR * cut.samples();
+            self.checked = at + RESCAN_FACTOR * cut.samples();
             let whole = whole_until(&y_m[..cut.samples()], &load_n[..cut.samples()]);
             if whole == cut.samples() {
                 break; // Nothing is missing, and something not finite.

@@ -24,11 +24,11 @@ const LONGEST_PART: usize = 63 * GROUP;
 /// A part no longer than this share of its early start gains too little.
 const SHORTEST_SHARE: f64 = 0.2;
 /// Places of a part at which its states are kept, the last at its end.
-const MARKS: usize = 4;
+const CHECKPOINTS: usize = 4;
 /// Samples of a part that are loaded and turned at once.
 const TILE: usize = 8;
 
-/// How a stretch is cut: part `i` covers `lead + part` samples from `i·part`; the first `lead` of them are its
+/// Partition of a run of samples: part `i` covers `lead + part` samples from `i·part`; the first `lead` of them are its
 /// early start, but for the first part, whose state is known.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ChunkPlan {
@@ -37,7 +37,7 @@ pub(crate) struct ChunkPlan {
 }
 
 impl ChunkPlan {
-    /// Of up to so many samples; none where they are too few. `lead` is how long it takes to forget a start.
+    /// Partition of up to `samples` samples; `None` where they are too few. `lead` is the warm-up until the initial state has no effect.
     pub(crate) fn new(samples: usize, lead: usize) -> Option<Self> {
         let lead = lead.div_ceil(GROUP) * GROUP;
         let part = (samples.checked_sub(lead)? / PARTS).min(LONGEST_PART.max(4 * lead)) / GROUP * GROUP;
@@ -60,9 +60,9 @@ impl ChunkPlan {
     }
 
     /// The samples of a part between two marks.
-    fn between(self, mark: usize) -> Range<usize> {
-        let at = |mark: usize| self.lead + self.part / GROUP * mark / MARKS * GROUP;
-        at(mark)..at(mark + 1)
+    fn between(self, checkpoint: usize) -> Range<usize> {
+        let at = |checkpoint: usize| self.lead + self.part / GROUP * checkpoint / CHECKPOINTS * GROUP;
+        at(checkpoint)..at(checkpoint + 1)
     }
 }
 
@@ -95,11 +95,11 @@ impl ChunkIo<'_> {
     /// innovations added, group by group. None where a sample is missing, which leaves no state behind it a number.
     pub(crate) fn run(&mut self, states: ChunkStates, mut sum_m2: f64) -> Option<(SteadyState, f64)> {
         let arrived = self.advance_chunks(states, 0..self.cut.lead);
-        let mut marks = [arrived; MARKS];
+        let mut checkpoints = [arrived; CHECKPOINTS];
         let mut reached = arrived;
-        for (mark, states) in marks.iter_mut().enumerate() {
+        for (checkpoint, states) in checkpoints.iter_mut().enumerate() {
             // A chunk's end is written after the warm-up of the next, which uses the same memory.
-            reached = self.advance_chunks(reached, self.cut.between(mark));
+            reached = self.advance_chunks(reached, self.cut.between(checkpoint));
             *states = reached;
         }
         if reached.as_flattened().iter().any(|entry| !entry.is_finite()) {
@@ -112,7 +112,7 @@ impl ChunkIo<'_> {
             (last, sum_m2) = if same(state(&arrived, part), last) {
                 (state(&reached, part), self.add_squares(sum_m2, part, self.cut.lead))
             } else {
-                self.recompute_until_match(part, last, sum_m2, &marks)
+                self.recompute_until_match(part, last, sum_m2, &checkpoints)
             };
         }
         Some((last, sum_m2))
@@ -125,15 +125,15 @@ impl ChunkIo<'_> {
         part: usize,
         mut x: SteadyState,
         mut sum_m2: f64,
-        marks: &[ChunkStates; MARKS],
+        checkpoints: &[ChunkStates; CHECKPOINTS],
     ) -> (SteadyState, f64) {
-        for (mark, states) in marks.iter().enumerate() {
-            let Range { start, end } = self.cut.between(mark);
+        for (checkpoint, states) in checkpoints.iter().enumerate() {
+            let Range { start, end } = self.cut.between(checkpoint);
             let all = self.cut.start(part) + start..self.cut.start(part) + end;
             let columns = (&self.y_m[all.clone()], &self.load_n[all.clone()]);
             (x, sum_m2) = steady_state::run(self.map, x, sum_m2, columns, &mut self.s_m[all], &mut []);
             if same(x, state(states, part)) {
-                return (state(&marks[MARKS - 1], part), self.add_squares(sum_m2, part, end));
+                return (state(&checkpoints[CHECKPOINTS - 1], part), self.add_squares(sum_m2, part, end));
             }
         }
         (x, sum_m2)

@@ -153,7 +153,7 @@ simd_dispatch! {
 #[cfg(feature = "std")]
 simd_dispatch! {
     /// Samples one after the other: the last state, and a sum with the squared innovations added, [`GROUP`] by
-    /// [`GROUP`]. The innovations are handed out as far as there is room for them.
+    /// [`GROUP`]. Innovations are written as far as the buffer reaches.
     pub(crate) fn run(
         map: &SteadyStateFilter,
         from: SteadyState,
@@ -163,7 +163,7 @@ simd_dispatch! {
         innovation_m: &mut [f64],
     ) -> (SteadyState, f64) {
         let (coefficients, mut x, mut sum_m2) = (map.wide::<f64>(), from, sum_m2);
-        let mut room = innovation_m.iter_mut();
+        let mut outputs = innovation_m.iter_mut();
         let groups = columns.0.chunks(GROUP).zip(columns.1.chunks(GROUP)).zip(s_m.chunks_mut(GROUP));
         for ((y_m, load_n), s_m) in groups {
             let mut group_m2 = 0.0;
@@ -172,7 +172,7 @@ simd_dispatch! {
                 (x, e_m) = coefficients.step(x, y, u);
                 *s = x[2];
                 group_m2 = e_m.mul_add(e_m, group_m2);
-                if let Some(out) = room.next() {
+                if let Some(out) = outputs.next() {
                     *out = e_m;
                 }
             }

@@ -1,5 +1,6 @@
 //! Structure of `pipeline.toml`.
 
+use records::time::DAY_S;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -170,7 +171,6 @@ impl Default for ObjectSettings {
 impl ObjectSettings {
     /// As settings of an object store. No timeout is longer than a day.
     pub(super) fn retry_settings(&self) -> object_io::Settings {
-        const DAY_S: f64 = 86_400.0;
         let [timeout, give_up] =
             [self.timeout_s, self.give_up_s].map(|s| Duration::from_secs_f64(s.clamp(1e-3, DAY_S)));
         object_io::Settings { timeout, give_up }
@@ -214,7 +214,7 @@ pub struct TrendSettings {
     pub planning_horizon_hours: f64,
     /// Beyond these hours a crossing is not stated. Default 20 000.
     pub horizon_hours: f64,
-    /// After so many days without an estimate a state is marked as stale. Default 30.
+    /// Days without an estimate after which a state is marked as stale. Default 30.
     pub stale_after_days: f64,
     /// Hours until the next check, for the probability of meeting the limit before it. Default 300.
     pub next_check_hours: f64,
@@ -229,11 +229,13 @@ pub struct TrendSettings {
 
 impl Default for TrendSettings {
     fn default() -> Self {
+        // The limit is not used.
+        let defaults = trend::Settings::for_limit(1.0);
         Self {
-            planning_horizon_hours: 500.0,
-            horizon_hours: 20_000.0,
-            stale_after_days: 30.0,
-            next_check_hours: 300.0,
+            planning_horizon_hours: defaults.planning_horizon_hours,
+            horizon_hours: defaults.horizon_hours,
+            stale_after_days: defaults.stale_after_days,
+            next_check_hours: defaults.check_interval_hours,
             axis: None,
             limit_m: None,
         }

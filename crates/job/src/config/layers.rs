@@ -108,7 +108,7 @@ fn merge<'t>(below: &mut DeTable<'t>, over: DeTable<'t>) {
     }
 }
 
-/// Names the line on which a text value stands, or else the file.
+/// Names the line of a text value, or else the file.
 pub(super) fn at_text(layers: &[ConfigLayer], value: &str, diagnostic: Diagnostic) -> Diagnostic {
     let quoted = [format!("\"{value}\""), format!("'{value}'")];
     let found = layers.iter().rev().find_map(|layer| quoted.iter().find_map(|text| layer.text.find(text)));

@@ -74,7 +74,7 @@ impl Config {
     /// the first key of a wrong type, else every value that cannot be meant.
     pub fn read_layers(files: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
         let read = |file: &PathBuf| {
-            let shown = file.display().to_string();
+            let file_name = file.display().to_string();
             let text = std::fs::read_to_string(file).map_err(|e| {
                 let why = match e.kind() {
                     ErrorKind::NotFound => "no such file".to_owned(),
@@ -84,14 +84,14 @@ impl Config {
                 };
                 let what = format!("the configuration cannot be read: {why}");
                 let hint = "create one with `freeplay init`, or select another with `--config FILE` or FREEPLAY_CONFIG";
-                vec![Diagnostic::new("config_unreadable", what).in_file(&shown).hint(hint)]
+                vec![Diagnostic::new("config_unreadable", what).in_file(&file_name).hint(hint)]
             })?;
-            Ok((shown, text))
+            Ok((file_name, text))
         };
         let texts = files.iter().map(read).collect::<Result<Vec<_>, Vec<Diagnostic>>>()?;
         let folder = files.first().and_then(|f| f.parent()).map_or_else(PathBuf::new, Path::to_path_buf);
-        let shown: Vec<&str> = texts.iter().map(|(shown, _)| shown.as_str()).collect();
-        let file = PathBuf::from(shown.join(" + "));
+        let file_name: Vec<&str> = texts.iter().map(|(file_name, _)| file_name.as_str()).collect();
+        let file = PathBuf::from(file_name.join(" + "));
         let mut config = Self::from_layers(ConfigLayer::stack(texts), &file, &folder)?;
         // Before the first table is read: it may lie in an object store.
         object_io::configure(config.document.objects.retry_settings());
@@ -108,8 +108,8 @@ impl Config {
     /// # Errors
     /// As [`Config::read_layers`].
     pub fn parse(text: &str, file: &Path, folder: &Path) -> Result<Self, Vec<Diagnostic>> {
-        let shown = file.display().to_string();
-        Self::from_layers(ConfigLayer::stack([(shown, text.to_owned())]), file, folder)
+        let file_name = file.display().to_string();
+        Self::from_layers(ConfigLayer::stack([(file_name, text.to_owned())]), file, folder)
     }
 
     fn from_layers(layers: Vec<ConfigLayer>, file: &Path, folder: &Path) -> Result<Self, Vec<Diagnostic>> {

@@ -1,4 +1,4 @@
-//! Trends of units: the store's records, per part and serial number across tails, as statements.
+//! Fleet assessment: trends of units from the store's records, by part and serial number across tails.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -57,10 +57,10 @@ impl UnitSelection {
     }
 }
 
-/// States what is known of the asked units.
+/// Assesses the selected units.
 ///
 /// # Errors
-/// When the store cannot be read, or a part's limits cannot be judged by.
+/// When the store cannot be read, or a part's limits are invalid.
 pub fn assess_store(
     config: &Config,
     installations: &Installations,
@@ -73,19 +73,19 @@ pub fn assess_store(
     let moved = detect_changes_in_store(store, as_of)?;
     let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?
         .with_recorder_changes(moved);
-    fleet.asked(ask, as_of)
+    fleet.selected(ask, as_of)
 }
 
 /// Assessments of the units of a run.
 #[derive(Debug, Default)]
 pub struct RunAssessments {
-    /// Statements of the newest day in the store.
+    /// Assessments at the newest date in the store.
     pub now: Vec<TrendRow>,
-    /// What of them is otherwise than without the run's records. Where the store holds no others, nothing is.
+    /// Changes against the assessments without the run's records; empty if the store holds no others.
     pub changed: Vec<UnitChange>,
     /// Recent diagnostics in addition to gaps, of all tails.
     pub recent: RecentDiagnostics,
-    /// How many units of the whole fleet are in which state.
+    /// Number of units of the fleet by state.
     pub states: BTreeMap<&'static str, usize>,
     /// Units of the whole fleet in state `watch`, `plan` or `act`, touched by the run or not.
     pub work_list: Vec<TrendRow>,
@@ -119,7 +119,7 @@ pub fn assess_run(
     before: &States,
 ) -> Result<RunAssessments, Error> {
     let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
-    let (all, of_run) = (load_histories(store)?, gathered(store, &query)?);
+    let (all, of_run) = (load_histories(store)?, read_histories(store, &query)?);
     let recent =
         all.newest_utc().map(|newest| recent_diagnostics(store, newest)).transpose()?.unwrap_or_default();
     let moved = detect_changes(&recent);
@@ -177,19 +177,19 @@ pub fn assess_run_from(
 /// Assessments of the selected units with everything that a report shows.
 #[derive(Default)]
 pub(crate) struct ReportAssessments {
-    /// Statements of the day.
+    /// Assessments at the date.
     pub(crate) now: Vec<TrendRow>,
     /// Plotted forecast of each of them.
     pub(crate) drawn: Vec<trend::Forecast>,
-    /// Statements of so many days before, by days.
+    /// Assessments of earlier dates, by the number of days before.
     pub(crate) before: BTreeMap<i64, Vec<TrendRow>>,
-    /// The forecasts of those days for the day of the report, by days and unit.
+    /// Forecasts of those dates for the date of the report, by days and unit.
     pub(crate) past: BTreeMap<i64, BTreeMap<UnitKey, trend::Interval>>,
     /// Fleet prior of each part, and its training cut-off.
     pub(crate) priors: Vec<(Option<String>, Timestamp, FleetPrior)>,
 }
 
-/// States what is known of the asked units, and what was known of them so many days before.
+/// Assesses the selected units at the date, and at earlier dates given in days before.
 ///
 /// # Errors
 /// As [`assess_histories`].
@@ -207,7 +207,7 @@ pub(crate) fn assess_for_report(
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
     let fleet = FleetContext::new(config, installations, histories, &days)?.with_recorder_changes(moved);
-    let now = fleet.asked(ask, as_of)?;
+    let now = fleet.selected(ask, as_of)?;
     let names: Vec<UnitKey> =
         now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
     let drawn =
@@ -218,19 +218,19 @@ pub(crate) fn assess_for_report(
         .collect::<Result<_, Error>>()?;
     let then = |(days, at): (i64, Timestamp)| Ok((days, fleet.statements(names.iter(), at)?));
     let before = earlier.into_iter().map(then).collect::<Result<_, Error>>()?;
-    let asked: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
+    let selected: BTreeSet<Option<&str>> = names.iter().map(|name| name.0.as_deref()).collect();
     let priors = |part: Option<&str>| {
         let (turn, prior) = fleet.priors.of(part, as_of)?;
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
-    let priors = asked.into_iter().filter_map(priors).collect();
+    let priors = selected.into_iter().filter_map(priors).collect();
     Ok(ReportAssessments { now, drawn, before, past, priors })
 }
 
-/// One statement for each query, from nothing later than its date.
+/// One assessment for each query, without data later than its date.
 ///
 /// # Errors
-/// When a history or a part's limits cannot be judged.
+/// When a history or a part's limits are invalid.
 pub fn assess_queries(
     config: &Config,
     installations: &Installations,
@@ -239,10 +239,11 @@ pub fn assess_queries(
     statistics: bool,
 ) -> Result<Vec<TrendRow>, Error> {
     let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
-    let asked: Vec<UnitKey> = queries.iter().map(|query| unit_of(query, &histories)).collect();
+    let selected: Vec<UnitKey> = queries.iter().map(|query| unit_of(query, &histories)).collect();
     let fleet = FleetContext::consuming(config, installations, &mut histories, &days)?;
     let statement = |(query, unit): (&AsOfQuery, &UnitKey)| fleet.statement(unit, query.as_of_utc);
-    let mut rows: Vec<TrendRow> = queries.par_iter().zip(&asked).map(statement).collect::<Result<_, _>>()?;
+    let mut rows: Vec<TrendRow> =
+        queries.par_iter().zip(&selected).map(statement).collect::<Result<_, _>>()?;
     fleet.add_statistics(&mut rows, statistics);
     Ok(rows)
 }
@@ -261,10 +262,10 @@ fn unit_of(query: &AsOfQuery, histories: &Histories) -> UnitKey {
 /// # Errors
 /// When the store cannot be read.
 pub fn load_histories(store: &Store) -> Result<Histories, Error> {
-    gathered(store, &Query::default())
+    read_histories(store, &Query::default())
 }
 
-fn gathered(store: &Store, query: &Query) -> Result<Histories, Error> {
+fn read_histories(store: &Store, query: &Query) -> Result<Histories, Error> {
     let stored: Vec<&str> = HistoryBuilder::COLUMNS
         .into_iter()
         .filter(|name| !["serial", "tail"].contains(name))
@@ -281,10 +282,10 @@ fn gathered(store: &Store, query: &Query) -> Result<Histories, Error> {
     })
 }
 
-/// One statement for each asked unit, by part and serial number.
+/// One assessment for each selected unit, by part and serial number.
 ///
 /// # Errors
-/// When a history or a part's limits cannot be judged.
+/// When a history or a part's limits are invalid.
 pub fn assess_histories(
     config: &Config,
     installations: &Installations,
@@ -292,7 +293,7 @@ pub fn assess_histories(
     ask: &UnitSelection,
 ) -> Result<Vec<TrendRow>, Error> {
     let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
-    FleetContext::consuming(config, installations, &mut histories, &[as_of])?.asked(ask, as_of)
+    FleetContext::consuming(config, installations, &mut histories, &[as_of])?.selected(ask, as_of)
 }
 
 /// All units, and the fleet prior of each part by training cut-off.
@@ -307,7 +308,7 @@ pub(crate) struct FleetContext<'a> {
 }
 
 impl<'a> FleetContext<'a> {
-    /// Reads all histories and learns by the turn before each of the `days`, each from nothing later.
+    /// Reads all histories and learns the priors of the cut-off before each of the `days`, without later data.
     pub(crate) fn new(
         config: &'a Config,
         installations: &'a Installations,
@@ -352,7 +353,7 @@ impl<'a> FleetContext<'a> {
         Ok(Self { installations, ..Self::of(config, histories, series) })
     }
 
-    /// Histories, and what each adds up to.
+    /// Histories, and the usage series of each.
     fn of(config: &'a Config, histories: &'a Histories, series: Vec<Series>) -> Self {
         let limits = Limits::new(config, series.iter());
         let units = histories.iter().zip(series);
@@ -360,7 +361,7 @@ impl<'a> FleetContext<'a> {
         Self { limits, units, priors: FleetPriors::default(), moved: Vec::new(), installations: None }
     }
 
-    /// The same with what was learned by the turn before each of the days.
+    /// The same with the priors of the cut-off before each of the days.
     fn taught_by(mut self, days: &[Timestamp]) -> Self {
         let units = self.units.iter().map(|(name, (_, series))| (name.0.as_deref(), series));
         self.priors = FleetPriors::train(units, self.limits, days);
@@ -372,12 +373,12 @@ impl<'a> FleetContext<'a> {
         self.units.get(name).map(|(_, series)| series)
     }
 
-    /// What a unit is judged by.
+    /// Trend settings of a unit.
     pub(crate) fn settings(&self, name: &UnitKey) -> trend::Settings {
         self.limits.settings(name.0.as_deref())
     }
 
-    /// What was known of a unit's like on a day.
+    /// Fleet prior of a unit at a date.
     pub(crate) fn prior<'s>(&'s self, name: &'s UnitKey, as_of: Timestamp) -> Option<&'s FleetPrior> {
         Some(self.priors.of(name.0.as_deref(), as_of)?.1)
     }
@@ -388,7 +389,7 @@ impl<'a> FleetContext<'a> {
     }
 
     /// The selected assessments, with classic statistics if selected.
-    fn asked(&self, ask: &UnitSelection, as_of: Timestamp) -> Result<Vec<TrendRow>, Error> {
+    fn selected(&self, ask: &UnitSelection, as_of: Timestamp) -> Result<Vec<TrendRow>, Error> {
         let names = self.units.keys().copied();
         let mut rows = self.statements(names.filter(|name| ask.names(name)), as_of)?;
         rows.retain(|row| ask.fits(row));
@@ -402,18 +403,18 @@ impl<'a> FleetContext<'a> {
         as_of: Timestamp,
     ) -> Result<Vec<TrendRow>, Error> {
         let names: BTreeSet<&UnitKey> = names.collect();
-        // A change is a tail's when its other units made it too, so they are judged with those asked for.
-        let judged: Vec<&UnitKey> = self.mates(&names).union(&names).copied().collect();
+        // A change is a tail's when its other units made it too, so they are assessed with the selected ones.
+        let judged: Vec<&UnitKey> = self.tail_mates(&names).union(&names).copied().collect();
         let trends: Vec<Assessment> =
             judged.par_iter().map(|name| self.trend(name, as_of)).collect::<Result<_, _>>()?;
         let known = judged.iter().zip(&trends).filter_map(|(name, t)| Some((self.units.get(*name)?.0, t)));
         let wide = TailWide::new(&known.collect::<Vec<_>>(), &self.moved);
-        let asked = judged.par_iter().zip(&trends).filter(|(name, _)| names.contains(*name));
-        Ok(asked.map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect())
+        let selected = judged.par_iter().zip(&trends).filter(|(name, _)| names.contains(*name));
+        Ok(selected.map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect())
     }
 
-    /// The units that have flown on the tails of some.
-    fn mates(&self, names: &BTreeSet<&UnitKey>) -> BTreeSet<&UnitKey> {
+    /// All units that have flown on the tails of some units.
+    fn tail_mates(&self, names: &BTreeSet<&UnitKey>) -> BTreeSet<&UnitKey> {
         let history = |name: &&UnitKey| self.units.get(*name).map(|unit| unit.0);
         let tails: BTreeSet<&str> = names.iter().filter_map(history).flat_map(History::tails).collect();
         let is_mate = |unit: &(&'a History, Series)| unit.0.tails().any(|tail| tails.contains(tail));
@@ -427,7 +428,7 @@ impl<'a> FleetContext<'a> {
         Ok(trend::assess_with_hysteresis(series, as_of.as_microsecond(), &self.settings(name), prior)?)
     }
 
-    /// What engineers know, and no alarm is made from.
+    /// Adds the classic trend statistics, from which no alarm is raised.
     fn add_statistics(&self, rows: &mut [TrendRow], are_asked: bool) {
         let add = |row: &mut TrendRow| {
             let Some(series) = self.series(&row.unit()) else { return };
@@ -445,7 +446,7 @@ impl<'a> FleetContext<'a> {
         }
     }
 
-    /// One unit's statement, whatever its tail's others made.
+    /// Assessment of one unit, without the tail-wide steps.
     fn statement(&self, name: &UnitKey, as_of: Timestamp) -> Result<TrendRow, Error> {
         Ok(self.row(name, &self.trend(name, as_of)?, as_of, &TailWide::default()))
     }
@@ -462,7 +463,7 @@ impl<'a> FleetContext<'a> {
         TrendRow { usage_axis, ..row }
     }
 
-    /// The forecast that was made of some units on a day, for the hours they have flown by a later one.
+    /// Forecasts of units at a date, for the hours flown until a later one.
     fn forecasts(
         &self,
         names: &[UnitKey],

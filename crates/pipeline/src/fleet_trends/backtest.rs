@@ -55,13 +55,12 @@ records::row! {
     }
 }
 
-/// Every past statement of the units that were seen to wear, by part, serial number and day.
+/// Past forecasts of the wearing units, by part number, serial number and date.
 ///
-/// A statement is left out where a step or a reset came between it and its target, which ended the wear
-/// it spoke of, and where the unit has not clearly moved since.
+/// A forecast is left out if a step or a reset came between it and its target, or if the unit has not clearly worn since.
 ///
 /// # Errors
-/// When a history or a part's limits cannot be judged.
+/// When a history or a part's limits are invalid.
 pub fn of_histories(
     config: &Config,
     installations: &Installations,
@@ -102,7 +101,7 @@ fn past(fleet: &FleetContext<'_>, name: &UnitKey, day: Timestamp) -> Result<Opti
     }
     let then_hours = series.flights_until(as_of_us).last().map_or(0.0, |f| f.hours);
     let end_hours = series.flights().last().map_or(then_hours, |f| f.hours);
-    let (target, target_m, at_hours) = match met(series, settings.limit_m) {
+    let (target, target_m, at_hours) = match hours_to_limit(series, settings.limit_m) {
         Some(hours) => ("limit", settings.limit_m, hours),
         None => ("level", after.gap_m, end_hours),
     };
@@ -133,7 +132,7 @@ fn past(fleet: &FleetContext<'_>, name: &UnitKey, day: Timestamp) -> Result<Opti
 }
 
 /// The unit's hours when the running median of its gaps first met a limit.
-fn met(series: &Series, limit_m: f64) -> Option<f64> {
+fn hours_to_limit(series: &Series, limit_m: f64) -> Option<f64> {
     let gaps: Vec<(f64, f64)> =
         series.flights().iter().filter_map(|f| Some((f.hours, f.gap?.gap_m))).collect();
     let over = |window: &&[(f64, f64)]| 2 * window.iter().filter(|(_, gap)| *gap >= limit_m).count() > WINDOW;

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::days::days;
 use crate::history::histories::UnitKey;
+use records::time::days_between;
 use records::{ChangePoint, TrendRow};
 
 /// An event of one kind is the same one when its date moved by no more than this: dates are estimates.
@@ -89,7 +89,7 @@ fn of_unit(before: Option<&TrendRow>, now: &TrendRow) -> Option<UnitChange> {
 /// Events that have no like among others.
 fn beyond(events: &[ChangePoint], others: &[ChangePoint]) -> Vec<ChangePoint> {
     let is_like = |a: &ChangePoint, b: &ChangePoint| {
-        a.kind == b.kind && days(a.departure_utc, b.departure_utc).abs() <= SAME_EVENT_DAYS
+        a.kind == b.kind && days_between(a.departure_utc, b.departure_utc).abs() <= SAME_EVENT_DAYS
     };
     events.iter().filter(|event| !others.iter().any(|other| is_like(event, other))).cloned().collect()
 }

@@ -1,4 +1,4 @@
-//! What units of each part number are judged by.
+//! Limits, usage axes and trend settings of each part number.
 
 use job::Config;
 use job::config::part::WearAxis;
@@ -55,15 +55,14 @@ impl<'a> Limits<'a> {
         self.settings(part).limit_m
     }
 
-    /// What is configured of a part.
+    /// Configuration of a part.
     fn part(self, number: Option<&str>) -> Option<&'a job::Part> {
         number
             .and_then(|number| PartNumber::new(number).ok())
             .and_then(|number| self.config.parts.get(&number))
     }
 
-    /// What a unit of a part is judged by. Without a limit there is still a level and a rate; only crossings and
-    /// states need one.
+    /// Trend settings of a part's units. Without a limit there is a level and a rate, but no crossing and no state.
     pub(crate) fn settings(self, part: Option<&str>) -> trend::Settings {
         let of = &self.config.document.trend;
         let base = trend::Settings::for_limit(self.stated_m(part).unwrap_or(self.scale_m));

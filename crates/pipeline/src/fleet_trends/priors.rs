@@ -8,7 +8,7 @@ use trend::{Executor, FleetPrior, Series, UsageAxis};
 
 use crate::fleet_trends::limits::Limits;
 
-/// What a prior asks of each unit, done by all workers.
+/// Executor of the learning: units are distributed over all workers.
 struct RayonExecutor;
 
 impl Executor for RayonExecutor {
@@ -17,10 +17,10 @@ impl Executor for RayonExecutor {
     }
 }
 
-/// The days on which priors are learned, microseconds since 1970 UTC: every thirty days from a fleet's first
+/// Training cut-offs, microseconds since 1970 UTC: every thirty days from a fleet's first
 /// departure on, and when it has grown older by a tenth.
 ///
-/// A prior moves slowly and costs as much as its fleet's statements: that of a turn serves until the next.
+/// A prior changes slowly and costs as much as its fleet's assessments, so it is used until the next cut-off.
 #[derive(Debug, Clone, Default)]
 struct TrainingCutoffs(Vec<i64>);
 
@@ -32,7 +32,7 @@ impl TrainingCutoffs {
         Self(std::iter::successors(Some(first_us), next).take_while(|cutoff| *cutoff <= last_us).collect())
     }
 
-    /// The last turn by a day.
+    /// The last cut-off before a date.
     fn train(&self, as_of: Timestamp) -> Option<i64> {
         self.0[..self.0.partition_point(|cutoff| *cutoff <= as_of.as_microsecond())].last().copied()
     }
@@ -49,7 +49,7 @@ pub(crate) struct FleetPriors<'a> {
 }
 
 impl<'a> FleetPriors<'a> {
-    /// By the turn before each of the days, each from nothing later.
+    /// Priors of the cut-off before each of the dates, without later data.
     pub(crate) fn train<'s>(
         units: impl Iterator<Item = (Option<&'a str>, &'s Series)>,
         limits: Limits<'_>,
@@ -72,7 +72,7 @@ impl<'a> FleetPriors<'a> {
         Self { cutoffs, priors }
     }
 
-    /// What was known of a part by a day, and since which turn, microseconds since 1970 UTC.
+    /// Fleet prior of a part at a date, and its cut-off, microseconds since 1970 UTC.
     pub(crate) fn of<'s>(&'s self, part: Option<&'s str>, as_of: Timestamp) -> Option<(i64, &'s FleetPrior)> {
         let cutoff_us = self.cutoffs.train(as_of)?;
         Some((cutoff_us, self.priors.get(&(cutoff_us, part))?))
@@ -86,7 +86,7 @@ struct PriorTrainer<'a, 's> {
 }
 
 impl<'a> PriorTrainer<'a, '_> {
-    /// The turns by the last of some days.
+    /// Training cut-offs up to the last of some dates.
     fn cutoffs(&self, days: &[Timestamp]) -> TrainingCutoffs {
         let first = self.classes.values().flatten().filter_map(|series| series.flights().first());
         let first_us = first.map(|flight| flight.departure_us).min();
@@ -123,7 +123,7 @@ impl<'a> PriorTrainer<'a, '_> {
         (self.limits.limit_m(part).to_bits(), self.limits.axis(part))
     }
 
-    /// Parts of one kind in groups of lives within a factor of two; one alone needs no look at its life.
+    /// Parts of one kind in groups of lives within a factor of two; the life of a single part is not computed.
     fn group_by_life(&self, cutoff_us: i64, parts: &[Option<&'a str>]) -> Vec<Parts<'a>> {
         const ALIKE: f64 = 2.0;
         if parts.len() == 1 {

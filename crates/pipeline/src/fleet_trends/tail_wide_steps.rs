@@ -1,26 +1,26 @@
-//! Steps that all actuators of a tail make at once: what measures them changed, not their screws.
+//! Tail-wide steps: all actuators of a tail step at once, because a sensor or a recorder changed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
 use trend::{Assessment, ChangePoint, ChangePointKind};
 
-use crate::days::days;
 use crate::history::flight_row::FlightRow;
 use crate::history::histories::History;
 use crate::monitoring::recorder_change::RecorderChange;
+use records::time::days_between;
 
-/// Steps of one tail this close together are one, days: a step is dated to within some flights.
+/// Days within which steps of one tail are one step: a step is dated to within some flights.
 const SAME_DAYS: f64 = 7.0;
 
-/// Of the units that could show it, this share at least makes the step: one may be too noisy to.
+/// Minimum share of the tail's units that make the step: single units may be too noisy.
 const SHARE: f64 = 0.75;
 
-/// The changes, by tail and departure, that are a tail's and not a unit's.
+/// Tail-wide changes, by tail and departure.
 #[derive(Debug, Default)]
 pub(crate) struct TailWide(BTreeSet<(String, Timestamp)>);
 
-/// A change of one of the judged units.
+/// A change of one of the assessed units.
 struct Made<'a> {
     tail_number: &'a str,
     departure_utc: Timestamp,
@@ -75,7 +75,7 @@ fn is_explained(change: &Made<'_>, moved: &[RecorderChange]) -> bool {
 
 /// Whether the units that flew on the tail before and after made it together.
 fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], judged: &[(&History, &Assessment)]) -> bool {
-    let near = |step: &&&Made<'_>| days(step.departure_utc, change.departure_utc).abs() <= SAME_DAYS;
+    let near = |step: &&&Made<'_>| days_between(step.departure_utc, change.departure_utc).abs() <= SAME_DAYS;
     let stepped: BTreeSet<usize> = steps.iter().filter(near).map(|step| step.unit).collect();
     if stepped.len() < 2 {
         return false;
@@ -90,7 +90,7 @@ fn is_there(history: &History, as_of_us: i64, change: &Made<'_>) -> bool {
     let on_tail = known.filter(|f| {
         f.gap_m().is_some() && history.place(f).tail_number.as_deref() == Some(change.tail_number)
     });
-    let away = |f: &FlightRow| days(change.departure_utc, f.departure_utc());
+    let away = |f: &FlightRow| days_between(change.departure_utc, f.departure_utc());
     let (mut before, mut after) = (false, false);
     for days in on_tail.map(away) {
         before |= days < -SAME_DAYS;

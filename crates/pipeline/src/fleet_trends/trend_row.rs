@@ -2,6 +2,7 @@
 
 use jiff::Timestamp;
 use records::row_schema::NoColumn;
+use records::time::days_after;
 use records::{ChangePoint, Installation, TrendRow};
 use trend::{Assessment, Series, classic};
 
@@ -34,7 +35,7 @@ pub(crate) fn row(
     let crossing = trend.crossing.filter(|_| is_judged);
     let use_now = trend.utilization;
     let flights = |hours: Option<f64>| Some(hours? / use_now?.hours_per_flight);
-    let day = |hours: Option<f64>| after(as_of, hours? / use_now?.hours_per_day);
+    let day = |hours: Option<f64>| days_after(as_of, hours? / use_now?.hours_per_day);
     TrendRow {
         part_number: name.0.clone(),
         serial_number: name.1.clone(),
@@ -88,12 +89,6 @@ pub(crate) fn row(
         }),
         sketch_m: sketched(&gaps_m),
     }
-}
-
-/// A day so many days later; nothing beyond the calendar.
-fn after(from: Timestamp, days: f64) -> Option<Timestamp> {
-    const DAY_S: f64 = 86_400.0;
-    from.checked_add(jiff::SignedDuration::try_from_secs_f64((days * DAY_S).round()).ok()?).ok()
 }
 
 /// Why a removed unit has no state.

@@ -111,7 +111,7 @@ impl HistoryBuilder {
     fn rows(
         &mut self,
         chunk: &TableBatch,
-        seats: &KeyColumns,
+        position_keys: &KeyColumns,
         flights: &TextColumn,
         flags: Option<&ListArray>,
     ) -> Result<(), ingest::Error> {
@@ -127,12 +127,13 @@ impl HistoryBuilder {
         let mut seen = KeyCache::default();
         for row in 0..chunk.len() {
             let empty = |column| chunk.error(row, column, "it is empty".into());
-            let seat = match seen.get(seats, row) {
-                Some(seat) => seat,
+            let position_key = match seen.get(position_keys, row) {
+                Some(position_key) => position_key,
                 None => {
-                    let seat = self.seat(seats.who(row).ok_or_else(|| empty(serial))?);
-                    seen.put(seats, row, seat);
-                    seat
+                    let position_key =
+                        self.position_key(position_keys.key_at(row).ok_or_else(|| empty(serial))?);
+                    seen.put(position_keys, row, position_key);
+                    position_key
                 }
             };
             let departure_us = departures.is_valid(row).then(|| departures.value(row));
@@ -150,28 +151,28 @@ impl HistoryBuilder {
                 disagreeing_gap_m: at(&others_m, row)
                     .filter(|_| flags.is_some_and(|flags| disagree(flags, row))),
             };
-            self.push_row(seat, &said);
+            self.push_row(position_key, &said);
         }
         Ok(())
     }
 
     /// Adds a flight.
     pub fn put(&mut self, who: RowKey<'_>, row: &FlightInput<'_>) {
-        let seat = self.seat(who);
-        self.push_row(seat, row);
+        let position_key = self.position_key(who);
+        self.push_row(position_key, row);
     }
 
-    fn push_row(&mut self, seat: RowTarget, row: &FlightInput<'_>) {
+    fn push_row(&mut self, position_key: RowTarget, row: &FlightInput<'_>) {
         if self.blocks.last().is_none_or(|block| block.rows.len() == BLOCK_ROWS) {
             self.blocks.push(RowBlock { rows: Vec::with_capacity(BLOCK_ROWS), names: String::new() });
         }
         let last = self.blocks.len() - 1;
-        let (block, unit) = (&mut self.blocks[last], &mut self.units[seat.unit]);
+        let (block, unit) = (&mut self.blocks[last], &mut self.units[position_key.unit]);
         let name = row.flight_id.unwrap_or_default();
         block.names.push_str(name);
         block.rows.push(StagedRow {
-            unit: seat.unit as u32,
-            place: seat.place,
+            unit: position_key.unit as u32,
+            place: position_key.place,
             name_end: block.names.len() as u32,
             departure_us: row.departure_utc.as_microsecond(),
             gap_m: row.gap_m.unwrap_or(f64::NAN),
@@ -205,7 +206,7 @@ impl HistoryBuilder {
         self.put(who, &row);
     }
 
-    fn seat(&mut self, who: RowKey<'_>) -> RowTarget {
+    fn position_key(&mut self, who: RowKey<'_>) -> RowTarget {
         let unit = self.unit(who.part_number, who.serial_number);
         RowTarget { unit, place: self.units[unit].places.number(who.tail_number, who.position) }
     }

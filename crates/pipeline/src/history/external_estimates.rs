@@ -1,4 +1,4 @@
-//! Tables made elsewhere: estimates to be judged, and the days on which to judge them.
+//! External tables: estimates to be assessed, and the dates of the assessments.
 
 use std::path::Path;
 
@@ -42,7 +42,7 @@ pub fn read(file: &Path) -> Result<Histories, Error> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn gathered(chunks: &[TableBatch]) -> Result<Histories, Error> {
+pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
     let histories = of_parts(chunks.len(), false, |gathering, some| {
         chunks[some].iter().try_for_each(|chunk| gathering.add(chunk)).map_err(bad)
     })?;
@@ -93,14 +93,14 @@ fn is_conflict(history: &History, a: &FlightRow, b: &FlightRow) -> bool {
 /// # Errors
 /// As [`read`].
 pub fn queries(file: &Path) -> Result<Vec<AsOfQuery>, Error> {
-    asked(&Table::read(file).map_err(bad)?)
+    queries_of(&Table::read(file).map_err(bad)?)
 }
 
 /// The units and days of a table of queries.
 ///
 /// # Errors
 /// As [`read`].
-pub fn asked(table: &Table) -> Result<Vec<AsOfQuery>, Error> {
+pub fn queries_of(table: &Table) -> Result<Vec<AsOfQuery>, Error> {
     let serial = table.column(&["serial_number", "serial"]).map_err(bad)?;
     let as_of = table.column(&["as_of_utc"]).map_err(bad)?;
     let part = table.find(&["part_number"]);

@@ -27,7 +27,7 @@ pub(crate) struct UnitExtras {
 
 impl ExtrasArena {
     /// An arena with the given number of rows of each unit.
-    pub(crate) fn with_room(rows: impl Iterator<Item = usize>) -> Self {
+    pub(crate) fn with_capacity(rows: impl Iterator<Item = usize>) -> Self {
         let (mut lengths, mut units): (Vec<usize>, _) = (Vec::new(), Vec::new());
         for rows in rows {
             let arena = match lengths.last() {
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn every_unit_finds_its_own_rows_in_whatever_order_they_were_put_down() {
         let rows = [SHELF_ROWS + 1, 3, 2];
-        let mut arena = ExtrasArena::with_room(rows.into_iter());
+        let mut arena = ExtrasArena::with_capacity(rows.into_iter());
         for unit in [1, 0, 2] {
             for row in (0..rows[unit]).rev() {
                 arena.put(unit, row as u32, extras((10_000_000 * unit + row) as f64));

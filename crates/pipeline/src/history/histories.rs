@@ -24,9 +24,12 @@ pub struct TailPosition {
 }
 
 impl TailPosition {
-    /// Where a stay is.
-    pub(crate) fn of(stay: &Installation) -> Self {
-        Self { tail_number: Some(stay.tail_number.to_string()), position: Some(stay.position.to_string()) }
+    /// Tail and position of an installation.
+    pub(crate) fn of(installation: &Installation) -> Self {
+        Self {
+            tail_number: Some(installation.tail_number.to_string()),
+            position: Some(installation.position.to_string()),
+        }
     }
 
     fn is(&self, tail_number: Option<&str>, position: Option<&str>) -> bool {
@@ -123,15 +126,19 @@ impl History {
         &self.places[flown.place as usize]
     }
 
-    /// The stay among some of the unit's that a flight belongs to.
-    pub(crate) fn stay<'a>(&self, flown: &FlightRow, stays: &[&'a Installation]) -> Option<&'a Installation> {
+    /// The installation, of those of the unit, that a flight belongs to.
+    pub(crate) fn installation<'a>(
+        &self,
+        flown: &FlightRow,
+        installations: &[&'a Installation],
+    ) -> Option<&'a Installation> {
         let TailPosition { tail_number, position } = self.place(flown);
-        let is_here = |stay: &&&Installation| {
-            tail_number.as_deref() == Some(stay.tail_number.as_str())
-                && position.as_deref() == Some(stay.position.as_str())
-                && stay.covers(flown.departure_utc())
+        let is_here = |installation: &&&Installation| {
+            tail_number.as_deref() == Some(installation.tail_number.as_str())
+                && position.as_deref() == Some(installation.position.as_str())
+                && installation.covers(flown.departure_utc())
         };
-        stays.iter().find(is_here).copied()
+        installations.iter().find(is_here).copied()
     }
 
     fn key<'a>(&'a self, flown: &FlightRow) -> Key<'a> {
@@ -139,7 +146,7 @@ impl History {
     }
 
     /// One with positions, and capacity for a number of flights and bytes of their names.
-    pub(crate) fn with_room(places: Positions, flights: usize, names: usize) -> Self {
+    pub(crate) fn with_capacity(places: Positions, flights: usize, names: usize) -> Self {
         Self {
             places: places.0,
             flights: Vec::with_capacity(flights),
@@ -184,7 +191,7 @@ impl Histories {
         Self { units, is_booked }
     }
 
-    /// Whether these are the store's own, whose flights belong to stays of the installations table.
+    /// Whether these are the store's own, whose flights belong to rows of the installations table.
     ///
     /// Those of a table made elsewhere may be of other aircraft under the same names.
     pub(crate) fn is_booked(&self) -> bool {
@@ -228,10 +235,16 @@ impl Histories {
         Some(last.map(FlightRow::departure_utc).max()?.min(Timestamp::now()))
     }
 
+    /// The first departure of all.
+    pub fn oldest_utc(&self) -> Option<Timestamp> {
+        let first = self.units.values().filter_map(|history| history.flights.first());
+        first.map(FlightRow::departure_utc).min()
+    }
+
     /// The last departure of all but the flights that others hold.
     pub(crate) fn newest_without_utc(&self, others: &Self) -> Option<Timestamp> {
         let last = |(name, history): (&UnitKey, &History)| {
-            let held = others.held(name);
+            let held = others.flight_keys(name);
             history
                 .flights
                 .iter()
@@ -245,7 +258,7 @@ impl Histories {
     /// The histories of some units without the flights that others hold; a unit left with none goes.
     pub(crate) fn without(&self, names: &BTreeSet<UnitKey>, others: &Self) -> Self {
         let left = |name: &UnitKey| {
-            let (history, held) = (self.get(name)?, others.held(name));
+            let (history, held) = (self.get(name)?, others.flight_keys(name));
             let flights = history.flights.iter().filter(|f| !held.contains(&history.key(f)));
             let left = History {
                 places: history.places.clone(),
@@ -265,7 +278,7 @@ impl Histories {
         self.units.values().all(first)
     }
 
-    fn held(&self, name: &UnitKey) -> BTreeSet<Key<'_>> {
+    fn flight_keys(&self, name: &UnitKey) -> BTreeSet<Key<'_>> {
         let Some(history) = self.get(name) else { return BTreeSet::new() };
         history.flights.iter().map(|f| history.key(f)).collect()
     }

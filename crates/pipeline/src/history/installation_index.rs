@@ -7,16 +7,18 @@ use records::{Installation, Installations};
 
 use crate::history::histories::UnitKey;
 
-/// Every unit's stays, earliest first.
+/// Installations by unit, earliest first.
 pub(crate) struct InstallationIndex<'a>(HashMap<&'a str, Vec<&'a Installation>>);
 
 impl<'a> InstallationIndex<'a> {
     pub(crate) fn new(installations: &'a Installations) -> Self {
         let mut by_serial: HashMap<&str, Vec<&Installation>> = HashMap::new();
-        for stay in installations.iter() {
-            by_serial.entry(stay.serial_number.as_str()).or_default().push(stay);
+        for installation in installations.iter() {
+            by_serial.entry(installation.serial_number.as_str()).or_default().push(installation);
         }
-        by_serial.values_mut().for_each(|stays| stays.sort_by_key(|stay| stay.installed_utc));
+        by_serial
+            .values_mut()
+            .for_each(|installations| installations.sort_by_key(|installation| installation.installed_utc));
         Self(by_serial)
     }
 
@@ -30,8 +32,9 @@ impl<'a> InstallationIndex<'a> {
 
     /// A unit's installations; where its part number is unknown, by its serial number.
     pub(crate) fn of(&self, (part, serial): &UnitKey) -> Vec<&'a Installation> {
-        let is_of =
-            |stay: &&&Installation| part.as_deref().is_none_or(|part| stay.part_number.as_str() == part);
+        let is_of = |installation: &&&Installation| {
+            part.as_deref().is_none_or(|part| installation.part_number.as_str() == part)
+        };
         self.0.get(serial.as_str()).into_iter().flatten().filter(is_of).copied().collect()
     }
 }

@@ -1,4 +1,4 @@
-//! The maintenance book: what was done to which unit, and when.
+//! Maintenance log: work on units, with its date.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,7 +24,7 @@ pub fn read(file: &Path) -> Result<MaintenanceLog, Error> {
         ["part_number", "serial_number", "utc", "kind"].map(|n| table.column(&[n]));
     let (part, serial, done, kind) =
         (part.map_err(bad)?, serial.map_err(bad)?, done.map_err(bad)?, kind.map_err(bad)?);
-    let mut book = MaintenanceLog::new();
+    let mut maintenance = MaintenanceLog::new();
     for row in 0..table.len() {
         let unit = (
             table.required(row, part, name::<PartNumber>).map_err(bad)?.to_string(),
@@ -32,9 +32,9 @@ pub fn read(file: &Path) -> Result<MaintenanceLog, Error> {
         );
         let utc_us = table.required(row, done, utc).map_err(bad)?.as_microsecond();
         let renews = table.required(row, kind, renews).map_err(bad)?;
-        book.entry(unit).or_default().push(MaintenanceEvent { utc_us, renews });
+        maintenance.entry(unit).or_default().push(MaintenanceEvent { utc_us, renews });
     }
-    Ok(book)
+    Ok(maintenance)
 }
 
 /// Whether what was done makes a worn unit as good as new.

@@ -20,16 +20,17 @@ const SHARES: usize = 4;
 /// Each worker takes the rows of its own units, so no worker waits for another, and a block is freed
 /// after its last use.
 pub(crate) fn merge(gathered: Vec<HistoryBuilder>, is_booked: bool) -> Histories {
-    let mut rooms = rooms(&gathered);
-    let homes: Vec<TargetMap> = gathered.iter().map(|one| TargetMap::of(&one.units, &mut rooms)).collect();
-    let mut stacks: Vec<Partition<'_>> = sections(rooms).into_iter().map(Partition::of).collect();
-    for (one, homes) in gathered.into_iter().zip(&homes) {
+    let mut capacities = capacities(&gathered);
+    let targets: Vec<TargetMap> =
+        gathered.iter().map(|one| TargetMap::of(&one.units, &mut capacities)).collect();
+    let mut partitions: Vec<Partition<'_>> = sections(capacities).into_iter().map(Partition::of).collect();
+    for (one, targets) in gathered.into_iter().zip(&targets) {
         for block in one.blocks.into_iter().map(Arc::new) {
-            let takers = stacks.iter_mut().filter(|stack| homes.are_in(&stack.ranks));
-            takers.for_each(|stack| stack.blocks.push((homes, Arc::clone(&block))));
+            let takers = partitions.iter_mut().filter(|partition| targets.are_in(&partition.ranks));
+            takers.for_each(|partition| partition.blocks.push((targets, Arc::clone(&block))));
         }
     }
-    let full: Vec<Vec<_>> = stacks.into_par_iter().map(Partition::histories).collect();
+    let full: Vec<Vec<_>> = partitions.into_par_iter().map(Partition::histories).collect();
     Histories::new(full.into_iter().flatten().collect(), is_booked)
 }
 
@@ -43,17 +44,17 @@ struct UnitCapacity {
     bytes: usize,
 }
 
-fn rooms(gathered: &[HistoryBuilder]) -> BTreeMap<UnitKey, UnitCapacity> {
-    let mut rooms: BTreeMap<UnitKey, UnitCapacity> = BTreeMap::new();
+fn capacities(gathered: &[HistoryBuilder]) -> BTreeMap<UnitKey, UnitCapacity> {
+    let mut capacities: BTreeMap<UnitKey, UnitCapacity> = BTreeMap::new();
     for unit in gathered.iter().flat_map(|one| &one.units) {
-        let room = rooms.entry(unit.name.clone()).or_default();
-        room.rows += unit.rows;
-        room.bytes += unit.bytes;
+        let capacity = capacities.entry(unit.name.clone()).or_default();
+        capacity.rows += unit.rows;
+        capacity.bytes += unit.bytes;
     }
-    for (rank, room) in rooms.values_mut().enumerate() {
-        room.rank = rank as u32;
+    for (rank, capacity) in capacities.values_mut().enumerate() {
+        capacity.rank = rank as u32;
     }
-    rooms
+    capacities
 }
 
 /// Where the rows of each unit go that one gathering knows.
@@ -66,29 +67,29 @@ struct Target {
 }
 
 impl TargetMap {
-    fn of(units: &[UnitEntry], rooms: &mut BTreeMap<UnitKey, UnitCapacity>) -> Self {
-        let home = |unit: &UnitEntry| {
-            // Each unit's room was made from these names.
-            let room = rooms.entry(unit.name.clone()).or_default();
-            Target { rank: room.rank, places: room.places.numbers(&unit.places) }
+    fn of(units: &[UnitEntry], capacities: &mut BTreeMap<UnitKey, UnitCapacity>) -> Self {
+        let target = |unit: &UnitEntry| {
+            // Each unit's target was made from these names.
+            let capacity = capacities.entry(unit.name.clone()).or_default();
+            Target { rank: capacity.rank, places: capacity.places.numbers(&unit.places) }
         };
-        Self(units.iter().map(home).collect())
+        Self(units.iter().map(target).collect())
     }
 
     /// Whether any of them is one of those units.
     fn are_in(&self, ranks: &Range<u32>) -> bool {
-        self.0.iter().any(|home| ranks.contains(&home.rank))
+        self.0.iter().any(|target| ranks.contains(&target.rank))
     }
 }
 
 /// One section per worker, with about equal numbers of rows; the units of one section follow each other by name.
-fn sections(rooms: BTreeMap<UnitKey, UnitCapacity>) -> Vec<Vec<(UnitKey, UnitCapacity)>> {
-    let rows: usize = rooms.values().map(|room| room.rows).sum();
+fn sections(capacities: BTreeMap<UnitKey, UnitCapacity>) -> Vec<Vec<(UnitKey, UnitCapacity)>> {
+    let rows: usize = capacities.values().map(|capacity| capacity.rows).sum();
     let most = rows.div_ceil(rayon::current_num_threads());
     let (mut sections, mut some, mut held) = (Vec::new(), Vec::new(), 0);
-    for room in rooms {
-        held += room.1.rows;
-        some.push(room);
+    for capacity in capacities {
+        held += capacity.1.rows;
+        some.push(capacity);
         if held >= most {
             sections.push(std::mem::take(&mut some));
             held = 0;
@@ -107,21 +108,22 @@ struct Partition<'a> {
 
 impl Partition<'_> {
     fn of(section: Vec<(UnitKey, UnitCapacity)>) -> Self {
-        let first = section.first().map_or(0, |(_, room)| room.rank);
+        let first = section.first().map_or(0, |(_, capacity)| capacity.rank);
         Self { ranks: first..first + section.len() as u32, section, blocks: Vec::new() }
     }
 
     fn histories(self) -> Vec<(UnitKey, History)> {
-        let mut arena = ExtrasArena::with_room(self.section.iter().map(|(_, room)| room.rows));
-        let history =
-            |(name, room): (_, UnitCapacity)| (name, History::with_room(room.places, room.rows, room.bytes));
+        let mut arena = ExtrasArena::with_capacity(self.section.iter().map(|(_, capacity)| capacity.rows));
+        let history = |(name, capacity): (_, UnitCapacity)| {
+            (name, History::with_capacity(capacity.places, capacity.rows, capacity.bytes))
+        };
         let mut units: Vec<(UnitKey, History)> = self.section.into_iter().map(history).collect();
-        for (homes, block) in self.blocks {
-            each_row(&block, homes, |home, put, name| {
-                let unit = home.rank.wrapping_sub(self.ranks.start) as usize;
+        for (targets, block) in self.blocks {
+            each_row(&block, targets, |target, put, name| {
+                let unit = target.rank.wrapping_sub(self.ranks.start) as usize;
                 let Some((_, history)) = units.get_mut(unit) else { return };
                 let row = history.flights().len() as u32;
-                let place = home.places[put.place as usize];
+                let place = target.places[put.place as usize];
                 history.put(FlightRow::new(put.departure_us, put.gap_m, place, row), name);
                 arena.put(unit, row, put.extras);
             });
@@ -132,11 +134,11 @@ impl Partition<'_> {
 }
 
 /// Hands over the rows of a block in order, each with where it goes and its flight's name.
-fn each_row(block: &RowBlock, homes: &TargetMap, mut take: impl FnMut(&Target, &StagedRow, &str)) {
+fn each_row(block: &RowBlock, targets: &TargetMap, mut take: impl FnMut(&Target, &StagedRow, &str)) {
     let mut begin = 0;
     for put in &block.rows {
         let end = put.name_end as usize;
-        take(&homes.0[put.unit as usize], put, &block.names[begin..end]);
+        take(&targets.0[put.unit as usize], put, &block.names[begin..end]);
         begin = end;
     }
 }
@@ -147,7 +149,7 @@ impl HistoryBuilder {
         merge(vec![self], false)
     }
 
-    /// The histories of the store, whose flights belong to stays of the installations table.
+    /// The histories of the store, whose flights belong to rows of the installations table.
     pub fn into_store(self) -> Histories {
         merge(vec![self], true)
     }
@@ -191,7 +193,7 @@ mod tests {
     use ingest::tables::TableBatch;
     use jiff::Timestamp;
 
-    /// Whole numbers below a bound that look like chance.
+    /// Pseudo-random whole numbers below a bound.
     fn chances() -> impl FnMut(u64) -> u64 {
         let mut state = 7_u64;
         move |bound| {

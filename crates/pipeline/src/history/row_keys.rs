@@ -4,7 +4,7 @@ use arrow::array::{Array, AsArray, DictionaryArray, StringArray};
 use arrow::datatypes::Int32Type;
 use ingest::tables::{StringColumn, TableBatch, trim_ascii_fast};
 
-/// Who flew, and where.
+/// Unit and position of a row.
 #[derive(Debug, Clone, Copy)]
 #[expect(missing_docs, reason = "each field is named for the contract's column")]
 pub struct RowKey<'a> {
@@ -14,7 +14,7 @@ pub struct RowKey<'a> {
     pub position: Option<&'a str>,
 }
 
-/// Who flew and where, row by row.
+/// Key columns of some rows.
 pub(crate) struct KeyColumns {
     serials: TextColumn,
     parts: TextColumn,
@@ -35,8 +35,8 @@ impl KeyColumns {
         Ok(Self { serials: serials?, parts: parts?, tails: tails?, positions: positions? })
     }
 
-    /// Who flew in a row; none where the cell of the serial number is empty.
-    pub(crate) fn who(&self, row: usize) -> Option<RowKey<'_>> {
+    /// Key of a row; none where the cell of the serial number is empty.
+    pub(crate) fn key_at(&self, row: usize) -> Option<RowKey<'_>> {
         Some(RowKey {
             part_number: self.parts.get(row),
             serial_number: self.serials.get(row)?,
@@ -51,7 +51,7 @@ impl KeyColumns {
     }
 }
 
-/// What was found for the seats of the rows before: of the last one, and of the last one of each serial number
+/// Cached results for the position keys of earlier rows: of the last one, and of the last one of each serial number
 /// where these have codes.
 pub(crate) struct KeyCache<T> {
     last: Option<(usize, T)>,
@@ -65,19 +65,19 @@ impl<T> Default for KeyCache<T> {
 }
 
 impl<T: Copy> KeyCache<T> {
-    /// What was found for a row's seat.
-    pub(crate) fn get(&self, seats: &KeyColumns, row: usize) -> Option<T> {
-        let of_code = match seats.serials.code(row) {
+    /// Cached result for a row's position key.
+    pub(crate) fn get(&self, keys: &KeyColumns, row: usize) -> Option<T> {
+        let of_code = match keys.serials.code(row) {
             Some(code) => self.by_code.get(code).copied().flatten(),
             None => self.last,
         };
-        of_code.filter(|(before, _)| seats.are_same(*before, row)).map(|(_, found)| found)
+        of_code.filter(|(before, _)| keys.are_same(*before, row)).map(|(_, found)| found)
     }
 
-    /// Keeps what was found for a row's seat.
-    pub(crate) fn put(&mut self, seats: &KeyColumns, row: usize, found: T) {
+    /// Caches the result for a row's position key.
+    pub(crate) fn put(&mut self, keys: &KeyColumns, row: usize, found: T) {
         self.last = Some((row, found));
-        let Some(code) = seats.serials.code(row) else { return };
+        let Some(code) = keys.serials.code(row) else { return };
         if self.by_code.len() <= code {
             self.by_code.resize(code + 1, None);
         }

@@ -8,7 +8,7 @@ use records::{Flight, Installation};
 
 use crate::history::histories::History;
 
-/// A flight of one name within so long of a record's departure is the record's: names come back.
+/// Longest distance between the departures of a flight and a record of the same name: names are reused.
 const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
 
 /// The flights table, tail by tail.
@@ -33,28 +33,30 @@ impl<'a> UnloggedFlights<'a> {
         self.by_tail.contains_key(tail)
     }
 
-    /// The flights of a unit's stays for which it has no row, each with its stay.
+    /// Flights of a unit's installations for which it has no row, each with its installation.
     ///
-    /// Histories of which no row belongs to a stay are taken as they are.
+    /// Histories of which no row belongs to an installation are taken as they are.
     pub(crate) fn of_unit<'s>(
         &self,
         history: &History,
-        stays: &[&'s Installation],
+        installations: &[&'s Installation],
     ) -> Vec<(&'s Installation, &'a Flight)> {
-        if self.by_tail.is_empty() || history.flights().iter().all(|f| history.stay(f, stays).is_none()) {
+        if self.by_tail.is_empty()
+            || history.flights().iter().all(|f| history.installation(f, installations).is_none())
+        {
             return Vec::new();
         }
         let known = &Known::of(history);
-        let missing = stays.iter().flat_map(|&stay| {
-            let flights = self.by_tail.get(stay.tail_number.as_str()).map_or(&[][..], Vec::as_slice);
-            let missing = flights.iter().filter(|f| stay.covers(f.departure_utc) && !known.holds(f));
-            missing.map(move |&flight| (stay, flight))
+        let missing = installations.iter().flat_map(|&installation| {
+            let flights = self.by_tail.get(installation.tail_number.as_str()).map_or(&[][..], Vec::as_slice);
+            let missing = flights.iter().filter(|f| installation.covers(f.departure_utc) && !known.holds(f));
+            missing.map(move |&flight| (installation, flight))
         });
         missing.collect()
     }
 }
 
-/// The flights that a unit's rows speak for.
+/// Flights covered by a unit's rows.
 struct Known<'a> {
     departures: BTreeSet<(&'a str, Timestamp)>,
     names: BTreeSet<(&'a str, &'a str, Timestamp)>,

@@ -16,7 +16,7 @@ use crate::history::unlogged_flights::UnloggedFlights;
 pub(crate) struct UsageSources<'a> {
     maintenance: maintenance_log::MaintenanceLog,
     unlogged: UnloggedFlights<'a>,
-    stays: InstallationIndex<'a>,
+    installations: InstallationIndex<'a>,
 }
 
 impl<'a> UsageSources<'a> {
@@ -26,7 +26,7 @@ impl<'a> UsageSources<'a> {
         Ok(Self {
             maintenance: maintenance.unwrap_or_default(),
             unlogged: UnloggedFlights::of_table(&config.flights),
-            stays: InstallationIndex::new(installations),
+            installations: InstallationIndex::new(installations),
         })
     }
 
@@ -44,11 +44,11 @@ impl<'a> UsageSources<'a> {
 
     /// A unit's flights, added up.
     pub(crate) fn series(&self, name: &UnitKey, history: &History, is_booked: bool) -> Result<Series, Error> {
-        let stays = self.stays.of(name);
-        let booked = if is_booked { &stays[..] } else { &[] };
-        let first = stays.iter().min_by_key(|stay| stay.installed_utc);
-        let unit_hours_at_start = first.and_then(|stay| stay.unit_hours_at_install);
-        let observations = observations(history, booked, &self.unlogged.of_unit(history, booked));
+        let installations = self.installations.of(name);
+        let installed = if is_booked { &installations[..] } else { &[] };
+        let first = installations.iter().min_by_key(|installation| installation.installed_utc);
+        let unit_hours_at_start = first.and_then(|installation| installation.unit_hours_at_install);
+        let observations = observations(history, installed, &self.unlogged.of_unit(history, installed));
         let source = self.source(history);
         let usage = UsageDefaults { unit_hours_at_start, source, ..UsageDefaults::default() };
         Ok(Series::new(observations, &usage)?.with_maintenance(maintenance_events(&self.maintenance, name)))
@@ -57,16 +57,16 @@ impl<'a> UsageSources<'a> {
 
 /// Recorded maintenance of a unit; nothing for a unit without a part number.
 fn maintenance_events(
-    book: &maintenance_log::MaintenanceLog,
+    maintenance: &maintenance_log::MaintenanceLog,
     (part, serial): &UnitKey,
 ) -> Vec<trend::MaintenanceEvent> {
-    part.clone().and_then(|part| book.get(&(part, serial.clone())).cloned()).unwrap_or_default()
+    part.clone().and_then(|part| maintenance.get(&(part, serial.clone())).cloned()).unwrap_or_default()
 }
 
 /// A unit's flights as the trend knows them, those that left no record among them.
 fn observations(
     history: &History,
-    stays: &[&Installation],
+    installations: &[&Installation],
     unlogged: &[(&Installation, &records::Flight)],
 ) -> Vec<Observation> {
     let mut numbers = InstallationIds::default();
@@ -74,7 +74,7 @@ fn observations(
         let extras = history.extras(f);
         Observation {
             departure_us: f.departure_us(),
-            installation: numbers.of_flown(f, history, stays),
+            installation: numbers.of_flown(f, history, installations),
             flight_hours: extras.flight_hours(),
             tail_hours_end: extras.tail_hours_end(),
             load_reversals: extras.load_reversals(),
@@ -83,9 +83,9 @@ fn observations(
         }
     });
     let mut observations: Vec<Observation> = seen.collect();
-    observations.extend(unlogged.iter().map(|(stay, flight)| Observation {
+    observations.extend(unlogged.iter().map(|(installation, flight)| Observation {
         departure_us: flight.departure_utc.as_microsecond(),
-        installation: numbers.of(&TailPosition::of(stay), Some(stay)),
+        installation: numbers.of(&TailPosition::of(installation), Some(installation)),
         flight_hours: flight.flight_hours,
         tail_hours_end: flight.tail_hours_end,
         load_reversals: None,
@@ -99,26 +99,27 @@ fn observations(
 #[derive(Default)]
 struct InstallationIds<'a> {
     known: Vec<(TailPosition, Option<Timestamp>)>,
-    /// Place and stay of the flight before, and their number.
+    /// Position and installation of the previous flight, and their number.
     last: Option<(u32, &'a Installation, u32)>,
 }
 
 impl<'a> InstallationIds<'a> {
-    /// That of a flight. Stays of one place do not overlap, so most flights are of the stay of the one before.
-    fn of_flown(&mut self, flown: &FlightRow, history: &History, stays: &[&'a Installation]) -> u32 {
+    /// Installation number of a flight. Installations of one position do not overlap, so most flights have that of the
+    /// previous flight.
+    fn of_flown(&mut self, flown: &FlightRow, history: &History, installations: &[&'a Installation]) -> u32 {
         let is_here =
             |last: &(u32, &Installation, u32)| last.0 == flown.place && last.1.covers(flown.departure_utc());
         if let Some((_, _, number)) = self.last.filter(is_here) {
             return number;
         }
-        let stay = history.stay(flown, stays);
-        let number = self.of(history.place(flown), stay);
-        self.last = stay.map(|stay| (flown.place, stay, number));
+        let installation = history.installation(flown, installations);
+        let number = self.of(history.place(flown), installation);
+        self.last = installation.map(|installation| (flown.place, installation, number));
         number
     }
 
-    fn of(&mut self, place: &TailPosition, stay: Option<&Installation>) -> u32 {
-        let installed_utc = stay.map(|stay| stay.installed_utc);
+    fn of(&mut self, place: &TailPosition, installation: Option<&Installation>) -> u32 {
+        let installed_utc = installation.map(|installation| installation.installed_utc);
         let known = self.known.iter().rposition(|(p, at)| p == place && *at == installed_utc);
         let number = known.unwrap_or_else(|| {
             self.known.push((place.clone(), installed_utc));

@@ -3,7 +3,10 @@
 //! The tuning asks for a bandwidth, not for white innovations, so their normalised square (NIS) is not 1 even
 //! when all is well, and χ² bounds mean nothing. What a unit's own flights show is its bound.
 
+use crate::monitoring::REPORTED_DAYS;
 use jiff::Timestamp;
+use records::time::days_between;
+use records::uncertainty::SD_OVER_MAD;
 use serde::Serialize;
 
 use crate::monitoring::recent::{FlightDiagnostics, PositionKey, RecentDiagnostics, newest_utc};
@@ -26,21 +29,17 @@ pub struct InnovationOutlier {
     pub usual: f64,
 }
 
-/// A flight is held against so many before it, at least and at most.
+/// Minimum and maximum number of earlier flights that a flight is compared with.
 const BEFORE: (usize, usize) = (10, 50);
-/// It is unlike them beyond so many of their spreads of ln NIS,
+/// Distance from the median of ln NIS, in standard deviations, from which a flight is an outlier,
 const SPREADS: f64 = 6.0;
 /// and beyond this factor: a spread seen in few flights may be small by chance.
 const FACTOR: f64 = 2.0;
-/// Number of days for which a flight is reported.
-const REPORTED_DAYS: f64 = 30.0;
 
-/// The unlike flights of the last month of these.
+/// Outliers among the flights of the last month.
 pub fn find_outliers(recent_diagnostics: &RecentDiagnostics) -> Vec<InnovationOutlier> {
     let newest = newest_utc(recent_diagnostics);
-    let recent = |at: Timestamp| {
-        newest.is_some_and(|newest| newest.duration_since(at).as_secs_f64() <= REPORTED_DAYS * 86_400.0)
-    };
+    let recent = |at: Timestamp| newest.is_some_and(|newest| days_between(at, newest) <= REPORTED_DAYS);
     let mut found = Vec::new();
     for (position, diagnostics) in recent_diagnostics {
         let surprised = diagnostics
@@ -63,13 +62,13 @@ pub fn find_outliers(recent_diagnostics: &RecentDiagnostics) -> Vec<InnovationOu
     found
 }
 
-/// The usual ln NIS, where this one is unlike it.
+/// Median ln NIS of the earlier flights, if this one is an outlier.
 fn median_ln_nis(before: &[f64], this: f64) -> Option<f64> {
     if before.len() < BEFORE.0 {
         return None;
     }
     let usual = median(before.to_vec());
-    let spread = 1.4826 * median(before.iter().map(|v| (v - usual).abs()).collect());
+    let spread = SD_OVER_MAD * median(before.iter().map(|v| (v - usual).abs()).collect());
     ((this - usual).abs() > (SPREADS * spread).max(FACTOR.ln())).then_some(usual)
 }
 

@@ -15,7 +15,7 @@ use crate::history::builder::at;
 use crate::history::parallel_scan::read_each;
 use crate::history::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
 
-/// As far back as is looked: some months of flights.
+/// Maximum age of the flights: some months.
 const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
 
 /// One flight of one place.
@@ -46,7 +46,7 @@ pub struct PositionKey {
     pub serial_number: String,
 }
 
-/// The flights of a unit in a seat, by departure.
+/// Flights of a unit at one position, by departure.
 pub type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
 
 /// The last months until a time, with it.
@@ -90,7 +90,7 @@ struct Found {
 impl Found {
     fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
         let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
-        let (seats, flights) = (KeyColumns::of(&chunk)?, TextColumn::of(&chunk, &["flight_id"])?);
+        let (keys, flights) = (KeyColumns::of(&chunk)?, TextColumn::of(&chunk, &["flight_id"])?);
         let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
         let (skews_s, stiffnesses, nis) =
             (numbers("skew_s")?, numbers("stiffness_n_per_m")?, numbers("nis")?);
@@ -103,10 +103,10 @@ impl Found {
         let mut seen = KeyCache::default();
         for row in 0..chunk.len() {
             let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) else { continue };
-            let Some(who) = seats.who(row) else { continue };
-            let of_position = seen.get(&seats, row).unwrap_or_else(|| {
+            let Some(who) = keys.key_at(row) else { continue };
+            let of_position = seen.get(&keys, row).unwrap_or_else(|| {
                 let found = self.of_position(who);
-                seen.put(&seats, row, found);
+                seen.put(&keys, row, found);
                 found
             });
             self.diagnostics[of_position].push(FlightDiagnostics {

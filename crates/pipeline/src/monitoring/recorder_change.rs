@@ -2,15 +2,17 @@
 //! wiring is changed, the fitted stiffness of all actuators of an aircraft when what measures load is, and the zero and
 //! the delay of a load channel when its cell or its wiring is.
 
+use crate::monitoring::REPORTED_DAYS;
+use records::uncertainty::SD_OVER_MAD;
 use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
 use serde::Serialize;
 use store::Store;
 
-use crate::days::days;
 use crate::error::Error;
 use crate::monitoring::recent::{FlightDiagnostics, RecentDiagnostics, newest_utc, recent_diagnostics};
+use records::time::days_between;
 
 /// What moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -51,7 +53,7 @@ impl RecorderChange {
     pub(crate) fn explains(&self, tail_number: &str, departure_utc: Timestamp) -> bool {
         self.everywhere
             && self.tail_number == tail_number
-            && days(self.since_utc, departure_utc).abs() <= SAME_DAYS
+            && days_between(self.since_utc, departure_utc).abs() <= SAME_DAYS
     }
 }
 
@@ -62,16 +64,14 @@ const LEAST_AFTER: usize = 3;
 const MAX_FLIGHTS: usize = 200;
 /// Least change in standard errors of a difference of medians.
 const LEAST_CERTAINTY: f64 = 8.0;
-/// Changes of one aircraft this close together are one, days.
+/// Days within which changes of one aircraft are one change.
 const SAME_DAYS: f64 = 3.0;
-/// Number of days for which a change is reported.
-const REPORTED_DAYS: f64 = 30.0;
 
-/// What of a change is believed.
+/// Bounds of a significant change.
 #[derive(Debug, Clone, Copy)]
 struct Bounds {
     least_step: f64,
-    /// Scatter below which nothing is believed of a fitted value.
+    /// Smallest assumed scatter of a fitted value.
     least_scatter: f64,
 }
 
@@ -113,7 +113,7 @@ pub fn detect_changes(recent_diagnostics: &RecentDiagnostics) -> Vec<RecorderCha
         Some(RecorderChange { from: m.from * load_n, to: m.to * load_n, ..m })
     }));
     found.retain(|detect_changes| {
-        newest.is_some_and(|newest| days(detect_changes.since_utc, newest) <= REPORTED_DAYS)
+        newest.is_some_and(|newest| days_between(detect_changes.since_utc, newest) <= REPORTED_DAYS)
     });
     found.sort_by(|a, b| {
         (&a.tail_number, a.quantity, a.since_utc).cmp(&(&b.tail_number, b.quantity, b.since_utc))
@@ -211,7 +211,7 @@ fn of_quantity(tails: &Tails<'_>, quantity: Quantity, bounds: Bounds) -> Vec<Rec
         for (position, values) in places {
             let latest = &values[values.len().saturating_sub(MAX_FLIGHTS)..];
             let Some((since_utc, from_value, to)) = step(latest, bounds) else { continue };
-            let is_same = |m: &&mut RecorderChange| days(m.since_utc, since_utc).abs() <= SAME_DAYS;
+            let is_same = |m: &&mut RecorderChange| days_between(m.since_utc, since_utc).abs() <= SAME_DAYS;
             match found[from..].iter_mut().find(is_same) {
                 Some(known) => known.positions.push((*position).to_owned()),
                 None => found.push(RecorderChange {
@@ -248,7 +248,7 @@ fn has_enough_flights(values: &[(Timestamp, f64)], since_utc: Timestamp) -> bool
 fn step(flights: &[(Timestamp, f64)], bounds: Bounds) -> Option<(Timestamp, f64, f64)> {
     let values: Vec<f64> = flights.iter().map(|(_, skew)| *skew).collect();
     let last = values.len().checked_sub(LEAST_AFTER)?;
-    // Where two levels leave least unexplained, there the jump is, if it is one.
+    // The split with the smallest absolute residuals around two medians.
     let (at, from, to, off) = (LEAST_BEFORE..=last)
         .map(|at| {
             let (before, after) = values.split_at(at);
@@ -257,7 +257,7 @@ fn step(flights: &[(Timestamp, f64)], bounds: Bounds) -> Option<(Timestamp, f64,
             (at, from, to, off.collect::<Vec<f64>>())
         })
         .min_by(|a, b| a.3.iter().sum::<f64>().total_cmp(&b.3.iter().sum()))?;
-    let scatter = (1.4826 * median(off)).max(bounds.least_scatter);
+    let scatter = (SD_OVER_MAD * median(off)).max(bounds.least_scatter);
     let (before, after) = (at as f64, (values.len() - at) as f64);
     // The median of a normal sample scatters 1.25 times as much as its mean.
     let error = 1.25 * scatter * (before.recip() + after.recip()).sqrt();
@@ -322,7 +322,7 @@ mod tests {
                 departure_utc,
                 flight_id: k.to_string().into(),
                 skew_s: Some(skew_s),
-                // The scatter of ± 0.2 ms stands for one of 2 %.
+                // The scatter of ± 0.2 ms corresponds to one of 2 %.
                 stiffness_n_per_m: Some(
                     8e7 * (1.0 + 100.0 * (skew_s - 0.1e-3))
                         * if k as i64 >= changes_at { factor } else { 1.0 },
@@ -361,7 +361,7 @@ mod tests {
         let flights = |se_n: f64| -> RecentDiagnostics {
             let flight = |(k, (departure_utc, scatter)): (usize, (Timestamp, f64))| FlightDiagnostics {
                 departure_utc,
-                // The scatter of ± 0.2 ms stands for one of 20 N.
+                // The scatter of ± 0.2 ms corresponds to one of 20 N.
                 load_zero_n: Some(if k < 30 { 50.0 } else { 450.0 } + 1e5 * scatter),
                 load_zero_se_n: Some(se_n),
                 load_p95_n: Some(7_000.0),

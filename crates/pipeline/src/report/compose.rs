@@ -1,5 +1,6 @@
 //! Composes a report from the store: assessments now and before, flights, installations, inspections.
 
+use records::uncertainty::SD_OVER_MAD;
 use std::collections::{BTreeMap, BTreeSet};
 
 use ::report::{
@@ -7,13 +8,12 @@ use ::report::{
     Report, Tail, TimedInterval, UnitView,
 };
 use ingest::tables::{Table, name, number, utc};
-use jiff::{SignedDuration, Timestamp};
+use jiff::Timestamp;
 use job::Config;
 use records::{GapRecord, Installations, PartNumber, SerialNumber};
 use store::{LogOutcome, Store};
 use trend::Forecast;
 
-use crate::days::days;
 use crate::error::Error;
 use crate::fleet_trends::assess::{self, ReportAssessments, UnitSelection};
 use crate::history::builder::HistoryBuilder;
@@ -21,6 +21,7 @@ use crate::history::flight_row::FlightRow as FlownRow;
 use crate::history::histories::{Histories, History, UnitKey as Name};
 use crate::history::installation_index::InstallationIndex;
 use crate::monitoring::recorder_change::detect_changes_in_store;
+use records::time::{days_after, days_between};
 use records::{ChangePoint, TrendRow};
 
 /// Days before the report whose forecasts are compared with the outcome.
@@ -34,7 +35,7 @@ const MAX_COMPARED_DAYS: f64 = 30.0;
 /// Composes the report of the asked units.
 ///
 /// # Errors
-/// When the store or the table of inspections cannot be read, or a part's limits cannot be judged by.
+/// When the store or the table of inspections cannot be read, or a part's limits are invalid.
 pub fn compose(
     config: &Config,
     installations: &Installations,
@@ -61,7 +62,7 @@ pub fn compose(
         before: &by_name(before),
         past: &past,
         checks: checks.as_deref().unwrap_or(&[]),
-        stays: &InstallationIndex::new(installations),
+        installations: &InstallationIndex::new(installations),
     };
     let unit = |(row, drawn): (&TrendRow, &Forecast)| {
         let name = name_of(row);
@@ -100,7 +101,7 @@ fn scope(ask: &UnitSelection) -> Option<String> {
     (!both.is_empty()).then(|| both.join(", "))
 }
 
-/// What became of all logs: how many of each tail, and those in error.
+/// Logs: number by tail, and those in error.
 struct Logs {
     known: BTreeMap<Option<String>, usize>,
     faults: Vec<LogError>,
@@ -199,14 +200,15 @@ struct ReportComposer<'a> {
     before: &'a PastAssessments,
     past: &'a BTreeMap<i64, BTreeMap<Name, trend::Interval>>,
     checks: &'a [InspectionRow],
-    stays: &'a InstallationIndex<'a>,
+    installations: &'a InstallationIndex<'a>,
 }
 
 impl ReportComposer<'_> {
     fn unit(&self, row: &TrendRow, drawn: &Forecast, history: &History, rest: &[FlightExtras]) -> UnitView {
         let flown = history.flights();
         let name = name_of(row);
-        let stays: Vec<Installation> = self.stays.of(&name).into_iter().map(stay).collect();
+        let installations: Vec<Installation> =
+            self.installations.of(&name).into_iter().map(installation).collect();
         UnitView {
             level: drawn
                 .past
@@ -216,11 +218,11 @@ impl ReportComposer<'_> {
             forecast: forecast(drawn, row),
             assessment: self.statement(row, history, &name),
             quality: quality(history, rest, row.as_of_utc),
-            events: events(row, &stays),
+            events: events(row, &installations),
             past_forecasts: self.past(row, &name),
             inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.extras(flown)).collect(),
             flights: flown.iter().map(|flown| flight(history, flown, &rest[flown.row as usize])).collect(),
-            installations: stays,
+            installations,
             part_number: name.0,
             serial_number: name.1,
             tail_number: row.tail_number.clone(),
@@ -289,7 +291,7 @@ impl ReportComposer<'_> {
     }
 }
 
-fn stay(of: &records::Installation) -> Installation {
+fn installation(of: &records::Installation) -> Installation {
     Installation {
         tail_number: of.tail_number.to_string(),
         position: of.position.to_string(),
@@ -303,7 +305,7 @@ fn forecast(drawn: &Forecast, row: &TrendRow) -> Vec<TimedInterval> {
     let Some(hours_per_day) = row.hours_per_day.filter(|_| row.removed_utc.is_none()) else {
         return Vec::new();
     };
-    let at = |hours: f64| date(row.as_of_utc, hours / hours_per_day);
+    let at = |hours: f64| days_after(row.as_of_utc, hours / hours_per_day);
     drawn.ahead.iter().filter_map(|(hours, band)| timed_interval(at(*hours), band)).collect()
 }
 
@@ -329,16 +331,11 @@ fn prior(
     }
 }
 
-/// So many days after; nothing where the calendar ends.
-fn date(from: Timestamp, days: f64) -> Option<Timestamp> {
-    from.checked_add(SignedDuration::try_from_secs_f64(days * 86_400.0).ok()?).ok()
-}
-
-fn events(row: &TrendRow, stays: &[Installation]) -> Vec<Event> {
+fn events(row: &TrendRow, installations: &[Installation]) -> Vec<Event> {
     let booked = |at: Timestamp| {
-        stays.iter().any(|s| {
+        installations.iter().any(|s| {
             let ends = [Some(s.installed_utc), s.removed_utc];
-            ends.into_iter().flatten().any(|end| days(end, at).abs() <= BOOKED_WITHIN_DAYS)
+            ends.into_iter().flatten().any(|end| days_between(end, at).abs() <= BOOKED_WITHIN_DAYS)
         })
     };
     let event = |c: &ChangePoint| Event {
@@ -376,7 +373,7 @@ fn quality(history: &History, rest: &[FlightExtras], as_of: Timestamp) -> Qualit
         reasons: ranked(reasons),
         flags: ranked(doubts),
         last_estimate_utc: last,
-        days_since_estimate: last.map(|last| days(last, as_of)),
+        days_since_estimate: last.map(|last| days_between(last, as_of)),
         noise_ratio: successive_difference_ratio(history),
     }
 }
@@ -394,7 +391,7 @@ fn successive_difference_ratio(history: &History) -> Option<f64> {
     let ratio = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0).abs() / pair[0].1.hypot(pair[1].1);
     let mut ratios: Vec<f64> = gaps.windows(2).map(ratio).filter(|r| r.is_finite()).collect();
     ratios.sort_by(f64::total_cmp);
-    (ratios.len() >= 5).then(|| 1.4826 * ratios[ratios.len() / 2])
+    (ratios.len() >= 5).then(|| SD_OVER_MAD * ratios[ratios.len() / 2])
 }
 
 fn flight(history: &History, flown: &FlownRow, rest: &FlightExtras) -> FlightRow {
@@ -486,7 +483,7 @@ impl InspectionRow {
         let near = records
             .iter()
             .rev()
-            .filter(|r| (0.0..=MAX_COMPARED_DAYS).contains(&days(r.departure_utc(), self.date_utc)));
+            .filter(|r| (0.0..=MAX_COMPARED_DAYS).contains(&days_between(r.departure_utc(), self.date_utc)));
         let mut gaps: Vec<f64> = near.filter_map(FlownRow::gap_m).take(MAX_COMPARED).collect();
         gaps.sort_by(f64::total_cmp);
         let middle = gaps.len() / 2;

@@ -27,8 +27,8 @@ pub struct PublishSummary {
 /// that was there stays.
 pub fn write(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<PublishSummary, Error> {
     refuse_foreign(dir)?;
-    let fresh = beside(dir, "new");
-    let old = beside(dir, "old");
+    let fresh = sibling(dir, "new");
+    let old = sibling(dir, "old");
     for leftover in [&fresh, &old] {
         if leftover.exists() {
             fs::remove_dir_all(leftover).map_err(|e| failed(leftover, e))?;
@@ -85,7 +85,7 @@ fn all(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<P
     Ok(PublishSummary { files: files.into_inner(), bytes: bytes.into_inner() })
 }
 
-fn beside(dir: &Path, what: &str) -> PathBuf {
+fn sibling(dir: &Path, what: &str) -> PathBuf {
     let name = dir.file_name().map_or_else(|| "report".to_owned(), |n| n.to_string_lossy().into_owned());
     dir.with_file_name(format!(".{name}.{what}"))
 }

@@ -40,7 +40,7 @@ pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
         companions.extend(files.into_iter().map(|file| (name.as_str(), file)));
     }
     let mut found = if companions.is_empty() && !config.document.logs.pieces {
-        let logs = main.into_iter().map(|(shown, path)| (shown, LogFiles::one(path))).collect();
+        let logs = main.into_iter().map(|(log_path, path)| (log_path, LogFiles::one(path))).collect();
         DiscoveredLogs { logs, ..DiscoveredLogs::default() }
     } else {
         group_files(config, main, companions)
@@ -77,20 +77,20 @@ fn group_files(
 ) -> DiscoveredLogs {
     let known: Vec<_> = main
         .into_par_iter()
-        .map(|(shown, path)| (identify(&LogFiles::one(&path), &shown, config), shown, path))
+        .map(|(log_path, path)| (identify(&LogFiles::one(&path), &log_path, config), log_path, path))
         .collect();
     let mut found = DiscoveredLogs::default();
     let mut whose = IdentityIndex::new();
-    for (who, shown, path) in known {
+    for (who, log_path, path) in known {
         let who = match who {
             Ok(who) => who,
             // Without its companions it would be an error of another kind, which no run would try again.
             Err(diagnostic) if is_passing(&diagnostic.code) => {
-                found.faulty.insert(shown, (path, diagnostic));
+                found.faulty.insert(log_path, (path, diagnostic));
                 continue;
             }
             Err(_) => {
-                found.logs.insert(shown, LogFiles::one(path));
+                found.logs.insert(log_path, LogFiles::one(path));
                 continue;
             }
         };
@@ -99,19 +99,21 @@ fn group_files(
         match on_tail.iter().find(is_piece).and_then(|(_, first)| found.logs.get_mut(first)) {
             Some(files) => files.main.push(path),
             None => {
-                on_tail.push((who, shown.clone()));
-                found.logs.insert(shown, LogFiles::one(path));
+                on_tail.push((who, log_path.clone()));
+                found.logs.insert(log_path, LogFiles::one(path));
             }
         }
     }
-    let said: Vec<_> = companions
+    let identified: Vec<_> = companions
         .into_par_iter()
-        .map(|(group, (shown, path))| (identify_companion(&path, group, &shown, config), group, shown, path))
+        .map(|(group, (log_path, path))| {
+            (identify_companion(&path, group, &log_path, config), group, log_path, path)
+        })
         .collect();
-    for (who, group, shown, path) in said {
+    for (who, group, log_path, path) in identified {
         match who {
-            Err(diagnostic) => drop(found.faulty.insert(shown, (path, diagnostic))),
-            Ok(who) => attach_companions(&mut found, &whose, &who, group, shown, &path),
+            Err(diagnostic) => drop(found.faulty.insert(log_path, (path, diagnostic))),
+            Ok(who) => attach_companions(&mut found, &whose, &who, group, log_path, &path),
         }
     }
     found
@@ -123,7 +125,7 @@ fn attach_companions(
     whose: &IdentityIndex,
     who: &FlightIdentity,
     group: &str,
-    shown: String,
+    log_path: String,
     path: &Path,
 ) {
     let mut is_stray = true;
@@ -135,7 +137,7 @@ fn attach_companions(
         }
     }
     if is_stray {
-        found.strays.push(shown);
+        found.strays.push(log_path);
     }
 }
 
@@ -172,7 +174,7 @@ fn matching(
             let before = found.len();
             let listed = discover_remote::each(pattern, |entry| {
                 if !ours(&entry.path) {
-                    found.insert(shown(config, &entry.path), entry.path.clone());
+                    found.insert(log_path(config, &entry.path), entry.path.clone());
                     seen.insert(entry.path.clone(), entry.into());
                 }
             })?;
@@ -197,15 +199,15 @@ fn matching(
             match listed {
                 Ok((path, is_file)) => files.extend((is_file && !ours(&path)).then_some(path)),
                 Err((path, e)) => {
-                    let shown = shown(config, &path);
-                    unlisted.insert(shown.clone(), (path.clone(), unreadable(&path, &shown, &e)));
+                    let log_path = log_path(config, &path);
+                    unlisted.insert(log_path.clone(), (path.clone(), unreadable(&path, &log_path, &e)));
                 }
             }
         }
         if files.is_empty() && unlisted.len() == faults {
             silent.insert(pattern.as_str());
         }
-        found.extend(files.into_iter().map(|path| (shown(config, &path), path)));
+        found.extend(files.into_iter().map(|path| (log_path(config, &path), path)));
     }
     // Silence is a fault: a pattern that fits nothing is more often a moved folder than a day without flights.
     if silent.is_empty() {
@@ -225,11 +227,11 @@ fn is_file(path: &Path) -> std::io::Result<bool> {
 }
 
 /// A folder that cannot be listed may hold any number of logs: it is an error and not an empty folder.
-fn unreadable(path: &Path, shown: &str, error: &std::io::Error) -> Diagnostic {
+fn unreadable(path: &Path, log_path: &str, error: &std::io::Error) -> Diagnostic {
     let (code, kind) =
         if path.is_dir() { ("folder_unreadable", "folder") } else { ("file_unreadable", "file") };
-    Diagnostic::new(code, format!("the {kind} {shown} cannot be listed: {error}"))
-        .in_file(shown)
+    Diagnostic::new(code, format!("the {kind} {log_path} cannot be listed: {error}"))
+        .in_file(log_path)
         .hint("check its owner and mode, or the link; then `freeplay run --retry`")
 }
 
@@ -241,7 +243,7 @@ fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
     config.at(silent.first().copied().unwrap_or_default(), diagnostic)
 }
 
-fn shown(config: &Config, path: &Path) -> String {
+fn log_path(config: &Config, path: &Path) -> String {
     path.strip_prefix(&config.folder).unwrap_or(path).to_string_lossy().replace('\\', "/")
 }
 
@@ -250,7 +252,7 @@ fn shown(config: &Config, path: &Path) -> String {
 mod tests {
     use super::*;
 
-    /// A link to itself stands for whatever cannot be listed, which no test that runs as root can otherwise make.
+    /// A link to itself cannot be listed, even by root.
     #[cfg(unix)]
     #[test]
     fn what_cannot_be_listed_is_an_error_and_not_left_out() {
@@ -262,7 +264,10 @@ mod tests {
         let config = Config::parse(&text, Path::new("pipeline.toml"), folder.path()).unwrap();
         let (mut seen, mut unlisted) = (SeenObjects::new(), BTreeMap::new());
         let found = matching(&config, &["logs/*.parquet".to_owned()], &mut seen, &mut unlisted).unwrap();
-        assert_eq!(found.iter().map(|(shown, _)| shown.as_str()).collect::<Vec<_>>(), ["logs/a.parquet"]);
+        assert_eq!(
+            found.iter().map(|(log_path, _)| log_path.as_str()).collect::<Vec<_>>(),
+            ["logs/a.parquet"]
+        );
         let (path, error) = &unlisted["logs/b.parquet"];
         assert_eq!((error.code.as_str(), path.ends_with("b.parquet")), ("file_unreadable", true));
     }

@@ -17,7 +17,7 @@ const AS_FILES: glob::MatchOptions = glob::MatchOptions {
 /// does not fit is not kept.
 ///
 /// # Errors
-/// [`Error::Objects`] when the store does not answer; the text of what is wrong with the pattern.
+/// [`Error::Objects`] when the store is not reachable; the text of an error in the pattern.
 pub(crate) fn each(pattern: &str, mut take: impl FnMut(ListEntry)) -> Result<Result<(), String>, Error> {
     let address = Address::parse_required(pattern)?;
     let wanted = match glob::Pattern::new(address.key()) {

@@ -1,9 +1,10 @@
-//! A run whose logs are done elsewhere, on the machines of an engine such as Spark: the plan is made here, a
-//! log is a [`Task`] that [`process_task`] does there, and its answer comes back as rows that are stored here.
+//! Distributed run: logs are processed on the machines of an engine such as Spark.
 //!
-//! Engines run a task at least once, and may lose it. An answer counts once, whichever copy arrives; records
-//! take the place of those with the same key; a log without an answer is *not reached*, and the next run
-//! does it. Only this side writes, so the store's promises stand.
+//! This process plans and stores. A log is a [`Task`]; [`process_task`] processes it on the engine and returns rows.
+//!
+//! Engines run a task at least once, and may lose it. The first result of a task counts; records replace those with the
+//! same key; a log without a result is *not reached*, and the next run processes it. Only this process writes, so the
+//! guarantees of the store hold.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
@@ -30,7 +31,7 @@ use crate::run::scheduler::{Context, WorkerContext, execute_run};
 use crate::run::summary::{self, RunSummary};
 use crate::run::worker_pool::StepCount;
 
-/// One log to be done elsewhere.
+/// One log to be processed by the engine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Task {
     /// Its name in records and messages.
@@ -43,7 +44,7 @@ pub struct Task {
     pub run_id: String,
 }
 
-/// What does some tasks, and brings their answers in any order.
+/// Processes tasks and returns their results in any order.
 pub type Engine<'a> = dyn FnMut(&[Task]) -> Result<Vec<RecordBatch>, String> + 'a;
 
 /// Status of a processed log, without its records.
@@ -74,12 +75,12 @@ pub fn schema() -> SchemaRef {
 
 const OURS: [&str; 3] = ["error_code", "error_detail", "account"];
 
-/// Does one log, on one thread: the engine gives a task one core.
+/// Processes one log on one thread: the engine gives a task one core.
 ///
-/// A log in error is an answer like any other.
+/// A log in error has a result like any other.
 ///
 /// # Errors
-/// When a thread cannot be started, or the answer does not fit its columns.
+/// When a thread cannot be started, or the result does not fit its columns.
 pub fn process_task(
     config: &Config,
     installations: &Installations,
@@ -88,12 +89,12 @@ pub fn process_task(
 ) -> Result<RecordBatch, Error> {
     let (plan, budget) = (Plan::default(), MemoryBudget::new(config.document.run.memory_mib));
     let (plan, budget, steps, run_id) = (&plan, &budget, &StepCount::default(), task.run_id.as_str());
-    let shop = WorkerContext { config, installations, program_version, plan, run_id, budget, steps };
+    let worker = WorkerContext { config, installations, program_version, plan, run_id, budget, steps };
     let files = LogFiles { main: task.main.clone(), groups: task.groups.clone() };
-    let shown = task.log_path.clone();
-    let work = WorkItem { files, fault: None, shown, stat: None, why: WorkReason::New, before: None };
+    let log_path = task.log_path.clone();
+    let work = WorkItem { files, fault: None, log_path, stat: None, why: WorkReason::New, before: None };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    match pool.install(|| shop.process_log(&work)) {
+    match pool.install(|| worker.process_log(&work)) {
         LogOutcomeData::Read { account, records, diagnostics } => {
             encode_result(&account, &records, diagnostics)
         }
@@ -102,7 +103,7 @@ pub fn process_task(
     }
 }
 
-/// One log's answer as rows: what became of it first, then its records.
+/// Result of one log as rows: its status first, then its records.
 fn encode_result(
     account: &LogRecord,
     records: &[GapRecord],
@@ -147,7 +148,7 @@ fn encode_result(
 /// as they arrive.
 ///
 /// # Errors
-/// As [`crate::run()`], and [`Error::Engine`] when the engine fails. What it answered before is stored.
+/// As [`crate::run()`], and [`Error::Engine`] when the engine fails. Its earlier results are stored.
 pub fn run(
     config: &Config,
     request: &Request,
@@ -159,41 +160,41 @@ pub fn run(
         intent.state(writer)?;
         let budget = MemoryBudget::new(config.document.run.memory_mib);
         let steps = StepCount::default();
-        let shop = &inputs.worker(&budget, &steps);
-        let mut book = OwnershipLedger::of(shop.plan, shop.config, shop.installations);
+        let worker = &inputs.worker(&budget, &steps);
+        let mut ledger = OwnershipLedger::of(worker.plan, worker.config, worker.installations);
         report.not_reached = 0;
-        for works in shop.plan.work.chunks(at_a_time.max(1)) {
-            some((shop, context), works, engine, (writer, &mut book, report))?;
+        for works in worker.plan.work.chunks(at_a_time.max(1)) {
+            process_batch((worker, context), works, engine, (writer, &mut ledger, report))?;
         }
         report.not_reached = report.not_reached_logs.len();
-        report.quiet = summary::quiet(book.accounts(), shop.config.document.trend.stale_after_days);
-        Ok(book.touched.into_iter().collect::<Vec<assess::Unit>>())
+        report.quiet = summary::quiet(ledger.accounts(), worker.config.document.trend.stale_after_days);
+        Ok(ledger.touched.into_iter().collect::<Vec<assess::Unit>>())
     })
 }
 
 /// One batch of logs: those with a known error are reported here, the others go to the engine.
-fn some(
-    (shop, context): (&WorkerContext<'_>, &Context<'_>),
+fn process_batch(
+    (worker, context): (&WorkerContext<'_>, &Context<'_>),
     works: &[WorkItem],
     engine: &mut Engine<'_>,
-    (writer, book, report): (&mut Writer, &mut OwnershipLedger<'_>, &mut RunSummary),
+    (writer, ledger, report): (&mut Writer, &mut OwnershipLedger<'_>, &mut RunSummary),
 ) -> Result<(), Error> {
     let sound = works.iter().filter(|work| work.fault.is_none());
-    let tasks: Vec<Task> = sound.map(|work| task(work, shop.run_id)).collect();
+    let tasks: Vec<Task> = sound.map(|work| task(work, worker.run_id)).collect();
     let mut answers =
         if tasks.is_empty() { HashMap::new() } else { read(&engine(&tasks).map_err(Error::Engine)?)? };
     let mut results: Vec<LogResult> = Vec::new();
     for work in works {
-        let done = match answers.remove(&work.shown) {
-            Some((results, records)) => to_log_result(shop, work, results, records),
-            None if work.fault.is_some() => shop.process_log(work),
+        let done = match answers.remove(&work.log_path) {
+            Some((results, records)) => to_log_result(worker, work, results, records),
+            None if work.fault.is_some() => worker.process_log(work),
             None => {
-                report.not_reached_logs.push(work.shown.clone());
+                report.not_reached_logs.push(work.log_path.clone());
                 continue;
             }
         };
         (context.watch)(done.event(work));
-        results.extend(book.resolve(done, report));
+        results.extend(ledger.resolve(done, report));
     }
     if !results.is_empty() {
         writer.commit(&results)?;
@@ -204,16 +205,16 @@ fn some(
 
 fn task(work: &WorkItem, run_id: &str) -> Task {
     Task {
-        log_path: work.shown.clone(),
+        log_path: work.log_path.clone(),
         main: work.files.main.clone(),
         groups: work.files.groups.clone(),
         run_id: run_id.to_owned(),
     }
 }
 
-/// What came of a log, as if it had been read here.
+/// Outcome of a log, as if it had been processed by this process.
 fn to_log_result(
-    shop: &WorkerContext<'_>,
+    worker: &WorkerContext<'_>,
     work: &WorkItem,
     results: TaskResult,
     records: Vec<GapRecord>,
@@ -229,9 +230,9 @@ fn to_log_result(
         refused: results.refused,
         duration_s: results.duration_s,
         processed_utc: results.processed_utc,
-        ..summary::of_log(work, shop.run_id)
+        ..summary::of_log(work, worker.run_id)
     };
-    if let Some((estimated, refused)) = shop.already_recorded(work, &account) {
+    if let Some((estimated, refused)) = worker.already_recorded(work, &account) {
         let already_recorded = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account };
         return LogOutcomeData::Same(Box::new(already_recorded));
     }
@@ -267,7 +268,7 @@ fn read(batches: &[RecordBatch]) -> Result<TaskResults, Error> {
     Ok(whole.collect())
 }
 
-/// A batch in our own types: engines hand text and lists on as they like best.
+/// A batch in the types of the schema: engines return text and lists in types of their own.
 fn typed(batch: &RecordBatch) -> Result<RecordBatch, Error> {
     let schema = schema();
     let column = |field: &Arc<Field>| {

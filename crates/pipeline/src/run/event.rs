@@ -35,7 +35,7 @@ pub enum Event {
         /// Logs in this commit.
         logs: usize,
     },
-    /// The trends of so many units are being stated.
+    /// Number of units whose trends are being assessed.
     Trends {
         /// Units.
         units: usize,

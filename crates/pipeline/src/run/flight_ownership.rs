@@ -15,24 +15,24 @@ use crate::run::event::Event;
 use crate::run::plan::{Plan, WorkItem};
 use crate::run::summary::{self, DuplicateLog, RunSummary};
 
-/// What came of one log.
+/// Outcome of one log.
 pub(crate) enum LogOutcomeData {
-    /// Its content is known; only its name or date is new.
+    /// The content is known; only name or date is new.
     Same(Box<LogRecord>),
-    /// It was read.
+    /// The log was read.
     Read {
-        /// Its account.
+        /// Its status.
         account: Box<LogRecord>,
         /// Its records.
         records: Vec<GapRecord>,
-        /// What is wrong with it.
+        /// Its errors.
         diagnostics: Vec<Diagnostic>,
     },
 }
 
 impl LogOutcomeData {
     pub(crate) fn event(&self, work: &WorkItem) -> Event {
-        let (log, bytes) = (work.shown.clone(), work.stat.as_ref().map_or(0, |s| s.size_bytes as u64));
+        let (log, bytes) = (work.log_path.clone(), work.stat.as_ref().map_or(0, |s| s.size_bytes as u64));
         let (estimated, refused, diagnostics) = match self {
             Self::Read { account, diagnostics, .. } => {
                 (account.estimated as usize, account.refused as usize, diagnostics.clone())
@@ -43,7 +43,7 @@ impl LogOutcomeData {
     }
 }
 
-/// The writer's book of the store as it is and as it will be.
+/// Ledger of the writer: which log owns which flight, in the store and after this run.
 pub(crate) struct OwnershipLedger<'a> {
     config: &'a Config,
     installations: &'a Installations,
@@ -57,14 +57,14 @@ pub(crate) struct OwnershipLedger<'a> {
 impl<'a> OwnershipLedger<'a> {
     pub(crate) fn of(plan: &'a Plan, config: &'a Config, installations: &'a Installations) -> Self {
         let (accounts, owners) = (HashMap::new(), HashMap::new());
-        let mut book = Self { config, installations, plan, accounts, owners, touched: BTreeSet::new() };
+        let mut ledger = Self { config, installations, plan, accounts, owners, touched: BTreeSet::new() };
         if !plan.work.is_empty() {
-            plan.accounts.values().for_each(|account| book.insert(account.clone()));
+            plan.accounts.values().for_each(|account| ledger.insert(account.clone()));
         }
-        book
+        ledger
     }
 
-    /// What is accounted for now.
+    /// Status of all logs, after this run.
     pub(crate) fn accounts(&self) -> impl Iterator<Item = &LogRecord> {
         let unchanged = self.plan.work.is_empty().then(|| self.plan.accounts.values());
         self.accounts.values().chain(unchanged.into_iter().flatten())
@@ -76,7 +76,7 @@ impl<'a> OwnershipLedger<'a> {
         self.accounts.insert(account.log_path.clone(), account);
     }
 
-    /// Turns what came of a log into what is written, and counts it.
+    /// Converts the outcome of a log to rows, and counts it.
     pub(crate) fn resolve(&mut self, done: LogOutcomeData, report: &mut RunSummary) -> Vec<LogResult> {
         match done {
             LogOutcomeData::Same(account) => {
@@ -130,7 +130,7 @@ impl<'a> OwnershipLedger<'a> {
         vec![first, self.store(loser, Vec::new(), &diagnostics, report)]
     }
 
-    /// Whether two logs hold the same samples in another encoding. Rare, so it is found out by reading both.
+    /// Whether two logs hold the same samples in different encodings. Rare, so both are read.
     fn holds_the_same(&self, one: &LogRecord, other: &LogRecord) -> bool {
         let digest = |account: &LogRecord| {
             let files = self.plan.files.get(&account.log_path)?;
@@ -139,7 +139,7 @@ impl<'a> OwnershipLedger<'a> {
         digest(one).is_some_and(|one| digest(other) == Some(one))
     }
 
-    /// Another log that speaks for one of these flights.
+    /// Another log that owns one of these flights.
     fn competing_log(&self, account: &LogRecord, records: &[GapRecord]) -> Option<LogRecord> {
         let owner = |r: &GapRecord| self.owners.get(&RecordKey::of(r));
         let other = records.iter().filter_map(owner).find(|path| **path != account.log_path)?;
@@ -163,7 +163,7 @@ impl<'a> OwnershipLedger<'a> {
         LogResult { account, records, retires }
     }
 
-    /// Records this log made under another identity or for positions it no longer speaks for.
+    /// Records of this log under another identity, or for positions it no longer has.
     fn stale_records(&mut self, account: &LogRecord, records: &[GapRecord]) -> Vec<RecordKey> {
         let Some(before) = self.accounts.get(&account.log_path) else { return Vec::new() };
         let now: BTreeSet<RecordKey> = records.iter().map(RecordKey::of).collect();
@@ -177,7 +177,7 @@ impl<'a> OwnershipLedger<'a> {
     }
 }
 
-/// The account of a log whose flight belongs to another.
+/// Status of a log whose flight belongs to another log.
 fn superseded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> (LogRecord, Vec<Diagnostic>) {
     (account.estimated, account.refused) = (0, 0);
     account.outcome = LogOutcome::Done;

@@ -22,7 +22,7 @@ pub(crate) struct MemoryPermit<'b> {
 }
 
 impl MemoryBudget {
-    /// A budget of so many MiB; without one, nothing ever waits.
+    /// A budget in MiB; without one, nothing waits.
     pub(crate) fn new(limit_mib: Option<u64>) -> Self {
         let limit_bytes = limit_mib.map_or(u64::MAX, |mib| mib.saturating_mul(1 << 20));
         Self { limit_bytes, in_use_bytes: Mutex::new(0), freed: Condvar::new() }

@@ -1,4 +1,4 @@
-//! Which logs are there, which are already accounted for, and why each of the others is done.
+//! Plan of a run: the logs found, those already processed, and the reason to process each of the others.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::PathBuf;
@@ -18,23 +18,23 @@ use crate::run::file_stat::SeenObjects;
 /// Options of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
-    /// Departures from then on.
+    /// Departures at or after this time.
     pub since_utc: Option<Timestamp>,
-    /// Departures before then.
+    /// Departures before this time.
     pub until_utc: Option<Timestamp>,
     /// One aircraft only.
     pub tail_number: Option<TailNumber>,
-    /// Logs of flights on which this unit flew only.
+    /// This unit only.
     pub serial_number: Option<SerialNumber>,
     /// Process at most this number of logs.
     pub limit: Option<usize>,
     /// Number of workers; one per core when not given.
     pub jobs: Option<usize>,
-    /// Logs in error again.
+    /// Process failed logs again.
     pub retry: bool,
-    /// Every log again.
+    /// Process every log again.
     pub redo: bool,
-    /// The content of known logs too, though nothing about their files has changed.
+    /// Compare the content of known logs, even if their files have not changed.
     pub verify_content: bool,
 }
 
@@ -51,7 +51,9 @@ impl Request {
     pub fn wants(&self, flight: &Flight, installations: &Installations) -> bool {
         let at = flight.departure_utc;
         let flew = |serial: &SerialNumber| {
-            installations.units_on_tail(&flight.tail_number, at).any(|stay| stay.serial_number == *serial)
+            installations
+                .units_on_tail(&flight.tail_number, at)
+                .any(|installation| installation.serial_number == *serial)
         };
         self.since_utc.is_none_or(|since| since <= at)
             && self.until_utc.is_none_or(|until| at < until)
@@ -60,31 +62,31 @@ impl Request {
     }
 }
 
-/// Why a log is done.
+/// Reason to process a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum WorkReason {
-    /// It was never seen.
+    /// The log is new.
     New,
-    /// Its file is not the one that was accounted for.
+    /// The file has changed.
     ContentChanged,
-    /// A setting that touches it, or an installation, changed.
+    /// A setting that affects it, or an installation, has changed.
     SettingChanged,
-    /// The log it had yielded its flight to speaks for it no longer.
+    /// The log it had yielded its flight to no longer owns it.
     OwnerGone,
-    /// It was in error, and `--retry` asks for it.
+    /// It failed before, and `--retry` is set.
     Retry,
-    /// It could not be fetched or read completely before, for a cause that may pass by itself.
+    /// An earlier run could not fetch or read it, for a passing cause.
     Unfetched,
-    /// It cannot be listed, so nothing is known of it.
+    /// It cannot be listed.
     Unlisted,
-    /// `--redo` asks for it.
+    /// `--redo` is set.
     Asked,
-    /// `--verify-content` asks whether it is still what was read.
+    /// `--verify-content` is set.
     Verify,
 }
 
 impl WorkReason {
-    /// In words.
+    /// Reason as text.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::New => "new",
@@ -100,60 +102,60 @@ impl WorkReason {
     }
 }
 
-/// One log to be done.
+/// One log to be processed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorkItem {
     /// Its files.
     pub files: LogFiles,
-    /// Why it cannot be read, where that is known already.
+    /// Error that is known already, e.g. an unreadable folder.
     pub fault: Option<Diagnostic>,
-    /// Its name in records and messages: relative to the configuration's folder where it is inside it.
-    pub shown: String,
+    /// Its path in records and messages: relative to the configuration's folder where it is inside it.
+    pub log_path: String,
     /// File status; none when the file vanished since it was found.
     pub stat: Option<FileStat>,
-    /// Why it is done.
+    /// Reason to process it.
     pub why: WorkReason,
-    /// What was accounted for before under this name.
+    /// Status of an earlier log of this path.
     pub before: Option<LogRecord>,
 }
 
 /// Plan of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
-    /// Logs that fit the patterns.
+    /// Number of logs that match the patterns.
     pub found: usize,
-    /// Those already accounted for.
+    /// Number of logs already processed.
     pub known: usize,
-    /// Those to be done, longest first.
+    /// Logs to be processed, largest first.
     pub work: Vec<WorkItem>,
-    /// What is accounted for, by name, of the logs that are still there.
+    /// Log records, by path, of the logs that still exist.
     pub accounts: BTreeMap<String, LogRecord>,
-    /// What was read, and under which settings, of logs that are there; nothing without work.
+    /// Content and settings digests of existing logs; empty without work.
     pub here: HashSet<Digests>,
-    /// The same of logs that are gone, with their records: they may be here under another name.
+    /// The same of deleted logs, with their records: a log may have been renamed.
     pub gone: HashMap<Digests, (i64, i64)>,
-    /// Logs of flights that were not asked for.
+    /// Number of logs excluded by the selection.
     pub not_asked: usize,
-    /// Logs left by the limit.
+    /// Logs left for later by `--limit`.
     pub left: usize,
-    /// Logs in error of earlier runs that are not done again, by name.
+    /// Failed logs of earlier runs that are not processed again, by path.
     pub standing_errors: Vec<StandingError>,
     /// Files of groups whose flight has no main log.
     pub strays: Vec<String>,
-    /// The files of every log that was found; nothing without work.
+    /// Files of every log found; empty without work.
     pub files: BTreeMap<String, LogFiles>,
 }
 
-/// An error of an earlier run whose log has not changed since: it stands until the log or a setting is fixed.
+/// An error of an earlier run whose log has not changed since: it is reported until the log or a setting is fixed.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct StandingError {
     /// The log.
     pub log: String,
     /// Code of its first error.
     pub code: String,
-    /// What is wrong: all its errors as text.
+    /// All errors as text.
     pub detail: String,
-    /// The run that met it.
+    /// The run in which it failed.
     pub run_id: String,
 }
 
@@ -168,10 +170,10 @@ impl StandingError {
     }
 }
 
-/// What was read of a log, and under which settings.
+/// Digests of a log's content and of the settings that affect it.
 pub type Digests = (String, String);
 
-/// Makes the plan from the logs there are and the accounts kept.
+/// Plans a run from the logs found and the status of earlier ones.
 pub fn plan(
     config: &Config,
     installations: &Installations,
@@ -181,9 +183,9 @@ pub fn plan(
 ) -> Plan {
     let (strays, seen) = (found.strays, found.seen);
     let mut logs: BTreeMap<String, (LogFiles, Option<Diagnostic>)> =
-        found.logs.into_iter().map(|(shown, files)| (shown, (files, None))).collect();
-    let faulty = |(shown, (path, diagnostic)): (String, (PathBuf, Diagnostic))| {
-        (shown, (LogFiles::one(path), Some(diagnostic)))
+        found.logs.into_iter().map(|(log_path, files)| (log_path, (files, None))).collect();
+    let faulty = |(log_path, (path, diagnostic)): (String, (PathBuf, Diagnostic))| {
+        (log_path, (LogFiles::one(path), Some(diagnostic)))
     };
     logs.extend(found.faulty.into_iter().map(faulty));
     let found = logs;
@@ -197,19 +199,21 @@ pub fn plan(
         HashSet::new()
     };
     let unidentified = job::flight_log::digest_without_identity(config, installations);
-    let judge =
-        Judge { config, installations, request, owned: &owned, unidentified: &unidentified, seen: &seen };
-    let verdicts: Vec<Verdict> =
-        found.par_iter().map(|(shown, log)| judge.judge(shown, log, accounts.get(shown))).collect();
+    let planner =
+        Planner { config, installations, request, owned: &owned, unidentified: &unidentified, seen: &seen };
+    let verdicts: Vec<Verdict> = found
+        .par_iter()
+        .map(|(log_path, log)| planner.plan_log(log_path, log, accounts.get(log_path)))
+        .collect();
     let not_asked = verdicts.iter().filter(|v| matches!(v, Verdict::NotAsked)).count();
     let mut work: Vec<WorkItem> = verdicts.into_iter().filter_map(Verdict::work).collect();
     let size = |w: &WorkItem| w.stat.as_ref().map_or(0, |s| s.size_bytes);
-    work.sort_by(|a, b| size(b).cmp(&size(a)).then_with(|| a.shown.cmp(&b.shown)));
+    work.sort_by(|a, b| size(b).cmp(&size(a)).then_with(|| a.log_path.cmp(&b.log_path)));
     let wanted = work.len();
     work.truncate(request.limit.unwrap_or(usize::MAX));
     let left = wanted - work.len();
     let known = found.len() - wanted - not_asked;
-    let to_do: HashSet<&str> = work.iter().map(|work| work.shown.as_str()).collect();
+    let to_do: HashSet<&str> = work.iter().map(|work| work.log_path.as_str()).collect();
     let standing_errors = accounts
         .values()
         .filter(|account| account.outcome == LogOutcome::Error && !to_do.contains(account.log_path.as_str()))
@@ -230,12 +234,12 @@ pub fn plan(
     };
     if !plan.work.is_empty() {
         plan.here = plan.accounts.values().filter_map(digests).collect();
-        plan.files = found.into_iter().map(|(shown, (files, _))| (shown, files)).collect();
+        plan.files = found.into_iter().map(|(log_path, (files, _))| (log_path, files)).collect();
     }
     plan
 }
 
-/// What was read, and which settings touched it, of a log that went well.
+/// Digests of a log that was processed without an error.
 pub fn digests(account: &LogRecord) -> Option<(String, String)> {
     account
         .outcome
@@ -244,7 +248,7 @@ pub fn digests(account: &LogRecord) -> Option<(String, String)> {
         .flatten()
 }
 
-/// The flight an account speaks of, where its log was identified.
+/// Flight of a log record, where its log was identified.
 pub fn flight_of(account: &LogRecord) -> Option<Flight> {
     Some(Flight {
         tail_number: TailNumber::new(account.tail_number.as_ref()?).ok()?,
@@ -271,8 +275,8 @@ impl Verdict {
     }
 }
 
-/// Everything that one log's verdict depends on.
-struct Judge<'a> {
+/// Inputs of the decision about a log.
+struct Planner<'a> {
     config: &'a Config,
     installations: &'a Installations,
     request: &'a Request,
@@ -281,10 +285,10 @@ struct Judge<'a> {
     seen: &'a SeenObjects,
 }
 
-impl Judge<'_> {
-    fn judge(
+impl Planner<'_> {
+    fn plan_log(
         &self,
-        shown: &str,
+        log_path: &str,
         (files, fault): &(LogFiles, Option<Diagnostic>),
         before: Option<&LogRecord>,
     ) -> Verdict {
@@ -296,15 +300,15 @@ impl Judge<'_> {
         let flight = || {
             before
                 .and_then(flight_of)
-                .or_else(|| Some(job::flight_log::identify(files, shown, self.config).ok()?.0))
+                .or_else(|| Some(job::flight_log::identify(files, log_path, self.config).ok()?.0))
         };
         let asked =
             !self.request.is_narrow() || flight().is_none_or(|f| self.request.wants(&f, self.installations));
         if !asked {
             return Verdict::NotAsked;
         }
-        let (files, fault, shown) = (files.clone(), fault.clone(), shown.to_owned());
-        Verdict::Process(Box::new(WorkItem { files, fault, shown, stat, why, before: before.cloned() }))
+        let (files, fault, log_path) = (files.clone(), fault.clone(), log_path.to_owned());
+        Verdict::Process(Box::new(WorkItem { files, fault, log_path, stat, why, before: before.cloned() }))
     }
 
     /// Why this log is processed in this run, or nothing when it is up to date.
@@ -340,7 +344,7 @@ impl Judge<'_> {
         }
     }
 
-    /// A log that yielded its flight to another, which speaks for it no longer.
+    /// A log that yielded its flight to another log, which no longer owns it.
     fn is_orphan(&self, account: &LogRecord) -> bool {
         let keys = if is_silent(account) { account.keys() } else { Vec::new() };
         !keys.is_empty() && keys.iter().all(|key| !self.owned.contains(key))

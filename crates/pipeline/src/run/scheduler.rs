@@ -1,7 +1,7 @@
 //! The run: one flight per worker, longest first, each stored as soon as it is finished.
 //!
 //! Workers pull the next log from one list, so the longest are begun first and no worker waits for
-//! another. What they finish goes to the one thread that writes: it commits whatever has gathered,
+//! another. Their results go to the one thread that writes: it commits the finished ones,
 //! whole flights at a time, so an interrupted run keeps what it finished. Workers without a log left
 //! take actuators of the logs that are still in work.
 
@@ -27,20 +27,20 @@ use crate::run::plan::{self, Plan, Request, WorkItem, WorkReason};
 use crate::run::summary::{self, KilledRun, RunSummary};
 use crate::run::worker_pool::{Next, PoolSettings, StepCount, WorkerPool};
 
-/// Finished flights wait this long at most for company in a commit: each commit is a file and a log entry.
+/// Longest wait of a finished flight for others of the same commit: each commit is a file and a log entry.
 const BATCH_WAIT: Duration = Duration::from_millis(500);
 /// A log whose file could not be read is opened again after these delays: a stale handle never recovers.
 const READ_AGAIN_AFTER: [Duration; 2] = [Duration::from_millis(300), Duration::from_millis(1500)];
-/// So many finished logs are committed without waiting.
+/// Number of finished logs that are committed without waiting.
 const BATCH_LOGS: usize = 256;
 
 /// Inputs of a run in addition to its configuration.
 pub struct Context<'a> {
-    /// The version written into every record.
+    /// Version written into every record.
     pub program_version: &'a str,
-    /// Who holds the store meanwhile.
+    /// Holder of the store's lock.
     pub holder: Holder,
-    /// How long to wait for another run that holds it.
+    /// Longest wait for another run that holds it.
     pub wait: Option<Duration>,
     /// Set from outside to end the run after the flights in progress.
     pub stop: &'a AtomicBool,
@@ -70,7 +70,7 @@ pub fn dry_run(config: &Config, request: &Request) -> Result<Plan, Error> {
     Ok(plan::plan(config, &installations(config)?, discover::discover(config)?, accounts, request))
 }
 
-/// Runs every log not yet accounted for, stores what it finds, and states the trends of the units it touched.
+/// Processes every log that is new or changed, stores the results, and assesses the units they belong to.
 ///
 /// # Errors
 /// [`Error::Refused`] when nothing could be run; [`Error::Store`] when the store fails in the middle:
@@ -148,7 +148,7 @@ pub(crate) fn execute_run(
     Ok(report)
 }
 
-/// The store's lock, waited for in short turns so that a signal is heard meanwhile.
+/// Acquires the store's lock; it waits in short intervals so that a signal is handled.
 fn acquire_lock(store: &Store, context: &Context<'_>) -> Result<Writer, Error> {
     const TURN: Duration = Duration::from_millis(200);
     let deadline = context.wait.map(|wait| Instant::now() + wait);
@@ -182,7 +182,7 @@ pub(crate) struct RunPlanRows {
 }
 
 impl RunPlanRows {
-    /// Writes it down: before any other commit.
+    /// Writes the planned status, before any other commit.
     pub(crate) fn state(&self, writer: &mut Writer) -> Result<(), Error> {
         Ok(writer.begin_run(&self.run, &self.to_do)?)
     }
@@ -196,7 +196,7 @@ fn raise_mmap_threshold() {
     drop(std::hint::black_box(Vec::<u8>::with_capacity(BOUND_BYTES)));
 }
 
-/// What a run works from; owned, since workers that were abandoned outlive it.
+/// Inputs of a run; owned, since abandoned workers outlive it.
 pub(crate) struct RunInputs {
     pub(crate) config: Config,
     pub(crate) installations: Installations,
@@ -206,7 +206,7 @@ pub(crate) struct RunInputs {
 }
 
 impl RunInputs {
-    /// What a worker looks at.
+    /// Input of a worker.
     pub(crate) fn worker<'a>(&'a self, budget: &'a MemoryBudget, steps: &'a StepCount) -> WorkerContext<'a> {
         WorkerContext {
             config: &self.config,
@@ -219,7 +219,7 @@ impl RunInputs {
         }
     }
 
-    /// The outcome of a log that was given up after some seconds.
+    /// Outcome of a log that exceeded its time limit.
     pub(crate) fn failed(&self, work: &WorkItem, diagnostic: Diagnostic, after_s: f64) -> LogOutcomeData {
         let (budget, steps) = (MemoryBudget::new(None), StepCount::default());
         let mut failed = self.worker(&budget, &steps).failed(work, diagnostic);
@@ -230,7 +230,7 @@ impl RunInputs {
     }
 }
 
-/// Lets the workers loose and writes what they bring; returns the units whose records changed.
+/// Starts the workers and writes their results; returns the units whose records changed.
 fn process_all(
     inputs: &Arc<RunInputs>,
     context: &Context<'_>,
@@ -260,7 +260,7 @@ fn process_all(
     written
 }
 
-/// The writer's side: gathers, settles who owns a flight, commits.
+/// The writer: collects results, resolves flight ownership, commits.
 fn write(
     inputs: &RunInputs,
     context: &Context<'_>,
@@ -268,20 +268,20 @@ fn write(
     writer: &mut Writer,
     report: &mut RunSummary,
 ) -> Result<Vec<assess::Unit>, Error> {
-    let mut book = OwnershipLedger::of(&inputs.plan, &inputs.config, &inputs.installations);
+    let mut ledger = OwnershipLedger::of(&inputs.plan, &inputs.config, &inputs.installations);
     while let Next::Log(first) = pool.next(None)? {
         let gathered = collect_batch(*first, pool)?.into_iter();
-        let results: Vec<LogResult> = gathered.flat_map(|done| book.resolve(done, report)).collect();
+        let results: Vec<LogResult> = gathered.flat_map(|done| ledger.resolve(done, report)).collect();
         if !results.is_empty() {
             writer.commit(&results)?;
             (context.watch)(Event::Stored { logs: results.len() });
         }
     }
-    report.quiet = summary::quiet(book.accounts(), inputs.config.document.trend.stale_after_days);
-    Ok(book.touched.into_iter().collect())
+    report.quiet = summary::quiet(ledger.accounts(), inputs.config.document.trend.stale_after_days);
+    Ok(ledger.touched.into_iter().collect())
 }
 
-/// Everything a worker may look at.
+/// Input of a worker, shared by all.
 #[derive(Clone, Copy)]
 pub(crate) struct WorkerContext<'a> {
     pub(crate) config: &'a Config,
@@ -313,7 +313,7 @@ impl WorkerContext<'_> {
     /// One log; a panic in it is an error row like any other.
     fn process_once(&self, work: &WorkItem) -> LogOutcomeData {
         let clock = Instant::now();
-        let done = catch_panic(&work.shown, || Ok(self.open(work)));
+        let done = catch_panic(&work.log_path, || Ok(self.open(work)));
         let done = done.unwrap_or_else(|diagnostic| self.failed(work, diagnostic));
         match done {
             LogOutcomeData::Read { mut account, records, diagnostics } => {
@@ -340,7 +340,7 @@ impl WorkerContext<'_> {
             return self.failed(work, fault.clone());
         }
         let step = self.steps.begin();
-        let opened = match FlightLog::open(&work.files, &work.shown, self.config, self.installations) {
+        let opened = match FlightLog::open(&work.files, &work.log_path, self.config, self.installations) {
             Ok(opened) => opened,
             Err(diagnostic) => return self.failed(work, diagnostic),
         };
@@ -363,7 +363,7 @@ impl WorkerContext<'_> {
     }
 
     /// The records that are known of this content under these settings: its own, those of a log that
-    /// is gone, whose place it takes, or none, when another log that is there speaks for them.
+    /// is gone, whose place it takes, or none, when another existing log owns them.
     pub(crate) fn already_recorded(&self, work: &WorkItem, account: &LogRecord) -> Option<(i64, i64)> {
         let digests = plan::digests(account)?;
         if matches!(work.why, WorkReason::Asked | WorkReason::OwnerGone) {
@@ -409,7 +409,7 @@ impl WorkerContext<'_> {
     }
 }
 
-/// What is finished within a short while, or nothing but the first when nothing follows.
+/// Results that arrive within a short time after the first.
 fn collect_batch(first: LogOutcomeData, pool: &mut WorkerPool<'_>) -> Result<Vec<LogOutcomeData>, Error> {
     let deadline = Instant::now() + BATCH_WAIT;
     let mut gathered = vec![first];

@@ -1,5 +1,6 @@
-//! The account of a run: every log done, refused, in error, known or not reached; nothing is missing.
+//! Run summary: counts and findings of a run; every log is in exactly one count.
 
+use records::time::days_between;
 use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
@@ -15,12 +16,12 @@ use crate::monitoring::recorder_change::{self, RecorderChange};
 use crate::run::plan::{Plan, StandingError, WorkItem};
 use records::TrendRow;
 
-/// One log's trouble.
+/// Error of a log.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct LogError {
     /// The log.
     pub log: String,
-    /// What is wrong with it.
+    /// The error.
     #[serde(rename = "complaint")]
     pub diagnostic: Diagnostic,
 }
@@ -45,7 +46,7 @@ pub struct DuplicateLog {
     pub owner: String,
 }
 
-/// An aircraft that sends nothing while others do.
+/// An aircraft without data while others have some.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct SilentTail {
     /// The aircraft.
@@ -54,14 +55,14 @@ pub struct SilentTail {
     pub since_utc: Timestamp,
 }
 
-/// The aircraft that have been silent for longer than `days` before the fleet's newest departure.
+/// Aircraft without data for longer than `days` before the fleet's newest departure.
 pub(crate) fn quiet<'a>(accounts: impl Iterator<Item = &'a LogRecord>, days: f64) -> Vec<SilentTail> {
     let mut newest: BTreeMap<&str, Timestamp> = BTreeMap::new();
     for (tail, at) in accounts.filter_map(|a| Some((a.tail_number.as_deref()?, a.departure_utc?))) {
         newest.entry(tail).and_modify(|known| *known = (*known).max(at)).or_insert(at);
     }
     let Some(&last) = newest.values().max() else { return Vec::new() };
-    let is_late = |at: Timestamp| last.duration_since(at).as_secs_f64() > days * 86_400.0;
+    let is_late = |at: Timestamp| days_between(at, last) > days;
     let late = newest.into_iter().filter(|(_, at)| is_late(*at));
     late.map(|(tail, since_utc)| SilentTail { tail_number: tail.to_owned(), since_utc }).collect()
 }
@@ -69,13 +70,13 @@ pub(crate) fn quiet<'a>(accounts: impl Iterator<Item = &'a LogRecord>, days: f64
 /// An earlier run without an end: it was killed, or its disk failed.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct KilledRun {
-    /// Its name.
+    /// Identifier of the run.
     pub run_id: String,
     /// When it began.
     pub started_utc: Timestamp,
     /// Logs it had finished.
     pub done: i64,
-    /// Logs it had not come to.
+    /// Logs it had not processed.
     pub not_reached: i64,
 }
 
@@ -90,30 +91,30 @@ impl From<RunRecord> for KilledRun {
     }
 }
 
-/// What a run did.
+/// Summary of a run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct RunSummary {
-    /// Its name.
+    /// Identifier of the run.
     pub run_id: String,
     /// When it began.
     pub started_utc: Timestamp,
     /// Earlier runs that were killed.
     pub cut_short: Vec<KilledRun>,
-    /// Logs that fit the patterns.
+    /// Logs that match the patterns.
     pub found: usize,
-    /// Logs that were accounted for already.
+    /// Logs that were processed before.
     pub known: usize,
-    /// Logs of flights that were not asked for.
+    /// Logs excluded by the selection.
     pub not_asked: usize,
-    /// Logs left by the limit.
+    /// Logs left for later by `--limit`.
     pub left: usize,
-    /// Logs finished, those in error included.
+    /// Logs processed, failed ones included.
     pub done: usize,
     /// Flights whose records were stored.
     pub flights: usize,
     /// Records with a gap.
     pub estimated: usize,
-    /// Records of sound logs that cannot show one, by reason.
+    /// Records of rejected flights, by reason.
     pub refused: BTreeMap<String, usize>,
     /// The same with the remedy of each reason.
     pub refusals: Vec<Refusals>,
@@ -121,34 +122,33 @@ pub struct RunSummary {
     pub duplicates: Vec<DuplicateLog>,
     /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
     pub mapping_faults: Vec<MappingFault>,
-    /// Logs in error, in the order of their names.
+    /// Failed logs, by path.
     pub errors: Vec<LogError>,
-    /// Logs the run has not come to, or was stopped before.
+    /// Logs that the run has not processed.
     pub not_reached: usize,
     /// Their names.
     pub not_reached_logs: Vec<String>,
-    /// Aircraft whose newest departure is older than the fleet's by more than a trend may be stale.
+    /// Aircraft whose newest departure is older than the fleet's by more than `stale_after_days`.
     pub quiet: Vec<SilentTail>,
-    /// Delays between the positions, and stiffnesses of whole aircraft, that moved within the last month, on
-    /// the aircraft this run touched.
+    /// Skews, and stiffnesses of complete aircraft, that moved within the last month, on the aircraft of this run.
     pub recorder_moved: Vec<RecorderChange>,
-    /// Flights of the last month, on those aircraft, whose innovations are unlike their unit's others.
+    /// Flights of the last month, on those aircraft, with unusual innovations for their unit.
     pub innovations_unlike: Vec<InnovationOutlier>,
     /// The slowest log and its seconds.
     pub slowest: Option<(String, f64)>,
-    /// Seconds from plan to account.
+    /// Duration of the run, s.
     pub took_s: f64,
     /// Workers.
     pub workers: usize,
-    /// Units whose records changed, with the statement made of each.
+    /// Assessments of the units whose records changed.
     pub trends: Vec<TrendRow>,
     /// Units whose assessment differs from the one without this run's records.
     pub changed: Vec<UnitChange>,
-    /// Logs in error of earlier runs, which stand until they are fixed.
+    /// Failed logs of earlier runs, reported until they are fixed.
     pub standing_errors: Vec<StandingError>,
     /// Units of the whole fleet in state `watch`, `plan` or `act`, also when the run had nothing new.
     pub work_list: Vec<TrendRow>,
-    /// How many units of the whole fleet are in which state.
+    /// Number of units of the fleet by state.
     #[serde(skip)]
     pub states: BTreeMap<&'static str, usize>,
     /// Status of each log; the last update counts, independent of the order of the workers.
@@ -156,7 +156,7 @@ pub struct RunSummary {
     logs: BTreeMap<String, LogCounts>,
 }
 
-/// What came of one log.
+/// Outcome of one log.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct LogCounts {
     estimated: usize,
@@ -332,11 +332,11 @@ impl RunSummary {
     }
 }
 
-/// The account of one log, before anything is known of its flight.
+/// Status of one log, before its flight is identified.
 pub(crate) fn of_log(work: &WorkItem, run_id: &str) -> LogRecord {
     let stat = work.stat.as_ref();
     LogRecord {
-        log_path: work.shown.clone(),
+        log_path: work.log_path.clone(),
         size_bytes: stat.map_or(0, |s| s.size_bytes),
         modified_utc_ns: stat.map_or(0, |s| s.modified_utc_ns),
         file_id: stat.map(|s| s.file_id.clone()).unwrap_or_default(),
@@ -357,12 +357,12 @@ pub(crate) fn of_log(work: &WorkItem, run_id: &str) -> LogRecord {
     }
 }
 
-/// The account of a log that a run means to do.
+/// Status of a log that a run has planned.
 pub(crate) fn not_reached(work: &WorkItem, run_id: &str) -> LogRecord {
     LogRecord { outcome: LogOutcome::NotReached, ..of_log(work, run_id) }
 }
 
-/// Writes diagnostics into an account: the code of the first, and all of their text. A cause that may pass goes before
+/// Writes diagnostics into a log's status: the code of the first, and all of their text. A cause that may pass goes before
 /// the others, since the next run tries the log again for it.
 pub(crate) fn set_error(account: &mut LogRecord, diagnostics: &[Diagnostic]) {
     let passing = diagnostics.iter().find(|diagnostic| is_passing(&diagnostic.code));

@@ -253,7 +253,7 @@ impl<'a> WorkerPool<'a> {
             return;
         }
         if self.in_progress.insert(log, InProgress { since, generation }).is_none() {
-            (self.settings.watch)(Event::Started { log: self.settings.plan.work[log].shown.clone() });
+            (self.settings.watch)(Event::Started { log: self.settings.plan.work[log].log_path.clone() });
         }
     }
 
@@ -292,7 +292,7 @@ impl<'a> WorkerPool<'a> {
             self.start_generation()?;
         }
         let work = &self.settings.plan.work[log];
-        let diagnostic = log_timeout(&work.shown, self.settings.limit.as_secs_f64());
+        let diagnostic = log_timeout(&work.log_path, self.settings.limit.as_secs_f64());
         let outcome = (self.settings.fail)(work, diagnostic, self.settings.limit.as_secs_f64());
         Ok(self.finished(log, Box::new(outcome)))
     }
@@ -300,7 +300,7 @@ impl<'a> WorkerPool<'a> {
     /// Logs without an outcome, by name.
     pub(crate) fn not_reached(&self) -> Vec<String> {
         let logs = self.settings.plan.work.iter().zip(&self.is_finished);
-        logs.filter(|(_, is_finished)| !**is_finished).map(|(work, _)| work.shown.clone()).collect()
+        logs.filter(|(_, is_finished)| !**is_finished).map(|(work, _)| work.log_path.clone()).collect()
     }
 }
 
@@ -325,7 +325,7 @@ mod tests {
         let work = |k: usize| WorkItem {
             files: ingest::LogFiles::one(format!("{k}.parquet")),
             fault: None,
-            shown: k.to_string(),
+            log_path: k.to_string(),
             stat: None,
             why: WorkReason::New,
             before: None,

@@ -131,7 +131,7 @@ pub fn estimate_plot_html(plots: &[EstimatePlot]) -> Result<String, Error> {
 /// SHA-256 of `uplot.js` and `estimate_plot.js`: the only scripts that a browser executes in the page
 /// (Content Security Policy Level 3, hash sources).
 const SCRIPT_HASHES: &str = "'sha256-GcjUxq2Ikpp59K5J1vcWFWbf0Lo9FcxJXpdPeH63jx8=' \
-                             'sha256-aX3DKBiq4JRApQJxsM38SWfL3ZGYePPDnAPa8PQ7YX0='";
+                             'sha256-GhK3S6lb2bBkTuCnC3L8eZlKbLsbwRQKFaVNHjh0M0Q='";
 
 #[derive(Template)]
 #[template(path = "estimate_plot.html")]

@@ -3,6 +3,7 @@
 use jiff::Timestamp;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+use records::time::DAY_S;
 
 use crate::model::{TimedInterval, UnitView};
 use crate::page::Error;
@@ -141,9 +142,9 @@ fn downsampled(unit: &UnitView) -> Vec<BandPoint> {
 }
 
 fn day(t: Timestamp) -> f64 {
-    t.as_second() as f64 / 86_400.0
+    t.as_second() as f64 / DAY_S
 }
 
 fn date_of(day: f64) -> String {
-    Timestamp::from_second((day * 86_400.0) as i64).map(crate::format::date).unwrap_or_default()
+    Timestamp::from_second((day * DAY_S) as i64).map(crate::format::date).unwrap_or_default()
 }

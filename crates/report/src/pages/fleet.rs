@@ -1,12 +1,13 @@
 //! Fleet page: work list, changes, map of tails and positions, removal forecast, forecast accuracy, data quality.
 
+use records::time::days_between;
 use std::collections::{BTreeMap, BTreeSet};
 
 use askama::Template;
 
 use crate::charts::agreement_plot::agreement_plot;
 use crate::format::{
-    NO_DATA, count, counted, date, date_or, days_between, hours, level, micrometres, minute_or, percent, rate,
+    NO_DATA, count, counted, date, date_or, hours, level, micrometres, minute_or, percent, rate,
 };
 use crate::model::{Report, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};

@@ -1,6 +1,7 @@
 //! Unit page: assessment, history, events, data quality and past forecasts of one unit.
 
 use askama::Template;
+use records::uncertainty::NORMAL_95;
 
 use crate::charts::history::history;
 use crate::format::{
@@ -286,7 +287,7 @@ fn prior(report: &Report, unit: &UnitView) -> String {
                  90 % of units between {} and {} FH; wear follows {}. {wider}",
                 date(p.learned_until_utc),
                 micrometres(p.new_m),
-                micrometres(1.645 * p.new_sd_m),
+                micrometres(NORMAL_95 * p.new_sd_m),
                 hours(p.life_p50_hours),
                 hours(p.life_p05_hours),
                 hours(p.life_p95_hours),

@@ -1,5 +1,7 @@
 //! Bias and limits of agreement between estimate and inspection (Bland and Altman 1986).
 
+use records::uncertainty::NORMAL_95;
+
 /// Bias and limits of agreement of two measurements of the same gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Agreement {
@@ -28,7 +30,7 @@ impl Agreement {
         Some(Self {
             pairs: pairs.len(),
             bias_m,
-            bias_half_width_m: 1.645 * sd_m / n.sqrt(),
+            bias_half_width_m: NORMAL_95 * sd_m / n.sqrt(),
             lower_m: bias_m - 1.96 * sd_m,
             upper_m: bias_m + 1.96 * sd_m,
         })
@@ -45,7 +47,7 @@ mod tests {
         let a = Agreement::of(&[(11e-6, 10e-6), (22e-6, 20e-6), (33e-6, 30e-6)]).unwrap();
         assert!((a.bias_m - 2e-6).abs() < 1e-15);
         assert!((a.lower_m - 0.04e-6).abs() < 1e-12 && (a.upper_m - 3.96e-6).abs() < 1e-12);
-        assert!((a.bias_half_width_m - 1.645e-6 / 3f64.sqrt()).abs() < 1e-12);
+        assert!((a.bias_half_width_m - 1.644_854e-6 / 3f64.sqrt()).abs() < 1e-12);
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! Expected removals per month: sum of the units' crossing probabilities, with its 90 % interval.
 
-use crate::format::{days_between, month, month_name};
+use records::time::days_between;
+use records::uncertainty::NORMAL_95;
+
+use crate::format::{month, month_name};
 use crate::model::Report;
 use crate::stats::crossing_probability::probability_within;
 
@@ -28,7 +31,7 @@ pub(crate) fn removal_forecast(report: &Report) -> Vec<Month> {
             expected += chance;
             variance += chance * (1.0 - chance);
         }
-        let half = 1.645 * f64::sqrt(variance);
+        let half = NORMAL_95 * f64::sqrt(variance);
         let name = month_name(from);
         months.push(Month { name, expected, low: (expected - half).max(0.0), high: expected + half });
     }

@@ -1,4 +1,4 @@
-//! What the store holds, and when it was last fed.
+//! Contents of the store, and its last run.
 
 use records::GapRecord;
 use std::collections::{BTreeSet, HashSet};

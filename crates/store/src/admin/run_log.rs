@@ -37,7 +37,7 @@ impl Store {
             logs.into_iter().map(|account| (account.log_path.clone(), account)).collect();
         let records = self.records(&Query { run_id: Some(run_id.to_owned()), ..Query::default() })?;
         for record in &records {
-            let log = logs.entry(record.provenance.log_path.clone()).or_insert_with(|| seen(record));
+            let log = logs.entry(record.provenance.log_path.clone()).or_insert_with(|| log_of_record(record));
             if matches!(log.outcome, LogOutcome::NotReached | LogOutcome::Unaccounted) {
                 count(log, record);
             }
@@ -127,7 +127,7 @@ impl Writer {
 }
 
 /// A log of which only records are stored.
-fn seen(record: &GapRecord) -> LogRecord {
+fn log_of_record(record: &GapRecord) -> LogRecord {
     LogRecord {
         log_path: record.provenance.log_path.clone(),
         size_bytes: 0,

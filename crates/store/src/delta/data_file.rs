@@ -24,7 +24,7 @@ const DIGEST_DIGITS: usize = 64;
 
 /// Writes a batch as a data file into a table's folder and returns the action that adds it.
 ///
-/// The version the file is made for stands first in its name: the same content written again later
+/// The version the file is made for comes first in its name: the same content written again later
 /// is another file, since Delta cannot remove and add one name in one commit.
 pub(crate) fn write(
     location: &Location,

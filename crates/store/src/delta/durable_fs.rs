@@ -38,7 +38,7 @@ pub(crate) fn sync_dir(dir: &FsPath) -> io::Result<()> {
 fn create_parts(path: &FsPath, parts: &[&[u8]]) -> io::Result<bool> {
     let (dir, staged) = stage(path, parts)?;
     let linked = std::fs::hard_link(&staged, path);
-    // Best effort: a staged file that stays is ignored by readers and replaced by the next write.
+    // Best effort: a staged file that is left is ignored by readers and replaced by the next write.
     let _ = std::fs::remove_file(&staged);
     let is_ours = match linked {
         Ok(()) => true,

@@ -113,7 +113,7 @@ impl Location {
         Ok(default_logstore(below, Arc::clone(&bucket.client), &url, &StorageConfig::default()))
     }
 
-    /// Makes room for files: a folder where this is one, or where copies lie.
+    /// Creates the folder, or the folder of the copies.
     pub(crate) fn make(&self) -> Result<(), Error> {
         durable_fs::create_folder(&self.dir).map_err(Error::io(&self.dir, "created"))
     }
@@ -148,7 +148,7 @@ impl Location {
     }
 
     fn size(&self, bucket: &BucketLocation, path: &Path) -> Result<Option<u64>, Error> {
-        match bucket.ask(&self.key(bucket, path), async |location| bucket.client.head(location).await) {
+        match bucket.request(&self.key(bucket, path), async |location| bucket.client.head(location).await) {
             Ok(meta) => Ok(Some(meta.size)),
             Err(object_io::Error::Missing { .. }) => Ok(None),
             Err(error) => Err(error.into()),
@@ -172,7 +172,7 @@ impl Location {
     /// Makes a file available under its local path: a file in a bucket is copied there.
     pub(crate) fn fetch(&self, path: &Path) -> Result<(), Error> {
         let Some(bucket) = &self.bucket else { return Ok(()) };
-        let content = bucket.ask(&self.key(bucket, path), async |location| {
+        let content = bucket.request(&self.key(bucket, path), async |location| {
             bucket.client.get(location).await?.bytes().await
         })?;
         let folder = path.parent().unwrap_or(&self.dir);
@@ -217,7 +217,7 @@ impl Location {
     ) -> Result<(), object_io::Error> {
         let payload = PutPayload::from(content.to_vec());
         let options = PutOptions { mode, ..PutOptions::default() };
-        bucket.ask(&self.key(bucket, path), async |location| {
+        bucket.request(&self.key(bucket, path), async |location| {
             bucket.client.put_opts(location, payload, options).await.map(drop)
         })
     }
@@ -225,10 +225,8 @@ impl Location {
     /// Deletes a file.
     pub(crate) fn delete(&self, path: &Path) -> Result<(), Error> {
         match &self.bucket {
-            Some(bucket) => {
-                Ok(bucket
-                    .ask(&self.key(bucket, path), async |location| bucket.client.delete(location).await)?)
-            }
+            Some(bucket) => Ok(bucket
+                .request(&self.key(bucket, path), async |location| bucket.client.delete(location).await)?),
             None => std::fs::remove_file(path).map_err(Error::io(path, "deleted")),
         }
     }
@@ -258,7 +256,7 @@ impl Location {
 
 impl BucketLocation {
     /// Asks for one key.
-    fn ask<T>(
+    fn request<T>(
         &self,
         key: &str,
         question: impl AsyncFnOnce(&object_store::path::Path) -> object_store::Result<T>,

@@ -69,7 +69,7 @@ impl SnapshotCache {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
-    /// Keeps a snapshot in place of the one before; none that another commit has overtaken. In a bucket a look costs
+    /// Replaces the cached snapshot, unless another commit is newer. In a bucket a listing costs
     /// as much as reading: nothing is kept.
     pub(crate) fn keep(&self, location: &Location, snapshot: &Snapshot) {
         let log = if location.is_bucket() { None } else { LogListing::of(&location.dir().join(LOG)) };

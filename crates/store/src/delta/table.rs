@@ -34,7 +34,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// The pause after the first attempt; it doubles.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// Commits between two checkpoints: so many small files at most are read to open the table.
+/// Commits between two checkpoints: the maximum number of small files that are read to open the table.
 const CHECKPOINT: &str = "20";
 
 /// Every change that removes files carries a transaction of this name.
@@ -126,7 +126,7 @@ impl Table {
         if wanted.fields().all(|field| known.field(field.name()).is_some()) {
             return Ok(None);
         }
-        // What a release after this one added stays.
+        // Columns of later releases are kept.
         let others = known.fields().filter(|field| wanted.field(field.name()).is_none());
         let all =
             StructType::try_new(wanted.fields().chain(others).cloned()).map_err(DeltaTableError::from)?;

@@ -1,6 +1,6 @@
 //! Scan of selected columns of the records, file by file, for callers that read all records.
 //!
-//! A whole fleet's records are tens of millions of rows with repeated names, so text columns stay dictionaries as
+//! A whole fleet's records are tens of millions of rows with repeated names, so text columns remain dictionaries as
 //! stored, numbers are not copied, and a caller with threads may read several files at once.
 
 use records::GapRecord;
@@ -117,7 +117,7 @@ fn dictionary() -> DataType {
     DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
 }
 
-/// A file whose texts are to stay dictionaries.
+/// A file whose text columns remain dictionaries.
 fn opened(path: &Path) -> Result<ParquetRecordBatchReaderBuilder<File>, Error> {
     let file = File::open(path).map_err(Error::io(path, "opened"))?;
     let found = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())?;

@@ -1,4 +1,4 @@
-//! Accounts as rows, of each name the newest: read whole, batch by batch, without an engine for questions.
+//! Latest row of each key of a versioned table, read batch by batch without a query engine.
 //!
 //! Polars starts pools of threads and plans a query before it reads a row. Every run reads the accounts first, and
 //! for them that was a third of what a run with nothing to do takes.
@@ -37,7 +37,7 @@ impl<R: Row + FromCells> LatestRows<R> {
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Parquet`] and [`Error::Arrow`] when it cannot be read; [`Error::Value`] when a cell
-    /// cannot be what it stands for.
+    /// is not valid in its column.
     pub(crate) fn take(
         &mut self,
         file: &Path,

@@ -1,4 +1,4 @@
-//! Data files as rows that fit a condition: read by Polars, handed on as Arrow.
+//! Scan of data files by a condition: read by Polars, returned as Arrow.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ pub(crate) struct ScanRequest<'a> {
     pub(crate) schema: SchemaRef,
     /// The rows wanted; all without one.
     pub(crate) condition: Option<Expr>,
-    /// The columns to sort by; rows stay as they are stored without any.
+    /// The columns to sort by; none keeps the stored order.
     pub(crate) order: &'a [&'a str],
     /// Only the last N rows.
     pub(crate) last: Option<usize>,

@@ -36,7 +36,7 @@ impl Store {
     /// The same as rows.
     ///
     /// # Errors
-    /// As [`Store::scan`]; [`Error::Value`] when a cell cannot be what it stands for.
+    /// As [`Store::scan`]; [`Error::Value`] when a cell is not valid in its column.
     pub fn records(&self, query: &Query) -> Result<Vec<GapRecord>, Error> {
         Ok(from_batch(&self.scan(query)?)?)
     }
@@ -93,7 +93,7 @@ impl Store {
 
     /// The data files of the records as of now, for engines that do not read Delta's log.
     ///
-    /// A plain look into the folder would find superseded files too. There is always one at least.
+    /// A listing of the folder would find superseded files too. There is always one at least.
     ///
     /// # Errors
     /// [`Error::Table`] when the log cannot be read.
@@ -133,7 +133,7 @@ impl Store {
         ScanRequest { files: &files, schema, condition, order: &RecordKey::COLUMNS, last }.collect()
     }
 
-    /// The files that may hold an answer.
+    /// Files that may hold matching rows.
     pub(crate) fn candidate_files(snapshot: &Snapshot, query: &Query) -> Vec<PathBuf> {
         let files = snapshot.files.iter().filter(|file| file.has_rows() && query.may_be_in(&file.stats));
         files.map(|file| file.path.clone()).collect()

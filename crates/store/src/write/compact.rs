@@ -20,7 +20,7 @@ use crate::write::writer::Writer;
 /// Rows of a full file: many enough to open few, few enough to copy one for a flight estimated again.
 const FILE_ROWS: usize = 100_000;
 
-/// Superseded files stay as long, so that a reader that began before may finish: Delta's own default.
+/// Age at which superseded files are deleted, so that a reader that began before may finish: Delta's default.
 const KEPT: Duration = Duration::from_hours(7 * 24);
 
 /// What a compaction did.
@@ -58,7 +58,7 @@ impl Store {
 impl Writer {
     /// Merges the files of every table and deletes superseded ones older than seven days.
     ///
-    /// Rows stay what they are. Memory holds one file's rows, or one tail's where it has more.
+    /// Rows do not change. Memory holds one file's rows, or one tail's where it has more.
     ///
     /// # Errors
     /// As [`Writer::commit`]; the tables are unchanged then.

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
 
-/// How often a waiting process looks again.
+/// Interval at which a waiting process tries again.
 const LOOK_AGAIN: Duration = Duration::from_millis(100);
 
 /// Who holds a store, in words another process can show.

@@ -21,7 +21,7 @@ pub struct PromotionSummary {
 }
 
 impl Writer {
-    /// Takes over the records, log status and runs of another store; flights of logs it does not know stay.
+    /// Takes over the records, log status and runs of another store; flights of logs that it does not have are kept.
     ///
     /// `watch` receives each finished tail, and the number of tails.
     ///

@@ -117,11 +117,11 @@ impl Writer {
         let files = slice::from_ref(&file.path);
         self.store.check(files)?;
         let keys = polars_scan::only(&GapRecord::schema(), &RecordKey::COLUMNS)?;
-        if stays(&rows(files, keys)?, decisions)?.false_count() == 0 {
+        if is_kept(&rows(files, keys)?, decisions)?.false_count() == 0 {
             return Ok(None);
         }
         let all = rows(files, GapRecord::schema())?;
-        Ok(Some(filter_record_batch(&all, &stays(&all, decisions)?)?))
+        Ok(Some(filter_record_batch(&all, &is_kept(&all, decisions)?)?))
     }
 }
 
@@ -143,7 +143,7 @@ fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
     decisions
 }
 
-/// Whether the file's bounds leave room for one of the records.
+/// Whether the file may hold one of the records, by its bounds.
 fn may_hold_any(file: &DataFile, decisions: &MergeDecisions<'_>) -> bool {
     let (earliest_us, latest_us) = file.stats.times_us("departure_utc");
     let from = |departure_us| RecordKey {
@@ -161,7 +161,7 @@ fn rows(files: &[PathBuf], schema: SchemaRef) -> Result<RecordBatch, Error> {
 }
 
 /// Mask of the rows without a merge decision.
-fn stays(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<BooleanArray, Error> {
+fn is_kept(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<BooleanArray, Error> {
     let keys = keys(batch)?;
     Ok(keys.iter().map(|key| Some(!decisions.contains_key(key))).collect())
 }

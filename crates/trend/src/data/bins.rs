@@ -1,4 +1,4 @@
-//! A segment's estimates in a few bins of equal count: all that the bank of curves looks at.
+//! A segment's estimates in a few bins of equal count: the data of the candidate bank.
 
 use crate::data::outliers::WeightedGap;
 

@@ -2,11 +2,11 @@
 
 use crate::data::outliers::WeightedGap;
 
-/// A stretch of a unit's history without maintenance that resets it.
+/// Segment of a unit's history between resets.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Segment<'a> {
     pub(crate) estimates: &'a [WeightedGap],
-    /// Usage at which it began and at which it is judged.
+    /// Usage at its beginning and at the date of the assessment.
     pub(crate) begin: f64,
     pub(crate) now: f64,
     /// New or just reset when it began.

@@ -2,12 +2,15 @@
 
 use crate::error::Error;
 
+/// Microseconds of a day.
+pub(crate) const DAY_US: i64 = 86_400_000_000;
+
 /// One flight of a unit, as a caller knows it; order does not matter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
     /// Departure, microseconds since 1970 UTC.
     pub departure_us: i64,
-    /// The installation, interned: one stay of the unit on one tail and position. A unit that was
+    /// The installation, interned: one period of the unit on one tail and position. A unit that was
     /// taken off and came back to the same tail has a new one, or another unit's hours would be its.
     pub installation: u32,
     /// Length of the flight, hours.
@@ -106,7 +109,7 @@ impl MaintenanceEvent {
 
 /// The flights of one serial number, by departure.
 ///
-/// Usage follows these rules, each of which looks backwards only, so that a series cut at a date is
+/// Usage follows these rules, each of which uses earlier flights only, so that a series cut at a date is
 /// the series that was known on that date:
 ///
 /// 1. Between two flights of one installation that both state the tail's hours, usage is their
@@ -138,7 +141,7 @@ impl Series {
         }
         let rows = in_order(rows)?;
         let mut meter = UsageAccumulator::new(nominal);
-        let flights: Vec<Flight> = rows.iter().map(|row| meter.fly(row)).collect();
+        let flights: Vec<Flight> = rows.iter().map(|row| meter.add_flight(row)).collect();
         debug_assert!(
             flights.is_sorted_by_key(|flight| flight.departure_us),
             "flights are in order of departure"
@@ -257,7 +260,7 @@ impl UsageAccumulator {
     }
 
     /// Adds a flight.
-    fn fly(&mut self, row: &Observation) -> Flight {
+    fn add_flight(&mut self, row: &Observation) -> Flight {
         let before = self.hours;
         let metered = self.metered(row);
         let own = row.flight_hours.or(metered.map(|h| h - before)).unwrap_or(self.nominal_flight_hours);

@@ -2,7 +2,7 @@
 
 use crate::data::outliers::WeightedGap;
 
-/// Estimates on each side of a candidate, from a quick look to a long one.
+/// Numbers of estimates on each side of a candidate, from the shortest window to the longest.
 const REACHES: [usize; 4] = [15, 30, 60, FARTHEST];
 
 /// The longest of them.
@@ -14,16 +14,16 @@ const STRIDE: usize = 3;
 /// Fewest estimates on either side.
 const MIN_ESTIMATES: usize = 6;
 
-/// A step is believed beyond this many standard errors.
+/// Standard errors from which a step is significant.
 const BELIEVED: f64 = 6.5;
 
-/// Estimates on each side of the near look, which a bend of the wear cannot deceive.
+/// Estimates on each side of the near window, in which a bend of the wear is no step.
 const NEAR: usize = 20;
 
 /// Estimates of one side's slope.
 const SIDE: usize = 60;
 
-/// Standard errors, and share of the step, that must be there in the near look.
+/// Standard errors, and share of the step, required in the near window.
 const NEAR_BELIEVED: f64 = 3.5;
 const NEAR_SHARE: f64 = 0.6;
 
@@ -38,7 +38,7 @@ const RATE_SPREAD: f64 = 5e-4;
 
 /// Variance of the wear per wear between the middles of both sides, a share of the limit: wear comes in
 /// spurts, which must not pass for steps.
-const WEAR_NOISE: f64 = 0.002;
+pub(crate) const WEAR_NOISE: f64 = 0.002;
 
 /// A step of the measured gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,7 +95,7 @@ pub(crate) fn installation_steps(estimates: &[WeightedGap], limit_m: f64) -> (f6
 /// A step larger than this share of the limit at a change of installation was more than the change.
 const LARGEST_BIAS: f64 = 0.08;
 
-/// Weighted sums up to each estimate, from which a line over any stretch follows at once.
+/// Weighted sums up to each estimate, from which the line over any range follows.
 struct PrefixSums {
     sums: Vec<[f64; 6]>,
     usages: Vec<f64>,
@@ -105,7 +105,7 @@ struct PrefixSums {
     wear_noise_m: f64,
 }
 
-/// A stretch's variance, means, and centred squares.
+/// Variance, means and centred sums of squares of a range.
 struct WindowStats {
     variance: f64,
     x: f64,
@@ -234,11 +234,11 @@ impl PrefixSums {
         let squares = |at: usize| self.squares_about_line(from, at) + self.squares_about_line(at, to);
         let at = places.min_by(|a, b| squares(*a).total_cmp(&squares(*b))).unwrap_or(found);
         let (step, slope) = self.within_reach(low, at, high, reach);
-        let (jump_m, jump_se_m) = self.jump(low, at, high, slope);
+        let (jump_m, jump_se_m) = self.step_between_lines(low, at, high, slope);
         StepChange { jump_m, jump_se_m, ..step }
     }
 
-    /// Weighted squares that a line of a stretch's own leaves.
+    /// Weighted sum of squared residuals of the range's own line.
     fn squares_about_line(&self, from: usize, to: usize) -> f64 {
         let WindowStats { xx, xy, yy, .. } = self.window_stats(from, to);
         yy - xy * xy / (xx + self.slope_information)
@@ -246,7 +246,7 @@ impl PrefixSums {
 
     /// The step between the lines of both sides, each with a slope of its own, where they meet in time: the
     /// growth from one flight to the next is no part of it.
-    fn jump(&self, low: usize, at: usize, high: usize, common: f64) -> (f64, f64) {
+    fn step_between_lines(&self, low: usize, at: usize, high: usize, common: f64) -> (f64, f64) {
         let (from, to) = (at.saturating_sub(SIDE).max(low), (at + SIDE).min(high));
         let x = self.usages[at - 1].midpoint(self.usages[at]);
         let end = |from: usize, to: usize| {

@@ -5,6 +5,7 @@
 
 use crate::data::outliers::{NoiseScale, WeightedGap};
 use crate::data::segment::Segment;
+use crate::data::series::DAY_US;
 use crate::data::series::{Flight, MaintenanceEvent};
 use crate::data::steps;
 use crate::inference::consistency::{self, ConsistentPosterior, Inconsistency, fit_consistent};
@@ -15,7 +16,7 @@ use crate::statement::history::{self, History};
 use crate::statement::level;
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
-/// Flights of the shortest history that is not judged whole every time.
+/// Flights of the shortest history that is assessed from a checkpoint.
 const SHORTEST: usize = 64;
 
 /// Checkpoints are at multiples of the largest power of two in this share of the history, within
@@ -28,14 +29,13 @@ const LONGEST_STRIDE: usize = 64;
 const YOUNG: usize = 20;
 const LAST: usize = 300;
 
-/// A day, microseconds, and the days of the pace.
-pub(crate) const DAY_US: i64 = 86_400_000_000;
+/// Number of last days that give the utilisation.
 pub(crate) const UTILIZATION_DAYS: i64 = 90;
 
-/// Days of which one flight is kept for the pace.
+/// Number of days of which one flight is kept for the utilisation.
 const MARK_DAYS: i64 = 5;
 
-/// Flights until the last checkpoint of so many.
+/// Flights up to the last checkpoint of a history with `flights` flights.
 pub(crate) fn before(flights: usize) -> usize {
     if flights < SHORTEST {
         return flights;
@@ -138,13 +138,13 @@ impl HistoryView<'_> {
     }
 }
 
-/// The entries of an ordered book until a departure.
+/// Entries of an ordered maintenance log up to a departure.
 pub(crate) fn events_until(maintenance: &[MaintenanceEvent], departure_us: i64) -> &[MaintenanceEvent] {
     &maintenance[..maintenance.partition_point(|entry| entry.utc_us <= departure_us)]
 }
 
 impl Checkpoint {
-    /// Reads the flights; nothing is judged yet.
+    /// Reads the flights; nothing is assessed yet.
     pub(crate) fn read(known: &HistoryView<'_>, prior: &FleetPrior) -> (Self, History) {
         let HistoryView { flights, maintenance, unit_hours_at_start } = *known;
         let history = history::read_history(flights, maintenance, unit_hours_at_start, prior);
@@ -162,7 +162,7 @@ impl Checkpoint {
             kind_m2: history.kind_m2,
             undone_m: history.undone_m,
             in_segment,
-            near: near(&history, flights),
+            near: step_window(&history, flights),
             recent: consistency::recent_estimates(&history.estimates[at..]).to_vec(),
             fitted: SegmentPosterior::Nothing,
             onsets: Vec::new(),
@@ -188,7 +188,7 @@ impl Checkpoint {
         }
     }
 
-    /// The onset of wear that a mixture found in the segment last judged, as a change.
+    /// The onset of wear that a mixture found in the last segment, as a change point.
     pub(crate) fn onset(&self, posterior: &Posterior) -> Option<ChangePoint> {
         let (start, certainty) = level::onset(posterior)?;
         let (_, departure_us) = *self.onsets.iter().find(|(known, _)| *known >= start)?;
@@ -225,7 +225,7 @@ fn departure_after(start: f64, segment: &Segment<'_>, flights: &[Flight], prior:
 }
 
 /// As many of the last estimates as a later step can depend on.
-fn near(history: &History, flights: &[Flight]) -> Vec<StepWindowEntry> {
+fn step_window(history: &History, flights: &[Flight]) -> Vec<StepWindowEntry> {
     let estimates = &history.estimates;
     let from = history.last_step.max(estimates.len().saturating_sub(2 * steps::FARTHEST));
     let near = |e: &WeightedGap| StepWindowEntry {

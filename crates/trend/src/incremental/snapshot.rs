@@ -1,8 +1,9 @@
 //! Assessment of a unit from its last checkpoint and the flights after it.
 
+use crate::data::series::DAY_US;
 use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::incremental::checkpoint::{
-    self, Checkpoint, DAY_US, HistoryView, SegmentPosterior, UTILIZATION_DAYS, UsageSample, events_until,
+    self, Checkpoint, HistoryView, SegmentPosterior, UTILIZATION_DAYS, UsageSample, events_until,
 };
 use crate::incremental::tail::Tail;
 use crate::inference::posterior::Posterior;
@@ -145,7 +146,7 @@ impl UnitSnapshot {
         changes
     }
 
-    /// Entries of the book in the tail, where the gap shows no step, at the first flight after each.
+    /// Maintenance entries after the checkpoint where the gap shows no step, at the first flight after each.
     fn recorded(&self, maintenance: &[MaintenanceEvent]) -> impl Iterator<Item = ChangePoint> {
         let known = self.checkpoint.last.map_or(0, |last| events_until(maintenance, last.departure_us).len());
         maintenance[known..].iter().filter_map(|entry| {

@@ -95,7 +95,8 @@ fn thin(components: &[Component]) -> Vec<StoredComponent> {
     stored
 }
 
-/// The weight that every light node is to have, below which a node is one; none where all may stay.
+/// Weight threshold of the systematic resampling: components below it are resampled to this weight; `None` where all
+/// components fit.
 fn light_share(components: &[Component]) -> f64 {
     if components.len() <= MOST {
         return 0.0;

@@ -5,16 +5,16 @@ use crate::data::segment::Segment;
 use crate::inference::bank_regression::regressions;
 use crate::inference::level_filter::Regression;
 use crate::inference::segment_fit::{SegmentFit, linear_growth};
-use crate::prior::fleet_prior::FleetPrior;
+use crate::prior::fleet_prior::{FleetPrior, TimeConstantPrior};
 use crate::wear::bank::{Candidate, CandidateBank, WearLaw, power_of_ln_life};
 
-/// Bins of the first look, by which most curves are dropped.
+/// Bins of the first pass, which drops most curves.
 const COARSE_BINS: usize = 12;
 
 /// What a prior over lives and cells can add to a curve's bound.
 const SLACK: f64 = 3.0;
 
-/// By how much a curve's weight usually stays below its bound, at most.
+/// Usual maximum distance of a curve's weight below its bound.
 const USUAL: f64 = 20.0;
 
 /// Standard deviations within which a life may lie.
@@ -41,7 +41,7 @@ pub(crate) enum AgeAssumption {
     Worn,
 }
 
-/// One law with one amplitude, and how much it is believed.
+/// One wear law with one amplitude, and its weight.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Component {
     pub(crate) law: WearLaw,
@@ -75,7 +75,7 @@ pub(crate) struct Posterior {
     pub(crate) level_m2: f64,
     /// Variance of every node's growth since the segment began.
     pub(crate) growth_m2: f64,
-    /// Variance of every node's swing, and its covariance with the level.
+    /// Variance of every component's seasonal amplitude, and its covariance with the level.
     pub(crate) seasonal_m2: f64,
     pub(crate) level_seasonal_m2: f64,
     /// Log of the sum of the weights before they were normalised.
@@ -104,7 +104,7 @@ impl Posterior {
 
 /// Judges a segment by a prior: all curves on a few bins, the likely ones on many.
 ///
-/// The level walks by a variance proportional to the wear, so the first look assumes wear along a
+/// The level walks by a variance proportional to the wear, so the first pass assumes wear along a
 /// line and the second takes it from the first.
 pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Posterior> {
     let span = segment.now - segment.begin;
@@ -130,7 +130,7 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
     Some(finish(&second, believed))
 }
 
-/// Leaves only the curves that are believed.
+/// Drops the curves of negligible weight.
 fn retain(candidates: &mut Vec<Candidate>, believed: &[(usize, Component)]) {
     let mut kept: Vec<usize> = believed.iter().map(|(index, _)| *index).collect();
     kept.dedup();
@@ -171,7 +171,7 @@ pub(crate) fn mean_growth(components: &[Component], usage: f64) -> f64 {
     components.iter().map(|n| n.weight * n.amplitude_m * n.law.value(n.age_begin + usage)).sum()
 }
 
-/// Turns log weights into weights that add up to one, drops what is not believed, and returns the log
+/// Turns log weights into weights that add up to one, drops negligible ones, and returns the log
 /// of their sum.
 fn normalise(believed: &mut Vec<(usize, Component)>, drop: f64) -> f64 {
     let best = believed.iter().map(|(_, n)| n.weight).fold(f64::NEG_INFINITY, f64::max);
@@ -278,7 +278,7 @@ fn try_lives(
     let age_now = candidate.age + fit.segment.now - fit.segment.begin;
     let mut height_now = None;
     let shared = step.ln() + fit.logs.share(candidate.law) + fit.logs.cell(candidate, fit.segment);
-    let own = fit.logs.time_constant_prior(candidate);
+    let own = TimeConstantPrior::of(candidate);
     let age_assumption = match candidate.law {
         _ if fit.segment.is_of_known_age() => AgeAssumption::NotNeeded,
         WearLaw::Onset { .. } => AgeAssumption::NotNeeded,

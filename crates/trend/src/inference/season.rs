@@ -1,7 +1,7 @@
-//! A yearly swing of the measurement: one phase for a part number's fleet, a size for each unit.
+//! Seasonal component of the measurement: one phase for a part number's fleet, an amplitude for each unit.
 //!
 //! Grease stiffens in winter and the gap reads differently. Against a growth of a few micrometres a
-//! year a swing of one is an error of tens of per cent in the rate, so it is fitted with the wear and
+//! year an amplitude of one is an error of tens of per cent in the rate, so it is fitted with the wear and
 //! not left to the noise.
 
 use std::f64::consts::TAU;
@@ -20,7 +20,7 @@ const PSEUDO_UNITS: f64 = 4.0;
 /// Spread of the units' amplitudes while their mean is sought, a share of the limit.
 const UNIT_SPREAD: f64 = 0.005;
 
-/// Standard errors beyond which the fleet's mean swing is believed.
+/// Standard errors beyond which the fleet's mean amplitude is used.
 const BELIEVED: f64 = 3.0;
 
 /// One unit's cosine and sine amplitudes, and their covariance (xx, xy, yy).

@@ -21,7 +21,7 @@ pub(crate) struct SegmentFit<'a> {
     pub(crate) wave: Pass,
     wave_by_gaps: f64,
     wave_information: f64,
-    /// Variance of the unit's own swing.
+    /// Variance of the unit's seasonal amplitude.
     pub(crate) seasonal_m2: f64,
 }
 
@@ -76,7 +76,7 @@ impl<'a> SegmentFit<'a> {
         self.filter.end_m2 + self.wave.end * self.wave.end * self.seasonal_m2
     }
 
-    /// Covariance of the level now and the unit's own swing, whatever the curve.
+    /// Covariance of the present level and the unit's seasonal amplitude; the same for every curve.
     pub(crate) fn level_seasonal_m2(&self) -> f64 {
         -self.wave.end * self.seasonal_m2
     }

@@ -17,7 +17,7 @@ use crate::prior::fleet_prior::FleetPrior;
 /// Standard deviations by which a bin may differ from the forecast of the mixture.
 const REACH: f64 = 4.0;
 
-/// Where a mixture stands: the usage, and the installation of its last estimate.
+/// Reference point of a mixture: usage and installation of its last estimate.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct UpdateStart {
     pub(crate) usage: f64,

@@ -263,7 +263,7 @@ fn bias(histories: &[History], assumed_m: f64, limit_m: f64) -> f64 {
     (0.5 * squares / count).max(0.0).sqrt()
 }
 
-/// One round: weights by `current` for units judged by `base`, moments by weights, and `assumed` as the
+/// One round: weights by `current` for units assessed with `base`, moments by weights, and `assumed` as the
 /// pseudo-units that keep a small fleet sane.
 fn step(assumed: &FleetPrior, base: &FleetPrior, current: &FleetPrior, units: &[Posterior]) -> FleetPrior {
     let ratio = ImportanceRatio::new(base, current);

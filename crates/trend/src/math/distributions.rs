@@ -2,6 +2,9 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
+/// 95 % quantile of the standard normal distribution: half the width of a 90 % interval, in standard deviations.
+pub(crate) const NORMAL_95: f64 = 1.644_853_626_951_472_2;
+
 /// Normal distribution function Φ(z), to the last bits also far in the lower tail.
 pub(crate) fn cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * FRAC_1_SQRT_2)

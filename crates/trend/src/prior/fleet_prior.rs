@@ -6,9 +6,11 @@ use crate::prior::calibration_params::{CalibrationParams, USUAL_WIDTH};
 
 use crate::data::segment::Segment;
 use crate::data::series::Flight;
+use crate::data::steps::WEAR_NOISE;
+use crate::math::distributions::NORMAL_95;
 use crate::math::quadrature::WAIT_QUANTILES;
 use crate::prior::season_params::SeasonParams;
-use crate::wear::bank::{BENDS, Candidate, FAMILIES, LIFE_CURVES, LINEAR, POWERS, WearLaw};
+use crate::wear::bank::{Candidate, FAMILIES, WearLaw, default_shares};
 
 /// A unit first seen in service has seldom used more than this share of its life: an age beyond it is
 /// less likely by this power of how far. Forbidden outright, an overdue unit would have no curve at all.
@@ -19,19 +21,13 @@ const OVERDUE: f64 = 20.0;
 const NEW_SHARE: f64 = 0.2;
 
 /// What is assumed of the measurement and of the wear while nothing is known, shares of the limit: the spread of
-/// a new gap, variance of the wear per wear, variance of the level per hour (of the limit's square), and the spread
+/// a new gap, variance of the level per hour (of the limit's square), and the spread
 /// of what an installation adds. Every length of this crate is a share of the limit: results do not depend on its unit.
 const NEW_SPREAD: f64 = 0.05;
-const WEAR_NOISE: f64 = 0.002;
 const DRIFT_PER_HOUR: f64 = 1e-8;
 const BIAS_SPREAD: f64 = 0.015;
 
-/// A life over the time by which its law runs: its logarithm is normal with this mean and spread. Of the
-/// exponential law, whose time constant it is, and of a course, whose nominal life.
-const LN_CONSTANTS: (f64, f64) = (1.1, 0.5);
-const LN_COURSES: (f64, f64) = (0.0, 0.2);
-
-/// Share of the fleet below which a family of laws is not tried: a unit that needs it is judged without the
+/// Share of the fleet below which a family of laws is not tried: a unit that needs it is assessed without the
 /// fleet.
 const RULED_OUT: f64 = 0.003;
 
@@ -86,7 +82,7 @@ pub struct FleetPrior {
     pub(crate) ln_life_sd: f64,
     /// Share of each family of laws.
     pub(crate) shares: [f64; FAMILIES],
-    /// The yearly swing of what is measured.
+    /// Seasonal component of the measurement.
     pub(crate) season: SeasonParams,
     /// Share of units first seen in service that were new then.
     pub(crate) fresh_share: f64,
@@ -106,11 +102,6 @@ impl FleetPrior {
     /// Prior of a part number without data: a new gap of a fifth of the limit, lives around
     /// 4,000 h within a factor of ten, any law.
     pub fn uninformative(limit_m: f64) -> Self {
-        let mut shares = [0.28 / POWERS as f64; FAMILIES];
-        shares[LINEAR] += 0.09;
-        shares[..BENDS.start].copy_from_slice(&[0.17, 0.16, 0.11, 0.05]);
-        shares[BENDS].fill(0.07 / BENDS.len() as f64);
-        shares[LIFE_CURVES].fill(0.07 / LIFE_CURVES.len() as f64);
         Self {
             axis: UsageAxis::Hours,
             hours_per_unit: 1.0,
@@ -119,7 +110,7 @@ impl FleetPrior {
             new_sd_m: NEW_SPREAD * limit_m,
             ln_life: 4000.0_f64.ln(),
             ln_life_sd: 0.8,
-            shares,
+            shares: default_shares(),
             season: SeasonParams::unknown(limit_m),
             fresh_share: 0.3,
             onsets_per_hour: 1.0 / 2000.0,
@@ -155,7 +146,7 @@ impl FleetPrior {
 
     /// 5 % and 95 % quantiles of the log-normal prior of lives, flight hours at the fleet's mean usage.
     pub fn life_range_hours(&self) -> (f64, f64) {
-        let reach = 1.645 * self.ln_life_sd;
+        let reach = NORMAL_95 * self.ln_life_sd;
         ((self.ln_life - reach).exp(), (self.ln_life + reach).exp())
     }
 
@@ -185,13 +176,11 @@ impl FleetPrior {
         LogPrior {
             prior: self,
             shares: self.shares.map(f64::ln),
-            life: log_of(self.ln_life_sd),
+            life: ln_peak_density(self.ln_life_sd),
             fresh: self.fresh_share.ln(),
             worn: ((1.0 - self.fresh_share) / WORN_SHARE).ln(),
             worn_share: WORN_SHARE.ln(),
             onset: self.onsets_per_hour.ln(),
-            constant: log_of(LN_CONSTANTS.1),
-            shape: log_of(LN_COURSES.1),
         }
     }
 
@@ -211,9 +200,6 @@ pub(crate) struct LogPrior<'a> {
     worn: f64,
     worn_share: f64,
     onset: f64,
-    /// Of a law's own time at its likeliest.
-    constant: f64,
-    shape: f64,
 }
 
 /// Prior of a law's time constant given a life: the density of ln life.
@@ -224,19 +210,19 @@ pub(crate) struct TimeConstantPrior {
     log: f64,
 }
 
+impl TimeConstantPrior {
+    /// Prior of a candidate's time constant; `None` for a law without one.
+    pub(crate) fn of(candidate: &Candidate) -> Option<Self> {
+        let ln_time_constant = candidate.ln_time_constant_hours?;
+        let (ln_ratio, sd) = candidate.law.ln_life_over_time_constant();
+        Some(Self { ln_life: ln_time_constant + ln_ratio, sd, log: ln_peak_density(sd) })
+    }
+}
+
 impl LogPrior<'_> {
     /// Of a law's family.
     pub(crate) fn share(&self, law: WearLaw) -> f64 {
         self.shares[law.family()]
-    }
-
-    /// Of the time by which a curve's law runs; nothing of a law that runs by none.
-    pub(crate) fn time_constant_prior(&self, candidate: &Candidate) -> Option<TimeConstantPrior> {
-        let ((ln_ratio, sd), log) = match candidate.law {
-            WearLaw::LifeCurve { .. } => (LN_COURSES, self.shape),
-            _ => (LN_CONSTANTS, self.constant),
-        };
-        Some(TimeConstantPrior { ln_life: candidate.ln_time_constant_hours? + ln_ratio, sd, log })
     }
 
     /// Of an onset that has not come in some hours.
@@ -275,8 +261,8 @@ impl LogPrior<'_> {
     }
 }
 
-/// Log density of a normal distribution at its middle.
-fn log_of(sd: f64) -> f64 {
+/// Log density of a normal distribution at its mean.
+fn ln_peak_density(sd: f64) -> f64 {
     -sd.ln() - LN_ROOT_TAU
 }
 

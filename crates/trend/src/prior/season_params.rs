@@ -1,9 +1,10 @@
 //! Yearly seasonal component of the measurement: one phase per fleet, one amplitude per unit.
 
+use crate::data::series::DAY_US;
 use std::f64::consts::TAU;
 
 /// A tropical year, microseconds.
-pub(crate) const YEAR_US: f64 = 365.242_2 * 86_400e6;
+pub(crate) const YEAR_US: f64 = 365.242_2 * DAY_US as f64;
 
 /// Spread of the amplitude from unit to unit while no fleet is known, a share of the limit.
 pub(crate) const PSEUDO_SD: f64 = 0.003;

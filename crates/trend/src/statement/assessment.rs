@@ -1,7 +1,8 @@
 //! The assessment of one unit at a date.
 
 use crate::statement::state::{Reason, State};
-use crate::statement::types::{ChangePoint, Crossing, Level, Rate, Utilization, WearClass, WearStatus};
+use crate::statement::types::{ChangePoint, Crossing, Level, Rate, Utilization, WearStatus};
+use crate::wear::bank::WearClass;
 
 /// What is known of one unit on one day.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +23,7 @@ pub struct Assessment {
     pub wear: WearStatus,
     /// Probability that the gap has grown by 2 % of the limit or more since it was new here, or reset.
     pub growth_probability: Option<f64>,
-    /// The law most believed in, and how much.
+    /// Most probable class of wear laws, and its probability.
     pub law: Option<(WearClass, f64)>,
     /// Steps, resets and onsets, by departure.
     pub changes: Vec<ChangePoint>,

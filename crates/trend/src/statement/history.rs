@@ -76,7 +76,7 @@ pub(crate) fn read_history(
     for step in &found {
         history.apply(step, flights, maintenance, prior);
     }
-    history.changes.extend(unseen(flights, maintenance, &found, &history.estimates));
+    history.changes.extend(events_without_step(flights, maintenance, &found, &history.estimates));
     history
 }
 
@@ -205,24 +205,24 @@ impl History {
     }
 }
 
-/// Whether an entry of the book was made within a few flights of one.
+/// Whether a maintenance entry lies within a few flights of a step.
 fn is_near(entry: &MaintenanceEvent, flights: &[Flight], flight: usize) -> bool {
     let from = flights[flight.saturating_sub(RECORD_FLIGHTS + 1)].departure_us;
     let to = flights[(flight + RECORD_FLIGHTS).min(flights.len() - 1)].departure_us;
     (from..=to).contains(&entry.utc_us)
 }
 
-/// Entries of the book that the gap does not show, at the first flight after each.
-fn unseen<'a>(
+/// Maintenance entries without a step in the gap, at the first flight after each.
+fn events_without_step<'a>(
     flights: &'a [Flight],
     maintenance: &'a [MaintenanceEvent],
     found: &'a [StepChange],
     estimates: &'a [WeightedGap],
 ) -> impl Iterator<Item = ChangePoint> + 'a {
-    let shown = |entry: &MaintenanceEvent| {
+    let has_step = |entry: &MaintenanceEvent| {
         found.iter().any(|step| is_near(entry, flights, estimates[step.at].flight))
     };
-    maintenance.iter().filter(move |entry| !shown(entry)).filter_map(|entry| {
+    maintenance.iter().filter(move |entry| !has_step(entry)).filter_map(|entry| {
         let first = flights.get(flights.partition_point(|f| f.departure_us < entry.utc_us))?;
         let departure_us = first.departure_us;
         Some(ChangePoint {

@@ -1,20 +1,15 @@
-//! Where a unit stands now, by the mixture over its curves: gap, rate, growth, law.
+//! Present gap, rate, growth and wear law of a unit, from the mixture over its curves.
 
 use crate::inference::posterior::{Component, Posterior};
 use crate::math::distributions;
 use crate::math::weighted::WeightedSamples;
 use crate::prior::calibration_params::USUAL_WIDTH;
 use crate::prior::fleet_prior::FleetPrior;
-use crate::statement::types::{Level, Rate, WearClass};
-use crate::wear::bank::WearLaw;
-use crate::wear::life_curve::LifeCurve;
+use crate::statement::types::{Level, Rate};
+use crate::wear::bank::{WearClass, WearLaw};
 
 /// Growth that counts as visible, a share of the limit.
 const VISIBLE: f64 = 0.02;
-
-/// Exponents up to this slow down, and from that speed up; so does a course, by its next tenth's rate over this.
-const SLOWING: f64 = 0.9;
-const SPEEDING: f64 = 1.2;
 
 /// The mixture's mean and spread, the installation's bias and undone offsets included.
 pub(crate) fn level(posterior: &Posterior, prior: &FleetPrior, offset_m2: f64) -> Level {
@@ -59,11 +54,11 @@ pub(crate) fn onset_usage(component: &Component) -> Option<f64> {
     if let WearLaw::Onset { start } = component.law { Some(start) } else { None }
 }
 
-/// The law most believed in, and how much; of a unit that wears, the one of those by which it can.
+/// Most probable class of wear laws, and its probability; for a wearing unit, of the classes other than none.
 pub(crate) fn law(posterior: &Posterior, is_wearing: bool) -> Option<(WearClass, f64)> {
     let mut shares: Vec<(WearClass, f64)> = Vec::new();
     for component in &posterior.components {
-        let law = name(component);
+        let law = component.law.class(component.age_now);
         if is_wearing && law == WearClass::None {
             continue;
         }
@@ -74,31 +69,4 @@ pub(crate) fn law(posterior: &Posterior, is_wearing: bool) -> Option<(WearClass,
     }
     let likeliest = shares.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
     likeliest.map(|(law, share)| (law, probability(share)))
-}
-
-fn name(component: &Component) -> WearClass {
-    match component.law {
-        WearLaw::None => WearClass::None,
-        WearLaw::Onset { .. } => WearClass::Onset,
-        WearLaw::Exponential { .. } => WearClass::Accelerating,
-        WearLaw::Settling { .. } => WearClass::Slowing,
-        law @ WearLaw::Bend { .. } => {
-            if law.derivative(0.0) < law.derivative(f64::MAX) {
-                WearClass::Accelerating
-            } else {
-                WearClass::Slowing
-            }
-        }
-        WearLaw::LifeCurve { shape, life } => match LifeCurve::new(shape, life).rate_ratio(component.age_now)
-        {
-            ratio if ratio < SLOWING => WearClass::Slowing,
-            ratio if ratio > SPEEDING => WearClass::Accelerating,
-            _ => WearClass::Linear,
-        },
-        law @ WearLaw::Power { .. } => match law.exponent() {
-            Some(p) if p < SLOWING => WearClass::Slowing,
-            Some(p) if p > SPEEDING => WearClass::Accelerating,
-            _ => WearClass::Linear,
-        },
-    }
 }

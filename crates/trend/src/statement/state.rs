@@ -1,15 +1,13 @@
 //! Alert state of a unit, and its reason.
 
+use crate::data::series::DAY_US;
 use std::fmt;
 
 use crate::settings::Settings;
 use crate::statement::types::{ChangePoint, ChangePointKind, Crossing, Level, MIN_ESTIMATES};
 
-/// A day, microseconds.
-const DAY_US: f64 = 86_400e6;
-
 /// By how much a limit must be left before the state it caused is: three per cent of a gap, fifteen of
-/// the planning horizon. Without it a unit at a limit would change its state from night to night.
+/// the planning horizon. Without it a unit at a limit would change its state from run to run.
 const GAP_MARGIN: f64 = 0.97;
 const HORIZON_MARGIN: f64 = 1.15;
 
@@ -132,7 +130,7 @@ impl fmt::Display for Reason {
     }
 }
 
-/// What a state is judged by.
+/// Evidence for a state.
 pub(crate) struct Evidence<'a> {
     /// Departure of the last flight with a gap.
     pub(crate) last_gap_us: Option<i64>,
@@ -154,7 +152,7 @@ pub(crate) fn alert_state(
     let Some(last_gap_us) = evidence.last_gap_us else {
         return (None, Reason::NoEstimate);
     };
-    let days_since = |departure_us: i64| (evidence.as_of_us - departure_us) as f64 / DAY_US;
+    let days_since = |departure_us: i64| (evidence.as_of_us - departure_us) as f64 / DAY_US as f64;
     let (Some(Level { gap_m, .. }), Some(crossing)) = (evidence.level, evidence.crossing) else {
         let few = Reason::TooFew { estimates: evidence.estimates };
         let unsupported = |(gap_m, recent_m)| Reason::Unsupported { gap_m, recent_m };

@@ -53,33 +53,6 @@ pub struct Utilization {
     pub hours_per_flight: f64,
 }
 
-/// Forms of wear.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WearClass {
-    /// It does not wear.
-    None,
-    /// Flat, then a line.
-    Onset,
-    /// Ever more slowly.
-    Slowing,
-    /// As the usage.
-    Linear,
-    /// Ever faster.
-    Accelerating,
-}
-
-impl fmt::Display for WearClass {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::None => "none",
-            Self::Onset => "onset",
-            Self::Slowing => "slowing",
-            Self::Linear => "linear",
-            Self::Accelerating => "accelerating",
-        })
-    }
-}
-
 /// Whether a unit wears.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WearStatus {

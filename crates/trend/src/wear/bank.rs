@@ -8,12 +8,15 @@
 //! settling     F(t) = 1 − e^(−t/τ)
 //! onset        F(t) = max(0, t − o)/1000    flat, then a line
 //! bend         F(t) = (s t + (1 − s) max(0, t − o))/1000    one line, then another; s the ratio of rates
-//! shape       F(t) = G(t/T)    turns at shares of a life T, see `shape`
+//! life curve   F(t) = G(t/T)    piecewise over the shares of a life T, see `life_curve`
 //! none         F(t) = 0
 //! ```
-//! Ages are hours, or another usage brought to hours by the part number's mean. Each law is known by
-//! its *life*: the age T at which it has grown by a given span, so A = span/F(T).
+//! Ages are hours, or another usage converted to hours by the part number's mean. Each law is parametrised by its
+//! *life*: the age T at which it has grown by a given span, so A = span/F(T).
+//!
+//! This file holds everything that is particular to a law: values, parameters, default share, reported class.
 
+use std::fmt;
 use std::ops::Range;
 use std::sync::LazyLock;
 
@@ -40,25 +43,34 @@ const BEND_RATIOS: [f64; 5] = [0.2, 0.45, 2.2, 5.0, 12.0];
 const KNEES: usize = 10;
 const BEND_AGE_STRIDE: usize = 4;
 
-/// The same for courses.
+/// The same for life curves.
 const LIFE_CURVE_AGE_STRIDE: usize = 2;
+
+/// Mean and standard deviation of ln(life / time constant): of the exponential law, and of a life curve.
+const LN_LIFE_OF_EXPONENTIAL: (f64, f64) = (1.1, 0.5);
+const LN_LIFE_OF_CURVE: (f64, f64) = (0.0, 0.2);
+
+/// Rate ratio up to which a law is reported as slowing, and from which as accelerating: the exponent of a power, the
+/// next tenth's rate over the present one of a life curve.
+const SLOWING: f64 = 0.9;
+const ACCELERATING: f64 = 1.2;
 
 /// Ages at first sight, hours.
 const AGES: [f64; 14] =
     [0.0, 75.0, 150.0, 250.0, 400.0, 600.0, 850.0, 1150.0, 1500.0, 2000.0, 2600.0, 3400.0, 4500.0, 6000.0];
 
 /// Number of exponents, the last families.
-pub(crate) const POWERS: usize = POWER_EIGHTHS.len();
+const POWERS: usize = POWER_EIGHTHS.len();
 
 /// Number of [`WearLaw::family`] values: every exponent is one, the other laws are one each.
 pub(crate) const FAMILIES: usize = LIFE_CURVES.end + POWER_EIGHTHS.len();
 
-/// The families of bends and of courses.
-pub(crate) const BENDS: Range<usize> = 4..4 + BEND_RATIOS.len();
-pub(crate) const LIFE_CURVES: Range<usize> = BENDS.end..BENDS.end + life_curve::COUNT;
+/// The families of bends and of life curves.
+const BENDS: Range<usize> = 4..4 + BEND_RATIOS.len();
+const LIFE_CURVES: Range<usize> = BENDS.end..BENDS.end + life_curve::COUNT;
 
 /// The family of wear that is proportional to usage.
-pub(crate) const LINEAR: usize = FAMILIES - POWERS + 4;
+const LINEAR: usize = FAMILIES - POWERS + 4;
 
 /// A law's form.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +85,7 @@ pub(crate) enum WearLaw {
     Exponential { index: usize },
     /// Index into the constants of settling.
     Settling { index: usize },
-    /// Indices into the courses and their lives.
+    /// Indices into the life curves and their lives.
     LifeCurve { shape: usize, life: usize },
     /// Index into the exponents.
     Power { index: usize },
@@ -86,7 +98,7 @@ pub(crate) struct Candidate {
     /// Age at first sight, hours, and its index in [`CandidateBank::ages`].
     pub(crate) age: f64,
     age_index: usize,
-    /// Width of the cell of ages this member of the grid stands for.
+    /// Width of the grid cell of ages that the candidate represents.
     age_cell: f64,
     /// Logarithms of its age, of that cell, and of the cell of ln τ or the start.
     pub(crate) ln_age: f64,
@@ -98,6 +110,46 @@ pub(crate) struct Candidate {
     pub(crate) ln_time_constant_hours: Option<f64>,
     /// The sequence of which its basis values are a multiple, plus a line and a constant, if there is one.
     pub(crate) basis: Option<(usize, BasisCoefficients)>,
+}
+
+/// Class of wear laws that is reported.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WearClass {
+    /// No wear.
+    None,
+    /// Flat, then a line.
+    Onset,
+    /// Wear with a falling rate.
+    Slowing,
+    /// Wear in proportion to usage.
+    Linear,
+    /// Wear with a rising rate.
+    Accelerating,
+}
+
+impl fmt::Display for WearClass {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::None => "none",
+            Self::Onset => "onset",
+            Self::Slowing => "slowing",
+            Self::Linear => "linear",
+            Self::Accelerating => "accelerating",
+        })
+    }
+}
+
+/// Share of each family in a fleet without data.
+pub(crate) fn default_shares() -> [f64; FAMILIES] {
+    let mut shares = [0.28 / POWERS as f64; FAMILIES];
+    shares[LINEAR] += 0.09;
+    shares[WearLaw::None.family()] = 0.17;
+    shares[WearLaw::Onset { start: 0.0 }.family()] = 0.16;
+    shares[WearLaw::Exponential { index: 0 }.family()] = 0.11;
+    shares[WearLaw::Settling { index: 0 }.family()] = 0.05;
+    shares[BENDS].fill(0.07 / BENDS.len() as f64);
+    shares[LIFE_CURVES].fill(0.07 / LIFE_CURVES.len() as f64);
+    shares
 }
 
 impl WearLaw {
@@ -118,8 +170,8 @@ impl WearLaw {
     pub(crate) fn value(self, age: f64) -> f64 {
         match self {
             Self::None => 0.0,
-            Self::Onset { start } => bent(0.0, start, age),
-            Self::Bend { knee, index } => bent(BEND_RATIOS[index], knee, age),
+            Self::Onset { start } => two_lines(0.0, start, age),
+            Self::Bend { knee, index } => two_lines(BEND_RATIOS[index], knee, age),
             Self::Exponential { index } => (age / TIME_CONSTANTS[index]).exp_m1(),
             Self::Settling { index } => -(-age / SETTLING[index]).exp_m1(),
             Self::LifeCurve { shape, life } => LifeCurve::new(shape, life).value(age),
@@ -185,6 +237,32 @@ impl WearLaw {
         }
     }
 
+    /// Mean and standard deviation of ln(life / time constant), for a law with a time constant.
+    pub(crate) fn ln_life_over_time_constant(self) -> (f64, f64) {
+        match self {
+            Self::LifeCurve { .. } => LN_LIFE_OF_CURVE,
+            _ => LN_LIFE_OF_EXPONENTIAL,
+        }
+    }
+
+    /// Class that is reported at an age.
+    pub(crate) fn class(self, age: f64) -> WearClass {
+        let by_rate_ratio = |ratio: f64| match ratio {
+            ratio if ratio < SLOWING => WearClass::Slowing,
+            ratio if ratio > ACCELERATING => WearClass::Accelerating,
+            _ => WearClass::Linear,
+        };
+        match self {
+            Self::None => WearClass::None,
+            Self::Onset { .. } => WearClass::Onset,
+            Self::Exponential { .. } => WearClass::Accelerating,
+            Self::Settling { .. } => WearClass::Slowing,
+            Self::Bend { index, .. } => by_rate_ratio(BEND_RATIOS[index].recip()),
+            Self::LifeCurve { shape, life } => by_rate_ratio(LifeCurve::new(shape, life).rate_ratio(age)),
+            Self::Power { index } => by_rate_ratio(0.125 * f64::from(POWER_EIGHTHS[index])),
+        }
+    }
+
     /// How fast an amplitude falls with ln life where that is a power: d ln A/d ln T = −p.
     pub(crate) fn exponent(self) -> Option<f64> {
         match self {
@@ -201,7 +279,7 @@ pub(crate) fn power_of_ln_life(exponent: f64, ln_hours: f64) -> f64 {
 }
 
 /// A line of slope `before` up to a knee, then one of slope 1, per reference age.
-fn bent(before: f64, knee: f64, age: f64) -> f64 {
+fn two_lines(before: f64, knee: f64, age: f64) -> f64 {
     (before * age + (1.0 - before) * (age - knee).max(0.0)) * (1.0 / REFERENCE_HOURS)
 }
 
@@ -342,7 +420,7 @@ fn bends(ages: &[Candidate], cell: f64) -> impl Iterator<Item = Candidate> {
     ages.iter().step_by(BEND_AGE_STRIDE).flat_map(of_age)
 }
 
-/// Every course over every life, at every other age.
+/// Every life curve over every life, at every other age.
 fn life_curves(ages: &[Candidate]) -> impl Iterator<Item = Candidate> {
     let all = || {
         (0..life_curve::COUNT).flat_map(|shape| (0..life_curve::LIVES.len()).map(move |life| (shape, life)))
@@ -469,7 +547,7 @@ impl BasisMatrix {
         let exponential = |tau: f64, (place, u): (&mut f64, &f64)| *place = (u / tau).exp();
         if basis < KNEES {
             let knee = (basis as f64 + 0.5) * self.knee_cell;
-            places.for_each(|(place, u)| *place = bent(0.0, knee, *u));
+            places.for_each(|(place, u)| *place = two_lines(0.0, knee, *u));
         } else if let Some(tau) = TIME_CONSTANTS.get(basis - KNEES) {
             places.for_each(|at| exponential(*tau, at));
         } else {

@@ -23,15 +23,15 @@ const LIFE_CURVES: [[f64; TENTHS + 1]; COUNT] = [
 
 const TENTHS: usize = 10;
 
-/// Number of courses.
+/// Number of life curves.
 pub(crate) const COUNT: usize = 7;
 
-/// Lives tried, hours, and the width of the cell of ln life that each stands for.
+/// Grid of lives, hours, and its cell width in ln life.
 pub(crate) const LIVES: [f64; 10] =
     [600.0, 810.0, 1094.0, 1476.0, 1993.0, 2690.0, 3632.0, 4903.0, 6619.0, 8936.0];
 pub(crate) const LN_LIFE_CELL: f64 = 0.3;
 
-/// One course over one life.
+/// One life curve over one life.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LifeCurve {
     basis_values: &'static [f64; TENTHS + 1],
@@ -39,7 +39,7 @@ pub(crate) struct LifeCurve {
 }
 
 impl LifeCurve {
-    /// Of indices into the courses and the lives.
+    /// The curve of an index into the shapes and one into the lives.
     pub(crate) fn new(shape: usize, life: usize) -> Self {
         Self { basis_values: &LIFE_CURVES[shape], life: LIVES[life] }
     }
@@ -105,7 +105,7 @@ mod tests {
         }
     }
 
-    /// By hand: of the first course at a life of 600 h, 0.06 + 0.08/2 more after 345 h; a tenth is 60 h.
+    /// By hand: of the first shape at a life of 600 h, 0.06 + 0.08/2 more after 345 h; a tenth is 60 h.
     #[test]
     fn heights_between_tenths_lie_on_lines() {
         let shape = LifeCurve::new(0, 0);

@@ -1,5 +1,6 @@
 //! `check`: shows how logs are mapped, channel by channel, and what would be refused; reports no gap, writes nothing.
 
+use records::uncertainty::NORMAL_95;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
@@ -24,9 +25,6 @@ const SLOPE_TOLERANCE: f64 = 0.02;
 
 /// Usual logging rates; a rate outside mostly means a wrong unit of time.
 const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=20e3;
-
-/// Half the width of a 90 % interval, in standard errors.
-const Z90: f64 = 1.645;
 
 /// Note on the slope of screw on motor.
 const RATIO: &str = "screw/motor ratio";
@@ -256,13 +254,13 @@ fn actuator(
     installations: &Installations,
 ) -> Result<ActuatorCheck, Diagnostic> {
     let id = &opened.identity;
-    let (stay, part) = opened.unit(at, config, installations)?;
+    let (installation, part) = opened.unit(at, config, installations)?;
     let base = |channel: &'static str, column: &Option<String>, unit: &'static str| Channel {
         log: name.to_owned(),
         tail_number: id.tail_number.to_string(),
         flight_id: id.flight_id.to_string(),
         position: at.position.to_string(),
-        serial_number: Some(stay.serial_number.to_string()),
+        serial_number: Some(installation.serial_number.to_string()),
         channel,
         column: column.clone().unwrap_or_default(),
         unit,
@@ -321,7 +319,7 @@ fn actuator(
         channel.remedy = rejection::remedy(code);
     }
     let params = job::part_identification::IdentifiedParams::of(&a, tested.as_deref().ok());
-    let says = Some((stay.part_number.clone(), params));
+    let says = Some((installation.part_number.clone(), params));
     Ok(ActuatorCheck { found, clock: Some(clock(&a)), says, rejection })
 }
 
@@ -475,7 +473,8 @@ fn proposals(facts: &Facts, config: &Config) -> String {
             .iter()
             .map(|p| {
                 let stated = p.configured.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
-                let uncertainty = p.uncertainty.map_or_else(String::new, |v| format!(" ± {:.1e}", Z90 * v));
+                let uncertainty =
+                    p.uncertainty.map_or_else(String::new, |v| format!(" ± {:.1e}", NORMAL_95 * v));
                 vec![p.key.to_owned(), format!("{:.2e}{uncertainty}", p.identified), stated]
             })
             .collect();

@@ -26,25 +26,25 @@ pub(super) fn estimate_plot(
     output: &Output,
 ) -> Result<(), Failure> {
     let draw = renderer(file)?;
-    let mut looks = Vec::new();
+    let mut plots = Vec::new();
     for path in logs {
         let name = display_path(path);
         // A failed log is reported already; it is not drawn.
         let files = pipeline::run::discover::log_containing(config, path)?;
         let found =
             job::estimate_plot_data::of_log(&files, &name, config, installations, part).unwrap_or_default();
-        looks.extend(found.into_iter().map(|look| drawn(&name, look)));
+        plots.extend(found.into_iter().map(|data| to_plot(&name, data)));
     }
-    if looks.is_empty() {
+    if plots.is_empty() {
         output.note(&format!("no actuator to draw; {} was not written", display_path(file)));
         return Ok(());
     }
     let failed = |what: &dyn std::fmt::Display| {
         Failure::failed(records::Diagnostic::new("cannot_write", format!("{}: {what}", display_path(file))))
     };
-    let picture = draw(&looks).map_err(|e| failed(&e))?;
+    let picture = draw(&plots).map_err(|e| failed(&e))?;
     std::fs::write(file, picture).map_err(|e| failed(&e))?;
-    output.note(&format!("drew {} to {}", table::count(looks.len(), "actuator"), display_path(file)));
+    output.note(&format!("drew {} to {}", table::count(plots.len(), "actuator"), display_path(file)));
     Ok(())
 }
 
@@ -53,9 +53,9 @@ type Renderer = fn(&[report::EstimatePlot]) -> Result<Vec<u8>, report::Error>;
 fn renderer(file: &Path) -> Result<Renderer, Failure> {
     let ending = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
     match ending.as_str() {
-        "svg" => Ok(|looks| estimate_plot_svg(looks).map(String::into_bytes)),
+        "svg" => Ok(|plots| estimate_plot_svg(plots).map(String::into_bytes)),
         "png" => Ok(estimate_plot_png),
-        "html" | "htm" => Ok(|looks| estimate_plot_html(looks).map(String::into_bytes)),
+        "html" | "htm" => Ok(|plots| estimate_plot_html(plots).map(String::into_bytes)),
         _ => Err(Failure::usage(
             "unknown_ending",
             format!("{} has no known extension", display_path(file)),
@@ -64,22 +64,22 @@ fn renderer(file: &Path) -> Result<Renderer, Failure> {
     }
 }
 
-fn drawn(log: &str, look: EstimatePlot) -> report::EstimatePlot {
-    let (upper, lower, touches) = match look.picture {
+fn to_plot(log: &str, data: EstimatePlot) -> report::EstimatePlot {
+    let (upper, lower, touches) = match data.picture {
         Some(picture) => (picture.upper, picture.lower, picture.touches),
         None => Default::default(),
     };
     let mut plot = report::EstimatePlot {
-        title: format!("{} in {log}", look.position),
-        summary: words(&look.estimate),
-        step_s: look.step_s,
-        breaks: look.breaks,
+        title: format!("{} in {log}", data.position),
+        summary: words(&data.estimate),
+        step_s: data.step_s,
+        breaks: data.breaks,
         contacts: Vec::new(),
-        bounds_m: look.midrange.map(|gap| (gap.upper_m, gap.lower_m)),
+        bounds_m: data.midrange.map(|gap| (gap.upper_m, gap.lower_m)),
         flanks: [upper, lower],
-        dx_m: look.dx_m,
-        load_n: look.load_n,
-        s_m: look.s_m,
+        dx_m: data.dx_m,
+        load_n: data.load_n,
+        s_m: data.s_m,
     };
     let intervals = touches.into_iter().map(|touch| ContactInterval {
         time_s: plot.time_s(touch.time_s / plot.step_s),

@@ -91,10 +91,10 @@ fn page(
     before: &BTreeMap<Key, GapRecord>,
     after: &BTreeMap<Key, GapRecord>,
 ) -> String {
-    let said = |all: &BTreeMap<Key, GapRecord>| {
-        let told: Vec<&GapEstimate> =
+    let record_counts = |all: &BTreeMap<Key, GapRecord>| {
+        let with_gap: Vec<&GapEstimate> =
             all.values().map(|r| &r.estimate).filter(|e| e.gap_m.is_some()).collect();
-        format!("{} with {}", count(all.len(), "record"), count(told.len(), "gap"))
+        format!("{} with {}", count(all.len(), "record"), count(with_gap.len(), "gap"))
     };
     let mut changes: Vec<f64> = rows.iter().filter_map(|r| r.gap_change_m).map(f64::abs).collect();
     changes.sort_by(f64::total_cmp);
@@ -102,8 +102,8 @@ fn page(
     let mut head = format!(
         "{} of {of} actuator-flights differ; before {}, after {}\n",
         rows.len(),
-        said(before),
-        said(after)
+        record_counts(before),
+        record_counts(after)
     );
     if let (Some(middle), Some(largest)) = (middle, changes.last()) {
         let _ = writeln!(

@@ -1,5 +1,6 @@
 //! `explain`: traces one estimate to its inputs and settings, and recomputes it.
 
+use records::uncertainty::NORMAL_95;
 use std::fmt::Write as _;
 
 use ingest::{ActuatorChannels, LogFiles};
@@ -73,9 +74,6 @@ fn find(args: &ExplainArgs, store: &Store) -> Result<GapRecord, Failure> {
     }
 }
 
-/// Half the width of a 90 % interval, in standard errors.
-const Z90: f64 = 1.645;
-
 /// Result of recomputing a record.
 struct Recomputation {
     digest: String,
@@ -88,14 +86,14 @@ fn replay(
     config: &Config,
     installations: &records::Installations,
 ) -> Result<Recomputation, Diagnostic> {
-    let shown = &record.provenance.log_path;
-    let path = config.path(shown);
+    let log_path = &record.provenance.log_path;
+    let path = config.path(log_path);
     let files = discover::log_containing(config, &path).unwrap_or_else(|_| LogFiles::one(path));
-    catch_panic(shown, || {
-        let opened = FlightLog::open(&files, shown, config, installations)?;
+    catch_panic(log_path, || {
+        let opened = FlightLog::open(&files, log_path, config, installations)?;
         let at = opened.positions.iter().find(|at| at.position == record.position).ok_or_else(|| {
             Diagnostic::new("no_position", format!("the log has no position {} any more", record.position))
-                .in_file(shown)
+                .in_file(log_path)
         })?;
         let (_, part) = opened.unit(at, config, installations)?;
         if !at.lacking.is_empty() {
@@ -200,7 +198,7 @@ fn page(
         &format!(
             "stiffness {} ± {} N/m (90 %), skew {} ms, loop {} µm, lost motion {} µm",
             newtons(e.stiffness_n_per_m),
-            newtons(e.stiffness_se_n_per_m.map(|se| Z90 * se)),
+            newtons(e.stiffness_se_n_per_m.map(|se| NORMAL_95 * se)),
             e.skew_s.map_or_else(table::empty_cell, |s| format!("{:.2}", s * 1e3)),
             table::micrometres(e.loop_width_m),
             table::micrometres(e.lost_motion_m)

@@ -28,7 +28,7 @@ const LEAST_HISTORY: usize = 3;
 pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     check_range(args.since, args.until)?;
     let config = load_config(global)?;
-    let records = Store::open(config.store())?.records(&asked(args))?;
+    let records = Store::open(config.store())?.records(&query_of(args))?;
     if records.is_empty() {
         check_names(args, &KnownNames::read(&config))?;
     }
@@ -78,7 +78,7 @@ fn word(by: QueryKey) -> &'static str {
     }
 }
 
-fn asked(args: &QueryArgs) -> Query {
+fn query_of(args: &QueryArgs) -> Query {
     let id = |by: QueryKey| (args.by == by).then(|| args.id.clone());
     Query {
         tail_number: id(QueryKey::Tail),

@@ -12,7 +12,7 @@ use crate::output::Output;
 use crate::progress::Progress;
 use crate::table::count;
 
-use crate::commands::context::{KnownNames, VERSION, display_path, load_with_installations};
+use crate::commands::context::{KnownNames, VERSION, display_path, load_with_installations, selection};
 
 /// Writes the pages and prints the path of the first one.
 ///
@@ -31,9 +31,11 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
     let program = format!("Freeplay {VERSION}");
     let report = compose::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
     if report.units.is_empty() {
-        KnownNames::read(&config).check_units(args.tail.as_deref(), args.serial.as_deref(), None)?;
+        let known = KnownNames::read(&config);
+        known.check_units(args.tail.as_deref(), args.serial.as_deref(), None)?;
+        let what = format!("no unit{} has flown; {}", selection(&ask), known.searched());
         let hint = "list the store's contents with `freeplay store info`; fill it with `freeplay run`";
-        return Err(Failure::usage("nothing_to_report", "no unit matches the selection", hint));
+        return Err(Failure::usage("nothing_to_report", what, hint));
     }
     let progress = Progress::new("report", output);
     let watch = |event: Event| match event {

@@ -12,7 +12,7 @@ use crate::row_output;
 use crate::sparkline::sparkline;
 use crate::table::{self, count, number, state_mark, text};
 
-use crate::commands::context::{KnownNames, load_trend_context};
+use crate::commands::context::{KnownNames, load_trend_context, selection};
 
 /// Prints one row per unit, or per query.
 ///
@@ -43,6 +43,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
             }
         }
     };
+    let mut nothing = None;
     if found.is_empty() && args.queries.is_none() {
         let known = match &args.external.estimates {
             Some(file) => {
@@ -51,21 +52,13 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
             None => KnownNames::read(&config),
         };
         known.check_units(args.tail.as_deref(), args.serial.as_deref(), args.part.as_deref())?;
+        nothing = Some(format!("no unit{} has flown; {}\n", selection(&ask), known.searched()));
     }
-    row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found, args))?;
+    row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found, nothing))?;
     Ok(Code::Success)
 }
 
-/// The selection as text.
-fn selection(args: &TrendArgs) -> String {
-    let named = |what: &str, name: &Option<String>| name.as_ref().map(|name| format!(" of {what} {name}"));
-    let as_of = args.as_of.map(|as_of| format!(" until {as_of}"));
-    let parts =
-        [named("tail", &args.tail), named("serial number", &args.serial), named("part number", &args.part)];
-    parts.into_iter().chain([as_of]).flatten().collect()
-}
-
-fn page(found: &[TrendRow], args: &TrendArgs) -> String {
+fn page(found: &[TrendRow], nothing: Option<String>) -> String {
     let columns = [
         text("state", 0),
         text("part / serial", 0),
@@ -104,19 +97,9 @@ fn page(found: &[TrendRow], args: &TrendArgs) -> String {
             r.reason.clone().unwrap_or_default(),
         ]
     };
-    let as_of = found.iter().map(|r| r.as_of_utc).max();
-    let head = as_of.map_or_else(
-        || {
-            format!(
-                "no unit{} has flown; list the store's contents with `freeplay store info`\n",
-                selection(args)
-            )
-        },
-        |as_of| format!("{} as of {}\n", count(found.len(), "unit"), as_of.strftime("%Y-%m-%d %H:%M UTC")),
-    );
-    if found.is_empty() {
-        head
-    } else {
-        head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
-    }
+    let Some(as_of) = found.iter().map(|r| r.as_of_utc).max() else {
+        return nothing.unwrap_or_else(|| "no unit was queried\n".to_owned());
+    };
+    let head = format!("{} as of {}\n", count(found.len(), "unit"), as_of.strftime("%Y-%m-%d %H:%M UTC"));
+    head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
 }

@@ -451,16 +451,16 @@ fn changes_section(changed: &[UnitChange]) -> String {
 /// State and event changes of a unit as text.
 fn change_text(unit: &UnitChange) -> String {
     let word = |state: Option<&'static str>| state.unwrap_or("no state");
-    let mut told = Vec::new();
+    let mut changes = Vec::new();
     if unit.from != unit.to {
         let why = unit.reason.as_deref().map(|why| format!(" ({why})")).unwrap_or_default();
-        told.push(format!("{} → {}{why}", word(unit.from), word(unit.to)));
+        changes.push(format!("{} → {}{why}", word(unit.from), word(unit.to)));
     }
     for (events, what) in [(&unit.new_events, "new"), (&unit.cleared_events, "cleared")] {
         let day = |at: jiff::Timestamp| at.strftime("%Y-%m-%d").to_string();
-        told.extend(events.iter().map(|e| format!("{what}: {} of {}", e.kind, day(e.departure_utc))));
+        changes.extend(events.iter().map(|e| format!("{what}: {} of {}", e.kind, day(e.departure_utc))));
     }
-    told.join("; ")
+    changes.join("; ")
 }
 
 fn dry_run(config: &job::Config, request: &Request, output: &Output) -> Result<Code, Failure> {
@@ -479,7 +479,7 @@ fn dry_run(config: &job::Config, request: &Request, output: &Output) -> Result<C
                 .stat
                 .as_ref()
                 .map_or_else(table::empty_cell, |s| format!("{:.2}", s.size_bytes as f64 / 1e6));
-            vec![w.shown.clone(), w.why.as_str().to_owned(), megabytes]
+            vec![w.log_path.clone(), w.why.as_str().to_owned(), megabytes]
         })
         .collect();
     let table = if rows.is_empty() { String::new() } else { table::layout(&columns, &rows) };

@@ -56,7 +56,7 @@ pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
         let logs = logs(folder)?;
         let offer = propose(&logs[0]).map_err(|e| Failure::Refused(vec![e.diagnostic()]))?;
         toml = proposed(folder, &args.dir, &logs[0], &offer)?;
-        table = stays(&logs, &offer).unwrap_or(table);
+        table = installation_rows(&logs, &offer).unwrap_or(table);
     }
     fs::create_dir_all(&args.dir)?;
     for ((name, _), text) in FILES.iter().zip([toml, table]) {
@@ -90,7 +90,7 @@ fn logs(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// Installations table with a placeholder unit per tail and position, if the logs name both.
-fn stays(logs: &[PathBuf], offer: &InferredMapping) -> Option<String> {
+fn installation_rows(logs: &[PathBuf], offer: &InferredMapping) -> Option<String> {
     let by_folder = |log: &PathBuf| {
         path_identity(log)?;
         Some(log.parent()?.file_name()?.to_str()?.to_owned())

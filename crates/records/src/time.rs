@@ -1,4 +1,19 @@
-//! Times of samples on a uniform clock with breaks.
+//! Days between times, and times of samples on a uniform clock with breaks.
+
+use jiff::{SignedDuration, Timestamp};
+
+/// Seconds of a day.
+pub const DAY_S: f64 = 86_400.0;
+
+/// Days from one time to another.
+pub fn days_between(from: Timestamp, to: Timestamp) -> f64 {
+    to.duration_since(from).as_secs_f64() / DAY_S
+}
+
+/// Time a number of days later, to the second; `None` beyond the calendar.
+pub fn days_after(from: Timestamp, days: f64) -> Option<Timestamp> {
+    from.checked_add(SignedDuration::try_from_secs_f64((days * DAY_S).round()).ok()?).ok()
+}
 
 /// Time of a position among the samples since the first one, s: the step within a segment, and at each of the `breaks`
 /// (first sample after it, its time in s) the log's own time.
