@@ -415,7 +415,7 @@ fn map_actuators(
     }
     let installed: BTreeSet<&PartNumber> = installations
         .units_on_tail(&id.tail_number, id.departure_utc)
-        .map(|stay| &stay.part_number)
+        .map(|installation| &installation.part_number)
         .collect();
     for part in installed.into_iter().filter(|part| config.has_overrides(part)) {
         let mapping = config.mapping(&id.tail_number, Some(part));
