@@ -4,6 +4,7 @@
 
 mod cli_output;
 mod docs;
+mod fuzz;
 mod harness;
 mod logs;
 mod markdown;

@@ -1,7 +1,7 @@
 //! File-system calls of a run that fail, are killed at, or never return: `tests/data/disk/faults.c`, preloaded.
 //!
 //! Every call of the process on a folder is counted, so that each can be tried. The gate tries a sample; all of them
-//! are tried with `FREEPLAY_FAULTS=all`. `docs/reliability.md` has the figures.
+//! are tried with `FREEPLAY_FAULTS=all`, and so many of each row with a number. `docs/reliability.md` has the figures.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -9,11 +9,12 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::harness::{CommandResult, TestFleet, print_line};
-use crate::runs::interruption::{small, whole_flights};
+use crate::runs::interruption::{Chance, small, whole_flights};
 
 /// Numbers of `errno(3)`.
 const EIO: &str = "5";
 const ESTALE: &str = "116";
+const ENOSPC: &str = "28";
 
 /// Calls that the gate tries of each kind of fault.
 const SAMPLE: usize = 4;
@@ -35,6 +36,15 @@ struct Fault {
     at: usize,
     /// The last one; 0 for all that follow.
     last: usize,
+    /// One more call that fails, and how.
+    also: Option<(usize, &'static str)>,
+}
+
+impl Fault {
+    /// A fault at one call of a kind.
+    fn at(under: &'static str, kind: &'static str, mode: &'static str, at: usize) -> Self {
+        Self { under, kind, mode, at, last: at, also: None }
+    }
 }
 
 impl Injector {
@@ -60,6 +70,9 @@ impl Injector {
         if fault.at > 0 {
             command.env("FAULT_AT", fault.at.to_string()).env("FAULT_LAST", fault.last.to_string());
         }
+        if let Some((at, mode)) = fault.also {
+            command.env("FAULT_ALSO", format!("{at}:{mode}"));
+        }
         command
     }
 
@@ -78,11 +91,16 @@ impl Injector {
         CommandResult { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
     }
 
+    /// A run one of whose calls on the store fails.
+    pub(crate) fn random_fault(&self, fleet: &TestFleet, at: usize) {
+        self.run(fleet, &["run", "--jobs", "1", "-q"], &Fault::at("results", "both", EIO, at.max(1)));
+    }
+
     /// A run whose writes to the store fail with `ENOSPC` from one on.
     pub(crate) fn full_disk(&self, fleet: &TestFleet) -> CommandResult {
         let count = self.count(fleet, &["run", "--jobs", "1", "--limit", "1"], "results", "write");
         std::fs::remove_dir_all(fleet.path("results")).unwrap();
-        let fault = Fault { under: "results", kind: "write", mode: "28", at: count / 2, last: 0 };
+        let fault = Fault { last: 0, ..Fault::at("results", "write", "28", count / 2) };
         self.run(fleet, &["run", "--jobs", "1"], &fault)
     }
 
@@ -90,7 +108,7 @@ impl Injector {
     pub(crate) fn killed(&self, fleet: &TestFleet) {
         let count = self.count(fleet, &["run", "--jobs", "1"], "results", "write");
         std::fs::remove_dir_all(fleet.path("results")).unwrap();
-        let fault = Fault { under: "results", kind: "write", mode: "kill", at: count * 3 / 4, last: 0 };
+        let fault = Fault::at("results", "write", "kill", count * 3 / 4);
         assert_eq!(self.run(fleet, &["run", "--jobs", "1"], &fault).code, None);
     }
 
@@ -121,27 +139,31 @@ impl Injector {
         let under = "N413FP-0002.parquet";
         let count = self.count(fleet, &["run", "--jobs", "1"], under, "read");
         std::fs::remove_dir_all(fleet.path("results")).unwrap();
-        Fault { under, kind: "read", mode: "hang", at: count / 2, last: 0 }
+        Fault { last: 0, ..Fault::at(under, "read", "hang", count / 2) }
     }
 
     /// How many calls a command makes.
     fn count(&self, fleet: &TestFleet, args: &[&str], under: &'static str, kind: &'static str) -> usize {
         let file = fleet.path("calls.txt");
-        let fault = Fault { under, kind, mode: EIO, at: 0, last: 0 };
+        let fault = Fault::at(under, kind, EIO, 0);
         let mut command = self.command(fleet, args, &fault);
         assert!(command.env("FAULT_COUNT", &file).stdout(Stdio::null()).status().unwrap().success());
         std::fs::read_to_string(file).unwrap().parse().unwrap()
     }
 }
 
-/// The calls to test: all, or the number of the gate, spread evenly.
+/// How many calls of each row are tried: all, a number, or those of the gate.
+fn sample() -> usize {
+    match std::env::var("FREEPLAY_FAULTS") {
+        Ok(which) if which == "all" => usize::MAX,
+        Ok(which) => which.parse().unwrap_or(SAMPLE),
+        Err(_) => SAMPLE,
+    }
+}
+
+/// The calls to test, spread evenly.
 fn calls(count: usize) -> Vec<usize> {
-    let step = if std::env::var("FREEPLAY_FAULTS").is_ok_and(|which| which == "all") {
-        1
-    } else {
-        count.div_ceil(SAMPLE).max(1)
-    };
-    (1..=count).step_by(step).collect()
+    (1..=count).step_by(count.div_ceil(sample()).max(1)).collect()
 }
 
 /// The logs that the small fleet's configuration names.
@@ -149,85 +171,242 @@ fn logs_of(fleet: &TestFleet) -> Vec<PathBuf> {
     fleet.logs().into_iter().filter(|log| log.to_string_lossy().contains("N413FP")).collect()
 }
 
-/// The small fleet with a run behind it and two logs that are new.
-fn grown() -> TestFleet {
+/// Three flights of four actuators.
+fn few() -> TestFleet {
     let fleet = small();
-    let kept: Vec<(PathBuf, Vec<u8>)> =
-        logs_of(&fleet).into_iter().take(2).map(|log| (log.clone(), std::fs::read(log).unwrap())).collect();
-    kept.iter().for_each(|(log, _)| std::fs::remove_file(log).unwrap());
-    fleet.run_ok(&["run", "-q"]);
-    kept.iter().for_each(|(log, bytes)| std::fs::write(log, bytes).unwrap());
+    logs_of(&fleet).iter().skip(3).for_each(|log| std::fs::remove_file(log).unwrap());
     fleet
 }
 
-/// Runs with a fault at each call, and then without: the second run must end with every record, and the first must
-/// have reported an error if it lacks one.
-fn survives(
+/// The fleet with a run behind it and a log that is new.
+fn grown() -> TestFleet {
+    let fleet = few();
+    let log = logs_of(&fleet)[0].clone();
+    let bytes = std::fs::read(&log).unwrap();
+    std::fs::remove_file(&log).unwrap();
+    fleet.run_ok(&["run", "-q"]);
+    std::fs::write(&log, bytes).unwrap();
+    fleet
+}
+
+/// The fleet with every log in its store, in commits of their own.
+fn stored() -> TestFleet {
+    let fleet = grown();
+    fleet.run_ok(&["run", "-q"]);
+    fleet
+}
+
+/// A command under faults.
+struct Struck<'a> {
+    injector: &'a Injector,
     make: fn() -> TestFleet,
-    under: &'static str,
-    kind: &'static str,
-    mode: &'static str,
-    from: bool,
-) {
-    const RUN: &[&str] = &["run", "--jobs", "1"];
-    let Some(injector) = Injector::new() else { return };
-    let plain = small();
-    plain.run_ok(&["run"]);
-    let wanted = plain.exported();
-    let count = injector.count(&make(), RUN, under, kind);
-    let mut outcomes: BTreeMap<Option<i32>, usize> = BTreeMap::new();
-    let tried = calls(count);
-    for &at in &tried {
-        let fleet = make();
-        let fault = Fault { under, kind, mode, at, last: if from { 0 } else { at } };
-        let struck = injector.run(&fleet, RUN, &fault);
-        *outcomes.entry(struck.code).or_default() += 1;
+    args: &'static [&'static str],
+    /// Records that the store must have after the command without a fault.
+    wanted: &'a str,
+}
+
+const RUN: &[&str] = &["run", "--jobs", "1"];
+
+impl Struck<'_> {
+    /// Runs the command with a fault, and then without: the second must end with every record, and the first must
+    /// have reported an error if the store lacks one. Returns the first exit code.
+    fn tried(&self, fault: &Fault) -> Option<i32> {
+        let fleet = (self.make)();
+        let struck = self.injector.run(&fleet, self.args, fault);
         assert!(matches!(struck.code, None | Some(0..=3)), "{fault:?}: {struck:?}");
-        if struck.code == Some(0) {
-            assert_eq!(fleet.exported(), wanted, "{fault:?} was not reported: {struck:?}");
-        }
         // A log of which one actuator cannot be read keeps the records of the others, and is an error.
-        if under == "results" {
+        if fault.under == "results" {
             whole_flights(&fleet);
         }
-        let healed = fleet.freeplay(RUN);
-        assert_eq!(healed.code, Some(0), "the run after {fault:?}: {healed:?}; it followed {struck:?}");
-        assert_eq!(fleet.exported(), wanted, "the run after {fault:?}");
+        let is_run = self.args[0] == "run";
+        if struck.code == Some(0) || !is_run {
+            assert_eq!(fleet.exported(), self.wanted, "{fault:?} was not reported: {struck:?}");
+        }
+        let healed = fleet.freeplay(self.args);
+        assert_eq!(
+            healed.code,
+            Some(0),
+            "without a fault after {fault:?}: {healed:?}; it followed {struck:?}"
+        );
+        assert_eq!(fleet.exported(), self.wanted, "without a fault after {fault:?}");
+        whole_flights(&fleet);
+        struck.code
     }
+
+    /// Whether a fault is survived.
+    fn survives(&self, fault: &Fault) -> bool {
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| self.tried(fault))).is_ok()
+    }
+}
+
+/// Exit codes and how often each came.
+#[derive(Default)]
+struct ExitCodes(BTreeMap<Option<i32>, usize>);
+
+impl std::fmt::Display for ExitCodes {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let shown = |(code, count): (&Option<i32>, &usize)| {
+            let code = code.map_or_else(|| "killed".to_owned(), |code| code.to_string());
+            format!("{code}: {count}")
+        };
+        f.write_str(&self.0.iter().map(shown).collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// Tries a fault at each call of a command; prints a row of the table in `docs/reliability.md`.
+fn strike(
+    args: &'static [&'static str],
+    (make, store): (fn() -> TestFleet, &str),
+    (under, kind, mode): (&'static str, &'static str, &'static str),
+    from: bool,
+) {
+    let Some(injector) = Injector::new() else { return };
+    let plain = few();
+    plain.run_ok(&["run"]);
+    let wanted = plain.exported();
+    let count = injector.count(&make(), args, under, kind);
+    let command = Struck { injector: &injector, make, args, wanted: &wanted };
+    let mut codes = ExitCodes::default();
+    let tried = calls(count);
+    for &at in &tried {
+        let fault = Fault::at(under, kind, mode, at);
+        let fault = if from { Fault { last: 0, ..fault } } else { fault };
+        *codes.0.entry(command.tried(&fault)).or_default() += 1;
+    }
+    let fault = match mode {
+        EIO => "EIO",
+        ESTALE => "ESTALE",
+        other => other,
+    };
+    let place = if under == "results" { "the store" } else { "logs" };
+    let all = if from { " and all that follow" } else { "" };
     print_line(&format!(
-        "{mode} at {} of {count} calls ({kind}, {under}, from then on: {from}): exit codes {outcomes:?}, 0 rows lost",
+        "| `{}`, {store} | {fault} at a {kind} of {place}{all} | {count} | {} | {codes} | 0 |",
+        args[0..args.len().min(2)].join(" ").replace(" --jobs", ""),
         tried.len()
     ));
     assert!(count > SAMPLE, "{count} calls were seen");
 }
 
+const NEW: (fn() -> TestFleet, &str) = (few, "new store");
+const GROWN: (fn() -> TestFleet, &str) = (grown, "grown store");
+const STORED: (fn() -> TestFleet, &str) = (stored, "grown store");
+
 #[test]
 fn a_log_read_that_fails_once_loses_no_flight() {
-    survives(small, "sample-data/logs", "read", EIO, false);
-    survives(small, "sample-data/logs", "read", ESTALE, false);
+    strike(RUN, NEW, ("sample-data/logs", "read", EIO), false);
+    strike(RUN, NEW, ("sample-data/logs", "read", ESTALE), false);
 }
 
 #[test]
 fn a_log_folder_that_fails_from_some_call_on_is_reported_and_heals() {
-    survives(small, "sample-data/logs", "read", EIO, true);
+    strike(RUN, NEW, ("sample-data/logs", "read", EIO), true);
 }
 
 #[test]
 fn a_store_call_that_fails_in_a_new_store_loses_nothing() {
-    survives(small, "results", "write", EIO, false);
-    survives(small, "results", "read", EIO, false);
+    strike(RUN, NEW, ("results", "write", EIO), false);
+    strike(RUN, NEW, ("results", "read", EIO), false);
 }
 
 #[test]
 fn a_store_call_that_fails_in_a_grown_store_loses_nothing() {
-    survives(grown, "results", "write", EIO, false);
-    survives(grown, "results", "read", ESTALE, false);
+    strike(RUN, GROWN, ("results", "write", EIO), false);
+    strike(RUN, GROWN, ("results", "read", ESTALE), false);
+    strike(RUN, GROWN, ("results", "write", EIO), true);
 }
 
 #[test]
 fn a_kill_at_any_call_loses_nothing() {
-    survives(small, "results", "write", "kill", false);
-    survives(grown, "results", "write", "kill", false);
+    strike(RUN, NEW, ("results", "write", "kill"), false);
+    strike(RUN, GROWN, ("results", "write", "kill"), false);
+}
+
+#[test]
+fn a_fault_in_a_compaction_loses_nothing() {
+    const COMPACT: &[&str] = &["store", "compact"];
+    for (kind, mode) in [("write", EIO), ("read", EIO), ("read", ESTALE), ("write", "kill")] {
+        strike(COMPACT, STORED, ("results", kind, mode), false);
+    }
+}
+
+#[test]
+fn a_fault_in_a_report_changes_no_store_and_the_next_report_is_whole() {
+    const REPORT: &[&str] = &["report", "--output", "pages"];
+    strike(REPORT, STORED, ("results", "read", EIO), false);
+    let Some(injector) = Injector::new() else { return };
+    let names = |fleet: &TestFleet| {
+        let pattern = fleet.path("pages/**/*");
+        let found = glob::glob(pattern.to_str().unwrap()).unwrap().flatten();
+        found.map(|path| path.strip_prefix(fleet.path("")).unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let plain = stored();
+    plain.run_ok(REPORT);
+    let wanted = names(&plain);
+    assert!(wanted.len() > 4, "{wanted:?}");
+    for mode in [EIO, "kill"] {
+        let count = injector.count(&stored(), REPORT, "pages", "write");
+        let (mut codes, tried) = (ExitCodes::default(), calls(count));
+        for &at in &tried {
+            let fleet = stored();
+            let struck = injector.run(&fleet, REPORT, &Fault::at("pages", "write", mode, at));
+            assert!(matches!(struck.code, None | Some(0..=3)), "{mode} at {at}: {struck:?}");
+            if struck.code == Some(0) {
+                assert_eq!(names(&fleet), wanted, "{mode} at {at} was not reported: {struck:?}");
+            }
+            *codes.0.entry(struck.code).or_default() += 1;
+            fleet.run_ok(REPORT);
+            assert_eq!(names(&fleet), wanted, "after {mode} at {at}");
+        }
+        let mode = if mode == EIO { "EIO" } else { mode };
+        print_line(&format!(
+            "| `report` | {mode} at a write of a page | {count} | {} | {codes} | 0 |",
+            tried.len()
+        ));
+    }
+}
+
+/// Two faults of one run, at calls and of kinds from a seed. A pair that is not survived is reduced to the earliest
+/// pair, or the single fault, that still is not.
+#[test]
+fn two_faults_in_one_run_lose_nothing() {
+    const MODES: [&str; 4] = [EIO, ESTALE, ENOSPC, "kill"];
+    let Some(injector) = Injector::new() else { return };
+    let plain = few();
+    plain.run_ok(&["run"]);
+    let wanted = plain.exported();
+    let seed = std::env::var("FREEPLAY_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(1);
+    let mut chance = Chance(seed);
+    for (make, store) in [NEW, GROWN] {
+        let command = Struck { injector: &injector, make, args: RUN, wanted: &wanted };
+        let count = injector.count(&make(), RUN, "results", "both");
+        let tries = sample().min(count);
+        let mut codes = ExitCodes::default();
+        for _ in 0..tries {
+            let mut below = |count: usize| (chance.next() * count as f64) as usize;
+            let (first, second) = (below(count), below(count));
+            let (mode, also) = (MODES[below(3)], MODES[below(4)]);
+            let fault = Fault::at("results", "both", mode, 1 + first.min(second));
+            let fault = Fault { also: Some((1 + first.max(second), also)), ..fault };
+            let code = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| command.tried(&fault)));
+            let Ok(code) = code else { panic!("seed {seed}: {:?}", reduced(&command, fault)) };
+            *codes.0.entry(code).or_default() += 1;
+        }
+        print_line(&format!(
+            "| `run`, {store} | two of EIO, ESTALE, ENOSPC and kill at calls of the store | {count} | {tries} | {codes} | 0 |"
+        ));
+    }
+}
+
+/// The least fault that is not survived: one of two alone, else the second as early as it can be.
+fn reduced(command: &Struck<'_>, fault: Fault) -> Fault {
+    let Some((at, mode)) = fault.also else { return fault };
+    let alone = [Fault { also: None, ..fault }, Fault::at(fault.under, fault.kind, mode, at)];
+    if let Some(one) = alone.into_iter().find(|one| !command.survives(one)) {
+        return one;
+    }
+    let earlier = (fault.at + 1..at).map(|at| Fault { also: Some((at, mode)), ..fault }).take(50);
+    earlier.into_iter().find(|pair| !command.survives(pair)).unwrap_or(fault)
 }
 
 #[test]
@@ -252,6 +431,25 @@ fn a_log_that_never_ends_is_an_error_of_that_log_and_the_rest_is_stored() {
         // The cause may have passed: no `--retry` is needed.
         fleet.run_ok(&["run"]);
         assert_eq!(fleet.exported(), wanted);
+    }
+}
+
+#[test]
+fn estimate_and_check_give_up_a_log_that_never_ends_and_go_on() {
+    let Some(injector) = Injector::new() else { return };
+    let fleet = small();
+    let fault = injector.hang(&fleet);
+    let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
+    std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 5\n")).unwrap();
+    let logs = logs_of(&fleet);
+    let names: Vec<&str> = logs.iter().take(3).map(|log| log.to_str().unwrap()).collect();
+    for command in ["estimate", "check"] {
+        // A hang from the first read of that log on.
+        let fault = Fault { at: 1, ..fault };
+        let found = injector.run(&fleet, &[&[command][..], &names].concat(), &fault);
+        assert_eq!(found.code, Some(1), "{found:?}");
+        assert!(found.err.contains("log_timeout") && found.err.contains(fault.under), "{found:?}");
+        assert!(found.out.contains("N413FP-0003"), "{found:?}");
     }
 }
 

@@ -12,3 +12,5 @@ mod mapping_faults;
 mod old_store_formats;
 #[cfg(target_os = "linux")]
 mod quiet_failures;
+#[cfg(target_os = "linux")]
+mod soak;

@@ -2,6 +2,9 @@
 
 use crate::error::Error;
 
+/// Sizes that a limit [m], a horizon [h] or a number of days can have.
+const PLAUSIBLE: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
+
 /// Limits and horizons of one part number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -39,7 +42,7 @@ impl Settings {
     /// Checks that all settings are positive and ordered.
     ///
     /// # Errors
-    /// [`Error::Setting`] for a value that is not positive and finite, [`Error::LimitOrder`].
+    /// [`Error::Setting`] for a value that is not positive or not plausible, [`Error::LimitOrder`].
     pub fn check(&self) -> Result<(), Error> {
         let values = [
             ("limit_m", self.limit_m),
@@ -50,7 +53,7 @@ impl Settings {
             ("change_watch_days", self.change_watch_days),
             ("stale_after_days", self.stale_after_days),
         ];
-        if let Some(&(name, value)) = values.iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
+        if let Some(&(name, value)) = values.iter().find(|(_, v)| !PLAUSIBLE.contains(v)) {
             return Err(Error::Setting { name, value });
         }
         if self.watch_m > self.limit_m {

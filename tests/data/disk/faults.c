@@ -3,6 +3,7 @@
    FAULT_AT     number of the call, from 1; without it calls are only counted
    FAULT_LAST   number of the last call that fails; FAULT_AT by default, 0 for all that follow
    FAULT_MODE   an errno, or "kill" or "hang"
+   FAULT_ALSO   number and mode of one more call, such as "17:5"
    FAULT_KIND   only calls of this kind count: "read" (open, read, stat and list) or "write"; both by default
    FAULT_COUNT  file into which the number of calls is written at the end
    CLOCK_OFFSET_S  seconds by which the clock of the calendar is wrong */
@@ -26,8 +27,8 @@
 enum { READ = 1, WRITE = 2 };
 
 static atomic_long calls;
-static const char *under, *mode, *count_file;
-static long first, last;
+static const char *under, *mode, *count_file, *also_mode;
+static long first, last, also;
 static int kinds = READ | WRITE;
 
 __attribute__((constructor)) static void start(void) {
@@ -37,7 +38,12 @@ __attribute__((constructor)) static void start(void) {
     count_file = getenv("FAULT_COUNT");
     first = at ? atol(at) : 0;
     last = until ? atol(until) : first;
-    if (kind) kinds = strcmp(kind, "read") == 0 ? READ : WRITE;
+    const char *more = getenv("FAULT_ALSO");
+    also_mode = more ? strchr(more, ':') : NULL;
+    if (also_mode++) also = atol(more);
+    else also_mode = NULL;
+    if (kind && strcmp(kind, "read") == 0) kinds = READ;
+    if (kind && strcmp(kind, "write") == 0) kinds = WRITE;
 }
 
 __attribute__((destructor)) static void finish(void) {
@@ -51,19 +57,24 @@ __attribute__((destructor)) static void finish(void) {
     }
 }
 
-static int fails(int kind) {
-    if (!(kinds & kind)) return 0;
-    long now = atomic_fetch_add(&calls, 1) + 1;
-    if (first == 0 || !mode || now < first || (last != 0 && now > last)) return 0;
-    if (strcmp(mode, "kill") == 0) {
+static int strike(const char *how) {
+    if (strcmp(how, "kill") == 0) {
         syscall(SYS_kill, getpid(), SIGKILL);
         for (;;) syscall(SYS_pause);
     }
-    if (strcmp(mode, "hang") == 0) {
+    if (strcmp(how, "hang") == 0) {
         for (;;) usleep(1000000);
     }
-    errno = atoi(mode);
+    errno = atoi(how);
     return 1;
+}
+
+static int fails(int kind) {
+    if (!(kinds & kind)) return 0;
+    long now = atomic_fetch_add(&calls, 1) + 1;
+    if (also_mode && now == also) return strike(also_mode);
+    if (first == 0 || !mode || now < first || (last != 0 && now > last)) return 0;
+    return strike(mode);
 }
 
 /* A path from the current folder counts as one under FAULT_UNDER when the folder and it together do. */

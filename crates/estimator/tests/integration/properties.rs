@@ -83,6 +83,40 @@ fn no_settings_keep_a_filter_from_ending() {
     assert!(ended.recv_timeout(std::time::Duration::from_mins(2)).is_ok(), "a filter did not end");
 }
 
+/// A hardly damped part whose own frequency is near a multiple of the sample rate: each sample shows it at the same
+/// phase. P repeats to the last bit after a while, so what holds until then holds for any number of steps.
+#[test]
+fn a_part_that_rings_at_a_multiple_of_the_rate_keeps_a_covariance() {
+    const STEPS: usize = 60_000;
+    let (step_s, mass) = (0.004, 8.0);
+    for multiple in [0.5, 1.0, 2.0, 3.0] {
+        for off in [0.0, 1e-9, 1e-6, 1e-3] {
+            for damping in [0.0, 1e-8, 1e-5, 1e-2] {
+                let omega = std::f64::consts::TAU * multiple / step_s * (1.0 + off);
+                let actuator =
+                    ActuatorModel::linear(mass * omega * omega, 2.0 * damping * mass * omega, mass);
+                let Ok(actuator) = actuator else { continue };
+                let Ok(filter) = Filter::new(&actuator, step_s, &sensor_noise(10.0)) else { continue };
+                let case = format!("{multiple} of the rate, off by {off}, damping ratio {damping}");
+                let mut state = filter.initial_state(0.0, 0.0);
+                for k in 0..STEPS {
+                    let step = filter.update(&state, 1e-5 * f64::from(k as u32 % 7)).unwrap();
+                    for p in [step.prior.p, step.posterior.p] {
+                        assert!((0..3).all(|i| p[(i, i)] >= 0.0), "{case}: P is {p} in step {k}");
+                    }
+                    let next = filter.predict(&step.posterior, 0.0);
+                    assert!(next.x.amax() < 1e3, "{case}: x is {} in step {k}", next.x);
+                    let is_settled = next.p == state.p;
+                    state = next;
+                    if is_settled {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+}
+
 proptest! {
     /// Superposition: the track of two sums is the sum of two tracks.
     #[test]

@@ -8,6 +8,7 @@ mod crash_recovery;
 mod exports;
 mod fixtures;
 mod folder;
+mod fuzz;
 mod maintenance;
 mod queries;
 mod round_trip;

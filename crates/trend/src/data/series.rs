@@ -194,10 +194,20 @@ impl Series {
     }
 }
 
+/// Largest amount of a gap or of its error, m: far beyond any actuator.
+const MAX_GAP_M: f64 = 100.0;
+
+/// Least standard error of a gap, m: a thousandth of an atomic nucleus.
+const MIN_GAP_SE_M: f64 = 1e-18;
+
+/// Longest flight, and largest reading of an hour meter, h.
+const MAX_HOURS: (f64, f64) = (1e5, 1e9);
+
 /// Rows in the order of the flights, each flight once.
 fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<Vec<Observation>, Error> {
     let mut rows: Vec<Observation> = rows.into_iter().collect();
     rows.iter().try_for_each(check)?;
+    rows.iter_mut().for_each(forget_implausible);
     rows.sort_unstable_by(order);
     rows.dedup_by_key(|row| (row.departure_us, row.installation));
     Ok(rows)
@@ -217,6 +227,14 @@ fn check(row: &Observation) -> Result<(), Error> {
         }
     }
     Ok(())
+}
+
+/// A number that no unit can have is not known: one such record must not end the assessment of a fleet.
+fn forget_implausible(row: &mut Observation) {
+    row.gap_m = row.gap_m.filter(|gap_m| gap_m.abs() <= MAX_GAP_M);
+    row.gap_se_m = row.gap_se_m.filter(|se_m| (MIN_GAP_SE_M..=MAX_GAP_M).contains(se_m));
+    row.flight_hours = row.flight_hours.filter(|hours| *hours <= MAX_HOURS.0);
+    row.tail_hours_end = row.tail_hours_end.filter(|hours| *hours <= MAX_HOURS.1);
 }
 
 /// A total order, so that neither arrival nor duplicates decide anything.

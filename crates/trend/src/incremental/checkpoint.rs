@@ -239,8 +239,8 @@ fn step_window(history: &History, flights: &[Flight]) -> Vec<StepWindowEntry> {
 /// The first flight of the pace's days, and the first one of every few days among them.
 fn days(flights: &[Flight]) -> Vec<UsageSample> {
     let Some(last) = flights.last() else { return Vec::new() };
-    let flights = &flights
-        [flights.partition_point(|f| last.departure_us - f.departure_us > UTILIZATION_DAYS * DAY_US)..];
+    let flights = &flights[flights
+        .partition_point(|f| last.departure_us.saturating_sub(f.departure_us) > UTILIZATION_DAYS * DAY_US)..];
     let days = |flight: &Flight| flight.departure_us.div_euclid(MARK_DAYS * DAY_US);
     flights.chunk_by(|a, b| days(a) == days(b)).map(|of_days| UsageSample::of(&of_days[0])).collect()
 }

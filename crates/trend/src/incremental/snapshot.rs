@@ -130,7 +130,7 @@ impl UnitSnapshot {
             outliers_us: [&self.checkpoint.outliers_us[..], &tail.outliers_us[..]].concat(),
             noise_factor: self.checkpoint.scatter.noise_factor,
             stale_days: last_gap_us
-                .map(|last_us| (as_of_us - last_us) as f64 / DAY_US as f64)
+                .map(|last_us| as_of_us.saturating_sub(last_us) as f64 / DAY_US as f64)
                 .filter(|days| *days > settings.stale_after_days),
             state,
             reason,
@@ -183,7 +183,8 @@ impl UnitSnapshot {
     fn utilization(&self) -> Option<Utilization> {
         let last = UsageSample::of(self.last()?);
         let marks = self.checkpoint.days.iter().copied().chain(self.tail.iter().map(UsageSample::of));
-        let days = |mark: &UsageSample| (last.departure_us - mark.departure_us) as f64 / DAY_US as f64;
+        let days =
+            |mark: &UsageSample| last.departure_us.saturating_sub(mark.departure_us) as f64 / DAY_US as f64;
         let first = marks.into_iter().find(|mark| days(mark) <= UTILIZATION_DAYS as f64)?;
         let (hours, days) = (last.hours - first.hours, days(&first));
         let flights = last.flights - first.flights;

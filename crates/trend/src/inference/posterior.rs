@@ -118,16 +118,19 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
     let grown_m = linear_growth(&coarse);
     let first = SegmentFit::new(segment, prior, coarse, |usage| grown_m * usage / span);
     if segment.estimates.len() <= COARSE_BINS {
-        return Some(finish(&first, components(&first, &bank, THOROUGH)));
+        return finish(&first, components(&first, &bank, THOROUGH));
     }
     let mut believed = components(&first, &bank, ROUGH);
     normalise(&mut believed, ROUGH.drop);
+    if believed.is_empty() {
+        return None;
+    }
     retain(&mut bank.candidates, &believed);
     let likely = likeliest(&believed);
     let fine = bins::bin(segment.estimates, bins::BINS);
     let second = SegmentFit::new(segment, prior, fine, |usage| mean_growth(&likely, usage));
     let believed = components(&second, &bank, THOROUGH);
-    Some(finish(&second, believed))
+    finish(&second, believed)
 }
 
 /// Drops the curves of negligible weight.
@@ -137,9 +140,10 @@ fn retain(candidates: &mut Vec<Candidate>, believed: &[(usize, Component)]) {
     *candidates = kept.into_iter().map(|index| candidates[index]).collect();
 }
 
-fn finish(fit: &SegmentFit<'_>, mut believed: Vec<(usize, Component)>) -> Posterior {
+/// The posterior; none where the gaps are so far from every curve that no likelihood is a number.
+fn finish(fit: &SegmentFit<'_>, mut believed: Vec<(usize, Component)>) -> Option<Posterior> {
     let log_sum = normalise(&mut believed, THOROUGH.drop);
-    Posterior {
+    (!believed.is_empty()).then(|| Posterior {
         components: believed.into_iter().map(|(_, component)| component).collect(),
         since: fit.segment.now - fit.bins.last().map_or(fit.segment.begin, |bin| bin.usage),
         level_m2: fit.level_m2(),
@@ -147,7 +151,7 @@ fn finish(fit: &SegmentFit<'_>, mut believed: Vec<(usize, Component)>) -> Poster
         seasonal_m2: fit.seasonal_m2,
         level_seasonal_m2: fit.level_seasonal_m2(),
         log_evidence: log_sum + fit.shared_log_likelihood(),
-    }
+    })
 }
 
 /// The likeliest nodes, with weights that add up to one: enough for a mean.
@@ -175,6 +179,10 @@ pub(crate) fn mean_growth(components: &[Component], usage: f64) -> f64 {
 /// of their sum.
 fn normalise(believed: &mut Vec<(usize, Component)>, drop: f64) -> f64 {
     let best = believed.iter().map(|(_, n)| n.weight).fold(f64::NEG_INFINITY, f64::max);
+    if !best.is_finite() {
+        believed.clear();
+        return f64::NEG_INFINITY;
+    }
     believed.retain(|(_, n)| n.weight > best - drop);
     let mut sum = 0.0;
     for (_, component) in believed.iter_mut() {

@@ -85,7 +85,8 @@ pub(crate) fn seasonal_fit(
     prior: &FleetPrior,
     posterior: &Posterior,
 ) -> Option<SeasonalFit> {
-    let seen_us = segment.estimates.last()?.departure_us - segment.estimates.first()?.departure_us;
+    let seen_us =
+        segment.estimates.last()?.departure_us.saturating_sub(segment.estimates.first()?.departure_us);
     if (seen_us as f64) < 0.5 * YEAR_US {
         return None;
     }

@@ -36,7 +36,8 @@ impl RulDistribution {
         offset_m2: f64,
     ) -> Self {
         let Settings { limit_m, horizon_hours, .. } = *settings;
-        let scale = CELLS as f64 / horizon_hours.ln();
+        // Cells are of equal width in the logarithm of the hours from one hour on.
+        let scale = CELLS as f64 / horizon_hours.max(std::f64::consts::E).ln();
         let calibration = prior.calibration;
         let mut remaining = Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, scale, calibration };
         let spread_m2 = posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2);

@@ -152,7 +152,8 @@ pub(crate) fn alert_state(
     let Some(last_gap_us) = evidence.last_gap_us else {
         return (None, Reason::NoEstimate);
     };
-    let days_since = |departure_us: i64| (evidence.as_of_us - departure_us) as f64 / DAY_US as f64;
+    let days_since =
+        |departure_us: i64| evidence.as_of_us.saturating_sub(departure_us) as f64 / DAY_US as f64;
     let (Some(Level { gap_m, .. }), Some(crossing)) = (evidence.level, evidence.crossing) else {
         let few = Reason::TooFew { estimates: evidence.estimates };
         let unsupported = |(gap_m, recent_m)| Reason::Unsupported { gap_m, recent_m };

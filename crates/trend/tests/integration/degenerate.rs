@@ -174,3 +174,24 @@ proptest! {
         }
     }
 }
+
+/// Gaps of 10⁹ m among those of an actuator once left weights that added up to zero.
+#[test]
+fn gaps_beyond_every_curve_leave_numbers_or_nothing() {
+    let mut rows: Vec<Observation> = (0..111)
+        .map(|day| Observation {
+            departure_us: day * DAY_US,
+            installation: 0,
+            flight_hours: Some(1.5),
+            tail_hours_end: Some(1.5 * (day + 1) as f64),
+            load_reversals: Some(100),
+            gap_m: Some(30e-6 + 2e-7 * day as f64),
+            gap_se_m: Some(1e-6),
+        })
+        .collect();
+    rows[8..52].iter_mut().for_each(|row| row.gap_m = Some(1e9));
+    let series = Series::new(rows, &UsageDefaults::default()).unwrap();
+    let found = assess(&series, 111 * DAY_US, &Settings::for_limit(LIMIT_M), None, None).unwrap();
+    assert!(found.level.is_none_or(|level| level.gap_m.is_finite()), "{found:?}");
+    assert!(found.growth_probability.is_none_or(|p| (0.0..=1.0).contains(&p)), "{found:?}");
+}

@@ -264,6 +264,44 @@ fn a_prior_is_the_same_to_the_last_bit_whoever_does_the_work() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
+    /// The order of a unit's flights changes no number, and an actuator twice as large with a limit twice as large has
+    /// twice the level and the same remaining life.
+    #[test]
+    fn a_statement_depends_on_neither_order_nor_scale(
+        seed in 0_u64..1000, um_per_flight in 0.0..0.3, order in Just((0..150_usize).collect::<Vec<_>>()).prop_shuffle(),
+    ) {
+        let mut random = Random::new(seed);
+        let rows: Vec<Observation> = (0..150_i64).map(|flight| Observation {
+            departure_us: flight * DAY_US,
+            installation: 0,
+            flight_hours: Some(2.0),
+            tail_hours_end: None,
+            load_reversals: None,
+            gap_m: Some((30.0 + um_per_flight * flight as f64 + random.normal()) * 1e-6),
+            gap_se_m: Some(1e-6),
+        }).collect();
+        let assessed = |rows: Vec<Observation>, scale: f64| {
+            let scaled = rows.into_iter().map(|row| Observation {
+                gap_m: row.gap_m.map(|m| m * scale),
+                gap_se_m: row.gap_se_m.map(|m| m * scale),
+                ..row
+            });
+            let series = Series::new(scaled, &UsageDefaults::default()).unwrap();
+            assess(&series, 150 * DAY_US, &Settings::for_limit(scale * LIMIT_M), None, None).unwrap()
+        };
+        let plain = assessed(rows.clone(), 1.0);
+        let shuffled = assessed(order.iter().map(|&k| rows[k]).collect(), 1.0);
+        prop_assert_eq!(format!("{shuffled:?}"), format!("{plain:?}"));
+        let double = assessed(rows, 2.0);
+        prop_assert_eq!(double.state, plain.state);
+        let (level, wanted) = (double.level.unwrap(), plain.level.unwrap());
+        prop_assert!((level.gap_m / wanted.gap_m - 2.0).abs() < 0.02, "{level:?} {wanted:?}");
+        let hours = |found: &Assessment| found.crossing.and_then(|crossing| crossing.p50_hours);
+        if let (Some(found), Some(wanted)) = (hours(&double), hours(&plain)) {
+            prop_assert!((found / wanted - 1.0).abs() < 0.05, "{found} h, {wanted} h");
+        }
+    }
+
     /// For any gaps, the quantiles are ordered and every number is finite.
     #[test]
     fn a_statement_is_finite_and_in_order(

@@ -12,6 +12,7 @@ mod classic;
 mod degenerate;
 mod fleet;
 mod forecast;
+mod fuzz;
 mod random;
 mod scale;
 mod series;

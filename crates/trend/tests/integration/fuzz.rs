@@ -1,0 +1,163 @@
+//! Fuzz target of the assessment: any numbers and dates in the rows of a unit, any settings.
+
+use trend::{FleetPrior, Observation, Series, Settings, UsageDefaults, assess, forecast};
+
+use self::engine::{Input, Random, fuzz, overwrite};
+
+#[path = "../../../../tests/fuzz/engine.rs"]
+mod engine;
+
+const DAY_US: i64 = 86_400_000_000;
+
+/// Bytes of one change to a row.
+const EDIT: usize = 12;
+
+/// Numbers that break arithmetic.
+const NUMBERS: [f64; 20] = [
+    0.0,
+    -0.0,
+    f64::NAN,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+    f64::MAX,
+    f64::MIN,
+    f64::MIN_POSITIVE,
+    5e-324,
+    1e-300,
+    1e300,
+    1e50,
+    -1e50,
+    1.0,
+    -1.0,
+    1e-6,
+    1e-4,
+    -1e-4,
+    3e-5,
+    1e9,
+];
+
+/// A number of the list, or any.
+fn number(kind: u8, bits: [u8; 8]) -> f64 {
+    if kind < 128 { NUMBERS[usize::from(kind) % NUMBERS.len()] } else { f64::from_le_bytes(bits) }
+}
+
+fn wearing(flights: i64) -> Vec<Observation> {
+    let flight = |day: i64| Observation {
+        departure_us: day * DAY_US,
+        installation: 0,
+        flight_hours: Some(1.5),
+        tail_hours_end: Some(1.5 * (day + 1) as f64),
+        load_reversals: Some(100),
+        gap_m: Some(30e-6 + 2e-7 * day as f64 + 1e-6 * (day as f64).sin()),
+        gap_se_m: Some(1e-6),
+    };
+    (0..flights).map(flight).collect()
+}
+
+/// Rows, settings and date after the changes that the bytes describe.
+fn changed(bytes: &[u8]) -> (Vec<Observation>, Settings, UsageDefaults, i64) {
+    let flights = 20 + usize::from(bytes.first().copied().unwrap_or_default());
+    let mut rows = wearing(flights as i64);
+    let (mut settings, mut usage) = (Settings::for_limit(1e-4), UsageDefaults::default());
+    let mut as_of_us = flights as i64 * DAY_US;
+    for edit in bytes.get(1..).unwrap_or_default().chunks_exact(EDIT) {
+        let bits: [u8; 8] = edit[4..].try_into().unwrap();
+        let (value, whole) = (number(edit[3], bits), i64::from_le_bytes(bits));
+        let first = usize::from(edit[1]) % flights;
+        for row in rows.iter_mut().skip(first).take(1 + usize::from(edit[2])) {
+            match edit[0] % 16 {
+                0..=3 => row.gap_m = Some(value),
+                4 => row.gap_m = None,
+                5 | 6 => row.gap_se_m = Some(value),
+                7 => row.gap_se_m = None,
+                8 => row.flight_hours = Some(value),
+                9 => row.flight_hours = None,
+                10 => row.tail_hours_end = Some(value),
+                11 => row.load_reversals = Some(whole as u64),
+                12 => row.departure_us = whole,
+                13 => row.installation = u32::from(edit[3]),
+                14 => row.gap_m = row.gap_m.map(|gap_m| gap_m + value),
+                _ => row.departure_us = row.departure_us.saturating_add(value as i64),
+            }
+        }
+        match edit[0] {
+            200 => settings.limit_m = value,
+            201 => settings.watch_m = value,
+            202 => settings.horizon_hours = value,
+            203 => settings.planning_horizon_hours = value,
+            204 => settings.check_interval_hours = value,
+            205 => usage.nominal_flight_hours = value,
+            206 => usage.unit_hours_at_start = Some(value),
+            207 => as_of_us = whole,
+            208 => settings.stale_after_days = value,
+            _ => {}
+        }
+    }
+    (rows, settings, usage, as_of_us)
+}
+
+/// Assesses and forecasts. What is stated must be numbers in order, and probabilities between zero and one.
+fn assess_any(bytes: &[u8]) -> String {
+    let (rows, settings, usage, as_of_us) = changed(bytes);
+    let series = match Series::new(rows, &usage) {
+        Ok(series) => series,
+        Err(e) => return format!("{e:?}").chars().take(30).collect(),
+    };
+    let fleet: Vec<Series> =
+        [40, 90].map(|n| Series::new(wearing(n), &UsageDefaults::default()).unwrap()).into();
+    let prior = bytes
+        .len()
+        .is_multiple_of(2)
+        .then(|| FleetPrior::learn(fleet.iter().chain([&series]), as_of_us, settings.limit_m, None));
+    let found = match assess(&series, as_of_us, &settings, prior.as_ref(), None) {
+        Ok(found) => found,
+        Err(e) => return format!("{e:?}").chars().take(30).collect(),
+    };
+    if let Some(level) = found.level {
+        assert!(level.gap_m.is_finite() && level.se_m >= 0.0, "level {level:?}");
+    }
+    if let Some(rate) = found.rate {
+        assert!(rate.p05_m_per_hour <= rate.m_per_hour && rate.m_per_hour <= rate.p95_m_per_hour, "{rate:?}");
+    }
+    for probability in [found.growth_probability, found.check_probability].into_iter().flatten() {
+        assert!((0.0..=1.0).contains(&probability), "probability {probability}");
+    }
+    let ahead = forecast(&series, as_of_us, &settings, prior.as_ref(), [0.0, 100.0, 1000.0]).unwrap();
+    for (_, gap) in &ahead.ahead {
+        assert!(gap.p05_m <= gap.m && gap.m <= gap.p95_m, "{gap:?}");
+    }
+    format!("{:?} {:?} {:?}", found.state, found.reason, found.wear)
+}
+
+/// Dates at the ends of their type overflowed, and a horizon below an hour gave a probability of −5.
+#[test]
+fn extreme_dates_and_horizons_leave_numbers() {
+    let mut rows = wearing(100);
+    rows[0].departure_us = i64::MIN;
+    rows[99].departure_us = i64::MAX;
+    let series = Series::new(rows, &UsageDefaults::default()).unwrap();
+    let plain = Settings::for_limit(1e-4);
+    for (as_of_us, horizon_hours) in [(i64::MAX, 20_000.0), (99 * DAY_US, 0.5), (99 * DAY_US, 1.0), (0, 1e-3)]
+    {
+        let settings = Settings { horizon_hours, ..plain };
+        let found = assess(&series, as_of_us, &settings, None, None).unwrap();
+        assert!(found.check_probability.is_none_or(|p| (0.0..=1.0).contains(&p)), "{found:?}");
+    }
+}
+
+#[test]
+fn fuzz_trend() {
+    let mut random = Random::new(7);
+    let mut corpus = vec![vec![], vec![100]];
+    corpus.extend((0..20).map(|edits| (0..=edits * EDIT).map(|_| random.next() as u8).collect::<Vec<u8>>()));
+    let change = |random: &mut Random, input: &mut Input| {
+        let length = input.bytes.len();
+        match random.below(4) {
+            0 => input.bytes.extend((0..EDIT).map(|_| random.next() as u8)),
+            1 if length > EDIT => input.bytes.truncate(length - EDIT),
+            _ => overwrite(random, &mut input.bytes, std::slice::from_ref(&(0..length))),
+        }
+        input.bytes.truncate(1 + 40 * EDIT);
+    };
+    fuzz("trend inputs", corpus, 60, change, assess_any);
+}
