@@ -2,8 +2,6 @@
 //! wiring is changed, the fitted stiffness of all actuators of an aircraft when what measures load is, and the zero and
 //! the delay of a load channel when its cell or its wiring is.
 
-use crate::monitoring::REPORTED_DAYS;
-use records::uncertainty::SD_OVER_MAD;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::monitoring::REPORTED_DAYS;
