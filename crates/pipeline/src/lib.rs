@@ -5,6 +5,7 @@
 //! neither on the number of workers nor on the order in which they finish.
 
 mod days;
+pub mod discovery;
 mod error;
 pub mod estimate;
 pub mod fleet_trends;
