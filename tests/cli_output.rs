@@ -82,6 +82,69 @@ fn what_init_proposes_for_foreign_logs_runs_as_it_stands() {
     assert!(records.contains("2026-09-10 13:07"), "{records}");
 }
 
+/// Loads in a folder of their own, paths from the folder of the configuration, and no invented serial number.
+#[test]
+fn what_init_proposes_for_channel_groups_runs_as_it_stands() {
+    let fleet = TestFleet::sample();
+    for log in fleet.logs().iter().take(2) {
+        let (name, own) = (log.file_name().unwrap(), crate::harness::facts(log));
+        let is_load = |c: &str| c.ends_with("_load_n");
+        let loads = fleet.path("qar/loads").join(name);
+        std::fs::create_dir_all(loads.parent().unwrap()).unwrap();
+        crate::harness::rewrite(log, &loads, &own, |c| is_load(c) || c == "time_s", |_| true);
+        crate::harness::rewrite(
+            log,
+            &fleet.path("qar/positions").join(name),
+            &own,
+            |c| !is_load(c),
+            |_| true,
+        );
+    }
+    fleet.run_ok(&["init", "new-fleet", "--from", "qar"]);
+    let toml = std::fs::read_to_string(fleet.path("new-fleet/pipeline.toml")).unwrap();
+    assert!(toml.contains("files = [\"../qar/positions/**/*.parquet\"]"), "{toml}");
+    let account = fleet.run_ok(&["run", "--config", "new-fleet/pipeline.toml"]);
+    assert!(account.contains("8 records of 2 flights"), "{account}");
+}
+
+/// Hive folders name tail, departure and position; the table of installations has each pair of tail and position once.
+#[test]
+fn what_init_proposes_for_hive_folders_runs_as_it_stands() {
+    let fleet = TestFleet::sample();
+    let log = &fleet.logs()[0];
+    for position in ["aileron_left", "aileron_right"] {
+        let folder = format!("qar/tail=TC-JRA/off=2026-09-10T13%3A07%3A19Z/actuator={position}");
+        std::fs::create_dir_all(fleet.path(&folder)).unwrap();
+        let file = fleet.path(&folder).join("part-0.parquet");
+        crate::harness::rewrite(
+            log,
+            &file,
+            &Vec::new(),
+            |c| c.starts_with(position) || c == "time_s",
+            |_| true,
+        );
+    }
+    fleet.run_ok(&["init", "new-fleet", "--from", "qar"]);
+    let account = fleet.run_ok(&["run", "--config", "new-fleet/pipeline.toml"]);
+    assert!(
+        account.contains("2 records of 2 flights") || account.contains("2 records of 1 flight"),
+        "{account}"
+    );
+}
+
+/// Where neither tail nor position is known, the table of installations has its header and no row.
+#[test]
+fn init_invents_no_serial_number() {
+    let fleet = TestFleet::sample();
+    let log = &fleet.logs()[0];
+    std::fs::create_dir_all(fleet.path("qar")).unwrap();
+    crate::harness::rewrite(log, &fleet.path("qar/a.parquet"), &Vec::new(), |c| c == "time_s", |_| true);
+    fleet.run_ok(&["init", "new-fleet", "--from", "qar"]);
+    let table = std::fs::read_to_string(fleet.path("new-fleet/installations.csv")).unwrap();
+    let rows: Vec<&str> = table.lines().filter(|line| !line.starts_with('#')).collect();
+    assert_eq!(rows, ["tail_number,position,part_number,serial_number,installed_utc,removed_utc"]);
+}
+
 #[test]
 fn usage_and_configuration_errors_are_code_2_and_run_nothing() {
     let fleet = TestFleet::sample();

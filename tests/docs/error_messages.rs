@@ -33,7 +33,7 @@ const CONFIGURATION: &[Slip] = &[
         &["check"],
     ),
     ("bad unit", "pipeline.toml", "unit = \"deg\"", "unit = \"degre\"", &["check"]),
-    ("bad unit of time", "pipeline.toml", "unit = \"s\"", "unit = \"min\"", &["check"]),
+    ("bad unit of time", "pipeline.toml", "unit = \"s\"", "unit = \"mins\"", &["check"]),
     ("a force for a position", "pipeline.toml", "unit = \"mm\"", "unit = \"N\"", &["check"]),
     ("negative stiffness", "pipeline.toml", "5.0e7", "-5.0e7", &["check"]),
     ("a watch level over the limit", "pipeline.toml", "watch_m = 110e-6", "watch_m = 210e-6", &["check"]),

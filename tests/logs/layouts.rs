@@ -258,3 +258,130 @@ fn a_condition_selects_what_a_shorter_log_would_hold() {
     assert_eq!(result.code, Some(1), "a log without the column");
     assert!(result.err.contains("weight_on_wheels"), "{}", result.err);
 }
+
+/// The log of a Delta table, by the format's own specification: a version adds files, a later one removes one.
+fn delta_log(table: &std::path::Path, added: &[&str], removed: &[&str]) {
+    let log = table.join("_delta_log");
+    std::fs::create_dir_all(&log).unwrap();
+    let schema = r#"{\"type\":\"struct\",\"fields\":[{\"name\":\"time_s\",\"type\":\"double\",\"nullable\":true,\"metadata\":{}}]}"#;
+    let mut first = format!(
+        "{{\"protocol\":{{\"minReaderVersion\":1,\"minWriterVersion\":2}}}}\n{{\"metaData\":{{\"id\":\"af23c9d7-fff1-4a5a-a2c8-55c59bd782aa\",\"format\":{{\"provider\":\"parquet\",\"options\":{{}}}},\"schemaString\":\"{schema}\",\"partitionColumns\":[],\"configuration\":{{}}}}}}\n"
+    );
+    for name in added {
+        let size = std::fs::metadata(table.join(name)).unwrap().len();
+        writeln!(
+            first,
+            "{{\"add\":{{\"path\":\"{name}\",\"partitionValues\":{{}},\"size\":{size},\"modificationTime\":0,\"dataChange\":true}}}}"
+        )
+        .unwrap();
+    }
+    std::fs::write(log.join("00000000000000000000.json"), first).unwrap();
+    let remove = |name: &&str| {
+        format!("{{\"remove\":{{\"path\":\"{name}\",\"deletionTimestamp\":0,\"dataChange\":true}}}}\n")
+    };
+    std::fs::write(log.join("00000000000000000001.json"), removed.iter().map(remove).collect::<String>())
+        .unwrap();
+}
+
+/// Three flights were added to the table and one was withdrawn: its file is still there, and is no log.
+#[test]
+fn a_delta_table_is_read_by_its_log() {
+    let fleet = one_tail();
+    let table = fleet.path("sample-data/logs/N414FP");
+    let names: Vec<String> = std::fs::read_dir(&table)
+        .unwrap()
+        .flatten()
+        .map(|entry| entry.file_name().into_string().unwrap())
+        .collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).take(3).collect();
+    delta_log(&table, &names, &names[1..2]);
+    let text = fleet.run_ok(&["run"]);
+    assert!(text.contains("8 records of 2 flights"), "{text}");
+}
+
+#[test]
+fn an_iceberg_table_is_refused_by_name() {
+    let fleet = one_tail();
+    let table = fleet.path("sample-data/logs/N414FP");
+    std::fs::create_dir(table.join("metadata")).unwrap();
+    std::fs::write(table.join("metadata/v1.metadata.json"), "{}").unwrap();
+    for command in ["check", "run"] {
+        let result = fleet.freeplay(&[command]);
+        assert_eq!(result.code, Some(1), "{result:?}");
+        assert!(
+            result.err.contains("error[table_unsupported]") && result.err.contains("Iceberg"),
+            "{}",
+            result.err
+        );
+    }
+}
+
+#[test]
+fn temporary_files_are_no_logs() {
+    let fleet = one_tail();
+    let folder = fleet.path("sample-data/logs/N414FP");
+    for name in ["._a.parquet", ".b.parquet", "_temporary/0/c.parquet"] {
+        let file = folder.join(name);
+        std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+        std::fs::write(file, "no log").unwrap();
+    }
+    fleet.configure("N414FP/*.parquet", "N414FP/**/*.parquet");
+    fleet.run_ok(&["run"]);
+    assert_eq!(numbers(&fleet), plain());
+}
+
+/// Each piece names the flight, and the instant of its own first row as its departure.
+#[test]
+fn pieces_of_one_flight_may_name_their_own_departures() {
+    let fleet = one_tail();
+    let log = &logs(&fleet)[0];
+    let whole = facts(log);
+    let rows = Table::read(log).rows();
+    for (k, name) in ["c.parquet", "a.parquet", "b.parquet"].into_iter().enumerate() {
+        let mut own = whole.clone();
+        for (key, value) in &mut own {
+            if key == "departure_utc" {
+                let departure: jiff::Timestamp = value.parse().unwrap();
+                *value = (departure + jiff::SignedDuration::from_secs(36 * k as i64)).to_string();
+            }
+        }
+        let part = rows * k / 3..rows * (k + 1) / 3;
+        rewrite(log, &log.with_file_name(name), &own, |_| true, |row| part.contains(&row));
+    }
+    let (first, before) = (log.clone(), plain());
+    std::fs::remove_file(first).unwrap();
+    fleet.configure("[logs]", "[logs]\npieces = true");
+    fleet.run_ok(&["run"]);
+    assert_eq!(numbers(&fleet).len(), before.len());
+    assert_eq!(numbers(&fleet), before);
+}
+
+/// Pieces that are not declared are two logs of one flight: `check` reports what `run` does, and both name the setting.
+#[test]
+fn check_finds_a_flight_in_two_logs_as_run_does() {
+    let fleet = one_tail();
+    let log = &logs(&fleet)[0];
+    let folder = fleet.path("pieces");
+    rewrite(log, &folder.join("a.parquet"), &facts(log), |_| true, |row| row < 4321);
+    rewrite(log, &folder.join("b.parquet"), &facts(log), |_| true, |row| row >= 4321);
+    fleet.configure("sample-data/logs/N414FP/*.parquet", "pieces/*.parquet");
+    for command in ["check", "run"] {
+        let result = fleet.freeplay(&[command]);
+        assert_eq!(result.code, Some(1), "{result:?}");
+        assert_eq!(result.err.matches("error[duplicate_flight]").count(), 1, "{}", result.err);
+        assert!(result.err.contains("logs.pieces = true"), "{}", result.err);
+    }
+}
+
+/// Ten logs: a line for each, and each note once. Two logs: every channel.
+#[test]
+fn check_summarises_many_logs() {
+    let fleet = one_tail();
+    let text = fleet.run_ok(&["check"]);
+    assert!(text.lines().count() < 40, "{text}");
+    for log in logs(&fleet) {
+        assert_eq!(text.matches(log.file_name().unwrap().to_str().unwrap()).count(), 1, "{text}");
+    }
+    let few = fleet.run_ok(&["check", "--limit", "2"]);
+    assert!(few.contains("aileron_left_motor_deg") && few.contains("motor_position"), "{few}");
+}

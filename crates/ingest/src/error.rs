@@ -59,6 +59,18 @@ pub enum ErrorKind {
     /// It is not Parquet, or its footer is truncated.
     #[error("cannot read as Parquet: {detail}")]
     NotParquet { detail: String },
+    /// It is a file of another format.
+    #[error("this is {format}, not a Parquet file")]
+    ForeignFormat { format: &'static str },
+    /// It, or a column of it, is encrypted.
+    #[error("{}", match column { Some(column) => format!("column `{column}` is encrypted"), None => "the file is encrypted".into() })]
+    Encrypted { column: Option<String> },
+    /// Its numbers are written in an encoding that this release does not read.
+    #[error("the file uses the encoding {encoding}, which is not supported")]
+    EncodingUnsupported { encoding: String },
+    /// Several columns have the name that is mapped.
+    #[error("the log has {count} columns called `{column}`")]
+    DuplicateColumn { column: String, count: usize },
     /// The footer is sound, a page is not.
     #[error("a column cannot be decoded: {detail}")]
     Decode { column: String, row_group: Option<u64>, detail: String },
@@ -135,7 +147,10 @@ impl ErrorKind {
             Self::Unreadable { .. } => "unreadable",
             Self::Object(source) => source.code(),
             Self::Empty => "empty_log",
-            Self::NotParquet { .. } => "not_parquet",
+            Self::NotParquet { .. } | Self::ForeignFormat { .. } => "not_parquet",
+            Self::Encrypted { .. } => "encrypted",
+            Self::EncodingUnsupported { .. } => "encoding_unsupported",
+            Self::DuplicateColumn { .. } => "duplicate_column",
             Self::Decode { .. } => "decode_failed",
             Self::RowCount { .. } => "row_count_differs",
             Self::ColumnMissing { .. } => "column_missing",
@@ -176,6 +191,7 @@ impl ErrorKind {
                 c.row_group = *row_group;
             }
             Self::RowCount { column, .. }
+            | Self::DuplicateColumn { column, .. }
             | Self::ColumnMissing { column, .. }
             | Self::TableColumn { column, .. }
             | Self::ColumnType { column, .. }
@@ -237,10 +253,25 @@ impl ErrorKind {
             Self::NotParquet { .. } => {
                 "copy the file again, or exclude it in `logs.files`; then `freeplay run --retry`"
             }
+            Self::ForeignFormat { .. } => {
+                "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`"
+            }
+            Self::Encrypted { .. } => {
+                "have it decrypted before it arrives here: keys of encrypted Parquet files are not supported"
+            }
+            Self::EncodingUnsupported { .. } => {
+                "have the recorder write PLAIN, BYTE_STREAM_SPLIT or dictionary encoding, or rewrite the file with the tool that wrote it"
+            }
+            Self::DuplicateColumn { .. } => {
+                "give each column a name of its own where the file is written, or map another column"
+            }
             Self::Decode { .. } | Self::RowCount { .. } => {
                 "the file is corrupt: fetch it again from the recorder, then `freeplay run --retry`"
             }
-            Self::ColumnMissing { nearest: Some(near), .. } => {
+            Self::ColumnMissing { column, nearest: Some(near) } => {
+                if let Some(characters) = hidden_difference(column, near) {
+                    return format!("`{near}`? {characters}");
+                }
                 return format!("`{near}`? Names are mapped under `[channel]`, `[clock]` and `[identity]`");
             }
             Self::TableColumn { nearest: Some(near), .. } => {
@@ -248,11 +279,16 @@ impl ErrorKind {
             }
             Self::TableColumn { .. } => "map the column names under `[columns]` (docs/configuration.md)",
             Self::ColumnMissing { .. } => "names are mapped under `[channel]`, `[clock]` and `[identity]`",
+            Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
+                return format!("name a field of it, as in `{column}.FIELD` (`freeplay check` lists them)");
+            }
             Self::ColumnType { .. } => "map another column, or have the recorder write numbers",
             Self::GroupMissing { .. } => {
                 "check that the file has arrived and has the same tail and flight (see `freeplay check`)"
             }
-            Self::ListLengths { .. } => "channels in lists must hold as many samples in every row",
+            Self::ListLengths { .. } => {
+                "if the channel has timestamps of its own, name them in its `time_column`; else all lists of a row must hold as many samples"
+            }
             Self::ClocksDiffer { .. } => {
                 "both must be instants, or both numbers from the same zero: see `clock.epoch` and `identity.time_zone`"
             }
@@ -272,7 +308,7 @@ impl ErrorKind {
             Self::TimeUnit { .. } => "set `clock.unit` to s, ms, us or ns",
             Self::NoClock => "name the time column, or give the rate when rows are evenly spaced",
             Self::TimeGoesBack { .. } => {
-                "split the file if it holds two recorder segments, or raise `clock.max_back_s`"
+                "if the file joins several recordings, set `clock.split_at_jumps = true`; if a counter starts again, set `clock.wraps_at` to the value at which it does"
             }
             Self::RateContradicts { .. } => {
                 "check `clock.unit`; omit `clock.rate_hz` to use the rate of the timestamps"
@@ -315,6 +351,31 @@ fn missing_remedy(source: &io::Error) -> String {
         _ => "check the disk",
     }
     .into()
+}
+
+/// How the type of a column of structs begins.
+pub(crate) const STRUCT: &str = "a struct of ";
+
+/// How two names differ that look equal: by the code points of their characters beyond ASCII.
+fn hidden_difference(wanted: &str, found: &str) -> Option<String> {
+    let points = |name: &str| {
+        let beyond = name.chars().filter(|c| !c.is_ascii() || c.is_ascii_control());
+        let points: Vec<String> = beyond.map(|c| format!("U+{:04X}", u32::from(c))).collect();
+        if points.is_empty() { "no such character".to_owned() } else { points.join(" ") }
+    };
+    let looks = |name: &str| -> String {
+        name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect()
+    };
+    let (a, b) = (looks(wanted), looks(found));
+    let is_alike = a == b || strsim::levenshtein(&a, &b) <= 2;
+    let has_hidden = [wanted, found].iter().any(|name| !name.is_ascii() || name.contains(char::is_control));
+    (is_alike && has_hidden && points(wanted) != points(found)).then(|| {
+        format!(
+            "The names differ in characters that look equal or are invisible: {} in the log, {} in the configuration",
+            points(found),
+            points(wanted)
+        )
+    })
 }
 
 /// The places where an identity field was searched.

@@ -52,6 +52,7 @@
 
 pub mod channel;
 pub mod error;
+pub mod infer;
 mod io;
 pub mod log;
 pub mod mapping;
@@ -65,7 +66,7 @@ pub use error::{Error, ErrorKind, is_passing};
 pub use log::identity::Identity;
 pub use log::{ActuatorChannels, ActuatorColumns, Log, LogFiles};
 pub use mapping::{
-    ChannelMapping, Channels, ClockMapping, GroupMapping, IdentityMapping, Layout, Mapping, Role,
+    ChannelMapping, Channels, ClockMapping, GroupMapping, IdentityMapping, Layout, Mapping, RawValue, Role,
     SampleFilter,
 };
 pub use tables::flights::Flights;

@@ -460,6 +460,14 @@ pub fn sample_digest(
     })
 }
 
+/// The error of a log whose flight another log holds with other samples.
+pub fn duplicate_flight(log: &str, owner: &str) -> Diagnostic {
+    Diagnostic::new("duplicate_flight", format!("another log holds the same flight: {owner}")).in_file(log).hint(
+        "if they are pieces of one flight, set `logs.pieces = true`; else remove one of them, or map an identity that \
+         separates the flights. The log whose name sorts first is used",
+    )
+}
+
 fn flight_of(id: &Identity) -> Flight {
     Flight {
         tail_number: id.tail_number.clone(),

@@ -64,5 +64,5 @@ pub(crate) fn is_passing(code: &str) -> bool {
 
 /// Whether an error is of a path that cannot be listed: each run lists it again, and reports it again.
 pub(crate) fn is_unlisted(code: &str) -> bool {
-    ["folder_unreadable", "file_unreadable"].contains(&code)
+    ["folder_unreadable", "file_unreadable", "table_unreadable", "table_unsupported"].contains(&code)
 }

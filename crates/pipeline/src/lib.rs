@@ -4,6 +4,7 @@
 //! This crate alone uses rayon. It prints nothing: it reports [`Event`]s and returns a [`RunSummary`]. Results depend
 //! neither on the number of workers nor on the order in which they finish.
 
+pub mod discovery;
 mod error;
 pub mod estimate;
 pub mod fleet_trends;

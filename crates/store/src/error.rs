@@ -38,6 +38,9 @@ pub enum Error {
     /// The Delta table could not be read or committed to.
     #[error("table `{table}` cannot be {verb}: {}", first_line(source))]
     Table { table: &'static str, verb: &'static str, source: Box<DeltaTableError> },
+    /// A Delta table of another program cannot be read.
+    #[error("{}", first_line(source))]
+    LogTable { source: Box<DeltaTableError> },
     /// A data file is not the one that was committed.
     #[error("a data file is corrupt: its digest is {}…, but {}… was committed", short(found), short(wanted))]
     Damaged { path: PathBuf, found: String, wanted: String },
@@ -93,7 +96,7 @@ impl Error {
             Self::Held { .. } => "store_held",
             Self::Itself { .. } => "store_itself",
             Self::Io { .. } => "store_io",
-            Self::Table { .. } => "store_table",
+            Self::Table { .. } | Self::LogTable { .. } => "store_table",
             Self::Damaged { .. } | Self::LogDamaged { .. } => "store_damaged",
             Self::Object(error) => error.code(),
             Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) => "store_value",
@@ -132,7 +135,9 @@ impl Error {
                 "its log (`_delta_log` in the table's folder) may be truncated: restore the store from a backup; without \
                  one, remove it and run its logs again"
             }
-            Self::Table { .. } => "is the disk full, or does another program write into this table?",
+            Self::Table { .. } | Self::LogTable { .. } => {
+                "is the disk full, or does another program write into this table?"
+            }
             Self::LogDamaged { .. } => {
                 "restore this file, or the whole store, from a backup; data files are not affected"
             }

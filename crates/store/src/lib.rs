@@ -43,6 +43,7 @@ mod write;
 
 pub use admin::export::{Format, csv_safe};
 pub use admin::info::Info;
+pub use delta::foreign_table::{LiveFile, live_files};
 pub use error::Error;
 pub use handle::Store;
 pub use read::column_scan::ColumnScan;

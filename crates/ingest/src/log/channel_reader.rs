@@ -11,7 +11,7 @@ use crate::channel::stats::ChannelStats;
 use crate::error::{Error, ErrorKind};
 use crate::log::row_table::{RowTable, SampleSelector};
 use crate::mapping::column_pattern::ColumnPattern;
-use crate::mapping::{ChannelMapping, ClockMapping, Role};
+use crate::mapping::{ChannelMapping, ClockMapping, RawValue, Role};
 use crate::parquet::row_selection::RowSelection;
 use crate::time::clock::{self, BREAK_STEPS, TimeBase, Timestamps};
 use crate::time::resample::{Interpolation, TimeSeries, decimated_rows, interpolate_at};
@@ -197,7 +197,8 @@ impl<'s> ChannelSampling<'s> {
             Some(kept) => kept.iter().map(|&row| values[row as usize]).collect(),
             None => values,
         };
-        let is_mended = !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
+        let is_text = !map.texts.is_empty();
+        let is_mended = is_text || !map.missing.is_empty() || self.valid.is_some() || map.wraps_at.is_some();
         if !is_mended {
             // Rows that were put in order are not those of the file.
             let wanted = if self.line.kept.is_none() { wanted } else { RowSelection::ALL };
@@ -206,16 +207,22 @@ impl<'s> ChannelSampling<'s> {
             let seen = seen.filter(|_| self.line.kept.is_none());
             return Ok(Channel { values: kept(values), seen });
         }
-        let read = self.raw(&self.samples)?;
+        let read =
+            if is_text { self.sheet.matches(&self.samples, &map.texts)? } else { self.raw(&self.samples)? };
         self.same_count(read.len(), self.column())?;
         let mut values = kept(read);
         if !map.missing.is_empty() {
             values.iter_mut().filter(|v| map.missing.contains(v)).for_each(|v| *v = f64::NAN);
         }
         if let Some(valid) = &self.valid {
-            let marks = self.raw(valid)?;
+            let texts = RawValue::texts(&map.valid_values);
+            let marks =
+                if texts.is_empty() { self.raw(valid)? } else { self.sheet.matches(valid, &texts)? };
             self.same_count(marks.len(), &valid.leaf)?;
-            let bad = |mark: &f64| !map.valid_values.contains(mark);
+            let is_valid = |mark: f64| map.valid_values.iter().any(|value| value.is(mark));
+            let bad = |mark: &f64| {
+                if texts.is_empty() { !is_valid(*mark) } else { !RawValue::Truth(true).is(*mark) }
+            };
             values.iter_mut().zip(kept(marks)).filter(|(_, m)| bad(m)).for_each(|(v, _)| *v = f64::NAN);
         }
         if let Some(turn) = map.wraps_at {

@@ -170,9 +170,11 @@ impl Log {
         let later = |start: Timestamp| start.checked_add(channel_reader::duration(earliest)).ok();
         Ok(match stamps.origin {
             TimeOrigin::Utc(start) => later(start),
-            TimeOrigin::Local(start) => {
-                later(start).and_then(|local| identity::local_to_utc(local, &self.mapping.identity))
-            }
+            TimeOrigin::Local(start) => match later(start) {
+                Some(local) => identity::local_to_utc(local, &self.mapping.identity)
+                    .map_err(|fault| self.main.error(fault))?,
+                None => None,
+            },
             TimeOrigin::Counted(_) | TimeOrigin::Start => None,
         })
     }
@@ -286,6 +288,8 @@ impl Log {
             let first = self.present(map, &position)?.into_iter().next();
             let name = ColumnPattern::new(&map.column).column_for(position.as_str());
             if first.is_none() && role != Role::Temperature {
+                // A group without a file is no lack of this actuator, and neither is a struct in a number's place.
+                self.sheet_of(map)?.check_no_struct(&name)?;
                 lacking.push(name.clone());
             }
             *slot = first.map(|(_, name)| name).or((role != Role::Temperature).then_some(name));

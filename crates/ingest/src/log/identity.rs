@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use jiff::{Timestamp, civil, tz::TimeZone};
+use jiff::tz::{AmbiguousOffset, TimeZone};
+use jiff::{Timestamp, civil};
 use percent_encoding::percent_decode_str;
 use records::{FlightId, Position, TailNumber};
 
@@ -45,7 +46,12 @@ pub(crate) fn from_path(path: &Path, expression: &str) -> Result<IdentityFields,
     let text = whole.to_string_lossy().replace('\\', "/");
     let Some(groups) = regex.captures(&text) else { return Ok(IdentityFields::new()) };
     let named = |fact: &IdentityField| Some((*fact, groups.name(fact.as_str())?.as_str().to_owned()));
-    Ok(IdentityField::ALL.iter().filter_map(named).collect())
+    let mut facts: IdentityFields = IdentityField::ALL.iter().filter_map(named).collect();
+    if let (Some(date), Some(time)) = (groups.name("departure_date"), groups.name("departure_time")) {
+        let departure = format!("{}T{}", date.as_str(), time.as_str());
+        facts.entry(IdentityField::DepartureUtc).or_insert(departure);
+    }
+    Ok(facts)
 }
 
 /// The whole path; an address is whole as it is.
@@ -158,7 +164,22 @@ pub(crate) fn instant(text: &str, mapping: &IdentityMapping) -> Result<Timestamp
     let name = mapping.time_zone.as_deref();
     let name =
         name.ok_or_else(|| invalid("it names no time zone, and `identity.time_zone` is not given".into()))?;
-    zone(name).map_err(invalid)?.to_timestamp(local).map_err(|e| invalid(e.to_string()))
+    unambiguous(local, name).map_err(invalid)
+}
+
+/// The instant of a local time, where the zone has it once.
+fn unambiguous(local: civil::DateTime, zone_name: &str) -> Result<Timestamp, String> {
+    let found = zone(zone_name)?.into_ambiguous_zoned(local);
+    let is = match found.offset() {
+        AmbiguousOffset::Unambiguous { .. } => {
+            return found.compatible().map(|t| t.timestamp()).map_err(|e| e.to_string());
+        }
+        AmbiguousOffset::Gap { .. } => "does not exist",
+        AmbiguousOffset::Fold { .. } => "exists twice",
+    };
+    Err(format!(
+        "at a change of the clocks the local time {local} {is} in {zone_name}; log the departure in UTC or with its offset"
+    ))
 }
 
 /// A time zone by its name.
@@ -174,9 +195,18 @@ pub fn zone(name: &str) -> Result<TimeZone, String> {
 }
 
 /// The instant of a local time that was read as if it were UTC; nothing when no zone is mapped.
-pub(crate) fn local_to_utc(as_utc: Timestamp, mapping: &IdentityMapping) -> Option<Timestamp> {
-    let zone = zone(mapping.time_zone.as_deref()?).ok()?;
-    zone.to_timestamp(TimeZone::UTC.to_datetime(as_utc)).ok()
+///
+/// # Errors
+/// [`ErrorKind::IdentityInvalid`] for a time that the zone skips or repeats.
+pub(crate) fn local_to_utc(
+    as_utc: Timestamp,
+    mapping: &IdentityMapping,
+) -> Result<Option<Timestamp>, ErrorKind> {
+    let Some(name) = mapping.time_zone.as_deref() else { return Ok(None) };
+    let local = TimeZone::UTC.to_datetime(as_utc);
+    let invalid =
+        |detail| ErrorKind::IdentityInvalid { fact: "departure_utc", found: local.to_string(), detail };
+    unambiguous(local, name).map(Some).map_err(invalid)
 }
 
 #[cfg(test)]
@@ -212,6 +242,31 @@ mod tests {
         assert_eq!(there.to_string(), "2026-07-01T00:00:00Z");
         let offset = instant("2026-07-01T03:00:00+02:00", &mapping(None, Some("Europe/Istanbul"))).unwrap();
         assert_eq!(offset.to_string(), "2026-07-01T01:00:00Z");
+    }
+
+    /// Berlin, 2026: clocks go from 02:00 to 03:00 on March 29, and from 03:00 back to 02:00 on October 25.
+    #[test]
+    fn a_local_time_that_is_skipped_or_repeated_is_refused() {
+        let there = mapping(None, Some("Europe/Berlin"));
+        for (local, is) in
+            [("2026-03-29T02:30:00", "does not exist"), ("2026-10-25T02:30:00", "exists twice")]
+        {
+            let fault = instant(local, &there).unwrap_err();
+            assert!(fault.to_string().contains(is), "{fault}");
+            let start: Timestamp = format!("{local}Z").parse().unwrap();
+            assert!(local_to_utc(start, &there).is_err());
+        }
+        assert_eq!(instant("2026-10-25T03:30:00", &there).unwrap().to_string(), "2026-10-25T02:30:00Z");
+    }
+
+    /// The date in a folder, the time in the name of the file.
+    #[test]
+    fn a_departure_may_be_in_two_parts_of_a_path() {
+        let path = Path::new("/logs/N412FP/2026-11-19/0413.parquet");
+        let expression = r"(?<tail_number>N\w+)/(?<departure_date>[\d-]+)/(?<departure_time>\d{4})\.parquet$";
+        let facts = from_path(path, expression).unwrap();
+        let identity = read(&facts, &mapping(Some("%Y-%m-%dT%H%M"), Some("UTC")), None).unwrap();
+        assert_eq!(identity.departure_utc.to_string(), "2026-11-19T04:13:00Z");
     }
 
     #[test]

@@ -1,8 +1,7 @@
 //! Samples of long layouts: one pass over the files gathers the rows of every channel and actuator that will be read.
 //!
-//! A row of such a file belongs to one channel, or to one actuator, and a column of texts names it. Rows that nobody
-//! asks for are dropped as they are decoded, and row groups whose statistics exclude every text asked for are not
-//! decoded at all.
+//! A row of such a file belongs to one channel, or to one actuator, and a column of texts names it. Other
+//! rows are dropped as they are decoded, and row groups whose statistics exclude every requested text are not decoded.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -22,7 +21,7 @@ pub(crate) const LONG_BATCH_ROWS: usize = 1 << 16;
 /// Gathered samples may occupy so many bytes; what does not fit is gathered by a later pass.
 const MAX_GATHERED_BYTES: usize = 256 << 20;
 
-/// No slot: the row belongs to a channel that is not asked for.
+/// No slot: the row belongs to a channel that is not requested.
 const NONE: u32 = u32::MAX;
 
 /// The texts that mark the rows of a channel or an actuator, by column.
@@ -126,7 +125,7 @@ impl Partition {
     }
 }
 
-/// Samples of each key, leaf by leaf; fewer keys than asked for where the samples of all would occupy too much memory.
+/// Samples of each key, leaf by leaf; fewer keys than requested where the samples of all would occupy too much memory.
 type Gathered = Vec<Vec<Vec<ArrayRef>>>;
 
 fn gather(
@@ -181,7 +180,7 @@ fn gather(
 
 /// The rows of a batch by slot: slot k holds the rows of key k.
 struct Slots {
-    /// For each column the number of each text that is asked for.
+    /// For each column the number of each requested text.
     texts: Vec<BTreeMap<String, u32>>,
     /// The slot of every combination of these numbers.
     slots: Vec<u32>,

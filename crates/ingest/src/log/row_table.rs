@@ -14,7 +14,7 @@ use arrow::datatypes::{DataType, Int32Type};
 use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::si_conversion::SiConversion;
 use crate::channel::stats::ChannelStats;
-use crate::error::{Error, ErrorKind};
+use crate::error::{Error, ErrorKind, STRUCT};
 use crate::log::row_partition::{LONG_BATCH_ROWS, Partition, RowKeys};
 use crate::log::timestamps::{TickEpoch, TickFormat, TimestampParser};
 use crate::mapping::column_pattern::nearest;
@@ -141,6 +141,22 @@ impl RowTable {
         Ok(values.finish())
     }
 
+    /// 1 where a sample is one of these texts, 0 where it is another, NaN where it is missing.
+    ///
+    /// # Errors
+    /// When a leaf is missing, has no text form, or cannot be decoded.
+    pub(crate) fn matches(&self, samples: &SampleSelector, texts: &[String]) -> Result<Vec<f64>, Error> {
+        let mut marks = Vec::new();
+        self.each(samples, &samples.leaf, |array| {
+            let text = as_text(&samples.leaf, array)?;
+            let is_one = |text: &str| texts.iter().any(|wanted| wanted == text.trim());
+            let mark = |text: Option<&str>| text.map_or(f64::NAN, |text| f64::from(u8::from(is_one(text))));
+            marks.extend(text.as_string::<i32>().iter().map(mark));
+            Ok(())
+        })?;
+        Ok(marks)
+    }
+
     /// Whether the headers of a leaf's pages claim what can be, and the rows that are declared.
     pub(crate) fn check_pages(&self, leaf: &str) -> Result<(), Error> {
         self.files.iter().try_for_each(|file| file.check_pages(leaf))
@@ -190,7 +206,7 @@ impl RowTable {
     }
 
     /// Every text that a column holds; a row group that holds but one, by its statistics, is not read.
-    fn texts(&self, column: &str) -> Result<Arc<BTreeSet<String>>, Error> {
+    pub(crate) fn texts(&self, column: &str) -> Result<Arc<BTreeSet<String>>, Error> {
         let known = |texts: &BTreeMap<String, Arc<BTreeSet<String>>>| texts.get(column).cloned();
         if let Some(texts) = known(&self.texts.lock().unwrap_or_else(PoisonError::into_inner)) {
             return Ok(texts);
@@ -341,6 +357,10 @@ impl RowTable {
                 return Ok(TickFormat::of_timestamp(*unit, zone.is_none()));
             }
             (DataType::Utf8 | DataType::LargeUtf8 | DataType::Utf8View, _) => return Ok(TickFormat::text()),
+            (DataType::Time32(unit) | DataType::Time64(unit), _) => return Ok(TickFormat::of_day(*unit)),
+            (DataType::Int64, None) if let Some(unit) = self.files[0].duration_unit(column) => {
+                return Ok(TickFormat::of_duration(unit));
+            }
             (kind, None) => {
                 let (column, found) = (column.to_owned(), kind.to_string());
                 return Err(self.error(ErrorKind::TimeUnit { column, found }));
@@ -361,9 +381,25 @@ impl RowTable {
 
     /// The known name nearest to a channel that is not here.
     pub(crate) fn lacks(&self, name: &str) -> Error {
+        if let Err(error) = self.check_no_struct(name) {
+            return error;
+        }
         let names = self.names().unwrap_or_default();
         let nearest = nearest(name, names.iter().map(String::as_str)).map(str::to_owned);
         self.error(ErrorKind::ColumnMissing { column: name.to_owned(), nearest })
+    }
+
+    /// Whether this is the name of a column of structs, whose fields alone can be mapped.
+    pub(crate) fn check_no_struct(&self, name: &str) -> Result<(), Error> {
+        let field = |leaf: &str| leaf.strip_prefix(name)?.strip_prefix('.').map(|field| format!("`{field}`"));
+        let fields: BTreeSet<String> =
+            self.files.iter().flat_map(LogFile::leaves).filter_map(|leaf| field(&leaf.name)).collect();
+        if fields.is_empty() {
+            return Ok(());
+        }
+        let shown: Vec<String> = fields.into_iter().take(8).collect();
+        let found = format!("{STRUCT}{}", shown.join(", "));
+        Err(self.error(ErrorKind::ColumnType { column: name.to_owned(), found, wanted: "numbers" }))
     }
 }
 

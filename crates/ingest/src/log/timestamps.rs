@@ -10,6 +10,9 @@ use crate::error::ErrorKind;
 use crate::parquet::numeric::{append, as_text, wrong_type};
 use crate::time::clock::{TimeOrigin, Timestamps};
 
+/// Seconds of a day.
+const DAY_S: f64 = 86_400.0;
+
 /// What zero means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum TickEpoch {
@@ -30,14 +33,25 @@ pub(crate) struct TickFormat {
 
 impl TickFormat {
     pub(crate) fn of_timestamp(unit: ArrowTimeUnit, is_local: bool) -> Self {
+        let origin = if is_local { TickEpoch::Local } else { TickEpoch::Utc };
+        Self { origin, ..Self::of_duration(unit) }
+    }
+
+    /// A time of the day, which starts again at midnight.
+    pub(crate) fn of_day(unit: ArrowTimeUnit) -> Self {
+        let ticks = Self::of_duration(unit);
+        Self { wraps_at: Some(DAY_S * ticks.per_second), ..ticks }
+    }
+
+    /// A time since an unknown zero.
+    pub(crate) fn of_duration(unit: ArrowTimeUnit) -> Self {
         let per_second = match unit {
             ArrowTimeUnit::Second => 1.0,
             ArrowTimeUnit::Millisecond => 1e3,
             ArrowTimeUnit::Microsecond => 1e6,
             ArrowTimeUnit::Nanosecond => 1e9,
         };
-        let origin = if is_local { TickEpoch::Local } else { TickEpoch::Utc };
-        Self { per_second, is_whole: true, is_text: false, origin, wraps_at: None }
+        Self { per_second, is_whole: true, is_text: false, origin: TickEpoch::Own, wraps_at: None }
     }
 
     /// Whether they are numbers with a fraction.
@@ -83,6 +97,12 @@ impl<'a> TimestampParser<'a> {
                 self.push_whole(tick);
             }
         } else if self.ticks.is_whole {
+            // A time of the day in 32 bits becomes a number of 32 bits only.
+            let array = match array.data_type() {
+                DataType::Time32(_) => &cast(array, &DataType::Int32)
+                    .map_err(|_| wrong_type(self.column, array, "time stamps"))?,
+                _ => array,
+            };
             let whole =
                 cast(array, &DataType::Int64).map_err(|_| wrong_type(self.column, array, "time stamps"))?;
             let whole: &PrimitiveArray<Int64Type> = whole.as_primitive();

@@ -1,6 +1,6 @@
 //! What a log must offer, and where in it: the mapping that `pipeline.toml` writes down.
 
-use crate::mapping::SampleFilter;
+use crate::mapping::{RawValue, SampleFilter};
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
@@ -316,9 +316,9 @@ pub struct ChannelMapping {
     /// A column that marks valid samples; `{position}` as in `column`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub valid_column: Option<String>,
-    /// The values of `valid_column` that mean yes. Default `[1]`, which is also *true*.
+    /// The values of `valid_column` that mean yes: numbers, texts, true or false. Default `[1]`, which is also *true*.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
-    pub valid_values: Vec<f64>,
+    pub valid_values: Vec<RawValue>,
     /// The name of the `[group.…]` whose files hold this channel; the main logs when not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
@@ -337,6 +337,9 @@ pub struct ChannelMapping {
     /// Redundant channels to be taken, in this order, where this one does not live.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alternatives: Vec<ChannelMapping>,
+    /// Texts for which the channel is 1, and 0 for every other; of a condition on a column of texts.
+    #[serde(skip)]
+    pub texts: Vec<String>,
 }
 
 impl ChannelMapping {
@@ -360,6 +363,7 @@ impl From<&SampleFilter> for ChannelMapping {
             group: filter.group.clone(),
             time_column: filter.time_column.clone(),
             rate_hz: filter.rate_hz,
+            texts: RawValue::texts(&filter.equals),
             ..Self::default()
         }
     }
@@ -384,16 +388,17 @@ impl Default for ChannelMapping {
             instant_s: 0.0,
             latency_s: 0.0,
             alternatives: Vec::new(),
+            texts: Vec::new(),
         }
     }
 }
 
-fn yes() -> Vec<f64> {
-    vec![1.0]
+fn yes() -> Vec<RawValue> {
+    vec![RawValue::Number(1.0)]
 }
 
-fn is_yes(values: &[f64]) -> bool {
-    values == [1.0]
+fn is_yes(values: &[RawValue]) -> bool {
+    values == [RawValue::Number(1.0)]
 }
 
 fn one() -> f64 {

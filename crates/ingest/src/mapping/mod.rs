@@ -9,4 +9,4 @@ pub use log_mapping::{
     ChannelMapping, Channels, ClockMapping, Epoch, GroupMapping, IdentityField, IdentityMapping, Layout,
     Mapping, Output, Role,
 };
-pub use sample_filter::SampleFilter;
+pub use sample_filter::{RawValue, SampleFilter};

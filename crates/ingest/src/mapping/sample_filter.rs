@@ -5,15 +5,60 @@ use std::ops::Range;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// A raw value of a column: a number, a truth value, or a text.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum RawValue {
+    /// A number.
+    Number(f64),
+    /// True, which is also 1, or false, which is also 0.
+    Truth(bool),
+    /// A text, compared without the blanks around it.
+    Text(String),
+}
+
+impl From<f64> for RawValue {
+    fn from(number: f64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl RawValue {
+    /// Whether a number is this value.
+    #[expect(clippy::float_cmp, reason = "a raw value is compared as it was written")]
+    pub(crate) fn is(&self, number: f64) -> bool {
+        match self {
+            Self::Number(own) => *own == number,
+            Self::Truth(own) => f64::from(u8::from(*own)) == number,
+            Self::Text(_) => false,
+        }
+    }
+
+    /// The value as a column of texts holds it.
+    fn as_text(&self) -> String {
+        match self {
+            Self::Number(number) => number.to_string(),
+            Self::Truth(is_true) => is_true.to_string(),
+            Self::Text(text) => text.trim().to_owned(),
+        }
+    }
+
+    /// The texts that these values are, where any of them is a text: the column is then read as text.
+    pub(crate) fn texts(values: &[Self]) -> Vec<String> {
+        let has_text = values.iter().any(|value| matches!(value, Self::Text(_)));
+        if has_text { values.iter().map(Self::as_text).collect() } else { Vec::new() }
+    }
+}
+
 /// `[[channel.when]]`: samples count only while a column meets a condition, e.g. airborne, or powered.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SampleFilter {
     /// The column's name; `{position}` stands for the actuator's place.
     pub column: String,
-    /// Raw values that will do; true is 1.
+    /// Raw values that will do: numbers, texts, true or false.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub equals: Vec<f64>,
+    pub equals: Vec<RawValue>,
     /// The least raw value that will do.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_least: Option<f64>,
@@ -42,7 +87,10 @@ impl SampleFilter {
 
     /// Whether a raw value will do. A missing one does not.
     fn holds(&self, value: f64) -> bool {
-        let one_of = self.equals.is_empty() || self.equals.contains(&value);
+        // A column of texts is read as 1 where it holds one of them.
+        let is_text = !RawValue::texts(&self.equals).is_empty();
+        let one_of = self.equals.is_empty()
+            || if is_text { value > 0.5 } else { self.equals.iter().any(|wanted| wanted.is(value)) };
         let reaches = self.at_least.is_none_or(|least| value >= least);
         let stays = self.at_most.is_none_or(|most| value <= most);
         !value.is_nan() && one_of && reaches && stays
@@ -79,7 +127,8 @@ mod tests {
     use super::*;
 
     fn when(equals: &[f64], at_least: Option<f64>, margin_s: Option<f64>) -> SampleFilter {
-        SampleFilter { equals: equals.to_vec(), at_least, margin_s, ..SampleFilter::default() }
+        let equals = equals.iter().copied().map(RawValue::Number).collect();
+        SampleFilter { equals, at_least, margin_s, ..SampleFilter::default() }
     }
 
     #[test]
@@ -94,6 +143,16 @@ mod tests {
         let values = [1.0; 20];
         assert_eq!(when(&[1.0], None, Some(0.25)).within(&values, &[0..20], 0.1), [3..17]);
         assert!(when(&[1.0], None, Some(2.0)).within(&values, &[0..20], 0.1).is_empty());
+    }
+
+    /// As a recorder writes flight phases and validity words: text, padded text, booleans.
+    #[test]
+    fn values_may_be_texts_and_truth_values() {
+        let text = |text: &str| RawValue::Text(text.into());
+        assert_eq!(RawValue::texts(&[text("CRUISE "), text("CLIMB")]), ["CRUISE", "CLIMB"]);
+        let (three, yes, no) = (RawValue::Number(3.0), RawValue::Truth(true), RawValue::Truth(false));
+        assert!(yes.is(1.0) && !yes.is(0.0) && no.is(0.0) && three.is(3.0));
+        assert_eq!(RawValue::texts(&[three, yes]), Vec::<String>::new());
     }
 
     #[test]

@@ -168,6 +168,15 @@ pub enum TimeUnit {
     /// Nanoseconds.
     #[serde(rename = "ns")]
     Nanosecond,
+    /// Minutes.
+    #[serde(rename = "min")]
+    Minute,
+    /// Hours.
+    #[serde(rename = "h")]
+    Hour,
+    /// Days.
+    #[serde(rename = "d")]
+    Day,
     /// Row counter that increases by one with every row; `clock.rate_hz` gives the rate.
     #[serde(rename = "count")]
     Count,
@@ -182,6 +191,9 @@ impl TimeUnit {
             Self::Millisecond => 1e3,
             Self::Microsecond => 1e6,
             Self::Nanosecond => 1e9,
+            Self::Minute => 1.0 / 60.0,
+            Self::Hour => 1.0 / 3600.0,
+            Self::Day => 1.0 / 86_400.0,
         })
     }
 }

@@ -22,6 +22,8 @@ pub(crate) struct LeafColumn {
     pub(crate) index: usize,
     /// Number of the top-level column that contains it.
     pub(crate) root: usize,
+    /// Whether it is a field of a struct.
+    pub(crate) is_field: bool,
     /// The type of one of its values.
     pub(crate) kind: DataType,
     /// Whether lists lie on the way to it.
@@ -32,25 +34,34 @@ pub(crate) struct LeafColumn {
 pub(crate) fn leaves(fields: &Fields) -> Vec<LeafColumn> {
     let mut found = Vec::new();
     for (root, field) in fields.iter().enumerate() {
-        walk(field, field.name().clone(), root, false, &mut found);
+        walk(field, field.name().clone(), root, LeafPath::default(), &mut found);
     }
     found
 }
 
-fn walk(field: &Field, name: String, root: usize, is_listed: bool, found: &mut Vec<LeafColumn>) {
+/// Lists and structs that contain a leaf.
+#[derive(Debug, Clone, Copy, Default)]
+struct LeafPath {
+    is_listed: bool,
+    is_field: bool,
+}
+
+fn walk(field: &Field, name: String, root: usize, path: LeafPath, found: &mut Vec<LeafColumn>) {
     match field.data_type() {
         DataType::Struct(inner) => {
             for field in inner {
-                walk(field, format!("{name}.{}", field.name()), root, is_listed, found);
+                let path = LeafPath { is_field: true, ..path };
+                walk(field, format!("{name}.{}", field.name()), root, path, found);
             }
         }
         DataType::List(inner) | DataType::LargeList(inner) | DataType::FixedSizeList(inner, _) => {
-            walk(inner, name, root, true, found);
+            walk(inner, name, root, LeafPath { is_listed: true, ..path }, found);
         }
-        DataType::Map(inner, _) => walk(inner, name, root, true, found),
+        DataType::Map(inner, _) => walk(inner, name, root, LeafPath { is_listed: true, ..path }, found),
         kind => {
             let (index, kind) = (found.len(), kind.clone());
-            found.push(LeafColumn { name, index, root, kind, is_listed });
+            let LeafPath { is_listed, is_field } = path;
+            found.push(LeafColumn { name, index, root, is_field, kind, is_listed });
         }
     }
 }

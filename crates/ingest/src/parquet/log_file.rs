@@ -3,15 +3,16 @@
 use std::fs::File;
 use std::iter::once;
 use std::ops::Range;
+use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use arrow::array::ArrayRef;
-use arrow::datatypes::{DataType, Field, Schema};
-use parquet::arrow::ProjectionMask;
+use arrow::datatypes::{DataType, Field, Schema, TimeUnit};
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
 };
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::basic::Encoding;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ColumnChunkMetaData;
@@ -24,9 +25,11 @@ use crate::io::read_at::{self, PreadFile};
 use crate::io::transient;
 use crate::mapping::column_pattern::nearest;
 use crate::parquet::fast_decode;
+use crate::parquet::foreign_format;
 use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
 use crate::parquet::page_header::{self, Page};
+use crate::parquet::raw_footer;
 use crate::parquet::row_selection::RowSelection;
 
 /// Rows decoded at a time: small enough for the cache, large enough to forget the cost of a batch.
@@ -35,17 +38,29 @@ const BATCH_ROWS: usize = 8192;
 /// So much of an object's end is fetched at first: most footers are shorter.
 const USUAL_FOOTER: u64 = 64 << 10;
 
-/// Reason why a footer could not be read, from the first bytes of the file where those identify another format.
-fn footer_error(source: &ByteSource, error: &ParquetError) -> String {
-    let mut head = [0; 4];
-    let length = source.want(once(0..4)).map(|()| read_at::read_at(source.file(), &mut head, 0));
-    match (length, &head) {
-        (Ok(Ok(4)), b"PAR1") => {
-            let detail = error.to_string();
-            format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: "))
+/// Why a footer could not be read, from the first bytes of the file where those identify another format.
+fn footer_error(source: &ByteSource, error: &ParquetError) -> ErrorKind {
+    let mut head = [0; foreign_format::HEAD_BYTES];
+    let length =
+        source.want(once(0..head.len() as u64)).map(|()| read_at::read_at(source.file(), &mut head, 0));
+    let head = match length {
+        Ok(Ok(length)) => &head[..length],
+        _ => &[],
+    };
+    if head.starts_with(b"PARE") {
+        return ErrorKind::Encrypted { column: None };
+    }
+    if head.starts_with(b"PAR1") {
+        if let Some(encoding) = raw_footer::unknown_encoding(source.file()) {
+            return ErrorKind::EncodingUnsupported { encoding };
         }
-        (Ok(Ok(4)), b"PARE") => "the file is encrypted".into(),
-        _ => "not a Parquet file".into(),
+        let detail = error.to_string();
+        let detail = format!("the file is truncated ({})", detail.trim_start_matches("Parquet error: "));
+        return ErrorKind::NotParquet { detail };
+    }
+    match foreign_format::of(head) {
+        Some(format) => ErrorKind::ForeignFormat { format },
+        None => ErrorKind::NotParquet { detail: "not a Parquet file".into() },
     }
 }
 
@@ -67,7 +82,7 @@ pub(crate) struct Scan<'s> {
     pub(crate) batch_rows: usize,
     /// Whether text that is stored as codes of a dictionary stays so.
     pub(crate) as_codes: bool,
-    /// The row groups that are read, by their number; those left out must hold no row that is asked for.
+    /// The row groups that are read, by their number; those left out must hold no requested row.
     pub(crate) wants_group: &'s dyn Fn(usize) -> bool,
 }
 
@@ -98,7 +113,7 @@ impl LogFile {
         let footer = ArrowReaderMetadata::load(&PreadFile(reader), options).map_err(|e| {
             fail(match transient::take_failed_read() {
                 Some(source) => ErrorKind::Unreadable { source },
-                None => ErrorKind::NotParquet { detail: footer_error(&source, &e) },
+                None => footer_error(&source, &e),
             })
         })?;
         let leaves = leaf_columns::leaves(footer.schema().fields());
@@ -132,20 +147,43 @@ impl LogFile {
     }
 
     fn find(&self, name: &str) -> Option<&LeafColumn> {
-        self.leaves.iter().find(|leaf| leaf.name == name)
+        let mut named = self.leaves.iter().filter(|leaf| leaf.name == name);
+        let first = named.next()?;
+        // A column called `a.b` comes before field `b` of struct `a`.
+        if first.is_field { named.find(|leaf| !leaf.is_field).or(Some(first)) } else { Some(first) }
+    }
+
+    /// How many columns have this name, or fields where no column has.
+    fn count_of(&self, found: &LeafColumn) -> usize {
+        self.leaves.iter().filter(|leaf| leaf.name == found.name && leaf.is_field == found.is_field).count()
     }
 
     /// A leaf by its name.
     pub(crate) fn leaf(&self, name: &str) -> Result<&LeafColumn, Error> {
-        self.find(name).ok_or_else(|| {
+        let found = self.find(name).ok_or_else(|| {
             let nearest = nearest(name, self.leaves.iter().map(|l| l.name.as_str())).map(str::to_owned);
             self.error(ErrorKind::ColumnMissing { column: name.to_owned(), nearest })
-        })
+        })?;
+        match self.count_of(found) {
+            1 => Ok(found),
+            count => Err(self.error(ErrorKind::DuplicateColumn { column: name.to_owned(), count })),
+        }
     }
 
     /// The type of a leaf's values.
     pub(crate) fn kind(&self, name: &str) -> Result<&DataType, Error> {
         self.leaf(name).map(|leaf| &leaf.kind)
+    }
+
+    /// The unit of a column of durations: the format has no such type, so Arrow's writers note it in the metadata.
+    pub(crate) fn duration_unit(&self, name: &str) -> Option<TimeUnit> {
+        let file = self.footer.metadata().file_metadata();
+        // The decoder of that note panics on some damage.
+        let noted = catch_unwind(|| parquet_to_arrow_schema(file.schema_descr(), file.key_value_metadata()));
+        match noted.ok()?.ok()?.field_with_name(name).ok()?.data_type() {
+            DataType::Duration(unit) => Some(*unit),
+            _ => None,
+        }
     }
 
     /// A value of the footer's key-value metadata.
@@ -401,6 +439,13 @@ impl LogFile {
     }
 
     fn decode(&self, leaf: &LeafColumn, group: usize, detail: String) -> Error {
+        if let Some(column) = raw_footer::encrypted(self.source.file(), leaf.index) {
+            let column = column.then(|| leaf.name.clone());
+            return self.error(ErrorKind::Encrypted { column });
+        }
+        if let Some(encoding) = raw_footer::unknown_encoding(self.source.file()) {
+            return self.error(ErrorKind::EncodingUnsupported { encoding });
+        }
         let row_group = Some(group as u64);
         self.error(ErrorKind::Decode { column: leaf.name.clone(), row_group, detail })
     }
@@ -435,7 +480,7 @@ pub(crate) struct TextBounds<'f> {
     pub(crate) least: &'f [u8],
     /// No text is greater.
     pub(crate) greatest: &'f [u8],
-    /// Whether both are texts of the column, and not cut short.
+    /// Whether both are texts of the column, and not truncated.
     pub(crate) is_exact: bool,
 }
 

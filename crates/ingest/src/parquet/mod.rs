@@ -2,10 +2,12 @@
 
 pub(crate) mod dictionary;
 pub(crate) mod fast_decode;
+mod foreign_format;
 pub(crate) mod leaf_columns;
 pub(crate) mod log_file;
 pub(crate) mod numeric;
 pub(crate) mod page_crc;
 pub(crate) mod page_header;
+mod raw_footer;
 pub(crate) mod row_selection;
 pub mod writer;

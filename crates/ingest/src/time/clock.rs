@@ -152,7 +152,9 @@ pub fn build_time_base(stamps: &mut Timestamps, clock: &ClockMapping) -> Result<
             return Ok(TimeBase { step_s, ..uniform(stamps.seconds.len(), 1.0) });
         }
     }
-    let max_back_s = clock.max_back_s.unwrap_or(MAX_BACK_S);
+    // A log whose every stamp falls was written backwards: sorting it loses nothing.
+    let is_backwards = strictly_falling(&stamps.seconds);
+    let max_back_s = if is_backwards { f64::INFINITY } else { clock.max_back_s.unwrap_or(MAX_BACK_S) };
     let filled = clock.rate_hz.map_or(0, |rate_hz| fill_missing(&mut stamps.seconds, rate_hz));
     let pieces = split_at_resets(stamps, max_back_s, clock.split_at_jumps)?;
     if let Some(tick_s) = clock.tick_s {
@@ -393,6 +395,11 @@ fn strictly_rising(t: &[f64]) -> bool {
     t.first().is_some_and(|s| !s.is_nan()) && t.windows(2).all(|w| w[0] < w[1])
 }
 
+/// Whether every stamp of at least three is less than the one before.
+fn strictly_falling(t: &[f64]) -> bool {
+    t.len() > 2 && t.windows(2).all(|w| w[1] < w[0])
+}
+
 /// Rows with a stamp, piece by piece in order of time, the first of each repeated stamp.
 #[expect(clippy::float_cmp, reason = "a repeated stamp repeats its bits")]
 fn sort_dedup(t: &[f64], pieces: &[Range<usize>]) -> Vec<u32> {
@@ -502,6 +509,14 @@ mod tests {
         early.origin = TimeOrigin::Counted(-1e50);
         let refused = build_time_base(&mut early, &usual());
         assert!(matches!(refused, Err(ErrorKind::TimeImplausible { what: "the first stamp", .. })));
+    }
+
+    #[test]
+    fn a_log_that_was_written_backwards_is_sorted() {
+        let t: Vec<f64> = (0..500).map(|k| 5.0 - f64::from(k) * 0.01).collect();
+        let line = line(&t, &usual()).unwrap();
+        assert_eq!(line.kept, Some((0..500).rev().collect()));
+        assert_eq!((line.segments.len(), line.repairs.repeated), (1, 0));
     }
 
     #[test]

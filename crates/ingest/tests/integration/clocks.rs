@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray, UInt16Array};
+use arrow::array::{
+    ArrayRef, BooleanArray, DurationMicrosecondArray, Float64Array, Int64Array, StringArray,
+    Time32MillisecondArray, UInt16Array,
+};
 use ingest::mapping::Epoch;
 use ingest::mapping::units::{TimeUnit, Unit};
-use ingest::{ActuatorChannels, ChannelMapping, Error, Geometry, Log, LogFiles, Mapping};
+use ingest::{ActuatorChannels, ChannelMapping, Error, Geometry, Log, LogFiles, Mapping, RawValue};
 use records::Position;
 
 use crate::layouts::{channel, mapping, write};
@@ -149,9 +152,16 @@ fn the_redundant_channel_that_lives_is_taken() {
 #[test]
 fn a_sample_that_is_not_valid_is_missing() {
     let bad = |k: usize| (200..240).contains(&k);
-    let marks: [(ArrayRef, Vec<f64>); 2] = [
-        (Arc::new((0..ROWS).map(|k| Some(!bad(k))).collect::<BooleanArray>()), vec![1.0]),
-        (Arc::new((0..ROWS).map(|k| if bad(k) { 1 } else { 3 }).collect::<Int64Array>()), vec![3.0, 7.0]),
+    let words = |k: usize| Some(if bad(k) { "FAILED" } else { "NORMAL " });
+    let truth: ArrayRef = Arc::new((0..ROWS).map(|k| Some(!bad(k))).collect::<BooleanArray>());
+    let marks: [(ArrayRef, Vec<RawValue>); 4] = [
+        (Arc::clone(&truth), vec![1.0.into()]),
+        (truth, vec![RawValue::Truth(true)]),
+        (
+            Arc::new((0..ROWS).map(|k| if bad(k) { 1 } else { 3 }).collect::<Int64Array>()),
+            vec![3.0.into(), 7.0.into()],
+        ),
+        (Arc::new((0..ROWS).map(words).collect::<StringArray>()), vec![RawValue::Text("NORMAL".into())]),
     ];
     for (mark, valid_values) in marks {
         let mut m = plain();
@@ -171,6 +181,25 @@ fn a_counter_that_wraps_is_a_clock() {
     (m.clock.rate_hz, m.clock.wraps_at) = (Some(100.0), Some(65_536.0));
     let a = read(&m, &with(columns(), "t", count)).unwrap();
     assert_eq!((a.step_s, a.segments.len(), a.dx_m.len()), (0.01, 1, ROWS));
+}
+
+/// The second half of a flight over midnight, in 10 ms: a time of day, a duration, and the same in minutes.
+#[test]
+fn times_of_day_and_durations_have_a_unit_of_their_own() {
+    let day_ms = 86_400_000;
+    let of_day = |k: usize| ((day_ms - 2000 + 10 * k as i64) % day_ms) as i32;
+    let of_day: ArrayRef = Arc::new(Time32MillisecondArray::from_iter_values((0..ROWS).map(of_day)));
+    let duration: ArrayRef = Arc::new(DurationMicrosecondArray::from_iter_values(
+        (0..ROWS as i64).map(|k| 5_000_000 + 10_000 * k),
+    ));
+    let minutes = reals(|t| 7.0 + t / 60.0);
+    for (clock, unit) in [(of_day, None), (duration, None), (minutes, Some(TimeUnit::Minute))] {
+        let mut m = plain();
+        m.clock.unit = unit;
+        let a = read(&m, &with(columns(), "t", clock)).unwrap();
+        assert!((a.step_s - 0.01).abs() < 1e-9 && a.segments.len() == 1, "{} s", a.step_s);
+        assert_eq!(a.dx_m.len(), ROWS);
+    }
 }
 
 #[test]

@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, Float64Array};
+use arrow::array::{ArrayRef, Float64Array, StructArray};
+use arrow::datatypes::{DataType, Field};
 use ingest::mapping::units::Unit;
 use ingest::{ActuatorChannels, ClockMapping, Error, Geometry, Log, LogFiles, Mapping, SampleFilter};
 
@@ -42,7 +43,7 @@ fn files_that_are_no_logs_are_distinguished() {
     };
     assert_eq!(at("empty.parquet", b""), "empty_log");
     assert_eq!(at("text.parquet", b"time,motor,screw\n1,2,3\n"), "not_parquet");
-    assert_eq!(at("encrypted.parquet", b"PARE\x00\x00\x00\x00PARE"), "not_parquet");
+    assert_eq!(at("encrypted.parquet", b"PARE\x00\x00\x00\x00PARE"), "encrypted");
     assert_eq!(code(Log::open(&LogFiles::one(dir.path()), &Arc::new(m.clone()))), "unreadable");
     assert_eq!(
         code(Log::open(&LogFiles::one(dir.path().join("none.parquet")), &Arc::new(m.clone()))),
@@ -155,4 +156,97 @@ fn no_change_of_bytes_ends_the_process() {
             }
         }
     }
+}
+
+/// Two columns of one name: neither is taken, and the error names them.
+#[test]
+fn a_name_that_two_columns_have_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("twice.parquet");
+    let values: ArrayRef = Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()));
+    let all = |names: &[&'static str]| -> Vec<(&'static str, ArrayRef)> {
+        names.iter().map(|name| (*name, Arc::clone(&values))).collect()
+    };
+    for column in ["t", "s"] {
+        let mut names = vec!["t", "m", "s", "f"];
+        names.push(column);
+        write(&file, &all(&names));
+        let diagnostic = read(&file, &plain()).unwrap_err().diagnostic();
+        assert_eq!(
+            (diagnostic.code.as_str(), diagnostic.column.as_deref()),
+            ("duplicate_column", Some(column))
+        );
+    }
+    write(&file, &all(&["t", "m", "s", "f", "spare", "spare"]));
+    assert!(read(&file, &plain()).is_ok());
+}
+
+#[test]
+fn a_struct_in_place_of_a_number_is_named_with_its_fields() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("struct.parquet");
+    let values: ArrayRef = Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()));
+    let field = |name: &str| Arc::new(Field::new(name, DataType::Float64, true));
+    let record: ArrayRef = Arc::new(StructArray::from(vec![
+        (field("deg"), Arc::clone(&values)),
+        (field("raw"), Arc::clone(&values)),
+    ]));
+    write(&file, &[("t", Arc::clone(&values)), ("m", record), ("s", Arc::clone(&values)), ("f", values)]);
+    let diagnostic = read(&file, &plain()).unwrap_err().diagnostic();
+    assert_eq!((diagnostic.code.as_str(), diagnostic.column.as_deref()), ("column_type", Some("m")));
+    assert!(diagnostic.to_string().contains("`deg`, `raw`"), "{diagnostic}");
+}
+
+/// A byte order mark before a name, and a no-break space in one, show by their code points.
+#[test]
+fn names_that_look_alike_are_told_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("alike.parquet");
+    let values: ArrayRef = Arc::new(Float64Array::from((0..2000).map(f64::from).collect::<Vec<_>>()));
+    let columns = |name: &'static str| -> Vec<(&'static str, ArrayRef)> {
+        ["t", "m", name, "f"].into_iter().map(|name| (name, Arc::clone(&values))).collect()
+    };
+    let alike = [
+        ("\u{feff}screw_mm", "screw_mm", "U+FEFF"),
+        ("screw\u{a0}mm", "screw mm", "U+00A0"),
+        ("schlu\u{308}ssel", "schl\u{fc}ssel", "U+0308"),
+    ];
+    for (logged, mapped, point) in alike {
+        write(&file, &columns(logged));
+        let mut m = plain();
+        m.channels.screw_position = Some(channel(mapped, Unit::Metre));
+        let hint = read(&file, &m).unwrap_err().diagnostic().hint.unwrap();
+        assert!(hint.contains(point), "{hint}");
+    }
+}
+
+#[test]
+fn a_file_of_another_tool_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("flight.parquet");
+    for (head, format) in
+        [(&b"MDF     4.10    "[..], "MDF"), (b"\x89HDF\r\n\x1a\n", "HDF5"), (b"t,m\n0,1\n", "CSV")]
+    {
+        std::fs::write(&file, head).unwrap();
+        let diagnostic = Log::open(&LogFiles::one(&file), &Arc::new(plain())).unwrap_err().diagnostic();
+        let text = diagnostic.to_string();
+        assert!(text.contains(format) && diagnostic.hint.unwrap().contains("docs/convert-logs.md"), "{text}");
+    }
+}
+
+/// Files that pyarrow 26.0.1 wrote with an encrypted footer, with an encrypted column under a plain footer, and one
+/// whose footer names encoding 10, which is ALP in the format's list of encodings.
+#[test]
+fn encrypted_files_and_new_encodings_are_named() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    let mut m = plain();
+    m.clock.column = Some("t".into());
+    let diagnostic = |name: &str| read(&folder.join(name), &m).unwrap_err().diagnostic();
+    assert_eq!(diagnostic("encrypted_footer.parquet").code, "encrypted");
+    let column = diagnostic("encrypted_column.parquet");
+    assert_eq!(column.code, "encrypted");
+    assert!(column.message.contains("`m`"), "{column}");
+    let alp = diagnostic("alp.parquet");
+    assert_eq!(alp.code, "encoding_unsupported");
+    assert!(alp.message.contains("ALP"), "{alp}");
 }

@@ -182,5 +182,5 @@ fn loads_in_a_file_of_their_own_at_their_own_rate_are_held() {
     assert_is_the_flight(&actuators(&files, &m), "groups", 0.0, 2);
     let log = Log::open(&LogFiles::one(file("group_positions.parquet")), &Arc::new(m.clone())).unwrap();
     let error = log.actuators(&m.channels, None).unwrap_err();
-    assert_eq!(error.diagnostic().code, "no_position");
+    assert_eq!(error.diagnostic().code, "group_missing");
 }

@@ -69,7 +69,8 @@ fn conditional(is_conditional: bool) -> Mapping {
     let mut mapping =
         mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton));
     if is_conditional {
-        let when = SampleFilter { column: "state".into(), equals: vec![1.0], ..SampleFilter::default() };
+        let when =
+            SampleFilter { column: "state".into(), equals: vec![1.0.into()], ..SampleFilter::default() };
         mapping.channels.when.push(when);
     }
     mapping
@@ -166,7 +167,7 @@ fn a_condition_that_is_never_met_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let file = written(folder.path(), Laid { group_rows: 1000, page_rows: 100, is_coded: false });
     let mut never = conditional(true);
-    never.channels.when[0].equals = vec![7.0];
+    never.channels.when[0].equals = vec![7.0.into()];
     let read = read(&file, &never).unwrap();
     assert!(read.segments.is_empty() && read.motor_m.len() == ROWS && read.apart == ROWS);
     assert!(read.motor_m.iter().chain(&read.dx_m).all(|v| v.is_nan()) && read.missing_share == 0.0);
@@ -206,8 +207,11 @@ fn conditions_apply_to_each_actuator() {
         let read = |at| log.read_actuator(at, &mapping.channels, Geometry::Linear { lead_m_per_rev: None });
         positions.iter().map(|at| read(at).unwrap().segments).collect()
     };
-    let when =
-        |column: &str| SampleFilter { column: column.into(), equals: vec![1.0], ..SampleFilter::default() };
+    let when = |column: &str| SampleFilter {
+        column: column.into(),
+        equals: vec![1.0.into()],
+        ..SampleFilter::default()
+    };
     mapping.channels.when = vec![when("{position}_mode")];
     assert_eq!(segments(&mapping), [vec![50..100], vec![90..100]]);
     mapping.channels.when = vec![when("a_mode")];

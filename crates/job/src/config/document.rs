@@ -242,6 +242,9 @@ impl Default for TrendSettings {
     }
 }
 
+/// Groups of `identity.path` that hold the departure in two parts.
+const DEPARTURE_PARTS: [&str; 2] = ["departure_date", "departure_time"];
+
 impl Document {
     /// The JSON Schema of the file, every definition in its place.
     pub fn schema() -> serde_json::Value {
@@ -325,9 +328,9 @@ impl Document {
             }
             Some(Ok(regex)) => {
                 let facts = || IdentityField::ALL.iter().map(|fact| fact.as_str());
-                for group in
-                    regex.capture_names().flatten().filter(|group| !facts().any(|fact| fact == *group))
-                {
+                let is_known =
+                    |group: &&str| facts().any(|fact| fact == *group) || DEPARTURE_PARTS.contains(group);
+                for group in regex.capture_names().flatten().filter(|group| !is_known(group)) {
                     let c = Diagnostic::new(
                         "unknown_key",
                         format!("`{group}` in `identity.path` is no fact of a flight"),

@@ -4,11 +4,14 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use ingest::LogFiles;
+use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use job::flight_log::{identify, identify_companion};
 use rayon::prelude::*;
-use records::{Diagnostic, Flight, Position, TailNumber};
+use records::{Diagnostic, Flight, FlightId, Position, TailNumber};
 
+use crate::discovery::table_folders::{TableFolders, TableMembership};
+use crate::discovery::temporary_files::is_temporary;
 use crate::error::{Error, is_passing};
 use crate::run::discover_remote::{self};
 use crate::run::file_stat::SeenObjects;
@@ -67,6 +70,33 @@ pub fn log_containing(config: &Config, path: &Path) -> Result<LogFiles, Error> {
 
 type FlightIdentity = (Flight, Option<Position>);
 
+/// A file of the main logs, with the flight it belongs to or why that is unknown.
+type IdentifiedFile = (Result<FlightIdentity, Diagnostic>, String, PathBuf);
+
+/// Pieces of a flight depart within so long of each other: each may hold its own first instant as its departure.
+const MAX_BETWEEN_PIECES: SignedDuration = SignedDuration::from_hours(12);
+
+/// Gives pieces that name one flight the identity of its first piece, and puts them in order of departure.
+fn join_pieces(known: &mut [IdentifiedFile]) {
+    let departure = |file: &IdentifiedFile| file.0.as_ref().ok().map(|(flight, _)| flight.departure_utc);
+    known.sort_by(|a, b| departure(a).cmp(&departure(b)).then_with(|| a.1.cmp(&b.1)));
+    // The first piece of each flight, and when the latest one departed.
+    let mut flights: HashMap<(TailNumber, FlightId, Option<Position>), (FlightIdentity, Timestamp)> =
+        HashMap::new();
+    for who in known.iter_mut().filter_map(|(who, ..)| who.as_mut().ok()) {
+        let (flight, position) = &*who;
+        let departed = flight.departure_utc;
+        let key = (flight.tail_number.clone(), flight.flight_id.clone(), position.clone());
+        match flights.get_mut(&key) {
+            Some((first, latest)) if departed.duration_since(*latest) <= MAX_BETWEEN_PIECES => {
+                *latest = departed;
+                *who = first.clone();
+            }
+            _ => drop(flights.insert(key, (who.clone(), departed))),
+        }
+    }
+}
+
 /// Who the logs are, tail by tail, each with the name that its files go by.
 type IdentityIndex = HashMap<TailNumber, Vec<(FlightIdentity, String)>>;
 
@@ -75,10 +105,13 @@ fn group_files(
     main: Vec<(String, PathBuf)>,
     companions: Vec<(&str, (String, PathBuf))>,
 ) -> DiscoveredLogs {
-    let known: Vec<_> = main
+    let mut known: Vec<IdentifiedFile> = main
         .into_par_iter()
         .map(|(log_path, path)| (identify(&LogFiles::one(&path), &log_path, config), log_path, path))
         .collect();
+    if config.document.logs.pieces {
+        join_pieces(&mut known);
+    }
     let mut found = DiscoveredLogs::default();
     let mut whose = IdentityIndex::new();
     for (who, log_path, path) in known {
@@ -158,29 +191,34 @@ fn matching(
     unlisted: &mut BTreeMap<String, (PathBuf, Diagnostic)>,
 ) -> Result<Vec<(String, PathBuf)>, Error> {
     let mut found = BTreeMap::new();
-    let mut silent = BTreeSet::new();
+    let (mut silent, mut tables) = (BTreeSet::new(), TableFolders::default());
     // `**` reaches our own results and tables, which are no logs.
     let logs = &config.document.logs;
-    let tables: Vec<PathBuf> =
+    let user_tables: Vec<PathBuf> =
         std::iter::once(&logs.installations).chain(&logs.flights).map(|table| config.path(table)).collect();
     let store = config.store();
-    let ours = |path: &PathBuf| path.starts_with(&store) || tables.contains(path);
+    let ours = |path: &PathBuf| path.starts_with(&store) || user_tables.contains(path);
     let invalid = |pattern: &str, e: &dyn std::fmt::Display| {
         let what = format!("`{pattern}` is not a valid file pattern: {e}");
         Error::refused(config.at(pattern, Diagnostic::new("bad_pattern", what)))
     };
     for pattern in patterns {
         if object_io::is_address(pattern) {
-            let before = found.len();
-            let listed = discover_remote::each(pattern, |entry| {
-                if !ours(&entry.path) {
-                    found.insert(log_path(config, &entry.path), entry.path.clone());
-                    seen.insert(entry.path.clone(), entry.into());
+            let (mut tables, mut objects) = (TableFolders::default(), Vec::new());
+            let listed = discover_remote::each(pattern, &mut tables, |entry| {
+                if !ours(&entry.path) && !is_temporary(&entry.path, Path::new(pattern)) {
+                    objects.push(entry);
                 }
             })?;
             listed.map_err(|e| invalid(pattern, &e))?;
-            if found.len() == before {
+            let faults = unlisted.len();
+            objects.retain(|entry| is_log(config, &entry.path, tables.object(&entry.path), unlisted));
+            if objects.is_empty() && unlisted.len() == faults {
                 silent.insert(pattern.as_str());
+            }
+            for entry in objects {
+                found.insert(log_path(config, &entry.path), entry.path.clone());
+                seen.insert(entry.path.clone(), entry.into());
             }
             continue;
         }
@@ -188,6 +226,7 @@ fn matching(
         let folder = glob::Pattern::escape(&config.folder.to_string_lossy());
         let full = Path::new(&folder).join(pattern);
         let paths = glob::glob(&full.to_string_lossy()).map_err(|e| invalid(pattern, &e.msg))?;
+        let written = config.folder.join(pattern);
         let mut files = Vec::new();
         let faults = unlisted.len();
         for path in paths {
@@ -197,13 +236,17 @@ fn matching(
                     Err(e) => Err((path, e)),
                 });
             match listed {
-                Ok((path, is_file)) => files.extend((is_file && !ours(&path)).then_some(path)),
+                Ok((path, is_file)) => {
+                    let is_kept = is_file && !ours(&path) && !is_temporary(&path, &written);
+                    files.extend(is_kept.then_some(path));
+                }
                 Err((path, e)) => {
                     let log_path = log_path(config, &path);
                     unlisted.insert(log_path.clone(), (path.clone(), unreadable(&path, &log_path, &e)));
                 }
             }
         }
+        files.retain(|path| is_log(config, path, tables.local(path), unlisted));
         if files.is_empty() && unlisted.len() == faults {
             silent.insert(pattern.as_str());
         }
@@ -215,6 +258,22 @@ fn matching(
     } else {
         Err(Error::refused(no_log(config, &silent)))
     }
+}
+
+/// Whether a file is a log, by the table in whose folder it lies; a table that cannot be used is a fault.
+fn is_log(
+    config: &Config,
+    path: &Path,
+    membership: TableMembership,
+    unlisted: &mut BTreeMap<String, (PathBuf, Diagnostic)>,
+) -> bool {
+    if let TableMembership::Fault(at, diagnostic) = membership {
+        debug_assert!(path.starts_with(&at), "the fault of another table");
+        let shown = log_path(config, &at);
+        unlisted.insert(shown.clone(), (at, diagnostic.in_file(&shown)));
+        return false;
+    }
+    matches!(membership, TableMembership::Log)
 }
 
 /// Whether a path is a file; links that lead nowhere are errors, files that were deleted meanwhile are none.

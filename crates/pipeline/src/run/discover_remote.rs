@@ -4,6 +4,7 @@ use std::path::Path;
 
 use object_io::{Address, ListEntry};
 
+use crate::discovery::table_folders::TableFolders;
 use crate::error::Error;
 
 /// Keys are matched as files are: `*` stays within a folder, `**` does not.
@@ -13,12 +14,16 @@ const AS_FILES: glob::MatchOptions = glob::MatchOptions {
     require_literal_leading_dot: false,
 };
 
-/// Hands over every object that fits a pattern. Only the folder before its first wildcard is listed, and what
-/// does not fit is not kept.
+/// Hands over every object that fits a pattern, and notes the tables that are met. Only the folder before its first
+/// wildcard is listed, and what does not fit is not kept.
 ///
 /// # Errors
 /// [`Error::Objects`] when the store is not reachable; the text of an error in the pattern.
-pub(crate) fn each(pattern: &str, mut take: impl FnMut(ListEntry)) -> Result<Result<(), String>, Error> {
+pub(crate) fn each(
+    pattern: &str,
+    tables: &mut TableFolders,
+    mut take: impl FnMut(ListEntry),
+) -> Result<Result<(), String>, Error> {
     let address = Address::parse_required(pattern)?;
     let wanted = match glob::Pattern::new(address.key()) {
         Ok(wanted) => wanted,
@@ -37,6 +42,7 @@ pub(crate) fn each(pattern: &str, mut take: impl FnMut(ListEntry)) -> Result<Res
     let folder = address.key()[..first].rsplit_once('/').map_or("", |(folder, _)| folder);
     let root = address.bucket_url();
     object_io::list(&address.with_key(folder), |entry| {
+        tables.note(&entry.path);
         let key = entry.path.to_str().and_then(|text| text.strip_prefix(&root));
         if key.is_some_and(|key| wanted.matches_with(key, AS_FILES)) {
             take(entry);

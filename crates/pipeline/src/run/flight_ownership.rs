@@ -6,7 +6,7 @@
 use std::collections::{BTreeSet, HashMap};
 
 use job::Config;
-use job::flight_log::sample_digest;
+use job::flight_log::{duplicate_flight, sample_digest};
 use records::{Diagnostic, GapRecord, Installations};
 use store::{LogOutcome, LogRecord, LogResult, RecordKey};
 
@@ -185,12 +185,7 @@ fn superseded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> (LogR
         account.error_detail = Some(format!("copy of {}", owner.log_path));
         return (account, Vec::new());
     }
-    let diagnostic = Diagnostic::new(
-        "duplicate_flight",
-        format!("another log holds the same flight: {}", owner.log_path),
-    )
-    .in_file(&account.log_path)
-    .hint("the log whose name sorts first is used; remove one of them, or map an identity that separates the flights");
+    let diagnostic = duplicate_flight(&account.log_path, &owner.log_path);
     summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
     (account, vec![diagnostic])
 }

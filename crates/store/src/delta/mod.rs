@@ -4,6 +4,7 @@ pub(crate) mod data_file;
 pub(crate) mod digested_log;
 pub(crate) mod durable_fs;
 pub(crate) mod file_stats;
+pub(crate) mod foreign_table;
 pub(crate) mod location;
 pub(crate) mod log_digests;
 pub(crate) mod snapshot;

@@ -1,13 +1,12 @@
 //! `check`: shows how logs are mapped, channel by channel, and what would be refused; reports no gap, writes nothing.
 
-use records::uncertainty::NORMAL_95;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::sync::Arc;
 
 use ingest::channel::quality;
 use ingest::{ActuatorChannels, ActuatorColumns, LogFiles, Quality};
-use job::flight_log::FlightLog;
+use job::flight_log::{FlightLog, duplicate_flight, sample_digest};
 use job::{Config, estimate, rejection};
 use pipeline::run::discover;
 use pipeline::time_limit::within_time_limit;
@@ -31,6 +30,12 @@ const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=20e3;
 /// Note on the slope of screw on motor.
 const RATIO: &str = "screw/motor ratio";
 
+/// More logs than these are summarised, one line each.
+const MOST_WHOLE_LOGS: usize = 3;
+
+/// Why page checksums matter, and how to write them.
+const NO_CHECKSUMS: &str = "silent corruption would not be detected (`write_page_checksum=True` in pyarrow)";
+
 /// Replaces the channel table if no actuator could be checked.
 const NOTHING: &str = "  no actuator could be checked; see errors above\n";
 
@@ -40,27 +45,36 @@ const NOTHING: &str = "  no actuator could be checked; see errors above\n";
 /// If configuration or tables are wrong. Failed logs make the exit code 1.
 pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
-    let logs = logs(args, &config, output)?;
+    let (logs, faults) = logs(args, &config, output)?;
     let count = logs.len();
     let (config, installations) = (Arc::new(config), Arc::new(installations));
     let (mut seen, mut schemas) = (CheckSummary::default(), ColumnTypes::default());
+    let mut flights = FlightOwners::default();
+    seen.diagnostics.extend(faults);
     for (files, name) in logs {
         let (of_log, installed, shown) = (Arc::clone(&config), Arc::clone(&installations), name.clone());
+        let own_files = files.clone();
         let looked = within_time_limit(&name, &config, move || {
             let opened = FlightLog::open(&files, &shown, &of_log, &installed)?;
-            Ok((opened.column_types(), one(&opened, &shown, &of_log, &installed)))
+            let keys = flight_keys(&opened, &installed);
+            let digest = opened.digest.clone();
+            Ok((opened.column_types(), one(&opened, &shown, &of_log, &installed), keys, digest))
         });
         match looked {
-            Ok((types, found)) => {
+            Ok((types, found, keys, digest)) => {
                 schemas.enter(&name, &types);
                 seen.extend(found);
+                let log = CheckedLog { files: own_files, name, digest };
+                seen.diagnostics.extend(flights.enter(log, keys, &config, &installations));
             }
             Err(diagnostic) => seen.diagnostics.push(diagnostic),
         }
     }
-    let CheckSummary { channels, facts, rejections, mut diagnostics, page } = seen;
+    let CheckSummary { channels, facts, rejections, mut diagnostics, page, overview } = seen;
     let failed = diagnostics.len();
     diagnostics.extend(mapping_faults(&rejections));
+    let is_short = count > MOST_WHOLE_LOGS && args.rows.output.is_none() && !output.is_verbose();
+    let page = if is_short { overview.page(&channels) } else { page };
     let table = || {
         format!(
             "{page}{}{}{}",
@@ -78,23 +92,124 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
     Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
 }
 
-fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<Vec<(LogFiles, String)>, Failure> {
+type NamedLogs = Vec<(LogFiles, String)>;
+
+/// The logs to be checked, and the faults of what cannot be listed.
+fn logs(args: &CheckArgs, config: &Config, output: &Output) -> Result<(NamedLogs, Vec<Diagnostic>), Failure> {
     if !args.logs.is_empty() {
         let whole =
             |path: &std::path::PathBuf| Ok((discover::log_containing(config, path)?, display_path(path)));
-        return args.logs.iter().map(whole).collect();
+        return Ok((args.logs.iter().map(whole).collect::<Result<_, Failure>>()?, Vec::new()));
     }
     let found = discover::discover(config)?;
     for stray in &found.strays {
         output.note(&format!("{stray}: no matching main log for this flight; not used"));
     }
-    let faulty = found.faulty.into_iter().map(|(name, (path, _))| (LogFiles::one(path), name));
-    let mut logs: Vec<_> = found.logs.into_iter().map(|(name, files)| (files, name)).chain(faulty).collect();
+    let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
+    let mut logs: Vec<_> = found.logs.into_iter().map(|(name, files)| (files, name)).collect();
     if logs.len() > args.limit {
         output.note(&format!("checking {} of {} logs; use `--limit` to check more", args.limit, logs.len()));
         logs.truncate(args.limit);
     }
-    Ok(logs)
+    Ok((logs, faults))
+}
+
+/// Departure, tail, flight and position: what one log holds, no other may.
+type FlightKey = (jiff::Timestamp, String, String, String);
+
+fn flight_keys(opened: &FlightLog, installations: &Installations) -> Vec<FlightKey> {
+    let id = &opened.identity;
+    let key = |at: &ActuatorColumns| {
+        (id.departure_utc, id.tail_number.to_string(), id.flight_id.to_string(), at.position.to_string())
+    };
+    opened.actuators(installations).map(key).collect()
+}
+
+/// A log that was opened.
+struct CheckedLog {
+    files: LogFiles,
+    name: String,
+    digest: String,
+}
+
+/// The log of each flight and position: another log of the same flight is an error in a run, too.
+#[derive(Default)]
+struct FlightOwners {
+    owners: BTreeMap<FlightKey, usize>,
+    logs: Vec<CheckedLog>,
+}
+
+impl FlightOwners {
+    /// Enters a log; an error where another log holds its flight with other samples.
+    fn enter(
+        &mut self,
+        log: CheckedLog,
+        keys: Vec<FlightKey>,
+        config: &Config,
+        installations: &Installations,
+    ) -> Option<Diagnostic> {
+        let own = self.logs.len();
+        let owners = keys.into_iter().map(|key| *self.owners.entry(key).or_insert(own));
+        let other = owners.filter(|owner| *owner != own).min();
+        let first = other.map(|other| &self.logs[other]).filter(|first| first.digest != log.digest);
+        let samples = |log: &CheckedLog| sample_digest(&log.files, &log.name, config, installations).ok();
+        let fault = first.and_then(|first| {
+            let is_copy = samples(first).is_some_and(|digest| samples(&log) == Some(digest));
+            (!is_copy).then(|| duplicate_flight(&log.name, &first.name))
+        });
+        self.logs.push(log);
+        fault
+    }
+}
+
+/// One line for each log, and each note once.
+#[derive(Default)]
+struct Overview {
+    lines: Vec<Vec<String>>,
+    without_checksums: usize,
+}
+
+impl Overview {
+    fn page(&self, channels: &[Channel]) -> String {
+        let columns = [
+            text("log", 0),
+            text("tail", 3),
+            text("flight", 2),
+            text("departed", 4),
+            number("rows", 5),
+            text("clock", 0),
+            number("actuators", 0),
+            number("notes", 1),
+        ];
+        let mut page = table::layout(&columns, &self.lines);
+        // Ratios differ from log to log, and mean the same.
+        let kind = |channel: &Channel| {
+            let note = channel.note.as_deref().unwrap_or_default();
+            if note.starts_with(RATIO) {
+                format!("{RATIO} differs from 1: check sign, unit, lead or gear ratio")
+            } else {
+                note_of(channel)
+            }
+        };
+        let mut notes: BTreeMap<(&str, String), (usize, &Channel)> = BTreeMap::new();
+        for channel in channels.iter().filter(|channel| is_warning(channel)) {
+            notes.entry((channel.channel, kind(channel))).or_insert((0, channel)).0 += 1;
+        }
+        for ((channel, note), (count, first)) in notes {
+            let _ = writeln!(page, "{count} × {channel}: {note} (first {}, {})", first.log, first.position);
+        }
+        if self.without_checksums > 0 {
+            let logs = table::count(self.without_checksums, "log");
+            let _ = writeln!(page, "{logs} without page checksums: {NO_CHECKSUMS}");
+        }
+        page.push_str("channels of each log: -v, --json, or name at most three logs\n\n");
+        page
+    }
+}
+
+/// The note of a channel, with its remedy.
+fn note_of(channel: &Channel) -> String {
+    channel.note.iter().map(String::as_str).chain(channel.remedy).collect::<Vec<_>>().join(": ")
 }
 
 records::row! {
@@ -132,6 +247,7 @@ struct CheckSummary {
     rejections: Rejections,
     diagnostics: Vec<Diagnostic>,
     page: String,
+    overview: Overview,
 }
 
 impl CheckSummary {
@@ -139,6 +255,8 @@ impl CheckSummary {
         self.channels.extend(log.channels);
         self.diagnostics.extend(log.diagnostics);
         self.page.push_str(&log.page);
+        self.overview.lines.extend(log.overview.lines);
+        self.overview.without_checksums += log.overview.without_checksums;
         for (part, found) in log.facts {
             self.facts.entry(part).or_default().extend(found);
         }
@@ -177,7 +295,7 @@ struct ActuatorCheck {
 fn one(opened: &FlightLog, name: &str, config: &Config, installations: &Installations) -> CheckSummary {
     let id = &opened.identity;
     let mut seen = CheckSummary::default();
-    let CheckSummary { channels, facts, rejections, diagnostics, page } = &mut seen;
+    let CheckSummary { channels, facts, rejections, diagnostics, page, overview } = &mut seen;
     let mut clocks = Vec::new();
     for at in opened.actuators(installations) {
         match actuator(opened, name, at, config, installations) {
@@ -200,12 +318,25 @@ fn one(opened: &FlightLog, name: &str, config: &Config, installations: &Installa
     }
     clocks.dedup();
     let checksums = match opened.is_checked() {
-        Ok(true) => "all pages have checksums",
+        Ok(true) => "all pages have checksums".to_owned(),
         Ok(false) => {
-            "no page checksums: silent corruption would not be detected (`write_page_checksum=True` in pyarrow)"
+            overview.without_checksums += 1;
+            format!("no page checksums: {NO_CHECKSUMS}")
         }
-        Err(_) => "page headers cannot be read",
+        Err(_) => "page headers cannot be read".to_owned(),
     };
+    let positions: BTreeSet<&str> = channels.iter().map(|channel| channel.position.as_str()).collect();
+    let notes = channels.iter().filter(|channel| is_warning(channel)).count();
+    overview.lines.push(vec![
+        name.to_owned(),
+        id.tail_number.to_string(),
+        id.flight_id.to_string(),
+        id.departure_utc.to_string(),
+        opened.rows().to_string(),
+        clocks.first().cloned().unwrap_or_default(),
+        positions.len().to_string(),
+        notes.to_string(),
+    ]);
     let clocks = if clocks.is_empty() { String::new() } else { format!(", {}", clocks.join("; ")) };
     let _ = writeln!(
         page,
@@ -367,9 +498,27 @@ fn describe(base: Channel, q: Quality, flags: &[&str]) -> Channel {
         frozen_share: Some(q.frozen_share),
         saturated_share: Some(q.saturated_share),
         spikes: Some(q.spikes as i64),
-        note: still.or_else(|| (!flags.is_empty()).then(|| flags.join(", "))),
+        note: still.or_else(|| {
+            let flagged = (!flags.is_empty()).then(|| flags.join(", "));
+            let notes: Vec<String> = flagged.into_iter().chain(slower_channel(base.channel, &q)).collect();
+            (!notes.is_empty()).then(|| notes.join("; "))
+        }),
         ..base
     }
+}
+
+/// A position that holds a value in every second row, or fewer, is recorded more slowly than its rows.
+fn slower_channel(channel: &str, q: &Quality) -> Option<String> {
+    const LEAST_MISSING: f64 = 0.4;
+    let is_position = channel.ends_with("_position");
+    let is_slower = q.missing_share > LEAST_MISSING && q.missing_share < 1.0;
+    (is_position && is_slower).then(|| {
+        format!(
+            "{:.0} % of its rows are empty: if it is recorded more slowly, set its `rate_hz = {:.6}`",
+            100.0 * q.missing_share,
+            q.rate_hz
+        )
+    })
 }
 
 fn layout(channels: &[Channel]) -> String {
@@ -408,7 +557,7 @@ fn layout(channels: &[Channel]) -> String {
             share(c.missing_share),
             share(c.frozen_share),
             c.spikes.map_or_else(table::empty_cell, |n| n.to_string()),
-            c.note.iter().map(String::as_str).chain(c.remedy).collect::<Vec<_>>().join(": "),
+            note_of(c),
         ]
     };
     table::layout(&columns, &channels.iter().map(cells).collect::<Vec<_>>())

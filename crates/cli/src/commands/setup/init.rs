@@ -1,13 +1,16 @@
 //! `init`: writes a commented configuration, its JSON schema and an example table; never overwrites a file.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
 use std::fs::{self, OpenOptions};
 use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
-use ingest::Role;
-use ingest::log::infer_mapping::{InferredMapping, path_identity, propose};
+use ingest::infer::{InferredMapping, folder_value, path_identity, path_tail, propose};
 use ingest::mapping::IdentityField;
+use ingest::mapping::units::Unit;
+use ingest::{Layout, Role};
+use pipeline::discovery::temporary_files::is_temporary;
 
 use crate::args::InitArgs;
 use crate::exit::{Code, Failure};
@@ -54,9 +57,10 @@ pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
     let [mut toml, mut table] = FILES.map(|(_, text)| text.to_owned());
     if let Some(folder) = &args.from {
         let logs = logs(folder)?;
-        let offer = propose(&logs[0]).map_err(|e| Failure::Refused(vec![e.diagnostic()]))?;
-        toml = proposed(folder, &args.dir, &logs[0], &offer)?;
-        table = installation_rows(&logs, &offer).unwrap_or(table);
+        let proposal = Proposal::of(folder, &logs)?;
+        toml = proposed(folder, &args.dir, &proposal)?;
+        // Without a tail and a position there is no row: a serial number is never invented for one.
+        table = installation_rows(&proposal.logs, &proposal.offer).unwrap_or_else(|| STAYS.to_owned());
     }
     fs::create_dir_all(&args.dir)?;
     for ((name, _), text) in FILES.iter().zip([toml, table]) {
@@ -80,8 +84,8 @@ fn write(path: &Path, text: &str, output: &Output) -> Result<(), Failure> {
 /// All Parquet files below a folder; an error if there is none.
 fn logs(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let pattern = glob::Pattern::escape(&folder.to_string_lossy());
-    let found: Vec<PathBuf> =
-        glob::glob(&format!("{pattern}/**/*.parquet")).into_iter().flatten().flatten().collect();
+    let found = glob::glob(&format!("{pattern}/**/*.parquet")).into_iter().flatten().flatten();
+    let found: Vec<PathBuf> = found.filter(|path| !is_temporary(path, folder)).collect();
     if found.is_empty() {
         let what = format!("no *.parquet files found under {}", display_path(folder));
         return Err(Failure::usage("no_log_matched", what, "give the folder that holds your logs"));
@@ -89,36 +93,150 @@ fn logs(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(found)
 }
 
+/// The mapping of the logs below a folder, and of the files of other kinds that belong to them.
+struct Proposal<'p> {
+    /// The main logs, and the first of them.
+    logs: Vec<PathBuf>,
+    log: &'p Path,
+    offer: InferredMapping,
+    /// The folder of the main logs below the given one, if others hold groups.
+    main: Option<String>,
+    /// Groups by their folder, with what their files offer and the channels that they alone hold.
+    groups: BTreeMap<String, (InferredMapping, Vec<Role>)>,
+}
+
+impl<'p> Proposal<'p> {
+    /// Logs whose channels lie in several folders, each with a part of them, are a main log and groups.
+    fn of(folder: &Path, logs: &'p [PathBuf]) -> Result<Self, Failure> {
+        let offer_of = |log: &Path| propose(log).map_err(|e| Failure::Refused(vec![e.diagnostic()]));
+        let kind = |log: &PathBuf| -> Option<String> {
+            let below = log.strip_prefix(folder).ok()?.parent()?;
+            Some(below.components().next()?.as_os_str().to_str()?.to_owned())
+        };
+        let mut firsts: BTreeMap<String, &PathBuf> = BTreeMap::new();
+        for log in logs {
+            if let Some(kind) = kind(log) {
+                firsts.entry(kind).or_insert(log);
+            }
+        }
+        let whole = Self {
+            logs: logs.to_vec(),
+            log: &logs[0],
+            offer: offer_of(&logs[0])?,
+            main: None,
+            groups: BTreeMap::new(),
+        };
+        let lacks = |offer: &InferredMapping, role: &Role| !offer.channels.contains_key(role);
+        let is_whole = !Role::NEEDED.iter().any(|role| lacks(&whole.offer, role));
+        if is_whole || !(2..=MOST_GROUPS).contains(&firsts.len()) {
+            return Ok(whole);
+        }
+        let mut offers = BTreeMap::new();
+        for (kind, log) in &firsts {
+            offers.insert(kind.clone(), (offer_of(log)?, *log));
+        }
+        let holder = |role: Role| offers.iter().find(|(_, (offer, _))| offer.channels.contains_key(&role));
+        let Some((main, (offer, log))) = holder(Role::Motor) else { return Ok(whole) };
+        let mut groups: BTreeMap<String, (InferredMapping, Vec<Role>)> = BTreeMap::new();
+        for role in Role::ALL.into_iter().filter(|role| lacks(offer, role)) {
+            if let Some((kind, (of_group, _))) = holder(role) {
+                groups.entry(kind.clone()).or_insert_with(|| (of_group.clone(), Vec::new())).1.push(role);
+            }
+        }
+        let mut offer = offer.clone();
+        for (of_group, roles) in groups.values() {
+            for role in roles {
+                offer.channels.insert(*role, of_group.channels[role].clone());
+                offer
+                    .alternatives
+                    .extend(of_group.alternatives.get(role).map(|others| (*role, others.clone())));
+            }
+        }
+        let is_main = |log: &&PathBuf| kind(log).as_ref() == Some(main);
+        let logs = logs.iter().filter(is_main).cloned().collect();
+        Ok(Self { logs, log, offer, main: Some(main.clone()), groups })
+    }
+
+    fn group_of(&self, role: Role) -> Option<&str> {
+        self.groups.iter().find(|(_, (_, roles))| roles.contains(&role)).map(|(name, _)| name.as_str())
+    }
+}
+
+/// Folders of more kinds than this are tails or days, not groups.
+const MOST_GROUPS: usize = 6;
+
 /// Installations table with a placeholder unit per tail and position, if the logs name both.
 fn installation_rows(logs: &[PathBuf], offer: &InferredMapping) -> Option<String> {
-    let by_folder = |log: &PathBuf| {
-        path_identity(log)?;
-        Some(log.parent()?.file_name()?.to_str()?.to_owned())
+    let folder = |log: &Path, fact| folder_value(log, offer.folders.get(&fact)?);
+    let tail = |log: &PathBuf| {
+        let own = offer.tail.is_some().then(|| propose(log).ok()?.tail).flatten();
+        own.or_else(|| folder(log, IdentityField::TailNumber)).or_else(|| path_tail(log))
     };
-    let named = offer.metadata.contains_key(&IdentityField::TailNumber);
-    let tail = |log: &PathBuf| if named { propose(log).ok()?.tail } else { by_folder(log) };
     let is_plain = |name: &String| !name.contains(['"', ',', '#', '\n']);
-    let tails: BTreeSet<String> = logs.iter().take(MOST_LOGS).filter_map(tail).filter(is_plain).collect();
-    let positions = || offer.positions.iter().filter(|name| is_plain(name));
-    let row =
-        |tail: &String, position| format!("{tail},{position},EMA-27-1040,{tail} {position},1970-01-01,\n");
-    let rows: Vec<String> = tails.iter().flat_map(|t| positions().map(move |p| row(t, p))).collect();
+    let mut places: BTreeSet<(String, String)> = BTreeSet::new();
+    for log in logs.iter().take(MOST_LOGS) {
+        let Some(tail) = tail(log).filter(is_plain) else { continue };
+        let own = folder(log, IdentityField::Position);
+        let positions = own.iter().chain(offer.positions.iter().filter(|_| own.is_none()));
+        places
+            .extend(positions.filter(|name| is_plain(name)).map(|position| (tail.clone(), position.clone())));
+    }
+    let row = |(tail, position): &(String, String)| {
+        format!("{tail},{position},EMA-27-1040,{tail} {position},1970-01-01,\n")
+    };
+    let rows: Vec<String> = places.iter().map(row).collect();
     (!rows.is_empty()).then(|| format!("{STAYS}{}", rows.concat()))
 }
 
 /// Template with the mapping inferred from the logs below a folder, to be verified with `check`.
-fn proposed(folder: &Path, dir: &Path, log: &Path, offer: &InferredMapping) -> Result<String, Failure> {
+fn proposed(folder: &Path, dir: &Path, proposal: &Proposal<'_>) -> Result<String, Failure> {
     let (head, rest) = TEMPLATE.split_once("# Which flight a log is.").unwrap_or((TEMPLATE, ""));
     let (_, tail) = rest.split_once("[estimate]").unwrap_or(("", rest));
-    let here = dir == Path::new(".") || folder.is_absolute();
-    let folder = if here { folder.to_owned() } else { std::path::absolute(folder)? };
-    let files = format!("files = [{:?}]", format!("{}/**/*.parquet", display_path(&folder)));
-    let head = head.replace("files = [\"logs/**/*.parquet\"]", &files);
-    Ok(format!("{head}{}[estimate]{tail}", mapping(offer, log)))
+    let folder = relative(folder, dir)?;
+    let below = |kind: Option<&String>| {
+        let deeper = kind.map_or_else(String::new, |kind| format!("/{kind}"));
+        format!("{:?}", format!("{}{deeper}/**/*.parquet", display_path(&folder)))
+    };
+    let files = format!("files = [{}]", below(proposal.main.as_ref()));
+    let mut head = head.replace("files = [\"logs/**/*.parquet\"]", &files);
+    for (kind, (offer, _)) in &proposal.groups {
+        let _ = write!(head, "[group.{kind}]\nfiles = [{}]\n\n", below(Some(kind)));
+        if offer.clock != proposal.offer.clock {
+            let _ = write!(head, "[group.{kind}.clock]\n{}\n", clock(offer));
+        }
+        if offer.layout != Layout::default() {
+            let _ = write!(head, "[group.{kind}.layout]\n{}\n", layout(&offer.layout));
+        }
+    }
+    Ok(format!("{head}{}[estimate]{tail}", mapping(proposal)))
+}
+
+/// A folder as it is named from another one; as it is where they share no root.
+fn relative(folder: &Path, from: &Path) -> Result<PathBuf, Failure> {
+    if folder.is_absolute() {
+        return Ok(folder.to_owned());
+    }
+    let plain = |path: &Path| -> Result<PathBuf, Failure> {
+        let mut found = PathBuf::new();
+        for part in std::path::absolute(path)?.components() {
+            match part {
+                Component::CurDir => {}
+                Component::ParentDir => drop(found.pop()),
+                part => found.push(part),
+            }
+        }
+        Ok(found)
+    };
+    let (folder, from) = (plain(folder)?, plain(from)?);
+    let shared = folder.components().zip(from.components()).take_while(|(a, b)| a == b).count();
+    let up = from.components().skip(shared).map(|_| Component::ParentDir);
+    let found: PathBuf = up.chain(folder.components().skip(shared)).collect();
+    Ok(if found.as_os_str().is_empty() { PathBuf::from(".") } else { found })
 }
 
 /// Inferred part of the configuration; keys that could not be inferred are left to fill in.
-fn mapping(offer: &InferredMapping, log: &Path) -> String {
+fn mapping(proposal: &Proposal<'_>) -> String {
+    let Proposal { offer, log, .. } = proposal;
     let positions: Vec<&str> = offer.positions.iter().map(String::as_str).collect();
     let positions = if positions.is_empty() { "none".to_owned() } else { positions.join(", ") };
     let others: Vec<&str> = offer.others.iter().take(12).map(String::as_str).collect();
@@ -128,7 +246,17 @@ fn mapping(offer: &InferredMapping, log: &Path) -> String {
         (Role::Load, "load", "N"),
     ];
     let channels =
-        channels.map(|(role, name, usual)| format!("\n[channel.{name}]\n{}", channel(offer, role, usual)));
+        channels.map(|(role, name, usual)| format!("\n[channel.{name}]\n{}", channel(proposal, role, usual)));
+    let temperature = if offer.channels.contains_key(&Role::Temperature) {
+        format!("\n[channel.temperature]\n{}", channel(proposal, Role::Temperature, "degC"))
+    } else {
+        String::new()
+    };
+    let rows = if offer.layout == Layout::default() {
+        String::new()
+    } else {
+        format!("\n[layout]\n{}", layout(&offer.layout))
+    };
     [
         format!(
             "# Inferred from {}: verify names, units and signs with `freeplay check`.\n",
@@ -136,8 +264,10 @@ fn mapping(offer: &InferredMapping, log: &Path) -> String {
         ),
         format!("# Positions found: {positions}.\n\n[identity]\n{}", identity(offer, log)),
         "# Time zone of departures without one.\ntime_zone = \"UTC\"\n".to_owned(),
+        rows,
         format!("\n[clock]\n{}", clock(offer)),
         channels.concat(),
+        temperature,
         if others.is_empty() {
             "\n".to_owned()
         } else {
@@ -147,24 +277,54 @@ fn mapping(offer: &InferredMapping, log: &Path) -> String {
     .concat()
 }
 
+fn layout(layout: &Layout) -> String {
+    let keys = [
+        ("name_column", &layout.name_column),
+        ("value_column", &layout.value_column),
+        ("position_column", &layout.position_column),
+    ];
+    keys.iter().filter_map(|(key, column)| Some(format!("{key} = {:?}\n", column.as_ref()?))).collect()
+}
+
 fn identity(offer: &InferredMapping, log: &Path) -> String {
-    if offer.metadata.is_empty() {
-        let found = path_identity(log);
-        let remark = match found {
-            Some(_) => "# No identity in the file metadata; inferred from the path.\n",
-            None => "# TODO: no tail/departure found in metadata or path; set path, folders or columns\n",
-        };
-        let (path, format) = found.unwrap_or_else(|| {
-            (
-                r"(?<tail_number>[^/]+)/(?<departure_utc>\d{8}T\d{6}Z)[^/]*\.parquet$".to_owned(),
-                "%Y%m%dT%H%M%SZ",
-            )
-        });
-        return format!("{remark}path = '{path}'\ndeparture_format = \"{format}\"\n");
+    let table = |key: &str, facts: &BTreeMap<IdentityField, String>| {
+        let facts: Vec<String> =
+            facts.iter().map(|(fact, name)| format!("{} = {name:?}", fact.as_str())).collect();
+        if facts.is_empty() { String::new() } else { format!("{key} = {{ {} }}\n", facts.join(", ")) }
+    };
+    let mut text = [
+        table("metadata", &offer.metadata),
+        table("columns", &offer.columns),
+        table("folders", &offer.folders),
+    ]
+    .concat();
+    let has = |fact| {
+        [&offer.metadata, &offer.columns, &offer.folders].iter().any(|facts| facts.contains_key(&fact))
+    };
+    if has(IdentityField::TailNumber) && has(IdentityField::DepartureUtc) {
+        return text;
     }
-    let facts: Vec<String> =
-        offer.metadata.iter().map(|(fact, key)| format!("{} = {key:?}", fact.as_str())).collect();
-    format!("metadata = {{ {} }}\n", facts.join(", "))
+    match path_identity(log) {
+        Some((path, format)) => {
+            text.push_str(
+                "# Not all of the identity is in metadata or columns; the rest is inferred from the path.\n",
+            );
+            let _ = writeln!(text, "path = '{path}'\ndeparture_format = {format:?}");
+        }
+        None if has(IdentityField::TailNumber) => {
+            text.push_str("# No departure was found: it is the first timestamp if the clock has a date.\n");
+        }
+        None => {
+            text.push_str(
+                "# TODO: no tail/departure found in metadata or path; set path, folders or columns\n",
+            );
+            text.push_str(
+                "path = '(?<tail_number>[^/]+)/(?<departure_utc>\\d{8}T\\d{6}Z)[^/]*\\.parquet$'\n",
+            );
+            text.push_str("departure_format = \"%Y%m%dT%H%M%SZ\"\n");
+        }
+    }
+    text
 }
 
 fn clock(offer: &InferredMapping) -> String {
@@ -179,14 +339,33 @@ fn clock(offer: &InferredMapping) -> String {
     }
 }
 
-fn channel(offer: &InferredMapping, role: Role, usual: &str) -> String {
-    match offer.channels.get(&role) {
+fn channel(proposal: &Proposal<'_>, role: Role, usual: &str) -> String {
+    let offer = &proposal.offer;
+    let mut text = match offer.channels.get(&role) {
         Some((column, Some(unit))) => format!("column = {column:?}\nunit = {:?}\n", unit.as_str()),
         Some((column, None)) => {
             format!("column = {column:?}\nunit = {usual:?}          # a guess: the name has no unit\n")
         }
         None => format!("column = \"\"           # no column was recognised\nunit = {usual:?}\n"),
+    };
+    if let Some(group) = proposal.group_of(role) {
+        let _ = writeln!(text, "group = {group:?}");
     }
+    let turn = offer.motor_wraps_at.filter(|_| role == Role::Motor);
+    if let Some(turn) = turn {
+        let _ = writeln!(text, "wraps_at = {turn:?}");
+    }
+    let own_unit = offer.channels.get(&role).and_then(|(_, unit)| *unit);
+    let other = |(column, unit): &(String, Option<Unit>)| {
+        let unit = unit.or(own_unit).map_or(usual, |unit| unit.as_str());
+        let wraps = turn.map_or_else(String::new, |turn| format!(", wraps_at = {turn:?}"));
+        format!("{{ column = {column:?}, unit = {unit:?}{wraps} }}")
+    };
+    if let Some(others) = offer.alternatives.get(&role) {
+        let others: Vec<String> = others.iter().map(other).collect();
+        let _ = writeln!(text, "alternatives = [{}]", others.join(", "));
+    }
+    text
 }
 
 fn exists(path: &Path) -> Failure {
@@ -210,6 +389,6 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let table = dir.path().join("installations.csv");
         fs::write(&table, FILES[1].1).unwrap();
-        assert!(ingest::tables::installations(&table, &std::collections::BTreeMap::new()).is_ok());
+        assert!(ingest::tables::installations(&table, &BTreeMap::new()).is_ok());
     }
 }

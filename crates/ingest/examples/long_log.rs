@@ -1,0 +1,51 @@
+//! Time to read every actuator of a long log: `long_log LOG.parquet NAME_COLUMN VALUE_COLUMN TIME_COLUMN`.
+//!
+//! Names are `POSITION_motor_deg`, `POSITION_screw_mm` and `POSITION_load_n`; times are in seconds. `docs/performance.md`
+//! compares the CPU time of the process with that of a filter in Polars.
+
+#![expect(clippy::print_stdout, reason = "an example prints what it measured")]
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use ingest::mapping::units::{TimeUnit, Unit};
+use ingest::{ChannelMapping, Channels, ClockMapping, Geometry, Layout, Log, LogFiles, Mapping};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let [log, name, value, time] = args.as_slice() else { return Err("four arguments are needed".into()) };
+    let channel = |column: &str, unit| ChannelMapping { column: column.into(), unit, ..Default::default() };
+    let mapping = Arc::new(Mapping {
+        clock: ClockMapping {
+            column: Some(time.clone()),
+            unit: Some(TimeUnit::Second),
+            ..ClockMapping::default()
+        },
+        layout: Layout {
+            name_column: Some(name.clone()),
+            value_column: Some(value.clone()),
+            ..Layout::default()
+        },
+        channels: Channels {
+            motor_position: channel("{position}_motor_deg", Unit::Degree),
+            screw_position: Some(channel("{position}_screw_mm", Unit::Millimetre)),
+            load: channel("{position}_load_n", Unit::Newton),
+            ..Channels::default()
+        },
+        ..Mapping::default()
+    });
+    let begun = Instant::now();
+    let log = Log::open(&LogFiles::one(log), &mapping)?;
+    let actuators = log.actuators(&mapping.channels, None)?;
+    let used: Vec<_> =
+        actuators.iter().filter(|at| at.lacking.is_empty()).map(|at| (&mapping.channels, at)).collect();
+    log.announce(&used)?;
+    let mut samples = 0;
+    for (channels, at) in &used {
+        let read = log.read_actuator(at, channels, Geometry::Linear { lead_m_per_rev: Some(0.005) })?;
+        samples += read.dx_m.len();
+        read.recycle_buffers();
+    }
+    println!("{} actuators, {samples} samples, {:.3} s", used.len(), begun.elapsed().as_secs_f64());
+    Ok(())
+}

@@ -1,0 +1,199 @@
+//! Names of columns: the words that name a channel, a unit, a redundant sensor or a position.
+
+use crate::mapping::Role;
+use crate::mapping::column_pattern::PLACEHOLDER;
+use crate::mapping::units::{Dimension, Unit};
+
+/// A name's words: cut at what is no letter or digit, and where a capital follows a small letter.
+fn words(name: &str) -> Vec<(usize, &str)> {
+    let mut found = Vec::new();
+    let mut start = None;
+    let mut before = ' ';
+    for (at, c) in name.char_indices().chain(std::iter::once((name.len(), ' '))) {
+        let is_cut = !c.is_alphanumeric() || (c.is_uppercase() && before.is_lowercase());
+        if let (true, Some(from)) = (is_cut, start) {
+            found.push((from, &name[from..at]));
+            start = None;
+        }
+        if c.is_alphanumeric() && start.is_none() {
+            start = Some(at);
+        }
+        before = c;
+    }
+    found
+}
+
+const TIMES: [&str; 9] = ["time", "t", "timestamp", "stamp", "elapsed", "tick", "ticks", "clock", "utc"];
+
+pub(super) fn is_time(name: &str) -> bool {
+    words(name).iter().any(|(_, word)| TIMES.contains(&word.to_lowercase().as_str()))
+}
+
+pub(super) fn time_unit(name: &str) -> Option<&'static str> {
+    let units = [
+        ("s", "s"),
+        ("sec", "s"),
+        ("seconds", "s"),
+        ("ms", "ms"),
+        ("us", "us"),
+        ("ns", "ns"),
+        ("min", "min"),
+        ("h", "h"),
+        ("hours", "h"),
+    ];
+    let word = words(name).last()?.1.to_lowercase();
+    units.iter().find(|(said, _)| *said == word).map(|(_, unit)| *unit)
+}
+
+const ROLES: [(Role, &[&str]); 4] = [
+    (Role::Motor, &["motor", "mot", "mtr", "resolver", "rotor", "input", "drive"]),
+    (Role::Screw, &["screw", "nut", "ram", "lvdt", "output", "stroke", "rod", "joint"]),
+    (Role::Load, &["load", "force", "frc", "torque", "trq", "loadcell"]),
+    (Role::Temperature, &["temp", "temperature"]),
+];
+
+/// Words without information.
+const FILLERS: [&str; 8] = ["position", "pos", "angle", "displacement", "cell", "sensor", "meas", "value"];
+
+fn unit_of(word: &str) -> Option<Unit> {
+    let known = [
+        ("mm", Unit::Millimetre),
+        ("um", Unit::Micrometre),
+        ("m", Unit::Metre),
+        ("in", Unit::Inch),
+        ("inch", Unit::Inch),
+        ("deg", Unit::Degree),
+        ("rad", Unit::Radian),
+        ("rev", Unit::Revolution),
+        ("n", Unit::Newton),
+        ("kn", Unit::Kilonewton),
+        ("dan", Unit::Decanewton),
+        ("lbf", Unit::PoundForce),
+        ("nm", Unit::NewtonMetre),
+        ("degc", Unit::Celsius),
+        ("degf", Unit::Fahrenheit),
+        ("c", Unit::Celsius),
+        ("k", Unit::Kelvin),
+    ];
+    known.iter().find(|(said, _)| *said == word).map(|(_, unit)| *unit)
+}
+
+/// Words of quantities that are no position, load or temperature.
+const OTHERS: [&str; 16] = [
+    "current", "speed", "velocity", "voltage", "cmd", "command", "demand", "power", "status", "valid", "ssm",
+    "mode", "target", "setpoint", "error", "fault",
+];
+
+/// Words that distinguish redundant sensors of one quantity, best first.
+const SENSORS: [&str; 12] =
+    ["a", "primary", "main", "1", "cha", "ch1", "b", "secondary", "backup", "2", "chb", "ch2"];
+
+/// One column, understood.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ParsedName {
+    pub(super) role: Role,
+    pub(super) pattern: String,
+    pub(super) position: Option<String>,
+    pub(super) unit: Option<Unit>,
+    /// Which of redundant sensors it is, as a place in [`SENSORS`].
+    pub(super) sensor: Option<usize>,
+}
+
+impl ParsedName {
+    /// Parses a name; a word of redundant sensors after the channel is one where `has_sensors`, else part of a position.
+    pub(super) fn of(name: &str, has_sensors: bool) -> Option<Self> {
+        let words: Vec<(usize, &str, String)> =
+            words(name).into_iter().map(|(at, word)| (at, word, word.to_lowercase())).collect();
+        let says = |known: &[&str], word: &str| known.contains(&word);
+        if words.iter().any(|(_, _, word)| says(&OTHERS, word)) {
+            return None;
+        }
+        // The temperature of a motor is a temperature.
+        let roles = ROLES.iter().rev().filter(|(role, _)| *role == Role::Temperature).chain(&ROLES);
+        let (at, role) = roles
+            .filter_map(|(role, known)| Some((words.iter().position(|(_, _, w)| says(known, w))?, *role)))
+            .min_by_key(|(at, role)| (*role != Role::Temperature, *at))?;
+        let fits = |unit: &Unit| match role {
+            Role::Motor | Role::Screw => matches!(unit.dimension(), Dimension::Length | Dimension::Angle),
+            Role::Load => matches!(unit.dimension(), Dimension::Force | Dimension::Torque),
+            Role::Temperature => unit.dimension() == Dimension::Temperature,
+        };
+        let last = words.len() - 1;
+        let unit = if last == at { None } else { unit_of(&words[last].2).filter(fits) };
+        let is_unit = |i: usize| unit.is_some() && i == last;
+        let tag = (at + 1..words.len()).find(|i| has_sensors && !is_unit(*i) && says(&SENSORS, &words[*i].2));
+        let sensor = tag.and_then(|i| SENSORS.iter().position(|word| *word == words[i].2));
+        let is_other_role =
+            |word: &str| role == Role::Temperature && ROLES.iter().any(|(_, known)| says(known, word));
+        let is_place = |i: &usize| {
+            *i != at
+                && !is_unit(*i)
+                && tag != Some(*i)
+                && !says(&FILLERS, &words[*i].2)
+                && !is_other_role(&words[*i].2)
+        };
+        let place: Vec<usize> = (0..words.len()).filter(is_place).collect();
+        let run = place.windows(2).all(|w| w[1] == w[0] + 1);
+        let (Some(&first), Some(&end)) = (place.first(), place.last()) else {
+            return Some(Self { role, pattern: name.to_owned(), position: None, unit, sensor });
+        };
+        let span = words[first].0..words[end].0 + words[end].1.len();
+        let position = run.then(|| name[span.clone()].to_owned())?;
+        let pattern = format!("{}{PLACEHOLDER}{}", &name[..span.start], &name[span.end..]);
+        Some(Self { role, pattern, position: Some(position), unit, sensor })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn inferred(name: &str) -> Option<(Role, String, Option<String>, Option<Unit>)> {
+        ParsedName::of(name, true).map(|g| (g.role, g.pattern, g.position, g.unit))
+    }
+
+    #[test]
+    fn names_of_several_houses_are_understood() {
+        let place = |text: &str| Some(text.to_owned());
+        let cases = [
+            (
+                "aileron_left_motor_deg",
+                Role::Motor,
+                "{position}_motor_deg",
+                place("aileron_left"),
+                Some(Unit::Degree),
+            ),
+            (
+                "AIL_L.SCREW_POS.mm",
+                Role::Screw,
+                "{position}.SCREW_POS.mm",
+                place("AIL_L"),
+                Some(Unit::Millimetre),
+            ),
+            ("loadElevatorRight", Role::Load, "load{position}", place("ElevatorRight"), None),
+            ("ELV_L.MOT_POS_RAD", Role::Motor, "{position}.MOT_POS_RAD", place("ELV_L"), Some(Unit::Radian)),
+            ("load_n", Role::Load, "load_n", None, Some(Unit::Newton)),
+            ("resolver angle rudder", Role::Motor, "resolver angle {position}", place("rudder"), None),
+        ];
+        for (name, role, pattern, position, unit) in cases {
+            assert_eq!(inferred(name), Some((role, pattern.to_owned(), position, unit)), "{name}");
+        }
+        assert_eq!(inferred("airspeed_kt"), None);
+    }
+
+    #[test]
+    fn sensors_and_other_quantities_are_told_from_positions() {
+        let a = ParsedName::of("aileron_left_motor_a_deg", true).unwrap();
+        assert_eq!(
+            (a.position.as_deref(), a.pattern.as_str(), a.sensor),
+            (Some("aileron_left"), "{position}_motor_a_deg", Some(0))
+        );
+        let second = ParsedName::of("motor_2_deg", false).unwrap();
+        assert_eq!(
+            (second.position.as_deref(), second.pattern.as_str()),
+            (Some("2"), "motor_{position}_deg")
+        );
+        assert_eq!(ParsedName::of("aileron_left_motor_current", true), None);
+        assert_eq!(inferred("aileron_left_motor_temp_degc").unwrap().0, Role::Temperature);
+    }
+}

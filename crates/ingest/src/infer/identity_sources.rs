@@ -1,0 +1,192 @@
+//! Sources of a flight's identity: names of columns, metadata keys, folders, and forms of paths.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use percent_encoding::percent_decode_str;
+
+use crate::mapping::IdentityField;
+
+/// Names by which a fact goes, in small letters.
+const SOUNDS: [(IdentityField, &[&str]); 6] = [
+    (
+        IdentityField::TailNumber,
+        &["tail_number", "tail", "tail_no", "registration", "reg", "ac_reg", "aircraft", "tail_id", "msn"],
+    ),
+    (
+        IdentityField::FlightId,
+        &["flight_id", "flight", "flight_number", "flight_no", "leg", "leg_id", "sortie"],
+    ),
+    (
+        IdentityField::DepartureUtc,
+        &[
+            "departure_utc",
+            "departure",
+            "departure_time",
+            "takeoff_utc",
+            "takeoff",
+            "off_block_utc",
+            "off_block",
+            "off",
+            "start_utc",
+            "date_utc",
+        ],
+    ),
+    (IdentityField::Position, &["position", "actuator", "actuator_position", "surface"]),
+    (
+        IdentityField::FlightHours,
+        &["flight_hours", "flight_duration_h", "duration_h", "flight_time_h", "block_hours", "flight_h"],
+    ),
+    (
+        IdentityField::TailHoursEnd,
+        &["tail_hours_end", "tail_hours", "total_hours", "airframe_hours", "aircraft_hours", "total_time_h"],
+    ),
+];
+
+/// The fact that a name sounds like.
+pub(super) fn fact_of(name: &str) -> Option<IdentityField> {
+    let plain = name.trim().to_lowercase().replace(['-', ' ', '.'], "_");
+    SOUNDS.iter().find(|(_, known)| known.contains(&plain.as_str())).map(|(fact, _)| *fact)
+}
+
+/// The name of each fact among some names, the best known one first.
+pub(super) fn facts_of<'n>(names: &[&'n str]) -> BTreeMap<IdentityField, &'n str> {
+    let rank = |fact: IdentityField, name: &str| {
+        let known = SOUNDS.iter().find(|(of, _)| *of == fact).map_or(&[][..], |(_, known)| known);
+        known.iter().position(|word| *word == name.to_lowercase())
+    };
+    let mut found: BTreeMap<IdentityField, &str> = BTreeMap::new();
+    for name in names {
+        let Some(fact) = fact_of(name) else { continue };
+        let is_better = found.get(&fact).is_none_or(|other| rank(fact, name) < rank(fact, other));
+        if is_better {
+            found.insert(fact, name);
+        }
+    }
+    found
+}
+
+/// Folders called `name=value` whose names sound like facts.
+pub(super) fn folders(path: &Path) -> BTreeMap<IdentityField, String> {
+    let parts = path.parent().into_iter().flat_map(Path::components);
+    let named = parts.filter_map(|part| part.as_os_str().to_str()?.split_once('='));
+    let mut found = BTreeMap::new();
+    for (name, value) in named {
+        let value = percent_decode_str(value).decode_utf8_lossy();
+        let is_instant =
+            value.parse::<jiff::Timestamp>().is_ok() || value.parse::<jiff::civil::DateTime>().is_ok();
+        let fact = if is_instant { Some(IdentityField::DepartureUtc) } else { fact_of(name) };
+        found.extend(fact.map(|fact| (fact, name.to_owned())));
+    }
+    found
+}
+
+/// The value of a folder called `name=value`.
+pub fn folder_value(path: &Path, name: &str) -> Option<String> {
+    let parts = path.parent()?.components().filter_map(|part| part.as_os_str().to_str()?.split_once('='));
+    let (_, value) = parts.rev().find(|(own, _)| *own == name)?;
+    Some(percent_decode_str(value).decode_utf8_lossy().into_owned())
+}
+
+/// Forms of a departure in a file name, and their `strftime` patterns; the longest first.
+const DEPARTURES: [(&str, &str); 9] = [
+    (r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d", "%Y-%m-%dT%H-%M-%S"),
+    (r"\d{4}-\d\d-\d\d_\d\d-\d\d-\d\d", "%Y-%m-%d_%H-%M-%S"),
+    (r"\d{4}-\d\d-\d\d_\d{6}", "%Y-%m-%d_%H%M%S"),
+    (r"\d{4}-\d\d-\d\d_\d{4}", "%Y-%m-%d_%H%M"),
+    (r"\d{8}T\d{6}Z", "%Y%m%dT%H%M%SZ"),
+    (r"\d{8}T\d{6}", "%Y%m%dT%H%M%S"),
+    (r"\d{8}_\d{6}", "%Y%m%d_%H%M%S"),
+    (r"\d{8}_\d{4}", "%Y%m%d_%H%M"),
+    (r"\d{14}", "%Y%m%d%H%M%S"),
+];
+
+/// Forms of a day and of a time that lie in a folder and in a file name.
+const DAYS: [(&str, &str); 2] = [(r"\d{4}-\d\d-\d\d", "%Y-%m-%d"), (r"\d{8}", "%Y%m%d")];
+const TIMES: [(&str, &str); 4] =
+    [(r"\d\d-\d\d-\d\d", "%H-%M-%S"), (r"\d{6}", "%H%M%S"), (r"\d\d-\d\d", "%H-%M"), (r"\d{4}", "%H%M")];
+
+/// What a tail number looks like.
+const TAIL: &str = r"[A-Z]{1,2}-?[A-Z0-9]{2,6}";
+
+/// An expression and a departure format for logs whose path holds tail and departure, if this one seems to: as
+/// `TAIL/…departure….parquet`, `TAIL_departure.parquet` or `TAIL/day/time.parquet`.
+pub fn path_identity(path: &Path) -> Option<(String, String)> {
+    let name = path.file_name()?.to_str()?;
+    let fits =
+        |expression: &str, text: &str| regex::Regex::new(expression).is_ok_and(|regex| regex.is_match(text));
+    let folder = |up: usize| path.ancestors().nth(up)?.file_name()?.to_str();
+    let is_tail = |text: Option<&str>| text.is_some_and(|text| fits(&format!("^{TAIL}$"), text));
+    let alone = |form: &str| format!(r"^(?:.*\D)?{form}(?:\D.*)?$");
+    if let Some((form, format)) = DEPARTURES.iter().find(|(form, _)| fits(&alone(form), name)) {
+        let in_name = format!(r"^{TAIL}_[^/]*?{form}");
+        let expression = if !is_tail(folder(1)) && fits(&in_name, name) {
+            format!(r"(?<tail_number>{TAIL})_[^/]*?(?<departure_utc>{form})[^/]*\.parquet$")
+        } else {
+            format!(r"(?<tail_number>[^/]+)/[^/]*?(?<departure_utc>{form})[^/]*\.parquet$")
+        };
+        return Some((expression, (*format).to_owned()));
+    }
+    let day = DAYS.iter().find(|(form, _)| folder(1).is_some_and(|text| fits(&format!("^{form}$"), text)))?;
+    let time = TIMES.iter().find(|(form, _)| fits(&alone(form), name))?;
+    let expression = format!(
+        r"(?<tail_number>[^/]+)/(?<departure_date>{})/[^/]*?(?<departure_time>{})[^/]*\.parquet$",
+        day.0, time.0
+    );
+    is_tail(folder(2)).then(|| (expression, format!("{}T{}", day.1, time.1)))
+}
+
+/// The tail number in a path of one of the forms that [`path_identity`] knows.
+pub fn path_tail(path: &Path) -> Option<String> {
+    let (expression, _) = path_identity(path)?;
+    let regex = regex::Regex::new(&expression).ok()?;
+    Some(regex.captures(path.to_str()?)?.name("tail_number")?.as_str().to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_departure_in_a_name_is_found_with_its_form() {
+        for (path, departure, format) in [
+            ("d/N412FP/FLT_2026-09-10_1307.parquet", "2026-09-10_1307", "%Y-%m-%d_%H%M"),
+            ("d/TC-JRA/20261119T041300Z_0413.parquet", "20261119T041300Z", "%Y%m%dT%H%M%SZ"),
+            ("d/TC-JRA/QAR20261119_041300.parquet", "20261119_041300", "%Y%m%d_%H%M%S"),
+        ] {
+            let (expression, found) = path_identity(Path::new(path)).unwrap();
+            let regex = regex::Regex::new(&expression).unwrap();
+            let facts = regex.captures(path).unwrap();
+            assert_eq!((&facts["departure_utc"], found.as_str()), (departure, format), "{expression}");
+            assert_eq!(&facts["tail_number"], path.split('/').nth(1).unwrap());
+        }
+        assert_eq!(path_identity(Path::new("d/N412FP/flight 7.parquet")), None);
+    }
+
+    #[test]
+    fn a_day_in_a_folder_and_a_tail_in_a_name_are_found() {
+        let (expression, format) = path_identity(Path::new("d/N412FP/2026-11-19/0413.parquet")).unwrap();
+        let facts = regex::Regex::new(&expression).unwrap();
+        let facts = facts.captures("d/N412FP/2026-11-19/0413.parquet").unwrap();
+        assert_eq!((&facts["departure_date"], &facts["departure_time"]), ("2026-11-19", "0413"));
+        assert_eq!(format, "%Y-%m-%dT%H%M");
+        let path = "logs/TC-JRA_20261119T041300Z.parquet";
+        let (expression, _) = path_identity(Path::new(path)).unwrap();
+        assert_eq!(&regex::Regex::new(&expression).unwrap().captures(path).unwrap()["tail_number"], "TC-JRA");
+    }
+
+    #[test]
+    fn facts_are_known_by_their_usual_names() {
+        let found = facts_of(&["Tail", "tail_number", "flight_duration_h", "tail_hours", "value"]);
+        assert_eq!(found[&IdentityField::TailNumber], "tail_number");
+        assert_eq!(found[&IdentityField::FlightHours], "flight_duration_h");
+        assert_eq!(found[&IdentityField::TailHoursEnd], "tail_hours");
+        let hive =
+            folders(Path::new("l/tail=N412FP/off=2026-11-19T04%3A13%3A00Z/actuator=left/part-0.parquet"));
+        assert_eq!(hive[&IdentityField::DepartureUtc], "off");
+        assert_eq!(hive[&IdentityField::Position], "actuator");
+        let path = Path::new("l/tail=TC%2DJRA/part-0.parquet");
+        assert_eq!(folder_value(path, "tail").as_deref(), Some("TC-JRA"));
+        assert_eq!(path_tail(Path::new("d/TC-JRA_20261119T041300Z.parquet")).as_deref(), Some("TC-JRA"));
+    }
+}

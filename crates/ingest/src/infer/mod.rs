@@ -1,0 +1,346 @@
+//! A first mapping, guessed from the names and the shape of a log, for a person to confirm.
+//!
+//! Names of flight parameters consist of words: a channel, a unit, a position. Words that name a channel or a unit are
+//! recognised; the remaining words that differ between columns of one channel are the position. Columns of names and
+//! of positions show a long layout. A person confirms every inferred mapping.
+
+mod column_names;
+mod identity_sources;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use arrow::datatypes::DataType;
+
+use crate::channel::column_builder::ColumnBuilder;
+use crate::error::Error;
+use crate::infer::column_names::{ParsedName, is_time, time_unit};
+use crate::infer::identity_sources::{fact_of, facts_of, folders};
+use crate::log::row_table::RowTable;
+use crate::mapping::column_pattern::PLACEHOLDER;
+use crate::mapping::units::Unit;
+use crate::mapping::{ClockMapping, IdentityField, Layout, Role};
+use crate::parquet::leaf_columns::LeafColumn;
+use crate::parquet::log_file::LogFile;
+use crate::parquet::row_selection::RowSelection;
+
+pub use identity_sources::{folder_value, path_identity, path_tail};
+
+/// What a log seems to offer.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct InferredMapping {
+    /// The time column, and its unit where the name holds one; timestamp types need none.
+    pub clock: Option<(String, Option<&'static str>)>,
+    /// Channel → its column with `{position}` in it, and its unit where the name holds one.
+    pub channels: BTreeMap<Role, (String, Option<Unit>)>,
+    /// Redundant columns of a channel, best first.
+    pub alternatives: BTreeMap<Role, Vec<(String, Option<Unit>)>>,
+    /// The value at which the motor position starts again.
+    pub motor_wraps_at: Option<f64>,
+    /// How the rows are laid out.
+    pub layout: Layout,
+    /// The positions found.
+    pub positions: BTreeSet<String>,
+    /// Facts that the footer's metadata holds: fact → key.
+    pub metadata: BTreeMap<IdentityField, String>,
+    /// Facts that columns of one value hold: fact → column.
+    pub columns: BTreeMap<IdentityField, String>,
+    /// Facts that folders called `name=value` hold: fact → name.
+    pub folders: BTreeMap<IdentityField, String>,
+    /// The tail that the log names.
+    pub tail: Option<String>,
+    /// Columns that hold numbers and were not understood.
+    pub others: Vec<String>,
+}
+
+/// Names of columns that name the channel of a row, and of those that hold its value.
+const NAME_COLUMNS: [&str; 12] = [
+    "parameter",
+    "parameter_name",
+    "param",
+    "name",
+    "channel",
+    "channel_name",
+    "signal",
+    "signal_name",
+    "mnemonic",
+    "label",
+    "variable",
+    "tag",
+];
+const VALUE_COLUMNS: [&str; 7] = ["value", "val", "reading", "data", "measurement", "sample", "v"];
+/// Names of columns that name the position of a row, beyond those of a fact.
+const POSITION_COLUMNS: [&str; 6] = ["unit", "location", "ema", "servo", "actuator_id", "side"];
+
+/// Looks at one log.
+///
+/// # Errors
+/// When it, or a column of texts in it, cannot be read.
+pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
+    let table = RowTable::new(vec![LogFile::open(path)?], ClockMapping::default(), Layout::default());
+    let file = &table.files[0];
+    let leaves = file.leaves();
+    let owned = |facts: BTreeMap<IdentityField, &str>| -> BTreeMap<IdentityField, String> {
+        facts.into_iter().map(|(fact, name)| (fact, name.to_owned())).collect()
+    };
+    let mut metadata = owned(facts_of(&file.metadata_keys()));
+    metadata.remove(&IdentityField::Position);
+    let constant = |name: &str| table.constant(name, "fact").ok().flatten();
+    let single: Vec<&str> = leaves.iter().filter(|l| !l.is_listed).map(|l| l.name.as_str()).collect();
+    let facts = facts_of(&single).into_iter().filter(|(fact, _)| !metadata.contains_key(fact));
+    let columns = owned(facts.filter(|(_, name)| constant(name).is_some()).collect());
+    let layout = layout(&table, &columns)?;
+    let numeric: Vec<&LeafColumn> = leaves.iter().filter(|leaf| leaf.kind.is_numeric()).collect();
+    let is_identity = |name: &str| columns.values().any(|column| column == name);
+    let clock =
+        clock(leaves, |name| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some()));
+    let clock = clock.map(|(name, unit)| {
+        let is_number = leaves.iter().any(|leaf| leaf.name == name && leaf.kind.is_numeric());
+        let unit = unit.or_else(|| is_number.then(|| unit_of_steps(file, &name)).flatten());
+        (name, unit)
+    });
+    let is_clock = |name: &str| clock.as_ref().is_some_and(|(column, _)| column == name);
+    let texts = layout.name_column.as_deref().map(|column| table.texts(column)).transpose()?;
+    let names: Vec<&str> = match &texts {
+        Some(texts) => texts.iter().map(String::as_str).collect(),
+        None => {
+            let names = numeric.iter().map(|leaf| leaf.name.as_str());
+            names.filter(|name| !is_clock(name) && !is_identity(name)).collect()
+        }
+    };
+    let (mut found, guesses) = channels(&names, common_root(&numeric));
+    let has_own_position = layout.position_column.is_some() || columns.contains_key(&IdentityField::Position);
+    if has_own_position {
+        let only = found.positions.iter().next().cloned().unwrap_or_default();
+        let patterns = found.channels.values_mut().chain(found.alternatives.values_mut().flatten());
+        patterns.for_each(|(pattern, _)| *pattern = pattern.replace(PLACEHOLDER, &only));
+    }
+    let others = names.iter().filter(|name| !guesses.iter().any(|guess| guess == *name));
+    found.others = others.map(|name| (*name).to_owned()).collect();
+    if let Some(column) = &layout.position_column {
+        found.positions.clone_from(table.texts(column)?.as_ref());
+    } else if let Some(column) = columns.get(&IdentityField::Position) {
+        found.positions = constant(column).into_iter().collect();
+    }
+    found.motor_wraps_at = if texts.is_none() { wraps_at(file, &found) } else { None };
+    let tail = metadata.get(&IdentityField::TailNumber).and_then(|key| file.metadata(key)).map(str::to_owned);
+    let tail = tail.or_else(|| columns.get(&IdentityField::TailNumber).and_then(|column| constant(column)));
+    Ok(InferredMapping { clock, layout, metadata, columns, folders: folders(path), tail, ..found })
+}
+
+/// The layout that columns of names, values and positions show.
+fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result<Layout, Error> {
+    let leaves = table.files[0].leaves();
+    let is_called = |leaf: &LeafColumn, known: &[&str]| known.contains(&leaf.name.to_lowercase().as_str());
+    let text = |leaf: &&LeafColumn| leaf.kind == DataType::Utf8 && !leaf.is_listed;
+    let name = leaves.iter().filter(text).find(|leaf| is_called(leaf, &NAME_COLUMNS));
+    let value = leaves.iter().find(|leaf| leaf.kind.is_numeric() && is_called(leaf, &VALUE_COLUMNS));
+    let mut layout = Layout::default();
+    if let (Some(name), Some(value)) = (name, value) {
+        (layout.name_column, layout.value_column) = (Some(name.name.clone()), Some(value.name.clone()));
+    }
+    let is_taken =
+        |leaf: &LeafColumn| columns.values().chain(&layout.name_column).any(|column| *column == leaf.name);
+    for leaf in leaves.iter().filter(text).filter(|leaf| !is_taken(leaf)) {
+        let is_position =
+            fact_of(&leaf.name) == Some(IdentityField::Position) || is_called(leaf, &POSITION_COLUMNS);
+        if is_position && table.texts(&leaf.name)?.len() > 1 {
+            layout.position_column = Some(leaf.name.clone());
+            break;
+        }
+    }
+    Ok(layout)
+}
+
+/// The time column: timestamps before numbers, names of a time before others; never a column of one value.
+fn clock(
+    leaves: &[LeafColumn],
+    is_constant: impl Fn(&str) -> bool,
+) -> Option<(String, Option<&'static str>)> {
+    let is_instant = |leaf: &LeafColumn| {
+        matches!(leaf.kind, DataType::Timestamp(..) | DataType::Time32(_) | DataType::Time64(_))
+    };
+    let rank = |leaf: &LeafColumn| match (is_instant(leaf), is_time(&leaf.name), time_unit(&leaf.name)) {
+        (true, true, _) => Some(0),
+        (true, false, _) => Some(1),
+        (false, true, Some(_)) if leaf.kind.is_numeric() => Some(2),
+        (false, true, None) if leaf.kind.is_numeric() => Some(3),
+        _ => None,
+    };
+    let ranked = leaves.iter().filter_map(|leaf| Some((rank(leaf)?, leaf)));
+    let (_, best) = ranked.filter(|(_, leaf)| !is_constant(&leaf.name)).min_by_key(|(rank, _)| *rank)?;
+    Some((best.name.clone(), if is_instant(best) { None } else { time_unit(&best.name) }))
+}
+
+/// The unit that gives the usual step of a column of times a rate between 2 and 5000 Hz; none where two units do.
+fn unit_of_steps(file: &LogFile, name: &str) -> Option<&'static str> {
+    let mut values = ColumnBuilder::with_capacity(0, None);
+    file.append_numbers(name, RowSelection::ALL, &mut values).ok()?;
+    let (values, _) = values.finish();
+    let mut steps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
+    let middle = steps.len().checked_sub(1)? / 2;
+    match *steps.select_nth_unstable_by(middle, f64::total_cmp).1 {
+        step if (2e-4..=0.5).contains(&step) => Some("s"),
+        step if (2.0..=500.0).contains(&step) => Some("ms"),
+        step if (2e3..=5e5).contains(&step) => Some("us"),
+        step if (2e6..=5e8).contains(&step) => Some("ns"),
+        _ => None,
+    }
+}
+
+/// The struct that all numbers are fields of, with its dot.
+fn common_root<'l>(numeric: &[&'l LeafColumn]) -> &'l str {
+    let root = |leaf: &&'l LeafColumn| {
+        leaf.name.split_once('.').filter(|_| leaf.is_field).map(|(root, _)| &leaf.name[..=root.len()])
+    };
+    let first = numeric.first().and_then(root);
+    first.filter(|first| numeric.iter().all(|leaf| root(leaf) == Some(first))).unwrap_or_default()
+}
+
+/// The channels that names speak of, and the names that were understood.
+fn channels(names: &[&str], root: &str) -> (InferredMapping, BTreeSet<String>) {
+    let parse = |has_sensors: bool| -> Vec<(String, ParsedName)> {
+        let one = |name: &&str| {
+            let guess = ParsedName::of(name.strip_prefix(root)?, has_sensors)?;
+            let pattern = format!("{root}{}", guess.pattern);
+            Some(((*name).to_owned(), ParsedName { pattern, ..guess }))
+        };
+        names.iter().filter_map(one).collect()
+    };
+    let tagged = parse(true);
+    let sensors = |role: Role| -> BTreeSet<Option<usize>> {
+        tagged.iter().filter(|(_, guess)| guess.role == role).map(|(_, guess)| guess.sensor).collect()
+    };
+    // Words that number every channel in the same way, where nothing else names a position, number the actuators.
+    let of_motor = sensors(Role::Motor);
+    let are_positions = of_motor.len() > 1
+        && Role::NEEDED.iter().all(|role| sensors(*role) == of_motor)
+        && tagged.iter().all(|(_, guess)| guess.position.is_none());
+    let guesses = if are_positions { parse(false) } else { tagged };
+    let found = choose(guesses.iter().map(|(_, guess)| guess));
+    let is_chosen = |guess: &ParsedName| {
+        let all = found.channels.values().chain(found.alternatives.values().flatten());
+        all.into_iter().any(|(pattern, _)| *pattern == guess.pattern)
+            && guess.position.as_ref().is_none_or(|position| found.positions.contains(position))
+    };
+    let understood =
+        guesses.iter().filter(|(_, guess)| is_chosen(guess)).map(|(name, _)| name.clone()).collect();
+    (found, understood)
+}
+
+/// A pattern of a channel: the places where it fits a column, its unit, and which of redundant sensors it is.
+type Pattern<'g> = (BTreeSet<&'g str>, Option<Unit>, Option<usize>);
+
+/// The pattern of each channel that fits most columns, its redundant ones, and the positions that all of them know.
+fn choose<'g>(guesses: impl Iterator<Item = &'g ParsedName>) -> InferredMapping {
+    let mut patterns: BTreeMap<(Role, &str), Pattern<'_>> = BTreeMap::new();
+    for guess in guesses {
+        let entry = patterns.entry((guess.role, &guess.pattern)).or_default();
+        entry.0.extend(guess.position.as_deref());
+        (entry.1, entry.2) = (guess.unit, guess.sensor);
+    }
+    let mut found = InferredMapping::default();
+    let mut shared: Option<BTreeSet<&str>> = None;
+    for role in Role::ALL {
+        let of_role = patterns.iter().filter(|((of, _), _)| *of == role);
+        let mut ranked: Vec<(&str, &Pattern<'_>)> =
+            of_role.map(|((_, name), pattern)| (*name, pattern)).collect();
+        ranked.sort_by_key(|(_, (places, _, sensor))| (std::cmp::Reverse(places.len()), *sensor));
+        let Some((name, (places, unit, sensor))) = ranked.first().copied() else { continue };
+        found.channels.insert(role, (name.to_owned(), *unit));
+        let is_redundant = |other: &Pattern<'_>| sensor.is_some() && other.2.is_some() && other.0 == *places;
+        let others = ranked.iter().skip(1).filter(|(_, other)| is_redundant(other));
+        let others: Vec<_> = others.map(|(name, (_, unit, _))| ((*name).to_owned(), *unit)).collect();
+        if !others.is_empty() {
+            found.alternatives.insert(role, others);
+        }
+        if Role::NEEDED.contains(&role) {
+            shared = Some(
+                shared.map_or_else(|| places.clone(), |all| all.intersection(places).copied().collect()),
+            );
+        }
+    }
+    found.positions = shared.unwrap_or_default().into_iter().map(str::to_owned).collect();
+    found
+}
+
+/// The value at which the first motor position starts again: it leaps by more than half a turn within one turn.
+fn wraps_at(file: &LogFile, found: &InferredMapping) -> Option<f64> {
+    let (pattern, unit) = found.channels.get(&Role::Motor)?;
+    let turn = match unit {
+        Some(Unit::Degree) | None => 360.0,
+        Some(Unit::Radian) => std::f64::consts::TAU,
+        Some(Unit::Revolution) => 1.0,
+        _ => return None,
+    };
+    let name = pattern.replace(PLACEHOLDER, found.positions.iter().next().map_or("", String::as_str));
+    let mut values = ColumnBuilder::with_capacity(0, None);
+    file.append_numbers(&name, RowSelection::ALL, &mut values).ok()?;
+    let (values, _) = values.finish();
+    let (least, greatest) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let leaps = values.windows(2).filter(|w| (w[1] - w[0]).abs() > turn / 2.0).count();
+    (leaps > 0 && greatest - least <= turn * 1.001).then_some(turn)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sample_fleet_is_understood_whole() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sample-data/logs/N412FP");
+        let log = std::fs::read_dir(folder).unwrap().flatten().next().unwrap().path();
+        let found = propose(&log).unwrap();
+        assert_eq!(found.clock, Some(("time_s".to_owned(), Some("s"))));
+        assert_eq!(found.channels[&Role::Screw], ("{position}_screw_mm".to_owned(), Some(Unit::Millimetre)));
+        let positions: Vec<&str> = found.positions.iter().map(String::as_str).collect();
+        assert_eq!(positions, ["aileron_left", "aileron_right", "elevator_left", "elevator_right"]);
+        assert_eq!((found.metadata.len(), found.others.len()), (5, 0));
+        assert_eq!(found.tail.as_deref(), Some("N412FP"));
+    }
+
+    fn of(names: &[&str]) -> InferredMapping {
+        channels(names, "").0
+    }
+
+    #[test]
+    fn redundant_sensors_are_alternatives_and_numbered_actuators_are_positions() {
+        let found = of(&["ail_l_motor_a_deg", "ail_l_motor_b_deg", "ail_l_screw_mm", "ail_l_load_n"]);
+        assert_eq!(found.channels[&Role::Motor].0, "{position}_motor_a_deg");
+        assert_eq!(found.alternatives[&Role::Motor][0].0, "{position}_motor_b_deg");
+        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["ail_l"]);
+        let numbers = ["motor_1_deg", "motor_2_deg", "screw_1_mm", "screw_2_mm", "load_1_n", "load_2_n"];
+        let found = of(&numbers);
+        assert_eq!(found.channels[&Role::Load].0, "load_{position}_n");
+        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["1", "2"]);
+    }
+
+    /// A long table with its identity in columns, one of which is a constant instant.
+    #[test]
+    fn a_long_log_with_its_identity_in_columns_is_understood() {
+        use crate::parquet::writer::{Column, write_parquet};
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("x.parquet");
+        let rows = 300;
+        let names = ["rudder_motor_deg", "rudder_screw_mm", "rudder_load_n"];
+        let departure: jiff::Timestamp = "2026-11-19T04:13:00Z".parse().unwrap();
+        let columns = [
+            ("departure_utc", Column::Instant(vec![departure; rows])),
+            ("tail_number", Column::Text(vec!["N412FP".into(); rows])),
+            ("flight_id", Column::Text(vec!["0413".into(); rows])),
+            ("stamp_ms", Column::Real((0..rows).map(|k| (k / 3 * 10) as f64).collect())),
+            ("parameter", Column::Text((0..rows).map(|k| names[k % 3].to_owned()).collect())),
+            ("value", Column::Real((0..rows).map(|k| k as f64).collect())),
+        ];
+        write_parquet(&file, &columns.map(|(name, column)| (name.to_owned(), column)), &[]).unwrap();
+        let found = propose(&file).unwrap();
+        assert_eq!(found.clock, Some(("stamp_ms".to_owned(), Some("ms"))));
+        assert_eq!(found.layout.name_column.as_deref(), Some("parameter"));
+        assert_eq!(found.channels[&Role::Screw], ("{position}_screw_mm".to_owned(), Some(Unit::Millimetre)));
+        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
+        let facts: Vec<&str> = found.columns.values().map(String::as_str).collect();
+        assert_eq!(facts, ["tail_number", "flight_id", "departure_utc"]);
+        assert_eq!(found.tail.as_deref(), Some("N412FP"));
+    }
+}

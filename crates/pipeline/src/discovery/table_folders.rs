@@ -1,0 +1,144 @@
+//! Folders of logs that are tables: the table's log lists its live files; others were withdrawn.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+use records::Diagnostic;
+
+/// The format of a table, by the files in its folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum TableFormat {
+    Delta,
+    Iceberg,
+    Hudi,
+}
+
+impl TableFormat {
+    fn as_str(self) -> &'static str {
+        match self {
+            Self::Delta => "Delta",
+            Self::Iceberg => "Iceberg",
+            Self::Hudi => "Hudi",
+        }
+    }
+}
+
+/// Tables among the folders of logs. Local folders are searched when they contain a log; those of object stores are known
+/// from the listing.
+#[derive(Debug, Default)]
+pub(crate) struct TableFolders {
+    /// What each folder is; none where it is no table.
+    folders: HashMap<PathBuf, Option<TableFormat>>,
+    /// The live files of each table that was met, or none where the table cannot be used.
+    tables: BTreeMap<PathBuf, Option<BTreeMap<PathBuf, bool>>>,
+}
+
+/// What a file is to the table in whose folder it lies.
+#[derive(Debug)]
+pub(crate) enum TableMembership {
+    /// A log: of no table, or of one that has it.
+    Log,
+    /// No log: the table does not have it, or cannot be used.
+    Withdrawn,
+    /// The table, or this file of it, cannot be used: the path at fault and why.
+    Fault(PathBuf, Box<Diagnostic>),
+}
+
+impl TableFolders {
+    /// Notes an object of a listing that makes its folder a table.
+    pub(crate) fn note(&mut self, object: &Path) {
+        let Some(folder) = object.parent() else { return };
+        let format = match folder.file_name().and_then(|name| name.to_str()) {
+            Some("_delta_log") => TableFormat::Delta,
+            Some(".hoodie") => TableFormat::Hudi,
+            Some("metadata") if is_iceberg_metadata(object) => TableFormat::Iceberg,
+            _ => return,
+        };
+        if let Some(root) = folder.parent() {
+            self.folders.insert(root.to_owned(), Some(format));
+        }
+    }
+
+    /// Whether a local file is a log.
+    pub(crate) fn local(&mut self, file: &Path) -> TableMembership {
+        for folder in file.ancestors().skip(1) {
+            let format = *self.folders.entry(folder.to_owned()).or_insert_with(|| format_of(folder));
+            if let Some(format) = format {
+                return self.member(file, folder, format);
+            }
+        }
+        TableMembership::Log
+    }
+
+    /// Whether an object of a listing is a log, by what was noted of that listing.
+    pub(crate) fn object(&mut self, object: &Path) -> TableMembership {
+        let known = |folder: &Path| Some((folder.to_owned(), (*self.folders.get(folder)?)?));
+        match object.ancestors().skip(1).find_map(known) {
+            Some((folder, format)) => self.member(object, &folder, format),
+            None => TableMembership::Log,
+        }
+    }
+
+    fn member(&mut self, file: &Path, root: &Path, format: TableFormat) -> TableMembership {
+        if !self.tables.contains_key(root) {
+            let (live, fault) = match live_files(root, format) {
+                Ok(live) => (Some(live), None),
+                Err(diagnostic) => (None, Some(diagnostic)),
+            };
+            self.tables.insert(root.to_owned(), live);
+            if let Some(diagnostic) = fault {
+                return TableMembership::Fault(root.to_owned(), Box::new(diagnostic));
+            }
+        }
+        let live = self.tables.get(root).and_then(Option::as_ref);
+        match live.and_then(|live| live.get(file)) {
+            None => TableMembership::Withdrawn,
+            Some(false) => TableMembership::Log,
+            Some(true) => {
+                let what =
+                    "rows of this file were deleted from its Delta table, and the file still holds them";
+                let hint = "rewrite the table without deletion vectors: `REORG TABLE … APPLY (PURGE)`, or `OPTIMIZE`";
+                TableMembership::Fault(
+                    file.to_owned(),
+                    Box::new(Diagnostic::new("table_unsupported", what).hint(hint)),
+                )
+            }
+        }
+    }
+}
+
+fn format_of(folder: &Path) -> Option<TableFormat> {
+    if folder.join("_delta_log").is_dir() {
+        return Some(TableFormat::Delta);
+    }
+    if folder.join(".hoodie").is_dir() {
+        return Some(TableFormat::Hudi);
+    }
+    let metadata = std::fs::read_dir(folder.join("metadata")).ok()?;
+    let is_iceberg = metadata.flatten().any(|entry| is_iceberg_metadata(&entry.path()));
+    is_iceberg.then_some(TableFormat::Iceberg)
+}
+
+fn is_iceberg_metadata(path: &Path) -> bool {
+    path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.ends_with(".metadata.json"))
+}
+
+/// The live files of a table, and whether rows of each were deleted.
+fn live_files(root: &Path, format: TableFormat) -> Result<BTreeMap<PathBuf, bool>, Diagnostic> {
+    if format != TableFormat::Delta {
+        let name = format.as_str();
+        let what = format!("the folder is a table of Apache {name}, which is not supported");
+        let hint = format!(
+            "export its current snapshot to a folder of Parquet files and name that folder in `logs.files` \
+             (DuckDB: `COPY (FROM {}) TO 'logs' (FORMAT parquet, PARTITION_BY (tail, flight))`)",
+            if format == TableFormat::Iceberg { "iceberg_scan('…')" } else { "'…'" }
+        );
+        return Err(Diagnostic::new("table_unsupported", what).hint(hint));
+    }
+    let live = store::live_files(root).map_err(|e| {
+        Diagnostic::new("table_unreadable", format!("the Delta table cannot be read: {e}"))
+            .hint("repair the table, or name its files without the table: copy them to a folder of their own")
+    })?;
+    let whole = |name: &str| if name.contains("://") { PathBuf::from(name) } else { root.join(name) };
+    Ok(live.into_iter().map(|file| (whole(&file.name), file.has_deleted_rows)).collect())
+}

@@ -1,0 +1,56 @@
+//! Files that writers and copying tools leave in folders of logs: hidden and unfinished files, and those of engines.
+
+use std::path::{Component, Path};
+
+/// Folders and files of Spark, Hadoop, Delta and Parquet writers that hold no log.
+const OF_ENGINES: [&str; 6] =
+    ["_temporary", "_delta_log", "_spark_metadata", "_SUCCESS", "_metadata", "_common_metadata"];
+/// Beginnings of such names.
+const BEGINNINGS: [&str; 3] = [".", "_started_", "_committed_"];
+/// Ends of the names of unfinished copies and of checksums.
+const ENDS: [&str; 7] = [".tmp", ".temp", ".part", ".partial", ".crdownload", ".filepart", ".crc"];
+
+/// Whether a path names a temporary file below the part of a pattern that its user wrote out.
+pub fn is_temporary(path: &Path, pattern: &Path) -> bool {
+    let is_written_out = |part: &Component<'_>| !part.as_os_str().to_string_lossy().contains(['*', '?', '[']);
+    let written_out = pattern.components().take_while(is_written_out).count();
+    path.components().skip(written_out).any(|part| {
+        let name = part.as_os_str().to_string_lossy();
+        OF_ENGINES.contains(&name.as_ref())
+            || BEGINNINGS.iter().any(|begin| name.starts_with(begin))
+            || ENDS.iter().any(|end| name.ends_with(end))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Names that Spark, Hadoop, Delta Lake, macOS, rsync and browsers give to files that are no logs.
+    #[test]
+    fn unfinished_and_hidden_files_are_no_logs() {
+        let temporary = |path: &str| is_temporary(Path::new(path), Path::new("/logs/**/*"));
+        for path in [
+            "/logs/._a.parquet",
+            "/logs/N1/.a.parquet.tmp",
+            "/logs/N1/a.parquet.tmp",
+            "/logs/_temporary/0/a.parquet",
+            "/logs/_delta_log/00000000000000000010.checkpoint.parquet",
+            "/logs/_SUCCESS",
+            "/logs/N1/_metadata",
+            "/logs/.a.parquet.crc",
+        ] {
+            assert!(temporary(path), "{path}");
+        }
+        for path in ["/logs/a.parquet", "/logs/_archive/_a.parquet", "/logs/tail=N1/a.b.parquet"] {
+            assert!(!temporary(path), "{path}");
+        }
+    }
+
+    #[test]
+    fn a_name_that_the_pattern_writes_out_is_meant() {
+        let pattern = Path::new("/home/.cache/logs/*.parquet");
+        assert!(!is_temporary(Path::new("/home/.cache/logs/a.parquet"), pattern));
+        assert!(is_temporary(Path::new("/home/.cache/logs/.a.parquet"), pattern));
+    }
+}

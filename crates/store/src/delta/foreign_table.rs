@@ -1,0 +1,44 @@
+//! Delta tables of other programs: which of the files in a folder of logs belong to the table now.
+
+use std::path::Path;
+
+use deltalake::{DeltaTable, DeltaTableError};
+
+use crate::delta::location::Location;
+use crate::error::Error;
+
+/// A data file that belongs to the current version of a table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LiveFile {
+    /// Its path below the table's folder, with `/` between folders.
+    pub name: String,
+    /// Whether a deletion vector marks some of its rows as deleted.
+    pub has_deleted_rows: bool,
+}
+
+/// Data files of the current version of a Delta table, by its log: files that were withdrawn or compacted away may
+/// still be in its folder.
+///
+/// # Errors
+/// [`Error::LogTable`] when the log cannot be read, or maps columns to other names in the files.
+pub fn live_files(folder: &Path) -> Result<Vec<LiveFile>, Error> {
+    let location = Location::at(folder)?;
+    let load = async {
+        let mut delta = DeltaTable::new(location.log_store()?);
+        delta.load().await?;
+        let snapshot = delta.snapshot()?;
+        let mode = snapshot.metadata().configuration().get("delta.columnMapping.mode");
+        if mode.is_some_and(|mode| mode != "none") {
+            let unsupported =
+                "the table maps its columns to other names in the files (`delta.columnMapping.mode`)";
+            return Err(DeltaTableError::Generic(unsupported.into()));
+        }
+        let files = snapshot.log_data();
+        let live = files.iter().map(|view| LiveFile {
+            name: view.path().into_owned(),
+            has_deleted_rows: view.deletion_vector_descriptor().is_some(),
+        });
+        Ok(live.collect())
+    };
+    location.block_on(load).map_err(|source| Error::LogTable { source: Box::new(source) })
+}
