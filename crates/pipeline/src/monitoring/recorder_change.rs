@@ -2,8 +2,6 @@
 //! wiring is changed, the fitted stiffness of all actuators of an aircraft when what measures load is, and the zero and
 //! the delay of a load channel when its cell or its wiring is.
 
-use crate::monitoring::REPORTED_DAYS;
-use records::uncertainty::SD_OVER_MAD;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::monitoring::REPORTED_DAYS;
@@ -13,6 +11,7 @@ use serde::Serialize;
 use store::Store;
 
 use crate::error::Error;
+use crate::monitoring::REPORTED_DAYS;
 use crate::monitoring::recent::{FlightDiagnostics, RecentDiagnostics, newest_utc, recent_diagnostics};
 use records::time::days_between;
 

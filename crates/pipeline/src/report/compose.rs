@@ -1,6 +1,5 @@
 //! Composes a report from the store: assessments now and before, flights, installations, inspections.
 
-use records::uncertainty::SD_OVER_MAD;
 use std::collections::{BTreeMap, BTreeSet};
 
 use ::report::{

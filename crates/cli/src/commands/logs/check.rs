@@ -1,6 +1,5 @@
 //! `check`: shows how logs are mapped, channel by channel, and what would be refused; reports no gap, writes nothing.
 
-use records::uncertainty::NORMAL_95;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::sync::Arc;

@@ -1,6 +1,5 @@
 //! `explain`: traces one estimate to its inputs and settings, and recomputes it.
 
-use records::uncertainty::NORMAL_95;
 use std::fmt::Write as _;
 
 use ingest::{ActuatorChannels, LogFiles};
