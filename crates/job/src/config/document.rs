@@ -1,6 +1,5 @@
 //! Structure of `pipeline.toml`.
 
-use records::time::DAY_S;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -10,6 +9,7 @@ use ingest::mapping::column_pattern::nearest;
 use ingest::mapping::units::TimeUnit;
 use ingest::{Channels, ClockMapping, GroupMapping, IdentityMapping, Layout, Mapping};
 use records::Diagnostic;
+use records::time::DAY_S;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

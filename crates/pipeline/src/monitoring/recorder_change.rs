@@ -11,6 +11,7 @@ use serde::Serialize;
 use store::Store;
 
 use crate::error::Error;
+use crate::monitoring::REPORTED_DAYS;
 use crate::monitoring::recent::{FlightDiagnostics, RecentDiagnostics, newest_utc, recent_diagnostics};
 use records::time::days_between;
 

@@ -1,9 +1,9 @@
 //! Run summary: counts and findings of a run; every log is in exactly one count.
 
-use records::time::days_between;
 use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
+use records::time::days_between;
 use records::{Diagnostic, GapRecord, Status};
 use store::{LogOutcome, LogRecord, RunRecord};
 

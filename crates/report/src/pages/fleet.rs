@@ -1,9 +1,9 @@
 //! Fleet page: work list, changes, map of tails and positions, removal forecast, forecast accuracy, data quality.
 
-use records::time::days_between;
 use std::collections::{BTreeMap, BTreeSet};
 
 use askama::Template;
+use records::time::days_between;
 
 use crate::charts::agreement_plot::agreement_plot;
 use crate::format::{

@@ -1,6 +1,5 @@
 //! Export: the records as one file others read, the same bytes for the same records.
 
-use records::GapRecord;
 use std::borrow::Cow;
 use std::io::Write;
 
@@ -10,6 +9,7 @@ use arrow::error::ArrowError;
 use arrow::json::writer::{JsonArray, WriterBuilder};
 use jiff::Timestamp;
 use parquet::arrow::ArrowWriter;
+use records::GapRecord;
 use records::sanitize::csv_cell;
 use std::sync::Arc;
 

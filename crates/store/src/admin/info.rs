@@ -1,12 +1,12 @@
 //! Contents of the store, and its last run.
 
-use records::GapRecord;
 use std::collections::{BTreeSet, HashSet};
 use std::path::PathBuf;
 
 use arrow::array::AsArray;
 use arrow::datatypes::TimestampMicrosecondType;
 use jiff::Timestamp;
+use records::GapRecord;
 
 use crate::error::Error;
 use crate::handle::Store;

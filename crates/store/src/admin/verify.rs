@@ -1,7 +1,6 @@
 //! Verification: log files and data files against their digests, statistics against content, log records against gap
 //! records.
 
-use records::GapRecord;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -9,6 +8,7 @@ use std::sync::Arc;
 
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use records::Diagnostic;
+use records::GapRecord;
 
 use crate::delta::data_file;
 use crate::delta::file_stats::{self, Stats};

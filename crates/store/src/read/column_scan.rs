@@ -3,7 +3,6 @@
 //! A whole fleet's records are tens of millions of rows with repeated names, so text columns remain dictionaries as
 //! stored, numbers are not copied, and a caller with threads may read several files at once.
 
-use records::GapRecord;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,6 +15,7 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowPredicateFn, ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder, RowFilter,
 };
+use records::GapRecord;
 
 use crate::delta::data_file::GROUP_ROWS;
 use crate::error::Error;

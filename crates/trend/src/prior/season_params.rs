@@ -1,7 +1,8 @@
 //! Yearly seasonal component of the measurement: one phase per fleet, one amplitude per unit.
 
-use crate::data::series::DAY_US;
 use std::f64::consts::TAU;
+
+use crate::data::series::DAY_US;
 
 /// A tropical year, microseconds.
 pub(crate) const YEAR_US: f64 = 365.242_2 * DAY_US as f64;

@@ -1,8 +1,8 @@
 //! Alert state of a unit, and its reason.
 
-use crate::data::series::DAY_US;
 use std::fmt;
 
+use crate::data::series::DAY_US;
 use crate::settings::Settings;
 use crate::statement::types::{ChangePoint, ChangePointKind, Crossing, Level, MIN_ESTIMATES};
 
