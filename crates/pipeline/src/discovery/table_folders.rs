@@ -98,7 +98,10 @@ impl TableFolders {
                 let what =
                     "rows of this file were deleted from its Delta table, and the file still holds them";
                 let hint = "rewrite the table without deletion vectors: `REORG TABLE … APPLY (PURGE)`, or `OPTIMIZE`";
-                TableMembership::Fault(file.to_owned(), Diagnostic::new("table_unsupported", what).hint(hint))
+                TableMembership::Fault(
+                    file.to_owned(),
+                    Box::new(Diagnostic::new("table_unsupported", what).hint(hint)),
+                )
             }
         }
     }
