@@ -1,7 +1,7 @@
-//! A fleet whose logs arrive night by night, while runs are killed, meet failing disks, broken files and wrong clocks.
+//! A fleet whose logs arrive day by day, while runs are killed, meet failing disks, broken files and wrong clocks.
 //!
 //! At the end the store equals that of one run over the same logs, and a run needs no more memory than at first. The
-//! gate lasts some nights; `FREEPLAY_SOAK=365` is a year.
+//! gate lasts some days; `FREEPLAY_SOAK=365` is a year.
 
 use std::path::Path;
 use std::process::Stdio;
@@ -12,12 +12,12 @@ use crate::runs::injected_faults::Injector;
 use crate::runs::interruption::{Chance, whole_flights};
 
 /// Nights of the gate.
-const NIGHTS: usize = 6;
+const DAYS: usize = 6;
 
-/// Flights that a night brings.
+/// Flights that a day brings.
 const FLIGHTS: usize = 2;
 
-/// Rows of a log: enough for an estimate, few enough for a year of nights.
+/// Rows of a log: enough for an estimate, few enough for a year of days.
 const ROWS: usize = 6000;
 
 /// A fleet without logs, and the logs that it starts from.
@@ -40,7 +40,7 @@ fn bare() -> (TestFleet, Vec<std::path::PathBuf>) {
     (fleet, logs)
 }
 
-/// Writes the log of a night: a sample log as another flight.
+/// Writes the log of a day: a sample log as another flight.
 fn fly(source: &Path, to: &Path, flight: usize) {
     let mut labels = facts(source);
     for (key, value) in &mut labels {
@@ -85,17 +85,17 @@ fn run_watched(fleet: &TestFleet, kill_after: Option<Duration>) -> Option<u64> {
 #[test]
 fn a_year_of_faults_ends_with_the_store_of_one_run() {
     let Some(injector) = Injector::new() else { return };
-    let nights = std::env::var("FREEPLAY_SOAK").ok().and_then(|n| n.parse().ok()).unwrap_or(NIGHTS);
+    let days = std::env::var("FREEPLAY_SOAK").ok().and_then(|n| n.parse().ok()).unwrap_or(DAYS);
     let mut chance = Chance(7);
     let (fleet, sources) = bare();
     let (mut peaks, mut counts) = (Vec::new(), [0; 6]);
     let mut broken: Vec<(std::path::PathBuf, Vec<u8>)> = Vec::new();
-    for night in 0..nights {
+    for day in 0..days {
         // Files that were broken are sent again, whole.
         for (log, bytes) in std::mem::take(&mut broken) {
             std::fs::write(log, bytes).unwrap();
         }
-        for flight in night * FLIGHTS..(night + 1) * FLIGHTS {
+        for flight in day * FLIGHTS..(day + 1) * FLIGHTS {
             let log = fleet.path(&format!("logs/{flight:05}.parquet"));
             fly(&sources[flight % sources.len()], &log, flight);
             if chance.next() < 0.1 {
@@ -125,10 +125,10 @@ fn a_year_of_faults_ends_with_the_store_of_one_run() {
     std::fs::remove_dir_all(fleet.path("results")).unwrap();
     fleet.run_ok(&["run", "-q"]);
     assert_eq!(found, fleet.exported(), "the store is not that of one run");
-    assert_eq!(records, nights * FLIGHTS * 4);
+    assert_eq!(records, days * FLIGHTS * 4);
     let [killed, ahead, back, failed, sound, files] = counts;
     print_line(&format!(
-        "{nights} nights: {killed} killed, {failed} with a failing disk, {ahead} with the clock ahead, {back} with it \
+        "{days} days: {killed} killed, {failed} with a failing disk, {ahead} with the clock ahead, {back} with it \
          back, {sound} undisturbed, {files} broken files; {records} records, 0 lost; memory {:?} to {last} KiB",
         peaks.first()
     ));

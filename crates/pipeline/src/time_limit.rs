@@ -22,7 +22,7 @@ pub fn within_time_limit<T: Send + 'static>(
     let (sender, receiver) = channel();
     let name = display_name.to_owned();
     let started = std::thread::Builder::new().spawn(move || {
-        // Nobody receives after the limit.
+        // The receiver is gone after the limit.
         let _ = sender.send(catch_panic(&name, work));
     });
     if let Err(e) = started {

@@ -241,7 +241,11 @@ impl PageLayout {
     }
 
     fn first(header: &DataPageHeader, form: ChunkFormat) -> Option<Self> {
-        if form.is_nullable && header.definition_level_encoding != Encoding::RLE {
+        let is_known = |encoding: Encoding| matches!(encoding.0, 0 | 2..=9);
+        if form.is_nullable && header.definition_level_encoding != Encoding::RLE
+            || !is_known(header.definition_level_encoding)
+            || !is_known(header.repetition_level_encoding)
+        {
             return None;
         }
         let levels = if form.is_nullable { DefinitionLevels::Counted } else { DefinitionLevels::None };
@@ -403,8 +407,12 @@ fn validity_runs(mut levels: &[u8], values: usize) -> Option<Vec<ValidityRun>> {
         if header & 1 == 0 {
             let count = usize::try_from(header >> 1).ok()?.min(left);
             let (mark, rest) = levels.split_first()?;
+            // Levels of a column that may be null are zero and one.
+            if *mark > 1 {
+                return None;
+            }
             (levels, left) = (rest, left - count);
-            extend(&mut runs, mark & 1 == 1, count);
+            extend(&mut runs, *mark == 1, count);
         } else {
             let (bytes, rest) = levels.split_at_checked(usize::try_from(header >> 1).ok()?)?;
             let count = bytes.len().saturating_mul(8).min(left);

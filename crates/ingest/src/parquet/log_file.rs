@@ -3,19 +3,20 @@
 use std::fs::File;
 use std::iter::once;
 use std::ops::Range;
-use std::panic::catch_unwind;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use arrow::array::ArrayRef;
 use arrow::datatypes::{DataType, Field, Schema, TimeUnit};
+use arrow::error::ArrowError;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
 };
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::basic::Encoding;
 use parquet::errors::ParquetError;
-use parquet::file::metadata::ColumnChunkMetaData;
+use parquet::file::metadata::{ColumnChunkMetaData, RowGroupMetaData};
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::{Error, ErrorKind};
@@ -116,6 +117,9 @@ impl LogFile {
                 None => footer_error(&source, &e),
             })
         })?;
+        if footer.metadata().row_groups().iter().flat_map(RowGroupMetaData::columns).any(is_before_start) {
+            return Err(fail(ErrorKind::NotParquet { detail: "its footer has an offset below zero".into() }));
+        }
         let leaves = leaf_columns::leaves(footer.schema().fields());
         let opened = Self { path: path.to_owned(), source, footer, coded: OnceLock::new(), leaves };
         if opened.rows() == 0 {
@@ -331,7 +335,10 @@ impl LogFile {
         loop {
             let mut batch: Vec<ArrayRef> = Vec::with_capacity(columns.len());
             for (reader, leaf) in columns.iter_mut().zip(leaves) {
-                match reader.next() {
+                // On some inconsistent pages the parquet crate panics instead of returning an error.
+                let next = catch_unwind(AssertUnwindSafe(|| reader.next()));
+                let panicked = |_| Some(Err(ArrowError::ParquetError("its pages are inconsistent".into())));
+                match next.unwrap_or_else(panicked) {
                     Some(Ok(found)) => batch.push(Arc::clone(found.column(0))),
                     Some(Err(e)) => return Err(self.decode(leaf, group, e.to_string())),
                     None => {}
@@ -497,6 +504,12 @@ impl TextBounds<'_> {
 }
 
 type BatchIter = parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+
+/// Whether an offset or a length of a chunk is negative, on which the parquet crate panics.
+fn is_before_start(chunk: &ColumnChunkMetaData) -> bool {
+    let dictionary = chunk.dictionary_page_offset().unwrap_or(0);
+    [chunk.data_page_offset(), chunk.compressed_size(), dictionary].iter().any(|offset| *offset < 0)
+}
 
 /// Where a chunk's pages lie, as its footer has it.
 fn range_of(chunk: &ColumnChunkMetaData) -> Range<u64> {

@@ -3,6 +3,9 @@
 pub(crate) mod dictionary;
 pub(crate) mod fast_decode;
 mod foreign_format;
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+mod fuzz;
 pub(crate) mod leaf_columns;
 pub(crate) mod log_file;
 pub(crate) mod numeric;

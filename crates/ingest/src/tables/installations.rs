@@ -27,7 +27,7 @@ pub fn installations(file: &Path, names: &ColumnAliases) -> Result<Installations
     if !errors.is_empty() {
         return Err(errors);
     }
-    // A million rows of text are not kept beside what they say.
+    // The text of a million rows is not kept next to their values.
     drop(table);
     let contradiction = |e: records::installation::Error| {
         Error::new(file, ErrorKind::Table { row: None, column: None, detail: e.to_string() })

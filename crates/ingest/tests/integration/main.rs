@@ -5,6 +5,7 @@
 mod clocks;
 mod corrupt_files;
 mod foreign_writers;
+mod fuzz;
 mod layouts;
 mod sample_filters;
 mod simulated_channels;

@@ -39,7 +39,7 @@ impl Clone for Overrides {
 struct ValidatedOverride {
     tails: Vec<glob::Pattern>,
     parts: Vec<glob::Pattern>,
-    /// Part numbers that are not patterns: there may be many, so each is looked up.
+    /// Part numbers that are not patterns: there may be many, so they are a set.
     exact_parts: BTreeSet<PartNumber>,
     clock: toml::Table,
     channel: toml::Table,

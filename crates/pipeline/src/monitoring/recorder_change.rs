@@ -4,7 +4,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::monitoring::REPORTED_DAYS;
 use jiff::Timestamp;
 use records::uncertainty::SD_OVER_MAD;
 use serde::Serialize;

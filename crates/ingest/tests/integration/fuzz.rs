@@ -1,0 +1,165 @@
+//! Fuzz targets of clocks and of the tables of installations and flights.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, StringArray};
+use ingest::tables::ColumnAliases;
+use ingest::time::clock::{TimeOrigin, Timestamps, build_time_base};
+use ingest::{ClockMapping, Flights, IdentityMapping};
+
+use self::engine::{Input, Random, edit_text, fuzz, overwrite};
+use crate::layouts::write;
+
+#[path = "../../../../tests/fuzz/engine.rs"]
+mod engine;
+
+/// A number that breaks arithmetic, or any.
+fn number(kind: u8, bits: [u8; 8]) -> f64 {
+    const NUMBERS: [f64; 16] = [
+        0.0,
+        f64::NAN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::MAX,
+        f64::MIN,
+        5e-324,
+        1e50,
+        -1e50,
+        1e11,
+        1e-300,
+        0.01,
+        1.0,
+        -1.0,
+        10.0,
+        3600.0,
+    ];
+    if kind < 160 { NUMBERS[usize::from(kind) % 16] } else { f64::from_le_bytes(bits) }
+}
+
+/// Stamps of 50 Hz after the changes that the bytes describe, and a clock.
+fn stamps_of(bytes: &[u8]) -> (Timestamps, ClockMapping) {
+    const EDIT: usize = 12;
+    let rows = 8 * usize::from(bytes.first().copied().unwrap_or_default()) + 1;
+    let mut seconds: Vec<f64> = (0..rows).map(|row| row as f64 * 0.02).collect();
+    let (mut origin, mut clock) = (TimeOrigin::Counted(0.0), ClockMapping::default());
+    for edit in bytes.get(1..).unwrap_or_default().chunks_exact(EDIT) {
+        let value = number(edit[3], edit[4..].try_into().unwrap());
+        let first = rows * usize::from(edit[1]) / 256;
+        let range = first..(first + usize::from(edit[2])).min(rows);
+        match edit[0] % 16 {
+            0..=2 => seconds[range].fill(value),
+            3 => seconds[range].reverse(),
+            4..=6 => seconds[first..].iter_mut().for_each(|s| *s += value),
+            7 => seconds[range].iter_mut().for_each(|s| *s *= value),
+            8 => seconds[range].iter_mut().for_each(|s| *s = s.floor()),
+            9 => clock.rate_hz = Some(value),
+            10 => clock.tick_s = Some(value),
+            11 => clock.max_back_s = Some(value),
+            12 => clock.split_at_jumps = edit[3] % 2 == 0,
+            13 => origin = TimeOrigin::Counted(value),
+            14 => clock.wraps_at = Some(value),
+            _ => origin = TimeOrigin::Start,
+        }
+    }
+    // A configuration with settings outside their ranges is refused before a clock is built.
+    let within =
+        |value: Option<f64>, least: f64, most: f64| value.filter(|value| (least..=most).contains(value));
+    clock.rate_hz = within(clock.rate_hz, 1e-6, 1e6);
+    clock.tick_s = within(clock.tick_s, 1e-9, 1e4);
+    clock.max_back_s = within(clock.max_back_s, 1e-9, 1e9);
+    (Timestamps { column: "t".into(), seconds, origin }, clock)
+}
+
+/// A clock has a positive step, and its rows and segments lie within the log, in order.
+fn clock_of_any(bytes: &[u8]) -> String {
+    let (mut stamps, clock) = stamps_of(bytes);
+    let rows = stamps.seconds.len();
+    match build_time_base(&mut stamps, &clock) {
+        Ok(line) => {
+            assert!(line.step_s.is_finite() && line.step_s > 0.0, "step {}", line.step_s);
+            let kept = line.kept.as_ref().map_or(rows, Vec::len);
+            assert!(kept <= rows);
+            assert!(line.kept.iter().flatten().all(|row| (*row as usize) < rows), "rows");
+            let mut end = 0;
+            for segment in &line.segments {
+                assert!(
+                    end <= segment.start && segment.start <= segment.end && segment.end <= kept,
+                    "{segment:?}"
+                );
+                end = segment.end;
+            }
+            assert_eq!(stamps.of(&line).len(), kept);
+            let r = line.repairs;
+            let repaired = [r.unstamped, r.filled, r.out_of_order, r.repeated].map(|count| count > 0);
+            format!("{repaired:?} {}", line.segments.len().min(3))
+        }
+        Err(e) => format!("{e:?}").split([' ', '{']).next().unwrap_or_default().to_owned(),
+    }
+}
+
+#[test]
+fn fuzz_clock() {
+    let mut random = Random::new(3);
+    let corpus: Vec<Vec<u8>> =
+        (0..24_usize).map(|edits| (0..=12 * (edits % 8)).map(|_| random.next() as u8).collect()).collect();
+    let change = |random: &mut Random, input: &mut Input| {
+        let length = input.bytes.len();
+        match random.below(4) {
+            0 => input.bytes.extend((0..12).map(|_| random.next() as u8)),
+            1 if length > 12 => input.bytes.truncate(length - 12),
+            _ => overwrite(random, &mut input.bytes, std::slice::from_ref(&(0..length))),
+        }
+        input.bytes.truncate(1 + 20 * 12);
+    };
+    fuzz("clock", corpus, 2000, change, clock_of_any);
+}
+
+#[test]
+fn fuzz_installations_and_flights() {
+    let sample = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../sample-data/installations.csv");
+    let flights = "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end,path,position\n\
+                   N1,F1,2026-01-01T06:00:00Z,1.5,100.0,N1/F1.parquet,aileron\nN1,F2,2026-01-02,,101.5,,\n";
+    let corpus = vec![std::fs::read(sample).unwrap(), flights.as_bytes().to_vec()];
+    let others = corpus.clone();
+    let folder = tempfile::tempdir().unwrap();
+    let [csv, parquet] = ["table.csv", "table.parquet"].map(|name| folder.path().join(name));
+    let change = |random: &mut Random, input: &mut Input| edit_text(random, &mut input.bytes, &others);
+    fuzz("installations and flights", corpus, 500, change, |bytes| {
+        std::fs::write(&csv, bytes).unwrap();
+        // The same cells as a table of texts.
+        let text = String::from_utf8_lossy(bytes);
+        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        let names: Vec<String> = rows
+            .first()
+            .into_iter()
+            .flatten()
+            .enumerate()
+            .map(|(k, name)| format!("{name}{}", if k < 9 { "" } else { "+" }))
+            .collect();
+        let column = |k: usize| {
+            let cells = rows.iter().skip(1).map(|row| row.get(k).copied());
+            Arc::new(cells.collect::<StringArray>()) as ArrayRef
+        };
+        let columns: Vec<(&str, ArrayRef)> =
+            names.iter().enumerate().map(|(k, name)| (name.as_str(), column(k))).collect();
+        let mut outcome = String::new();
+        let is_table = !columns.is_empty() && rows.len() > 1;
+        if is_table {
+            write(&parquet, &columns);
+        }
+        for file in [&csv, &parquet].into_iter().take(1 + usize::from(is_table)) {
+            let found = ingest::tables::installations(file, &ColumnAliases::new());
+            outcome.push_str(
+                &found
+                    .map_or_else(|e| e[0].diagnostic().code, |found| found.iter().count().min(9).to_string()),
+            );
+            let found = Flights::read(file, &ColumnAliases::new(), &IdentityMapping::default());
+            outcome.push_str(
+                &found
+                    .map_or_else(|e| e[0].diagnostic().code, |found| found.iter().count().min(9).to_string()),
+            );
+        }
+        outcome
+    });
+}
