@@ -120,6 +120,10 @@ impl DecodeBuffers {
                 Some(levels) => validity_runs(levels, data.values)?,
                 None => vec![ValidityRun { is_present: true, values: data.values }],
             };
+            let missing: usize = runs.iter().filter(|run| !run.is_present).map(|run| run.values).sum();
+            if data.missing.is_some_and(|stated| stated != missing) {
+                return None;
+            }
             if data.coding == ValueEncoding::Dictionary {
                 let mut codes = DictIndices::of(body)?;
                 append_runs(&runs, into, |values, into| codes.append(values, &self.dictionary, into))?;
@@ -218,6 +222,8 @@ struct PageLayout {
     /// Bytes of levels that lie before what is compressed.
     levels_len: usize,
     levels: DefinitionLevels,
+    /// Missing numbers, where the header states them.
+    missing: Option<usize>,
 }
 
 /// Where the marks of missing numbers lie.
@@ -250,7 +256,7 @@ impl PageLayout {
         }
         let levels = if form.is_nullable { DefinitionLevels::Counted } else { DefinitionLevels::None };
         let (values, coding) = (usize::try_from(header.num_values).ok()?, coding(header.encoding)?);
-        Some(Self { values, coding, is_compressed: true, levels_len: 0, levels })
+        Some(Self { values, coding, is_compressed: true, levels_len: 0, levels, missing: None })
     }
 
     fn second(header: &DataPageHeaderV2) -> Option<Self> {
@@ -260,7 +266,9 @@ impl PageLayout {
         }
         let (values, coding) = (usize::try_from(header.num_values).ok()?, coding(header.encoding)?);
         let is_compressed = header.is_compressed.unwrap_or(true);
-        Some(Self { values, coding, is_compressed, levels_len, levels: DefinitionLevels::Bytes(levels_len) })
+        let (levels, missing) =
+            (DefinitionLevels::Bytes(levels_len), usize::try_from(header.num_nulls).ok()?);
+        Some(Self { values, coding, is_compressed, levels_len, levels, missing: Some(missing) })
     }
 
     /// A page's bytes, split_levels into levels and numbers.

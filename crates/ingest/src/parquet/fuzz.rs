@@ -1,8 +1,7 @@
 //! Fuzz targets of the Parquet reader, over files of eight writers.
 //!
-//! Of each column the fast decoder and the parquet crate must give the same numbers. Behind a sound page header the fast
-//! decoder gives none where the parquet crate refuses; of a damaged header it may skip a field that the parquet crate
-//! does not.
+//! Of each column the fast decoder and the parquet crate must give the same numbers, and the fast decoder none where the
+//! parquet crate finds too few. Of a damaged page header, the fast decoder may skip a field that the parquet crate refuses.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -105,7 +104,7 @@ fn ranges(bytes: &[u8], part: Part) -> Vec<Range<usize>> {
 }
 
 /// Reads every column both ways and compares; the outcome names how each ended.
-fn read_both_ways(file: &Path, part: Part) -> String {
+fn read_both_ways(file: &Path) -> String {
     let opened = match LogFile::open(file) {
         Ok(opened) => opened,
         Err(e) => return code(&e),
@@ -124,8 +123,9 @@ fn read_both_ways(file: &Path, part: Part) -> String {
                 assert_eq!(fast.len(), plain.len(), "rows of `{}`", leaf.name);
                 assert!(fast.iter().zip(&plain).all(is_same), "numbers of `{}` differ", leaf.name);
             }
-            (Ok(()), Err(e)) if matches!(part, Part::Pages | Part::Dictionaries) => {
-                panic!("`{}` is read, and the parquet crate refuses it: {}", leaf.name, e.diagnostic())
+            (Ok(()), Err(e)) => {
+                let why = e.diagnostic().to_string();
+                assert!(!why.contains("insufficient values"), "`{}` is read: {why}", leaf.name);
             }
             _ => {}
         }
@@ -154,7 +154,7 @@ fn fuzz_part(name: &'static str, part: Part, gate_cases: usize) {
     };
     fuzz(name, corpus.clone(), gate_cases, change, |bytes| {
         std::fs::write(&file, bytes).unwrap();
-        read_both_ways(&file, part)
+        read_both_ways(&file)
     });
 }
 
