@@ -11,7 +11,6 @@ use arrow::compute::take;
 use arrow::datatypes::Int32Type;
 
 use crate::error::{Error, ErrorKind};
-use crate::log::row_table::SampleSelector;
 use crate::parquet::log_file::{LogFile, Scan};
 use crate::parquet::numeric::as_text;
 
@@ -23,6 +22,15 @@ const MAX_GATHERED_BYTES: usize = 256 << 20;
 
 /// No slot: the row belongs to a channel that is not requested.
 const NONE: u32 = u32::MAX;
+
+/// Which samples are meant: the leaf that holds them, and the rows in which it does.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct SampleSelector {
+    /// The leaf.
+    pub(crate) leaf: String,
+    /// Columns and the text they must hold.
+    pub(crate) rows: Vec<(String, String)>,
+}
 
 /// The texts that mark the rows of a channel or an actuator, by column.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -15,6 +15,7 @@ use crate::channel::column_builder::ColumnBuilder;
 use crate::channel::si_conversion::SiConversion;
 use crate::channel::stats::ChannelStats;
 use crate::error::{Error, ErrorKind, STRUCT};
+pub(crate) use crate::log::row_partition::SampleSelector;
 use crate::log::row_partition::{LONG_BATCH_ROWS, Partition, RowKeys};
 use crate::log::timestamps::{TickEpoch, TickFormat, TimestampParser};
 use crate::mapping::column_pattern::nearest;
@@ -37,15 +38,6 @@ pub(crate) struct RowTable {
     texts: Mutex<BTreeMap<String, Arc<BTreeSet<String>>>>,
     /// The rows of each channel or actuator, where rows belong to one.
     partition: Partition,
-}
-
-/// Which samples are meant: the leaf that holds them, and the rows in which it does.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct SampleSelector {
-    /// The leaf.
-    pub(crate) leaf: String,
-    /// Columns and the text they must hold.
-    pub(crate) rows: Vec<(String, String)>,
 }
 
 impl RowTable {
