@@ -14,9 +14,7 @@ mod state_badge;
 mod stats;
 
 pub use assets::assets;
-pub use charts::estimate_plot::{
-    ContactInterval, EstimatePlot, estimate_plot_html, estimate_plot_png, estimate_plot_svg,
-};
+pub use charts::estimate_plot::{ContactInterval, EstimatePlot, estimate_plot_html, estimate_plot_svg};
 pub use model::{
     Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
     Report, Tail, TimedInterval, UnitView,

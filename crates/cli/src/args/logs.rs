@@ -42,7 +42,7 @@ pub(crate) struct EstimateArgs {
     #[arg(long, value_name = "FILE.parquet")]
     pub trace: Option<PathBuf>,
     /// Plot time histories and the load–deflection fit.
-    #[arg(long, value_name = "FILE.svg|png|html")]
+    #[arg(long, value_name = "FILE.svg|html")]
     pub plot: Option<PathBuf>,
     #[command(flatten)]
     pub rows: RowFormatArgs,

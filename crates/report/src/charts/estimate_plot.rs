@@ -4,7 +4,6 @@ use askama::Template;
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
-use resvg::{tiny_skia, usvg};
 
 use crate::charts::history::{GRID, INK};
 use crate::page::Error;
@@ -24,8 +23,6 @@ const TIME_PLOTS_WIDTH: u32 = 800;
 const MAX_POINTS: usize = 1400;
 /// Maximum number of contact intervals drawn; above it, every n-th.
 const MAX_CONTACTS: usize = 3000;
-/// Scale of a PNG relative to the SVG, so that it can be enlarged.
-const PNG_SCALE: f32 = 1.5;
 
 /// Data behind one estimate.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -86,23 +83,6 @@ pub fn estimate_plot_svg(plots: &[EstimatePlot]) -> Result<String, Error> {
     let mut svg = String::new();
     draw(&mut svg, plots).map_err(|e| Error::Plot(e.to_string()))?;
     Ok(svg)
-}
-
-/// Draws all estimates as a PNG with an embedded font, so that the result does not depend on the machine.
-///
-/// # Errors
-/// If the plot cannot be drawn.
-pub fn estimate_plot_png(plots: &[EstimatePlot]) -> Result<Vec<u8>, Error> {
-    let plot_error = |e: &dyn std::fmt::Display| Error::Plot(e.to_string());
-    let mut options = usvg::Options { font_family: "DejaVu Sans".to_owned(), ..usvg::Options::default() };
-    options.fontdb_mut().load_font_data(dejavu::sans::regular().to_vec());
-    options.fontdb_mut().set_sans_serif_family("DejaVu Sans");
-    let tree = usvg::Tree::from_str(&estimate_plot_svg(plots)?, &options).map_err(|e| plot_error(&e))?;
-    let side = |length: f32| (length * PNG_SCALE).ceil() as u32;
-    let mut pixels = tiny_skia::Pixmap::new(side(tree.size().width()), side(tree.size().height()))
-        .ok_or_else(|| Error::Plot(format!("{} actuators are too many for one PNG", plots.len())))?;
-    resvg::render(&tree, tiny_skia::Transform::from_scale(PNG_SCALE, PNG_SCALE), &mut pixels.as_mut());
-    pixels.encode_png().map_err(|e| plot_error(&e))
 }
 
 /// Writes a self-contained HTML page: each plot, and its curves as data to hover over and zoom into.
@@ -428,15 +408,6 @@ mod tests {
             assert!(!text.contains("<script>alert"), "escaped");
             assert!(text.contains("&#60;script&#62;alert") || text.contains("&lt;script&gt;alert"));
         }
-    }
-
-    #[test]
-    fn a_png_has_the_picture_in_it() {
-        let png = estimate_plot_png(&[plot(), EstimatePlot::default()]).unwrap();
-        assert_eq!(&png[1..4], b"PNG");
-        let side = |at: usize| u32::from_be_bytes([png[at], png[at + 1], png[at + 2], png[at + 3]]);
-        assert_eq!((side(16), side(20)), (SIZE.0 * 3 / 2, SIZE.1 * 3));
-        assert!(png.len() > 30_000, "{} bytes hold no curves", png.len());
     }
 
     #[test]

@@ -1,11 +1,11 @@
-//! `estimate --plot`: diagnostic plot of an estimate as SVG, PNG or HTML.
+//! `estimate --plot`: diagnostic plot of an estimate as SVG or HTML.
 
 use std::path::{Path, PathBuf};
 
 use job::Config;
 use job::estimate_plot_data::EstimatePlot;
 use records::{Installations, PartNumber};
-use report::{ContactInterval, estimate_plot_html, estimate_plot_png, estimate_plot_svg};
+use report::{ContactInterval, estimate_plot_html, estimate_plot_svg};
 
 use crate::exit::Failure;
 use crate::output::Output;
@@ -54,12 +54,16 @@ fn renderer(file: &Path) -> Result<Renderer, Failure> {
     let ending = file.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
     match ending.as_str() {
         "svg" => Ok(|plots| estimate_plot_svg(plots).map(String::into_bytes)),
-        "png" => Ok(estimate_plot_png),
         "html" | "htm" => Ok(|plots| estimate_plot_html(plots).map(String::into_bytes)),
+        "png" => Err(Failure::usage(
+            "unknown_ending",
+            format!("{}: plots are not written as PNG", display_path(file)),
+            "write .svg and convert it, for example with `rsvg-convert plot.svg -o plot.png`",
+        )),
         _ => Err(Failure::usage(
             "unknown_ending",
             format!("{} has no known extension", display_path(file)),
-            "use the extension .svg, .png or .html",
+            "use the extension .svg or .html",
         )),
     }
 }
