@@ -24,7 +24,7 @@ fn numbers(fleet: &TestFleet) -> Vec<String> {
 /// One tail of the sample fleet, so that each case costs a third.
 fn one_tail() -> TestFleet {
     let fleet = TestFleet::sample();
-    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N414FP/*.parquet");
+    fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");
     fleet
 }
 
@@ -35,7 +35,7 @@ fn plain() -> Vec<String> {
 }
 
 fn logs(fleet: &TestFleet) -> Vec<PathBuf> {
-    fleet.logs().into_iter().filter(|log| log.to_str().unwrap().contains("N414FP")).collect()
+    fleet.logs().into_iter().filter(|log| log.to_str().unwrap().contains("N412FP")).collect()
 }
 
 #[test]
@@ -44,10 +44,10 @@ fn normalized_logs_give_the_same_gaps_bit_for_bit() {
         let fleet = one_tail();
         let output = fleet.run_ok(&["normalize", "--output", "normalized", "--encoding", encoding]);
         assert!(output.contains("40 normalized logs of 10 logs"), "{output}");
-        fleet.configure("sample-data/logs/N414FP/*.parquet", "normalized/**/*.parquet");
+        fleet.configure("sample-data/logs/N412FP/*.parquet", "normalized/**/*.parquet");
         fleet.run_ok(&["run"]);
         assert_eq!(numbers(&fleet), plain(), "{encoding}");
-        let one = glob::glob(fleet.path("normalized/N414FP/*/*.parquet").to_str().unwrap()).unwrap();
+        let one = glob::glob(fleet.path("normalized/N412FP/*/*.parquet").to_str().unwrap()).unwrap();
         let output = facts(&one.flatten().next().unwrap());
         for key in ["freeplay.source_log", "freeplay.source_digest", "freeplay.step_s", "freeplay.units"] {
             assert!(output.iter().any(|(k, v)| k == key && !v.is_empty()), "{key}");
@@ -59,7 +59,7 @@ fn normalized_logs_give_the_same_gaps_bit_for_bit() {
 fn a_normalized_log_of_another_lead_is_refused() {
     let fleet = one_tail();
     fleet.run_ok(&["normalize", "--output", "normalized"]);
-    fleet.configure("sample-data/logs/N414FP/*.parquet", "normalized/**/*.parquet");
+    fleet.configure("sample-data/logs/N412FP/*.parquet", "normalized/**/*.parquet");
     fleet.configure("lead_m_per_rev = 0.005", "lead_m_per_rev = 0.0051");
     let result = fleet.freeplay(&["run"]);
     assert_eq!(result.code, Some(1), "{result:?}");
@@ -106,7 +106,7 @@ fn loads_in_files_of_their_own_find_their_flights() {
             let positions = fleet.path("positions").join(name);
             rewrite(&log, &positions, &facts(&log), |c| !is_load(c), |_| true);
         }
-        fleet.configure("sample-data/logs/N414FP/*.parquet", "positions/*.parquet");
+        fleet.configure("sample-data/logs/N412FP/*.parquet", "positions/*.parquet");
         fleet.configure(
             "[channel.load]",
             "[group.loads]\nfiles = [\"loads/*.parquet\"]\n\n[channel.load]\ngroup = \"loads\"",
@@ -133,7 +133,7 @@ fn a_broken_file_of_a_group_and_one_without_a_flight_are_reported() {
         rewrite(&log, &fleet.path("loads").join(name), &facts(&log), |c| load(c) || c == "time_s", |_| true);
         rewrite(&log, &fleet.path("positions").join(name), &facts(&log), |c| !load(c), |_| true);
     }
-    fleet.configure("sample-data/logs/N414FP/*.parquet", "positions/*.parquet");
+    fleet.configure("sample-data/logs/N412FP/*.parquet", "positions/*.parquet");
     fleet.configure(
         "[channel.load]",
         "[group.loads]\nfiles = [\"loads/*.parquet\"]\n\n[channel.load]\ngroup = \"loads\"",
@@ -204,7 +204,7 @@ fn a_flights_table_tells_what_the_logs_do_not() {
         let known = facts(log);
         let fact = |key: &str| known.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone()).unwrap();
         let name = log.file_name().unwrap().to_str().unwrap();
-        writeln!(table, "N414FP,L{n},{},{},{name}", fact("departure_utc"), n + 1).unwrap();
+        writeln!(table, "N412FP,L{n},{},{},{name}", fact("departure_utc"), n + 1).unwrap();
     }
     std::fs::write(fleet.path("flights.csv"), table).unwrap();
     let text = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
@@ -287,7 +287,7 @@ fn delta_log(table: &std::path::Path, added: &[&str], removed: &[&str]) {
 #[test]
 fn a_delta_table_is_read_by_its_log() {
     let fleet = one_tail();
-    let table = fleet.path("sample-data/logs/N414FP");
+    let table = fleet.path("sample-data/logs/N412FP");
     let names: Vec<String> = std::fs::read_dir(&table)
         .unwrap()
         .flatten()
@@ -302,7 +302,7 @@ fn a_delta_table_is_read_by_its_log() {
 #[test]
 fn an_iceberg_table_is_refused_by_name() {
     let fleet = one_tail();
-    let table = fleet.path("sample-data/logs/N414FP");
+    let table = fleet.path("sample-data/logs/N412FP");
     std::fs::create_dir(table.join("metadata")).unwrap();
     std::fs::write(table.join("metadata/v1.metadata.json"), "{}").unwrap();
     for command in ["check", "run"] {
@@ -319,13 +319,13 @@ fn an_iceberg_table_is_refused_by_name() {
 #[test]
 fn temporary_files_are_no_logs() {
     let fleet = one_tail();
-    let folder = fleet.path("sample-data/logs/N414FP");
+    let folder = fleet.path("sample-data/logs/N412FP");
     for name in ["._a.parquet", ".b.parquet", "_temporary/0/c.parquet"] {
         let file = folder.join(name);
         std::fs::create_dir_all(file.parent().unwrap()).unwrap();
         std::fs::write(file, "no log").unwrap();
     }
-    fleet.configure("N414FP/*.parquet", "N414FP/**/*.parquet");
+    fleet.configure("N412FP/*.parquet", "N412FP/**/*.parquet");
     fleet.run_ok(&["run"]);
     assert_eq!(numbers(&fleet), plain());
 }
@@ -364,7 +364,7 @@ fn check_finds_a_flight_in_two_logs_as_run_does() {
     let folder = fleet.path("pieces");
     rewrite(log, &folder.join("a.parquet"), &facts(log), |_| true, |row| row < 4321);
     rewrite(log, &folder.join("b.parquet"), &facts(log), |_| true, |row| row >= 4321);
-    fleet.configure("sample-data/logs/N414FP/*.parquet", "pieces/*.parquet");
+    fleet.configure("sample-data/logs/N412FP/*.parquet", "pieces/*.parquet");
     for command in ["check", "run"] {
         let result = fleet.freeplay(&[command]);
         assert_eq!(result.code, Some(1), "{result:?}");

@@ -57,7 +57,7 @@ fn without(rows: &str, columns: &[&str]) -> String {
 #[test]
 fn files_of_two_releases_are_one_table() {
     let fleet = old();
-    fleet.run_ok(&["run", "--limit", "3"]);
+    fleet.run_ok(&["run", "--tail", "N412FP", "--limit", "3"]);
     let rows: serde_json::Value =
         serde_json::from_str(&fleet.run_ok(&["query", "tail", "N412FP", "--json"])).unwrap();
     let has_skew_se = |row: &serde_json::Value| row["skew_se_s"].is_number();
