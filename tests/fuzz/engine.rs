@@ -175,6 +175,17 @@ pub(crate) fn overwrite(random: &mut Random, bytes: &mut [u8], ranges: &[std::op
     }
 }
 
+/// Changes an input that is one byte and then edits of some bytes each: one more, one less, or other bytes.
+pub(crate) fn change_edits(random: &mut Random, input: &mut Input, edit: usize, most: usize) {
+    let length = input.bytes.len();
+    match random.below(4) {
+        0 => input.bytes.extend((0..edit).map(|_| random.next() as u8)),
+        1 if length > edit => input.bytes.truncate(length - edit),
+        _ => overwrite(random, &mut input.bytes, std::slice::from_ref(&(0..length))),
+    }
+    input.bytes.truncate(1 + most * edit);
+}
+
 /// Words that break readers of text.
 const WORDS: [&str; 40] = [
     "",

@@ -9,7 +9,7 @@ use job::Config;
 use pipeline::history::{external_estimates, maintenance_log};
 use records::{PartNumber, Status, TailNumber};
 
-use self::engine::{Input, Random, edit_text, fuzz, overwrite};
+use self::engine::{Input, Random, change_edits, edit_text, fuzz};
 use crate::harness::top;
 
 mod engine;
@@ -131,7 +131,7 @@ fn channels(bytes: &[u8]) -> [Vec<f64>; 4] {
         };
         let channel = &mut all[usize::from(edit[0]) % 4];
         let first = rows * usize::from(edit[2]) / 256;
-        // A stretch, a point, or every so many samples.
+        // A range, one sample, or samples at a regular distance.
         let step = if edit[1] >= 128 { 1 + usize::from(edit[3]) % 37 } else { 1 };
         let last = if edit[1] % 8 == 0 { first + 1 } else { first + rows * (1 + usize::from(edit[3])) / 256 };
         for sample in channel[first..last.min(rows)].iter_mut().step_by(step) {
@@ -156,15 +156,7 @@ fn fuzz_estimators() {
     corpus.extend(
         (0..30).map(|edits| (0..=(edits % 6) * EDIT).map(|_| random.next() as u8).collect::<Vec<u8>>()),
     );
-    let change = |random: &mut Random, input: &mut Input| {
-        let length = input.bytes.len();
-        match random.below(4) {
-            0 => input.bytes.extend((0..EDIT).map(|_| random.next() as u8)),
-            1 if length > EDIT => input.bytes.truncate(length - EDIT),
-            _ => overwrite(random, &mut input.bytes, std::slice::from_ref(&(0..length))),
-        }
-        input.bytes.truncate(1 + 20 * EDIT);
-    };
+    let change = |random: &mut Random, input: &mut Input| change_edits(random, input, EDIT, 20);
     fuzz("estimator inputs", corpus, 150, change, |bytes| {
         let [time_s, motor_m, screw_m, load_n] = channels(bytes);
         let arrays = ChannelArrays { time_s: &time_s, motor_m: &motor_m, screw_m: &screw_m, load_n: &load_n };

@@ -1,7 +1,7 @@
 //! File-system calls of a run that fail, are killed at, or never return: `tests/data/disk/faults.c`, preloaded.
 //!
 //! Every call of the process on a folder is counted, so that each can be tried. The gate tries a sample; all of them
-//! are tried with `FREEPLAY_FAULTS=all`, and so many of each row with a number. `docs/reliability.md` has the figures.
+//! are tried with `FREEPLAY_FAULTS=all`, and a number of calls of each row with a number. `docs/reliability.md` has the figures.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

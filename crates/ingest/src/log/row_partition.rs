@@ -17,7 +17,7 @@ use crate::parquet::numeric::as_text;
 /// Rows decoded at a time: a batch is split among many channels, so it is larger than that of a wide log.
 pub(crate) const LONG_BATCH_ROWS: usize = 1 << 16;
 
-/// Gathered samples may occupy so many bytes; what does not fit is gathered by a later pass.
+/// Memory limit of gathered samples, bytes; what does not fit is gathered by a later pass.
 const MAX_GATHERED_BYTES: usize = 256 << 20;
 
 /// No slot: the row belongs to a channel that is not requested.

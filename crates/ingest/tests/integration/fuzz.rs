@@ -8,7 +8,7 @@ use ingest::tables::ColumnAliases;
 use ingest::time::clock::{TimeOrigin, Timestamps, build_time_base};
 use ingest::{ClockMapping, Flights, IdentityMapping};
 
-use self::engine::{Input, Random, edit_text, fuzz, overwrite};
+use self::engine::{Input, Random, change_edits, edit_text, fuzz};
 use crate::layouts::write;
 
 #[path = "../../../../tests/fuzz/engine.rs"]
@@ -37,9 +37,11 @@ fn number(kind: u8, bits: [u8; 8]) -> f64 {
     if kind < 160 { NUMBERS[usize::from(kind) % 16] } else { f64::from_le_bytes(bits) }
 }
 
+/// Bytes of one change to the stamps.
+const EDIT: usize = 12;
+
 /// Stamps of 50 Hz after the changes that the bytes describe, and a clock.
 fn stamps_of(bytes: &[u8]) -> (Timestamps, ClockMapping) {
-    const EDIT: usize = 12;
     let rows = 8 * usize::from(bytes.first().copied().unwrap_or_default()) + 1;
     let mut seconds: Vec<f64> = (0..rows).map(|row| row as f64 * 0.02).collect();
     let (mut origin, mut clock) = (TimeOrigin::Counted(0.0), ClockMapping::default());
@@ -102,16 +104,8 @@ fn clock_of_any(bytes: &[u8]) -> String {
 fn fuzz_clock() {
     let mut random = Random::new(3);
     let corpus: Vec<Vec<u8>> =
-        (0..24_usize).map(|edits| (0..=12 * (edits % 8)).map(|_| random.next() as u8).collect()).collect();
-    let change = |random: &mut Random, input: &mut Input| {
-        let length = input.bytes.len();
-        match random.below(4) {
-            0 => input.bytes.extend((0..12).map(|_| random.next() as u8)),
-            1 if length > 12 => input.bytes.truncate(length - 12),
-            _ => overwrite(random, &mut input.bytes, std::slice::from_ref(&(0..length))),
-        }
-        input.bytes.truncate(1 + 20 * 12);
-    };
+        (0..24_usize).map(|edits| (0..=EDIT * (edits % 8)).map(|_| random.next() as u8).collect()).collect();
+    let change = |random: &mut Random, input: &mut Input| change_edits(random, input, EDIT, 20);
     fuzz("clock", corpus, 2000, change, clock_of_any);
 }
 

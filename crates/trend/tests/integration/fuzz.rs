@@ -2,7 +2,7 @@
 
 use trend::{FleetPrior, Observation, Series, Settings, UsageDefaults, assess, forecast};
 
-use self::engine::{Input, Random, fuzz, overwrite};
+use self::engine::{Input, Random, change_edits, fuzz};
 
 #[path = "../../../../tests/fuzz/engine.rs"]
 mod engine;
@@ -150,14 +150,6 @@ fn fuzz_trend() {
     let mut random = Random::new(7);
     let mut corpus = vec![vec![], vec![100]];
     corpus.extend((0..20).map(|edits| (0..=edits * EDIT).map(|_| random.next() as u8).collect::<Vec<u8>>()));
-    let change = |random: &mut Random, input: &mut Input| {
-        let length = input.bytes.len();
-        match random.below(4) {
-            0 => input.bytes.extend((0..EDIT).map(|_| random.next() as u8)),
-            1 if length > EDIT => input.bytes.truncate(length - EDIT),
-            _ => overwrite(random, &mut input.bytes, std::slice::from_ref(&(0..length))),
-        }
-        input.bytes.truncate(1 + 40 * EDIT);
-    };
+    let change = |random: &mut Random, input: &mut Input| change_edits(random, input, EDIT, 40);
     fuzz("trend inputs", corpus, 60, change, assess_any);
 }

@@ -31,7 +31,8 @@ const SCHEMA: &str = "pipeline.schema.json";
 /// Maximum number of logs that are read for their tail numbers.
 const MOST_LOGS: usize = 5000;
 
-const STAYS: &str = "\
+/// Head of a proposed installations table.
+const INSTALLATIONS_HEAD: &str = "\
 # Proposed: one row per tail and position found, each with a placeholder unit.
 # Enter the real part and serial numbers and dates: a trend belongs to the unit and follows it to other positions.
 # Empty removed_utc: still installed. A date without time is midnight UTC.
@@ -60,7 +61,8 @@ pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
         let proposal = Proposal::of(folder, &logs)?;
         toml = proposed(folder, &args.dir, &proposal)?;
         // Without a tail and a position there is no row: a serial number is never invented for one.
-        table = installation_rows(&proposal.logs, &proposal.offer).unwrap_or_else(|| STAYS.to_owned());
+        table = installation_rows(&proposal.logs, &proposal.offer)
+            .unwrap_or_else(|| INSTALLATIONS_HEAD.to_owned());
     }
     fs::create_dir_all(&args.dir)?;
     for ((name, _), text) in FILES.iter().zip([toml, table]) {
@@ -185,7 +187,7 @@ fn installation_rows(logs: &[PathBuf], offer: &InferredMapping) -> Option<String
         format!("{tail},{position},EMA-27-1040,{tail} {position},1970-01-01,\n")
     };
     let rows: Vec<String> = places.iter().map(row).collect();
-    (!rows.is_empty()).then(|| format!("{STAYS}{}", rows.concat()))
+    (!rows.is_empty()).then(|| format!("{INSTALLATIONS_HEAD}{}", rows.concat()))
 }
 
 /// Template with the mapping inferred from the logs below a folder, to be verified with `check`.

@@ -185,8 +185,7 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     if vibration_n > ALIASED_LOAD * scaling.load_n && scale_m > ALIASED_RESIDUAL * windup_m {
         return Err(Rejection::RateTooLow);
     }
-    let (gap_m, mut doubt, sigma) = gap_and_doubt(&line, spread_m, windup_m, vibration_n, scaling.load_n);
-    doubt.aliased_m = aliased_share(vibration_n / scaling.load_n, scale_m / windup_m) * windup_m;
+    let (gap_m, doubt, sigma) = gap_and_doubt(&line, spread_m, scale_m, vibration_n, scaling);
     let fit = FlankFit {
         gap_m: (gap_m, doubt.standard_error_m()),
         compliance_m_per_n: (line.fit.beta[FORCE] / scaling.load_n, error_m(FORCE) / scaling.load_n),
@@ -305,10 +304,11 @@ fn is_periodic(found: &GaussNewtonResult) -> bool {
 fn gap_and_doubt(
     line: &GaussNewtonResult,
     search_m: f64,
-    windup_m: f64,
+    residual_m: f64,
     vibration_n: f64,
-    load_n: f64,
+    scaling: &Scaling,
 ) -> (f64, Doubt, f64) {
+    let (windup_m, load_n) = (scaling.windup_m(), scaling.load_n);
     let rows = &line.design.firm;
     let groups = groups(rows);
     let refit = |least: f64| line.fit.leave_one_out(GAP, rows, &groups, (FORCE, least));
@@ -338,7 +338,7 @@ fn gap_and_doubt(
         bend_m: bend * difference_m / (1.0 + (difference_m / (NONLINEAR_SHARE * windup_m)).powi(2)),
         light_m: (1.0 - weight) * median(&mut outward_m),
         vibration_m: friction.lost_share * vibration_n / stiffness_n_per_m,
-        aliased_m: 0.0,
+        aliased_m: aliased_share(vibration_n / load_n, residual_m / windup_m) * windup_m,
         floor_m: (3e-4 * windup_m).hypot(2e-4 * gap_m),
         changes: (changes.max(1) as f64).sqrt().recip(),
         friction_share: friction.at_n(load_n) / load_n,
