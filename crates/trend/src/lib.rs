@@ -53,6 +53,7 @@ mod inference;
 mod learning;
 mod math;
 mod prior;
+pub mod quantity;
 mod settings;
 mod statement;
 mod wear;

@@ -13,6 +13,7 @@ mod degenerate;
 mod fleet;
 mod forecast;
 mod fuzz;
+mod quantities;
 mod random;
 mod scale;
 mod series;

@@ -1,0 +1,273 @@
+//! Steps and drift of a quantity: forward selection of regressors, then elimination of those that do not hold.
+//!
+//! ```text
+//! y_i = b + d·(u_i − ū) + Σ_k s_k·[i ≥ k] + e_i         Var e_i = inflation · (ω² + se_i²)
+//! ```
+//! with u the usage. A step's place is that of the largest decrease of the weighted squares of what the other
+//! regressors leave (Bai & Perron 1998, one break at a time).
+
+use nalgebra::{SMatrix, SVector};
+
+use super::noise::{Scatter, without_outliers};
+use super::{MIN_FLIGHTS, QuantityValue};
+
+/// Most steps of one unit.
+const MAX_STEPS: usize = 4;
+/// Most regressors: one, the drift, the steps.
+const COLUMNS: usize = 2 + MAX_STEPS;
+/// Fewest flights before the first step, and from each step to the next or to the end.
+const LEAST_BEFORE: usize = 5;
+const LEAST_AFTER: usize = 3;
+/// Squared t-value from which a step is selected: it is the largest of as many as there are flights, on every night.
+const STEP_GAIN: f64 = 32.0;
+/// Squared t-value from which a drift is selected.
+const DRIFT_GAIN: f64 = 20.0;
+
+type Row = SVector<f64, COLUMNS>;
+type Square = SMatrix<f64, COLUMNS, COLUMNS>;
+
+/// A step of a quantity.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct QuantityStep {
+    /// Departure of the first flight after it, µs since 1970 UTC.
+    pub departure_us: i64,
+    /// Size, in the quantity's unit.
+    pub size: f64,
+    /// Standard error of the size.
+    pub size_se: f64,
+}
+
+/// Steps, drift and level of a quantity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct QuantityChanges {
+    /// Values used.
+    pub flights: usize,
+    /// Values excluded as outliers.
+    pub outliers: usize,
+    /// Fitted value at the first flight.
+    pub baseline: f64,
+    /// Fitted value at the last flight.
+    pub level: f64,
+    /// Standard error of the level.
+    pub level_se: f64,
+    /// Level less baseline; exactly zero where nothing changed significantly.
+    pub change: f64,
+    /// Standard error of the change.
+    pub change_se: f64,
+    /// Change per flight hour beside the steps, significant or not, and its standard error.
+    pub rate_per_hour: Option<(f64, f64)>,
+    /// Whether the drift is significant.
+    pub is_drifting: bool,
+    /// Significant steps, by time.
+    pub steps: Vec<QuantityStep>,
+}
+
+/// Fits steps and drift to the values of one unit, in order of departure; none below two values.
+///
+/// `least_scatter` is the smallest scatter between flights to assume, in the quantity's unit.
+///
+/// ```
+/// use trend::quantity::{QuantityValue, changes};
+///
+/// // A delay of 0.1 ms that is 2.1 ms from the 31st flight on, with a scatter of 50 µs.
+/// let value = |k: i64| QuantityValue {
+///     departure_us: k * 86_400_000_000,
+///     usage_hours: 2.0 * k as f64,
+///     value: if k < 30 { 0.1e-3 } else { 2.1e-3 } + 50e-6 * (1.7 * k as f64).sin(),
+///     se: 10e-6,
+///     temperature_c: None,
+///     ln_load: None,
+/// };
+/// let values: Vec<QuantityValue> = (0..40).map(value).collect();
+/// let found = changes::fit(&values, 1e-6).ok_or("too few values")?;
+/// assert_eq!(found.steps[0].departure_us, values[30].departure_us);
+/// assert!((found.change - 2e-3).abs() < 5.0 * found.change_se);
+/// # Ok::<(), &str>(())
+/// ```
+pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChanges> {
+    let scatter = Scatter::of(values, least_scatter);
+    let sound = without_outliers(values, &scatter);
+    let (first, last) = (sound.first()?, sound.last()?);
+    let mut model = Model::new(&sound, scatter);
+    if sound.len() >= MIN_FLIGHTS {
+        model.select();
+    }
+    let (beta, covariance) = model.solve()?;
+    let at = |index: usize, value: &QuantityValue| model.row(index, value);
+    let (x_first, x_last) = (at(0, first), at(sound.len() - 1, last));
+    let variance = |x: &Row| (x.transpose() * &covariance * x)[(0, 0)].max(0.0);
+    let moved = &x_last - &x_first;
+    let steps = model.steps.iter().enumerate().map(|(k, &at)| {
+        let column = model.first_step() + k;
+        QuantityStep {
+            departure_us: sound[at].departure_us,
+            size: beta[column],
+            size_se: covariance[(column, column)].max(0.0).sqrt(),
+        }
+    });
+    Some(QuantityChanges {
+        flights: sound.len(),
+        outliers: values.len() - sound.len(),
+        baseline: x_first.dot(&beta),
+        level: x_last.dot(&beta),
+        level_se: variance(&x_last).sqrt(),
+        change: moved.dot(&beta),
+        change_se: variance(&moved).sqrt(),
+        rate_per_hour: model.rate_per_hour(),
+        is_drifting: model.has_drift,
+        steps: steps.collect(),
+    })
+}
+
+/// Regressors: one, the drift if selected, and a step from each place on.
+struct Model<'a> {
+    values: &'a [QuantityValue],
+    scatter: Scatter,
+    /// Middle and half the span of the usage, hours; the span zero where usage stands still.
+    usage_hours: (f64, f64),
+    has_drift: bool,
+    steps: Vec<usize>,
+}
+
+impl<'a> Model<'a> {
+    fn new(values: &'a [QuantityValue], scatter: Scatter) -> Self {
+        let low = values.iter().map(|v| v.usage_hours).fold(f64::INFINITY, f64::min);
+        let high = values.iter().map(|v| v.usage_hours).fold(f64::NEG_INFINITY, f64::max);
+        let usage_hours = (0.5 * (low + high), 0.5 * (high - low));
+        Self { values, scatter, usage_hours, has_drift: false, steps: Vec::new() }
+    }
+
+    fn first_step(&self) -> usize {
+        1 + usize::from(self.has_drift)
+    }
+
+    fn columns(&self) -> usize {
+        self.first_step() + self.steps.len()
+    }
+
+    fn weight(&self, value: &QuantityValue) -> f64 {
+        (self.scatter.inflation * self.scatter.variance(value)).recip()
+    }
+
+    /// Regressors of a value.
+    fn row(&self, index: usize, value: &QuantityValue) -> Row {
+        let (middle, half) = self.usage_hours;
+        let mut row = Row::zeros();
+        row[0] = 1.0;
+        if self.has_drift {
+            row[1] = (value.usage_hours - middle) / half;
+        }
+        for (k, &step) in self.steps.iter().enumerate() {
+            row[self.first_step() + k] = f64::from(u8::from(index >= step));
+        }
+        row
+    }
+
+    /// Normal matrix and right side.
+    fn normal(&self) -> (Square, Row) {
+        let mut sums = (Square::zeros(), Row::zeros());
+        for (index, value) in self.values.iter().enumerate() {
+            let (row, weight) = (self.row(index, value), self.weight(value));
+            sums.0.ger(weight, &row, &row, 1.0);
+            sums.1.axpy(weight * value.value, &row, 1.0);
+        }
+        // Regressors that are not selected have coefficient zero.
+        (self.columns()..COLUMNS).for_each(|column| sums.0[(column, column)] = 1.0);
+        sums
+    }
+
+    /// Coefficients and their covariance; none where regressors are dependent.
+    fn solve(&self) -> Option<(Row, Square)> {
+        let (normal, right) = self.normal();
+        let factor = normal.cholesky()?;
+        Some((factor.solve(&right), factor.inverse()))
+    }
+
+    /// Adds the regressor with the largest gain as long as one is significant, then removes those that are not.
+    fn select(&mut self) {
+        while self.steps.len() < MAX_STEPS && self.add_best() {}
+        while self.remove_worst() {}
+    }
+
+    fn add_best(&mut self) -> bool {
+        let drift_gain = if self.has_drift { 0.0 } else { self.drift_gain() };
+        let (step_gain, at) = self.best_step();
+        // A drift explains with one number what steps would follow in stairs.
+        let excess = (drift_gain / DRIFT_GAIN, step_gain / STEP_GAIN);
+        if excess.0.max(excess.1) < 1.0 {
+            return false;
+        }
+        if drift_gain + STEP_GAIN - DRIFT_GAIN >= step_gain {
+            self.has_drift = true;
+        } else {
+            self.steps.push(at);
+            self.steps.sort_unstable();
+        }
+        true
+    }
+
+    /// Squared t-value of a drift beside the present regressors.
+    fn drift_gain(&self) -> f64 {
+        if !(self.usage_hours.1 > 0.0) {
+            return 0.0;
+        }
+        let with = Self { steps: self.steps.clone(), has_drift: true, ..*self };
+        with.solve().map_or(0.0, |(beta, covariance)| beta[1] * beta[1] / covariance[(1, 1)])
+    }
+
+    /// The largest squared t-value of a further step, and its place: by suffix sums, in one pass.
+    fn best_step(&self) -> (f64, usize) {
+        let Some((beta, covariance)) = self.solve() else { return (0.0, 0) };
+        let mut best = (0.0, 0);
+        let (mut residual, mut weight, mut shared) = (0.0, 0.0, Row::zeros());
+        for (index, value) in self.values.iter().enumerate().rev() {
+            let row = self.row(index, value);
+            let w = self.weight(value);
+            residual += w * (value.value - row.dot(&beta));
+            weight += w;
+            shared.axpy(w, &row, 1.0);
+            if !self.is_free(index) {
+                continue;
+            }
+            let own = weight - (shared.transpose() * &covariance * &shared)[(0, 0)];
+            if own > 1e-9 * weight && residual * residual / own > best.0 {
+                best = (residual * residual / own, index);
+            }
+        }
+        best
+    }
+
+    /// Whether a further step may be at an index: far enough from both ends and from the other steps.
+    fn is_free(&self, index: usize) -> bool {
+        let from_others = self.steps.iter().all(|&step| index.abs_diff(step) >= LEAST_AFTER);
+        index >= LEAST_BEFORE && self.values.len() - index >= LEAST_AFTER && from_others
+    }
+
+    /// Removes the least significant regressor, if it is not significant beside the others.
+    fn remove_worst(&mut self) -> bool {
+        let Some((beta, covariance)) = self.solve() else { return false };
+        let gain = |column: usize| beta[column] * beta[column] / covariance[(column, column)];
+        let drift = self.has_drift.then(|| (gain(1) / DRIFT_GAIN, None));
+        let steps = (0..self.steps.len()).map(|k| (gain(self.first_step() + k) / STEP_GAIN, Some(k)));
+        match drift.into_iter().chain(steps).min_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((gain, which)) if gain < 1.0 => {
+                match which {
+                    None => self.has_drift = false,
+                    Some(k) => drop(self.steps.remove(k)),
+                }
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Drift per hour beside the steps, and its standard error, also where it is not significant.
+    fn rate_per_hour(&self) -> Option<(f64, f64)> {
+        if self.values.len() < MIN_FLIGHTS || !(self.usage_hours.1 > 0.0) {
+            return None;
+        }
+        let with = Self { steps: self.steps.clone(), has_drift: true, ..*self };
+        let (beta, covariance) = with.solve()?;
+        Some((beta[1] / self.usage_hours.1, covariance[(1, 1)].max(0.0).sqrt() / self.usage_hours.1))
+    }
+}

@@ -1,0 +1,29 @@
+//! Fitted quantities other than the gap, followed flight by flight: stiffness, friction, delays, load zero.
+//!
+//! [`covariates`] takes off what temperature and load level explain, [`common_curve`] what all units of a part share
+//! (the season, for one), and [`changes`] fits steps and a drift to what is left.
+
+pub mod changes;
+pub mod common_curve;
+pub mod covariates;
+pub mod noise;
+
+/// Fewest flights from which a change is sought.
+pub const MIN_FLIGHTS: usize = 8;
+
+/// A quantity of one unit in one flight, in any unit of measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct QuantityValue {
+    /// Departure, µs since 1970 UTC.
+    pub departure_us: i64,
+    /// The unit's usage at departure, flight hours.
+    pub usage_hours: f64,
+    /// The value.
+    pub value: f64,
+    /// Its standard error; zero where none is stated.
+    pub se: f64,
+    /// Mean temperature of the flight, °C, where it is known.
+    pub temperature_c: Option<f64>,
+    /// Natural logarithm of the flight's 95 % load, where it is known.
+    pub ln_load: Option<f64>,
+}
