@@ -241,6 +241,11 @@ fn from_contact(found: &ContactEstimate) -> GapEstimate {
         load_delay_s: Some(found.load_delay_s),
         load_delay_se_s: Some(found.load_delay_se_s),
         friction_n: Some(found.friction_n()),
+        friction_se_n: Some(found.friction_se.at_p95_n),
+        friction_dry_n: Some(found.friction.dry_n),
+        friction_dry_se_n: Some(found.friction_se.dry_n),
+        friction_load_share: Some(found.friction.lost_share),
+        friction_load_share_se: Some(found.friction_se.lost_share),
         gap_midrange_fitted_m: found.midrange_at_fit_m,
         reason: None,
         ..GapEstimate::refused("")

@@ -11,6 +11,7 @@ pub mod fleet_trends;
 pub mod history;
 pub mod monitoring;
 pub mod normalize;
+pub mod quantities;
 pub mod report;
 pub mod run;
 pub mod simulate;

@@ -312,7 +312,7 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     let of_last_run: Vec<Row> =
         rows.iter().filter(|row| row.assess.departure_utc >= day(200)).cloned().collect();
     let night = |of_last_run: &Histories| {
-        assess::assess_run_from(&config(), &nobody, all(), of_last_run, &units, Vec::new()).unwrap()
+        assess::assess_run_from(&config(), &nobody, all(), of_last_run, &units, None).unwrap()
     };
     let of_night = |of_last_run: &Histories| {
         let night = night(of_last_run);

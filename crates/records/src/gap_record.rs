@@ -124,6 +124,16 @@ stored_row! {
         pub friction_n: Option<f64>,
         /// ΔS by equations 29–31 with the stiffness, load zero and delays fitted in this flight, m: a check of `gap_m`.
         pub gap_midrange_fitted_m: Option<f64>,
+        /// Standard error of `friction_n`, N.
+        pub friction_se_n: Option<f64>,
+        /// Dry friction of the screw fitted in this flight, N: the part that does not depend on the load.
+        pub friction_dry_n: Option<f64>,
+        /// Standard error of `friction_dry_n`, N.
+        pub friction_dry_se_n: Option<f64>,
+        /// Share of the load lost to friction fitted in this flight.
+        pub friction_load_share: Option<f64>,
+        /// Standard error of `friction_load_share`.
+        pub friction_load_share_se: Option<f64>,
     }
 }
 

@@ -128,6 +128,9 @@ row! {
         pub state: Option<&'static str>,
         /// Reason of the state, in words.
         pub reason: Option<String>,
+        /// States of the other followed quantities of the unit: `softening`, `friction_rising`, …; all in the
+        /// quantities table.
+        pub conditions: Vec<String>,
         /// The estimated gaps in order of flights, at most a hundred means of neighbours, m: for a sparkline.
         #[serde(skip)]
         pub sketch_m: NoColumn<Vec<f64>>,

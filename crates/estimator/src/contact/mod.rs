@@ -35,7 +35,7 @@ pub use fit::workspace::ContactWorkspace;
 pub use friction::flank::Flank;
 pub use friction::friction_model::Friction;
 pub use plot_data::{ContactPlot, Touch};
-pub use types::{ContactEstimate, ContactOutcome, PartPrior};
+pub use types::{ContactEstimate, ContactOutcome, FrictionErrors, PartPrior};
 
 use crate::error::Error;
 use crate::{Samples, model};
@@ -136,6 +136,7 @@ fn report(
         load_delay_s: contact.state.load_delay_s + contact.state.load_lag_s,
         load_delay_se_s: contact.load_delay_se_s,
         friction: contact.state.friction,
+        friction_se: contact.friction_se,
         loop_width_m: loop_width.map(|(m, _)| m),
         loop_width_se_m: loop_width.map(|(_, se_m)| se_m),
         lost_motion_m: lost_motion.map(|(m, _)| m),

@@ -47,6 +47,17 @@ impl PartPrior {
     }
 }
 
+/// Standard errors of a fitted friction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrictionErrors {
+    /// Of `F_d`, N.
+    pub dry_n: f64,
+    /// Of η.
+    pub lost_share: f64,
+    /// Of the friction at the 95 % load, N.
+    pub at_p95_n: f64,
+}
+
 /// The gap by contact regression, and what was found on the way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactEstimate {
@@ -75,6 +86,8 @@ pub struct ContactEstimate {
     pub load_delay_se_s: f64,
     /// Friction of the screw in motion.
     pub friction: Friction,
+    /// Its standard errors.
+    pub friction_se: FrictionErrors,
     /// Lost motion at zero load, m, from lightly loaded samples that the fit leaves out. On soft flanks it is narrower
     /// than the gap.
     pub loop_width_m: Option<f64>,

@@ -225,6 +225,57 @@ pub struct TrendSettings {
     /// Removal limit of parts without a `limit_m` of their own, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit_m: Option<f64>,
+    /// Changes of the other followed quantities from which there is a state.
+    pub quantity_limits: QuantityLimits,
+}
+
+/// `[trend.quantity_limits]`: changes since a unit's first flights from which a followed quantity has a state.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct QuantityLimits {
+    /// Stiffness, as a share of the unit's own. Default 0.05.
+    pub stiffness_share: f64,
+    /// Friction at the unit's usual load, as a share of its own. Default 0.1.
+    pub friction_share: f64,
+    /// Lost motion at the reference load, as a share of the unit's own. Default 0.25.
+    pub lost_motion_share: f64,
+    /// Delay between the positions, s. Default 0.0005.
+    pub delay_s: f64,
+    /// Load zero, as a share of the unit's usual 95 % load. Default 0.02.
+    pub load_zero_share: f64,
+    /// Delay of the load, s. Default 0.001.
+    pub load_delay_s: f64,
+    /// Mean NIS, as a share of the unit's own. Default 1.
+    pub nis_share: f64,
+}
+
+impl Default for QuantityLimits {
+    fn default() -> Self {
+        Self {
+            stiffness_share: 0.05,
+            friction_share: 0.1,
+            lost_motion_share: 0.25,
+            delay_s: 0.5e-3,
+            load_zero_share: 0.02,
+            load_delay_s: 1e-3,
+            nis_share: 1.0,
+        }
+    }
+}
+
+impl QuantityLimits {
+    /// The keys and their values.
+    pub(crate) fn entries(&self) -> [(&'static str, f64); 7] {
+        [
+            ("stiffness_share", self.stiffness_share),
+            ("friction_share", self.friction_share),
+            ("lost_motion_share", self.lost_motion_share),
+            ("delay_s", self.delay_s),
+            ("load_zero_share", self.load_zero_share),
+            ("load_delay_s", self.load_delay_s),
+            ("nis_share", self.nis_share),
+        ]
+    }
 }
 
 impl Default for TrendSettings {
@@ -238,6 +289,7 @@ impl Default for TrendSettings {
             next_check_hours: defaults.check_interval_hours,
             axis: None,
             limit_m: None,
+            quantity_limits: QuantityLimits::default(),
         }
     }
 }
@@ -305,6 +357,10 @@ impl Document {
             ("next_check_hours", self.trend.next_check_hours),
         ] {
             found.extend(bounded(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
+        }
+        for (key, limit) in self.trend.quantity_limits.entries() {
+            let path = ["trend", "quantity_limits", key];
+            found.extend(bounded(key, Some(limit)).map(|c| source.at(&path, c)));
         }
         found.extend(bounded("limit_m", self.trend.limit_m).map(|c| source.at(&["trend", "limit_m"], c)));
         let timeout = bounded("log_timeout_s", Some(self.run.log_timeout_s));

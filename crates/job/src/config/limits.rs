@@ -51,6 +51,13 @@ pub const PLAUSIBLE: &[(&str, f64, f64)] = &[
     ("horizon_hours", 1e-3, 1e7),
     ("stale_after_days", 1e-3, 1e5),
     ("next_check_hours", 1e-3, 1e7),
+    ("stiffness_share", 1e-4, 10.0),
+    ("friction_share", 1e-4, 100.0),
+    ("lost_motion_share", 1e-4, 100.0),
+    ("delay_s", 1e-7, 1.0),
+    ("load_zero_share", 1e-5, 10.0),
+    ("load_delay_s", 1e-7, 10.0),
+    ("nis_share", 1e-3, 1e4),
     ("log_timeout_s", 1e-3, 86_400.0),
 ];
 

@@ -19,7 +19,8 @@ use records::{Diagnostic, PartNumber, TailNumber};
 use serde::Serialize;
 
 pub use document::{
-    Document, EstimateSettings, LogSettings, Method, Override, StoreSettings, TableNames, TrendSettings,
+    Document, EstimateSettings, LogSettings, Method, Override, QuantityLimits, StoreSettings, TableNames,
+    TrendSettings,
 };
 use layers::{ConfigLayer, Source};
 use overrides::Overrides;

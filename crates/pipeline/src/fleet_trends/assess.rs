@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
-use records::{Installations, PartNumber, SerialNumber};
+use records::{Installations, PartNumber, QuantityChange, QuantityRow, SerialNumber};
 use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series, State, UsageDefaults, classic};
 
@@ -23,7 +23,10 @@ use crate::history::merge::of_parts;
 use crate::history::usage::UsageSources;
 use crate::monitoring::mapping_faults::{self, MappingFault};
 use crate::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
-use crate::monitoring::recorder_change::{RecorderChange, detect_changes, detect_changes_in_store};
+use crate::monitoring::recorder_change::{RecorderChange, recorder_changes};
+use crate::quantities::follow::{FollowedQuantities, UnitFacts, follow, gap_row};
+use crate::quantities::values;
+use job::config::QuantityLimits;
 use records::TrendRow;
 
 /// A unit, by part and serial number.
@@ -67,13 +70,27 @@ pub fn assess_store(
     store: &Store,
     ask: &UnitSelection,
 ) -> Result<Vec<TrendRow>, Error> {
+    Ok(assess_store_with_quantities(config, installations, store, ask)?.0)
+}
+
+/// As [`assess_store`], with the followed quantities of the selected units and what changed on their tails and parts.
+///
+/// # Errors
+/// As [`assess_store`].
+pub fn assess_store_with_quantities(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+    ask: &UnitSelection,
+) -> Result<(Vec<TrendRow>, FollowedQuantities), Error> {
     // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
     let mut histories = load_histories(store)?;
-    let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
-    let moved = detect_changes_in_store(store, as_of)?;
-    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?
-        .with_recorder_changes(moved);
-    fleet.selected(ask, as_of)
+    let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Default::default()) };
+    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
+    let fleet = fleet.with_quantities(store, as_of)?;
+    let rows = fleet.selected(ask, as_of)?;
+    let followed = fleet.followed_of(&rows);
+    Ok((rows, followed))
 }
 
 /// Assessments of the units of a run.
@@ -85,6 +102,8 @@ pub struct RunAssessments {
     pub changed: Vec<UnitChange>,
     /// Recent diagnostics in addition to gaps, of all tails.
     pub recent: RecentDiagnostics,
+    /// Followed quantities of all units, and what changed.
+    pub followed: FollowedQuantities,
     /// Number of units of the fleet by state.
     pub states: BTreeMap<&'static str, usize>,
     /// Units of the whole fleet in state `watch`, `plan` or `act`, touched by the run or not.
@@ -122,15 +141,14 @@ pub fn assess_run(
     let (all, of_run) = (load_histories(store)?, read_histories(store, &query)?);
     let recent =
         all.newest_utc().map(|newest| recent_diagnostics(store, newest)).transpose()?.unwrap_or_default();
-    let moved = detect_changes(&recent);
     let touched = units.iter().map(|(part, serial)| (part.to_string(), serial.to_string())).collect();
     let mapping_faults = mapping_faults::detect(&recent, &touched);
-    let run = assess_run_from(config, installations, all, &of_run, units, moved)?;
+    let run = assess_run_from(config, installations, all, &of_run, units, Some(store))?;
     let changed = since_states(run.changed, before, &run.now);
     Ok(RunAssessments { changed, recent, mapping_faults, ..run })
 }
 
-/// The same from all flights that are known after a run, and those of the run.
+/// The same from all flights that are known after a run, and those of the run; with the followed quantities of a store.
 ///
 /// # Errors
 /// As [`assess_histories`].
@@ -140,7 +158,7 @@ pub fn assess_run_from(
     mut all: Histories,
     of_run: &Histories,
     units: &[Unit],
-    moved: Vec<RecorderChange>,
+    store: Option<&Store>,
 ) -> Result<RunAssessments, Error> {
     let names: BTreeSet<UnitKey> =
         units.iter().map(|(part, serial)| (Some(part.to_string()), serial.to_string())).collect();
@@ -152,10 +170,13 @@ pub fn assess_run_from(
     let is_later =
         config.flights.iter().next().is_none() && before_utc.is_none_or(|before| of_run.all_after(before));
     let earlier = if is_later { Histories::default() } else { all.without(&names, of_run) };
-    let fleet = FleetContext::consuming(config, installations, &mut all, &days)?.with_recorder_changes(moved);
+    let mut fleet = FleetContext::consuming(config, installations, &mut all, &days)?;
+    if let Some(store) = store {
+        fleet = fleet.with_quantities(store, as_of)?;
+    }
     let mut now = fleet.statements(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
-    let mut run = RunAssessments::default();
+    let mut run = RunAssessments { followed: fleet.followed.clone(), ..RunAssessments::default() };
     let states = now.iter().filter_map(|row| row.state);
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
@@ -179,6 +200,8 @@ pub fn assess_run_from(
 pub(crate) struct ReportAssessments {
     /// Assessments at the date.
     pub(crate) now: Vec<TrendRow>,
+    /// Followed quantities of these units, and what changed on their tails and parts.
+    pub(crate) followed: FollowedQuantities,
     /// Plotted forecast of each of them.
     pub(crate) drawn: Vec<trend::Forecast>,
     /// Assessments of earlier dates, by the number of days before.
@@ -199,15 +222,16 @@ pub(crate) fn assess_for_report(
     histories: &Histories,
     ask: &UnitSelection,
     days_before: &[i64],
-    moved: Vec<RecorderChange>,
+    store: &Store,
 ) -> Result<ReportAssessments, Error> {
     let newest = || histories.newest_utc();
     let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(ReportAssessments::default()) };
     let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
-    let fleet = FleetContext::new(config, installations, histories, &days)?.with_recorder_changes(moved);
+    let fleet = FleetContext::new(config, installations, histories, &days)?.with_quantities(store, as_of)?;
     let now = fleet.selected(ask, as_of)?;
+    let followed = fleet.followed_of(&now);
     let names: Vec<UnitKey> =
         now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
     let drawn =
@@ -224,7 +248,7 @@ pub(crate) fn assess_for_report(
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = selected.into_iter().filter_map(priors).collect();
-    Ok(ReportAssessments { now, drawn, before, past, priors })
+    Ok(ReportAssessments { now, followed, drawn, before, past, priors })
 }
 
 /// One assessment for each query, without data later than its date.
@@ -296,11 +320,34 @@ pub fn assess_histories(
     FleetContext::consuming(config, installations, &mut histories, &[as_of])?.selected(ask, as_of)
 }
 
+/// What the followed quantities need to know of units.
+struct Facts<'f, 'a>(&'f FleetContext<'a>);
+
+impl UnitFacts for Facts<'_, '_> {
+    fn series(&self, unit: &UnitKey) -> Option<&Series> {
+        self.0.series(unit)
+    }
+
+    fn flight_id(&self, unit: &UnitKey, departure_us: i64) -> Option<String> {
+        let history = self.0.units.get(unit)?.0;
+        let flown = history.at(Timestamp::from_microsecond(departure_us).ok()?)?;
+        history.flight_id(flown).map(str::to_owned)
+    }
+
+    fn limits(&self, _part_number: Option<&str>) -> QuantityLimits {
+        self.0.limits.quantities()
+    }
+}
+
 /// All units, and the fleet prior of each part by training cut-off.
 pub(crate) struct FleetContext<'a> {
     limits: Limits<'a>,
     units: BTreeMap<&'a UnitKey, (&'a History, Series)>,
     priors: FleetPriors<'a>,
+    /// Followed quantities of all units; nothing for external tables.
+    followed: FollowedQuantities,
+    /// Their states, by unit.
+    conditions: BTreeMap<UnitKey, Vec<String>>,
     /// Recorder changes of whole aircraft.
     moved: Vec<RecorderChange>,
     /// Installations of the store's own units; of external tables none apply.
@@ -358,7 +405,15 @@ impl<'a> FleetContext<'a> {
         let limits = Limits::new(config, series.iter());
         let units = histories.iter().zip(series);
         let units = units.map(|((name, history), series)| (name, (history, series))).collect();
-        Self { limits, units, priors: FleetPriors::default(), moved: Vec::new(), installations: None }
+        Self {
+            limits,
+            units,
+            priors: FleetPriors::default(),
+            followed: FollowedQuantities::default(),
+            conditions: BTreeMap::new(),
+            moved: Vec::new(),
+            installations: None,
+        }
     }
 
     /// The same with the priors of the cut-off before each of the days.
@@ -383,9 +438,37 @@ impl<'a> FleetContext<'a> {
         Some(self.priors.of(name.0.as_deref(), as_of)?.1)
     }
 
-    /// The same, with recorder changes of whole aircraft.
-    pub(crate) fn with_recorder_changes(self, moved: Vec<RecorderChange>) -> Self {
-        Self { moved, ..self }
+    /// The same, with the quantities that the store holds besides the gap.
+    fn with_quantities(self, store: &Store, as_of: Timestamp) -> Result<Self, Error> {
+        let followed = follow(&values::read(store, as_of)?, &Facts(&self), as_of);
+        let moved = recorder_changes(&followed.changes, as_of);
+        let mut conditions: BTreeMap<UnitKey, Vec<String>> = BTreeMap::new();
+        for (row, state) in followed.rows.iter().filter_map(|row| Some((row, row.state?))) {
+            let unit = (row.part_number.clone(), row.serial_number.clone());
+            conditions.entry(unit).or_default().push(state.to_owned());
+        }
+        Ok(Self { followed, conditions, moved, ..self })
+    }
+
+    /// The followed quantities of some assessed units, the gap with them, and what changed on their tails and parts.
+    fn followed_of(&self, rows: &[TrendRow]) -> FollowedQuantities {
+        let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
+        let tails: BTreeSet<Option<&str>> = rows.iter().map(|row| row.tail_number.as_deref()).collect();
+        let parts: BTreeSet<Option<&str>> = rows.iter().map(|row| row.part_number.as_deref()).collect();
+        let mut of_units: Vec<QuantityRow> = rows.iter().map(gap_row).collect();
+        let is_selected =
+            |row: &&QuantityRow| units.contains(&(row.part_number.clone(), row.serial_number.clone()));
+        of_units.extend(self.followed.rows.iter().filter(is_selected).cloned());
+        of_units.sort_by(|a, b| (&a.part_number, &a.serial_number).cmp(&(&b.part_number, &b.serial_number)));
+        let concerns = |change: &&QuantityChange| match &change.serial_number {
+            Some(serial) => units.contains(&(change.part_number.clone(), serial.clone())),
+            None => match &change.tail_number {
+                Some(tail) => tails.contains(&Some(tail.as_str())),
+                None => parts.contains(&change.part_number.as_deref()),
+            },
+        };
+        let changes = self.followed.changes.iter().filter(concerns).cloned().collect();
+        FollowedQuantities { rows: of_units, changes }
     }
 
     /// The selected assessments, with classic statistics if selected.
@@ -460,7 +543,7 @@ impl<'a> FleetContext<'a> {
         let usage_axis = prior.map(|prior| prior.axis().to_string());
         let removal = self.installations.as_ref().and_then(|index| index.removal(name, as_of));
         let row = trend_row::row(name, history, series, limit_m, trend, as_of, wide, removal);
-        TrendRow { usage_axis, ..row }
+        TrendRow { usage_axis, conditions: self.conditions.get(name).cloned().unwrap_or_default(), ..row }
     }
 
     /// Forecasts of units at a date, for the hours flown until a later one.

@@ -1,6 +1,7 @@
 //! Limits, usage axes and trend settings of each part number.
 
 use job::Config;
+use job::config::QuantityLimits;
 use job::config::part::WearAxis;
 use records::PartNumber;
 use trend::{Series, UsageAxis};
@@ -53,6 +54,11 @@ impl<'a> Limits<'a> {
     /// The act limit, m, or its stand-in.
     pub(crate) fn limit_m(self, part: Option<&str>) -> f64 {
         self.settings(part).limit_m
+    }
+
+    /// Changes from which other quantities than the gap have a state.
+    pub(crate) fn quantities(self) -> QuantityLimits {
+        self.config.document.trend.quantity_limits
     }
 
     /// Configuration of a part.

@@ -87,6 +87,7 @@ pub(crate) fn row(
             (None, Some(_)) => reason(trend, history, wide, as_of),
             (None, None) => "no limit is configured".into(),
         }),
+        conditions: Vec::new(),
         sketch_m: sketched(&gaps_m),
     }
 }

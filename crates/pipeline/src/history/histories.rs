@@ -42,6 +42,11 @@ impl TailPosition {
 pub(crate) struct Positions(Vec<TailPosition>);
 
 impl Positions {
+    /// The place with a number.
+    pub(crate) fn get(&self, number: u32) -> &TailPosition {
+        &self.0[number as usize]
+    }
+
     /// The number of a place.
     pub(crate) fn number(&mut self, tail_number: Option<&str>, position: Option<&str>) -> u32 {
         // A unit sits where it sat in the row before, or in one of a handful of places.

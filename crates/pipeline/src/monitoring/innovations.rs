@@ -9,8 +9,8 @@ use records::time::days_between;
 use records::uncertainty::SD_OVER_MAD;
 use serde::Serialize;
 
+use crate::monitoring::median;
 use crate::monitoring::recent::{FlightDiagnostics, PositionKey, RecentDiagnostics, newest_utc};
-use crate::monitoring::recorder_change::median;
 
 /// A flight whose innovations are unlike those of the unit's other flights.
 #[derive(Debug, Clone, PartialEq, Serialize)]

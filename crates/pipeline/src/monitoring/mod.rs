@@ -6,4 +6,9 @@ pub mod recent;
 pub mod recorder_change;
 
 /// Number of days for which a finding is reported.
-const REPORTED_DAYS: f64 = 30.0;
+pub(crate) const REPORTED_DAYS: f64 = 30.0;
+
+/// The upper median; NaN of nothing.
+pub(crate) fn median(values: Vec<f64>) -> f64 {
+    trend::quantity::noise::median(values).unwrap_or(f64::NAN)
+}

@@ -1,5 +1,4 @@
-//! Recent diagnostics of the last months in addition to gaps, by position: skew, stiffness, zero and delay of the
-//! load, innovations and rejections.
+//! Diagnostics of the last months in addition to gaps, by position: innovations and rejections.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,14 +23,7 @@ const LOOKED_BACK: SignedDuration = SignedDuration::from_hours(24 * 120);
 pub struct FlightDiagnostics {
     pub departure_utc: Timestamp,
     pub flight_id: Box<str>,
-    pub skew_s: Option<f64>,
-    pub stiffness_n_per_m: Option<f64>,
     pub nis: Option<f64>,
-    pub load_zero_n: Option<f64>,
-    pub load_zero_se_n: Option<f64>,
-    pub load_delay_s: Option<f64>,
-    pub load_delay_se_s: Option<f64>,
-    pub load_p95_n: Option<f64>,
     /// Rejection code of a flight without a gap.
     pub rejection: Option<Box<str>>,
 }
@@ -54,21 +46,14 @@ pub type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
 /// # Errors
 /// When the store cannot be read.
 pub fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagnostics, Error> {
-    const COLUMNS: [&str; 16] = [
+    const COLUMNS: [&str; 9] = [
         "tail_number",
         "position",
         "part_number",
         "serial_number",
         "flight_id",
         "departure_utc",
-        "skew_s",
-        "stiffness_n_per_m",
         "nis",
-        "load_zero_n",
-        "load_zero_se_n",
-        "load_delay_s",
-        "load_delay_se_s",
-        "load_p95_n",
         "status",
         "reason",
     ];
@@ -91,12 +76,7 @@ impl Found {
     fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
         let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
         let (keys, flights) = (KeyColumns::of(&chunk)?, TextColumn::of(&chunk, &["flight_id"])?);
-        let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
-        let (skews_s, stiffnesses, nis) =
-            (numbers("skew_s")?, numbers("stiffness_n_per_m")?, numbers("nis")?);
-        let (zeros_n, zero_ses_n) = (numbers("load_zero_n")?, numbers("load_zero_se_n")?);
-        let (delays_s, delay_ses_s) = (numbers("load_delay_s")?, numbers("load_delay_se_s")?);
-        let loads_n = numbers("load_p95_n")?;
+        let nis = chunk.numbers(Some(chunk.column(&["nis"])?))?;
         let (statuses, reasons) =
             (TextColumn::of(&chunk, &["status"])?, TextColumn::of(&chunk, &["reason"])?);
         let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
@@ -112,14 +92,7 @@ impl Found {
             self.diagnostics[of_position].push(FlightDiagnostics {
                 departure_utc,
                 flight_id: flights.get(row).unwrap_or_default().into(),
-                skew_s: at(&skews_s, row),
-                stiffness_n_per_m: at(&stiffnesses, row),
                 nis: at(&nis, row),
-                load_zero_n: at(&zeros_n, row),
-                load_zero_se_n: at(&zero_ses_n, row),
-                load_delay_s: at(&delays_s, row),
-                load_delay_se_s: at(&delay_ses_s, row),
-                load_p95_n: at(&loads_n, row),
                 rejection: reasons
                     .get(row)
                     .filter(|_| statuses.get(row) == Some(Status::Refused.as_str()))

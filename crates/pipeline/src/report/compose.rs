@@ -20,7 +20,6 @@ use crate::history::builder::HistoryBuilder;
 use crate::history::flight_row::FlightRow as FlownRow;
 use crate::history::histories::{Histories, History, UnitKey as Name};
 use crate::history::installation_index::InstallationIndex;
-use crate::monitoring::recorder_change::detect_changes_in_store;
 use records::time::{days_after, days_between};
 use records::{ChangePoint, TrendRow};
 
@@ -48,11 +47,9 @@ pub fn compose(
     let mut logs = Logs::of(store)?;
     let StoreContents { histories, mut rest, store_version } = StoreContents::until(ask.as_of_utc, store)?;
     let newest_departure_utc = histories.newest_utc();
-    let as_of = ask.as_of_utc.or(newest_departure_utc);
-    let moved = as_of.map(|as_of| detect_changes_in_store(store, as_of)).transpose()?.unwrap_or_default();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
-    let ReportAssessments { now, drawn, before, past, priors } =
-        assess::assess_for_report(config, installations, &histories, ask, &days, moved)?;
+    let ReportAssessments { now, followed, drawn, before, past, priors } =
+        assess::assess_for_report(config, installations, &histories, ask, &days, store)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
     let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();

@@ -10,11 +10,13 @@ use store::{LogOutcome, LogRecord, RunRecord};
 use crate::error::is_passing;
 use crate::fleet_trends::assess::RunAssessments;
 use crate::fleet_trends::changes::UnitChange;
+use crate::monitoring::REPORTED_DAYS;
 use crate::monitoring::innovations::{self, InnovationOutlier};
 use crate::monitoring::mapping_faults::MappingFault;
-use crate::monitoring::recorder_change::{self, RecorderChange};
+use crate::monitoring::recent;
+use crate::monitoring::recorder_change::{RecorderChange, recorder_changes};
 use crate::run::plan::{Plan, StandingError, WorkItem};
-use records::TrendRow;
+use records::{QuantityChange, TrendRow};
 
 /// Error of a log.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -132,6 +134,8 @@ pub struct RunSummary {
     pub quiet: Vec<SilentTail>,
     /// Skews, and stiffnesses of complete aircraft, that moved within the last month, on the aircraft of this run.
     pub recorder_moved: Vec<RecorderChange>,
+    /// Followed quantities that changed within the last month, on units, tails and parts of the whole fleet.
+    pub quantity_changes: Vec<QuantityChange>,
     /// Flights of the last month, on those aircraft, with unusual innovations for their unit.
     pub innovations_unlike: Vec<InnovationOutlier>,
     /// The slowest log and its seconds.
@@ -209,6 +213,7 @@ impl RunSummary {
             not_reached_logs: Vec::new(),
             quiet: Vec::new(),
             recorder_moved: Vec::new(),
+            quantity_changes: Vec::new(),
             innovations_unlike: Vec::new(),
             slowest: None,
             took_s: 0.0,
@@ -224,13 +229,15 @@ impl RunSummary {
 
     /// Adds the assessments of the run's units, and the recorder changes of their aircraft.
     pub(crate) fn add_assessments(&mut self, assessments: RunAssessments) {
-        let RunAssessments { now, changed, recent, states, work_list, mapping_faults } = assessments;
+        let RunAssessments { now, changed, recent, followed, states, work_list, mapping_faults } =
+            assessments;
         let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
         let touched = |tail: &String| tails.contains(tail.as_str());
-        self.recorder_moved = recorder_change::detect_changes(&recent)
-            .into_iter()
-            .filter(|m| touched(&m.tail_number))
-            .collect();
+        let newest = recent::newest_utc(&recent).unwrap_or_default();
+        self.recorder_moved = recorder_changes(&followed.changes, newest);
+        self.recorder_moved.retain(|m| touched(&m.tail_number));
+        self.quantity_changes = followed.changes;
+        self.quantity_changes.retain(|change| days_between(change.since_utc, newest) <= REPORTED_DAYS);
         self.innovations_unlike =
             innovations::find_outliers(&recent).into_iter().filter(|u| touched(&u.tail_number)).collect();
         (self.trends, self.changed, self.states) = (now, changed, states);

@@ -79,7 +79,7 @@ pub fn without_outliers(values: &[QuantityValue], scatter: &Scatter) -> Vec<Quan
 }
 
 /// The upper median; none of nothing.
-pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -62,7 +62,8 @@ fn a_drift_over_five_hundred_flights_is_found() {
             .filter(|seed| {
                 let values = flights(&mut Random::new(*seed), 500, scatter, rho);
                 let found = fit(&changed(values, |k| size * k as f64 / 500.0));
-                found.change.signum() == f64::signum(size) && found.change.abs() > limit + 0.5 * found.change_se
+                found.change.signum() == f64::signum(size)
+                    && found.change.abs() > limit + 0.5 * found.change_se
             })
             .count();
         assert!(found >= 190, "{size}: {found} of 200");

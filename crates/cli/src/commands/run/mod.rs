@@ -9,9 +9,10 @@ use std::time::Duration;
 
 use pipeline::fleet_trends::changes::UnitChange;
 use pipeline::history::histories::Histories;
-use pipeline::monitoring::recorder_change::{Quantity, RecorderChange};
+use pipeline::monitoring::recorder_change::RecorderChange;
 use pipeline::run::scheduler::{self, Context};
 use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
+use records::Quantity;
 use records::TrendRow;
 use records::{SerialNumber, TailNumber};
 use report::StateBadge;
@@ -356,7 +357,7 @@ fn recorder_moved(moved: &RecorderChange) -> String {
         Quantity::SkewS => format!("delay {:.1} → {:.1} ms", moved.from * 1e3, moved.to * 1e3),
         Quantity::LoadZeroN => format!("load zero {:+.0} → {:+.0} N", moved.from, moved.to),
         Quantity::LoadDelayS => format!("load delay {:.1} → {:.1} ms", moved.from * 1e3, moved.to * 1e3),
-        Quantity::StiffnessNPerM => format!("stiffness {:+.0} %", (moved.to / moved.from - 1.0) * 100.0),
+        _ => format!("stiffness {:+.0} %", (moved.to / moved.from - 1.0) * 100.0),
     };
     let whole = if moved.everywhere { "all of " } else { "" };
     format!(

@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
-    COLUMNS, DesignRow, FORCE, GAP, LOAD_RATE, ORIGIN, PERIODIC, RowSource, SIDE_FORCE, SPEED,
+    COLUMNS, DRY, DesignRow, FORCE, GAP, LOAD_RATE, ORIGIN, PERIODIC, RowSource, SHARE, SIDE_FORCE, SPEED,
 };
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
@@ -18,6 +18,7 @@ use crate::contact::fit::workspace::ContactWorkspace;
 use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::FrictionState;
 use crate::contact::stats::median;
+use crate::contact::types::FrictionErrors;
 use crate::gap::midrange;
 use crate::kalman::Filter;
 use crate::model::{ActuatorModel, NoiseModel, SensorNoise};
@@ -133,6 +134,18 @@ impl Doubt {
     }
 }
 
+/// Standard errors of the friction of a fit. A coefficient of friction is what F_d lacks over K, or η at the 95 % load.
+fn friction_errors(line: &GaussNewtonResult, scaling: &Scaling) -> FrictionErrors {
+    let stiffness = scaling.load_n / line.fit.beta[FORCE];
+    let error_n =
+        |columns: &[usize]| stiffness * line.fit.standard_error_of_sum_m(columns, &line.design.firm);
+    FrictionErrors {
+        dry_n: error_n(&[DRY]),
+        lost_share: error_n(&[SHARE]) / scaling.load_n,
+        at_p95_n: error_n(&[DRY, SHARE]),
+    }
+}
+
 /// The fitted flanks.
 #[derive(Debug)]
 pub(crate) struct FlankFit {
@@ -143,6 +156,7 @@ pub(crate) struct FlankFit {
     pub(crate) skew_se_s: f64,
     pub(crate) load_zero_se_n: f64,
     pub(crate) load_delay_se_s: f64,
+    pub(crate) friction_se: FrictionErrors,
     pub(crate) touched_s: (f64, f64),
     /// Rms of the residuals of single blocks, m.
     pub(crate) residual_rms_m: f64,
@@ -192,6 +206,7 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         skew_se_s: error_m(SPEED) / SPEED_M_PER_S,
         load_zero_se_n,
         load_delay_se_s: error_m(LOAD_RATE) * LATE_S / line.fit.beta[FORCE],
+        friction_se: friction_errors(&line, scaling),
         touched_s: line.design.touched_s,
         residual_rms_m: scale_m,
         period_s: workspace.whole.period_s,

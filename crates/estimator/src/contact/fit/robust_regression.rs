@@ -250,7 +250,13 @@ impl<const N: usize> RobustFit<N> {
     /// Var β_j = Σ_stretches (Σ w e aᵀx)² · B/(B − N) + Σ_i (a_i λ_i σ_i)²      a = row j of H⁻¹
     /// ```
     pub(crate) fn standard_error_m(&self, column: usize, rows: &[DesignRow<N>]) -> f64 {
-        let influence: [f64; N] = self.inverse.row(column).transpose().into();
+        self.standard_error_of_sum_m(&[column], rows)
+    }
+
+    /// As [`standard_error_m`](Self::standard_error_m), of a sum of coefficients.
+    pub(crate) fn standard_error_of_sum_m(&self, columns: &[usize], rows: &[DesignRow<N>]) -> f64 {
+        let influence: [f64; N] =
+            std::array::from_fn(|i| columns.iter().map(|&column| self.inverse[(column, i)]).sum());
         let (mut total, mut sum, mut stretches) = (0.0, 0.0, 0_usize);
         let mut stretch = None;
         for (row, w) in rows.iter().zip(&self.weights) {

@@ -1,0 +1,149 @@
+//! Values of the followed quantities, read from the store.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use arrow::array::RecordBatch;
+use ingest::tables::TableBatch;
+use jiff::{SignedDuration, Timestamp};
+use records::Quantity;
+use store::{Query, Store};
+
+use crate::error::Error;
+use crate::history::builder::at;
+use crate::history::histories::{Positions, TailPosition, UnitKey};
+use crate::history::parallel_scan::read_each;
+use crate::history::row_keys::{KeyCache, KeyColumns, RowKey};
+
+/// Flights that are followed: three years. It bounds what a fleet of any age takes.
+const WINDOW: SignedDuration = SignedDuration::from_hours(24 * 1_096);
+
+/// Quantities that are read, with the column of their standard error.
+pub(crate) const READ: [(Quantity, Option<&str>); 9] = [
+    (Quantity::LostMotionM, Some("lost_motion_se_m")),
+    (Quantity::StiffnessNPerM, Some("stiffness_se_n_per_m")),
+    (Quantity::FrictionN, Some("friction_se_n")),
+    (Quantity::FrictionDryN, Some("friction_dry_se_n")),
+    (Quantity::FrictionLoadShare, Some("friction_load_share_se")),
+    (Quantity::SkewS, Some("skew_se_s")),
+    (Quantity::LoadZeroN, Some("load_zero_se_n")),
+    (Quantity::LoadDelayS, Some("load_delay_se_s")),
+    (Quantity::Nis, None),
+];
+
+/// One flight of one unit, in as few bytes as its numbers take; NaN for none.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FlightValues {
+    pub(crate) departure_us: i64,
+    /// Index of the unit's positions.
+    pub(crate) place: u32,
+    pub(crate) temperature_c: f32,
+    pub(crate) load_p95_n: f32,
+    /// Value and standard error, in the order of [`READ`].
+    pub(crate) values: [(f32, f32); READ.len()],
+}
+
+/// Values of one unit, by departure.
+#[derive(Debug, Default)]
+pub(crate) struct UnitValues {
+    pub(crate) places: Positions,
+    pub(crate) flights: Vec<FlightValues>,
+}
+
+impl UnitValues {
+    /// Where a flight was flown.
+    pub(crate) fn place(&self, flight: &FlightValues) -> &TailPosition {
+        self.places.get(flight.place)
+    }
+}
+
+/// Values of all units.
+pub(crate) type FleetValues = BTreeMap<UnitKey, UnitValues>;
+
+/// Reads the values of the last three years before a time, with it.
+///
+/// # Errors
+/// When the store cannot be read.
+pub(crate) fn read(store: &Store, until: Timestamp) -> Result<FleetValues, Error> {
+    let query = Query {
+        since_utc: until.checked_sub(WINDOW).ok(),
+        until_utc: until.checked_add(SignedDuration::from_micros(1)).ok(),
+        ..Query::default()
+    };
+    let numbers = READ.iter().flat_map(|(quantity, error)| [Some(quantity.as_str()), *error]).flatten();
+    let keys = [
+        "tail_number",
+        "position",
+        "part_number",
+        "serial_number",
+        "departure_utc",
+        "temperature_c",
+        "load_p05_n",
+        "load_p95_n",
+    ];
+    let columns: Vec<&str> = keys.into_iter().chain(numbers).collect();
+    let mut found = Reader::default();
+    read_each(&store.scan_columns(&query, &columns)?, |batch| found.add(batch))?;
+    let mut units: FleetValues =
+        found.names.into_iter().map(|(name, unit)| (name, std::mem::take(&mut found.units[unit]))).collect();
+    for unit in units.values_mut() {
+        unit.flights.sort_by_key(|flight| flight.departure_us);
+    }
+    Ok(units)
+}
+
+/// Values while their rows come in.
+#[derive(Default)]
+struct Reader {
+    names: BTreeMap<UnitKey, usize>,
+    units: Vec<UnitValues>,
+}
+
+impl Reader {
+    fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
+        let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
+        let keys = KeyColumns::of(&chunk)?;
+        let numbers = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
+        let (temperatures, lows, highs) =
+            (numbers("temperature_c")?, numbers("load_p05_n")?, numbers("load_p95_n")?);
+        let mut columns = Vec::with_capacity(READ.len());
+        for (quantity, error) in READ {
+            columns.push((numbers(quantity.as_str())?, error.map(numbers).transpose()?));
+        }
+        let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
+        let mut seen = KeyCache::default();
+        for row in 0..chunk.len() {
+            let Some(who) = keys.key_at(row) else { continue };
+            let (unit, place) = seen.get(&keys, row).unwrap_or_else(|| {
+                let found = self.place(who);
+                seen.put(&keys, row, found);
+                found
+            });
+            let values = std::array::from_fn(|k| {
+                let (values, errors) = &columns[k];
+                let error = errors.as_ref().and_then(|errors| at(errors, row));
+                (at(values, row).unwrap_or(f64::NAN) as f32, error.unwrap_or(0.0) as f32)
+            });
+            let load_n = at(&lows, row).zip(at(&highs, row)).map(|(low, high)| low.abs().max(high.abs()));
+            self.units[unit].flights.push(FlightValues {
+                departure_us: departures.value(row),
+                place,
+                temperature_c: at(&temperatures, row).unwrap_or(f64::NAN) as f32,
+                load_p95_n: load_n.unwrap_or(f64::NAN) as f32,
+                values,
+            });
+        }
+        Ok(())
+    }
+
+    /// Index of a unit, and of one of its positions.
+    fn place(&mut self, who: RowKey<'_>) -> (usize, u32) {
+        let name = (who.part_number.map(str::to_owned), who.serial_number.to_owned());
+        let units = &mut self.units;
+        let unit = *self.names.entry(name).or_insert_with(|| {
+            units.push(UnitValues::default());
+            units.len() - 1
+        });
+        (unit, self.units[unit].places.number(who.tail_number, who.position))
+    }
+}

@@ -1,0 +1,218 @@
+//! Quantity row: one followed quantity of one unit at a date; and what changed, with whose it is.
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+use crate::row;
+
+/// A followed quantity, named like its column of the records; its unit ends the name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "each is documented in the records table under its name")]
+pub enum Quantity {
+    GapM,
+    LostMotionM,
+    StiffnessNPerM,
+    FrictionN,
+    FrictionDryN,
+    FrictionLoadShare,
+    SkewS,
+    LoadZeroN,
+    LoadDelayS,
+    Nis,
+}
+
+impl Quantity {
+    /// All quantities, in the order of tables.
+    pub const ALL: [Self; 10] = [
+        Self::GapM,
+        Self::LostMotionM,
+        Self::StiffnessNPerM,
+        Self::FrictionN,
+        Self::FrictionDryN,
+        Self::FrictionLoadShare,
+        Self::SkewS,
+        Self::LoadZeroN,
+        Self::LoadDelayS,
+        Self::Nis,
+    ];
+
+    /// Name of the column.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::GapM => "gap_m",
+            Self::LostMotionM => "lost_motion_m",
+            Self::StiffnessNPerM => "stiffness_n_per_m",
+            Self::FrictionN => "friction_n",
+            Self::FrictionDryN => "friction_dry_n",
+            Self::FrictionLoadShare => "friction_load_share",
+            Self::SkewS => "skew_s",
+            Self::LoadZeroN => "load_zero_n",
+            Self::LoadDelayS => "load_delay_s",
+            Self::Nis => "nis",
+        }
+    }
+
+    /// Name for readers.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::GapM => "gap",
+            Self::LostMotionM => "lost motion",
+            Self::StiffnessNPerM => "stiffness",
+            Self::FrictionN => "friction",
+            Self::FrictionDryN => "dry friction",
+            Self::FrictionLoadShare => "load-dependent friction",
+            Self::SkewS => "channel delay",
+            Self::LoadZeroN => "load zero",
+            Self::LoadDelayS => "load delay",
+            Self::Nis => "mean NIS",
+        }
+    }
+
+    /// Unit in which readers see it, and the factor to that unit.
+    pub fn display_unit(self) -> (&'static str, f64) {
+        match self {
+            Self::GapM | Self::LostMotionM => ("µm", 1e6),
+            Self::StiffnessNPerM => ("N/µm", 1e-6),
+            Self::FrictionN | Self::FrictionDryN | Self::LoadZeroN => ("N", 1.0),
+            Self::FrictionLoadShare => ("%", 100.0),
+            Self::SkewS | Self::LoadDelayS => ("ms", 1e3),
+            Self::Nis => ("", 1.0),
+        }
+    }
+}
+
+/// Whose a change is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ChangeScope {
+    /// One unit alone: the actuator, or its own sensors.
+    Unit,
+    /// All units of a tail at once: sensor, recorder or wiring.
+    Tail,
+    /// All units of a part number at once: settings, software or season.
+    Part,
+}
+
+impl ChangeScope {
+    /// Its word in columns.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Unit => "unit",
+            Self::Tail => "tail",
+            Self::Part => "part",
+        }
+    }
+
+    /// Likely cause.
+    pub fn cause(self) -> &'static str {
+        match self {
+            Self::Unit => "the actuator",
+            Self::Tail => "sensor, recorder or wiring of the tail",
+            Self::Part => "settings or software, or the season",
+        }
+    }
+}
+
+row! {
+    /// A step of a followed quantity.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct QuantityStep {
+        /// Departure of the first flight after the step.
+        pub departure_utc: Timestamp,
+        /// That flight.
+        pub flight_id: Option<String>,
+        /// Size, in the unit of the quantity.
+        pub size: f64,
+        /// Standard error of the size.
+        pub size_se: f64,
+        /// `unit`, `tail` or `part`: whose step it is.
+        pub scope: &'static str,
+    }
+}
+
+row! {
+    /// One followed quantity of one unit at a date; all numbers in the unit that ends the quantity's name.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct QuantityRow {
+        /// Part number of the unit.
+        pub part_number: Option<String>,
+        /// Serial number of the unit.
+        pub serial_number: String,
+        /// Tail of the unit's last flight.
+        pub tail_number: Option<String>,
+        /// Position of the unit's last flight.
+        pub position: Option<String>,
+        /// Date of the assessment.
+        pub as_of_utc: Timestamp,
+        /// Column of the records that is followed: `stiffness_n_per_m`, `friction_n`, …
+        pub quantity: &'static str,
+        /// Flights used: at most three years, since the last recorded maintenance; of delays, load zero and NIS since
+        /// the unit is at its position.
+        pub flights: i64,
+        /// Flights excluded as outliers.
+        pub outliers: i64,
+        /// Departure of the first of them.
+        pub since_utc: Option<Timestamp>,
+        /// Fitted value at the first flight, at the part's usual temperature and load.
+        pub baseline: Option<f64>,
+        /// Fitted value now.
+        pub level: Option<f64>,
+        /// Standard error of `level`.
+        pub level_se: Option<f64>,
+        /// `level` less `baseline`; zero where nothing changed significantly, and without the steps of tail or part.
+        pub change: Option<f64>,
+        /// Standard error of `change`.
+        pub change_se: Option<f64>,
+        /// Rate of change beside the steps, per flight hour.
+        pub rate_per_hour: Option<f64>,
+        /// Standard error of `rate_per_hour`.
+        pub rate_se_per_hour: Option<f64>,
+        /// Change from which there is a state.
+        pub change_limit: Option<f64>,
+        /// Steps: `departure_utc`, `flight_id`, `size`, `size_se`, `scope`.
+        pub steps: Vec<QuantityStep>,
+        /// `softening`, `stiffening`, `friction_rising`, `friction_falling`, `lost_motion_rising`, `delay_moved`,
+        /// `load_zero_moved`, `load_delay_moved`, `innovations_moved`, or null.
+        pub state: Option<&'static str>,
+        /// Reason of the state, in words.
+        pub reason: Option<String>,
+    }
+}
+
+row! {
+    /// A change of a followed quantity, with whose it is and the evidence.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct QuantityChange {
+        /// Column of the records that changed.
+        pub quantity: &'static str,
+        /// `unit`, `tail` or `part`: whose change it is.
+        pub scope: &'static str,
+        /// `step` or `drift`.
+        pub kind: &'static str,
+        /// The part; of a tail's change, none.
+        pub part_number: Option<String>,
+        /// The tail; of a part's change, none.
+        pub tail_number: Option<String>,
+        /// The unit; of a tail's or part's change, none.
+        pub serial_number: Option<String>,
+        /// Positions that changed.
+        pub positions: Vec<String>,
+        /// Units that changed.
+        pub units: i64,
+        /// Units with flights enough to show it.
+        pub units_able: i64,
+        /// First flight of the new level; of a drift, the flight at which it passed half of its size.
+        pub since_utc: Timestamp,
+        /// Value before; of several units, their median.
+        pub from: f64,
+        /// Value after.
+        pub to: f64,
+        /// Standard error of the change; of several units, of the first of them.
+        pub change_se: f64,
+        /// State that follows from it, or null.
+        pub state: Option<&'static str>,
+        /// What changed, by how much, and why it is theirs, in words.
+        pub evidence: String,
+    }
+}
