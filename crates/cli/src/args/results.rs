@@ -68,6 +68,12 @@ pub(crate) struct TrendArgs {
     /// Also compute the Theil–Sen slope and the Hamed–Rao test (slow: quadratic in history length).
     #[arg(long)]
     pub statistics: bool,
+    /// Show every followed quantity of the units instead: stiffness, friction, delays, load zero, lost motion, NIS.
+    #[arg(long, conflicts_with_all = ["queries", "statistics", "estimates"])]
+    pub quantities: bool,
+    /// Show what changed instead, of units, tails and parts, with the evidence.
+    #[arg(long, conflicts_with_all = ["quantities", "queries", "statistics", "estimates"])]
+    pub changes: bool,
     #[command(flatten)]
     pub rows: RowFormatArgs,
 }

@@ -1,8 +1,8 @@
 //! `trend`: current gap, wear rate, time to limit and state of each unit.
 
+use job::Config;
 use pipeline::fleet_trends::assess::{self, UnitSelection};
-use records::Installations;
-use records::TrendRow;
+use records::{Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
 use store::Store;
 
 use crate::args::{Global, TrendArgs};
@@ -27,6 +27,9 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
         as_of_utc: args.as_of,
         statistics: args.statistics,
     };
+    if args.quantities || args.changes {
+        return quantities(args, &ask, &config, &installations, output);
+    }
     let found = match (&args.external.estimates, &args.queries) {
         (None, None) => assess::assess_store(&config, &installations, &Store::open(config.store())?, &ask)?,
         (estimates, queries) => {
@@ -56,6 +59,114 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     }
     row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found, nothing))?;
     Ok(Code::Success)
+}
+
+/// Reason of the state, with the states of the other followed quantities.
+fn reason_and_conditions(row: &TrendRow) -> String {
+    let conditions = row.conditions.iter().map(|state| state.replace('_', " "));
+    row.reason.iter().cloned().chain(conditions).collect::<Vec<_>>().join("; ")
+}
+
+/// Prints the followed quantities of the units, or what changed.
+fn quantities(
+    args: &TrendArgs,
+    ask: &UnitSelection,
+    config: &Config,
+    installations: &Installations,
+    output: &Output,
+) -> Result<Code, Failure> {
+    let store = Store::open(config.store())?;
+    let (units, followed) = assess::assess_store_with_quantities(config, installations, &store, ask)?;
+    if units.is_empty() {
+        let known = KnownNames::read(config);
+        known.check_units(args.tail.as_deref(), args.serial.as_deref(), args.part.as_deref())?;
+    }
+    if args.changes {
+        let page = || changes_page(&followed.changes, units.len());
+        row_output::write_rows(&args.rows, output, || row_output::batch(&followed.changes), page)?;
+    } else {
+        let page = || quantities_page(&followed.rows);
+        row_output::write_rows(&args.rows, output, || row_output::batch(&followed.rows), page)?;
+    }
+    Ok(Code::Success)
+}
+
+fn quantities_page(rows: &[QuantityRow]) -> String {
+    let columns = [
+        text("part / serial", 0),
+        text("quantity", 0),
+        number("flights", 5),
+        number("level", 0),
+        number("SE", 2),
+        text("unit", 1),
+        number("change", 1),
+        number("limit", 4),
+        number("per 1000 FH", 3),
+        number("steps", 6),
+        text("state", 0),
+    ];
+    let cells = |row: &QuantityRow| {
+        let quantity = Quantity::ALL.into_iter().find(|q| q.as_str() == row.quantity);
+        let (unit, factor) = quantity.map_or(("", 1.0), Quantity::display_unit);
+        let value = |value: Option<f64>, sign: bool| {
+            value.map_or_else(table::empty_cell, |v| significant(v * factor, sign))
+        };
+        vec![
+            format!("{} / {}", row.part_number.as_deref().unwrap_or("–"), row.serial_number),
+            quantity.map_or(row.quantity, Quantity::label).to_owned(),
+            row.flights.to_string(),
+            value(row.level, false),
+            value(row.level_se, false),
+            unit.to_owned(),
+            value(row.change, true),
+            value(row.change_limit, false),
+            value(row.rate_per_hour.map(|rate| rate * 1000.0), true),
+            row.steps.len().to_string(),
+            row.state.unwrap_or_default().replace('_', " "),
+        ]
+    };
+    if rows.is_empty() {
+        return "no unit was selected\n".to_owned();
+    }
+    table::layout(&columns, &rows.iter().map(cells).collect::<Vec<_>>())
+}
+
+/// A number with three significant digits.
+fn significant(value: f64, sign: bool) -> String {
+    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    let places = (2 - magnitude).clamp(0, 4) as usize;
+    if sign && value != 0.0 { format!("{value:+.places$}") } else { format!("{value:.places$}") }
+}
+
+fn changes_page(changes: &[QuantityChange], units: usize) -> String {
+    if changes.is_empty() {
+        return format!("nothing but the gap changed on {}\n", count(units, "unit"));
+    }
+    let columns = [
+        text("since", 0),
+        text("scope", 0),
+        text("part / serial or tail", 0),
+        text("position", 3),
+        text("state", 2),
+        text("evidence", 0),
+    ];
+    let cells = |change: &QuantityChange| {
+        let part = change.part_number.as_deref();
+        let name = match (&change.serial_number, &change.tail_number) {
+            (Some(serial), _) => format!("{} / {serial}", part.unwrap_or("–")),
+            (None, Some(tail)) => tail.clone(),
+            (None, None) => part.unwrap_or("–").to_owned(),
+        };
+        vec![
+            change.since_utc.strftime("%Y-%m-%d").to_string(),
+            change.scope.to_owned(),
+            name,
+            change.positions.join(", "),
+            change.state.unwrap_or_default().replace('_', " "),
+            change.evidence.clone(),
+        ]
+    };
+    table::layout(&columns, &changes.iter().map(cells).collect::<Vec<_>>())
 }
 
 fn page(found: &[TrendRow], nothing: Option<String>) -> String {
@@ -94,7 +205,7 @@ fn page(found: &[TrendRow], nothing: Option<String>) -> String {
             r.not_before_utc.map_or_else(table::empty_cell, |day| day.strftime("%Y-%m-%d").to_string()),
             table::hours(r.crossing_hours_p50),
             table::hours(r.crossing_hours_p95),
-            r.reason.clone().unwrap_or_default(),
+            reason_and_conditions(r),
         ]
     };
     let Some(as_of) = found.iter().map(|r| r.as_of_utc).max() else {

@@ -325,6 +325,14 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     for moved in &report.recorder_moved {
         line(&mut page, "recorder", &recorder_moved(moved));
     }
+    for change in report.quantity_changes.iter().take(MAX_CHANGES) {
+        let of_unit = change.serial_number.as_deref().map(|serial| format!("{} ", escape(serial)));
+        line(&mut page, "changed", &format!("{}{}", of_unit.unwrap_or_default(), escape(&change.evidence)));
+    }
+    if report.quantity_changes.len() > MAX_CHANGES {
+        let more = report.quantity_changes.len() - MAX_CHANGES;
+        line(&mut page, "", &format!("and {more} more, all in `freeplay trend --changes`"));
+    }
     unusual_innovations(report, &mut page);
     if let Some((log, seconds)) = &report.slowest {
         let took = span(Duration::from_secs_f64(report.took_s));
@@ -351,6 +359,9 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     }
     page
 }
+
+/// Changes of followed quantities that are printed.
+const MAX_CHANGES: usize = 10;
 
 fn recorder_moved(moved: &RecorderChange) -> String {
     let change = match moved.quantity {
