@@ -42,6 +42,8 @@ pub struct Delivery {
     pub failed: Vec<AlertRecord>,
     /// Messages that may have been received, new in this run.
     pub unconfirmed: Vec<AlertRecord>,
+    /// Messages that earlier runs left unconfirmed, and that are not sent again.
+    pub unconfirmed_before: usize,
     /// Messages left for the next run without an attempt.
     pub waiting: usize,
 }
@@ -90,6 +92,8 @@ pub fn deliver<C: Courier>(
             || (row.status == AlertStatus::Unconfirmed && is_repeatable)
         {
             due.entry(row.channel.clone()).or_default().push(row);
+        } else if row.status == AlertStatus::Unconfirmed {
+            delivery.unconfirmed_before += 1;
         }
     }
     for mut rows in due.into_values() {

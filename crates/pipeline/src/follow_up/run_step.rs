@@ -118,8 +118,6 @@ impl FollowUp<'_> {
         now: Timestamp,
     ) -> Result<Vec<AlertRecord>, Error> {
         let mut rows = writer.store().alerts()?;
-        let is_unconfirmed = |row: &&AlertRecord| row.status == AlertStatus::Unconfirmed;
-        summary.unconfirmed_before = rows.iter().filter(is_unconfirmed).count();
         summary.is_held = self.is_partial;
         if self.is_partial {
             return Ok(rows);
@@ -140,6 +138,7 @@ impl AlertSummary {
         self.sent = delivery.sent;
         self.failed = delivery.failed.len();
         self.unconfirmed = delivery.unconfirmed.len();
+        self.unconfirmed_before = delivery.unconfirmed_before;
         self.waiting = delivery.waiting;
     }
 }

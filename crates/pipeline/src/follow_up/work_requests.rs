@@ -73,6 +73,7 @@ fn apply(request: &mut WorkRequest, event: &WorkEvent) {
                 _ => "closed",
             };
             if kind.closes() {
+                request.state.clone_from(&event.state);
                 request.closed_by = Some(kind.as_str().to_owned());
                 request.closed_utc = Some(event.as_of_utc);
             }

@@ -76,15 +76,20 @@ fn of_open(
 ) -> Vec<WorkEvent> {
     let name = unit(request);
     let event = |event: WorkEventKind| WorkEvent { event, ..event_of(request, now) };
+    let state = finding.and_then(|finding| finding.state);
+    let close = |kind: WorkEventKind| {
+        let closed = event(kind);
+        WorkEvent { state: state.map(str::to_owned).or_else(|| closed.state.clone()), ..closed }
+    };
     if let Some(repaired) = tables.repair_after(&name, request.opened_utc) {
         let reason = format!("repair of {} in the maintenance table", repaired.strftime("%Y-%m-%d"));
-        let closed = event(WorkEventKind::Maintained);
+        let closed = close(WorkEventKind::Maintained);
         return vec![WorkEvent { reason: Some(reason), as_of_utc: repaired, ..closed }];
     }
     if let Some((last, removed)) = tables.removal(&name) {
         let date = removed.strftime("%Y-%m-%d");
         let reason = format!("removed from {} of {} on {date}", last.position, last.tail_number);
-        let closed = event(WorkEventKind::Removed);
+        let closed = close(WorkEventKind::Removed);
         return vec![WorkEvent { reason: Some(reason), as_of_utc: removed, ..closed }];
     }
     let mut found = Vec::new();
@@ -97,7 +102,6 @@ fn of_open(
             found.push(WorkEvent { tail_number, position, as_of_utc, ..event(WorkEventKind::Moved) });
         }
     }
-    let state = finding.and_then(|finding| finding.state);
     let is_worse = rank(state) > rank(request.state.as_deref());
     let is_due = request.status == "open" && request.until_utc.is_some();
     if is_due || (request.status == "deferred" && is_worse) {
