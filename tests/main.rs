@@ -4,6 +4,7 @@
 
 mod cli_output;
 mod docs;
+mod follow_up;
 mod fuzz;
 mod harness;
 mod logs;

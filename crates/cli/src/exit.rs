@@ -17,6 +17,8 @@ pub enum Code {
     RunFailed = 3,
     /// With `--fail-on`: a unit is in that state or worse.
     StateReached = 4,
+    /// The run is complete, but an alert was not sent, or work requests and alerts could not be stored.
+    AlertsNotSent = 5,
     /// Interrupted: finished flights are stored; the next run processes the others.
     Interrupted = 130,
 }

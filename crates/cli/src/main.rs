@@ -73,6 +73,7 @@ fn dispatch(args: &Args, output: &Output) -> Result<Code, Failure> {
         Command::Report(a) => commands::results::report::report(a, &args.global, output),
         Command::Simulate(a) => commands::setup::simulate::simulate(a, output),
         Command::Store(a) => commands::store::store(a, &args.global, output),
+        Command::Work(a) => commands::work::work(a, &args.global, output),
         Command::Completions(a) => commands::setup::shell::completions(a, output),
         Command::Man => commands::setup::shell::man(output),
     }

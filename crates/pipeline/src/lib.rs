@@ -8,6 +8,7 @@ pub mod discovery;
 mod error;
 pub mod estimate;
 pub mod fleet_trends;
+pub mod follow_up;
 pub mod history;
 pub mod monitoring;
 pub mod normalize;

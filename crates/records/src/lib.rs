@@ -5,6 +5,7 @@
 
 pub mod diagnostic;
 pub mod flight;
+pub mod follow_up;
 pub mod gap_record;
 pub mod ids;
 pub mod installation;
@@ -19,6 +20,9 @@ pub mod uncertainty;
 
 pub use diagnostic::Diagnostic;
 pub use flight::Flight;
+pub use follow_up::alert_record::{AlertRecord, AlertStatus};
+pub use follow_up::work_event::{WorkEvent, WorkEventKind};
+pub use follow_up::work_request::WorkRequest;
 pub use gap_record::{GapEstimate, GapRecord, Provenance, RecordKey, Status};
 pub use ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 pub use installation::{Installation, Installations};

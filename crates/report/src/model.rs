@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use jiff::Timestamp;
+use records::WorkRequest;
 use serde::Serialize;
 
 use crate::state_badge::StateBadge;
@@ -100,6 +101,8 @@ pub struct UnitView {
     #[serde(rename = "past")]
     pub past_forecasts: Vec<PastForecast>,
     pub inspections: Vec<Inspection>,
+    /// Work requests about the unit, earliest first.
+    pub work_requests: Vec<WorkRequest>,
     /// Smoothed level over past flights; plotted, not part of `report.json`.
     #[serde(skip)]
     pub level: Vec<TimedInterval>,
@@ -256,6 +259,11 @@ impl UnitView {
     /// State to show.
     pub fn badge(&self) -> StateBadge {
         StateBadge::from_state(self.assessment.state.as_deref())
+    }
+
+    /// The latest work request that is not closed.
+    pub fn open_request(&self) -> Option<&WorkRequest> {
+        self.work_requests.iter().rfind(|request| request.is_open())
     }
 
     /// Part and serial number, `PART / SERIAL`.

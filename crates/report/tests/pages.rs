@@ -1,6 +1,7 @@
 //! Public API: hostile names, missing data, and numbers that must be in the page.
 #![expect(clippy::unwrap_used, reason = "a test may fail")]
 
+use records::WorkRequest;
 use report::{
     Assessment, Quality, RateSpreads, Report, Tail, UnitView, fleet_pages, tail_page, unit_page, unit_path,
 };
@@ -24,6 +25,7 @@ fn unit(serial: &str, state: Option<&str>) -> UnitView {
         installations: Vec::new(),
         past_forecasts: Vec::new(),
         inspections: Vec::new(),
+        work_requests: Vec::new(),
         level: Vec::new(),
         forecast: Vec::new(),
         flights: Vec::new(),
@@ -104,6 +106,39 @@ fn the_gap_and_its_share_of_the_limit_stand_in_the_page_as_text() {
     // 118.04 of 150 µm is 78.7 %, by hand.
     assert!(index.contains("118.0 µm") && index.contains("79 %"), "{index}");
     assert!(index.contains(&unit_path(&report.units[0])));
+}
+
+/// A unit whose state is normal again keeps its place until its request is closed.
+#[test]
+fn an_open_request_is_on_the_work_list_and_on_the_page_of_its_unit() {
+    let opened = |id: &str, status: &'static str| WorkRequest {
+        request_id: id.to_owned(),
+        status,
+        state: Some("normal".to_owned()),
+        part_number: Some("EMA".to_owned()),
+        serial_number: "A".to_owned(),
+        tail_number: Some("N1".to_owned()),
+        position: Some(HOSTILE.to_owned()),
+        quantity: "gap".to_owned(),
+        finding: None,
+        opened_utc: "2026-11-01T04:13:00Z".parse().unwrap(),
+        by: Some(HOSTILE.to_owned()),
+        reason: Some(HOSTILE.to_owned()),
+        until_utc: Some("2027-01-31T00:00:00Z".parse().unwrap()),
+        changed_utc: "2026-11-02T00:00:00Z".parse().unwrap(),
+        closed_by: None,
+        closed_utc: None,
+    };
+    let mut normal = unit("A", Some("normal"));
+    normal.work_requests = vec![opened("W3", "closed"), opened("W8", "deferred")];
+    let report = report(vec![normal, unit("B", Some("normal"))]);
+    let index = fleet_pages(&report).unwrap().iter().find(|p| p.path == "index.html").map(text).unwrap();
+    assert!(index.contains("W8 deferred to 2027-01-31") && !index.contains("W3"), "{index}");
+    let html = text(&unit_page(&report, &RateSpreads::of(&report), &report.units[0]).unwrap());
+    assert!(html.contains("W3") && html.contains("W8") && html.contains("deferred to 2027-01-31"), "{html}");
+    assert!(!html.contains("<script>"));
+    let other = text(&unit_page(&report, &RateSpreads::of(&report), &report.units[1]).unwrap());
+    assert!(!other.contains("Work request"), "{other}");
 }
 
 #[test]

@@ -11,7 +11,7 @@ use crate::delta::location::Location;
 use crate::delta::table::Table;
 use crate::delta::versioned;
 use crate::error::Error;
-use records::{LogRecord, RunRecord};
+use records::{AlertRecord, LogRecord, RunRecord, WorkEvent};
 
 const LOCK: &str = "lock";
 
@@ -23,6 +23,10 @@ pub struct Store {
     pub(crate) gaps: Table,
     pub(crate) logs: Table,
     pub(crate) runs: Table,
+    /// Alerts; the table exists from its first row on.
+    pub(crate) alerts: Table,
+    /// Events of work requests; the table exists from its first row on.
+    pub(crate) work: Table,
     /// Data files whose digests this process has verified.
     verified: Arc<Mutex<HashSet<PathBuf>>>,
 }
@@ -33,8 +37,10 @@ impl Store {
         let gaps = table("gaps", GapRecord::schema());
         let logs = table("logs", versioned::schema::<LogRecord>());
         let runs = table("runs", versioned::schema::<RunRecord>());
+        let alerts = table("alerts", versioned::schema::<AlertRecord>());
+        let work = table("work", versioned::schema::<WorkEvent>());
         let display_path = location.display_path(location.dir());
-        Self { gaps, logs, runs, verified: Arc::default(), display_path, location }
+        Self { gaps, logs, runs, alerts, work, verified: Arc::default(), display_path, location }
     }
 
     /// The folder or the object address.
@@ -47,9 +53,16 @@ impl Store {
         (!self.location.is_bucket()).then(|| self.location.dir().join(LOCK))
     }
 
-    /// All tables.
+    /// The tables of every store.
     pub(crate) fn tables(&self) -> [&Table; 3] {
         [&self.gaps, &self.logs, &self.runs]
+    }
+
+    /// The tables of this store: those of every store, and those of alerts and work requests where they exist.
+    pub(crate) fn existing_tables(&self) -> Vec<&Table> {
+        // A table that cannot be read is kept: its reader reports why.
+        let later = [&self.alerts, &self.work].into_iter().filter(|table| table.exists().unwrap_or(true));
+        self.tables().into_iter().chain(later).collect()
     }
 
     /// Verifies the digests of data files, each once per store handle.

@@ -9,6 +9,8 @@
 //!   gaps/        one row per actuator and flight
 //!   logs/        one row per log and run that finished with it
 //!   runs/        one row at the start of a run and one at its end
+//!   alerts/      changes of state, and what became of their messages; from the first alert on
+//!   work/        events of work requests; from the first request on
 //! ```
 //!
 //! A prefix of a bucket holds the same, except for the lock: see `docs/store.md`.
@@ -48,7 +50,7 @@ pub use error::Error;
 pub use handle::Store;
 pub use read::column_scan::ColumnScan;
 pub use read::query::Query;
-pub use records::{LogOutcome, LogRecord, RecordKey, RunRecord};
+pub use records::{AlertRecord, LogOutcome, LogRecord, RecordKey, RunRecord, WorkEvent};
 pub use write::compact::Compaction;
 pub use write::lock::Holder;
 pub use write::promote::PromotionSummary;

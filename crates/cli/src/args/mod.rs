@@ -6,6 +6,7 @@ mod results;
 mod rows;
 mod run;
 mod store;
+mod work;
 
 use std::path::PathBuf;
 
@@ -18,6 +19,7 @@ pub(crate) use results::{
 pub(crate) use rows::{Format, RowFormatArgs};
 pub(crate) use run::{FailOn, RunArgs};
 pub(crate) use store::{StoreArgs, StoreCommand, Table};
+pub(crate) use work::{WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs, WorkStatus};
 
 const AFTER: &str = "\
 First steps:
@@ -27,7 +29,7 @@ First steps:
   freeplay query tail N412FP
 
 Exit codes: 0 success, 1 some logs failed, 2 usage or configuration, 3 the run failed,
-4 a unit met --fail-on, 130 interrupted.";
+4 a unit met --fail-on, 5 an alert was not sent, 130 interrupted.";
 
 /// Estimate actuator backlash (free play) from flight logs and forecast when each unit reaches its limit.
 #[derive(Debug, Parser)]
@@ -153,6 +155,11 @@ pub(crate) enum Command {
         after_help = "Examples:\n  freeplay store info --max-age 30h\n  freeplay store export --format csv --output gaps.csv"
     )]
     Store(StoreArgs),
+    /// List and decide about work requests: open findings of the fleet
+    #[command(
+        after_help = "Examples:\n  freeplay work list --tail N412FP\n  freeplay work defer W12 --until 2027-01-15 --reason \"C-check\" --by \"M. Kaya\""
+    )]
+    Work(WorkArgs),
     /// Generate shell completions
     #[command(
         after_help = "Example:\n  freeplay completions bash > ~/.local/share/bash-completion/completions/freeplay"

@@ -37,6 +37,17 @@ pub(crate) enum StoreCommand {
         #[command(flatten)]
         rows: RowFormatArgs,
     },
+    /// List changes of state, and what became of their messages
+    Alerts {
+        /// Show only messages that were not sent, or perhaps not received.
+        #[arg(long)]
+        unsent: bool,
+        /// Let the next run send the unconfirmed messages of this alert again.
+        #[arg(long, value_name = "ID")]
+        resend: Option<String>,
+        #[command(flatten)]
+        rows: RowFormatArgs,
+    },
     /// List the current data files of a table, for tools without Delta support
     Files {
         /// Table to list.

@@ -6,3 +6,4 @@ pub(crate) mod results;
 pub(crate) mod run;
 pub(crate) mod setup;
 pub(crate) mod store;
+pub(crate) mod work;

@@ -13,6 +13,7 @@ use records::time::DAY_S;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::alerts::AlertChannel;
 use super::layers::Source;
 use super::validate_channels;
 use crate::config::limits::{bounded, positive};
@@ -61,6 +62,9 @@ pub struct Document {
     /// How the trend of a unit is assessed.
     #[serde(default)]
     pub trend: TrendSettings,
+    /// Where changes of state are sent, by a name of your choice.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub alerts: BTreeMap<String, AlertChannel>,
 }
 
 /// `[logs]`.
@@ -368,6 +372,7 @@ impl Document {
         for (key, seconds) in [("timeout_s", self.objects.timeout_s), ("give_up_s", self.objects.give_up_s)] {
             found.extend(positive(key, Some(seconds)).map(|c| source.at(&["objects", key], c)));
         }
+        self.alerts.iter().for_each(|(name, channel)| channel.check(name, source, &mut found));
         found
     }
 

@@ -1,5 +1,6 @@
 //! `pipeline.toml`: read once, checked whole, and its digest carried by every record.
 
+pub mod alerts;
 mod document;
 mod layers;
 pub mod limits;
@@ -18,6 +19,7 @@ use ingest::{Flights, Mapping};
 use records::{Diagnostic, PartNumber, TailNumber};
 use serde::Serialize;
 
+pub use alerts::AlertChannel;
 pub use document::{
     Document, EstimateSettings, LogSettings, Method, Override, QuantityLimits, StoreSettings, TableNames,
     TrendSettings,

@@ -15,6 +15,7 @@ use crate::fleet_trends::limits::Limits;
 use crate::fleet_trends::priors::FleetPriors;
 use crate::fleet_trends::tail_wide_steps::TailWide;
 use crate::fleet_trends::trend_row;
+use crate::follow_up::finding::Finding;
 use crate::history::builder::HistoryBuilder;
 use crate::history::external_estimates::AsOfQuery;
 use crate::history::histories::{Histories, History, UnitKey};
@@ -110,6 +111,8 @@ pub struct RunAssessments {
     pub work_list: Vec<TrendRow>,
     /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
     pub mapping_faults: Vec<MappingFault>,
+    /// Findings about all units of the fleet, for alerts and work requests.
+    pub findings: Vec<Finding>,
 }
 
 /// The states of all units of a store.
@@ -180,6 +183,8 @@ pub fn assess_run_from(
     let states = now.iter().filter_map(|row| row.state);
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
+    run.findings =
+        now.iter().map(|row| Finding::of_gap(row, fleet.latest_flight(&row.unit(), as_of))).collect();
     run.work_list = now.iter().filter(needs_attention).cloned().collect();
     now.retain(|row| names.contains(&row.unit()));
     let Some(before_utc) = before_utc else { return Ok(RunAssessments { now, ..run }) };
@@ -426,6 +431,12 @@ impl<'a> FleetContext<'a> {
     /// A unit's flights.
     pub(crate) fn series(&self, name: &UnitKey) -> Option<&Series> {
         self.units.get(name).map(|(_, series)| series)
+    }
+
+    /// Departure of a unit's latest flight until a date.
+    fn latest_flight(&self, name: &UnitKey, as_of: Timestamp) -> Option<Timestamp> {
+        let (history, _) = self.units.get(name)?;
+        history.until(as_of).last().map(|flight| flight.departure_utc())
     }
 
     /// Trend settings of a unit.

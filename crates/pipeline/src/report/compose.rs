@@ -16,12 +16,13 @@ use trend::Forecast;
 
 use crate::error::Error;
 use crate::fleet_trends::assess::{self, ReportAssessments, UnitSelection};
+use crate::follow_up::work_requests;
 use crate::history::builder::HistoryBuilder;
 use crate::history::flight_row::FlightRow as FlownRow;
 use crate::history::histories::{Histories, History, UnitKey as Name};
 use crate::history::installation_index::InstallationIndex;
 use records::time::{days_after, days_between};
-use records::{ChangePoint, TrendRow};
+use records::{ChangePoint, TrendRow, WorkRequest};
 
 /// Days before the report whose forecasts are compared with the outcome.
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
@@ -53,6 +54,7 @@ pub fn compose(
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
     let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
+    let requests = requests_by_unit(work_requests::requests(&store.work_events()?, made_utc));
     let mut tails = tails(&histories);
     let compose = ReportComposer {
         config,
@@ -60,6 +62,7 @@ pub fn compose(
         past: &past,
         checks: checks.as_deref().unwrap_or(&[]),
         installations: &InstallationIndex::new(installations),
+        requests: &requests,
     };
     let unit = |(row, drawn): (&TrendRow, &Forecast)| {
         let name = name_of(row);
@@ -89,6 +92,14 @@ pub fn compose(
         inspections_unmatched,
         units,
     })
+}
+
+fn requests_by_unit(requests: Vec<WorkRequest>) -> BTreeMap<Name, Vec<WorkRequest>> {
+    let mut by_unit = BTreeMap::<Name, Vec<WorkRequest>>::new();
+    for request in requests {
+        by_unit.entry(work_requests::unit(&request)).or_default().push(request);
+    }
+    by_unit
 }
 
 fn scope(ask: &UnitSelection) -> Option<String> {
@@ -198,6 +209,7 @@ struct ReportComposer<'a> {
     past: &'a BTreeMap<i64, BTreeMap<Name, trend::Interval>>,
     checks: &'a [InspectionRow],
     installations: &'a InstallationIndex<'a>,
+    requests: &'a BTreeMap<Name, Vec<WorkRequest>>,
 }
 
 impl ReportComposer<'_> {
@@ -220,6 +232,7 @@ impl ReportComposer<'_> {
             inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.extras(flown)).collect(),
             flights: flown.iter().map(|flown| flight(history, flown, &rest[flown.row as usize])).collect(),
             installations,
+            work_requests: self.requests.get(&name).cloned().unwrap_or_default(),
             part_number: name.0,
             serial_number: name.1,
             tail_number: row.tail_number.clone(),

@@ -19,6 +19,7 @@ use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
 
 use crate::error::Error;
 use crate::fleet_trends::assess;
+use crate::follow_up::FollowUp;
 use crate::run::discover;
 use crate::run::event::Event;
 use crate::run::flight_ownership::{LogOutcomeData, OwnershipLedger};
@@ -132,8 +133,9 @@ pub(crate) fn execute_run(
     let touched = work(&inputs, &intent, &mut writer, &mut report)?;
 
     (context.watch)(Event::Trends { units: touched.len() });
-    let assessments =
+    let mut assessments =
         assess::assess_run(config, &inputs.installations, &store, &touched, &report.run_id, &before)?;
+    let findings = std::mem::take(&mut assessments.findings);
     report.add_assessments(assessments);
     if report.is_partial() {
         // A run that left logs out cannot determine which tails have no data.
@@ -145,6 +147,15 @@ pub(crate) fn execute_run(
         writer.compact()?;
     }
     writer.end_run(&report.row(context.program_version, &config_path, Some(exit_code)))?;
+    // After the end of the run is stored: what fails from here on loses nothing of it.
+    let follow_up = FollowUp {
+        config,
+        installations: &inputs.installations,
+        run_id: &report.run_id,
+        is_partial: report.not_reached + report.left > 0,
+        stop: context.stop,
+    };
+    report.follow_up = follow_up.run(findings, &mut writer);
     Ok(report)
 }
 

@@ -10,6 +10,7 @@ use store::{LogOutcome, LogRecord, RunRecord};
 use crate::error::is_passing;
 use crate::fleet_trends::assess::RunAssessments;
 use crate::fleet_trends::changes::UnitChange;
+use crate::follow_up::summary::FollowUpSummary;
 use crate::monitoring::REPORTED_DAYS;
 use crate::monitoring::innovations::{self, InnovationOutlier};
 use crate::monitoring::mapping_faults::MappingFault;
@@ -152,6 +153,9 @@ pub struct RunSummary {
     pub standing_errors: Vec<StandingError>,
     /// Units of the whole fleet in state `watch`, `plan` or `act`, also when the run had nothing new.
     pub work_list: Vec<TrendRow>,
+    /// Alerts and work requests that follow from the findings.
+    #[serde(flatten)]
+    pub follow_up: FollowUpSummary,
     /// Number of units of the fleet by state.
     #[serde(skip)]
     pub states: BTreeMap<&'static str, usize>,
@@ -222,6 +226,7 @@ impl RunSummary {
             changed: Vec::new(),
             standing_errors: plan.standing_errors.clone(),
             work_list: Vec::new(),
+            follow_up: FollowUpSummary::default(),
             states: BTreeMap::new(),
             logs: BTreeMap::new(),
         }
@@ -229,7 +234,7 @@ impl RunSummary {
 
     /// Adds the assessments of the run's units, and the recorder changes of their aircraft.
     pub(crate) fn add_assessments(&mut self, assessments: RunAssessments) {
-        let RunAssessments { now, changed, recent, followed, states, work_list, mapping_faults } =
+        let RunAssessments { now, changed, recent, followed, states, work_list, mapping_faults, findings: _ } =
             assessments;
         let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
         let touched = |tail: &String| tails.contains(tail.as_str());

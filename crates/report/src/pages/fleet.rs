@@ -11,6 +11,7 @@ use crate::format::{
 };
 use crate::model::{Report, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
+use crate::pages::work_requests::request_badge;
 use crate::state_badge::StateBadge;
 use crate::stats::agreement::Agreement;
 use crate::stats::rate_spread::spreads;
@@ -35,6 +36,7 @@ pub(crate) struct Row {
     pub(crate) not_before: String,
     pub(crate) likely: String,
     pub(crate) why: String,
+    pub(crate) work: String,
 }
 
 impl Row {
@@ -50,6 +52,7 @@ impl Row {
             not_before: when(s.crossing_hours_p05, s.not_before_utc, unit),
             likely: when(s.crossing_hours_p50, s.likely_utc, unit),
             why: s.reason.clone().unwrap_or_else(|| NO_DATA.to_owned()),
+            work: unit.open_request().map(request_badge).unwrap_or_default(),
         }
     }
 }
@@ -234,9 +237,10 @@ fn heading(report: &Report) -> String {
     }
 }
 
-/// Units that need action, by earliest date.
+/// Units that need action or have an open work request, by earliest date.
 fn work(report: &Report) -> Vec<&UnitView> {
-    let mut units: Vec<&UnitView> = report.units.iter().filter(|u| u.badge().needs_action()).collect();
+    let mut units: Vec<&UnitView> =
+        report.units.iter().filter(|u| u.badge().needs_action() || u.open_request().is_some()).collect();
     units.sort_by(|a, b| urgency(a).partial_cmp(&urgency(b)).unwrap_or(std::cmp::Ordering::Equal));
     // Units of one tail are grouped for one maintenance visit, after the tail's most urgent unit.
     let mut first: BTreeMap<Option<&str>, usize> = BTreeMap::new();

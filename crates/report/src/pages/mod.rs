@@ -3,3 +3,4 @@
 pub(crate) mod fleet;
 pub(crate) mod tail;
 pub(crate) mod unit;
+pub(crate) mod work_requests;

@@ -11,6 +11,7 @@ use crate::format::{
 use crate::model::{FlightRow, Report, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
 use crate::pages::fleet::{share, when};
+use crate::pages::work_requests::{RequestRow, request_rows};
 use crate::state_badge::StateBadge;
 use crate::stats::crossing_probability::probability_text;
 use crate::stats::rate_spread::RateSpreads;
@@ -37,6 +38,7 @@ struct View {
     quality: Facts,
     past_forecasts: Vec<(String, String, String, String, String, &'static str)>,
     inspections: Vec<(String, String, String, String, String)>,
+    requests: Vec<RequestRow>,
     statistics: Facts,
     prior: String,
     band: Vec<(String, &'static str, String, String, String)>,
@@ -90,6 +92,7 @@ pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) ->
         quality: quality(unit),
         past_forecasts: past_forecasts(unit),
         inspections: inspections(unit),
+        requests: request_rows(unit),
         statistics: statistics(unit),
         prior: prior(report, unit),
         band: band(unit),

@@ -1,6 +1,7 @@
 //! Store administration: run log, summary, verification and export.
 
 pub(crate) mod export;
+pub(crate) mod follow_up;
 pub(crate) mod info;
 pub(crate) mod run_log;
 pub(crate) mod verify;

@@ -43,7 +43,7 @@ impl Store {
     /// # Errors
     /// [`Error::Table`] when a table's log cannot be read.
     pub fn needs_compaction(&self) -> Result<bool, Error> {
-        for table in self.tables() {
+        for table in self.existing_tables() {
             let snapshot = table.snapshot()?;
             let files = &snapshot.files;
             let rows: i64 = files.iter().filter_map(|file| file.stats.num_records).sum();
@@ -70,10 +70,19 @@ impl Writer {
         };
         let by_log = RewritePlan { slice_by: "log_path", order: &["log_path", versioned::COMMIT] };
         let by_run = RewritePlan { slice_by: "run_id", order: &[versioned::COMMIT] };
+        let by_alert = RewritePlan { slice_by: "alert_id", order: &["alert_id", versioned::COMMIT] };
+        let by_request = RewritePlan { slice_by: "request_id", order: &["number", versioned::COMMIT] };
+        let plan = |table: &Table| match table.name {
+            "gaps" => &by_unit,
+            "logs" => &by_log,
+            "alerts" => &by_alert,
+            "work" => &by_request,
+            _ => &by_run,
+        };
         let mut total = Compaction { before: 0, after: 0, deleted: 0 };
-        for (table, plan) in store.tables().into_iter().zip([by_unit, by_log, by_run]) {
+        for table in store.existing_tables() {
             let before = table.snapshot()?.files.len();
-            table.change(|snapshot| plan.change(table, snapshot, |files| store.check(files)))?;
+            table.change(|snapshot| plan(table).change(table, snapshot, |files| store.check(files)))?;
             total.before += before;
             total.after += table.snapshot()?.files.len();
         }
@@ -86,7 +95,7 @@ impl Writer {
     /// # Errors
     /// [`Error::Io`] when a file cannot be deleted, [`Error::Table`] when the log cannot be read.
     pub fn vacuum(&mut self, kept: Duration) -> Result<usize, Error> {
-        let tables = self.store().tables();
+        let tables = self.store().existing_tables();
         tables.iter().map(|table| table.vacuum(kept)).sum()
     }
 }

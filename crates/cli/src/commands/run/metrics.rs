@@ -28,7 +28,8 @@ fn text(report: &RunSummary, code: Code) -> String {
     };
     let states = |state: &str| report.trends.iter().filter(|row| row.state == Some(state)).count() as f64;
     let now = Timestamp::now().as_millisecond() as f64 / 1e3;
-    let completed = matches!(code, Code::Success | Code::LogsInError | Code::StateReached);
+    let completed =
+        matches!(code, Code::Success | Code::LogsInError | Code::StateReached | Code::AlertsNotSent);
     gauge(
         "run_started_timestamp_seconds",
         "When the last run began.",
@@ -63,6 +64,19 @@ fn text(report: &RunSummary, code: Code) -> String {
     for state in State::ALL.map(State::as_str) {
         let name = format!("units_touched_{state}");
         gauge(&name, "Units updated by this run that are in this state.", states(state));
+        let name = format!("units_{state}");
+        let units = report.states.get(state).copied().unwrap_or_default() as f64;
+        gauge(&name, "Units of the fleet in this state.", units);
+    }
+    let work = &report.follow_up.work_requests;
+    gauge("work_requests_open", "Work requests that wait for somebody.", work.open as f64);
+    gauge("work_requests_acknowledged", "Work requests that a person has seen.", work.acknowledged as f64);
+    gauge("work_requests_deferred", "Work requests that a person postponed.", work.deferred as f64);
+    if let Some(alerts) = &report.follow_up.alerts {
+        gauge("alerts_sent", "Messages sent by the last run.", alerts.sent as f64);
+        gauge("alerts_unsent", "Messages that the next run sends.", (alerts.failed + alerts.waiting) as f64);
+        let unconfirmed = alerts.unconfirmed + alerts.unconfirmed_before;
+        gauge("alerts_unconfirmed", "Messages that may have been received.", unconfirmed as f64);
     }
     text
 }

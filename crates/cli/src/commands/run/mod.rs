@@ -1,5 +1,6 @@
 //! `run`: processes new and changed logs, updates trends and prints the run summary.
 
+mod follow_up;
 mod metrics;
 
 use std::fmt::Write as _;
@@ -75,6 +76,7 @@ pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Co
     }
     let report = report?;
     output.diagnostics(report.errors.iter().map(|e| &e.diagnostic));
+    output.diagnostics(&report.follow_up.errors);
     let reached = args.fail_on.is_some_and(|least| is_reached(&report, least));
     let code = code(&report, reached, stop.load(Ordering::Relaxed));
     if let Some(file) = &args.metrics {
@@ -158,6 +160,7 @@ fn code(report: &RunSummary, reached: bool, stopped: bool) -> Code {
         RunEnd::Interrupted => Code::Interrupted,
         RunEnd::LogsInError => Code::LogsInError,
         RunEnd::Complete if reached => Code::StateReached,
+        RunEnd::Complete if report.follow_up.has_failed() => Code::AlertsNotSent,
         RunEnd::Complete => Code::Success,
     }
 }
@@ -348,6 +351,7 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     }
     page.push_str(&work_list_section(&report.trends, &report.work_list));
     page.push_str(&changes_section(&report.changed));
+    page.push_str(&follow_up::section(&report.follow_up));
     if code == Code::LogsInError && !report.errors.is_empty() {
         let failed = count(report.logs_in_error(), "log");
         let _ = writeln!(page, "Exit code 1: {failed} failed. After fixing them: `freeplay run --retry`");

@@ -1,5 +1,6 @@
 //! `store`: inspects and maintains the results store.
 
+mod alerts;
 mod runs;
 
 use std::path::Path;
@@ -30,6 +31,9 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Resul
     match &args.command {
         StoreCommand::Info { max_age, json } => info(&store, *max_age, *json, output),
         StoreCommand::Runs { run, last, rows } => runs::runs(&store, run.as_deref(), *last, rows, output),
+        StoreCommand::Alerts { unsent, resend, rows } => {
+            alerts::alerts(&store, *unsent, resend.as_deref(), rows, output)
+        }
         StoreCommand::Files { table } => files(&store, *table, output),
         StoreCommand::Verify => verify(&store, output),
         StoreCommand::Compact => compact(&store, output),

@@ -1,0 +1,92 @@
+//! Arguments of `work`.
+
+use clap::{Args as ClapArgs, Subcommand, ValueEnum};
+use jiff::Timestamp;
+
+use super::parse::parse_utc;
+use super::rows::RowFormatArgs;
+
+/// `work`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct WorkArgs {
+    #[command(subcommand)]
+    pub command: WorkCommand,
+}
+
+/// Commands on work requests.
+#[derive(Debug, Subcommand)]
+pub(crate) enum WorkCommand {
+    /// List work requests, most urgent first
+    List(WorkListArgs),
+    /// Record that you have seen a request
+    Acknowledge {
+        #[command(flatten)]
+        who: WorkDecisionArgs,
+        /// Your remark.
+        #[arg(long, value_name = "TEXT")]
+        reason: Option<String>,
+    },
+    /// Postpone a request; it comes back on the date, or when the state becomes worse
+    Defer {
+        #[command(flatten)]
+        who: WorkDecisionArgs,
+        /// Date on which the request comes back, e.g. `2026-12-01`.
+        #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+        until: Timestamp,
+        /// Why it can wait.
+        #[arg(long, value_name = "TEXT")]
+        reason: String,
+    },
+    /// Close a request without an entry in the maintenance or installations table
+    Close {
+        #[command(flatten)]
+        who: WorkDecisionArgs,
+        /// What was done, or why nothing is to be done.
+        #[arg(long, value_name = "TEXT")]
+        reason: String,
+    },
+}
+
+/// `work list`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct WorkListArgs {
+    /// Only units on this tail.
+    #[arg(long)]
+    pub tail: Option<String>,
+    /// Only this unit.
+    #[arg(long)]
+    pub serial: Option<String>,
+    /// Only this part number.
+    #[arg(long)]
+    pub part: Option<String>,
+    /// Only requests with this status; default: all that are not closed.
+    #[arg(long, value_enum, value_name = "STATUS")]
+    pub status: Option<WorkStatus>,
+    #[command(flatten)]
+    pub rows: RowFormatArgs,
+}
+
+/// Request and person of a decision.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct WorkDecisionArgs {
+    /// The request, e.g. `W12`.
+    pub request: String,
+    /// Who decides.
+    #[arg(long, value_name = "NAME", env = "USER", hide_env_values = true)]
+    pub by: String,
+}
+
+/// Status of a work request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum WorkStatus {
+    /// Waits for somebody.
+    Open,
+    /// Seen by a person.
+    Acknowledged,
+    /// Postponed.
+    Deferred,
+    /// Done.
+    Closed,
+    /// Every request.
+    All,
+}

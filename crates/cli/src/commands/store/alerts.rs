@@ -1,0 +1,86 @@
+//! `store alerts`: changes of state and what became of their messages.
+
+use records::{AlertRecord, AlertStatus};
+use store::{Holder, Store};
+
+use crate::args::RowFormatArgs;
+use crate::exit::{Code, Failure};
+use crate::output::Output;
+use crate::row_output;
+use crate::table::{self, count, number, text};
+
+/// Lists alerts, or makes one due again.
+///
+/// # Errors
+/// If the store cannot be read or written, or no message with the identifier is unconfirmed.
+pub(crate) fn alerts(
+    store: &Store,
+    is_unsent: bool,
+    resend: Option<&str>,
+    format: &RowFormatArgs,
+    output: &Output,
+) -> Result<Code, Failure> {
+    if let Some(id) = resend {
+        return send_again(store, id, output);
+    }
+    let mut found = store.alerts()?;
+    // The states of a baseline are no messages.
+    found.retain(|row| !row.channel.is_empty() || row.kind == "change");
+    if is_unsent {
+        found.retain(|row| !matches!(row.status, AlertStatus::Sent | AlertStatus::Recorded));
+    }
+    row_output::write_rows(format, output, || row_output::batch(&found), || page(&found))?;
+    Ok(Code::Success)
+}
+
+fn send_again(store: &Store, id: &str, output: &Output) -> Result<Code, Failure> {
+    let mut writer = store.lock(&Holder::this_process(), None)?;
+    let mut rows = store.alerts()?;
+    rows.retain(|row| row.alert_id == id && row.status == AlertStatus::Unconfirmed);
+    if rows.is_empty() {
+        let what = format!("no unconfirmed message of an alert `{id}`");
+        return Err(Failure::usage("no_such_alert", what, "`freeplay store alerts --unsent` lists them"));
+    }
+    rows.iter_mut().for_each(|row| row.status = AlertStatus::Pending);
+    writer.write_alerts(&rows)?;
+    output.write_result(&format!("the next run sends {} of {id} again\n", count(rows.len(), "message")))?;
+    Ok(Code::Success)
+}
+
+fn page(found: &[AlertRecord]) -> String {
+    if found.is_empty() {
+        return "no alert\n".to_owned();
+    }
+    let columns = [
+        text("alert", 2),
+        text("part / serial", 0),
+        text("tail", 3),
+        text("change", 0),
+        text("channel", 0),
+        text("status", 0),
+        number("attempts", 4),
+        text("error", 5),
+    ];
+    let cells = |row: &AlertRecord| {
+        let word = |state: &Option<String>| state.clone().unwrap_or_else(|| "not assessed".to_owned());
+        let change = match row.kind.as_str() {
+            "change" => format!("{} → {}", word(&row.from_state), word(&row.to_state)),
+            kind => kind.to_owned(),
+        };
+        let unit = row.serial_number.as_ref().map_or_else(table::empty_cell, |serial| {
+            format!("{} / {serial}", row.part_number.as_deref().unwrap_or("–"))
+        });
+        vec![
+            row.alert_id.clone(),
+            unit,
+            row.tail_number.clone().unwrap_or_else(table::empty_cell),
+            change,
+            if row.channel.is_empty() { table::empty_cell() } else { row.channel.clone() },
+            row.status.as_str().to_owned(),
+            row.attempts.to_string(),
+            row.error.clone().unwrap_or_else(table::empty_cell),
+        ]
+    };
+    let head = format!("{}\n", count(found.len(), "row"));
+    head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
+}

@@ -1,0 +1,157 @@
+//! `work`: lists work requests, and records what people decide about them.
+
+use std::time::Duration;
+
+use jiff::Timestamp;
+use pipeline::follow_up::work_requests::{self, Decision};
+use records::{WorkEventKind, WorkRequest};
+use report::StateBadge;
+use store::{Holder, Store};
+
+use crate::args::{Global, WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs, WorkStatus};
+use crate::commands::context::{KnownNames, load_config};
+use crate::exit::{Code, Failure};
+use crate::output::{Output, escape};
+use crate::row_output;
+use crate::table::{self, count, state_mark, text};
+
+/// Longest wait for a run that writes into the store.
+const WAIT: Duration = Duration::from_secs(60);
+
+/// Lists requests, or records a decision.
+///
+/// # Errors
+/// If configuration or store cannot be read or written, or there is no such open request.
+pub(crate) fn work(args: &WorkArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    let config = load_config(global)?;
+    let store = Store::open(config.store())?;
+    let (who, kind, reason, until_utc) = match &args.command {
+        WorkCommand::List(args) => return list(&config, &store, args, output),
+        WorkCommand::Acknowledge { who, reason } => (who, WorkEventKind::Acknowledged, reason.clone(), None),
+        WorkCommand::Defer { who, until, reason } => {
+            (who, WorkEventKind::Deferred, Some(reason.clone()), Some(*until))
+        }
+        WorkCommand::Close { who, reason } => (who, WorkEventKind::Closed, Some(reason.clone()), None),
+    };
+    if until_utc.is_some_and(|until| until <= Timestamp::now()) {
+        let what = "the date of `--until` has passed";
+        return Err(Failure::usage("date_passed", what, "give a later date, e.g. `--until 2031-01-31`"));
+    }
+    decide(&store, who, Decision { kind, by: who.by.clone(), reason, until_utc }, output)
+}
+
+fn decide(
+    store: &Store,
+    who: &WorkDecisionArgs,
+    decision: Decision,
+    output: &Output,
+) -> Result<Code, Failure> {
+    let blank =
+        [Some(&decision.by), decision.reason.as_ref()].into_iter().flatten().any(|t| t.trim().is_empty());
+    if blank {
+        let what = "the name or the reason is empty";
+        return Err(Failure::usage("empty_name", what, "give `--by NAME` and `--reason TEXT`"));
+    }
+    let mut writer = store.lock(&Holder::this_process(), Some(WAIT))?;
+    // Read under the lock: a run may have closed the request in the meantime.
+    let mut events = store.work_events()?;
+    let now = Timestamp::now();
+    let event = work_requests::decide(&events, &who.request, decision, now)
+        .map_err(|diagnostic| Failure::Refused(vec![diagnostic]))?;
+    writer.add_work_events(std::slice::from_ref(&event))?;
+    let id = event.request_id.clone();
+    events.push(event);
+    let requests = work_requests::requests(&events, now);
+    let Some(request) = requests.iter().find(|request| request.request_id == id) else {
+        return Ok(Code::Success);
+    };
+    output.write_result(&format!("{id}: {}; {}\n", escape(&unit(request)), escape(&status(request))))?;
+    Ok(Code::Success)
+}
+
+fn list(config: &job::Config, store: &Store, args: &WorkListArgs, output: &Output) -> Result<Code, Failure> {
+    let mut found = work_requests::requests(&store.work_events()?, Timestamp::now());
+    found.retain(|request| is_selected(request, args));
+    if found.is_empty() && [&args.tail, &args.serial, &args.part].iter().any(|name| name.is_some()) {
+        let known = KnownNames::read(config);
+        known.check_units(args.tail.as_deref(), args.serial.as_deref(), args.part.as_deref())?;
+    }
+    let urgency = |request: &WorkRequest| StateBadge::from_state(request.state.as_deref()).rank();
+    found.sort_by_key(|request| (!request.is_open(), urgency(request), request.opened_utc));
+    row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found))?;
+    Ok(Code::Success)
+}
+
+fn is_selected(request: &WorkRequest, args: &WorkListArgs) -> bool {
+    let is_wanted = match args.status {
+        None => request.is_open(),
+        Some(WorkStatus::All) => true,
+        Some(WorkStatus::Open) => request.status == "open",
+        Some(WorkStatus::Acknowledged) => request.status == "acknowledged",
+        Some(WorkStatus::Deferred) => request.status == "deferred",
+        Some(WorkStatus::Closed) => request.status == "closed",
+    };
+    is_wanted
+        && (args.tail.is_none() || args.tail == request.tail_number)
+        && args.serial.as_ref().is_none_or(|serial| *serial == request.serial_number)
+        && (args.part.is_none() || args.part == request.part_number)
+}
+
+fn page(found: &[WorkRequest]) -> String {
+    if found.is_empty() {
+        return "no work request\n".to_owned();
+    }
+    let columns = [
+        text("request", 0),
+        text("state", 0),
+        text("part / serial", 0),
+        text("tail", 1),
+        text("position", 3),
+        text("opened", 2),
+        text("status", 0),
+        text("remark", 4),
+        text("finding", 5),
+    ];
+    let cells = |request: &WorkRequest| {
+        let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(table::empty_cell);
+        vec![
+            request.request_id.clone(),
+            state_mark(request.state.as_deref()),
+            unit(request),
+            or_dash(&request.tail_number),
+            or_dash(&request.position),
+            day(request.opened_utc),
+            status(request),
+            or_dash(&request.reason),
+            or_dash(&request.finding),
+        ]
+    };
+    let with = |status: &str| found.iter().filter(|request| request.status == status).count();
+    let counts = ["open", "acknowledged", "deferred", "closed"].map(|status| (with(status), status));
+    let counts = counts.into_iter().filter(|(n, _)| *n > 0).map(|(n, status)| format!("{n} {status}"));
+    let head = format!("{}: {}\n", count(found.len(), "work request"), counts.collect::<Vec<_>>().join(", "));
+    head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
+}
+
+fn unit(request: &WorkRequest) -> String {
+    format!("{} / {}", request.part_number.as_deref().unwrap_or("–"), request.serial_number)
+}
+
+/// Status with its person and date.
+fn status(request: &WorkRequest) -> String {
+    let by = request.by.as_deref().map(|by| format!(" by {by}")).unwrap_or_default();
+    match (request.status, request.until_utc) {
+        ("deferred", Some(until)) => format!("deferred to {}{by}", day(until)),
+        ("open", Some(until)) => format!("open, was deferred to {}{by}", day(until)),
+        ("closed", _) => {
+            let how = request.closed_by.as_deref().unwrap_or("closed");
+            format!("{how} {}{by}", request.closed_utc.map(day).unwrap_or_default())
+        }
+        ("open", None) => "open".to_owned(),
+        (other, _) => format!("{other}{by}"),
+    }
+}
+
+fn day(at: Timestamp) -> String {
+    at.strftime("%Y-%m-%d").to_string()
+}

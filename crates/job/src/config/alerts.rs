@@ -1,0 +1,127 @@
+//! `[alerts.NAME]`: where a change of state is sent.
+
+use std::time::Duration;
+
+use ingest::mapping::column_pattern::nearest;
+use records::Diagnostic;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::layers::Source;
+use crate::config::limits::positive;
+
+/// Word for a unit without a state, in `states` and in messages.
+pub const NOT_ASSESSED: &str = "not_assessed";
+
+/// Longest time limit of one message, s: a run waits for it.
+const MAX_TIMEOUT_S: f64 = 600.0;
+
+/// `[alerts.NAME]`: one channel for changes of state. It has one of `command`, `folder` and `url`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct AlertChannel {
+    /// Program and arguments, without a shell: it gets the message as JSON on standard input. Exit code 0 means sent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub command: Option<Vec<String>>,
+    /// Folder that gets one JSON file per message, named after the alert's `id`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub folder: Option<String>,
+    /// Address (`https://` or `http://`) that the message is posted to as JSON. An answer of 200 to 299 means sent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub url: Option<String>,
+    /// New states that are sent: `normal`, `watch`, `plan`, `act`, `not_assessed`, or a state of another quantity.
+    /// Default `watch`, `plan`, `act`.
+    pub states: Vec<String>,
+    /// Only these part numbers, `*` and `?` stand for anything; every part when not given.
+    pub parts: Vec<String>,
+    /// Only these tail numbers, in the same way.
+    pub tails: Vec<String>,
+    /// Time limit of one message, s; at most 600. Default 30.
+    pub timeout_s: f64,
+    /// Whether a message that may have been received is sent again, with the same `id`. Default false.
+    pub resend_unconfirmed: bool,
+    /// Whether messages are sent. Set it to false in the configuration of a trial. Default true.
+    pub enabled: bool,
+}
+
+impl Default for AlertChannel {
+    fn default() -> Self {
+        Self {
+            command: None,
+            folder: None,
+            url: None,
+            states: ["watch", "plan", "act"].map(str::to_owned).to_vec(),
+            parts: Vec::new(),
+            tails: Vec::new(),
+            timeout_s: 30.0,
+            resend_unconfirmed: false,
+            enabled: true,
+        }
+    }
+}
+
+impl AlertChannel {
+    /// Whether a unit's change to a state is sent: state, part and tail are selected.
+    pub fn selects(&self, state: Option<&str>, part: Option<&str>, tail: Option<&str>) -> bool {
+        let state = state.unwrap_or(NOT_ASSESSED);
+        self.states.iter().any(|wanted| wanted == state)
+            && is_among(&self.parts, part)
+            && is_among(&self.tails, tail)
+    }
+
+    /// Time limit of one message.
+    pub fn timeout(&self) -> Duration {
+        Duration::from_secs_f64(self.timeout_s.clamp(1e-3, MAX_TIMEOUT_S))
+    }
+
+    /// Everything about the channel that cannot be meant.
+    pub(super) fn check(&self, name: &str, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
+        let targets = [self.command.is_some(), self.folder.is_some(), self.url.is_some()];
+        if targets.iter().filter(|given| **given).count() != 1 {
+            let what = format!("`alerts.{name}` needs one of `command`, `folder` and `url`");
+            let c = Diagnostic::new("alert_channel", what).hint("folder = \"alerts\"");
+            found.push(source.at(&["alerts", name], c));
+        }
+        if self.command.as_ref().is_some_and(|words| words.first().is_none_or(|program| program.is_empty())) {
+            let c = Diagnostic::new("alert_channel", format!("`alerts.{name}.command` names no program"));
+            found.push(
+                source.at(&["alerts", name, "command"], c.hint("command = [\"/usr/local/bin/notify\"]")),
+            );
+        }
+        if self.folder.as_ref().is_some_and(|folder| folder.is_empty() || object_io::is_address(folder)) {
+            let c = Diagnostic::new("alert_channel", format!("`alerts.{name}.folder` is not a local folder"));
+            found.push(source.at(&["alerts", name, "folder"], c.hint("folder = \"alerts\"")));
+        }
+        if let Some(detail) = self.url.as_ref().and_then(|url| object_io::check_url(url).err()) {
+            // The address may hold a secret: the line of the file is not quoted.
+            let what = format!("`alerts.{name}.url` is not an address of HTTP: {detail}");
+            let c = Diagnostic::new("alert_channel", what).hint("write it as https://HOST/PATH");
+            found.push(Diagnostic { text: None, ..source.at(&["alerts", name, "url"], c) });
+        }
+        for (key, texts) in [("parts", &self.parts), ("tails", &self.tails)] {
+            for (text, e) in texts.iter().filter_map(|text| Some((text, glob::Pattern::new(text).err()?))) {
+                let what = format!("`{text}` is not a valid name pattern: {e}");
+                found.push(source.at(&["alerts", name, key], Diagnostic::new("bad_pattern", what)));
+            }
+        }
+        let known = trend::State::ALL.map(trend::State::as_str);
+        for state in self.states.iter().filter(|s| !known.contains(&s.as_str()) && *s != NOT_ASSESSED) {
+            let c = Diagnostic::new("unknown_state", format!("`{state}` is not a state of a unit"));
+            let names = known.into_iter().chain([NOT_ASSESSED]);
+            let c = match nearest(state, names.clone()) {
+                Some(near) => c.hint(format!("`{near}`?")),
+                None => c.hint(format!("states are {}", names.collect::<Vec<_>>().join(", "))),
+            };
+            found.push(source.at(&["alerts", name, "states"], c));
+        }
+        let timeout = positive("timeout_s", Some(self.timeout_s));
+        found.extend(timeout.map(|c| source.at(&["alerts", name, "timeout_s"], c)));
+    }
+}
+
+/// Whether a name fits one of the patterns, or there is none.
+fn is_among(patterns: &[String], name: Option<&str>) -> bool {
+    let fits =
+        |pattern: &String, name| glob::Pattern::new(pattern).is_ok_and(|pattern| pattern.matches(name));
+    patterns.is_empty() || name.is_some_and(|name| patterns.iter().any(|pattern| fits(pattern, name)))
+}

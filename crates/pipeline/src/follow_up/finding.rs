@@ -1,0 +1,53 @@
+//! Finding: the state of one quantity of one unit after a run, as alerts and work requests need it.
+
+use jiff::Timestamp;
+use records::TrendRow;
+
+use crate::history::histories::UnitKey;
+
+/// Quantity of the free play.
+pub const GAP: &str = "gap";
+
+/// State of one quantity of one unit.
+#[derive(Debug, Clone, PartialEq)]
+#[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
+pub struct Finding {
+    pub unit: UnitKey,
+    pub tail_number: Option<String>,
+    pub position: Option<String>,
+    /// Name of the quantity, [`GAP`] for the free play.
+    pub quantity: &'static str,
+    /// `None` of a unit that is not assessed or was removed.
+    pub state: Option<&'static str>,
+    pub reason: Option<String>,
+    pub as_of_utc: Timestamp,
+    /// Departure of the unit's latest flight.
+    pub latest_flight_utc: Option<Timestamp>,
+    pub gap_m: Option<f64>,
+    pub limit_m: Option<f64>,
+    pub not_before_utc: Option<Timestamp>,
+    pub likely_utc: Option<Timestamp>,
+    /// The open work request about it.
+    pub work_request: Option<String>,
+}
+
+impl Finding {
+    /// The finding about a unit's gap.
+    pub fn of_gap(row: &TrendRow, latest_flight_utc: Option<Timestamp>) -> Self {
+        Self {
+            unit: row.unit(),
+            tail_number: row.tail_number.clone(),
+            position: row.position.clone(),
+            quantity: GAP,
+            state: row.state,
+            reason: row.reason.clone(),
+            as_of_utc: row.as_of_utc,
+            latest_flight_utc,
+            gap_m: row.gap_m,
+            limit_m: row.limit_m,
+            not_before_utc: row.not_before_utc,
+            likely_utc: row.likely_utc,
+            work_request: None,
+        }
+    }
+}

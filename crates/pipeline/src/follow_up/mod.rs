@@ -1,0 +1,13 @@
+//! What follows from the findings of a run: alerts about changes of state, and work requests.
+
+pub mod alert_changes;
+mod alert_message;
+mod channel;
+pub mod delivery;
+pub mod finding;
+mod run_step;
+pub mod summary;
+pub mod work_requests;
+pub mod work_update;
+
+pub(crate) use run_step::FollowUp;

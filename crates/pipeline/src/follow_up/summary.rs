@@ -1,0 +1,63 @@
+//! What a run did with alerts and work requests.
+
+use records::{Diagnostic, WorkRequest};
+use serde::Serialize;
+
+/// Alerts of a run.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct AlertSummary {
+    /// Changes of state since the last known states; none in the run that writes the baseline.
+    pub changes: usize,
+    /// Whether this run wrote the baseline: the states known when alerts begin.
+    pub is_baseline: bool,
+    /// Whether changes wait for a run that processes every log.
+    pub is_held: bool,
+    /// Messages that were accepted.
+    pub sent: usize,
+    /// Messages that were not accepted; the next run sends them again.
+    pub failed: usize,
+    /// Messages that may have been received, new in this run.
+    pub unconfirmed: usize,
+    /// The same of earlier runs.
+    pub unconfirmed_before: usize,
+    /// Messages left for the next run without an attempt.
+    pub waiting: usize,
+}
+
+/// Work requests after a run.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct WorkSummary {
+    /// Requests that wait for somebody.
+    pub open: usize,
+    /// Requests that a person has seen.
+    pub acknowledged: usize,
+    /// Requests that a person postponed.
+    pub deferred: usize,
+    /// Requests that this run opened, or opened again.
+    pub new: Vec<WorkRequest>,
+    /// Deferred requests that came back in this run.
+    pub returned: Vec<WorkRequest>,
+    /// Requests whose unit is installed in another place.
+    pub moved: Vec<WorkRequest>,
+    /// Requests that this run closed.
+    pub closed: Vec<WorkRequest>,
+}
+
+/// What follows from a run's findings.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct FollowUpSummary {
+    /// Alerts; `None` without a channel.
+    pub alerts: Option<AlertSummary>,
+    /// Work requests.
+    pub work_requests: WorkSummary,
+    /// Alerts and work requests that failed.
+    #[serde(rename = "follow_up_errors")]
+    pub errors: Vec<Diagnostic>,
+}
+
+impl FollowUpSummary {
+    /// Whether a message was not accepted, or may not have been, or the tables could not be written.
+    pub fn has_failed(&self) -> bool {
+        !self.errors.is_empty()
+    }
+}

@@ -1,0 +1,336 @@
+//! Alerts under kills: every change is sent exactly once, or is marked as unconfirmed.
+#![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use jiff::Timestamp;
+use job::config::AlertChannel;
+use pipeline::follow_up::alert_changes::{self, Channels};
+use pipeline::follow_up::delivery::{self, Attempt, Courier};
+use pipeline::follow_up::finding::{Finding, GAP};
+use records::{AlertRecord, AlertStatus};
+use serde_json::Value;
+use store::{Holder, Store};
+
+const STATES: [Option<&str>; 5] = [None, Some("normal"), Some("watch"), Some("plan"), Some("act")];
+
+/// Names that break shells, JSON, paths and terminals.
+const SERIALS: [&str; 6] =
+    ["1040-0009", "../../etc/x", "$(reboot)", "\"},{\"id\":\"", "S\n\u{202e}1", "Ünït 7"];
+
+/// Numbers of a linear congruential generator (Knuth, MMIX).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % n
+    }
+}
+
+fn finding(serial: &str, state: Option<&'static str>, day: i64) -> Finding {
+    let as_of_utc = Timestamp::from_second(1_780_000_000 + 86_400 * day).unwrap();
+    Finding {
+        unit: (Some("EMA".to_owned()), serial.to_owned()),
+        tail_number: Some("N412FP".to_owned()),
+        position: Some("aileron".to_owned()),
+        quantity: GAP,
+        state,
+        reason: Some("of a test".to_owned()),
+        as_of_utc,
+        latest_flight_utc: Some(as_of_utc),
+        gap_m: Some(1e-4),
+        limit_m: Some(1.5e-4),
+        not_before_utc: None,
+        likely_utc: None,
+        work_request: None,
+    }
+}
+
+/// A folder, a command, and an address whose receiver drops doubles; all of them get every change.
+fn channels() -> Channels {
+    let states: Vec<String> = STATES.iter().map(|state| state.unwrap_or("not_assessed").to_owned()).collect();
+    let channel = AlertChannel { states, ..AlertChannel::default() };
+    let folder = AlertChannel { folder: Some("alerts".to_owned()), ..channel.clone() };
+    let command = AlertChannel { command: Some(vec!["notify".to_owned()]), ..channel.clone() };
+    let url = AlertChannel { url: Some("http://localhost/".to_owned()), resend_unconfirmed: true, ..channel };
+    [("command", command), ("folder", folder), ("url", url)]
+        .into_iter()
+        .map(|(name, channel)| (name.to_owned(), channel))
+        .collect()
+}
+
+/// The run was killed.
+#[derive(Debug, PartialEq)]
+struct Killed;
+
+/// A table in memory, receivers, and a kill before or after the n-th write.
+struct World {
+    table: BTreeMap<(String, String), AlertRecord>,
+    received: Vec<(String, String)>,
+    random: Random,
+    /// Writes until the kill, and whether the last of them is durable.
+    kill_in: Option<(u64, bool)>,
+    is_calm: bool,
+}
+
+impl World {
+    fn write_all(&mut self, rows: &[AlertRecord]) -> Result<(), Killed> {
+        let (is_last, is_durable) = match &mut self.kill_in {
+            Some((0, is_durable)) => (true, *is_durable),
+            Some((left, _)) => {
+                *left -= 1;
+                (false, true)
+            }
+            None => (false, true),
+        };
+        if is_durable {
+            let key = |row: &AlertRecord| (row.alert_id.clone(), row.channel.clone());
+            self.table.extend(rows.iter().map(|row| (key(row), row.clone())));
+        }
+        if is_last { Err(Killed) } else { Ok(()) }
+    }
+
+    /// What a run does after its assessments; returns the changes it has written.
+    fn run(&mut self, findings: &[Finding], number: u64) -> (usize, Result<(), Killed>) {
+        let channels = channels();
+        let mut rows: Vec<AlertRecord> = self.table.values().cloned().collect();
+        let known = rows.len();
+        let now = Timestamp::UNIX_EPOCH;
+        let run_id = format!("run {number}");
+        let found = alert_changes::detect(&rows, findings, &channels, &run_id, now);
+        let is_new = |row: &&AlertRecord| row.channel.is_empty() && row.kind == "change";
+        let changes = found.iter().filter(is_new).count();
+        if !found.is_empty()
+            && let Err(killed) = self.write_all(&found)
+        {
+            let written = if self.table.len() > known { changes } else { 0 };
+            return (written, Err(killed));
+        }
+        rows.extend(found);
+        (changes, delivery::deliver(rows, &channels, &run_id, self).map(drop))
+    }
+}
+
+impl Courier for World {
+    type Error = Killed;
+
+    fn write(&mut self, row: &AlertRecord) -> Result<(), Killed> {
+        self.write_all(std::slice::from_ref(row))
+    }
+
+    fn send(&mut self, row: &AlertRecord) -> Attempt {
+        let why = "a fault".to_owned();
+        let (attempt, is_received) = match self.random.below(10) {
+            0..=1 if !self.is_calm => (Attempt::NotSent(why), false),
+            2 if !self.is_calm => (Attempt::Unknown(why), true),
+            3 if !self.is_calm => (Attempt::Unknown(why), false),
+            _ => (Attempt::Sent, true),
+        };
+        if is_received {
+            let message: Value = serde_json::from_str(row.message.as_ref().unwrap()).unwrap();
+            assert_eq!(message["id"], row.alert_id.as_str());
+            self.received.push((row.channel.clone(), row.alert_id.clone()));
+        }
+        attempt
+    }
+
+    fn is_stopped(&self) -> bool {
+        false
+    }
+}
+
+/// 1,000 runs; every third is killed at a random write, most are repeated, some leave and return within one run.
+#[test]
+fn a_thousand_runs_with_kills_send_every_change_once_or_mark_it() {
+    let mut world = World {
+        table: BTreeMap::new(),
+        received: Vec::new(),
+        random: Random(25),
+        kill_in: None,
+        is_calm: false,
+    };
+    let mut truth: BTreeMap<&str, Option<&'static str>> =
+        SERIALS.into_iter().map(|serial| (serial, Some("normal"))).collect();
+    let (mut expected, mut kills) = (0, 0);
+    let mut known = truth.clone();
+    for number in 0..1000 {
+        if world.random.below(3) > 0 {
+            let serial = SERIALS[world.random.below(6) as usize];
+            truth.insert(serial, STATES[world.random.below(5) as usize]);
+        }
+        let is_killed = world.random.below(3) == 0;
+        let step = world.random.below(12);
+        world.kill_in = is_killed.then_some((step, world.random.below(2) == 0));
+        // A back-fill on the same date changes states as well.
+        let day = number as i64 / 4;
+        let findings: Vec<Finding> =
+            truth.iter().map(|(serial, state)| finding(serial, *state, day)).collect();
+        let differ = truth.iter().filter(|(serial, state)| known[*serial] != **state).count();
+        let (written, ended) = world.run(&findings, number);
+        kills += usize::from(ended.is_err());
+        // Without rows there is no baseline yet, and the first states written are it.
+        if ended.is_ok() || written > 0 {
+            assert_eq!(written, if number == 0 { 0 } else { differ }, "run {number}");
+        }
+        if written > 0 || ended.is_ok() || world.table.values().all(|row| row.kind == "baseline") {
+            expected += written;
+            known.clone_from(&truth);
+        }
+    }
+    (world.kill_in, world.is_calm) = (None, true);
+    let last: Vec<Finding> = truth.iter().map(|(serial, state)| finding(serial, *state, 999)).collect();
+    for number in 1000..1003 {
+        let (written, ended) = world.run(&last, number);
+        assert_eq!(ended, Ok(()));
+        expected += written;
+    }
+    assert!(kills > 150 && expected > 400, "{kills} kills, {expected} changes");
+
+    let changes: BTreeSet<&str> = world
+        .table
+        .values()
+        .filter(|row| row.kind == "change" && row.channel.is_empty())
+        .map(|row| row.alert_id.as_str())
+        .collect();
+    assert_eq!(changes.len(), expected, "a change is written twice or lost");
+    let mut counts = BTreeMap::<&str, usize>::new();
+    for row in world.table.values().filter(|row| !row.channel.is_empty() && row.kind == "change") {
+        let name = (row.channel.clone(), row.alert_id.clone());
+        let times = world.received.iter().filter(|received| **received == name).count();
+        *counts.entry(row.status.as_str()).or_default() += 1;
+        match (row.channel.as_str(), row.status) {
+            // At most once: exactly once where it is marked as sent.
+            ("command", AlertStatus::Sent) => assert_eq!(times, 1, "{row:?}"),
+            ("command", AlertStatus::Unconfirmed) => assert!(times <= 1, "{row:?}"),
+            // At least once, and doubles have one identifier, as the file of a folder has one name.
+            ("folder" | "url", AlertStatus::Sent) => assert!(times >= 1, "{row:?}"),
+            _ => panic!("left as it is: {row:?}"),
+        }
+    }
+    assert_eq!(counts.values().sum::<usize>(), 3 * expected);
+    assert!(counts["unconfirmed"] > 20 && counts["sent"] > 2 * expected, "{counts:?}");
+}
+
+/// The messages of one unit are a chain: each begins where the one before ended.
+#[test]
+fn the_changes_of_a_unit_are_a_chain_over_repeated_and_back_filled_runs() {
+    let channels = channels();
+    let mut table: Vec<AlertRecord> = Vec::new();
+    let mut run = |state, day| {
+        let now = Timestamp::UNIX_EPOCH;
+        let found = alert_changes::detect(&table, &[finding("7", state, day)], &channels, "R", now);
+        table.extend(found.clone());
+        found.iter().filter(|row| row.channel == "command").map(|row| row.message.clone().unwrap()).collect()
+    };
+    let text = |messages: Vec<String>| -> Vec<(String, String)> {
+        let read = |message: &String| -> Value { serde_json::from_str(message).unwrap() };
+        let words = |message: Value| (message["from"].to_string(), message["to"].to_string());
+        messages.iter().map(read).map(words).collect()
+    };
+    let one = |from: &str, to: &str| vec![(format!("\"{from}\""), format!("\"{to}\""))];
+    let baseline: Vec<String> = run(Some("watch"), 1);
+    let baseline: Value = serde_json::from_str(&baseline[0]).unwrap();
+    assert_eq!((&baseline["kind"], &baseline["states"]["watch"]), (&"baseline".into(), &1.into()));
+    // A back-fill that passed through `act` and ended in `watch` is no change.
+    assert_eq!(text(run(Some("watch"), 2)), []);
+    assert_eq!(text(run(Some("act"), 2)), one("watch", "act"));
+    // The same date: only the number of the change differs.
+    assert_eq!(text(run(Some("watch"), 2)), one("act", "watch"));
+    assert_eq!(text(run(Some("act"), 2)), one("watch", "act"));
+    assert_eq!(text(run(None, 3)), one("act", "not_assessed"));
+    let ids: BTreeSet<&String> = table.iter().map(|row| &row.alert_id).collect();
+    assert_eq!(ids.len(), 8, "one baseline, the summaries of three channels, four changes");
+}
+
+#[test]
+fn filters_select_by_new_state_part_and_tail() {
+    let channel = AlertChannel {
+        states: vec!["act".to_owned()],
+        parts: vec!["EMA-27-*".to_owned()],
+        tails: vec!["N41?FP".to_owned()],
+        ..AlertChannel::default()
+    };
+    assert!(channel.selects(Some("act"), Some("EMA-27-1040"), Some("N412FP")));
+    assert!(!channel.selects(Some("plan"), Some("EMA-27-1040"), Some("N412FP")));
+    assert!(!channel.selects(Some("act"), Some("EMA-32-1040"), Some("N412FP")));
+    assert!(!channel.selects(Some("act"), Some("EMA-27-1040"), Some("N4122FP")));
+    assert!(!channel.selects(Some("act"), None, Some("N412FP")));
+    assert!(AlertChannel::default().selects(Some("watch"), None, None));
+    assert!(!AlertChannel::default().selects(None, None, None));
+}
+
+/// A message that always fails must not keep the others back, and a dead receiver costs three attempts a run.
+#[test]
+fn a_dead_receiver_costs_three_attempts_and_a_bad_message_does_not_block_others() {
+    struct Table(BTreeMap<String, AlertRecord>, Vec<String>, fn(&str) -> bool);
+    impl Courier for Table {
+        type Error = Killed;
+        fn write(&mut self, row: &AlertRecord) -> Result<(), Killed> {
+            self.0.insert(row.alert_id.clone(), row.clone());
+            Ok(())
+        }
+        fn send(&mut self, row: &AlertRecord) -> Attempt {
+            self.1.push(row.serial_number.clone().unwrap());
+            if (self.2)(row.serial_number.as_deref().unwrap()) {
+                Attempt::Sent
+            } else {
+                Attempt::NotSent("no".to_owned())
+            }
+        }
+        fn is_stopped(&self) -> bool {
+            false
+        }
+    }
+    let mut channels = channels();
+    channels.retain(|name, _| name == "command");
+    let serials: Vec<String> = (0..8).map(|n| format!("S{n}")).collect();
+    let findings = |state| serials.iter().map(|s| finding(s, Some(state), 1)).collect::<Vec<_>>();
+    let now = Timestamp::UNIX_EPOCH;
+    let baseline = alert_changes::detect(&[], &findings("normal"), &channels, "0", now);
+    let known: Vec<AlertRecord> = baseline.into_iter().filter(|row| row.channel.is_empty()).collect();
+    let mut due = alert_changes::detect(&known, &findings("act"), &channels, "1", now);
+    due.retain(|row| !row.channel.is_empty());
+    let mut table = Table(due.into_iter().map(|r| (r.alert_id.clone(), r)).collect(), Vec::new(), |_| false);
+    let run = |table: &mut Table| {
+        let rows = table.0.values().cloned().collect();
+        let done = delivery::deliver(rows, &channels, "2", table).unwrap();
+        (done.sent, done.failed.len(), done.waiting, std::mem::take(&mut table.1).len())
+    };
+    assert_eq!(run(&mut table), (0, 3, 5, 3));
+    assert_eq!(run(&mut table), (0, 3, 5, 3));
+    assert_eq!(run(&mut table), (0, 3, 5, 3), "others are tried first");
+    table.2 = |serial| serial != "S3";
+    assert_eq!(run(&mut table), (7, 1, 0, 8));
+    assert_eq!(run(&mut table), (0, 1, 0, 1));
+}
+
+/// The store keeps what was claimed when a process ends without a word.
+#[test]
+fn a_claim_is_durable_and_the_newest_status_counts() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = Store::create_or_open(dir.path().join("results")).unwrap();
+    assert_eq!(store.alerts().unwrap(), []);
+    let rows = alert_changes::detect(
+        &[],
+        &[finding("\"},{\n\u{0}", Some("act"), 1)],
+        &channels(),
+        "R",
+        Timestamp::UNIX_EPOCH,
+    );
+    let mut writer = store.lock(&Holder::this_process(), None).unwrap();
+    writer.write_alerts(&rows).unwrap();
+    let mut claimed = rows.iter().find(|row| row.channel == "command").unwrap().clone();
+    for status in [AlertStatus::Sending, AlertStatus::Unconfirmed, AlertStatus::Sent] {
+        claimed.status = status;
+        claimed.attempts += 1;
+        writer.write_alerts(std::slice::from_ref(&claimed)).unwrap();
+        let read = Store::open(dir.path().join("results")).unwrap().alerts().unwrap();
+        assert_eq!(read.len(), rows.len());
+        assert_eq!(read.iter().find(|row| row.channel == "command"), Some(&claimed));
+    }
+    writer.compact().unwrap();
+    let read = Store::open(dir.path().join("results")).unwrap().alerts().unwrap();
+    assert!(read.contains(&claimed) && read.len() == rows.len());
+    assert_eq!(store.verify(), []);
+}

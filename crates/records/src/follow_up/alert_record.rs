@@ -1,0 +1,86 @@
+//! Alert record: one change of state, and what became of its message in each channel.
+
+use jiff::Timestamp;
+
+use crate::row_schema::text_cell;
+use crate::stored_row;
+
+/// What became of an alert.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AlertStatus {
+    /// The change itself: it needs no message, or its messages have rows of their own.
+    Recorded,
+    /// The message was not sent; the next run sends it.
+    Pending,
+    /// The message is being sent. A run that was killed here leaves this status.
+    Sending,
+    /// The receiver accepted the message.
+    Sent,
+    /// The message may or may not have been received: the run was killed, or the receiver did not answer in time.
+    Unconfirmed,
+}
+
+impl AlertStatus {
+    const ALL: [Self; 5] = [Self::Recorded, Self::Pending, Self::Sending, Self::Sent, Self::Unconfirmed];
+
+    /// Value of the `status` column.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Recorded => "recorded",
+            Self::Pending => "pending",
+            Self::Sending => "sending",
+            Self::Sent => "sent",
+            Self::Unconfirmed => "unconfirmed",
+        }
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let known = Self::ALL.into_iter().find(|status| status.as_str() == text);
+        known.ok_or_else(|| format!("`{text}` is no status of an alert"))
+    }
+}
+
+text_cell!(AlertStatus, AlertStatus::parse);
+
+stored_row! {
+    /// One change of state, or its message in one channel.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct AlertRecord {
+        /// Identifier of the change, part of every message about it. With `channel` the key of the row: the newest row counts.
+        pub alert_id: String,
+        /// Channel of the message, as named under `[alerts]`; empty in the row of the change itself.
+        pub channel: String,
+        /// `change`, or `baseline` for the states that were known when alerts began.
+        pub kind: String,
+        /// Part number of the unit.
+        pub part_number: Option<String>,
+        /// Serial number of the unit; empty in the summary of a baseline.
+        pub serial_number: Option<String>,
+        /// The aircraft of its latest flight.
+        pub tail_number: Option<String>,
+        /// Position on the aircraft.
+        pub position: Option<String>,
+        /// Quantity whose state changed; `gap` is the free play.
+        pub quantity: String,
+        /// Number of the change of this unit and quantity, from 0 for the baseline.
+        pub change_number: i64,
+        /// State before the change; empty when none was known.
+        pub from_state: Option<String>,
+        /// State after the change; empty when the unit is not assessed.
+        pub to_state: Option<String>,
+        /// Date of the assessment.
+        pub as_of_utc: Timestamp,
+        /// The message, JSON: what is sent in every attempt.
+        pub message: Option<String>,
+        /// `recorded`, `pending`, `sending`, `sent` or `unconfirmed`.
+        pub status: AlertStatus,
+        /// Attempts to send the message.
+        pub attempts: i64,
+        /// Why the last attempt failed.
+        pub error: Option<String>,
+        /// The run that wrote the row.
+        pub run_id: String,
+        /// When the row was written.
+        pub recorded_utc: Timestamp,
+    }
+}

@@ -1,0 +1,111 @@
+//! Work event: one step in the life of a work request. Events are only added; the request is their sum.
+
+use jiff::Timestamp;
+
+use crate::row_schema::text_cell;
+use crate::stored_row;
+
+/// Kind of a work event.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WorkEventKind {
+    /// A run found the unit in state `plan` or `act`.
+    Opened,
+    /// A person has seen the request.
+    Acknowledged,
+    /// A person postponed the request.
+    Deferred,
+    /// A deferred request came back: its date passed, or the state became worse.
+    Returned,
+    /// The unit is installed in another place.
+    Moved,
+    /// The state of the unit changed.
+    StateChanged,
+    /// The unit, removed before, is installed again without maintenance.
+    Reopened,
+    /// The unit was removed.
+    Removed,
+    /// The maintenance table has a repair of the unit.
+    Maintained,
+    /// A person closed the request.
+    Closed,
+}
+
+impl WorkEventKind {
+    const ALL: [Self; 10] = [
+        Self::Opened,
+        Self::Acknowledged,
+        Self::Deferred,
+        Self::Returned,
+        Self::Moved,
+        Self::StateChanged,
+        Self::Reopened,
+        Self::Removed,
+        Self::Maintained,
+        Self::Closed,
+    ];
+
+    /// Value of the `event` column.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Opened => "opened",
+            Self::Acknowledged => "acknowledged",
+            Self::Deferred => "deferred",
+            Self::Returned => "returned",
+            Self::Moved => "moved",
+            Self::StateChanged => "state_changed",
+            Self::Reopened => "reopened",
+            Self::Removed => "removed",
+            Self::Maintained => "maintained",
+            Self::Closed => "closed",
+        }
+    }
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let known = Self::ALL.into_iter().find(|kind| kind.as_str() == text);
+        known.ok_or_else(|| format!("`{text}` is no event of a work request"))
+    }
+
+    /// Whether the event closes its request.
+    pub fn closes(self) -> bool {
+        matches!(self, Self::Removed | Self::Maintained | Self::Closed)
+    }
+}
+
+text_cell!(WorkEventKind, WorkEventKind::parse);
+
+stored_row! {
+    /// One step in the life of a work request.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct WorkEvent {
+        /// Number of the event in the store, from 1.
+        pub number: i64,
+        /// The request, such as `W12`.
+        pub request_id: String,
+        /// `opened`, `acknowledged`, `deferred`, `returned`, `moved`, `state_changed`, `reopened`, `removed`, `maintained` or `closed`.
+        pub event: WorkEventKind,
+        /// Part number of the unit.
+        pub part_number: Option<String>,
+        /// Serial number of the unit.
+        pub serial_number: String,
+        /// The aircraft.
+        pub tail_number: Option<String>,
+        /// Position on the aircraft.
+        pub position: Option<String>,
+        /// Quantity of the finding; `gap` is the free play.
+        pub quantity: String,
+        /// State of the unit.
+        pub state: Option<String>,
+        /// Why: of the state, of the person, or of the table that closed the request.
+        pub reason: Option<String>,
+        /// Who: a person, or `freeplay` for what a run found.
+        pub by: String,
+        /// Of a deferral: until when.
+        pub until_utc: Option<Timestamp>,
+        /// Date of the fact: of the assessment, of the removal, of the repair, or of the command.
+        pub as_of_utc: Timestamp,
+        /// When the event was written.
+        pub recorded_utc: Timestamp,
+        /// The run that wrote it; empty for a command.
+        pub run_id: Option<String>,
+    }
+}

@@ -1,0 +1,51 @@
+//! Work request: an open finding about a unit, from its events.
+
+use jiff::Timestamp;
+
+use crate::row;
+
+row! {
+    /// A finding that wants work, from the run that found it until it is closed.
+    #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+    pub struct WorkRequest {
+        /// Identifier, such as `W12`.
+        pub request_id: String,
+        /// `open`, `acknowledged`, `deferred` or `closed`.
+        pub status: &'static str,
+        /// Latest known state of the unit.
+        pub state: Option<String>,
+        /// Part number of the unit.
+        pub part_number: Option<String>,
+        /// Serial number of the unit.
+        pub serial_number: String,
+        /// The aircraft, by the installations table.
+        pub tail_number: Option<String>,
+        /// Position on the aircraft.
+        pub position: Option<String>,
+        /// Quantity of the finding; `gap` is the free play.
+        pub quantity: String,
+        /// Reason of the latest known state.
+        pub finding: Option<String>,
+        /// Date of the assessment that opened the request.
+        pub opened_utc: Timestamp,
+        /// Who acknowledged, deferred or closed it last; `freeplay` when a table closed it.
+        pub by: Option<String>,
+        /// Their reason.
+        pub reason: Option<String>,
+        /// Of a deferred request: until when.
+        pub until_utc: Option<Timestamp>,
+        /// Date of the latest event.
+        pub changed_utc: Timestamp,
+        /// What closed it: `removed`, `maintained` or `closed` by a person.
+        pub closed_by: Option<String>,
+        /// Date of the removal, the repair or the command that closed it.
+        pub closed_utc: Option<Timestamp>,
+    }
+}
+
+impl WorkRequest {
+    /// Whether work is left to do, now or later.
+    pub fn is_open(&self) -> bool {
+        self.status != "closed"
+    }
+}

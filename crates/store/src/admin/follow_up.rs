@@ -1,0 +1,63 @@
+//! Alerts and work events: two small tables that are created with their first row.
+
+use records::row_schema::{FromCells, Row};
+use records::{AlertRecord, WorkEvent};
+
+use crate::delta::table::Table;
+use crate::error::Error;
+use crate::handle::Store;
+use crate::write::writer::{self, Writer};
+
+impl Store {
+    /// The newest row of every alert and channel, by identifier and channel; none of a store without alerts.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn alerts(&self) -> Result<Vec<AlertRecord>, Error> {
+        self.rows(&self.alerts, |alert: &AlertRecord| format!("{} {}", alert.alert_id, alert.channel))
+    }
+
+    /// Every event of every work request, earliest first.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn work_events(&self) -> Result<Vec<WorkEvent>, Error> {
+        // Two commands on a bucket, which has no lock, may have chosen the same number.
+        let name = |event: &WorkEvent| {
+            format!("{:012} {} {}", event.number, event.request_id, event.recorded_utc.as_microsecond())
+        };
+        self.rows(&self.work, name)
+    }
+
+    fn rows<R: Row + FromCells>(&self, table: &Table, name: impl Fn(&R) -> String) -> Result<Vec<R>, Error> {
+        if table.exists()? { self.newest(table, None, |_| true, name) } else { Ok(Vec::new()) }
+    }
+}
+
+impl Writer {
+    /// Writes rows of alerts; each takes the place of the row with the same identifier and channel.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
+    pub fn write_alerts(&mut self, alerts: &[AlertRecord]) -> Result<(), Error> {
+        append(&self.store().alerts, alerts)
+    }
+
+    /// Adds events of work requests, in one commit.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
+    pub fn add_work_events(&mut self, events: &[WorkEvent]) -> Result<(), Error> {
+        append(&self.store().work, events)
+    }
+}
+
+fn append<R: Row + FromCells>(table: &Table, rows: &[R]) -> Result<(), Error> {
+    if rows.is_empty() {
+        return Ok(());
+    }
+    if !table.exists()? {
+        table.create()?;
+    }
+    writer::account(table, rows)
+}

@@ -1,0 +1,5 @@
+//! What follows from a run: alerts, work requests, and the dashboards of its metrics.
+
+mod alerts;
+mod dashboards;
+mod work;

@@ -1,0 +1,143 @@
+//! Work requests of the command, as a planner and a mechanic use them on the sample fleet.
+
+use serde_json::Value;
+
+use crate::harness::TestFleet;
+
+fn requests(fleet: &TestFleet, status: &str) -> Vec<Value> {
+    let rows = fleet.run_ok(&["work", "list", "--status", status, "--json"]);
+    serde_json::from_str(&rows).unwrap()
+}
+
+fn summary(fleet: &TestFleet) -> Value {
+    serde_json::from_str::<Value>(&fleet.run_ok(&["run", "--json"])).unwrap()["work_requests"].clone()
+}
+
+fn ids(rows: &Value) -> Vec<&str> {
+    rows.as_array().unwrap().iter().map(|row| row["request_id"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn a_request_lives_from_the_run_that_finds_it_to_the_maintenance_table() {
+    let fleet = TestFleet::sample();
+    fleet.configure("[logs]\n", "[logs]\nmaintenance = \"maintenance.csv\"\n");
+    let header = "part_number,serial_number,utc,kind\n";
+    std::fs::write(fleet.path("maintenance.csv"), header).unwrap();
+    assert_eq!(ids(&summary(&fleet)["new"]), ["W1", "W2"]);
+    assert_eq!(summary(&fleet)["new"], Value::Array(Vec::new()), "no second request while one is open");
+
+    // The planner.
+    let text = fleet.run_ok(&["work", "acknowledge", "W1", "--by", "M. Kaya", "--reason", "order a kit"]);
+    assert_eq!(text, "W1: EMA-27-1040 / 1040-0009; acknowledged by M. Kaya\n");
+    let until = ["--until", "2099-01-31", "--reason", "C-check", "--by", "M. Kaya"];
+    let text = fleet.run_ok(&[&["work", "defer", "w2"], &until[..]].concat());
+    assert_eq!(text, "W2: EMA-27-1040 / 1040-0013; deferred to 2099-01-31 by M. Kaya\n");
+    let list = fleet.run_ok(&["work", "list"]);
+    assert!(list.starts_with("2 work requests: 1 acknowledged, 1 deferred\n"), "{list}");
+    for part in ["order a kit", "deferred to 2099-01-31 by M. Kaya", "N414FP", "▲ plan"] {
+        assert!(list.contains(part), "{part}: {list}");
+    }
+    assert_eq!(requests(&fleet, "deferred")[0]["serial_number"], "1040-0013");
+    let on_tail = fleet.run_ok(&["work", "list", "--tail", "N413FP", "--format", "csv"]);
+    assert!(on_tail.lines().count() == 2 && on_tail.contains("\nW1,acknowledged,plan,"), "{on_tail}");
+
+    // The report shows both.
+    fleet.run_ok(&["report", "--output", "report", "--quiet"]);
+    let index = std::fs::read_to_string(fleet.path("report/index.html")).unwrap();
+    assert!(index.contains("W1 acknowledged") && index.contains("W2 deferred to 2099-01-31"), "{index}");
+    let report: Value =
+        serde_json::from_slice(&std::fs::read(fleet.path("report/report.json")).unwrap()).unwrap();
+    let units = report["units"].as_array().unwrap();
+    let with: Vec<&Value> = units.iter().filter(|unit| unit["work_requests"][0].is_object()).collect();
+    assert_eq!(with.len(), 2);
+
+    // The mechanic enters a repair of one, and the store takes the other out of the aircraft.
+    let repair = format!("{header}EMA-27-1040,1040-0009,2026-11-15T10:00:00Z,reshim\n");
+    std::fs::write(fleet.path("maintenance.csv"), repair).unwrap();
+    let table = fleet.path("sample-data/installations.csv");
+    let text = std::fs::read_to_string(&table).unwrap();
+    let open = "1040-0013,2026-09-07T00:00:00Z,,";
+    assert!(text.contains(open));
+    let removed = "1040-0013,2026-09-07T00:00:00Z,2026-11-16T00:00:00Z,";
+    std::fs::write(&table, text.replace(open, removed)).unwrap();
+    let after = summary(&fleet);
+    assert_eq!((ids(&after["closed"]), &after["open"]), (vec!["W1", "W2"], &0.into()), "{after}");
+    let closed = requests(&fleet, "closed");
+    assert_eq!(closed[0]["reason"], "repair of 2026-11-15 in the maintenance table");
+    assert_eq!(closed[1]["reason"], "removed from aileron_left of N414FP on 2026-11-16");
+    assert_eq!(fleet.run_ok(&["work", "list"]), "no work request\n");
+
+    // Installed on another aircraft, as it was.
+    let text = std::fs::read_to_string(&table).unwrap();
+    let again = "N415FP,aileron_left,EMA-27-1040,1040-0013,2026-11-17T00:00:00Z,,,\n";
+    std::fs::write(&table, text + again).unwrap();
+    let after = summary(&fleet);
+    assert_eq!(after["new"][0]["request_id"], "W2", "{after}");
+    assert_eq!(after["new"][0]["tail_number"], "N415FP");
+}
+
+#[test]
+fn wrong_decisions_change_nothing() {
+    let fleet = TestFleet::sample();
+    let missing = fleet.freeplay(&["work", "list"]);
+    assert_eq!(missing.code, Some(3), "there is no store: {missing:?}");
+    fleet.run_ok(&["run", "--quiet"]);
+    let before = fleet.run_ok(&["work", "list", "--json"]);
+    let reason = ["--reason", "x", "--by", "mk"];
+    for (args, code) in [
+        (["work", "close", "W9"].as_slice(), "no_such_request"),
+        (&["work", "defer", "W1", "--until", "2020-01-01"], "date_passed"),
+        (&["work", "acknowledge", "W1", "--reason", " "], "empty_name"),
+        (&["work", "list", "--serial", "1040-9999"], "unknown_name"),
+    ] {
+        let args = if args[1] == "list" || args.contains(&"--reason") {
+            args.to_vec()
+        } else {
+            [args, &reason].concat()
+        };
+        let result = fleet.command(&args).env("USER", "mk").output().unwrap();
+        let err = String::from_utf8(result.stderr).unwrap();
+        assert_eq!(result.status.code(), Some(2), "{args:?}: {err}");
+        assert!(err.contains(&format!("error[{code}]")), "{args:?}: {err}");
+    }
+    assert_eq!(fleet.run_ok(&["work", "list", "--json"]), before);
+    fleet.run_ok(&["work", "close", "W1", "--reason", "x", "--by", "mk"]);
+    let again = fleet.freeplay(&["work", "close", "W1", "--reason", "x", "--by", "mk"]);
+    assert_eq!(again.code, Some(2));
+    assert!(again.err.contains("error[request_closed]"), "{}", again.err);
+}
+
+/// A name cannot move the cursor of the terminal, nor become a formula of a spreadsheet.
+#[test]
+fn hostile_names_and_remarks_stay_text() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--quiet"]);
+    let remark = "=cmd|'/c calc'!A1\u{1b}[2J\u{202e}";
+    fleet.run_ok(&["work", "acknowledge", "W1", "--by", "\u{1b}[31mme", "--reason", remark]);
+    let list = fleet.run_ok(&["work", "list"]);
+    assert!(!list.contains('\u{1b}') && !list.contains('\u{202e}') && list.contains("[U+001B]"), "{list}");
+    let csv = fleet.run_ok(&["work", "list", "--format", "csv"]);
+    assert!(csv.contains("'=cmd|"), "{csv}");
+    assert_eq!(requests(&fleet, "acknowledged")[0]["reason"], remark);
+}
+
+/// A command waits for a run that holds the store, and a run for a command.
+#[test]
+fn decisions_beside_a_run_are_all_kept() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--quiet"]);
+    let decisions: Vec<_> = (0..4)
+        .map(|n| {
+            let by = format!("person {n}");
+            fleet.command(&["work", "acknowledge", "W1", "--by", &by]).spawn().unwrap()
+        })
+        .collect();
+    let run = fleet.command(&["run", "--quiet", "--redo", "--wait", "60s"]).output().unwrap();
+    assert_eq!(run.status.code(), Some(0), "{run:?}");
+    for mut decision in decisions {
+        assert_eq!(decision.wait().unwrap().code(), Some(0));
+    }
+    let events = std::fs::read_dir(fleet.path("results/work")).unwrap().count();
+    assert!(events >= 6, "one file for the run, and one for each decision: {events}");
+    assert!(fleet.run_ok(&["store", "verify"]).contains("OK"));
+}
