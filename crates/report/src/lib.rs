@@ -17,7 +17,7 @@ pub use assets::assets;
 pub use charts::estimate_plot::{ContactInterval, EstimatePlot, estimate_plot_html, estimate_plot_svg};
 pub use model::{
     Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
-    Report, Tail, TimedInterval, UnitView,
+    QuantityView, Report, Tail, TimedInterval, UnitView,
 };
 pub use page::{Error, Page, tail_path, unit_path};
 pub use pages::fleet::fleet_pages;

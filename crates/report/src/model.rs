@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use jiff::Timestamp;
 use records::WorkRequest;
+use records::{QuantityChange, QuantityRow};
 use serde::Serialize;
 
 use crate::state_badge::StateBadge;
@@ -28,6 +29,8 @@ pub struct Report {
     pub priors: Vec<FleetPriorView>,
     pub tails: Vec<Tail>,
     pub units: Vec<UnitView>,
+    /// What changed besides the gap, of units, tails and parts; the newest first.
+    pub quantity_changes: Vec<QuantityChange>,
     /// Whether a table of inspections is configured.
     pub inspections_given: bool,
     /// Inspections of units without records.
@@ -103,6 +106,8 @@ pub struct UnitView {
     pub inspections: Vec<Inspection>,
     /// Work requests about the unit, earliest first.
     pub work_requests: Vec<WorkRequest>,
+    /// Followed quantities besides the gap.
+    pub quantities: Vec<QuantityView>,
     /// Smoothed level over past flights; plotted, not part of `report.json`.
     #[serde(skip)]
     pub level: Vec<TimedInterval>,
@@ -112,6 +117,17 @@ pub struct UnitView {
     /// Shown on the page and in the store, not part of `report.json`.
     #[serde(skip)]
     pub flights: Vec<FlightRow>,
+}
+
+/// A followed quantity of a unit.
+#[derive(Debug, Clone, Serialize)]
+pub struct QuantityView {
+    /// Its level, change and state.
+    #[serde(flatten)]
+    pub row: QuantityRow,
+    /// Value of each flight; plotted, not part of `report.json`.
+    #[serde(skip)]
+    pub flights: Vec<(Timestamp, f64)>,
 }
 
 /// Assessment of a unit on the date of the report.

@@ -26,6 +26,7 @@ fn unit(serial: &str, state: Option<&str>) -> UnitView {
         past_forecasts: Vec::new(),
         inspections: Vec::new(),
         work_requests: Vec::new(),
+        quantities: Vec::new(),
         level: Vec::new(),
         forecast: Vec::new(),
         flights: Vec::new(),
@@ -56,6 +57,7 @@ fn report(units: Vec<UnitView>) -> Report {
         units,
         inspections_given: false,
         inspections_unmatched: 0,
+        quantity_changes: Vec::new(),
     }
 }
 

@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use ::report::{
     Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
-    Report, Tail, TimedInterval, UnitView,
+    QuantityView, Report, Tail, TimedInterval, UnitView,
 };
 use ingest::tables::{Table, name, number, utc};
 use jiff::Timestamp;
 use job::Config;
 use records::uncertainty::SD_OVER_MAD;
-use records::{GapRecord, Installations, PartNumber, SerialNumber};
+use records::{GapRecord, Installations, PartNumber, Quantity, QuantityRow, SerialNumber};
 use store::{LogOutcome, Store};
 use trend::Forecast;
 
@@ -62,6 +62,7 @@ pub fn compose(
         past: &past,
         checks: checks.as_deref().unwrap_or(&[]),
         installations: &InstallationIndex::new(installations),
+        quantities: by_unit(&followed.rows),
         requests: &requests,
     };
     let unit = |(row, drawn): (&TrendRow, &Forecast)| {
@@ -91,6 +92,7 @@ pub fn compose(
         inspections_given: checks.is_some(),
         inspections_unmatched,
         units,
+        quantity_changes: followed.changes,
     })
 }
 
@@ -100,6 +102,14 @@ fn requests_by_unit(requests: Vec<WorkRequest>) -> BTreeMap<Name, Vec<WorkReques
         by_unit.entry(work_requests::unit(&request)).or_default().push(request);
     }
     by_unit
+}
+
+fn by_unit(rows: &[QuantityRow]) -> BTreeMap<Name, Vec<&QuantityRow>> {
+    let mut units: BTreeMap<Name, Vec<&QuantityRow>> = BTreeMap::new();
+    for row in rows {
+        units.entry((row.part_number.clone(), row.serial_number.clone())).or_default().push(row);
+    }
+    units
 }
 
 fn scope(ask: &UnitSelection) -> Option<String> {
@@ -152,6 +162,8 @@ struct FlightExtras {
     load_p95_n: Option<f64>,
     reason: Option<String>,
     flags: Vec<String>,
+    /// Followed quantities, in the order of [`Quantity::ALL`]; NaN for none.
+    quantities: [f32; Quantity::ALL.len()],
 }
 
 impl StoreContents {
@@ -184,6 +196,7 @@ impl FlightExtras {
             load_p95_n: e.load_p95_n,
             reason: e.reason.take(),
             flags: std::mem::take(&mut e.flags),
+            quantities: Quantity::ALL.map(|quantity| quantity.of_estimate(e).unwrap_or(f64::NAN) as f32),
         }
     }
 }
@@ -209,6 +222,7 @@ struct ReportComposer<'a> {
     past: &'a BTreeMap<i64, BTreeMap<Name, trend::Interval>>,
     checks: &'a [InspectionRow],
     installations: &'a InstallationIndex<'a>,
+    quantities: BTreeMap<Name, Vec<&'a QuantityRow>>,
     requests: &'a BTreeMap<Name, Vec<WorkRequest>>,
 }
 
@@ -231,6 +245,7 @@ impl ReportComposer<'_> {
             past_forecasts: self.past(row, &name),
             inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.extras(flown)).collect(),
             flights: flown.iter().map(|flown| flight(history, flown, &rest[flown.row as usize])).collect(),
+            quantities: self.quantities(row, history, rest),
             installations,
             work_requests: self.requests.get(&name).cloned().unwrap_or_default(),
             part_number: name.0,
@@ -279,6 +294,21 @@ impl ReportComposer<'_> {
                 .and_then(|d| d.get(name))
                 .map(|r| r.state.map(str::to_owned)),
         }
+    }
+
+    /// The followed quantities besides the gap, with the values of the flights.
+    fn quantities(&self, row: &TrendRow, history: &History, rest: &[FlightExtras]) -> Vec<QuantityView> {
+        let view = |of: &&QuantityRow| {
+            let index = Quantity::ALL.iter().position(|quantity| quantity.as_str() == of.quantity)?;
+            let flown = history.until(row.as_of_utc).iter();
+            let value = |flown: &FlownRow| {
+                let value = f64::from(rest[flown.row as usize].quantities[index]);
+                value.is_finite().then(|| (flown.departure_utc(), value))
+            };
+            Some(QuantityView { row: (*of).clone(), flights: flown.filter_map(value).collect() })
+        };
+        let of_unit = self.quantities.get(&name_of(row)).into_iter().flatten();
+        of_unit.filter(|of| of.quantity != Quantity::GapM.as_str()).filter_map(view).collect()
     }
 
     /// The forecasts that were made for the date of the report, and the level found.

@@ -114,6 +114,7 @@ mod tests {
             units: Vec::new(),
             inspections_given: false,
             inspections_unmatched: 0,
+            quantity_changes: Vec::new(),
         }
     }
 

@@ -11,6 +11,7 @@ use crate::format::{
 };
 use crate::model::{Report, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
+use crate::pages::quantities::{self, Change};
 use crate::pages::work_requests::request_badge;
 use crate::state_badge::StateBadge;
 use crate::stats::agreement::Agreement;
@@ -51,10 +52,17 @@ impl Row {
             share: share(unit).map_or_else(|| NO_DATA.to_owned(), percent),
             not_before: when(s.crossing_hours_p05, s.not_before_utc, unit),
             likely: when(s.crossing_hours_p50, s.likely_utc, unit),
-            why: s.reason.clone().unwrap_or_else(|| NO_DATA.to_owned()),
+            why: why(unit),
             work: unit.open_request().map(request_badge).unwrap_or_default(),
         }
     }
+}
+
+/// Reason of the state, with the states of the other followed quantities.
+pub(crate) fn why(unit: &UnitView) -> String {
+    let reason = unit.assessment.reason.clone().unwrap_or_else(|| NO_DATA.to_owned());
+    let states = unit.quantities.iter().filter_map(|view| view.row.state);
+    states.fold(reason, |why, state| format!("{why}; {}", state.replace('_', " ")))
 }
 
 /// Gap divided by limit.
@@ -99,6 +107,8 @@ struct FleetView {
     more_work: Vec<String>,
     label: &'static str,
     changes: Vec<(String, String, String, String)>,
+    quantity_changes: Vec<Change>,
+    more_quantity_changes: usize,
     map: Map,
     tail_pages: Vec<String>,
     months: Vec<(String, String, String, u32)>,
@@ -190,6 +200,7 @@ fn index_page(
     let worst = most_urgent_tails(report);
     let log_errors = report.log_errors.iter().map(|f| (f.log_path.clone(), f.code.clone()));
     let (inspections, pairs) = inspection_agreement(report);
+    let quantity_changes = quantities::changes(report, "", |_| true);
     Ok(FleetView {
         root: "",
         title: "Actuator free play".to_owned(),
@@ -213,6 +224,8 @@ fn index_page(
         more_work,
         label: "Work list",
         changes: changes(report),
+        more_quantity_changes: quantity_changes.len().saturating_sub(FEW),
+        quantity_changes: quantity_changes.into_iter().take(FEW).collect(),
         map: map(report, &worst),
         tail_pages,
         months: months(report),

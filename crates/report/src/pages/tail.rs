@@ -6,6 +6,7 @@ use crate::format::{count, minute_or};
 use crate::model::{Report, Tail};
 use crate::page::{Error, Page, tail_path};
 use crate::pages::fleet::Row;
+use crate::pages::quantities::{self, Change, Chart};
 
 #[derive(Template)]
 #[template(path = "tail.html")]
@@ -17,6 +18,8 @@ struct View<'a> {
     facts: Vec<(&'static str, String)>,
     label: &'static str,
     groups: Vec<(String, String, Vec<Row>)>,
+    quantity_changes: Vec<Change>,
+    charts: Vec<Chart>,
     log_errors: Vec<(String, String, String)>,
 }
 
@@ -44,6 +47,10 @@ pub fn tail_page(report: &Report, tail: &Tail) -> Result<Page, Error> {
         ],
         label: "Actuators of this tail",
         groups: if rows.is_empty() { Vec::new() } else { vec![(String::new(), String::new(), rows)] },
+        quantity_changes: quantities::changes(report, "../", |change| {
+            change.tail_number.as_deref() == Some(name)
+        }),
+        charts: quantities::tail_charts(report, name)?,
         log_errors: log_errors
             .map(|f| (f.log_path.clone(), f.code.clone(), crate::format::minute(f.processed_utc)))
             .collect(),

@@ -10,7 +10,8 @@ use crate::format::{
 };
 use crate::model::{FlightRow, Report, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
-use crate::pages::fleet::{share, when};
+use crate::pages::fleet::{share, when, why};
+use crate::pages::quantities::{self, Change, Chart, Level};
 use crate::pages::work_requests::{RequestRow, request_rows};
 use crate::state_badge::StateBadge;
 use crate::stats::crossing_probability::probability_text;
@@ -33,6 +34,9 @@ struct View {
     limit: String,
     watch: String,
     forecast: Vec<(&'static str, String)>,
+    quantity_changes: Vec<Change>,
+    charts: Vec<Chart>,
+    levels: Vec<Level>,
     events: Vec<(String, String, String, &'static str)>,
     installations: Vec<(String, String, String, String, String)>,
     quality: Facts,
@@ -79,7 +83,7 @@ pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) ->
             (format!("../{}", tail_path(tail)), tail.clone(), unit.position.clone().unwrap_or_default())
         }),
         badge: unit.badge(),
-        reason: s.reason.clone().unwrap_or_else(|| NO_DATA.to_owned()),
+        reason: why(unit),
         now: now(spreads, unit),
         remaining: remaining(report, unit),
         plot: history(unit)?,
@@ -87,6 +91,12 @@ pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) ->
         limit: micrometres_cell(s.limit_m),
         watch: micrometres_cell(s.watch_m),
         forecast: forecast.into_iter().filter_map(|(word, t)| Some((word, date(t?)))).collect(),
+        quantity_changes: quantities::changes(report, "../", |change| {
+            change.serial_number.as_ref() == Some(&unit.serial_number)
+                && change.part_number == unit.part_number
+        }),
+        charts: quantities::unit_charts(unit)?,
+        levels: quantities::levels(unit),
         events: events(unit),
         installations: installations(unit),
         quality: quality(unit),

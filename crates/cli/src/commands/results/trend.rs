@@ -106,7 +106,7 @@ fn quantities_page(rows: &[QuantityRow]) -> String {
         text("state", 0),
     ];
     let cells = |row: &QuantityRow| {
-        let quantity = Quantity::ALL.into_iter().find(|q| q.as_str() == row.quantity);
+        let quantity = Quantity::from_name(row.quantity);
         let (unit, factor) = quantity.map_or(("", 1.0), Quantity::display_unit);
         let value = |value: Option<f64>, sign: bool| {
             value.map_or_else(table::empty_cell, |v| significant(v * factor, sign))
