@@ -29,9 +29,8 @@ pub(crate) fn alerts(
     // A change without a message has one row; the states of a baseline are no messages.
     let messages: BTreeSet<String> =
         found.iter().filter(|row| !row.channel.is_empty()).map(|row| row.alert_id.clone()).collect();
-    found.retain(|row| {
-        !row.channel.is_empty() || (row.kind == "change" && !messages.contains(&row.alert_id))
-    });
+    found
+        .retain(|row| !row.channel.is_empty() || (row.kind == "change" && !messages.contains(&row.alert_id)));
     if is_unsent {
         found.retain(|row| !matches!(row.status, AlertStatus::Sent | AlertStatus::Recorded));
     }
