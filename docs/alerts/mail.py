@@ -11,9 +11,14 @@ import subprocess
 import sys
 
 
+def line(text: str) -> str:
+    """The text without line feeds."""
+    return " ".join(text.split())
+
+
 def mail(alert: dict, to: str, sender: str) -> email.message.EmailMessage:
     """The mail of an alert. `EmailMessage` refuses line feeds in headers, which a name could bring."""
-    one_line = " ".join(alert["text"].split())
+    one_line = line(alert["text"])
     message = email.message.EmailMessage(policy=email.policy.SMTP)
     message["To"] = to
     message["From"] = sender
@@ -22,8 +27,8 @@ def mail(alert: dict, to: str, sender: str) -> email.message.EmailMessage:
     message["Message-ID"] = f"<{alert['id']}@freeplay.invalid>"
     lines = [one_line, ""]
     for unit in alert.get("units", [alert]):
-        lines.append(f"{unit['state']:>12}  {unit['part_number']} / {unit['serial_number']}  {unit['tail_number']}")
-        lines.append(f"{'':>12}  {unit['reason']}; work request {unit['work_request'] or 'none'}")
+        lines.append(line(f"{unit['state']}: {unit['part_number']} / {unit['serial_number']}, {unit['tail_number']}"))
+        lines.append("    " + line(f"{unit['reason']}; work request {unit['work_request'] or 'none'}"))
     message.set_content("\n".join(lines) + "\n")
     return message
 

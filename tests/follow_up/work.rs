@@ -2,7 +2,16 @@
 
 use serde_json::Value;
 
+use super::{LONG_HORIZON, SHORT_HORIZON, processed_fleet};
 use crate::harness::TestFleet;
+
+/// The sample fleet with two open requests.
+fn fleet() -> TestFleet {
+    let fleet = processed_fleet();
+    fleet.configure(SHORT_HORIZON, LONG_HORIZON);
+    fleet.run_ok(&["run", "--quiet"]);
+    fleet
+}
 
 fn requests(fleet: &TestFleet, status: &str) -> Vec<Value> {
     let rows = fleet.run_ok(&["work", "list", "--status", status, "--json"]);
@@ -19,7 +28,8 @@ fn ids(rows: &Value) -> Vec<&str> {
 
 #[test]
 fn a_request_lives_from_the_run_that_finds_it_to_the_maintenance_table() {
-    let fleet = TestFleet::sample();
+    let fleet = processed_fleet();
+    fleet.configure(SHORT_HORIZON, LONG_HORIZON);
     fleet.configure("[logs]\n", "[logs]\nmaintenance = \"maintenance.csv\"\n");
     let header = "part_number,serial_number,utc,kind\n";
     std::fs::write(fleet.path("maintenance.csv"), header).unwrap();
@@ -78,10 +88,10 @@ fn a_request_lives_from_the_run_that_finds_it_to_the_maintenance_table() {
 
 #[test]
 fn wrong_decisions_change_nothing() {
-    let fleet = TestFleet::sample();
-    let missing = fleet.freeplay(&["work", "list"]);
+    let empty = TestFleet::sample();
+    let missing = empty.freeplay(&["work", "list"]);
     assert_eq!(missing.code, Some(3), "there is no store: {missing:?}");
-    fleet.run_ok(&["run", "--quiet"]);
+    let fleet = fleet();
     let before = fleet.run_ok(&["work", "list", "--json"]);
     let reason = ["--reason", "x", "--by", "mk"];
     for (args, code) in [
@@ -110,8 +120,7 @@ fn wrong_decisions_change_nothing() {
 /// A name cannot move the cursor of the terminal, nor become a formula of a spreadsheet.
 #[test]
 fn hostile_names_and_remarks_stay_text() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--quiet"]);
+    let fleet = fleet();
     let remark = "=cmd|'/c calc'!A1\u{1b}[2J\u{202e}";
     fleet.run_ok(&["work", "acknowledge", "W1", "--by", "\u{1b}[31mme", "--reason", remark]);
     let list = fleet.run_ok(&["work", "list"]);
@@ -123,9 +132,8 @@ fn hostile_names_and_remarks_stay_text() {
 
 /// A command waits for a run that holds the store, and a run for a command.
 #[test]
-fn decisions_beside_a_run_are_all_kept() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--quiet"]);
+fn decisions_during_a_run_are_all_kept() {
+    let fleet = fleet();
     let decisions: Vec<_> = (0..4)
         .map(|n| {
             let by = format!("person {n}");

@@ -6,14 +6,19 @@ use std::path::Path;
 
 use arrow::datatypes::DataType;
 use records::row_schema::{self, Column, Row};
-use records::{GapRecord, TrendRow};
+use records::{AlertRecord, GapRecord, TrendRow, WorkRequest};
 
 #[test]
 fn the_page_lists_every_column_with_its_type_and_meaning() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/columns.md");
     let page = std::fs::read_to_string(&file).unwrap();
     let mut expected = page.clone();
-    for (name, table) in [("records", table::<GapRecord>()), ("trends", table::<TrendRow>())] {
+    for (name, table) in [
+        ("records", table::<GapRecord>()),
+        ("trends", table::<TrendRow>()),
+        ("work requests", table::<WorkRequest>()),
+        ("alerts", table::<AlertRecord>()),
+    ] {
         let (begin, end) = (format!("<!-- columns of {name} -->\n"), "<!-- end -->");
         let (before, rest) = expected.split_once(&begin).unwrap();
         let (_, after) = rest.split_once(end).unwrap();

@@ -79,7 +79,7 @@ pub(crate) struct WorkDecisionArgs {
 /// Status of a work request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum WorkStatus {
-    /// Waits for somebody.
+    /// Waits for a decision.
     Open,
     /// Seen by a person.
     Acknowledged,

@@ -10,6 +10,19 @@ use serde::{Deserialize, Serialize};
 use super::layers::Source;
 use crate::config::limits::positive;
 
+/// States of quantities other than the gap.
+pub const QUANTITY_STATES: [&str; 9] = [
+    "softening",
+    "stiffening",
+    "friction_rising",
+    "friction_falling",
+    "lost_motion_rising",
+    "delay_moved",
+    "load_zero_moved",
+    "load_delay_moved",
+    "innovations_moved",
+];
+
 /// Word for a unit without a state, in `states` and in messages.
 pub const NOT_ASSESSED: &str = "not_assessed";
 
@@ -29,8 +42,9 @@ pub struct AlertChannel {
     /// Address (`https://` or `http://`) that the message is posted to as JSON. An answer of 200 to 299 means sent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
-    /// New states that are sent: `normal`, `watch`, `plan`, `act`, `not_assessed`, or a state of another quantity.
-    /// Default `watch`, `plan`, `act`.
+    /// New states that are sent: of the gap `normal`, `watch`, `plan`, `act`, `not_assessed`; of other quantities
+    /// `normal`, `softening`, `friction_rising` and the others in the column `state` of
+    /// `freeplay trend --quantities`. Default: all but `normal` and `not_assessed`.
     pub states: Vec<String>,
     /// Only these part numbers, `*` and `?` stand for anything; every part when not given.
     pub parts: Vec<String>,
@@ -50,7 +64,7 @@ impl Default for AlertChannel {
             command: None,
             folder: None,
             url: None,
-            states: ["watch", "plan", "act"].map(str::to_owned).to_vec(),
+            states: default_states(),
             parts: Vec::new(),
             tails: Vec::new(),
             timeout_s: 30.0,
@@ -58,6 +72,11 @@ impl Default for AlertChannel {
             enabled: true,
         }
     }
+}
+
+/// Every state that a person should know of.
+fn default_states() -> Vec<String> {
+    ["watch", "plan", "act"].into_iter().chain(QUANTITY_STATES).map(str::to_owned).collect()
 }
 
 impl AlertChannel {
@@ -104,13 +123,13 @@ impl AlertChannel {
                 found.push(source.at(&["alerts", name, key], Diagnostic::new("bad_pattern", what)));
             }
         }
-        let known = trend::State::ALL.map(trend::State::as_str);
-        for state in self.states.iter().filter(|s| !known.contains(&s.as_str()) && *s != NOT_ASSESSED) {
+        let of_gap = trend::State::ALL.map(trend::State::as_str);
+        let known: Vec<&str> = of_gap.into_iter().chain([NOT_ASSESSED]).chain(QUANTITY_STATES).collect();
+        for state in self.states.iter().filter(|state| !known.contains(&state.as_str())) {
             let c = Diagnostic::new("unknown_state", format!("`{state}` is not a state of a unit"));
-            let names = known.into_iter().chain([NOT_ASSESSED]);
-            let c = match nearest(state, names.clone()) {
+            let c = match nearest(state, known.iter().copied()) {
                 Some(near) => c.hint(format!("`{near}`?")),
-                None => c.hint(format!("states are {}", names.collect::<Vec<_>>().join(", "))),
+                None => c.hint(format!("states are {}", known.join(", "))),
             };
             found.push(source.at(&["alerts", name, "states"], c));
         }

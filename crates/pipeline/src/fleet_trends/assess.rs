@@ -183,8 +183,8 @@ pub fn assess_run_from(
     let states = now.iter().filter_map(|row| row.state);
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
-    run.findings =
-        now.iter().map(|row| Finding::of_gap(row, fleet.latest_flight(&row.unit(), as_of))).collect();
+    let gap = |row: &TrendRow| Finding::of_gap(row, fleet.latest_flight(&row.unit(), as_of));
+    run.findings = now.iter().map(gap).chain(Finding::of_quantities(&run.followed.rows)).collect();
     run.work_list = now.iter().filter(needs_attention).cloned().collect();
     now.retain(|row| names.contains(&row.unit()));
     let Some(before_utc) = before_utc else { return Ok(RunAssessments { now, ..run }) };

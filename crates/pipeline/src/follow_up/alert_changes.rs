@@ -10,7 +10,7 @@ use job::config::AlertChannel;
 use records::{AlertRecord, AlertStatus};
 
 use crate::follow_up::alert_message;
-use crate::follow_up::finding::Finding;
+use crate::follow_up::finding::{Finding, GAP};
 use crate::history::histories::UnitKey;
 
 /// Channels by name.
@@ -45,8 +45,8 @@ pub fn detect(
         if before.is_some() && from == finding.state {
             continue;
         }
-        // A unit that is not assessed, and was not known, is no change.
-        if before.is_none() && finding.state.is_none() {
+        // A unit that is not assessed and was not known, or a quantity that never changed, is no change.
+        if before.is_none() && !finding.is_noteworthy() {
             continue;
         }
         let id = change_id(finding, number + 1, from);
@@ -76,15 +76,17 @@ fn known_states(known: &[AlertRecord]) -> KnownStates<'_> {
 }
 
 fn baseline(findings: &[Finding], channels: &Channels, run_id: &str, now: Timestamp) -> Vec<AlertRecord> {
+    let is_kept = |finding: &&Finding| finding.quantity == GAP || finding.is_noteworthy();
     let mut rows: Vec<AlertRecord> = findings
         .iter()
+        .filter(is_kept)
         .map(|finding| {
             let id = change_id(finding, 0, None);
             row(&id, BASELINE, 0, None, finding, run_id, now)
         })
         .collect();
     let Some(first) = findings.first() else { return rows };
-    let all: Vec<&Finding> = findings.iter().collect();
+    let all: Vec<&Finding> = findings.iter().filter(|finding| finding.quantity == GAP).collect();
     for (name, channel) in channels.iter().filter(|(_, channel)| channel.enabled) {
         let is_selected =
             |f: &&Finding| channel.selects(f.state, f.unit.0.as_deref(), f.tail_number.as_deref());

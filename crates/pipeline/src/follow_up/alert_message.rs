@@ -3,7 +3,7 @@
 use records::sanitize::escape_cell;
 use serde_json::{Value, json};
 
-use crate::follow_up::finding::Finding;
+use crate::follow_up::finding::{Finding, GAP};
 use job::config::alerts::NOT_ASSESSED;
 
 /// Version of the message: it is raised when a key changes its meaning.
@@ -95,13 +95,13 @@ fn change_text(from: Option<&str>, to: &Finding) -> String {
         (Some(tail), None) => format!(" on {tail}"),
         _ => String::new(),
     };
-    let quantity = if to.quantity == crate::follow_up::finding::GAP { "" } else { to.quantity };
+    let quantity = if to.quantity == GAP { String::new() } else { format!("{} ", to.quantity) };
     let reason = to.reason.as_deref().map(|reason| format!(" ({reason})")).unwrap_or_default();
     let gap = match (to.gap_m, to.limit_m) {
         (Some(gap), Some(limit)) => format!("; gap {:.1} µm, limit {:.1} µm", gap * 1e6, limit * 1e6),
         _ => String::new(),
     };
     let unit = unit_text(to.unit.0.as_deref(), &to.unit.1);
-    let text = format!("{unit}{place}: {quantity} {} → {}{reason}{gap}", word(from), word(to.state));
-    escape_cell(&text.replace(":  ", ": ")).into_owned()
+    let text = format!("{unit}{place}: {quantity}{} → {}{reason}{gap}", word(from), word(to.state));
+    escape_cell(&text).into_owned()
 }

@@ -1,12 +1,15 @@
 //! Finding: the state of one quantity of one unit after a run, as alerts and work requests need it.
 
 use jiff::Timestamp;
-use records::TrendRow;
+use records::{QuantityRow, TrendRow};
 
 use crate::history::histories::UnitKey;
 
 /// Quantity of the free play.
 pub const GAP: &str = "gap";
+
+/// State of a quantity other than the gap that has not changed.
+const UNCHANGED: &str = "normal";
 
 /// State of one quantity of one unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +35,30 @@ pub struct Finding {
 }
 
 impl Finding {
+    /// Findings about the followed quantities of units, each `normal` where it has no state of its own.
+    pub fn of_quantities(rows: &[QuantityRow]) -> impl Iterator<Item = Self> {
+        rows.iter().map(|row| Self {
+            unit: (row.part_number.clone(), row.serial_number.clone()),
+            tail_number: row.tail_number.clone(),
+            position: row.position.clone(),
+            quantity: row.quantity,
+            state: Some(row.state.unwrap_or(UNCHANGED)),
+            reason: row.reason.clone(),
+            as_of_utc: row.as_of_utc,
+            latest_flight_utc: None,
+            gap_m: None,
+            limit_m: None,
+            not_before_utc: None,
+            likely_utc: None,
+            work_request: None,
+        })
+    }
+
+    /// Whether the state is worth a row where none was known: every state of a gap, and other quantities that changed.
+    pub(crate) fn is_noteworthy(&self) -> bool {
+        if self.quantity == GAP { self.state.is_some() } else { self.state != Some(UNCHANGED) }
+    }
+
     /// The finding about a unit's gap.
     pub fn of_gap(row: &TrendRow, latest_flight_utc: Option<Timestamp>) -> Self {
         Self {

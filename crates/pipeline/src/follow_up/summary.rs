@@ -27,7 +27,7 @@ pub struct AlertSummary {
 /// Work requests after a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct WorkSummary {
-    /// Requests that wait for somebody.
+    /// Requests that wait for a decision.
     pub open: usize,
     /// Requests that a person has seen.
     pub acknowledged: usize,

@@ -90,3 +90,19 @@ impl Treatment {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    /// The configuration of alerts refuses words that no quantity has.
+    #[test]
+    fn alerts_know_every_state_of_a_quantity() {
+        let states = Quantity::ALL.map(|quantity| Treatment::of(quantity, &QuantityLimits::default()).states);
+        let states: BTreeSet<&str> =
+            states.into_iter().flat_map(|(rise, fall)| rise.into_iter().chain(fall)).collect();
+        assert_eq!(states, BTreeSet::from(job::config::alerts::QUANTITY_STATES));
+    }
+}

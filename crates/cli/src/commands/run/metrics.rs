@@ -69,7 +69,7 @@ fn text(report: &RunSummary, code: Code) -> String {
         gauge(&name, "Units of the fleet in this state.", units);
     }
     let work = &report.follow_up.work_requests;
-    gauge("work_requests_open", "Work requests that wait for somebody.", work.open as f64);
+    gauge("work_requests_open", "Work requests that wait for a decision.", work.open as f64);
     gauge("work_requests_acknowledged", "Work requests that a person has seen.", work.acknowledged as f64);
     gauge("work_requests_deferred", "Work requests that a person postponed.", work.deferred as f64);
     if let Some(alerts) = &report.follow_up.alerts {

@@ -1,5 +1,7 @@
 //! `store alerts`: changes of state and what became of their messages.
 
+use std::collections::BTreeSet;
+
 use records::{AlertRecord, AlertStatus};
 use store::{Holder, Store};
 
@@ -24,8 +26,11 @@ pub(crate) fn alerts(
         return send_again(store, id, output);
     }
     let mut found = store.alerts()?;
-    // The states of a baseline are no messages.
-    found.retain(|row| !row.channel.is_empty() || row.kind == "change");
+    // A change without a message has one row; the states of a baseline are no messages.
+    let messages: BTreeSet<String> =
+        found.iter().filter(|row| !row.channel.is_empty()).map(|row| row.alert_id.clone()).collect();
+    found
+        .retain(|row| !row.channel.is_empty() || (row.kind == "change" && !messages.contains(&row.alert_id)));
     if is_unsent {
         found.retain(|row| !matches!(row.status, AlertStatus::Sent | AlertStatus::Recorded));
     }
