@@ -115,7 +115,7 @@ fn relative_motion(
 }
 
 /// Speed of the motor at the screw axis, m/s: central difference over two steps; NaN at the ends of a segment and
-/// beside a missing position.
+/// next to a missing position.
 fn motor_speed_m_per_s(channels: &ingest::ActuatorChannels) -> Vec<f64> {
     let mut speed = vec![f64::NAN; channels.motor_m.len()];
     for segment in estimate::samples(channels).segments {

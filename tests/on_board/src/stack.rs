@@ -1,4 +1,4 @@
-//! The stack below a point, painted before a call and looked at after it.
+//! The stack below a point, painted before a call and read after it.
 
 use core::arch::asm;
 use core::ptr;

@@ -1,4 +1,4 @@
-//! Reproduces the paper: writes its figures, and a page with its claims beside them.
+//! Reproduces the paper: writes its figures, and a page with its claims.
 
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a command prints")]
 

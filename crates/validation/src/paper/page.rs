@@ -15,7 +15,6 @@ gap. The paper gives neither parameters nor an accuracy, and its figures are nor
 
 One command writes the page and its figures in about 6 s:
 
-<!-- not run: it rewrites this page; a test compares the page -->
 ```sh
 cargo run -p validation --bin paper -- --output docs
 ```
