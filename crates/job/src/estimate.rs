@@ -123,6 +123,7 @@ pub fn filter(channels: &ActuatorChannels, part: &Part) -> Result<Filter, Diagno
             .hint("record at 20 samples a second or more, 50 or more for a small gap"));
     }
     Filter::new(&part.actuator, channels.step_s, &part.noise)
+        .and_then(|filter| filter.with_initial_variances(part.initial))
         .map_err(|e| Diagnostic::new("bad_parameter", e).hint("see the part's settings in the configuration"))
 }
 

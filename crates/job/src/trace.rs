@@ -1,6 +1,6 @@
 //! Trace: inputs and outputs of the filter, sample by sample.
 
-use estimator::InnovationBuffers;
+use estimator::{InnovationBuffers, Stream};
 use ingest::LogFiles;
 use ingest::parquet::writer::Column;
 use records::{Diagnostic, Installations, PartNumber};
@@ -10,14 +10,30 @@ use crate::config::part::Part;
 use crate::estimate;
 use crate::flight_log;
 
+/// Columns of numbers, in their order.
+const COLUMNS: [&str; 11] = [
+    "time_s",
+    "motor_m",
+    "dx_m",
+    "load_n",
+    "s_m",
+    "innovation_m",
+    "innovation_variance_m2",
+    "flank",
+    "dx_estimated_m",
+    "dx_speed_estimated_m_per_s",
+    "motor_speed_m_per_s",
+];
+
 /// S(t), its inputs, innovation and its variance of one or more actuators, one after the other.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trace {
     log: Vec<String>,
     position: Vec<String>,
     /// Time since the first kept sample, s; motor position, m; δX, m; load, N; S, m; innovation, m; its
-    /// variance, m²; and 1 or −1 where the regression saw the upper or lower flank pressed, else 0.
-    numbers: [Vec<f64>; 8],
+    /// variance, m²; 1 or −1 where the regression saw the upper or lower flank pressed, else 0; the estimated δX,
+    /// m, and δẊ, m/s; and the speed of the motor at the screw axis, m/s.
+    numbers: [Vec<f64>; COLUMNS.len()],
 }
 
 impl Trace {
@@ -42,11 +58,9 @@ impl Trace {
 
     /// As columns of a file.
     pub fn columns(&self) -> Vec<(String, Column)> {
-        let names =
-            ["time_s", "motor_m", "dx_m", "load_n", "s_m", "innovation_m", "innovation_variance_m2", "flank"];
         let text = [("log_path", &self.log), ("position", &self.position)];
         let text = text.into_iter().map(|(name, values)| (name.to_owned(), Column::Text(values.clone())));
-        let numbers = names.iter().zip(&self.numbers);
+        let numbers = COLUMNS.iter().zip(&self.numbers);
         text.chain(numbers.map(|(name, values)| ((*name).to_owned(), Column::Real(values.clone())))).collect()
     }
 
@@ -57,6 +71,7 @@ impl Trace {
             .track(&estimate::samples(channels), Some(&mut seen))
             .map_err(|e| Diagnostic::new("estimate_failed", e))?;
         let count = track.s_m.len();
+        let [position_m, speed_m_per_s] = relative_motion(&filter, channels)?;
         let time_s = (0..count).map(|k| channels.time_s(k)).collect();
         Ok(Self {
             log: vec![log.to_owned(); count],
@@ -70,9 +85,45 @@ impl Trace {
                 seen.innovation_m,
                 seen.variance_m2,
                 flanks(channels, part, count)?,
+                position_m,
+                speed_m_per_s,
+                motor_speed_m_per_s(channels),
             ],
         })
     }
+}
+
+/// Estimated δX, m, and δẊ, m/s, of each sample; NaN outside the segments and before the first measured position of
+/// one. The stream is bitwise the batch that estimates S.
+fn relative_motion(
+    filter: &estimator::Filter,
+    channels: &ingest::ActuatorChannels,
+) -> Result<[Vec<f64>; 2], Diagnostic> {
+    let mut motion = [vec![f64::NAN; channels.dx_m.len()], vec![f64::NAN; channels.dx_m.len()]];
+    let mut stream = Stream::steady_state(filter);
+    for segment in estimate::samples(channels).segments {
+        stream.restart();
+        for k in segment.clone() {
+            let pushed = stream.push(channels.dx_m[k], channels.load_n[k]);
+            pushed.map_err(|e| Diagnostic::new("estimate_failed", e))?;
+            if let Some(state) = stream.estimate() {
+                (motion[0][k], motion[1][k]) = (state.x[0], state.x[1]);
+            }
+        }
+    }
+    Ok(motion)
+}
+
+/// Speed of the motor at the screw axis, m/s: central difference over two steps; NaN at the ends of a segment and
+/// next to a missing position.
+fn motor_speed_m_per_s(channels: &ingest::ActuatorChannels) -> Vec<f64> {
+    let mut speed = vec![f64::NAN; channels.motor_m.len()];
+    for segment in estimate::samples(channels).segments {
+        for k in segment.start + 1..segment.end.saturating_sub(1) {
+            speed[k] = (channels.motor_m[k + 1] - channels.motor_m[k - 1]) / (2.0 * channels.step_s);
+        }
+    }
+    speed
 }
 
 /// Which flank was pressed at each sample, as the contact regression saw it.

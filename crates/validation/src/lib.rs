@@ -9,6 +9,7 @@ pub mod accuracy_page;
 pub mod gear_bench;
 pub mod methods;
 pub mod metrics;
+pub mod paper;
 pub mod plots;
 pub mod robot_logs;
 pub mod scenarios;

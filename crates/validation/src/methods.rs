@@ -1,6 +1,6 @@
 //! The methods compared: contact regression, the paper's statistic and two baselines.
 
-use estimator::{ActuatorModel, NoiseModel, SensorNoise};
+use estimator::{ActuatorModel, InitialVariances, NoiseModel, SensorNoise};
 use ingest::log::in_memory::ChannelArrays;
 use ingest::{ActuatorChannels, Geometry};
 use job::Part;
@@ -101,6 +101,7 @@ pub fn part(case: &Case) -> Result<Part, estimator::Error> {
         actuator: ActuatorModel::linear(case.assumed_stiffness_n_per_m(), 2000.0, 8.0)?,
         geometry: Geometry::Linear { lead_m_per_rev: Some(LEAD_M_PER_REV) },
         noise: NoiseModel::Sensors(noise),
+        initial: InitialVariances::default(),
         reference_load_n: None,
         limit_m: None,
         watch_m: None,

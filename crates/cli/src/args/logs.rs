@@ -38,7 +38,7 @@ pub(crate) struct EstimateArgs {
     /// Treat every actuator as this part number (identity and installations not required).
     #[arg(long, value_name = "PART")]
     pub part: Option<String>,
-    /// Write per-sample filter output (S, inputs, innovation, contact side) to Parquet.
+    /// Write per-sample filter output (inputs, estimated state, innovation, contact side, speed) to Parquet.
     #[arg(long, value_name = "FILE.parquet")]
     pub trace: Option<PathBuf>,
     /// Plot time histories and the load–deflection fit.

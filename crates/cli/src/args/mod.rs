@@ -31,9 +31,26 @@ First steps:
 Exit codes: 0 success, 1 some logs failed, 2 usage or configuration, 3 the run failed,
 4 a unit met --fail-on, 5 an alert was not sent, 130 interrupted.";
 
+/// What `--version` prints after the name; `-V` prints the first line only.
+const LONG_VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\ncommit: ",
+    env!("FREEPLAY_COMMIT"),
+    "\nbuild: ",
+    env!("FREEPLAY_BUILD"),
+    "\nfeatures: object stores S3, Google Cloud Storage and Azure with rustls; Parquet snappy, zstd, lz4, brotli, gzip"
+);
+
 /// Estimate actuator backlash (free play) from flight logs and forecast when each unit reaches its limit.
 #[derive(Debug, Parser)]
-#[command(name = "freeplay", version, after_help = AFTER, infer_subcommands = false, propagate_version = true)]
+#[command(
+    name = "freeplay",
+    version,
+    long_version = LONG_VERSION,
+    after_help = AFTER,
+    infer_subcommands = false,
+    propagate_version = true
+)]
 pub(crate) struct Args {
     #[command(flatten)]
     pub global: Global,

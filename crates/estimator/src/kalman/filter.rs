@@ -5,10 +5,8 @@ use nalgebra::{ComplexField, Matrix3, Vector3};
 use crate::error::Error;
 use crate::model::ActuatorModel;
 use crate::model::DiscreteModel;
-use crate::model::{NoiseCovariances, NoiseModel};
+use crate::model::{NoiseCovariances, NoiseModel, not_negative};
 
-/// Variance of the initial speed, (m/s)², and of the initial backlash, m²: the paper gives none.
-const INITIAL_VARIANCE: (f64, f64) = (1e-4, 1e-6);
 /// The covariance has settled when it changes by less than this share of itself in a step.
 const SETTLED: f64 = 1e-15;
 /// Rounding may keep it from that; then it has settled when it came no closer in so many steps, and is at
@@ -24,6 +22,24 @@ pub struct KalmanState {
     pub x: Vector3<f64>,
     /// Its covariance, 3×3.
     pub p: Matrix3<f64>,
+}
+
+/// Variances of the initial state, P₀ = diag(position, speed, backlash): the paper gives none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InitialVariances {
+    /// Variance of the initial relative position, m²; by default V_d, since the first measurement is the position.
+    pub position_m2: Option<f64>,
+    /// Variance of the initial relative speed, (m/s)².
+    pub speed_m2_per_s2: f64,
+    /// Variance of the initial backlash, m².
+    pub backlash_m2: f64,
+}
+
+impl Default for InitialVariances {
+    /// V_d, 10⁻⁴ (m/s)² and 10⁻⁶ m².
+    fn default() -> Self {
+        Self { position_m2: None, speed_m2_per_s2: 1e-4, backlash_m2: 1e-6 }
+    }
 }
 
 /// What one sample did to the state.
@@ -48,6 +64,7 @@ pub struct Filter {
     noise: NoiseCovariances,
     stiffness_n_per_m: f64,
     step_s: f64,
+    initial: InitialVariances,
 }
 
 impl Filter {
@@ -74,7 +91,24 @@ impl Filter {
     pub fn new(actuator: &ActuatorModel, step_s: f64, noise: &NoiseModel) -> Result<Self, Error> {
         let discrete = DiscreteModel::new(actuator, step_s)?;
         let noise = noise.covariances(actuator, &discrete, step_s)?;
-        Ok(Self { discrete, noise, stiffness_n_per_m: actuator.stiffness_n_per_m(), step_s })
+        Ok(Self {
+            discrete,
+            noise,
+            stiffness_n_per_m: actuator.stiffness_n_per_m(),
+            step_s,
+            initial: InitialVariances::default(),
+        })
+    }
+
+    /// The same filter with other variances of its initial state, P₀.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a variance that is negative or not finite.
+    pub fn with_initial_variances(self, initial: InitialVariances) -> Result<Self, Error> {
+        not_negative("initial position variance", initial.position_m2.unwrap_or(0.0))?;
+        not_negative("initial speed variance", initial.speed_m2_per_s2)?;
+        not_negative("initial backlash variance", initial.backlash_m2)?;
+        Ok(Self { initial, ..self })
     }
 
     /// A_d and B_d.
@@ -88,15 +122,16 @@ impl Filter {
     }
 
     /// Initial state from the first measurement, m, and its load, N:
-    /// x₀ = [y, 0, y − u/K], P₀ = diag(V_d, 10⁻⁴, 10⁻⁶) in m², (m/s)², m².
+    /// x₀ = [y, 0, y − u/K], P₀ = diag(V_d, 10⁻⁴, 10⁻⁶) in m², (m/s)², m², or the filter's [`InitialVariances`].
     ///
     /// The paper gives none (`docs/equations.md`, "The filter"). x₀ = 0 adds 650 % to the
     /// gap where δX has an offset of a millimetre.
     pub fn initial_state(&self, y_m: f64, load_n: f64) -> KalmanState {
-        let (speed, backlash) = INITIAL_VARIANCE;
+        let InitialVariances { position_m2, speed_m2_per_s2, backlash_m2 } = self.initial;
+        let position_m2 = position_m2.unwrap_or(self.noise.v_d_m2);
         KalmanState {
             x: Vector3::new(y_m, 0.0, y_m - load_n / self.stiffness_n_per_m),
-            p: Matrix3::from_diagonal(&Vector3::new(self.noise.v_d_m2, speed, backlash)),
+            p: Matrix3::from_diagonal(&Vector3::new(position_m2, speed_m2_per_s2, backlash_m2)),
         }
     }
 

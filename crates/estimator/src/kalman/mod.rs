@@ -12,7 +12,7 @@ pub(crate) mod stream;
 
 #[cfg(feature = "std")]
 pub use batch::{FilterOutput, FilterWorkspace, InnovationBuffers};
-pub use filter::{Filter, FilterStep, KalmanState};
+pub use filter::{Filter, FilterStep, InitialVariances, KalmanState};
 #[cfg(feature = "std")]
 pub use gain_schedule::GainSchedule;
 pub use stream::Stream;

@@ -8,4 +8,5 @@ mod noise;
 pub use actuator::ActuatorModel;
 pub(crate) use actuator::positive;
 pub use discretise::DiscreteModel;
+pub(crate) use noise::not_negative;
 pub use noise::{NoiseCovariances, NoiseModel, SensorNoise};

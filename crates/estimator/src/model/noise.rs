@@ -139,6 +139,6 @@ impl NoiseModel {
     }
 }
 
-fn not_negative(name: &'static str, value: f64) -> Result<(), Error> {
+pub(crate) fn not_negative(name: &'static str, value: f64) -> Result<(), Error> {
     if value.is_finite() && value >= 0.0 { Ok(()) } else { Err(Error::Parameter { name, value }) }
 }

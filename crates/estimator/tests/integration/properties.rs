@@ -307,3 +307,25 @@ proptest! {
         prop_assert_eq!(&both[half..], &alone[..]);
     }
 }
+
+/// P₀ moves the first seconds and nothing later: after 1 s two filters of different P₀ agree to 10⁻⁹ of the gap.
+#[test]
+fn the_initial_variances_are_forgotten() {
+    let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap();
+    let filter = Filter::new(&actuator, 1e-3, &crate::sensor_noise(10.0)).unwrap();
+    let start =
+        estimator::InitialVariances { position_m2: Some(1e-6), speed_m2_per_s2: 1.0, backlash_m2: 1e-14 };
+    let other = filter.with_initial_variances(start).unwrap();
+    assert!((other.initial_state(0.0, 0.0).p[(2, 2)] - 1e-14).abs() < 1e-28);
+    let [mut usual, mut unusual] = [filter, other].map(|filter| estimator::Stream::constant_time(&filter));
+    let (mut first_m, mut last_m) = (0.0_f64, 0.0_f64);
+    for k in 0..1000 {
+        let y_m = if k < 5 { 0.0 } else { 100e-6 };
+        let apart_m = (usual.push(y_m, 0.0).unwrap() - unusual.push(y_m, 0.0).unwrap()).abs();
+        first_m = if k < 100 { first_m.max(apart_m) } else { first_m };
+        last_m = apart_m;
+    }
+    assert!(first_m > 1e-6 && last_m < 1e-13, "{first_m} m, then {last_m} m");
+    let wrong = estimator::InitialVariances { backlash_m2: -1.0, ..start };
+    assert!(filter.with_initial_variances(wrong).is_err());
+}

@@ -147,6 +147,15 @@ pub struct NoiseSettings {
     /// `continuous`: density of the backlash rate, m²/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub backlash_rate_psd_m2_per_s: Option<f64>,
+    /// Uncertainty of the initial relative position, rms, m; default: that of the measurement.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub initial_position_rms_m: Option<f64>,
+    /// Uncertainty of the initial relative speed, rms, m/s; default 0.01.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub initial_speed_rms_m_per_s: Option<f64>,
+    /// Uncertainty of the initial backlash, rms, m; default 0.001.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub initial_backlash_rms_m: Option<f64>,
 }
 
 /// A part, checked, at the screw axis.
@@ -158,6 +167,8 @@ pub struct Part {
     pub geometry: Geometry,
     /// Its noise.
     pub noise: estimator::NoiseModel,
+    /// Variances of the filter's initial state, P₀.
+    pub initial: estimator::InitialVariances,
     /// Whether its output is fixed: the relative position is then minus the motor position.
     pub output_locked: bool,
     /// Load between whose positive and negative value lost motion is stated, N.
@@ -209,6 +220,7 @@ impl PartSettings {
                 actuator,
                 geometry,
                 noise,
+                initial: self.noise.as_ref().map(NoiseSettings::initial).unwrap_or_default(),
                 output_locked: self.output.is_locked(),
                 reference_load_n: self.reference_load_n,
                 limit_m: self.limit_m,
@@ -300,6 +312,9 @@ impl PartSettings {
             );
             return None;
         };
+        keys.positive(&["noise", "initial_position_rms_m"], noise.initial_position_rms_m);
+        keys.positive(&["noise", "initial_speed_rms_m_per_s"], noise.initial_speed_rms_m_per_s);
+        keys.positive(&["noise", "initial_backlash_rms_m"], noise.initial_backlash_rms_m);
         match noise.model {
             NoiseModel::Sensors => noise.sensors(self, keys).map(estimator::NoiseModel::Sensors),
             NoiseModel::PerStep => {
@@ -327,7 +342,7 @@ impl PartSettings {
 
 impl NoiseSettings {
     /// Every number with its key; of a matrix its largest entry.
-    fn numbers(&self) -> [(&'static [&'static str], Option<f64>); 15] {
+    fn numbers(&self) -> [(&'static [&'static str], Option<f64>); 18] {
         let largest = |w_d: [[f64; 3]; 3]| w_d.into_iter().flatten().map(f64::abs).fold(0.0, f64::max);
         [
             (&["noise", "screw_rms_m"], self.screw_rms_m),
@@ -345,7 +360,21 @@ impl NoiseSettings {
             (&["noise", "v_d_m2"], self.v_d_m2),
             (&["noise", "force_psd_n2_s"], self.force_psd_n2_s),
             (&["noise", "backlash_rate_psd_m2_per_s"], self.backlash_rate_psd_m2_per_s),
+            (&["noise", "initial_position_rms_m"], self.initial_position_rms_m),
+            (&["noise", "initial_speed_rms_m_per_s"], self.initial_speed_rms_m_per_s),
+            (&["noise", "initial_backlash_rms_m"], self.initial_backlash_rms_m),
         ]
+    }
+
+    /// P₀: the estimator's own where a key is missing.
+    fn initial(&self) -> estimator::InitialVariances {
+        let default = estimator::InitialVariances::default();
+        let variance = |rms: Option<f64>| rms.map(|rms| rms * rms);
+        estimator::InitialVariances {
+            position_m2: variance(self.initial_position_rms_m),
+            speed_m2_per_s2: variance(self.initial_speed_rms_m_per_s).unwrap_or(default.speed_m2_per_s2),
+            backlash_m2: variance(self.initial_backlash_rms_m).unwrap_or(default.backlash_m2),
+        }
     }
 
     /// Sensor facts at the screw axis; a rotary part's are in radians and newton metres.

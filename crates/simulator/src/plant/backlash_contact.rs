@@ -134,6 +134,8 @@ pub struct Contact {
     pub lower_stiffness_factor: f64,
     /// Growth of the stiffness from the start to the end of the log, as a share, −0.5 to 1. Default 0.
     pub stiffness_drift: f64,
+    /// Growth of the gap from the start to the end of the log, as a share, −1 to 10. Default 0.
+    pub gap_drift: f64,
     /// Stiffness in the middle of each phase (preflight, take-off, climb, cruise, approach, landing)
     /// over `stiffness_n_per_m`, changing linearly between, 0.2 to 5. Default 1 in each.
     pub stiffness_phase_factors: [f64; 6],
@@ -150,6 +152,7 @@ impl Default for Contact {
             lower_law: None,
             lower_stiffness_factor: 1.0,
             stiffness_drift: 0.0,
+            gap_drift: 0.0,
             stiffness_phase_factors: [1.0; 6],
         }
     }
@@ -175,23 +178,27 @@ impl Contact {
         let factor = |key, value| within(key, value, 0.2, 5.0, "between 0.2 and 5");
         factor("contact.lower_stiffness_factor", self.lower_stiffness_factor)?;
         within("contact.stiffness_drift", self.stiffness_drift, -0.5, 1.0, "between -0.5 and 1")?;
+        within("contact.gap_drift", self.gap_drift, -1.0, 10.0, "between -1 and 10")?;
         let mut factors = self.stiffness_phase_factors.into_iter();
         factors.try_for_each(|value| factor("contact.stiffness_phase_factors", value))
     }
 
-    /// The coupling at a share of the log, with the stiffness it has by then.
+    /// The coupling at a share of the log, with the stiffness and the gap it has by then.
     #[must_use]
     pub(crate) fn at(&self, progress: f64) -> Self {
         let progress = progress.clamp(0.0, 1.0);
         let factor = phase_factor(progress, &self.stiffness_phase_factors);
         let drift = 1.0 + self.stiffness_drift * progress;
-        Self { stiffness_n_per_m: self.stiffness_n_per_m * factor * drift, ..*self }
+        let gap_m = self.gap_m * (1.0 + self.gap_drift * progress);
+        Self { stiffness_n_per_m: self.stiffness_n_per_m * factor * drift, gap_m, ..*self }
     }
 
-    /// Whether the stiffness changes during a log.
+    /// Whether stiffness or gap change during a log.
     pub(crate) fn is_varying(&self) -> bool {
         let is_one = |factor: &f64| (factor - 1.0).abs() < f64::EPSILON;
-        self.stiffness_drift.abs() > 0.0 || !self.stiffness_phase_factors.iter().all(is_one)
+        self.stiffness_drift.abs() > 0.0
+            || self.gap_drift.abs() > 0.0
+            || !self.stiffness_phase_factors.iter().all(is_one)
     }
 
     /// Law and stiffness of the flank that pushes the screw up.

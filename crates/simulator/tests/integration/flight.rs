@@ -142,6 +142,7 @@ fn every_new_key_is_read_from_a_spec() {
         lower_law = { hertz = { share = 0.5, reference_m = 80e-6 } }
         lower_stiffness_factor = 1.2
         stiffness_drift = 0.05
+        gap_drift = 0.2
         stiffness_phase_factors = [1.0, 1.0, 0.97, 1.0, 1.02, 1.0]
     ";
     let plant: Plant = toml::from_str(text).unwrap();

@@ -1,0 +1,268 @@
+//! The paper's claims of its method, measured.
+
+use estimator::gap::{GapStatistic, mid_range};
+use estimator::{Filter, KalmanState};
+use rayon::prelude::*;
+use simulator::{Flight, Plant, Sensors};
+
+use crate::paper::operations::{OperationCount, count_step};
+use crate::paper::{Assumed, GAP_M, STEP_S, backlash_m, filter, fly, gap, states};
+
+/// Seeds of the flights; the figures show the first.
+const SEEDS: [u64; 5] = [11, 12, 13, 14, 15];
+/// Factors on damping and mass.
+const DECADES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
+/// Factors on the stiffness.
+const TENTHS: [f64; 5] = [0.9, 0.95, 1.0, 1.05, 1.1];
+/// Factors on W_d.
+const TUNINGS: [f64; 7] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3];
+/// Factors on the noise of both positions.
+const NOISES: [f64; 5] = [0.1, 1.0, 3.0, 10.0, 30.0];
+/// Factors on P₀.
+const SPREADS: [f64; 5] = [1e-6, 1e-3, 1.0, 1e3, 1e6];
+/// A wrong initial backlash, m.
+const WRONG_M: f64 = 1e-3;
+/// Growth of the varying gap over the flight, as a share.
+const GROWTH: f64 = 1.0;
+/// Window of the statistic of a varying gap, s.
+const WINDOW_S: f64 = 12.0;
+/// The state has converged once S is within this share of the gap.
+const CONVERGED: f64 = 0.01;
+
+/// An error of the simulator or the estimator.
+#[derive(Debug)]
+pub enum ClaimsError {
+    /// Of the simulator.
+    Simulator(simulator::Error),
+    /// Of the estimator.
+    Estimator(estimator::Error),
+}
+
+impl std::fmt::Display for ClaimsError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Simulator(error) => error.fmt(f),
+            Self::Estimator(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for ClaimsError {}
+
+impl From<simulator::Error> for ClaimsError {
+    fn from(error: simulator::Error) -> Self {
+        Self::Simulator(error)
+    }
+}
+
+impl From<estimator::Error> for ClaimsError {
+    fn from(error: estimator::Error) -> Self {
+        Self::Estimator(error)
+    }
+}
+
+/// A change of ΔS, % of the gap, over the flights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// The factor that was changed.
+    pub factor: f64,
+    /// Least, mean and most over the flights.
+    pub percent: [f64; 3],
+}
+
+impl Change {
+    fn of(factor: f64, percent: &[f64]) -> Self {
+        let least = percent.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = percent.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self { factor, percent: [least, percent.iter().sum::<f64>() / percent.len() as f64, most] }
+    }
+
+    /// The largest amount of any flight, %.
+    pub fn largest(&self) -> f64 {
+        self.percent[0].abs().max(self.percent[2].abs())
+    }
+}
+
+/// Convergence from a wrong start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Convergence {
+    /// What is wrong.
+    pub name: String,
+    /// Difference of S from that of the right start, m, sample by sample.
+    pub error_m: Vec<f64>,
+    /// Time until the difference stays below 1 % of the gap, s.
+    pub time_s: f64,
+}
+
+/// One window of a flight whose gap grows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Window {
+    /// Its middle, s.
+    pub time_s: f64,
+    /// The true gap there, m.
+    pub true_m: f64,
+    /// ΔS of its samples, m.
+    pub gap_m: f64,
+}
+
+/// Everything measured.
+#[derive(Debug, Clone)]
+pub struct Claims {
+    /// The flight of the figures.
+    pub flight: Flight,
+    /// The filter's state after each of its samples.
+    pub states: Vec<KalmanState>,
+    /// Its ΔS (29–31).
+    pub gap: GapStatistic,
+    /// Error of ΔS with everything known, %.
+    pub known: Change,
+    /// Operations of 24, 25, 26, 27 and 28 in a step.
+    pub operations: [OperationCount; 5],
+    /// From wrong states.
+    pub starts: Vec<Convergence>,
+    /// From a wrong backlash with wrong covariances.
+    pub spreads: Vec<Convergence>,
+    /// Error of ΔS against the noise of both positions.
+    pub noise: Vec<Change>,
+    /// Error of ΔS against W_d/V_d.
+    pub tuning: Vec<Change>,
+    /// Change of ΔS by an assumed damping.
+    pub damping: Vec<Change>,
+    /// Change of ΔS by an assumed mass.
+    pub mass: Vec<Change>,
+    /// Change of ΔS by an assumed stiffness.
+    pub stiffness: Vec<Change>,
+    /// A gap that grows within the flight.
+    pub varying: Vec<Window>,
+}
+
+type Result<T> = std::result::Result<T, ClaimsError>;
+
+impl Claims {
+    /// Flies and estimates all flights.
+    ///
+    /// # Errors
+    /// Of the simulator or the estimator.
+    pub fn measure() -> Result<Self> {
+        let sensors = Sensors::default();
+        let flights = fly_all(&sensors)?;
+        let usual = filter(Assumed::default(), &sensors, STEP_S)?;
+        let own = states(&usual, &flights[0], None)?;
+        let known_m: Vec<f64> = gaps_m(&usual, &flights)?;
+        let assume = |assumed: Assumed| gaps_m(&filter(assumed, &sensors, STEP_S)?, &flights);
+        let against_known = |factors: &[f64], assumed: fn(f64) -> Assumed| {
+            let change = |&factor: &f64| {
+                let found_m = assume(assumed(factor))?;
+                let percent: Vec<f64> =
+                    found_m.iter().zip(&known_m).map(|(gap, known)| 100.0 * (gap - known) / GAP_M).collect();
+                Ok(Change::of(factor, &percent))
+            };
+            factors.par_iter().map(change).collect::<Result<Vec<Change>>>()
+        };
+        let tuning = TUNINGS.par_iter().map(|&factor| {
+            Ok(Change::of(factor, &errors(&assume(Assumed { process_noise: factor, ..Assumed::default() })?)))
+        });
+        let last = own.len() - 1;
+        Ok(Self {
+            gap: mid_range(&backlash_m(&own))?,
+            known: Change::of(1.0, &errors(&known_m)),
+            operations: count_step(&usual, &own[last], flights[0].load_n[last], own[last].x[0]).0,
+            starts: starts(&usual, &flights[0], &own)?,
+            spreads: spreads(&usual, &flights[0], &own)?,
+            noise: NOISES.par_iter().map(|&factor| noise(factor)).collect::<Result<_>>()?,
+            tuning: tuning.collect::<Result<_>>()?,
+            damping: against_known(&DECADES, |damping| Assumed { damping, ..Assumed::default() })?,
+            mass: against_known(&DECADES, |mass| Assumed { mass, ..Assumed::default() })?,
+            stiffness: against_known(&TENTHS, |stiffness| Assumed { stiffness, ..Assumed::default() })?,
+            varying: varying(&usual, &sensors)?,
+            states: own,
+            flight: flights.into_iter().next().ok_or(estimator::Error::NothingMeasured)?,
+        })
+    }
+}
+
+fn fly_all(sensors: &Sensors) -> Result<Vec<Flight>> {
+    SEEDS.par_iter().map(|&seed| Ok(fly(&Plant::default(), sensors, seed)?)).collect()
+}
+
+fn gaps_m(filter: &Filter, flights: &[Flight]) -> Result<Vec<f64>> {
+    flights.iter().map(|flight| Ok(gap(filter, flight)?.gap_m)).collect()
+}
+
+/// Errors of gaps, % of the true one.
+fn errors(gaps_m: &[f64]) -> Vec<f64> {
+    gaps_m.iter().map(|gap| 100.0 * (gap / GAP_M - 1.0)).collect()
+}
+
+/// Both positions noisier, with the V_d that belongs to them.
+fn noise(factor: f64) -> Result<Change> {
+    let mut sensors = Sensors::default();
+    sensors.screw.noise_rms *= factor;
+    sensors.motor.noise_rms *= factor;
+    let filter = filter(Assumed::default(), &sensors, STEP_S)?;
+    Ok(Change::of(factor, &errors(&gaps_m(&filter, &fly_all(&sensors)?)?)))
+}
+
+/// S from a start against S from the right one.
+fn convergence(
+    name: String,
+    filter: &Filter,
+    flight: &Flight,
+    right: &[KalmanState],
+    start: KalmanState,
+) -> Result<Convergence> {
+    let found = states(filter, flight, Some(start))?;
+    let error_m: Vec<f64> =
+        found.iter().zip(right).map(|(one, other)| (one.x[2] - other.x[2]).abs()).collect();
+    let last = error_m.iter().rposition(|error| *error > CONVERGED * GAP_M);
+    Ok(Convergence { name, error_m, time_s: last.map_or(0.0, |k| (k + 1) as f64 * STEP_S) })
+}
+
+fn right_start(filter: &Filter, flight: &Flight) -> KalmanState {
+    filter.initial_state(flight.screw_m[0] - flight.motor_m[0], flight.load_n[0])
+}
+
+fn starts(filter: &Filter, flight: &Flight, right: &[KalmanState]) -> Result<Vec<Convergence>> {
+    let changes: [(&str, fn(&mut KalmanState)); 4] = [
+        ("backlash 1 mm off", |state| state.x[2] += WRONG_M),
+        ("position 1 mm off", |state| state.x[0] += WRONG_M),
+        ("speed 0.1 m/s off", |state| state.x[1] += 0.1),
+        ("x₀ = 0", |state| state.x.fill(0.0)),
+    ];
+    let start = |(name, change): &(&str, fn(&mut KalmanState))| {
+        let mut state = right_start(filter, flight);
+        change(&mut state);
+        convergence((*name).to_owned(), filter, flight, right, state)
+    };
+    changes.iter().map(start).collect()
+}
+
+fn spreads(filter: &Filter, flight: &Flight, right: &[KalmanState]) -> Result<Vec<Convergence>> {
+    let start = |&factor: &f64| {
+        let mut state = right_start(filter, flight);
+        state.x[2] += WRONG_M;
+        state.p *= factor;
+        let name = match factor.log10().round() as i32 {
+            0 => "P₀ as configured".to_owned(),
+            exponent => format!("P₀ × 10^{exponent}"),
+        };
+        convergence(name, filter, flight, right, state)
+    };
+    SPREADS.iter().map(start).collect()
+}
+
+/// A gap that doubles within the flight, by windows.
+fn varying(filter: &Filter, sensors: &Sensors) -> Result<Vec<Window>> {
+    let mut plant = Plant::default();
+    plant.contact.gap_drift = GROWTH;
+    let flight = fly(&plant, sensors, SEEDS[0])?;
+    let s_m = backlash_m(&states(filter, &flight, None)?);
+    let samples = (WINDOW_S / STEP_S).round() as usize;
+    let duration_s = s_m.len() as f64 * STEP_S;
+    let window = |(k, s_m): (usize, &[f64])| {
+        let time_s = (k as f64 + 0.5) * WINDOW_S;
+        let true_m = GAP_M * (1.0 + GROWTH * time_s / duration_s);
+        Ok(Window { time_s, true_m, gap_m: mid_range(s_m)?.gap_m })
+    };
+    s_m.chunks_exact(samples).enumerate().map(window).collect()
+}
