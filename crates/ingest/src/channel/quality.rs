@@ -174,7 +174,7 @@ fn mean_step(values: &[f64]) -> f64 {
 ///
 /// The fourth difference over 6 is an outlier's height; smooth motion hardly shows in it. An outlier gives −4/6, 1,
 /// −4/6 in three neighbouring differences; a step of the position or of its speed does not. The height must exceed six
-/// standard deviations of the channel's noise, six times the impacts that recur every few seconds, and twice what its
+/// standard deviations of the channel's noise, nine times the impacts that recur every few seconds, and twice what its
 /// surroundings show.
 fn spikes(
     (values, segments): (&[f64], &[Range<usize>]),
@@ -183,7 +183,7 @@ fn spikes(
     step_s: f64,
 ) -> usize {
     const FAR: f64 = 6.0;
-    const IMPACTS: f64 = 6.0;
+    const IMPACTS: f64 = 9.0;
     const LOCAL_SHARE: f64 = 0.45;
     const SHAPE_TOLERANCE: f64 = 0.3;
     const REACH: usize = 12;
