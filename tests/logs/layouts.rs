@@ -366,9 +366,9 @@ fn misses(kind: &str, channel: usize, row: usize) -> bool {
 
 const CHANNELS: [&str; 3] = ["motor_deg", "screw_mm", "load_n"];
 
-/// A file for each channel, each with rows of its own missing: no doubt is raised, and the gaps stay.
+/// A file for each channel, each with rows of its own missing: no flag is raised, and the gaps stay.
 #[test]
-fn missing_rows_of_one_channel_in_its_own_file_raise_no_doubt() {
+fn missing_rows_of_one_channel_in_its_own_file_raise_no_flag() {
     let whole = one_tail();
     whole.run_ok(&["run"]);
     for kind in ["three", "few"] {
@@ -389,14 +389,14 @@ fn missing_rows_of_one_channel_in_its_own_file_raise_no_doubt() {
         fleet.configure("[estimate]", groups);
         fleet.run_ok(&["run"]);
         let (flags, change_m) = flags_and_change(&fleet, &whole);
-        let is_doubt = |flag: &String| flag.ends_with("_spikes") || flag.ends_with("_missing");
-        assert!(!flags.iter().any(is_doubt) && change_m < 1e-6, "{kind}: {flags:?}, {change_m} m");
+        let is_raised = |flag: &String| flag.ends_with("_spikes") || flag.ends_with("_missing");
+        assert!(!flags.iter().any(is_raised) && change_m < 1e-6, "{kind}: {flags:?}, {change_m} m");
     }
 }
 
-/// A row per channel and instant, some rows missing: no doubt is raised, and the gaps stay.
+/// A row per channel and instant, some rows missing: no flag is raised, and the gaps stay.
 #[test]
-fn missing_rows_of_a_long_log_raise_no_doubt() {
+fn missing_rows_of_a_long_log_raise_no_flag() {
     use ingest::parquet::writer::{Column, write_parquet};
     let whole = one_tail();
     whole.run_ok(&["run"]);
@@ -427,9 +427,76 @@ fn missing_rows_of_a_long_log_raise_no_doubt() {
         fleet.configure("[clock]", layout);
         fleet.run_ok(&["run"]);
         let (flags, change_m) = flags_and_change(&fleet, &whole);
-        let is_doubt = |flag: &String| flag.ends_with("_spikes") || flag.ends_with("_missing");
-        assert!(!flags.iter().any(is_doubt) && change_m < 1e-6, "{kind}: {flags:?}, {change_m} m");
+        let is_raised = |flag: &String| flag.ends_with("_spikes") || flag.ends_with("_missing");
+        assert!(!flags.iter().any(is_raised) && change_m < 1e-6, "{kind}: {flags:?}, {change_m} m");
     }
+}
+
+/// A screw position in every second row, and nothing between: `check` names the setting, and it gives the gaps.
+#[test]
+fn check_names_the_rate_of_a_slower_screw() {
+    use ingest::parquet::writer::{Column, write_parquet};
+    let fleet = one_tail();
+    for log in logs(&fleet) {
+        let table = Table::read(&log);
+        let column = |name: String| {
+            let mut values = table.reals(&name);
+            if name.ends_with("screw_mm") {
+                values.iter_mut().skip(1).step_by(2).for_each(|value| *value = f64::NAN);
+            }
+            (name, Column::Real(values))
+        };
+        let columns: Vec<_> = table.names().into_iter().map(column).collect();
+        write_parquet(&log, &columns, &facts(&log)).unwrap();
+    }
+    let text = fleet.freeplay(&["check", "--limit", "1"]).out;
+    assert!(text.contains("rate_hz = 50"), "{text}");
+    fleet.configure("_screw_mm\"", "_screw_mm\"\nrate_hz = 50.0");
+    let text = fleet.run_ok(&["check", "--limit", "1"]);
+    assert!(!text.contains("rate_hz"), "{text}");
+}
+
+/// A clock that starts again: the error names both settings, and neither drops samples in silence.
+#[test]
+fn a_clock_that_restarts_names_its_settings() {
+    use ingest::parquet::writer::{Column, write_parquet};
+    let fleet = one_tail();
+    let log = &logs(&fleet)[0];
+    let table = Table::read(log);
+    let column = |name: String| {
+        let mut values = table.reals(&name);
+        if name == "time_s" {
+            let half = values.len() / 2;
+            let first = values[0];
+            let restart = values[half] - first;
+            values[half..].iter_mut().for_each(|time| *time -= restart);
+        }
+        (name, Column::Real(values))
+    };
+    let columns: Vec<_> = table.names().into_iter().map(column).collect();
+    write_parquet(log, &columns, &facts(log)).unwrap();
+    for command in ["check", "run"] {
+        let result = fleet.freeplay(&[command]);
+        assert_eq!(result.code, Some(1), "{result:?}");
+        assert!(result.err.contains("error[time_goes_back]"), "{}", result.err);
+        assert!(result.err.contains("split_at_jumps") && result.err.contains("wraps_at"), "{}", result.err);
+        let hint = result.err.lines().find(|line| line.starts_with("hint: ")).unwrap();
+        assert!(!hint.contains("max_back_s"), "{hint}");
+    }
+    fleet.configure("unit = \"s\"", "unit = \"s\"\nsplit_at_jumps = true");
+    fleet.run_ok(&["run"]);
+    assert_eq!(numbers(&fleet).len(), 1 + 10 * 4);
+}
+
+/// A pattern that matches nothing, and a file of a group without a flight: both name what to do.
+#[test]
+fn listing_hints_name_the_pattern_and_the_flight() {
+    let fleet = one_tail();
+    fleet.configure("N412FP/*.parquet", "N999XX/*.parquet");
+    let result = fleet.freeplay(&["check"]);
+    assert_eq!(result.code, Some(2), "{result:?}");
+    assert!(result.err.contains("error[no_log_matched]") && result.err.contains("N999XX"), "{}", result.err);
+    assert!(result.err.contains("hint: patterns are relative to"), "{}", result.err);
 }
 
 /// Three thirds of a flight, each with the instant of its first row as its departure, as files `c`, `a` and `b`.

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use crate::channel::noise_floor::white_noise;
+use crate::channel::noise_floor::white_noise_of;
 use crate::channel::stats::{ChannelStats, range};
 use crate::mapping::Role;
 use crate::time::zero_order_hold::median_sample_interval;
@@ -187,10 +187,17 @@ fn spikes(
     const LOCAL_SHARE: f64 = 0.45;
     const SHAPE_TOLERANCE: f64 = 0.3;
     const REACH: usize = 12;
+    /// Enough for a threshold: the noise is known to about 3 %.
+    const NOISE_BLOCKS: usize = 1000;
     let step = resolution.unwrap_or(0.0);
-    let noise = white_noise(values, resolution).map_or(0.0, |noise| noise.rms).hypot(step / 12.0_f64.sqrt());
+    if max_second_difference <= 4.0 * step || values.len() < 7 {
+        return 0;
+    }
+    let noise = white_noise_of(values, resolution, NOISE_BLOCKS)
+        .map_or(0.0, |noise| noise.rms)
+        .hypot(step / 12.0_f64.sqrt());
     let far = (FAR * DIFFERENCE_NOISE * noise).max(4.0 * step);
-    if max_second_difference <= far || values.len() < 7 {
+    if max_second_difference <= far {
         return 0;
     }
     let height = |i: usize| {

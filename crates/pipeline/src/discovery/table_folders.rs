@@ -46,6 +46,9 @@ pub(crate) enum TableMembership {
 }
 
 impl TableFolders {
+    /// The folders in which tables keep their logs.
+    pub(crate) const LOGS: [&str; 3] = ["_delta_log", ".hoodie", "metadata"];
+
     /// Notes an object of a listing that makes its folder a table.
     pub(crate) fn note(&mut self, object: &Path) {
         let Some(folder) = object.parent() else { return };

@@ -6,7 +6,9 @@ use std::fs::{self, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
 
-use ingest::infer::{InferredMapping, folder_value, path_identity, path_tail, propose};
+use ingest::infer::{
+    InferredMapping, PLACE_END, folder_value, path_identity, path_position, path_tail, propose,
+};
 use ingest::mapping::IdentityField;
 use ingest::mapping::units::Unit;
 use ingest::{Layout, Role};
@@ -181,7 +183,8 @@ fn installation_rows(logs: &[PathBuf], offer: &InferredMapping) -> Option<String
     let mut places: BTreeSet<(String, String)> = BTreeSet::new();
     for log in logs.iter().take(MOST_LOGS) {
         let Some(tail) = tail(log).filter(is_plain) else { continue };
-        let own = folder(log, IdentityField::Position);
+        let own = folder(log, IdentityField::Position)
+            .or_else(|| path_position(log).filter(|_| needs_position(offer)));
         let positions = own.iter().chain(offer.positions.iter().filter(|_| own.is_none()));
         places
             .extend(positions.filter(|name| is_plain(name)).map(|position| (tail.clone(), position.clone())));
@@ -314,6 +317,13 @@ fn layout(layout: &Layout) -> String {
     keys.iter().filter_map(|(key, column)| Some(format!("{key} = {}\n", quoted(column.as_ref()?)))).collect()
 }
 
+/// Whether neither columns nor folders name the position of a log.
+fn needs_position(offer: &InferredMapping) -> bool {
+    offer.positions.is_empty()
+        && !offer.folders.contains_key(&IdentityField::Position)
+        && offer.layout.position_column.is_none()
+}
+
 fn identity(offer: &InferredMapping, log: &Path) -> String {
     let table = |key: &str, facts: &BTreeMap<IdentityField, String>| {
         let facts: Vec<String> =
@@ -330,9 +340,12 @@ fn identity(offer: &InferredMapping, log: &Path) -> String {
         [&offer.metadata, &offer.columns, &offer.folders].iter().any(|facts| facts.contains_key(&fact))
     };
     if has(IdentityField::TailNumber) && has(IdentityField::DepartureUtc) {
+        if needs_position(offer) && path_position(log).is_some() {
+            let _ = writeln!(text, "# The position is inferred from the file name.\npath = '{PLACE_END}$'");
+        }
         return text;
     }
-    match path_identity(log) {
+    match path_identity(log, needs_position(offer)) {
         Some((path, format)) => {
             text.push_str(
                 "# Not all of the identity is in metadata or columns; the rest is inferred from the path.\n",
@@ -356,8 +369,11 @@ fn identity(offer: &InferredMapping, log: &Path) -> String {
 }
 
 fn clock(offer: &InferredMapping) -> String {
+    let epoch = if offer.is_unix_clock { "epoch = \"unix\"\n" } else { "" };
     match &offer.clock {
-        Some((column, Some(unit))) => format!("column = {}\nunit = {}\n", quoted(column), quoted(unit)),
+        Some((column, Some(unit))) => {
+            format!("column = {}\nunit = {}\n{epoch}", quoted(column), quoted(unit))
+        }
         Some((column, None)) => {
             let column = quoted(column);
             format!("column = {column}\n# unit = \"s\"          # s, ms, us, ns; not needed for timestamps\n")
