@@ -139,6 +139,16 @@ impl Table {
         text.as_string::<i32>().iter().map(|v| v.unwrap_or_default().to_owned()).collect()
     }
 
+    pub(crate) fn names(&self) -> Vec<String> {
+        self.0.schema().fields().iter().map(|field| field.name().clone()).collect()
+    }
+
+    /// A column of numbers of any type as doubles.
+    pub(crate) fn reals(&self, column: &str) -> Vec<f64> {
+        let real = cast(self.0.column_by_name(column).unwrap(), &DataType::Float64).unwrap();
+        real.as_primitive::<Float64Type>().values().to_vec()
+    }
+
     /// NaN where null.
     pub(crate) fn numbers(&self, column: &str) -> Vec<f64> {
         let values = self.0.column_by_name(column).unwrap().as_primitive::<Float64Type>();

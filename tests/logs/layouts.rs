@@ -260,7 +260,7 @@ fn a_condition_selects_what_a_shorter_log_would_hold() {
 }
 
 /// The log of a Delta table, by the format's own specification: a version adds files, a later one removes one.
-fn delta_log(table: &std::path::Path, added: &[&str], removed: &[&str]) {
+pub(crate) fn delta_log(table: &std::path::Path, added: &[&str], removed: &[&str]) {
     let log = table.join("_delta_log");
     std::fs::create_dir_all(&log).unwrap();
     let schema = r#"{\"type\":\"struct\",\"fields\":[{\"name\":\"time_s\",\"type\":\"double\",\"nullable\":true,\"metadata\":{}}]}"#;
@@ -334,7 +334,174 @@ fn temporary_files_are_no_logs() {
 #[test]
 fn pieces_of_one_flight_may_name_their_own_departures() {
     let fleet = one_tail();
+    thirds(&fleet);
+    let before = plain();
+    fleet.configure("[logs]", "[logs]\npieces = true");
+    fleet.run_ok(&["run"]);
+    assert_eq!(numbers(&fleet).len(), before.len());
+    assert_eq!(numbers(&fleet), before);
+}
+
+/// Flags of all records, and the largest change of a gap against the whole logs, m.
+fn flags_and_change(fleet: &TestFleet, whole: &TestFleet) -> (Vec<String>, f64) {
+    let records = |fleet: &TestFleet| {
+        let rows = fleet.run_ok(&["store", "export", "--format", "json"]);
+        serde_json::from_str::<Vec<serde_json::Value>>(&rows).unwrap()
+    };
+    let (found, wanted) = (records(fleet), records(whole));
+    assert_eq!(found.len(), wanted.len());
+    let gap = |row: &serde_json::Value| row["gap_m"].as_f64().unwrap();
+    let change = found.iter().zip(&wanted).map(|(a, b)| (gap(a) - gap(b)).abs()).fold(0.0, f64::max);
+    let flags = found.iter().flat_map(|row| row["flags"].as_array().unwrap().clone());
+    (flags.map(|flag| flag.as_str().unwrap().to_owned()).collect(), change)
+}
+
+/// Rows of one channel that are missing from a log: three in a row, or one in five hundred.
+fn misses(kind: &str, channel: usize, row: usize) -> bool {
+    match kind {
+        "three" => (5_000 + 17 * channel..5_003 + 17 * channel).contains(&row),
+        _ => row % 499 == 100 + 7 * channel,
+    }
+}
+
+const CHANNELS: [&str; 3] = ["motor_deg", "screw_mm", "load_n"];
+
+/// A file for each channel, each with rows of its own missing: no flag is raised, and the gaps stay.
+#[test]
+fn missing_rows_of_one_channel_in_its_own_file_raise_no_flag() {
+    let whole = one_tail();
+    whole.run_ok(&["run"]);
+    for kind in ["three", "few"] {
+        let fleet = one_tail();
+        for log in logs(&fleet) {
+            for (k, channel) in CHANNELS.iter().enumerate() {
+                let to = fleet.path(&format!("{channel}/{}", log.file_name().unwrap().to_str().unwrap()));
+                std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+                let is_own = |column: &str| column == "time_s" || column.ends_with(channel);
+                rewrite(&log, &to, &facts(&log), is_own, |row| !misses(kind, k, row));
+            }
+        }
+        fleet.configure("sample-data/logs/N412FP/*.parquet", "motor_deg/*.parquet");
+        fleet.configure("[channel.screw_position]", "[channel.screw_position]\ngroup = \"screw\"");
+        fleet.configure("[channel.load]", "[channel.load]\ngroup = \"load\"");
+        let groups = "[group.screw]\nfiles = [\"screw_mm/*.parquet\"]\n\n\
+                      [group.load]\nfiles = [\"load_n/*.parquet\"]\n\n[estimate]";
+        fleet.configure("[estimate]", groups);
+        fleet.run_ok(&["run"]);
+        let (flags, change_m) = flags_and_change(&fleet, &whole);
+        let is_raised = |flag: &String| flag.ends_with("_spikes") || flag.ends_with("_missing");
+        assert!(!flags.iter().any(is_raised) && change_m < 1e-6, "{kind}: {flags:?}, {change_m} m");
+    }
+}
+
+/// A row per channel and instant, some rows missing: no flag is raised, and the gaps stay.
+#[test]
+fn missing_rows_of_a_long_log_raise_no_flag() {
+    use ingest::parquet::writer::{Column, write_parquet};
+    let whole = one_tail();
+    whole.run_ok(&["run"]);
+    for kind in ["three", "few"] {
+        let fleet = one_tail();
+        for log in logs(&fleet) {
+            let table = Table::read(&log);
+            let time = table.reals("time_s");
+            let channels = table.names().into_iter().filter_map(|name| {
+                let channel = CHANNELS.iter().position(|channel| name.ends_with(channel))?;
+                Some((channel, table.reals(&name), name))
+            });
+            let mut rows: Vec<(f64, String, f64)> = channels
+                .flat_map(|(channel, values, name)| {
+                    let kept = (0..time.len()).filter(|row| !misses(kind, channel, *row));
+                    kept.map(|row| (time[row], name.clone(), values[row])).collect::<Vec<_>>()
+                })
+                .collect();
+            rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let columns = [
+                ("time_s".to_owned(), Column::Real(rows.iter().map(|row| row.0).collect())),
+                ("parameter".to_owned(), Column::Text(rows.iter().map(|row| row.1.clone()).collect())),
+                ("value".to_owned(), Column::Real(rows.iter().map(|row| row.2).collect())),
+            ];
+            write_parquet(&log, &columns, &facts(&log)).unwrap();
+        }
+        let layout = "[layout]\nname_column = \"parameter\"\nvalue_column = \"value\"\n\n[clock]";
+        fleet.configure("[clock]", layout);
+        fleet.run_ok(&["run"]);
+        let (flags, change_m) = flags_and_change(&fleet, &whole);
+        let is_raised = |flag: &String| flag.ends_with("_spikes") || flag.ends_with("_missing");
+        assert!(!flags.iter().any(is_raised) && change_m < 1e-6, "{kind}: {flags:?}, {change_m} m");
+    }
+}
+
+/// A screw position in every second row, and nothing between: `check` names the setting, and it gives the gaps.
+#[test]
+fn check_names_the_rate_of_a_slower_screw() {
+    use ingest::parquet::writer::{Column, write_parquet};
+    let fleet = one_tail();
+    for log in logs(&fleet) {
+        let table = Table::read(&log);
+        let column = |name: String| {
+            let mut values = table.reals(&name);
+            if name.ends_with("screw_mm") {
+                values.iter_mut().skip(1).step_by(2).for_each(|value| *value = f64::NAN);
+            }
+            (name, Column::Real(values))
+        };
+        let columns: Vec<_> = table.names().into_iter().map(column).collect();
+        write_parquet(&log, &columns, &facts(&log)).unwrap();
+    }
+    let text = fleet.freeplay(&["check", "--limit", "1"]).out;
+    assert!(text.contains("rate_hz = 50"), "{text}");
+    fleet.configure("_screw_mm\"", "_screw_mm\"\nrate_hz = 50.0");
+    let text = fleet.run_ok(&["check", "--limit", "1"]);
+    assert!(!text.contains("rate_hz"), "{text}");
+}
+
+/// A clock that starts again: the error names both settings, and neither drops samples in silence.
+#[test]
+fn a_clock_that_restarts_names_its_settings() {
+    use ingest::parquet::writer::{Column, write_parquet};
+    let fleet = one_tail();
     let log = &logs(&fleet)[0];
+    let table = Table::read(log);
+    let column = |name: String| {
+        let mut values = table.reals(&name);
+        if name == "time_s" {
+            let half = values.len() / 2;
+            let first = values[0];
+            let restart = values[half] - first;
+            values[half..].iter_mut().for_each(|time| *time -= restart);
+        }
+        (name, Column::Real(values))
+    };
+    let columns: Vec<_> = table.names().into_iter().map(column).collect();
+    write_parquet(log, &columns, &facts(log)).unwrap();
+    for command in ["check", "run"] {
+        let result = fleet.freeplay(&[command]);
+        assert_eq!(result.code, Some(1), "{result:?}");
+        assert!(result.err.contains("error[time_goes_back]"), "{}", result.err);
+        assert!(result.err.contains("split_at_jumps") && result.err.contains("wraps_at"), "{}", result.err);
+        let hint = result.err.lines().find(|line| line.starts_with("hint: ")).unwrap();
+        assert!(!hint.contains("max_back_s"), "{hint}");
+    }
+    fleet.configure("unit = \"s\"", "unit = \"s\"\nsplit_at_jumps = true");
+    fleet.run_ok(&["run"]);
+    assert_eq!(numbers(&fleet).len(), 1 + 10 * 4);
+}
+
+/// A pattern that matches nothing, and a file of a group without a flight: both name what to do.
+#[test]
+fn listing_hints_name_the_pattern_and_the_flight() {
+    let fleet = one_tail();
+    fleet.configure("N412FP/*.parquet", "N999XX/*.parquet");
+    let result = fleet.freeplay(&["check"]);
+    assert_eq!(result.code, Some(2), "{result:?}");
+    assert!(result.err.contains("error[no_log_matched]") && result.err.contains("N999XX"), "{}", result.err);
+    assert!(result.err.contains("hint: patterns are relative to"), "{}", result.err);
+}
+
+/// Three thirds of a flight, each with the instant of its first row as its departure, as files `c`, `a` and `b`.
+fn thirds(fleet: &TestFleet) {
+    let log = &logs(fleet)[0];
     let whole = facts(log);
     let rows = Table::read(log).rows();
     for (k, name) in ["c.parquet", "a.parquet", "b.parquet"].into_iter().enumerate() {
@@ -348,12 +515,60 @@ fn pieces_of_one_flight_may_name_their_own_departures() {
         let part = rows * k / 3..rows * (k + 1) / 3;
         rewrite(log, &log.with_file_name(name), &own, |_| true, |row| part.contains(&row));
     }
-    let (first, before) = (log.clone(), plain());
-    std::fs::remove_file(first).unwrap();
+    std::fs::remove_file(log).unwrap();
+}
+
+/// None of the pieces is a flight, in whichever order they are found; once the setting declares what they are, they are read.
+#[test]
+fn undeclared_pieces_with_their_own_departures_are_an_error() {
+    let fleet = one_tail();
+    thirds(&fleet);
+    let late = fleet.path("sample-data/logs/N412FP/a.parquet");
+    let bytes = std::fs::read(&late).unwrap();
+    std::fs::remove_file(&late).unwrap();
+    let faults = |text: &str| text.matches("error[pieces_undeclared]").count();
+    for command in ["check", "run"] {
+        let result = fleet.freeplay(&[command]);
+        assert_eq!((result.code, faults(&result.err)), (Some(1), 2), "{result:?}");
+        assert!(
+            result.err.contains("logs.pieces = true") && result.err.contains("logs.pieces = false"),
+            "{result:?}"
+        );
+    }
+    let others = numbers(&fleet);
+    assert_eq!(others.len(), 1 + 9 * 4);
+    // A piece that comes later changes nothing for the others.
+    std::fs::write(&late, bytes).unwrap();
+    for (command, count) in [("check", 3), ("run", 1)] {
+        let result = fleet.freeplay(&[command]);
+        assert_eq!((result.code, faults(&result.err)), (Some(1), count), "{command}: {result:?}");
+    }
+    assert_eq!(numbers(&fleet), others);
     fleet.configure("[logs]", "[logs]\npieces = true");
+    fleet.run_ok(&["check"]);
     fleet.run_ok(&["run"]);
-    assert_eq!(numbers(&fleet).len(), before.len());
-    assert_eq!(numbers(&fleet), before);
+    assert_eq!(numbers(&fleet), plain());
+}
+
+/// A piece whose flight was stored alone takes the records back; declared as flights of their own, both are stored.
+#[test]
+fn a_second_piece_retires_the_records_of_the_first() {
+    let fleet = one_tail();
+    thirds(&fleet);
+    let folder = fleet.path("sample-data/logs/N412FP");
+    let hidden: Vec<(PathBuf, Vec<u8>)> = ["a.parquet", "b.parquet"]
+        .map(|name| (folder.join(name), std::fs::read(folder.join(name)).unwrap()))
+        .into();
+    hidden.iter().for_each(|(path, _)| std::fs::remove_file(path).unwrap());
+    fleet.run_ok(&["run"]);
+    assert_eq!(numbers(&fleet).len(), 1 + 10 * 4);
+    hidden.iter().for_each(|(path, bytes)| std::fs::write(path, bytes).unwrap());
+    assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
+    assert_eq!(numbers(&fleet).len(), 1 + 9 * 4);
+    fleet.configure("[logs]", "[logs]\npieces = false");
+    fleet.run_ok(&["check"]);
+    fleet.run_ok(&["run"]);
+    assert_eq!(numbers(&fleet).len(), 1 + 12 * 4);
 }
 
 /// Pieces that are not declared are two logs of one flight: `check` reports what `run` does, and both name the setting.

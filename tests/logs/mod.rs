@@ -2,5 +2,6 @@
 
 mod corrupt_logs;
 mod ground_truth;
-mod layouts;
+mod hostile_names;
+pub(crate) mod layouts;
 mod reference_logs;

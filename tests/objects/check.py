@@ -309,9 +309,55 @@ def a_listing_takes_no_more_memory_the_longer_it_is(bench):
     return f"peak {few:.0f} MiB for 1000 keys, {many:.0f} MiB for {KEYS}"
 
 
+def a_table_in_a_bucket_is_read_by_its_log(bench):
+    """Three flights of one tail were added and one was withdrawn; the pattern names the table, a part of it, or a file."""
+    logs = [log for log in bench.logs if log.parent.name == "N412FP"][:3]
+    names = [f"part=1/{log.name}" for log in logs]
+    for name, log in zip(names, logs):
+        bench.put(f"lake/table/{name}", log.read_bytes())
+    schema = '{"type":"struct","fields":[{"name":"time_s","type":"double","nullable":true,"metadata":{}}]}'
+    first = [
+        {"protocol": {"minReaderVersion": 1, "minWriterVersion": 2}},
+        {
+            "metaData": {
+                "id": "af23c9d7-fff1-4a5a-a2c8-55c59bd782aa",
+                "format": {"provider": "parquet", "options": {}},
+                "schemaString": schema,
+                "partitionColumns": [],
+                "configuration": {},
+            }
+        },
+    ]
+    add = lambda name, log: {
+        "add": {
+            "path": name.replace("=", "%3D"),
+            "partitionValues": {},
+            "size": log.stat().st_size,
+            "modificationTime": 0,
+            "dataChange": True,
+        }
+    }
+    first += [add(name, log) for name, log in zip(names, logs)]
+    remove = {"remove": {"path": names[1].replace("=", "%3D"), "deletionTimestamp": 0, "dataChange": True}}
+    for version, entries in enumerate((first, [remove])):
+        text = "".join(json.dumps(entry) + "\n" for entry in entries)
+        bench.put(f"lake/table/_delta_log/{version:020}.json", text.encode())
+    bench.line.spoil(0, 0)
+    for number, pattern in enumerate(("lake/**/*.parquet", "lake/table/part=1/*.parquet", f"lake/table/{names[1]}")):
+        folder = bench.folder(f"table-{number}", logs="s3://fleet")
+        text = (folder / "pipeline.toml").read_text().replace("logs/**/*.parquet", pattern)
+        (folder / "pipeline.toml").write_text(text)
+        if number == 2:
+            assert "error[no_log_matched]" in bench.run(folder, "run", code=2)
+        else:
+            assert "8 records of 2 flights" in bench.run(folder, "run")
+    return "the withdrawn flight is in no store"
+
+
 TESTS = [
     logs_over_a_bad_line_give_the_rows_of_local_logs,
     only_the_needed_columns_are_fetched,
+    a_table_in_a_bucket_is_read_by_its_log,
     what_is_known_is_not_fetched_again,
     a_store_that_is_down_is_told_with_a_remedy,
     keys_come_from_a_profile_too,

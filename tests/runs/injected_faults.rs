@@ -303,6 +303,37 @@ fn a_log_folder_that_fails_from_some_call_on_is_reported_and_heals() {
     strike(RUN, NEW, ("sample-data/logs", "read", EIO), true);
 }
 
+/// Three flights as a Delta table from which the second was withdrawn; its file is still in the folder.
+fn table() -> TestFleet {
+    let fleet = few();
+    let logs = logs_of(&fleet);
+    let names: Vec<&str> = logs.iter().map(|log| log.file_name().unwrap().to_str().unwrap()).collect();
+    crate::logs::layouts::delta_log(logs[0].parent().unwrap(), &names, &names[1..2]);
+    fleet
+}
+
+/// A folder that may be a table is an error: a withdrawn file is never read as a log.
+#[test]
+fn a_look_at_a_table_that_fails_stores_no_withdrawn_flight() {
+    let Some(injector) = Injector::new() else { return };
+    let plain = table();
+    plain.run_ok(RUN);
+    let wanted = plain.exported();
+    assert_eq!(wanted.lines().count() - 1, 8);
+    let command = Struck { injector: &injector, make: table, args: RUN, wanted: &wanted };
+    const UNDER: &str = "logs/N413FP/_delta_log";
+    for (under, mode) in [(UNDER, EIO), (UNDER, ESTALE)] {
+        let count = injector.count(&table(), RUN, under, "read");
+        assert!(count > 0, "no call on {under}");
+        for &at in &calls(count) {
+            command.tried(&Fault::at(under, "read", mode, at));
+        }
+        let always = injector.run(&table(), RUN, &Fault { last: 0, ..Fault::at(under, "read", mode, 1) });
+        assert_eq!(always.code, Some(1), "{always:?}");
+        assert!(always.err.contains("error[folder_unreadable]"), "{always:?}");
+    }
+}
+
 #[test]
 fn a_store_call_that_fails_in_a_new_store_loses_nothing() {
     strike(RUN, NEW, ("results", "write", EIO), false);

@@ -80,11 +80,7 @@ impl Output {
     /// Writes a note to stderr.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {
-            self.err(&if self.is_json() {
-                json_log::note(text)
-            } else {
-                escape_invisible(text).into_owned()
-            });
+            self.err(&if self.is_json() { json_log::note(text) } else { escape(text) });
         }
     }
 

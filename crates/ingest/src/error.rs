@@ -220,7 +220,7 @@ impl ErrorKind {
             Self::NoPosition { columns, .. } => Some(format!("columns {}", shortened(columns))),
             Self::TimeUnit { found, .. } => Some(found.clone()),
             Self::TimeGoesBack { before_s, after_s, times, .. } => {
-                Some(format!("{after_s} s after {before_s} s, {times} such falls in all"))
+                Some(format!("{after_s} s after {before_s} s; {times} rows lie so far back"))
             }
             Self::TimeStandsStill { rows, .. } => Some(format!("{rows} rows with one stamp")),
             Self::RateContradicts { seen_hz, .. } => Some(format!("{seen_hz:.6} Hz by the median step")),

@@ -468,6 +468,30 @@ pub fn duplicate_flight(log: &str, owner: &str) -> Diagnostic {
     )
 }
 
+/// Pieces of a flight depart within so long of each other: each may hold its own first instant as its departure.
+pub const MAX_BETWEEN_PIECES: SignedDuration = SignedDuration::from_hours(12);
+
+/// Whether two departures of one flight id may be those of pieces of one flight.
+pub fn may_be_pieces(one: Timestamp, other: Timestamp) -> bool {
+    one != other && one.duration_since(other).abs() <= MAX_BETWEEN_PIECES
+}
+
+/// The error of a log whose flight id another log has, with another departure close by: no piece is a flight.
+pub fn pieces_undeclared(
+    log: &str,
+    departure: Timestamp,
+    other: &str,
+    other_departure: Timestamp,
+) -> Diagnostic {
+    let what = format!(
+        "the flight departs at {departure} in this log and at {other_departure} in {other}, which has the same tail and flight id"
+    );
+    Diagnostic::new("pieces_undeclared", what).in_file(log).hint(
+        "if they are pieces of one flight, set `logs.pieces = true`; if they are flights of their own, set \
+         `logs.pieces = false`, or map a flight id that separates them. Until then none of them is used",
+    )
+}
+
 fn flight_of(id: &Identity) -> Flight {
     Flight {
         tail_number: id.tail_number.clone(),

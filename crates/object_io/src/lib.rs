@@ -23,6 +23,6 @@ pub use address::{Address, is_address};
 pub use client::{Client, block_on, handle};
 pub use error::Error;
 pub use http_post::{Posted, check_url, post_json};
-pub use listing::{ListEntry, head, list};
+pub use listing::{ListEntry, head, list, list_first};
 pub use object_file::{ObjectFile, read_all};
 pub use settings::{Settings, configure};

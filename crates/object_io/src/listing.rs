@@ -38,10 +38,18 @@ impl ListEntry {
 ///
 /// # Errors
 /// The error of the failed request; entries passed before it are valid.
-pub fn list(folder: &Address, mut take: impl FnMut(ListEntry)) -> Result<(), Error> {
+pub fn list(folder: &Address, take: impl FnMut(ListEntry)) -> Result<(), Error> {
+    list_first(folder, usize::MAX, take)
+}
+
+/// As [`list`], for the first `most` objects by name.
+///
+/// # Errors
+/// As [`list`].
+pub fn list_first(folder: &Address, most: usize, mut take: impl FnMut(ListEntry)) -> Result<(), Error> {
     let (client, location, clock) = (folder.client()?, folder.location()?, Instant::now());
     block_on(async {
-        let mut found = client.list(Some(&location));
+        let mut found = client.list(Some(&location)).take(most);
         while let Some(meta) = found.next().await {
             let failed = |e| Error::of(folder, clock.elapsed().as_secs_f64(), &e);
             take(ListEntry::of(folder, meta.map_err(failed)?));

@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 use std::fmt;
 
-use crate::sanitize::{MAX_FIELD_CHARS, escape_invisible, limit_length};
+use crate::sanitize::{MAX_FIELD_CHARS, escape_cell, escape_invisible, limit_length};
 use serde::{Deserialize, Serialize, Serializer};
 
 /// One error in one file, with a hint that its owner can act on.
@@ -124,10 +124,17 @@ fn serialize_masked_option<S: Serializer>(text: &Option<String>, to: S) -> Resul
     }
 }
 
-/// A field as people see it: without credentials, invisible characters, or more text than they can take in.
+/// A field as people see it: on its line, without credentials, invisible characters, or more text than they can take in.
 fn readable(text: &str) -> String {
     let masked = mask_credentials(text);
-    escape_invisible(&limit_length(&masked, MAX_FIELD_CHARS)).into_owned()
+    escape_cell(&limit_length(&masked, MAX_FIELD_CHARS)).into_owned()
+}
+
+/// A hint as people see it. It may have several lines; those after the first are indented, so that none looks like
+/// another diagnostic.
+fn readable_hint(text: &str) -> String {
+    let masked = mask_credentials(text);
+    escape_invisible(&limit_length(&masked, MAX_FIELD_CHARS)).replace('\n', "\n  ")
 }
 
 /// The layout of `docs/errors.md`, without colour: the first line is the error, the other lines are indented.
@@ -152,7 +159,7 @@ impl fmt::Display for Diagnostic {
             }
         }
         if let Some(hint) = &self.hint {
-            write!(f, "\nhint: {}", readable(hint))?;
+            write!(f, "\nhint: {}", readable_hint(hint))?;
         }
         Ok(())
     }
@@ -174,6 +181,20 @@ mod tests {
         };
         let text = "error[time_goes_back]: the clock runs backwards\n  file    a.parquet\n  at      column `t_ns`, row 9\n  found   12:04:07 after 12:04:09\nhint: sort it";
         assert_eq!(c.to_string(), text);
+    }
+
+    /// A name may hold line feeds; what follows them must not look like a message of the program.
+    #[test]
+    fn a_name_with_line_feeds_cannot_forge_a_diagnostic() {
+        let name = "a\nerror[forged]: b";
+        let diagnostic = Diagnostic {
+            column: Some(name.to_owned()),
+            found: Some(name.to_owned()),
+            ..Diagnostic::new("column_missing", name).in_file(name).hint(name)
+        };
+        let shown = diagnostic.to_string();
+        assert!(shown.lines().skip(1).all(|line| !line.starts_with("error[")), "{shown}");
+        assert!(shown.contains("a[U+000A]error[forged]: b\n  file    a[U+000A]error"), "{shown}");
     }
 
     #[test]

@@ -67,7 +67,7 @@ pub fn limit_length(text: &str, max_chars: usize) -> Cow<'_, str> {
 
 /// A text cell of a CSV file that no spreadsheet takes for a formula (OWASP, *CSV Injection*): an apostrophe stands
 /// before a first `=`, `+`, `-`, `@`, tab or carriage return, unless the whole cell is a number. Control characters
-/// are replaced by their code points.
+/// and direction overrides are replaced by their code points.
 ///
 /// ```
 /// # use records::sanitize::csv_cell;
@@ -75,7 +75,7 @@ pub fn limit_length(text: &str, max_chars: usize) -> Cow<'_, str> {
 /// assert_eq!(csv_cell("-1.5e-5"), "-1.5e-5");
 /// ```
 pub fn csv_cell(text: &str) -> Cow<'_, str> {
-    let is_hidden = |c: char| c.is_control() && !matches!(c, '\n' | '\t' | '\r');
+    let is_hidden = |c: char| is_invisible(c) && c != '\r';
     let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
     match (is_formula, escape(text, is_hidden)) {
         (false, shown) => shown,
@@ -104,7 +104,7 @@ mod tests {
         for plain in ["-12.5", "+3", "N412FP", "", "2026-03-01T00:00:00Z", "inf", "-inf", "-0"] {
             assert!(matches!(csv_cell(plain), Cow::Borrowed(_)), "{plain}");
         }
-        assert_eq!(csv_cell("a\u{1b}[2Jb"), "a[U+001B][2Jb");
+        assert_eq!(csv_cell("a\u{1b}[2Jb\u{202e}"), "a[U+001B][2Jb[U+202E]");
     }
 
     #[test]

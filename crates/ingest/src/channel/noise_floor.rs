@@ -41,8 +41,17 @@ const SYSTEMATIC: f64 = 0.03;
 /// Rounding to steps adds step²/12 to the variance and is subtracted. A channel that repeats every value k times, or
 /// holds one in k rows, is taken at its own rate. NaN marks a missing sample.
 pub fn white_noise(values: &[f64], resolution: Option<f64>) -> Option<WhiteNoise> {
+    white_noise_of(values, resolution, MAX_BLOCKS)
+}
+
+/// As [`white_noise`], from at most so many blocks.
+pub(crate) fn white_noise_of(
+    values: &[f64],
+    resolution: Option<f64>,
+    most_blocks: usize,
+) -> Option<WhiteNoise> {
     let own = own_samples(values);
-    let blocks = block_variances(own.as_deref().unwrap_or(values), resolution.unwrap_or(0.0));
+    let blocks = block_variances(own.as_deref().unwrap_or(values), resolution.unwrap_or(0.0), most_blocks);
     let levels: Vec<Level> =
         ORDERS.iter().zip(blocks).filter_map(|(order, variances)| quiet_level(*order, variances)).collect();
     let mut best = *levels.first()?;
@@ -94,10 +103,10 @@ fn own_samples(values: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// Noise variances of all blocks, for each order; blocks with a missing sample, or at rest, are left out.
-fn block_variances(values: &[f64], step: f64) -> [Vec<f64>; ORDERS.len()] {
+fn block_variances(values: &[f64], step: f64, most_blocks: usize) -> [Vec<f64>; ORDERS.len()] {
     let mut found: [Vec<f64>; ORDERS.len()] = std::array::from_fn(|_| Vec::new());
     let count = values.len().saturating_sub(BLOCK) / (BLOCK / 2) + 1;
-    let stride = (BLOCK / 2) * count.div_ceil(MAX_BLOCKS);
+    let stride = (BLOCK / 2) * count.div_ceil(most_blocks);
     for start in (0..(values.len() + 1).saturating_sub(BLOCK)).step_by(stride) {
         let about = &values[start.saturating_sub(MARGIN)..values.len().min(start + BLOCK + MARGIN)];
         if step > 0.0 && span(about) < MIN_STEPS * step {

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use crate::channel::noise_floor::white_noise;
+use crate::channel::noise_floor::white_noise_of;
 use crate::channel::stats::{ChannelStats, range};
 use crate::mapping::Role;
 use crate::time::zero_order_hold::median_sample_interval;
@@ -174,7 +174,7 @@ fn mean_step(values: &[f64]) -> f64 {
 ///
 /// The fourth difference over 6 is an outlier's height; smooth motion hardly shows in it. An outlier gives −4/6, 1,
 /// −4/6 in three neighbouring differences; a step of the position or of its speed does not. The height must exceed six
-/// standard deviations of the channel's noise, six times the impacts that recur every few seconds, and twice what its
+/// standard deviations of the channel's noise, nine times the impacts that recur every few seconds, and twice what its
 /// surroundings show.
 fn spikes(
     (values, segments): (&[f64], &[Range<usize>]),
@@ -183,14 +183,21 @@ fn spikes(
     step_s: f64,
 ) -> usize {
     const FAR: f64 = 6.0;
-    const IMPACTS: f64 = 6.0;
+    const IMPACTS: f64 = 9.0;
     const LOCAL_SHARE: f64 = 0.45;
     const SHAPE_TOLERANCE: f64 = 0.3;
     const REACH: usize = 12;
+    /// Enough for a threshold: the noise is known to about 3 %.
+    const NOISE_BLOCKS: usize = 1000;
     let step = resolution.unwrap_or(0.0);
-    let noise = white_noise(values, resolution).map_or(0.0, |noise| noise.rms).hypot(step / 12.0_f64.sqrt());
+    if max_second_difference <= 4.0 * step || values.len() < 7 {
+        return 0;
+    }
+    let noise = white_noise_of(values, resolution, NOISE_BLOCKS)
+        .map_or(0.0, |noise| noise.rms)
+        .hypot(step / 12.0_f64.sqrt());
     let far = (FAR * DIFFERENCE_NOISE * noise).max(4.0 * step);
-    if max_second_difference <= far || values.len() < 7 {
+    if max_second_difference <= far {
         return 0;
     }
     let height = |i: usize| {

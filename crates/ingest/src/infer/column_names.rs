@@ -23,7 +23,8 @@ fn words(name: &str) -> Vec<(usize, &str)> {
     found
 }
 
-const TIMES: [&str; 9] = ["time", "t", "timestamp", "stamp", "elapsed", "tick", "ticks", "clock", "utc"];
+const TIMES: [&str; 11] =
+    ["time", "t", "timestamp", "stamp", "elapsed", "tick", "ticks", "clock", "utc", "epoch", "unix"];
 
 pub(super) fn is_time(name: &str) -> bool {
     words(name).iter().any(|(_, word)| TIMES.contains(&word.to_lowercase().as_str()))
@@ -78,6 +79,11 @@ fn unit_of(word: &str) -> Option<Unit> {
     known.iter().find(|(said, _)| *said == word).map(|(_, unit)| *unit)
 }
 
+/// Whether a text is the symbol of a unit.
+pub(super) fn is_unit(text: &str) -> bool {
+    unit_of(&text.trim().to_lowercase()).is_some()
+}
+
 /// Words of quantities that are no position, load or temperature.
 const OTHERS: [&str; 16] = [
     "current", "speed", "velocity", "voltage", "cmd", "command", "demand", "power", "status", "valid", "ssm",
@@ -118,9 +124,13 @@ impl ParsedName {
             Role::Load => matches!(unit.dimension(), Dimension::Force | Dimension::Torque),
             Role::Temperature => unit.dimension() == Dimension::Temperature,
         };
-        let last = words.len() - 1;
-        let unit = if last == at { None } else { unit_of(&words[last].2).filter(fits) };
-        let is_unit = |i: usize| unit.is_some() && i == last;
+        // A unit ends a name, or follows the channel.
+        let unit_at = |i: usize| Some((i, unit_of(&words[i].2).filter(fits)?));
+        let follower = (at + 1..words.len()).find(|i| !says(&FILLERS, &words[*i].2));
+        let last = Some(words.len() - 1).filter(|last| *last != at);
+        let found = last.and_then(unit_at).or_else(|| follower.and_then(unit_at));
+        let unit = found.map(|(_, unit)| unit);
+        let is_unit = |i: usize| found.is_some_and(|(at, _)| at == i);
         let tag = (at + 1..words.len()).find(|i| has_sensors && !is_unit(*i) && says(&SENSORS, &words[*i].2));
         let sensor = tag.and_then(|i| SENSORS.iter().position(|word| *word == words[i].2));
         let is_other_role =
@@ -173,6 +183,14 @@ mod tests {
             ("loadElevatorRight", Role::Load, "load{position}", place("ElevatorRight"), None),
             ("ELV_L.MOT_POS_RAD", Role::Motor, "{position}.MOT_POS_RAD", place("ELV_L"), Some(Unit::Radian)),
             ("load_n", Role::Load, "load_n", None, Some(Unit::Newton)),
+            (
+                "motor_pos_deg_rudder",
+                Role::Motor,
+                "motor_pos_deg_{position}",
+                place("rudder"),
+                Some(Unit::Degree),
+            ),
+            ("rudder/screw_position", Role::Screw, "{position}/screw_position", place("rudder"), None),
             ("resolver angle rudder", Role::Motor, "resolver angle {position}", place("rudder"), None),
         ];
         for (name, role, pattern, position, unit) in cases {

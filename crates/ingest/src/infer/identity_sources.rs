@@ -110,21 +110,29 @@ const TIMES: [(&str, &str); 4] =
 const TAIL: &str = r"[A-Z]{1,2}-?[A-Z0-9]{2,6}";
 
 /// An expression and a departure format for logs whose path holds tail and departure, if this one seems to: as
-/// `TAIL/…departure….parquet`, `TAIL_departure.parquet` or `TAIL/day/time.parquet`.
-pub fn path_identity(path: &Path) -> Option<(String, String)> {
+/// `TAIL/…departure….parquet`, `TAIL_departure.parquet`, `TAIL/departure/….parquet` or `TAIL/day/time.parquet`. Where
+/// `with_position`, the end of the file name is the position, if it has no digits.
+pub fn path_identity(path: &Path, with_position: bool) -> Option<(String, String)> {
     let name = path.file_name()?.to_str()?;
     let fits =
         |expression: &str, text: &str| regex::Regex::new(expression).is_ok_and(|regex| regex.is_match(text));
     let folder = |up: usize| path.ancestors().nth(up)?.file_name()?.to_str();
     let is_tail = |text: Option<&str>| text.is_some_and(|text| fits(&format!("^{TAIL}$"), text));
     let alone = |form: &str| format!(r"^(?:.*\D)?{form}(?:\D.*)?$");
-    if let Some((form, format)) = DEPARTURES.iter().find(|(form, _)| fits(&alone(form), name)) {
+    let is_known = |text: &str| DEPARTURES.iter().find(|(form, _)| fits(&alone(form), text));
+    let is_place = with_position && fits(&format!("^{PLACE_END}$"), name);
+    let end = if is_place { PLACE_END } else { r"[^/]*\.parquet" };
+    if let Some((form, format)) = is_known(name) {
         let in_name = format!(r"^{TAIL}_[^/]*?{form}");
         let expression = if !is_tail(folder(1)) && fits(&in_name, name) {
-            format!(r"(?<tail_number>{TAIL})_[^/]*?(?<departure_utc>{form})[^/]*\.parquet$")
+            format!(r"(?<tail_number>{TAIL})_[^/]*?(?<departure_utc>{form}){end}$")
         } else {
-            format!(r"(?<tail_number>[^/]+)/[^/]*?(?<departure_utc>{form})[^/]*\.parquet$")
+            format!(r"(?<tail_number>[^/]+)/[^/]*?(?<departure_utc>{form}){end}$")
         };
+        return Some((expression, (*format).to_owned()));
+    }
+    if let Some((form, format)) = folder(1).and_then(is_known).filter(|_| is_tail(folder(2))) {
+        let expression = format!(r"(?<tail_number>[^/]+)/[^/]*?(?<departure_utc>{form})[^/]*/{end}$");
         return Some((expression, (*format).to_owned()));
     }
     let day = DAYS.iter().find(|(form, _)| folder(1).is_some_and(|text| fits(&format!("^{form}$"), text)))?;
@@ -138,9 +146,18 @@ pub fn path_identity(path: &Path) -> Option<(String, String)> {
 
 /// The tail number in a path of one of the forms that [`path_identity`] knows.
 pub fn path_tail(path: &Path) -> Option<String> {
-    let (expression, _) = path_identity(path)?;
+    let (expression, _) = path_identity(path, false)?;
     let regex = regex::Regex::new(&expression).ok()?;
     Some(regex.captures(path.to_str()?)?.name("tail_number")?.as_str().to_owned())
+}
+
+/// The end of a file name that is a position.
+pub const PLACE_END: &str = r"(?:[^/]*?[_ -])?(?<position>[A-Za-z]+(?:[_ -][A-Za-z]+)*)\.parquet";
+
+/// The position at the end of a file name, if it has no digits.
+pub fn path_position(path: &Path) -> Option<String> {
+    let regex = regex::Regex::new(&format!("^{PLACE_END}$")).ok()?;
+    Some(regex.captures(path.file_name()?.to_str()?)?.name("position")?.as_str().to_owned())
 }
 
 #[cfg(test)]
@@ -154,25 +171,43 @@ mod tests {
             ("d/TC-JRA/20261119T041300Z_0413.parquet", "20261119T041300Z", "%Y%m%dT%H%M%SZ"),
             ("d/TC-JRA/QAR20261119_041300.parquet", "20261119_041300", "%Y%m%d_%H%M%S"),
         ] {
-            let (expression, found) = path_identity(Path::new(path)).unwrap();
+            let (expression, found) = path_identity(Path::new(path), false).unwrap();
             let regex = regex::Regex::new(&expression).unwrap();
             let facts = regex.captures(path).unwrap();
             assert_eq!((&facts["departure_utc"], found.as_str()), (departure, format), "{expression}");
             assert_eq!(&facts["tail_number"], path.split('/').nth(1).unwrap());
         }
-        assert_eq!(path_identity(Path::new("d/N412FP/flight 7.parquet")), None);
+        assert_eq!(path_identity(Path::new("d/N412FP/flight 7.parquet"), false), None);
     }
 
     #[test]
     fn a_day_in_a_folder_and_a_tail_in_a_name_are_found() {
-        let (expression, format) = path_identity(Path::new("d/N412FP/2026-11-19/0413.parquet")).unwrap();
+        let (expression, format) =
+            path_identity(Path::new("d/N412FP/2026-11-19/0413.parquet"), false).unwrap();
         let facts = regex::Regex::new(&expression).unwrap();
         let facts = facts.captures("d/N412FP/2026-11-19/0413.parquet").unwrap();
         assert_eq!((&facts["departure_date"], &facts["departure_time"]), ("2026-11-19", "0413"));
         assert_eq!(format, "%Y-%m-%dT%H%M");
         let path = "logs/TC-JRA_20261119T041300Z.parquet";
-        let (expression, _) = path_identity(Path::new(path)).unwrap();
+        let (expression, _) = path_identity(Path::new(path), false).unwrap();
         assert_eq!(&regex::Regex::new(&expression).unwrap().captures(path).unwrap()["tail_number"], "TC-JRA");
+    }
+
+    #[test]
+    fn a_position_at_the_end_of_a_name_is_found() {
+        for path in [
+            "d/N412FP/20261119T041300Z/aileron_left.parquet",
+            "d/N412FP/20261119T041300Z_aileron_left.parquet",
+        ] {
+            let (expression, format) = path_identity(Path::new(path), true).unwrap();
+            let regex = regex::Regex::new(&expression).unwrap();
+            let facts = regex.captures(path).unwrap();
+            let found = (&facts["tail_number"], &facts["departure_utc"], &facts["position"]);
+            assert_eq!(found, ("N412FP", "20261119T041300Z", "aileron_left"), "{expression}");
+            assert_eq!(format, "%Y%m%dT%H%M%SZ");
+            assert_eq!(path_position(Path::new(path)).as_deref(), Some("aileron_left"));
+        }
+        assert_eq!(path_position(Path::new("d/N412FP/20261119T041300Z.parquet")), None);
     }
 
     #[test]

@@ -9,12 +9,13 @@ mod identity_sources;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 
 use arrow::datatypes::DataType;
 
 use crate::channel::column_builder::ColumnBuilder;
 use crate::error::Error;
-use crate::infer::column_names::{ParsedName, is_time, time_unit};
+use crate::infer::column_names::{ParsedName, is_time, is_unit, time_unit};
 use crate::infer::identity_sources::{fact_of, facts_of, folders};
 use crate::log::row_table::RowTable;
 use crate::mapping::column_pattern::PLACEHOLDER;
@@ -24,13 +25,15 @@ use crate::parquet::leaf_columns::LeafColumn;
 use crate::parquet::log_file::LogFile;
 use crate::parquet::row_selection::RowSelection;
 
-pub use identity_sources::{folder_value, path_identity, path_tail};
+pub use identity_sources::{PLACE_END, folder_value, path_identity, path_position, path_tail};
 
 /// What a log seems to offer.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct InferredMapping {
     /// The time column, and its unit where the name holds one; timestamp types need none.
     pub clock: Option<(String, Option<&'static str>)>,
+    /// Whether the time column counts from 1970, in its unit.
+    pub is_unix_clock: bool,
     /// Channel → its column with `{position}` in it, and its unit where the name holds one.
     pub channels: BTreeMap<Role, (String, Option<Unit>)>,
     /// Redundant columns of a channel, best first.
@@ -94,9 +97,12 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     let is_identity = |name: &str| columns.values().any(|column| column == name);
     let clock =
         clock(leaves, |name| is_identity(name) || fact_of(name).is_some_and(|_| constant(name).is_some()));
+    let mut is_unix_clock = false;
     let clock = clock.map(|(name, unit)| {
         let is_number = leaves.iter().any(|leaf| leaf.name == name && leaf.kind.is_numeric());
-        let unit = unit.or_else(|| is_number.then(|| unit_of_steps(file, &name)).flatten());
+        let times = if is_number { numbers(file, &name) } else { Vec::new() };
+        let unit = unit.or_else(|| unit_of_steps(&times));
+        is_unix_clock = unit.is_some_and(|unit| counts_from_1970(&times, unit));
         (name, unit)
     });
     let is_clock = |name: &str| clock.as_ref().is_some_and(|(column, _)| column == name);
@@ -125,7 +131,16 @@ pub fn propose(path: &Path) -> Result<InferredMapping, Error> {
     found.motor_wraps_at = if texts.is_none() { wraps_at(file, &found) } else { None };
     let tail = metadata.get(&IdentityField::TailNumber).and_then(|key| file.metadata(key)).map(str::to_owned);
     let tail = tail.or_else(|| columns.get(&IdentityField::TailNumber).and_then(|column| constant(column)));
-    Ok(InferredMapping { clock, layout, metadata, columns, folders: folders(path), tail, ..found })
+    Ok(InferredMapping {
+        clock,
+        is_unix_clock,
+        layout,
+        metadata,
+        columns,
+        folders: folders(path),
+        tail,
+        ..found
+    })
 }
 
 /// The layout that columns of names, values and positions show.
@@ -144,7 +159,8 @@ fn layout(table: &RowTable, columns: &BTreeMap<IdentityField, String>) -> Result
     for leaf in leaves.iter().filter(text).filter(|leaf| !is_taken(leaf)) {
         let is_position =
             fact_of(&leaf.name) == Some(IdentityField::Position) || is_called(leaf, &POSITION_COLUMNS);
-        if is_position && table.texts(&leaf.name)?.len() > 1 {
+        let texts = if is_position { table.texts(&leaf.name)? } else { Arc::default() };
+        if texts.len() > 1 && !texts.iter().all(|text| is_unit(text)) {
             layout.position_column = Some(leaf.name.clone());
             break;
         }
@@ -173,10 +189,7 @@ fn clock(
 }
 
 /// The unit that gives the usual step of a column of times a rate between 2 and 5000 Hz; none where two units do.
-fn unit_of_steps(file: &LogFile, name: &str) -> Option<&'static str> {
-    let mut values = ColumnBuilder::with_capacity(0, None);
-    file.append_numbers(name, RowSelection::ALL, &mut values).ok()?;
-    let (values, _) = values.finish();
+fn unit_of_steps(values: &[f64]) -> Option<&'static str> {
     let mut steps: Vec<f64> = values.windows(2).map(|w| w[1] - w[0]).filter(|step| *step > 0.0).collect();
     let middle = steps.len().checked_sub(1)? / 2;
     match *steps.select_nth_unstable_by(middle, f64::total_cmp).1 {
@@ -186,6 +199,28 @@ fn unit_of_steps(file: &LogFile, name: &str) -> Option<&'static str> {
         step if (2e6..=5e8).contains(&step) => Some("ns"),
         _ => None,
     }
+}
+
+/// A column of numbers; none where it cannot be read.
+fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
+    let mut values = ColumnBuilder::with_capacity(0, None);
+    match file.append_numbers(name, RowSelection::ALL, &mut values) {
+        Ok(_) => values.finish().0,
+        Err(_) => Vec::new(),
+    }
+}
+
+/// Whether times lie between 1990 and 2100 when they count from 1970.
+fn counts_from_1970(times: &[f64], unit: &str) -> bool {
+    let scale = match unit {
+        "s" => 1.0,
+        "ms" => 1e-3,
+        "us" => 1e-6,
+        "ns" => 1e-9,
+        _ => return false,
+    };
+    let first = times.iter().find(|time| !time.is_nan());
+    first.is_some_and(|first| (631_152_000.0..4_102_444_800.0).contains(&(first * scale)))
 }
 
 /// The struct that all numbers are fields of, with its dot.
@@ -274,9 +309,7 @@ fn wraps_at(file: &LogFile, found: &InferredMapping) -> Option<f64> {
         _ => return None,
     };
     let name = pattern.replace(PLACEHOLDER, found.positions.iter().next().map_or("", String::as_str));
-    let mut values = ColumnBuilder::with_capacity(0, None);
-    file.append_numbers(&name, RowSelection::ALL, &mut values).ok()?;
-    let (values, _) = values.finish();
+    let values = numbers(file, &name);
     let (least, greatest) =
         values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     let leaps = values.windows(2).filter(|w| (w[1] - w[0]).abs() > turn / 2.0).count();

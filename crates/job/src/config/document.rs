@@ -80,9 +80,10 @@ pub struct LogSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flights: Option<String>,
     /// Whether files of one flight are its pieces, one after the other. Without it a second file of the
-    /// same flight is a copy of the first, or an error.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub pieces: bool,
+    /// same flight is a copy of the first, or an error. `false`: logs with one flight id and different departures are
+    /// flights of their own, also within 12 hours.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pieces: Option<bool>,
     /// The maintenance table, CSV or Parquet, if there is one.
     #[serde(default)]
     pub maintenance: Option<String>,
@@ -91,6 +92,13 @@ pub struct LogSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[serde(default)]
     pub inspections: Option<String>,
+}
+
+impl LogSettings {
+    /// Whether files of one flight are declared to be its pieces.
+    pub fn has_pieces(&self) -> bool {
+        self.pieces == Some(true)
+    }
 }
 
 /// `[columns]`: our name → what the table calls it.

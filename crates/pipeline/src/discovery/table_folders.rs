@@ -1,6 +1,7 @@
 //! Folders of logs that are tables: the table's log lists its live files; others were withdrawn.
 
 use std::collections::{BTreeMap, HashMap};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use records::Diagnostic;
@@ -45,6 +46,9 @@ pub(crate) enum TableMembership {
 }
 
 impl TableFolders {
+    /// The folders in which tables keep their logs.
+    pub(crate) const LOGS: [&str; 3] = ["_delta_log", ".hoodie", "metadata"];
+
     /// Notes an object of a listing that makes its folder a table.
     pub(crate) fn note(&mut self, object: &Path) {
         let Some(folder) = object.parent() else { return };
@@ -59,15 +63,45 @@ impl TableFolders {
         }
     }
 
-    /// Whether a local file is a log.
-    pub(crate) fn local(&mut self, file: &Path) -> TableMembership {
+    /// Whether a local file is a log. `written_out` is the folder before the pattern's first wildcard: a folder above it
+    /// may forbid to be listed.
+    pub(crate) fn local(&mut self, file: &Path, written_out: &Path) -> TableMembership {
         for folder in file.ancestors().skip(1) {
-            let format = *self.folders.entry(folder.to_owned()).or_insert_with(|| format_of(folder));
+            let format = match self.folders.get(folder) {
+                Some(format) => *format,
+                None => {
+                    let format = match format_of(folder) {
+                        Err(e)
+                            if e.kind() == ErrorKind::PermissionDenied
+                                && !folder.starts_with(written_out) =>
+                        {
+                            None
+                        }
+                        Err(e) => return self.unknown(folder, &e),
+                        Ok(format) => format,
+                    };
+                    self.folders.insert(folder.to_owned(), format);
+                    format
+                }
+            };
             if let Some(format) = format {
                 return self.member(file, folder, format);
             }
         }
         TableMembership::Log
+    }
+
+    /// A folder that may be a table: any of its files may be withdrawn. It is one fault for all of them.
+    fn unknown(&mut self, folder: &Path, error: &std::io::Error) -> TableMembership {
+        self.folders.insert(folder.to_owned(), Some(TableFormat::Delta));
+        self.tables.insert(folder.to_owned(), None);
+        let what =
+            format!("whether the folder is a Delta, Iceberg or Hudi table cannot be determined: {error}");
+        let hint = "check its owner and mode, or the share; then `freeplay run`";
+        TableMembership::Fault(
+            folder.to_owned(),
+            Box::new(Diagnostic::new("folder_unreadable", what).hint(hint)),
+        )
     }
 
     /// Whether an object of a listing is a log, by what was noted of that listing.
@@ -107,16 +141,33 @@ impl TableFolders {
     }
 }
 
-fn format_of(folder: &Path) -> Option<TableFormat> {
-    if folder.join("_delta_log").is_dir() {
-        return Some(TableFormat::Delta);
+/// The table that a folder is, if it is one. Folders that do not exist are the answer *no*; every other failure is an error.
+fn format_of(folder: &Path) -> std::io::Result<Option<TableFormat>> {
+    let is_folder = |name: &str| match std::fs::metadata(folder.join(name)) {
+        Ok(data) => Ok(data.is_dir()),
+        Err(e) if is_absent(&e) => Ok(false),
+        Err(e) => Err(e),
+    };
+    if is_folder("_delta_log")? {
+        return Ok(Some(TableFormat::Delta));
     }
-    if folder.join(".hoodie").is_dir() {
-        return Some(TableFormat::Hudi);
+    if is_folder(".hoodie")? {
+        return Ok(Some(TableFormat::Hudi));
     }
-    let metadata = std::fs::read_dir(folder.join("metadata")).ok()?;
-    let is_iceberg = metadata.flatten().any(|entry| is_iceberg_metadata(&entry.path()));
-    is_iceberg.then_some(TableFormat::Iceberg)
+    let metadata = match std::fs::read_dir(folder.join("metadata")) {
+        Err(e) if is_absent(&e) => return Ok(None),
+        entries => entries?,
+    };
+    for entry in metadata {
+        if is_iceberg_metadata(&entry?.path()) {
+            return Ok(Some(TableFormat::Iceberg));
+        }
+    }
+    Ok(None)
+}
+
+fn is_absent(error: &std::io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory)
 }
 
 fn is_iceberg_metadata(path: &Path) -> bool {

@@ -12,14 +12,18 @@ const ENDS: [&str; 7] = [".tmp", ".temp", ".part", ".partial", ".crdownload", ".
 
 /// Whether a path names a temporary file below the part of a pattern that its user wrote out.
 pub fn is_temporary(path: &Path, pattern: &Path) -> bool {
-    let is_written_out = |part: &Component<'_>| !part.as_os_str().to_string_lossy().contains(['*', '?', '[']);
-    let written_out = pattern.components().take_while(is_written_out).count();
-    path.components().skip(written_out).any(|part| {
+    path.components().skip(parts_written_out(pattern)).any(|part| {
         let name = part.as_os_str().to_string_lossy();
         OF_ENGINES.contains(&name.as_ref())
             || BEGINNINGS.iter().any(|begin| name.starts_with(begin))
             || ENDS.iter().any(|end| name.ends_with(end))
     })
+}
+
+/// How many parts of a pattern stand before its first wildcard.
+pub(crate) fn parts_written_out(pattern: &Path) -> usize {
+    let is_written_out = |part: &Component<'_>| !part.as_os_str().to_string_lossy().contains(['*', '?', '[']);
+    pattern.components().take_while(is_written_out).count()
 }
 
 #[cfg(test)]

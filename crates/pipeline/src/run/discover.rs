@@ -4,14 +4,14 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use ingest::LogFiles;
-use jiff::{SignedDuration, Timestamp};
+use jiff::Timestamp;
 use job::Config;
-use job::flight_log::{identify, identify_companion};
+use job::flight_log::{MAX_BETWEEN_PIECES, identify, identify_companion};
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Position, TailNumber};
 
 use crate::discovery::table_folders::{TableFolders, TableMembership};
-use crate::discovery::temporary_files::is_temporary;
+use crate::discovery::temporary_files::{is_temporary, parts_written_out};
 use crate::error::{Error, is_passing};
 use crate::run::discover_remote::{self};
 use crate::run::file_stat::SeenObjects;
@@ -42,7 +42,7 @@ pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
         let files = matching(config, &group.files, &mut seen, &mut unlisted)?;
         companions.extend(files.into_iter().map(|file| (name.as_str(), file)));
     }
-    let mut found = if companions.is_empty() && !config.document.logs.pieces {
+    let mut found = if companions.is_empty() && !config.document.logs.has_pieces() {
         let logs = main.into_iter().map(|(log_path, path)| (log_path, LogFiles::one(path))).collect();
         DiscoveredLogs { logs, ..DiscoveredLogs::default() }
     } else {
@@ -57,7 +57,7 @@ pub fn discover(config: &Config) -> Result<DiscoveredLogs, Error> {
 /// # Errors
 /// As [`discover`], where groups or pieces must be searched.
 pub fn log_containing(config: &Config, path: &Path) -> Result<LogFiles, Error> {
-    if config.document.group.is_empty() && !config.document.logs.pieces {
+    if config.document.group.is_empty() && !config.document.logs.has_pieces() {
         return Ok(LogFiles::one(path));
     }
     let same = |other: &PathBuf| {
@@ -72,9 +72,6 @@ type FlightIdentity = (Flight, Option<Position>);
 
 /// A file of the main logs, with the flight it belongs to or why that is unknown.
 type IdentifiedFile = (Result<FlightIdentity, Diagnostic>, String, PathBuf);
-
-/// Pieces of a flight depart within so long of each other: each may hold its own first instant as its departure.
-const MAX_BETWEEN_PIECES: SignedDuration = SignedDuration::from_hours(12);
 
 /// Gives pieces that name one flight the identity of its first piece, and puts them in order of departure.
 fn join_pieces(known: &mut [IdentifiedFile]) {
@@ -109,7 +106,7 @@ fn group_files(
         .into_par_iter()
         .map(|(log_path, path)| (identify(&LogFiles::one(&path), &log_path, config), log_path, path))
         .collect();
-    if config.document.logs.pieces {
+    if config.document.logs.has_pieces() {
         join_pieces(&mut known);
     }
     let mut found = DiscoveredLogs::default();
@@ -128,7 +125,8 @@ fn group_files(
             }
         };
         let on_tail = whose.entry(who.0.tail_number.clone()).or_default();
-        let is_piece = |(other, _): &&(FlightIdentity, String)| config.document.logs.pieces && *other == who;
+        let is_piece =
+            |(other, _): &&(FlightIdentity, String)| config.document.logs.has_pieces() && *other == who;
         match on_tail.iter().find(is_piece).and_then(|(_, first)| found.logs.get_mut(first)) {
             Some(files) => files.main.push(path),
             None => {
@@ -246,7 +244,8 @@ fn matching(
                 }
             }
         }
-        files.retain(|path| is_log(config, path, tables.local(path), unlisted));
+        let written_out = folder_written_out(&written);
+        files.retain(|path| is_log(config, path, tables.local(path, &written_out), unlisted));
         if files.is_empty() && unlisted.len() == faults {
             silent.insert(pattern.as_str());
         }
@@ -258,6 +257,12 @@ fn matching(
     } else {
         Err(Error::refused(no_log(config, &silent)))
     }
+}
+
+/// The folder of a pattern before its first wildcard.
+fn folder_written_out(pattern: &Path) -> PathBuf {
+    let folder = pattern.parent().unwrap_or(pattern);
+    folder.components().take(parts_written_out(folder)).collect()
 }
 
 /// Whether a file is a log, by the table in whose folder it lies; a table that cannot be used is a fault.

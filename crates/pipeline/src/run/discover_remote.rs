@@ -14,6 +14,9 @@ const AS_FILES: glob::MatchOptions = glob::MatchOptions {
     require_literal_leading_dot: false,
 };
 
+/// Objects of a folder by which a table is recognised; their names sort before those of data files.
+const MOST_NOTED: usize = 1000;
+
 /// Hands over every object that fits a pattern, and notes the tables that are met. Only the folder before its first
 /// wildcard is listed, and what does not fit is not kept.
 ///
@@ -30,6 +33,7 @@ pub(crate) fn each(
         Err(e) => return Ok(Err(e.to_string())),
     };
     let Some(first) = address.key().find(['*', '?', '[']) else {
+        note_tables_above(&address, address.key(), tables)?;
         return match object_io::head(Path::new(pattern)) {
             Ok(entry) => {
                 take(entry);
@@ -41,6 +45,7 @@ pub(crate) fn each(
     };
     let folder = address.key()[..first].rsplit_once('/').map_or("", |(folder, _)| folder);
     let root = address.bucket_url();
+    note_tables_above(&address, folder, tables)?;
     object_io::list(&address.with_key(folder), |entry| {
         tables.note(&entry.path);
         let key = entry.path.to_str().and_then(|text| text.strip_prefix(&root));
@@ -49,4 +54,22 @@ pub(crate) fn each(
         }
     })?;
     Ok(Ok(()))
+}
+
+/// Notes the tables whose folders lie above a key: a pattern may name a partition of a table. Folders that these
+/// credentials may not list are none.
+fn note_tables_above(address: &Address, key: &str, tables: &mut TableFolders) -> Result<(), Error> {
+    let mut above = key;
+    while !above.is_empty() {
+        above = above.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let separator = if above.is_empty() { "" } else { "/" };
+        for name in TableFolders::LOGS {
+            let log = address.with_key(&format!("{above}{separator}{name}"));
+            match object_io::list_first(&log, MOST_NOTED, |entry| tables.note(&entry.path)) {
+                Ok(()) | Err(object_io::Error::Denied { .. } | object_io::Error::Missing { .. }) => {}
+                Err(error) => return Err(error.into()),
+            }
+        }
+    }
+    Ok(())
 }

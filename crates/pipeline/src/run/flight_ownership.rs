@@ -1,12 +1,15 @@
 //! Flight ownership: two logs may hold the same flight, and the owner must not depend on the order of arrival.
 //!
 //! The log whose name sorts first owns the flight. A copy with the same content is skipped without an error; a
-//! log of the same flight with other content is in error, and the error names the owner.
+//! log of the same flight with other content is in error, and the error names the owner. Logs with one flight id and
+//! departures a few hours apart may be pieces of one flight: unless the configuration declares what they are, all of them are
+//! in error.
 
 use std::collections::{BTreeSet, HashMap};
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 use job::Config;
-use job::flight_log::{duplicate_flight, sample_digest};
+use job::flight_log::{duplicate_flight, may_be_pieces, pieces_undeclared, sample_digest};
 use records::{Diagnostic, GapRecord, Installations};
 use store::{LogOutcome, LogRecord, LogResult, RecordKey};
 
@@ -50,14 +53,23 @@ pub(crate) struct OwnershipLedger<'a> {
     plan: &'a Plan,
     accounts: HashMap<String, LogRecord>,
     owners: HashMap<RecordKey, String>,
+    /// Logs by the hash of their tail and flight id, unless the configuration declares whether they are pieces.
+    same_id: HashMap<u64, Vec<String>>,
     /// Units whose records changed.
     pub(crate) touched: BTreeSet<Unit>,
 }
 
 impl<'a> OwnershipLedger<'a> {
     pub(crate) fn of(plan: &'a Plan, config: &'a Config, installations: &'a Installations) -> Self {
-        let (accounts, owners) = (HashMap::new(), HashMap::new());
-        let mut ledger = Self { config, installations, plan, accounts, owners, touched: BTreeSet::new() };
+        let mut ledger = Self {
+            config,
+            installations,
+            plan,
+            accounts: HashMap::new(),
+            owners: HashMap::new(),
+            same_id: HashMap::new(),
+            touched: BTreeSet::new(),
+        };
         if !plan.work.is_empty() {
             plan.accounts.values().for_each(|account| ledger.insert(account.clone()));
         }
@@ -73,6 +85,14 @@ impl<'a> OwnershipLedger<'a> {
     fn insert(&mut self, account: LogRecord) {
         let names = account.record_keys();
         self.owners.extend(names.into_iter().map(|name| (name, account.log_path.clone())));
+        if self.config.document.logs.pieces.is_none()
+            && let Some(id) = hash_of_id(&account)
+        {
+            let logs = self.same_id.entry(id).or_default();
+            if !logs.contains(&account.log_path) {
+                logs.push(account.log_path.clone());
+            }
+        }
         self.accounts.insert(account.log_path.clone(), account);
     }
 
@@ -107,6 +127,10 @@ impl<'a> OwnershipLedger<'a> {
         diagnostics: &[Diagnostic],
         report: &mut RunSummary,
     ) -> Vec<LogResult> {
+        let pieces = self.undeclared_pieces(&account);
+        if !pieces.is_empty() {
+            return self.refuse_pieces(account, diagnostics, pieces, report);
+        }
         let Some(competing_log) = self.competing_log(&account, &records) else {
             return vec![self.store(account, records, diagnostics, report)];
         };
@@ -128,6 +152,54 @@ impl<'a> OwnershipLedger<'a> {
         let first = self.store(account, records, diagnostics, report);
         let (loser, diagnostics) = superseded(competing_log, &first.account, same);
         vec![first, self.store(loser, Vec::new(), &diagnostics, report)]
+    }
+
+    /// Logs with the tail, flight id and a position of this one, and another departure close by. What became of them does
+    /// not matter: the answer must not depend on the order of the logs.
+    fn undeclared_pieces(&self, account: &LogRecord) -> Vec<LogRecord> {
+        let Some(logs) = hash_of_id(account).and_then(|id| self.same_id.get(&id)) else { return Vec::new() };
+        let is_piece = |other: &&LogRecord| {
+            let departures = account.departure_utc.zip(other.departure_utc);
+            other.log_path != account.log_path
+                && other.tail_number == account.tail_number
+                && other.flight_id == account.flight_id
+                && other.positions.iter().any(|position| account.positions.contains(position))
+                && departures.is_some_and(|(own, others)| may_be_pieces(own, others))
+        };
+        let mut found: Vec<LogRecord> =
+            logs.iter().filter_map(|log| self.accounts.get(log)).filter(is_piece).cloned().collect();
+        found.sort_by(|a, b| a.log_path.cmp(&b.log_path));
+        found
+    }
+
+    /// Neither a log nor those that may be other pieces of its flight have records.
+    fn refuse_pieces(
+        &mut self,
+        account: LogRecord,
+        diagnostics: &[Diagnostic],
+        pieces: Vec<LogRecord>,
+        report: &mut RunSummary,
+    ) -> Vec<LogResult> {
+        let refused = |mut account: LogRecord, other: &LogRecord| {
+            let departures = account.departure_utc.zip(other.departure_utc);
+            let (own, others) = departures.unwrap_or_default();
+            let diagnostic = pieces_undeclared(&account.log_path, own, &other.log_path, others);
+            (account.estimated, account.refused) = (0, 0);
+            summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
+            (account, vec![diagnostic])
+        };
+        // A log with an error of its own keeps it.
+        let (own, diagnostics) = if diagnostics.is_empty() {
+            refused(account, &pieces[0])
+        } else {
+            (account, diagnostics.to_vec())
+        };
+        let mut results = vec![self.store(own.clone(), Vec::new(), &diagnostics, report)];
+        for piece in pieces.into_iter().filter(|piece| piece.estimated + piece.refused > 0) {
+            let (piece, diagnostics) = refused(piece, &own);
+            results.push(self.store(piece, Vec::new(), &diagnostics, report));
+        }
+        results
     }
 
     /// Whether two logs hold the same samples in different encodings. Rare, so both are read.
@@ -175,6 +247,14 @@ impl<'a> OwnershipLedger<'a> {
         }
         gone
     }
+}
+
+/// Hash of the tail and the flight id of a log that was identified.
+fn hash_of_id(account: &LogRecord) -> Option<u64> {
+    let id = account.tail_number.as_ref().zip(account.flight_id.as_ref())?;
+    let mut hash = DefaultHasher::new();
+    id.hash(&mut hash);
+    Some(hash.finish())
 }
 
 /// Status of a log whose flight belongs to another log.

@@ -335,6 +335,10 @@ impl Planner<'_> {
             Some(WorkReason::OwnerGone)
         } else if account.error_code.as_deref().is_some_and(is_passing) {
             Some(WorkReason::Unfetched)
+        } else if self.config.document.logs.pieces.is_some()
+            && account.error_code.as_deref() == Some("pieces_undeclared")
+        {
+            Some(WorkReason::SettingChanged)
         } else if self.request.retry && account.outcome == LogOutcome::Error {
             Some(WorkReason::Retry)
         } else if self.request.verify_content && account.outcome.is_success() {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use ingest::channel::quality;
 use ingest::{ActuatorChannels, ActuatorColumns, LogFiles, Quality};
-use job::flight_log::{FlightLog, duplicate_flight, sample_digest};
+use job::flight_log::{FlightLog, duplicate_flight, may_be_pieces, pieces_undeclared, sample_digest};
 use job::{Config, estimate, rejection};
 use pipeline::run::discover;
 use pipeline::time_limit::within_time_limit;
@@ -15,7 +15,7 @@ use records::{Diagnostic, Installations, PartNumber};
 
 use crate::args::{CheckArgs, Format, Global};
 use crate::exit::{Code, Failure};
-use crate::output::Output;
+use crate::output::{Output, escape};
 use crate::row_output;
 use crate::table::{self, number, text};
 
@@ -69,6 +69,9 @@ pub(crate) fn check(args: &CheckArgs, global: &Global, output: &Output) -> Resul
             }
             Err(diagnostic) => seen.diagnostics.push(diagnostic),
         }
+    }
+    if config.document.logs.pieces.is_none() {
+        seen.diagnostics.extend(flights.undeclared_pieces());
     }
     let CheckSummary { channels, facts, rejections, mut diagnostics, page, overview } = seen;
     let failed = diagnostics.len();
@@ -160,6 +163,28 @@ impl FlightOwners {
         self.logs.push(log);
         fault
     }
+
+    /// An error for each log with the tail, flight id and position of another, and another departure close by.
+    fn undeclared_pieces(&self) -> Vec<Diagnostic> {
+        let mut same_id: BTreeMap<(&str, &str, &str), Vec<(jiff::Timestamp, usize)>> = BTreeMap::new();
+        for ((departure, tail, flight, position), log) in &self.owners {
+            same_id.entry((tail, flight, position)).or_default().push((*departure, *log));
+        }
+        let mut found = BTreeMap::new();
+        for logs in same_id.values() {
+            for (departure, log) in logs {
+                let others = logs.iter().filter(|(other, _)| may_be_pieces(*departure, *other));
+                if let Some((other_departure, other)) =
+                    others.min_by_key(|(_, other)| &self.logs[*other].name)
+                {
+                    let (name, other) = (&self.logs[*log].name, &self.logs[*other].name);
+                    let fault = || pieces_undeclared(name, *departure, other, *other_departure);
+                    found.entry(*log).or_insert_with(fault);
+                }
+            }
+        }
+        found.into_values().collect()
+    }
 }
 
 /// One line for each log, and each note once.
@@ -196,7 +221,8 @@ impl Overview {
             notes.entry((channel.channel, kind(channel))).or_insert((0, channel)).0 += 1;
         }
         for ((channel, note), (count, first)) in notes {
-            let _ = writeln!(page, "{count} × {channel}: {note} (first {}, {})", first.log, first.position);
+            let note = format!("{count} × {channel}: {note} (first {}, {})", first.log, first.position);
+            let _ = writeln!(page, "{}", escape(&note));
         }
         if self.without_checksums > 0 {
             let logs = table::count(self.without_checksums, "log");
@@ -338,12 +364,12 @@ fn one(opened: &FlightLog, name: &str, config: &Config, installations: &Installa
         notes.to_string(),
     ]);
     let clocks = if clocks.is_empty() { String::new() } else { format!(", {}", clocks.join("; ")) };
+    let flight = format!("{} flight {} departed {}", id.tail_number, id.flight_id, id.departure_utc);
     let _ = writeln!(
         page,
-        "{name}\n  {} flight {} departed {}\n  {} rows{clocks}\n  {checksums}",
-        id.tail_number,
-        id.flight_id,
-        id.departure_utc,
+        "{}\n  {}\n  {} rows{clocks}\n  {checksums}",
+        escape(name),
+        escape(&flight),
         opened.rows(),
     );
     page.push_str(&if channels.is_empty() { NOTHING.to_owned() } else { layout(channels) });
@@ -595,7 +621,7 @@ impl ColumnTypes {
                     .iter()
                     .map(|(kind, (count, first))| format!("{kind} in {count} (first {first})"))
                     .collect();
-                format!("  `{name}`: {}\n", kinds.join(", "))
+                format!("  {}\n", escape(&format!("`{name}`: {}", kinds.join(", "))))
             })
             .collect();
         if lines.is_empty() {
@@ -630,6 +656,7 @@ fn proposals(facts: &Facts, config: &Config) -> String {
             })
             .collect();
         let flights = table::count(all.len(), "actuator-flight");
+        let number = escape(number.as_str());
         let _ = writeln!(page, "part {number}, identified from {flights} (prefer data-sheet values)");
         page.push_str(&table::layout(&columns, &rows));
         page.push('\n');

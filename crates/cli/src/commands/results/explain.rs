@@ -13,7 +13,7 @@ use store::{Query, Store};
 
 use crate::args::{ExplainArgs, Global};
 use crate::exit::{Code, Failure};
-use crate::output::Output;
+use crate::output::{Output, escape};
 use crate::table::{self, number, text};
 
 use crate::commands::context::load_with_installations;
@@ -164,8 +164,8 @@ fn page(
     verdict: &ReplayVerdict,
 ) -> String {
     let (flight, p, e) = (&record.flight, &record.provenance, &record.estimate);
-    let mut page = format!(
-        "{} / {} in {} of {}, flight {}, departed {}\n",
+    let head = format!(
+        "{} / {} in {} of {}, flight {}, departed {}",
         record.part_number,
         record.serial_number,
         record.position,
@@ -173,8 +173,9 @@ fn page(
         flight.flight_id,
         flight.departure_utc
     );
+    let mut page = escape(&head) + "\n";
     let mut line = |label: &str, text: &str| {
-        let _ = writeln!(page, "  {label:<11} {text}");
+        let _ = writeln!(page, "  {label:<11} {}", escape(text));
     };
     line(
         "gap",

@@ -393,7 +393,7 @@ fn refused(report: &RunSummary) -> String {
 }
 
 fn line(page: &mut String, label: &str, text: &str) {
-    let _ = writeln!(page, "  {label:<11} {text}");
+    let _ = writeln!(page, "  {label:<11} {}", escape(text));
 }
 
 /// Lists the units that need attention, most urgent first, and counts the others.
@@ -456,7 +456,13 @@ fn changes_section(changed: &[UnitChange]) -> String {
     let mut page = format!("\nstate changes in this run: {}\n", count(changed.len(), "unit"));
     for unit in changed.iter().take(MAX_CHANGES_SHOWN) {
         let part = unit.part_number.as_deref().unwrap_or("–");
-        let _ = writeln!(page, "  {} / {}: {}", escape(part), escape(&unit.serial_number), change_text(unit));
+        let _ = writeln!(
+            page,
+            "  {} / {}: {}",
+            escape(part),
+            escape(&unit.serial_number),
+            escape(&change_text(unit))
+        );
     }
     if let Some(more @ 1..) = changed.len().checked_sub(MAX_CHANGES_SHOWN) {
         let _ = writeln!(page, "  and {more} more, all in `freeplay run --json`");

@@ -6,15 +6,18 @@ use std::fs::{self, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
 
-use ingest::infer::{InferredMapping, folder_value, path_identity, path_tail, propose};
+use ingest::infer::{
+    InferredMapping, PLACE_END, folder_value, path_identity, path_position, path_tail, propose,
+};
 use ingest::mapping::IdentityField;
 use ingest::mapping::units::Unit;
 use ingest::{Layout, Role};
 use pipeline::discovery::temporary_files::is_temporary;
+use records::sanitize::csv_cell;
 
 use crate::args::InitArgs;
 use crate::exit::{Code, Failure};
-use crate::output::Output;
+use crate::output::{Output, escape};
 
 use crate::commands::context::display_path;
 
@@ -174,11 +177,14 @@ fn installation_rows(logs: &[PathBuf], offer: &InferredMapping) -> Option<String
         let own = offer.tail.is_some().then(|| propose(log).ok()?.tail).flatten();
         own.or_else(|| folder(log, IdentityField::TailNumber)).or_else(|| path_tail(log))
     };
-    let is_plain = |name: &String| !name.contains(['"', ',', '#', '\n']);
+    let is_plain = |name: &String| {
+        !name.contains(|c: char| matches!(c, '"' | ',' | '#') || c.is_control()) && csv_cell(name) == *name
+    };
     let mut places: BTreeSet<(String, String)> = BTreeSet::new();
     for log in logs.iter().take(MOST_LOGS) {
         let Some(tail) = tail(log).filter(is_plain) else { continue };
-        let own = folder(log, IdentityField::Position);
+        let own = folder(log, IdentityField::Position)
+            .or_else(|| path_position(log).filter(|_| needs_position(offer)));
         let positions = own.iter().chain(offer.positions.iter().filter(|_| own.is_none()));
         places
             .extend(positions.filter(|name| is_plain(name)).map(|position| (tail.clone(), position.clone())));
@@ -197,12 +203,14 @@ fn proposed(folder: &Path, dir: &Path, proposal: &Proposal<'_>) -> Result<String
     let folder = relative(folder, dir)?;
     let below = |kind: Option<&String>| {
         let deeper = kind.map_or_else(String::new, |kind| format!("/{kind}"));
-        format!("{:?}", format!("{}{deeper}/**/*.parquet", display_path(&folder)))
+        quoted(&format!("{}{deeper}/**/*.parquet", display_path(&folder)))
     };
     let files = format!("files = [{}]", below(proposal.main.as_ref()));
     let mut head = head.replace("files = [\"logs/**/*.parquet\"]", &files);
     for (kind, (offer, _)) in &proposal.groups {
-        let _ = write!(head, "[group.{kind}]\nfiles = [{}]\n\n", below(Some(kind)));
+        let files = below(Some(kind));
+        let kind = key(kind);
+        let _ = write!(head, "[group.{kind}]\nfiles = [{files}]\n\n");
         if offer.clock != proposal.offer.clock {
             let _ = write!(head, "[group.{kind}.clock]\n{}\n", clock(offer));
         }
@@ -240,7 +248,7 @@ fn relative(folder: &Path, from: &Path) -> Result<PathBuf, Failure> {
 fn mapping(proposal: &Proposal<'_>) -> String {
     let Proposal { offer, log, .. } = proposal;
     let positions: Vec<&str> = offer.positions.iter().map(String::as_str).collect();
-    let positions = if positions.is_empty() { "none".to_owned() } else { positions.join(", ") };
+    let positions = if positions.is_empty() { "none".to_owned() } else { escape(&positions.join(", ")) };
     let others: Vec<&str> = offer.others.iter().take(12).map(String::as_str).collect();
     let channels = [
         (Role::Motor, "motor_position", "deg"),
@@ -262,7 +270,7 @@ fn mapping(proposal: &Proposal<'_>) -> String {
     [
         format!(
             "# Inferred from {}: verify names, units and signs with `freeplay check`.\n",
-            display_path(log)
+            escape(&display_path(log))
         ),
         format!("# Positions found: {positions}.\n\n[identity]\n{}", identity(offer, log)),
         "# Time zone of departures without one.\ntime_zone = \"UTC\"\n".to_owned(),
@@ -273,10 +281,31 @@ fn mapping(proposal: &Proposal<'_>) -> String {
         if others.is_empty() {
             "\n".to_owned()
         } else {
-            format!("\n# Unmapped numeric columns: {}\n\n", others.join(", "))
+            format!("\n# Unmapped numeric columns: {}\n\n", escape(&others.join(", ")))
         },
     ]
     .concat()
+}
+
+/// A text as a basic string of TOML 1.0.
+fn quoted(text: &str) -> String {
+    let escaped = |c: char| match c {
+        '"' | '\\' => format!("\\{c}"),
+        c if is_escaped(c) => format!("\\U{:08X}", u32::from(c)),
+        c => c.to_string(),
+    };
+    format!("\"{}\"", text.chars().map(escaped).collect::<String>())
+}
+
+/// Whether a character has an effect in an editor without being seen.
+fn is_escaped(c: char) -> bool {
+    escape(c.encode_utf8(&mut [0; 4])).len() > c.len_utf8()
+}
+
+/// A key of TOML 1.0: bare where it can be.
+fn key(text: &str) -> String {
+    let is_bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
+    if text.chars().all(is_bare) { text.to_owned() } else { quoted(text) }
 }
 
 fn layout(layout: &Layout) -> String {
@@ -285,13 +314,20 @@ fn layout(layout: &Layout) -> String {
         ("value_column", &layout.value_column),
         ("position_column", &layout.position_column),
     ];
-    keys.iter().filter_map(|(key, column)| Some(format!("{key} = {:?}\n", column.as_ref()?))).collect()
+    keys.iter().filter_map(|(key, column)| Some(format!("{key} = {}\n", quoted(column.as_ref()?)))).collect()
+}
+
+/// Whether neither columns nor folders name the position of a log.
+fn needs_position(offer: &InferredMapping) -> bool {
+    offer.positions.is_empty()
+        && !offer.folders.contains_key(&IdentityField::Position)
+        && offer.layout.position_column.is_none()
 }
 
 fn identity(offer: &InferredMapping, log: &Path) -> String {
     let table = |key: &str, facts: &BTreeMap<IdentityField, String>| {
         let facts: Vec<String> =
-            facts.iter().map(|(fact, name)| format!("{} = {name:?}", fact.as_str())).collect();
+            facts.iter().map(|(fact, name)| format!("{} = {}", fact.as_str(), quoted(name))).collect();
         if facts.is_empty() { String::new() } else { format!("{key} = {{ {} }}\n", facts.join(", ")) }
     };
     let mut text = [
@@ -304,9 +340,12 @@ fn identity(offer: &InferredMapping, log: &Path) -> String {
         [&offer.metadata, &offer.columns, &offer.folders].iter().any(|facts| facts.contains_key(&fact))
     };
     if has(IdentityField::TailNumber) && has(IdentityField::DepartureUtc) {
+        if needs_position(offer) && path_position(log).is_some() {
+            let _ = writeln!(text, "# The position is inferred from the file name.\npath = '{PLACE_END}$'");
+        }
         return text;
     }
-    match path_identity(log) {
+    match path_identity(log, needs_position(offer)) {
         Some((path, format)) => {
             text.push_str(
                 "# Not all of the identity is in metadata or columns; the rest is inferred from the path.\n",
@@ -330,12 +369,14 @@ fn identity(offer: &InferredMapping, log: &Path) -> String {
 }
 
 fn clock(offer: &InferredMapping) -> String {
+    let epoch = if offer.is_unix_clock { "epoch = \"unix\"\n" } else { "" };
     match &offer.clock {
-        Some((column, Some(unit))) => format!("column = {column:?}\nunit = {unit:?}\n"),
+        Some((column, Some(unit))) => {
+            format!("column = {}\nunit = {}\n{epoch}", quoted(column), quoted(unit))
+        }
         Some((column, None)) => {
-            format!(
-                "column = {column:?}\n# unit = \"s\"          # s, ms, us, ns; not needed for timestamps\n"
-            )
+            let column = quoted(column);
+            format!("column = {column}\n# unit = \"s\"          # s, ms, us, ns; not needed for timestamps\n")
         }
         None => "# No time column was recognised.\ncolumn = \"\"\nunit = \"s\"\n".to_owned(),
     }
@@ -344,14 +385,17 @@ fn clock(offer: &InferredMapping) -> String {
 fn channel(proposal: &Proposal<'_>, role: Role, usual: &str) -> String {
     let offer = &proposal.offer;
     let mut text = match offer.channels.get(&role) {
-        Some((column, Some(unit))) => format!("column = {column:?}\nunit = {:?}\n", unit.as_str()),
+        Some((column, Some(unit))) => format!("column = {}\nunit = {:?}\n", quoted(column), unit.as_str()),
         Some((column, None)) => {
-            format!("column = {column:?}\nunit = {usual:?}          # a guess: the name has no unit\n")
+            format!(
+                "column = {}\nunit = {usual:?}          # a guess: the name has no unit\n",
+                quoted(column)
+            )
         }
         None => format!("column = \"\"           # no column was recognised\nunit = {usual:?}\n"),
     };
     if let Some(group) = proposal.group_of(role) {
-        let _ = writeln!(text, "group = {group:?}");
+        let _ = writeln!(text, "group = {}", quoted(group));
     }
     let turn = offer.motor_wraps_at.filter(|_| role == Role::Motor);
     if let Some(turn) = turn {
@@ -361,7 +405,8 @@ fn channel(proposal: &Proposal<'_>, role: Role, usual: &str) -> String {
     let other = |(column, unit): &(String, Option<Unit>)| {
         let unit = unit.or(own_unit).map_or(usual, |unit| unit.as_str());
         let wraps = turn.map_or_else(String::new, |turn| format!(", wraps_at = {turn:?}"));
-        format!("{{ column = {column:?}, unit = {unit:?}{wraps} }}")
+        let column = quoted(column);
+        format!("{{ column = {column}, unit = {unit:?}{wraps} }}")
     };
     if let Some(others) = offer.alternatives.get(&role) {
         let others: Vec<String> = others.iter().map(other).collect();
