@@ -312,7 +312,7 @@ proptest! {
 #[test]
 fn the_initial_variances_are_forgotten() {
     let actuator = ActuatorModel::linear(5e7, 2000.0, 8.0).unwrap();
-    let filter = Filter::new(&actuator, 1e-3, &crate::sensor_noise(10.0)).unwrap();
+    let filter = Filter::new(&actuator, 1e-3, &sensor_noise(10.0)).unwrap();
     let start =
         estimator::InitialVariances { position_m2: Some(1e-6), speed_m2_per_s2: 1.0, backlash_m2: 1e-14 };
     let other = filter.with_initial_variances(start).unwrap();

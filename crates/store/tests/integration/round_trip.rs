@@ -1,5 +1,9 @@
 //! Every column comes back as it went in, through Parquet, Delta and Polars.
 
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, Float64Array, RecordBatch};
+use arrow::datatypes::DataType;
 use jiff::Timestamp;
 use proptest::prelude::*;
 use records::row_schema::{from_batch, to_batch};
@@ -40,22 +44,31 @@ prop_compose! {
         status in prop_oneof![Just(Status::Estimated), Just(Status::Refused)],
         reason in prop::option::of(text()),
         flags in prop::collection::vec(text(), 0..4),
-        n in prop::collection::vec(number(), 24),
+        n in prop::collection::vec(number(), 40),
         counts in prop::array::uniform4(any::<i64>()),
     ) -> GapEstimate {
         let [load_reversals, samples, samples_upper, samples_lower] = counts;
         GapEstimate {
-            status, reason, flags,
-            gap_m: n[0], gap_se_m: n[1], gap_p05_m: n[2], gap_p95_m: n[3], gap_midrange_m: n[4],
-            stiffness_n_per_m: n[5], stiffness_se_n_per_m: n[6], skew_s: n[7], loop_width_m: n[8],
-            lost_motion_m: n[9], reference_radius_m: n[10],
-            load_reversals, samples, samples_upper, samples_lower,
-            skew_se_s: n[15], loop_width_se_m: n[16], lost_motion_se_m: n[17],
-            load_zero_n: n[18], load_zero_se_n: n[19], load_delay_s: n[20], load_delay_se_s: n[21],
-            friction_n: n[22], gap_midrange_fitted_m: n[23],
-            load_p05_n: n[11], load_p95_n: n[12], temperature_c: n[13], nis: n[14],
+            status, reason, flags, load_reversals, samples, samples_upper, samples_lower,
+            ..with_numbers(&n)
         }
     }
+}
+
+/// An estimate with a number of its own in each of its columns of numbers, those of later releases with them.
+fn with_numbers(numbers: &[Option<f64>]) -> GapEstimate {
+    let plain = to_batch(&[GapEstimate::default()]).unwrap();
+    let mut numbers = numbers.iter().cycle();
+    let schema = plain.schema();
+    let columns = schema.fields().iter().zip(plain.columns()).map(|(field, column)| {
+        let is_number = field.data_type() == &DataType::Float64;
+        if !is_number {
+            return Arc::clone(column);
+        }
+        Arc::new(Float64Array::from(vec![*numbers.next().unwrap()])) as ArrayRef
+    });
+    let columns: Vec<ArrayRef> = columns.collect();
+    from_batch(&RecordBatch::try_new(Arc::clone(&schema), columns).unwrap()).unwrap().remove(0)
 }
 
 prop_compose! {
@@ -141,7 +154,7 @@ fn a_time_beyond_the_calendar_is_an_error_and_never_wraps() {
     let batch = to_batch(&[record(1, 0, "elevator", 1e-6)]).unwrap();
     let mut arrays: Vec<ArrayRef> = batch.columns().to_vec();
     let beyond = TimestampMicrosecondArray::from(vec![i64::MAX]).with_timezone("UTC");
-    arrays[5] = std::sync::Arc::new(beyond);
+    arrays[5] = Arc::new(beyond);
     let batch = RecordBatch::try_new(batch.schema(), arrays).unwrap();
     let error = from_batch::<GapRecord>(&batch).unwrap_err().to_string();
     assert!(error.starts_with("column `departure_utc`, row 0: 9223372036854775807 µs since 1970"), "{error}");
