@@ -30,4 +30,4 @@ pub use log_record::{LogOutcome, LogRecord};
 pub use quantity_row::{ChangeScope, Quantity, QuantityChange, QuantityRow, QuantityStep};
 pub use run_record::RunRecord;
 pub use time::sample_time_s;
-pub use trend_row::{ChangePoint, TrendRow};
+pub use trend_row::{ChangePoint, InspectionInterval, TrendRow};

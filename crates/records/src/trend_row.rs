@@ -131,6 +131,10 @@ row! {
         /// States of the other followed quantities of the unit: `softening`, `friction_rising`, …; all in the
         /// quantities table.
         pub conditions: Vec<String>,
+        /// Probabilities of reaching the limit within intervals of flight hours, from the hours up: for advice on
+        /// inspection intervals.
+        #[serde(skip)]
+        pub interval_chances: NoColumn<Vec<(f64, f64)>>,
         /// The estimated gaps in order of flights, at most a hundred means of neighbours, m: for a sparkline.
         #[serde(skip)]
         pub sketch_m: NoColumn<Vec<f64>>,
@@ -141,5 +145,29 @@ impl TrendRow {
     /// Part number, if known, and serial number.
     pub fn unit(&self) -> (Option<String>, String) {
         (self.part_number.clone(), self.serial_number.clone())
+    }
+}
+
+row! {
+    /// Inspection interval of a part: the chance that a unit meets its limit before the next inspection.
+    #[derive(Debug, Clone, PartialEq, Serialize)]
+    pub struct InspectionInterval {
+        /// The part.
+        pub part_number: Option<String>,
+        /// Interval between inspections, flight hours.
+        pub interval_hours: f64,
+        /// Units of the part in state `normal` or `watch`; those in `plan` and `act` have dates of their own.
+        pub units: i64,
+        /// Mean chance of a unit.
+        pub mean_chance: f64,
+        /// Chance of the unit that is likeliest to meet its limit.
+        pub largest_chance: f64,
+        /// That unit.
+        pub serial_number: String,
+        /// Accepted chance, from `trend.inspection_risk`.
+        pub risk: f64,
+        /// Longest interval for which no unit exceeds `risk`, flight hours; null below the shortest listed, and at most
+        /// the longest listed.
+        pub longest_hours: Option<f64>,
     }
 }

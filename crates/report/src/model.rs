@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use jiff::Timestamp;
 use records::WorkRequest;
-use records::{QuantityChange, QuantityRow};
+use records::{InspectionInterval, QuantityChange, QuantityRow};
 use serde::Serialize;
 
 use crate::state_badge::StateBadge;
@@ -29,6 +29,10 @@ pub struct Report {
     pub priors: Vec<FleetPriorView>,
     pub tails: Vec<Tail>,
     pub units: Vec<UnitView>,
+    /// Chances of meeting the limit before the next inspection, by part and interval.
+    pub inspection_intervals: Vec<InspectionInterval>,
+    /// The advice for each part, in words.
+    pub interval_advice: Vec<String>,
     /// What changed besides the gap, of units, tails and parts; the newest first.
     pub quantity_changes: Vec<QuantityChange>,
     /// Whether a table of inspections is configured.

@@ -58,6 +58,8 @@ fn report(units: Vec<UnitView>) -> Report {
         inspections_given: false,
         inspections_unmatched: 0,
         quantity_changes: Vec::new(),
+        inspection_intervals: Vec::new(),
+        interval_advice: Vec::new(),
     }
 }
 

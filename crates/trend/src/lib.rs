@@ -67,7 +67,7 @@ pub use forecast::{Forecast, Interval, forecast};
 pub use hysteresis::assess_with_hysteresis;
 pub use prior::fleet_prior::{FleetPrior, UsageAxis};
 pub use settings::Settings;
-pub use statement::assessment::Assessment;
+pub use statement::assessment::{Assessment, INTERVAL_HOURS};
 pub use statement::state::{Reason, State};
 pub use statement::types::{
     ChangePoint, ChangePointKind, Crossing, Level, MIN_ESTIMATES, Rate, Utilization, WearStatus,

@@ -74,6 +74,9 @@ pub(crate) struct TrendArgs {
     /// Show what changed instead, of units, tails and parts, with the evidence.
     #[arg(long, conflicts_with_all = ["quantities", "queries", "statistics", "estimates"])]
     pub changes: bool,
+    /// Show inspection intervals by part instead: the chance of meeting the limit before the next inspection.
+    #[arg(long, conflicts_with_all = ["quantities", "changes", "queries", "statistics", "estimates"])]
+    pub intervals: bool,
     #[command(flatten)]
     pub rows: RowFormatArgs,
 }

@@ -230,6 +230,8 @@ pub struct TrendSettings {
     pub stale_after_days: f64,
     /// Hours until the next check, for the probability of meeting the limit before it. Default 300.
     pub next_check_hours: f64,
+    /// Chance of meeting the limit before the next inspection that is accepted, for advice on intervals. Default 0.01.
+    pub inspection_risk: f64,
     /// What wear follows: `hours`, `flights` or `reversals`; by default what each part number's own
     /// histories speak for. A part's `axis` goes before it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -299,6 +301,7 @@ impl Default for TrendSettings {
             horizon_hours: defaults.horizon_hours,
             stale_after_days: defaults.stale_after_days,
             next_check_hours: defaults.check_interval_hours,
+            inspection_risk: 0.01,
             axis: None,
             limit_m: None,
             quantity_limits: QuantityLimits::default(),
@@ -367,6 +370,7 @@ impl Document {
             ("horizon_hours", self.trend.horizon_hours),
             ("stale_after_days", self.trend.stale_after_days),
             ("next_check_hours", self.trend.next_check_hours),
+            ("inspection_risk", self.trend.inspection_risk),
         ] {
             found.extend(bounded(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
         }

@@ -88,6 +88,13 @@ pub(crate) fn row(
             (None, None) => "no limit is configured".into(),
         }),
         conditions: Vec::new(),
+        interval_chances: NoColumn(
+            trend
+                .interval_chances
+                .filter(|_| is_judged)
+                .map(|chances| trend::INTERVAL_HOURS.into_iter().zip(chances).collect())
+                .unwrap_or_default(),
+        ),
         sketch_m: sketched(&gaps_m),
     }
 }

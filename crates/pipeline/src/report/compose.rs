@@ -16,6 +16,7 @@ use trend::Forecast;
 
 use crate::error::Error;
 use crate::fleet_trends::assess::{self, ReportAssessments, UnitSelection};
+use crate::fleet_trends::inspection_interval::{inspection_intervals, interval_advice};
 use crate::follow_up::work_requests;
 use crate::history::builder::HistoryBuilder;
 use crate::history::flight_row::FlightRow as FlownRow;
@@ -72,6 +73,7 @@ pub fn compose(
     };
     let units: Vec<UnitView> = now.iter().zip(&drawn).map(unit).collect();
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
+    let intervals = inspection_intervals(&now, config.document.trend.inspection_risk);
     let narrowed = ask.tail_number.is_some() || ask.serial_number.is_some();
     let wanted = |tail: Option<&str>| !narrowed || tail.is_some_and(|tail| shown.contains(tail));
     logs.faults.retain(|fault| wanted(fault.tail_number.as_deref()));
@@ -92,6 +94,11 @@ pub fn compose(
         inspections_given: checks.is_some(),
         inspections_unmatched,
         units,
+        interval_advice: intervals
+            .chunk_by(|a, b| a.part_number == b.part_number)
+            .map(|of_part| interval_advice(&of_part[0]))
+            .collect(),
+        inspection_intervals: intervals,
         quantity_changes: followed.changes,
     })
 }

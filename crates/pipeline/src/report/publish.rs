@@ -115,6 +115,8 @@ mod tests {
             inspections_given: false,
             inspections_unmatched: 0,
             quantity_changes: Vec::new(),
+            inspection_intervals: Vec::new(),
+            interval_advice: Vec::new(),
         }
     }
 

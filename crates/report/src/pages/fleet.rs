@@ -119,6 +119,9 @@ struct FleetView {
     more_log_errors: usize,
     forecast_accuracy: Vec<(String, String, String)>,
     inspections: String,
+    inspection_bias: Vec<(String, String, String, String)>,
+    intervals: Vec<(String, String, String, String, String, String)>,
+    interval_advice: Vec<String>,
     scatter: String,
     pairs: Vec<(String, String, String, String, String, String)>,
 }
@@ -236,6 +239,9 @@ fn index_page(
         log_errors: log_errors.take(FEW).collect(),
         forecast_accuracy: forecast_accuracy(report),
         inspections,
+        inspection_bias: inspection_bias(report),
+        intervals: intervals(report),
+        interval_advice: report.interval_advice.clone(),
         scatter: agreement_plot(&inspection_pairs(report))?,
         pairs,
     })
@@ -416,6 +422,40 @@ type Pairs = Vec<(String, String, String, String, String, String)>;
 fn inspection_pairs(report: &Report) -> Vec<(f64, f64)> {
     let checks = report.units.iter().flat_map(|u| &u.inspections);
     checks.filter_map(|i| Some((i.estimate_m?, i.play_m))).collect()
+}
+
+/// Agreement of each part's estimates with its inspections: part, pairs, bias, limits.
+fn inspection_bias(report: &Report) -> Vec<(String, String, String, String)> {
+    let mut parts: BTreeMap<&str, Vec<(f64, f64)>> = BTreeMap::new();
+    for unit in &report.units {
+        let pairs = unit.inspections.iter().filter_map(|i| Some((i.estimate_m?, i.play_m)));
+        parts.entry(unit.part_number.as_deref().unwrap_or(NO_DATA)).or_default().extend(pairs);
+    }
+    let row = |(part, pairs): (&str, Vec<(f64, f64)>)| {
+        let found = Agreement::of(&pairs);
+        let text = |value: fn(&Agreement) -> String| found.as_ref().map_or_else(|| NO_DATA.to_owned(), value);
+        (!pairs.is_empty()).then(|| {
+            let bias = text(|a| format!("{} ± {}", micrometres(a.bias_m), micrometres(a.bias_half_width_m)));
+            let limits = text(|a| format!("{} to {}", micrometres(a.lower_m), micrometres(a.upper_m)));
+            (part.to_owned(), count(pairs.len()), bias, limits)
+        })
+    };
+    parts.into_iter().filter_map(row).collect()
+}
+
+/// Inspection intervals as table rows.
+fn intervals(report: &Report) -> Vec<(String, String, String, String, String, String)> {
+    let row = |i: &records::InspectionInterval| {
+        (
+            i.part_number.clone().unwrap_or_else(|| NO_DATA.to_owned()),
+            hours(i.interval_hours),
+            i.units.to_string(),
+            format!("{:.2} %", 100.0 * i.mean_chance),
+            format!("{:.2} %", 100.0 * i.largest_chance),
+            i.serial_number.clone(),
+        )
+    };
+    report.inspection_intervals.iter().map(row).collect()
 }
 
 /// Agreement of estimates with hangar inspections: summary and pairs.

@@ -9,7 +9,7 @@ use crate::incremental::tail::Tail;
 use crate::inference::posterior::Posterior;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
-use crate::statement::assessment::Assessment;
+use crate::statement::assessment::{Assessment, INTERVAL_HOURS};
 use crate::statement::crossing::RulDistribution;
 use crate::statement::level;
 use crate::statement::state::{Evidence, State, alert_state};
@@ -126,6 +126,7 @@ impl UnitSnapshot {
             changes,
             crossing,
             check_probability: remaining.as_ref().map(|r| r.within(settings.check_interval_hours)),
+            interval_chances: remaining.as_ref().map(|r| INTERVAL_HOURS.map(|hours| r.chance_by(hours))),
             utilization: self.utilization(),
             outliers_us: [&self.checkpoint.outliers_us[..], &tail.outliers_us[..]].concat(),
             noise_factor: self.checkpoint.scatter.noise_factor,

@@ -4,6 +4,10 @@ use crate::statement::state::{Reason, State};
 use crate::statement::types::{ChangePoint, Crossing, Level, Rate, Utilization, WearStatus};
 use crate::wear::bank::WearClass;
 
+/// Inspection intervals for which the chance of meeting the limit is stated, flight hours.
+pub const INTERVAL_HOURS: [f64; 14] =
+    [25.0, 50.0, 75.0, 100.0, 150.0, 200.0, 300.0, 400.0, 500.0, 750.0, 1000.0, 1500.0, 2000.0, 3000.0];
+
 /// What is known of one unit on one day.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assessment {
@@ -31,6 +35,9 @@ pub struct Assessment {
     pub crossing: Option<Crossing>,
     /// Probability that it is met before the next check ([`crate::Settings::check_interval_hours`]).
     pub check_probability: Option<f64>,
+    /// Probabilities that it is met within each of [`INTERVAL_HOURS`], in the widths that the fleet's past forecasts
+    /// were found to need.
+    pub interval_chances: Option<[f64; INTERVAL_HOURS.len()]>,
     /// How the unit is used now, to turn hours into flights and days.
     pub utilization: Option<Utilization>,
     /// Flights whose gap was left out as an outlier, by departure.

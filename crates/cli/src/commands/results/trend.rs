@@ -2,7 +2,8 @@
 
 use job::Config;
 use pipeline::fleet_trends::assess::{self, UnitSelection};
-use records::{Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
+use pipeline::fleet_trends::inspection_interval::{inspection_intervals, interval_advice};
+use records::{InspectionInterval, Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
 use store::Store;
 
 use crate::args::{Global, TrendArgs};
@@ -27,7 +28,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
         as_of_utc: args.as_of,
         statistics: args.statistics,
     };
-    if args.quantities || args.changes {
+    if args.quantities || args.changes || args.intervals {
         return quantities(args, &ask, &config, &installations, output);
     }
     let found = match (&args.external.estimates, &args.queries) {
@@ -81,7 +82,11 @@ fn quantities(
         let known = KnownNames::read(config);
         known.check_units(args.tail.as_deref(), args.serial.as_deref(), args.part.as_deref())?;
     }
-    if args.changes {
+    if args.intervals {
+        let found = inspection_intervals(&units, config.document.trend.inspection_risk);
+        let page = || intervals_page(&found);
+        row_output::write_rows(&args.rows, output, || row_output::batch(&found), page)?;
+    } else if args.changes {
         let page = || changes_page(&followed.changes, units.len());
         row_output::write_rows(&args.rows, output, || row_output::batch(&followed.changes), page)?;
     } else {
@@ -129,6 +134,37 @@ fn quantities_page(rows: &[QuantityRow]) -> String {
         return "no unit was selected\n".to_owned();
     }
     table::layout(&columns, &rows.iter().map(cells).collect::<Vec<_>>())
+}
+
+fn intervals_page(rows: &[InspectionInterval]) -> String {
+    let columns = [
+        text("part", 0),
+        number("interval [FH]", 0),
+        number("units", 2),
+        number("mean chance", 1),
+        number("largest chance", 0),
+        text("serial", 1),
+    ];
+    let percent = |chance: f64| format!("{:.2} %", 100.0 * chance);
+    let cells = |row: &InspectionInterval| {
+        vec![
+            row.part_number.clone().unwrap_or_else(table::empty_cell),
+            format!("{:.0}", row.interval_hours),
+            row.units.to_string(),
+            percent(row.mean_chance),
+            percent(row.largest_chance),
+            row.serial_number.clone(),
+        ]
+    };
+    if rows.is_empty() {
+        return "no unit in state normal or watch has a forecast\n".to_owned();
+    }
+    let mut page = table::layout(&columns, &rows.iter().map(cells).collect::<Vec<_>>());
+    for of_part in rows.chunk_by(|a, b| a.part_number == b.part_number) {
+        page.push_str(&interval_advice(&of_part[0]));
+        page.push('\n');
+    }
+    page
 }
 
 /// A number with three significant digits.
