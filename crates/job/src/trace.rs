@@ -119,8 +119,9 @@ fn relative_motion(
 fn motor_speed_m_per_s(channels: &ingest::ActuatorChannels) -> Vec<f64> {
     let mut speed = vec![f64::NAN; channels.motor_m.len()];
     for segment in estimate::samples(channels).segments {
-        for k in segment.start + 1..segment.end.saturating_sub(1) {
-            speed[k] = (channels.motor_m[k + 1] - channels.motor_m[k - 1]) / (2.0 * channels.step_s);
+        let inner = speed.iter_mut().skip(segment.start + 1);
+        for (speed, around) in inner.zip(channels.motor_m[segment.clone()].windows(3)) {
+            *speed = (around[2] - around[0]) / (2.0 * channels.step_s);
         }
     }
     speed

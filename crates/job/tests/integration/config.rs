@@ -108,6 +108,8 @@ fn what_cannot_be_meant_is_refused_by_a_stable_code() {
         ("limit_m = 150e-6", "limit_m = 150.0", "out_of_range"),
         ("screw_rms_m = 3e-6", "screw_rms_m = 3.0", "out_of_range"),
         ("bandwidth_hz = 10.0", "bandwidth_hz = 1e9", "out_of_range"),
+        ("bandwidth_hz = 10.0", "bandwidth_hz = 10.0\ninitial_backlash_rms_m = -1e-4", "not_positive"),
+        ("bandwidth_hz = 10.0", "bandwidth_hz = 10.0\ninitial_speed_rms_m_per_s = 1e5", "out_of_range"),
         ("column = \"t\"", "column = \"t\"\nrate_hz = 1e12", "out_of_range"),
         ("unit = \"deg\"", "unit = \"deg\"\ngear_ratio = 1e-30", "out_of_range"),
         ("unit = \"deg\"", "unit = \"deg\"\nscale = 1e99", "out_of_range"),
@@ -146,6 +148,23 @@ fn an_unreadable_file_is_reported_with_a_remedy() {
     assert!(found[0].hint.as_ref().unwrap().contains("freeplay init"));
 }
 
+/// P₀ is diag(V_d, (0.01 m/s)², (1 mm)²) unless a key gives it.
+#[test]
+fn the_initial_covariance_is_that_of_the_keys() {
+    let ema = PartNumber::new("EMA").unwrap();
+    let initial = |keys: &str| {
+        let text = GOOD.replacen("bandwidth_hz = 10.0", &format!("bandwidth_hz = 10.0\n{keys}"), 1);
+        job::flight_log::part_of(&parse(&text).unwrap(), &ema).unwrap().initial
+    };
+    assert_eq!(initial(""), estimator::InitialVariances::default());
+    let given = initial(
+        "initial_position_rms_m = 2e-3\ninitial_speed_rms_m_per_s = 0.5\ninitial_backlash_rms_m = 2e-4",
+    );
+    let position_m2 = given.position_m2.unwrap();
+    assert!((position_m2 - 4e-6).abs() < 1e-18 && (given.speed_m2_per_s2 - 0.25).abs() < 1e-12);
+    assert!((given.backlash_m2 - 4e-8).abs() < 1e-20, "{given:?}");
+}
+
 /// A part's digest follows what can move its number, and nothing else.
 #[test]
 fn the_digest_follows_what_moves_a_number() {
@@ -155,6 +174,7 @@ fn the_digest_follows_what_moves_a_number() {
     for (line, by) in [
         ("stiffness_n_per_m = 5.0e7", "stiffness_n_per_m = 5.1e7"),
         ("bandwidth_hz = 10.0", "bandwidth_hz = 11.0"),
+        ("bandwidth_hz = 10.0", "bandwidth_hz = 10.0\ninitial_backlash_rms_m = 1e-4"),
         ("unit = \"mm\"", "unit = \"m\""),
         ("column = \"t\"", "column = \"t\"\nrate_hz = 250.0"),
     ] {

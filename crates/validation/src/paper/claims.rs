@@ -222,8 +222,11 @@ fn right_start(filter: &Filter, flight: &Flight) -> KalmanState {
     filter.initial_state(flight.screw_m[0] - flight.motor_m[0], flight.load_n[0])
 }
 
+/// Makes a state wrong.
+type Spoil = fn(&mut KalmanState);
+
 fn starts(filter: &Filter, flight: &Flight, right: &[KalmanState]) -> Result<Vec<Convergence>> {
-    let changes: [(&str, fn(&mut KalmanState)); 4] = [
+    let changes: [(&str, Spoil); 4] = [
         ("backlash 1 mm off", |state| state.x[2] += WRONG_M),
         ("position 1 mm off", |state| state.x[0] += WRONG_M),
         ("speed 0.1 m/s off", |state| state.x[1] += 0.1),

@@ -169,9 +169,12 @@ fn spread(points: &[Curve]) -> (f64, f64) {
     range(points.iter().flat_map(|(_, _, points)| points.iter().map(|(_, y)| *y)))
 }
 
+/// Points of a series, scaled.
+type Thin = fn(&[f64], f64) -> Vec<(f64, f64)>;
+
 /// Curves over the whole flight on the left, and over two seconds on the right.
 fn whole_and_zoom(series: [(&str, RGBColor, &[f64]); 2], name: &str, scale: f64) -> Drawn {
-    let curves = |points: fn(&[f64], f64) -> Vec<(f64, f64)>| -> Vec<Curve> {
+    let curves = |points: Thin| -> Vec<Curve> {
         series
             .iter()
             .map(|(name, colour, values)| ((*name).to_owned(), *colour, points(values, scale)))

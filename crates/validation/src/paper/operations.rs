@@ -35,10 +35,14 @@ thread_local! {
     static DONE: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0 }) };
 }
 
-fn note(change: impl FnOnce(&mut OperationCount)) {
-    let mut count = DONE.get();
-    change(&mut count);
-    DONE.set(count);
+/// Counts additions, multiplications and divisions.
+fn note(additions: u32, multiplications: u32, divisions: u32) {
+    let before = DONE.get();
+    DONE.set(OperationCount {
+        additions: before.additions + additions,
+        multiplications: before.multiplications + multiplications,
+        divisions: before.divisions + divisions,
+    });
 }
 
 /// A number that counts what is done with it.
@@ -48,7 +52,7 @@ struct Counted(f64);
 impl Add for Counted {
     type Output = Self;
     fn add(self, other: Self) -> Self {
-        note(|count| count.additions += 1);
+        note(1, 0, 0);
         Self(self.0 + other.0)
     }
 }
@@ -56,7 +60,7 @@ impl Add for Counted {
 impl Sub for Counted {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
-        note(|count| count.additions += 1);
+        note(1, 0, 0);
         Self(self.0 - other.0)
     }
 }
@@ -64,7 +68,7 @@ impl Sub for Counted {
 impl Mul for Counted {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
-        note(|count| count.multiplications += 1);
+        note(0, 1, 0);
         Self(self.0 * other.0)
     }
 }
@@ -72,7 +76,7 @@ impl Mul for Counted {
 impl Div for Counted {
     type Output = Self;
     fn div(self, other: Self) -> Self {
-        note(|count| count.divisions += 1);
+        note(0, 0, 1);
         Self(self.0 / other.0)
     }
 }
