@@ -6,7 +6,9 @@ use std::path::Path;
 
 use arrow::datatypes::DataType;
 use records::row_schema::{self, Column, Row};
-use records::{AlertRecord, GapRecord, TrendRow, WorkRequest};
+use records::{
+    AlertRecord, GapRecord, InspectionInterval, QuantityChange, QuantityRow, TrendRow, WorkRequest,
+};
 
 #[test]
 fn the_page_lists_every_column_with_its_type_and_meaning() {
@@ -16,6 +18,9 @@ fn the_page_lists_every_column_with_its_type_and_meaning() {
     for (name, table) in [
         ("records", table::<GapRecord>()),
         ("trends", table::<TrendRow>()),
+        ("quantities", table::<QuantityRow>()),
+        ("changes", table::<QuantityChange>()),
+        ("intervals", table::<InspectionInterval>()),
         ("work requests", table::<WorkRequest>()),
         ("alerts", table::<AlertRecord>()),
     ] {
