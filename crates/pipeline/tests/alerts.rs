@@ -115,8 +115,8 @@ impl World {
 impl Courier for World {
     type Error = Killed;
 
-    fn write(&mut self, row: &AlertRecord) -> Result<(), Killed> {
-        self.write_all(std::slice::from_ref(row))
+    fn write(&mut self, rows: &[AlertRecord]) -> Result<(), Killed> {
+        self.write_all(rows)
     }
 
     fn send(&mut self, row: &AlertRecord) -> Attempt {
@@ -266,8 +266,8 @@ fn a_dead_receiver_costs_three_attempts_and_a_bad_message_does_not_block_others(
     struct Table(BTreeMap<String, AlertRecord>, Vec<String>, fn(&str) -> bool);
     impl Courier for Table {
         type Error = Killed;
-        fn write(&mut self, row: &AlertRecord) -> Result<(), Killed> {
-            self.0.insert(row.alert_id.clone(), row.clone());
+        fn write(&mut self, rows: &[AlertRecord]) -> Result<(), Killed> {
+            self.0.extend(rows.iter().map(|row| (row.alert_id.clone(), row.clone())));
             Ok(())
         }
         fn send(&mut self, row: &AlertRecord) -> Attempt {
