@@ -160,7 +160,7 @@ fn a_thousand_runs_with_kills_send_every_change_once_or_mark_it() {
             truth.insert(serial, STATES[world.random.below(5) as usize]);
         }
         let is_killed = world.random.below(3) == 0;
-        let step = world.random.below(12);
+        let step = world.random.below(5);
         world.kill_in = is_killed.then_some((step, world.random.below(2) == 0));
         // A back-fill on the same date changes states as well.
         let day = number as i64 / 4;
