@@ -115,8 +115,8 @@ impl World {
 impl Courier for World {
     type Error = Killed;
 
-    fn write(&mut self, row: &AlertRecord) -> Result<(), Killed> {
-        self.write_all(std::slice::from_ref(row))
+    fn write(&mut self, rows: &[AlertRecord]) -> Result<(), Killed> {
+        self.write_all(rows)
     }
 
     fn send(&mut self, row: &AlertRecord) -> Attempt {
@@ -160,7 +160,7 @@ fn a_thousand_runs_with_kills_send_every_change_once_or_mark_it() {
             truth.insert(serial, STATES[world.random.below(5) as usize]);
         }
         let is_killed = world.random.below(3) == 0;
-        let step = world.random.below(12);
+        let step = world.random.below(5);
         world.kill_in = is_killed.then_some((step, world.random.below(2) == 0));
         // A back-fill on the same date changes states as well.
         let day = number as i64 / 4;
@@ -266,8 +266,8 @@ fn a_dead_receiver_costs_three_attempts_and_a_bad_message_does_not_block_others(
     struct Table(BTreeMap<String, AlertRecord>, Vec<String>, fn(&str) -> bool);
     impl Courier for Table {
         type Error = Killed;
-        fn write(&mut self, row: &AlertRecord) -> Result<(), Killed> {
-            self.0.insert(row.alert_id.clone(), row.clone());
+        fn write(&mut self, rows: &[AlertRecord]) -> Result<(), Killed> {
+            self.0.extend(rows.iter().map(|row| (row.alert_id.clone(), row.clone())));
             Ok(())
         }
         fn send(&mut self, row: &AlertRecord) -> Attempt {

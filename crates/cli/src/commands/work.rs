@@ -65,7 +65,8 @@ fn decide(
     let Some(request) = requests.iter().find(|request| request.request_id == id) else {
         return Ok(Code::Success);
     };
-    output.write_result(&format!("{id}: {}; {}\n", escape(&unit(request)), escape(&status(request))))?;
+    let by = escape(&who.by);
+    output.write_result(&format!("{id}: {}; {} by {by}\n", escape(&unit(request)), status(request)))?;
     Ok(Code::Success)
 }
 
@@ -106,11 +107,12 @@ fn page(found: &[WorkRequest]) -> String {
         text("state", 0),
         text("part / serial", 0),
         text("tail", 1),
-        text("position", 3),
-        text("opened", 2),
+        text("position", 4),
+        text("opened", 3),
         text("status", 0),
-        text("remark", 4),
-        text("finding", 5),
+        text("by", 2),
+        text("remark", 5),
+        text("finding", 6),
     ];
     let cells = |request: &WorkRequest| {
         let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(table::empty_cell);
@@ -122,6 +124,7 @@ fn page(found: &[WorkRequest]) -> String {
             or_dash(&request.position),
             day(request.opened_utc),
             status(request),
+            or_dash(&request.by),
             or_dash(&request.reason),
             or_dash(&request.finding),
         ]
@@ -137,18 +140,17 @@ fn unit(request: &WorkRequest) -> String {
     format!("{} / {}", request.part_number.as_deref().unwrap_or("–"), request.serial_number)
 }
 
-/// Status with its person and date.
+/// Status with its date.
 fn status(request: &WorkRequest) -> String {
-    let by = request.by.as_deref().map(|by| format!(" by {by}")).unwrap_or_default();
     match (request.status, request.until_utc) {
-        ("deferred", Some(until)) => format!("deferred to {}{by}", day(until)),
-        ("open", Some(until)) => format!("open, was deferred to {}{by}", day(until)),
+        ("deferred", Some(until)) => format!("deferred to {}", day(until)),
+        ("open", Some(until)) => format!("open, was deferred to {}", day(until)),
         ("closed", _) => {
             let how = request.closed_by.as_deref().unwrap_or("closed");
-            format!("{how} {}{by}", request.closed_utc.map(day).unwrap_or_default())
+            format!("{how} {}", request.closed_utc.map(day).unwrap_or_default())
         }
         ("open", None) => "open".to_owned(),
-        (other, _) => format!("{other}{by}"),
+        (other, _) => other.to_owned(),
     }
 }
 

@@ -43,6 +43,7 @@ fn other_type(message: &str) -> Option<Diagnostic> {
         "f64" => ("a number", Some("a plain number such as `8.0`; its unit is in the key's name")),
         "a string" => ("text", Some("put text in quotes: `\"…\"`")),
         "a sequence" => ("a list", Some("write a list in brackets: `[\"…\"]`")),
+        "struct AlertChannel" => ("a table", Some("name each channel: `[alerts.mail]`")),
         other => (other, None),
     };
     let diagnostic = Diagnostic::new("bad_toml", format!("expected {wanted}, found {found}"));

@@ -7,18 +7,22 @@
 //! ```
 //!
 //! A run that is killed between claim and mark leaves `sending`. The next run makes it `unconfirmed`, since the
-//! receiver may have the message; or it sends the message again, where the channel drops doubles.
+//! receiver may have the message. A channel that drops doubles, as a folder does, needs no claim: what was not marked
+//! is sent again.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use jiff::Timestamp;
+use job::config::AlertChannel;
 use records::{AlertRecord, AlertStatus};
 
 use crate::follow_up::alert_changes::Channels;
 
 /// Failures in a row after which a channel is left until the next run.
 const MAX_FAILURES: usize = 3;
+/// Messages of a channel without claims that are marked in one commit.
+const MAX_MARKED: usize = 50;
 /// Time after which a channel is left until the next run.
 const MAX_CHANNEL_TIME: Duration = Duration::from_secs(300);
 
@@ -53,11 +57,11 @@ pub trait Courier {
     /// Error of the store.
     type Error;
 
-    /// Writes a row; it is durable when the call returns.
+    /// Writes rows in one commit; they are durable when the call returns.
     ///
     /// # Errors
     /// When the store cannot be written.
-    fn write(&mut self, row: &AlertRecord) -> Result<(), Self::Error>;
+    fn write(&mut self, rows: &[AlertRecord]) -> Result<(), Self::Error>;
 
     /// Sends the message of a row.
     fn send(&mut self, row: &AlertRecord) -> Attempt;
@@ -80,12 +84,11 @@ pub fn deliver<C: Courier>(
     let mut due = BTreeMap::<String, Vec<AlertRecord>>::new();
     for mut row in rows {
         let Some(channel) = channels.get(&row.channel).filter(|channel| channel.enabled) else { continue };
-        // A file of one name is written once, whatever happens.
-        let is_repeatable = channel.resend_unconfirmed || channel.folder.is_some();
+        let is_repeatable = is_repeatable(channel);
         let is_cut = row.status == AlertStatus::Sending;
         if is_cut && !is_repeatable {
             row.error = Some("the run was killed while the message was sent".to_owned());
-            mark(&mut row, AlertStatus::Unconfirmed, run_id, courier)?;
+            mark(&mut row, AlertStatus::Unconfirmed, run_id);
             delivery.unconfirmed.push(row);
         } else if is_cut
             || row.status == AlertStatus::Pending
@@ -96,7 +99,10 @@ pub fn deliver<C: Courier>(
             delivery.unconfirmed_before += 1;
         }
     }
-    for mut rows in due.into_values() {
+    if !delivery.unconfirmed.is_empty() {
+        courier.write(&delivery.unconfirmed)?;
+    }
+    for (name, mut rows) in due {
         // A message that always fails must not keep others back.
         rows.sort_by(|a, b| {
             (a.attempts, a.as_of_utc, a.change_number, &a.alert_id).cmp(&(
@@ -106,51 +112,73 @@ pub fn deliver<C: Courier>(
                 &b.alert_id,
             ))
         });
-        deliver_channel(rows, run_id, courier, &mut delivery)?;
+        let is_repeatable = channels.get(&name).is_some_and(is_repeatable);
+        ChannelDelivery { run_id, is_repeatable, courier, delivery: &mut delivery }.run(rows)?;
     }
     Ok(delivery)
 }
 
-fn deliver_channel<C: Courier>(
-    rows: Vec<AlertRecord>,
-    run_id: &str,
-    courier: &mut C,
-    delivery: &mut Delivery,
-) -> Result<(), C::Error> {
-    let (begun, mut failures) = (Instant::now(), 0);
-    for mut row in rows {
-        if failures == MAX_FAILURES || begun.elapsed() > MAX_CHANNEL_TIME || courier.is_stopped() {
-            delivery.waiting += 1;
-            continue;
+/// Whether a message may be sent twice: a file of one name is written once, and some receivers drop doubles.
+fn is_repeatable(channel: &AlertChannel) -> bool {
+    channel.resend_unconfirmed || channel.folder.is_some()
+}
+
+/// Delivery of one channel.
+struct ChannelDelivery<'a, C> {
+    run_id: &'a str,
+    /// Messages need no claim: one that was sent and not marked is sent again.
+    is_repeatable: bool,
+    courier: &'a mut C,
+    delivery: &'a mut Delivery,
+}
+
+impl<C: Courier> ChannelDelivery<'_, C> {
+    /// Sends messages in order. One commit marks a message and claims the next one; where no claim is needed, it
+    /// marks many.
+    fn run(mut self, rows: Vec<AlertRecord>) -> Result<(), C::Error> {
+        let (begun, mut failures) = (Instant::now(), 0);
+        let mut marked: Vec<AlertRecord> = Vec::new();
+        let mut rows = rows.into_iter();
+        while failures < MAX_FAILURES && begun.elapsed() < MAX_CHANNEL_TIME && !self.courier.is_stopped() {
+            let Some(mut row) = rows.next() else { break };
+            row.attempts += 1;
+            row.error = None;
+            if self.is_repeatable {
+                if marked.len() == MAX_MARKED {
+                    self.courier.write(&std::mem::take(&mut marked))?;
+                }
+            } else {
+                mark(&mut row, AlertStatus::Sending, self.run_id);
+                marked.push(row.clone());
+                self.courier.write(&std::mem::take(&mut marked))?;
+            }
+            self.send(&mut row);
+            failures = if row.error.is_some() { failures + 1 } else { 0 };
+            marked.push(row);
         }
-        row.attempts += 1;
-        row.error = None;
-        mark(&mut row, AlertStatus::Sending, run_id, courier)?;
-        let (status, error) = match courier.send(&row) {
+        self.delivery.waiting += rows.len();
+        if marked.is_empty() { Ok(()) } else { self.courier.write(&marked) }
+    }
+
+    /// Sends one message and counts it.
+    fn send(&mut self, row: &mut AlertRecord) {
+        let (status, error) = match self.courier.send(row) {
             Attempt::Sent => (AlertStatus::Sent, None),
             Attempt::NotSent(why) => (AlertStatus::Pending, Some(why)),
             Attempt::Unknown(why) => (AlertStatus::Unconfirmed, Some(why)),
         };
-        failures = if error.is_some() { failures + 1 } else { 0 };
         row.error = error;
-        mark(&mut row, status, run_id, courier)?;
+        mark(row, status, self.run_id);
         match status {
-            AlertStatus::Sent => delivery.sent += 1,
-            AlertStatus::Unconfirmed => delivery.unconfirmed.push(row),
-            _ => delivery.failed.push(row),
+            AlertStatus::Sent => self.delivery.sent += 1,
+            AlertStatus::Unconfirmed => self.delivery.unconfirmed.push(row.clone()),
+            _ => self.delivery.failed.push(row.clone()),
         }
     }
-    Ok(())
 }
 
-fn mark<C: Courier>(
-    row: &mut AlertRecord,
-    status: AlertStatus,
-    run_id: &str,
-    courier: &mut C,
-) -> Result<(), C::Error> {
+fn mark(row: &mut AlertRecord, status: AlertStatus, run_id: &str) {
     row.status = status;
     run_id.clone_into(&mut row.run_id);
     row.recorded_utc = Timestamp::now();
-    courier.write(row)
 }

@@ -180,8 +180,8 @@ struct StoreCourier<'a> {
 impl Courier for StoreCourier<'_> {
     type Error = store::Error;
 
-    fn write(&mut self, row: &AlertRecord) -> Result<(), store::Error> {
-        self.writer.write_alerts(std::slice::from_ref(row))
+    fn write(&mut self, rows: &[AlertRecord]) -> Result<(), store::Error> {
+        self.writer.write_alerts(rows)
     }
 
     fn send(&mut self, row: &AlertRecord) -> Attempt {
