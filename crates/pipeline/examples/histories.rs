@@ -1,18 +1,24 @@
-//! Time to read a store's records and to group them by unit: `histories STORE`. `docs/design.md` compares it with Polars.
+//! Time to read records and to group them by unit: `histories STORE` or `histories ESTIMATES.parquet`.
+//! `benches/histories.py` compares it with Polars.
 
 #![expect(clippy::print_stdout, reason = "an example prints what it measured")]
 
 use std::error::Error;
+use std::path::Path;
 use std::time::Instant;
 
 use pipeline::fleet_trends::assess::load_histories;
+use pipeline::history::external_estimates;
 use store::Store;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = std::env::args().nth(1).ok_or("usage: histories STORE")?;
-    let store = Store::open(folder)?;
+    let source = std::env::args().nth(1).ok_or("usage: histories STORE|ESTIMATES.parquet")?;
     let begun = Instant::now();
-    let histories = load_histories(&store)?;
+    let histories = if source.ends_with(".parquet") {
+        external_estimates::read(Path::new(&source))?
+    } else {
+        load_histories(&Store::open(&source)?)?
+    };
     let rows: usize = histories.iter().map(|(_, history)| history.flights().len()).sum();
     println!("{} units, {rows} flights, {:.3} s", histories.names().count(), begun.elapsed().as_secs_f64());
     Ok(())

@@ -152,7 +152,7 @@ pub fn path_tail(path: &Path) -> Option<String> {
 }
 
 /// The end of a file name that is a position.
-pub const PLACE_END: &str = r"(?:[^/]*?[_ -])?(?<position>[A-Za-z]+(?:[_ -][A-Za-z]+)*)\.parquet";
+pub const PLACE_END: &str = r"(?:[^/]*?[_ -])??(?<position>[A-Za-z]+(?:[_ -][A-Za-z]+)*)\.parquet";
 
 /// The position at the end of a file name, if it has no digits.
 pub fn path_position(path: &Path) -> Option<String> {
