@@ -100,6 +100,7 @@ struct FleetView {
     title: String,
     footer: String,
     heading: String,
+    decision: String,
     lead: String,
     counts: Vec<(StateBadge, String)>,
     data_summary: String,
@@ -208,6 +209,7 @@ fn index_page(
         root: "",
         title: "Actuator free play".to_owned(),
         heading: heading(report),
+        decision: decision(report),
         footer: footer(report),
         lead: format!(
             "{} · data to {} · assessed {}",
@@ -254,6 +256,27 @@ fn heading(report: &Report) -> String {
         Some(day) => format!("{scope}: actuator free play – {}", date(day)),
         None => format!("{scope}: actuator free play"),
     }
+}
+
+/// What to do first, and how many units are in each state.
+fn decision(report: &Report) -> String {
+    let number = |badge: StateBadge| report.units.iter().filter(|u| u.badge() == badge).count();
+    let counts = StateBadge::ALL.map(|badge| (number(badge), badge.word()));
+    let counts: Vec<String> =
+        counts.into_iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{} {word}", count(n))).collect();
+    let first = work(report).into_iter().find(|unit| unit.badge().needs_action());
+    let Some(unit) = first else {
+        return format!("No unit needs action: {}.", counts.join(", "));
+    };
+    let place = [unit.tail_number.as_deref(), unit.position.as_deref()];
+    let place = place.into_iter().flatten().collect::<Vec<_>>().join(" ");
+    let due = unit.assessment.not_before_utc.map(|by| format!(" before {}", date(by))).unwrap_or_default();
+    let act = match unit.badge().word() {
+        "act" => "replace now".to_owned(),
+        "plan" => format!("plan the replacement{due}"),
+        _ => "inspect".to_owned(),
+    };
+    format!("{place} ({}): {act}. In all: {}.", unit.name(), counts.join(", "))
 }
 
 /// Units that need action or have an open work request, by earliest date.
