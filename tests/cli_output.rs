@@ -453,3 +453,19 @@ fn a_proposal_from_logs_reads_them() {
     let account = fleet.run_ok(&["run"]);
     assert!(account.contains("120 estimated"), "{account}");
 }
+
+/// Scripts read the first line; a report of a fault needs the rest.
+#[test]
+fn the_version_has_a_commit_and_features_below_the_line_that_scripts_read() {
+    let fleet = TestFleet::sample();
+    let short = fleet.freeplay(&["-V"]);
+    let long = fleet.freeplay(&["--version"]);
+    let first = concat!("freeplay ", env!("CARGO_PKG_VERSION"));
+    assert_eq!((short.code, short.out.trim_end()), (Some(0), first));
+    let lines: Vec<&str> = long.out.lines().collect();
+    assert_eq!(lines[0], first);
+    for (line, start) in lines[1..].iter().zip(["commit: ", "build: ", "features: "]) {
+        assert!(line.starts_with(start) && line.len() > start.len(), "{line}");
+    }
+    assert_eq!(lines.len(), 4, "{lines:?}");
+}
