@@ -187,8 +187,11 @@ fn a_failing_command_a_timeout_and_a_bad_folder_lose_no_result() {
     assert_eq!(serials(&got), IN_PLAN);
 }
 
+/// Code of the answer and body of each request.
+type Received = Arc<Mutex<Vec<(u16, Value)>>>;
+
 /// A receiver on loopback that answers with the codes in turn, and keeps the bodies it accepted.
-fn receiver(codes: &'static [u16]) -> (String, Arc<Mutex<Vec<(u16, Value)>>>) {
+fn receiver(codes: &'static [u16]) -> (String, Received) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("http://{}/hooks/SECRET", listener.local_addr().unwrap());
     let got = Arc::new(Mutex::new(Vec::new()));

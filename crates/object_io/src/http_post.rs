@@ -85,7 +85,6 @@ fn detail(error: &object_store::client::HttpError) -> String {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod tests {
     use std::io::{Read, Write};
     use std::net::TcpListener;

@@ -16,7 +16,7 @@ use crate::row_output;
 use crate::table::{self, count, state_mark, text};
 
 /// Longest wait for a run that writes into the store.
-const WAIT: Duration = Duration::from_secs(60);
+const WAIT: Duration = Duration::from_mins(1);
 
 /// Lists requests, or records a decision.
 ///

@@ -101,7 +101,7 @@ impl AlertChannel {
             let c = Diagnostic::new("alert_channel", what).hint("folder = \"alerts\"");
             found.push(source.at(&["alerts", name], c));
         }
-        if self.command.as_ref().is_some_and(|words| words.first().is_none_or(|program| program.is_empty())) {
+        if self.command.as_ref().is_some_and(|words| words.first().is_none_or(String::is_empty)) {
             let c = Diagnostic::new("alert_channel", format!("`alerts.{name}.command` names no program"));
             found.push(
                 source.at(&["alerts", name, "command"], c.hint("command = [\"/usr/local/bin/notify\"]")),

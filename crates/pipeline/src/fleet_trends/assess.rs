@@ -18,6 +18,7 @@ use crate::fleet_trends::trend_row;
 use crate::follow_up::finding::Finding;
 use crate::history::builder::HistoryBuilder;
 use crate::history::external_estimates::AsOfQuery;
+use crate::history::flight_row::FlightRow;
 use crate::history::histories::{Histories, History, UnitKey};
 use crate::history::installation_index::InstallationIndex;
 use crate::history::merge::of_parts;
@@ -436,7 +437,7 @@ impl<'a> FleetContext<'a> {
     /// Departure of a unit's latest flight until a date.
     fn latest_flight(&self, name: &UnitKey, as_of: Timestamp) -> Option<Timestamp> {
         let (history, _) = self.units.get(name)?;
-        history.until(as_of).last().map(|flight| flight.departure_utc())
+        history.until(as_of).last().map(FlightRow::departure_utc)
     }
 
     /// Trend settings of a unit.

@@ -24,7 +24,7 @@ const MAX_FAILURES: usize = 3;
 /// Messages of a channel without claims that are marked in one commit.
 const MAX_MARKED: usize = 50;
 /// Time after which a channel is left until the next run.
-const MAX_CHANNEL_TIME: Duration = Duration::from_secs(300);
+const MAX_CHANNEL_TIME: Duration = Duration::from_mins(5);
 
 /// Outcome of one attempt.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -59,7 +59,7 @@ fn apply(request: &mut WorkRequest, event: &WorkEvent) {
             *request = WorkRequest { opened_utc, ..opened(event) };
         }
         WorkEventKind::StateChanged => {
-            (request.state, request.finding) = (event.state.clone(), event.reason.clone())
+            (request.state, request.finding) = (event.state.clone(), event.reason.clone());
         }
         WorkEventKind::Moved => {
             (request.tail_number, request.position) = (event.tail_number.clone(), event.position.clone());
