@@ -205,7 +205,7 @@ fn unit_of_steps(values: &[f64]) -> Option<&'static str> {
 fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
     let mut values = ColumnBuilder::with_capacity(0, None);
     match file.append_numbers(name, RowSelection::ALL, &mut values) {
-        Ok(_) => values.finish().0,
+        Ok(()) => values.finish().0,
         Err(_) => Vec::new(),
     }
 }
