@@ -358,7 +358,7 @@ mod tests {
         let names = ["rudder/motor_position", "rudder/screw_position", "rudder/load"];
         let every = |texts: [&str; 3]| Column::Text((0..300).map(|k| texts[k % 3].to_owned()).collect());
         let columns = [
-            ("unix_ms", Column::Real((0..300).map(|k| 1_795_061_580e3 + (k / 3 * 10) as f64).collect())),
+            ("unix_ms", Column::Real((0..300).map(|k| 1_795_061_580e3 + f64::from(k / 3 * 10)).collect())),
             ("channel", every(names)),
             ("unit", every(["deg", "mm", "N"])),
             ("value", Column::Real((0..300).map(f64::from).collect())),
