@@ -77,7 +77,8 @@ fn fleet() -> TestFleet {
         let (position, serial) = (hostile(cells[1]), format!("={}{HOSTILE}", cells[3]));
         let line =
             [quoted(&tail), quoted(&position), cells[2].to_owned(), quoted(&serial), cells[4].to_owned()];
-        text += &format!("{}\n", line.join(","));
+        text += &line.join(",");
+        text.push('\n');
     }
     std::fs::write(fleet.path("sample-data/installations.csv"), text).unwrap();
     fleet

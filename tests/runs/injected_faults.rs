@@ -315,13 +315,13 @@ fn table() -> TestFleet {
 /// A folder that may be a table is an error: a withdrawn file is never read as a log.
 #[test]
 fn a_look_at_a_table_that_fails_stores_no_withdrawn_flight() {
+    const UNDER: &str = "logs/N413FP/_delta_log";
     let Some(injector) = Injector::new() else { return };
     let plain = table();
     plain.run_ok(RUN);
     let wanted = plain.exported();
     assert_eq!(wanted.lines().count() - 1, 8);
     let command = Struck { injector: &injector, make: table, args: RUN, wanted: &wanted };
-    const UNDER: &str = "logs/N413FP/_delta_log";
     for (under, mode) in [(UNDER, EIO), (UNDER, ESTALE)] {
         let count = injector.count(&table(), RUN, under, "read");
         assert!(count > 0, "no call on {under}");

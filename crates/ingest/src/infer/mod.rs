@@ -205,7 +205,7 @@ fn unit_of_steps(values: &[f64]) -> Option<&'static str> {
 fn numbers(file: &LogFile, name: &str) -> Vec<f64> {
     let mut values = ColumnBuilder::with_capacity(0, None);
     match file.append_numbers(name, RowSelection::ALL, &mut values) {
-        Ok(_) => values.finish().0,
+        Ok(()) => values.finish().0,
         Err(_) => Vec::new(),
     }
 }
@@ -347,6 +347,29 @@ mod tests {
         let found = of(&numbers);
         assert_eq!(found.channels[&Role::Load].0, "load_{position}_n");
         assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["1", "2"]);
+    }
+
+    /// 1,795,061,580 s after 1970 is 2026-11-19T04:13:00Z.
+    #[test]
+    fn a_clock_that_counts_from_1970_and_a_column_of_units_are_recognised() {
+        use crate::parquet::writer::{Column, write_parquet};
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("x.parquet");
+        let names = ["rudder/motor_position", "rudder/screw_position", "rudder/load"];
+        let every = |texts: [&str; 3]| Column::Text((0..300).map(|k| texts[k % 3].to_owned()).collect());
+        let columns = [
+            ("unix_ms", Column::Real((0..300).map(|k| 1_795_061_580e3 + f64::from(k / 3 * 10)).collect())),
+            ("channel", every(names)),
+            ("unit", every(["deg", "mm", "N"])),
+            ("value", Column::Real((0..300).map(f64::from).collect())),
+        ];
+        write_parquet(&file, &columns.map(|(name, column)| (name.to_owned(), column)), &[]).unwrap();
+        let found = propose(&file).unwrap();
+        assert_eq!((found.clock, found.is_unix_clock), (Some(("unix_ms".to_owned(), Some("ms"))), true));
+        assert_eq!(found.layout.position_column, None);
+        assert_eq!(found.channels[&Role::Load].0, "{position}/load");
+        assert_eq!(found.positions.iter().collect::<Vec<_>>(), ["rudder"]);
+        assert!(!counts_from_1970(&[0.0, 0.01], "s") && !counts_from_1970(&[1_795_061_580.0], "ms"));
     }
 
     /// A long table with its identity in columns, one of which is a constant instant.

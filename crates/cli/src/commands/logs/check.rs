@@ -166,7 +166,7 @@ impl FlightOwners {
 
     /// An error for each log with the tail, flight id and position of another, and another departure close by.
     fn undeclared_pieces(&self) -> Vec<Diagnostic> {
-        let mut same_id: BTreeMap<(&str, &str, &str), Vec<(jiff::Timestamp, usize)>> = BTreeMap::new();
+        let mut same_id: BTreeMap<_, Vec<(jiff::Timestamp, usize)>> = BTreeMap::new();
         for ((departure, tail, flight, position), log) in &self.owners {
             same_id.entry((tail, flight, position)).or_default().push((*departure, *log));
         }
