@@ -51,15 +51,24 @@ impl Channels {
     }
 }
 
-/// ΔS of the paper, and the gap of the contact regression with its standard error, m.
-fn gaps(text: &str) -> Result<(f64, Option<(f64, f64)>), Box<dyn Error>> {
+/// Gaps of a flight, m.
+struct Gaps {
+    /// ΔS of the paper.
+    published_m: f64,
+    /// Gap of the contact regression and its standard error, where the flight allows one.
+    contact_m: Option<(f64, f64)>,
+}
+
+fn gaps(text: &str) -> Result<Gaps, Box<dyn Error>> {
     let channels = Channels::read(text)?;
+    let whole = 0..channels.dx_m.len();
+    let segments = std::slice::from_ref(&whole);
     let samples = Samples {
         step_s: channels.step_s,
         motor_m: &channels.motor_m,
         dx_m: &channels.dx_m,
         load_n: &channels.load_n,
-        segments: &[0..channels.dx_m.len()],
+        segments,
     };
     let actuator = ActuatorModel::linear(STIFFNESS_N_PER_M, 2000.0, 8.0)?;
     let noise = NoiseModel::Sensors(SensorNoise {
@@ -71,18 +80,18 @@ fn gaps(text: &str) -> Result<(f64, Option<(f64, f64)>), Box<dyn Error>> {
         bandwidth_hz: 10.0,
     });
     let published = midrange::estimate(&samples, &Filter::new(&actuator, channels.step_s, &noise)?)?;
-    let contact = match contact::estimate(&samples, &PartPrior::of_stiffness(STIFFNESS_N_PER_M))? {
+    let contact_m = match contact::estimate(&samples, &PartPrior::of_stiffness(STIFFNESS_N_PER_M))? {
         ContactOutcome::Estimated(found) => Some((found.gap_m, found.gap_se_m)),
         ContactOutcome::Refused(_) => None,
     };
-    Ok((published.gap.gap_m, contact))
+    Ok(Gaps { published_m: published.gap.gap_m, contact_m })
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let file = std::env::args().nth(1).ok_or("name a CSV file")?;
-    let (published_m, contact) = gaps(&std::fs::read_to_string(file)?)?;
+    let Gaps { published_m, contact_m } = gaps(&std::fs::read_to_string(file)?)?;
     println!("mid-range of the paper: {:.1} µm", 1e6 * published_m);
-    match contact {
+    match contact_m {
         Some((gap_m, se_m)) => println!("contact regression: {:.1} ± {:.1} µm", 1e6 * gap_m, 1e6 * se_m),
         None => println!("contact regression: the flight does not allow an estimate"),
     }
@@ -108,15 +117,15 @@ mod tests {
             let cells = [flight.time_s[k], flight.motor_m[k], flight.screw_m[k], flight.load_n[k]];
             writeln!(text, "{}", cells.map(|cell| format!("{cell:e}")).join(",")).unwrap();
         }
-        let (published_m, contact) = gaps(&text).unwrap();
-        let (gap_m, se_m) = contact.unwrap();
+        let Gaps { published_m, contact_m } = gaps(&text).unwrap();
+        let (gap_m, se_m) = contact_m.unwrap();
         assert!((published_m - 100e-6).abs() < 4e-6, "{published_m}");
         assert!((gap_m - 100e-6).abs() < 4.0 * se_m && se_m < 2e-6, "{gap_m} ± {se_m}");
     }
 
     #[test]
     fn a_row_that_is_not_numbers_is_named() {
-        let error = gaps("t,m,s,f\n0,1,2,3\n0.1,x,2,3\n").unwrap_err();
+        let error = gaps("t,m,s,f\n0,1,2,3\n0.1,x,2,3\n").err().unwrap();
         assert!(error.to_string().starts_with("line 3"), "{error}");
     }
 }

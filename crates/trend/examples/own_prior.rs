@@ -37,7 +37,7 @@ fn unit(first_day: i64, flights: i64, growth_m_per_flight: f64) -> Result<Series
 fn assess_young_unit() -> Result<[Assessment; 2], Box<dyn Error>> {
     let today = 1000;
     let fleet: Vec<Series> =
-        (0..40).map(|k| unit(0, 600, 80e-9 + 2e-9 * k as f64)).collect::<Result<_, _>>()?;
+        (0..40).map(|k| unit(0, 600, 80e-9 + 2e-9 * f64::from(k))).collect::<Result<_, _>>()?;
     let prior = FleetPrior::learn(&fleet, day_us(today), LIMIT_M, None);
     let young = unit(today - 60, 60, 120e-9)?;
     let settings = Settings::for_limit(LIMIT_M);
