@@ -3,6 +3,7 @@
 //! This crate holds no mathematics and opens no file. Identifiers are distinct types, so a tail number cannot
 //! be passed where a serial number is expected.
 
+pub mod assessment;
 pub mod diagnostic;
 pub mod flight;
 pub mod follow_up;
@@ -10,14 +11,14 @@ pub mod gap_record;
 pub mod ids;
 pub mod installation;
 pub mod log_record;
-pub mod quantity_row;
 pub mod row_schema;
 pub mod run_record;
 pub mod sanitize;
 pub mod time;
-pub mod trend_row;
 pub mod uncertainty;
 
+pub use assessment::quantity_row::{ChangeScope, Quantity, QuantityChange, QuantityRow, QuantityStep};
+pub use assessment::trend_row::{ChangePoint, InspectionInterval, TrendRow};
 pub use diagnostic::Diagnostic;
 pub use flight::Flight;
 pub use follow_up::alert_record::{AlertRecord, AlertStatus};
@@ -27,7 +28,5 @@ pub use gap_record::{GapEstimate, GapRecord, Provenance, RecordKey, Status};
 pub use ids::{FlightId, PartNumber, Position, SerialNumber, TailNumber};
 pub use installation::{Installation, Installations};
 pub use log_record::{LogOutcome, LogRecord};
-pub use quantity_row::{ChangeScope, Quantity, QuantityChange, QuantityRow, QuantityStep};
 pub use run_record::RunRecord;
 pub use time::sample_time_s;
-pub use trend_row::{ChangePoint, InspectionInterval, TrendRow};

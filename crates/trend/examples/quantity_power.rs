@@ -5,6 +5,9 @@
 //! ```
 //!
 //! Units fly three times a day. Errors of neighbouring flights are correlated with the given coefficient.
+#![allow(clippy::print_stdout, reason = "the table is the output")]
+
+#[allow(dead_code, reason = "examples use some of it each")]
 mod random;
 
 use random::Random;

@@ -47,6 +47,7 @@ pub(crate) enum QueryKey {
 
 /// `trend`.
 #[derive(Debug, ClapArgs)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag that a user types")]
 pub(crate) struct TrendArgs {
     /// Only units on this tail.
     #[arg(long)]

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use records::ChangeScope;
 use trend::quantity::QuantityValue;
 
-use crate::quantities::follow::Subject;
+use crate::quantities::subject::Subject;
 
 /// Steps within these days are one: a tail's flights, or a fleet's first flights under new software.
 const SAME_US: i64 = 3 * 86_400_000_000;

@@ -16,6 +16,7 @@ use crate::history::histories::UnitKey;
 use crate::monitoring::median;
 use crate::quantities::attribution::{self, CommonStep};
 use crate::quantities::limits::{Scale, Treatment};
+use crate::quantities::subject::Subject;
 use crate::quantities::values::{FleetValues, FlightValues, READ, UnitValues};
 
 /// A common step matters from this share of the limit on: all units of a tail agree about it.
@@ -46,37 +47,6 @@ pub struct FollowedQuantities {
     pub rows: Vec<QuantityRow>,
     /// What changed, by date, the newest first.
     pub changes: Vec<QuantityChange>,
-}
-
-/// One quantity of one unit.
-pub(crate) struct Subject<'a> {
-    pub(crate) name: &'a UnitKey,
-    unit: &'a UnitValues,
-    /// What limits are a share of, in the quantity's unit.
-    pub(crate) scale: f64,
-    limits: QuantityLimits,
-    /// Values at the part's usual temperature and load.
-    pub(crate) values: Vec<QuantityValue>,
-    /// Changes of the values as they are: at the end, those of the unit alone.
-    pub(crate) fit: Option<QuantityChanges>,
-    /// Steps of tail or part, with their scope.
-    common: Vec<(changes::QuantityStep, ChangeScope)>,
-}
-
-impl Subject<'_> {
-    /// The tail at a departure.
-    pub(crate) fn tail_at(&self, departure_us: i64) -> Option<&str> {
-        let at = self.unit.flights.partition_point(|f| f.departure_us < departure_us);
-        self.unit.place(self.unit.flights.get(at)?).tail_number.as_deref()
-    }
-
-    fn last_place(&self) -> Option<&crate::history::histories::TailPosition> {
-        Some(self.unit.place(self.unit.flights.last()?))
-    }
-
-    fn position(&self) -> Option<&str> {
-        self.last_place()?.position.as_deref()
-    }
 }
 
 /// Follows all quantities of all units.
@@ -154,10 +124,8 @@ fn subject<'a>(
     let series = facts.series(name);
     let maintained_us = series.and_then(|s| Some(s.maintenance_until(last.departure_us).last()?.utc_us));
     let hours = |us: i64| Some(series?.flights_until(us).last()?.hours);
-    let begin = match treatment.is_of_position {
-        true => unit.flights.iter().rposition(|f| f.place != last.place).map_or(0, |k| k + 1),
-        false => 0,
-    };
+    let moved = unit.flights.iter().rposition(|f| f.place != last.place);
+    let begin = moved.filter(|_| treatment.is_of_position).map_or(0, |k| k + 1);
     let followed =
         unit.flights[begin..].iter().filter(|f| maintained_us.is_none_or(|us| f.departure_us >= us));
     let value = |(k, flight): (usize, &FlightValues)| {
@@ -250,17 +218,6 @@ fn take_off_moves(subjects: &mut [Subject<'_>]) {
         };
         let moves: Vec<changes::QuantityStep> = fit.steps.iter().filter(is_move).copied().collect();
         moves.into_iter().for_each(|step| subject.take_off(step, ChangeScope::Tail));
-    }
-}
-
-impl Subject<'_> {
-    fn take_off(&mut self, step: changes::QuantityStep, scope: ChangeScope) {
-        if self.common.iter().any(|(known, _)| known.departure_us == step.departure_us) {
-            return;
-        }
-        let after = self.values.iter_mut().filter(|v| v.departure_us >= step.departure_us);
-        after.for_each(|v| v.value -= step.size);
-        self.common.push((step, scope));
     }
 }
 

@@ -41,7 +41,6 @@ impl Treatment {
         };
         let position = Self { is_of_position: true, ..own };
         match quantity {
-            Quantity::GapM => own,
             Quantity::LostMotionM => Self {
                 limit: Some(limits.lost_motion_share),
                 least_scatter: 0.002,
@@ -59,7 +58,7 @@ impl Treatment {
                 states: (Some("friction_rising"), Some("friction_falling")),
                 ..own
             },
-            Quantity::FrictionDryN | Quantity::FrictionLoadShare => own,
+            Quantity::GapM | Quantity::FrictionDryN | Quantity::FrictionLoadShare => own,
             Quantity::SkewS => Self {
                 scale: Scale::One,
                 limit: Some(limits.delay_s),

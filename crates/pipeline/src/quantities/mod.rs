@@ -7,4 +7,5 @@
 pub mod attribution;
 pub mod follow;
 pub mod limits;
+pub mod subject;
 pub mod values;

@@ -34,7 +34,7 @@ pub(crate) fn small_chart(
     let series: Vec<Vec<(f64, f64)>> = lines.iter().map(|line| downsampled(line.flights, factor)).collect();
     let values = || series.iter().flatten().map(|p| p.1);
     let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-    if !(low <= high) {
+    if low > high {
         return Ok(String::new());
     }
     let margin = (0.1 * (high - low)).max(0.02 * high.abs()).max(1e-9);

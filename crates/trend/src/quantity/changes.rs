@@ -95,8 +95,8 @@ pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChang
     let (beta, covariance) = model.solve()?;
     let at = |index: usize, value: &QuantityValue| model.row(index, value);
     let (x_first, x_last) = (at(0, first), at(sound.len() - 1, last));
-    let variance = |x: &Row| (x.transpose() * &covariance * x)[(0, 0)].max(0.0);
-    let moved = &x_last - &x_first;
+    let variance = |x: &Row| (x.transpose() * covariance * x)[(0, 0)].max(0.0);
+    let moved = x_last - x_first;
     let steps = model.steps.iter().enumerate().map(|(k, &at)| {
         let column = model.first_step() + k;
         QuantityStep {
@@ -208,7 +208,7 @@ impl<'a> Model<'a> {
 
     /// Squared t-value of a drift beside the present regressors.
     fn drift_gain(&self) -> f64 {
-        if !(self.usage_hours.1 > 0.0) {
+        if self.usage_hours.1 <= 0.0 {
             return 0.0;
         }
         let with = Self { steps: self.steps.clone(), has_drift: true, ..*self };
@@ -229,7 +229,7 @@ impl<'a> Model<'a> {
             if !self.is_free(index) {
                 continue;
             }
-            let own = weight - (shared.transpose() * &covariance * &shared)[(0, 0)];
+            let own = weight - (shared.transpose() * covariance * shared)[(0, 0)];
             if own > 1e-9 * weight && residual * residual / own > best.0 {
                 best = (residual * residual / own, index);
             }
@@ -263,7 +263,7 @@ impl<'a> Model<'a> {
 
     /// Drift per hour beside the steps, and its standard error, also where it is not significant.
     fn rate_per_hour(&self) -> Option<(f64, f64)> {
-        if self.values.len() < MIN_FLIGHTS || !(self.usage_hours.1 > 0.0) {
+        if self.values.len() < MIN_FLIGHTS || self.usage_hours.1 <= 0.0 {
             return None;
         }
         let with = Self { steps: self.steps.clone(), has_drift: true, ..*self };

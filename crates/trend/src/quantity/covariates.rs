@@ -73,7 +73,7 @@ fn huber(rows: &[(f64, Vector2<f64>)]) -> Option<(Vector2<f64>, Matrix2<f64>)> {
     for _ in 0..ITERATIONS {
         let residual = |(y, x): &(f64, Vector2<f64>)| y - x.dot(&beta);
         let scale = SD_OVER_MAD * median(rows.iter().map(|row| residual(row).abs()).collect())?;
-        if !(scale > 0.0) {
+        if scale.is_nan() || scale <= 0.0 {
             return None;
         }
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
@@ -83,7 +83,7 @@ fn huber(rows: &[(f64, Vector2<f64>)]) -> Option<(Vector2<f64>, Matrix2<f64>)> {
             right += weight * row.0 * row.1;
         }
         for k in 0..2 {
-            if !(normal[(k, k)] > 0.0) {
+            if normal[(k, k)] <= 0.0 {
                 normal[(k, k)] = 1.0;
             }
         }

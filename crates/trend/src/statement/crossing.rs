@@ -146,7 +146,7 @@ impl RulDistribution {
         };
         let CalibrationParams { low, high, .. } = self.calibration;
         let width = if hours < middle { high } else { -low };
-        if !(width > 0.0) {
+        if width.is_nan() || width <= 0.0 {
             return self.within(hours);
         }
         self.within(middle * (hours.max(1.0) / middle).powf(width.recip()))

@@ -1,0 +1,54 @@
+//! One quantity of one unit while its changes are attributed.
+
+use job::config::QuantityLimits;
+use records::ChangeScope;
+use trend::quantity::QuantityValue;
+use trend::quantity::changes::{self, QuantityChanges};
+
+use crate::history::histories::{TailPosition, UnitKey};
+use crate::quantities::values::UnitValues;
+
+/// One quantity of one unit.
+pub(crate) struct Subject<'a> {
+    /// The unit.
+    pub(crate) name: &'a UnitKey,
+    /// Its values.
+    pub(crate) unit: &'a UnitValues,
+    /// What limits are a share of, in the quantity's unit.
+    pub(crate) scale: f64,
+    pub(crate) limits: QuantityLimits,
+    /// Values at the part's usual temperature and load.
+    pub(crate) values: Vec<QuantityValue>,
+    /// Changes of the values as they are: at the end, those of the unit alone.
+    pub(crate) fit: Option<QuantityChanges>,
+    /// Steps of tail or part, with their scope.
+    pub(crate) common: Vec<(changes::QuantityStep, ChangeScope)>,
+}
+
+impl Subject<'_> {
+    /// The tail at a departure.
+    pub(crate) fn tail_at(&self, departure_us: i64) -> Option<&str> {
+        let at = self.unit.flights.partition_point(|f| f.departure_us < departure_us);
+        self.unit.place(self.unit.flights.get(at)?).tail_number.as_deref()
+    }
+
+    /// Where the last flight was flown.
+    pub(crate) fn last_place(&self) -> Option<&TailPosition> {
+        Some(self.unit.place(self.unit.flights.last()?))
+    }
+
+    /// Position of the last flight.
+    pub(crate) fn position(&self) -> Option<&str> {
+        self.last_place()?.position.as_deref()
+    }
+
+    /// Takes a step of tail or part off the values.
+    pub(crate) fn take_off(&mut self, step: changes::QuantityStep, scope: ChangeScope) {
+        if self.common.iter().any(|(known, _)| known.departure_us == step.departure_us) {
+            return;
+        }
+        let after = self.values.iter_mut().filter(|v| v.departure_us >= step.departure_us);
+        after.for_each(|v| v.value -= step.size);
+        self.common.push((step, scope));
+    }
+}

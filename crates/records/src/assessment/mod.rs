@@ -1,0 +1,4 @@
+//! Rows of assessments: trend of a unit, followed quantities, inspection intervals.
+
+pub mod quantity_row;
+pub mod trend_row;
