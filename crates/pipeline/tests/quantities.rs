@@ -123,7 +123,7 @@ fn record(at: &At, plant: Plant, swaps: bool) -> GapRecord {
         },
         position: Position::new(position).unwrap(),
         part_number: PartNumber::new(if at.position < 2 { "EMA-27-1040" } else { "EMA-27-1060" }).unwrap(),
-        // Two units change places after half of the flights, where that is asked for.
+        // Two units change places after half of the flights, if `swaps`.
         serial_number: match (swaps && at.position == 0 && at.flight >= FLIGHTS / 2, at.tail) {
             (true, 0) => SerialNumber::new(format!("T1-{position}")).unwrap(),
             (true, 1) => SerialNumber::new(format!("T0-{position}")).unwrap(),
@@ -285,7 +285,7 @@ fn a_change_of_all_units_of_a_part_is_the_parts() {
 
 #[test]
 fn a_unit_that_moves_to_a_tail_with_another_load_cell_has_not_softened() {
-    // Units of tails 0 and 1 at one position change places in the books and in the logs: the cell of tail 1 reads 8 %
+    // Units of tails 0 and 1 at one position change places in the logs: the cell of tail 1 reads 8 %
     // more than that of tail 0.
     let plant: Plant = |at, e| {
         if at.tail == 1 {

@@ -33,7 +33,7 @@ pub struct Report {
     pub inspection_intervals: Vec<InspectionInterval>,
     /// The advice for each part, in words.
     pub interval_advice: Vec<String>,
-    /// What changed besides the gap, of units, tails and parts; the newest first.
+    /// Changes of quantities other than the gap, of units, tails and parts; the newest first.
     pub quantity_changes: Vec<QuantityChange>,
     /// Whether a table of inspections is configured.
     pub inspections_given: bool,
@@ -110,7 +110,7 @@ pub struct UnitView {
     pub inspections: Vec<Inspection>,
     /// Work requests about the unit, earliest first.
     pub work_requests: Vec<WorkRequest>,
-    /// Followed quantities besides the gap.
+    /// Followed quantities other than the gap.
     pub quantities: Vec<QuantityView>,
     /// Smoothed level over past flights; plotted, not part of `report.json`.
     #[serde(skip)]

@@ -450,7 +450,7 @@ impl<'a> FleetContext<'a> {
         Some(self.priors.of(name.0.as_deref(), as_of)?.1)
     }
 
-    /// The same, with the quantities that the store holds besides the gap.
+    /// The same, with the followed quantities of the store.
     fn with_quantities(self, store: &Store, as_of: Timestamp) -> Result<Self, Error> {
         let followed = follow(&values::read(store, as_of)?, &Facts(&self), as_of);
         let moved = recorder_changes(&followed.changes, as_of);

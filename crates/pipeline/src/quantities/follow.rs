@@ -30,7 +30,7 @@ const DRIFT_SHARE: f64 = 0.5;
 /// Share of a tail's units that make a drift the tail's.
 const SHARE: f64 = 0.75;
 
-/// What is known of units besides the values.
+/// Facts about units in addition to the values.
 pub(crate) trait UnitFacts: Sync {
     /// Flights of a unit by usage, and its maintenance.
     fn series(&self, unit: &UnitKey) -> Option<&Series>;

@@ -14,7 +14,7 @@ pub(crate) struct Treatment {
     pub(crate) least_scatter: f64,
     /// State of a rise and of a fall.
     pub(crate) states: (Option<&'static str>, Option<&'static str>),
-    /// Whether it belongs to the position and its channels, so that a unit that moves begins anew.
+    /// Whether it belongs to the position and its channels, so that a unit that moves begins a new series.
     pub(crate) is_of_position: bool,
 }
 

@@ -303,7 +303,7 @@ impl ReportComposer<'_> {
         }
     }
 
-    /// The followed quantities besides the gap, with the values of the flights.
+    /// The followed quantities other than the gap, with the values of the flights.
     fn quantities(&self, row: &TrendRow, history: &History, rest: &[FlightExtras]) -> Vec<QuantityView> {
         let view = |of: &&QuantityRow| {
             let index = Quantity::ALL.iter().position(|quantity| quantity.as_str() == of.quantity)?;

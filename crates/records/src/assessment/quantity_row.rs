@@ -186,7 +186,7 @@ row! {
         pub change: Option<f64>,
         /// Standard error of `change`.
         pub change_se: Option<f64>,
-        /// Rate of change beside the steps, per flight hour.
+        /// Rate of change without the steps, per flight hour.
         pub rate_per_hour: Option<f64>,
         /// Standard error of `rate_per_hour`.
         pub rate_se_per_hour: Option<f64>,

@@ -18,7 +18,7 @@ const COLUMNS: usize = 2 + MAX_STEPS;
 /// Fewest flights before the first step, and from each step to the next or to the end.
 const LEAST_BEFORE: usize = 5;
 const LEAST_AFTER: usize = 3;
-/// Squared t-value from which a step is selected: it is the largest of as many as there are flights, on every night.
+/// Squared t-value from which a step is selected: it is the largest over all flights, and each run searches again.
 const STEP_GAIN: f64 = 32.0;
 /// Squared t-value from which a drift is selected.
 const DRIFT_GAIN: f64 = 20.0;
@@ -54,7 +54,7 @@ pub struct QuantityChanges {
     pub change: f64,
     /// Standard error of the change.
     pub change_se: f64,
-    /// Change per flight hour beside the steps, significant or not, and its standard error.
+    /// Change per flight hour without the steps, significant or not, and its standard error.
     pub rate_per_hour: Option<(f64, f64)>,
     /// Whether the drift is significant.
     pub is_drifting: bool,
@@ -123,7 +123,7 @@ pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChang
 struct Model<'a> {
     values: &'a [QuantityValue],
     scatter: Scatter,
-    /// Middle and half the span of the usage, hours; the span zero where usage stands still.
+    /// Middle and half the span of the usage, hours; the span zero where usage is constant.
     usage_hours: (f64, f64),
     has_drift: bool,
     steps: Vec<usize>,
@@ -206,7 +206,7 @@ impl<'a> Model<'a> {
         true
     }
 
-    /// Squared t-value of a drift beside the present regressors.
+    /// Squared t-value of a drift in addition to the present regressors.
     fn drift_gain(&self) -> f64 {
         if self.usage_hours.1 <= 0.0 {
             return 0.0;
@@ -243,7 +243,7 @@ impl<'a> Model<'a> {
         index >= LEAST_BEFORE && self.values.len() - index >= LEAST_AFTER && from_others
     }
 
-    /// Removes the least significant regressor, if it is not significant beside the others.
+    /// Removes the least significant regressor, if it is not significant in addition to the others.
     fn remove_worst(&mut self) -> bool {
         let Some((beta, covariance)) = self.solve() else { return false };
         let gain = |column: usize| beta[column] * beta[column] / covariance[(column, column)];
@@ -261,7 +261,7 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Drift per hour beside the steps, and its standard error, also where it is not significant.
+    /// Drift per hour without the steps, and its standard error, also where it is not significant.
     fn rate_per_hour(&self) -> Option<(f64, f64)> {
         if self.values.len() < MIN_FLIGHTS || self.usage_hours.1 <= 0.0 {
             return None;
