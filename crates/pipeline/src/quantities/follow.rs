@@ -17,7 +17,7 @@ use crate::monitoring::median;
 use crate::quantities::attribution::{self, CommonStep};
 use crate::quantities::limits::{Scale, Treatment};
 use crate::quantities::subject::Subject;
-use crate::quantities::values::{FleetValues, FlightValues, READ, UnitValues};
+use crate::quantities::values::{FleetValues, FlightValues, READ, UnitValues, by_position};
 
 /// A common step matters from this share of the limit on: all units of a tail agree about it.
 const COMMON_SHARE: f64 = 0.3;
@@ -51,8 +51,11 @@ pub struct FollowedQuantities {
 
 /// Follows all quantities of all units.
 pub(crate) fn follow(fleet: &FleetValues, facts: &dyn UnitFacts, as_of: Timestamp) -> FollowedQuantities {
-    let followed: Vec<FollowedQuantities> =
-        (0..READ.len()).into_par_iter().map(|index| follow_quantity(fleet, facts, as_of, index)).collect();
+    let positions = by_position(fleet);
+    let followed: Vec<FollowedQuantities> = (0..READ.len())
+        .into_par_iter()
+        .map(|index| follow_quantity((fleet, &positions), facts, as_of, index))
+        .collect();
     let mut all = FollowedQuantities::default();
     for of_quantity in followed {
         all.rows.extend(of_quantity.rows);
@@ -63,13 +66,14 @@ pub(crate) fn follow(fleet: &FleetValues, facts: &dyn UnitFacts, as_of: Timestam
 }
 
 fn follow_quantity(
-    fleet: &FleetValues,
+    (units, positions): (&FleetValues, &FleetValues),
     facts: &dyn UnitFacts,
     as_of: Timestamp,
     index: usize,
 ) -> FollowedQuantities {
     let quantity = READ[index].0;
     let usual = Treatment::of(quantity, &facts.limits(None));
+    let fleet = if usual.is_of_channel { positions } else { units };
     let made: Vec<Option<Subject<'_>>> =
         fleet.par_iter().map(|(name, unit)| subject(name, unit, facts, index)).collect();
     let mut subjects: Vec<Subject<'_>> = made.into_iter().flatten().collect();
@@ -121,7 +125,7 @@ fn subject<'a>(
     let loads_n: Vec<f64> =
         unit.flights.iter().map(|f| f64::from(f.load_p95_n)).filter(|n| n.is_finite()).collect();
     let usual_load_n = (!loads_n.is_empty()).then(|| median(loads_n));
-    let series = facts.series(name);
+    let series = facts.series(name).filter(|_| !treatment.is_of_channel);
     let maintained_us = series.and_then(|s| Some(s.maintenance_until(last.departure_us).last()?.utc_us));
     let hours = |us: i64| Some(series?.flights_until(us).last()?.hours);
     let moved = unit.flights.iter().rposition(|f| f.place != last.place);
@@ -293,6 +297,8 @@ impl Assessed<'_> {
             own.chain(subject.common.iter().copied()).collect();
         steps.sort_by_key(|(step, _)| step.departure_us);
         let common: f64 = subject.common.iter().map(|(step, _)| step.size).sum();
+        // The channels of a position have no hours of their own.
+        let rate = fit.rate_per_hour.filter(|_| !self.treatment.is_of_channel);
         let state = self.state().filter(|_| !is_tails);
         QuantityRow {
             part_number: subject.name.0.clone(),
@@ -309,8 +315,8 @@ impl Assessed<'_> {
             level_se: Some(fit.level_se),
             change: Some(fit.change),
             change_se: Some(fit.change_se),
-            rate_per_hour: fit.rate_per_hour.map(|(rate, _)| rate),
-            rate_se_per_hour: fit.rate_per_hour.map(|(_, se)| se),
+            rate_per_hour: rate.map(|(rate, _)| rate),
+            rate_se_per_hour: rate.map(|(_, se)| se),
             change_limit: self.treatment.limit.map(|limit| limit * subject.scale),
             steps: steps.into_iter().filter_map(|(step, scope)| self.step(step, scope)).collect(),
             state,
@@ -353,7 +359,11 @@ impl Assessed<'_> {
             shown_change(*quantity, fit.change, subject.scale),
             shown(*quantity, fit.baseline),
             shown(*quantity, fit.baseline + fit.change),
-            if self.treatment.is_of_position { "its sensor or wiring" } else { ChangeScope::Unit.cause() },
+            if self.treatment.is_of_position || self.treatment.is_of_channel {
+                "its sensor or wiring"
+            } else {
+                ChangeScope::Unit.cause()
+            },
         )
     }
 

@@ -14,7 +14,9 @@ pub(crate) struct Treatment {
     pub(crate) least_scatter: f64,
     /// State of a rise and of a fall.
     pub(crate) states: (Option<&'static str>, Option<&'static str>),
-    /// Whether it belongs to the position and its channels, so that a unit that moves begins a new series.
+    /// Whether it belongs to the channels of a position, whichever unit is installed there.
+    pub(crate) is_of_channel: bool,
+    /// Whether it belongs to a unit at its position, so that a unit that moves begins a new series.
     pub(crate) is_of_position: bool,
 }
 
@@ -37,9 +39,11 @@ impl Treatment {
             limit: None,
             least_scatter: 0.02,
             states: (None, None),
+            is_of_channel: false,
             is_of_position: false,
         };
         let position = Self { is_of_position: true, ..own };
+        let channel = Self { is_of_channel: true, ..own };
         match quantity {
             Quantity::LostMotionM => Self {
                 limit: Some(limits.lost_motion_share),
@@ -64,7 +68,7 @@ impl Treatment {
                 limit: Some(limits.delay_s),
                 least_scatter: 2e-5,
                 states: (Some("delay_moved"), Some("delay_moved")),
-                ..position
+                ..channel
             },
             Quantity::LoadZeroN => Self {
                 scale: Scale::UsualLoad,
@@ -78,7 +82,7 @@ impl Treatment {
                 limit: Some(limits.load_delay_s),
                 least_scatter: 1e-4,
                 states: (Some("load_delay_moved"), Some("load_delay_moved")),
-                ..position
+                ..channel
             },
             Quantity::Nis => Self {
                 limit: Some(limits.nis_share),

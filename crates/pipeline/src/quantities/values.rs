@@ -92,6 +92,34 @@ pub(crate) fn read(store: &Store, until: Timestamp) -> Result<FleetValues, Error
     Ok(units)
 }
 
+/// The same by position: all flights there, under the unit that flew there last.
+pub(crate) fn by_position(fleet: &FleetValues) -> FleetValues {
+    type Place<'a> = (i64, Option<&'a UnitKey>, Vec<FlightValues>);
+    let mut positions: BTreeMap<&TailPosition, Place<'_>> = BTreeMap::new();
+    for (name, unit) in fleet {
+        for flight in &unit.flights {
+            let (last_us, last, flights) = positions.entry(unit.place(flight)).or_default();
+            flights.push(FlightValues { place: 0, ..*flight });
+            if last.is_none() || flight.departure_us > *last_us {
+                (*last_us, *last) = (flight.departure_us, Some(name));
+            }
+        }
+    }
+    // A unit that was the last one at two positions is at the later one.
+    let mut of_units: BTreeMap<&UnitKey, (i64, UnitValues)> = BTreeMap::new();
+    for (position, (last_us, name, mut flights)) in positions {
+        let Some(name) = name else { continue };
+        if of_units.get(name).is_some_and(|(known_us, _)| *known_us >= last_us) {
+            continue;
+        }
+        flights.sort_by_key(|flight| flight.departure_us);
+        let mut places = Positions::default();
+        places.number(position.tail_number.as_deref(), position.position.as_deref());
+        of_units.insert(name, (last_us, UnitValues { places, flights }));
+    }
+    of_units.into_iter().map(|(name, (_, values))| (name.clone(), values)).collect()
+}
+
 /// Values while their rows come in.
 #[derive(Default)]
 struct Reader {

@@ -169,8 +169,8 @@ row! {
         pub as_of_utc: Timestamp,
         /// Column of the records that is followed: `stiffness_n_per_m`, `friction_n`, …
         pub quantity: &'static str,
-        /// Flights used: at most three years, since the last recorded maintenance; of delays, load zero and NIS since
-        /// the unit is at its position.
+        /// Flights used: at most three years, since the last recorded maintenance; of load zero and NIS, since the unit
+        /// is at its position; of delays, all flights at the position.
         pub flights: i64,
         /// Flights excluded as outliers.
         pub outliers: i64,
@@ -186,7 +186,7 @@ row! {
         pub change: Option<f64>,
         /// Standard error of `change`.
         pub change_se: Option<f64>,
-        /// Rate of change without the steps, per flight hour.
+        /// Rate of change without the steps, per flight hour; null for delays, which are those of a position.
         pub rate_per_hour: Option<f64>,
         /// Standard error of `rate_per_hour`.
         pub rate_se_per_hour: Option<f64>,

@@ -119,8 +119,10 @@ fn level(view: &QuantityView) -> Option<Level> {
     };
     let with_error = |value: Option<f64>, se: Option<f64>| match (value, se) {
         (Some(v), Some(se)) => {
-            let half = records::uncertainty::NORMAL_95 * se;
-            format!("{} ± {} {unit}", significant(v * factor), significant(half * factor))
+            let half = records::uncertainty::NORMAL_95 * se * factor;
+            // Two digits of the uncertainty; more of the level are noise.
+            let places = if half > 0.0 { (1 - half.log10().floor() as i32).clamp(0, 6) as usize } else { 2 };
+            format!("{:.places$} ± {half:.places$} {unit}", v * factor)
         }
         _ => NO_DATA.to_owned(),
     };
