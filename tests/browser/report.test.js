@@ -158,6 +158,8 @@ test("the picture answers to hover, drag and buttons with values of the table", 
   await on(index("sample"), {}, async (page) => {
     await worst(page).click();
     const plot = page.locator(".live .u-over");
+    // The picture may begin below the window.
+    await plot.scrollIntoViewIfNeeded();
     const box = await plot.boundingBox();
     const readout = page.locator(".readout");
     const range = page.locator(".range");
