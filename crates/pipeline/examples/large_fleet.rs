@@ -117,6 +117,7 @@ fn scatter(tail: usize, place: usize, flight: usize) -> f64 {
 
 fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<GapRecord> {
     let gap_um = unit.gap_um(flight) + 1.2 * scatter(tail_at, place, flight);
+    let noise = |quantity: usize| scatter(tail_at, place, quantity << 32 | flight);
     let refused = (tail_at + 7 * place + flight).is_multiple_of(REFUSED_EVERY);
     let estimate = GapEstimate {
         status: Status::Estimated,
@@ -132,6 +133,17 @@ fn record(tail_at: usize, place: usize, flight: usize, unit: &Unit) -> Outcomes<
         samples_lower: 5_200,
         load_p05_n: Some(-2_300.0),
         load_p95_n: Some(2_600.0),
+        stiffness_n_per_m: Some(5e7 * (1.0 + 0.002 * noise(1))),
+        stiffness_se_n_per_m: Some(1e5),
+        friction_n: Some(150.0 + 15.0 * noise(2)),
+        friction_se_n: Some(15.0),
+        skew_s: Some(2e-5 * noise(3)),
+        skew_se_s: Some(2e-5),
+        load_zero_n: Some(20.0 * noise(4)),
+        load_zero_se_n: Some(20.0),
+        load_delay_s: Some(3e-4 * noise(5)),
+        load_delay_se_s: Some(3e-4),
+        nis: Some(1.0 + 0.1 * noise(6)),
         ..GapEstimate::refused("")
     };
     Ok(GapRecord {

@@ -187,7 +187,7 @@ row! {
         pub since_utc: Option<Timestamp>,
         /// Fitted value at the first flight, at the part's usual temperature and load.
         pub baseline: Option<f64>,
-        /// Fitted value now.
+        /// Fitted value now, without what the units of the part share from week to week.
         pub level: Option<f64>,
         /// Standard error of `level`.
         pub level_se: Option<f64>,
