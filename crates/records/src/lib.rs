@@ -17,6 +17,7 @@ pub mod sanitize;
 pub mod time;
 pub mod uncertainty;
 
+pub use assessment::action::Action;
 pub use assessment::quantity_row::{ChangeScope, Quantity, QuantityChange, QuantityRow, QuantityStep};
 pub use assessment::trend_row::{ChangePoint, InspectionInterval, TrendRow};
 pub use diagnostic::Diagnostic;

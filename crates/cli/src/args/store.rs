@@ -80,4 +80,8 @@ pub(crate) enum Table {
     Logs,
     /// One row per run.
     Runs,
+    /// Changes of state, and their messages.
+    Alerts,
+    /// Events of work requests.
+    Work,
 }

@@ -56,6 +56,12 @@ impl Config {
         Self::read_layers(&[file.to_owned()])
     }
 
+    /// Removal limit of a part, m: its own, or that of `[trend]`.
+    pub fn limit_m(&self, part: Option<&PartNumber>) -> Option<f64> {
+        let own = part.and_then(|part| self.parts.get(part)?.limit_m);
+        own.or(self.document.trend.limit_m)
+    }
+
     /// A configuration without logs: defaults, to assess tables that other programs made.
     pub fn without_logs() -> Self {
         Self {

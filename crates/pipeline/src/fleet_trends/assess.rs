@@ -553,7 +553,8 @@ impl<'a> FleetContext<'a> {
         let usage_axis = prior.map(|prior| prior.axis().to_string());
         let removal = self.installations.as_ref().and_then(|index| index.removal(name, as_of));
         let row = trend_row::row(name, history, series, limit_m, trend, as_of, wide, removal);
-        TrendRow { usage_axis, conditions: self.conditions.get(name).cloned().unwrap_or_default(), ..row }
+        let conditions = self.conditions.get(name).cloned().unwrap_or_default();
+        TrendRow { usage_axis, conditions, ..row }.with_action()
     }
 
     /// Forecasts of units at a date, for the hours flown until a later one.

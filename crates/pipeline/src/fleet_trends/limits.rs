@@ -48,7 +48,8 @@ impl<'a> Limits<'a> {
 
     /// The act limit, m; none where neither the part nor the configuration states one.
     pub(crate) fn stated_m(self, part: Option<&str>) -> Option<f64> {
-        self.part(part).and_then(|p| p.limit_m).or(self.config.document.trend.limit_m)
+        let part = part.and_then(|part| PartNumber::new(part).ok());
+        self.config.limit_m(part.as_ref())
     }
 
     /// The act limit, m, or its stand-in.

@@ -88,6 +88,8 @@ pub(crate) fn row(
             (None, None) => "no limit is configured".into(),
         }),
         conditions: Vec::new(),
+        action: None,
+        due_utc: None,
         interval_chances: NoColumn(
             trend
                 .interval_chances

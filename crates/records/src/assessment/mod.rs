@@ -1,4 +1,5 @@
 //! Rows of assessments: trend of a unit, followed quantities, inspection intervals.
 
+pub mod action;
 pub mod quantity_row;
 pub mod trend_row;

@@ -131,6 +131,11 @@ row! {
         /// States of the other followed quantities of the unit: `softening`, `friction_rising`, …; all in the
         /// quantities table.
         pub conditions: Vec<String>,
+        /// What the state asks for: `replace` (state `act`), `inspect` (`plan`, `watch`, or another quantity changed), or
+        /// null.
+        pub action: Option<&'static str>,
+        /// Date until when: `as_of_utc` to replace, `not_before_utc` to inspect; null where it is not known.
+        pub due_utc: Option<Timestamp>,
         /// Probabilities of reaching the limit within intervals of flight hours, from the hours up: for advice on
         /// inspection intervals.
         #[serde(skip)]

@@ -117,6 +117,22 @@ impl Store {
         self.named_files(&self.runs)
     }
 
+    /// The same of alerts; empty where none has been written.
+    ///
+    /// # Errors
+    /// As [`Store::files`].
+    pub fn alert_files(&self) -> Result<Vec<PathBuf>, Error> {
+        if self.alerts.exists()? { self.named_files(&self.alerts) } else { Ok(Vec::new()) }
+    }
+
+    /// The same of events of work requests.
+    ///
+    /// # Errors
+    /// As [`Store::files`].
+    pub fn work_files(&self) -> Result<Vec<PathBuf>, Error> {
+        if self.work.exists()? { self.named_files(&self.work) } else { Ok(Vec::new()) }
+    }
+
     fn named_files(&self, table: &Table) -> Result<Vec<PathBuf>, Error> {
         Ok(files_of(table)?.iter().map(|file| self.location.display_path(file)).collect())
     }

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use arrow::array::{RecordBatch, StringArray};
 use arrow::datatypes::{DataType, Field, Schema};
-use records::GapRecord;
+use job::Config;
 use records::row_schema::to_batch;
+use records::{GapRecord, PartNumber};
 use store::{Query, Store};
 
 use crate::args::{Global, QueryArgs, QueryKey};
@@ -36,7 +37,7 @@ pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Resul
         &args.rows,
         output,
         || with_remedies(to_batch(&records).map_err(store::Error::from)?, &records),
-        || page(&records),
+        || page(&records, &config),
     )?;
     if records.is_empty() {
         output.note(&format!(
@@ -94,19 +95,18 @@ fn query_of(args: &QueryArgs) -> Query {
 }
 
 /// Records as a table.
-pub(crate) fn page(records: &[GapRecord]) -> String {
+pub(crate) fn page(records: &[GapRecord], config: &Config) -> String {
     let columns = [
         text("departure [UTC]", 0),
-        text("tail", 2),
-        text("flight", 3),
+        text("tail", 3),
+        text("flight", 2),
         text("position", 1),
         text("part / serial", 2),
-        number("gap [µm]", 0),
-        number("SE [µm]", 4),
+        number("gap ± 90 % [µm]", 0),
         number("mid-range [µm]", 5),
         number("load reversals", 7),
         number("load [N]", 6),
-        text("flags", 1),
+        text("flags", 0),
     ];
     let cells = |r: &GapRecord| {
         let e = &r.estimate;
@@ -116,8 +116,7 @@ pub(crate) fn page(records: &[GapRecord]) -> String {
             r.flight.flight_id.to_string(),
             r.position.to_string(),
             format!("{} / {}", r.part_number, r.serial_number),
-            table::micrometres(e.gap_m),
-            table::micrometres(e.gap_se_m),
+            table::gap(e.gap_m, e.gap_p05_m.zip(e.gap_p95_m).map(|(low, high)| 0.5 * (high - low))),
             table::micrometres(e.gap_midrange_m),
             e.load_reversals.to_string(),
             load(e),
@@ -129,7 +128,7 @@ pub(crate) fn page(records: &[GapRecord]) -> String {
         head
     } else {
         let table = table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>());
-        head + &table + &remedies(records) + &sketches(records)
+        head + &table + &remedies(records) + &sketches(records, config)
     }
 }
 
@@ -163,10 +162,10 @@ fn with_remedies(batch: RecordBatch, records: &[GapRecord]) -> Result<RecordBatc
 }
 
 /// One line per unit with a history in these records: sparkline, first and last gap.
-fn sketches(records: &[GapRecord]) -> String {
-    let mut units: BTreeMap<(&str, &str), Vec<f64>> = BTreeMap::new();
+fn sketches(records: &[GapRecord], config: &Config) -> String {
+    let mut units: BTreeMap<(&PartNumber, &str), Vec<f64>> = BTreeMap::new();
     for r in records {
-        let key = (r.part_number.as_str(), r.serial_number.as_str());
+        let key = (&r.part_number, r.serial_number.as_str());
         units.entry(key).or_default().extend(r.estimate.gap_m);
     }
     units.retain(|_, gaps_m| gaps_m.len() >= LEAST_HISTORY);
@@ -174,7 +173,13 @@ fn sketches(records: &[GapRecord]) -> String {
         .iter()
         .map(|((part, serial), gaps_m)| {
             let ends = [gaps_m.first(), gaps_m.last()].map(|gap_m| table::micrometres(gap_m.copied()));
-            vec![format!("{part} / {serial}"), sparkline(gaps_m), ends.join(" → "), gaps_m.len().to_string()]
+            let limit_m = config.limit_m(Some(part));
+            vec![
+                format!("{part} / {serial}"),
+                sparkline(gaps_m, limit_m),
+                ends.join(" → "),
+                gaps_m.len().to_string(),
+            ]
         })
         .collect();
     if rows.is_empty() {

@@ -3,6 +3,7 @@
 use job::Config;
 use pipeline::fleet_trends::assess::{self, UnitSelection};
 use pipeline::fleet_trends::inspection_interval::{inspection_intervals, interval_advice};
+use records::uncertainty::NORMAL_95;
 use records::{InspectionInterval, Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
 use store::Store;
 
@@ -206,47 +207,56 @@ fn changes_page(changes: &[QuantityChange], units: usize) -> String {
 }
 
 fn page(found: &[TrendRow], nothing: Option<String>) -> String {
-    let columns = [
-        text("state", 0),
-        text("part / serial", 0),
-        text("tail", 2),
-        text("position", 4),
-        number("flights", 6),
-        number("gap [µm]", 0),
-        number("SE [µm]", 3),
-        text("history", 2),
-        number("rate [nm/FH]", 1),
-        text("trend", 4),
-        number("limit [µm]", 5),
-        number("earliest 5 % [FH]", 1),
-        text("earliest date", 2),
-        number("median [FH]", 4),
-        number("latest 95 % [FH]", 6),
-        text("reason", 7),
-    ];
-    let cells = |r: &TrendRow| {
-        vec![
-            state_mark(r.state),
-            format!("{} / {}", r.part_number.as_deref().unwrap_or("–"), r.serial_number),
-            r.tail_number.clone().unwrap_or_else(table::empty_cell),
-            r.position.clone().unwrap_or_else(table::empty_cell),
-            r.flights.to_string(),
-            table::micrometres(r.gap_m),
-            table::micrometres(r.gap_se_m),
-            sparkline(&r.sketch_m.0),
-            r.rate_m_per_hour.map_or_else(table::empty_cell, |v| format!("{:.1}", v * 1e9)),
-            r.trend.to_owned(),
-            table::micrometres(r.limit_m),
-            table::hours(r.crossing_hours_p05),
-            r.not_before_utc.map_or_else(table::empty_cell, |day| day.strftime("%Y-%m-%d").to_string()),
-            table::hours(r.crossing_hours_p50),
-            table::hours(r.crossing_hours_p95),
-            reason_and_conditions(r),
-        ]
-    };
     let Some(as_of) = found.iter().map(|r| r.as_of_utc).max() else {
         return nothing.unwrap_or_else(|| "no unit was queried\n".to_owned());
     };
     let head = format!("{} as of {}\n", count(found.len(), "unit"), as_of.strftime("%Y-%m-%d %H:%M UTC"));
-    head + &table::layout(&columns, &found.iter().map(cells).collect::<Vec<_>>())
+    head + &unit_table(found.iter().collect())
+}
+
+/// Units by urgency, with action and date.
+pub(crate) fn unit_table(mut units: Vec<&TrendRow>) -> String {
+    units.sort_by(|a, b| {
+        let ((a, a_hours), (b, b_hours)) = (a.urgency(), b.urgency());
+        a.cmp(&b).then(a_hours.total_cmp(&b_hours))
+    });
+    let columns = [
+        text("state", 0),
+        text("tail", 0),
+        text("position", 0),
+        text("part / serial", 1),
+        number("gap ± 90 % [µm]", 0),
+        number("limit [µm]", 3),
+        text("action", 4),
+        text("due by", 0),
+        text("history", 2),
+        number("rate [nm/FH]", 5),
+        text("trend", 7),
+        number("5 % [FH]", 6),
+        number("median [FH]", 8),
+        number("95 % [FH]", 9),
+        number("flights", 10),
+        text("reason", 0),
+    ];
+    let cells = |r: &&TrendRow| {
+        vec![
+            state_mark(r.state),
+            r.tail_number.clone().unwrap_or_else(table::empty_cell),
+            r.position.clone().unwrap_or_else(table::empty_cell),
+            format!("{} / {}", r.part_number.as_deref().unwrap_or("–"), r.serial_number),
+            table::gap(r.gap_m, r.gap_se_m.map(|se_m| NORMAL_95 * se_m)),
+            table::micrometres(r.limit_m),
+            r.action.map_or_else(table::empty_cell, str::to_owned),
+            r.due_text().unwrap_or_else(table::empty_cell),
+            sparkline(&r.sketch_m.0, r.limit_m),
+            r.rate_m_per_hour.map_or_else(table::empty_cell, |v| format!("{:.1}", v * 1e9)),
+            r.trend.to_owned(),
+            table::hours(r.crossing_hours_p05),
+            table::hours(r.crossing_hours_p50),
+            table::hours(r.crossing_hours_p95),
+            r.flights.to_string(),
+            reason_and_conditions(r),
+        ]
+    };
+    table::layout(&columns, &units.iter().map(cells).collect::<Vec<_>>())
 }

@@ -16,16 +16,16 @@ use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
 use records::Quantity;
 use records::TrendRow;
 use records::{SerialNumber, TailNumber};
-use report::StateBadge;
 use store::Holder;
 
 use crate::args::{FailOn, Global, RunArgs};
 use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
 use crate::progress::{Progress, span};
-use crate::table::{self, count, number, state_mark, text};
+use crate::table::{self, count, number, text};
 
 use crate::commands::context::{KnownNames, VERSION, check_range, load_config};
+use crate::commands::results::trend::unit_table;
 
 /// Maximum number of flights with unusual filter innovations in the summary.
 const MAX_UNUSUAL_SHOWN: usize = 5;
@@ -401,49 +401,21 @@ fn work_list_section(rows: &[TrendRow], work_list: &[TrendRow]) -> String {
     if rows.is_empty() && work_list.is_empty() {
         return String::new();
     }
-    let urgency = |row: &TrendRow| StateBadge::from_state(row.state).rank();
-    let mut urgent: Vec<&TrendRow> = work_list.iter().collect();
-    urgent.sort_by(|a, b| {
-        let hours = |r: &TrendRow| r.crossing_hours_p05.unwrap_or(f64::INFINITY);
-        urgency(a).cmp(&urgency(b)).then_with(|| hours(a).total_cmp(&hours(b)))
-    });
     let silent = rows.iter().filter(|r| r.state.is_none()).count();
     let normal = rows.iter().filter(|r| r.state == Some(State::Normal.as_str())).count();
     let mut page = if rows.is_empty() {
-        format!("\nno unit updated; {} in the fleet need attention\n", count(urgent.len(), "unit"))
+        format!("\nno unit updated; {} in the fleet need attention\n", count(work_list.len(), "unit"))
     } else {
         format!(
             "\n{} updated: {} need attention, {normal} normal, {silent} not assessed{}; {} in the fleet need attention\n",
             count(rows.len(), "unit"),
             rows.len() - normal - silent,
             if silent > 0 { " (see `freeplay trend`)" } else { "" },
-            count(urgent.len(), "unit")
+            count(work_list.len(), "unit")
         )
     };
-    if !urgent.is_empty() {
-        let columns = [
-            text("state", 0),
-            text("part / serial", 0),
-            text("tail", 2),
-            text("position", 3),
-            number("gap [µm]", 0),
-            number("limit [µm]", 4),
-            number("earliest [FH]", 1),
-            text("reason", 5),
-        ];
-        let cells = |r: &&TrendRow| {
-            vec![
-                state_mark(r.state),
-                format!("{} / {}", r.part_number.as_deref().unwrap_or("–"), r.serial_number),
-                r.tail_number.clone().unwrap_or_else(table::empty_cell),
-                r.position.clone().unwrap_or_else(table::empty_cell),
-                table::micrometres(r.gap_m),
-                table::micrometres(r.limit_m),
-                table::hours(r.crossing_hours_p05),
-                r.reason.clone().unwrap_or_default(),
-            ]
-        };
-        page.push_str(&table::layout(&columns, &urgent.iter().map(cells).collect::<Vec<_>>()));
+    if !work_list.is_empty() {
+        page.push_str(&unit_table(work_list.iter().collect()));
     }
     page
 }

@@ -7,6 +7,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use jiff::Timestamp;
+use job::Config;
 use records::Diagnostic;
 use records::row_schema::to_batch;
 use serde_json::json;
@@ -27,7 +28,8 @@ use crate::commands::results::query;
 /// # Errors
 /// If configuration or store cannot be read or written.
 pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
-    let store = Store::open(load_config(global)?.store())?;
+    let config = load_config(global)?;
+    let store = Store::open(config.store())?;
     match &args.command {
         StoreCommand::Info { max_age, json } => info(&store, *max_age, *json, output),
         StoreCommand::Runs { run, last, rows } => runs::runs(&store, run.as_deref(), *last, rows, output),
@@ -38,7 +40,7 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Resul
         StoreCommand::Verify => verify(&store, output),
         StoreCommand::Compact => compact(&store, output),
         StoreCommand::Adopt { trial } => adopt(&store, trial, output),
-        StoreCommand::Export { rows } => export(&store, rows, output),
+        StoreCommand::Export { rows } => export(&store, &config, rows, output),
     }
 }
 
@@ -47,6 +49,8 @@ fn files(store: &Store, table: Table, output: &Output) -> Result<Code, Failure> 
         Table::Gaps => store.files()?,
         Table::Logs => store.log_files()?,
         Table::Runs => store.run_files()?,
+        Table::Alerts => store.alert_files()?,
+        Table::Work => store.work_files()?,
     };
     let lines: Vec<String> = files.iter().map(|file| file.display().to_string() + "\n").collect();
     output.write_result(&lines.concat())?;
@@ -220,14 +224,14 @@ fn compact(store: &Store, output: &Output) -> Result<Code, Failure> {
     Ok(Code::Success)
 }
 
-fn export(store: &Store, format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
+fn export(store: &Store, config: &Config, format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
     if format.format() == Format::Table {
         let records = store.records(&Query::default())?;
         row_output::write_rows(
             format,
             output,
             || Ok(to_batch(&records).map_err(store::Error::from)?),
-            || query::page(&records),
+            || query::page(&records, config),
         )?;
     } else {
         let batch = store.scan(&Query::default())?;

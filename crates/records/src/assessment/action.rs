@@ -1,0 +1,90 @@
+//! What the state of a unit asks for, and until when: one statement for every table, page and message.
+
+use jiff::Timestamp;
+
+use crate::assessment::trend_row::TrendRow;
+
+/// What a unit's state asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Action {
+    /// State `act`: the gap is at or above the limit.
+    Replace,
+    /// State `plan` or `watch`, or another quantity changed.
+    Inspect,
+}
+
+impl Action {
+    /// Its word in columns.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Replace => "replace",
+            Self::Inspect => "inspect",
+        }
+    }
+
+    /// The action that a state asks for, with the states of other quantities.
+    pub fn of(state: Option<&str>, conditions: &[String]) -> Option<Self> {
+        match state {
+            Some("act") => Some(Self::Replace),
+            Some("plan" | "watch") => Some(Self::Inspect),
+            Some(_) if !conditions.is_empty() => Some(Self::Inspect),
+            _ => None,
+        }
+    }
+}
+
+impl TrendRow {
+    /// The row with its action and the date until when.
+    ///
+    /// A unit in `act` is due at once; one in `plan` or `watch` before the earliest date on which it reaches its limit.
+    #[must_use]
+    pub fn with_action(mut self) -> Self {
+        let action = Action::of(self.state, &self.conditions);
+        self.action = action.map(Action::as_str);
+        self.due_utc = match action {
+            Some(Action::Replace) => Some(self.as_of_utc),
+            Some(Action::Inspect) => self.not_before_utc,
+            None => None,
+        };
+        self
+    }
+
+    /// The date until when, for readers: `now`, `2026-12-28`, `348 FH` where no usage is known, or nothing.
+    pub fn due_text(&self) -> Option<String> {
+        let is_now = self.due_utc.is_some_and(|due| due <= self.as_of_utc);
+        match (self.action?, self.due_utc, self.crossing_hours_p05) {
+            _ if is_now => Some("now".to_owned()),
+            (_, Some(due), _) => Some(day(due)),
+            ("inspect", None, Some(hours)) => Some(format!("{hours:.0} FH")),
+            _ => None,
+        }
+    }
+
+    /// What to do, for readers: `replace now`, `inspect before 2026-12-28`, `inspect`.
+    pub fn action_text(&self) -> Option<String> {
+        let action = self.action?;
+        Some(match self.due_text() {
+            Some(due) if due == "now" => format!("{action} now"),
+            Some(due) if due.ends_with(" FH") => format!("{action} within {due}"),
+            Some(due) => format!("{action} before {due}"),
+            None => action.to_owned(),
+        })
+    }
+
+    /// Order of urgency: by state, then by the hours to the limit.
+    pub fn urgency(&self) -> (u8, f64) {
+        let rank = match self.state {
+            Some("act") => 0,
+            Some("plan") => 1,
+            Some("watch") => 2,
+            Some(_) if self.action.is_some() => 3,
+            Some(_) => 4,
+            None => 5,
+        };
+        (rank, self.crossing_hours_p05.unwrap_or(f64::INFINITY))
+    }
+}
+
+fn day(at: Timestamp) -> String {
+    at.strftime("%Y-%m-%d").to_string()
+}
