@@ -56,7 +56,7 @@ pub fn simulate(
 }
 
 /// Configuration of the sample fleet, whose data lie in the folder [`SAMPLE_FOLDER`] next to it.
-const SAMPLE_CONFIGURATION: &str = include_str!("../../../pipeline.toml");
+const SAMPLE_CONFIGURATION: &str = include_str!("../templates/sample.toml");
 
 /// Folder of the sample fleet's data.
 pub const SAMPLE_FOLDER: &str = "sample-data";

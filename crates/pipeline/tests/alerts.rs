@@ -37,6 +37,7 @@ fn finding(serial: &str, state: Option<&'static str>, day: i64) -> Finding {
         quantity: GAP,
         state,
         reason: Some("of a test".to_owned()),
+        since_utc: None,
         as_of_utc,
         latest_flight_utc: Some(as_of_utc),
         gap_m: Some(1e-4),
@@ -333,4 +334,46 @@ fn a_claim_is_durable_and_the_newest_status_counts() {
     let read = Store::open(dir.path().join("results")).unwrap().alerts().unwrap();
     assert!(read.contains(&claimed) && read.len() == rows.len());
     assert_eq!(store.verify(), []);
+}
+
+/// A change that a tail made, first seen on a day.
+fn tail_change(day: i64, as_of_day: i64) -> Finding {
+    let at = |day: i64| Timestamp::from_second(1_780_000_000 + 86_400 * day).unwrap();
+    Finding {
+        unit: (None, String::new()),
+        tail_number: Some("N412FP".to_owned()),
+        position: None,
+        quantity: "skew_s",
+        state: Some("recorder_moved"),
+        since_utc: Some(at(day)),
+        gap_m: None,
+        limit_m: None,
+        ..finding("", None, as_of_day)
+    }
+}
+
+#[test]
+fn a_change_of_a_tail_is_one_alert_though_its_date_moves_and_a_later_change_is_another() {
+    let folder = AlertChannel { folder: Some("alerts".to_owned()), ..AlertChannel::default() };
+    let channels = Channels::from([("folder".to_owned(), folder)]);
+    let unit = finding("1040-0009", Some("normal"), 0);
+    let detect = |known: &[AlertRecord], findings: &[Finding]| {
+        alert_changes::detect(known, findings, &channels, "run", unit.as_of_utc)
+    };
+    let mut known = detect(&[], std::slice::from_ref(&unit));
+    let first = detect(&known, &[unit.clone(), tail_change(100, 103)]);
+    assert_eq!(first.len(), 1 + channels.len());
+    let message: Value =
+        serde_json::from_str(first.iter().find_map(|row| row.message.as_deref()).unwrap()).unwrap();
+    assert_eq!(message["text"], "all of N412FP: skew_s normal → recorder_moved (of a test)");
+    assert_eq!(message["serial_number"], Value::Null);
+    known.extend(first);
+    assert_eq!(detect(&known, &[unit.clone(), tail_change(97, 110)]), []);
+    let second = detect(&known, &[unit.clone(), tail_change(97, 160), tail_change(150, 160)]);
+    assert_eq!(second.len(), 1 + channels.len());
+    assert_eq!(second.iter().map(|row| row.change_number).max(), Some(2));
+    known.extend(second);
+    // Another tail has changes of its own.
+    let other = Finding { tail_number: Some("N413FP".to_owned()), ..tail_change(150, 160) };
+    assert_eq!(detect(&known, &[unit.clone(), other]).len(), 1 + channels.len());
 }

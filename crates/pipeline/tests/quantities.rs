@@ -174,13 +174,16 @@ fn followed(plant: Plant) -> (Vec<TrendRow>, FollowedQuantities) {
 }
 
 fn assessed(plant: Plant, swaps: bool) -> (Vec<TrendRow>, FollowedQuantities) {
+    assessed_under(include_str!("../../../pipeline.toml"), plant, swaps)
+}
+
+fn assessed_under(text: &str, plant: Plant, swaps: bool) -> (Vec<TrendRow>, FollowedQuantities) {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::create_or_open(folder.path().join("results")).unwrap();
     let results: Vec<LogResult> = (0..TAILS)
         .flat_map(|tail| (0..FLIGHTS).map(move |flight| result(tail, flight, plant, swaps)))
         .collect();
     store.lock(&Holder::this_process(), None).unwrap().commit(&results).unwrap();
-    let text = include_str!("../../../pipeline.toml");
     let config = Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap();
     let ask = UnitSelection::default();
     assess::assess_store_with_quantities(&config, &Installations::default(), &store, &ask).unwrap()
@@ -241,6 +244,23 @@ fn changes_of_single_units_are_theirs() {
     let softer = of("stiffness_n_per_m");
     assert!((softer.to / softer.from - 0.90).abs() < 0.01, "{softer:?}");
     assert!(softer.evidence.contains("stiffness drifted by -"), "{}", softer.evidence);
+}
+
+#[test]
+fn a_part_has_limits_of_its_own() {
+    let text = include_str!("../../../pipeline.toml").to_owned()
+        + "\n[part.\"EMA-27-1040\".quantity_limits]\nstiffness_share = 0.5\n";
+    let (rows, _) = assessed_under(
+        &text,
+        |at, e| {
+            if at.is(0, 0) || at.is(1, 2) {
+                scale(&mut e.stiffness_n_per_m, 1.0 - 0.10 * at.drift());
+            }
+        },
+        false,
+    );
+    let soft = rows.iter().filter(|row| row.conditions.iter().any(|c| c == "softening"));
+    assert_eq!(soft.map(|row| row.serial_number.as_str()).collect::<Vec<_>>(), ["T1-elevator_left"]);
 }
 
 #[test]

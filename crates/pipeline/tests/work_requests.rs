@@ -65,6 +65,7 @@ impl Desk {
                 quantity: GAP,
                 state: *state,
                 reason: Some(format!("finding of {day}")),
+                since_utc: None,
                 as_of_utc: flight,
                 latest_flight_utc: Some(flight),
                 gap_m: None,

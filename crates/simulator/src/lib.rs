@@ -29,6 +29,7 @@ pub use fleet::fleet_plan_types::{
 pub use fleet::fleet_spec::{
     Aircraft, MotorLogFormat, ParameterSpread, Part, Position, SAMPLE_SPEC, ScrewLogUnit, Spec, UnitSpec,
 };
+pub use fleet::planted_change::PlantedChange;
 pub use fleet::wear::WearLaw;
 pub use flight::{ExpectedOutcome, Flight, simulate};
 pub use load::flight_profile::Profile;

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::layers::Source;
 use crate::config::limits::positive;
 
-/// States of quantities other than the gap.
-pub const QUANTITY_STATES: [&str; 9] = [
+/// States of quantities other than the gap: of a unit, of a tail, of a part.
+pub const QUANTITY_STATES: [&str; 11] = [
     "softening",
     "stiffening",
     "friction_rising",
@@ -21,6 +21,8 @@ pub const QUANTITY_STATES: [&str; 9] = [
     "load_zero_moved",
     "load_delay_moved",
     "innovations_moved",
+    "recorder_moved",
+    "settings_moved",
 ];
 
 /// Word for a unit without a state, in `states` and in messages.

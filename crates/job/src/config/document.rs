@@ -243,52 +243,60 @@ pub struct TrendSettings {
     pub quantity_limits: QuantityLimits,
 }
 
-/// `[trend.quantity_limits]`: changes since a unit's first flights from which a followed quantity has a state.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// `[trend.quantity_limits]`, and `[part."…".quantity_limits]` for one part: changes since a unit's first flights from
+/// which a followed quantity has a state.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct QuantityLimits {
     /// Stiffness, as a share of the unit's own. Default 0.05.
-    pub stiffness_share: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stiffness_share: Option<f64>,
     /// Friction at the unit's usual load, as a share of its own. Default 0.1.
-    pub friction_share: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction_share: Option<f64>,
     /// Lost motion at the reference load, as a share of the unit's own. Default 0.25.
-    pub lost_motion_share: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost_motion_share: Option<f64>,
     /// Delay between the positions, s. Default 0.0005.
-    pub delay_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay_s: Option<f64>,
     /// Load zero, as a share of the unit's usual 95 % load. Default 0.02.
-    pub load_zero_share: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub load_zero_share: Option<f64>,
     /// Delay of the load, s. Default 0.001.
-    pub load_delay_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub load_delay_s: Option<f64>,
     /// Mean NIS, as a share of the unit's own. Default 1.
-    pub nis_share: f64,
-}
-
-impl Default for QuantityLimits {
-    fn default() -> Self {
-        Self {
-            stiffness_share: 0.05,
-            friction_share: 0.1,
-            lost_motion_share: 0.25,
-            delay_s: 0.5e-3,
-            load_zero_share: 0.02,
-            load_delay_s: 1e-3,
-            nis_share: 1.0,
-        }
-    }
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nis_share: Option<f64>,
 }
 
 impl QuantityLimits {
-    /// The keys and their values.
-    pub(crate) fn entries(&self) -> [(&'static str, f64); 7] {
+    /// The keys below the table that holds the limits, and their values.
+    pub(crate) fn entries(&self) -> [(&'static [&'static str], Option<f64>); 7] {
         [
-            ("stiffness_share", self.stiffness_share),
-            ("friction_share", self.friction_share),
-            ("lost_motion_share", self.lost_motion_share),
-            ("delay_s", self.delay_s),
-            ("load_zero_share", self.load_zero_share),
-            ("load_delay_s", self.load_delay_s),
-            ("nis_share", self.nis_share),
+            (&["quantity_limits", "stiffness_share"], self.stiffness_share),
+            (&["quantity_limits", "friction_share"], self.friction_share),
+            (&["quantity_limits", "lost_motion_share"], self.lost_motion_share),
+            (&["quantity_limits", "delay_s"], self.delay_s),
+            (&["quantity_limits", "load_zero_share"], self.load_zero_share),
+            (&["quantity_limits", "load_delay_s"], self.load_delay_s),
+            (&["quantity_limits", "nis_share"], self.nis_share),
         ]
+    }
+
+    /// These limits, and others where a key is not given.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            stiffness_share: self.stiffness_share.or(other.stiffness_share),
+            friction_share: self.friction_share.or(other.friction_share),
+            lost_motion_share: self.lost_motion_share.or(other.lost_motion_share),
+            delay_s: self.delay_s.or(other.delay_s),
+            load_zero_share: self.load_zero_share.or(other.load_zero_share),
+            load_delay_s: self.load_delay_s.or(other.load_delay_s),
+            nis_share: self.nis_share.or(other.nis_share),
+        }
     }
 }
 
@@ -375,8 +383,8 @@ impl Document {
             found.extend(bounded(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
         }
         for (key, limit) in self.trend.quantity_limits.entries() {
-            let path = ["trend", "quantity_limits", key];
-            found.extend(bounded(key, Some(limit)).map(|c| source.at(&path, c)));
+            let path = [&["trend"], key].concat();
+            found.extend(bounded(key[1], limit).map(|c| source.at(&path, c)));
         }
         found.extend(bounded("limit_m", self.trend.limit_m).map(|c| source.at(&["trend", "limit_m"], c)));
         let timeout = bounded("log_timeout_s", Some(self.run.log_timeout_s));

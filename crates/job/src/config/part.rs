@@ -7,7 +7,8 @@ use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::limits::implausible;
+use crate::config::document::QuantityLimits;
+use crate::config::limits::{bounded, implausible};
 use crate::filter_cache::FilterCache;
 
 /// How a part moves.
@@ -81,6 +82,9 @@ pub struct PartSettings {
     /// What wear follows: `hours`, `flights` or `reversals`; that of `[trend]` when not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<WearAxis>,
+    /// Changes of its other followed quantities from which there is a state, where they differ from those of `[trend]`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quantity_limits: Option<QuantityLimits>,
 }
 
 /// Which noise model fills `W_d` and `V_d`.
@@ -181,6 +185,8 @@ pub struct Part {
     pub filters: FilterCache,
     /// What wear follows, where that is known.
     pub axis: Option<WearAxis>,
+    /// Changes of its other followed quantities from which there is a state, as far as they are its own.
+    pub quantity_limits: QuantityLimits,
 }
 
 /// A key below the part's table, and what is wrong with it.
@@ -189,7 +195,7 @@ pub(crate) type SettingError = (&'static [&'static str], Diagnostic);
 impl PartSettings {
     /// The settings that can move a gap: limits and the axis of wear move none.
     pub(crate) fn without_limits(&self) -> Self {
-        Self { limit_m: None, watch_m: None, axis: None, ..self.clone() }
+        Self { limit_m: None, watch_m: None, axis: None, quantity_limits: None, ..self.clone() }
     }
 
     /// Brings the settings to the screw axis.
@@ -227,6 +233,7 @@ impl PartSettings {
                 watch_m: self.watch_m,
                 filters: FilterCache::default(),
                 axis: self.axis,
+                quantity_limits: self.quantity_limits.unwrap_or_default(),
             }),
             _ => Err(keys.found),
         }
@@ -251,6 +258,9 @@ impl PartSettings {
         for (key, value) in part.into_iter().chain(noise.into_iter().flatten()) {
             let name = key.last().copied().unwrap_or_default();
             keys.found.extend(implausible(name, value).map(|c| (key, c)));
+        }
+        for (key, limit) in self.quantity_limits.iter().flat_map(QuantityLimits::entries) {
+            keys.found.extend(bounded(key[1], limit).map(|c| (key, c)));
         }
     }
 

@@ -185,7 +185,9 @@ pub fn assess_run_from(
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
     let gap = |row: &TrendRow| Finding::of_gap(row, fleet.latest_flight(&row.unit(), as_of));
-    run.findings = now.iter().map(gap).chain(Finding::of_quantities(&run.followed.rows)).collect();
+    let of_common = Finding::of_common_changes(&run.followed.changes, as_of);
+    run.findings =
+        now.iter().map(gap).chain(Finding::of_quantities(&run.followed.rows)).chain(of_common).collect();
     run.work_list = now.iter().filter(needs_attention).cloned().collect();
     now.retain(|row| names.contains(&row.unit()));
     let Some(before_utc) = before_utc else { return Ok(RunAssessments { now, ..run }) };
@@ -238,8 +240,7 @@ pub(crate) fn assess_for_report(
     let fleet = FleetContext::new(config, installations, histories, &days)?.with_quantities(store, as_of)?;
     let now = fleet.selected(ask, as_of)?;
     let followed = fleet.followed_of(&now);
-    let names: Vec<UnitKey> =
-        now.iter().map(|row| (row.part_number.clone(), row.serial_number.clone())).collect();
+    let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
     let drawn =
         names.par_iter().zip(&now).map(|(name, row)| fleet.forecast(name, row)).collect::<Result<_, _>>()?;
     let past = earlier
@@ -340,8 +341,8 @@ impl UnitFacts for Facts<'_, '_> {
         history.flight_id(flown).map(str::to_owned)
     }
 
-    fn limits(&self, _part_number: Option<&str>) -> QuantityLimits {
-        self.0.limits.quantities()
+    fn limits(&self, part_number: Option<&str>) -> QuantityLimits {
+        self.0.limits.quantities(part_number)
     }
 }
 
@@ -456,8 +457,7 @@ impl<'a> FleetContext<'a> {
         let moved = recorder_changes(&followed.changes, as_of);
         let mut conditions: BTreeMap<UnitKey, Vec<String>> = BTreeMap::new();
         for (row, state) in followed.rows.iter().filter_map(|row| Some((row, row.state?))) {
-            let unit = (row.part_number.clone(), row.serial_number.clone());
-            conditions.entry(unit).or_default().push(state.to_owned());
+            conditions.entry(row.unit()).or_default().push(state.to_owned());
         }
         Ok(Self { followed, conditions, moved, ..self })
     }
@@ -468,9 +468,7 @@ impl<'a> FleetContext<'a> {
         let tails: BTreeSet<Option<&str>> = rows.iter().map(|row| row.tail_number.as_deref()).collect();
         let parts: BTreeSet<Option<&str>> = rows.iter().map(|row| row.part_number.as_deref()).collect();
         let mut of_units: Vec<QuantityRow> = rows.iter().map(gap_row).collect();
-        let is_selected =
-            |row: &&QuantityRow| units.contains(&(row.part_number.clone(), row.serial_number.clone()));
-        of_units.extend(self.followed.rows.iter().filter(is_selected).cloned());
+        of_units.extend(self.followed.rows.iter().filter(|row| units.contains(&row.unit())).cloned());
         of_units.sort_by(|a, b| (&a.part_number, &a.serial_number).cmp(&(&b.part_number, &b.serial_number)));
         let concerns = |change: &&QuantityChange| match &change.serial_number {
             Some(serial) => units.contains(&(change.part_number.clone(), serial.clone())),

@@ -57,8 +57,9 @@ impl<'a> Limits<'a> {
     }
 
     /// Changes from which other quantities than the gap have a state.
-    pub(crate) fn quantities(self) -> QuantityLimits {
-        self.config.document.trend.quantity_limits
+    pub(crate) fn quantities(self, part: Option<&str>) -> QuantityLimits {
+        let of_part = self.part(part).map(|p| p.quantity_limits).unwrap_or_default();
+        of_part.or(self.config.document.trend.quantity_limits)
     }
 
     /// Configuration of a part.

@@ -5,12 +5,12 @@
 
 use std::collections::BTreeMap;
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use job::config::AlertChannel;
 use records::{AlertRecord, AlertStatus};
 
 use crate::follow_up::alert_message;
-use crate::follow_up::finding::{Finding, GAP};
+use crate::follow_up::finding::{Finding, GAP, UNCHANGED};
 use crate::history::histories::UnitKey;
 
 /// Channels by name.
@@ -20,6 +20,9 @@ pub type Channels = BTreeMap<String, AlertChannel>;
 const CHANGE: &str = "change";
 /// Kind of the rows that hold the states known when alerts begin.
 const BASELINE: &str = "baseline";
+
+/// Changes of one tail or part in one quantity within these days are one: later flights can move its date.
+const SAME_CHANGE: SignedDuration = SignedDuration::from_hours(24 * 14);
 
 /// Latest known state of each quantity of each unit, and the number of its change.
 type KnownStates<'a> = BTreeMap<(UnitKey, &'a str), (i64, Option<&'a str>)>;
@@ -40,15 +43,11 @@ pub fn detect(
     }
     let mut rows = Vec::new();
     for finding in findings {
-        let before = states.get(&(finding.unit.clone(), finding.quantity)).copied();
-        let (number, from) = before.unwrap_or((0, None));
-        if before.is_some() && from == finding.state {
-            continue;
-        }
-        // A unit that is not assessed and was not known, or a quantity that never changed, is no change.
-        if before.is_none() && !finding.is_noteworthy() {
-            continue;
-        }
+        let before = match finding.since_utc {
+            None => state_before(&states, finding),
+            Some(since_utc) => changes_before(known, finding, since_utc),
+        };
+        let Some((number, from)) = before else { continue };
         let id = change_id(finding, number + 1, from);
         let change = row(&id, CHANGE, number + 1, from, finding, run_id, now);
         let (part, tail) = (finding.unit.0.as_deref(), finding.tail_number.as_deref());
@@ -60,6 +59,36 @@ pub fn detect(
         rows.push(change);
     }
     rows
+}
+
+/// Number and state of a unit's last change, if its state is another one now.
+fn state_before<'a>(states: &KnownStates<'a>, finding: &Finding) -> Option<(i64, Option<&'a str>)> {
+    match states.get(&(finding.unit.clone(), finding.quantity)) {
+        Some((number, state)) => (*state != finding.state).then_some((*number, *state)),
+        // A unit that is not assessed and was not known, or a quantity that never changed, is no change.
+        None => finding.is_noteworthy().then_some((0, None)),
+    }
+}
+
+/// Number of the changes that a tail or part is known to have made, unless this one is among them.
+fn changes_before(
+    known: &[AlertRecord],
+    finding: &Finding,
+    since_utc: Timestamp,
+) -> Option<(i64, Option<&'static str>)> {
+    let is_same = |at: Timestamp| since_utc.duration_since(at).abs() <= SAME_CHANGE;
+    let mut number = 0;
+    for row in
+        known.iter().filter(|row| row.status == AlertStatus::Recorded && row.quantity == finding.quantity)
+    {
+        let is_of = row.part_number == finding.unit.0 && row.tail_number == finding.tail_number;
+        let Some(at) = row.since_utc.filter(|_| is_of) else { continue };
+        if is_same(at) {
+            return None;
+        }
+        number = number.max(row.change_number);
+    }
+    Some((number, Some(UNCHANGED)))
 }
 
 fn known_states(known: &[AlertRecord]) -> KnownStates<'_> {
@@ -93,7 +122,7 @@ fn baseline(findings: &[Finding], channels: &Channels, run_id: &str, now: Timest
         let selected: Vec<&Finding> = findings.iter().filter(is_selected).collect();
         let id = identifier(first.as_of_utc, &[BASELINE, name, run_id]);
         let message = alert_message::baseline(&id, &all, &selected, run_id);
-        let nobody = Finding {
+        let of_fleet = Finding {
             unit: (None, String::new()),
             tail_number: None,
             position: None,
@@ -101,8 +130,8 @@ fn baseline(findings: &[Finding], channels: &Channels, run_id: &str, now: Timest
             reason: None,
             ..first.clone()
         };
-        let summary =
-            AlertRecord { serial_number: None, ..row(&id, BASELINE, 0, None, &nobody, run_id, now) };
+        let summary = row(&id, BASELINE, 0, None, &of_fleet, run_id, now);
+        let summary = AlertRecord { serial_number: None, since_utc: None, ..summary };
         rows.push(pending(&summary, name, &message));
     }
     rows
@@ -122,13 +151,14 @@ fn row(
         channel: String::new(),
         kind: kind.to_owned(),
         part_number: to.unit.0.clone(),
-        serial_number: Some(to.unit.1.clone()),
+        serial_number: to.serial_number().map(str::to_owned),
         tail_number: to.tail_number.clone(),
         position: to.position.clone(),
         quantity: to.quantity.to_owned(),
         change_number: number,
         from_state: from.map(str::to_owned),
         to_state: to.state.map(str::to_owned),
+        since_utc: to.since_utc,
         as_of_utc: to.as_of_utc,
         message: None,
         status: AlertStatus::Recorded,
@@ -153,7 +183,8 @@ fn change_id(to: &Finding, number: i64, from: Option<&str>) -> String {
     let number = number.to_string();
     let state = |state: Option<&str>| alert_message::word(state).to_owned();
     let part = to.unit.0.as_deref().unwrap_or_default();
-    identifier(to.as_of_utc, &[part, &to.unit.1, to.quantity, &number, &state(from), &state(to.state)])
+    let name = to.serial_number().or(to.tail_number.as_deref()).unwrap_or_default();
+    identifier(to.as_of_utc, &[part, name, to.quantity, &number, &state(from), &state(to.state)])
 }
 
 /// Date and digest: names of files sort by date, and hold no character of a name from a log.

@@ -67,12 +67,13 @@ pub(super) fn baseline(id: &str, known: &[&Finding], selected: &[&Finding], run_
 fn unit_fields(finding: &Finding) -> Value {
     json!({
         "part_number": finding.unit.0,
-        "serial_number": finding.unit.1,
+        "serial_number": finding.serial_number(),
         "tail_number": finding.tail_number,
         "position": finding.position,
         "quantity": finding.quantity,
         "state": word(finding.state),
         "reason": finding.reason,
+        "since_utc": finding.since_utc,
         "as_of_utc": finding.as_of_utc,
         "gap_m": finding.gap_m,
         "limit_m": finding.limit_m,
@@ -101,7 +102,11 @@ fn change_text(from: Option<&str>, to: &Finding) -> String {
         (Some(gap), Some(limit)) => format!("; gap {:.1} µm, limit {:.1} µm", gap * 1e6, limit * 1e6),
         _ => String::new(),
     };
-    let unit = unit_text(to.unit.0.as_deref(), &to.unit.1);
-    let text = format!("{unit}{place}: {quantity}{} → {}{reason}{gap}", word(from), word(to.state));
+    let name = match (to.serial_number(), &to.tail_number) {
+        (Some(serial), _) => format!("{}{place}", unit_text(to.unit.0.as_deref(), serial)),
+        (None, Some(tail)) => format!("all of {tail}"),
+        (None, None) => format!("all of {}", to.unit.0.as_deref().unwrap_or_default()),
+    };
+    let text = format!("{name}: {quantity}{} → {}{reason}{gap}", word(from), word(to.state));
     escape_cell(&text).into_owned()
 }

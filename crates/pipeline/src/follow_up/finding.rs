@@ -1,7 +1,8 @@
-//! Finding: the state of one quantity of one unit after a run, as alerts and work requests need it.
+//! Finding: the state of one quantity of one unit after a run, or a change that a tail or a part made, as alerts and
+//! work requests need it.
 
 use jiff::Timestamp;
-use records::{QuantityRow, TrendRow};
+use records::{QuantityChange, QuantityRow, TrendRow};
 
 use crate::history::histories::UnitKey;
 
@@ -9,12 +10,13 @@ use crate::history::histories::UnitKey;
 pub const GAP: &str = "gap";
 
 /// State of a quantity other than the gap that has not changed.
-const UNCHANGED: &str = "normal";
+pub(crate) const UNCHANGED: &str = "normal";
 
-/// State of one quantity of one unit.
+/// State of one quantity of one unit, or a change that a tail or a part made.
 #[derive(Debug, Clone, PartialEq)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct Finding {
+    /// Without a serial number for a tail or a part.
     pub unit: UnitKey,
     pub tail_number: Option<String>,
     pub position: Option<String>,
@@ -23,6 +25,8 @@ pub struct Finding {
     /// `None` of a unit that is not assessed or was removed.
     pub state: Option<&'static str>,
     pub reason: Option<String>,
+    /// First flight of a change that a tail or a part made; none for a unit's state.
+    pub since_utc: Option<Timestamp>,
     pub as_of_utc: Timestamp,
     /// Departure of the unit's latest flight.
     pub latest_flight_utc: Option<Timestamp>,
@@ -38,12 +42,13 @@ impl Finding {
     /// Findings about the followed quantities of units, each `normal` where it has no state of its own.
     pub fn of_quantities(rows: &[QuantityRow]) -> impl Iterator<Item = Self> {
         rows.iter().map(|row| Self {
-            unit: (row.part_number.clone(), row.serial_number.clone()),
+            unit: row.unit(),
             tail_number: row.tail_number.clone(),
             position: row.position.clone(),
             quantity: row.quantity,
             state: Some(row.state.unwrap_or(UNCHANGED)),
             reason: row.reason.clone(),
+            since_utc: None,
             as_of_utc: row.as_of_utc,
             latest_flight_utc: None,
             gap_m: None,
@@ -52,6 +57,31 @@ impl Finding {
             likely_utc: None,
             work_request: None,
         })
+    }
+
+    /// Findings about changes that tails or parts made.
+    pub fn of_common_changes(changes: &[QuantityChange], as_of_utc: Timestamp) -> impl Iterator<Item = Self> {
+        changes.iter().filter(|change| change.serial_number.is_none()).map(move |change| Self {
+            unit: (change.part_number.clone(), String::new()),
+            tail_number: change.tail_number.clone(),
+            position: None,
+            quantity: change.quantity,
+            state: change.state,
+            reason: Some(change.evidence.clone()),
+            since_utc: Some(change.since_utc),
+            as_of_utc,
+            latest_flight_utc: None,
+            gap_m: None,
+            limit_m: None,
+            not_before_utc: None,
+            likely_utc: None,
+            work_request: None,
+        })
+    }
+
+    /// Serial number of a unit.
+    pub fn serial_number(&self) -> Option<&str> {
+        Some(self.unit.1.as_str()).filter(|_| self.since_utc.is_none())
     }
 
     /// Whether the state is worth a row where none was known: every state of a gap, and other quantities that changed.
@@ -68,6 +98,7 @@ impl Finding {
             quantity: GAP,
             state: row.state,
             reason: row.reason.clone(),
+            since_utc: None,
             as_of_utc: row.as_of_utc,
             latest_flight_utc,
             gap_m: row.gap_m,

@@ -93,12 +93,11 @@ fn follow_quantity(
         }
     }
     subjects.par_iter_mut().for_each(|s| s.fit = fit(s));
-    let drifting_tails = drifting_tails(&subjects, quantity);
+    let drifting_tails = drifting_tails(&subjects);
     let mut found = FollowedQuantities { rows: Vec::new(), changes: common };
     for subject in &subjects {
         let Some(fit) = &subject.fit else { continue };
-        let assessed =
-            Assessed { subject, fit, quantity, treatment: Treatment::of(quantity, &subject.limits), facts };
+        let assessed = Assessed { subject, fit, quantity, facts };
         let is_tails = subject
             .last_place()
             .and_then(|p| p.tail_number.as_deref())
@@ -119,12 +118,9 @@ fn subject<'a>(
     index: usize,
 ) -> Option<Subject<'a>> {
     let quantity = READ[index].0;
-    let limits = facts.limits(name.0.as_deref());
-    let treatment = Treatment::of(quantity, &limits);
+    let treatment = Treatment::of(quantity, &facts.limits(name.0.as_deref()));
     let last = unit.flights.last()?;
-    let loads_n: Vec<f64> =
-        unit.flights.iter().map(|f| f64::from(f.load_p95_n)).filter(|n| n.is_finite()).collect();
-    let usual_load_n = (!loads_n.is_empty()).then(|| median(loads_n));
+    let usual_load_n = unit.usual_load_n;
     let series = facts.series(name).filter(|_| !treatment.is_of_channel);
     let maintained_us = series.and_then(|s| Some(s.maintenance_until(last.departure_us).last()?.utc_us));
     let hours = |us: i64| Some(series?.flights_until(us).last()?.hours);
@@ -157,7 +153,7 @@ fn subject<'a>(
         name,
         unit,
         scale,
-        limits,
+        treatment,
         values,
         fit: None,
         common: Vec::new(),
@@ -245,7 +241,7 @@ fn take_off_curves(subjects: &mut [Subject<'_>]) {
 }
 
 /// Tails whose units drift in one direction, with their subjects.
-fn drifting_tails(subjects: &[Subject<'_>], quantity: Quantity) -> BTreeMap<String, Vec<usize>> {
+fn drifting_tails(subjects: &[Subject<'_>]) -> BTreeMap<String, Vec<usize>> {
     let mut tails: BTreeMap<&str, (Vec<usize>, Vec<usize>, usize)> = BTreeMap::new();
     for (k, subject) in subjects.iter().enumerate() {
         let (Some(fit), Some(tail)) =
@@ -255,7 +251,7 @@ fn drifting_tails(subjects: &[Subject<'_>], quantity: Quantity) -> BTreeMap<Stri
         };
         let entry = tails.entry(tail).or_default();
         entry.2 += usize::from(fit.flights >= MIN_FLIGHTS);
-        let Some(limit) = Treatment::of(quantity, &subject.limits).limit else { continue };
+        let Some(limit) = subject.treatment.limit else { continue };
         if fit.is_drifting && fit.change.abs() >= DRIFT_SHARE * limit * subject.scale {
             if fit.change > 0.0 { entry.0.push(k) } else { entry.1.push(k) }
         }
@@ -273,15 +269,14 @@ struct Assessed<'a> {
     subject: &'a Subject<'a>,
     fit: &'a QuantityChanges,
     quantity: Quantity,
-    treatment: Treatment,
     facts: &'a dyn UnitFacts,
 }
 
 impl Assessed<'_> {
     /// State of the unit's own change.
     fn state(&self) -> Option<&'static str> {
-        let limit = self.treatment.limit? * self.subject.scale;
-        let (rise, fall) = self.treatment.states;
+        let limit = self.subject.treatment.limit? * self.subject.scale;
+        let (rise, fall) = self.subject.treatment.states;
         let is_beyond = self.fit.change.abs() > limit + BEYOND_SE * self.fit.change_se;
         if !is_beyond {
             return None;
@@ -298,7 +293,7 @@ impl Assessed<'_> {
         steps.sort_by_key(|(step, _)| step.departure_us);
         let common: f64 = subject.common.iter().map(|(step, _)| step.size).sum();
         // The channels of a position have no hours of their own.
-        let rate = fit.rate_per_hour.filter(|_| !self.treatment.is_of_channel);
+        let rate = fit.rate_per_hour.filter(|_| !self.subject.treatment.is_of_channel);
         let state = self.state().filter(|_| !is_tails);
         QuantityRow {
             part_number: subject.name.0.clone(),
@@ -317,7 +312,7 @@ impl Assessed<'_> {
             change_se: Some(fit.change_se),
             rate_per_hour: rate.map(|(rate, _)| rate),
             rate_se_per_hour: rate.map(|(_, se)| se),
-            change_limit: self.treatment.limit.map(|limit| limit * subject.scale),
+            change_limit: self.subject.treatment.limit.map(|limit| limit * subject.scale),
             steps: steps.into_iter().filter_map(|(step, scope)| self.step(step, scope)).collect(),
             state,
             reason: state.map(|_| self.evidence()),
@@ -349,17 +344,13 @@ impl Assessed<'_> {
             (false, true) => "stepped and drifted",
         };
         let since = self.since_us().and_then(utc).map(day).unwrap_or_default();
-        let others = match subject.last_place().and_then(|p| p.tail_number.as_deref()) {
-            Some(tail) => format!("the other actuators of {tail} did not"),
-            None => "no other unit did".to_owned(),
-        };
         format!(
-            "{} {how} by {} since {since} ({} to {}); {others}: {}",
+            "{} {how} by {} since {since} ({} to {}), shared neither by the tail nor by the part: {}",
             quantity.label(),
             shown_change(*quantity, fit.change, subject.scale),
             shown(*quantity, fit.baseline),
             shown(*quantity, fit.baseline + fit.change),
-            if self.treatment.is_of_position || self.treatment.is_of_channel {
+            if self.subject.treatment.is_of_position || self.subject.treatment.is_of_channel {
                 "its sensor or wiring"
             } else {
                 ChangeScope::Unit.cause()
@@ -436,7 +427,7 @@ fn of_common(
         from,
         to: from + size,
         change_se,
-        state: None,
+        state: step.scope.state(),
         evidence: format!(
             "{} of {} units of {} stepped in {} by {} on {}{flight}: {}",
             step.members.len(),
@@ -477,7 +468,7 @@ fn of_drift(tail: &str, members: &[usize], subjects: &[Subject<'_>], quantity: Q
         from,
         to: from + change,
         change_se: known.first().map_or(f64::NAN, |(_, f)| f.change_se),
-        state: None,
+        state: ChangeScope::Tail.state(),
         evidence: format!(
             "{} units of {tail} drifted in {} by {}: {}",
             known.len(),

@@ -46,46 +46,46 @@ impl Treatment {
         let channel = Self { is_of_channel: true, ..own };
         match quantity {
             Quantity::LostMotionM => Self {
-                limit: Some(limits.lost_motion_share),
+                limit: limits.lost_motion_share.or(Some(0.25)),
                 least_scatter: 0.002,
                 states: (Some("lost_motion_rising"), None),
                 ..own
             },
             Quantity::StiffnessNPerM => Self {
-                limit: Some(limits.stiffness_share),
+                limit: limits.stiffness_share.or(Some(0.05)),
                 least_scatter: 0.001,
                 states: (Some("stiffening"), Some("softening")),
                 ..own
             },
             Quantity::FrictionN => Self {
-                limit: Some(limits.friction_share),
+                limit: limits.friction_share.or(Some(0.1)),
                 states: (Some("friction_rising"), Some("friction_falling")),
                 ..own
             },
             Quantity::GapM | Quantity::FrictionDryN | Quantity::FrictionLoadShare => own,
             Quantity::SkewS => Self {
                 scale: Scale::One,
-                limit: Some(limits.delay_s),
+                limit: limits.delay_s.or(Some(0.5e-3)),
                 least_scatter: 2e-5,
                 states: (Some("delay_moved"), Some("delay_moved")),
                 ..channel
             },
             Quantity::LoadZeroN => Self {
                 scale: Scale::UsualLoad,
-                limit: Some(limits.load_zero_share),
+                limit: limits.load_zero_share.or(Some(0.02)),
                 least_scatter: 0.002,
                 states: (Some("load_zero_moved"), Some("load_zero_moved")),
                 ..position
             },
             Quantity::LoadDelayS => Self {
                 scale: Scale::One,
-                limit: Some(limits.load_delay_s),
+                limit: limits.load_delay_s.or(Some(1e-3)),
                 least_scatter: 1e-4,
                 states: (Some("load_delay_moved"), Some("load_delay_moved")),
                 ..channel
             },
             Quantity::Nis => Self {
-                limit: Some(limits.nis_share),
+                limit: limits.nis_share.or(Some(1.0)),
                 least_scatter: 0.05,
                 states: (Some("innovations_moved"), Some("innovations_moved")),
                 ..position
@@ -98,14 +98,17 @@ impl Treatment {
 mod tests {
     use std::collections::BTreeSet;
 
+    use records::ChangeScope;
+
     use super::*;
 
     /// The configuration of alerts refuses words that no quantity has.
     #[test]
     fn alerts_know_every_state_of_a_quantity() {
         let states = Quantity::ALL.map(|quantity| Treatment::of(quantity, &QuantityLimits::default()).states);
+        let common = [ChangeScope::Tail, ChangeScope::Part].into_iter().filter_map(ChangeScope::state);
         let states: BTreeSet<&str> =
-            states.into_iter().flat_map(|(rise, fall)| rise.into_iter().chain(fall)).collect();
+            states.into_iter().flat_map(|(rise, fall)| rise.into_iter().chain(fall)).chain(common).collect();
         assert_eq!(states, BTreeSet::from(job::config::alerts::QUANTITY_STATES));
     }
 }

@@ -1,11 +1,11 @@
 //! One quantity of one unit while its changes are attributed.
 
-use job::config::QuantityLimits;
 use records::ChangeScope;
 use trend::quantity::QuantityValue;
 use trend::quantity::changes::{self, QuantityChanges};
 
 use crate::history::histories::{TailPosition, UnitKey};
+use crate::quantities::limits::Treatment;
 use crate::quantities::values::UnitValues;
 
 /// One quantity of one unit.
@@ -16,7 +16,8 @@ pub(crate) struct Subject<'a> {
     pub(crate) unit: &'a UnitValues,
     /// What limits are a share of, in the quantity's unit.
     pub(crate) scale: f64,
-    pub(crate) limits: QuantityLimits,
+    /// How the quantity is followed, with the limits of the unit's part.
+    pub(crate) treatment: Treatment,
     /// Values at the part's usual temperature and load.
     pub(crate) values: Vec<QuantityValue>,
     /// Changes of the values as they are: at the end, those of the unit alone.

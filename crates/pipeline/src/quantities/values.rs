@@ -14,6 +14,7 @@ use crate::history::builder::at;
 use crate::history::histories::{Positions, TailPosition, UnitKey};
 use crate::history::parallel_scan::read_each;
 use crate::history::row_keys::{KeyCache, KeyColumns, RowKey};
+use crate::monitoring::median;
 
 /// Flights that are followed: three years. It bounds what a fleet of any age takes.
 const WINDOW: SignedDuration = SignedDuration::from_hours(24 * 1_096);
@@ -48,9 +49,19 @@ pub(crate) struct FlightValues {
 pub(crate) struct UnitValues {
     pub(crate) places: Positions,
     pub(crate) flights: Vec<FlightValues>,
+    /// Median 95 % load, N.
+    pub(crate) usual_load_n: Option<f64>,
 }
 
 impl UnitValues {
+    fn new(places: Positions, mut flights: Vec<FlightValues>) -> Self {
+        flights.sort_by_key(|flight| flight.departure_us);
+        let loads_n: Vec<f64> =
+            flights.iter().map(|f| f64::from(f.load_p95_n)).filter(|n| n.is_finite()).collect();
+        let usual_load_n = (!loads_n.is_empty()).then(|| median(loads_n));
+        Self { places, flights, usual_load_n }
+    }
+
     /// Where a flight was flown.
     pub(crate) fn place(&self, flight: &FlightValues) -> &TailPosition {
         self.places.get(flight.place)
@@ -84,12 +95,11 @@ pub(crate) fn read(store: &Store, until: Timestamp) -> Result<FleetValues, Error
     let columns: Vec<&str> = keys.into_iter().chain(numbers).collect();
     let mut found = Reader::default();
     read_each(&store.scan_columns(&query, &columns)?, |batch| found.add(batch))?;
-    let mut units: FleetValues =
-        found.names.into_iter().map(|(name, unit)| (name, std::mem::take(&mut found.units[unit]))).collect();
-    for unit in units.values_mut() {
-        unit.flights.sort_by_key(|flight| flight.departure_us);
-    }
-    Ok(units)
+    let unit = |(name, unit): (UnitKey, usize)| {
+        let (places, flights) = std::mem::take(&mut found.units[unit]);
+        (name, UnitValues::new(places, flights))
+    };
+    Ok(found.names.into_iter().map(unit).collect())
 }
 
 /// The same by position: all flights there, under the unit that flew there last.
@@ -107,15 +117,14 @@ pub(crate) fn by_position(fleet: &FleetValues) -> FleetValues {
     }
     // A unit that was the last one at two positions is at the later one.
     let mut of_units: BTreeMap<&UnitKey, (i64, UnitValues)> = BTreeMap::new();
-    for (position, (last_us, name, mut flights)) in positions {
+    for (position, (last_us, name, flights)) in positions {
         let Some(name) = name else { continue };
         if of_units.get(name).is_some_and(|(known_us, _)| *known_us >= last_us) {
             continue;
         }
-        flights.sort_by_key(|flight| flight.departure_us);
         let mut places = Positions::default();
         places.number(position.tail_number.as_deref(), position.position.as_deref());
-        of_units.insert(name, (last_us, UnitValues { places, flights }));
+        of_units.insert(name, (last_us, UnitValues::new(places, flights)));
     }
     of_units.into_iter().map(|(name, (_, values))| (name.clone(), values)).collect()
 }
@@ -124,7 +133,7 @@ pub(crate) fn by_position(fleet: &FleetValues) -> FleetValues {
 #[derive(Default)]
 struct Reader {
     names: BTreeMap<UnitKey, usize>,
-    units: Vec<UnitValues>,
+    units: Vec<(Positions, Vec<FlightValues>)>,
 }
 
 impl Reader {
@@ -153,7 +162,7 @@ impl Reader {
                 (at(values, row).unwrap_or(f64::NAN) as f32, error.unwrap_or(0.0) as f32)
             });
             let load_n = at(&lows, row).zip(at(&highs, row)).map(|(low, high)| low.abs().max(high.abs()));
-            self.units[unit].flights.push(FlightValues {
+            self.units[unit].1.push(FlightValues {
                 departure_us: departures.value(row),
                 place,
                 temperature_c: at(&temperatures, row).unwrap_or(f64::NAN) as f32,
@@ -169,9 +178,9 @@ impl Reader {
         let name = (who.part_number.map(str::to_owned), who.serial_number.to_owned());
         let units = &mut self.units;
         let unit = *self.names.entry(name).or_insert_with(|| {
-            units.push(UnitValues::default());
+            units.push(Default::default());
             units.len() - 1
         });
-        (unit, self.units[unit].places.number(who.tail_number, who.position))
+        (unit, self.units[unit].0.number(who.tail_number, who.position))
     }
 }

@@ -114,7 +114,7 @@ fn requests_by_unit(requests: Vec<WorkRequest>) -> BTreeMap<Name, Vec<WorkReques
 fn by_unit(rows: &[QuantityRow]) -> BTreeMap<Name, Vec<&QuantityRow>> {
     let mut units: BTreeMap<Name, Vec<&QuantityRow>> = BTreeMap::new();
     for row in rows {
-        units.entry((row.part_number.clone(), row.serial_number.clone())).or_default().push(row);
+        units.entry(row.unit()).or_default().push(row);
     }
     units
 }

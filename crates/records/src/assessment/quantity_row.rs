@@ -126,6 +126,15 @@ impl ChangeScope {
         }
     }
 
+    /// State of a tail or a part that changed; a unit has one by quantity.
+    pub fn state(self) -> Option<&'static str> {
+        match self {
+            Self::Unit => None,
+            Self::Tail => Some("recorder_moved"),
+            Self::Part => Some("settings_moved"),
+        }
+    }
+
     /// Likely cause.
     pub fn cause(self) -> &'static str {
         match self {
@@ -202,6 +211,13 @@ row! {
     }
 }
 
+impl QuantityRow {
+    /// Part number, if known, and serial number.
+    pub fn unit(&self) -> (Option<String>, String) {
+        (self.part_number.clone(), self.serial_number.clone())
+    }
+}
+
 row! {
     /// A change of a followed quantity, with whose it is and the evidence.
     #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -232,7 +248,8 @@ row! {
         pub to: f64,
         /// Standard error of the change; of several units, of the first of them.
         pub change_se: f64,
-        /// State that follows from it, or null.
+        /// State that follows from it: of a tail `recorder_moved`, of a part `settings_moved`, of a unit as in the quantity
+        /// table; or null.
         pub state: Option<&'static str>,
         /// What changed, by how much, and why it is theirs, in words.
         pub evidence: String,

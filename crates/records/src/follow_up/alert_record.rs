@@ -52,11 +52,11 @@ stored_row! {
         pub channel: String,
         /// `change`, or `baseline` for the states that were known when alerts began.
         pub kind: String,
-        /// Part number of the unit.
+        /// Part number of the unit, or the part that changed.
         pub part_number: Option<String>,
-        /// Serial number of the unit; empty in the summary of a baseline.
+        /// Serial number of the unit; empty for a tail or a part, and in the summary of a baseline.
         pub serial_number: Option<String>,
-        /// The aircraft of its latest flight.
+        /// The aircraft of its latest flight, or the one that changed.
         pub tail_number: Option<String>,
         /// Position on the aircraft.
         pub position: Option<String>,
@@ -68,6 +68,8 @@ stored_row! {
         pub from_state: Option<String>,
         /// State after the change; empty when the unit is not assessed.
         pub to_state: Option<String>,
+        /// First flight of a change that a tail or a part made; empty for a unit's state.
+        pub since_utc: Option<Timestamp>,
         /// Date of the assessment.
         pub as_of_utc: Timestamp,
         /// The message, JSON: what is sent in every attempt.

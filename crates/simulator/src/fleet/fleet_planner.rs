@@ -12,6 +12,7 @@ use crate::fleet::fleet_plan_types::{
 };
 use crate::fleet::fleet_roster::{FleetUnit, UnitAssignment, fleet_units};
 use crate::fleet::fleet_spec::Spec;
+use crate::fleet::planted_change::ActuatorFlight;
 use crate::fleet::wear;
 use crate::flight::ExpectedOutcome;
 use crate::seeded_streams::{derive_seed, seeded_rng};
@@ -161,8 +162,9 @@ impl<'a> Planner<'a> {
         let departure_us = self.slot_us(number) + self.departure_us(flight_hours, &mut rng);
         self.tail_hours[tail] += flight_hours;
         let seats = 0..spec.positions.len();
-        let (actuators, assignments) =
-            seats.map(|position| self.plan_actuator(tail, position, &flight_id, flight_hours)).unzip();
+        let (actuators, assignments) = seats
+            .map(|position| self.plan_actuator((tail, position), (number, &flight_id), flight_hours))
+            .unzip();
         self.flights.push(PlannedFlight {
             tail_number: name.clone(),
             seed: derive_seed(spec.seed, &["log", &flight_id]),
@@ -193,14 +195,13 @@ impl<'a> Planner<'a> {
     /// Applies the wear of the flight and assigns plant, profile and sensors.
     fn plan_actuator(
         &mut self,
-        tail: usize,
-        position: usize,
-        flight_id: &str,
+        (tail, position): (usize, usize),
+        (number, flight_id): (usize, &str),
         flight_hours: f64,
     ) -> (ActuatorTruth, Assignment) {
         let index = self.unit_at.unit(tail, position);
         self.wear(index, flight_hours);
-        let assignment = self.assignment(tail, position, flight_id);
+        let assignment = self.assignment((tail, position), (number, flight_id));
         let unit = &self.units[index];
         let truth = ActuatorTruth {
             position: self.spec.positions[position].position.clone(),
@@ -228,7 +229,7 @@ impl<'a> Planner<'a> {
         unit.gap_m += wear::step_m(growth_m, scatter_m, &mut self.wear[index]);
     }
 
-    fn assignment(&self, tail: usize, position: usize, flight_id: &str) -> Assignment {
+    fn assignment(&self, (tail, position): (usize, usize), (number, flight_id): (usize, &str)) -> Assignment {
         let (spec, unit) = (self.spec, &self.units[self.unit_at.unit(tail, position)]);
         let (spread, place, tail) = (&spec.spread, &spec.positions[position], &spec.tails[tail]);
         let mut of_place = seeded_rng(spec.seed, &["place", tail, &place.position]);
@@ -250,6 +251,14 @@ impl<'a> Planner<'a> {
             sensors.load.bias += aircraft.load_bias_n;
             profile.buffet = aircraft.buffet.unwrap_or(profile.buffet);
         }
+        let flight = ActuatorFlight {
+            tail,
+            position: &place.position,
+            part_number: &spec.parts[unit.part].part_number,
+            serial_number: &unit.serial_number,
+            number,
+        };
+        spec.changes.iter().for_each(|change| change.apply(&flight, &mut plant, &mut sensors));
         profile.no_reversal |= place.no_reversal || of_flight.random_bool(spread.no_reversal_share);
         Assignment { plant, profile, sensors, part: unit.part }
     }

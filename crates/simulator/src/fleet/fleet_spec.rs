@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, finite, not_negative, positive, within};
 use crate::fleet::calendar::midnight_us;
 use crate::fleet::fleet_events::{LogFault, PlayCheck, Replacement, Reshim, Swap};
+use crate::fleet::planted_change::PlantedChange;
 use crate::fleet::wear::WearLaw;
 use crate::load::flight_profile::Profile;
 use crate::load::vibration::Vibration;
@@ -78,6 +79,9 @@ pub struct Spec {
     /// Aircraft whose load cells or structure differ from the others'.
     #[serde(default)]
     pub aircraft: Vec<Aircraft>,
+    /// Changes that come over the flights.
+    #[serde(default)]
+    pub changes: Vec<PlantedChange>,
 }
 
 fn default_seed() -> u64 {
@@ -292,7 +296,8 @@ impl Spec {
         self.reshims.iter().try_for_each(|shim| self.check_reshim(shim))?;
         self.play_checks.iter().try_for_each(|check| self.check_play_check(check))?;
         self.log_faults.iter().try_for_each(|fault| self.check_log_fault(fault))?;
-        self.aircraft.iter().try_for_each(|aircraft| self.check_aircraft(aircraft))
+        self.aircraft.iter().try_for_each(|aircraft| self.check_aircraft(aircraft))?;
+        self.changes.iter().try_for_each(|change| self.check_change(change))
     }
 
     fn check_names(&self) -> Result<(), Error> {
@@ -377,6 +382,15 @@ impl Spec {
         self.check_tail("an aircraft", tail)?;
         finite(&format!("aircraft {tail} load_bias_n"), aircraft.load_bias_n)?;
         aircraft.buffet.map_or(Ok(()), |buffet| buffet.check(&format!("aircraft {tail} buffet")))
+    }
+
+    fn check_change(&self, change: &PlantedChange) -> Result<(), Error> {
+        change.check()?;
+        let tail = change.tail.as_deref().unwrap_or(&self.tails[0]);
+        let position = change.position.as_deref().unwrap_or(&self.positions[0].position);
+        self.check_place("a change", tail, position)?;
+        let part = change.part_number.as_deref().map(|part| self.part_index("a change", part));
+        part.transpose().map(|_| ())
     }
 
     fn check_tail(&self, who: &str, tail: &str) -> Result<(), Error> {

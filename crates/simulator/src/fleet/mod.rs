@@ -4,6 +4,7 @@ pub(crate) mod fleet_events;
 pub(crate) mod fleet_plan;
 pub(crate) mod fleet_plan_types;
 pub(crate) mod fleet_spec;
+pub(crate) mod planted_change;
 pub(crate) mod wear;
 
 mod calendar;

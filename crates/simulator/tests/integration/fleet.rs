@@ -1,6 +1,6 @@
 //! A planned fleet: books that balance, and flights that do not depend on the order of asking.
 
-use simulator::{Error, ExpectedOutcome, Plan, SAMPLE_SPEC, Spec};
+use simulator::{Error, ExpectedOutcome, Plan, PlantedChange, SAMPLE_SPEC, Spec};
 
 fn sample() -> Spec {
     toml::from_str(SAMPLE_SPEC).unwrap()
@@ -215,4 +215,62 @@ fn every_spec_that_comes_with_the_crate_flies() {
         assert_eq!(flight.actuators.len(), spec.positions.len());
         assert_eq!(flight.time_s.len(), flight.actuators[0].motor.len());
     }
+}
+
+/// Both fleets meet the same flights and the same noise, so that only what was planted differs.
+#[test]
+fn a_planted_change_shows_on_the_actuators_that_it_names_and_from_its_flight_on() {
+    let mut spec = small();
+    spec.flights_per_tail = 4;
+    let before = Plan::new(&spec).unwrap();
+    let changes = r#"
+        [[changes]]
+        tail = "B"
+        from_flight = 3
+        load_bias_n = 400.0
+        skew_s = 1e-3
+
+        [[changes]]
+        serial_number = "S10001"
+        from_flight = 1
+        to_flight = 4
+        stiffness_factor = 0.8
+    "#;
+    let planted: std::collections::BTreeMap<String, Vec<PlantedChange>> = toml::from_str(changes).unwrap();
+    spec.changes = planted["changes"].clone();
+    let after = Plan::new(&spec).unwrap();
+    let mut drift = Vec::new();
+    for (k, (was, is)) in before.flights.iter().zip(&after.flights).enumerate() {
+        let is_moved = is.tail_number == "B" && (is.flight_id.ends_with("3") || is.flight_id.ends_with("4"));
+        for (was, is) in was.actuators.iter().zip(&is.actuators) {
+            let skew_s = if is_moved { 1e-3 } else { 0.0 };
+            assert!((is.skew_s - was.skew_s - skew_s).abs() < 1e-12);
+            let ratio = is.stiffness_n_per_m / was.stiffness_n_per_m;
+            if is.serial_number == "S10001" {
+                drift.push(ratio);
+            } else {
+                assert!((ratio - 1.0).abs() < 1e-12);
+            }
+        }
+        if is.tail_number == "A" {
+            continue;
+        }
+        let (was, is) = (before.simulate_flight(k).unwrap(), after.simulate_flight(k).unwrap());
+        let added_n = if is_moved { 400.0 } else { 0.0 };
+        for (was, is) in was.actuators[0].load.iter().zip(&is.actuators[0].load) {
+            assert!((is - was - added_n).abs() < 1e-9 || is.is_nan());
+        }
+    }
+    assert_eq!(drift.len(), 4);
+    for (found, expected) in drift.iter().zip([0.95, 0.90, 0.85, 0.80]) {
+        assert!((found - expected).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_planted_change_of_an_unknown_part_is_refused() {
+    let mut spec = small();
+    let change: PlantedChange = toml::from_str("part_number = \"Q\"\nfrom_flight = 1").unwrap();
+    spec.changes = vec![change];
+    assert!(matches!(Plan::new(&spec).unwrap_err(), Error::Unknown { kind: "part", .. }));
 }

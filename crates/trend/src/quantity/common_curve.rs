@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::QuantityValue;
-use super::noise::median;
+use super::noise::{SD_OVER_MAD, median};
 
 const WEEK_US: i64 = 7 * 86_400_000_000;
 /// Fewest tails from which a week's deviation is taken.
@@ -15,8 +15,6 @@ const MIN_TAILS: usize = 3;
 const SWEEPS: usize = 10;
 /// A median of a normal sample scatters this much more than its mean: √(π/2).
 const MEDIAN_SE: f64 = 1.253_314_137_315_5;
-/// See [`super::noise`].
-const SD_OVER_MAD: f64 = 1.482_602_218_505_602;
 
 /// Deviation of a part's units by week.
 #[derive(Debug, Clone, Default, PartialEq)]

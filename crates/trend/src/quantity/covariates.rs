@@ -5,7 +5,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::QuantityValue;
-use super::noise::median;
+use super::noise::{SD_OVER_MAD, median};
 
 /// Standard errors from which a slope is applied.
 const SIGNIFICANT: f64 = 4.0;
@@ -15,8 +15,6 @@ const MIN_DIFFERENCES: usize = 30;
 const HUBER: f64 = 1.345;
 /// Reweightings.
 const ITERATIONS: usize = 8;
-/// See [`super::noise`].
-const SD_OVER_MAD: f64 = 1.482_602_218_505_602;
 
 /// Slopes of a quantity.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -3,7 +3,7 @@
 use super::QuantityValue;
 
 /// Standard deviation of a normal distribution over its median absolute deviation: 1/Φ⁻¹(3/4).
-const SD_OVER_MAD: f64 = 1.482_602_218_505_602;
+pub(super) const SD_OVER_MAD: f64 = 1.482_602_218_505_602;
 /// Flights of a batch whose means show a scatter that neighbours share.
 const BATCH: usize = 8;
 /// Variance inflation assumed before a batch is seen, and the number of batches it counts for.

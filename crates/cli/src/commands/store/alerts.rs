@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use pipeline::follow_up::finding::GAP;
 use records::{AlertRecord, AlertStatus};
 use store::{Holder, Store};
 
@@ -68,13 +69,17 @@ fn page(found: &[AlertRecord]) -> String {
     ];
     let cells = |row: &AlertRecord| {
         let word = |state: &Option<String>| state.clone().unwrap_or_else(|| "not assessed".to_owned());
+        let change = format!("{} → {}", word(&row.from_state), word(&row.to_state));
         let change = match row.kind.as_str() {
-            "change" => format!("{} → {}", word(&row.from_state), word(&row.to_state)),
+            "change" if row.quantity == GAP => change,
+            "change" => format!("{}: {change}", row.quantity),
             kind => kind.to_owned(),
         };
-        let unit = row.serial_number.as_ref().map_or_else(table::empty_cell, |serial| {
-            format!("{} / {serial}", row.part_number.as_deref().unwrap_or("–"))
-        });
+        let unit = match (&row.serial_number, &row.part_number) {
+            (Some(serial), part) => format!("{} / {serial}", part.as_deref().unwrap_or("–")),
+            (None, Some(part)) => part.clone(),
+            (None, None) => table::empty_cell(),
+        };
         vec![
             row.alert_id.clone(),
             unit,
