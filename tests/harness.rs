@@ -33,8 +33,13 @@ pub(crate) struct CommandResult {
 }
 
 impl TestFleet {
-    /// A copy of the sample fleet.
+    /// A copy of the tests' small fleet: three aircraft with ten flights each, all with a log.
     pub(crate) fn sample() -> Self {
+        Self::of("three-aircraft")
+    }
+
+    /// A copy of the sample fleet, `sample-data/`.
+    pub(crate) fn sample_data() -> Self {
         let fleet = Self { folder: tempfile::tempdir().unwrap() };
         copy(&top().join("sample-data"), &fleet.path("sample-data"));
         std::fs::copy(top().join("pipeline.toml"), fleet.path("pipeline.toml")).unwrap();

@@ -21,6 +21,7 @@ import endless
 from unreliable import Proxy
 
 TOP = Path(__file__).resolve().parents[2]
+FLEET = TOP / "tests/data/three-aircraft"
 SEEDS = (1, 2, 3)
 SHARE = 0.15
 KEYS = int(os.environ.get("KEYS", "100000"))
@@ -45,10 +46,10 @@ class Bench:
             region_name="us-east-1",
         )
         self.s3.create_bucket(Bucket="fleet")
-        self.logs = sorted((TOP / "sample-data/logs").glob("*/*.parquet"))
+        self.logs = sorted((FLEET / "sample-data/logs").glob("*/*.parquet"))
         for log in self.logs:
             self.put(f"logs/{log.parent.name}/{log.name}", log.read_bytes())
-        self.put("installations.csv", (TOP / "sample-data/installations.csv").read_bytes())
+        self.put("installations.csv", (FLEET / "sample-data/installations.csv").read_bytes())
         self.put("logs/readme.txt", b"no log")
 
     def put(self, key, content):
@@ -58,13 +59,13 @@ class Bench:
         """A folder with a configuration: logs beside it or in the bucket, results likewise."""
         folder = self.work / name
         folder.mkdir()
-        text = (TOP / "pipeline.toml").read_text()
+        text = (FLEET / "pipeline.toml").read_text()
         text = text.replace('"sample-data/logs/**/*.parquet"', f'"{logs}/logs/**/*.parquet"')
         text = text.replace('"sample-data/installations.csv"', f'"{logs}/installations.csv"')
         text = text.replace('path = "results"', f'path = "{store}"')
         (folder / "pipeline.toml").write_text(text + "\n[objects]\ntimeout_s = 1\ngive_up_s = 60\n")
         if logs == "sample-data":
-            (folder / "sample-data").symlink_to(TOP / "sample-data")
+            (folder / "sample-data").symlink_to(FLEET / "sample-data")
         return folder
 
     def env(self, **more):
@@ -292,7 +293,7 @@ def a_run_that_is_killed_leaves_whole_flights(bench):
 def a_listing_takes_no_more_memory_the_longer_it_is(bench):
     folder = bench.folder("endless", logs="s3://fleet")
     text = (folder / "pipeline.toml").read_text()
-    text = text.replace("s3://fleet/installations.csv", str(TOP / "sample-data/installations.csv"))
+    text = text.replace("s3://fleet/installations.csv", str(FLEET / "sample-data/installations.csv"))
     text = text.replace("logs/**/*.parquet", "logs/**/00000007.parquet")
     (folder / "pipeline.toml").write_text(text)
 

@@ -31,8 +31,7 @@ def command() -> Command:
 @pytest.fixture
 def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Thirty logs of three aircraft, below the current folder."""
-    shutil.copy(TOP / "pipeline.toml", tmp_path)
-    shutil.copytree(TOP / "sample-data", tmp_path / "sample-data")
+    shutil.copytree(TOP / "tests/data/three-aircraft", tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

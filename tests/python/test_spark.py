@@ -67,10 +67,9 @@ def spark(cluster: list[subprocess.Popen[bytes]]) -> Iterator[SparkSession]:
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The sample fleet, one of its logs cut short."""
+    """The small fleet, one of its logs cut short."""
     folder = tmp_path_factory.mktemp("fleet")
-    shutil.copy(TOP / "pipeline.toml", folder)
-    shutil.copytree(TOP / "sample-data", folder / "sample-data")
+    shutil.copytree(TOP / "tests/data/three-aircraft", folder, dirs_exist_ok=True)
     log = next((folder / "sample-data/logs/N414FP").iterdir())
     (log.parent / "torn.parquet").write_bytes(log.read_bytes()[:5000])
     return folder

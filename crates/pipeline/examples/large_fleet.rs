@@ -42,10 +42,10 @@ fn main() -> Outcomes<()> {
     fill(&dir.join("results"), units.div_ceil(POSITIONS.len()), flights)
 }
 
-/// The sample fleet's settings, with this fleet's tables.
+/// The small fleet's settings, with this fleet's tables.
 fn settings() -> String {
     let inspected = "installations = \"installations.csv\"\ninspections = \"inspections.csv\"";
-    include_str!("../../../pipeline.toml")
+    include_str!("../../../tests/data/three-aircraft/pipeline.toml")
         .replace("sample-data/logs/", "logs/")
         .replace("installations = \"sample-data/installations.csv\"", inspected)
 }

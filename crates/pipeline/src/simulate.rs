@@ -7,12 +7,14 @@ use ingest::parquet::writer::{Column, write_parquet};
 use jiff::Timestamp;
 use rayon::prelude::*;
 use records::Diagnostic;
-use simulator::{ActuatorLog, ChannelUnit, MotorLogFormat, Plan, PlannedFlight, Spec};
+use simulator::{
+    ActuatorLog, ChannelUnit, LogState, MotorLogFormat, Plan, PlannedFlight, ScrewLogUnit, Spec,
+};
 
 use crate::error::Error;
 use crate::run::event::Event;
 
-/// Reads a spec, or takes the small fleet that made `sample-data/`.
+/// Reads a spec, or takes the sample fleet's.
 ///
 /// # Errors
 /// [`Error::Refused`] when it cannot be read or cannot be flown.
@@ -36,7 +38,7 @@ pub fn spec(file: Option<&Path>, seed: Option<u64>) -> Result<Spec, Error> {
     Ok(spec)
 }
 
-/// Flies every flight of a spec and writes `logs/`, `installations.csv`, `truth.parquet` and `pipeline.toml`.
+/// Simulates a fleet and writes its data and a `pipeline.toml` that reads them. Returns the number of logs.
 ///
 /// The same spec and seed give the same files, whatever the number of workers.
 ///
@@ -48,21 +50,77 @@ pub fn simulate(
     jobs: Option<usize>,
     watch: &(dyn Fn(Event) + Sync),
 ) -> Result<usize, Error> {
+    let logs = write_data(spec, folder, jobs, watch)?;
+    text(&folder.join("pipeline.toml"), &configuration(spec, &Tables::of(spec)))?;
+    Ok(logs)
+}
+
+/// Configuration of the sample fleet, whose data lie in the folder [`SAMPLE_FOLDER`] next to it.
+const SAMPLE_CONFIGURATION: &str = include_str!("../templates/sample.toml");
+
+/// Folder of the sample fleet's data.
+pub const SAMPLE_FOLDER: &str = "sample-data";
+
+/// Writes the sample fleet: `pipeline.toml` and the folder [`SAMPLE_FOLDER`]. Returns the number of logs.
+///
+/// # Errors
+/// [`Error::Refused`] when a file cannot be written.
+pub fn write_sample(folder: &Path, watch: &(dyn Fn(Event) + Sync)) -> Result<usize, Error> {
+    let logs = write_data(&spec(None, None)?, &folder.join(SAMPLE_FOLDER), None, watch)?;
+    text(&folder.join("pipeline.toml"), SAMPLE_CONFIGURATION)?;
+    Ok(logs)
+}
+
+/// Flies every flight that has a log and writes logs, tables and `truth.parquet`.
+fn write_data(
+    spec: &Spec,
+    folder: &Path,
+    jobs: Option<usize>,
+    watch: &(dyn Fn(Event) + Sync),
+) -> Result<usize, Error> {
     let plan = Plan::new(spec).map_err(|e| Error::refused(Diagnostic::new("bad_spec", e)))?;
-    watch(Event::Planned { logs: plan.flights.len(), bytes: 0 });
+    let logged: Vec<usize> =
+        (0..plan.flights.len()).filter(|&index| plan.flights[index].log != LogState::Absent).collect();
+    watch(Event::Planned { logs: logged.len(), bytes: 0 });
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs.unwrap_or(0)).build()?;
     pool.install(|| {
-        (0..plan.flights.len()).into_par_iter().try_for_each(|index| {
+        logged.par_iter().try_for_each(|&index| {
             let name = write_flight(&plan, index, folder)?;
             watch(Event::Finished { log: name, bytes: 0, estimated: 0, refused: 0, diagnostics: Vec::new() });
             Ok::<(), Error>(())
         })
     })?;
+    let tables = Tables::of(spec);
     text(&folder.join("installations.csv"), &installations(&plan))?;
+    if tables.flights {
+        text(&folder.join("flights.csv"), &flights(&plan))?;
+    }
+    if tables.maintenance {
+        text(&folder.join("maintenance.csv"), &maintenance(&plan))?;
+    }
+    if tables.inspections {
+        text(&folder.join("inspections.csv"), &inspections(&plan))?;
+    }
     write_parquet(&folder.join("truth.parquet"), &truth(&plan), &[])
         .map_err(|e| Error::refused(e.diagnostic()))?;
-    text(&folder.join("pipeline.toml"), &configuration(spec))?;
-    Ok(plan.flights.len())
+    Ok(logged.len())
+}
+
+/// The tables of a fleet that are not always there.
+struct Tables {
+    flights: bool,
+    maintenance: bool,
+    inspections: bool,
+}
+
+impl Tables {
+    fn of(spec: &Spec) -> Self {
+        Self {
+            flights: spec.flights_per_log > 1,
+            maintenance: spec.reshims.iter().any(|shim| shim.is_recorded),
+            inspections: !spec.play_checks.is_empty(),
+        }
+    }
 }
 
 /// Flies one flight and writes its log: a column for each channel of each actuator.
@@ -74,9 +132,31 @@ fn write_flight(plan: &Plan, index: usize, folder: &Path) -> Result<String, Erro
         columns.extend(channels(actuator));
     }
     let name = log_name(planned);
-    let file = folder.join("logs").join(&name);
+    let logs = folder.join(if planned.log == LogState::Truncated { "arrives-later" } else { "logs" });
+    let file = logs.join(&name);
     write_parquet(&file, &columns, &facts(planned)).map_err(|e| Error::refused(e.diagnostic()))?;
+    match planned.log {
+        LogState::Duplicate => copy(&file)?,
+        LogState::Truncated => truncate(&file)?,
+        LogState::Sound | LogState::Absent => {}
+    }
     Ok(name)
+}
+
+/// A second file with the same content.
+fn copy(file: &Path) -> Result<(), Error> {
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    let second = file.with_file_name(format!("{name}_copy.parquet"));
+    std::fs::copy(file, &second).map(|_| ()).map_err(|e| not_written(&second, &e))
+}
+
+/// Keeps the first quarter of a file, as after a transfer that stopped.
+fn truncate(file: &Path) -> Result<(), Error> {
+    let cut = || {
+        let open = std::fs::OpenOptions::new().write(true).open(file)?;
+        open.set_len(open.metadata()?.len() / 4)
+    };
+    cut().map_err(|e| not_written(file, &e))
 }
 
 /// `N412FP/20260907T061500Z_FP0001.parquet`.
@@ -114,6 +194,7 @@ fn channels(actuator: ActuatorLog) -> [(String, Column); 3] {
 fn recorded(unit: ChannelUnit) -> (&'static str, f64) {
     match unit {
         ChannelUnit::Metre => ("mm", 1e3),
+        ChannelUnit::Micrometre => ("um", 1.0),
         ChannelUnit::Radian => ("deg", 180.0 / std::f64::consts::PI),
         ChannelUnit::Newton => ("n", 1.0),
         ChannelUnit::NewtonMetre => ("nm", 1.0),
@@ -139,10 +220,54 @@ fn installations(plan: &Plan) -> String {
     text
 }
 
-/// The contract's columns of a truth table.
+/// Every flight, with and without a log.
+fn flights(plan: &Plan) -> String {
+    let mut text = "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n".to_owned();
+    for flight in &plan.flights {
+        let _ = writeln!(
+            text,
+            "{},{},{},{:.2},{:.2}",
+            flight.tail_number,
+            flight.flight_id,
+            instant(flight.departure_us),
+            flight.flight_hours,
+            flight.tail_hours_end
+        );
+    }
+    text
+}
+
+fn maintenance(plan: &Plan) -> String {
+    let mut text = "part_number,serial_number,utc,kind\n".to_owned();
+    for row in &plan.maintenance {
+        let _ = writeln!(text, "{},{},{},reshim", row.part_number, row.serial_number, instant(row.at_us));
+    }
+    text
+}
+
+fn inspections(plan: &Plan) -> String {
+    let mut text = "part_number,serial_number,date_utc,play_m,instrument,force_n\n".to_owned();
+    for row in &plan.inspections {
+        let _ = writeln!(
+            text,
+            "{},{},{},{:e},{},{}",
+            row.part_number,
+            row.serial_number,
+            instant(row.at_us),
+            row.play_m,
+            row.instrument,
+            row.force_n
+        );
+    }
+    text
+}
+
+/// The contract's columns of a truth table: actuators of the flights whose logs are whole.
 fn truth(plan: &Plan) -> Vec<(String, Column)> {
     let all = || {
-        plan.flights.iter().flat_map(|flight| flight.actuators.iter().map(move |actuator| (flight, actuator)))
+        let whole = |flight: &&PlannedFlight| matches!(flight.log, LogState::Sound | LogState::Duplicate);
+        let flights = plan.flights.iter().filter(whole);
+        flights.flat_map(|flight| flight.actuators.iter().map(move |actuator| (flight, actuator)))
     };
     let text = |of: &dyn Fn(&PlannedFlight, &simulator::ActuatorTruth) -> String| {
         Column::Text(all().map(|(f, a)| of(f, a)).collect())
@@ -166,8 +291,17 @@ fn truth(plan: &Plan) -> Vec<(String, Column)> {
 }
 
 /// A configuration that reads these logs: nominal parts, the sensors' own facts.
-fn configuration(spec: &Spec) -> String {
-    let mut text = HEAD.to_owned();
+fn configuration(spec: &Spec, tables: &Tables) -> String {
+    let named = |is_there: bool, name: &str| {
+        if is_there { format!("\n{name} = \"{name}.csv\"") } else { String::new() }
+    };
+    let tables = [
+        named(tables.flights, "flights"),
+        named(tables.maintenance, "maintenance"),
+        named(tables.inspections, "inspections"),
+    ];
+    let installations = "installations = \"installations.csv\"";
+    let mut text = HEAD.replace(installations, &format!("{installations}{}", tables.concat()));
     let Some(first) = spec.parts.first() else { return text };
     text += &channel_tables(first, "channel");
     for part in &spec.parts[1..] {
@@ -206,11 +340,12 @@ fn channel_tables(part: &simulator::Part, above: &str) -> String {
     let rotary = part.reference_radius_m.is_some();
     let unit = |angle: bool| if angle { ("deg", "deg") } else { ("mm", "mm") };
     let motor = unit(rotary || part.motor_log != MotorLogFormat::Position);
+    let screw = if !rotary && part.screw_log == ScrewLogUnit::Micrometre { ("um", "um") } else { unit(rotary) };
     let load = if rotary { ("nm", "N.m") } else { ("n", "N") };
     let mut text = String::new();
     for (channel, column, (suffix, unit)) in [
         ("motor_position", "motor", motor),
-        ("screw_position", "screw", unit(rotary)),
+        ("screw_position", "screw", screw),
         ("load", "load", load),
     ] {
         let _ = writeln!(
@@ -278,8 +413,10 @@ fn instant(us: i64) -> Timestamp {
 }
 
 fn text(file: &Path, text: &str) -> Result<(), Error> {
-    std::fs::write(file, text).map_err(|e| {
-        let what = format!("the file cannot be written: {e}");
-        Error::refused(Diagnostic::new("output_failed", what).in_file(file.display()))
-    })
+    std::fs::write(file, text).map_err(|e| not_written(file, &e))
+}
+
+fn not_written(file: &Path, error: &std::io::Error) -> Error {
+    let what = format!("the file cannot be written: {error}");
+    Error::refused(Diagnostic::new("output_failed", what).in_file(file.display()))
 }

@@ -14,9 +14,9 @@ use records::GapRecord;
 use store::{Holder, Query, Store};
 use tempfile::TempDir;
 
-/// Six logs of one aircraft of the sample fleet, and a store of their own.
+/// Six logs of one aircraft of the small fleet, and a store of their own.
 fn fleet() -> (TempDir, Config) {
-    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/three-aircraft");
     let dir = tempfile::tempdir().unwrap();
     std::fs::create_dir_all(dir.path().join("sample-data/logs")).unwrap();
     for file in ["pipeline.toml", "sample-data/installations.csv"] {

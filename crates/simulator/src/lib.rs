@@ -21,11 +21,13 @@ mod seeded_streams;
 mod sensors;
 
 pub use error::Error;
+pub use fleet::fleet_events::{FaultKind, LogFault, Place, PlayCheck, Replacement, Reshim, Swap};
 pub use fleet::fleet_plan_types::{
-    ActuatorLog, ActuatorTruth, ChannelUnit, Installation, Plan, PlannedFlight, SimulatedFlight,
+    ActuatorLog, ActuatorTruth, ChannelUnit, Inspection, Installation, LogState, Maintenance, Plan,
+    PlannedFlight, SimulatedFlight,
 };
 pub use fleet::fleet_spec::{
-    Aircraft, MotorLogFormat, ParameterSpread, Part, Place, Position, SAMPLE_SPEC, Spec, Swap, UnitSpec,
+    Aircraft, MotorLogFormat, ParameterSpread, Part, Position, SAMPLE_SPEC, ScrewLogUnit, Spec, UnitSpec,
 };
 pub use fleet::planted_change::PlantedChange;
 pub use fleet::wear::WearLaw;

@@ -15,6 +15,9 @@ pub(crate) struct InitArgs {
     /// Infer the log mapping from the logs below this folder.
     #[arg(long, value_name = "FOLDER")]
     pub from: Option<PathBuf>,
+    /// Set up the sample fleet: simulated logs, all tables, and a pipeline.toml that reads them.
+    #[arg(long, conflicts_with = "from")]
+    pub sample: bool,
 }
 
 /// `check`.
@@ -85,7 +88,7 @@ impl From<LogEncoding> for ingest::parquet::writer::Encoding {
 /// `simulate`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct SimulateArgs {
-    /// Simulation spec; default: a small fleet.
+    /// Simulation spec; default: the sample fleet.
     pub spec: Option<PathBuf>,
     /// Write logs, installations and ground truth to this folder.
     #[arg(long, short, value_name = "DIR")]

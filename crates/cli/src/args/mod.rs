@@ -23,6 +23,7 @@ pub(crate) use work::{WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs, Wor
 
 const AFTER: &str = "\
 First steps:
+  freeplay init --sample   set up a simulated fleet here and try everything on it
   freeplay init            write a commented pipeline.toml here
   freeplay check           see what your logs offer, before anything is computed
   freeplay run             estimate every new flight, store it, update trends
@@ -114,7 +115,7 @@ pub(crate) enum Color {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Write a commented pipeline.toml and an example installations.csv; nothing is overwritten
-    #[command(after_help = "Examples:\n  freeplay init fleet-a\n  freeplay init --from /data/logs")]
+    #[command(after_help = "Examples:\n  freeplay init fleet-a\n  freeplay init --from /data/logs\n  freeplay init --sample demo && cd demo && freeplay run")]
     Init(InitArgs),
     /// Check how logs are mapped: columns, units, signs and rates per channel; nothing is computed
     #[command(after_help = "Example:\n  freeplay check logs/N412FP/20261119_0413.parquet")]

@@ -321,8 +321,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_sample_fleet_is_understood_whole() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sample-data/logs/N412FP");
+    fn a_log_with_names_and_units_is_understood_whole() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/three-aircraft/sample-data/logs/N412FP");
         let log = std::fs::read_dir(folder).unwrap().flatten().next().unwrap().path();
         let found = propose(&log).unwrap();
         assert_eq!(found.clock, Some(("time_s".to_owned(), Some("s"))));

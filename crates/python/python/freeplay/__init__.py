@@ -5,7 +5,7 @@ Tables come in and go out through Arrow's PyCapsule interface: hand a :class:`Ta
 ``polars.DataFrame``, ``pandas.DataFrame.from_arrow`` or DuckDB, and hand any of theirs back. Work is done without
 the interpreter's lock. What is wrong is raised as :class:`FreeplayError`, with the command's code, text and remedy.
 
-The examples start from the folder of the repository, whose ``sample-data`` holds 30 simulated flights.
+The examples start from the folder of the repository, whose ``sample-data`` holds a simulated fleet.
 """
 
 from __future__ import annotations
@@ -81,14 +81,14 @@ def estimate(
     that part number, and neither an identity nor the installations table is needed.
 
     >>> import freeplay, pyarrow as pa
-    >>> log = "sample-data/logs/N412FP/20260910T130719Z_N412FP-0001.parquet"
+    >>> log = "sample-data/logs/N412FP/20260828T005251Z_N412FP-0017.parquet"
     >>> table = pa.table(freeplay.estimate(log))
     >>> table.num_rows
     4
     >>> table["position"].to_pylist()
     ['aileron_left', 'aileron_right', 'elevator_left', 'elevator_right']
     >>> [f"{1e6 * gap:.1f} um" for gap in table["gap_m"].to_pylist()][:2]
-    ['93.4 um', '76.3 um']
+    ['62.3 um', '96.3 um']
 
     Raises :class:`LogError` when a log, or an actuator in it, cannot be used; its ``answer`` is the table of the
     others.
@@ -123,7 +123,7 @@ def trace(log: Path, config: Settings = _USUAL, *, part: str | None = None) -> T
     """What the filter saw of a log, sample by sample: inputs, the backlash ``s_m``, innovation and its variance.
 
     >>> import freeplay
-    >>> log = "sample-data/logs/N412FP/20260910T130719Z_N412FP-0001.parquet"
+    >>> log = "sample-data/logs/N412FP/20260828T005251Z_N412FP-0017.parquet"
     >>> freeplay.trace(log).column_names[:4]
     ['log_path', 'position', 'time_s', 'motor_m']
     """
@@ -155,7 +155,7 @@ def trend(
     >>> estimates = freeplay.estimate(sorted(glob.glob("sample-data/logs/*/*.parquet")))
     >>> rows = pa.table(freeplay.trend(estimates)).to_pylist()
     >>> [row["serial_number"] for row in rows if row["state"] == "plan"]
-    ['1040-0009', '1040-0013']
+    ['1040-0009', '1060-0015']
     """
     is_foreign = estimates is not None and config is _USUAL and not exists(_USUAL)
     judging = Config.without_logs() if is_foreign else load(config)
@@ -181,7 +181,7 @@ def records(
     >>> import freeplay
     >>> account = freeplay.run()
     >>> freeplay.records(tail="N412FP").num_rows
-    40
+    52
     """
     texts = [tail, serial, part, flight, position]
     return _freeplay.records(load(config), texts, _text(since), _text(until), last)
@@ -201,10 +201,10 @@ def normalize(
     its ``answer`` lists the files of the others.
 
     >>> import freeplay
-    >>> log = "sample-data/logs/N412FP/20260910T130719Z_N412FP-0001.parquet"
+    >>> log = "sample-data/logs/N412FP/20260828T005251Z_N412FP-0017.parquet"
     >>> files = freeplay.normalize(log, "normalized")
     >>> files[0]
-    'normalized/N412FP/N412FP-0001/aileron_left.parquet'
+    'normalized/N412FP/N412FP-0017/aileron_left.parquet'
     """
     written, trouble = _freeplay.normalize(_paths(logs), fspath(output), load(config), compatible, jobs)
     return _or_raise([fspath(file) for file in written], trouble)

@@ -11,7 +11,7 @@ use crate::fleet::fleet_plan_types::{
     ActuatorLog, ActuatorTruth, Assignment, ChannelUnit, Plan, PlannedFlight, SimulatedFlight,
 };
 use crate::fleet::fleet_planner::Planner;
-use crate::fleet::fleet_spec::{MotorLogFormat, Part, Spec};
+use crate::fleet::fleet_spec::{MotorLogFormat, Part, ScrewLogUnit, Spec};
 use crate::flight::simulate;
 use crate::seeded_streams::derive_seed;
 
@@ -57,7 +57,13 @@ impl Plan {
         let position = truth.position.clone();
         let (mut screw, mut load) = (log.screw_m, log.load_n);
         let Some(radius_m) = part.reference_radius_m else {
-            let (screw_unit, load_unit) = (ChannelUnit::Metre, ChannelUnit::Newton);
+            let (screw_unit, load_unit) = match part.screw_log {
+                ScrewLogUnit::Millimetre => (ChannelUnit::Metre, ChannelUnit::Newton),
+                ScrewLogUnit::Micrometre => {
+                    screw.iter_mut().for_each(|x| *x *= 1e6);
+                    (ChannelUnit::Micrometre, ChannelUnit::Newton)
+                }
+            };
             return Ok(ActuatorLog { position, motor, motor_unit, screw, screw_unit, load, load_unit });
         };
         screw.iter_mut().for_each(|x| *x /= radius_m);

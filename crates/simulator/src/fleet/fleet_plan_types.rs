@@ -27,6 +27,47 @@ pub struct Installation {
     pub tail_hours_at_install: f64,
 }
 
+/// A row of the maintenance table.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Maintenance {
+    /// The design.
+    pub part_number: String,
+    /// The unit.
+    pub serial_number: String,
+    /// When, microseconds since 1970 UTC.
+    pub at_us: i64,
+}
+
+/// Play measured in the hangar.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inspection {
+    /// The design.
+    pub part_number: String,
+    /// The unit.
+    pub serial_number: String,
+    /// When, microseconds since 1970 UTC.
+    pub at_us: i64,
+    /// The reading, metres.
+    pub play_m: f64,
+    /// The instrument.
+    pub instrument: String,
+    /// The force at which the play was read, N.
+    pub force_n: f64,
+}
+
+/// Whether a flight has a log, and how the file arrives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LogState {
+    /// No log.
+    Absent,
+    /// As recorded.
+    Sound,
+    /// As recorded, and a second time under another name.
+    Duplicate,
+    /// Only the beginning of the file.
+    Truncated,
+}
+
 /// What is true of one actuator in one flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActuatorTruth {
@@ -61,6 +102,8 @@ pub struct PlannedFlight {
     pub flight_hours: f64,
     /// The tail's meter after the flight, hours.
     pub tail_hours_end: f64,
+    /// Whether it has a log.
+    pub log: LogState,
     /// The truth of each actuator, in the spec's order of positions.
     pub actuators: Vec<ActuatorTruth>,
     pub(crate) seed: u64,
@@ -82,6 +125,8 @@ pub(crate) struct Assignment {
 pub enum ChannelUnit {
     /// m.
     Metre,
+    /// µm.
+    Micrometre,
     /// rad.
     Radian,
     /// N.
@@ -101,7 +146,7 @@ pub struct ActuatorLog {
     pub motor_unit: ChannelUnit,
     /// Screw position, in `screw_unit`.
     pub screw: Vec<f64>,
-    /// Metres, or radians of a rotary output.
+    /// Metres or micrometres, or radians of a rotary output.
     pub screw_unit: ChannelUnit,
     /// Load, in `load_unit`.
     pub load: Vec<f64>,
@@ -127,6 +172,10 @@ pub struct Plan {
     pub parts: Vec<Part>,
     /// Every stay, by tail, position and time.
     pub installations: Vec<Installation>,
+    /// Recorded re-shims, by time.
+    pub maintenance: Vec<Maintenance>,
+    /// Play checks, by time.
+    pub inspections: Vec<Inspection>,
     /// Every flight, by flight number, then tail.
     pub flights: Vec<PlannedFlight>,
 }

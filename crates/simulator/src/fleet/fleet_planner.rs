@@ -6,7 +6,10 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::error::Error;
 use crate::fleet::calendar::{DAY_US, HOUR_US, midnight_us};
-use crate::fleet::fleet_plan_types::{ActuatorTruth, Assignment, Installation, Plan, PlannedFlight};
+use crate::fleet::fleet_events::FaultKind;
+use crate::fleet::fleet_plan_types::{
+    ActuatorTruth, Assignment, Inspection, Installation, LogState, Maintenance, Plan, PlannedFlight,
+};
 use crate::fleet::fleet_roster::{FleetUnit, UnitAssignment, fleet_units};
 use crate::fleet::fleet_spec::Spec;
 use crate::fleet::planted_change::ActuatorFlight;
@@ -23,6 +26,8 @@ pub(crate) struct Planner<'a> {
     wear: Vec<ChaCha8Rng>,
     tail_hours: Vec<f64>,
     installations: Vec<Installation>,
+    maintenance: Vec<Maintenance>,
+    inspections: Vec<Inspection>,
     flights: Vec<PlannedFlight>,
 }
 
@@ -39,6 +44,8 @@ impl<'a> Planner<'a> {
             wear,
             tail_hours: (0..spec.tails.len()).map(|k| spec.tail_hours * (1.0 + 0.1 * k as f64)).collect(),
             installations: Vec::new(),
+            maintenance: Vec::new(),
+            inspections: Vec::new(),
             flights: Vec::new(),
         };
         for tail in 0..spec.tails.len() {
@@ -51,6 +58,8 @@ impl<'a> Planner<'a> {
     pub(crate) fn plan(mut self) -> Result<Plan, Error> {
         for number in 1..=self.spec.flights_per_tail {
             self.swap(number)?;
+            self.inspect(number);
+            self.reshim(number);
             for tail in 0..self.spec.tails.len() {
                 self.plan_flight(number, tail);
             }
@@ -80,6 +89,52 @@ impl<'a> Planner<'a> {
             self.install(tail, position, at_us);
         }
         Ok(())
+    }
+
+    /// Reads the play of units before a flight, to the micrometre.
+    fn inspect(&mut self, number: usize) {
+        for check in self.spec.play_checks.iter().filter(|check| check.before_flight == number) {
+            let unit = &self.units[self.unit_at.installed(self.spec, &check.tail, &check.position)];
+            self.inspections.push(Inspection {
+                part_number: self.spec.parts[unit.part].part_number.clone(),
+                serial_number: unit.serial_number.clone(),
+                at_us: self.slot_us(number),
+                play_m: ((unit.gap_m + check.error_m) * 1e6).round() / 1e6,
+                instrument: check.instrument.clone(),
+                force_n: check.force_n,
+            });
+        }
+    }
+
+    /// Sets gaps before a flight, after the inspections.
+    fn reshim(&mut self, number: usize) {
+        let at_us = self.slot_us(number);
+        for shim in self.spec.reshims.iter().filter(|shim| shim.before_flight == number) {
+            let index = self.unit_at.installed(self.spec, &shim.tail, &shim.position);
+            let unit = &mut self.units[index];
+            unit.gap_m = shim.gap_m;
+            if shim.is_recorded {
+                let part_number = self.spec.parts[unit.part].part_number.clone();
+                let serial_number = unit.serial_number.clone();
+                self.maintenance.push(Maintenance { part_number, serial_number, at_us });
+            }
+        }
+    }
+
+    /// One flight of each group has a log.
+    fn log_state(&self, number: usize, tail: &str) -> LogState {
+        let (size, log) = (self.spec.flights_per_log, (number - 1) / self.spec.flights_per_log + 1);
+        let size = size.min(self.spec.flights_per_tail - (log - 1) * size);
+        let logged = seeded_rng(self.spec.seed, &["logged", tail, &log.to_string()]).random_range(0..size);
+        if (number - 1) % self.spec.flights_per_log != logged {
+            return LogState::Absent;
+        }
+        let fault = self.spec.log_faults.iter().find(|fault| fault.tail == tail && fault.log == log);
+        match fault.map(|fault| fault.fault) {
+            None => LogState::Sound,
+            Some(FaultKind::Duplicate) => LogState::Duplicate,
+            Some(FaultKind::Truncated) => LogState::Truncated,
+        }
     }
 
     fn install(&mut self, tail: usize, position: usize, installed_us: i64) {
@@ -117,6 +172,7 @@ impl<'a> Planner<'a> {
             departure_us,
             flight_hours,
             tail_hours_end: self.tail_hours[tail],
+            log: self.log_state(number, name),
             actuators,
             assignments,
         });
@@ -212,7 +268,13 @@ impl<'a> Planner<'a> {
         let place = |name: &str| self.spec.positions.iter().position(|known| known.position == name);
         let tail = |name: &str| self.spec.tails.iter().position(|known| known == name);
         installations.sort_by_key(|s| (tail(&s.tail_number), place(&s.position), s.installed_us));
-        Plan { parts: self.spec.parts.clone(), installations, flights: self.flights }
+        Plan {
+            parts: self.spec.parts.clone(),
+            installations,
+            maintenance: self.maintenance,
+            inspections: self.inspections,
+            flights: self.flights,
+        }
     }
 }
 

@@ -3,7 +3,8 @@
 use rand::Rng;
 
 use crate::error::Error;
-use crate::fleet::fleet_spec::{Place, Position, Spec};
+use crate::fleet::fleet_events::{Place, Replacement};
+use crate::fleet::fleet_spec::{Position, Spec};
 use crate::fleet::wear::WearLaw;
 use crate::seeded_streams::seeded_rng;
 
@@ -19,13 +20,16 @@ pub(crate) struct FleetUnit {
     pub(crate) wear: WearLaw,
 }
 
-/// Every unit of the fleet, in order of tail and position at the start.
+/// Every unit of the fleet, in order of tail and position at the start; then the spares, in the spec's order.
 pub(crate) fn fleet_units(spec: &Spec) -> Result<Vec<FleetUnit>, Error> {
     let places = spec.tails.iter().flat_map(|tail| spec.positions.iter().map(move |place| (tail, place)));
-    let units: Vec<FleetUnit> = places
+    let mut units: Vec<FleetUnit> = places
         .enumerate()
         .map(|(count, (tail, place))| unit(spec, tail, place, count))
         .collect::<Result<_, _>>()?;
+    let spares = spec.replacements.iter().map(|spare| spare_unit(spec, &units, spare));
+    let spares: Vec<FleetUnit> = spares.collect();
+    units.extend(spares);
     let names: Vec<_> = units.iter().map(|unit| (unit.part, unit.serial_number.as_str())).collect();
     match names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
         Some((_, (_, name))) => Err(Error::Twice { kind: "serial number", name: (*name).to_owned() }),
@@ -53,6 +57,27 @@ fn unit(spec: &Spec, tail: &str, place: &Position, count: usize) -> Result<Fleet
     })
 }
 
+/// A spare of the part that its place holds, as stiff as the part.
+fn spare_unit(spec: &Spec, units: &[FleetUnit], spare: &Replacement) -> FleetUnit {
+    let place = Place { tail: spare.tail.clone(), position: spare.position.clone() };
+    let part = units[seat(spec, &place)].part;
+    FleetUnit {
+        part,
+        serial_number: spare.serial_number.clone(),
+        age_hours: spare.unit_hours,
+        gap_m: spare.gap_m,
+        stiffness_factor: 1.0,
+        wear: spare.wear.unwrap_or(spec.parts[part].wear),
+    }
+}
+
+/// Index of a place; the spec is checked before, so both names are found.
+fn seat(spec: &Spec, place: &Place) -> usize {
+    let tail = spec.tails.iter().take_while(|tail| **tail != place.tail).count();
+    let position = spec.positions.iter().take_while(|known| known.position != place.position).count();
+    tail * spec.positions.len() + position
+}
+
 /// Who sits where, one flight after the other.
 #[derive(Debug, Clone)]
 pub(crate) struct UnitAssignment {
@@ -72,7 +97,13 @@ impl UnitAssignment {
         self.units[tail * self.positions + position]
     }
 
-    /// Carries out the swaps due before a flight, counted from 1, and names the seats they touched.
+    /// The unit installed in a named place.
+    pub(crate) fn installed(&self, spec: &Spec, tail: &str, position: &str) -> usize {
+        self.units[seat(spec, &Place { tail: tail.to_owned(), position: position.to_owned() })]
+    }
+
+    /// Carries out the swaps and replacements due before a flight, counted from 1, and names the seats they
+    /// touched.
     pub(crate) fn swap(
         &mut self,
         spec: &Spec,
@@ -81,7 +112,7 @@ impl UnitAssignment {
     ) -> Result<Vec<(usize, usize)>, Error> {
         let mut touched = Vec::new();
         for swap in spec.swaps.iter().filter(|swap| swap.before_flight == flight) {
-            let (a, b) = (self.seat(spec, &swap.from), self.seat(spec, &swap.to));
+            let (a, b) = (seat(spec, &swap.from), seat(spec, &swap.to));
             let part = |seat: usize| units[self.units[seat]].part;
             if part(a) != part(b) {
                 let name = |seat| spec.parts[part(seat)].part_number.clone();
@@ -90,15 +121,14 @@ impl UnitAssignment {
             self.units.swap(a, b);
             touched.extend([a, b].map(|seat| (seat / self.positions, seat % self.positions)));
         }
+        let first_spare = spec.tails.len() * self.positions;
+        for (k, spare) in spec.replacements.iter().enumerate().filter(|(_, s)| s.before_flight == flight) {
+            let at = seat(spec, &Place { tail: spare.tail.clone(), position: spare.position.clone() });
+            self.units[at] = first_spare + k;
+            touched.push((at / self.positions, at % self.positions));
+        }
         touched.sort_unstable();
         touched.dedup();
         Ok(touched)
-    }
-
-    /// The spec is checked before, so both names are found.
-    fn seat(&self, spec: &Spec, place: &Place) -> usize {
-        let tail = spec.tails.iter().take_while(|tail| **tail != place.tail).count();
-        let position = spec.positions.iter().take_while(|known| known.position != place.position).count();
-        tail * self.positions + position
     }
 }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, finite, not_negative, positive, within};
 use crate::fleet::calendar::midnight_us;
+use crate::fleet::fleet_events::{LogFault, PlayCheck, Replacement, Reshim, Swap};
 use crate::fleet::planted_change::PlantedChange;
 use crate::fleet::wear::WearLaw;
 use crate::load::flight_profile::Profile;
@@ -11,7 +12,7 @@ use crate::load::vibration::Vibration;
 use crate::plant::actuator_plant::Plant;
 use crate::sensors::sensor::Sensors;
 
-/// The fleet that made the sample data, as TOML text: three tails, four positions, ten flights each.
+/// The fleet that made the sample data, as TOML text: three tails with four positions, twelve weeks of flights.
 pub const SAMPLE_SPEC: &str = include_str!("../../specs/sample.toml");
 
 /// A fleet, its flights and its sensors.
@@ -29,6 +30,9 @@ pub struct Spec {
     /// How many flights each tail makes. Default 10.
     #[serde(default = "default_flights")]
     pub flights_per_tail: usize,
+    /// One flight of this many in a row, drawn at random, has a log. Default 1: each.
+    #[serde(default = "default_flights_per_log")]
+    pub flights_per_log: usize,
     /// Each flight has a slot of so many days; below 1, several flights a day. Default 7.
     #[serde(default = "default_days")]
     pub days_between_flights: f64,
@@ -60,6 +64,18 @@ pub struct Spec {
     /// Exchanges of two units.
     #[serde(default)]
     pub swaps: Vec<Swap>,
+    /// Removals of a unit for a spare.
+    #[serde(default)]
+    pub replacements: Vec<Replacement>,
+    /// Gaps set by a shim.
+    #[serde(default)]
+    pub reshims: Vec<Reshim>,
+    /// Play measured in the hangar.
+    #[serde(default)]
+    pub play_checks: Vec<PlayCheck>,
+    /// Log files that do not arrive as recorded.
+    #[serde(default)]
+    pub log_faults: Vec<LogFault>,
     /// Aircraft whose load cells or structure differ from the others'.
     #[serde(default)]
     pub aircraft: Vec<Aircraft>,
@@ -76,6 +92,9 @@ fn default_start() -> String {
 }
 fn default_flights() -> usize {
     10
+}
+fn default_flights_per_log() -> usize {
+    1
 }
 fn default_days() -> f64 {
     7.0
@@ -127,6 +146,18 @@ pub enum MotorLogFormat {
     WrappedAngle,
 }
 
+/// Unit of a logged screw position.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ScrewLogUnit {
+    /// Millimetres.
+    #[default]
+    #[serde(rename = "mm")]
+    Millimetre,
+    /// Micrometres.
+    #[serde(rename = "um")]
+    Micrometre,
+}
+
 /// One design.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -139,6 +170,9 @@ pub struct Part {
     /// How its motor position is logged. Default `angle`.
     #[serde(default)]
     pub motor_log: MotorLogFormat,
+    /// Unit in which a linear screw position is logged. Default `mm`.
+    #[serde(default)]
+    pub screw_log: ScrewLogUnit,
     /// For a rotary actuator the radius r at which its metres and newtons are meant: the output is
     /// logged as `X/r` in radians and the load as `F·r` in N·m. Default none, a linear actuator.
     #[serde(default)]
@@ -221,18 +255,6 @@ pub struct UnitSpec {
     pub wear: Option<WearLaw>,
 }
 
-/// Before a flight, the units of two places change places.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Swap {
-    /// The first flight of both tails with the new arrangement, counted from 1, so at least 2.
-    pub before_flight: usize,
-    /// One place.
-    pub from: Place,
-    /// The other.
-    pub to: Place,
-}
-
 /// What differs on all actuators of one tail.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -245,16 +267,6 @@ pub struct Aircraft {
     /// Vibration of its loads in place of the profile's. Default the profile's.
     #[serde(default)]
     pub buffet: Option<Vibration>,
-}
-
-/// A tail and a position on it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Place {
-    /// The tail.
-    pub tail: String,
-    /// The position.
-    pub position: String,
 }
 
 impl Spec {
@@ -280,6 +292,10 @@ impl Spec {
         self.positions.iter().try_for_each(|place| self.check_position(place))?;
         self.units.iter().try_for_each(|unit| self.check_unit(unit))?;
         self.swaps.iter().try_for_each(|swap| self.check_swap(swap))?;
+        self.replacements.iter().try_for_each(|spare| self.check_replacement(spare))?;
+        self.reshims.iter().try_for_each(|shim| self.check_reshim(shim))?;
+        self.play_checks.iter().try_for_each(|check| self.check_play_check(check))?;
+        self.log_faults.iter().try_for_each(|fault| self.check_log_fault(fault))?;
         self.aircraft.iter().try_for_each(|aircraft| self.check_aircraft(aircraft))?;
         self.changes.iter().try_for_each(|change| self.check_change(change))
     }
@@ -295,6 +311,7 @@ impl Spec {
 
     fn check_flights(&self) -> Result<(), Error> {
         positive("flights_per_tail", self.flights_per_tail as f64)?;
+        positive("flights_per_log", self.flights_per_log as f64)?;
         positive("days_between_flights", self.days_between_flights)?;
         positive("flight_hours", self.flight_hours)?;
         within("flight_hours_spread", self.flight_hours_spread, 0.0, 0.9, "between 0 and 0.9")?;
@@ -323,11 +340,41 @@ impl Spec {
     }
 
     fn check_swap(&self, swap: &Swap) -> Result<(), Error> {
-        let last = self.flights_per_tail as f64;
-        let must = "between 2 and `flights_per_tail`";
-        within("swaps before_flight", swap.before_flight as f64, 2.0, last, must)?;
-        self.check_place("a swap", &swap.from.tail, &swap.from.position)?;
+        self.check_before("a swap", swap.before_flight, &swap.from.tail, &swap.from.position)?;
         self.check_place("a swap", &swap.to.tail, &swap.to.position)
+    }
+
+    fn check_replacement(&self, spare: &Replacement) -> Result<(), Error> {
+        let key = |name: &str| format!("replacements {} {name}", spare.serial_number);
+        not_negative(&key("gap_m"), spare.gap_m)?;
+        not_negative(&key("unit_hours"), spare.unit_hours)?;
+        spare.wear.map_or(Ok(()), |law| law.check())?;
+        self.check_before("a replacement", spare.before_flight, &spare.tail, &spare.position)
+    }
+
+    fn check_reshim(&self, shim: &Reshim) -> Result<(), Error> {
+        not_negative(&format!("reshims {} {} gap_m", shim.tail, shim.position), shim.gap_m)?;
+        self.check_before("a re-shim", shim.before_flight, &shim.tail, &shim.position)
+    }
+
+    fn check_play_check(&self, check: &PlayCheck) -> Result<(), Error> {
+        let key = |name: &str| format!("play_checks {} {} {name}", check.tail, check.position);
+        finite(&key("error_m"), check.error_m)?;
+        positive(&key("force_n"), check.force_n)?;
+        self.check_before("a play check", check.before_flight, &check.tail, &check.position)
+    }
+
+    fn check_log_fault(&self, fault: &LogFault) -> Result<(), Error> {
+        let logs = self.flights_per_tail.div_ceil(self.flights_per_log) as f64;
+        within("log_faults log", fault.log as f64, 1.0, logs, "between 1 and the number of the tail's logs")?;
+        self.check_tail("a log fault", &fault.tail)
+    }
+
+    /// An event lies between two flights of a declared place.
+    fn check_before(&self, who: &str, flight: usize, tail: &str, position: &str) -> Result<(), Error> {
+        let (last, must) = (self.flights_per_tail as f64, "between 2 and `flights_per_tail`");
+        within(&format!("before_flight of {who}"), flight as f64, 2.0, last, must)?;
+        self.check_place(who, tail, position)
     }
 
     fn check_aircraft(&self, aircraft: &Aircraft) -> Result<(), Error> {

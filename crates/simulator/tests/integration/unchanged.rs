@@ -20,7 +20,7 @@ fn first_flight(spec: &str, duration_s: f64) -> u64 {
 #[test]
 fn flights_of_specs_without_new_keys_keep_their_bits() {
     let specs = [
-        simulator::SAMPLE_SPEC,
+        include_str!("../../specs/three_aircraft.toml"),
         include_str!("../../specs/service.toml"),
         include_str!("../../specs/rough.toml"),
     ];

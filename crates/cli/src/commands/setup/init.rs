@@ -1,4 +1,5 @@
-//! `init`: writes a commented configuration, its JSON schema and an example table; never overwrites a file.
+//! `init`: writes a commented configuration, its JSON schema and an example table, or the sample fleet; never
+//! overwrites a file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -13,13 +14,16 @@ use ingest::mapping::IdentityField;
 use ingest::mapping::units::Unit;
 use ingest::{Layout, Role};
 use pipeline::discovery::temporary_files::is_temporary;
+use pipeline::simulate::{SAMPLE_FOLDER, write_sample};
 use records::sanitize::csv_cell;
 
 use crate::args::InitArgs;
 use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
+use crate::table::count;
 
 use crate::commands::context::display_path;
+use crate::commands::setup::simulate::with_progress;
 
 const TEMPLATE: &str = include_str!("../../../templates/pipeline.toml");
 
@@ -48,11 +52,17 @@ const NEXT: &str = "next: set the log paths and column names in pipeline.toml, e
 const NEXT_OF_PROPOSAL: &str = "next: review pipeline.toml and correct wrong guesses, enter in installations.csv which serial \
                                 number was installed where, then run `freeplay check`";
 
-/// Writes the configuration, the example table and the schema.
+/// Next steps after `init --sample`, in its folder.
+const NEXT_OF_SAMPLE: &str = "freeplay run && freeplay report --output report && freeplay work list";
+
+/// Writes the configuration, the example table and the schema; or the sample fleet.
 ///
 /// # Errors
-/// If one of them already exists; then nothing is written.
+/// If one of the files already exists; then nothing is written.
 pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
+    if args.sample {
+        return sample(&args.dir, output);
+    }
     let names = FILES.iter().map(|(name, _)| *name).chain([SCHEMA]);
     let there = names.map(|name| args.dir.join(name)).find(|path| path.exists());
     if let Some(path) = there {
@@ -73,6 +83,26 @@ pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
     }
     write(&args.dir.join(SCHEMA), &format!("{:#}\n", job::config::Document::schema()), output)?;
     output.note(if args.from.is_some() { NEXT_OF_PROPOSAL } else { NEXT });
+    Ok(Code::Success)
+}
+
+/// Writes the sample fleet with its configuration.
+fn sample(dir: &Path, output: &Output) -> Result<Code, Failure> {
+    let there = ["pipeline.toml", SAMPLE_FOLDER].map(|name| dir.join(name)).into_iter().find(|p| p.exists());
+    if let Some(path) = there {
+        return Err(exists(&path));
+    }
+    fs::create_dir_all(dir)?;
+    let logs = with_progress(output, |watch| write_sample(dir, watch))?;
+    let data = display_path(&dir.join(SAMPLE_FOLDER));
+    output.write_result(&format!(
+        "wrote {}\nwrote {data}: {}, installations, flights, maintenance, inspections and the true gaps\n",
+        display_path(&dir.join("pipeline.toml")),
+        count(logs, "simulated log"),
+    ))?;
+    let is_here = dir == Path::new(".");
+    let change = if is_here { String::new() } else { format!("cd {} && ", display_path(dir)) };
+    output.note(&format!("next: {change}{NEXT_OF_SAMPLE}"));
     Ok(Code::Success)
 }
 
