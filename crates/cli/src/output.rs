@@ -25,7 +25,7 @@ pub(crate) struct Output {
     quiet: bool,
     verbose: u8,
     progress: bool,
-    color_err: bool,
+    color: bool,
     form: LogFormat,
 }
 
@@ -33,7 +33,7 @@ impl Output {
     /// Sets up the output from the options, the terminal and `NO_COLOR`.
     pub(crate) fn new(global: &Global) -> Self {
         let auto = std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) && is_attended();
-        let color_err = match global.color {
+        let color = match global.color {
             Color::Always => true,
             Color::Never => false,
             Color::Auto => auto,
@@ -43,7 +43,7 @@ impl Output {
             quiet: global.quiet,
             verbose: global.verbose,
             progress: !(global.no_progress || global.quiet || json),
-            color_err,
+            color,
             form: global.log_format,
         }
     }
@@ -63,14 +63,15 @@ impl Output {
     /// # Errors
     /// If stdout is closed or full.
     pub(crate) fn write_result(&self, text: &str) -> Result<(), Failure> {
-        self.write_exact(&escape_invisible(text))
+        let text = escape_invisible(text);
+        if self.color { self.write_exact(&with_coloured_states(&text)) } else { self.write_exact(&text) }
     }
 
     /// Writes a result for programs to stdout, character by character.
     ///
     /// # Errors
     /// If stdout is closed or full.
-    #[expect(clippy::unused_self, reason = "only who holds the voice may speak")]
+    #[expect(clippy::unused_self, reason = "only who holds the output may write")]
     pub(crate) fn write_exact(&self, text: &str) -> Result<(), Failure> {
         let mut out = io::stdout().lock();
         out.write_all(text.as_bytes())?;
@@ -97,7 +98,7 @@ impl Output {
             return self.err(&json_log::diagnostic(diagnostic));
         }
         let text = diagnostic.to_string();
-        self.err(&if self.color_err { coloured(&text) } else { text });
+        self.err(&if self.color { coloured(&text) } else { text });
     }
 
     /// Shows diagnostics: of each kind the first few whole, and how many more there are.
@@ -138,7 +139,7 @@ impl Output {
     }
 
     /// Writes to stderr; a closed stderr is ignored.
-    #[expect(clippy::unused_self, reason = "only who holds the voice may speak")]
+    #[expect(clippy::unused_self, reason = "only who holds the output may write")]
     fn err(&self, text: &str) {
         let _ = writeln!(io::stderr().lock(), "{text}");
     }
@@ -152,4 +153,19 @@ pub(crate) fn escape(text: &str) -> String {
 fn coloured(text: &str) -> String {
     let (head, rest) = text.split_once(':').unwrap_or((text, ""));
     format!("\u{1b}[1;31m{head}\u{1b}[0m:{}", rest.replace("\nhint:", "\n\u{1b}[36mhint\u{1b}[0m:"))
+}
+
+/// Text with the first state mark of each line in colour.
+fn with_coloured_states(text: &str) -> String {
+    let style = || console::Style::new().force_styling(true);
+    let marks =
+        [("◆ act", style().red().bold()), ("▲ plan", style().yellow().bold()), ("● watch", style().cyan())];
+    let coloured = |line: &str| {
+        let found = marks.iter().find_map(|(mark, style)| Some((line.split_once(mark)?, mark, style)));
+        match found {
+            Some(((before, after), mark, style)) => format!("{before}{}{after}", style.apply_to(mark)),
+            None => line.to_owned(),
+        }
+    };
+    text.split_inclusive('\n').map(coloured).collect()
 }

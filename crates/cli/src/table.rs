@@ -82,22 +82,8 @@ fn grid(columns: &[Column], rows: &[Vec<String>], kept: &[usize], widths: &[usiz
             }
         }
     }
-    let lines: Vec<String> = grid.lines().map(|line| coloured(line.trim_end())).collect();
+    let lines: Vec<String> = grid.lines().map(|line| line.trim_end().to_owned()).collect();
     lines.join("\n")
-}
-
-/// The line with its state in colour, where colour is on.
-fn coloured(line: &str) -> String {
-    for (mark, style) in [
-        ("◆ act", console::Style::new().red().bold()),
-        ("▲ plan", console::Style::new().yellow().bold()),
-        ("● watch", console::Style::new().cyan()),
-    ] {
-        if let Some((before, after)) = line.split_once(mark) {
-            return format!("{before}{}{after}", style.apply_to(mark));
-        }
-    }
-    line.to_owned()
 }
 
 /// Whether a column wraps: the last one, if it is text.

@@ -105,23 +105,23 @@ fn page(found: &[WorkRequest]) -> String {
     let columns = [
         text("request", 0),
         text("state", 0),
-        text("part / serial", 0),
-        text("tail", 1),
-        text("position", 4),
+        text("tail", 0),
+        text("position", 0),
+        text("part / serial", 1),
         text("opened", 3),
         text("status", 0),
         text("by", 2),
-        text("remark", 5),
-        text("finding", 6),
+        text("remark", 4),
+        text("finding", 0),
     ];
     let cells = |request: &WorkRequest| {
         let or_dash = |text: &Option<String>| text.clone().unwrap_or_else(table::empty_cell);
         vec![
             request.request_id.clone(),
             state_mark(request.state.as_deref()),
-            unit(request),
             or_dash(&request.tail_number),
             or_dash(&request.position),
+            unit(request),
             day(request.opened_utc),
             status(request),
             or_dash(&request.by),

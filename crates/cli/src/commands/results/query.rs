@@ -102,7 +102,7 @@ pub(crate) fn page(records: &[GapRecord], config: &Config) -> String {
         text("flight", 2),
         text("position", 1),
         text("part / serial", 2),
-        number("gap ± 90 % [µm]", 0),
+        number("gap [µm]", 0),
         number("mid-range [µm]", 5),
         number("load reversals", 7),
         number("load [N]", 6),
@@ -127,6 +127,7 @@ pub(crate) fn page(records: &[GapRecord], config: &Config) -> String {
     if records.is_empty() {
         head
     } else {
+        let head = format!("{}; ± is half the 90 % interval\n", count(records.len(), "record"));
         let table = table::layout(&columns, &records.iter().map(cells).collect::<Vec<_>>());
         head + &table + &remedies(records) + &sketches(records, config)
     }

@@ -210,7 +210,8 @@ fn page(found: &[TrendRow], nothing: Option<String>) -> String {
     let Some(as_of) = found.iter().map(|r| r.as_of_utc).max() else {
         return nothing.unwrap_or_else(|| "no unit was queried\n".to_owned());
     };
-    let head = format!("{} as of {}\n", count(found.len(), "unit"), as_of.strftime("%Y-%m-%d %H:%M UTC"));
+    let as_of = as_of.strftime("%Y-%m-%d %H:%M UTC");
+    let head = format!("{} as of {as_of}; ± is half the 90 % interval\n", count(found.len(), "unit"));
     head + &unit_table(found.iter().collect())
 }
 
@@ -225,7 +226,7 @@ pub(crate) fn unit_table(mut units: Vec<&TrendRow>) -> String {
         text("tail", 0),
         text("position", 0),
         text("part / serial", 1),
-        number("gap ± 90 % [µm]", 0),
+        number("gap [µm]", 0),
         number("limit [µm]", 3),
         text("action", 4),
         text("due by", 0),
