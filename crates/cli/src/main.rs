@@ -7,6 +7,7 @@ mod args;
 mod commands;
 #[cfg(test)]
 mod commands_doc;
+mod completion;
 mod exit;
 mod json_log;
 mod output;
@@ -17,7 +18,8 @@ mod table;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
+use clap_complete::CompleteEnv;
 
 use args::{Args, Command};
 use exit::{Code, Failure};
@@ -25,6 +27,8 @@ use output::Output;
 use records::Diagnostic;
 
 fn main() -> ExitCode {
+    // The shell asks for completions with a variable in the environment; nothing else of the program runs then.
+    CompleteEnv::with_factory(Args::command).complete();
     let args = match Args::try_parse() {
         Ok(args) => args,
         // Help and version go to stdout with code 0; other parser errors are usage errors.

@@ -1,4 +1,4 @@
-//! Row output: a table for readers, or one Arrow batch as JSON, CSV or Parquet.
+//! Row output: a table for readers, or one Arrow batch as JSON, JSON lines, CSV or Parquet.
 
 use std::fs::File;
 use std::io::{self, IsTerminal, Write};
@@ -8,7 +8,7 @@ use arrow::array::{Array, AsArray, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::csv::WriterBuilder as CsvWriter;
 use arrow::datatypes::{DataType, Field, Schema};
-use arrow::json::writer::{JsonArray, WriterBuilder as JsonWriter};
+use arrow::json::writer::{JsonArray, LineDelimited, WriterBuilder as JsonWriter};
 use parquet::arrow::ArrowWriter;
 use records::Diagnostic;
 use records::row_schema::{Row, to_nullable_batch};
@@ -82,6 +82,10 @@ fn write(batch: &RecordBatch, format: Format, out: &mut (impl Write + Send)) -> 
             let mut writer = JsonWriter::new().with_explicit_nulls(true).build::<_, JsonArray>(&mut *out);
             writer.write(batch).and_then(|()| writer.finish()).map_err(|e| broken(&e))?;
             out.write_all(b"\n")?;
+        }
+        Format::Jsonl => {
+            let mut writer = JsonWriter::new().with_explicit_nulls(true).build::<_, LineDelimited>(&mut *out);
+            writer.write(batch).and_then(|()| writer.finish()).map_err(|e| broken(&e))?;
         }
         Format::Csv => CsvWriter::new()
             .with_header(true)

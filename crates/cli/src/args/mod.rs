@@ -5,6 +5,7 @@ mod parse;
 mod results;
 mod rows;
 mod run;
+mod selection;
 mod store;
 mod work;
 
@@ -18,6 +19,7 @@ pub(crate) use results::{
 };
 pub(crate) use rows::{Format, RowFormatArgs};
 pub(crate) use run::{FailOn, RunArgs};
+pub(crate) use selection::UnitFilterArgs;
 pub(crate) use store::{StoreArgs, StoreCommand, Table};
 pub(crate) use work::{WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs, WorkStatus};
 
@@ -64,6 +66,7 @@ pub(crate) const CONFIG: &str = "pipeline.toml";
 
 /// Options common to all commands.
 #[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Global options")]
 pub(crate) struct Global {
     /// Configuration file; repeat to override keys of earlier files.
     #[arg(

@@ -3,10 +3,13 @@
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
+use clap_complete::ArgValueCompleter;
 use jiff::Timestamp;
 
 use super::parse::{parse_count, parse_limit, parse_utc};
 use super::rows::RowFormatArgs;
+use super::selection::{DepartureArgs, UnitFilterArgs};
+use crate::completion;
 
 /// `query`.
 #[derive(Debug, ClapArgs)]
@@ -15,18 +18,15 @@ pub(crate) struct QueryArgs {
     #[arg(value_enum)]
     pub by: QueryKey,
     /// Value to match.
+    #[arg(add = ArgValueCompleter::new(completion::queried))]
     pub id: String,
-    /// Only departures at or after this UTC time.
-    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
-    pub since: Option<Timestamp>,
-    /// Only departures before this UTC time.
-    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
-    pub until: Option<Timestamp>,
+    #[command(flatten)]
+    pub departures: DepartureArgs,
     /// Show only the newest N records.
-    #[arg(long, value_name = "N", value_parser = parse_count)]
+    #[arg(long, value_name = "N", value_parser = parse_count, help_heading = "Selection")]
     pub last: Option<usize>,
     /// Only this part number.
-    #[arg(long)]
+    #[arg(long, help_heading = "Selection", add = ArgValueCompleter::new(completion::parts))]
     pub part: Option<String>,
     #[command(flatten)]
     pub rows: RowFormatArgs,
@@ -49,34 +49,27 @@ pub(crate) enum QueryKey {
 #[derive(Debug, ClapArgs)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag that a user types")]
 pub(crate) struct TrendArgs {
-    /// Only units on this tail.
-    #[arg(long)]
-    pub tail: Option<String>,
-    /// Only this unit.
-    #[arg(long)]
-    pub serial: Option<String>,
-    /// Only this part number.
-    #[arg(long)]
-    pub part: Option<String>,
+    #[command(flatten)]
+    pub units: UnitFilterArgs,
     /// Date of the assessment; default: that of the newest record. Later data are ignored.
-    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    #[arg(long, value_parser = parse_utc, value_name = "UTC", help_heading = "Selection")]
     pub as_of: Option<Timestamp>,
     #[command(flatten)]
     pub external: ExternalEstimatesArgs,
     /// Table of (`serial_number`, `as_of_utc`, optional `part_number`) to assess, one row each.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["as_of", "tail", "serial", "part"])]
+    #[arg(long, value_name = "FILE", help_heading = "Selection", conflicts_with_all = ["as_of", "tail", "serial", "part"])]
     pub queries: Option<PathBuf>,
     /// Also compute the Theil–Sen slope and the Hamed–Rao test (slow: quadratic in history length).
-    #[arg(long)]
+    #[arg(long, help_heading = "Views")]
     pub statistics: bool,
     /// Show every followed quantity of the units instead: stiffness, friction, delays, load zero, lost motion, NIS.
-    #[arg(long, conflicts_with_all = ["queries", "statistics", "estimates"])]
+    #[arg(long, help_heading = "Views", conflicts_with_all = ["queries", "statistics", "estimates"])]
     pub quantities: bool,
     /// Show what changed instead, of units, tails and parts, with the evidence.
-    #[arg(long, conflicts_with_all = ["quantities", "queries", "statistics", "estimates"])]
+    #[arg(long, help_heading = "Views", conflicts_with_all = ["quantities", "queries", "statistics", "estimates"])]
     pub changes: bool,
     /// Show inspection intervals by part instead: the chance of meeting the limit before the next inspection.
-    #[arg(long, conflicts_with_all = ["quantities", "changes", "queries", "statistics", "estimates"])]
+    #[arg(long, help_heading = "Views", conflicts_with_all = ["quantities", "changes", "queries", "statistics", "estimates"])]
     pub intervals: bool,
     #[command(flatten)]
     pub rows: RowFormatArgs,
@@ -84,6 +77,7 @@ pub(crate) struct TrendArgs {
 
 /// Options for estimates made by another program.
 #[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Estimates of another program")]
 pub(crate) struct ExternalEstimatesArgs {
     /// Read this table of estimates instead of the store; needs no configuration.
     #[arg(long, value_name = "FILE")]
@@ -97,11 +91,13 @@ pub(crate) struct ExternalEstimatesArgs {
 #[derive(Debug, ClapArgs)]
 pub(crate) struct ExplainArgs {
     /// Flight to trace.
+    #[arg(add = ArgValueCompleter::new(completion::flights))]
     pub flight: String,
     /// Position of the actuator.
+    #[arg(add = ArgValueCompleter::new(completion::positions))]
     pub position: String,
     /// Tail number, if several aircraft have a flight of this name.
-    #[arg(long)]
+    #[arg(long, add = ArgValueCompleter::new(completion::tails))]
     pub tail: Option<String>,
     /// Print JSON, SI.
     #[arg(long)]
@@ -137,13 +133,9 @@ pub(crate) struct ReportArgs {
     /// Write to this folder; an existing report is replaced, other files are kept.
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
-    /// Only units on this tail.
-    #[arg(long)]
-    pub tail: Option<String>,
-    /// Only this unit.
-    #[arg(long)]
-    pub serial: Option<String>,
+    #[command(flatten)]
+    pub units: UnitFilterArgs,
     /// Date of the assessments; default: that of the newest record. Later data are ignored.
-    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    #[arg(long, value_parser = parse_utc, value_name = "UTC", help_heading = "Selection")]
     pub as_of: Option<Timestamp>,
 }

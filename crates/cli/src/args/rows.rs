@@ -6,6 +6,7 @@ use clap::{Args as ClapArgs, ValueEnum};
 
 /// Format and destination of rows.
 #[derive(Debug, Clone, ClapArgs)]
+#[command(next_help_heading = "Output")]
 pub(crate) struct RowFormatArgs {
     /// Output format.
     #[arg(long, value_enum, default_value_t = Format::Table)]
@@ -32,6 +33,8 @@ pub(crate) enum Format {
     Table,
     /// JSON array of objects, SI.
     Json,
+    /// One JSON object per line, SI.
+    Jsonl,
     /// CSV with a header, SI.
     Csv,
     /// Parquet, SI.

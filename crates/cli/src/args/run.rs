@@ -3,55 +3,53 @@
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
-use jiff::Timestamp;
+use clap_complete::ArgValueCompleter;
 
-use super::parse::{parse_count, parse_span, parse_utc};
+use super::parse::{parse_count, parse_span};
+use super::selection::DepartureArgs;
+use crate::completion;
 
 /// `run`.
 #[derive(Debug, ClapArgs)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag that a user types")]
 pub(crate) struct RunArgs {
-    /// Only departures at or after this UTC time.
-    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
-    pub since: Option<Timestamp>,
-    /// Only departures before this UTC time.
-    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
-    pub until: Option<Timestamp>,
+    #[command(flatten)]
+    pub departures: DepartureArgs,
     /// Only this tail.
-    #[arg(long)]
+    #[arg(long, help_heading = "Selection", add = ArgValueCompleter::new(completion::tails))]
     pub tail: Option<String>,
     /// Only flights of this unit.
-    #[arg(long)]
+    #[arg(long, help_heading = "Selection", add = ArgValueCompleter::new(completion::serials))]
     pub serial: Option<String>,
     /// Process at most N logs.
-    #[arg(long, value_name = "N", value_parser = parse_count)]
+    #[arg(long, value_name = "N", value_parser = parse_count, help_heading = "Selection")]
     pub limit: Option<usize>,
     /// Use N workers; default: one per core.
-    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), help_heading = "Processing")]
     pub jobs: Option<u16>,
     /// Retry failed logs.
-    #[arg(long)]
+    #[arg(long, help_heading = "Processing")]
     pub retry: bool,
     /// Reprocess all logs.
-    #[arg(long)]
+    #[arg(long, help_heading = "Processing")]
     pub redo: bool,
     /// Hash known logs and reprocess those whose content changed.
-    #[arg(long)]
+    #[arg(long, help_heading = "Processing")]
     pub verify_content: bool,
     /// Show what would be processed and why, without processing it (dry run).
-    #[arg(long)]
+    #[arg(long, help_heading = "Processing")]
     pub dry_run: bool,
     /// Write run metrics in Prometheus text format, e.g. for a node exporter.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub metrics: Option<PathBuf>,
     /// Wait up to TIME for another run to release the store, e.g. `20m`.
-    #[arg(long, value_parser = parse_span, value_name = "TIME")]
+    #[arg(long, value_parser = parse_span, value_name = "TIME", help_heading = "Processing")]
     pub wait: Option<std::time::Duration>,
     /// Exit with code 4 if any unit is in this state or worse.
-    #[arg(long, value_enum, value_name = "STATE")]
+    #[arg(long, value_enum, value_name = "STATE", help_heading = "Output")]
     pub fail_on: Option<FailOn>,
     /// Print the run summary as JSON on stdout.
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     pub json: bool,
 }
 

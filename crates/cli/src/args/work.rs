@@ -5,6 +5,7 @@ use jiff::Timestamp;
 
 use super::parse::parse_utc;
 use super::rows::RowFormatArgs;
+use super::selection::UnitFilterArgs;
 
 /// `work`.
 #[derive(Debug, ClapArgs)]
@@ -50,17 +51,10 @@ pub(crate) enum WorkCommand {
 /// `work list`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct WorkListArgs {
-    /// Only units on this tail.
-    #[arg(long)]
-    pub tail: Option<String>,
-    /// Only this unit.
-    #[arg(long)]
-    pub serial: Option<String>,
-    /// Only this part number.
-    #[arg(long)]
-    pub part: Option<String>,
+    #[command(flatten)]
+    pub units: UnitFilterArgs,
     /// Only requests with this status; default: all that are not closed.
-    #[arg(long, value_enum, value_name = "STATUS")]
+    #[arg(long, value_enum, value_name = "STATUS", help_heading = "Selection")]
     pub status: Option<WorkStatus>,
     #[command(flatten)]
     pub rows: RowFormatArgs,

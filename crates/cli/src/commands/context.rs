@@ -10,7 +10,7 @@ use pipeline::history::histories::Histories;
 use records::Installations;
 use store::Store;
 
-use crate::args::{CONFIG, ExternalEstimatesArgs, Global};
+use crate::args::{CONFIG, ExternalEstimatesArgs, Global, UnitFilterArgs};
 use crate::exit::Failure;
 use crate::output::Output;
 
@@ -144,15 +144,23 @@ impl KnownNames {
     }
 
     /// Refuses the first name of a selection of units that is unknown.
-    pub(crate) fn check_units(
-        &self,
-        tail: Option<&str>,
-        serial: Option<&str>,
-        part: Option<&str>,
-    ) -> Result<(), Failure> {
-        check_name("tail", tail, self.tails())?;
-        check_name("serial number", serial, self.serials())?;
-        check_name("part number", part, self.parts())
+    pub(crate) fn check_units(&self, units: &UnitFilterArgs) -> Result<(), Failure> {
+        check_name("tail", units.tail.as_deref(), self.tails())?;
+        check_name("serial number", units.serial.as_deref(), self.serials())?;
+        check_name("part number", units.part.as_deref(), self.parts())
+    }
+}
+
+impl UnitFilterArgs {
+    /// The units, at a date.
+    pub(crate) fn selection(&self, as_of_utc: Option<Timestamp>) -> UnitSelection {
+        UnitSelection {
+            tail_number: self.tail.clone(),
+            serial_number: self.serial.clone(),
+            part_number: self.part.clone(),
+            as_of_utc,
+            statistics: false,
+        }
     }
 }
 

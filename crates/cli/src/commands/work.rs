@@ -73,9 +73,11 @@ fn decide(
 fn list(config: &job::Config, store: &Store, args: &WorkListArgs, output: &Output) -> Result<Code, Failure> {
     let mut found = work_requests::requests(&store.work_events()?, Timestamp::now());
     found.retain(|request| is_selected(request, args));
-    if found.is_empty() && [&args.tail, &args.serial, &args.part].iter().any(|name| name.is_some()) {
+    if found.is_empty()
+        && [&args.units.tail, &args.units.serial, &args.units.part].iter().any(|name| name.is_some())
+    {
         let known = KnownNames::read(config);
-        known.check_units(args.tail.as_deref(), args.serial.as_deref(), args.part.as_deref())?;
+        known.check_units(&args.units)?;
     }
     let urgency = |request: &WorkRequest| StateBadge::from_state(request.state.as_deref()).rank();
     found.sort_by_key(|request| (!request.is_open(), urgency(request), request.opened_utc));
@@ -93,9 +95,9 @@ fn is_selected(request: &WorkRequest, args: &WorkListArgs) -> bool {
         Some(WorkStatus::Closed) => request.status == "closed",
     };
     is_wanted
-        && (args.tail.is_none() || args.tail == request.tail_number)
-        && args.serial.as_ref().is_none_or(|serial| *serial == request.serial_number)
-        && (args.part.is_none() || args.part == request.part_number)
+        && (args.units.tail.is_none() || args.units.tail == request.tail_number)
+        && args.units.serial.as_ref().is_none_or(|serial| *serial == request.serial_number)
+        && (args.units.part.is_none() || args.units.part == request.part_number)
 }
 
 fn page(found: &[WorkRequest]) -> String {

@@ -27,7 +27,7 @@ const LEAST_HISTORY: usize = 3;
 /// # Errors
 /// If configuration or store cannot be read.
 pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
-    check_range(args.since, args.until)?;
+    check_range(args.departures.since, args.departures.until)?;
     let config = load_config(global)?;
     let records = Store::open(config.store())?.records(&query_of(args))?;
     if records.is_empty() {
@@ -65,8 +65,8 @@ fn check_names(args: &QueryArgs, known: &KnownNames) -> Result<(), Failure> {
 /// The searched range as text.
 fn range(args: &QueryArgs) -> String {
     let part = args.part.as_ref().map(|part| format!(" with part number {part}"));
-    let since = args.since.map(|since| format!(" from {since}"));
-    let until = args.until.map(|until| format!(" before {until}"));
+    let since = args.departures.since.map(|since| format!(" from {since}"));
+    let until = args.departures.until.map(|until| format!(" before {until}"));
     [part, since, until].into_iter().flatten().collect()
 }
 
@@ -88,8 +88,8 @@ fn query_of(args: &QueryArgs) -> Query {
         position: id(QueryKey::Position),
         part_number: args.part.clone(),
         run_id: None,
-        since_utc: args.since,
-        until_utc: args.until,
+        since_utc: args.departures.since,
+        until_utc: args.departures.until,
         last: args.last,
     }
 }

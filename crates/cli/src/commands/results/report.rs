@@ -20,19 +20,13 @@ use crate::commands::context::{KnownNames, VERSION, display_path, load_with_inst
 /// If configuration, tables or store cannot be read, or the folder cannot be written.
 pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
-    let ask = UnitSelection {
-        tail_number: args.tail.clone(),
-        serial_number: args.serial.clone(),
-        part_number: None,
-        as_of_utc: args.as_of,
-        statistics: true,
-    };
+    let ask = UnitSelection { statistics: true, ..args.units.selection(args.as_of) };
     let store = Store::open(config.store())?;
     let program = format!("Freeplay {VERSION}");
     let report = compose::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
     if report.units.is_empty() {
         let known = KnownNames::read(&config);
-        known.check_units(args.tail.as_deref(), args.serial.as_deref(), None)?;
+        known.check_units(&args.units)?;
         let what = format!("no unit{} has flown; {}", selection(&ask), known.searched());
         let hint = "list the store's contents with `freeplay store info`; fill it with `freeplay run`";
         return Err(Failure::usage("nothing_to_report", what, hint));

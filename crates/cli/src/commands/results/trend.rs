@@ -22,13 +22,7 @@ use crate::commands::context::{KnownNames, load_trend_context, selection};
 /// If configuration, tables or store cannot be read.
 pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_trend_context(&args.external, global, output)?;
-    let ask = UnitSelection {
-        tail_number: args.tail.clone(),
-        serial_number: args.serial.clone(),
-        part_number: args.part.clone(),
-        as_of_utc: args.as_of,
-        statistics: args.statistics,
-    };
+    let ask = UnitSelection { statistics: args.statistics, ..args.units.selection(args.as_of) };
     if args.quantities || args.changes || args.intervals {
         return quantities(args, &ask, &config, &installations, output);
     }
@@ -56,7 +50,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
             }
             None => KnownNames::read(&config),
         };
-        known.check_units(args.tail.as_deref(), args.serial.as_deref(), args.part.as_deref())?;
+        known.check_units(&args.units)?;
         nothing = Some(format!("no unit{} has flown; {}\n", selection(&ask), known.searched()));
     }
     row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found, nothing))?;
@@ -81,7 +75,7 @@ fn quantities(
     let (units, followed) = assess::assess_store_with_quantities(config, installations, &store, ask)?;
     if units.is_empty() {
         let known = KnownNames::read(config);
-        known.check_units(args.tail.as_deref(), args.serial.as_deref(), args.part.as_deref())?;
+        known.check_units(&args.units)?;
     }
     if args.intervals {
         let found = inspection_intervals(&units, config.document.trend.inspection_risk);

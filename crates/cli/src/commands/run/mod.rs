@@ -18,7 +18,7 @@ use records::TrendRow;
 use records::{SerialNumber, TailNumber};
 use store::Holder;
 
-use crate::args::{FailOn, Global, RunArgs};
+use crate::args::{FailOn, Global, RunArgs, UnitFilterArgs};
 use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
 use crate::progress::{Progress, span};
@@ -38,13 +38,17 @@ const MAX_CHANGES_SHOWN: usize = 20;
 /// # Errors
 /// If nothing could be run, or the store failed.
 pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
-    check_range(args.since, args.until)?;
+    check_range(args.departures.since, args.departures.until)?;
     let config = load_config(global)?;
     let request = request(args)?;
     if args.tail.is_some() || args.serial.is_some() {
         let installations = scheduler::installations(&config)?;
         let names = KnownNames::new(Histories::default(), installations);
-        names.check_units(args.tail.as_deref(), args.serial.as_deref(), None)?;
+        names.check_units(&UnitFilterArgs {
+            tail: args.tail.clone(),
+            serial: args.serial.clone(),
+            part: None,
+        })?;
     }
     if args.dry_run {
         return dry_run(&config, &request, output);
@@ -95,8 +99,8 @@ fn request(args: &RunArgs) -> Result<Request, Failure> {
     let empty =
         |e: records::ids::EmptyIdError| Failure::usage("empty_name", e, "omit the option to select all");
     Ok(Request {
-        since_utc: args.since,
-        until_utc: args.until,
+        since_utc: args.departures.since,
+        until_utc: args.departures.until,
         tail_number: args.tail.as_ref().map(TailNumber::new).transpose().map_err(empty)?,
         serial_number: args.serial.as_ref().map(SerialNumber::new).transpose().map_err(empty)?,
         limit: args.limit,

@@ -1,18 +1,22 @@
 //! `completions` and `man`: shell completions and manual page.
 
 use clap::CommandFactory;
+use clap_complete::env::Shells;
 
 use crate::args::{Args, CompletionsArgs};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 
-/// Writes completions for a shell.
+/// Writes the script by which a shell asks this program for completions.
 ///
 /// # Errors
 /// If stdout is closed or full.
 pub(crate) fn completions(args: &CompletionsArgs, output: &Output) -> Result<Code, Failure> {
     let mut text = Vec::new();
-    clap_complete::generate(args.shell, &mut Args::command(), "freeplay", &mut text);
+    let shells = Shells::builtins();
+    let shell = shells.completer(&args.shell.to_string());
+    let shell = shell.ok_or_else(|| std::io::Error::other("the shell has no completions"))?;
+    shell.write_registration("COMPLETE", "freeplay", "freeplay", "freeplay", &mut text)?;
     output.write_exact(&String::from_utf8_lossy(&text))?;
     Ok(Code::Success)
 }

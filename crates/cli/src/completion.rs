@@ -1,0 +1,81 @@
+//! Completion of names on the command line: tails, serial numbers, parts, positions and flights of the store.
+//!
+//! The shell asks this program while its user types, so that new names are known without a new script. A missing
+//! configuration or store completes nothing and prints nothing.
+
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::path::PathBuf;
+
+use arrow::array::AsArray;
+use arrow::compute::cast;
+use arrow::datatypes::DataType;
+use clap_complete::CompletionCandidate;
+use job::Config;
+use store::{Query, Store};
+
+use crate::args::CONFIG;
+
+/// Most names that are offered at once.
+const MAX_CANDIDATES: usize = 200;
+
+/// Tail numbers.
+pub(crate) fn tails(typed: &OsStr) -> Vec<CompletionCandidate> {
+    candidates(typed, "tail_number")
+}
+
+/// Serial numbers.
+pub(crate) fn serials(typed: &OsStr) -> Vec<CompletionCandidate> {
+    candidates(typed, "serial_number")
+}
+
+/// Part numbers.
+pub(crate) fn parts(typed: &OsStr) -> Vec<CompletionCandidate> {
+    candidates(typed, "part_number")
+}
+
+/// Flights.
+pub(crate) fn flights(typed: &OsStr) -> Vec<CompletionCandidate> {
+    candidates(typed, "flight_id")
+}
+
+/// Positions.
+pub(crate) fn positions(typed: &OsStr) -> Vec<CompletionCandidate> {
+    candidates(typed, "position")
+}
+
+/// Values for the field that the command line of `query` names.
+pub(crate) fn queried(typed: &OsStr) -> Vec<CompletionCandidate> {
+    let words: Vec<String> = std::env::args().collect();
+    let field = words.iter().skip_while(|word| *word != "query").find_map(|word| match word.as_str() {
+        "tail" => Some("tail_number"),
+        "serial" => Some("serial_number"),
+        "flight" => Some("flight_id"),
+        "position" => Some("position"),
+        _ => None,
+    });
+    field.map(|field| candidates(typed, field)).unwrap_or_default()
+}
+
+fn candidates(typed: &OsStr, column: &str) -> Vec<CompletionCandidate> {
+    let Some(typed) = typed.to_str() else { return Vec::new() };
+    let names = names(column).unwrap_or_default();
+    let fitting = names.into_iter().filter(|name| name.starts_with(typed));
+    fitting.take(MAX_CANDIDATES).map(CompletionCandidate::new).collect()
+}
+
+/// Different values of a column of the records; none where no store can be read.
+fn names(column: &str) -> Option<BTreeSet<String>> {
+    let file = std::env::var_os("FREEPLAY_CONFIG").map_or_else(|| PathBuf::from(CONFIG), PathBuf::from);
+    let config = Config::read(&file).ok()?;
+    let store = Store::open(config.store()).ok()?;
+    let parts = store.scan_columns(&Query::default(), &[column]).ok()?;
+    let mut names = BTreeSet::new();
+    for part in 0..parts.len() {
+        for batch in parts.read(part).ok()? {
+            let values = cast(batch.column_by_name(column)?, &DataType::Utf8).ok()?;
+            names.extend(values.as_string::<i32>().iter().flatten().map(str::to_owned));
+        }
+    }
+    Some(names)
+}
