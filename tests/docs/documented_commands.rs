@@ -63,7 +63,8 @@ struct Try<'p> {
 impl<'p> Try<'p> {
     /// Runs a page from its first block to its last.
     fn of(page: &'p Page) -> Vec<String> {
-        let mut tried = Self { page, fleet: TestFleet::sample_data(), faults: Vec::new(), blessed: Vec::new() };
+        let mut tried =
+            Self { page, fleet: TestFleet::sample_data(), faults: Vec::new(), blessed: Vec::new() };
         let mut output = String::new();
         for block in &page.blocks {
             if let Some(command) = block.mark("first:") {

@@ -12,7 +12,10 @@ fn the_sample_fleet_runs_well_and_its_median_error_is_below_one_per_cent() {
     assert_eq!(found.keys().collect::<Vec<_>>(), truth.keys().collect::<Vec<_>>());
     let (rows, flights) = (truth.len(), truth.len() / 4);
     let stored = format!("{rows} records of {flights} flights: {rows} estimated, 0 refused");
-    assert!(account.contains(&stored) && account.contains("1 log with the samples of another log"), "{account}");
+    assert!(
+        account.contains(&stored) && account.contains("1 log with the samples of another log"),
+        "{account}"
+    );
     let mut errors: Vec<f64> =
         found.iter().map(|(key, gap)| 100.0 * (gap / truth[key] - 1.0).abs()).collect();
     errors.sort_by(f64::total_cmp);
@@ -71,7 +74,11 @@ fn the_sample_fleet_is_made_anywhere_and_is_the_same_again() {
         let again = made.freeplay(&["init", "demo", "--sample"]);
         assert!(again.code == Some(2) && again.err.contains("would_overwrite"), "{again:?}");
         let path = made.path(folder);
-        if path.is_dir() { std::fs::remove_dir_all(path).unwrap() } else { std::fs::remove_file(path).unwrap() }
+        if path.is_dir() {
+            std::fs::remove_dir_all(path).unwrap()
+        } else {
+            std::fs::remove_file(path).unwrap()
+        }
     }
     assert_eq!(made.freeplay(&["init", "--sample", "--from", "demo"]).code, Some(2));
 }

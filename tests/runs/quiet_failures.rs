@@ -67,7 +67,10 @@ const WAYS: &[Way] = &[
     (
         "a tail sends nothing while others do",
         |f, _| {
-            copy(&crate::harness::top().join("tests/data/three-aircraft/sample-data/logs/N412FP"), &f.path("sample-data/logs/N412FP"));
+            copy(
+                &crate::harness::top().join("tests/data/three-aircraft/sample-data/logs/N412FP"),
+                &f.path("sample-data/logs/N412FP"),
+            );
             let newest = f.logs().into_iter().rfind(|log| log.to_string_lossy().contains("N412FP")).unwrap();
             for log in
                 f.logs().into_iter().filter(|log| log.to_string_lossy().contains("N412FP") && *log != newest)

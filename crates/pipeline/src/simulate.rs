@@ -340,14 +340,13 @@ fn channel_tables(part: &simulator::Part, above: &str) -> String {
     let rotary = part.reference_radius_m.is_some();
     let unit = |angle: bool| if angle { ("deg", "deg") } else { ("mm", "mm") };
     let motor = unit(rotary || part.motor_log != MotorLogFormat::Position);
-    let screw = if !rotary && part.screw_log == ScrewLogUnit::Micrometre { ("um", "um") } else { unit(rotary) };
+    let screw =
+        if !rotary && part.screw_log == ScrewLogUnit::Micrometre { ("um", "um") } else { unit(rotary) };
     let load = if rotary { ("nm", "N.m") } else { ("n", "N") };
     let mut text = String::new();
-    for (channel, column, (suffix, unit)) in [
-        ("motor_position", "motor", motor),
-        ("screw_position", "screw", screw),
-        ("load", "load", load),
-    ] {
+    for (channel, column, (suffix, unit)) in
+        [("motor_position", "motor", motor), ("screw_position", "screw", screw), ("load", "load", load)]
+    {
         let _ = writeln!(
             text,
             "\n[{above}.{channel}]\ncolumn = \"{{position}}_{column}_{suffix}\"\nunit = \"{unit}\""

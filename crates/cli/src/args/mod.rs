@@ -115,7 +115,9 @@ pub(crate) enum Color {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Write a commented pipeline.toml and an example installations.csv; nothing is overwritten
-    #[command(after_help = "Examples:\n  freeplay init fleet-a\n  freeplay init --from /data/logs\n  freeplay init --sample demo && cd demo && freeplay run")]
+    #[command(
+        after_help = "Examples:\n  freeplay init fleet-a\n  freeplay init --from /data/logs\n  freeplay init --sample demo && cd demo && freeplay run"
+    )]
     Init(InitArgs),
     /// Check how logs are mapped: columns, units, signs and rates per channel; nothing is computed
     #[command(after_help = "Example:\n  freeplay check logs/N412FP/20261119_0413.parquet")]

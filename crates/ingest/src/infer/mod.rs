@@ -322,7 +322,8 @@ mod tests {
 
     #[test]
     fn a_log_with_names_and_units_is_understood_whole() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/three-aircraft/sample-data/logs/N412FP");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../../tests/data/three-aircraft/sample-data/logs/N412FP");
         let log = std::fs::read_dir(folder).unwrap().flatten().next().unwrap().path();
         let found = propose(&log).unwrap();
         assert_eq!(found.clock, Some(("time_s".to_owned(), Some("s"))));

@@ -243,14 +243,18 @@ fn events_happen_before_the_flight_that_they_name() {
         fault = "truncated"
     "#;
     let small = toml::to_string(&Spec { flights_per_tail: 6, flights_per_log: 2, ..small() }).unwrap();
-    let small: String = small.lines().filter(|line| !line.ends_with("= []")).map(|l| format!("{l}\n")).collect();
+    let small: String =
+        small.lines().filter(|line| !line.ends_with("= []")).map(|l| format!("{l}\n")).collect();
     let plan = Plan::new(&toml::from_str(&format!("{small}{events}")).unwrap()).unwrap();
     let of = |tail: &str| plan.flights.iter().filter(|f| f.tail_number == tail).collect::<Vec<_>>();
     let (a, b) = (of("A"), of("B"));
     assert_eq!(b[1].actuators[0].serial_number, "S10003");
     assert_eq!((b[2].actuators[0].serial_number.as_str(), b[2].actuators[0].gap_m), ("SPARE", 40e-6));
     let stays: Vec<_> = plan.installations.iter().filter(|s| s.serial_number.starts_with("S10003")).collect();
-    assert_eq!(stays[0].removed_us, plan.installations.iter().find(|s| s.serial_number == "SPARE").map(|s| s.installed_us));
+    assert_eq!(
+        stays[0].removed_us,
+        plan.installations.iter().find(|s| s.serial_number == "SPARE").map(|s| s.installed_us)
+    );
     let before_m = a[2].actuators[1].gap_m;
     assert_eq!(a[3].actuators[1].gap_m, 20e-6);
     assert_eq!(plan.maintenance[0].serial_number, "S10002");
