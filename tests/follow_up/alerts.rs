@@ -1,4 +1,4 @@
-//! Alerts of the command on the sample fleet: to folders, commands and addresses, with faults and kills.
+//! Alerts of the command on the small fleet: to folders, commands and addresses, with faults and kills.
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -9,10 +9,10 @@ use serde_json::Value;
 use super::{LONG_HORIZON, SHORT_HORIZON, processed_fleet};
 use crate::harness::{CommandResult, TestFleet, top};
 
-/// Units that `freeplay trend` finds in `plan` on the sample fleet (README).
+/// Units that `freeplay trend` finds in `plan` on the small fleet.
 const IN_PLAN: [&str; 2] = ["1040-0009", "1040-0013"];
 
-/// The sample fleet with a baseline of states; the next run finds two units in `plan`.
+/// The small fleet with a baseline of states; the next run finds two units in `plan`.
 fn fleet(alerts: &str) -> TestFleet {
     let fleet = processed_fleet();
     append(&fleet, alerts);
@@ -22,7 +22,7 @@ fn fleet(alerts: &str) -> TestFleet {
     fleet
 }
 
-/// The sample fleet until October, where no unit has a state, with a baseline.
+/// The small fleet until October, where no unit has a state, with a baseline.
 fn fleet_of_october() -> TestFleet {
     let fleet = TestFleet::sample();
     append(&fleet, "[alerts.files]\nfolder = \"alerts\"\n");

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use crate::harness::{TestFleet, copy};
 
-/// A copy of the sample fleet with the results of all its logs.
+/// A copy of the small fleet with the results of all its logs.
 fn processed_fleet() -> TestFleet {
     static PROCESSED: OnceLock<TestFleet> = OnceLock::new();
     let processed = PROCESSED.get_or_init(|| {

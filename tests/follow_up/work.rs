@@ -1,11 +1,11 @@
-//! Work requests of the command, as a planner and a mechanic use them on the sample fleet.
+//! Work requests of the command, as a planner and a mechanic use them on the small fleet.
 
 use serde_json::Value;
 
 use super::{LONG_HORIZON, SHORT_HORIZON, processed_fleet};
 use crate::harness::TestFleet;
 
-/// The sample fleet with two open requests.
+/// The small fleet with two open requests.
 fn fleet() -> TestFleet {
     let fleet = processed_fleet();
     fleet.configure(SHORT_HORIZON, LONG_HORIZON);

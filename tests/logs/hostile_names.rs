@@ -12,7 +12,7 @@ const HOSTILE: &str = "\u{1b}[2J\u{1b}[31m\u{7}\nerror[forged]: x\u{202e}";
 /// A tail that a spreadsheet executes.
 const TAIL: &str = "=HYPERLINK(\"x\")";
 
-/// What a name of the sample fleet becomes.
+/// What a name of the small fleet becomes.
 fn hostile(name: &str) -> String {
     format!("+{name}{HOSTILE}")
 }

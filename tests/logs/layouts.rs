@@ -21,7 +21,7 @@ fn numbers(fleet: &TestFleet) -> Vec<String> {
     lines
 }
 
-/// One tail of the sample fleet, so that each case costs a third.
+/// One tail of the small fleet, so that each case costs a third.
 fn one_tail() -> TestFleet {
     let fleet = TestFleet::sample();
     fleet.configure("sample-data/logs/**/*.parquet", "sample-data/logs/N412FP/*.parquet");

@@ -29,7 +29,7 @@ OF_A_RUN = {"run_id", "processed_utc", "log_path"}
 
 
 class Bench:
-    """An S3 server with the sample fleet in it, a bad line to it, and the command."""
+    """An S3 server with the small fleet in it, a bad line to it, and the command."""
 
     def __init__(self, freeplay, work):
         self.freeplay, self.work = Path(freeplay), Path(work)

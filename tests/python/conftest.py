@@ -1,4 +1,4 @@
-"""A sample fleet of one's own for each test, and the command to hold the module against."""
+"""A small fleet of one's own for each test, and the command to hold the module against."""
 
 from __future__ import annotations
 

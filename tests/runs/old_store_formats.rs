@@ -1,7 +1,7 @@
 //! Stores as earlier releases left them.
 //!
 //! `tests/data/store-0.1` was written by release 0.1 before accounts knew *not reached*: one run over two logs
-//! of the sample fleet, one over the rest of that tail with a log in error, one `--redo` of one log, and a
+//! of the small fleet, one over the rest of that tail with a log in error, one `--redo` of one log, and a
 //! run on another tail that was killed between the commits of its records and of their accounts.
 
 use crate::harness::{TestFleet, copy, top};
