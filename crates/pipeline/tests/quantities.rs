@@ -174,7 +174,7 @@ fn followed(plant: Plant) -> (Vec<TrendRow>, FollowedQuantities) {
 }
 
 fn assessed(plant: Plant, swaps: bool) -> (Vec<TrendRow>, FollowedQuantities) {
-    assessed_under(include_str!("../../../pipeline.toml"), plant, swaps)
+    assessed_under(include_str!("../../../tests/data/three-aircraft/pipeline.toml"), plant, swaps)
 }
 
 fn assessed_under(text: &str, plant: Plant, swaps: bool) -> (Vec<TrendRow>, FollowedQuantities) {
@@ -248,7 +248,7 @@ fn changes_of_single_units_are_theirs() {
 
 #[test]
 fn a_part_has_limits_of_its_own() {
-    let text = include_str!("../../../pipeline.toml").to_owned()
+    let text = include_str!("../../../tests/data/three-aircraft/pipeline.toml").to_owned()
         + "\n[part.\"EMA-27-1040\".quantity_limits]\nstiffness_share = 0.5\n";
     let (rows, _) = assessed_under(
         &text,

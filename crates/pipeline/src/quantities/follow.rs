@@ -27,6 +27,8 @@ const BEYOND_SE: f64 = 0.5;
 const MIN_DRIFTING: usize = 3;
 /// Their share of the limit.
 const DRIFT_SHARE: f64 = 0.5;
+/// Standard errors of a rate from which a unit departs from what its part shares.
+const DEPARTS_SE: f64 = 3.0;
 /// Share of a tail's units that make a drift the tail's.
 const SHARE: f64 = 0.75;
 
@@ -89,7 +91,7 @@ fn follow_quantity(
         take_off(&mut subjects, &steps);
         if scope == ChangeScope::Part {
             take_off_moves(&mut subjects);
-            take_off_curves(&mut subjects);
+            take_off_curves(&mut subjects, &fit);
         }
     }
     subjects.par_iter_mut().for_each(|s| s.fit = fit(s));
@@ -221,23 +223,37 @@ fn take_off_moves(subjects: &mut [Subject<'_>]) {
     }
 }
 
-/// Takes off the curve that the units of each part share.
-fn take_off_curves(subjects: &mut [Subject<'_>]) {
+/// Takes off the curve that the units of each part share: of those that do not depart from it by themselves.
+fn take_off_curves<'a>(
+    subjects: &mut [Subject<'a>],
+    fit: &(dyn Fn(&Subject<'a>) -> Option<QuantityChanges> + Sync),
+) {
+    let all = curves(subjects, &vec![true; subjects.len()]);
+    let follows = |subject: &Subject<'a>| {
+        let left = subject.without(all.get(&subject.name.0));
+        fit(&left).is_none_or(|fit| {
+            fit.change == 0.0 && fit.rate_per_hour.is_none_or(|(rate, se)| rate.abs() <= DEPARTS_SE * se)
+        })
+    };
+    let follow: Vec<bool> = subjects.par_iter().map(follows).collect();
+    let curves = curves(subjects, &follow);
+    for subject in subjects {
+        *subject = subject.without(curves.get(&subject.name.0));
+    }
+}
+
+/// The curve of each part, of some of its units.
+fn curves(subjects: &[Subject<'_>], follow: &[bool]) -> BTreeMap<Option<String>, CommonCurve> {
     let mut tails: BTreeMap<Option<&str>, usize> = BTreeMap::new();
     let mut parts: BTreeMap<Option<String>, Vec<(usize, &[QuantityValue])>> = BTreeMap::new();
-    for subject in &*subjects {
+    for (subject, _) in subjects.iter().zip(follow).filter(|(_, follows)| **follows) {
         let count = tails.len();
         let tail = subject.last_place().and_then(|p| p.tail_number.as_deref());
         let tail = *tails.entry(tail).or_insert(count);
         parts.entry(subject.name.0.clone()).or_default().push((tail, &subject.values));
     }
     // The scale of units differs little within a part, and is one for delays.
-    let curves: BTreeMap<Option<String>, CommonCurve> =
-        parts.into_iter().map(|(part, units)| (part, CommonCurve::fit(units.into_iter()))).collect();
-    for subject in subjects {
-        let Some(curve) = curves.get(&subject.name.0) else { continue };
-        subject.values.iter_mut().for_each(|v| v.value -= curve.at(v.departure_us));
-    }
+    parts.into_iter().map(|(part, units)| (part, CommonCurve::fit(units.into_iter()))).collect()
 }
 
 /// Tails whose units drift in one direction, with their subjects.

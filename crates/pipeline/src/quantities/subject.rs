@@ -3,12 +3,14 @@
 use records::ChangeScope;
 use trend::quantity::QuantityValue;
 use trend::quantity::changes::{self, QuantityChanges};
+use trend::quantity::common_curve::CommonCurve;
 
 use crate::history::histories::{TailPosition, UnitKey};
 use crate::quantities::limits::Treatment;
 use crate::quantities::values::UnitValues;
 
 /// One quantity of one unit.
+#[derive(Clone)]
 pub(crate) struct Subject<'a> {
     /// The unit.
     pub(crate) name: &'a UnitKey,
@@ -41,6 +43,15 @@ impl Subject<'_> {
     /// Position of the last flight.
     pub(crate) fn position(&self) -> Option<&str> {
         self.last_place()?.position.as_deref()
+    }
+
+    /// The same without the curve of its part.
+    pub(crate) fn without(&self, curve: Option<&CommonCurve>) -> Self {
+        let mut left = self.clone();
+        if let Some(curve) = curve {
+            left.values.iter_mut().for_each(|v| v.value -= curve.at(v.departure_us));
+        }
+        left
     }
 
     /// Takes a step of tail or part off the values.

@@ -1,8 +1,6 @@
 //! A planned fleet: books that balance, and flights that do not depend on the order of asking.
 
-use simulator::{
-    Error, ExpectedOutcome, LogState, Plan, PlannedFlight, PlantedChange, SAMPLE_SPEC, Spec,
-};
+use simulator::{Error, ExpectedOutcome, LogState, Plan, PlannedFlight, PlantedChange, SAMPLE_SPEC, Spec};
 
 fn sample() -> Spec {
     toml::from_str(SAMPLE_SPEC).unwrap()

@@ -21,7 +21,7 @@ const LEAST_AFTER: usize = 3;
 /// Squared t-value from which a step is selected: it is the largest over all flights, and each run searches again.
 const STEP_GAIN: f64 = 32.0;
 /// Squared t-value from which a drift is selected.
-const DRIFT_GAIN: f64 = 20.0;
+const DRIFT_GAIN: f64 = 18.0;
 
 type Row = SVector<f64, COLUMNS>;
 type Square = SMatrix<f64, COLUMNS, COLUMNS>;

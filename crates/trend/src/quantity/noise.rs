@@ -78,8 +78,13 @@ pub fn without_outliers(values: &[QuantityValue], scatter: &Scatter) -> Vec<Quan
     (0..values.len()).filter(|&k| values.len() <= AGREEING || is_sound(k)).map(|k| values[k]).collect()
 }
 
-/// The upper median; none of nothing.
+/// The median; none of nothing.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    let (middle, is_even) = (values.len() / 2, values.len().is_multiple_of(2));
+    if values.is_empty() {
+        return None;
+    }
+    let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    let lower = below.iter().copied().max_by(f64::total_cmp).filter(|_| is_even);
+    Some(lower.map_or(*upper, |lower| 0.5 * (lower + *upper)))
 }
