@@ -19,6 +19,9 @@
   var fan = band.filter(function (b) { return b.what === "forecast"; });
   var events = Array.prototype.map.call(document.querySelectorAll("#events tbody td:first-child"), function (e) { return time(e.textContent); });
   var limit = number(figure.dataset.limit), watch = number(figure.dataset.watch);
+  var dated = function (name) { return figure.dataset[name] ? time(figure.dataset[name]) : null; };
+  var earliest = dated("earliest"), likely = dated("likely"), latest = dated("latest");
+  var today = fan.length ? fan[0].t : null;
   var first = rows[0].t, last = rows[rows.length - 1].t, span = Math.max(last - first, 864000);
   var far = fan.reduce(function (a, b) { return Math.max(a, b.t); }, last);
   var whole = { min: first - 0.02 * span, max: far + 0.02 * span };
@@ -56,6 +59,15 @@
     c.stroke();
     c.restore();
   };
+  var label = function (u, text, x, y, align) {
+    var c = u.ctx, left = u.valToPos(x, "x", true), gap = 5 * devicePixelRatio;
+    c.save();
+    c.font = 12 * devicePixelRatio + "px sans-serif";
+    c.fillStyle = colour("ink");
+    c.textAlign = align;
+    c.fillText(text, align === "left" ? left + gap : left - gap, u.valToPos(y, "y", true) - gap);
+    c.restore();
+  };
   var ribbon = function (u, points, stroke, dash) {
     if (points.length < 2) return;
     var c = u.ctx, px = function (x) { return u.valToPos(x, "x", true); }, py = function (y) { return u.valToPos(y, "y", true); };
@@ -79,6 +91,16 @@
     var y = u.scales.y, x = u.scales.x;
     if (watch !== null) line(u, x.min, watch, x.max, watch, colour("watch"), [], 2);
     if (limit !== null) line(u, x.min, limit, x.max, limit, colour("act"), [], 2);
+    if (watch !== null && watch > y.min) label(u, "watch " + watch.toFixed(0) + " µm", x.min, watch, "left");
+    if (limit !== null) label(u, "act limit " + limit.toFixed(0) + " µm", x.min, limit, "left");
+    if (today !== null && today > x.min && today < x.max) {
+      line(u, today, y.min, today, y.max, colour("ink"), [2, 3], 1);
+      label(u, "today", today, y.min, "right");
+    }
+    if (limit !== null && earliest !== null) {
+      line(u, earliest, limit, latest === null ? x.max : latest, limit, colour("plan"), [], 6);
+      if (likely !== null) line(u, likely, limit - 0.03 * (y.max - y.min), likely, limit + 0.03 * (y.max - y.min), colour("plan"), [], 3);
+    }
     events.forEach(function (t) { line(u, t, y.min, t, y.max, colour("plan"), [], 1); });
     rows.forEach(function (r) {
       if (r.gap === null) line(u, r.t, y.min, r.t, y.min + 0.03 * (y.max - y.min), colour("unstated"), [], 2);

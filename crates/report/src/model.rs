@@ -112,6 +112,9 @@ pub struct UnitView {
     pub work_requests: Vec<WorkRequest>,
     /// Followed quantities other than the gap.
     pub quantities: Vec<QuantityView>,
+    /// Gaps in order of flights, at most a hundred means of neighbours, m; drawn, not part of `report.json`.
+    #[serde(skip)]
+    pub sketch_m: Vec<f64>,
     /// Smoothed level over past flights; plotted, not part of `report.json`.
     #[serde(skip)]
     pub level: Vec<TimedInterval>,
@@ -140,6 +143,11 @@ pub struct QuantityView {
 pub struct Assessment {
     pub state: Option<String>,
     pub reason: Option<String>,
+    /// What the state asks for, and until when.
+    pub action: Option<String>,
+    pub due_utc: Option<Timestamp>,
+    /// Both in words.
+    pub action_text: Option<String>,
     pub flights: usize,
     pub unit_hours: Option<f64>,
     pub gap_m: Option<f64>,

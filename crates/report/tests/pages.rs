@@ -27,6 +27,7 @@ fn unit(serial: &str, state: Option<&str>) -> UnitView {
         inspections: Vec::new(),
         work_requests: Vec::new(),
         quantities: Vec::new(),
+        sketch_m: vec![40e-6, 50e-6, 60e-6],
         level: Vec::new(),
         forecast: Vec::new(),
         flights: Vec::new(),

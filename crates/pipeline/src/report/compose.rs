@@ -246,6 +246,7 @@ impl ReportComposer<'_> {
                 .filter_map(|(us, b)| timed_interval(Timestamp::from_microsecond(*us).ok(), b))
                 .collect(),
             forecast: forecast(drawn, row),
+            sketch_m: row.sketch_m.0.clone(),
             assessment: self.statement(row, history, &name),
             quality: quality(history, rest, row.as_of_utc),
             events: events(row, &installations),
@@ -269,6 +270,9 @@ impl ReportComposer<'_> {
         Assessment {
             state: row.state.map(str::to_owned),
             reason: row.reason.clone(),
+            action: row.action.map(str::to_owned),
+            due_utc: row.due_utc,
+            action_text: row.action_text(),
             flights: records.len(),
             unit_hours: row.unit_hours,
             gap_m: row.gap_m,

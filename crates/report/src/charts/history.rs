@@ -3,6 +3,7 @@
 use jiff::Timestamp;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use records::time::DAY_S;
 
 use crate::model::{TimedInterval, UnitView};
@@ -25,12 +26,31 @@ type DrawResult = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 /// Day, and 5 %, median and 95 % of a gap, µm.
 type BandPoint = (f64, f64, f64, f64);
 
+/// Until when the forecast is drawn: the median crossing, or the latest one where it is not much later; a fifth more.
+/// Nothing beyond serves a plan.
+pub(crate) fn forecast_end(unit: &UnitView) -> Option<Timestamp> {
+    let s = &unit.assessment;
+    let whole = unit.forecast.last()?.at_utc;
+    let start = unit.forecast.first()?.at_utc;
+    let Some(likely) = s.likely_utc.filter(|likely| *likely > start) else { return Some(whole) };
+    let ahead_s = likely.duration_since(start).as_secs_f64();
+    let latest_s = s.not_after_utc.map_or(f64::INFINITY, |latest| latest.duration_since(start).as_secs_f64());
+    let shown_s = 1.2 * if latest_s <= 2.0 * ahead_s { latest_s } else { ahead_s };
+    Some((start + jiff::SignedDuration::from_secs(shown_s.max(30.0 * DAY_S) as i64)).min(whole))
+}
+
+/// The forecast as far as it is drawn.
+pub(crate) fn drawn_forecast(unit: &UnitView) -> Vec<TimedInterval> {
+    let end = forecast_end(unit);
+    unit.forecast.iter().filter(|f| end.is_none_or(|end| f.at_utc <= end)).copied().collect()
+}
+
 /// Draws gap against date: flights with error bars, smoothed level, limits, forecast band and events.
 pub(crate) fn history(unit: &UnitView) -> Result<String, Error> {
     let points = downsampled(unit);
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Ok(String::new()) };
     let span = (last.0 - first.0).max(10.0);
-    let end = unit.forecast.last().map_or(last.0, |f| day(f.at_utc)).max(last.0);
+    let end = forecast_end(unit).map_or(last.0, day).max(last.0);
     let ahead = unit.forecast.iter().map(|f| f.p95_m * 1e6);
     let limit = unit.assessment.limit_m.map(|l| l * 1e6);
     // A forecast far above the limit would squeeze the flights into the bottom of the plot.
@@ -72,7 +92,7 @@ fn draw(
         .map_err(plot_error)?;
     draw_flights(&mut chart, points).map_err(plot_error)?;
     draw_band(&mut chart, &band_points(&unit.level), y, INK, false).map_err(plot_error)?;
-    draw_band(&mut chart, &band_points(&unit.forecast), y, PLAN, true).map_err(plot_error)?;
+    draw_band(&mut chart, &band_points(&drawn_forecast(unit)), y, PLAN, true).map_err(plot_error)?;
     draw_lines(&mut chart, unit, x, y).map_err(plot_error)?;
     root.present().map_err(plot_error)
 }
@@ -105,14 +125,39 @@ fn draw_band(
 /// Draws limits as horizontal and events as vertical lines.
 fn draw_lines(chart: &mut Chart<'_, '_>, unit: &UnitView, x: (f64, f64), y: (f64, f64)) -> DrawResult {
     let s = &unit.assessment;
-    for (limit, colour) in [(s.watch_m, WATCH), (s.limit_m, ACT)] {
+    for (name, limit, colour) in [("watch", s.watch_m, WATCH), ("act limit", s.limit_m, ACT)] {
         // A level outside the plot would be drawn along its edge.
         let level = limit.map(|l| l * 1e6).filter(|l| (y.0..y.1).contains(l));
-        let line = level.map(|l| LineSeries::new([(x.0, l), (x.1, l)], colour.stroke_width(2)));
-        line.map(|line| chart.draw_series(line)).transpose()?;
+        let Some(level) = level else { continue };
+        chart.draw_series(LineSeries::new([(x.0, level), (x.1, level)], colour.stroke_width(2)))?;
+        let text = format!("{name} {level:.0} µm");
+        let style = ("sans-serif", 12).into_font().color(&INK).pos(Pos::new(HPos::Left, VPos::Bottom));
+        chart.draw_series([Text::new(text, (x.0 + 0.005 * (x.1 - x.0), level), style)])?;
     }
+    draw_crossing(chart, unit, x, y)?;
     for event in unit.events.iter().map(|e| day(e.departure_utc)).filter(|d| (x.0..x.1).contains(d)) {
         chart.draw_series(LineSeries::new([(event, y.0), (event, y.1)], PLAN))?;
+    }
+    Ok(())
+}
+
+/// Draws the day of the assessment, and the crossing: its 90 % interval as a bar on the limit, its median as a mark.
+fn draw_crossing(chart: &mut Chart<'_, '_>, unit: &UnitView, x: (f64, f64), y: (f64, f64)) -> DrawResult {
+    let s = &unit.assessment;
+    if let Some(today) = unit.forecast.first().map(|f| day(f.at_utc)).filter(|d| (x.0..x.1).contains(d)) {
+        chart.draw_series(DashedLineSeries::new([(today, y.0), (today, y.1)], 2, 3, INK.stroke_width(1)))?;
+        let style = ("sans-serif", 12).into_font().color(&INK).pos(Pos::new(HPos::Right, VPos::Bottom));
+        chart.draw_series([Text::new("today ", (today, y.0), style)])?;
+    }
+    let Some(limit) = s.limit_m.map(|l| l * 1e6).filter(|l| (y.0..y.1).contains(l)) else { return Ok(()) };
+    let Some(from) = s.not_before_utc.map(day).filter(|d| *d < x.1) else { return Ok(()) };
+    let until = s.not_after_utc.map_or(x.1, day).min(x.1);
+    chart.draw_series([PathElement::new(
+        vec![(from.max(x.0), limit), (until, limit)],
+        PLAN.stroke_width(6),
+    )])?;
+    if let Some(likely) = s.likely_utc.map(day).filter(|d| (x.0..x.1).contains(d)) {
+        chart.draw_series([Circle::new((likely, limit), 5, PLAN.filled())])?;
     }
     Ok(())
 }

@@ -4,3 +4,4 @@ pub(crate) mod agreement_plot;
 pub(crate) mod estimate_plot;
 pub(crate) mod history;
 pub(crate) mod quantities;
+pub(crate) mod sparkline;

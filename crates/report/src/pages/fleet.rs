@@ -6,6 +6,7 @@ use askama::Template;
 use records::time::days_between;
 
 use crate::charts::agreement_plot::agreement_plot;
+use crate::charts::sparkline::sparkline;
 use crate::format::{
     NO_DATA, count, counted, date, date_or, hours, level, micrometres, minute_or, percent, rate,
 };
@@ -32,9 +33,15 @@ pub(crate) struct Row {
     pub(crate) link: String,
     pub(crate) name: String,
     pub(crate) position: String,
+    /// Tail and position.
+    pub(crate) place: String,
+    pub(crate) action: String,
+    /// Date of the action as a number that sorts; empty for none.
+    pub(crate) due: String,
     pub(crate) gap: String,
     pub(crate) share: String,
-    pub(crate) not_before: String,
+    pub(crate) share_sort: String,
+    pub(crate) sparkline: String,
     pub(crate) likely: String,
     pub(crate) why: String,
     pub(crate) work: String,
@@ -49,13 +56,23 @@ impl Row {
             name: unit.name(),
             position: unit.position.clone().unwrap_or_else(|| NO_DATA.to_owned()),
             gap: level(s.gap_m, s.gap_se_m),
+            place: place(unit),
+            action: s.action_text.clone().unwrap_or_else(|| "none".to_owned()),
+            due: s.due_utc.map(|due| due.as_second().to_string()).unwrap_or_default(),
             share: share(unit).map_or_else(|| NO_DATA.to_owned(), percent),
-            not_before: when(s.crossing_hours_p05, s.not_before_utc, unit),
+            share_sort: share(unit).map(|share| format!("{share:.4}")).unwrap_or_default(),
+            sparkline: sparkline(unit),
             likely: when(s.crossing_hours_p50, s.likely_utc, unit),
             why: why(unit),
             work: unit.open_request().map(request_badge).unwrap_or_default(),
         }
     }
+}
+
+/// Tail and position of a unit.
+fn place(unit: &UnitView) -> String {
+    let words = [unit.tail_number.as_deref(), unit.position.as_deref()];
+    words.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
 /// Reason of the state, with the states of the other followed quantities.
@@ -268,15 +285,8 @@ fn decision(report: &Report) -> String {
     let Some(unit) = first else {
         return format!("No unit needs action: {}.", counts.join(", "));
     };
-    let place = [unit.tail_number.as_deref(), unit.position.as_deref()];
-    let place = place.into_iter().flatten().collect::<Vec<_>>().join(" ");
-    let due = unit.assessment.not_before_utc.map(|by| format!(" before {}", date(by))).unwrap_or_default();
-    let act = match unit.badge().word() {
-        "act" => "replace now".to_owned(),
-        "plan" => format!("plan the replacement{due}"),
-        _ => "inspect".to_owned(),
-    };
-    format!("{place} ({}): {act}. In all: {}.", unit.name(), counts.join(", "))
+    let action = unit.assessment.action_text.as_deref().unwrap_or("inspect");
+    format!("{} ({}): {action}. In all: {}.", place(unit), unit.name(), counts.join(", "))
 }
 
 /// Units that need action or have an open work request, by earliest date.

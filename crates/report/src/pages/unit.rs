@@ -3,7 +3,7 @@
 use askama::Template;
 use records::uncertainty::NORMAL_95;
 
-use crate::charts::history::history;
+use crate::charts::history::{drawn_forecast, history};
 use crate::format::{
     NO_DATA, count, counted, date, date_or, hours, level, micrometres, micrometres_cell, micrometres_or,
     minute, percent, rate,
@@ -27,12 +27,16 @@ struct View {
     place: Option<(String, String, String)>,
     badge: StateBadge,
     reason: String,
+    /// What to do and until when.
+    action: String,
     now: Facts,
     remaining: Facts,
     plot: String,
     plot_description: String,
     limit: String,
     watch: String,
+    /// Dates of the crossing, earliest, median and latest; empty where unknown.
+    crossing: [String; 3],
     forecast: Vec<(&'static str, String)>,
     quantity_changes: Vec<Change>,
     charts: Vec<Chart>,
@@ -79,6 +83,8 @@ pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) ->
         title: format!("{} · actuator free play", unit.name()),
         footer: crate::pages::fleet::footer(report),
         name: unit.name(),
+        action: s.action_text.clone().unwrap_or_default(),
+        crossing: forecast.map(|(_, at)| at.map(date).unwrap_or_default()),
         place: unit.tail_number.as_ref().map(|tail| {
             (format!("../{}", tail_path(tail)), tail.clone(), unit.position.clone().unwrap_or_default())
         }),
@@ -317,7 +323,7 @@ fn band(unit: &UnitView) -> Vec<(String, &'static str, String, String, String)> 
             (minute(b.at_utc), what, micrometres(b.m), micrometres(b.p05_m), micrometres(b.p95_m))
         }
     };
-    unit.level.iter().map(row("level")).chain(unit.forecast.iter().map(row("forecast"))).collect()
+    unit.level.iter().map(row("level")).chain(drawn_forecast(unit).iter().map(row("forecast"))).collect()
 }
 
 /// A probability; one too p_value for three places is never shown as none.
