@@ -126,6 +126,40 @@ for (const which of Object.keys(reports)) {
     });
   });
 
+  test(`${which}: a heading sorts the work list up and down, and a filter keeps the rows with its words`, async () => {
+    await on(index(which), {}, async (page) => {
+      const rows = page.locator("table.units tbody tr:not(.group)");
+      const count = await rows.count();
+      assert.ok(count > 1);
+      const shares = async () => page.$$eval("table.units tbody tr:not(.group) td:nth-child(5)", (cells) => cells.map((c) => c.dataset.sort).filter((s) => s !== "").map(Number));
+      const button = page.locator("table.units thead button", { hasText: "% of limit" });
+      await button.click();
+      const up = await shares();
+      assert.deepEqual(up, [...up].sort((a, b) => a - b));
+      assert.equal(await rows.count(), count, "no row is lost");
+      assert.equal(await page.locator("table.units thead th[aria-sort=ascending]").count(), 1);
+      await button.click();
+      assert.deepEqual(await shares(), [...up].reverse());
+      const filter = page.locator(".filter input").first();
+      if (await page.locator("#work ~ .filter").count()) {
+        const word = plain((await all(page, "table.units tbody tr:not(.group) td:nth-child(2)"))[0]).split(" / ").pop();
+        await filter.fill(word);
+        const shown = await page.$$eval("table.units tbody tr:not(.group)", (found) => found.filter((r) => !r.hidden).map((r) => r.textContent));
+        assert.ok(shown.length >= 1 && shown.every((text) => plain(text).toLowerCase().includes(word.toLowerCase())));
+      }
+    });
+  });
+
+  test(`${which}: on a phone each unit of the work list is a card that shows its action whole`, async () => {
+    await on(index(which), { viewport: PHONE }, async (page) => {
+      const action = page.locator("table.units tbody td[data-label=Action]").first();
+      await action.scrollIntoViewIfNeeded();
+      const box = await action.boundingBox();
+      assert.ok(box.x >= 0 && box.x + box.width <= PHONE.width, JSON.stringify(box));
+      assert.match(await action.textContent(), /^(replace|inspect|none)/);
+    });
+  });
+
   test(`${which}: without scripts the pages still answer`, async () => {
     const unit = twin(which).units.find(calls);
     await on(index(which), { scripts: false }, async (page) => {

@@ -74,7 +74,8 @@ pub fn compose(
     let units: Vec<UnitView> = now.iter().zip(&drawn).map(unit).collect();
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
     let intervals = inspection_intervals(&now, config.document.trend.inspection_risk);
-    let narrowed = ask.tail_number.is_some() || ask.serial_number.is_some();
+    let narrowed = ask.tail_number.is_some() || ask.serial_number.is_some() || ask.part_number.is_some();
+    attribute_by_path(&mut logs.faults, &tails, installations);
     let wanted = |tail: Option<&str>| !narrowed || tail.is_some_and(|tail| shown.contains(tail));
     logs.faults.retain(|fault| wanted(fault.tail_number.as_deref()));
     add_log_errors(&mut tails, &logs.faults);
@@ -122,8 +123,9 @@ fn by_unit(rows: &[QuantityRow]) -> BTreeMap<Name, Vec<&QuantityRow>> {
 fn scope(ask: &UnitSelection) -> Option<String> {
     let tail = ask.tail_number.as_ref().map(|tail| format!("Tail {tail} only"));
     let serial = ask.serial_number.as_ref().map(|serial| format!("Serial {serial} only"));
-    let both: Vec<String> = tail.into_iter().chain(serial).collect();
-    (!both.is_empty()).then(|| both.join(", "))
+    let part = ask.part_number.as_ref().map(|part| format!("Part {part} only"));
+    let all: Vec<String> = tail.into_iter().chain(serial).chain(part).collect();
+    (!all.is_empty()).then(|| all.join(", "))
 }
 
 /// Logs: number by tail, and those in error.
@@ -494,6 +496,20 @@ fn tails(histories: &Histories) -> BTreeMap<String, Tail> {
     tails.into_iter().map(counted).collect()
 }
 
+/// Attributes logs that could not be read to the tail that their path names, if it names one known tail.
+fn attribute_by_path(faults: &mut [LogError], tails: &BTreeMap<String, Tail>, installations: &Installations) {
+    let installed = installations.iter().map(|i| i.tail_number.as_str());
+    let known: BTreeSet<&str> = tails.keys().map(String::as_str).chain(installed).collect();
+    for fault in faults.iter_mut().filter(|fault| fault.tail_number.is_none()) {
+        let words = fault.log_path.split(|c: char| !c.is_alphanumeric() && c != '-');
+        let words: Vec<&str> = words.flat_map(|word| word.split('-').chain([word])).collect();
+        let mut named = known.iter().filter(|tail| words.contains(tail));
+        if let (Some(tail), None) = (named.next(), named.next()) {
+            fault.tail_number = Some((*tail).to_owned());
+        }
+    }
+}
+
 /// Adds each tail's logs in error, of tails that never had a good one too.
 fn add_log_errors(tails: &mut BTreeMap<String, Tail>, faults: &[LogError]) {
     for name in faults.iter().filter_map(|fault| fault.tail_number.as_deref()) {
@@ -574,4 +590,30 @@ fn inspections(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error> {
         })
     };
     (0..table.len()).map(check).collect::<Result<Vec<_>, Error>>().map(Some)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests may fail loudly")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_in_error_belongs_to_the_one_tail_that_its_path_names() {
+        let tails: BTreeMap<String, Tail> =
+            ["N412FP", "N4", "D-ABCD"].map(|name| (name.to_owned(), empty_tail(name))).into();
+        let of = |path: &str| {
+            let processed_utc = "2026-11-12T00:00:00Z".parse().unwrap();
+            let code = "not_parquet".to_owned();
+            let mut fault = [LogError { log_path: path.to_owned(), tail_number: None, code, processed_utc }];
+            attribute_by_path(&mut fault, &tails, &Installations::default());
+            fault[0].tail_number.clone()
+        };
+        assert_eq!(of("logs/N412FP/20261114.parquet").as_deref(), Some("N412FP"));
+        assert_eq!(of("logs/20261114_N412FP-0330.parquet").as_deref(), Some("N412FP"));
+        assert_eq!(of("logs/D-ABCD_17.parquet").as_deref(), Some("D-ABCD"));
+        // A part of a name, two tails, or none.
+        assert_eq!(of("logs/XN412FP/1.parquet"), None);
+        assert_eq!(of("logs/N412FP/N4.parquet"), None);
+        assert_eq!(of("logs/1.parquet"), None);
+    }
 }
