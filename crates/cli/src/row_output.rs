@@ -57,6 +57,26 @@ pub(crate) fn to_file(
     temporary.persist(file).map(drop).map_err(|e| not_written(file, &e.error))
 }
 
+/// Refuses a file that cannot be written, before a long computation: its folder is missing, or it is a folder.
+pub(crate) fn check_file(file: &std::path::Path) -> Result<(), Failure> {
+    let folder = file.parent().filter(|p| !p.as_os_str().is_empty());
+    let kind = match folder {
+        _ if file.is_dir() => io::ErrorKind::IsADirectory,
+        Some(folder) if !folder.exists() => io::ErrorKind::NotFound,
+        _ => return Ok(()),
+    };
+    Err(not_written(file, &kind.into()))
+}
+
+/// Refuses a file where a folder is to be written.
+pub(crate) fn check_folder(folder: &std::path::Path) -> Result<(), Failure> {
+    if !folder.is_file() {
+        return Ok(());
+    }
+    let what = format!("{} is a file, not a folder", folder.display());
+    Err(Failure::usage("would_overwrite", what, "name a new or an empty folder"))
+}
+
 /// Temporary file with the permissions of the user's umask.
 fn shared() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
@@ -68,6 +88,9 @@ fn shared() -> tempfile::Builder<'static, 'static> {
 fn not_written(file: &std::path::Path, error: &io::Error) -> Failure {
     let (why, hint) = match error.kind() {
         io::ErrorKind::NotFound => ("no such folder".to_owned(), "create the folder first"),
+        io::ErrorKind::IsADirectory => {
+            ("this is a folder, not a file".to_owned(), "name a file, e.g. one in this folder")
+        }
         io::ErrorKind::PermissionDenied => ("permission denied".to_owned(), "choose another folder"),
         io::ErrorKind::StorageFull => ("the disk is full".to_owned(), "free space, or choose another folder"),
         _ => (error.to_string(), "check that the folder is writable"),

@@ -133,7 +133,7 @@ pub enum ErrorKind {
     IdentityChanges { fact: &'static str, column: String, row: u64, found: String, before: String },
     /// A column of a table is not there.
     #[error("the table has no column `{column}`")]
-    TableColumn { column: String, nearest: Option<String> },
+    TableColumn { column: String, nearest: Option<String>, has_semicolons: bool },
     /// A table cannot be used.
     #[error("the table cannot be used: {detail}")]
     Table { row: Option<u64>, column: Option<String>, detail: String },
@@ -277,6 +277,9 @@ impl ErrorKind {
             Self::TableColumn { nearest: Some(near), .. } => {
                 return format!("`{near}`? A table may call its columns otherwise: see `[columns]`");
             }
+            Self::TableColumn { has_semicolons: true, .. } => {
+                "the fields are separated by `;`: save the table with commas, and numbers with a point"
+            }
             Self::TableColumn { .. } => "map the column names under `[columns]` (docs/configuration.md)",
             Self::ColumnMissing { .. } => "names are mapped under `[channel]`, `[clock]` and `[identity]`",
             Self::ColumnType { found, column, .. } if found.starts_with(STRUCT) => {
@@ -326,6 +329,12 @@ impl ErrorKind {
             }
             Self::IdentityInvalid { .. } => "see `identity.departure_format` and `identity.time_zone`",
             Self::IdentityChanges { .. } => "a log must hold one flight: split it by this column",
+            Self::Table { detail, .. } if detail.contains("is not a UTC date") => {
+                "write dates as 2026-11-19, times as 2026-11-19T04:13:00Z"
+            }
+            Self::Table { detail, .. } if detail.contains(',') && detail.ends_with("is not a number") => {
+                "write decimals with a point, such as 1168.5"
+            }
             Self::Table { .. } => "columns and formats are in docs/configuration.md",
         };
         text.into()

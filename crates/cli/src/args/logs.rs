@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ValueEnum};
 
+use super::parse::parse_workers;
 use super::rows::RowFormatArgs;
 
 /// `init`.
@@ -63,7 +64,7 @@ pub(crate) struct NormalizeArgs {
     #[arg(long, value_enum, default_value_t = LogEncoding::Split)]
     pub encoding: LogEncoding,
     /// Use N workers; default: one per core.
-    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, short, value_name = "N", value_parser = parse_workers, allow_negative_numbers = true)]
     pub jobs: Option<u16>,
 }
 
@@ -97,6 +98,6 @@ pub(crate) struct SimulateArgs {
     #[arg(long)]
     pub seed: Option<u64>,
     /// Use N workers; default: one per core.
-    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, short, value_name = "N", value_parser = parse_workers, allow_negative_numbers = true)]
     pub jobs: Option<u16>,
 }

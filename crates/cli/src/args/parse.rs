@@ -13,6 +13,13 @@ pub(super) fn parse_count(text: &str) -> Result<usize, String> {
     }
 }
 
+pub(super) fn parse_workers(text: &str) -> Result<u16, String> {
+    match text.parse() {
+        Ok(0) | Err(_) => Err(format!("`{text}` is not a number of workers from 1 to {}", u16::MAX)),
+        Ok(count) => Ok(count),
+    }
+}
+
 pub(super) fn parse_limit(text: &str) -> Result<f64, String> {
     let limit_m = text.parse().map_err(|_| format!("`{text}` is not a length in metres such as 150e-6"))?;
     job::config::limits::plausible_limit_m(limit_m)
@@ -20,6 +27,6 @@ pub(super) fn parse_limit(text: &str) -> Result<f64, String> {
 
 pub(super) fn parse_span(text: &str) -> Result<std::time::Duration, String> {
     let span: jiff::SignedDuration =
-        text.parse().map_err(|e| format!("`{text}` is not a duration such as 20m or 30h: {e}"))?;
+        text.parse().map_err(|_| format!("`{text}` is not a duration with its unit, such as 20m or 30h"))?;
     span.try_into().map_err(|_| format!("`{text}` is negative"))
 }

@@ -23,7 +23,7 @@ pub(crate) struct QueryArgs {
     #[command(flatten)]
     pub departures: DepartureArgs,
     /// Show only the newest N records.
-    #[arg(long, value_name = "N", value_parser = parse_count, help_heading = "Selection")]
+    #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true, help_heading = "Selection")]
     pub last: Option<usize>,
     /// Only this part number.
     #[arg(long, help_heading = "Selection", add = ArgValueCompleter::new(completion::parts))]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 use clap_complete::ArgValueCompleter;
 
-use super::parse::{parse_count, parse_span};
+use super::parse::{parse_count, parse_span, parse_workers};
 use super::selection::DepartureArgs;
 use crate::completion;
 
@@ -22,10 +22,10 @@ pub(crate) struct RunArgs {
     #[arg(long, help_heading = "Selection", add = ArgValueCompleter::new(completion::serials))]
     pub serial: Option<String>,
     /// Process at most N logs.
-    #[arg(long, value_name = "N", value_parser = parse_count, help_heading = "Selection")]
+    #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true, help_heading = "Selection")]
     pub limit: Option<usize>,
     /// Use N workers; default: one per core.
-    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..), help_heading = "Processing")]
+    #[arg(long, short, value_name = "N", value_parser = parse_workers, allow_negative_numbers = true, help_heading = "Processing")]
     pub jobs: Option<u16>,
     /// Retry failed logs.
     #[arg(long, help_heading = "Processing")]

@@ -32,7 +32,7 @@ pub(crate) enum StoreCommand {
         #[arg(long, value_name = "ID")]
         run: Option<String>,
         /// Show at most N runs.
-        #[arg(long, value_name = "N", value_parser = parse_count, default_value_t = 20)]
+        #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true, default_value_t = 20)]
         last: usize,
         #[command(flatten)]
         rows: RowFormatArgs,

@@ -34,7 +34,8 @@ pub(super) fn missing(file: &Path, wanted: &str, header: &[String]) -> Error {
     // A column with a name of ours keeps its meaning.
     let others = header.iter().filter(|h| !KNOWN.contains(&h.trim()));
     let nearest = nearest(wanted, others.map(String::as_str)).map(str::to_owned);
-    Error::new(file, ErrorKind::TableColumn { column: wanted.to_owned(), nearest })
+    let has_semicolons = matches!(header, [one] if one.contains(';'));
+    Error::new(file, ErrorKind::TableColumn { column: wanted.to_owned(), nearest, has_semicolons })
 }
 
 /// A cell that is not what it should be; rows count from 0 here and from 1 for people.

@@ -89,10 +89,15 @@ impl Config {
                     ErrorKind::NotFound => "no such file".to_owned(),
                     ErrorKind::IsADirectory => "this is a folder, not a file".to_owned(),
                     ErrorKind::InvalidData => "it is no UTF-8 text".to_owned(),
+                    ErrorKind::PermissionDenied => "permission denied".to_owned(),
                     _ => e.to_string(),
                 };
                 let what = format!("the configuration cannot be read: {why}");
-                let hint = "create one with `freeplay init`, or select another with `--config FILE` or FREEPLAY_CONFIG";
+                let hint = match e.kind() {
+                    ErrorKind::InvalidData => "save the file as UTF-8",
+                    ErrorKind::PermissionDenied => "run as a user with read access, or change the file mode",
+                    _ => "create one with `freeplay init`, or select another with `--config FILE` or FREEPLAY_CONFIG",
+                };
                 vec![Diagnostic::new("config_unreadable", what).in_file(&file_name).hint(hint)]
             })?;
             Ok((file_name, text))

@@ -444,7 +444,11 @@ impl SettingsValidator {
     fn required<T>(&mut self, key: &'static [&'static str], value: Option<T>) -> Option<T> {
         if value.is_none() {
             let name = key.join(".");
-            self.report(key, Diagnostic::new("key_missing", format!("the part has no `{name}`")));
+            self.report(
+                key,
+                Diagnostic::new("key_missing", format!("the part has no `{name}`"))
+                    .hint(format!("add a line `{name} = …`, in the unit of the key's name (docs/keys.md)")),
+            );
         }
         value
     }

@@ -31,10 +31,13 @@ fn unknown_value(message: &str) -> Option<Diagnostic> {
 
 fn missing_key(message: &str) -> Option<Diagnostic> {
     let key = message.strip_prefix("missing field `")?.strip_suffix('`')?;
-    Some(
-        Diagnostic::new("bad_toml", format!("`{key}` is missing"))
-            .hint(format!("add a line `{key} = …` here")),
-    )
+    let hint = match key {
+        "logs" => {
+            "add a table `[logs]`, or write a complete configuration with `freeplay init DIR`".to_owned()
+        }
+        _ => format!("add a line `{key} = …` here"),
+    };
+    Some(Diagnostic::new("bad_toml", format!("`{key}` is missing")).hint(hint))
 }
 
 fn other_type(message: &str) -> Option<Diagnostic> {
@@ -46,6 +49,9 @@ fn other_type(message: &str) -> Option<Diagnostic> {
         "struct AlertChannel" => ("a table", Some("name each channel: `[alerts.mail]`")),
         other => (other, None),
     };
+    let is_single = matches!(wanted, "a number" | "text");
+    let hint =
+        if is_single && found == "map" { Some("write a table in single brackets: `[name]`") } else { hint };
     let diagnostic = Diagnostic::new("bad_toml", format!("expected {wanted}, found {found}"));
     Some(match hint {
         Some(hint) => diagnostic.hint(hint),

@@ -302,8 +302,17 @@ fn unreadable(path: &Path, log_path: &str, error: &std::io::Error) -> Diagnostic
 fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
     let patterns = silent.iter().map(|p| format!("`{p}`")).collect::<Vec<_>>().join(", ");
     let folder = if config.folder.as_os_str().is_empty() { Path::new(".") } else { &config.folder };
-    let diagnostic = Diagnostic::new("no_log_matched", format!("no log matches {patterns}"))
-        .hint(format!("patterns are relative to {}; check that the logs are present", folder.display()));
+    // Other files are passed over, so that a broad pattern may match notes and tables too.
+    let others =
+        silent.iter().flat_map(|p| glob::glob(&folder.join(p).to_string_lossy()).into_iter().flatten());
+    let what = match others.flatten().find(|path| path.is_file()) {
+        Some(other) => format!("{patterns} matches no Parquet file, but `{}`", log_path(config, &other)),
+        None => format!("no log matches {patterns}"),
+    };
+    let diagnostic = Diagnostic::new("no_log_matched", what).hint(format!(
+        "patterns are relative to {}; check that the logs are present and end in `.parquet`",
+        folder.display()
+    ));
     config.at(silent.first().copied().unwrap_or_default(), diagnostic)
 }
 

@@ -23,6 +23,7 @@ use crate::commands::results::query::{flags_text, load};
 /// # Errors
 /// If configuration or tables are wrong. Failed logs make the exit code 1.
 pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    [&args.trace, &args.plot].into_iter().flatten().try_for_each(|file| row_output::check_file(file))?;
     let (config, installations) = match &args.part {
         Some(_) => (load_config(global)?, Installations::default()),
         None => load_with_installations(global)?,
@@ -78,7 +79,10 @@ fn configured(config: &Config, number: &str) -> Result<PartNumber, Failure> {
         PartNumber::new(number).map_err(|e| Failure::usage("empty_name", e, &configured_parts(config)))?;
     match part_of(config, &name) {
         Ok(_) => Ok(name),
-        Err(diagnostic) => Err(Failure::Refused(vec![diagnostic])),
+        Err(_) => {
+            let what = format!("part number {number} is not configured");
+            Err(Failure::usage("part_unknown", what, &configured_parts(config)))
+        }
     }
 }
 

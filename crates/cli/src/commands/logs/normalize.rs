@@ -8,6 +8,7 @@ use crate::args::{Global, NormalizeArgs};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::progress::Progress;
+use crate::row_output;
 use crate::table::count;
 
 use crate::commands::context::{display_path, load_with_installations};
@@ -17,6 +18,7 @@ use crate::commands::context::{display_path, load_with_installations};
 /// # Errors
 /// If configuration or tables are wrong. Failed logs make the exit code 1.
 pub(crate) fn normalize(args: &NormalizeArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    row_output::check_folder(&args.output)?;
     let (config, installations) = load_with_installations(global)?;
     let logs: Vec<(LogFiles, String)> = if args.logs.is_empty() {
         discover::discover(&config)?.logs.into_iter().map(|(name, files)| (files, name)).collect()

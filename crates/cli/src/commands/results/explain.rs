@@ -16,7 +16,7 @@ use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
 use crate::table::{self, number, text};
 
-use crate::commands::context::load_with_installations;
+use crate::commands::context::{KnownNames, check_name, load_with_installations};
 
 /// Explains one record.
 ///
@@ -25,7 +25,7 @@ use crate::commands::context::load_with_installations;
 /// makes the exit code 1.
 pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
-    let record = find(args, &Store::open(config.store())?)?;
+    let record = find(args, &Store::open(config.store())?, &config)?;
     let replayed = replay(&record, &config, &installations);
     let digest = config.digest(&record.flight.tail_number, &record.part_number);
     let verdict = ReplayVerdict::of(&record, &replayed, &digest);
@@ -51,7 +51,7 @@ pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> R
     })
 }
 
-fn find(args: &ExplainArgs, store: &Store) -> Result<GapRecord, Failure> {
+fn find(args: &ExplainArgs, store: &Store, config: &Config) -> Result<GapRecord, Failure> {
     let query = Query {
         tail_number: args.tail.clone(),
         flight_id: Some(args.flight.clone()),
@@ -62,7 +62,16 @@ fn find(args: &ExplainArgs, store: &Store) -> Result<GapRecord, Failure> {
     match found.len() {
         1 => Ok(found.remove(0)),
         0 => {
-            let what = format!("no record of {} in flight {}", args.position, args.flight);
+            let known = KnownNames::read(config);
+            check_name("flight", Some(&args.flight), known.flights())?;
+            check_name("position", Some(&args.position), known.positions())?;
+            check_name("tail", args.tail.as_deref(), known.tails())?;
+            let what = format!(
+                "no record of {} in flight {}{}",
+                args.position,
+                args.flight,
+                args.tail.iter().map(|tail| format!(" of tail {tail}")).collect::<String>()
+            );
             let hint = format!("list its records with `freeplay query flight {}`", args.flight);
             Err(Failure::usage("no_such_record", what, &hint))
         }

@@ -10,6 +10,7 @@ use crate::args::{Global, ReportArgs};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::progress::Progress;
+use crate::row_output;
 use crate::table::count;
 
 use crate::commands::context::{KnownNames, VERSION, display_path, load_with_installations, selection};
@@ -19,6 +20,7 @@ use crate::commands::context::{KnownNames, VERSION, display_path, load_with_inst
 /// # Errors
 /// If configuration, tables or store cannot be read, or the folder cannot be written.
 pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    row_output::check_folder(&args.output)?;
     let (config, installations) = load_with_installations(global)?;
     let ask = UnitSelection { statistics: true, ..args.units.selection(args.as_of) };
     let store = Store::open(config.store())?;

@@ -22,6 +22,7 @@ use crate::args::{FailOn, Global, RunArgs, UnitFilterArgs};
 use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
 use crate::progress::{Progress, span};
+use crate::row_output;
 use crate::table::{self, count, number, text};
 
 use crate::commands::context::{KnownNames, VERSION, check_range, load_config};
@@ -39,6 +40,7 @@ const MAX_CHANGES_SHOWN: usize = 20;
 /// If nothing could be run, or the store failed.
 pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     check_range(args.departures.since, args.departures.until)?;
+    args.metrics.as_deref().map_or(Ok(()), row_output::check_file)?;
     let config = load_config(global)?;
     let request = request(args)?;
     if args.tail.is_some() || args.serial.is_some() {

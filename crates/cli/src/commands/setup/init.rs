@@ -20,6 +20,7 @@ use records::sanitize::csv_cell;
 use crate::args::InitArgs;
 use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
+use crate::row_output;
 use crate::table::count;
 
 use crate::commands::context::display_path;
@@ -60,6 +61,7 @@ const NEXT_OF_SAMPLE: &str = "freeplay run && freeplay report --output report &&
 /// # Errors
 /// If one of the files already exists; then nothing is written.
 pub(crate) fn init(args: &InitArgs, output: &Output) -> Result<Code, Failure> {
+    row_output::check_folder(&args.dir)?;
     if args.sample {
         return sample(&args.dir, output);
     }

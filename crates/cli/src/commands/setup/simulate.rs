@@ -6,6 +6,7 @@ use crate::args::SimulateArgs;
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::progress::Progress;
+use crate::row_output;
 use crate::table::count;
 
 use crate::commands::context::display_path;
@@ -15,6 +16,7 @@ use crate::commands::context::display_path;
 /// # Errors
 /// If the spec is invalid, the folder already holds logs, or a file cannot be written.
 pub(crate) fn simulate(args: &SimulateArgs, output: &Output) -> Result<Code, Failure> {
+    row_output::check_folder(&args.output)?;
     let taken = ["logs", "pipeline.toml", "installations.csv"]
         .iter()
         .map(|name| args.output.join(name))
