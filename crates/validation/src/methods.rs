@@ -107,6 +107,7 @@ pub fn part(case: &Case) -> Result<Part, estimator::Error> {
         watch_m: None,
         filters: FilterCache::default(),
         axis: None,
+        quantity_limits: job::config::QuantityLimits::default(),
         output_locked: false,
     })
 }
