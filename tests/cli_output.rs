@@ -469,3 +469,105 @@ fn the_version_has_a_commit_and_features_below_the_line_that_scripts_read() {
     }
     assert_eq!(lines.len(), 4, "{lines:?}");
 }
+
+/// What a planner needs is there at 80 columns, and no line is longer; the reason stands below its row, complete.
+#[test]
+fn tables_fit_80_columns_and_keep_what_matters() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run"]);
+    let at_80 = |args: &[&str]| {
+        let output = fleet.command(args).env("COLUMNS", "80").output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{args:?}");
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(!text.contains('\u{1b}'), "no colour in a pipe: {text}");
+        text
+    };
+    let fits = |text: &str| assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    let trend = at_80(&["trend"]);
+    fits(&trend);
+    let lines: Vec<&str> = trend.lines().collect();
+    for heading in ["state", "tail", "position", "serial", "gap [µm]", "earliest"] {
+        assert!(lines[1].contains(heading), "{heading}: {trend}");
+    }
+    assert!(lines[2].starts_with("▲ plan") && lines[2].contains(" ± "), "most urgent first: {trend}");
+    assert!(lines[3].starts_with("    could reach the limit within"), "{trend}");
+    assert!(trend.contains("hidden: ") && trend.contains("less -S"), "{trend}");
+    let query = at_80(&["query", "tail", "N412FP", "--last", "3"]);
+    fits(&query);
+    assert!(query.contains("gap ± SE [µm]") && query.contains(" ± "), "{query}");
+    let work = at_80(&["work", "list"]);
+    fits(&work);
+    assert!(work.contains("    could reach the limit within"), "{work}");
+    let account = at_80(&["run", "--no-progress"]);
+    assert!(account.lines().any(|line| line.starts_with("    could reach")), "{account}");
+}
+
+/// Colour is an addition on terminals: `always` brings it, `NO_COLOR` and a pipe do not.
+#[test]
+fn states_are_coloured_only_where_colour_is_on() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--tail", "N414FP"]);
+    assert!(fleet.run_ok(&["trend", "--color", "always"]).contains("\u{1b}[36m○ normal\u{1b}[0m"));
+    assert!(!fleet.run_ok(&["trend"]).contains('\u{1b}'));
+    let csv = fleet.run_ok(&["trend", "--color", "always", "--format", "csv"]);
+    assert!(!csv.contains('\u{1b}'), "{csv}");
+}
+
+#[test]
+fn json_lines_hold_the_objects_of_the_json_array() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--limit", "1"]);
+    for args in [&["trend"][..], &["store", "export"], &["store", "runs"], &["check", "--limit", "1"]] {
+        let array = fleet.run_ok(&[args, &["--format", "json"]].concat());
+        let array: Vec<serde_json::Value> = serde_json::from_str(&array).unwrap();
+        let lines = fleet.run_ok(&[args, &["--format", "jsonl"]].concat());
+        let lines: Vec<serde_json::Value> =
+            lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        assert_eq!(lines, array, "{args:?}");
+        assert!(!lines.is_empty(), "{args:?}");
+    }
+}
+
+#[test]
+fn options_are_grouped_and_every_table_of_the_store_has_its_files() {
+    let fleet = TestFleet::sample();
+    let help = fleet.run_ok(&["trend", "--help"]);
+    for heading in ["Selection:", "Output:", "Global options:", "What is shown:"] {
+        assert!(help.contains(&format!("\n{heading}\n")), "{heading}: {help}");
+    }
+    fleet.run_ok(&["run", "--tail", "N414FP"]);
+    for table in ["gaps", "logs", "runs", "work"] {
+        let files = fleet.run_ok(&["store", "files", "--table", table]);
+        assert!(files.lines().count() > 0 && files.contains(table), "{table}: {files}");
+        assert!(files.lines().all(|file| std::path::Path::new(file).exists()), "{table}: {files}");
+    }
+    assert_eq!(fleet.run_ok(&["store", "files", "--table", "alerts"]), "", "no alert is configured");
+}
+
+/// The shell asks the program; names come from the store, and without one there are none and no message.
+#[test]
+fn names_are_completed_from_the_store() {
+    let fleet = TestFleet::sample();
+    let complete = |words: &[&str]| {
+        let mut command = fleet.command(&["--", "freeplay"]);
+        command
+            .args(words)
+            .env("FREEPLAY_COMPLETE", "bash")
+            .env("_CLAP_COMPLETE_INDEX", words.len().to_string());
+        let output = command.env("_CLAP_IFS", "\n").output().unwrap();
+        assert!(output.stderr.is_empty() && output.status.success(), "{words:?}: {output:?}");
+        let text = String::from_utf8(output.stdout).unwrap();
+        text.lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert!(complete(&["trend", "--tail", ""]).is_empty(), "no store, no names");
+    fleet.run_ok(&["run", "--tail", "N412FP", "--limit", "1"]);
+    assert_eq!(complete(&["trend", "--tail", ""]), ["N412FP"]);
+    assert_eq!(complete(&["work", "list", "--part", "EMA-27-104"]), ["EMA-27-1040"]);
+    assert_eq!(complete(&["run", "--serial", "1040-"]), ["1040-0005", "1040-0006"]);
+    assert_eq!(complete(&["explain", "N4"]), ["N412FP-0007"]);
+    assert_eq!(complete(&["explain", "N412FP-0007", "aileron_l"]), ["aileron_left"]);
+    assert_eq!(complete(&["query", "position", "elevator_r"]), ["elevator_right"]);
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert!(fleet.run_ok(&["completions", shell]).contains("FREEPLAY_COMPLETE"), "{shell}");
+    }
+}

@@ -9,4 +9,5 @@ mod fuzz;
 mod harness;
 mod logs;
 mod markdown;
+mod mistakes;
 mod runs;

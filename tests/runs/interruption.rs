@@ -77,6 +77,32 @@ fn an_interrupted_run_exits_with_130_and_the_next_one_finishes() {
     assert_eq!(stored(&fleet), 120);
 }
 
+/// A second interrupt ends the run at once, whatever is in progress.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_is_answered_within_a_second() {
+    let fleet = TestFleet::sample();
+    let mut child = fleet.command(&["run", "--jobs", "1", "--no-progress"]).stdout(null()).spawn().unwrap();
+    let entry = fleet.path("results/gaps/_delta_log/00000000000000000001.json");
+    while !entry.exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let interrupt = |pid: u32| {
+        std::process::Command::new("kill").args(["-INT", &pid.to_string()]).status().unwrap();
+    };
+    let struck = std::time::Instant::now();
+    interrupt(child.id());
+    std::thread::sleep(Duration::from_millis(100));
+    interrupt(child.id());
+    let code = child.wait().unwrap().code();
+    let took = struck.elapsed();
+    print_line(&format!("interrupted: exit {code:?} after {took:?}"));
+    assert_eq!(code, Some(130));
+    assert!(took < Duration::from_secs(1), "{took:?}");
+    fleet.run_ok(&["run"]);
+    assert_eq!(stored(&fleet), 120);
+}
+
 /// Two hundred kills at random instants, run after run on the same store until it is finished, and then
 /// from nothing again. After each, the store opens, holds whole flights, and each of them once.
 #[test]

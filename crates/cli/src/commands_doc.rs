@@ -9,7 +9,10 @@ use crate::args::Args;
 
 const HEAD: &str = "# Every command\n\nWritten from the program's own parser (`FREEPLAY_BLESS=1 cargo test -p cli \
                     commands_doc`), and compared with it by a test.\n`freeplay help COMMAND` prints the same \
-                    text. Results go to stdout, progress and diagnostics to stderr;\n[exit codes](columns.md#exit-codes) are the same everywhere.\n";
+                    text. Results go to stdout, progress and diagnostics to stderr;\n[exit codes](columns.md#exit-codes) are the same everywhere.\n\n\
+                    Keys and columns of JSON, JSON lines, CSV and Parquet are stable: one that scripts rely on \
+                    changes only with a\nline in `CHANGELOG.md`. New ones may be added at any time, so \
+                    ignore what you do not know. Tables and sentences for\npeople may change in every release.\n";
 
 #[test]
 fn the_reference_of_commands_is_what_the_parser_knows() {

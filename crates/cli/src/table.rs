@@ -53,7 +53,7 @@ fn within(columns: &[Column], rows: &[Vec<String>], width: usize) -> String {
     if kept.len() < columns.len() {
         let hidden = (0..columns.len()).filter(|i| !kept.contains(i)).map(|i| columns[i].heading);
         let note = format!(
-            "hidden for width: {}; a wider terminal or --format csv shows all",
+            "hidden: {}; see all in a wider terminal or with `| less -S`",
             hidden.collect::<Vec<_>>().join(", ")
         );
         text.push_str(&wrapped(&note, width));
@@ -165,10 +165,11 @@ fn needed(columns: &[Column], rows: &[Vec<String>], kept: &[usize]) -> usize {
     kept.iter().map(|&i| width(i) + GAP).sum::<usize>().saturating_sub(GAP)
 }
 
-/// Width of the terminal on stdout; unlimited for a pipe.
+/// Width for tables: the environment's `COLUMNS`, the terminal's on stdout, or unlimited for a pipe.
 fn terminal_width() -> usize {
-    let columns = console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
-    columns.unwrap_or(usize::MAX)
+    let stated = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
+    let terminal = || console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
+    stated.filter(|&columns| columns > 0).or_else(terminal).unwrap_or(usize::MAX)
 }
 
 /// Micrometres with one decimal, or a dash.
@@ -228,7 +229,7 @@ mod tests {
             let table = within(&COLUMNS, &rows(), width);
             assert!(table.lines().all(|line| line.chars().count() <= width), "{width}:\n{table}");
             assert!(table.contains("103.25") && table.contains("0.99856") && table.contains("0413.parquet"));
-            assert_eq!(table.lines().count() > 3, table.contains("hidden for width: "), "{table}");
+            assert_eq!(table.lines().count() > 3, table.contains("hidden: "), "{table}");
         }
     }
 
@@ -241,7 +242,7 @@ mod tests {
         assert!(table.lines().all(|line| line.chars().count() <= 50), "{table}");
         let words: Vec<&str> = table.split_whitespace().collect();
         assert!(reason.split(' ').all(|word| words.contains(&word)), "{table}");
-        assert!(table.contains("hidden for width: flights;"), "{table}");
+        assert!(table.contains("hidden: flights;"), "{table}");
     }
 
     #[test]
