@@ -1,4 +1,4 @@
-//! The Python module `freeplay._freeplay`: the command's own rows, through Arrow's C interface.
+//! The Python module `freeplay_ema._freeplay`: the command's own rows, through Arrow's C interface.
 //!
 //! Nothing is computed here. Settings, logs and tables go to the lower layers, whose results become tables and
 //! whose diagnostics become exceptions; work is done without Python's lock.

@@ -9,7 +9,7 @@ use pyo3::types::PyCapsule;
 use crate::arrow_capsule;
 
 /// Rows with named columns. Hand it to pyarrow, Polars, pandas or DuckDB: none of them copies it.
-#[pyclass(frozen, module = "freeplay")]
+#[pyclass(frozen, module = "freeplay_ema")]
 pub(crate) struct Table {
     schema: SchemaRef,
     batches: Vec<RecordBatch>,
@@ -40,7 +40,7 @@ impl Table {
     }
 
     fn __repr__(&self) -> String {
-        format!("<freeplay.Table: {} rows, {} columns>", self.num_rows(), self.schema.fields().len())
+        format!("<freeplay_ema.Table: {} rows, {} columns>", self.num_rows(), self.schema.fields().len())
     }
 
     /// Address of a numeric column's values, to check that nothing was copied.

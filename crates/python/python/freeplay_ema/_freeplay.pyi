@@ -5,7 +5,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from freeplay._arrow import ArrowStream
+from freeplay_ema._arrow import ArrowStream
 
 __version__: str
 

@@ -16,8 +16,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-import freeplay
-from freeplay import ArrowStream, Config, RunError, Settings, _freeplay
+import freeplay_ema as fp
+from freeplay_ema import ArrowStream, Config, RunError, Settings, _freeplay
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -47,7 +47,7 @@ def run(
     Up to ``logs_per_job`` logs make one Spark job, and what they gave is stored before the next begins: a driver that
     dies loses at most that, and the next run does it. The account is that of ``freeplay run --json``.
     """
-    settings = freeplay.load(config)
+    settings = fp.load(config)
     if not settings.files:
         raise ValueError("workers read the configuration themselves: give its file, not a text")
     # Absolute paths mean the same to workers; logs below the configuration keep their short names.
@@ -90,7 +90,7 @@ def _worker(
     def work(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
         import pyarrow as pa
 
-        from freeplay import _freeplay, spark
+        from freeplay_ema import _freeplay, spark
 
         config = spark._same(files, digest)
         for batch in batches:
@@ -103,7 +103,7 @@ def _worker(
 @lru_cache(maxsize=4)
 def _same(files: tuple[str, ...], digest: str) -> Config:
     """The configuration as a worker reads it, which must be the driver's."""
-    config = freeplay.load(files)
+    config = fp.load(files)
     if config.digest() != digest:
         diagnostic = {
             "code": "worker_differs",

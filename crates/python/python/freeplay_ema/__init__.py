@@ -17,10 +17,10 @@ from os import PathLike, fspath
 from os.path import exists
 from typing import Any, TypeAlias, TypeVar
 
-from freeplay import _freeplay
-from freeplay._arrow import ArrowStream
-from freeplay._errors import ConfigError, FreeplayError, LogError, RunError
-from freeplay._freeplay import Config, Table, __version__
+from freeplay_ema import _freeplay
+from freeplay_ema._arrow import ArrowStream
+from freeplay_ema._errors import ConfigError, FreeplayError, LogError, RunError
+from freeplay_ema._freeplay import Config, Table, __version__
 
 __all__ = [
     "ArrowStream",
@@ -53,16 +53,16 @@ _USUAL = "pipeline.toml"
 def load(config: Settings = _USUAL) -> Config:
     """Reads and checks a configuration once, for many calls; keys of later files override earlier ones.
 
-    >>> import freeplay
-    >>> config = freeplay.load("pipeline.toml")
+    >>> import freeplay_ema as fp
+    >>> config = fp.load("pipeline.toml")
     >>> config.parts
     ['EMA-27-1040', 'EMA-27-1060']
 
     Raises :class:`ConfigError` with all its diagnostics:
 
     >>> try:
-    ...     freeplay.load("nowhere.toml")
-    ... except freeplay.ConfigError as error:
+    ...     fp.load("nowhere.toml")
+    ... except fp.ConfigError as error:
     ...     print(error.code, "|", error.help)
     config_unreadable | create one with `freeplay init`, or select another with `--config FILE` or FREEPLAY_CONFIG
     """
@@ -80,9 +80,9 @@ def estimate(
     The rows are those of ``freeplay estimate``: one for each actuator and flight. With ``part`` all are taken for
     that part number, and neither an identity nor the installations table is needed.
 
-    >>> import freeplay, pyarrow as pa
+    >>> import freeplay_ema as fp, pyarrow as pa
     >>> log = "sample-data/logs/N412FP/20260910T130719Z_N412FP-0001.parquet"
-    >>> table = pa.table(freeplay.estimate(log))
+    >>> table = pa.table(fp.estimate(log))
     >>> table.num_rows
     4
     >>> table["position"].to_pylist()
@@ -107,12 +107,12 @@ def estimate_arrays(
     the configuration. Each is anything that speaks Arrow's interface, a numpy array, or a sequence of numbers;
     ``float64`` in one piece is read without copying. NaN and null are missing readings.
 
-    >>> import freeplay, numpy as np, pyarrow as pa
+    >>> import freeplay_ema as fp, numpy as np, pyarrow as pa
     >>> t = np.arange(0, 100, 0.01)
     >>> motor = 0.03 * np.sin(0.25 * t)
     >>> load = 8000 * np.sin(1.1 * t) + 500 * np.sin(5.0 * t)
     >>> dx = load / 5e7 + 50e-6 * np.tanh(load / 300)
-    >>> found = pa.table(freeplay.estimate_arrays(t, motor, motor + dx, load, "EMA-27-1040")).to_pylist()[0]
+    >>> found = pa.table(fp.estimate_arrays(t, motor, motor + dx, load, "EMA-27-1040")).to_pylist()[0]
     >>> found["status"], found["samples"]
     ('estimated', 10000)
     """
@@ -122,9 +122,9 @@ def estimate_arrays(
 def trace(log: Path, config: Settings = _USUAL, *, part: str | None = None) -> Table:
     """What the filter saw of a log, sample by sample: inputs, the backlash ``s_m``, innovation and its variance.
 
-    >>> import freeplay
+    >>> import freeplay_ema as fp
     >>> log = "sample-data/logs/N412FP/20260910T130719Z_N412FP-0001.parquet"
-    >>> freeplay.trace(log).column_names[:4]
+    >>> fp.trace(log).column_names[:4]
     ['log_path', 'position', 'time_s', 'motor_m']
     """
     return _freeplay.trace(fspath(log), load(config), part)
@@ -151,9 +151,9 @@ def trend(
     limit in m for parts without one in the configuration; where no configuration is named and there is no
     ``pipeline.toml``, ``estimates`` are judged by it alone.
 
-    >>> import freeplay, glob, pyarrow as pa
-    >>> estimates = freeplay.estimate(sorted(glob.glob("sample-data/logs/*/*.parquet")))
-    >>> rows = pa.table(freeplay.trend(estimates)).to_pylist()
+    >>> import freeplay_ema as fp, glob, pyarrow as pa
+    >>> estimates = fp.estimate(sorted(glob.glob("sample-data/logs/*/*.parquet")))
+    >>> rows = pa.table(fp.trend(estimates)).to_pylist()
     >>> [row["serial_number"] for row in rows if row["state"] == "plan"]
     ['1040-0009', '1040-0013']
     """
@@ -178,9 +178,9 @@ def records(
 ) -> Table:
     """Stored records that fit, by departure, tail, flight and position.
 
-    >>> import freeplay
-    >>> account = freeplay.run()
-    >>> freeplay.records(tail="N412FP").num_rows
+    >>> import freeplay_ema as fp
+    >>> account = fp.run()
+    >>> fp.records(tail="N412FP").num_rows
     40
     """
     texts = [tail, serial, part, flight, position]
@@ -200,9 +200,9 @@ def normalize(
     ``compatible`` keeps to encodings that every reader knows. Raises :class:`LogError` when a log cannot be used;
     its ``answer`` lists the files of the others.
 
-    >>> import freeplay
+    >>> import freeplay_ema as fp
     >>> log = "sample-data/logs/N412FP/20260910T130719Z_N412FP-0001.parquet"
-    >>> files = freeplay.normalize(log, "normalized")
+    >>> files = fp.normalize(log, "normalized")
     >>> files[0]
     'normalized/N412FP/N412FP-0001/aileron_left.parquet'
     """
@@ -222,8 +222,8 @@ def run(
 
     Logs in error are listed under ``errors`` and raise nothing. ``retry`` does logs in error again, ``redo`` all.
 
-    >>> import freeplay
-    >>> freeplay.run()["found"]
+    >>> import freeplay_ema as fp
+    >>> fp.run()["found"]
     30
     """
     account: dict[str, Any] = json.loads(_freeplay.run(load(config), jobs, redo, retry, wait_s))
