@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import threading
 from datetime import datetime
@@ -36,12 +37,12 @@ def test_estimates_as_a_part_are_the_commands(logs: list[str], command: Command)
 
 def test_a_run_and_its_records_are_the_commands(fleet: Path, command: Command) -> None:
     account = fp.run(fp.load("pipeline.toml").replaced(store="ours"))
-    assert (account["found"], account["estimated"], account["errors"]) == (30, 120, [])
-    command("run")
+    told = json.loads(command("run", "--json").stdout)
+    assert (account.found, account.estimated, account.errors) == (told["found"], told["estimated"], [])
     command("store", "export", "--format", "parquet", "--output", "told.parquet")
     ours = pa.table(fp.records(fp.load().replaced(store="ours")))
     assert differing(ours, pq.read_table("told.parquet"), {"run_id", "processed_utc"}) == []
-    assert "0 new or changed, 30 already processed" in command("run").stdout
+    assert f"0 new or changed, {account.found} already processed" in command("run").stdout
 
 
 def test_trends_are_the_commands_from_store_table_and_queries(fleet: Path, command: Command) -> None:
@@ -171,17 +172,101 @@ def test_other_threads_run_while_an_estimate_is_made(logs: list[str]) -> None:
         thread.join()
 
 
-def test_a_broken_log_is_told_in_the_commands_words_and_the_others_are_answered(
-    logs: list[str], command: Command
-) -> None:
+def test_a_broken_log_of_several_is_an_error_row_in_the_commands_words(logs: list[str], command: Command) -> None:
     Path("torn.parquet").write_bytes(Path(logs[0]).read_bytes()[:1000])
+    found = fp.estimate(["torn.parquet", logs[1]])
+    command("estimate", logs[1], "--format", "parquet", "--output", "told.parquet")
+    assert differing(pa.table(found), pq.read_table("told.parquet")) == []
+    [error] = found.errors.to_arrow().to_pylist()
+    assert (error["log"], error["code"]) == ("torn.parquet", "not_parquet")
+    assert "1 error" in repr(found)
     with pytest.raises(fp.LogError) as caught:
-        fp.estimate(["torn.parquet", logs[1]])
+        fp.estimate(["torn.parquet", logs[1]], raise_on_error=True)
     told = command("estimate", "torn.parquet", logs[1], "--no-progress", code=caught.value.exit_code).stderr
     assert str(caught.value) == told.strip()
-    assert (caught.value.code, caught.value.diagnostics[0]["file"]) == ("not_parquet", "torn.parquet")
-    assert caught.value.help in told
-    assert caught.value.answer.num_rows == 4
+    assert caught.value.code == "not_parquet" and caught.value.diagnostics[0]["file"] == "torn.parquet"
+    assert error["hint"] == caught.value.help and caught.value.help in told
+    assert differing(pa.table(caught.value.answer), pa.table(found)) == []
+
+
+def test_a_single_broken_log_raises_unless_asked_not_to(logs: list[str]) -> None:
+    Path("torn.parquet").write_bytes(Path(logs[0]).read_bytes()[:1000])
+    with pytest.raises(fp.LogError):
+        fp.estimate("torn.parquet")
+    found = fp.estimate("torn.parquet", raise_on_error=False)
+    assert (len(found), len(found.errors)) == (0, 1)
+    sound = fp.estimate(logs[0])
+    assert len(sound.errors) == 0 and sound.raise_errors() is sound
+
+
+def test_results_are_converted_and_shown(logs: list[str]) -> None:
+    found = fp.estimate(logs[0])
+    gaps = pa.table(found)["gap_m"].to_pylist()
+    assert found.to_arrow()["gap_m"].to_pylist() == gaps
+    assert found.to_polars()["gap_m"].to_list() == gaps
+    assert found.to_pandas()["gap_m"].to_list() == gaps
+    assert repr(found).startswith(f"<freeplay_ema.Table: {len(gaps)} rows") and "tail_number" in repr(found)
+    assert found._repr_html_().count("<tr>") == len(gaps) + 1
+    assert "<script>" not in fp.estimate(["<script>.parquet"]).errors._repr_html_()
+
+
+def test_followed_quantities_are_the_commands(fleet: Path, command: Command) -> None:
+    command("run")
+    for option, ours in [("quantities", fp.quantities), ("changes", fp.changes), ("intervals", fp.intervals)]:
+        command("trend", f"--{option}", "--format", "parquet", "--output", f"{option}.parquet")
+        assert differing(pa.table(ours()), pq.read_table(f"{option}.parquet")) == [], option
+    assert len(fp.quantities(tail="N412FP")) < len(fp.quantities())
+
+
+def test_backtest_diff_and_work_are_the_commands(fleet: Path, command: Command) -> None:
+    command("run")
+    command("backtest", "--format", "parquet", "--output", "backtest.parquet")
+    assert differing(pa.table(fp.backtest()), pq.read_table("backtest.parquet")) == []
+    command("work", "list", "--format", "parquet", "--output", "work.parquet")
+    assert differing(pa.table(fp.work()), pq.read_table("work.parquet")) == []
+    fp.run(fp.load().replaced(store="one", logs=["sample-data/logs/N412FP/*.parquet"]))
+    command("diff", "one", "results", "--format", "parquet", "--output", "diff.parquet")
+    ours = pa.table(fp.diff("one", "results"))
+    assert ours.num_rows > 0 and differing(ours, pq.read_table("diff.parquet")) == []
+
+
+def test_an_explanation_is_the_commands(fleet: Path, command: Command) -> None:
+    fp.run()
+    record = fp.records(tail="N412FP", last=1).to_arrow().to_pylist()[0]
+    asked = (record["flight_id"], record["position"])
+    ours = fp.explain(*asked)
+    told = json.loads(command("explain", *asked, "--json").stdout)
+    assert ours.facts == told and (ours.verdict, ours.is_current) == ("same", True)
+    assert ours.record.to_arrow()["gap_m"].to_pylist() == [record["gap_m"]]
+    with pytest.raises(fp.ConfigError) as caught:
+        fp.explain("no flight", "aileron_left")
+    assert caught.value.code == "no_such_record"
+
+
+def test_a_check_is_the_commands(logs: list[str], command: Command) -> None:
+    command("check", *logs, "--format", "parquet", "--output", "check.parquet")
+    assert differing(pa.table(fp.check(logs)), pq.read_table("check.parquet")) == []
+    Path("torn.parquet").write_bytes(Path(logs[0]).read_bytes()[:1000])
+    assert fp.check("torn.parquet").errors.to_arrow()["code"].to_pylist() == ["not_parquet"]
+
+
+def test_a_report_has_the_pages_of_the_command(fleet: Path, command: Command) -> None:
+    command("run")
+    ours = fp.report("ours")
+    command("report", "--output", "told")
+    pages = {str(file.relative_to("told")) for file in Path("told").rglob("*.html")}
+    assert {str(file.relative_to("ours")) for file in Path("ours").rglob("*.html")} == pages
+    assert Path(ours.index).is_file() and ours.files >= len(pages)
+
+
+def test_the_fields_of_a_summary_are_those_of_the_commands_json(fleet: Path, command: Command) -> None:
+    Path("sample-data/logs/N412FP/torn.parquet").write_bytes(b"PAR1")
+    ours = fp.run(fp.load().replaced(store="ours"))
+    told = json.loads(command("run", "--json", code=1).stdout)
+    for name in ["found", "known", "done", "flights", "estimated", "not_reached"]:
+        assert getattr(ours, name) == ours[name] == told[name], name
+    assert [error.code for error in ours.errors] == [error["complaint"]["code"] for error in told["errors"]]
+    assert ours.errors[0].log == told["errors"][0]["log"]
 
 
 def test_a_wrong_configuration_is_told_in_the_commands_words(fleet: Path, command: Command) -> None:

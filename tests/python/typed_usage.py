@@ -14,7 +14,12 @@ trend: fp.Table = fp.trend(found, as_of=datetime(2026, 11, 1, tzinfo=timezone.ut
 again: fp.Table = fp.trend(pa.table(found), fp.load(["a.toml", "b.toml"]), serial="00317")
 files: list[str] = fp.normalize("a.parquet", "normalized")
 try:
-    fp.run(retry=True)
+    summary: fp.RunSummary = fp.run(retry=True)
+    codes: list[str] = [error.code for error in summary.errors]
+    verdict: str = fp.explain("F1", "aileron_left").verdict
+    shown: fp.Table = fp.check(limit=3).errors
+    page: str = fp.report("report").index
+    changed: int = len(fp.diff("a", "b", min_change_m=1e-6)) + fp.work(status="all").num_rows
 except fp.FreeplayError as error:
     code: str | None = error.code
     remedy: str | None = error.help

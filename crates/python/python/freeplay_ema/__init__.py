@@ -10,35 +10,61 @@ The examples start from the folder of the repository, whose ``sample-data`` hold
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from os import PathLike, fspath
-from os.path import exists
-from typing import Any, TypeAlias, TypeVar
+from os.path import exists, join
+from typing import Any, Literal, TypeAlias, TypeVar
 
 from freeplay_ema import _freeplay
 from freeplay_ema._arrow import ArrowStream
 from freeplay_ema._errors import ConfigError, FreeplayError, LogError, RunError
 from freeplay_ema._freeplay import Config, Table, __version__
+from freeplay_ema._results import (
+    DuplicateLog,
+    Explanation,
+    KilledRun,
+    LogFailure,
+    Refusals,
+    ReportFiles,
+    RunSummary,
+    SilentTail,
+)
 
 __all__ = [
     "ArrowStream",
     "Config",
     "ConfigError",
+    "DuplicateLog",
+    "Explanation",
     "FreeplayError",
+    "KilledRun",
     "LogError",
+    "LogFailure",
+    "Refusals",
+    "ReportFiles",
     "RunError",
+    "RunSummary",
+    "SilentTail",
     "Table",
     "__version__",
+    "backtest",
+    "changes",
+    "check",
+    "diff",
     "estimate",
     "estimate_arrays",
+    "explain",
+    "intervals",
     "load",
     "normalize",
+    "quantities",
     "records",
+    "report",
     "run",
     "trace",
     "trend",
+    "work",
 ]
 
 Path: TypeAlias = "str | PathLike[str]"
@@ -73,7 +99,11 @@ def load(config: Settings = _USUAL) -> Config:
 
 
 def estimate(
-    logs: Path | Iterable[Path], config: Settings = _USUAL, *, part: str | None = None
+    logs: Path | Iterable[Path],
+    config: Settings = _USUAL,
+    *,
+    part: str | None = None,
+    raise_on_error: bool | None = None,
 ) -> Table:
     """Estimates the gap of every actuator in a log, or in several; nothing is stored.
 
@@ -90,20 +120,25 @@ def estimate(
     >>> [f"{1e6 * gap:.1f} um" for gap in table["gap_m"].to_pylist()][:2]
     ['93.4 um', '76.3 um']
 
-    Raises :class:`LogError` when a log, or an actuator in it, cannot be used; its ``answer`` is the table of the
-    others.
+    A log, or an actuator in it, that cannot be used is a row of ``Table.errors``. One path alone raises
+    :class:`LogError` instead, with the other rows as its ``answer``; ``raise_on_error`` chooses explicitly.
+
+    >>> found = fp.estimate([log, "nowhere.parquet"])
+    >>> len(found), found.errors.to_arrow()["log"].to_pylist()
+    (4, ['nowhere.parquet'])
     """
-    found, trouble = _freeplay.estimate(_paths(logs), load(config), part)
-    return _or_raise(found, trouble)
+    is_one = isinstance(logs, (str, PathLike))
+    found = _freeplay.estimate(_paths(logs), load(config), part)
+    return found.raise_errors() if (is_one if raise_on_error is None else raise_on_error) else found
 
 
 def estimate_arrays(
-    t: Any, motor: Any, screw: Any, load_n: Any, part: str, config: Settings = _USUAL
+    time_s: Any, motor_m: Any, screw_m: Any, load_n: Any, part: str, config: Settings = _USUAL
 ) -> Table:
     """Estimates the gap of one actuator from arrays: a table of one row.
 
-    ``t`` is time in s from any zero, ``motor`` the motor's position brought to the screw axis in m (angle times
-    lead / 2 pi), ``screw`` the screw's position in m, ``load_n`` the load in N; ``part`` names a part number of
+    ``time_s`` counts from any zero, ``motor_m`` is the motor's position brought to the screw axis in m (angle times
+    lead / 2 pi), ``screw_m`` the screw's position, ``load_n`` the load; ``part`` names a part number of
     the configuration. Each is anything that speaks Arrow's interface, a numpy array, or a sequence of numbers;
     ``float64`` in one piece is read without copying. NaN and null are missing readings.
 
@@ -116,7 +151,7 @@ def estimate_arrays(
     >>> found["status"], found["samples"]
     ('estimated', 10000)
     """
-    return _freeplay.estimate_arrays(t, motor, screw, load_n, part, load(config))
+    return _freeplay.estimate_arrays(time_s, motor_m, screw_m, load_n, part, load(config))
 
 
 def trace(log: Path, config: Settings = _USUAL, *, part: str | None = None) -> Table:
@@ -157,10 +192,7 @@ def trend(
     >>> [row["serial_number"] for row in rows if row["state"] == "plan"]
     ['1040-0009', '1040-0013']
     """
-    is_foreign = estimates is not None and config is _USUAL and not exists(_USUAL)
-    judging = Config.without_logs() if is_foreign else load(config)
-    if limit_m is not None:
-        judging = judging.replaced(limit_m=limit_m)
+    judging = _judging(estimates, config, limit_m)
     return _freeplay.trend(estimates, judging, tail, serial, part, _text(as_of), queries, statistics)
 
 
@@ -179,9 +211,9 @@ def records(
     """Stored records that fit, by departure, tail, flight and position.
 
     >>> import freeplay_ema as fp
-    >>> account = fp.run()
-    >>> fp.records(tail="N412FP").num_rows
-    40
+    >>> summary = fp.run()
+    >>> set(fp.records(tail="N412FP").to_arrow()["tail_number"].to_pylist())
+    {'N412FP'}
     """
     texts = [tail, serial, part, flight, position]
     return _freeplay.records(load(config), texts, _text(since), _text(until), last)
@@ -217,17 +249,115 @@ def run(
     redo: bool = False,
     retry: bool = False,
     wait_s: float | None = None,
-) -> dict[str, Any]:
-    """The nightly run on this machine, and its account: that of ``freeplay run --json``.
+) -> RunSummary:
+    """The nightly run on this machine, and its summary: that of ``freeplay run --json``, with fields.
 
-    Logs in error are listed under ``errors`` and raise nothing. ``retry`` does logs in error again, ``redo`` all.
+    Failed logs are listed under ``errors`` and raise nothing. ``retry`` processes failed logs again, ``redo`` all.
 
     >>> import freeplay_ema as fp
-    >>> fp.run()["found"]
-    30
+    >>> summary = fp.run()
+    >>> summary.found == summary.known + summary.done
+    True
     """
-    account: dict[str, Any] = json.loads(_freeplay.run(load(config), jobs, redo, retry, wait_s))
-    return account
+    return RunSummary.from_json(_freeplay.run(load(config), jobs, redo, retry, wait_s))
+
+
+def quantities(
+    config: Settings = _USUAL,
+    *,
+    tail: str | None = None,
+    serial: str | None = None,
+    part: str | None = None,
+    as_of: Instant | None = None,
+) -> Table:
+    """Every followed quantity of the units of the store: stiffness, friction, delays, load zero, lost motion, NIS.
+
+    The rows are those of ``freeplay trend --quantities``.
+    """
+    return _freeplay.quantities(load(config), [tail, serial, part], _text(as_of))
+
+
+def changes(
+    config: Settings = _USUAL,
+    *,
+    tail: str | None = None,
+    serial: str | None = None,
+    part: str | None = None,
+    as_of: Instant | None = None,
+) -> Table:
+    """What changed on units, tails and parts, with the evidence: the rows of ``freeplay trend --changes``."""
+    return _freeplay.changes(load(config), [tail, serial, part], _text(as_of))
+
+
+def intervals(
+    config: Settings = _USUAL,
+    *,
+    tail: str | None = None,
+    serial: str | None = None,
+    part: str | None = None,
+    as_of: Instant | None = None,
+) -> Table:
+    """Chance of meeting the limit before the next inspection, by part and interval: ``freeplay trend --intervals``."""
+    return _freeplay.intervals(load(config), [tail, serial, part], _text(as_of))
+
+
+def backtest(
+    estimates: ArrowStream | None = None, config: Settings = _USUAL, *, limit_m: float | None = None
+) -> Table:
+    """Past forecasts against later measurements, one row each: the rows of ``freeplay backtest --json``."""
+    return _freeplay.backtest_forecasts(estimates, _judging(estimates, config, limit_m))
+
+
+def diff(before: Path, after: Path, *, min_change_m: float = 0.0) -> Table:
+    """Actuator-flights whose results differ between two stores; smaller changes of a gap are left out."""
+    return _freeplay.diff(fspath(before), fspath(after), min_change_m)
+
+
+def explain(flight: str, position: str, config: Settings = _USUAL, *, tail: str | None = None) -> Explanation:
+    """One stored estimate with its settings, recomputed from its log."""
+    text, record = _freeplay.explain(load(config), flight, position, tail)
+    return Explanation.from_json(text, record)
+
+
+def report(
+    output: Path,
+    config: Settings = _USUAL,
+    *,
+    tail: str | None = None,
+    serial: str | None = None,
+    as_of: Instant | None = None,
+) -> ReportFiles:
+    """Writes the HTML report into a folder and returns what was written; begin at ``index``."""
+    files, size_bytes = _freeplay.report(load(config), fspath(output), [tail, serial, None], _text(as_of))
+    return ReportFiles(join(fspath(output), "index.html"), files, size_bytes)
+
+
+def work(
+    config: Settings = _USUAL,
+    *,
+    status: Literal["open", "acknowledged", "deferred", "closed", "all"] | None = None,
+    tail: str | None = None,
+    serial: str | None = None,
+    part: str | None = None,
+) -> Table:
+    """Work requests by urgency, without closed ones unless asked: the rows of ``freeplay work list``."""
+    return _freeplay.work(load(config), status, [tail, serial, part])
+
+
+def check(
+    logs: Path | Iterable[Path] | None = None, config: Settings = _USUAL, *, limit: int = 20
+) -> Table:
+    """How logs are mapped, channel by channel, and what would be refused; nothing is estimated or stored.
+
+    Without ``logs`` the first ``limit`` of the configuration are checked. Failed logs are rows of ``Table.errors``.
+    """
+    return _freeplay.check(None if logs is None else _paths(logs), load(config), limit)
+
+
+def _judging(estimates: ArrowStream | None, config: Settings, limit_m: float | None) -> Config:
+    is_foreign = estimates is not None and config is _USUAL and not exists(_USUAL)
+    judging = Config.without_logs() if is_foreign else load(config)
+    return judging if limit_m is None else judging.replaced(limit_m=limit_m)
 
 
 def _paths(logs: Path | Iterable[Path]) -> list[str]:

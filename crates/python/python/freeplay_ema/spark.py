@@ -14,10 +14,10 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import freeplay_ema as fp
-from freeplay_ema import ArrowStream, Config, RunError, Settings, _freeplay
+from freeplay_ema import ArrowStream, Config, RunError, RunSummary, Settings, _freeplay
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -37,7 +37,7 @@ def run(
     redo: bool = False,
     retry: bool = False,
     wait_s: float | None = None,
-) -> dict[str, Any]:
+) -> RunSummary:
     """Does every log that is not accounted for yet, one task for each, and stores what comes of it.
 
     ``logs`` are patterns that take the place of ``[logs] files``, ``output`` is the store and takes the place of
@@ -45,7 +45,7 @@ def run(
     readable on driver and workers under the same paths; workers refuse a configuration that differs.
 
     Up to ``logs_per_job`` logs make one Spark job, and what they gave is stored before the next begins: a driver that
-    dies loses at most that, and the next run does it. The account is that of ``freeplay run --json``.
+    dies loses at most that, and the next run does it. The summary is that of ``freeplay run --json``.
     """
     settings = fp.load(config)
     if not settings.files:
@@ -54,10 +54,8 @@ def run(
     settings = Config(settings.files)
     settings = settings.replaced(_patterns(logs), None if output is None else os.path.abspath(output))
     engine = _engine(spark, settings)
-    account: dict[str, Any] = json.loads(
-        _freeplay.run_distributed(settings, engine, logs_per_job, redo, retry, wait_s)
-    )
-    return account
+    summary = _freeplay.run_distributed(settings, engine, logs_per_job, redo, retry, wait_s)
+    return RunSummary.from_json(summary)
 
 
 def _patterns(
