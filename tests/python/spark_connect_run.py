@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import sys
 
-import freeplay.spark
+import freeplay_ema as fp
+import freeplay_ema.spark
 from pysail.spark import SparkConnectServer
 from pyspark.sql import SparkSession
 
 server = SparkConnectServer()
 server.start()
 spark = SparkSession.builder.remote(f"sc://localhost:{server.listening_address[1]}").getOrCreate()
-account = freeplay.spark.run(spark, None, "pipeline.toml", sys.argv[1], logs_per_job=20)
+account = fp.spark.run(spark, None, "pipeline.toml", sys.argv[1], logs_per_job=20)
 spark.stop()
 server.stop()
 print(account["done"], account["estimated"], len(account["errors"]), account["not_reached"])

@@ -15,8 +15,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import freeplay
-import freeplay.spark
+import freeplay_ema as fp
+import freeplay_ema as fp
+import freeplay_ema.spark
 import pyarrow.parquet as pq
 import pyspark
 import pytest
@@ -105,7 +106,7 @@ def test_a_run_on_spark_with_a_worker_killed_is_that_of_one_machine(
     seen: dict[str, int] = {}
     killer = threading.Thread(target=kill_in_the_middle, args=(spark, cluster[0], seen), daemon=True)
     killer.start()
-    account = freeplay.spark.run(spark, None, "pipeline.toml")
+    account = fp.spark.run(spark, None, "pipeline.toml")
     killer.join(timeout=60)
     print(f"a worker was killed after {seen['done']} of {seen['of']} tasks")
     assert seen["done"] < seen["of"] - 2 and cluster[0].wait(timeout=10) == -signal.SIGKILL
@@ -125,9 +126,9 @@ def test_spark_goes_on_where_the_command_left_off(
     spark: SparkSession, one_machine: Path, command: Command
 ) -> None:
     command("run", "--tail", "N412FP", code=1)
-    account = freeplay.spark.run(spark, None, "pipeline.toml")
+    account = fp.spark.run(spark, None, "pipeline.toml")
     assert (account["known"], account["done"], account["errors"]) == (11, 20, [])
-    again = freeplay.spark.run(
+    again = fp.spark.run(
         spark, "sample-data/logs/**/*.parquet", "pipeline.toml", "results", logs_per_job=7, redo=True
     )
     assert (again["done"], again["estimated"]) == (31, 120)
@@ -138,6 +139,6 @@ def test_spark_goes_on_where_the_command_left_off(
 
 def test_a_worker_with_other_settings_is_refused(spark: SparkSession, fleet: Path) -> None:
     files, task = (str(fleet / "pipeline.toml"),), ["{}"]
-    work = freeplay.spark._worker(files, "of another configuration", task)
+    work = fp.spark._worker(files, "of another configuration", task)
     with pytest.raises(Exception, match="worker_differs"):
-        spark.range(0, 1, 1, 1).mapInArrow(work, freeplay.spark._spark_schema()).collect()
+        spark.range(0, 1, 1, 1).mapInArrow(work, fp.spark._spark_schema()).collect()

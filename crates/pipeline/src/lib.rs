@@ -4,9 +4,11 @@
 //! This crate alone uses rayon. It prints nothing: it reports [`Event`]s and returns a [`RunSummary`]. Results depend
 //! neither on the number of workers nor on the order in which they finish.
 
+pub mod check;
 pub mod discovery;
 mod error;
 pub mod estimate;
+pub mod explain;
 pub mod fleet_trends;
 pub mod follow_up;
 pub mod history;
@@ -16,6 +18,7 @@ pub mod quantities;
 pub mod report;
 pub mod run;
 pub mod simulate;
+pub mod store_diff;
 pub mod time_limit;
 
 pub use error::Error;

@@ -12,7 +12,7 @@ use crate::VERSION;
 use crate::error::{ExceptionClass, to_exception, to_run_exception};
 
 /// A checked configuration. Keys of later files override those of earlier ones, as with `--config A --config B`.
-#[pyclass(frozen, module = "freeplay")]
+#[pyclass(frozen, module = "freeplay_ema")]
 pub(crate) struct Config {
     pub(crate) inner: job::Config,
     files: Vec<PathBuf>,

@@ -24,12 +24,12 @@ impl ExceptionClass {
     }
 }
 
-/// An exception of `freeplay._errors` that carries diagnostics.
+/// An exception of `freeplay_ema._errors` that carries diagnostics.
 pub(crate) fn to_exception(py: Python<'_>, class: ExceptionClass, diagnostics: &[Diagnostic]) -> PyErr {
     let make = || -> PyResult<PyErr> {
         let texts: Vec<String> = diagnostics.iter().map(ToString::to_string).collect();
         let facts = serde_json::to_string(diagnostics).unwrap_or_default();
-        let class = py.import("freeplay._errors")?.getattr(class.name())?;
+        let class = py.import("freeplay_ema._errors")?.getattr(class.name())?;
         Ok(PyErr::from_value(class.call1((texts.join("\n"), facts))?))
     };
     make().unwrap_or_else(|error| error)

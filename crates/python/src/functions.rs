@@ -26,27 +26,18 @@ use crate::error::{ExceptionClass, config_error, to_exception, to_run_exception}
 use crate::numpy_input::numbers;
 use crate::table::Table;
 
-/// A table, and what was wrong with some of the logs: an exception to be to_exception, or none.
-type PartialResult = (Table, Option<Py<PyAny>>);
-
-fn partial_result(py: Python<'_>, batch: RecordBatch, diagnostics: &[Diagnostic]) -> PartialResult {
-    let trouble = (!diagnostics.is_empty())
-        .then(|| to_exception(py, ExceptionClass::Log, diagnostics).into_value(py).into_any());
-    (Table::of(batch), trouble)
-}
-
 fn part(py: Python<'_>, config: &Config, number: &str) -> PyResult<PartNumber> {
     let named = PartNumber::new(number).map_err(|e| config_error(py, Diagnostic::new("empty_name", e)))?;
     job::flight_log::part_of(&config.inner, &named).map_err(|diagnostic| config_error(py, diagnostic))?;
     Ok(named)
 }
 
-fn instant(py: Python<'_>, text: Option<&str>) -> PyResult<Option<jiff::Timestamp>> {
+pub(crate) fn instant(py: Python<'_>, text: Option<&str>) -> PyResult<Option<jiff::Timestamp>> {
     let read = text.map(ingest::tables::utc).transpose();
     read.map_err(|what| config_error(py, Diagnostic::new("bad_time", what)))
 }
 
-/// Estimates logs: as installed, or all as one part.
+/// Estimates logs: as installed, or all as one part. Errors of logs are in `Table.errors`.
 #[pyfunction]
 #[pyo3(signature = (logs, config, part_number=None))]
 pub(crate) fn estimate(
@@ -54,7 +45,7 @@ pub(crate) fn estimate(
     logs: Vec<PathBuf>,
     config: &Config,
     part_number: Option<&str>,
-) -> PyResult<PartialResult> {
+) -> PyResult<Table> {
     let no_installations = Installations::default();
     let number = part_number.map(|number| part(py, config, number)).transpose()?;
     let installations = if number.is_some() { &no_installations } else { config.installations(py)? };
@@ -68,7 +59,7 @@ pub(crate) fn estimate(
         found.extend(read.map_err(|error| to_run_exception(py, error))?);
     }
     let batch = to_nullable_batch(&found).map_err(|e| to_run_exception(py, e.into()))?;
-    Ok(partial_result(py, batch, &diagnostics))
+    Ok(Table::with_errors(batch, diagnostics))
 }
 
 /// Estimates channels held in memory.
@@ -172,7 +163,7 @@ fn assess(
 }
 
 /// The rows of a table from memory, counted through.
-fn chunks(batches: Vec<RecordBatch>) -> Vec<TableBatch> {
+pub(crate) fn chunks(batches: Vec<RecordBatch>) -> Vec<TableBatch> {
     let mut before = 0;
     let chunk = |batch: RecordBatch| {
         let rows = batch.num_rows();

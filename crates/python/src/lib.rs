@@ -1,4 +1,4 @@
-//! The Python module `freeplay._freeplay`: the command's own rows, through Arrow's C interface.
+//! The Python module `freeplay_ema._freeplay`: the command's own rows, through Arrow's C interface.
 //!
 //! Nothing is computed here. Settings, logs and tables go to the lower layers, whose results become tables and
 //! whose diagnostics become exceptions; work is done without Python's lock.
@@ -9,6 +9,7 @@ mod error;
 mod functions;
 mod numpy_input;
 mod spark_worker;
+mod store_results;
 mod table;
 
 use pyo3::prelude::*;
@@ -28,6 +29,15 @@ fn _freeplay(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(functions::records, module)?)?;
     module.add_function(wrap_pyfunction!(functions::normalize, module)?)?;
     module.add_function(wrap_pyfunction!(functions::run, module)?)?;
+    module.add_function(wrap_pyfunction!(store_results::quantities, module)?)?;
+    module.add_function(wrap_pyfunction!(store_results::changes, module)?)?;
+    module.add_function(wrap_pyfunction!(store_results::intervals, module)?)?;
+    module.add_function(wrap_pyfunction!(store_results::backtest_forecasts, module)?)?;
+    module.add_function(wrap_pyfunction!(store_results::diff, module)?)?;
+    module.add_function(wrap_pyfunction!(store_results::explain, module)?)?;
+    module.add_function(wrap_pyfunction!(store_results::report, module)?)?;
+    module.add_function(wrap_pyfunction!(store_results::work, module)?)?;
+    module.add_function(wrap_pyfunction!(store_results::check, module)?)?;
     module.add_function(wrap_pyfunction!(numpy_input::data_pointer, module)?)?;
     module.add_function(wrap_pyfunction!(spark_worker::process_task, module)?)?;
     module.add_function(wrap_pyfunction!(spark_worker::empty_result, module)?)?;

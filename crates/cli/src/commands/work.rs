@@ -2,13 +2,13 @@
 
 use std::time::Duration;
 
+use clap::ValueEnum as _;
 use jiff::Timestamp;
-use pipeline::follow_up::work_requests::{self, Decision};
+use pipeline::follow_up::work_requests::{self, Decision, WorkSelection};
 use records::{WorkEventKind, WorkRequest};
-use report::StateBadge;
 use store::{Holder, Store};
 
-use crate::args::{Global, WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs, WorkStatus};
+use crate::args::{Global, WorkArgs, WorkCommand, WorkDecisionArgs, WorkListArgs};
 use crate::commands::context::{KnownNames, load_config};
 use crate::exit::{Code, Failure};
 use crate::output::{Output, escape};
@@ -71,33 +71,21 @@ fn decide(
 }
 
 fn list(config: &job::Config, store: &Store, args: &WorkListArgs, output: &Output) -> Result<Code, Failure> {
-    let mut found = work_requests::requests(&store.work_events()?, Timestamp::now());
-    found.retain(|request| is_selected(request, args));
+    let selection = WorkSelection {
+        status: args.status.and_then(|status| Some(status.to_possible_value()?.get_name().to_owned())),
+        tail_number: args.units.tail.clone(),
+        serial_number: args.units.serial.clone(),
+        part_number: args.units.part.clone(),
+    };
+    let found = work_requests::work_list(&store.work_events()?, &selection, Timestamp::now());
     if found.is_empty()
         && [&args.units.tail, &args.units.serial, &args.units.part].iter().any(|name| name.is_some())
     {
         let known = KnownNames::read(config);
         known.check_units(&args.units)?;
     }
-    let urgency = |request: &WorkRequest| StateBadge::from_state(request.state.as_deref()).rank();
-    found.sort_by_key(|request| (!request.is_open(), urgency(request), request.opened_utc));
     row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found))?;
     Ok(Code::Success)
-}
-
-fn is_selected(request: &WorkRequest, args: &WorkListArgs) -> bool {
-    let is_wanted = match args.status {
-        None => request.is_open(),
-        Some(WorkStatus::All) => true,
-        Some(WorkStatus::Open) => request.status == "open",
-        Some(WorkStatus::Acknowledged) => request.status == "acknowledged",
-        Some(WorkStatus::Deferred) => request.status == "deferred",
-        Some(WorkStatus::Closed) => request.status == "closed",
-    };
-    is_wanted
-        && (args.units.tail.is_none() || args.units.tail == request.tail_number)
-        && args.units.serial.as_ref().is_none_or(|serial| *serial == request.serial_number)
-        && (args.units.part.is_none() || args.units.part == request.part_number)
 }
 
 fn page(found: &[WorkRequest]) -> String {

@@ -18,6 +18,7 @@ use super::layers::Source;
 use super::validate_channels;
 use crate::config::limits::{bounded, positive};
 use crate::config::part::{PartSettings, WearAxis};
+use crate::config::quantity_limits::QuantityLimits;
 
 /// The whole file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -241,63 +242,6 @@ pub struct TrendSettings {
     pub limit_m: Option<f64>,
     /// Changes of the other followed quantities from which there is a state.
     pub quantity_limits: QuantityLimits,
-}
-
-/// `[trend.quantity_limits]`, and `[part."…".quantity_limits]` for one part: changes since a unit's first flights from
-/// which a followed quantity has a state.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct QuantityLimits {
-    /// Stiffness, as a share of the unit's own. Default 0.05.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stiffness_share: Option<f64>,
-    /// Friction at the unit's usual load, as a share of its own. Default 0.1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub friction_share: Option<f64>,
-    /// Lost motion at the reference load, as a share of the unit's own. Default 0.25.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub lost_motion_share: Option<f64>,
-    /// Delay between the positions, s. Default 0.0005.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub delay_s: Option<f64>,
-    /// Load zero, as a share of the unit's usual 95 % load. Default 0.02.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub load_zero_share: Option<f64>,
-    /// Delay of the load, s. Default 0.001.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub load_delay_s: Option<f64>,
-    /// Mean NIS, as a share of the unit's own. Default 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub nis_share: Option<f64>,
-}
-
-impl QuantityLimits {
-    /// The keys below the table that holds the limits, and their values.
-    pub(crate) fn entries(&self) -> [(&'static [&'static str], Option<f64>); 7] {
-        [
-            (&["quantity_limits", "stiffness_share"], self.stiffness_share),
-            (&["quantity_limits", "friction_share"], self.friction_share),
-            (&["quantity_limits", "lost_motion_share"], self.lost_motion_share),
-            (&["quantity_limits", "delay_s"], self.delay_s),
-            (&["quantity_limits", "load_zero_share"], self.load_zero_share),
-            (&["quantity_limits", "load_delay_s"], self.load_delay_s),
-            (&["quantity_limits", "nis_share"], self.nis_share),
-        ]
-    }
-
-    /// These limits, and others where a key is not given.
-    #[must_use]
-    pub fn or(self, other: Self) -> Self {
-        Self {
-            stiffness_share: self.stiffness_share.or(other.stiffness_share),
-            friction_share: self.friction_share.or(other.friction_share),
-            lost_motion_share: self.lost_motion_share.or(other.lost_motion_share),
-            delay_s: self.delay_s.or(other.delay_s),
-            load_zero_share: self.load_zero_share.or(other.load_zero_share),
-            load_delay_s: self.load_delay_s.or(other.load_delay_s),
-            nis_share: self.nis_share.or(other.nis_share),
-        }
-    }
 }
 
 impl Default for TrendSettings {

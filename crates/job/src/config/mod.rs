@@ -6,6 +6,7 @@ mod layers;
 pub mod limits;
 mod overrides;
 pub mod part;
+mod quantity_limits;
 mod toml_errors;
 mod unknown_keys;
 mod validate_channels;
@@ -21,11 +22,11 @@ use serde::Serialize;
 
 pub use alerts::AlertChannel;
 pub use document::{
-    Document, EstimateSettings, LogSettings, Method, Override, QuantityLimits, StoreSettings, TableNames,
-    TrendSettings,
+    Document, EstimateSettings, LogSettings, Method, Override, StoreSettings, TableNames, TrendSettings,
 };
 use layers::{ConfigLayer, Source};
 use overrides::Overrides;
+pub use quantity_limits::QuantityLimits;
 
 use crate::METHOD_VERSION;
 use crate::config::part::Part;

@@ -7,8 +7,8 @@ use records::Diagnostic;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::document::QuantityLimits;
 use crate::config::limits::{bounded, implausible};
+use crate::config::quantity_limits::QuantityLimits;
 use crate::filter_cache::FilterCache;
 
 /// How a part moves.

@@ -2,14 +2,12 @@
 
 use std::fmt::Write as _;
 
-use ingest::{ActuatorChannels, LogFiles};
-use job::flight_log::{FlightLog, catch_panic};
-use job::{Config, estimate};
-use pipeline::run::discover;
+use ingest::ActuatorChannels;
+use job::Config;
+use pipeline::explain::{Explanation, Recomputation, RecordKey, remedy};
 use records::uncertainty::NORMAL_95;
-use records::{Diagnostic, GapRecord};
-use serde_json::{Value, json};
-use store::{Query, Store};
+use serde_json::Value;
+use store::Store;
 
 use crate::args::{ExplainArgs, Global};
 use crate::exit::{Code, Failure};
@@ -25,153 +23,35 @@ use crate::commands::context::{KnownNames, check_name, load_with_installations};
 /// makes the exit code 1.
 pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     let (config, installations) = load_with_installations(global)?;
-    let record = find(args, &Store::open(config.store())?, &config)?;
-    let replayed = replay(&record, &config, &installations);
-    let digest = config.digest(&record.flight.tail_number, &record.part_number);
-    let verdict = ReplayVerdict::of(&record, &replayed, &digest);
-    let settings = config.document.part.get(record.part_number.as_str());
-    if args.json {
-        let value = json!({
-            "record": record,
-            "remedy": super::query::remedy(&record.estimate),
-            "settings": { "part": settings, "config_digest": &*digest, "is_current": *digest == *record.provenance.config_digest },
-            "replay": { "verdict": verdict.code(), "says": verdict.to_string() },
-        });
-        output.write_exact(&format!("{value:#}\n"))?;
-    } else {
-        output.write_result(&page(&record, &config, &replayed, &verdict))?;
-    }
-    if let Err(diagnostic) = &replayed {
-        output.diagnostic(diagnostic);
-    }
-    Ok(if matches!(verdict, ReplayVerdict::Same | ReplayVerdict::OtherSettings) {
-        Code::Success
-    } else {
-        Code::LogsInError
-    })
-}
-
-fn find(args: &ExplainArgs, store: &Store, config: &Config) -> Result<GapRecord, Failure> {
-    let query = Query {
+    let key = RecordKey {
+        flight_id: args.flight.clone(),
+        position: args.position.clone(),
         tail_number: args.tail.clone(),
-        flight_id: Some(args.flight.clone()),
-        position: Some(args.position.clone()),
-        ..Query::default()
     };
-    let mut found = store.records(&query)?;
-    match found.len() {
-        1 => Ok(found.remove(0)),
-        0 => {
-            let known = KnownNames::read(config);
+    let store = Store::open(config.store())?;
+    let found = match pipeline::explain::explain(&config, &installations, &store, &key) {
+        Ok(found) => found,
+        Err(error) => {
+            let known = KnownNames::read(&config);
             check_name("flight", Some(&args.flight), known.flights())?;
             check_name("position", Some(&args.position), known.positions())?;
             check_name("tail", args.tail.as_deref(), known.tails())?;
-            let what = format!(
-                "no record of {} in flight {}{}",
-                args.position,
-                args.flight,
-                args.tail.iter().map(|tail| format!(" of tail {tail}")).collect::<String>()
-            );
-            let hint = format!("list its records with `freeplay query flight {}`", args.flight);
-            Err(Failure::usage("no_such_record", what, &hint))
+            return Err(error.into());
         }
-        _ => {
-            let tails: Vec<String> = found.iter().map(|r| r.flight.tail_number.to_string()).collect();
-            let what = format!("flight {} exists for several tails: {}", args.flight, tails.join(", "));
-            Err(Failure::usage("no_such_record", what, "select one with `--tail`"))
-        }
+    };
+    if args.json {
+        output.write_exact(&format!("{:#}\n", found.to_json(&config)))?;
+    } else {
+        output.write_result(&page(&found, &config))?;
     }
-}
-
-/// Result of recomputing a record.
-struct Recomputation {
-    digest: String,
-    channels: Option<ActuatorChannels>,
-    estimate: records::GapEstimate,
-}
-
-fn replay(
-    record: &GapRecord,
-    config: &Config,
-    installations: &records::Installations,
-) -> Result<Recomputation, Diagnostic> {
-    let log_path = &record.provenance.log_path;
-    let path = config.path(log_path);
-    let files = discover::log_containing(config, &path).unwrap_or_else(|_| LogFiles::one(path));
-    catch_panic(log_path, || {
-        let opened = FlightLog::open(&files, log_path, config, installations)?;
-        let at = opened.positions.iter().find(|at| at.position == record.position).ok_or_else(|| {
-            Diagnostic::new("no_position", format!("the log has no position {} any more", record.position))
-                .in_file(log_path)
-        })?;
-        let (_, part) = opened.unit(at, config, installations)?;
-        if !at.lacking.is_empty() {
-            let estimate = opened.estimate(at, part, config)?;
-            return Ok(Recomputation { digest: opened.digest.clone(), channels: None, estimate });
-        }
-        let channels = opened.channels(at, part)?;
-        let estimate = estimate::estimate(&channels, part, &config.document.estimate)?;
-        Ok(Recomputation { digest: opened.digest.clone(), channels: Some(channels), estimate })
-    })
-}
-
-/// Whether a record is reproduced.
-enum ReplayVerdict {
-    Same,
-    OtherSettings,
-    OtherLog,
-    OtherNumber,
-    NotReplayed,
-}
-
-impl ReplayVerdict {
-    fn of(record: &GapRecord, replayed: &Result<Recomputation, Diagnostic>, digest: &str) -> Self {
-        let Ok(replayed) = replayed else { return Self::NotReplayed };
-        if replayed.digest != record.provenance.log_digest {
-            Self::OtherLog
-        } else if digest != record.provenance.config_digest {
-            Self::OtherSettings
-        } else if in_bits(&replayed.estimate) == in_bits(&record.estimate) {
-            Self::Same
-        } else {
-            Self::OtherNumber
-        }
+    if let Err(diagnostic) = &found.replayed {
+        output.diagnostic(diagnostic);
     }
-
-    fn code(&self) -> &'static str {
-        match self {
-            Self::Same => "same",
-            Self::OtherSettings => "other_settings",
-            Self::OtherLog => "other_log",
-            Self::OtherNumber => "other_number",
-            Self::NotReplayed => "not_replayed",
-        }
-    }
+    Ok(if found.is_sound() { Code::Success } else { Code::LogsInError })
 }
 
-impl std::fmt::Display for ReplayVerdict {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Same => "recomputed: bit-identical",
-            Self::OtherSettings => "settings changed since; `freeplay run` will recompute it",
-            Self::OtherLog => "the log changed since; `freeplay run` will recompute it",
-            Self::OtherNumber => "recomputed value differs: please report this with the log",
-            Self::NotReplayed => "the log can no longer be read",
-        })
-    }
-}
-
-/// JSON form of an estimate, for bitwise comparison: numbers are written so that they read back unchanged.
-fn in_bits(estimate: &records::GapEstimate) -> Value {
-    serde_json::to_value(estimate).unwrap_or_default()
-}
-
-fn page(
-    record: &GapRecord,
-    config: &Config,
-    replayed: &Result<Recomputation, Diagnostic>,
-    verdict: &ReplayVerdict,
-) -> String {
+fn page(found: &Explanation, config: &Config) -> String {
+    let record = &found.record;
     let (flight, p, e) = (&record.flight, &record.provenance, &record.estimate);
     let head = format!(
         "{} / {} in {} of {}, flight {}, departed {}",
@@ -199,7 +79,7 @@ fn page(
     );
     let flags = super::query::flags_text(e);
     line("flags", if flags.is_empty() { "none" } else { &flags });
-    if let Some(remedy) = super::query::remedy(e) {
+    if let Some(remedy) = remedy(e) {
         line("remedy", remedy);
     }
     let newtons = |v: Option<f64>| v.map_or_else(table::empty_cell, |v| format!("{v:.2e}"));
@@ -242,7 +122,7 @@ fn page(
             p.processed_utc.strftime("%Y-%m-%d %H:%M UTC")
         ),
     );
-    line("replay", &verdict.to_string());
+    line("replay", &found.verdict.to_string());
     line("reproduce", &format!("freeplay estimate {}", config.path(&p.log_path).display()));
     if let Some(part) = config.document.part.get(record.part_number.as_str()) {
         let settings = serde_json::to_value(part).unwrap_or_default();
@@ -250,7 +130,7 @@ fn page(
             line(if at == 0 { "part" } else { "" }, &format!("{key} = {value}"));
         }
     }
-    if let Ok(Recomputation { channels: Some(channels), .. }) = replayed {
+    if let Ok(Recomputation { channels: Some(channels), .. }) = &found.replayed {
         page.push('\n');
         page.push_str(&quality(channels));
     }

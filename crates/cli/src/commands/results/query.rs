@@ -6,6 +6,7 @@ use std::sync::Arc;
 use arrow::array::{RecordBatch, StringArray};
 use arrow::datatypes::{DataType, Field, Schema};
 use job::Config;
+use pipeline::explain::remedy;
 use records::row_schema::to_batch;
 use records::{GapRecord, PartNumber};
 use store::{Query, Store};
@@ -144,11 +145,6 @@ fn remedies(records: &[GapRecord]) -> String {
 /// Rejection code of an estimate.
 fn rejection_code(e: &records::GapEstimate) -> Option<&str> {
     e.reason.as_deref().filter(|_| e.status == records::Status::Refused)
-}
-
-/// Remedy of a rejected estimate.
-pub(crate) fn remedy(e: &records::GapEstimate) -> Option<&'static str> {
-    rejection_code(e).and_then(job::rejection::remedy)
 }
 
 /// The rows with the remedy of each rejection as last column.

@@ -14,10 +14,10 @@ import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import freeplay
-from freeplay import ArrowStream, Config, RunError, Settings, _freeplay
+import freeplay_ema as fp
+from freeplay_ema import ArrowStream, Config, RunError, RunSummary, Settings, _freeplay
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -37,7 +37,7 @@ def run(
     redo: bool = False,
     retry: bool = False,
     wait_s: float | None = None,
-) -> dict[str, Any]:
+) -> RunSummary:
     """Does every log that is not accounted for yet, one task for each, and stores what comes of it.
 
     ``logs`` are patterns that take the place of ``[logs] files``, ``output`` is the store and takes the place of
@@ -45,19 +45,17 @@ def run(
     readable on driver and workers under the same paths; workers refuse a configuration that differs.
 
     Up to ``logs_per_job`` logs make one Spark job, and what they gave is stored before the next begins: a driver that
-    dies loses at most that, and the next run does it. The account is that of ``freeplay run --json``.
+    dies loses at most that, and the next run does it. The summary is that of ``freeplay run --json``.
     """
-    settings = freeplay.load(config)
+    settings = fp.load(config)
     if not settings.files:
         raise ValueError("workers read the configuration themselves: give its file, not a text")
     # Absolute paths mean the same to workers; logs below the configuration keep their short names.
     settings = Config(settings.files)
     settings = settings.replaced(_patterns(logs), None if output is None else os.path.abspath(output))
     engine = _engine(spark, settings)
-    account: dict[str, Any] = json.loads(
-        _freeplay.run_distributed(settings, engine, logs_per_job, redo, retry, wait_s)
-    )
-    return account
+    summary = _freeplay.run_distributed(settings, engine, logs_per_job, redo, retry, wait_s)
+    return RunSummary.from_json(summary)
 
 
 def _patterns(
@@ -90,7 +88,7 @@ def _worker(
     def work(batches: Iterable[pa.RecordBatch]) -> Iterator[pa.RecordBatch]:
         import pyarrow as pa
 
-        from freeplay import _freeplay, spark
+        from freeplay_ema import _freeplay, spark
 
         config = spark._same(files, digest)
         for batch in batches:
@@ -103,7 +101,7 @@ def _worker(
 @lru_cache(maxsize=4)
 def _same(files: tuple[str, ...], digest: str) -> Config:
     """The configuration as a worker reads it, which must be the driver's."""
-    config = freeplay.load(files)
+    config = fp.load(files)
     if config.digest() != digest:
         diagnostic = {
             "code": "worker_differs",

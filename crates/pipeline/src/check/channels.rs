@@ -1,0 +1,234 @@
+//! Channels of one actuator: mapping, quality, and what the estimator would reject.
+
+use ingest::channel::quality;
+use ingest::{ActuatorChannels, ActuatorColumns, Quality};
+use job::flight_log::FlightLog;
+use job::{Config, estimate, rejection};
+use records::{Diagnostic, Installations, PartNumber};
+
+/// Tolerance of the slope of screw on motor around 1; beyond it the mapping is suspect.
+const SLOPE_TOLERANCE: f64 = 0.02;
+
+/// Usual logging rates; a rate outside mostly means a wrong unit of time.
+const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 1.0..=20e3;
+
+/// Note on the slope of screw on motor.
+pub const RATIO: &str = "screw/motor ratio";
+
+records::row! {
+    /// One channel of one actuator of one log.
+    #[derive(Debug, Clone)]
+    #[expect(missing_docs, reason = "each field is a column named for what it holds")]
+    pub struct ChannelCheck {
+        pub log: String,
+        pub tail_number: String,
+        pub flight_id: String,
+        pub position: String,
+        pub serial_number: Option<String>,
+        pub channel: &'static str,
+        pub column: String,
+        pub unit: &'static str,
+        pub samples: i64,
+        pub missing_share: Option<f64>,
+        pub min: Option<f64>,
+        pub max: Option<f64>,
+        pub resolution: Option<f64>,
+        pub rate_hz: Option<f64>,
+        pub frozen_share: Option<f64>,
+        pub saturated_share: Option<f64>,
+        pub spikes: Option<i64>,
+        pub note: Option<String>,
+        /// What to do about a rejection.
+        pub remedy: Option<&'static str>,
+    }
+}
+
+impl ChannelCheck {
+    /// Whether the note is a warning; a ratio within tolerance is information.
+    pub fn is_warning(&self) -> bool {
+        self.note.as_ref().is_some_and(|note| !note.starts_with(RATIO) || note.contains("expected"))
+    }
+
+    /// The note with its remedy.
+    pub fn note_and_remedy(&self) -> String {
+        self.note.iter().map(String::as_str).chain(self.remedy).collect::<Vec<_>>().join(": ")
+    }
+}
+
+/// Findings of one actuator.
+pub(super) struct ActuatorCheck {
+    pub(super) found: Vec<ChannelCheck>,
+    pub(super) clock: Option<String>,
+    pub(super) identified: Option<(PartNumber, job::part_identification::IdentifiedParams)>,
+    pub(super) rejection: Option<&'static str>,
+}
+
+/// Time base of an actuator as text.
+fn clock(a: &ActuatorChannels) -> String {
+    let segments = match a.segments.len() {
+        1 => "no gaps".to_owned(),
+        n => format!("{n} segments"),
+    };
+    let r = a.repairs;
+    let repaired = [
+        (r.out_of_order, "out of order"),
+        (r.repeated, "repeated"),
+        (r.unstamped, "without a timestamp"),
+        (r.filled, "filled in from the rate"),
+    ];
+    let repaired: Vec<String> = repaired
+        .iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect();
+    let repaired =
+        if repaired.is_empty() { String::new() } else { format!("; repaired: {}", repaired.join(", ")) };
+    let rate_hz = a.step_s.recip();
+    let hint = if USUAL_RATES_HZ.contains(&rate_hz) { "" } else { " (unusual: check `clock.unit`)" };
+    let kept = 1.0 - a.apart as f64 / a.dx_m.len().max(1) as f64;
+    let selected =
+        if a.apart > 0 { format!(", {:.1} % of the rows selected", 100.0 * kept) } else { String::new() };
+    format!("{rate_hz:.3} Hz{hint}, {segments}{selected}{repaired}")
+}
+
+pub(super) fn actuator(
+    opened: &FlightLog,
+    name: &str,
+    at: &ActuatorColumns,
+    config: &Config,
+    installations: &Installations,
+) -> Result<ActuatorCheck, Diagnostic> {
+    let id = &opened.identity;
+    let (installation, part) = opened.unit(at, config, installations)?;
+    let base = |channel: &'static str, column: &Option<String>, unit: &'static str| ChannelCheck {
+        log: name.to_owned(),
+        tail_number: id.tail_number.to_string(),
+        flight_id: id.flight_id.to_string(),
+        position: at.position.to_string(),
+        serial_number: Some(installation.serial_number.to_string()),
+        channel,
+        column: column.clone().unwrap_or_default(),
+        unit,
+        samples: 0,
+        missing_share: None,
+        min: None,
+        max: None,
+        resolution: None,
+        rate_hz: None,
+        frozen_share: None,
+        saturated_share: None,
+        spikes: None,
+        note: None,
+        remedy: None,
+    };
+    let [motor, screw, load, _] = &at.columns;
+    if !at.lacking.is_empty() {
+        let note =
+            Some(format!("would be refused, channel_unmapped: the log lacks {}", at.lacking.join(", ")));
+        return Ok(ActuatorCheck {
+            found: vec![ChannelCheck {
+                note,
+                remedy: rejection::remedy("channel_unmapped"),
+                ..base("all", motor, "")
+            }],
+            clock: None,
+            identified: None,
+            rejection: None,
+        });
+    }
+    let a = opened.channels(at, part)?;
+    let slope = if a.output_locked {
+        Some("the output is locked: minus the motor position".to_owned())
+    } else {
+        quality::regression_slope(&a.motor_m, &a.dx_m).map(slope_note)
+    };
+    let [motor_seen, screw_seen, load_seen] = a.quality;
+    let mut found = vec![
+        describe(base("motor_position", motor, "m"), motor_seen, &channel_flags(&a, "motor")),
+        describe(base("screw_position", screw, "m"), screw_seen, &channel_flags(&a, "screw")),
+        describe(base("screw − motor", screw, "m"), a.dx_quality(), &[]),
+        describe(base("load", load, "N"), load_seen, &channel_flags(&a, "load")),
+    ];
+    found[2].note = found[2].note.take().or(slope);
+    if a.output_locked {
+        found[1].note = None;
+    }
+    // The estimator's own tests of sign, exchange, ratio and rate; its gap is dropped.
+    let tested = estimate::contact_regression(&a, part)?;
+    let rejection = tested.as_ref().err().copied();
+    if let Some(code) = rejection {
+        let channel = &mut found[tested_channel(code)];
+        let before = channel.note.take().filter(|note| !note.starts_with(RATIO));
+        let before = before.map(|note| format!("{note}; ")).unwrap_or_default();
+        channel.note = Some(format!("{before}would be refused, {code}"));
+        channel.remedy = rejection::remedy(code);
+    }
+    let params = job::part_identification::IdentifiedParams::of(&a, tested.as_deref().ok());
+    let identified = Some((installation.part_number.clone(), params));
+    Ok(ActuatorCheck { found, clock: Some(clock(&a)), identified, rejection })
+}
+
+/// Row of the channel that a rejection concerns: motor, screw, their difference, load.
+fn tested_channel(code: &str) -> usize {
+    match code {
+        "positions_swapped" | "position_ratio" | "motion_unexplained" => 2,
+        "load_sign_flipped" | "load_too_small" | "no_load_reversal" | "one_side_brief" => 3,
+        _ => 0,
+    }
+}
+
+/// Quality flags of one channel.
+fn channel_flags<'a>(a: &'a ActuatorChannels, channel: &str) -> Vec<&'a str> {
+    a.flags.iter().map(String::as_str).filter(|flag| flag.starts_with(channel)).collect()
+}
+
+fn slope_note(slope: f64) -> String {
+    if (slope - 1.0).abs() > SLOPE_TOLERANCE {
+        format!("{RATIO} {slope:.4} (expected 1): check sign, unit, lead or gear ratio")
+    } else {
+        format!("{RATIO} {slope:.5}")
+    }
+}
+
+fn describe(base: ChannelCheck, q: Quality, flags: &[&str]) -> ChannelCheck {
+    let still = if q.samples == 0 {
+        Some("no sample selected: nothing_selected".to_owned())
+    } else if q.span().is_none() {
+        Some("no finite value: channel_constant".to_owned())
+    } else if q.is_zero() {
+        Some("always zero: channel_zero".to_owned())
+    } else {
+        q.is_constant().then(|| "constant: channel_constant".to_owned())
+    };
+    ChannelCheck {
+        samples: q.samples as i64,
+        missing_share: Some(q.missing_share),
+        min: q.span().map(|span| span.0),
+        max: q.span().map(|span| span.1),
+        resolution: q.resolution,
+        rate_hz: Some(q.rate_hz),
+        frozen_share: Some(q.frozen_share),
+        saturated_share: Some(q.saturated_share),
+        spikes: Some(q.spikes as i64),
+        note: still.or_else(|| {
+            let flagged = (!flags.is_empty()).then(|| flags.join(", "));
+            let notes: Vec<String> = flagged.into_iter().chain(slower_channel(base.channel, &q)).collect();
+            (!notes.is_empty()).then(|| notes.join("; "))
+        }),
+        ..base
+    }
+}
+
+/// A position that holds a value in every second row, or fewer, is recorded more slowly than its rows.
+fn slower_channel(channel: &str, q: &Quality) -> Option<String> {
+    const LEAST_MISSING: f64 = 0.4;
+    let is_position = channel.ends_with("_position");
+    let is_slower = q.missing_share > LEAST_MISSING && q.missing_share < 1.0;
+    (is_position && is_slower).then(|| {
+        format!(
+            "{:.0} % of its rows are empty: if it is recorded more slowly, set its `rate_hz = {:.6}`",
+            100.0 * q.missing_share,
+            q.rate_hz
+        )
+    })
+}

@@ -1,0 +1,229 @@
+//! Functions that read a store: followed quantities, backtest, comparison, explanation, report and work requests.
+#![expect(clippy::needless_pass_by_value, reason = "Python hands values over")]
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use ::records::row_schema::{Row, to_nullable_batch};
+use ::records::{Diagnostic, GapRecord};
+use jiff::Timestamp;
+use pipeline::explain::RecordKey;
+use pipeline::fleet_trends::assess::{self, UnitSelection};
+use pipeline::fleet_trends::backtest;
+use pipeline::fleet_trends::inspection_interval::inspection_intervals;
+use pipeline::follow_up::work_requests::{self, WorkSelection};
+use pipeline::history::external_estimates;
+use pipeline::report::{compose, publish};
+use pipeline::store_diff::compare_stores;
+use pyo3::prelude::*;
+use store::Store;
+
+use crate::VERSION;
+use crate::arrow_capsule;
+use crate::config::Config;
+use crate::error::{config_error, to_run_exception};
+use crate::functions::{chunks, instant};
+use crate::table::Table;
+
+fn table<R: Row>(py: Python<'_>, rows: Result<Vec<R>, pipeline::Error>) -> PyResult<Table> {
+    let batch = rows.and_then(|rows| Ok(to_nullable_batch(&rows)?));
+    Ok(Table::of(batch.map_err(|error| to_run_exception(py, error))?))
+}
+
+fn selection(
+    py: Python<'_>,
+    units: [Option<String>; 3],
+    as_of: Option<&str>,
+    statistics: bool,
+) -> PyResult<UnitSelection> {
+    let [tail_number, serial_number, part_number] = units;
+    let as_of_utc = instant(py, as_of)?;
+    Ok(UnitSelection { tail_number, serial_number, part_number, as_of_utc, statistics })
+}
+
+/// What `trend` shows of the followed quantities.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Followed {
+    Quantities,
+    Changes,
+    Intervals,
+}
+
+fn followed(
+    py: Python<'_>,
+    config: &Config,
+    units: [Option<String>; 3],
+    as_of: Option<&str>,
+    what: Followed,
+) -> PyResult<Table> {
+    let (installations, ask) = (config.installations(py)?, selection(py, units, as_of, false)?);
+    let config = &config.inner;
+    let found = py.detach(|| {
+        assess::assess_store_with_quantities(config, installations, &Store::open(config.store())?, &ask)
+    });
+    let (rows, followed) = found.map_err(|error| to_run_exception(py, error))?;
+    match what {
+        Followed::Quantities => table(py, Ok(followed.rows)),
+        Followed::Changes => table(py, Ok(followed.changes)),
+        Followed::Intervals => {
+            table(py, Ok(inspection_intervals(&rows, config.document.trend.inspection_risk)))
+        }
+    }
+}
+
+/// Every followed quantity of the selected units.
+#[pyfunction]
+pub(crate) fn quantities(
+    py: Python<'_>,
+    config: &Config,
+    units: [Option<String>; 3],
+    as_of: Option<&str>,
+) -> PyResult<Table> {
+    followed(py, config, units, as_of, Followed::Quantities)
+}
+
+/// What changed on units, tails and parts.
+#[pyfunction]
+pub(crate) fn changes(
+    py: Python<'_>,
+    config: &Config,
+    units: [Option<String>; 3],
+    as_of: Option<&str>,
+) -> PyResult<Table> {
+    followed(py, config, units, as_of, Followed::Changes)
+}
+
+/// Chance of meeting the limit before the next inspection, by part and interval.
+#[pyfunction]
+pub(crate) fn intervals(
+    py: Python<'_>,
+    config: &Config,
+    units: [Option<String>; 3],
+    as_of: Option<&str>,
+) -> PyResult<Table> {
+    followed(py, config, units, as_of, Followed::Intervals)
+}
+
+/// Past forecasts against later measurements.
+#[pyfunction]
+pub(crate) fn backtest_forecasts(
+    py: Python<'_>,
+    estimates: Option<&Bound<'_, PyAny>>,
+    config: &Config,
+) -> PyResult<Table> {
+    let installations = config.installations(py)?;
+    let batches = estimates.map(arrow_capsule::batches).transpose()?;
+    let config = &config.inner;
+    let rows = py.detach(|| {
+        let histories = match batches {
+            Some(batches) => external_estimates::from_batches(&chunks(batches))?,
+            None => assess::load_histories(&Store::open(config.store())?)?,
+        };
+        backtest::of_histories(config, installations, &histories)
+    });
+    table(py, rows)
+}
+
+/// Actuator-flights that differ between two stores.
+#[pyfunction]
+pub(crate) fn diff(py: Python<'_>, before: PathBuf, after: PathBuf, min_change_m: f64) -> PyResult<Table> {
+    table(py, py.detach(|| compare_stores(&before, &after, min_change_m)).map(|found| found.rows))
+}
+
+/// One stored record, its settings, and whether it is reproduced: as JSON, with the record as a table.
+#[pyfunction]
+pub(crate) fn explain(
+    py: Python<'_>,
+    config: &Config,
+    flight: String,
+    position: String,
+    tail: Option<String>,
+) -> PyResult<(String, Table)> {
+    let installations = config.installations(py)?;
+    let config = &config.inner;
+    let key = RecordKey { flight_id: flight, position, tail_number: tail };
+    let found = py
+        .detach(|| pipeline::explain::explain(config, installations, &Store::open(config.store())?, &key))
+        .map_err(|error| to_run_exception(py, error))?;
+    let facts = found.to_json(config).to_string();
+    Ok((facts, table(py, Ok::<Vec<GapRecord>, _>(vec![found.record]))?))
+}
+
+/// Writes the report; the number of files and of bytes.
+#[pyfunction]
+pub(crate) fn report(
+    py: Python<'_>,
+    config: &Config,
+    output: PathBuf,
+    units: [Option<String>; 3],
+    as_of: Option<&str>,
+) -> PyResult<(u64, u64)> {
+    let (installations, ask) = (config.installations(py)?, selection(py, units, as_of, true)?);
+    let config = &config.inner;
+    let composed = py
+        .detach(|| {
+            let store = Store::open(config.store())?;
+            let program = format!("Freeplay {VERSION}");
+            compose::compose(config, installations, &store, &ask, Timestamp::now(), &program)
+        })
+        .map_err(|error| to_run_exception(py, error))?;
+    if composed.units.is_empty() {
+        let hint = "list the store's contents with `freeplay store info`; fill it with `freeplay run`";
+        let what = "no selected unit has flown";
+        return Err(config_error(py, Diagnostic::new("nothing_to_report", what).hint(hint)));
+    }
+    let written = py.detach(|| publish::write(&composed, &output, &|_| {}));
+    let written = written.map_err(|error| to_run_exception(py, error))?;
+    Ok((written.files, written.bytes))
+}
+
+/// Selected work requests, by urgency.
+#[pyfunction]
+pub(crate) fn work(
+    py: Python<'_>,
+    config: &Config,
+    status: Option<String>,
+    units: [Option<String>; 3],
+) -> PyResult<Table> {
+    let [tail_number, serial_number, part_number] = units;
+    let selection = WorkSelection { status, tail_number, serial_number, part_number };
+    let config = &config.inner;
+    let found = py.detach(|| {
+        let events = Store::open(config.store())?.work_events()?;
+        Ok(work_requests::work_list(&events, &selection, Timestamp::now()))
+    });
+    table(py, found)
+}
+
+/// Channels of logs, with errors of logs in `Table.errors`; nothing is estimated or written.
+#[pyfunction]
+pub(crate) fn check(
+    py: Python<'_>,
+    logs: Option<Vec<PathBuf>>,
+    config: &Config,
+    limit: usize,
+) -> PyResult<Table> {
+    let installations = Arc::new(config.installations(py)?.clone());
+    let config = Arc::new(config.inner.clone());
+    let seen = py.detach(|| {
+        let (logs, faults) = match logs {
+            Some(logs) => {
+                let whole = |log: &PathBuf| {
+                    Ok((pipeline::run::discover::log_containing(&config, log)?, log.display().to_string()))
+                };
+                (logs.iter().map(whole).collect::<Result<Vec<_>, pipeline::Error>>()?, Vec::new())
+            }
+            None => {
+                let found = pipeline::run::discover::discover(&config)?;
+                let faults = found.faulty.into_values().map(|(_, diagnostic)| diagnostic).collect();
+                let logs = found.logs.into_iter().map(|(name, files)| (files, name)).take(limit);
+                (logs.collect(), faults)
+            }
+        };
+        Ok(pipeline::check::check_logs(&config, &installations, logs, faults))
+    });
+    let seen = seen.map_err(|error| to_run_exception(py, error))?;
+    let batch = to_nullable_batch(&seen.channels()).map_err(|e| to_run_exception(py, e.into()))?;
+    let diagnostics = seen.diagnostics.into_iter().chain(seen.mapping_faults).collect();
+    Ok(Table::with_errors(batch, diagnostics))
+}
