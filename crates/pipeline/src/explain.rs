@@ -141,7 +141,7 @@ fn replay(
 /// Whether a record is reproduced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReplayVerdict {
-    /// The estimate is the same, bit by bit.
+    /// The estimate is the same, bitwise.
     Same,
     /// The settings differ from those of the record.
     OtherSettings,
