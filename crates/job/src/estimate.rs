@@ -208,7 +208,7 @@ fn combine_methods(
     estimate.samples_lower = published.gap.lower as i64;
     estimate.load_p05_n = Some(published.load.p05_n);
     estimate.load_p95_n = Some(published.load.p95_n);
-    estimate.nis = Some(published.nis);
+    (estimate.nis, estimate.nis_se) = (Some(published.nis.mean), published.nis.standard_error);
     if estimate.status == Status::Estimated {
         if method == Method::Midrange {
             estimate.gap_m = Some(published.gap.gap_m);

@@ -134,6 +134,8 @@ stored_row! {
         pub friction_load_share: Option<f64>,
         /// Standard error of `friction_load_share`.
         pub friction_load_share_se: Option<f64>,
+        /// Standard error of `nis`.
+        pub nis_se: Option<f64>,
     }
 }
 

@@ -6,6 +6,7 @@ use crate::gap::statistic::{self, GapStatistic};
 use crate::kalman::batch::FilterWorkspace;
 use crate::kalman::filter::Filter;
 use crate::kalman::gain_schedule::GainSchedule;
+use crate::kalman::nis::Nis;
 use crate::samples::Samples;
 
 /// The paper's estimate (equations 29–31) with the quantities of its record.
@@ -15,8 +16,8 @@ pub struct MidRangeEstimate {
     pub gap: GapStatistic,
     /// Load band of the samples.
     pub load: LoadBand,
-    /// Mean normalised innovation squared.
-    pub nis: f64,
+    /// Mean normalised innovation squared, with its standard error.
+    pub nis: Nis,
     /// Samples S was estimated at.
     pub samples: usize,
 }
@@ -67,7 +68,7 @@ pub fn estimate_with(
     workspace: &mut FilterWorkspace,
 ) -> Result<MidRangeEstimate, Error> {
     let load = load_band::load_band(samples.load_n, samples.segments);
-    let (nis, _) = schedule.filter_with(samples, None, workspace)?;
+    let nis = schedule.filter_with(samples, None, workspace)?;
     let gap = statistic::mid_range(workspace.s_m())?;
     let load = load.ok_or(Error::NothingMeasured)?;
     Ok(MidRangeEstimate { gap, load, nis, samples: gap.upper + gap.lower })

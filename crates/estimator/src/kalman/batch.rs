@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use crate::error::Error;
 use crate::kalman::filter::{Filter, KalmanState};
 use crate::kalman::gain_schedule::GainSchedule;
+use crate::kalman::nis::{BLOCK_SAMPLES, Nis, NisBlocks};
 use crate::kalman::parallel::{ChunkIo, ChunkPlan, ChunkStates, PARTS};
 use crate::kalman::steady_state::{self, SteadyState, SteadyStateFilter};
 use crate::samples::Samples;
@@ -21,10 +22,8 @@ use crate::simd::dispatch::simd_dispatch;
 pub struct FilterOutput {
     /// S at each sample, m; NaN outside the segments.
     pub s_m: Vec<f64>,
-    /// Mean normalised innovation squared over the measured samples; 1 for a true model.
-    pub nis: f64,
-    /// Measured samples.
-    pub measured: usize,
+    /// Mean normalised innovation squared, its standard error, and the measured samples.
+    pub nis: Nis,
 }
 
 /// Innovations of a batch, one value per sample.
@@ -50,12 +49,11 @@ impl GainSchedule {
         innovations: Option<&mut InnovationBuffers>,
     ) -> Result<FilterOutput, Error> {
         let mut workspace = FilterWorkspace::default();
-        let (nis, measured) = self.filter_with(samples, innovations, &mut workspace)?;
-        Ok(FilterOutput { s_m: workspace.s_m, nis, measured })
+        let nis = self.filter_with(samples, innovations, &mut workspace)?;
+        Ok(FilterOutput { s_m: workspace.s_m, nis })
     }
 
-    /// As [`GainSchedule::track`], with S in the workspace. Returns the mean normalised innovation squared (NIS,
-    /// e²/(C P Cᵀ + V_d), Bar-Shalom, Li and Kirubarajan 2001, section 5.4) and the number of measured samples.
+    /// As [`GainSchedule::track`], with S in the workspace.
     ///
     /// # Errors
     /// As [`GainSchedule::track`].
@@ -64,7 +62,7 @@ impl GainSchedule {
         samples: &Samples<'_>,
         mut innovations: Option<&mut InnovationBuffers>,
         workspace: &mut FilterWorkspace,
-    ) -> Result<(f64, usize), Error> {
+    ) -> Result<Nis, Error> {
         samples.check()?;
         let count = samples.dx_m.len();
         if let Some(out) = innovations.as_deref_mut() {
@@ -74,14 +72,21 @@ impl GainSchedule {
         // What no segment covers is NaN; all else will be written.
         workspace.s_m.resize(count, 0.0);
         for_each_uncovered(samples.segments, count, |gap| workspace.s_m[gap].fill(f64::NAN));
-        let mut pass =
-            FilterPass { schedule: self, innovations, workspace, nis: 0.0, measured: 0, checked_until: 0 };
+        let mut pass = FilterPass {
+            schedule: self,
+            innovations,
+            workspace,
+            squares: 0.0,
+            blocks: NisBlocks::default(),
+            measured: 0,
+            checked_until: 0,
+        };
         for segment in samples.segments {
             let (y_m, load_n) = (&samples.dx_m[segment.clone()], &samples.load_n[segment.clone()]);
             pass.segment(y_m, load_n, segment.start)?;
         }
-        let (nis, measured) = (pass.nis, pass.measured);
-        if measured == 0 { Err(Error::NothingMeasured) } else { Ok((nis / measured as f64, measured)) }
+        let FilterPass { squares, blocks, measured, .. } = pass;
+        if measured == 0 { Err(Error::NothingMeasured) } else { Ok(blocks.finish(squares, measured)) }
     }
 }
 
@@ -131,7 +136,9 @@ struct FilterPass<'f> {
     schedule: &'f GainSchedule,
     innovations: Option<&'f mut InnovationBuffers>,
     workspace: &'f mut FilterWorkspace,
-    nis: f64,
+    /// Sum of the normalised squared innovations, and the sums of its blocks.
+    squares: f64,
+    blocks: NisBlocks,
     measured: usize,
     /// Samples before this one are checked for missing values.
     checked_until: usize,
@@ -187,7 +194,9 @@ impl FilterPass<'_> {
             (out.innovation_m[at], out.variance_m2[at]) = (innovation_m, variance_m2);
         }
         if !innovation_m.is_nan() {
-            self.nis += innovation_m * innovation_m / variance_m2;
+            let square = innovation_m * innovation_m / variance_m2;
+            self.squares += square;
+            self.blocks.add_sample(square);
             self.measured += 1;
         }
     }
@@ -207,7 +216,9 @@ impl FilterPass<'_> {
         let (done, last, squares_m2) = match self.innovations.as_deref_mut() {
             None => {
                 let checked = self.checked_until.saturating_sub(at);
-                let mut filter_run = SampleRun { schedule: self.schedule, map, y_m, load_n, s_m, checked };
+                let blocks = &mut self.blocks;
+                let mut filter_run =
+                    SampleRun { schedule: self.schedule, map, y_m, load_n, s_m, blocks, checked };
                 let found = filter_run.run(from, &mut self.workspace.squares_m2);
                 self.checked_until = at + filter_run.checked;
                 found
@@ -219,13 +230,17 @@ impl FilterPass<'_> {
                 let columns = (&y_m[..done], &load_n[..done]);
                 let (last, squares_m2) =
                     steady_state::run(map, from, 0.0, columns, &mut s_m[..done], innovation_m);
+                for innovations in innovation_m.chunks(BLOCK_SAMPLES) {
+                    let square_m2: f64 = innovations.iter().map(|e| e * e).sum();
+                    self.blocks.add(square_m2 / map.variance_m2, innovations.len());
+                }
                 (done, last, squares_m2)
             }
         };
         if done > 0 {
             *x = map.inverse_transform(last);
         }
-        self.nis += squares_m2 / map.variance_m2;
+        self.squares += squares_m2 / map.variance_m2;
         self.measured += done;
         done
     }
@@ -242,6 +257,7 @@ struct SampleRun<'a> {
     y_m: &'a [f64],
     load_n: &'a [f64],
     s_m: &'a mut [f64],
+    blocks: &'a mut NisBlocks,
     /// Number of samples, from the first on, that are checked before they are filtered, since some were missing.
     checked: usize,
 }
@@ -262,7 +278,8 @@ impl SampleRun<'_> {
             let (y_m, load_n) = (&y_m[at..], &load_n[at..]);
             squares_m2.resize(squares_m2.len().max(cut.groups()), [0.0; PARTS]);
             let states = starts((&schedule.filter, map), cut, x, y_m, load_n);
-            let mut work = ChunkIo { map, cut, y_m, load_n, s_m: &mut self.s_m[at..], squares_m2 };
+            let mut work =
+                ChunkIo { map, cut, y_m, load_n, s_m: &mut self.s_m[at..], squares_m2, blocks: self.blocks };
             if let Some(found) = work.run(states, sum_m2) {
                 (x, sum_m2) = found;
                 at = all.end;
@@ -276,14 +293,13 @@ impl SampleRun<'_> {
             end = at + whole;
         }
         end = at + whole_until(&y_m[at..end], &load_n[at..end]);
-        (x, sum_m2) = steady_state::run(
-            map,
-            x,
-            sum_m2,
-            (&y_m[at..end], &load_n[at..end]),
-            &mut self.s_m[at..end],
-            &mut [],
-        );
+        for start in (at..end).step_by(BLOCK_SAMPLES) {
+            let block = start..(start + BLOCK_SAMPLES).min(end);
+            let before_m2 = sum_m2;
+            let columns = (&y_m[block.clone()], &load_n[block.clone()]);
+            (x, sum_m2) = steady_state::run(map, x, sum_m2, columns, &mut self.s_m[block.clone()], &mut []);
+            self.blocks.add((sum_m2 - before_m2) / map.variance_m2, block.len());
+        }
         (end, x, sum_m2)
     }
 }
@@ -364,7 +380,11 @@ mod tests {
             let mut schedule = schedule.clone();
             schedule.lead = lead;
             let track = schedule.track(&samples, None).unwrap();
-            (track.s_m.iter().map(|s| s.to_bits()).collect::<Vec<_>>(), track.nis.to_bits(), track.measured)
+            (
+                track.s_m.iter().map(|s| s.to_bits()).collect::<Vec<_>>(),
+                track.nis.mean.to_bits(),
+                track.nis.measured,
+            )
         };
         let wanted = track(None);
         for lead in [schedule.lead, Some(1), Some(17)] {

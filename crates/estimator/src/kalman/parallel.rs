@@ -11,6 +11,7 @@ use core::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
 use std::hint::black_box;
 use std::ops::Range;
 
+use crate::kalman::nis::NisBlocks;
 use crate::kalman::steady_state::{self, GROUP, SteadyState, SteadyStateFilter};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::f64x8::x86::{Avx2F64x8, Avx512F64x8};
@@ -88,6 +89,8 @@ pub(crate) struct ChunkIo<'a> {
     pub(crate) s_m: &'a mut [f64],
     /// Squared innovations of each group: of all parts' first groups, then of their second ones, and so on.
     pub(crate) squares_m2: &'a mut [[f64; PARTS]],
+    /// Takes each part as a block.
+    pub(crate) blocks: &'a mut NisBlocks,
 }
 
 impl ChunkIo<'_> {
@@ -106,14 +109,18 @@ impl ChunkIo<'_> {
             return None;
         }
         // The early start of the first part is no guess.
+        let mut start_m2 = sum_m2;
         sum_m2 = self.add_squares(sum_m2, 0, 0);
+        self.blocks.add((sum_m2 - start_m2) / self.map.variance_m2, self.cut.lead + self.cut.part);
         let mut last = state(&reached, 0);
         for part in 1..PARTS {
+            start_m2 = sum_m2;
             (last, sum_m2) = if same(state(&arrived, part), last) {
                 (state(&reached, part), self.add_squares(sum_m2, part, self.cut.lead))
             } else {
                 self.recompute_until_match(part, last, sum_m2, &checkpoints)
             };
+            self.blocks.add((sum_m2 - start_m2) / self.map.variance_m2, self.cut.part);
         }
         Some((last, sum_m2))
     }
@@ -293,7 +300,15 @@ mod tests {
         let cut = ChunkPlan { lead: 0, part: 96 };
         let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.groups()]);
         advance_chunks(
-            &mut ChunkIo { map, cut, y_m, load_n, s_m: &mut s_m, squares_m2: &mut squares_m2 },
+            &mut ChunkIo {
+                map,
+                cut,
+                y_m,
+                load_n,
+                s_m: &mut s_m,
+                squares_m2: &mut squares_m2,
+                blocks: &mut NisBlocks::default(),
+            },
             STARTS,
             0..96,
         );
@@ -382,7 +397,8 @@ mod tests {
             let (y_m, load_n) = channels(cut.samples());
             let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.groups()]);
             let (s_m, squares_m2) = (&mut s_m, &mut squares_m2);
-            let mut work = ChunkIo { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 };
+            let blocks = &mut NisBlocks::default();
+            let mut work = ChunkIo { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2, blocks };
             let (x, sum_m2) = work.run(STARTS, 0.25).unwrap();
             let (mut wanted_m, start) = (vec![0.0; cut.samples()], STARTS.map(|entry| entry[0]));
             let (wanted_x, wanted_m2) =
@@ -402,7 +418,9 @@ mod tests {
                 (if is_load { &mut load_n } else { &mut y_m })[at] = f64::NAN;
                 let (mut s_m, mut squares_m2) = (vec![0.0; cut.samples()], vec![[0.0; PARTS]; cut.groups()]);
                 let (s_m, squares_m2) = (&mut s_m, &mut squares_m2);
-                let mut work = ChunkIo { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2 };
+                let blocks = &mut NisBlocks::default();
+                let mut work =
+                    ChunkIo { map: &map, cut, y_m: &y_m, load_n: &load_n, s_m, squares_m2, blocks };
                 assert!(work.run(STARTS, 0.0).is_none(), "sample {at} is missing");
             }
         }

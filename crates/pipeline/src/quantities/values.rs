@@ -20,16 +20,16 @@ use crate::monitoring::median;
 const WINDOW: SignedDuration = SignedDuration::from_hours(24 * 1_096);
 
 /// Quantities that are read, with the column of their standard error.
-pub(crate) const READ: [(Quantity, Option<&str>); 9] = [
-    (Quantity::LostMotionM, Some("lost_motion_se_m")),
-    (Quantity::StiffnessNPerM, Some("stiffness_se_n_per_m")),
-    (Quantity::FrictionN, Some("friction_se_n")),
-    (Quantity::FrictionDryN, Some("friction_dry_se_n")),
-    (Quantity::FrictionLoadShare, Some("friction_load_share_se")),
-    (Quantity::SkewS, Some("skew_se_s")),
-    (Quantity::LoadZeroN, Some("load_zero_se_n")),
-    (Quantity::LoadDelayS, Some("load_delay_se_s")),
-    (Quantity::Nis, None),
+pub(crate) const READ: [(Quantity, &str); 9] = [
+    (Quantity::LostMotionM, "lost_motion_se_m"),
+    (Quantity::StiffnessNPerM, "stiffness_se_n_per_m"),
+    (Quantity::FrictionN, "friction_se_n"),
+    (Quantity::FrictionDryN, "friction_dry_se_n"),
+    (Quantity::FrictionLoadShare, "friction_load_share_se"),
+    (Quantity::SkewS, "skew_se_s"),
+    (Quantity::LoadZeroN, "load_zero_se_n"),
+    (Quantity::LoadDelayS, "load_delay_se_s"),
+    (Quantity::Nis, "nis_se"),
 ];
 
 /// One flight of one unit, in as few bytes as its numbers take; NaN for none.
@@ -81,7 +81,7 @@ pub(crate) fn read(store: &Store, until: Timestamp) -> Result<FleetValues, Error
         until_utc: until.checked_add(SignedDuration::from_micros(1)).ok(),
         ..Query::default()
     };
-    let numbers = READ.iter().flat_map(|(quantity, error)| [Some(quantity.as_str()), *error]).flatten();
+    let numbers = READ.iter().flat_map(|(quantity, error)| [quantity.as_str(), error]);
     let keys = [
         "tail_number",
         "position",
@@ -145,7 +145,7 @@ impl Reader {
             (numbers("temperature_c")?, numbers("load_p05_n")?, numbers("load_p95_n")?);
         let mut columns = Vec::with_capacity(READ.len());
         for (quantity, error) in READ {
-            columns.push((numbers(quantity.as_str())?, error.map(numbers).transpose()?));
+            columns.push((numbers(quantity.as_str())?, numbers(error)?));
         }
         let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
         let mut seen = KeyCache::default();
@@ -158,8 +158,7 @@ impl Reader {
             });
             let values = std::array::from_fn(|k| {
                 let (values, errors) = &columns[k];
-                let error = errors.as_ref().and_then(|errors| at(errors, row));
-                (at(values, row).unwrap_or(f64::NAN) as f32, error.unwrap_or(0.0) as f32)
+                (at(values, row).unwrap_or(f64::NAN) as f32, at(errors, row).unwrap_or(0.0) as f32)
             });
             let load_n = at(&lows, row).zip(at(&highs, row)).map(|(low, high)| low.abs().max(high.abs()));
             self.units[unit].1.push(FlightValues {
