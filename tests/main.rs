@@ -10,4 +10,5 @@ mod harness;
 mod logs;
 mod markdown;
 mod mistakes;
+mod report_contents;
 mod runs;

@@ -8,6 +8,7 @@ pub mod check;
 pub mod discovery;
 mod error;
 pub mod estimate;
+pub mod estimate_plots;
 pub mod explain;
 pub mod fleet_trends;
 pub mod follow_up;

@@ -13,7 +13,7 @@ use pipeline::fleet_trends::backtest;
 use pipeline::fleet_trends::inspection_interval::inspection_intervals;
 use pipeline::follow_up::work_requests::{self, WorkSelection};
 use pipeline::history::external_estimates;
-use pipeline::report::{compose, publish};
+use pipeline::report::{compose, data, publish};
 use pipeline::store_diff::compare_stores;
 use pyo3::prelude::*;
 use store::Store;
@@ -157,6 +157,7 @@ pub(crate) fn report(
     output: PathBuf,
     units: [Option<String>; 3],
     as_of: Option<&str>,
+    with_data: bool,
 ) -> PyResult<(u64, u64)> {
     let (installations, ask) = (config.installations(py)?, selection(py, units, as_of, true)?);
     let config = &config.inner;
@@ -172,7 +173,10 @@ pub(crate) fn report(
         let what = "no selected unit has flown";
         return Err(config_error(py, Diagnostic::new("nothing_to_report", what).hint(hint)));
     }
-    let written = py.detach(|| publish::write(&composed, &output, &|_| {}));
+    let written = py.detach(|| {
+        let files = if with_data { data::tables(&composed)? } else { Vec::new() };
+        publish::write(&composed, files, &output, &|_| {})
+    });
     let written = written.map_err(|error| to_run_exception(py, error))?;
     Ok((written.files, written.bytes))
 }

@@ -19,6 +19,7 @@ pub mod uncertainty;
 
 pub use assessment::action::Action;
 pub use assessment::quantity_row::{ChangeScope, Quantity, QuantityChange, QuantityRow, QuantityStep};
+pub use assessment::report_rows;
 pub use assessment::trend_row::{ChangePoint, InspectionInterval, TrendRow};
 pub use diagnostic::Diagnostic;
 pub use flight::Flight;

@@ -5,6 +5,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use arrow::datatypes::DataType;
+use records::report_rows::{
+    ReportFlightRow, ReportGapRow, ReportInspectionRow, ReportLogErrorRow, ReportPastForecastRow,
+    ReportRemovalsRow, ReportTailRow,
+};
 use records::row_schema::{self, Column, Row};
 use records::{
     AlertRecord, GapRecord, InspectionInterval, QuantityChange, QuantityRow, TrendRow, WorkRequest,
@@ -23,6 +27,13 @@ fn the_page_lists_every_column_with_its_type_and_meaning() {
         ("intervals", table::<InspectionInterval>()),
         ("work requests", table::<WorkRequest>()),
         ("alerts", table::<AlertRecord>()),
+        ("report flights", table::<ReportFlightRow>()),
+        ("report gaps", table::<ReportGapRow>()),
+        ("report past forecasts", table::<ReportPastForecastRow>()),
+        ("report inspections", table::<ReportInspectionRow>()),
+        ("report removals", table::<ReportRemovalsRow>()),
+        ("report tails", table::<ReportTailRow>()),
+        ("report log errors", table::<ReportLogErrorRow>()),
     ] {
         let (begin, end) = (format!("<!-- columns of {name} -->\n"), "<!-- end -->");
         let (before, rest) = expected.split_once(&begin).unwrap();
@@ -52,6 +63,7 @@ fn type_name(column: &Column) -> String {
         DataType::Timestamp(..) => "timestamp µs UTC",
         DataType::List(element) if element.data_type() == &DataType::Utf8 => "list of text",
         DataType::List(_) => "list of struct",
+        DataType::Boolean => "bool",
         other => panic!("{other} has no name on the page"),
     };
     if column.nullable { format!("{name}, null") } else { name.to_owned() }

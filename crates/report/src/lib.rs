@@ -1,4 +1,4 @@
-//! HTML report of a fleet: a fleet page, a page per tail and a page per unit.
+//! HTML report of a fleet: a fleet page, a page per part, per tail and per unit.
 //!
 //! A [`Report`] is rendered to [`Page`]s; this crate reads and writes no files and estimates nothing. Every
 //! number is in the page as text; scripts only add hover and zoom. Templates escape every external string.
@@ -19,10 +19,12 @@ pub use model::{
     Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
     QuantityView, Report, Tail, TimedInterval, UnitView,
 };
-pub use page::{Error, Page, tail_path, unit_path};
+pub use page::{Error, Page, flight_path, part_path, tail_path, unit_path};
 pub use pages::fleet::fleet_pages;
+pub use pages::part::part_pages;
 pub use pages::tail::tail_page;
 pub use pages::unit::unit_page;
 pub use state_badge::StateBadge;
 pub use stats::agreement::Agreement;
 pub use stats::rate_spread::RateSpreads;
+pub use stats::removal_forecast::{Month, removal_forecast};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use jiff::Timestamp;
 use records::WorkRequest;
-use records::{InspectionInterval, QuantityChange, QuantityRow};
+use records::{InspectionInterval, QuantityChange, QuantityRow, TrendRow};
 use serde::Serialize;
 
 use crate::state_badge::StateBadge;
@@ -39,6 +39,9 @@ pub struct Report {
     pub inspections_given: bool,
     /// Inspections of units without records.
     pub inspections_unmatched: usize,
+    /// Trends of the units, in their order; written as a table, not part of `report.json`.
+    #[serde(skip)]
+    pub trend_rows: Vec<TrendRow>,
 }
 
 /// Fleet prior of a part number, as learned before a cut-off date.
@@ -281,6 +284,8 @@ pub struct FlightRow {
     pub load_p95_n: Option<f64>,
     /// Rejection reason or quality flags.
     pub remarks: String,
+    /// Page of its diagnostic plot, relative to the report folder, where one is drawn.
+    pub plot_path: Option<String>,
 }
 
 impl UnitView {

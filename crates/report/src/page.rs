@@ -15,7 +15,7 @@ pub struct Page {
 
 impl Page {
     /// Makes an HTML page; invisible characters are escaped so that no name can disguise itself as another.
-    pub(crate) fn html(path: String, html: &str) -> Self {
+    pub fn html(path: String, html: &str) -> Self {
         Self { path, body: escape_invisible(html).into_owned().into_bytes() }
     }
 }
@@ -38,6 +38,17 @@ pub enum Error {
 pub fn unit_path(unit: &UnitView) -> String {
     let part = unit.part_number.as_deref().unwrap_or("");
     format!("serial/{}.html", file_stem("unit", &[part, &unit.serial_number]))
+}
+
+/// Path of the page with the diagnostic plot of an actuator in a flight, relative to the report folder.
+pub fn flight_path(tail_number: &str, flight_id: &str, position: &str) -> String {
+    format!("flight/{}.html", file_stem("flight", &[tail_number, flight_id, position]))
+}
+
+/// Path of a page of a part number, relative to the report folder; a part with many units has several.
+pub fn part_path(part_number: &str, page: usize) -> String {
+    let stem = file_stem("part", &[part_number]);
+    if page == 0 { format!("part/{stem}.html") } else { format!("part/{stem}.page-{}.html", page + 1) }
 }
 
 /// Path of a tail's page, relative to the report folder.

@@ -3,7 +3,8 @@
 
 use records::WorkRequest;
 use report::{
-    Assessment, Quality, RateSpreads, Report, Tail, UnitView, fleet_pages, tail_page, unit_page, unit_path,
+    Assessment, Quality, RateSpreads, Report, Tail, UnitView, fleet_pages, part_pages, tail_page, unit_page,
+    unit_path,
 };
 
 const HOSTILE: &str = "<script>alert(1)</script>";
@@ -61,6 +62,7 @@ fn report(units: Vec<UnitView>) -> Report {
         quantity_changes: Vec::new(),
         inspection_intervals: Vec::new(),
         interval_advice: Vec::new(),
+        trend_rows: Vec::new(),
     }
 }
 
@@ -74,6 +76,7 @@ fn a_hostile_name_is_shown_and_not_run() {
     let mut pages = fleet_pages(&report).unwrap();
     pages.push(unit_page(&report, &RateSpreads::of(&report), &report.units[0]).unwrap());
     pages.push(tail_page(&report, &report.tails[0]).unwrap());
+    pages.extend(part_pages(&report).unwrap());
     for page in pages.iter().filter(|p| p.path != "report.json") {
         let html = text(page);
         assert!(!html.contains("<script>"), "{}", page.path);
@@ -88,6 +91,7 @@ fn every_page_forbids_scripts_that_are_not_files_of_the_report() {
     let mut pages = fleet_pages(&report).unwrap();
     pages.push(unit_page(&report, &RateSpreads::of(&report), &report.units[0]).unwrap());
     pages.push(tail_page(&report, &report.tails[0]).unwrap());
+    pages.extend(part_pages(&report).unwrap());
     for page in pages.iter().filter(|p| p.path != "report.json") {
         let html = text(page);
         let (_, policy) = html.split_once("http-equiv=\"Content-Security-Policy\" content=\"").unwrap();

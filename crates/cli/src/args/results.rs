@@ -138,4 +138,18 @@ pub(crate) struct ReportArgs {
     /// Date of the assessments; default: that of the newest record. Later data are ignored.
     #[arg(long, value_parser = parse_utc, value_name = "UTC", help_heading = "Selection")]
     pub as_of: Option<Timestamp>,
+    /// Also draw the diagnostic plots of the latest flights from their logs, linked from the unit's page: of each unit that
+    /// needs action, or of all selected units; at most 200.
+    #[arg(
+        long,
+        value_name = "FLIGHTS",
+        num_args = 0..=1,
+        default_missing_value = "3",
+        value_parser = clap::value_parser!(u16).range(1..),
+        help_heading = "Contents"
+    )]
+    pub diagnostics: Option<u16>,
+    /// Also write what the pages show as Parquet tables to `data/` in the folder.
+    #[arg(long, help_heading = "Contents")]
+    pub data: bool,
 }

@@ -101,6 +101,7 @@ pub fn compose(
             .collect(),
         inspection_intervals: intervals,
         quantity_changes: followed.changes,
+        trend_rows: now,
     })
 }
 
@@ -468,6 +469,7 @@ fn flight(history: &History, flown: &FlownRow, rest: &FlightExtras) -> FlightRow
         load_p05_n: rest.load_p05_n,
         load_p95_n: rest.load_p95_n,
         remarks: rest.reason.iter().map(remark).chain(others).collect::<Vec<_>>().join(", "),
+        plot_path: None,
     }
 }
 

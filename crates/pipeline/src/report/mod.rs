@@ -1,4 +1,6 @@
-//! The report: composition of its view model and publication of its folder.
+//! The report: composition of its view model, plots of single flights, its tables, and publication of its folder.
 
 pub mod compose;
+pub mod data;
+pub mod flight_plots;
 pub mod publish;

@@ -20,12 +20,17 @@ pub struct PublishSummary {
     pub bytes: u64,
 }
 
-/// Writes the pages of a report to a folder, in the place of the report that was there.
+/// Writes the pages of a report, and further files of it, to a folder, in the place of the report that was there.
 ///
 /// # Errors
 /// When the folder holds something that is no report, or a page cannot be made or written: the report
 /// that was there stays.
-pub fn write(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<PublishSummary, Error> {
+pub fn write(
+    report: &Report,
+    files: Vec<Page>,
+    dir: &Path,
+    watch: &(impl Fn(Event) + Sync),
+) -> Result<PublishSummary, Error> {
     refuse_foreign(dir)?;
     let fresh = sibling(dir, "new");
     let old = sibling(dir, "old");
@@ -34,7 +39,7 @@ pub fn write(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Re
             fs::remove_dir_all(leftover).map_err(|e| failed(leftover, e))?;
         }
     }
-    let written = all(report, &fresh, watch)?;
+    let written = all(report, files, &fresh, watch)?;
     if dir.exists() {
         fs::rename(dir, &old).map_err(|e| failed(dir, e))?;
     }
@@ -57,8 +62,14 @@ fn refuse_foreign(dir: &Path) -> Result<(), Error> {
     Err(Error::refused(diagnostic))
 }
 
-fn all(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<PublishSummary, Error> {
-    for folder in ["assets", "tail", "serial"] {
+fn all(
+    report: &Report,
+    further: Vec<Page>,
+    dir: &Path,
+    watch: &(impl Fn(Event) + Sync),
+) -> Result<PublishSummary, Error> {
+    let folders = further.iter().filter_map(|page| Path::new(&page.path).parent());
+    for folder in ["assets", "tail", "serial", "part"].into_iter().map(Path::new).chain(folders) {
         fs::create_dir_all(dir.join(folder)).map_err(|e| failed(dir, e))?;
     }
     let pages = report.units.len() + report.tails.len();
@@ -77,11 +88,11 @@ fn all(report: &Report, dir: &Path, watch: &(impl Fn(Event) + Sync)) -> Result<P
         watch(Event::Finished { log, bytes, estimated: 0, refused: 0, diagnostics: Vec::new() });
         Ok::<(), Error>(())
     };
-    report::assets().into_iter().try_for_each(put)?;
+    report::assets().into_iter().chain(further).try_for_each(put)?;
     let spreads = report::RateSpreads::of(report);
     report.units.par_iter().try_for_each(|unit| done(report::unit_page(report, &spreads, unit)?))?;
     report.tails.par_iter().try_for_each(|tail| done(report::tail_page(report, tail)?))?;
-    report::fleet_pages(report)?.into_iter().try_for_each(put)?;
+    report::part_pages(report)?.into_iter().chain(report::fleet_pages(report)?).try_for_each(put)?;
     Ok(PublishSummary { files: files.into_inner(), bytes: bytes.into_inner() })
 }
 
@@ -117,6 +128,7 @@ mod tests {
             quantity_changes: Vec::new(),
             inspection_intervals: Vec::new(),
             interval_advice: Vec::new(),
+            trend_rows: Vec::new(),
         }
     }
 
@@ -126,7 +138,7 @@ mod tests {
         let out = dir.path().join("out");
         fs::create_dir(&out).unwrap();
         fs::write(out.join("thesis.txt"), "years").unwrap();
-        assert!(matches!(write(&empty(), &out, &|_| ()), Err(Error::Refused(_))));
+        assert!(matches!(write(&empty(), Vec::new(), &out, &|_| ()), Err(Error::Refused(_))));
         assert_eq!(fs::read_to_string(out.join("thesis.txt")).unwrap(), "years");
     }
 
@@ -134,9 +146,9 @@ mod tests {
     fn a_report_takes_the_place_of_the_one_before_and_leaves_nothing_beside_it() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
-        let first = write(&empty(), &out, &|_| ()).unwrap();
+        let first = write(&empty(), Vec::new(), &out, &|_| ()).unwrap();
         fs::write(out.join("serial/unit-GONE.html"), "old").unwrap();
-        assert_eq!(write(&empty(), &out, &|_| ()).unwrap(), first);
+        assert_eq!(write(&empty(), Vec::new(), &out, &|_| ()).unwrap(), first);
         assert!(out.join("index.html").exists() && !out.join("serial/unit-GONE.html").exists());
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
     }

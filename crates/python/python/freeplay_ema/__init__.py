@@ -325,10 +325,16 @@ def report(
     *,
     tail: str | None = None,
     serial: str | None = None,
+    part: str | None = None,
     as_of: Instant | None = None,
+    data: bool = False,
 ) -> ReportFiles:
-    """Writes the HTML report into a folder and returns what was written; begin at ``index``."""
-    files, size_bytes = _freeplay.report(load(config), fspath(output), [tail, serial, None], _text(as_of))
+    """Writes the HTML report into a folder and returns what was written; begin at ``index``.
+
+    With ``data`` the tables of the pages are written too, as Parquet in ``data/``.
+    """
+    units = [tail, serial, part]
+    files, size_bytes = _freeplay.report(load(config), fspath(output), units, _text(as_of), data)
     return ReportFiles(join(fspath(output), "index.html"), files, size_bytes)
 
 

@@ -1,5 +1,6 @@
-//! Rows of assessments: trend of a unit, followed quantities, inspection intervals.
+//! Rows of assessments: trend of a unit, followed quantities, inspection intervals, tables of a report.
 
 pub mod action;
 pub mod quantity_row;
+pub mod report_rows;
 pub mod trend_row;

@@ -85,11 +85,12 @@ pub fn estimate_plot_svg(plots: &[EstimatePlot]) -> Result<String, Error> {
     Ok(svg)
 }
 
-/// Writes a self-contained HTML page: each plot, and its curves as data to hover over and zoom into.
+/// Writes a self-contained HTML page: each plot, and its curves as data to hover over and zoom into. `back` is the
+/// address and the name of the page that leads here.
 ///
 /// # Errors
 /// If a plot cannot be drawn or the page cannot be rendered.
-pub fn estimate_plot_html(plots: &[EstimatePlot]) -> Result<String, Error> {
+pub fn estimate_plot_html(plots: &[EstimatePlot], back: Option<(&str, &str)>) -> Result<String, Error> {
     let sections = plots
         .iter()
         .map(|plot| {
@@ -98,6 +99,7 @@ pub fn estimate_plot_html(plots: &[EstimatePlot]) -> Result<String, Error> {
         })
         .collect::<Result<_, Error>>()?;
     let page = EstimatePlotPage {
+        back,
         sections,
         style: include_str!("../../assets/estimate_plot.css"),
         chart_style: include_str!("../../assets/uplot.css"),
@@ -116,6 +118,7 @@ const SCRIPT_HASHES: &str = "'sha256-GcjUxq2Ikpp59K5J1vcWFWbf0Lo9FcxJXpdPeH63jx8
 #[derive(Template)]
 #[template(path = "estimate_plot.html")]
 struct EstimatePlotPage<'a> {
+    back: Option<(&'a str, &'a str)>,
     sections: Vec<Section<'a>>,
     style: &'static str,
     chart_style: &'static str,
@@ -404,7 +407,7 @@ mod tests {
 
     #[test]
     fn foreign_text_is_never_markup() {
-        for text in [estimate_plot_svg(&[plot()]).unwrap(), estimate_plot_html(&[plot()]).unwrap()] {
+        for text in [estimate_plot_svg(&[plot()]).unwrap(), estimate_plot_html(&[plot()], None).unwrap()] {
             assert!(!text.contains("<script>alert"), "escaped");
             assert!(text.contains("&#60;script&#62;alert") || text.contains("&lt;script&gt;alert"));
         }
@@ -412,7 +415,7 @@ mod tests {
 
     #[test]
     fn the_page_needs_nothing_beside_it() {
-        let page = estimate_plot_html(&[plot()]).unwrap();
+        let page = estimate_plot_html(&[plot()], None).unwrap();
         assert!(!page.contains("src=\"") && !page.contains("<link rel=\"stylesheet\""));
     }
 

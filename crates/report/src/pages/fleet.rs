@@ -70,7 +70,7 @@ impl Row {
 }
 
 /// Tail and position of a unit.
-fn place(unit: &UnitView) -> String {
+pub(crate) fn place(unit: &UnitView) -> String {
     let words = [unit.tail_number.as_deref(), unit.position.as_deref()];
     words.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
@@ -129,6 +129,8 @@ struct FleetView {
     more_quantity_changes: usize,
     map: Map,
     tail_pages: Vec<String>,
+    /// Part numbers with their pages.
+    parts: Vec<(String, String)>,
     months: Vec<(String, String, String, u32)>,
     undated: usize,
     spreads: Vec<SpreadRow>,
@@ -250,6 +252,7 @@ fn index_page(
         quantity_changes: quantity_changes.into_iter().take(FEW).collect(),
         map: map(report, &worst),
         tail_pages,
+        parts: crate::pages::part::parts(report),
         months: months(report),
         undated: report.units.iter().filter(|u| u.assessment.hours_per_day.is_none()).count(),
         spreads: spread_rows(report),

@@ -51,6 +51,8 @@ struct View {
     prior: String,
     band: Vec<(String, &'static str, String, String, String)>,
     flights: Vec<Flight>,
+    /// Number of flights with a diagnostic plot.
+    plots: usize,
 }
 
 type Facts = Vec<(&'static str, String)>;
@@ -59,6 +61,8 @@ type Facts = Vec<(&'static str, String)>;
 struct Flight {
     when: String,
     id: String,
+    /// Page of its diagnostic plot; empty where none is drawn.
+    plot: String,
     place: String,
     hours: String,
     gap: String,
@@ -113,6 +117,7 @@ pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) ->
         prior: prior(report, unit),
         band: band(unit),
         flights: unit.flights.iter().map(flight).collect(),
+        plots: unit.flights.iter().filter(|flight| flight.plot_path.is_some()).count(),
     };
     Ok(Page::html(unit_path(unit), &view.render()?))
 }
@@ -336,6 +341,7 @@ fn flight(f: &FlightRow) -> Flight {
     Flight {
         when: minute(f.departure_utc),
         id: f.flight_id.clone(),
+        plot: f.plot_path.clone().unwrap_or_default(),
         place: format!("{} {}", f.tail_number, f.position),
         hours: f.unit_hours.map(|h| format!("{h:.1}")).unwrap_or_default(),
         gap: micrometres_cell(f.gap_m),

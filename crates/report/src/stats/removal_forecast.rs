@@ -9,15 +9,19 @@ use crate::stats::crossing_probability::probability_within;
 
 /// Expected removals in one month.
 #[derive(Debug, Clone)]
-pub(crate) struct Month {
+pub struct Month {
+    /// `YYYY-MM`.
     pub name: String,
+    /// Expected number.
     pub expected: f64,
+    /// 5 % bound.
     pub low: f64,
+    /// 95 % bound.
     pub high: f64,
 }
 
 /// Twelve months from that of the report; units without known utilisation are left out.
-pub(crate) fn removal_forecast(report: &Report) -> Vec<Month> {
+pub fn removal_forecast(report: &Report) -> Vec<Month> {
     let Some(now) = report.as_of_utc else { return Vec::new() };
     let mut months = Vec::new();
     for k in 0..12 {

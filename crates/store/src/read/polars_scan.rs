@@ -151,3 +151,52 @@ pub(crate) fn only(schema: &Schema, names: &[&str]) -> Result<SchemaRef, Error> 
     let fields = names.iter().map(|name| Ok(schema.field_with_name(name)?.clone()));
     Ok(Arc::new(Schema::new(fields.collect::<Result<Vec<_>, Error>>()?)))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+
+    use arrow::array::AsArray;
+    use arrow::datatypes::{Float64Type, TimeUnit};
+    use jiff::Timestamp;
+    use parquet::arrow::ArrowWriter;
+
+    use super::*;
+    use crate::read::query::Query;
+
+    /// Files of an earlier release lack a column, and one may be asked for by time: whatever the order of the files, the
+    /// missing values are empty.
+    #[test]
+    fn files_without_a_later_column_are_read_by_time_with_empty_values() {
+        let dir = tempfile::tempdir().unwrap();
+        let time = DataType::Timestamp(TimeUnit::Microsecond, Some("UTC".into()));
+        let schema = Arc::new(Schema::new(vec![
+            Field::new("departure_utc", time, false),
+            Field::new("later", DataType::Float64, true),
+        ]));
+        let times = Arc::new(TimestampMicrosecondArray::from(vec![10, 20]).with_timezone("UTC"));
+        let batch =
+            RecordBatch::try_new(schema.clone(), vec![times, Arc::new(Float64Array::from(vec![1.0, 2.0]))]);
+        let batch = batch.unwrap();
+        let [new, old] = ["new", "old"].map(|name| dir.path().join(format!("{name}.parquet")));
+        for (file, batch) in [(&new, batch.clone()), (&old, batch.project(&[0]).unwrap())] {
+            let mut writer = ArrowWriter::try_new(File::create(file).unwrap(), batch.schema(), None).unwrap();
+            writer.write(&batch).unwrap();
+            writer.close().unwrap();
+        }
+        for files in [[old.clone(), new.clone()], [new, old]] {
+            let since_utc = Timestamp::from_microsecond(15).ok();
+            let wanted = ScanRequest {
+                files: &files,
+                schema: schema.clone(),
+                condition: Query { since_utc, ..Query::default() }.condition(),
+                order: &[],
+                last: None,
+            };
+            let found = wanted.collect().unwrap();
+            let mut later: Vec<_> = found.column(1).as_primitive::<Float64Type>().iter().collect();
+            later.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            assert_eq!(later, [None, Some(2.0)]);
+        }
+    }
+}

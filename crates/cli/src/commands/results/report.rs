@@ -1,9 +1,11 @@
 //! `report`: writes the HTML report.
 
+use std::sync::Arc;
+
 use jiff::Timestamp;
 use pipeline::Event;
 use pipeline::fleet_trends::assess::UnitSelection;
-use pipeline::report::{compose, publish};
+use pipeline::report::{compose, data, flight_plots, publish};
 use store::Store;
 
 use crate::args::{Global, ReportArgs};
@@ -18,14 +20,15 @@ use crate::commands::context::{KnownNames, VERSION, display_path, load_with_inst
 /// Writes the pages and prints the path of the first one.
 ///
 /// # Errors
-/// If configuration, tables or store cannot be read, or the folder cannot be written.
+/// If configuration, tables or store cannot be read, or the folder cannot be written. Logs that cannot be drawn make the
+/// exit code 1; the report is written without them.
 pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     row_output::check_folder(&args.output)?;
     let (config, installations) = load_with_installations(global)?;
     let ask = UnitSelection { statistics: true, ..args.units.selection(args.as_of) };
     let store = Store::open(config.store())?;
     let program = format!("Freeplay {VERSION}");
-    let report = compose::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
+    let mut report = compose::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
     if report.units.is_empty() {
         let known = KnownNames::read(&config);
         known.check_units(&args.units)?;
@@ -33,18 +36,37 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
         let hint = "list the store's contents with `freeplay store info`; fill it with `freeplay run`";
         return Err(Failure::usage("nothing_to_report", what, hint));
     }
+    let (config, installations) = (Arc::new(config), Arc::new(installations));
+    let mut files = Vec::new();
+    let mut diagnostics = Vec::new();
+    if let Some(flights) = args.diagnostics {
+        let plots = flight_plots::draw(&mut report, usize::from(flights), &config, &installations, &store)?;
+        if plots.left_out > 0 {
+            output.note(&format!(
+                "{} without a diagnostic plot: a report has at most {}; select units with `--tail`, `--serial` or `--part`",
+                count(plots.left_out, "flight"),
+                flight_plots::MAX_PLOTS
+            ));
+        }
+        files.extend(plots.pages);
+        diagnostics = plots.diagnostics;
+    }
+    if args.data {
+        files.extend(data::tables(&report)?);
+    }
     let progress = Progress::new("report", output);
     let watch = |event: Event| match event {
         Event::Planned { logs, .. } => progress.total(logs),
         Event::Finished { log, .. } => progress.finished(&log, 0, 0),
         _ => {}
     };
-    let written = publish::write(&report, &args.output, &watch);
+    let written = publish::write(&report, files, &args.output, &watch);
     progress.end();
     let written = written?;
     let index = display_path(&args.output.join("index.html"));
     let size = written.bytes as f64 / 1e6;
     let units = count(report.units.len(), "unit");
     output.write_result(&format!("{index}: {units}, {} files, {size:.1} MB\n", written.files))?;
-    Ok(Code::Success)
+    output.diagnostics(&diagnostics);
+    Ok(if diagnostics.is_empty() { Code::Success } else { Code::LogsInError })
 }

@@ -1,0 +1,148 @@
+//! Diagnostic plots of a report's latest flights, drawn from their logs.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ::report::{Page, Report, UnitView, estimate_plot_html, flight_path, unit_path};
+use ingest::LogFiles;
+use job::Config;
+use rayon::prelude::*;
+use records::{Diagnostic, Installations};
+use store::{Query, Store};
+
+use crate::error::Error;
+use crate::estimate_plots;
+use crate::run::discover;
+use crate::time_limit::within_time_limit;
+
+/// Most flights of actuators that one report draws: some 40 MB of pages.
+pub const MAX_PLOTS: usize = 200;
+
+/// What was drawn.
+#[derive(Debug, Default)]
+pub struct FlightPlots {
+    /// One page per actuator and flight.
+    pub pages: Vec<Page>,
+    /// Logs that could not be read.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Flights that are not drawn because of [`MAX_PLOTS`].
+    pub left_out: usize,
+}
+
+/// One actuator in one flight: its place in the report, and in its log.
+#[derive(Debug, Clone)]
+struct Wanted {
+    unit: usize,
+    flight: usize,
+    position: String,
+}
+
+/// Draws the last `flights_per_unit` flights of each unit that needs action, or of each unit if the report is limited to
+/// some, and names the pages in the report's flights. The most urgent units come first where not all can be drawn.
+///
+/// # Errors
+/// When the store cannot be read.
+pub fn draw(
+    report: &mut Report,
+    flights_per_unit: usize,
+    config: &Arc<Config>,
+    installations: &Arc<Installations>,
+    store: &Store,
+) -> Result<FlightPlots, Error> {
+    let mut logs = BTreeMap::<String, Vec<Wanted>>::new();
+    let (mut chosen, mut left_out) = (0, 0);
+    for unit in by_urgency(report) {
+        let (view, first) = (&report.units[unit], report.units[unit].flights.len());
+        let flights = first.saturating_sub(flights_per_unit)..first;
+        let logs_of_flights = log_paths(view, flights.start, store)?;
+        for flight in flights.rev() {
+            let row = &view.flights[flight];
+            let Some(log) = logs_of_flights.get(&(row.tail_number.clone(), row.flight_id.clone())) else {
+                continue;
+            };
+            if chosen == MAX_PLOTS {
+                left_out += 1;
+                continue;
+            }
+            chosen += 1;
+            let wanted = Wanted { unit, flight, position: row.position.clone() };
+            logs.entry(log.clone()).or_default().push(wanted);
+        }
+    }
+    let drawn: Vec<Result<Vec<(Wanted, Page)>, Diagnostic>> = logs
+        .into_par_iter()
+        .map(|(log, wanted)| of_log(&log, &wanted, report, config, installations))
+        .collect();
+    let mut plots = FlightPlots { left_out, ..FlightPlots::default() };
+    for pages in drawn {
+        match pages {
+            Ok(pages) => {
+                for (wanted, page) in pages {
+                    report.units[wanted.unit].flights[wanted.flight].plot_path = Some(page.path.clone());
+                    plots.pages.push(page);
+                }
+            }
+            Err(diagnostic) => plots.diagnostics.push(diagnostic),
+        }
+    }
+    Ok(plots)
+}
+
+/// Indices of the units whose flights are drawn, the most urgent first.
+fn by_urgency(report: &Report) -> Vec<usize> {
+    let units = &report.units;
+    let mut chosen: Vec<usize> =
+        (0..units.len()).filter(|k| report.scope.is_some() || units[*k].badge().needs_action()).collect();
+    chosen.sort_by_key(|k| (units[*k].badge().rank(), units[*k].assessment.not_before_utc));
+    chosen
+}
+
+/// Logs of a unit's flights from one on, by tail and flight.
+fn log_paths(
+    unit: &UnitView,
+    first: usize,
+    store: &Store,
+) -> Result<BTreeMap<(String, String), String>, Error> {
+    let Some(first) = unit.flights.get(first) else { return Ok(BTreeMap::new()) };
+    let query = Query {
+        serial_number: Some(unit.serial_number.clone()),
+        part_number: unit.part_number.clone(),
+        since_utc: Some(first.departure_utc),
+        ..Query::default()
+    };
+    let key = |record: records::GapRecord| {
+        let flight = record.flight;
+        ((flight.tail_number.to_string(), flight.flight_id.to_string()), record.provenance.log_path)
+    };
+    Ok(store.records(&query)?.into_iter().map(key).collect())
+}
+
+fn of_log(
+    log: &str,
+    wanted: &[Wanted],
+    report: &Report,
+    config: &Arc<Config>,
+    installations: &Arc<Installations>,
+) -> Result<Vec<(Wanted, Page)>, Diagnostic> {
+    let (name, of_log, units) = (log.to_owned(), Arc::clone(config), Arc::clone(installations));
+    let plots = within_time_limit(log, config, move || {
+        let path = of_log.path(&name);
+        let files = discover::log_containing(&of_log, &path).unwrap_or_else(|_| LogFiles::one(path));
+        estimate_plots::of_log(&files, &name, &of_log, &units, None)
+    })?;
+    let page = |wanted: &Wanted| {
+        let unit = &report.units[wanted.unit];
+        let plot = plots.iter().find(|(position, _)| position.to_string() == wanted.position);
+        let (_, plot) = plot.ok_or_else(|| {
+            let what = format!("the log has no position {} any more", wanted.position);
+            Diagnostic::new("no_position", what).in_file(log)
+        })?;
+        let row = &unit.flights[wanted.flight];
+        let path = flight_path(&row.tail_number, &row.flight_id, &row.position);
+        let back = format!("../{}", unit_path(unit));
+        let html = estimate_plot_html(std::slice::from_ref(plot), Some((&back, &unit.name())))
+            .map_err(|e| Diagnostic::new("cannot_draw", e).in_file(log))?;
+        Ok((wanted.clone(), Page::html(path, &html)))
+    };
+    wanted.iter().map(page).collect()
+}

@@ -1,0 +1,72 @@
+//! Contents of a report that are asked for: diagnostic plots, tables; and the pages of parts.
+
+use std::collections::BTreeSet;
+
+use crate::harness::TestFleet;
+
+fn read(fleet: &TestFleet, file: &str) -> String {
+    std::fs::read_to_string(fleet.path(file)).unwrap()
+}
+
+/// Addresses of the links in a page that contain a word.
+fn links<'a>(html: &'a str, word: &str) -> Vec<&'a str> {
+    let addresses = html.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next());
+    addresses.filter(|address| address.contains(word)).collect()
+}
+
+#[test]
+fn a_flight_leads_to_its_diagnostic_plot() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--tail", "N414FP", "--quiet"]);
+    let serial = ["report", "-o", "pages", "--serial", "1040-0013", "--diagnostics", "2"];
+    fleet.run_ok(&serial);
+    let unit = read(&fleet, "pages/serial/unit-EMA-27-1040_1040-0013.html");
+    let plots: BTreeSet<&str> = links(&unit, "flight/").into_iter().collect();
+    assert_eq!(plots.len(), 2, "{plots:?}");
+    let queried = fleet.run_ok(&["query", "serial", "1040-0013", "--last", "2", "--json"]);
+    let queried: Vec<serde_json::Value> = serde_json::from_str(&queried).unwrap();
+    for record in &queried {
+        let flight = record["flight_id"].as_str().unwrap();
+        let plot = plots.iter().find(|plot| plot.contains(flight)).unwrap();
+        let page = read(&fleet, &format!("pages/serial/{plot}"));
+        let gap_um = record["gap_m"].as_f64().unwrap() * 1e6;
+        assert!(page.contains(&format!("gap {gap_um:.1} µm")), "{flight}");
+        assert_eq!(links(&page, "serial/"), ["../serial/unit-EMA-27-1040_1040-0013.html"]);
+    }
+    // A log that is gone is an error of its own; the report is there without its plot.
+    let log = queried[1]["log_path"].as_str().unwrap();
+    std::fs::remove_file(fleet.path(log)).unwrap();
+    let result = fleet.freeplay(&serial);
+    assert_eq!(result.code, Some(1), "{result:?}");
+    assert!(result.err.contains(log), "{}", result.err);
+    let unit = read(&fleet, "pages/serial/unit-EMA-27-1040_1040-0013.html");
+    assert_eq!(links(&unit, "flight/").into_iter().collect::<BTreeSet<_>>().len(), 1);
+    // Without the option no log is read.
+    fleet.run_ok(&serial[..5]);
+    assert!(links(&read(&fleet, "pages/serial/unit-EMA-27-1040_1040-0013.html"), "flight/").is_empty());
+    assert!(!fleet.path("pages/flight").exists());
+}
+
+#[test]
+fn every_unit_is_on_the_page_of_its_part_once() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--quiet"]);
+    fleet.run_ok(&["report", "-o", "pages", "--data"]);
+    let report: serde_json::Value = serde_json::from_str(&read(&fleet, "pages/report.json")).unwrap();
+    let units = report["units"].as_array().unwrap();
+    let mut shown = Vec::new();
+    for part in ["EMA-27-1040", "EMA-27-1060"] {
+        let page = read(&fleet, &format!("pages/part/part-{part}.html"));
+        let of_part = units.iter().filter(|unit| unit["part_number"] == part).count();
+        assert_eq!(links(&page, "serial/").len(), of_part, "{part}");
+        assert_eq!(page.matches("<polyline").count(), of_part, "{part}");
+        shown.extend(links(&page, "serial/").into_iter().map(str::to_owned));
+    }
+    assert_eq!(shown.iter().collect::<BTreeSet<_>>().len(), units.len());
+    assert_eq!(links(&read(&fleet, "pages/index.html"), "part/").len(), 2);
+    let tables: BTreeSet<String> = std::fs::read_dir(fleet.path("pages/data"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    assert_eq!(tables.len(), 12, "{tables:?}");
+}
