@@ -48,7 +48,7 @@ fn plain(path: &Path) -> PathBuf {
     plain
 }
 
-/// Readers do not find a page that is missing from the contents.
+/// Readers do not find a page that is missing from the contents. Pages in folders below are those of other programs.
 #[test]
 fn every_page_is_in_the_contents_once() {
     let pages = all();
@@ -56,7 +56,9 @@ fn every_page_is_in_the_contents_once() {
     let listed: BTreeSet<String> = contents.links.iter().map(|link| format!("docs/{link}")).collect();
     let written: BTreeSet<String> = pages
         .iter()
-        .filter(|page| page.name.starts_with("docs/") && page.name != contents.name)
+        .filter(|page| {
+            Path::new(&page.name).parent() == Some(Path::new("docs")) && page.name != contents.name
+        })
         .map(|page| page.name.clone())
         .collect();
     assert_eq!(listed, written, "docs/SUMMARY.md against the pages of docs/");

@@ -57,8 +57,8 @@ fn prose_uses_the_words_of_the_vocabulary() {
     let rules = rules();
     // A string literal, or a comment up to the end of the line.
     let parts = Regex::new(r#""(?:[^"\\]|\\.)*"|//.*"#).unwrap();
-    // A code span or a definition in Python quotes a name.
-    let code = Regex::new(r"`[^`]*`|\bdef \w+").unwrap();
+    // A code span, a definition or a key in Python quotes a name.
+    let code = Regex::new(r#"`[^`]*`|\bdef \w+|\["\w+"\]"#).unwrap();
     let mut places = String::new();
     for pattern in FILES {
         for file in glob::glob(top().join(pattern).to_str().unwrap()).unwrap().flatten() {

@@ -19,7 +19,7 @@ def test_tables_are_those_of_the_pages(fleet: Path, command: Command) -> None:
     command("report", "-o", "report", "--data", "--quiet")
     pages = json.loads(Path("report/report.json").read_text())
     table = {path.stem: pl.read_parquet(path) for path in Path("report/data").iterdir()}
-    command("trend", "--format", "parquet", "-o", "trend.parquet")
+    command("trend", "--statistics", "--format", "parquet", "-o", "trend.parquet")
     assert table["units"].equals(pl.read_parquet("trend.parquet").select(table["units"].columns))
     assert [unit["serial_number"] for unit in pages["units"]] == table["units"]["serial_number"].to_list()
     command("store", "export", "--format", "parquet", "-o", "records.parquet")
@@ -41,7 +41,7 @@ def test_evidence_page_is_answered(fleet: Path, command: Command) -> None:
         database.execute(f"create view freeplay.{source.stem} as {query}")
     page = (EVIDENCE / "pages/index.md").read_text()
     queries = dict(re.findall(r"```sql (\w+)\n(.*?)```", page, flags=re.DOTALL))
-    answers = {name: database.execute(query).pl() for name, query in queries.items()}
+    answers = {name: database.sql(query).pl() for name, query in queries.items()}
     units = len(json.loads(Path("report/report.json").read_text())["units"])
     assert answers["states"]["units"].sum() == units
     records = pl.read_parquet("report/data/flights.parquet")

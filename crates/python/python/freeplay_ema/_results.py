@@ -101,7 +101,7 @@ class RunSummary:
 
 
 def _failure(error: dict[str, Any]) -> LogFailure:
-    diagnostic = error["diagnostic"]
+    diagnostic = error["complaint"]
     return LogFailure(error["log"], diagnostic["code"], diagnostic["what"], diagnostic.get("hint"), diagnostic)
 
 
@@ -129,7 +129,7 @@ class Explanation:
         settings, replay = facts["settings"], facts["replay"]
         return cls(
             replay["verdict"],
-            replay["shows"],
+            replay["says"],
             facts["remedy"],
             settings["is_current"],
             settings["config_digest"],
