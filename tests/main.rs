@@ -12,3 +12,4 @@ mod markdown;
 mod mistakes;
 mod report_contents;
 mod runs;
+mod wrong_inputs;

@@ -1,7 +1,9 @@
 //! Console output: results to stdout, messages to stderr, colour only on terminals.
 
 use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
 
+use job::Config;
 use records::Diagnostic;
 use records::sanitize::{escape_cell, escape_invisible};
 
@@ -27,6 +29,8 @@ pub(crate) struct Output {
     progress: bool,
     color: bool,
     form: LogFormat,
+    /// Configuration files of this call.
+    configs: Vec<PathBuf>,
 }
 
 impl Output {
@@ -45,7 +49,28 @@ impl Output {
             progress: !(global.no_progress || global.quiet || json),
             color,
             form: global.log_format,
+            configs: global.config.clone(),
         }
+    }
+
+    /// Refuses to write over an input: a configuration file, or one of the tables that it names.
+    ///
+    /// # Errors
+    /// If the file is one of them.
+    pub(crate) fn refuse_input(&self, file: &Path) -> Result<(), Failure> {
+        let Ok(target) = file.canonicalize() else { return Ok(()) };
+        let mut inputs = self.configs.clone();
+        if let Ok(config) = Config::read_layers(&self.configs) {
+            let logs = &config.document.logs;
+            let tables = [Some(&logs.installations), logs.flights.as_ref(), logs.maintenance.as_ref()];
+            let tables = tables.into_iter().chain([logs.inspections.as_ref()]).flatten();
+            inputs.extend(tables.map(|table| config.path(table)));
+        }
+        if inputs.iter().all(|input| input.canonicalize().ok().as_ref() != Some(&target)) {
+            return Ok(());
+        }
+        let what = format!("{} is an input of this configuration; it was not changed", file.display());
+        Err(Failure::usage("would_overwrite", what, "name another output file"))
     }
 
     /// Whether progress may be shown.

@@ -28,6 +28,7 @@ pub(crate) fn write_rows(
     batch: impl FnOnce() -> Result<RecordBatch, Failure>,
     table: impl FnOnce() -> String,
 ) -> Result<(), Failure> {
+    format.output.as_deref().map_or(Ok(()), |file| output.refuse_input(file))?;
     match (format.format(), &format.output) {
         (Format::Table, None) => output.write_result(&table()),
         (Format::Table, Some(file)) => {
@@ -46,19 +47,26 @@ pub(crate) fn write_rows(
     }
 }
 
-/// Writes to a temporary file and renames it, so that no reader finds half a file.
+/// Writes to a temporary file and renames it, so that no reader finds half a file. A symbolic link stays a link, and a
+/// device or a pipe is written to.
 pub(crate) fn to_file(
     file: &std::path::Path,
     fill: impl FnOnce(&mut File) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
+    let target = file.canonicalize().unwrap_or_else(|_| file.to_owned());
+    if target.metadata().is_ok_and(|target| !target.is_file() && !target.is_dir()) {
+        let opened = File::options().write(true).open(&target);
+        return fill(&mut opened.map_err(|e| not_written(file, &e))?);
+    }
+    let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
     let mut temporary = shared().tempfile_in(folder).map_err(|e| not_written(file, &e))?;
     fill(temporary.as_file_mut())?;
-    temporary.persist(file).map(drop).map_err(|e| not_written(file, &e.error))
+    temporary.persist(&target).map(drop).map_err(|e| not_written(file, &e.error))
 }
 
-/// Refuses a file that cannot be written, before a long computation: its folder is missing, or it is a folder.
-pub(crate) fn check_file(file: &std::path::Path) -> Result<(), Failure> {
+/// Refuses a file that cannot be written, before a long computation: its folder is missing, or it is a folder or an input.
+pub(crate) fn check_file(file: &std::path::Path, output: &Output) -> Result<(), Failure> {
+    output.refuse_input(file)?;
     let folder = file.parent().filter(|p| !p.as_os_str().is_empty());
     let kind = match folder {
         _ if file.is_dir() => io::ErrorKind::IsADirectory,

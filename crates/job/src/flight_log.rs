@@ -106,8 +106,8 @@ impl FlightLog {
     /// `battery_load` may fit a pattern without being an actuator.
     pub fn actuators(&self, installations: &Installations) -> impl Iterator<Item = &ActuatorColumns> {
         let id = &self.identity;
-        let booked =
-            |at: &Position| installations.installed_at(&id.tail_number, at, id.departure_utc).is_some();
+        // Which columns a position has may depend on its part, so a position without a unit may lack some.
+        let booked = |at: &Position| installations.contains_position(&id.tail_number, at);
         self.positions.iter().filter(move |at| at.lacking.is_empty() || booked(&at.position))
     }
 

@@ -38,7 +38,7 @@ const MAPPING: [&str; 7] = [
 ];
 
 /// Codes that single flights have for other causes; on most flights of a part number, a unit is wrong.
-const UNIT: [(&str, &str); 2] = [
+const UNIT: [(&str, &str); 6] = [
     (
         "load_too_small",
         "check `unit` and `scale` of the load channel (N against kN), and `unknown_force_n` of the part",
@@ -48,7 +48,24 @@ const UNIT: [(&str, &str); 2] = [
         "check `unit` and `scale` of the load channel (N against kN), the part's stiffness, and the units of the \
          positions: the wind-up by this load exceeds the travel",
     ),
+    (
+        "too_short",
+        "check the unit of the clock (ms against s): by its times no flight has 9 s of valid samples under load",
+    ),
+    ("channel_constant", "check wiring and mapping: a channel that never changes is not measured"),
+    (
+        "motion_unexplained",
+        "check that load and positions are of the same actuator, and `stiffness_n_per_m` of the part",
+    ),
+    (
+        STIFFNESS_UNLIKE,
+        "set `stiffness_n_per_m` of the part to what `freeplay check` identifies: the gap is fitted with a stiffness \
+         of its own, but `gap_midrange_m`, loads and limits of other quantities assume the configured one",
+    ),
 ];
+
+/// The fitted stiffness of most flights of a part number is not the configured one, by a factor of two or more.
+pub const STIFFNESS_UNLIKE: &str = "stiffness_unlike";
 
 /// Remedy of a rejection; `None` for an unknown code.
 pub fn remedy(code: &str) -> Option<&'static str> {
@@ -97,6 +114,6 @@ mod tests {
     fn codes_of_the_mapping_have_a_remedy_for_a_part_and_those_of_a_flight_have_none() {
         assert!(MAPPING.iter().all(|code| part_remedy(code).is_some()));
         assert!(part_remedy("travel_too_small").unwrap().contains("kN"));
-        assert_eq!((part_remedy("no_load_reversal"), part_remedy("too_short")), (None, None));
+        assert_eq!((part_remedy("no_load_reversal"), part_remedy("load_reversals")), (None, None));
     }
 }

@@ -132,6 +132,11 @@ impl Installations {
         !self.of_tail(tail).is_empty()
     }
 
+    /// Whether the table has a unit in that position of that tail, at any time.
+    pub fn contains_position(&self, tail: &TailNumber, position: &Position) -> bool {
+        self.of_tail(tail).iter().any(|installation| installation.position == *position)
+    }
+
     /// Every installation, by tail, position and date.
     pub fn iter(&self) -> impl Iterator<Item = &Installation> {
         self.rows.iter()

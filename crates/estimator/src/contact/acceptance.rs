@@ -11,15 +11,17 @@ const IMPLAUSIBLE: f64 = 0.45;
 /// Largest relative standard error of a useful gap, in wind-ups.
 const VAGUE: f64 = 0.1;
 
+/// Flags of an estimate of a part whose stiffness, N/m, is known.
 pub(crate) fn flags(
     found: &ContactEstimate,
     frame: &Scaling,
+    part_stiffness_n_per_m: f64,
     is_soft: bool,
     agrees: bool,
 ) -> Vec<QualityFlag> {
     let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * frame.windup_m());
     let is_negative = found.gap_m < -SEEN * found.gap_se_m;
-    let compliance = frame.stiffness_n_per_m / found.stiffness_n_per_m;
+    let compliance = part_stiffness_n_per_m / found.stiffness_n_per_m;
     let doubts = [
         (QualityFlag::GapNegative, is_negative),
         (QualityFlag::BelowDetection, found.gap_m < least_m && !is_negative && agrees),

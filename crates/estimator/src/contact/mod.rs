@@ -104,9 +104,11 @@ fn look(
         return Err(Rejection::RateTooLow);
     }
     room.whole.gather(samples, prior)?;
-    let frame = Scaling::of(&room.whole, prior)?;
-    if !prior.output_locked {
-        sign_check::check(&room.whole, &frame)?;
+    let mut frame = Scaling::of(&room.whole, prior)?;
+    if !prior.output_locked
+        && let Some(stiffness_n_per_m) = sign_check::check(&room.whole, &frame)?
+    {
+        frame.stiffness_n_per_m = stiffness_n_per_m;
     }
     let contact = flank_fit::fit(room, &frame)?;
     Ok((frame, contact))
@@ -147,6 +149,6 @@ fn report(
         flags: Vec::new(),
     };
     let agrees = found.agrees_with_midrange(flank_fit::unknown_force_n(prior.unknown_force_n, frame));
-    found.flags = acceptance::flags(&found, frame, contact.is_soft, agrees);
+    found.flags = acceptance::flags(&found, frame, prior.stiffness_n_per_m, contact.is_soft, agrees);
     found
 }

@@ -121,6 +121,20 @@ fn eightfold_friction_costs_under_one_per_cent() {
     }
 }
 
+/// The gap does not depend on the stiffness that is configured: units of stiffness are mistaken by powers of ten.
+#[test]
+fn a_configured_stiffness_that_is_wrong_by_powers_of_ten_moves_no_gap() {
+    for gap_m in [30e-6, 100e-6] {
+        let right = Case::nominal(gap_m).gap(5);
+        for factor in [0.01, 0.1, 0.25, 4.0, 7.0, 10.0, 30.0, 1000.0] {
+            let found = Case::with(gap_m, |c| c.assumed_stiffness = factor).gap(5);
+            let off_m = (found.gap_m - right.gap_m).abs();
+            assert!(off_m < 1e-6 && found.gap_se_m < 2.0 * right.gap_se_m + 0.5e-6, "{factor}: {found:?}");
+            assert!(found.flags.contains(&QualityFlag::StiffnessImplausible), "{factor}: {:?}", found.flags);
+        }
+    }
+}
+
 /// A load cell that departs from its line bends the flanks: 2 % at full load move a gap by some 2 µm. A bend that noise
 /// hides does not widen the interval, so half of the flights must hold; without the term for it one of eight does.
 #[test]

@@ -62,6 +62,15 @@ pub fn number(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Reads a finite number that is not below zero.
+///
+/// # Errors
+/// When it is none.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    number(text)
+        .and_then(|value| if value < 0.0 { Err(format!("`{text}` is below zero")) } else { Ok(value) })
+}
+
 /// Parses an instant. In a column whose name holds UTC, a date or a time without zone is UTC.
 ///
 /// # Errors

@@ -9,8 +9,13 @@ use records::{Flight, FlightId, TailNumber};
 use crate::error::Error;
 use crate::log::identity::{IdentityFields, instant};
 use crate::mapping::{IdentityField, IdentityMapping};
-use crate::tables::cell::{self, name, number};
+use crate::tables::cell::{self, name, not_negative};
 use crate::tables::table::{ColumnAliases, Table};
+
+/// A flight may seem to last longer than until the next departure by this factor and by these hours: clocks and rounding.
+const OVERLAP_SHARE: f64 = 1.25;
+/// See [`OVERLAP_SHARE`].
+const OVERLAP_HOURS: f64 = 1.0;
 
 /// Flights, found by the path of their log, or by the identity in the log.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -50,7 +55,38 @@ impl Flights {
                 Err(error) => errors.push(error),
             }
         }
+        if let (true, Some(hours)) = (errors.is_empty(), optional[0]) {
+            errors = flights.overlapping(&table, hours);
+        }
         if errors.is_empty() { Ok(flights) } else { Err(errors) }
+    }
+
+    /// Flights that last beyond the next departure of their aircraft: hours in another unit, or a wrong row.
+    fn overlapping(&self, table: &Table, column: usize) -> Vec<Error> {
+        let mut by_tail = BTreeMap::<&str, Vec<(usize, &Flight)>>::new();
+        for (row, Row { flight, .. }) in self.rows.iter().enumerate() {
+            by_tail.entry(flight.tail_number.as_str()).or_default().push((row, flight));
+        }
+        let mut errors = Vec::new();
+        for flights in by_tail.values_mut() {
+            flights.sort_by_key(|(_, flight)| flight.departure_utc);
+            for (k, (row, flight)) in flights.iter().enumerate() {
+                let next = flights[k..].iter().find(|(_, next)| next.departure_utc > flight.departure_utc);
+                let (Some((_, next)), Some(hours)) = (next, flight.flight_hours) else { continue };
+                let until_next =
+                    next.departure_utc.duration_since(flight.departure_utc).as_secs_f64() / 3600.0;
+                if hours > OVERLAP_SHARE * until_next + OVERLAP_HOURS {
+                    let what = format!(
+                        "{hours} flight hours, but {} departs again {until_next:.1} h later ({}): give hours, not minutes, \
+                         and check the two departures",
+                        flight.tail_number, next.flight_id
+                    );
+                    errors.push((*row, table.error(*row, column, what)));
+                }
+            }
+        }
+        errors.sort_by_key(|(row, _)| *row);
+        errors.into_iter().map(|(_, error)| error).collect()
     }
 
     fn enter(
@@ -66,8 +102,8 @@ impl Flights {
             tail_number: table.required(row, tail, name::<TailNumber>)?,
             flight_id: table.required(row, flight, name::<FlightId>)?,
             departure_utc: table.required(row, departure, departs)?,
-            flight_hours: table.optional(row, hours, number)?,
-            tail_hours_end: table.optional(row, tail_hours, number)?,
+            flight_hours: table.optional(row, hours, not_negative)?,
+            tail_hours_end: table.optional(row, tail_hours, not_negative)?,
         };
         let known = [
             (IdentityField::TailNumber, Some(flown.tail_number.to_string())),

@@ -133,7 +133,8 @@ impl Table {
         read(text).map(Some).map_err(|detail| self.error(row, column, detail))
     }
 
-    fn error(&self, row: usize, column: usize, detail: String) -> Error {
+    /// The error of a cell.
+    pub(super) fn error(&self, row: usize, column: usize, detail: String) -> Error {
         bad_cell(&self.file, row, self.header.get(column), detail)
     }
 }

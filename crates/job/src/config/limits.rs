@@ -21,8 +21,8 @@ pub const PLAUSIBLE: &[(&str, f64, f64)] = &[
     ("inertia_kg_m2", 1e-9, 1e8),
     ("reference_radius_m", 1e-4, 100.0),
     ("reference_load_n", 1e-3, 1e9),
-    ("limit_m", 1e-8, MAX_PLAUSIBLE_LIMIT_M),
-    ("watch_m", 1e-8, MAX_PLAUSIBLE_LIMIT_M),
+    ("limit_m", PLAUSIBLE_LIMIT_M.0, PLAUSIBLE_LIMIT_M.1),
+    ("watch_m", PLAUSIBLE_LIMIT_M.0, PLAUSIBLE_LIMIT_M.1),
     ("screw_rms_m", 0.0, 0.1),
     ("screw_resolution_m", 0.0, 0.1),
     ("motor_rms_m", 0.0, 0.1),
@@ -86,15 +86,15 @@ pub(crate) fn bounded(key: &str, value: Option<f64>) -> Option<Diagnostic> {
     positive(key, value).or_else(|| implausible(key, value))
 }
 
-/// Largest plausible gap, m: a limit beyond it was given in another unit.
-pub const MAX_PLAUSIBLE_LIMIT_M: f64 = 0.01;
+/// Smallest and largest plausible limit of free play, m: one beyond them was given in another unit.
+pub const PLAUSIBLE_LIMIT_M: (f64, f64) = (1e-6, 0.01);
 
 /// A limit that an aircraft may be grounded by, m.
 ///
 /// # Errors
-/// In words, when it is not above zero, or so large that it was meant in another unit.
+/// In words, when it is so small or so large that it was meant in another unit.
 pub fn plausible_limit_m(limit_m: f64) -> Result<f64, String> {
-    if limit_m > 0.0 && limit_m <= MAX_PLAUSIBLE_LIMIT_M {
+    if (PLAUSIBLE_LIMIT_M.0..=PLAUSIBLE_LIMIT_M.1).contains(&limit_m) {
         Ok(limit_m)
     } else {
         Err(format!("{limit_m} m is not a plausible limit of free play: 150 µm is 150e-6"))

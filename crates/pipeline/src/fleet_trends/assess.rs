@@ -146,7 +146,11 @@ pub fn assess_run(
     let recent =
         all.newest_utc().map(|newest| recent_diagnostics(store, newest)).transpose()?.unwrap_or_default();
     let touched = units.iter().map(|(part, serial)| (part.to_string(), serial.to_string())).collect();
-    let mapping_faults = mapping_faults::detect(&recent, &touched);
+    let stiffness = |number: &str| {
+        let part = config.parts.get(&PartNumber::new(number).ok()?)?;
+        Some(part.actuator.stiffness_n_per_m())
+    };
+    let mapping_faults = mapping_faults::detect(&recent, stiffness, &touched);
     let run = assess_run_from(config, installations, all, &of_run, units, Some(store))?;
     let changed = since_states(run.changed, before, &run.now);
     Ok(RunAssessments { changed, recent, mapping_faults, ..run })

@@ -1,10 +1,12 @@
 //! Maintenance log: work on units, with its date.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use ingest::tables::{Table, name, utc};
-use records::{PartNumber, SerialNumber};
+use job::Config;
+use records::{Installations, PartNumber, SerialNumber};
+use serde::Serialize;
 use trend::MaintenanceEvent;
 
 use crate::error::Error;
@@ -35,6 +37,46 @@ pub fn read(file: &Path) -> Result<MaintenanceLog, Error> {
         maintenance.entry(unit).or_default().push(MaintenanceEvent { utc_us, renews });
     }
     Ok(maintenance)
+}
+
+/// A row of the maintenance or the inspections table about a unit that was never installed.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct UnknownUnit {
+    /// File of the table.
+    pub table: String,
+    /// Part number, where the table has one.
+    pub part_number: Option<String>,
+    /// Serial number.
+    pub serial_number: String,
+}
+
+/// Units of the maintenance and the inspections table that the installations table does not know.
+///
+/// A table that cannot be read is an error where it is used, and has none here.
+pub fn unknown_units(config: &Config, installations: &Installations) -> Vec<UnknownUnit> {
+    let known: BTreeSet<(&str, &str)> =
+        installations.iter().map(|i| (i.part_number.as_str(), i.serial_number.as_str())).collect();
+    let serials: BTreeSet<&str> = known.iter().map(|(_, serial)| *serial).collect();
+    let logs = &config.document.logs;
+    let mut unknown = BTreeSet::new();
+    for file in [&logs.maintenance, &logs.inspections].into_iter().flatten() {
+        let Ok(table) = Table::read(&config.path(file)) else { continue };
+        let Ok(serial) = table.column(&["serial_number", "serial"]) else { continue };
+        let part = table.find(&["part_number"]);
+        for row in 0..table.len() {
+            let Some(serial) = table.text(row, serial) else { continue };
+            let part = part.and_then(|column| table.text(row, column));
+            let is_known = part.map_or(serials.contains(serial), |part| known.contains(&(part, serial)));
+            if !is_known {
+                unknown.insert(UnknownUnit {
+                    table: file.clone(),
+                    part_number: part.map(str::to_owned),
+                    serial_number: serial.to_owned(),
+                });
+            }
+        }
+    }
+    unknown.into_iter().collect()
 }
 
 /// Whether what was done makes a worn unit as good as new.

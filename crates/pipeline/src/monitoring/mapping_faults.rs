@@ -5,10 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use job::rejection;
 use serde::Serialize;
 
-use crate::monitoring::recent::{PositionKey, RecentDiagnostics};
+use crate::monitoring::recent::{FlightDiagnostics, PositionKey, RecentDiagnostics};
 
 /// Latest flights of an actuator that count.
 const LATEST: usize = 5;
+
+/// A fitted stiffness is another than the part's beyond this factor.
+const STIFFNESS_FACTOR: f64 = 2.0;
 
 /// Fewest flights of a scope that show a fault.
 const MIN_FLIGHTS: usize = 3;
@@ -55,8 +58,12 @@ struct Tally<'a> {
 
 /// The faults of the mapping, the widest scope first: a part number, a tail, an actuator.
 ///
-/// `touched` holds the part and serial numbers whose records this run changed.
-pub(crate) fn detect(recent: &RecentDiagnostics, touched: &BTreeSet<(String, String)>) -> Vec<MappingFault> {
+/// `stiffness` gives the configured stiffness of a part number, N/m; `touched` holds the part and serial numbers whose records this run changed.
+pub(crate) fn detect(
+    recent: &RecentDiagnostics,
+    stiffness: impl Fn(&str) -> Option<f64>,
+    touched: &BTreeSet<(String, String)>,
+) -> Vec<MappingFault> {
     type Scope = fn(&PositionKey) -> (Option<&String>, Option<&String>, Option<&String>);
     let scopes: [Scope; 3] = [
         |key| (Some(&key.part_number), None, None),
@@ -69,7 +76,8 @@ pub(crate) fn detect(recent: &RecentDiagnostics, touched: &BTreeSet<(String, Str
         for (key, flights) in recent.iter().filter(|(key, _)| !explained.contains(key)) {
             let tally = tallies.entry(scope(key)).or_default();
             let latest = &flights[flights.len().saturating_sub(LATEST)..];
-            tally.codes.extend(latest.iter().map(|flight| flight.rejection.as_deref()));
+            let configured = stiffness(&key.part_number);
+            tally.codes.extend(latest.iter().map(|flight| code(flight, configured)));
             tally.members.insert(key);
         }
         let is_wide = width < 2;
@@ -99,12 +107,20 @@ pub(crate) fn detect(recent: &RecentDiagnostics, touched: &BTreeSet<(String, Str
     found
 }
 
+/// Rejection of a flight, or the code of a stiffness that is not the configured one.
+fn code(flight: &FlightDiagnostics, configured_n_per_m: Option<f64>) -> Option<&str> {
+    let unlike = || {
+        let ratio = flight.stiffness_n_per_m? / configured_n_per_m?;
+        (ratio > STIFFNESS_FACTOR || ratio < STIFFNESS_FACTOR.recip()).then_some(rejection::STIFFNESS_UNLIKE)
+    };
+    flight.rejection.as_deref().or_else(unlike)
+}
+
 #[cfg(test)]
 mod tests {
     use jiff::{SignedDuration, Timestamp};
 
     use super::*;
-    use crate::monitoring::recent::FlightDiagnostics;
 
     fn key(tail: &str, position: &str, part: &str) -> PositionKey {
         PositionKey {
@@ -127,7 +143,7 @@ mod tests {
     const SIGN: Option<&str> = Some("load_sign_flipped");
 
     fn scopes(latest: &RecentDiagnostics) -> Vec<String> {
-        detect(latest, &BTreeSet::new()).iter().map(MappingFault::scope).collect()
+        detect(latest, |_| Some(5e7), &BTreeSet::new()).iter().map(MappingFault::scope).collect()
     }
 
     #[test]
@@ -152,6 +168,20 @@ mod tests {
             (key("B", "left", "P"), good()),
         ];
         assert_eq!(scopes(&one.into()), ["left of A"]);
+    }
+
+    /// A stiffness in N/µm, or of another part, is stated for the part; one actuator that softens is no wrong setting.
+    #[test]
+    fn a_configured_stiffness_that_no_flight_shows_is_a_fault_of_the_part() {
+        let fitted = |n_per_m: f64| {
+            let mut flights = flights([None; 5]);
+            flights.iter_mut().for_each(|flight| flight.stiffness_n_per_m = Some(n_per_m));
+            flights
+        };
+        let all = |second| [(key("A", "left", "P"), fitted(2e7)), (key("B", "left", "P"), fitted(second))];
+        let found = detect(&all(1.9e7).into(), |_| Some(5e7), &BTreeSet::new());
+        assert_eq!((found.len(), &*found[0].reason, found[0].refused), (1, "stiffness_unlike", 10));
+        assert!(scopes(&all(4e7).into()).is_empty());
     }
 
     /// Flights that cannot show a gap are no fault; a unit of measure is at fault only where all of a part number is.

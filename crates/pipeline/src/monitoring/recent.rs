@@ -24,6 +24,8 @@ pub struct FlightDiagnostics {
     pub departure_utc: Timestamp,
     pub flight_id: Box<str>,
     pub nis: Option<f64>,
+    /// Stiffness fitted in the flight, N/m.
+    pub stiffness_n_per_m: Option<f64>,
     /// Rejection code of a flight without a gap.
     pub rejection: Option<Box<str>>,
 }
@@ -46,7 +48,7 @@ pub type RecentDiagnostics = BTreeMap<PositionKey, Vec<FlightDiagnostics>>;
 /// # Errors
 /// When the store cannot be read.
 pub fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagnostics, Error> {
-    const COLUMNS: [&str; 9] = [
+    const COLUMNS: [&str; 10] = [
         "tail_number",
         "position",
         "part_number",
@@ -54,6 +56,7 @@ pub fn recent_diagnostics(store: &Store, until: Timestamp) -> Result<RecentDiagn
         "flight_id",
         "departure_utc",
         "nis",
+        "stiffness_n_per_m",
         "status",
         "reason",
     ];
@@ -77,6 +80,7 @@ impl Found {
         let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
         let (keys, flights) = (KeyColumns::of(&chunk)?, TextColumn::of(&chunk, &["flight_id"])?);
         let nis = chunk.numbers(Some(chunk.column(&["nis"])?))?;
+        let stiffness = chunk.numbers(Some(chunk.column(&["stiffness_n_per_m"])?))?;
         let (statuses, reasons) =
             (TextColumn::of(&chunk, &["status"])?, TextColumn::of(&chunk, &["reason"])?);
         let departures = chunk.timestamps(Some(chunk.column(&["departure_utc"])?))?;
@@ -93,6 +97,7 @@ impl Found {
                 departure_utc,
                 flight_id: flights.get(row).unwrap_or_default().into(),
                 nis: at(&nis, row),
+                stiffness_n_per_m: at(&stiffness, row),
                 rejection: reasons
                     .get(row)
                     .filter(|_| statuses.get(row) == Some(Status::Refused.as_str()))

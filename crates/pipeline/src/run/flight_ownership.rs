@@ -57,6 +57,8 @@ pub(crate) struct OwnershipLedger<'a> {
     same_id: HashMap<u64, Vec<String>>,
     /// Units whose records changed.
     pub(crate) touched: BTreeSet<Unit>,
+    /// Records that were removed and not stored again.
+    withdrawn: BTreeSet<RecordKey>,
 }
 
 impl<'a> OwnershipLedger<'a> {
@@ -69,6 +71,7 @@ impl<'a> OwnershipLedger<'a> {
             owners: HashMap::new(),
             same_id: HashMap::new(),
             touched: BTreeSet::new(),
+            withdrawn: BTreeSet::new(),
         };
         if !plan.work.is_empty() {
             plan.accounts.values().for_each(|account| ledger.insert(account.clone()));
@@ -229,6 +232,11 @@ impl<'a> OwnershipLedger<'a> {
         let unit = |r: &GapRecord| (r.part_number.clone(), r.serial_number.clone());
         self.touched.extend(records.iter().map(unit));
         let retires = self.stale_records(&account, &records);
+        self.withdrawn.extend(retires.iter().cloned());
+        for record in &records {
+            self.withdrawn.remove(&RecordKey::of(record));
+        }
+        report.withdrawn = self.withdrawn.len();
         self.insert(account.clone());
         let is_owner = |r: &GapRecord| self.owners.get(&RecordKey::of(r)) == Some(&account.log_path);
         debug_assert!(records.iter().all(is_owner), "{} owns its flights", account.log_path);

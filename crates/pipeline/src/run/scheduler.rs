@@ -20,6 +20,7 @@ use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
 use crate::error::Error;
 use crate::fleet_trends::assess;
 use crate::follow_up::FollowUp;
+use crate::history::maintenance_log::unknown_units;
 use crate::run::discover;
 use crate::run::event::Event;
 use crate::run::flight_ownership::{LogOutcomeData, OwnershipLedger};
@@ -107,6 +108,7 @@ pub(crate) fn execute_run(
     let started_utc = Timestamp::now();
     let mut report = RunSummary::begin(run_id(started_utc), started_utc, &plan, workers);
     report.cut_short = killed.into_iter().map(KilledRun::from).collect();
+    report.unknown_units = unknown_units(config, &installations);
     let config_path = config.file.display().to_string();
     let to_do: Vec<LogRecord> =
         plan.work.iter().map(|work| summary::not_reached(work, &report.run_id)).collect();

@@ -11,6 +11,7 @@ use crate::error::is_passing;
 use crate::fleet_trends::assess::RunAssessments;
 use crate::fleet_trends::changes::UnitChange;
 use crate::follow_up::summary::FollowUpSummary;
+use crate::history::maintenance_log::UnknownUnit;
 use crate::monitoring::REPORTED_DAYS;
 use crate::monitoring::innovations::{self, InnovationOutlier};
 use crate::monitoring::mapping_faults::MappingFault;
@@ -125,6 +126,10 @@ pub struct RunSummary {
     pub duplicates: Vec<DuplicateLog>,
     /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
     pub mapping_faults: Vec<MappingFault>,
+    /// Stored records that this run removed because their log cannot be used any more or holds another flight.
+    pub withdrawn: usize,
+    /// Units of the maintenance and the inspections table that the installations table does not know.
+    pub unknown_units: Vec<UnknownUnit>,
     /// Failed logs, by path.
     pub errors: Vec<LogError>,
     /// Logs that the run has not processed.
@@ -212,6 +217,8 @@ impl RunSummary {
             refusals: Vec::new(),
             duplicates: Vec::new(),
             mapping_faults: Vec::new(),
+            withdrawn: 0,
+            unknown_units: Vec::new(),
             errors: Vec::new(),
             not_reached: plan.work.len(),
             not_reached_logs: Vec::new(),

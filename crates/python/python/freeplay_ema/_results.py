@@ -75,6 +75,10 @@ class RunSummary:
     refusals: list[Refusals]
     errors: list[LogFailure]
     duplicates: list[DuplicateLog]
+    #: Stored records that this run removed: their log cannot be used any more, or holds another flight.
+    withdrawn: int
+    #: Units of the maintenance and the inspections table that the installations table does not know.
+    unknown_units: list[dict[str, Any]]
     quiet: list[SilentTail]
     cut_short: list[KilledRun]
     took_s: float

@@ -23,7 +23,10 @@ use crate::commands::results::query::{flags_text, load};
 /// # Errors
 /// If configuration or tables are wrong. Failed logs make the exit code 1.
 pub(crate) fn estimate(args: &EstimateArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
-    [&args.trace, &args.plot].into_iter().flatten().try_for_each(|file| row_output::check_file(file))?;
+    [&args.trace, &args.plot]
+        .into_iter()
+        .flatten()
+        .try_for_each(|file| row_output::check_file(file, output))?;
     let (config, installations) = match &args.part {
         Some(_) => (load_config(global)?, Installations::default()),
         None => load_with_installations(global)?,

@@ -40,7 +40,7 @@ const MAX_CHANGES_SHOWN: usize = 20;
 /// If nothing could be run, or the store failed.
 pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     check_range(args.departures.since, args.departures.until)?;
-    args.metrics.as_deref().map_or(Ok(()), row_output::check_file)?;
+    args.metrics.as_deref().map_or(Ok(()), |file| row_output::check_file(file, output))?;
     let config = load_config(global)?;
     let request = request(args)?;
     if args.tail.is_some() || args.serial.is_some() {
@@ -186,6 +186,25 @@ fn mapping_faults(report: &RunSummary, page: &mut String) {
     }
 }
 
+/// A log in error with code and place; its actuators may share both.
+fn failed_log(error: &pipeline::run::summary::LogError) -> String {
+    let place = error.diagnostic.location().map(|p| format!("  {p}")).unwrap_or_default();
+    format!("{}  {}{place}", escape(&error.log), error.diagnostic.code)
+}
+
+/// Lists the units of the tables of work that were never installed.
+fn unknown_units(report: &RunSummary, page: &mut String) {
+    const MAX_SHOWN: usize = 5;
+    for unit in report.unknown_units.iter().take(MAX_SHOWN) {
+        let part = unit.part_number.as_ref().map(|part| format!("{part} / ")).unwrap_or_default();
+        let what = format!("{}: {part}{}", unit.table, unit.serial_number);
+        line(page, "unknown", &format!("{}: no such unit in the installations table", escape(&what)));
+    }
+    if let Some(more @ 1..) = report.unknown_units.len().checked_sub(MAX_SHOWN) {
+        line(page, "", &format!("and {}, all in `freeplay run --json`", count(more, "more unit")));
+    }
+}
+
 /// Lists the logs that are copies of others.
 fn duplicates(report: &RunSummary, page: &mut String) {
     const MAX_SHOWN: usize = 5;
@@ -288,6 +307,12 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
         line(&mut page, "refused", &format!("{} {}{remedy}", refusals.reason, refusals.count));
     }
     mapping_faults(report, &mut page);
+    if report.withdrawn > 0 {
+        let records = count(report.withdrawn, "stored record");
+        let text = format!("{records} removed: their log cannot be used any more, or holds another flight");
+        line(&mut page, "withdrawn", &text);
+    }
+    unknown_units(report, &mut page);
     duplicates(report, &mut page);
     if !report.errors.is_empty() {
         line(
@@ -296,12 +321,11 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
             &format!("{} could not be used; all others are stored", count(report.logs_in_error(), "log")),
         );
     }
-    for error in report.errors.iter().take(10) {
-        let place = error.diagnostic.location().map(|p| format!("  {p}")).unwrap_or_default();
-        line(&mut page, "", &format!("{}  {}{place}", escape(&error.log), error.diagnostic.code));
-    }
-    if report.errors.len() > 10 {
-        line(&mut page, "", &format!("and {} more, all in `freeplay run --json`", report.errors.len() - 10));
+    let mut failed: Vec<String> = report.errors.iter().map(failed_log).collect();
+    failed.dedup();
+    failed.iter().take(10).for_each(|log| line(&mut page, "", log));
+    if failed.len() > 10 {
+        line(&mut page, "", &format!("and {} more, all in `freeplay run --json`", failed.len() - 10));
     }
     standing_errors(report, &mut page);
     if report.not_reached > 0 {
@@ -364,7 +388,7 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     } else if code == Code::LogsInError {
         let _ = writeln!(
             page,
-            "Exit code 1: most flights are refused for a wrong mapping. After fixing pipeline.toml: `freeplay run`"
+            "Exit code 1: mapping or part settings are wrong for most flights. After fixing pipeline.toml: `freeplay run`"
         );
     }
     page

@@ -24,6 +24,9 @@ const SIGNIFICANT: f64 = 4.0;
 /// Rounds of reweighting.
 const ROUNDS: usize = 4;
 
+/// A stiffness of the part that is off by more than this factor is no start for the fit: it ends at a soft contact.
+const STIFFNESS_FACTOR: f64 = 3.0;
+
 const SIDE: usize = 1;
 const LOAD: usize = 2;
 const SLIP: usize = 3;
@@ -36,13 +39,15 @@ const COLUMNS: usize = 6;
 /// δX must grow with the load. Where it falls, either the load's sign is flipped or the two positions
 /// are swapped; friction separates the two cases, since it opposes the motion of the screw in either case.
 ///
+/// Returns a stiffness to start from, N/m, where the slope shows that the part's is off by more than a factor of three.
+///
 /// # Errors
 /// [`Rejection::PositionRatio`], [`Rejection::LoadSignFlipped`], [`Rejection::PositionsSwapped`].
-pub(crate) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<(), Rejection> {
+pub(crate) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<Option<f64>, Rejection> {
     let stride = STRIDE.max(blocks.len() / LOOKS);
     let rows: Vec<DesignRow<COLUMNS>> =
         (1..blocks.len()).step_by(stride).filter_map(|k| row(blocks, frame, k)).collect();
-    let Some(found) = fit(&rows, &[GaussianPrior::NONE; COLUMNS], ROUNDS) else { return Ok(()) };
+    let Some(found) = fit(&rows, &[GaussianPrior::NONE; COLUMNS], ROUNDS) else { return Ok(None) };
     let beta = &found.beta;
     let error_m = |column: usize| found.standard_error_m(column, &rows);
     let least_m = (RATIO * frame.place_m.1).max(TRANSDUCER_M);
@@ -52,10 +57,17 @@ pub(crate) fn check(blocks: &BlockMeans, frame: &Scaling) -> Result<(), Rejectio
     let windup_m = beta[SIDE] + beta[LOAD];
     let doubt_m = SIGNIFICANT * error_m(SIDE).hypot(error_m(LOAD));
     if windup_m + doubt_m > -FLIPPED * frame.windup_m() {
-        return Ok(());
+        return Ok(other_stiffness(beta[LOAD], SIGNIFICANT * error_m(LOAD), frame));
     }
     let drag_m = beta[SLIP] + beta[SPEED];
     Err(if drag_m > 0.0 { Rejection::PositionsSwapped } else { Rejection::LoadSignFlipped })
+}
+
+/// The stiffness of a wind-up at the 95 % load, m, that is known to `doubt_m`, where the part's is another.
+fn other_stiffness(windup_m: f64, doubt_m: f64, frame: &Scaling) -> Option<f64> {
+    let is_softer = windup_m - doubt_m > STIFFNESS_FACTOR * frame.windup_m();
+    let is_stiffer = windup_m > doubt_m && windup_m + doubt_m < frame.windup_m() / STIFFNESS_FACTOR;
+    (is_softer || is_stiffer).then(|| frame.load_n / windup_m)
 }
 
 fn row(blocks: &BlockMeans, frame: &Scaling, k: usize) -> Option<DesignRow<COLUMNS>> {

@@ -1,0 +1,131 @@
+//! Wrong settings and tables that gave a wrong number or lost one without a word: each is found, and named.
+
+use crate::harness::TestFleet;
+
+fn edit(fleet: &TestFleet, file: &str, change: impl FnOnce(String) -> String) {
+    let path = fleet.path(file);
+    std::fs::write(&path, change(std::fs::read_to_string(&path).unwrap())).unwrap();
+}
+
+fn gaps_um(fleet: &TestFleet) -> Vec<f64> {
+    let rows = fleet.run_ok(&["query", "tail", "N412FP", "--json"]);
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&rows).unwrap();
+    rows.iter().map(|row| row["gap_m"].as_f64().unwrap() * 1e6).collect()
+}
+
+/// A stiffness in N/µm, or of another part: the gaps stay right, and the run names the key.
+#[test]
+fn a_stiffness_of_another_unit_is_named_and_moves_no_gap() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--tail", "N412FP", "--quiet"]);
+    let right = gaps_um(&fleet);
+    for (from, to) in [("5.0e7", "5.0e8"), ("5.0e8", "5.0e10")] {
+        fleet.configure(from, to);
+        let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
+        assert_eq!(run.code, Some(1), "{run:?}");
+        assert!(run.out.contains("all actuators of part EMA-27-1040: stiffness_unlike"), "{}", run.out);
+        assert!(run.out.contains("`stiffness_n_per_m`"), "{}", run.out);
+        let found = gaps_um(&fleet);
+        assert_eq!(found.len(), right.len());
+        for (found, right) in found.iter().zip(&right) {
+            assert!((found - right).abs() < 1.0, "{to}: {found} µm instead of {right} µm");
+        }
+    }
+}
+
+/// Hours in minutes make a unit wear sixty times slower.
+#[test]
+fn flight_hours_in_minutes_are_refused_with_their_row() {
+    let fleet = TestFleet::sample();
+    fleet.configure("[logs]\n", "[logs]\nflights = \"flights.csv\"\n");
+    let table = |hours: [&str; 3]| {
+        let rows = ["2026-09-07T04:00:00Z", "2026-09-07T09:00:00Z", "2026-09-08T04:00:00Z"].iter().zip(hours);
+        let rows: String =
+            rows.enumerate().map(|(k, (at, hours))| format!("N412FP,F{k},{at},{hours}\n")).collect();
+        format!("tail_number,flight_id,departure_utc,flight_hours\n{rows}")
+    };
+    std::fs::write(fleet.path("flights.csv"), table(["2.1", "2.2", "2.3"])).unwrap();
+    fleet.run_ok(&["check", "--limit", "1"]);
+    for (hours, words) in [
+        (["126", "2.2", "2.3"], ["126 flight hours", "departs again 5.0 h later", "row 1"]),
+        (["2.1", "132", "2.3"], ["132 flight hours", "not minutes", "row 2"]),
+        (["2.1", "-2.2", "2.3"], ["`-2.2` is below zero", "flight_hours", "row 2"]),
+    ] {
+        std::fs::write(fleet.path("flights.csv"), table(hours)).unwrap();
+        let run = fleet.freeplay(&["run"]);
+        assert_eq!(run.code, Some(2), "{run:?}");
+        assert!(run.err.contains("bad_table") && run.err.contains("flights.csv"), "{}", run.err);
+        assert!(words.iter().all(|word| run.err.contains(word)), "{words:?}: {}", run.err);
+        assert!(!fleet.path("results").exists());
+    }
+}
+
+/// Columns depend on the part, so a position whose unit is not booked may lack its columns: it is an error all the same.
+#[test]
+fn a_position_between_two_stays_is_an_error_even_if_its_columns_depend_on_the_part() {
+    let fleet = TestFleet::sample_data();
+    edit(&fleet, "sample-data/installations.csv", |table| {
+        let kept = table.lines().filter(|row| !(row.starts_with("N412FP") && row.contains("1060-0012")));
+        kept.map(|row| format!("{row}\n")).collect()
+    });
+    let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert!(run.err.contains("no unit is booked in elevator_right of N412FP"), "{}", run.err);
+}
+
+#[test]
+fn work_on_a_unit_that_was_never_installed_is_named() {
+    let fleet = TestFleet::sample_data();
+    edit(&fleet, "sample-data/maintenance.csv", |table| {
+        table + "EMA-27-1040,1040-9999,2026-10-05T00:00:00Z,reshim\n"
+    });
+    edit(&fleet, "sample-data/inspections.csv", |table| table.replacen("1040-0009", "1040-0099", 1));
+    let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
+    assert!(run.out.contains("maintenance.csv: EMA-27-1040 / 1040-9999: no such unit"), "{}", run.out);
+    assert!(run.out.contains("1040-0099: no such unit"), "{}", run.out);
+    let json = fleet.freeplay(&["run", "--tail", "N412FP", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json.out).unwrap();
+    assert_eq!(json["unknown_units"].as_array().unwrap().len(), 2);
+}
+
+/// A typo of a part number takes the part's records away until it is mended: the run counts them.
+#[test]
+fn records_that_a_run_removes_are_counted() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--tail", "N412FP", "--quiet"]);
+    fleet.configure("[part.\"EMA-27-1040\"", "[part.\"EMA-27-1004\"");
+    let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert!(run.out.contains("withdrawn   20 stored records removed"), "{}", run.out);
+    let log = "N412FP/";
+    let listed: Vec<&str> =
+        run.out.lines().filter(|l| l.contains(log) && l.contains("part_unknown")).collect();
+    assert_eq!(listed.len(), 10, "each log once: {listed:?}");
+}
+
+/// Inputs are not written over; a device is written to and stays one; a link stays a link.
+#[test]
+fn an_output_replaces_no_input_and_no_device() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--tail", "N412FP", "--limit", "1", "--quiet"]);
+    for input in ["pipeline.toml", "sample-data/installations.csv"] {
+        let before = std::fs::read(fleet.path(input)).unwrap();
+        for args in [&["trend", "--json", "-o", input][..], &["run", "--metrics", input]] {
+            let result = fleet.freeplay(args);
+            assert_eq!(result.code, Some(2), "{args:?}: {result:?}");
+            assert!(result.err.contains("would_overwrite") && result.err.contains(input), "{}", result.err);
+        }
+        assert_eq!(std::fs::read(fleet.path(input)).unwrap(), before);
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        fleet.run_ok(&["trend", "--json", "-o", "/dev/null"]);
+        assert!(std::fs::metadata("/dev/null").unwrap().file_type().is_char_device());
+        std::os::unix::fs::symlink("real.json", fleet.path("link.json")).unwrap();
+        std::fs::write(fleet.path("real.json"), "old").unwrap();
+        fleet.run_ok(&["trend", "--json", "-o", "link.json"]);
+        assert!(fleet.path("link.json").is_symlink());
+        assert!(std::fs::read_to_string(fleet.path("real.json")).unwrap().starts_with('['));
+    }
+}
