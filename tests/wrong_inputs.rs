@@ -79,7 +79,7 @@ fn work_on_a_unit_that_was_never_installed_is_named() {
     edit(&fleet, "sample-data/maintenance.csv", |table| {
         table + "EMA-27-1040,1040-9999,2026-10-05T00:00:00Z,reshim\n"
     });
-    edit(&fleet, "sample-data/inspections.csv", |table| table.replacen("1040-0009", "1040-0099", 1));
+    edit(&fleet, "sample-data/inspections.csv", |table| table.replacen("1040-0013", "1040-0099", 1));
     let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
     assert!(run.out.contains("maintenance.csv: EMA-27-1040 / 1040-9999: no such unit"), "{}", run.out);
     assert!(run.out.contains("1040-0099: no such unit"), "{}", run.out);
@@ -93,7 +93,7 @@ fn work_on_a_unit_that_was_never_installed_is_named() {
 fn records_that_a_run_removes_are_counted() {
     let fleet = TestFleet::sample();
     fleet.run_ok(&["run", "--tail", "N412FP", "--quiet"]);
-    fleet.configure("[part.\"EMA-27-1040\"", "[part.\"EMA-27-1004\"");
+    edit(&fleet, "pipeline.toml", |toml| toml.replace("EMA-27-1040", "EMA-27-1004"));
     let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
     assert_eq!(run.code, Some(1), "{run:?}");
     assert!(run.out.contains("withdrawn   20 stored records removed"), "{}", run.out);
