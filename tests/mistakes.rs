@@ -94,6 +94,40 @@ const NAMES: &[Mistake] = &[
 /// Outputs that cannot be written, and files that are not what they should be.
 const FILES: &[Mistake] = &[
     (
+        Edit("pipeline.toml", "limit_m = 150e-6", "limit_m = 150e-9"),
+        &["trend"],
+        2,
+        &["pipeline.toml:", "limit_m", "1.5e-7", "150 µm is 150e-6"],
+    ),
+    (
+        Edit("pipeline.toml", "limit_m = 150e-6", ""),
+        &["check"],
+        2,
+        &["pipeline.toml:", "`watch_m` has no effect without a `limit_m`", "[trend] limit_m"],
+    ),
+    (
+        Edit(
+            "pipeline.toml",
+            "[estimate]",
+            "[[override]]\nparts = [\"EMA-27-1004\"]\nchannel.load.sign = 1\n\n[estimate]",
+        ),
+        &["run"],
+        2,
+        &["pipeline.toml:", "`EMA-27-1004`, which is not configured", "nearest: `EMA-27-1040`"],
+    ),
+    (
+        Write("pipeline.toml", b"[\0l\0o\0g\0s\0]\0"),
+        &["run"],
+        2,
+        &["pipeline.toml", "UTF-16", "save the file as UTF-8"],
+    ),
+    (
+        Nothing,
+        &["trend", "--json", "--output", "pipeline.toml"],
+        2,
+        &["pipeline.toml is an input", "not changed", "another output file"],
+    ),
+    (
         Nothing,
         &["trend", "--format", "csv", "--output", "sample-data"],
         3,

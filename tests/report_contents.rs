@@ -1,4 +1,4 @@
-//! Contents of a report that are asked for: diagnostic plots, tables; and the pages of parts.
+//! Optional contents of a report: diagnostic plots and tables; and the pages of parts.
 
 use std::collections::BTreeSet;
 

@@ -88,7 +88,7 @@ fn work_on_a_unit_that_was_never_installed_is_named() {
     assert_eq!(json["unknown_units"].as_array().unwrap().len(), 2);
 }
 
-/// A typo of a part number takes the part's records away until it is mended: the run counts them.
+/// A typo of a part number takes the part's records away until it is corrected: the run counts them.
 #[test]
 fn records_that_a_run_removes_are_counted() {
     let fleet = TestFleet::sample();
@@ -128,4 +128,13 @@ fn an_output_replaces_no_input_and_no_device() {
         assert!(fleet.path("link.json").is_symlink());
         assert!(std::fs::read_to_string(fleet.path("real.json")).unwrap().starts_with('['));
     }
+}
+
+#[test]
+fn a_date_of_assessment_that_has_not_come_is_noted() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--tail", "N412FP", "--limit", "1", "--quiet"]);
+    let result = fleet.freeplay(&["trend", "--as-of", "2190-01-01"]);
+    assert!(result.err.contains("--as-of 2190-01-01 is in the future"), "{result:?}");
+    assert!(!fleet.freeplay(&["trend"]).err.contains("future"));
 }

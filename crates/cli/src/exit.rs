@@ -69,6 +69,9 @@ impl From<pipeline::Error> for Failure {
             pipeline::Error::Objects(error) => {
                 Self::failed(Diagnostic::new(error.code(), &error).hint(error.remedy()))
             }
+            pipeline::Error::Pages { .. } => Self::failed(Diagnostic::new("output_failed", error).hint(
+                "the report that was there is unchanged; free space, or name a folder that can be written",
+            )),
             other => Self::failed(Diagnostic::new("run_failed", other)),
         }
     }

@@ -48,6 +48,15 @@ pub(crate) fn load_trend_context(
     Ok((config, installations))
 }
 
+/// Notes a date of assessment that has not come: nothing is known of the flights until then.
+pub(crate) fn note_future(as_of: Option<Timestamp>, output: &Output) {
+    const A_DAY: jiff::SignedDuration = jiff::SignedDuration::from_hours(24);
+    if let Some(as_of) = as_of.filter(|as_of| *as_of > Timestamp::now() + A_DAY) {
+        let date = as_of.strftime("%Y-%m-%d");
+        output.note(&format!("--as-of {date} is in the future: states assume that no unit flies until then"));
+    }
+}
+
 /// Refuses a range of departures without any instant.
 pub(crate) fn check_range(since: Option<Timestamp>, until: Option<Timestamp>) -> Result<(), Failure> {
     match since.zip(until).filter(|(since, until)| since >= until) {

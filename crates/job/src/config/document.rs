@@ -337,7 +337,30 @@ impl Document {
             found.extend(positive(key, Some(seconds)).map(|c| source.at(&["objects", key], c)));
         }
         self.alerts.iter().for_each(|(name, channel)| channel.check(name, source, &mut found));
+        self.check_parts(source, &mut found);
         found
+    }
+
+    /// Settings of parts that would have no effect: a watch limit without a limit, an override for a part that is not there.
+    fn check_parts(&self, source: &Source<'_>, found: &mut Vec<Diagnostic>) {
+        for (number, part) in &self.part {
+            if part.watch_m.is_some() && part.limit_m.or(self.trend.limit_m).is_none() {
+                let c = Diagnostic::new("key_missing", "`watch_m` has no effect without a `limit_m`")
+                    .hint("add `limit_m = …` to the part, or `[trend] limit_m` for all parts");
+                found.push(source.at(&["part", number, "watch_m"], c));
+            }
+        }
+        let numbers = || self.part.keys().map(String::as_str);
+        for name in self.overrides.iter().flat_map(|one| &one.parts) {
+            let Ok(pattern) = glob::Pattern::new(name) else { continue };
+            if !self.part.is_empty() && !numbers().any(|number| pattern.matches(number)) {
+                let near = nearest(name, numbers());
+                let near = near.map(|near| format!("nearest: `{near}`; ")).unwrap_or_default();
+                let what = format!("this override is for part `{name}`, which is not configured");
+                let hint = format!("{near}compare `parts` with the `[part.\"…\"]` tables");
+                found.push(source.at(&["override"], Diagnostic::new("part_unknown", what).hint(hint)));
+            }
+        }
     }
 
     fn check_identity(&self, source: &Source<'_>, found: &mut Vec<Diagnostic>) {

@@ -101,6 +101,11 @@ impl Config {
                 };
                 vec![Diagnostic::new("config_unreadable", what).in_file(&file_name).hint(hint)]
             })?;
+            if text.contains('\0') {
+                let what = "the configuration cannot be read: it holds NUL bytes, as text in UTF-16 does";
+                let c = Diagnostic::new("config_unreadable", what).in_file(&file_name);
+                return Err(vec![c.hint("save the file as UTF-8")]);
+            }
             Ok((file_name, text))
         };
         let texts = files.iter().map(read).collect::<Result<Vec<_>, Vec<Diagnostic>>>()?;

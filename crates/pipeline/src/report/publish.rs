@@ -1,15 +1,20 @@
 //! Publishes a report folder: written completely under a temporary name, then renamed.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use rayon::prelude::*;
 use records::Diagnostic;
 use report::{Page, Report};
+use tempfile::TempDir;
 
 use crate::error::Error;
 use crate::run::event::Event;
+
+/// Age at which a temporary folder is one of a report that was killed.
+const LEFTOVER_AGE: Duration = Duration::from_secs(24 * 3600);
 
 /// What was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,21 +37,17 @@ pub fn write(
     watch: &(impl Fn(Event) + Sync),
 ) -> Result<PublishSummary, Error> {
     refuse_foreign(dir)?;
-    let fresh = sibling(dir, "new");
-    let old = sibling(dir, "old");
-    for leftover in [&fresh, &old] {
-        if leftover.exists() {
-            fs::remove_dir_all(leftover).map_err(|e| failed(leftover, e))?;
-        }
-    }
-    let written = all(report, files, &fresh, watch)?;
+    let parent = dir.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(parent).map_err(|e| failed(parent, e))?;
+    remove_leftovers(parent, &prefix(dir));
+    // Both are removed when anything fails.
+    let fresh = temporary(parent, dir)?;
+    let written = all(report, files, fresh.path(), watch)?;
+    let old = temporary(parent, dir)?;
     if dir.exists() {
-        fs::rename(dir, &old).map_err(|e| failed(dir, e))?;
+        fs::rename(dir, old.path().join("report")).map_err(|e| failed(dir, e))?;
     }
-    fs::rename(&fresh, dir).map_err(|e| failed(dir, e))?;
-    if old.exists() {
-        fs::remove_dir_all(&old).map_err(|e| failed(&old, e))?;
-    }
+    fs::rename(fresh.path(), dir).map_err(|e| failed(dir, e))?;
     Ok(written)
 }
 
@@ -96,9 +97,32 @@ fn all(
     Ok(PublishSummary { files: files.into_inner(), bytes: bytes.into_inner() })
 }
 
-fn sibling(dir: &Path, what: &str) -> PathBuf {
+/// Start of the names of temporary folders of a report.
+fn prefix(dir: &Path) -> String {
     let name = dir.file_name().map_or_else(|| "report".to_owned(), |n| n.to_string_lossy().into_owned());
-    dir.with_file_name(format!(".{name}.{what}"))
+    format!(".{name}.new-")
+}
+
+/// A folder of its own next to the report, so that two programs may write one report; it is removed when dropped.
+fn temporary(parent: &Path, dir: &Path) -> Result<TempDir, Error> {
+    let prefix = prefix(dir);
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix);
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+    builder.tempdir_in(parent).map_err(|e| failed(dir, e))
+}
+
+/// Removes the temporary folders of reports that were killed more than a day ago.
+fn remove_leftovers(parent: &Path, prefix: &str) {
+    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
+        let is_ours = entry.file_name().to_string_lossy().starts_with(prefix);
+        let age = entry.metadata().and_then(|of| of.modified()).ok().and_then(|at| at.elapsed().ok());
+        if is_ours && age.is_some_and(|age| age > LEFTOVER_AGE) {
+            // What cannot be removed now is removed by a later report.
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
 }
 
 fn failed(path: &Path, source: std::io::Error) -> Error {

@@ -89,7 +89,7 @@ row! {
     pub struct ReportLogErrorRow {
         /// Path of the log.
         pub log_path: String,
-        /// Tail number, as far as the log or its path tells it.
+        /// Tail number, as far as the log or its path states it.
         pub tail_number: Option<String>,
         /// Error code.
         pub error_code: String,

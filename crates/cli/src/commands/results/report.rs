@@ -15,7 +15,9 @@ use crate::progress::Progress;
 use crate::row_output;
 use crate::table::count;
 
-use crate::commands::context::{KnownNames, VERSION, display_path, load_with_installations, selection};
+use crate::commands::context::{
+    KnownNames, VERSION, display_path, load_with_installations, note_future, selection,
+};
 
 /// Writes the pages and prints the path of the first one.
 ///
@@ -24,6 +26,7 @@ use crate::commands::context::{KnownNames, VERSION, display_path, load_with_inst
 /// exit code 1; the report is written without them.
 pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     row_output::check_folder(&args.output)?;
+    note_future(args.as_of, output);
     let (config, installations) = load_with_installations(global)?;
     let ask = UnitSelection { statistics: true, ..args.units.selection(args.as_of) };
     let store = Store::open(config.store())?;

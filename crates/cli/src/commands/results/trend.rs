@@ -14,13 +14,14 @@ use crate::row_output;
 use crate::sparkline::sparkline;
 use crate::table::{self, count, number, state_mark, text};
 
-use crate::commands::context::{KnownNames, load_trend_context, selection};
+use crate::commands::context::{KnownNames, load_trend_context, note_future, selection};
 
 /// Prints one row per unit, or per query.
 ///
 /// # Errors
 /// If configuration, tables or store cannot be read.
 pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    note_future(args.as_of, output);
     let (config, installations) = load_trend_context(&args.external, global, output)?;
     let ask = UnitSelection { statistics: args.statistics, ..args.units.selection(args.as_of) };
     if args.quantities || args.changes || args.intervals {
