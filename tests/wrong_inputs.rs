@@ -40,9 +40,9 @@ fn flight_hours_in_minutes_are_refused_with_their_row() {
     fleet.configure("[logs]\n", "[logs]\nflights = \"flights.csv\"\n");
     let table = |hours: [&str; 3]| {
         let rows = ["2026-09-07T04:00:00Z", "2026-09-07T09:00:00Z", "2026-09-08T04:00:00Z"].iter().zip(hours);
-        let rows: String =
-            rows.enumerate().map(|(k, (at, hours))| format!("N412FP,F{k},{at},{hours}\n")).collect();
-        format!("tail_number,flight_id,departure_utc,flight_hours\n{rows}")
+        let rows: Vec<String> =
+            rows.enumerate().map(|(k, (at, hours))| format!("N412FP,F{k},{at},{hours}")).collect();
+        format!("tail_number,flight_id,departure_utc,flight_hours\n{}\n", rows.join("\n"))
     };
     std::fs::write(fleet.path("flights.csv"), table(["2.1", "2.2", "2.3"])).unwrap();
     fleet.run_ok(&["check", "--limit", "1"]);
@@ -66,7 +66,7 @@ fn a_position_between_two_stays_is_an_error_even_if_its_columns_depend_on_the_pa
     let fleet = TestFleet::sample_data();
     edit(&fleet, "sample-data/installations.csv", |table| {
         let kept = table.lines().filter(|row| !(row.starts_with("N412FP") && row.contains("1060-0012")));
-        kept.map(|row| format!("{row}\n")).collect()
+        kept.collect::<Vec<_>>().join("\n")
     });
     let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
     assert_eq!(run.code, Some(1), "{run:?}");

@@ -75,9 +75,9 @@ fn the_sample_fleet_is_made_anywhere_and_is_the_same_again() {
         assert!(again.code == Some(2) && again.err.contains("would_overwrite"), "{again:?}");
         let path = made.path(folder);
         if path.is_dir() {
-            std::fs::remove_dir_all(path).unwrap()
+            std::fs::remove_dir_all(path).unwrap();
         } else {
-            std::fs::remove_file(path).unwrap()
+            std::fs::remove_file(path).unwrap();
         }
     }
     assert_eq!(made.freeplay(&["init", "--sample", "--from", "demo"]).code, Some(2));

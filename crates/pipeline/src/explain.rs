@@ -91,7 +91,7 @@ fn find(key: &RecordKey, store: &Store) -> Result<GapRecord, Error> {
                 "no record of {} in flight {}{}",
                 key.position,
                 key.flight_id,
-                key.tail_number.iter().map(|tail| format!(" of tail {tail}")).collect::<String>()
+                key.tail_number.as_ref().map(|tail| format!(" of tail {tail}")).unwrap_or_default()
             ),
             format!("list its records with `freeplay query flight {}`", key.flight_id),
         ),

@@ -128,7 +128,7 @@ impl Table {
     }
 
     /// Raises `LogError` with all errors, and with this table as its `answer`; returns the table if there is none.
-    fn raise_errors<'py>(this: Bound<'py, Self>) -> PyResult<Bound<'py, Self>> {
+    fn raise_errors(this: Bound<'_, Self>) -> PyResult<Bound<'_, Self>> {
         let (py, diagnostics) = (this.py(), &this.get().diagnostics);
         if diagnostics.is_empty() {
             return Ok(this);
@@ -139,17 +139,17 @@ impl Table {
     }
 
     /// The rows as a pyarrow table; nothing is copied.
-    fn to_arrow<'py>(this: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+    fn to_arrow(this: Bound<'_, Self>) -> PyResult<Bound<'_, PyAny>> {
         this.py().import("pyarrow")?.call_method1("table", (this,))
     }
 
     /// The rows as a Polars data frame.
-    fn to_polars<'py>(this: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+    fn to_polars(this: Bound<'_, Self>) -> PyResult<Bound<'_, PyAny>> {
         this.py().import("polars")?.call_method1("DataFrame", (this,))
     }
 
     /// The rows as a pandas data frame; needs pyarrow.
-    fn to_pandas<'py>(this: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+    fn to_pandas(this: Bound<'_, Self>) -> PyResult<Bound<'_, PyAny>> {
         Self::to_arrow(this)?.call_method0("to_pandas")
     }
 

@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::run::event::Event;
 
 /// Age at which a temporary folder is one of a report that was killed.
-const LEFTOVER_AGE: Duration = Duration::from_secs(24 * 3600);
+const LEFTOVER_AGE: Duration = Duration::from_hours(24);
 
 /// What was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -243,9 +243,8 @@ fn events_happen_before_the_flight_that_they_name() {
         fault = "truncated"
     "#;
     let small = toml::to_string(&Spec { flights_per_tail: 6, flights_per_log: 2, ..small() }).unwrap();
-    let small: String =
-        small.lines().filter(|line| !line.ends_with("= []")).map(|l| format!("{l}\n")).collect();
-    let plan = Plan::new(&toml::from_str(&format!("{small}{events}")).unwrap()).unwrap();
+    let small: String = small.lines().filter(|line| !line.ends_with("= []")).collect::<Vec<_>>().join("\n");
+    let plan = Plan::new(&toml::from_str(&format!("{small}\n{events}")).unwrap()).unwrap();
     let of = |tail: &str| plan.flights.iter().filter(|f| f.tail_number == tail).collect::<Vec<_>>();
     let (a, b) = (of("A"), of("B"));
     assert_eq!(b[1].actuators[0].serial_number, "S10003");
@@ -312,7 +311,7 @@ fn a_planted_change_shows_on_the_actuators_that_it_names_and_from_its_flight_on(
     let after = Plan::new(&spec).unwrap();
     let mut drift = Vec::new();
     for (k, (was, is)) in before.flights.iter().zip(&after.flights).enumerate() {
-        let is_moved = is.tail_number == "B" && (is.flight_id.ends_with("3") || is.flight_id.ends_with("4"));
+        let is_moved = is.tail_number == "B" && (is.flight_id.ends_with('3') || is.flight_id.ends_with('4'));
         for (was, is) in was.actuators.iter().zip(&is.actuators) {
             let skew_s = if is_moved { 1e-3 } else { 0.0 };
             assert!((is.skew_s - was.skew_s - skew_s).abs() < 1e-12);
