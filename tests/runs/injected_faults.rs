@@ -147,7 +147,8 @@ impl Injector {
         let file = fleet.path("calls.txt");
         let fault = Fault::at(under, kind, EIO, 0);
         let mut command = self.command(fleet, args, &fault);
-        assert!(command.env("FAULT_COUNT", &file).stdout(Stdio::null()).status().unwrap().success());
+        let counted = command.env("FAULT_COUNT", &file).output().unwrap();
+        assert!(counted.status.success(), "{args:?}: {}", String::from_utf8_lossy(&counted.stderr));
         std::fs::read_to_string(file).unwrap().parse().unwrap()
     }
 }
