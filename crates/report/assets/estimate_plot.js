@@ -1,4 +1,4 @@
-/* The curves once more, to hover over and zoom into; without scripts the pictures say the same. */
+/* The curves over time to hover over and zoom into, in the place of their picture; without scripts it stays. */
 (function () {
   "use strict";
   if (!window.uPlot) return;
@@ -9,6 +9,7 @@
     var live = section.querySelector(".live"), readout = section.querySelector(".readout");
     var rest = readout.textContent;
     live.hidden = readout.hidden = false;
+    section.querySelector(".over-time").classList.add("still");
     var text = function (v, unit, digits) { return v === null || v === undefined ? "missing" : v.toFixed(digits) + " " + unit; };
     var show = function (u) {
       var i = u.cursor.idx;

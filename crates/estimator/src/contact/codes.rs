@@ -69,13 +69,15 @@ impl Rejection {
             Self::TooShort => "record at least 9 s of valid samples in which the load presses on both flanks",
             Self::ChannelConstant => "check wiring and mapping: a channel that never changes is not measured",
             Self::LoadSignFlipped => {
-                "reverse the sign of the load in the mapping: it must be positive along +X"
+                "reverse the sign of the load in the mapping (`sign = -1` in `[channel.load]`): it must be positive along \
+                 +X"
             }
             Self::PositionsSwapped => {
-                "exchange motor and screw position in the mapping, or reverse both signs"
+                "exchange `column` of `[channel.motor_position]` and `[channel.screw_position]`, or reverse both signs"
             }
             Self::PositionRatio => {
-                "check lead, unit and sign of the positions: screw against motor must have slope 1"
+                "check `lead_m_per_rev` of the part, and unit and sign of the positions: screw against motor must have \
+                 slope 1 (`freeplay check` shows it)"
             }
         }
     }

@@ -158,7 +158,8 @@ pub(super) fn actuator(
     let rejection = tested.as_ref().err().copied();
     if let Some(code) = rejection {
         let channel = &mut found[tested_channel(code)];
-        let before = channel.note.take().filter(|note| !note.starts_with(RATIO));
+        let is_slope = |note: &String| note.starts_with(RATIO) && code != "position_ratio";
+        let before = channel.note.take().filter(|note| !is_slope(note));
         let before = before.map(|note| format!("{note}; ")).unwrap_or_default();
         channel.note = Some(format!("{before}would be refused, {code}"));
         channel.remedy = rejection::remedy(code);
@@ -184,10 +185,31 @@ fn channel_flags<'a>(a: &'a ActuatorChannels, channel: &str) -> Vec<&'a str> {
 
 fn slope_note(slope: f64) -> String {
     if (slope - 1.0).abs() > SLOPE_TOLERANCE {
-        format!("{RATIO} {slope:.4} (expected 1): check sign, unit, lead or gear ratio")
+        let cause = cause_of(slope).map_or("check sign, unit, lead or gear ratio", |(_, cause)| cause);
+        format!("{RATIO} {slope:.4} (expected 1): {cause}")
     } else {
         format!("{RATIO} {slope:.5}")
     }
+}
+
+/// Factors between the two positions that a usual mistake makes.
+const USUAL_FACTORS: [(f64, &str); 7] = [
+    (2.0, "as if `lead_m_per_rev`, or the turns of the motor, were twice or half as much"),
+    (180.0 / std::f64::consts::PI, "as degrees against radians: check `unit` of the motor position"),
+    (std::f64::consts::TAU, "as turns against radians: check `unit` of the motor position"),
+    (360.0, "as turns against degrees: check `unit` of the motor position"),
+    (25.4, "as inch against millimetre: check the lead and the units of both positions"),
+    (1e3, "as m against mm, or mm against µm: check the lead and the units of both positions"),
+    (1e6, "as m against µm: check the lead and the units of both positions"),
+];
+
+/// The usual mistake that makes such a ratio of the positions.
+fn cause_of(slope: f64) -> Option<(f64, &'static str)> {
+    if (slope + 1.0).abs() < SLOPE_TOLERANCE {
+        return Some((-1.0, "one position has the other sign: set `sign = -1` in its channel"));
+    }
+    let near = |factor: f64| (slope.abs() / factor - 1.0).abs() < SLOPE_TOLERANCE;
+    USUAL_FACTORS.into_iter().find(|(factor, _)| near(*factor) || near(factor.recip()))
 }
 
 fn describe(base: ChannelCheck, q: Quality, flags: &[&str]) -> ChannelCheck {

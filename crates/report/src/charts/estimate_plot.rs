@@ -94,8 +94,13 @@ pub fn estimate_plot_html(plots: &[EstimatePlot], back: Option<(&str, &str)>) ->
     let sections = plots
         .iter()
         .map(|plot| {
-            let figure = estimate_plot_svg(std::slice::from_ref(plot))?;
-            Ok(Section { title: &plot.title, summary: &plot.summary, plot: figure, data: data(plot)? })
+            Ok(Section {
+                title: &plot.title,
+                summary: &plot.summary,
+                over_time: part_svg(TIME_PLOTS_WIDTH, plot, draw_over_time)?,
+                flanks: part_svg(SIZE.0 - TIME_PLOTS_WIDTH, plot, draw_flanks)?,
+                data: data(plot)?,
+            })
         })
         .collect::<Result<_, Error>>()?;
     let page = EstimatePlotPage {
@@ -113,7 +118,7 @@ pub fn estimate_plot_html(plots: &[EstimatePlot], back: Option<(&str, &str)>) ->
 /// SHA-256 of `uplot.js` and `estimate_plot.js`: the only scripts that a browser executes in the page
 /// (Content Security Policy Level 3, hash sources).
 const SCRIPT_HASHES: &str = "'sha256-GcjUxq2Ikpp59K5J1vcWFWbf0Lo9FcxJXpdPeH63jx8=' \
-                             'sha256-GhK3S6lb2bBkTuCnC3L8eZlKbLsbwRQKFaVNHjh0M0Q='";
+                             'sha256-mSjEzJhCop6NNnrSHPRRxWxO1Dhikv3p4buOq6GL/f4='";
 
 #[derive(Template)]
 #[template(path = "estimate_plot.html")]
@@ -130,7 +135,8 @@ struct EstimatePlotPage<'a> {
 struct Section<'a> {
     title: &'a str,
     summary: &'a str,
-    plot: String,
+    over_time: String,
+    flanks: String,
     data: String,
 }
 
@@ -172,11 +178,34 @@ fn draw_one(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
     line(&plot.title, 17, 8)?;
     line(&plot.summary, 13, 30)?;
     let (timed, flanks) = body.split_horizontally(TIME_PLOTS_WIDTH);
-    let (positions, load) = timed.split_vertically((SIZE.1 - HEADING) * 2 / 3);
+    draw_over_time(&timed, plot)?;
+    draw_flanks(&flanks, plot)
+}
+
+/// Draws positions and load, one above the other.
+fn draw_over_time(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
+    let (positions, load) = area.split_vertically((SIZE.1 - HEADING) * 2 / 3);
     let end_s = plot.time_s(plot.s_m.len() as f64).max(1.0);
     draw_positions(&positions, plot, end_s)?;
-    draw_load(&load, plot, end_s)?;
-    draw_flanks(&flanks, plot)
+    draw_load(&load, plot, end_s)
+}
+
+/// One part of a plot as an SVG picture of its own.
+fn part_svg(
+    width: u32,
+    plot: &EstimatePlot,
+    part: fn(&Area<'_>, &EstimatePlot) -> Result<(), DrawError>,
+) -> Result<String, Error> {
+    let mut svg = String::new();
+    let drawn = {
+        let root = SVGBackend::with_string(&mut svg, (width, SIZE.1 - HEADING)).into_drawing_area();
+        root.fill(&WHITE)
+            .map_err(DrawError::from)
+            .and_then(|()| part(&root, plot))
+            .and_then(|()| Ok(root.present()?))
+    };
+    drawn.map_err(|e| Error::Plot(e.to_string()))?;
+    Ok(svg)
 }
 
 /// Draws δX, S(t) with both means, and the contact intervals as marks at the lower edge.

@@ -20,6 +20,9 @@ use records::RecordKey;
 use records::row_schema::{FromCells, Row, from_batch};
 use records::{LogOutcome, LogRecord};
 
+/// Records that are held as rows at once.
+const RECORDS_AT_ONCE: usize = 8_192;
+
 impl Store {
     /// The records that fit, as columns, by departure, tail, flight and position.
     ///
@@ -43,7 +46,7 @@ impl Store {
 
     /// Hands over every record, earliest departure first, and returns the version they are of.
     ///
-    /// A month's records at most are held at once, so a whole fleet's take no more memory than what the
+    /// A month's records at most are held at once, as columns, so a whole fleet's take no more memory than what the
     /// caller keeps of them.
     ///
     /// # Errors
@@ -52,9 +55,12 @@ impl Store {
         let snapshot = self.gaps.snapshot()?;
         for (since_utc, until_utc) in months(&snapshot) {
             let month = Query { since_utc, until_utc, ..Query::default() };
-            from_batch(&self.select(&snapshot, &month, GapRecord::schema())?)?
-                .into_iter()
-                .for_each(&mut take);
+            let records = self.select(&snapshot, &month, GapRecord::schema())?;
+            // A record takes several times as much as its row in columns.
+            for start in (0..records.num_rows()).step_by(RECORDS_AT_ONCE) {
+                let some = records.slice(start, RECORDS_AT_ONCE.min(records.num_rows() - start));
+                from_batch(&some)?.into_iter().for_each(&mut take);
+            }
         }
         Ok(snapshot.version)
     }
