@@ -30,7 +30,7 @@ const DAYS: i32 = 400;
 const LIMIT_M: f64 = 150e-6;
 
 fn config() -> Config {
-    let text = include_str!("../../../pipeline.toml");
+    let text = include_str!("../../../tests/data/three-aircraft/pipeline.toml");
     Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
 }
 

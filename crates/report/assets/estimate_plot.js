@@ -28,7 +28,7 @@
         width: Math.max(live.clientWidth, 260), height: height, legend: { show: false },
         cursor: { sync: { key: sync(k).key, scales: ["x", null] } },
         scales: { x: { time: false } },
-        axes: [{ label: "time s" }, { label: label, size: 64 }],
+        axes: [{ label: "time s" }, { label: label, size: 64, space: 18 }],
         series: [{}].concat(names.map(function (n) { return { stroke: colours[n], width: n === "s_um" ? 2 : 1, points: { show: false } }; })),
         hooks: hooks
       }, [data.time_s].concat(names.map(function (n) { return data[n]; })), live);

@@ -288,7 +288,35 @@ pub struct FlightRow {
     pub plot_path: Option<String>,
 }
 
+impl Report {
+    /// Footer of a page: time, program and store version.
+    pub(crate) fn footer(&self) -> String {
+        let version = self.store_version.map_or_else(String::new, |v| format!(" from store version {v}"));
+        format!("Made {} UTC by {}{version}.", crate::format::minute(self.made_utc), self.program)
+    }
+
+    /// Units by part number; those without one under `–`.
+    pub(crate) fn by_part(&self) -> BTreeMap<&str, Vec<&UnitView>> {
+        let mut parts: BTreeMap<&str, Vec<&UnitView>> = BTreeMap::new();
+        for unit in &self.units {
+            parts.entry(unit.part_number.as_deref().unwrap_or("–")).or_default().push(unit);
+        }
+        parts
+    }
+}
+
 impl UnitView {
+    /// Tail and position.
+    pub(crate) fn place(&self) -> String {
+        let words = [self.tail_number.as_deref(), self.position.as_deref()];
+        words.into_iter().flatten().collect::<Vec<_>>().join(" ")
+    }
+
+    /// Gap divided by limit.
+    pub(crate) fn share(&self) -> Option<f64> {
+        Some(self.assessment.gap_m? / self.assessment.limit_m?)
+    }
+
     /// State to show.
     pub fn badge(&self) -> StateBadge {
         StateBadge::from_state(self.assessment.state.as_deref())

@@ -110,11 +110,14 @@ fn a_unit_without_a_statement_is_never_called_normal() {
 #[test]
 fn the_fleet_page_opens_with_what_to_do_first() {
     let mut soon = unit("A", Some("plan"));
-    soon.assessment.not_before_utc = Some("2026-12-24T05:00:00Z".parse().unwrap());
+    soon.assessment.action_text = Some("inspect before 2026-12-24".to_owned());
     soon.position = Some("aileron_left".to_owned());
     let report = report(vec![unit("B", Some("normal")), soon]);
     let index = text(fleet_pages(&report).unwrap().iter().find(|p| p.path == "index.html").unwrap());
-    assert!(index.contains("plan the replacement before 2026-12-24. In all: 1 plan, 1 normal."), "{index}");
+    assert!(
+        index.contains("aileron_left (EMA / A): inspect before 2026-12-24. In all: 1 plan, 1 normal."),
+        "{index}"
+    );
     let calm = self::report(vec![unit("B", Some("normal"))]);
     let index = text(fleet_pages(&calm).unwrap().iter().find(|p| p.path == "index.html").unwrap());
     assert!(index.contains("No unit needs action: 1 normal."), "{index}");

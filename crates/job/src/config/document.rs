@@ -132,6 +132,18 @@ pub struct Override {
     pub channel: Option<toml::Table>,
 }
 
+/// Makes every key of a schema optional, at any depth.
+fn require_nothing(schema: &mut serde_json::Value) {
+    match schema {
+        serde_json::Value::Object(keys) => {
+            keys.remove("required");
+            keys.values_mut().for_each(require_nothing);
+        }
+        serde_json::Value::Array(all) => all.iter_mut().for_each(require_nothing),
+        _ => {}
+    }
+}
+
 /// `[store]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -270,7 +282,13 @@ impl Document {
         let settings = schemars::generate::SchemaSettings::draft2020_12()
             .for_deserialize()
             .with(|s| s.inline_subschemas = true);
-        settings.into_generator().into_root_schema_for::<Self>().to_value()
+        let mut schema = settings.into_generator().into_root_schema_for::<Self>().to_value();
+        // An override holds the keys that differ, and needs none of the others.
+        for key in ["clock", "channel"] {
+            let of_override = format!("/properties/override/items/properties/{key}");
+            schema.pointer_mut(&of_override).into_iter().for_each(require_nothing);
+        }
+        schema
     }
 
     /// How logs are read where nothing is otherwise.

@@ -36,19 +36,22 @@ fn section(page: &mut String, path: &str, schema: &Value, tables: &mut Tables) {
     }
     let required: Vec<&str> =
         schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
-    let mut table = String::new();
+    let (mut table, mut keys_only) = (String::new(), String::new());
     let mut below = Vec::new();
     for (key, value) in keys {
+        // Overrides need no key, and their keys are those of the tables that they override.
         let needed = if required.contains(&key.as_str()) { ", needed" } else { "" };
-        let _ = writeln!(table, "| `{key}` | {}{needed} | {} |", kind(value), text(value));
+        let row = |needed: &str| format!("| `{key}` | {}{needed} | {} |\n", kind(value), text(value));
+        table.push_str(&row(needed));
+        keys_only.push_str(&row(""));
         below.extend(inner(key, value, path));
     }
-    if let Some(first) = tables.get(&table) {
+    if let Some(first) = tables.get(&keys_only) {
         let _ = writeln!(page, "\nKeys as in `{first}`.");
         return;
     }
     let _ = write!(page, "\n| key | is | meaning |\n|---|---|---|\n{table}");
-    tables.insert(table, path.to_owned());
+    tables.insert(keys_only, path.to_owned());
     for (path, schema) in below {
         section(page, &path, schema, tables);
     }

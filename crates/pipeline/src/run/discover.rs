@@ -333,7 +333,8 @@ mod tests {
         std::fs::create_dir(folder.path().join("logs")).unwrap();
         std::fs::write(folder.path().join("logs/a.parquet"), "").unwrap();
         std::os::unix::fs::symlink("b.parquet", folder.path().join("logs/b.parquet")).unwrap();
-        let text = include_str!("../../../../pipeline.toml").replace("logs/**/*.parquet", "logs/*.parquet");
+        let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
+            .replace("logs/**/*.parquet", "logs/*.parquet");
         let config = Config::parse(&text, Path::new("pipeline.toml"), folder.path()).unwrap();
         let (mut seen, mut unlisted) = (SeenObjects::new(), BTreeMap::new());
         let found = matching(&config, &["logs/*.parquet".to_owned()], &mut seen, &mut unlisted).unwrap();

@@ -118,7 +118,7 @@ pub fn estimate_plot_html(plots: &[EstimatePlot], back: Option<(&str, &str)>) ->
 /// SHA-256 of `uplot.js` and `estimate_plot.js`: the only scripts that a browser executes in the page
 /// (Content Security Policy Level 3, hash sources).
 const SCRIPT_HASHES: &str = "'sha256-GcjUxq2Ikpp59K5J1vcWFWbf0Lo9FcxJXpdPeH63jx8=' \
-                             'sha256-mSjEzJhCop6NNnrSHPRRxWxO1Dhikv3p4buOq6GL/f4='";
+                             'sha256-aAVJXf2ZzxaZUoMVB/ar/O2Ejss9TN/J1avh2i9WY5g='";
 
 #[derive(Template)]
 #[template(path = "estimate_plot.html")]

@@ -11,7 +11,7 @@ use crate::format::{
     NO_DATA, count, counted, date, date_or, hours, level, micrometres, minute_or, percent, rate,
 };
 use crate::model::{Report, UnitView};
-use crate::page::{Error, Page, tail_path, unit_path};
+use crate::page::{Error, Page, part_path, tail_path, unit_path};
 use crate::pages::quantities::{self, Change};
 use crate::pages::work_requests::request_badge;
 use crate::state_badge::StateBadge;
@@ -56,11 +56,11 @@ impl Row {
             name: unit.name(),
             position: unit.position.clone().unwrap_or_else(|| NO_DATA.to_owned()),
             gap: level(s.gap_m, s.gap_se_m),
-            place: place(unit),
+            place: unit.place(),
             action: s.action_text.clone().unwrap_or_else(|| "none".to_owned()),
             due: s.due_utc.map(|due| due.as_second().to_string()).unwrap_or_default(),
-            share: share(unit).map_or_else(|| NO_DATA.to_owned(), percent),
-            share_sort: share(unit).map(|share| format!("{share:.4}")).unwrap_or_default(),
+            share: unit.share().map_or_else(|| NO_DATA.to_owned(), percent),
+            share_sort: unit.share().map(|share| format!("{share:.4}")).unwrap_or_default(),
             sparkline: sparkline(unit),
             likely: when(s.crossing_hours_p50, s.likely_utc, unit),
             why: why(unit),
@@ -69,22 +69,11 @@ impl Row {
     }
 }
 
-/// Tail and position of a unit.
-pub(crate) fn place(unit: &UnitView) -> String {
-    let words = [unit.tail_number.as_deref(), unit.position.as_deref()];
-    words.into_iter().flatten().collect::<Vec<_>>().join(" ")
-}
-
 /// Reason of the state, with the states of the other followed quantities.
 pub(crate) fn why(unit: &UnitView) -> String {
     let reason = unit.assessment.reason.clone().unwrap_or_else(|| NO_DATA.to_owned());
     let states = unit.quantities.iter().filter_map(|view| view.row.state);
     states.fold(reason, |why, state| format!("{why}; {}", state.replace('_', " ")))
-}
-
-/// Gap divided by limit.
-pub(crate) fn share(unit: &UnitView) -> Option<f64> {
-    Some(unit.assessment.gap_m? / unit.assessment.limit_m?)
 }
 
 /// Date and hours of a crossing, or why there is none.
@@ -97,12 +86,6 @@ pub(crate) fn when(h: Option<f64>, at: Option<jiff::Timestamp>, unit: &UnitView)
         (None, _) if s.limit_m.is_none() || s.gap_m.is_none() || s.state.is_none() => NO_DATA.to_owned(),
         (None, _) => "after the forecast horizon".to_owned(),
     }
-}
-
-/// Footer: time, program and store version.
-pub(crate) fn footer(report: &Report) -> String {
-    let version = report.store_version.map_or_else(String::new, |v| format!(" from store version {v}"));
-    format!("Made {} UTC by {}{version}.", crate::format::minute(report.made_utc), report.program)
 }
 
 /// Part, units, 5 %, median, 95 %, and the outlying units' pages.
@@ -192,7 +175,7 @@ pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
         let path = format!("work-{}.html", k + 2);
         let title = format!("Work list, page {} · actuator free play", k + 2);
         let groups = grouped(chunk);
-        let view = WorkView { root: "", title, footer: footer(report), groups, label: "Work list" };
+        let view = WorkView { root: "", title, footer: report.footer(), groups, label: "Work list" };
         pages.push(Page::html(path.clone(), &view.render()?));
         more_work.push(path);
     }
@@ -202,7 +185,7 @@ pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
         for (k, chunk) in tails.chunks(TAIL_ROWS).enumerate() {
             let path = format!("tails-{}.html", k + 1);
             let title = format!("All tails, page {} · actuator free play", k + 1);
-            let view = TailsView { root: "", title, footer: footer(report), map: map(report, chunk) };
+            let view = TailsView { root: "", title, footer: report.footer(), map: map(report, chunk) };
             pages.push(Page::html(path.clone(), &view.render()?));
             tail_pages.push(path);
         }
@@ -229,7 +212,7 @@ fn index_page(
         title: "Actuator free play".to_owned(),
         heading: heading(report),
         decision: decision(report),
-        footer: footer(report),
+        footer: report.footer(),
         lead: format!(
             "{} · data to {} · assessed {}",
             report.scope.as_deref().unwrap_or("Whole fleet"),
@@ -252,7 +235,7 @@ fn index_page(
         quantity_changes: quantity_changes.into_iter().take(FEW).collect(),
         map: map(report, &worst),
         tail_pages,
-        parts: crate::pages::part::parts(report),
+        parts: report.by_part().into_keys().map(|part| (part.to_owned(), part_path(part, 0))).collect(),
         months: months(report),
         undated: report.units.iter().filter(|u| u.assessment.hours_per_day.is_none()).count(),
         spreads: spread_rows(report),
@@ -289,7 +272,7 @@ fn decision(report: &Report) -> String {
         return format!("No unit needs action: {}.", counts.join(", "));
     };
     let action = unit.assessment.action_text.as_deref().unwrap_or("inspect");
-    format!("{} ({}): {action}. In all: {}.", place(unit), unit.name(), counts.join(", "))
+    format!("{} ({}): {action}. In all: {}.", unit.place(), unit.name(), counts.join(", "))
 }
 
 /// Units that need action or have an open work request, by earliest date.
@@ -382,7 +365,7 @@ fn map(report: &Report, tails: &[&str]) -> Map {
             link: unit_path(unit),
             badge: unit.badge(),
             name: unit.name(),
-            text: share(unit).map_or_else(|| NO_DATA.to_owned(), percent),
+            text: unit.share().map_or_else(|| NO_DATA.to_owned(), percent),
         });
     }
     let rows = tails.iter().map(|tail| {

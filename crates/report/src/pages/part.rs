@@ -1,14 +1,11 @@
 //! Part pages: all units of a part number as small multiples on shared axes.
 
-use std::collections::BTreeMap;
-
 use askama::Template;
 
 use crate::charts::small_multiple::SharedAxes;
 use crate::format::{NO_DATA, counted, date, level, micrometres};
 use crate::model::{Report, UnitView};
 use crate::page::{Error, Page, part_path, unit_path};
-use crate::pages::fleet::{footer, place, share};
 use crate::state_badge::StateBadge;
 
 /// Maximum number of units on one page.
@@ -38,27 +35,14 @@ struct Multiple {
     svg: String,
 }
 
-/// Part numbers of a report with the path of their first page.
-pub(crate) fn parts(report: &Report) -> Vec<(String, String)> {
-    by_part(report).into_keys().map(|part| (part.to_owned(), part_path(part, 0))).collect()
-}
-
-fn by_part(report: &Report) -> BTreeMap<&str, Vec<&UnitView>> {
-    let mut parts: BTreeMap<&str, Vec<&UnitView>> = BTreeMap::new();
-    for unit in &report.units {
-        parts.entry(unit.part_number.as_deref().unwrap_or(NO_DATA)).or_default().push(unit);
-    }
-    parts
-}
-
 /// Renders the pages of all part numbers: the most urgent units first, then by share of the limit.
 ///
 /// # Errors
 /// When the template cannot be filled.
 pub fn part_pages(report: &Report) -> Result<Vec<Page>, Error> {
     let mut pages = Vec::new();
-    for (part, mut units) in by_part(report) {
-        let order = |unit: &UnitView| (unit.badge().rank(), -share(unit).unwrap_or(0.0));
+    for (part, mut units) in report.by_part() {
+        let order = |unit: &UnitView| (unit.badge().rank(), -unit.share().unwrap_or(0.0));
         units.sort_by(|a, b| order(a).partial_cmp(&order(b)).unwrap_or(std::cmp::Ordering::Equal));
         let axes = SharedAxes::of(&units);
         let paths: Vec<String> = (0..units.len().div_ceil(UNITS)).map(|k| part_path(part, k)).collect();
@@ -66,7 +50,7 @@ pub fn part_pages(report: &Report) -> Result<Vec<Page>, Error> {
             let view = View {
                 root: "../",
                 title: format!("{part} · actuator free play"),
-                footer: footer(report),
+                footer: report.footer(),
                 part,
                 axes: axes.map(description).unwrap_or_default(),
                 units: units.iter().map(|unit| multiple(unit, axes)).collect(),
@@ -95,7 +79,7 @@ fn multiple(unit: &UnitView, axes: Option<SharedAxes>) -> Multiple {
         link: format!("../{}", unit_path(unit)),
         badge: unit.badge(),
         serial: unit.serial_number.clone(),
-        place: place(unit),
+        place: unit.place(),
         gap: format!(
             "{}, {}",
             level(unit.assessment.gap_m, unit.assessment.gap_se_m),

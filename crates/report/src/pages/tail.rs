@@ -36,7 +36,7 @@ pub fn tail_page(report: &Report, tail: &Tail) -> Result<Page, Error> {
     let view = View {
         root: "../",
         title: format!("{name} · actuator free play"),
-        footer: crate::pages::fleet::footer(report),
+        footer: report.footer(),
         tail: name,
         facts: vec![
             ("Flights", count(tail.flights)),

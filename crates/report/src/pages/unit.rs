@@ -10,7 +10,7 @@ use crate::format::{
 };
 use crate::model::{FlightRow, Report, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
-use crate::pages::fleet::{share, when, why};
+use crate::pages::fleet::{when, why};
 use crate::pages::quantities::{self, Change, Chart, Level};
 use crate::pages::work_requests::{RequestRow, request_rows};
 use crate::state_badge::StateBadge;
@@ -85,7 +85,7 @@ pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) ->
     let view = View {
         root: "../",
         title: format!("{} · actuator free play", unit.name()),
-        footer: crate::pages::fleet::footer(report),
+        footer: report.footer(),
         name: unit.name(),
         action: s.action_text.clone().unwrap_or_default(),
         crossing: forecast.map(|(_, at)| at.map(date).unwrap_or_default()),
@@ -132,7 +132,7 @@ fn now(spreads: &RateSpreads<'_>, unit: &UnitView) -> Facts {
     vec![
         ("Gap now", level(s.gap_m, s.gap_se_m)),
         ("Act limit", s.limit_m.map_or_else(|| NO_DATA.to_owned(), |l| format!("{} µm", micrometres(l)))),
-        ("% of limit", share(unit).map_or_else(|| NO_DATA.to_owned(), percent)),
+        ("% of limit", unit.share().map_or_else(|| NO_DATA.to_owned(), percent)),
         (
             "Rate [µm per 1000 FH], 90 % interval",
             rates(s.rate_p05_m_per_hour, s.rate_m_per_hour, s.rate_p95_m_per_hour),

@@ -265,7 +265,7 @@ fn events_happen_before_the_flight_that_they_name() {
         }
     }
     assert_eq!(b.iter().filter(|flight| flight.log == LogState::Truncated).count(), 1);
-    let late = small + "[[reshims]]\nbefore_flight = 7\ntail = \"A\"\nposition = \"left\"\ngap_m = 1e-5\n";
+    let late = small + "\n[[reshims]]\nbefore_flight = 7\ntail = \"A\"\nposition = \"left\"\ngap_m = 1e-5\n";
     let late = Plan::new(&toml::from_str(&late).unwrap()).unwrap_err().to_string();
     assert!(late.starts_with("`before_flight of a re-shim` is 7"), "{late}");
 }
