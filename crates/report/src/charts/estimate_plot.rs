@@ -199,10 +199,7 @@ fn part_svg(
     let mut svg = String::new();
     let drawn = {
         let root = SVGBackend::with_string(&mut svg, (width, SIZE.1 - HEADING)).into_drawing_area();
-        root.fill(&WHITE)
-            .map_err(DrawError::from)
-            .and_then(|()| part(&root, plot))
-            .and_then(|()| Ok(root.present()?))
+        root.fill(&WHITE).and_then(|()| part(&root, plot)).and_then(|()| root.present())
     };
     drawn.map_err(|e| Error::Plot(e.to_string()))?;
     Ok(svg)
