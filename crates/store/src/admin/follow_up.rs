@@ -9,12 +9,20 @@ use crate::handle::Store;
 use crate::write::writer::{self, Writer};
 
 impl Store {
-    /// The newest row of every alert and channel, by identifier and channel; none of a store without alerts.
+    /// The newest row of every alert and channel, by time, unit and channel; none of a store without alerts.
     ///
     /// # Errors
     /// As [`Store::records`].
     pub fn alerts(&self) -> Result<Vec<AlertRecord>, Error> {
-        self.rows(&self.alerts, |alert: &AlertRecord| format!("{} {}", alert.alert_id, alert.channel))
+        let mut alerts =
+            self.rows(&self.alerts, |alert: &AlertRecord| format!("{} {}", alert.alert_id, alert.channel))?;
+        // Identifiers end in a digest of their run: their order is by chance.
+        let order = |a: &AlertRecord| {
+            let unit = (a.part_number.clone(), a.serial_number.clone(), a.tail_number.clone());
+            (a.as_of_utc, unit, a.quantity.clone(), a.change_number, a.channel.clone())
+        };
+        alerts.sort_by_cached_key(order);
+        Ok(alerts)
     }
 
     /// Every event of every work request, earliest first.
