@@ -57,6 +57,13 @@ impl TestFleet {
         Self { folder: tempfile::tempdir().unwrap() }
     }
 
+    /// A copy of this fleet in a folder of its own, file times included.
+    pub(crate) fn copied(&self) -> Self {
+        let fleet = Self::empty();
+        copy(self.folder.path(), fleet.folder.path());
+        fleet
+    }
+
     pub(crate) fn path(&self, relative: &str) -> PathBuf {
         self.folder.path().join(relative)
     }
@@ -120,6 +127,9 @@ pub(crate) fn copy(from: &Path, to: &Path) {
             copy(&path, &target);
         } else {
             std::fs::copy(&path, &target).unwrap();
+            let modified = entry.metadata().unwrap().modified().unwrap();
+            let times = std::fs::FileTimes::new().set_modified(modified);
+            std::fs::File::options().append(true).open(&target).unwrap().set_times(times).unwrap();
         }
     }
 }

@@ -22,7 +22,7 @@ enum Before {
     Remove(&'static str),
     /// Replaced a file by a folder.
     Folder(&'static str),
-    /// Cut a file after so many bytes.
+    /// Cut a file to this number of bytes.
     Cut(&'static str, usize),
 }
 use Before::{Cut, Edit, Folder, Nothing, Remove, Write};

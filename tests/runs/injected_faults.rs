@@ -175,7 +175,8 @@ fn logs_of(fleet: &TestFleet) -> Vec<PathBuf> {
 /// Three flights of four actuators.
 fn few() -> TestFleet {
     let fleet = small();
-    logs_of(&fleet).iter().skip(3).for_each(|log| std::fs::remove_file(log).unwrap());
+    let kept = logs_of(&fleet).into_iter().take(3).collect::<Vec<_>>();
+    fleet.logs().iter().filter(|log| !kept.contains(log)).for_each(|log| std::fs::remove_file(log).unwrap());
     fleet
 }
 
@@ -200,7 +201,8 @@ fn stored() -> TestFleet {
 /// A command under faults.
 struct Struck<'a> {
     injector: &'a Injector,
-    make: fn() -> TestFleet,
+    /// The fleet before the command; each try has a copy.
+    before: TestFleet,
     args: &'static [&'static str],
     /// Records that the store must have after the command without a fault.
     wanted: &'a str,
@@ -212,7 +214,7 @@ impl Struck<'_> {
     /// Runs the command with a fault, and then without: the second must end with every record, and the first must
     /// have reported an error if the store lacks one. Returns the first exit code.
     fn tried(&self, fault: &Fault) -> Option<i32> {
-        let fleet = (self.make)();
+        let fleet = self.before.copied();
         let struck = self.injector.run(&fleet, self.args, fault);
         assert!(matches!(struck.code, None | Some(0..=3)), "{fault:?}: {struck:?}");
         // A log of which one actuator cannot be read keeps the records of the others, and is an error.
@@ -265,8 +267,9 @@ fn strike(
     let plain = few();
     plain.run_ok(&["run"]);
     let wanted = plain.exported();
-    let count = injector.count(&make(), args, under, kind);
-    let command = Struck { injector: &injector, make, args, wanted: &wanted };
+    let before = make();
+    let count = injector.count(&before.copied(), args, under, kind);
+    let command = Struck { injector: &injector, before, args, wanted: &wanted };
     let mut codes = ExitCodes::default();
     let tried = calls(count);
     for &at in &tried {
@@ -322,14 +325,18 @@ fn a_look_at_a_table_that_fails_stores_no_withdrawn_flight() {
     plain.run_ok(RUN);
     let wanted = plain.exported();
     assert_eq!(wanted.lines().count() - 1, 8);
-    let command = Struck { injector: &injector, make: table, args: RUN, wanted: &wanted };
+    let command = Struck { injector: &injector, before: table(), args: RUN, wanted: &wanted };
     for (under, mode) in [(UNDER, EIO), (UNDER, ESTALE)] {
-        let count = injector.count(&table(), RUN, under, "read");
+        let count = injector.count(&command.before.copied(), RUN, under, "read");
         assert!(count > 0, "no call on {under}");
         for &at in &calls(count) {
             command.tried(&Fault::at(under, "read", mode, at));
         }
-        let always = injector.run(&table(), RUN, &Fault { last: 0, ..Fault::at(under, "read", mode, 1) });
+        let always = injector.run(
+            &command.before.copied(),
+            RUN,
+            &Fault { last: 0, ..Fault::at(under, "read", mode, 1) },
+        );
         assert_eq!(always.code, Some(1), "{always:?}");
         assert!(always.err.contains("error[folder_unreadable]"), "{always:?}");
     }
@@ -372,15 +379,16 @@ fn a_fault_in_a_report_changes_no_store_and_the_next_report_is_whole() {
         let found = glob::glob(pattern.to_str().unwrap()).unwrap().flatten();
         found.map(|path| path.strip_prefix(fleet.path("")).unwrap().to_owned()).collect::<Vec<_>>()
     };
-    let plain = stored();
+    let before = stored();
+    let plain = before.copied();
     plain.run_ok(REPORT);
     let wanted = names(&plain);
     assert!(wanted.len() > 4, "{wanted:?}");
     for mode in [EIO, "kill"] {
-        let count = injector.count(&stored(), REPORT, "pages", "write");
+        let count = injector.count(&before.copied(), REPORT, "pages", "write");
         let (mut codes, tried) = (ExitCodes::default(), calls(count));
         for &at in &tried {
-            let fleet = stored();
+            let fleet = before.copied();
             let struck = injector.run(&fleet, REPORT, &Fault::at("pages", "write", mode, at));
             assert!(matches!(struck.code, None | Some(0..=3)), "{mode} at {at}: {struck:?}");
             if struck.code == Some(0) {
@@ -410,8 +418,8 @@ fn two_faults_in_one_run_lose_nothing() {
     let seed = std::env::var("FREEPLAY_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(1);
     let mut chance = Chance(seed);
     for (make, store) in [NEW, GROWN] {
-        let command = Struck { injector: &injector, make, args: RUN, wanted: &wanted };
-        let count = injector.count(&make(), RUN, "results", "both");
+        let command = Struck { injector: &injector, before: make(), args: RUN, wanted: &wanted };
+        let count = injector.count(&command.before.copied(), RUN, "results", "both");
         let tries = sample().min(count);
         let mut codes = ExitCodes::default();
         for _ in 0..tries {

@@ -60,7 +60,7 @@ impl Output {
     pub(crate) fn refuse_input(&self, file: &Path) -> Result<(), Failure> {
         let Ok(target) = file.canonicalize() else { return Ok(()) };
         let mut inputs = self.configs.clone();
-        if let Ok(config) = Config::read_layers(&self.configs) {
+        if let Ok(config) = Config::read_settings(&self.configs) {
             let logs = &config.document.logs;
             let tables = [Some(&logs.installations), logs.flights.as_ref(), logs.maintenance.as_ref()];
             let tables = tables.into_iter().chain([logs.inspections.as_ref()]).flatten();

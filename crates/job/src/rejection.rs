@@ -38,7 +38,7 @@ const MAPPING: [&str; 7] = [
 ];
 
 /// Codes that single flights have for other causes; on most flights of a part number, a unit is wrong.
-const UNIT: [(&str, &str); 6] = [
+const UNIT: [(&str, &str); 5] = [
     (
         "load_too_small",
         "check `unit` and `scale` of the load channel (N against kN), and `unknown_force_n` of the part",
@@ -52,7 +52,6 @@ const UNIT: [(&str, &str); 6] = [
         "too_short",
         "check the unit of the clock (ms against s): by its times no flight has 9 s of valid samples under load",
     ),
-    ("channel_constant", "check wiring and mapping: a channel that never changes is not measured"),
     (
         "motion_unexplained",
         "check that load and positions are of the same actuator, and `stiffness_n_per_m` of the part",
@@ -63,6 +62,9 @@ const UNIT: [(&str, &str); 6] = [
          of its own, but `gap_midrange_m`, loads and limits of other quantities assume the configured one",
     ),
 ];
+
+/// A code that single actuators have for a broken sensor; on most flights of a part number, the mapping is wrong.
+const OF_PART: &str = "channel_constant";
 
 /// The fitted stiffness of most flights of a part number is not the configured one, by a factor of two or more.
 pub const STIFFNESS_UNLIKE: &str = "stiffness_unlike";
@@ -89,7 +91,7 @@ pub fn majority<'c>(codes: &[Option<&'c str>]) -> Option<(&'c str, usize)> {
 /// Remedy of a rejection of most flights of a part number, where it points to a wrong mapping or unit.
 pub fn part_remedy(code: &str) -> Option<&'static str> {
     let unit = UNIT.iter().find(|(known, _)| *known == code).map(|(_, remedy)| *remedy);
-    unit.or_else(|| remedy(code).filter(|_| is_mapping_fault(code)))
+    unit.or_else(|| remedy(code).filter(|_| is_mapping_fault(code) || code == OF_PART))
 }
 
 #[cfg(test)]

@@ -172,7 +172,7 @@ fn changes_of(spec: &Spec) -> Result<Vec<QuantityChange>, Box<dyn Error>> {
     let store = Store::open(folder.path().join("results"))?;
     let installations = scheduler::installations(&config)?;
     let ask = UnitSelection::default();
-    Ok(assess::assess_store_with_quantities(&config, &installations, &store, &ask)?.1.changes)
+    Ok(assess::assess_store_with_quantities(&config, &installations, &store, &ask)?.followed.changes)
 }
 
 fn name_of(change: &QuantityChange) -> String {

@@ -1,6 +1,6 @@
 //! One stored estimate with its settings, recomputed from its log.
 
-use ingest::{ActuatorChannels, LogFiles};
+use ingest::ActuatorChannels;
 use job::flight_log::{FlightLog, catch_panic};
 use job::{Config, estimate};
 use records::{Diagnostic, GapEstimate, GapRecord, Installations, Status};
@@ -119,8 +119,7 @@ fn replay(
     installations: &Installations,
 ) -> Result<Recomputation, Diagnostic> {
     let log_path = &record.provenance.log_path;
-    let path = config.path(log_path);
-    let files = discover::log_containing(config, &path).unwrap_or_else(|_| LogFiles::one(path));
+    let files = discover::stored_log(config, log_path);
     catch_panic(log_path, || {
         let opened = FlightLog::open(&files, log_path, config, installations)?;
         let at = opened.positions.iter().find(|at| at.position == record.position).ok_or_else(|| {

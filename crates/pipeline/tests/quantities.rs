@@ -186,7 +186,9 @@ fn assessed_under(text: &str, plant: Plant, swaps: bool) -> (Vec<TrendRow>, Foll
     store.lock(&Holder::this_process(), None).unwrap().commit(&results).unwrap();
     let config = Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap();
     let ask = UnitSelection::default();
-    assess::assess_store_with_quantities(&config, &Installations::default(), &store, &ask).unwrap()
+    let found =
+        assess::assess_store_with_quantities(&config, &Installations::default(), &store, &ask).unwrap();
+    (found.now, found.followed)
 }
 
 /// Quantity, scope, kind, and name of tail, unit or part.

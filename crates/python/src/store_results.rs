@@ -8,7 +8,7 @@ use ::records::row_schema::{Row, to_nullable_batch};
 use ::records::{Diagnostic, GapRecord};
 use jiff::Timestamp;
 use pipeline::explain::RecordKey;
-use pipeline::fleet_trends::assess::{self, UnitSelection};
+use pipeline::fleet_trends::assess::{self, StoreAssessment, UnitSelection};
 use pipeline::fleet_trends::backtest;
 use pipeline::fleet_trends::inspection_interval::inspection_intervals;
 use pipeline::follow_up::work_requests::{self, WorkSelection};
@@ -61,12 +61,12 @@ fn followed(
     let found = py.detach(|| {
         assess::assess_store_with_quantities(config, installations, &Store::open(config.store())?, &ask)
     });
-    let (rows, followed) = found.map_err(|error| to_run_exception(py, error))?;
+    let StoreAssessment { now, followed, .. } = found.map_err(|error| to_run_exception(py, error))?;
     match what {
         Followed::Quantities => table(py, Ok(followed.rows)),
         Followed::Changes => table(py, Ok(followed.changes)),
         Followed::Intervals => {
-            table(py, Ok(inspection_intervals(&rows, config.document.trend.inspection_risk)))
+            table(py, Ok(inspection_intervals(&now, config.document.trend.inspection_risk)))
         }
     }
 }

@@ -35,6 +35,8 @@ pub struct Report {
     pub interval_advice: Vec<String>,
     /// Changes of quantities other than the gap, of units, tails and parts; the newest first.
     pub quantity_changes: Vec<QuantityChange>,
+    /// Wrong mappings with evidence and remedy, in words.
+    pub mapping_faults: Vec<String>,
     /// Whether a table of inspections is configured.
     pub inspections_given: bool,
     /// Inspections of units without records.

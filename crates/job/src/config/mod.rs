@@ -76,13 +76,29 @@ impl Config {
         }
     }
 
-    /// Reads files, each of which overrides those before it, checks the result, and reads the flights table that it
-    /// names. Relative paths start from the first file's folder.
+    /// Reads the configuration as [`Config::read_settings`], and the flights table that it names.
+    ///
+    /// # Errors
+    /// As [`Config::read_settings`], and the faults of the table.
+    pub fn read_layers(files: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
+        let mut config = Self::read_settings(files)?;
+        // Before the first table is read: it may lie in an object store.
+        object_io::configure(config.document.objects.retry_settings());
+        if let Some(table) = &config.document.logs.flights {
+            let names = &config.document.columns.flights;
+            let read = Flights::read(&config.path(table), names, &config.document.identity);
+            config.flights = read.map_err(|e| e.iter().map(ingest::Error::diagnostic).collect::<Vec<_>>())?;
+        }
+        Ok(config)
+    }
+
+    /// Reads files, each of which overrides those before it, and checks the result, without any table that it names.
+    /// Relative paths start from the first file's folder.
     ///
     /// # Errors
     /// All diagnostics at once: an unreadable file or broken TOML alone, else every unknown key, else
     /// the first key of a wrong type, else every value that cannot be meant.
-    pub fn read_layers(files: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
+    pub fn read_settings(files: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
         let read = |file: &PathBuf| {
             let file_name = file.display().to_string();
             let text = std::fs::read_to_string(file).map_err(|e| {
@@ -112,21 +128,13 @@ impl Config {
         let folder = files.first().and_then(|f| f.parent()).map_or_else(PathBuf::new, Path::to_path_buf);
         let file_name: Vec<&str> = texts.iter().map(|(file_name, _)| file_name.as_str()).collect();
         let file = PathBuf::from(file_name.join(" + "));
-        let mut config = Self::from_layers(ConfigLayer::stack(texts), &file, &folder)?;
-        // Before the first table is read: it may lie in an object store.
-        object_io::configure(config.document.objects.retry_settings());
-        if let Some(table) = &config.document.logs.flights {
-            let names = &config.document.columns.flights;
-            let read = Flights::read(&config.path(table), names, &config.document.identity);
-            config.flights = read.map_err(|e| e.iter().map(ingest::Error::diagnostic).collect::<Vec<_>>())?;
-        }
-        Ok(config)
+        Self::from_layers(ConfigLayer::stack(texts), &file, &folder)
     }
 
     /// Reads and checks the text of a configuration whose relative paths start from `folder`.
     ///
     /// # Errors
-    /// As [`Config::read_layers`].
+    /// As [`Config::read_settings`].
     pub fn parse(text: &str, file: &Path, folder: &Path) -> Result<Self, Vec<Diagnostic>> {
         let file_name = file.display().to_string();
         Self::from_layers(ConfigLayer::stack([(file_name, text.to_owned())]), file, folder)

@@ -72,10 +72,21 @@ pub fn assess_store(
     store: &Store,
     ask: &UnitSelection,
 ) -> Result<Vec<TrendRow>, Error> {
-    Ok(assess_store_with_quantities(config, installations, store, ask)?.0)
+    Ok(assess_store_with_quantities(config, installations, store, ask)?.now)
 }
 
-/// As [`assess_store`], with the followed quantities of the selected units and what changed on their tails and parts.
+/// Assessments of selected units with what was found about them in addition to gaps.
+#[derive(Debug, Default)]
+pub struct StoreAssessment {
+    /// One assessment for each unit.
+    pub now: Vec<TrendRow>,
+    /// Their followed quantities, and what changed on their tails and parts.
+    pub followed: FollowedQuantities,
+    /// Wrong mappings that concern them.
+    pub mapping_faults: Vec<MappingFault>,
+}
+
+/// As [`assess_store`], with the followed quantities and the mapping faults of the selected units.
 ///
 /// # Errors
 /// As [`assess_store`].
@@ -84,15 +95,20 @@ pub fn assess_store_with_quantities(
     installations: &Installations,
     store: &Store,
     ask: &UnitSelection,
-) -> Result<(Vec<TrendRow>, FollowedQuantities), Error> {
+) -> Result<StoreAssessment, Error> {
     // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
     let mut histories = load_histories(store)?;
-    let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Default::default()) };
+    let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else {
+        return Ok(StoreAssessment::default());
+    };
     let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
-    let fleet = fleet.with_quantities(store, as_of)?;
-    let rows = fleet.selected(ask, as_of)?;
-    let followed = fleet.followed_of(&rows);
-    Ok((rows, followed))
+    let fleet = fleet.with_diagnostics(store, as_of)?;
+    let now = fleet.selected(ask, as_of)?;
+    Ok(StoreAssessment {
+        followed: fleet.followed_of(&now),
+        mapping_faults: fleet.mapping_faults_of(&now),
+        now,
+    })
 }
 
 /// Assessments of the units of a run.
@@ -143,17 +159,9 @@ pub fn assess_run(
 ) -> Result<RunAssessments, Error> {
     let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
     let (all, of_run) = (load_histories(store)?, read_histories(store, &query)?);
-    let recent =
-        all.newest_utc().map(|newest| recent_diagnostics(store, newest)).transpose()?.unwrap_or_default();
-    let touched = units.iter().map(|(part, serial)| (part.to_string(), serial.to_string())).collect();
-    let stiffness = |number: &str| {
-        let part = config.parts.get(&PartNumber::new(number).ok()?)?;
-        Some(part.actuator.stiffness_n_per_m())
-    };
-    let mapping_faults = mapping_faults::detect(&recent, stiffness, &touched);
     let run = assess_run_from(config, installations, all, &of_run, units, Some(store))?;
     let changed = since_states(run.changed, before, &run.now);
-    Ok(RunAssessments { changed, recent, mapping_faults, ..run })
+    Ok(RunAssessments { changed, ..run })
 }
 
 /// The same from all flights that are known after a run, and those of the run; with the followed quantities of a store.
@@ -180,11 +188,16 @@ pub fn assess_run_from(
     let earlier = if is_later { Histories::default() } else { all.without(&names, of_run) };
     let mut fleet = FleetContext::consuming(config, installations, &mut all, &days)?;
     if let Some(store) = store {
-        fleet = fleet.with_quantities(store, as_of)?;
+        fleet = fleet.with_diagnostics(store, as_of)?;
     }
     let mut now = fleet.statements(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
-    let mut run = RunAssessments { followed: fleet.followed.clone(), ..RunAssessments::default() };
+    let mut run = RunAssessments {
+        recent: std::mem::take(&mut fleet.recent),
+        followed: fleet.followed.clone(),
+        mapping_faults: fleet.mapping_faults.clone(),
+        ..RunAssessments::default()
+    };
     let states = now.iter().filter_map(|row| row.state);
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
@@ -214,6 +227,8 @@ pub(crate) struct ReportAssessments {
     pub(crate) now: Vec<TrendRow>,
     /// Followed quantities of these units, and what changed on their tails and parts.
     pub(crate) followed: FollowedQuantities,
+    /// Wrong mappings that concern them.
+    pub(crate) mapping_faults: Vec<MappingFault>,
     /// Plotted forecast of each of them.
     pub(crate) drawn: Vec<trend::Forecast>,
     /// Assessments of earlier dates, by the number of days before.
@@ -241,7 +256,7 @@ pub(crate) fn assess_for_report(
     let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
-    let fleet = FleetContext::new(config, installations, histories, &days)?.with_quantities(store, as_of)?;
+    let fleet = FleetContext::new(config, installations, histories, &days)?.with_diagnostics(store, as_of)?;
     let now = fleet.selected(ask, as_of)?;
     let followed = fleet.followed_of(&now);
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
@@ -259,7 +274,8 @@ pub(crate) fn assess_for_report(
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = selected.into_iter().filter_map(priors).collect();
-    Ok(ReportAssessments { now, followed, drawn, before, past, priors })
+    let mapping_faults = fleet.mapping_faults_of(&now);
+    Ok(ReportAssessments { now, followed, mapping_faults, drawn, before, past, priors })
 }
 
 /// One assessment for each query, without data later than its date.
@@ -361,6 +377,10 @@ pub(crate) struct FleetContext<'a> {
     conditions: BTreeMap<UnitKey, Vec<String>>,
     /// Recorder changes of whole aircraft.
     moved: Vec<RecorderChange>,
+    /// Diagnostics of the last months.
+    recent: RecentDiagnostics,
+    /// Wrong mappings that they show.
+    mapping_faults: Vec<MappingFault>,
     /// Installations of the store's own units; of external tables none apply.
     installations: Option<InstallationIndex<'a>>,
 }
@@ -423,6 +443,8 @@ impl<'a> FleetContext<'a> {
             followed: FollowedQuantities::default(),
             conditions: BTreeMap::new(),
             moved: Vec::new(),
+            recent: RecentDiagnostics::default(),
+            mapping_faults: Vec::new(),
             installations: None,
         }
     }
@@ -455,15 +477,27 @@ impl<'a> FleetContext<'a> {
         Some(self.priors.of(name.0.as_deref(), as_of)?.1)
     }
 
-    /// The same, with the followed quantities of the store.
-    fn with_quantities(self, store: &Store, as_of: Timestamp) -> Result<Self, Error> {
+    /// The same, with what the store holds in addition to gaps: followed quantities, and wrong mappings.
+    fn with_diagnostics(self, store: &Store, as_of: Timestamp) -> Result<Self, Error> {
         let followed = follow(&values::read(store, as_of)?, &Facts(&self), as_of);
         let moved = recorder_changes(&followed.changes, as_of);
         let mut conditions: BTreeMap<UnitKey, Vec<String>> = BTreeMap::new();
         for (row, state) in followed.rows.iter().filter_map(|row| Some((row, row.state?))) {
             conditions.entry(row.unit()).or_default().push(state.to_owned());
         }
-        Ok(Self { followed, conditions, moved, ..self })
+        let recent = recent_diagnostics(store, as_of)?;
+        let parts = &self.limits.config().parts;
+        let stiffness =
+            |number: &str| Some(parts.get(&PartNumber::new(number).ok()?)?.actuator.stiffness_n_per_m());
+        let mapping_faults = mapping_faults::detect(&recent, stiffness);
+        Ok(Self { followed, conditions, moved, recent, mapping_faults, ..self })
+    }
+
+    /// The wrong mappings that concern some assessed units.
+    fn mapping_faults_of(&self, rows: &[TrendRow]) -> Vec<MappingFault> {
+        let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
+        let concerns = |fault: &&MappingFault| !fault.units.is_disjoint(&units);
+        self.mapping_faults.iter().filter(concerns).cloned().collect()
     }
 
     /// The followed quantities of some assessed units, the gap with them, and what changed on their tails and parts.
@@ -556,7 +590,8 @@ impl<'a> FleetContext<'a> {
         let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
         let usage_axis = prior.map(|prior| prior.axis().to_string());
         let removal = self.installations.as_ref().and_then(|index| index.removal(name, as_of));
-        let row = trend_row::row(name, history, series, limit_m, trend, as_of, wide, removal);
+        let fault = self.mapping_faults.iter().find(|fault| fault.units.contains(name));
+        let row = trend_row::row(name, history, series, limit_m, trend, as_of, wide, removal, fault);
         let conditions = self.conditions.get(name).cloned().unwrap_or_default();
         TrendRow { usage_axis, conditions, ..row }.with_action()
     }

@@ -36,6 +36,11 @@ impl<'a> Limits<'a> {
         Self { config, scale_m: LIMIT_OVER_NEW_GAP * median_m.unwrap_or(1e-5) }
     }
 
+    /// The configuration that they come from.
+    pub(crate) fn config(self) -> &'a Config {
+        self.config
+    }
+
     /// Configured usage axis of a part's wear; nothing where its histories decide.
     pub(crate) fn axis(self, part: Option<&str>) -> Option<UsageAxis> {
         let configured = self.part(part).and_then(|p| p.axis).or(self.config.document.trend.axis)?;

@@ -8,6 +8,7 @@ use trend::{Assessment, Series, classic};
 
 use crate::fleet_trends::tail_wide_steps::TailWide;
 use crate::history::histories::{History, UnitKey};
+use crate::monitoring::mapping_faults::MappingFault;
 
 /// Means of neighbours, at most a hundred.
 fn sketched(gaps_m: &[f64]) -> NoColumn<Vec<f64>> {
@@ -27,6 +28,7 @@ pub(crate) fn row(
     as_of: Timestamp,
     wide: &TailWide,
     removal: Option<&Installation>,
+    fault: Option<&MappingFault>,
 ) -> TrendRow {
     let last = history.until(as_of).last().map(|flown| history.place(flown));
     let gaps_m = series.map(|series| series.gaps_until(trend.as_of_us)).unwrap_or_default();
@@ -84,7 +86,7 @@ pub(crate) fn row(
         state: trend.state.filter(|_| is_judged).map(trend::State::as_str),
         reason: Some(match (removal, limit_m) {
             (Some(installation), _) => removed(installation),
-            (None, Some(_)) => reason(trend, history, wide, as_of),
+            (None, Some(_)) => reason(trend, history, wide, as_of, fault),
             (None, None) => "no limit is configured".into(),
         }),
         conditions: Vec::new(),
@@ -108,9 +110,18 @@ fn removed(last: &Installation) -> String {
 }
 
 /// Why a state, and how old it is where no estimate has followed.
-fn reason(trend: &Assessment, history: &History, wide: &TailWide, as_of: Timestamp) -> String {
+fn reason(
+    trend: &Assessment,
+    history: &History,
+    wide: &TailWide,
+    as_of: Timestamp,
+    fault: Option<&MappingFault>,
+) -> String {
     const LATEST: usize = 12;
     let mut reason = reason_of_state(trend, history, wide);
+    if let Some(fault) = fault {
+        reason = format!("{reason}; {} of {}", fault.evidence(), fault.scope());
+    }
     if let (disputed @ 1.., gaps) = history.disputed(as_of, LATEST) {
         reason = format!(
             "{reason}; {disputed} of the latest {gaps} gaps have little weight (estimators_disagree)"

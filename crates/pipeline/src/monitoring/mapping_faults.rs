@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use job::rejection;
 use serde::Serialize;
 
+use crate::history::histories::UnitKey;
 use crate::monitoring::recent::{FlightDiagnostics, PositionKey, RecentDiagnostics};
 
 /// Latest flights of an actuator that count.
@@ -33,8 +34,9 @@ pub struct MappingFault {
     pub flights: usize,
     /// What to change in the configuration.
     pub remedy: &'static str,
-    /// Whether this run has processed flights of the scope.
-    pub is_of_run: bool,
+    /// Units of the scope.
+    #[serde(skip)]
+    pub units: BTreeSet<UnitKey>,
 }
 
 impl MappingFault {
@@ -47,6 +49,18 @@ impl MappingFault {
             _ => "all actuators".to_owned(),
         }
     }
+
+    /// The code and its frequency.
+    pub fn evidence(&self) -> String {
+        format!("{} on {} of the latest {} flights", self.reason, self.refused, self.flights)
+    }
+}
+
+/// Scope, evidence and remedy.
+impl std::fmt::Display for MappingFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}; {}", self.scope(), self.evidence(), self.remedy)
+    }
 }
 
 /// Rejections of the latest flights of some actuators.
@@ -58,11 +72,10 @@ struct Tally<'a> {
 
 /// The faults of the mapping, the widest scope first: a part number, a tail, an actuator.
 ///
-/// `stiffness` gives the configured stiffness of a part number, N/m; `touched` holds the part and serial numbers whose records this run changed.
+/// `stiffness` gives the configured stiffness of a part number, N/m.
 pub(crate) fn detect(
     recent: &RecentDiagnostics,
     stiffness: impl Fn(&str) -> Option<f64>,
-    touched: &BTreeSet<(String, String)>,
 ) -> Vec<MappingFault> {
     type Scope = fn(&PositionKey) -> (Option<&String>, Option<&String>, Option<&String>);
     let scopes: [Scope; 3] = [
@@ -89,8 +102,7 @@ pub(crate) fn detect(
                 _ => rejection::remedy(reason).filter(|_| rejection::is_mapping_fault(reason)),
             };
             let Some(remedy) = remedy.filter(|_| !is_wide || tally.members.len() > 1) else { continue };
-            let is_touched =
-                |key: &PositionKey| touched.contains(&(key.part_number.clone(), key.serial_number.clone()));
+            let unit = |key: &&PositionKey| (Some(key.part_number.clone()), key.serial_number.clone());
             found.push(MappingFault {
                 part_number: part.cloned(),
                 tail_number: tail.cloned(),
@@ -99,7 +111,7 @@ pub(crate) fn detect(
                 refused,
                 flights: tally.codes.len(),
                 remedy,
-                is_of_run: tally.members.iter().any(|key| is_touched(key)),
+                units: tally.members.iter().map(unit).collect(),
             });
             explained.extend(tally.members);
         }
@@ -143,7 +155,7 @@ mod tests {
     const SIGN: Option<&str> = Some("load_sign_flipped");
 
     fn scopes(latest: &RecentDiagnostics) -> Vec<String> {
-        detect(latest, |_| Some(5e7), &BTreeSet::new()).iter().map(MappingFault::scope).collect()
+        detect(latest, |_| Some(5e7)).iter().map(MappingFault::scope).collect()
     }
 
     #[test]
@@ -179,7 +191,7 @@ mod tests {
             flights
         };
         let all = |second| [(key("A", "left", "P"), fitted(2e7)), (key("B", "left", "P"), fitted(second))];
-        let found = detect(&all(1.9e7).into(), |_| Some(5e7), &BTreeSet::new());
+        let found = detect(&all(1.9e7).into(), |_| Some(5e7));
         assert_eq!((found.len(), &*found[0].reason, found[0].refused), (1, "stiffness_unlike", 10));
         assert!(scopes(&all(4e7).into()).is_empty());
     }

@@ -50,7 +50,7 @@ pub fn compose(
     let StoreContents { histories, mut rest, store_version } = StoreContents::until(ask.as_of_utc, store)?;
     let newest_departure_utc = histories.newest_utc();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
-    let ReportAssessments { now, followed, drawn, before, past, priors } =
+    let ReportAssessments { now, followed, mapping_faults, drawn, before, past, priors } =
         assess::assess_for_report(config, installations, &histories, ask, &days, store)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
@@ -74,7 +74,8 @@ pub fn compose(
     let units: Vec<UnitView> = now.iter().zip(&drawn).map(unit).collect();
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
     let intervals = inspection_intervals(&now, config.document.trend.inspection_risk);
-    let narrowed = ask.tail_number.is_some() || ask.serial_number.is_some() || ask.part_number.is_some();
+    let scope = scope(ask);
+    let narrowed = scope.is_some();
     attribute_by_path(&mut logs.faults, &tails, installations);
     let wanted = |tail: Option<&str>| !narrowed || tail.is_some_and(|tail| shown.contains(tail));
     logs.faults.retain(|fault| wanted(fault.tail_number.as_deref()));
@@ -84,7 +85,7 @@ pub fn compose(
         made_utc,
         program: program.to_owned(),
         store_version: Some(store_version),
-        scope: scope(ask),
+        scope,
         as_of_utc,
         newest_departure_utc,
         logs_known: logs.known.iter().filter(|(tail, _)| wanted(tail.as_deref())).map(|(_, n)| n).sum(),
@@ -101,6 +102,7 @@ pub fn compose(
             .collect(),
         inspection_intervals: intervals,
         quantity_changes: followed.changes,
+        mapping_faults: mapping_faults.iter().map(ToString::to_string).collect(),
         trend_rows: now,
     })
 }

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use ::report::{Page, Report, UnitView, estimate_plot_html, flight_path, unit_path};
-use ingest::LogFiles;
 use job::Config;
 use rayon::prelude::*;
 use records::{Diagnostic, Installations};
@@ -54,6 +53,10 @@ pub fn draw(
     for unit in by_urgency(report) {
         let (view, first) = (&report.units[unit], report.units[unit].flights.len());
         let flights = first.saturating_sub(flights_per_unit)..first;
+        if chosen == MAX_PLOTS {
+            left_out += flights.len();
+            continue;
+        }
         let logs_of_flights = log_paths(view, flights.start, store)?;
         for flight in flights.rev() {
             let row = &view.flights[flight];
@@ -126,8 +129,7 @@ fn of_log(
 ) -> Result<Vec<(Wanted, Page)>, Diagnostic> {
     let (name, of_log, units) = (log.to_owned(), Arc::clone(config), Arc::clone(installations));
     let plots = within_time_limit(log, config, move || {
-        let path = of_log.path(&name);
-        let files = discover::log_containing(&of_log, &path).unwrap_or_else(|_| LogFiles::one(path));
+        let files = discover::stored_log(&of_log, &name);
         estimate_plots::of_log(&files, &name, &of_log, &units, None)
     })?;
     let page = |wanted: &Wanted| {

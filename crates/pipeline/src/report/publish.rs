@@ -150,6 +150,7 @@ mod tests {
             inspections_given: false,
             inspections_unmatched: 0,
             quantity_changes: Vec::new(),
+            mapping_faults: Vec::new(),
             inspection_intervals: Vec::new(),
             interval_advice: Vec::new(),
             trend_rows: Vec::new(),

@@ -68,6 +68,12 @@ pub fn log_containing(config: &Config, path: &Path) -> Result<LogFiles, Error> {
     Ok(found.unwrap_or_else(|| LogFiles::one(path)))
 }
 
+/// The whole log of a stored record; its first file alone where the search for the others fails.
+pub(crate) fn stored_log(config: &Config, log_path: &str) -> LogFiles {
+    let path = config.path(log_path);
+    log_containing(config, &path).unwrap_or_else(|_| LogFiles::one(path))
+}
+
 type FlightIdentity = (Flight, Option<Position>);
 
 /// A file of the main logs, with the flight it belongs to or why that is unknown.

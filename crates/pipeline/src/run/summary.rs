@@ -11,6 +11,7 @@ use crate::error::is_passing;
 use crate::fleet_trends::assess::RunAssessments;
 use crate::fleet_trends::changes::UnitChange;
 use crate::follow_up::summary::FollowUpSummary;
+use crate::history::histories::UnitKey;
 use crate::history::maintenance_log::UnknownUnit;
 use crate::monitoring::REPORTED_DAYS;
 use crate::monitoring::innovations::{self, InnovationOutlier};
@@ -312,7 +313,8 @@ impl RunSummary {
 
     /// Whether a wrong mapping shows in flights of this run.
     pub fn has_mapping_fault(&self) -> bool {
-        self.mapping_faults.iter().any(|fault| fault.is_of_run)
+        let units: BTreeSet<UnitKey> = self.trends.iter().map(TrendRow::unit).collect();
+        self.mapping_faults.iter().any(|fault| !fault.units.is_disjoint(&units))
     }
 
     /// Logs in error; one log may have several diagnostics.

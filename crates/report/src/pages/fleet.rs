@@ -118,6 +118,7 @@ struct FleetView {
     undated: usize,
     spreads: Vec<SpreadRow>,
     gaps: Vec<(String, String, String, String, String, String)>,
+    mapping_faults: Vec<String>,
     log_errors: Vec<(String, String)>,
     more_log_errors: usize,
     forecast_accuracy: Vec<(String, String, String)>,
@@ -212,6 +213,7 @@ fn index_page(
         title: "Actuator free play".to_owned(),
         heading: heading(report),
         decision: decision(report),
+        mapping_faults: report.mapping_faults.clone(),
         footer: report.footer(),
         lead: format!(
             "{} · data to {} · assessed {}",

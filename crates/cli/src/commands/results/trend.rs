@@ -1,15 +1,16 @@
 //! `trend`: current gap, wear rate, time to limit and state of each unit.
 
 use job::Config;
-use pipeline::fleet_trends::assess::{self, UnitSelection};
+use pipeline::fleet_trends::assess::{self, StoreAssessment, UnitSelection};
 use pipeline::fleet_trends::inspection_interval::{inspection_intervals, interval_advice};
+use pipeline::monitoring::mapping_faults::MappingFault;
 use records::uncertainty::NORMAL_95;
 use records::{InspectionInterval, Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
 use store::Store;
 
 use crate::args::{Global, TrendArgs};
 use crate::exit::{Code, Failure};
-use crate::output::Output;
+use crate::output::{Output, escape};
 use crate::row_output;
 use crate::sparkline::sparkline;
 use crate::table::{self, count, number, state_mark, text};
@@ -27,8 +28,14 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     if args.quantities || args.changes || args.intervals {
         return quantities(args, &ask, &config, &installations, output);
     }
+    let mut mapping_faults = Vec::new();
     let found = match (&args.external.estimates, &args.queries) {
-        (None, None) => assess::assess_store(&config, &installations, &Store::open(config.store())?, &ask)?,
+        (None, None) => {
+            let store = Store::open(config.store())?;
+            let found = assess::assess_store_with_quantities(&config, &installations, &store, &ask)?;
+            mapping_faults = found.mapping_faults;
+            found.now
+        }
         (estimates, queries) => {
             let histories = match estimates {
                 Some(file) => pipeline::history::external_estimates::read(file)?,
@@ -54,7 +61,12 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
         known.check_units(&args.units)?;
         nothing = Some(format!("no unit{} has flown; {}\n", selection(&ask), known.searched()));
     }
-    row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found, nothing))?;
+    row_output::write_rows(
+        &args.rows,
+        output,
+        || row_output::batch(&found),
+        || page(&found, &mapping_faults, nothing),
+    )?;
     Ok(Code::Success)
 }
 
@@ -73,7 +85,8 @@ fn quantities(
     output: &Output,
 ) -> Result<Code, Failure> {
     let store = Store::open(config.store())?;
-    let (units, followed) = assess::assess_store_with_quantities(config, installations, &store, ask)?;
+    let StoreAssessment { now: units, followed, .. } =
+        assess::assess_store_with_quantities(config, installations, &store, ask)?;
     if units.is_empty() {
         let known = KnownNames::read(config);
         known.check_units(&args.units)?;
@@ -201,13 +214,14 @@ fn changes_page(changes: &[QuantityChange], units: usize) -> String {
     table::layout(&columns, &changes.iter().map(cells).collect::<Vec<_>>())
 }
 
-fn page(found: &[TrendRow], nothing: Option<String>) -> String {
+fn page(found: &[TrendRow], mapping_faults: &[MappingFault], nothing: Option<String>) -> String {
     let Some(as_of) = found.iter().map(|r| r.as_of_utc).max() else {
         return nothing.unwrap_or_else(|| "no unit was queried\n".to_owned());
     };
     let as_of = as_of.strftime("%Y-%m-%d %H:%M UTC");
     let head = format!("{} as of {as_of}; ± is half the 90 % interval\n", count(found.len(), "unit"));
-    head + &unit_table(found.iter().collect())
+    let faults = mapping_faults.iter().map(|fault| format!("mapping  {}\n", escape(&fault.to_string())));
+    head + &unit_table(found.iter().collect()) + &faults.collect::<String>()
 }
 
 /// Units by urgency, with action and date.

@@ -174,15 +174,7 @@ fn code(report: &RunSummary, reached: bool, stopped: bool) -> Code {
 /// Lists the scopes whose flights are rejected for a wrong mapping.
 fn mapping_faults(report: &RunSummary, page: &mut String) {
     for fault in &report.mapping_faults {
-        let text = format!(
-            "{}: {} on {} of the latest {}; {}",
-            escape(&fault.scope()),
-            fault.reason,
-            fault.refused,
-            count(fault.flights, "flight"),
-            fault.remedy
-        );
-        line(page, "mapping", &text);
+        line(page, "mapping", &escape(&fault.to_string()));
     }
 }
 

@@ -30,7 +30,7 @@ const PERIODS: f64 = 3.0;
 pub(crate) struct Scaling {
     /// 95 % quantile of the load's magnitude, N.
     pub(crate) load_n: f64,
-    /// Stiffness of the part, N/m.
+    /// Stiffness that scales the compliance, N/m: the part's, or that of the data where they differ widely.
     pub(crate) stiffness_n_per_m: f64,
     /// Middle and half length of the flight, s.
     pub(crate) time_s: (f64, f64),
