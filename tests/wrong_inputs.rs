@@ -1,6 +1,6 @@
 //! Wrong settings and tables that gave a wrong number or lost one without a word: each is found, and named.
 
-use crate::harness::TestFleet;
+use crate::harness::{TestFleet, facts, rewrite};
 
 fn edit(fleet: &TestFleet, file: &str, change: impl FnOnce(String) -> String) {
     let path = fleet.path(file);
@@ -137,4 +137,43 @@ fn a_date_of_assessment_that_has_not_come_is_noted() {
     let result = fleet.freeplay(&["trend", "--as-of", "2190-01-01"]);
     assert!(result.err.contains("--as-of 2190-01-01 is in the future"), "{result:?}");
     assert!(!fleet.freeplay(&["trend"]).err.contains("future"));
+}
+
+/// The samples of another aircraft's log under a log's own name: no range shows it, but two estimates are one.
+#[test]
+fn the_samples_of_another_aircraft_are_named_with_both_flights() {
+    let fleet = TestFleet::sample();
+    let logs = fleet.logs();
+    let of = |tail: &str| logs.iter().find(|log| log.to_string_lossy().contains(tail)).unwrap();
+    let (own, other) = (of("N412FP"), of("N413FP"));
+    rewrite(other, own, &facts(own), |_| true, |_| true);
+    let run = fleet.run_ok(&["run"]);
+    let line = run.lines().find(|line| line.contains("  repeated ")).unwrap();
+    for name in ["N412FP-0001 of N412FP", "N413FP-0001 of N413FP", "aileron_left, aileron_right", "correct"] {
+        assert!(line.contains(name), "{line}");
+    }
+    assert_eq!(run.matches("  repeated ").count(), 1, "{run}");
+}
+
+/// A removal in a later year: the unit would fly on in its old place.
+#[test]
+fn dates_of_installations_that_are_still_to_come_are_named() {
+    let fleet = TestFleet::sample();
+    edit(&fleet, "sample-data/installations.csv", |table| table.replace("2026-10-12", "2126-10-12"));
+    let run = fleet.run_ok(&["run"]);
+    assert!(run.contains("1060-0008: `removed_utc` is 2126-10-12, a date to come\n"), "{run}");
+}
+
+/// A serial number typed again moves a history to a unit that does not exist.
+#[test]
+fn a_serial_number_that_loses_all_flights_is_named_with_the_one_that_has_them() {
+    let fleet = TestFleet::sample();
+    fleet.run_ok(&["run", "--quiet"]);
+    edit(&fleet, "sample-data/installations.csv", |table| table.replace("1040-0005", "1040-0050"));
+    let run = fleet.run_ok(&["run"]);
+    let changes = run.split("state changes in this run: ").nth(1).unwrap();
+    let lost = "1040-0005: normal → no state (no flight is left; aileron_left of N412FP is EMA-27-1040 / 1040-0050 now)";
+    assert!(changes.starts_with("2 units\n") && changes.contains(lost), "{run}");
+    // What has another serial number is all that changed: the other units of the tail have the state they had.
+    assert!(!changes.contains("1040-0006"), "{run}");
 }

@@ -71,8 +71,21 @@ fn a_reversed_load_sign_is_an_error_of_the_parts_and_names_the_units_that_lose_t
     let (flight, position) = (refused["flight_id"].as_str().unwrap(), refused["position"].as_str().unwrap());
     assert!(fleet.run_ok(&["explain", flight, position]).contains(REMEDY));
     fleet.run_ok(&["report", "--output", "pages"]);
-    let page = std::fs::read_to_string(fleet.path("pages/report.json")).unwrap();
-    assert!(page.contains(REMEDY));
+    let report = std::fs::read_to_string(fleet.path("pages/report.json")).unwrap();
+    let report: Value = serde_json::from_str(&report).unwrap();
+    // One computation: run, trend and report name the same faults.
+    let trend = fleet.run_ok(&["trend"]);
+    for fault in report["mapping_faults"].as_array().unwrap() {
+        let fault = fault.as_str().unwrap();
+        assert!(fault.contains(REMEDY) && fault.contains("load_sign_flipped on"), "{fault}");
+        assert!(trend.contains(fault) && again.contains(fault), "{fault}: {trend}\n{again}");
+    }
+    assert_eq!(report["mapping_faults"].as_array().unwrap().len(), faults.len());
+    let reasons = rows(&fleet.run_ok(&["trend", "--format", "json"]));
+    let named = |row: &&Value| row["reason"].as_str().unwrap().contains("load_sign_flipped on");
+    assert!(reasons.iter().filter(|row| row["removed_utc"].is_null()).all(|row| named(&row)), "{reasons:?}");
+    let page = std::fs::read_to_string(fleet.path("pages/index.html")).unwrap();
+    assert!(page.contains("Wrong mapping or setting."));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series, State, UsageDefaults, classic};
 
 use crate::error::Error;
-use crate::fleet_trends::changes::{UnitChange, changed, since_states};
+use crate::fleet_trends::changes::{UnitChange, changed, gone};
 use crate::fleet_trends::limits::Limits;
 use crate::fleet_trends::priors::FleetPriors;
 use crate::fleet_trends::tail_wide_steps::TailWide;
@@ -132,20 +132,24 @@ pub struct RunAssessments {
     pub findings: Vec<Finding>,
 }
 
-/// The states of all units of a store.
-pub(crate) type States = BTreeMap<UnitKey, &'static str>;
+/// Assessments of all units of a store, by unit.
+pub(crate) type RowsByUnit = BTreeMap<UnitKey, TrendRow>;
 
-/// The present states of all units of a store, by its own records.
+/// The present assessments of all units of a store, by its own records.
 ///
 /// # Errors
 /// As [`assess_store`].
-pub(crate) fn states(config: &Config, installations: &Installations, store: &Store) -> Result<States, Error> {
+pub(crate) fn by_unit(
+    config: &Config,
+    installations: &Installations,
+    store: &Store,
+) -> Result<RowsByUnit, Error> {
     let rows = assess_store(config, installations, store, &UnitSelection::default())?;
-    Ok(rows.into_iter().filter_map(|row| Some((row.unit(), row.state?))).collect())
+    Ok(rows.into_iter().map(|row| (row.unit(), row)).collect())
 }
 
 /// Assesses the fleet after a run: the units whose records it changed, and the work list of all units. `before` holds
-/// the states of units before the run computed records of theirs again.
+/// the assessments before a run that computed records again.
 ///
 /// # Errors
 /// As [`assess_store`].
@@ -155,13 +159,17 @@ pub fn assess_run(
     store: &Store,
     units: &[Unit],
     run_id: &str,
-    before: &States,
+    before: Option<&RowsByUnit>,
 ) -> Result<RunAssessments, Error> {
     let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
     let (all, of_run) = (load_histories(store)?, read_histories(store, &query)?);
-    let run = assess_run_from(config, installations, all, &of_run, units, Some(store))?;
-    let changed = since_states(run.changed, before, &run.now);
-    Ok(RunAssessments { changed, ..run })
+    let known: BTreeSet<UnitKey> = all.names().cloned().collect();
+    let mut run = assess_run_from(config, installations, all, &of_run, units, Some(store))?;
+    if let Some(before) = before {
+        run.changed = changed(before, &run.now);
+        run.changed.extend(gone(before.values(), &run.now, &known));
+    }
+    Ok(run)
 }
 
 /// The same from all flights that are known after a run, and those of the run; with the followed quantities of a store.

@@ -1,8 +1,8 @@
 //! Changes in a run: states and events of units with and without the run's flights.
 //!
 //! Both assessments are computed now with one prior, so nothing is stored between runs, and a new training cut-off
-//! of a prior changes no state by itself.
-use std::collections::BTreeMap;
+//! of a prior changes no state by itself. Where a run computes records again, the assessments before it are kept.
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
@@ -35,36 +35,40 @@ pub(crate) fn changed(before: &BTreeMap<UnitKey, TrendRow>, now: &[TrendRow]) ->
     now.iter().filter_map(|row| of_unit(before.get(&row.unit()), row)).collect()
 }
 
-/// Adds the changes against the states that units had before a run computed their records again.
-pub(crate) fn since_states(
-    mut changed: Vec<UnitChange>,
-    before: &BTreeMap<UnitKey, &'static str>,
+/// The units of which no flight is left: the records of their logs belong to other units now. `known` are all units
+/// that have flights.
+pub(crate) fn gone<'a>(
+    before: impl Iterator<Item = &'a TrendRow>,
     now: &[TrendRow],
+    known: &BTreeSet<UnitKey>,
 ) -> Vec<UnitChange> {
-    for row in now {
-        let Some(from) = before.get(&row.unit()).copied().filter(|from| row.state != Some(*from)) else {
-            continue;
+    let gone = before.filter(|row| row.flights > 0 && !known.contains(&row.unit()));
+    let change = |row: &TrendRow| {
+        let is_same_place =
+            |other: &&TrendRow| other.tail_number == row.tail_number && other.position == row.position;
+        let reason = match now.iter().find(is_same_place) {
+            Some(other) => format!(
+                "no flight is left; {} of {} is {} / {} now",
+                row.position.as_deref().unwrap_or("–"),
+                row.tail_number.as_deref().unwrap_or("–"),
+                other.part_number.as_deref().unwrap_or("–"),
+                other.serial_number
+            ),
+            None => "no flight is left".to_owned(),
         };
-        let is_unit = |change: &&mut UnitChange| {
-            change.part_number == row.part_number && change.serial_number == row.serial_number
-        };
-        if let Some(change) = changed.iter_mut().find(is_unit) {
-            change.from = Some(from);
-        } else {
-            changed.push(UnitChange {
-                part_number: row.part_number.clone(),
-                serial_number: row.serial_number.clone(),
-                tail_number: row.tail_number.clone(),
-                position: row.position.clone(),
-                from: Some(from),
-                to: row.state,
-                reason: row.reason.clone(),
-                new_events: Vec::new(),
-                cleared_events: Vec::new(),
-            });
+        UnitChange {
+            part_number: row.part_number.clone(),
+            serial_number: row.serial_number.clone(),
+            tail_number: row.tail_number.clone(),
+            position: row.position.clone(),
+            from: row.state,
+            to: None,
+            reason: Some(reason),
+            new_events: Vec::new(),
+            cleared_events: Vec::new(),
         }
-    }
-    changed
+    };
+    gone.map(change).collect()
 }
 
 fn of_unit(before: Option<&TrendRow>, now: &TrendRow) -> Option<UnitChange> {

@@ -5,7 +5,7 @@ pub mod external_estimates;
 pub(crate) mod extras;
 pub mod flight_row;
 pub mod histories;
-pub(crate) mod installation_index;
+pub mod installation_index;
 pub mod maintenance_log;
 pub(crate) mod merge;
 pub(crate) mod parallel_scan;

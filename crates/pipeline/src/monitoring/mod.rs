@@ -4,6 +4,7 @@ pub mod innovations;
 pub mod mapping_faults;
 pub mod recent;
 pub mod recorder_change;
+pub mod repeated_samples;
 
 /// Number of days for which a finding is reported.
 pub(crate) const REPORTED_DAYS: f64 = 30.0;

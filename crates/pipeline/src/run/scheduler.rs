@@ -20,6 +20,7 @@ use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
 use crate::error::Error;
 use crate::fleet_trends::assess;
 use crate::follow_up::FollowUp;
+use crate::history::installation_index::dates_ahead;
 use crate::history::maintenance_log::unknown_units;
 use crate::run::discover;
 use crate::run::event::Event;
@@ -109,6 +110,7 @@ pub(crate) fn execute_run(
     let mut report = RunSummary::begin(run_id(started_utc), started_utc, &plan, workers);
     report.cut_short = killed.into_iter().map(KilledRun::from).collect();
     report.unknown_units = unknown_units(config, &installations);
+    report.dates_ahead = dates_ahead(&installations, started_utc);
     let config_path = config.file.display().to_string();
     let to_do: Vec<LogRecord> =
         plan.work.iter().map(|work| summary::not_reached(work, &report.run_id)).collect();
@@ -119,11 +121,8 @@ pub(crate) fn execute_run(
     let is_again = |work: &WorkItem| {
         work.before.is_some() && !matches!(work.why, WorkReason::Retry | WorkReason::Unfetched)
     };
-    let before = if plan.work.iter().any(is_again) {
-        assess::states(config, &installations, &store)?
-    } else {
-        assess::States::new()
-    };
+    let is_repeated = plan.work.iter().any(is_again);
+    let before = is_repeated.then(|| assess::by_unit(config, &installations, &store)).transpose()?;
     let intent = RunPlanRows { run: report.row(context.program_version, &config_path, None), to_do };
     let inputs = Arc::new(RunInputs {
         config: config.clone(),
@@ -136,7 +135,7 @@ pub(crate) fn execute_run(
 
     (context.watch)(Event::Trends { units: touched.len() });
     let mut assessments =
-        assess::assess_run(config, &inputs.installations, &store, &touched, &report.run_id, &before)?;
+        assess::assess_run(config, &inputs.installations, &store, &touched, &report.run_id, before.as_ref())?;
     let findings = std::mem::take(&mut assessments.findings);
     report.add_assessments(assessments);
     if report.is_partial() {

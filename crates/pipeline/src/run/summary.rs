@@ -12,12 +12,14 @@ use crate::fleet_trends::assess::RunAssessments;
 use crate::fleet_trends::changes::UnitChange;
 use crate::follow_up::summary::FollowUpSummary;
 use crate::history::histories::UnitKey;
+use crate::history::installation_index::DateAhead;
 use crate::history::maintenance_log::UnknownUnit;
 use crate::monitoring::REPORTED_DAYS;
 use crate::monitoring::innovations::{self, InnovationOutlier};
 use crate::monitoring::mapping_faults::MappingFault;
 use crate::monitoring::recent;
 use crate::monitoring::recorder_change::{RecorderChange, recorder_changes};
+use crate::monitoring::repeated_samples::{self, RepeatedSamples};
 use crate::run::plan::{Plan, StandingError, WorkItem};
 use records::{QuantityChange, TrendRow};
 
@@ -131,6 +133,8 @@ pub struct RunSummary {
     pub withdrawn: usize,
     /// Units of the maintenance and the inspections table that the installations table does not know.
     pub unknown_units: Vec<UnknownUnit>,
+    /// Dates of the installations table that are still to come.
+    pub dates_ahead: Vec<DateAhead>,
     /// Failed logs, by path.
     pub errors: Vec<LogError>,
     /// Logs that the run has not processed.
@@ -145,6 +149,8 @@ pub struct RunSummary {
     pub quantity_changes: Vec<QuantityChange>,
     /// Flights of the last month, on those aircraft, with unusual innovations for their unit.
     pub innovations_unlike: Vec<InnovationOutlier>,
+    /// Pairs of flights of the last months with the samples of one.
+    pub samples_repeated: Vec<RepeatedSamples>,
     /// The slowest log and its seconds.
     pub slowest: Option<(String, f64)>,
     /// Duration of the run, s.
@@ -220,6 +226,7 @@ impl RunSummary {
             mapping_faults: Vec::new(),
             withdrawn: 0,
             unknown_units: Vec::new(),
+            dates_ahead: Vec::new(),
             errors: Vec::new(),
             not_reached: plan.work.len(),
             not_reached_logs: Vec::new(),
@@ -227,6 +234,7 @@ impl RunSummary {
             recorder_moved: Vec::new(),
             quantity_changes: Vec::new(),
             innovations_unlike: Vec::new(),
+            samples_repeated: Vec::new(),
             slowest: None,
             took_s: 0.0,
             workers,
@@ -251,6 +259,7 @@ impl RunSummary {
         self.recorder_moved.retain(|m| touched(&m.tail_number));
         self.quantity_changes = followed.changes;
         self.quantity_changes.retain(|change| days_between(change.since_utc, newest) <= REPORTED_DAYS);
+        self.samples_repeated = repeated_samples::detect(&recent);
         self.innovations_unlike =
             innovations::find_outliers(&recent).into_iter().filter(|u| touched(&u.tail_number)).collect();
         (self.trends, self.changed, self.states) = (now, changed, states);

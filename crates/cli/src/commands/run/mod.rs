@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use pipeline::fleet_trends::changes::UnitChange;
 use pipeline::history::histories::Histories;
+use pipeline::history::maintenance_log::UnknownUnit;
 use pipeline::monitoring::recorder_change::RecorderChange;
 use pipeline::run::scheduler::{self, Context};
 use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
@@ -171,29 +172,39 @@ fn code(report: &RunSummary, reached: bool, stopped: bool) -> Code {
     }
 }
 
-/// Lists the scopes whose flights are rejected for a wrong mapping.
-fn mapping_faults(report: &RunSummary, page: &mut String) {
-    for fault in &report.mapping_faults {
-        line(page, "mapping", &escape(&fault.to_string()));
-    }
-}
-
 /// A log in error with code and place; its actuators may share both.
 fn failed_log(error: &pipeline::run::summary::LogError) -> String {
     let place = error.diagnostic.location().map(|p| format!("  {p}")).unwrap_or_default();
     format!("{}  {}{place}", escape(&error.log), error.diagnostic.code)
 }
 
-/// Lists the units of the tables of work that were never installed.
-fn unknown_units(report: &RunSummary, page: &mut String) {
-    const MAX_SHOWN: usize = 5;
-    for unit in report.unknown_units.iter().take(MAX_SHOWN) {
+/// Lists the units of the tables of work that were never installed, and the installations that are still to come.
+fn table_findings(report: &RunSummary, page: &mut String) {
+    let name = |unit: &UnknownUnit| {
         let part = unit.part_number.as_ref().map(|part| format!("{part} / ")).unwrap_or_default();
-        let what = format!("{}: {part}{}", unit.table, unit.serial_number);
-        line(page, "unknown", &format!("{}: no such unit in the installations table", escape(&what)));
-    }
-    if let Some(more @ 1..) = report.unknown_units.len().checked_sub(MAX_SHOWN) {
-        line(page, "", &format!("and {}, all in `freeplay run --json`", count(more, "more unit")));
+        format!("{}: {part}{}: no such unit in the installations table", unit.table, unit.serial_number)
+    };
+    some_of("unknown", "unit", report.unknown_units.iter().map(name), page);
+    some_of("ahead", "date", &report.dates_ahead, page);
+}
+
+/// Prints the first few of some findings, and how many more there are.
+fn some_of(
+    head: &str,
+    noun: &str,
+    all: impl IntoIterator<Item: ToString, IntoIter: ExactSizeIterator>,
+    page: &mut String,
+) {
+    const MAX_SHOWN: usize = 5;
+    let all = all.into_iter();
+    let more = all.len().saturating_sub(MAX_SHOWN);
+    all.take(MAX_SHOWN).for_each(|finding| line(page, head, &finding.to_string()));
+    if more > 0 {
+        line(
+            page,
+            "",
+            &format!("and {}, all in `freeplay run --json`", count(more, &format!("more {noun}"))),
+        );
     }
 }
 
@@ -298,13 +309,14 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
         let remedy = refusals.remedy.map(|remedy| format!(": {remedy}")).unwrap_or_default();
         line(&mut page, "refused", &format!("{} {}{remedy}", refusals.reason, refusals.count));
     }
-    mapping_faults(report, &mut page);
+    some_of("mapping", "fault", &report.mapping_faults, &mut page);
+    some_of("repeated", "pair", &report.samples_repeated, &mut page);
     if report.withdrawn > 0 {
         let records = count(report.withdrawn, "stored record");
         let text = format!("{records} removed: their log cannot be used any more, or holds another flight");
         line(&mut page, "withdrawn", &text);
     }
-    unknown_units(report, &mut page);
+    table_findings(report, &mut page);
     duplicates(report, &mut page);
     if !report.errors.is_empty() {
         line(
