@@ -21,6 +21,10 @@ fn a_stiffness_of_another_unit_is_named_and_moves_no_gap() {
     let right = gaps_um(&fleet);
     for (from, to) in [("5.0e7", "5.0e8"), ("5.0e8", "5.0e10")] {
         fleet.configure(from, to);
+        let check = fleet.freeplay(&["check"]);
+        assert_eq!(check.code, Some(1), "{check:?}");
+        assert!(check.err.contains("fit a stiffness unlike the configured one"), "{}", check.err);
+        assert!(check.err.contains("`stiffness_n_per_m`"), "{}", check.err);
         let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
         assert_eq!(run.code, Some(1), "{run:?}");
         assert!(run.out.contains("all actuators of part EMA-27-1040: stiffness_unlike"), "{}", run.out);

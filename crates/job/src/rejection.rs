@@ -69,6 +69,15 @@ const OF_PART: &str = "channel_constant";
 /// The fitted stiffness of most flights of a part number is not the configured one, by a factor of two or more.
 pub const STIFFNESS_UNLIKE: &str = "stiffness_unlike";
 
+/// A fitted stiffness is another than the configured one beyond this factor.
+const STIFFNESS_FACTOR: f64 = 2.0;
+
+/// Whether a fitted stiffness is not that of the part; both in N/m.
+pub fn is_stiffness_unlike(fitted_n_per_m: f64, configured_n_per_m: f64) -> bool {
+    let ratio = fitted_n_per_m / configured_n_per_m;
+    !(STIFFNESS_FACTOR.recip()..=STIFFNESS_FACTOR).contains(&ratio)
+}
+
 /// Remedy of a rejection; `None` for an unknown code.
 pub fn remedy(code: &str) -> Option<&'static str> {
     let by_estimator = BY_ESTIMATOR.iter().find(|rejection| rejection.code() == code);

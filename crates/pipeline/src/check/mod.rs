@@ -47,7 +47,8 @@ pub struct LogsCheck {
     pub logs: Vec<LogCheck>,
     /// Errors of logs.
     pub diagnostics: Vec<Diagnostic>,
-    /// One error for each part number most of whose actuator-flights would be refused for a wrong mapping.
+    /// One error for each part number most of whose actuator-flights would be refused for a wrong mapping, or fit
+    /// another stiffness than the configured one.
     pub mapping_faults: Vec<Diagnostic>,
     /// Identified parameters by part number.
     pub identified: BTreeMap<PartNumber, Vec<IdentifiedParams>>,
@@ -108,7 +109,11 @@ fn mapping_fault((part, codes): (&PartNumber, &Vec<Option<&'static str>>)) -> Op
     let (code, refused) = rejection::majority(codes)?;
     let remedy = rejection::part_remedy(code)?;
     let flights = if codes.len() == 1 { "actuator-flight" } else { "actuator-flights" };
-    let what = format!("part {part}: {refused} of {} checked {flights} would be refused", codes.len());
+    let what = match code {
+        rejection::STIFFNESS_UNLIKE => "fit a stiffness unlike the configured one",
+        _ => "would be refused",
+    };
+    let what = format!("part {part}: {refused} of {} checked {flights} {what}", codes.len());
     Some(Diagnostic::new(code, what).hint(remedy))
 }
 
@@ -124,11 +129,15 @@ fn check_log(opened: &FlightLog, name: &str, config: &Config, installations: &In
     };
     for at in opened.actuators(installations) {
         match actuator(opened, name, at, config, installations) {
-            Ok(ActuatorCheck { found, clock, identified, rejection }) => {
+            Ok(ActuatorCheck { found, clock, identified, rejection: refused }) => {
                 seen.channels.extend(found);
                 seen.clocks.extend(clock);
                 if let Some((part, identified)) = identified {
-                    seen.rejections.push((part.clone(), rejection));
+                    let configured = config.parts.get(&part).map(|p| p.actuator.stiffness_n_per_m());
+                    let unlike = identified.stiffness_n_per_m.zip(configured);
+                    let unlike = unlike.filter(|(fitted, own)| rejection::is_stiffness_unlike(*fitted, *own));
+                    let code = refused.or(unlike.map(|_| rejection::STIFFNESS_UNLIKE));
+                    seen.rejections.push((part.clone(), code));
                     seen.identified.push((part, identified));
                 }
             }

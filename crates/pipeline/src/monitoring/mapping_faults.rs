@@ -11,9 +11,6 @@ use crate::monitoring::recent::{FlightDiagnostics, PositionKey, RecentDiagnostic
 /// Latest flights of an actuator that count.
 const LATEST: usize = 5;
 
-/// A fitted stiffness is another than the part's beyond this factor.
-const STIFFNESS_FACTOR: f64 = 2.0;
-
 /// Fewest flights of a scope that show a fault.
 const MIN_FLIGHTS: usize = 3;
 
@@ -122,8 +119,8 @@ pub(crate) fn detect(
 /// Rejection of a flight, or the code of a stiffness that is not the configured one.
 fn code(flight: &FlightDiagnostics, configured_n_per_m: Option<f64>) -> Option<&str> {
     let unlike = || {
-        let ratio = flight.stiffness_n_per_m? / configured_n_per_m?;
-        (ratio > STIFFNESS_FACTOR || ratio < STIFFNESS_FACTOR.recip()).then_some(rejection::STIFFNESS_UNLIKE)
+        let is_unlike = rejection::is_stiffness_unlike(flight.stiffness_n_per_m?, configured_n_per_m?);
+        is_unlike.then_some(rejection::STIFFNESS_UNLIKE)
     };
     flight.rejection.as_deref().or_else(unlike)
 }
