@@ -1,5 +1,6 @@
 //! Output of the program: exit codes, formats, pipes without noise, and help for new users.
 
+use std::collections::BTreeSet;
 use std::io::Read;
 
 use crate::harness::TestFleet;
@@ -573,5 +574,32 @@ fn names_are_completed_from_the_store() {
     assert_eq!(complete(&["query", "position", "elevator_r"]), ["elevator_right"]);
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         assert!(fleet.run_ok(&["completions", shell]).contains("COMPLETE"), "{shell}");
+    }
+}
+
+/// Neither a key without a meaning on the page, nor one that is not there any more.
+#[test]
+fn the_summary_of_a_run_has_the_keys_of_its_page() {
+    let page = std::fs::read_to_string(crate::harness::top().join("docs/columns.md")).unwrap();
+    let section = page.split("## Summary of a run").nth(1).unwrap().split("\n## ").next().unwrap();
+    let named: BTreeSet<&str> = section
+        .lines()
+        .filter(|line| line.starts_with("| `"))
+        .flat_map(|line| line[2..].split(" |").next().unwrap().split(", "))
+        .map(|key| key.trim().trim_matches('`'))
+        .collect();
+    let fleet = TestFleet::sample();
+    let log = &fleet.logs()[0];
+    std::fs::write(log.with_file_name("torn.parquet"), &std::fs::read(log).unwrap()[..1000]).unwrap();
+    let summary = fleet.freeplay(&["run", "--json"]).out;
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let keys: BTreeSet<&str> = summary.as_object().unwrap().keys().map(String::as_str).collect();
+    assert_eq!(named, keys);
+    let error = &summary["errors"][0];
+    for key in ["log", "complaint"] {
+        assert!(error[key].is_string() || error[key].is_object(), "{error}");
+    }
+    for key in error["complaint"].as_object().unwrap().keys() {
+        assert!(section.contains(&format!("`{key}`")), "{key} is not on the page");
     }
 }

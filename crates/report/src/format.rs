@@ -1,5 +1,6 @@
 //! Number and date formatting; missing values are shown as "no data".
 
+use askama::filters::{Html, escape};
 use jiff::Timestamp;
 use jiff::tz::TimeZone;
 use records::uncertainty::NORMAL_95;
@@ -34,6 +35,17 @@ pub(crate) fn level(gap_m: Option<f64>, se_m: Option<f64>) -> String {
 pub(crate) fn rate(m_per_hour: f64) -> String {
     let text = format!("{:.1}", m_per_hour * 1e9);
     if text == "-0.0" { "0.0".to_owned() } else { text }
+}
+
+/// HTML of a text whose dates and serial numbers do not break at their hyphens; one wider than a phone does.
+pub(crate) fn unbroken(text: &str) -> String {
+    const MAX_CHARS: usize = 24;
+    let word = |word: &str| {
+        let Ok(safe) = escape(word, Html);
+        let is_short = word.contains('-') && word.chars().count() <= MAX_CHARS;
+        if is_short { format!("<span class=\"d\">{safe}</span>") } else { safe.to_string() }
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 pub(crate) fn date(t: Timestamp) -> String {
@@ -96,6 +108,13 @@ mod tests {
         assert_eq!(count(7), "7");
         assert_eq!(count(1205), "1\u{202f}205");
         assert_eq!(count(123_456), "123\u{202f}456");
+    }
+
+    #[test]
+    fn dates_and_names_stay_whole_and_markup_is_escaped() {
+        assert_eq!(unbroken("<b> on 2026-11-30"), "&#60;b&#62; on <span class=\"d\">2026-11-30</span>");
+        let long = "a-".repeat(20);
+        assert_eq!(unbroken(&long), long);
     }
 
     #[test]

@@ -137,9 +137,9 @@ pub struct QuantityView {
     /// Its level, change and state.
     #[serde(flatten)]
     pub row: QuantityRow,
-    /// Value of each flight; plotted, not part of `report.json`.
+    /// Value in each of the unit's flights, NaN for none; plotted, not part of `report.json`.
     #[serde(skip)]
-    pub flights: Vec<(Timestamp, f64)>,
+    pub values: Vec<f32>,
 }
 
 /// Assessment of a unit on the date of the report.

@@ -258,7 +258,7 @@ impl ReportComposer<'_> {
             past_forecasts: self.past(row, &name),
             inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.extras(flown)).collect(),
             flights: flown.iter().map(|flown| flight(history, flown, &rest[flown.row as usize])).collect(),
-            quantities: self.quantities(row, history, rest),
+            quantities: self.quantities(&name, history, rest),
             installations,
             work_requests: self.requests.get(&name).cloned().unwrap_or_default(),
             part_number: name.0,
@@ -313,17 +313,13 @@ impl ReportComposer<'_> {
     }
 
     /// The followed quantities other than the gap, with the values of the flights.
-    fn quantities(&self, row: &TrendRow, history: &History, rest: &[FlightExtras]) -> Vec<QuantityView> {
+    fn quantities(&self, name: &Name, history: &History, rest: &[FlightExtras]) -> Vec<QuantityView> {
         let view = |of: &&QuantityRow| {
             let index = Quantity::ALL.iter().position(|quantity| quantity.as_str() == of.quantity)?;
-            let flown = history.until(row.as_of_utc).iter();
-            let value = |flown: &FlownRow| {
-                let value = f64::from(rest[flown.row as usize].quantities[index]);
-                value.is_finite().then(|| (flown.departure_utc(), value))
-            };
-            Some(QuantityView { row: (*of).clone(), flights: flown.filter_map(value).collect() })
+            let value = |flown: &FlownRow| rest[flown.row as usize].quantities[index];
+            Some(QuantityView { row: (*of).clone(), values: history.flights().iter().map(value).collect() })
         };
-        let of_unit = self.quantities.get(&name_of(row)).into_iter().flatten();
+        let of_unit = self.quantities.get(name).into_iter().flatten();
         of_unit.filter(|of| of.quantity != Quantity::GapM.as_str()).filter_map(view).collect()
     }
 

@@ -14,8 +14,8 @@ const SIZE: (u32, u32) = (420, 130);
 const MAX_POINTS: usize = 90;
 
 /// One line of a chart: the values of one unit.
-pub(crate) struct Line<'a> {
-    pub(crate) flights: &'a [(Timestamp, f64)],
+pub(crate) struct Line {
+    pub(crate) flights: Vec<(Timestamp, f64)>,
     /// Fitted level, drawn as a horizontal line from the last step on.
     pub(crate) level: Option<f64>,
 }
@@ -26,12 +26,12 @@ pub(crate) struct Line<'a> {
 /// When the plot cannot be drawn.
 pub(crate) fn small_chart(
     quantity: Quantity,
-    lines: &[Line<'_>],
+    lines: &[Line],
     events: &[Timestamp],
     span: (Timestamp, Timestamp),
 ) -> Result<String, Error> {
     let (_, factor) = quantity.display_unit();
-    let series: Vec<Vec<(f64, f64)>> = lines.iter().map(|line| downsampled(line.flights, factor)).collect();
+    let series: Vec<Vec<(f64, f64)>> = lines.iter().map(|line| downsampled(&line.flights, factor)).collect();
     let values = || series.iter().flatten().map(|p| p.1);
     let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
     if low > high {

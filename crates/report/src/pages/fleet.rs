@@ -8,7 +8,7 @@ use records::time::days_between;
 use crate::charts::agreement_plot::agreement_plot;
 use crate::charts::sparkline::sparkline;
 use crate::format::{
-    NO_DATA, count, counted, date, date_or, hours, level, micrometres, minute_or, percent, rate,
+    NO_DATA, count, counted, date, date_or, hours, level, micrometres, minute_or, percent, rate, unbroken,
 };
 use crate::model::{Report, UnitView};
 use crate::page::{Error, Page, part_path, tail_path, unit_path};
@@ -212,7 +212,7 @@ fn index_page(
         root: "",
         title: "Actuator free play".to_owned(),
         heading: heading(report),
-        decision: decision(report),
+        decision: unbroken(&decision(report)),
         mapping_faults: report.mapping_faults.clone(),
         footer: report.footer(),
         lead: format!(

@@ -56,7 +56,7 @@ pub(crate) fn unit_charts(unit: &UnitView) -> Result<Vec<Chart>, Error> {
         let Some(view) = view(unit, quantity) else { continue };
         let steps = view.row.steps.iter().map(|step| step.departure_utc);
         let all: Vec<Timestamp> = events.iter().copied().chain(steps).collect();
-        let line = Line { flights: &view.flights, level: view.row.level };
+        let line = Line { flights: points(unit, view), level: view.row.level };
         let svg = small_chart(quantity, &[line], &all, span)?;
         charts.extend(chart(quantity, svg, &unit.name()));
     }
@@ -77,9 +77,9 @@ pub(crate) fn tail_charts(report: &Report, tail: &str) -> Result<Vec<Chart>, Err
         };
         let events: Vec<Timestamp> =
             report.quantity_changes.iter().filter(of_tail).map(|change| change.since_utc).collect();
-        let views: Vec<&QuantityView> = units.iter().filter_map(|unit| view(unit, quantity)).collect();
-        let lines: Vec<Line<'_>> =
-            views.iter().map(|view| Line { flights: &view.flights, level: None }).collect();
+        let line =
+            |unit: &&UnitView| Some(Line { flights: points(unit, view(unit, quantity)?), level: None });
+        let lines: Vec<Line> = units.iter().filter_map(line).collect();
         charts.extend(chart(quantity, small_chart(quantity, &lines, &events, span)?, tail));
     }
     Ok(charts)
@@ -97,6 +97,13 @@ fn chart(quantity: Quantity, svg: String, name: &str) -> Option<Chart> {
 
 fn view(unit: &UnitView, quantity: Quantity) -> Option<&QuantityView> {
     unit.quantities.iter().find(|view| view.row.quantity == quantity.as_str())
+}
+
+/// The values of a quantity by departure.
+fn points(unit: &UnitView, view: &QuantityView) -> Vec<(Timestamp, f64)> {
+    let departures = unit.flights.iter().map(|flight| flight.departure_utc);
+    let points = departures.zip(&view.values).filter(|(_, value)| value.is_finite());
+    points.map(|(at, value)| (at, f64::from(*value))).collect()
 }
 
 /// First and last flight of some units.
