@@ -181,3 +181,99 @@ fn a_serial_number_that_loses_all_flights_is_named_with_the_one_that_has_them() 
     // What has another serial number is all that changed: the other units of the tail have the state they had.
     assert!(!changes.contains("1040-0006"), "{run}");
 }
+
+/// A part without a limit, or without its table, has units that no exit code can speak for.
+#[test]
+fn units_that_no_limit_covers_are_named_by_run_trend_and_report() {
+    let fleet = TestFleet::sample();
+    edit(&fleet, "pipeline.toml", |text| text.replacen("limit_m = 150e-6\nwatch_m = 110e-6\n", "", 1));
+    let run = fleet.run_ok(&["run", "--fail-on", "act"]);
+    let note = "part EMA-27-1040 has no limit: 6 units without a state, which `--fail-on` does not see; add `limit_m` to";
+    assert!(run.contains(note), "{run}");
+    assert!(fleet.run_ok(&["trend"]).contains(note));
+    fleet.run_ok(&["report", "--output", "pages"]);
+    let report = std::fs::read_to_string(fleet.path("pages/report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert!(report["notes"][0].as_str().unwrap().starts_with(note), "{}", report["notes"]);
+    edit(&fleet, "pipeline.toml", |text| text.replace("EMA-27-1060", "EMA-27-1006"));
+    let trend = fleet.run_ok(&["trend"]);
+    assert!(trend.contains("part EMA-27-1060 is not configured (nearest: EMA-27-1006)"), "{trend}");
+}
+
+/// A position that is spelt otherwise in the configuration would leave its actuator out without a word.
+#[test]
+fn installed_positions_that_no_log_has_are_named() {
+    let fleet = TestFleet::sample();
+    fleet.configure(
+        "[channel.motor_position]",
+        "[channel]\npositions = [\"aileron_right\"]\n\n[channel.motor_position]",
+    );
+    let run = fleet.run_ok(&["run"]);
+    let named =
+        "aileron_left, elevator_left, elevator_right of 3 tails: units are installed there, and no log has";
+    assert!(run.contains(named), "{run}");
+}
+
+#[test]
+fn tails_that_only_a_flights_table_or_an_override_knows_are_named_with_the_nearest() {
+    let fleet = TestFleet::sample();
+    fleet.configure("[logs]\n", "[logs]\nflights = \"flights.csv\"\n");
+    let table =
+        "tail_number,flight_id,departure_utc,flight_hours\nN412-FP,N412FP-0001,2026-09-07T04:00:00Z,2.0\n";
+    std::fs::write(fleet.path("flights.csv"), table).unwrap();
+    edit(&fleet, "pipeline.toml", |text| {
+        text + "\n[[override]]\ntails = [\"N413PF\"]\n[override.channel.load]\nsign = -1\n"
+    });
+    let run = fleet.run_ok(&["run"]);
+    for named in [
+        "flights.csv: tail N412-FP has neither",
+        "[[override]]: tail N413PF has neither an installation nor a log; nearest: N413FP",
+    ] {
+        assert!(run.contains(named), "{named}: {run}");
+    }
+}
+
+/// Minutes in the metadata of a log, a workbook, a column that is there twice, and a play in micrometres.
+#[test]
+fn units_and_formats_of_single_files_are_refused_with_what_is_wanted() {
+    let fleet = TestFleet::sample();
+    let log = &fleet.logs()[0];
+    let mut own = facts(log);
+    own.iter_mut().filter(|(key, _)| key == "flight_hours").for_each(|(_, value)| *value = "110.4".into());
+    rewrite(log, &log.with_file_name("minutes.parquet"), &own, |_| true, |_| true);
+    let run = fleet.freeplay(&["run"]);
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert!(
+        run.err.contains("identity_invalid") && run.err.contains("give hours, not minutes"),
+        "{}",
+        run.err
+    );
+    std::fs::remove_file(log.with_file_name("minutes.parquet")).unwrap();
+    std::fs::remove_file(&fleet.logs()[1]).unwrap();
+    let run = fleet.run_ok(&["run"]);
+    assert!(run.contains("absent      1 log of earlier runs that no pattern matches any more"), "{run}");
+
+    fleet.configure("[logs]\n", "[logs]\ninspections = \"checks.csv\"\n");
+    let header = "serial_number,date_utc,play_m\n";
+    for (content, wanted) in [
+        (
+            format!("{header}1040-0005,2026-09-20T00:00:00Z,64\n"),
+            "`64` is not between 0 and 0.01 m: 64 µm are 64e-6",
+        ),
+        ("serial_number,date_utc,play_m,play_m\n".to_owned(), "column `play_m` twice"),
+        ("PK\u{3}\u{4}workbook".to_owned(), "this is an Excel workbook: save it as CSV in UTF-8"),
+    ] {
+        std::fs::write(fleet.path("checks.csv"), content).unwrap();
+        let report = fleet.freeplay(&["report", "--output", "pages"]);
+        assert_eq!(report.code, Some(2), "{wanted}: {report:?}");
+        assert!(report.err.contains("checks.csv") && report.err.contains(wanted), "{wanted}: {}", report.err);
+    }
+    let log = log.to_str().unwrap();
+    let trace = fleet.freeplay(&["estimate", log, "--trace", "t.csv"]);
+    assert_eq!(trace.code, Some(2), "{trace:?}");
+    assert!(
+        trace.err.contains("use the extension .parquet") && !fleet.path("t.csv").exists(),
+        "{}",
+        trace.err
+    );
+}

@@ -1,7 +1,8 @@
 //! Fuzzing on stable Rust: seeded mutations of a corpus of real files. An input with a new outcome joins the corpus.
 //!
 //! A gate run tries a fixed number of cases. `FREEPLAY_FUZZ_S` is the time of each target in seconds, and
-//! `FREEPLAY_FUZZ_SEED` another seed. `docs/reliability.md` has the command and its figures.
+//! `FREEPLAY_FUZZ_SEED` another seed; `FREEPLAY_FUZZ_INPUT` is a kept input to try alone. `docs/reliability.md` has the
+//! command and its figures.
 
 #![allow(dead_code, reason = "each of the test programs that include this file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
@@ -61,6 +62,10 @@ pub(crate) fn fuzz(
     mutate: impl Fn(&mut Random, &mut Input),
     run: impl Fn(&[u8]) -> String,
 ) {
+    if let Ok(file) = std::env::var("FREEPLAY_FUZZ_INPUT") {
+        print(&format!("{name}: {}", run(&std::fs::read(file).unwrap())));
+        return;
+    }
     let number = |key: &str| std::env::var(key).ok().and_then(|text| text.parse::<u64>().ok());
     let time = number("FREEPLAY_FUZZ_S").map(Duration::from_secs);
     let seed = number("FREEPLAY_FUZZ_SEED").unwrap_or(1);

@@ -146,6 +146,21 @@ fn channels(bytes: &[u8]) -> [Vec<f64>; 4] {
     all
 }
 
+/// Inputs that had an error of NaN, and a search without an end.
+const FOUND: [&[u8]; 2] = [
+    &[
+        237, 17, 148, 76, 16, 114, 250, 161, 190, 9, 177, 35, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 226, 105,
+        196, 203, 213, 82, 216, 171, 0, 0, 0, 0, 0, 0, 0, 226, 105, 196, 203, 213, 229, 181, 16, 112, 53, 52,
+        12, 112, 226, 105, 196, 203, 213, 82, 99, 123, 181, 28, 63, 190, 93, 196, 251, 229, 136, 135, 67,
+        122, 82, 42, 152, 11, 143, 41, 72,
+    ],
+    &[
+        185, 15, 85, 255, 255, 255, 255, 255, 255, 255, 255, 255, 127, 14, 153, 245, 12, 227, 140, 141, 63,
+        158, 149, 178, 209, 155, 172, 138, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 153, 255, 1, 4, 167, 226, 232, 95,
+        121, 165, 255, 15, 198, 142, 16,
+    ],
+];
+
 #[test]
 fn fuzz_estimators() {
     let text = std::fs::read_to_string(top().join("pipeline.toml")).unwrap();
@@ -156,6 +171,7 @@ fn fuzz_estimators() {
     corpus.extend(
         (0..30).map(|edits| (0..=(edits % 6) * EDIT).map(|_| random.next() as u8).collect::<Vec<u8>>()),
     );
+    corpus.extend(FOUND.map(<[u8]>::to_vec));
     let change = |random: &mut Random, input: &mut Input| change_edits(random, input, EDIT, 20);
     fuzz("estimator inputs", corpus, 150, change, |bytes| {
         let [time_s, motor_m, screw_m, load_n] = channels(bytes);

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use ingest::log::identity::IdentityFields;
 use ingest::mapping::Output;
+use ingest::mapping::column_pattern::nearest;
 use ingest::{ActuatorChannels, ActuatorColumns, Channels, Identity, Log, LogFiles, Mapping};
 use jiff::{SignedDuration, Timestamp};
 use records::{
@@ -284,7 +285,14 @@ pub(crate) fn for_each_actuator(
 pub fn part_of<'c>(config: &'c Config, number: &PartNumber) -> Result<&'c Part, Diagnostic> {
     config.parts.get(number).ok_or_else(|| {
         Diagnostic::new("part_unknown", format!("part number {number} is installed, but not configured"))
-            .hint(format!("add `[part.\"{number}\"]` to {}", config.file.display()))
+            .hint(format!(
+                "{}add `[part.\"{number}\"]` to {}",
+                nearest(number.as_str(), config.parts.keys().map(PartNumber::as_str))
+                    .map_or_else(String::new, |near| {
+                        format!("nearest: {near}; correct the installations table, or ")
+                    }),
+                config.file.display()
+            ))
     })
 }
 

@@ -38,7 +38,12 @@ const MAPPING: [&str; 7] = [
 ];
 
 /// Codes that single flights have for other causes; on most flights of a part number, a unit is wrong.
-const UNIT: [(&str, &str); 5] = [
+const UNIT: [(&str, &str); 6] = [
+    (
+        "rate_too_low",
+        "check `clock.unit` (ms against s) and `clock.rate_hz`: by these times the log has too few samples a second; \
+         if they are right, record at 20 samples a second or more",
+    ),
     (
         "load_too_small",
         "check `unit` and `scale` of the load channel (N against kN), and `unknown_force_n` of the part",

@@ -1,6 +1,7 @@
 //! View model of a report: plain values in SI, composed by `pipeline`.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use jiff::Timestamp;
 use records::WorkRequest;
@@ -37,6 +38,8 @@ pub struct Report {
     pub quantity_changes: Vec<QuantityChange>,
     /// Wrong mappings with evidence and remedy, in words.
     pub mapping_faults: Vec<String>,
+    /// Limits and hours that assessments lack, in words.
+    pub notes: Vec<String>,
     /// Whether a table of inspections is configured.
     pub inspections_given: bool,
     /// Inspections of units without records.
@@ -268,14 +271,14 @@ pub struct Inspection {
     pub estimates: usize,
 }
 
-/// One flight of a unit.
+/// One flight of a unit; a report holds those of the whole fleet.
 #[derive(Debug, Clone)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct FlightRow {
     pub departure_utc: Timestamp,
-    pub flight_id: String,
-    pub tail_number: String,
-    pub position: String,
+    pub flight_id: Box<str>,
+    pub tail_number: Arc<str>,
+    pub position: Arc<str>,
     pub unit_hours: Option<f64>,
     pub gap_m: Option<f64>,
     pub gap_p05_m: Option<f64>,
@@ -285,9 +288,9 @@ pub struct FlightRow {
     pub load_p05_n: Option<f64>,
     pub load_p95_n: Option<f64>,
     /// Rejection reason or quality flags.
-    pub remarks: String,
+    pub remarks: Box<str>,
     /// Page of its diagnostic plot, relative to the report folder, where one is drawn.
-    pub plot_path: Option<String>,
+    pub plot_path: Option<Box<str>>,
 }
 
 impl Report {

@@ -69,8 +69,8 @@ impl Rejection {
             Self::TooShort => "record at least 9 s of valid samples in which the load presses on both flanks",
             Self::ChannelConstant => "check wiring and mapping: a channel that never changes is not measured",
             Self::LoadSignFlipped => {
-                "reverse the sign of the load in the mapping (`sign = -1` in `[channel.load]`): it must be positive along \
-                 +X"
+                "reverse the sign of the load in the mapping (set `sign = -1` in `[channel.load]`, or remove it where it \
+                 is set): the load must be positive along +X"
             }
             Self::PositionsSwapped => {
                 "exchange `column` of `[channel.motor_position]` and `[channel.screw_position]`, or reverse both signs"

@@ -111,7 +111,13 @@ fn look(
         frame.stiffness_n_per_m = stiffness_n_per_m;
     }
     let contact = flank_fit::fit(room, &frame)?;
-    Ok((frame, contact))
+    let (gap_m, gap_se_m) = contact.gap_m;
+    // Channels of absurd size overflow the sums of the fit.
+    if gap_m.is_finite() && gap_se_m.is_finite() {
+        Ok((frame, contact))
+    } else {
+        Err(Rejection::MotionUnexplained)
+    }
 }
 
 fn report(

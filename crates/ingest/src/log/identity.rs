@@ -126,9 +126,17 @@ fn missing(fact: IdentityField, mapping: &IdentityMapping) -> ErrorKind {
     ErrorKind::IdentityMissing { fact: fact.as_str(), looked: looked.into_iter().flatten().collect() }
 }
 
+/// Longest flight that a log may state, h: almost twice the longest scheduled one.
+const LONGEST_FLIGHT_H: f64 = 36.0;
+
 fn hours(fact: IdentityField, text: Option<&str>) -> Result<Option<f64>, ErrorKind> {
     let Some(text) = text else { return Ok(None) };
     match text.parse::<f64>() {
+        Ok(h) if fact == IdentityField::FlightHours && h > LONGEST_FLIGHT_H => {
+            let detail =
+                format!("no flight takes more than {LONGEST_FLIGHT_H} h: give hours, not minutes or seconds");
+            Err(ErrorKind::IdentityInvalid { fact: fact.as_str(), found: text.to_owned(), detail })
+        }
         Ok(h) if h.is_finite() && h >= 0.0 => Ok(Some(h)),
         _ => Err(ErrorKind::IdentityInvalid {
             fact: fact.as_str(),

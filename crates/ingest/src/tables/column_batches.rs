@@ -2,6 +2,7 @@
 //!
 //! A fleet's history has tens of millions of rows, so nothing is turned into text that is a number already.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 use std::ops::Range;
@@ -326,12 +327,21 @@ impl Rows {
             opened.read_to_end(&mut text)
         })
         .map_err(|source| ErrorKind::Unreadable { source })?;
+        if let Some(format) = foreign(&text) {
+            let detail = format!("this is {format}: save it as CSV in UTF-8");
+            return Err(ErrorKind::Table { row: None, column: None, detail });
+        }
         // Spreadsheets open their UTF-8 with a byte order mark.
         let mark = if text.starts_with("\u{feff}".as_bytes()) { 3 } else { 0 };
         let mut text = Cursor::new(text);
         text.set_position(mark);
         let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text);
         let header = reader.headers().map_err(|e| bad_row(&e))?;
+        let mut names = BTreeSet::new();
+        if let Some(twice) = header.iter().find(|name| !name.is_empty() && !names.insert(*name)) {
+            let detail = format!("the header has column `{twice}` twice: rename or remove one");
+            return Err(ErrorKind::Table { row: None, column: None, detail });
+        }
         let fields: Vec<Field> = header.iter().map(|name| Field::new(name, DataType::Utf8, true)).collect();
         Ok((Self::Csv(reader.into_records()), Arc::new(Schema::new(fields))))
     }
@@ -368,6 +378,15 @@ fn texts(
         columns.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef).collect();
     let batch = RecordBatch::try_new(Arc::clone(schema), columns);
     batch.map(Some).map_err(|e| ErrorKind::Table { row: None, column: None, detail: e.to_string() })
+}
+
+/// Format of a table that is no CSV in UTF-8, by its first bytes.
+fn foreign(bytes: &[u8]) -> Option<&'static str> {
+    match bytes {
+        [b'P', b'K', 3, 4, ..] => Some("an Excel workbook"),
+        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => Some("text in UTF-16"),
+        _ => None,
+    }
 }
 
 fn bad_row(error: &csv::Error) -> ErrorKind {

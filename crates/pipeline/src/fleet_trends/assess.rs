@@ -23,6 +23,7 @@ use crate::history::histories::{Histories, History, UnitKey};
 use crate::history::installation_index::InstallationIndex;
 use crate::history::merge::of_parts;
 use crate::history::usage::UsageSources;
+use crate::monitoring::coverage;
 use crate::monitoring::mapping_faults::{self, MappingFault};
 use crate::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
 use crate::monitoring::recorder_change::{RecorderChange, recorder_changes};
@@ -84,6 +85,8 @@ pub struct StoreAssessment {
     pub followed: FollowedQuantities,
     /// Wrong mappings that concern them.
     pub mapping_faults: Vec<MappingFault>,
+    /// Limits and hours that their assessments lack, in words.
+    pub notes: Vec<String>,
 }
 
 /// As [`assess_store`], with the followed quantities and the mapping faults of the selected units.
@@ -107,6 +110,7 @@ pub fn assess_store_with_quantities(
     Ok(StoreAssessment {
         followed: fleet.followed_of(&now),
         mapping_faults: fleet.mapping_faults_of(&now),
+        notes: coverage::notes(&now, config),
         now,
     })
 }
@@ -128,6 +132,8 @@ pub struct RunAssessments {
     pub work_list: Vec<TrendRow>,
     /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
     pub mapping_faults: Vec<MappingFault>,
+    /// Limits and hours that assessments of the fleet lack, in words.
+    pub notes: Vec<String>,
     /// Findings about all units of the fleet, for alerts and work requests.
     pub findings: Vec<Finding>,
 }
@@ -204,6 +210,7 @@ pub fn assess_run_from(
         recent: std::mem::take(&mut fleet.recent),
         followed: fleet.followed.clone(),
         mapping_faults: fleet.mapping_faults.clone(),
+        notes: coverage::notes(&now, config),
         ..RunAssessments::default()
     };
     let states = now.iter().filter_map(|row| row.state);
@@ -237,6 +244,8 @@ pub(crate) struct ReportAssessments {
     pub(crate) followed: FollowedQuantities,
     /// Wrong mappings that concern them.
     pub(crate) mapping_faults: Vec<MappingFault>,
+    /// Limits and hours that their assessments lack, in words.
+    pub(crate) notes: Vec<String>,
     /// Plotted forecast of each of them.
     pub(crate) drawn: Vec<trend::Forecast>,
     /// Assessments of earlier dates, by the number of days before.
@@ -282,8 +291,8 @@ pub(crate) fn assess_for_report(
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = selected.into_iter().filter_map(priors).collect();
-    let mapping_faults = fleet.mapping_faults_of(&now);
-    Ok(ReportAssessments { now, followed, mapping_faults, drawn, before, past, priors })
+    let (mapping_faults, notes) = (fleet.mapping_faults_of(&now), coverage::notes(&now, config));
+    Ok(ReportAssessments { now, followed, mapping_faults, notes, drawn, before, past, priors })
 }
 
 /// One assessment for each query, without data later than its date.
@@ -325,12 +334,7 @@ pub fn load_histories(store: &Store) -> Result<Histories, Error> {
 }
 
 fn read_histories(store: &Store, query: &Query) -> Result<Histories, Error> {
-    let stored: Vec<&str> = HistoryBuilder::COLUMNS
-        .into_iter()
-        .filter(|name| !["serial", "tail"].contains(name))
-        .chain(HistoryBuilder::STORE_COLUMNS)
-        .collect();
-    let parts = store.scan_columns(query, &stored)?;
+    let parts = store.scan_columns(query, &HistoryBuilder::of_store())?;
     of_parts(parts.len(), true, |gathering, some| {
         for part in some {
             let mut batches = parts.read(part)?.into_iter();

@@ -6,7 +6,6 @@ use std::path::Path;
 use arrow::array::{Array, AsArray, Float64Array, ListArray, RecordBatch};
 use ingest::tables::TableBatch;
 use jiff::Timestamp;
-use records::GapRecord;
 
 use crate::history::flight_row::{FlightExtras, FlightInput};
 use crate::history::histories::{Positions, UnitKey};
@@ -83,8 +82,11 @@ impl HistoryBuilder {
         "gap_se_m",
     ];
 
-    /// What the store's own rows bring in addition.
-    pub(crate) const STORE_COLUMNS: [&'static str; 2] = ["flags", OTHER_GAP];
+    /// The columns that the store's own rows bring.
+    pub(crate) fn of_store() -> Vec<&'static str> {
+        let stored = Self::COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name));
+        stored.chain(["flags", OTHER_GAP]).collect()
+    }
 
     /// Adds the rows of a batch.
     ///
@@ -180,30 +182,6 @@ impl HistoryBuilder {
         });
         unit.rows += 1;
         unit.bytes += name.len();
-    }
-
-    /// Adds the flight of a record.
-    pub(crate) fn push_record(&mut self, push_record: &GapRecord) {
-        let GapRecord { flight, estimate, .. } = push_record;
-        let who = RowKey {
-            part_number: Some(push_record.part_number.as_str()),
-            serial_number: push_record.serial_number.as_str(),
-            tail_number: Some(flight.tail_number.as_str()),
-            position: Some(push_record.position.as_str()),
-        };
-        let row = FlightInput {
-            flight_id: Some(flight.flight_id.as_str()),
-            departure_utc: flight.departure_utc,
-            flight_hours: flight.flight_hours,
-            tail_hours_end: flight.tail_hours_end,
-            load_reversals: u64::try_from(estimate.load_reversals).ok(),
-            gap_m: estimate.gap_m,
-            gap_se_m: estimate.gap_se_m,
-            disagreeing_gap_m: estimate
-                .gap_midrange_fitted_m
-                .filter(|_| estimate.flags.iter().any(|flag| flag == DISAGREE)),
-        };
-        self.put(who, &row);
     }
 
     fn position_key(&mut self, who: RowKey<'_>) -> RowTarget {

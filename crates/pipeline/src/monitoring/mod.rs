@@ -1,5 +1,6 @@
 //! Diagnostics in addition to the gap: filter innovations and recorder changes.
 
+pub mod coverage;
 pub mod innovations;
 pub mod mapping_faults;
 pub mod recent;

@@ -1,6 +1,7 @@
 //! Composes a report from the store: assessments now and before, flights, installations, inspections.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use ::report::{
     Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
@@ -9,8 +10,9 @@ use ::report::{
 use ingest::tables::{Table, name, number, utc};
 use jiff::Timestamp;
 use job::Config;
+use job::config::limits::PLAUSIBLE_LIMIT_M;
 use records::uncertainty::SD_OVER_MAD;
-use records::{GapRecord, Installations, PartNumber, Quantity, QuantityRow, SerialNumber};
+use records::{Installations, PartNumber, Quantity, QuantityRow, SerialNumber};
 use store::{LogOutcome, Store};
 use trend::Forecast;
 
@@ -18,10 +20,10 @@ use crate::error::Error;
 use crate::fleet_trends::assess::{self, ReportAssessments, UnitSelection};
 use crate::fleet_trends::inspection_interval::{inspection_intervals, interval_advice};
 use crate::follow_up::work_requests;
-use crate::history::builder::HistoryBuilder;
 use crate::history::flight_row::FlightRow as FlownRow;
-use crate::history::histories::{Histories, History, UnitKey as Name};
+use crate::history::histories::{Histories, History, TailPosition, UnitKey as Name};
 use crate::history::installation_index::InstallationIndex;
+use crate::report::flight_columns::{FlightExtras, StoreContents};
 use records::time::{days_after, days_between};
 use records::{ChangePoint, TrendRow, WorkRequest};
 
@@ -47,10 +49,10 @@ pub fn compose(
 ) -> Result<Report, Error> {
     let checks = inspections(config)?;
     let mut logs = Logs::of(store)?;
-    let StoreContents { histories, mut rest, store_version } = StoreContents::until(ask.as_of_utc, store)?;
+    let StoreContents { histories, mut extras, store_version } = StoreContents::until(ask.as_of_utc, store)?;
     let newest_departure_utc = histories.newest_utc();
     let days: Vec<i64> = [1].into_iter().chain(LOOK_BACK_DAYS).collect();
-    let ReportAssessments { now, followed, mapping_faults, drawn, before, past, priors } =
+    let ReportAssessments { now, followed, mapping_faults, notes, drawn, before, past, priors } =
         assess::assess_for_report(config, installations, &histories, ask, &days, store)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
     let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
@@ -68,8 +70,8 @@ pub fn compose(
     };
     let unit = |(row, drawn): (&TrendRow, &Forecast)| {
         let name = name_of(row);
-        let rest = rest.remove(&name).unwrap_or_default();
-        compose.unit(row, drawn, histories.get(&name).unwrap_or(&History::default()), &rest)
+        let extras = extras.remove(&name).unwrap_or_default();
+        compose.unit(row, drawn, histories.get(&name).unwrap_or(&History::default()), &extras)
     };
     let units: Vec<UnitView> = now.iter().zip(&drawn).map(unit).collect();
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
@@ -102,6 +104,7 @@ pub fn compose(
             .collect(),
         inspection_intervals: intervals,
         quantity_changes: followed.changes,
+        notes,
         mapping_faults: mapping_faults.iter().map(ToString::to_string).collect(),
         trend_rows: now,
     })
@@ -155,64 +158,6 @@ impl Logs {
     }
 }
 
-/// All flights of all units, and what of them no statement needs but a page shows.
-struct StoreContents {
-    histories: Histories,
-    /// In the order of arrival, which each flight's `row` counts.
-    rest: BTreeMap<Name, Vec<FlightExtras>>,
-    store_version: u64,
-}
-
-/// Columns of a flight that a page shows in addition to those used by the assessment.
-#[derive(Debug, Clone)]
-struct FlightExtras {
-    unit_hours: Option<f64>,
-    gap_p05_m: Option<f64>,
-    gap_p95_m: Option<f64>,
-    gap_midrange_m: Option<f64>,
-    load_p05_n: Option<f64>,
-    load_p95_n: Option<f64>,
-    reason: Option<String>,
-    flags: Vec<String>,
-    /// Followed quantities, in the order of [`Quantity::ALL`]; NaN for none.
-    quantities: [f32; Quantity::ALL.len()],
-}
-
-impl StoreContents {
-    /// Reads the store month by month and keeps what is used: records hold several times as much.
-    fn until(last: Option<Timestamp>, store: &Store) -> Result<Self, Error> {
-        let (mut gathering, mut rest) =
-            (HistoryBuilder::default(), BTreeMap::<Name, Vec<FlightExtras>>::new());
-        let store_version = store.for_each_record(|mut record| {
-            if last.is_none_or(|last| record.flight.departure_utc <= last) {
-                let name = (Some(record.part_number.to_string()), record.serial_number.to_string());
-                gathering.push_record(&record);
-                rest.entry(name).or_default().push(FlightExtras::take(&mut record));
-            }
-        })?;
-        // Room to grow is half as much again, and nothing grows any more.
-        rest.values_mut().for_each(Vec::shrink_to_fit);
-        Ok(Self { histories: gathering.into_store(), rest, store_version })
-    }
-}
-
-impl FlightExtras {
-    fn take(record: &mut GapRecord) -> Self {
-        let e = &mut record.estimate;
-        Self {
-            unit_hours: record.unit_hours,
-            gap_p05_m: e.gap_p05_m,
-            gap_p95_m: e.gap_p95_m,
-            gap_midrange_m: e.gap_midrange_m,
-            load_p05_n: e.load_p05_n,
-            load_p95_n: e.load_p95_n,
-            reason: e.reason.take(),
-            flags: std::mem::take(&mut e.flags),
-            quantities: Quantity::ALL.map(|quantity| quantity.of_estimate(e).unwrap_or(f64::NAN) as f32),
-        }
-    }
-}
-
 fn name_of(row: &TrendRow) -> Name {
     (row.part_number.clone(), row.serial_number.clone())
 }
@@ -239,7 +184,7 @@ struct ReportComposer<'a> {
 }
 
 impl ReportComposer<'_> {
-    fn unit(&self, row: &TrendRow, drawn: &Forecast, history: &History, rest: &[FlightExtras]) -> UnitView {
+    fn unit(&self, row: &TrendRow, drawn: &Forecast, history: &History, extras: &[FlightExtras]) -> UnitView {
         let flown = history.flights();
         let name = name_of(row);
         let installations: Vec<Installation> =
@@ -253,12 +198,12 @@ impl ReportComposer<'_> {
             forecast: forecast(drawn, row),
             sketch_m: row.sketch_m.0.clone(),
             assessment: self.statement(row, history, &name),
-            quality: quality(history, rest, row.as_of_utc),
+            quality: quality(history, extras, row.as_of_utc),
             events: events(row, &installations),
             past_forecasts: self.past(row, &name),
             inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.extras(flown)).collect(),
-            flights: flown.iter().map(|flown| flight(history, flown, &rest[flown.row as usize])).collect(),
-            quantities: self.quantities(&name, history, rest),
+            flights: flights(history, extras),
+            quantities: self.quantities(&name, history, extras),
             installations,
             work_requests: self.requests.get(&name).cloned().unwrap_or_default(),
             part_number: name.0,
@@ -313,10 +258,10 @@ impl ReportComposer<'_> {
     }
 
     /// The followed quantities other than the gap, with the values of the flights.
-    fn quantities(&self, name: &Name, history: &History, rest: &[FlightExtras]) -> Vec<QuantityView> {
+    fn quantities(&self, name: &Name, history: &History, extras: &[FlightExtras]) -> Vec<QuantityView> {
         let view = |of: &&QuantityRow| {
             let index = Quantity::ALL.iter().position(|quantity| quantity.as_str() == of.quantity)?;
-            let value = |flown: &FlownRow| rest[flown.row as usize].quantities[index];
+            let value = |flown: &FlownRow| extras[flown.row as usize].quantities[index];
             Some(QuantityView { row: (*of).clone(), values: history.flights().iter().map(value).collect() })
         };
         let of_unit = self.quantities.get(name).into_iter().flatten();
@@ -401,15 +346,15 @@ fn events(row: &TrendRow, installations: &[Installation]) -> Vec<Event> {
     row.change_points.iter().map(event).collect()
 }
 
-fn quality(history: &History, rest: &[FlightExtras], as_of: Timestamp) -> Quality {
+fn quality(history: &History, extras: &[FlightExtras], as_of: Timestamp) -> Quality {
     let records = history.flights();
     let (mut reasons, mut doubts) = (BTreeMap::new(), BTreeMap::new());
-    for (flown, rest) in records.iter().map(|flown| (flown, &rest[flown.row as usize])) {
+    for (flown, extras) in records.iter().map(|flown| (flown, &extras[flown.row as usize])) {
         if flown.gap_m().is_none() {
-            *reasons.entry(rest.reason.clone().unwrap_or_default()).or_default() += 1;
+            *reasons.entry(extras.reason.as_deref().unwrap_or_default().to_owned()).or_default() += 1;
         }
-        for flag in &rest.flags {
-            *doubts.entry(flag.clone()).or_default() += 1;
+        for flag in &extras.flags {
+            *doubts.entry(flag.to_string()).or_default() += 1;
         }
     }
     let estimated = records.iter().filter(|r| r.gap_m().is_some());
@@ -446,27 +391,53 @@ fn successive_difference_ratio(history: &History) -> Option<f64> {
     (ratios.len() >= 5).then(|| SD_OVER_MAD * ratios[ratios.len() / 2])
 }
 
-fn flight(history: &History, flown: &FlownRow, rest: &FlightExtras) -> FlightRow {
-    let place = history.place(flown);
-    let others = rest.flags.iter().filter(|flag| Some(*flag) != rest.reason.as_ref()).cloned();
-    let remark = |reason: &String| match flown.gap_m() {
-        None => format!("refused: {reason}"),
-        Some(_) => reason.clone(),
+/// Tail and position.
+type PlaceNames = (Arc<str>, Arc<str>);
+
+/// The flights of a unit, which share the names of its places.
+fn flights(history: &History, extras: &[FlightExtras]) -> Vec<FlightRow> {
+    let shared = |name: &Option<String>| Arc::from(name.as_deref().unwrap_or_default());
+    let mut names: Option<(&TailPosition, PlaceNames)> = None;
+    let row = |flown: &FlownRow| {
+        let place = history.place(flown);
+        let known = names.take().filter(|(of, _)| *of == place);
+        let (_, of_place) = names
+            .insert(known.unwrap_or_else(|| (place, (shared(&place.tail_number), shared(&place.position)))));
+        flight(history, flown, &extras[flown.row as usize], of_place.clone())
     };
+    history.flights().iter().map(row).collect()
+}
+
+fn flight(
+    history: &History,
+    flown: &FlownRow,
+    extras: &FlightExtras,
+    (tail_number, position): PlaceNames,
+) -> FlightRow {
+    let others = extras.flags.iter().filter(|flag| Some(*flag) != extras.reason.as_ref());
+    let reason = extras.reason.as_deref().map(|reason| match flown.gap_m() {
+        None => format!("refused: {reason}"),
+        Some(_) => reason.to_owned(),
+    });
     FlightRow {
         departure_utc: flown.departure_utc(),
-        flight_id: history.flight_id(flown).unwrap_or_default().to_owned(),
-        tail_number: place.tail_number.clone().unwrap_or_default(),
-        position: place.position.clone().unwrap_or_default(),
-        unit_hours: rest.unit_hours,
+        flight_id: history.flight_id(flown).unwrap_or_default().into(),
+        tail_number,
+        position,
+        unit_hours: extras.number("unit_hours"),
         gap_m: flown.gap_m(),
-        gap_p05_m: rest.gap_p05_m,
-        gap_p95_m: rest.gap_p95_m,
-        gap_midrange_m: rest.gap_midrange_m,
+        gap_p05_m: extras.number("gap_p05_m"),
+        gap_p95_m: extras.number("gap_p95_m"),
+        gap_midrange_m: extras.number("gap_midrange_m"),
         load_reversals: history.extras(flown).load_reversals(),
-        load_p05_n: rest.load_p05_n,
-        load_p95_n: rest.load_p95_n,
-        remarks: rest.reason.iter().map(remark).chain(others).collect::<Vec<_>>().join(", "),
+        load_p05_n: extras.number("load_p05_n"),
+        load_p95_n: extras.number("load_p95_n"),
+        remarks: reason
+            .into_iter()
+            .chain(others.map(ToString::to_string))
+            .collect::<Vec<_>>()
+            .join(", ")
+            .into(),
         plot_path: None,
     }
 }
@@ -568,6 +539,16 @@ impl InspectionRow {
     }
 }
 
+/// A measured play, m.
+fn plausible_play(text: &str) -> Result<f64, String> {
+    let (least, most) = (0.0, PLAUSIBLE_LIMIT_M.1);
+    let play_m = number(text)?;
+    if (least..=most).contains(&play_m) {
+        return Ok(play_m);
+    }
+    Err(format!("`{text}` is not between {least} and {most} m: 64 µm are 64e-6"))
+}
+
 /// The configured table of hangar checks.
 fn inspections(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error> {
     let Some(file) = &config.document.logs.inspections else { return Ok(None) };
@@ -584,7 +565,7 @@ fn inspections(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error> {
             part_number: text(row, part),
             serial_number: table.required(row, serial, name::<SerialNumber>).map_err(bad)?.to_string(),
             date_utc: table.required(row, date, utc).map_err(bad)?,
-            play_m: table.required(row, play, number).map_err(bad)?,
+            play_m: table.required(row, play, plausible_play).map_err(bad)?,
             instrument: text(row, instrument),
             force_n: table.optional(row, force, number).map_err(bad)?,
         })

@@ -60,7 +60,8 @@ pub fn draw(
         let logs_of_flights = log_paths(view, flights.start, store)?;
         for flight in flights.rev() {
             let row = &view.flights[flight];
-            let Some(log) = logs_of_flights.get(&(row.tail_number.clone(), row.flight_id.clone())) else {
+            let Some(log) = logs_of_flights.get(&(row.tail_number.to_string(), row.flight_id.to_string()))
+            else {
                 continue;
             };
             if chosen == MAX_PLOTS {
@@ -68,7 +69,7 @@ pub fn draw(
                 continue;
             }
             chosen += 1;
-            let wanted = Wanted { unit, flight, position: row.position.clone() };
+            let wanted = Wanted { unit, flight, position: row.position.to_string() };
             logs.entry(log.clone()).or_default().push(wanted);
         }
     }
@@ -81,7 +82,8 @@ pub fn draw(
         match pages {
             Ok(pages) => {
                 for (wanted, page) in pages {
-                    report.units[wanted.unit].flights[wanted.flight].plot_path = Some(page.path.clone());
+                    report.units[wanted.unit].flights[wanted.flight].plot_path =
+                        Some(page.path.as_str().into());
                     plots.pages.push(page);
                 }
             }

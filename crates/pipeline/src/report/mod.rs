@@ -2,5 +2,6 @@
 
 pub mod compose;
 pub mod data;
+mod flight_columns;
 pub mod flight_plots;
 pub mod publish;

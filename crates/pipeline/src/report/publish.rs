@@ -151,6 +151,7 @@ mod tests {
             inspections_unmatched: 0,
             quantity_changes: Vec::new(),
             mapping_faults: Vec::new(),
+            notes: Vec::new(),
             inspection_intervals: Vec::new(),
             interval_advice: Vec::new(),
             trend_rows: Vec::new(),

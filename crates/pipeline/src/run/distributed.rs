@@ -167,7 +167,7 @@ pub fn run(
             process_batch((worker, context), works, engine, (writer, &mut ledger, report))?;
         }
         report.not_reached = report.not_reached_logs.len();
-        report.quiet = summary::quiet(ledger.accounts(), worker.config.document.trend.stale_after_days);
+        report.add_coverage(ledger.accounts(), worker.config, worker.installations);
         Ok(ledger.touched.into_iter().collect::<Vec<assess::Unit>>())
     })
 }

@@ -80,7 +80,7 @@ impl<'a> OwnershipLedger<'a> {
     }
 
     /// Status of all logs, after this run.
-    pub(crate) fn accounts(&self) -> impl Iterator<Item = &LogRecord> {
+    pub(crate) fn accounts(&self) -> impl Iterator<Item = &LogRecord> + Clone {
         let unchanged = self.plan.work.is_empty().then(|| self.plan.accounts.values());
         self.accounts.values().chain(unchanged.into_iter().flatten())
     }

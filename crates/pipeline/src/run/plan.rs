@@ -134,6 +134,8 @@ pub struct Plan {
     pub here: HashSet<Digests>,
     /// The same of deleted logs, with their records: a log may have been renamed.
     pub gone: HashMap<Digests, (i64, i64)>,
+    /// Number of deleted logs, or logs that no pattern matches any more, with stored records.
+    pub absent: usize,
     /// Number of logs excluded by the selection.
     pub not_asked: usize,
     /// Logs left for later by `--limit`.
@@ -190,6 +192,7 @@ pub fn plan(
     logs.extend(found.faulty.into_iter().map(faulty));
     let found = logs;
     let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
+    let absent = gone.iter().filter(|a| a.estimated + a.refused > 0).count();
     let gone = gone.iter().filter_map(|a| Some((digests(a)?, (a.estimated, a.refused)))).collect();
     let accounts: BTreeMap<String, LogRecord> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
     // Names and digests of a hundred thousand logs are made only where they decide something.
@@ -226,6 +229,7 @@ pub fn plan(
         work,
         accounts,
         gone,
+        absent,
         not_asked,
         left,
         strays,

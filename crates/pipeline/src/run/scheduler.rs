@@ -289,7 +289,7 @@ fn write(
             (context.watch)(Event::Stored { logs: results.len() });
         }
     }
-    report.quiet = summary::quiet(ledger.accounts(), inputs.config.document.trend.stale_after_days);
+    report.add_coverage(ledger.accounts(), &inputs.config, &inputs.installations);
     Ok(ledger.touched.into_iter().collect())
 }
 

@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
+use job::Config;
 use records::time::days_between;
-use records::{Diagnostic, GapRecord, Status};
+use records::{Diagnostic, GapRecord, Installations, Status};
 use store::{LogOutcome, LogRecord, RunRecord};
 
 use crate::error::is_passing;
@@ -15,6 +16,7 @@ use crate::history::histories::UnitKey;
 use crate::history::installation_index::DateAhead;
 use crate::history::maintenance_log::UnknownUnit;
 use crate::monitoring::REPORTED_DAYS;
+use crate::monitoring::coverage::{self, UnknownTail, UnmappedPositions};
 use crate::monitoring::innovations::{self, InnovationOutlier};
 use crate::monitoring::mapping_faults::MappingFault;
 use crate::monitoring::recent;
@@ -63,7 +65,7 @@ pub struct SilentTail {
 }
 
 /// Aircraft without data for longer than `days` before the fleet's newest departure.
-pub(crate) fn quiet<'a>(accounts: impl Iterator<Item = &'a LogRecord>, days: f64) -> Vec<SilentTail> {
+fn quiet<'a>(accounts: impl Iterator<Item = &'a LogRecord>, days: f64) -> Vec<SilentTail> {
     let mut newest: BTreeMap<&str, Timestamp> = BTreeMap::new();
     for (tail, at) in accounts.filter_map(|a| Some((a.tail_number.as_deref()?, a.departure_utc?))) {
         newest.entry(tail).and_modify(|known| *known = (*known).max(at)).or_insert(at);
@@ -135,6 +137,14 @@ pub struct RunSummary {
     pub unknown_units: Vec<UnknownUnit>,
     /// Dates of the installations table that are still to come.
     pub dates_ahead: Vec<DateAhead>,
+    /// Installed positions that no log has, of the aircraft with logs.
+    pub unmapped_positions: Vec<UnmappedPositions>,
+    /// Tails of the flights table and of overrides that neither installations nor logs have.
+    pub unknown_tails: Vec<UnknownTail>,
+    /// Limits and hours that the assessments of the fleet lack, in words.
+    pub notes: Vec<String>,
+    /// Logs of earlier runs that no pattern matches any more; their records stay.
+    pub absent: usize,
     /// Failed logs, by path.
     pub errors: Vec<LogError>,
     /// Logs that the run has not processed.
@@ -227,6 +237,10 @@ impl RunSummary {
             withdrawn: 0,
             unknown_units: Vec::new(),
             dates_ahead: Vec::new(),
+            unmapped_positions: Vec::new(),
+            unknown_tails: Vec::new(),
+            notes: Vec::new(),
+            absent: plan.absent,
             errors: Vec::new(),
             not_reached: plan.work.len(),
             not_reached_logs: Vec::new(),
@@ -250,8 +264,17 @@ impl RunSummary {
 
     /// Adds the assessments of the run's units, and the recorder changes of their aircraft.
     pub(crate) fn add_assessments(&mut self, assessments: RunAssessments) {
-        let RunAssessments { now, changed, recent, followed, states, work_list, mapping_faults, findings: _ } =
-            assessments;
+        let RunAssessments {
+            now,
+            changed,
+            recent,
+            followed,
+            states,
+            work_list,
+            mapping_faults,
+            notes,
+            findings: _,
+        } = assessments;
         let tails: BTreeSet<&str> = now.iter().filter_map(|row| row.tail_number.as_deref()).collect();
         let touched = |tail: &String| tails.contains(tail.as_str());
         let newest = recent::newest_utc(&recent).unwrap_or_default();
@@ -263,7 +286,19 @@ impl RunSummary {
         self.innovations_unlike =
             innovations::find_outliers(&recent).into_iter().filter(|u| touched(&u.tail_number)).collect();
         (self.trends, self.changed, self.states) = (now, changed, states);
-        (self.work_list, self.mapping_faults) = (work_list, mapping_faults);
+        (self.work_list, self.mapping_faults, self.notes) = (work_list, mapping_faults, notes);
+    }
+
+    /// Adds what the status of all logs shows about the aircraft.
+    pub(crate) fn add_coverage<'a>(
+        &mut self,
+        accounts: impl Iterator<Item = &'a LogRecord> + Clone,
+        config: &Config,
+        installations: &'a Installations,
+    ) {
+        self.quiet = quiet(accounts.clone(), config.document.trend.stale_after_days);
+        self.unmapped_positions = coverage::unmapped_positions(accounts.clone(), installations);
+        self.unknown_tails = coverage::unknown_tails(config, installations, accounts);
     }
 
     pub(crate) fn count(&mut self, account: &LogRecord, records: &[GapRecord], diagnostics: &[Diagnostic]) {

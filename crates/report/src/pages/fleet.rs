@@ -119,6 +119,7 @@ struct FleetView {
     spreads: Vec<SpreadRow>,
     gaps: Vec<(String, String, String, String, String, String)>,
     mapping_faults: Vec<String>,
+    notes: Vec<String>,
     log_errors: Vec<(String, String)>,
     more_log_errors: usize,
     forecast_accuracy: Vec<(String, String, String)>,
@@ -214,6 +215,7 @@ fn index_page(
         heading: heading(report),
         decision: unbroken(&decision(report)),
         mapping_faults: report.mapping_faults.clone(),
+        notes: report.notes.clone(),
         footer: report.footer(),
         lead: format!(
             "{} · data to {} · assessed {}",
@@ -271,7 +273,9 @@ fn decision(report: &Report) -> String {
         counts.into_iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{} {word}", count(n))).collect();
     let first = work(report).into_iter().find(|unit| unit.badge().needs_action());
     let Some(unit) = first else {
-        return format!("No unit needs action: {}.", counts.join(", "));
+        let is_assessed = report.units.iter().any(|unit| unit.badge() != StateBadge::from_state(None));
+        let what = if is_assessed { "No unit needs action" } else { "No unit could be assessed" };
+        return format!("{what}: {}.", counts.join(", "));
     };
     let action = unit.assessment.action_text.as_deref().unwrap_or("inspect");
     format!("{} ({}): {action}. In all: {}.", unit.place(), unit.name(), counts.join(", "))

@@ -340,8 +340,8 @@ fn flight(f: &FlightRow) -> Flight {
     let load = f.load_p05_n.zip(f.load_p95_n).map(|(low, high)| format!("{low:.0} to {high:.0}"));
     Flight {
         when: minute(f.departure_utc),
-        id: f.flight_id.clone(),
-        plot: f.plot_path.clone().unwrap_or_default(),
+        id: f.flight_id.to_string(),
+        plot: f.plot_path.as_deref().unwrap_or_default().to_owned(),
         place: format!("{} {}", f.tail_number, f.position),
         hours: f.unit_hours.map(|h| format!("{h:.1}")).unwrap_or_default(),
         gap: micrometres_cell(f.gap_m),
@@ -350,6 +350,6 @@ fn flight(f: &FlightRow) -> Flight {
         midrange: micrometres_cell(f.gap_midrange_m),
         reversals: f.load_reversals.map(|n| n.to_string()).unwrap_or_default(),
         load: load.unwrap_or_default(),
-        remarks: f.remarks.clone(),
+        remarks: f.remarks.to_string(),
     }
 }

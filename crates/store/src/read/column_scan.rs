@@ -30,6 +30,7 @@ pub struct ColumnScan {
     files: Vec<PathBuf>,
     query: Query,
     schema: SchemaRef,
+    version: u64,
 }
 
 impl Store {
@@ -40,8 +41,10 @@ impl Store {
     /// # Errors
     /// [`Error::Table`] when the log cannot be read, and for a name that no column has.
     pub fn scan_columns(&self, query: &Query, names: &[&str]) -> Result<ColumnScan, Error> {
-        let files = Self::candidate_files(&self.gaps.snapshot()?, query);
-        Ok(ColumnScan { store: self.clone(), files, query: query.clone(), schema: schema_of(names)? })
+        let snapshot = self.gaps.snapshot()?;
+        let files = Self::candidate_files(&snapshot, query);
+        let (store, query, version) = (self.clone(), query.clone(), snapshot.version);
+        Ok(ColumnScan { store, files, query, schema: schema_of(names)?, version })
     }
 }
 
@@ -49,6 +52,11 @@ impl ColumnScan {
     /// How many there are.
     pub fn len(&self) -> usize {
         self.files.len()
+    }
+
+    /// Version of the store that they are of.
+    pub fn version(&self) -> u64 {
+        self.version
     }
 
     /// Whether there is none.

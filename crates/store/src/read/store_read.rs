@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use arrow::array::{AsArray, RecordBatch};
 use arrow::datatypes::SchemaRef;
-use jiff::Timestamp;
 use records::{GapRecord, PartNumber, SerialNumber};
 
 use crate::delta::file_stats::Stats;
@@ -19,9 +18,6 @@ use crate::read::query::Query;
 use records::RecordKey;
 use records::row_schema::{FromCells, Row, from_batch};
 use records::{LogOutcome, LogRecord};
-
-/// Records that are held as rows at once.
-const RECORDS_AT_ONCE: usize = 8_192;
 
 impl Store {
     /// The records that fit, as columns, by departure, tail, flight and position.
@@ -42,27 +38,6 @@ impl Store {
     /// As [`Store::scan`]; [`Error::Value`] when a cell is not valid in its column.
     pub fn records(&self, query: &Query) -> Result<Vec<GapRecord>, Error> {
         Ok(from_batch(&self.scan(query)?)?)
-    }
-
-    /// Hands over every record, earliest departure first, and returns the version they are of.
-    ///
-    /// A month's records at most are held at once, as columns, so a whole fleet's take no more memory than what the
-    /// caller keeps of them.
-    ///
-    /// # Errors
-    /// As [`Store::records`].
-    pub fn for_each_record(&self, mut take: impl FnMut(GapRecord)) -> Result<u64, Error> {
-        let snapshot = self.gaps.snapshot()?;
-        for (since_utc, until_utc) in months(&snapshot) {
-            let month = Query { since_utc, until_utc, ..Query::default() };
-            let records = self.select(&snapshot, &month, GapRecord::schema())?;
-            // A record takes several times as much as its row in columns.
-            for start in (0..records.num_rows()).step_by(RECORDS_AT_ONCE) {
-                let some = records.slice(start, RECORDS_AT_ONCE.min(records.num_rows() - start));
-                from_batch(&some)?.into_iter().for_each(&mut take);
-            }
-        }
-        Ok(snapshot.version)
     }
 
     /// Every unit with a record, by part and serial number.
@@ -177,20 +152,6 @@ impl Store {
         files.iter().try_for_each(|file| newest.take(file, wanted, &name))?;
         Ok(newest.into_rows())
     }
-}
-
-/// Spans of thirty days that together cover every departure; one unbounded span where the log
-/// has no bounds of the departures of its files.
-fn months(snapshot: &Snapshot) -> Vec<(Option<Timestamp>, Option<Timestamp>)> {
-    const MONTH_US: i64 = 30 * 86_400_000_000;
-    let times = || snapshot.files.iter().map(|file| file.stats.times_us("departure_utc"));
-    let edge = |us: i64| Timestamp::from_microsecond(us).ok();
-    let (first, last) = (times().map(|t| t.0).min(), times().map(|t| t.1).max());
-    let Some((first, last)) = first.zip(last).filter(|(first, last)| edge(*first).and(edge(*last)).is_some())
-    else {
-        return vec![(None, None)];
-    };
-    (first..=last).step_by(MONTH_US as usize).map(|from| (edge(from), edge(from + MONTH_US))).collect()
 }
 
 pub(crate) fn files_of(table: &Table) -> Result<Vec<PathBuf>, Error> {

@@ -204,26 +204,3 @@ fn a_flipped_byte_is_an_error_and_not_a_number() {
     let error = Store::open(dir.path()).unwrap().records(&Query::default()).unwrap_err();
     assert!(matches!(error, store::Error::Damaged { .. }), "{error}");
 }
-
-/// The store hands over by month; what it hands over is what a question without bounds answers.
-#[test]
-fn a_visit_meets_every_record_once_in_order_of_departure() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut writer = writer(dir.path());
-    let flights = |days: std::ops::Range<i64>| days.map(|day| result(1, day, 4e-5)).collect::<Vec<_>>();
-    writer.commit(&flights(100..131)).unwrap();
-    writer.commit(&flights(0..100)).unwrap();
-    let mut met = Vec::new();
-    let version = writer.store().for_each_record(|record| met.push(record)).unwrap();
-    assert_eq!(met.len(), 131 * POSITIONS.len());
-    assert_eq!(met, writer.store().records(&Query::default()).unwrap());
-    assert_eq!(version, writer.store().info().unwrap().version);
-}
-
-#[test]
-fn a_visit_to_an_empty_store_meets_nobody() {
-    let dir = tempfile::tempdir().unwrap();
-    let mut met = 0;
-    writer(dir.path()).store().for_each_record(|_| met += 1).unwrap();
-    assert_eq!(met, 0);
-}

@@ -140,6 +140,10 @@ fn trace(
     part: Option<&PartNumber>,
     output: &Output,
 ) -> Result<(), Failure> {
+    if !file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
+        let what = format!("{}: a trace is written as Parquet", display_path(file));
+        return Err(Failure::usage("unknown_ending", what, "use the extension .parquet"));
+    }
     let mut all = job::trace::Trace::default();
     for path in logs {
         // A failed log is reported already; it has no trace.

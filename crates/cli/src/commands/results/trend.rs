@@ -28,12 +28,12 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     if args.quantities || args.changes || args.intervals {
         return quantities(args, &ask, &config, &installations, output);
     }
-    let mut mapping_faults = Vec::new();
+    let (mut mapping_faults, mut notes) = (Vec::new(), Vec::new());
     let found = match (&args.external.estimates, &args.queries) {
         (None, None) => {
             let store = Store::open(config.store())?;
             let found = assess::assess_store_with_quantities(&config, &installations, &store, &ask)?;
-            mapping_faults = found.mapping_faults;
+            (mapping_faults, notes) = (found.mapping_faults, found.notes);
             found.now
         }
         (estimates, queries) => {
@@ -65,7 +65,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
         &args.rows,
         output,
         || row_output::batch(&found),
-        || page(&found, &mapping_faults, nothing),
+        || page(&found, &mapping_faults, &notes, nothing),
     )?;
     Ok(Code::Success)
 }
@@ -214,14 +214,20 @@ fn changes_page(changes: &[QuantityChange], units: usize) -> String {
     table::layout(&columns, &changes.iter().map(cells).collect::<Vec<_>>())
 }
 
-fn page(found: &[TrendRow], mapping_faults: &[MappingFault], nothing: Option<String>) -> String {
+fn page(
+    found: &[TrendRow],
+    mapping_faults: &[MappingFault],
+    notes: &[String],
+    nothing: Option<String>,
+) -> String {
     let Some(as_of) = found.iter().map(|r| r.as_of_utc).max() else {
         return nothing.unwrap_or_else(|| "no unit was queried\n".to_owned());
     };
     let as_of = as_of.strftime("%Y-%m-%d %H:%M UTC");
     let head = format!("{} as of {as_of}; ± is half the 90 % interval\n", count(found.len(), "unit"));
     let faults = mapping_faults.iter().map(|fault| format!("mapping  {}\n", escape(&fault.to_string())));
-    head + &unit_table(found.iter().collect()) + &faults.collect::<String>()
+    let notes = notes.iter().map(|note| format!("note     {}\n", escape(note)));
+    head + &unit_table(found.iter().collect()) + &faults.chain(notes).collect::<String>()
 }
 
 /// Units by urgency, with action and date.

@@ -186,6 +186,17 @@ fn table_findings(report: &RunSummary, page: &mut String) {
     };
     some_of("unknown", "unit", report.unknown_units.iter().map(name), page);
     some_of("ahead", "date", &report.dates_ahead, page);
+    some_of("unknown", "tail", &report.unknown_tails, page);
+    some_of("unmapped", "group", &report.unmapped_positions, page);
+    some_of("note", "note", &report.notes, page);
+    if report.absent > 0 {
+        let absent = count(report.absent, "log");
+        line(
+            page,
+            "absent",
+            &format!("{absent} of earlier runs that no pattern matches any more; their records stay"),
+        );
+    }
 }
 
 /// Prints the first few of some findings, and how many more there are.
@@ -480,7 +491,7 @@ fn changes_section(changed: &[UnitChange]) -> String {
 fn change_text(unit: &UnitChange) -> String {
     let word = |state: Option<&'static str>| state.unwrap_or("no state");
     let mut changes = Vec::new();
-    if unit.from != unit.to {
+    if unit.from != unit.to || (unit.new_events.is_empty() && unit.cleared_events.is_empty()) {
         let why = unit.reason.as_deref().map(|why| format!(" ({why})")).unwrap_or_default();
         changes.push(format!("{} → {}{why}", word(unit.from), word(unit.to)));
     }

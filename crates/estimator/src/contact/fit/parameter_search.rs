@@ -27,6 +27,9 @@ const BRISTLES: [f64; 3] = [0.3, 1.0, 3.0];
 const REFINEMENTS: [[f64; 2]; 2] = [[0.6, 1.6], [0.8, 1.25]];
 /// First and last step of the load zero over the 95 % load; steps are halved in between.
 const ZERO_STEPS: (f64, f64) = (0.04, 0.002);
+
+/// Most steps of that search: twice the 95 % load and back.
+const MAX_ZERO_MOVES: usize = 100;
 /// Step over the 95 % load for the curvature of the misfit by the load zero.
 const ZERO_ERROR_STEP: f64 = 0.02;
 /// Misfits of blocks are taken as independent after this time, s.
@@ -145,7 +148,11 @@ impl<'a> ParameterSearch<'a> {
         self.prepare(&best.found);
         let (mut zero_n, mut least) = (best.found.at.load_zero_n, best.misfit);
         let mut step_n = ZERO_STEPS.0 * self.scaling.load_n;
-        while step_n > ZERO_STEPS.1 * self.scaling.load_n {
+        // A misfit that falls on and on, as without any load, has no minimum.
+        for _ in 0..MAX_ZERO_MOVES {
+            if step_n <= ZERO_STEPS.1 * self.scaling.load_n {
+                break;
+            }
             let before = least;
             for candidate_n in [zero_n - step_n, zero_n + step_n] {
                 let misfit = self.misfit(&best.found, candidate_n);

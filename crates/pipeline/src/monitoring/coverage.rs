@@ -1,0 +1,136 @@
+//! What assessments lack: limits, hours of unlogged flights, channels of installed units, and tails that nothing else names.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use ingest::mapping::column_pattern::nearest;
+use job::Config;
+use records::{Installations, PartNumber, TrendRow};
+use serde::Serialize;
+use store::LogRecord;
+
+/// Limits and hours that the assessments of some units lack, in words.
+pub(crate) fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
+    let installed = || rows.iter().filter(|row| row.removed_utc.is_none());
+    let mut without_limit = BTreeMap::<&str, usize>::new();
+    for row in installed().filter(|row| row.limit_m.is_none()) {
+        *without_limit.entry(row.part_number.as_deref().unwrap_or_default()).or_default() += 1;
+    }
+    let mut notes: Vec<String> = without_limit.iter().map(|(part, n)| no_limit(part, *n, config)).collect();
+    let logged = trend::UsageSource::LoggedFlights.to_string();
+    let of_logs = installed().filter(|row| row.usage_source.as_ref() == Some(&logged)).count();
+    if of_logs > 0 {
+        notes.push(format!(
+            "{}: usage is that of logged flights alone, and every flight without a log is missing from rates and dates; \
+             give a flights table (`logs.flights`), or map `tail_hours_end`",
+            units(of_logs)
+        ));
+    }
+    notes
+}
+
+fn units(count: usize) -> String {
+    if count == 1 { "1 unit".to_owned() } else { format!("{count} units") }
+}
+
+fn no_limit(part: &str, count: usize, config: &Config) -> String {
+    let units = units(count);
+    let lost = format!("{units} without a state, which `--fail-on` does not see");
+    if PartNumber::new(part).is_ok_and(|part| config.parts.contains_key(&part)) {
+        return format!("part {part} has no limit: {lost}; add `limit_m` to `[part.\"{part}\"]`");
+    }
+    let near = nearest(part, config.parts.keys().map(PartNumber::as_str));
+    let near = near.map(|near| format!(" (nearest: {near})")).unwrap_or_default();
+    format!("part {part} is not configured{near}: {lost}; add `[part.\"{part}\"]`, or correct its name")
+}
+
+/// Installed positions whose channels no log has, with the number of their aircraft.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
+pub struct UnmappedPositions {
+    pub positions: Vec<String>,
+    pub tails: usize,
+}
+
+/// Positions and number of aircraft, with the remedy.
+impl std::fmt::Display for UnmappedPositions {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let tails = if self.tails == 1 { "1 tail".to_owned() } else { format!("{} tails", self.tails) };
+        write!(
+            f,
+            "{} of {tails}: units are installed there, and no log has their channels; check the names of columns and \
+             positions under `[channel]`",
+            self.positions.join(", ")
+        )
+    }
+}
+
+/// The installed positions, of aircraft with a processed log, that no log has.
+pub(crate) fn unmapped_positions<'a>(
+    accounts: impl Iterator<Item = &'a LogRecord>,
+    installations: &Installations,
+) -> Vec<UnmappedPositions> {
+    let mut logged = BTreeMap::<&str, BTreeSet<&str>>::new();
+    for account in accounts.filter(|account| account.estimated + account.refused > 0) {
+        let Some(tail) = &account.tail_number else { continue };
+        logged.entry(tail).or_default().extend(account.positions.iter().map(String::as_str));
+    }
+    let mut missing = BTreeMap::<&str, BTreeSet<&str>>::new();
+    for installation in installations.iter() {
+        let (tail, position) = (installation.tail_number.as_str(), installation.position.as_str());
+        if logged.get(tail).is_some_and(|positions| !positions.contains(position)) {
+            missing.entry(tail).or_default().insert(position);
+        }
+    }
+    let mut tails = BTreeMap::<BTreeSet<&str>, usize>::new();
+    missing.into_values().for_each(|positions| *tails.entry(positions).or_default() += 1);
+    let row = |(positions, tails): (BTreeSet<&str>, usize)| UnmappedPositions {
+        positions: positions.into_iter().map(str::to_owned).collect(),
+        tails,
+    };
+    tails.into_iter().map(row).collect()
+}
+
+/// A tail that a table or an override names, and neither the installations nor a log.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[expect(missing_docs, reason = "each field is named for what it holds")]
+pub struct UnknownTail {
+    /// File of the table, or `[[override]]`.
+    pub named_in: String,
+    pub tail_number: String,
+    /// The known tail with the most similar name.
+    pub nearest: Option<String>,
+}
+
+/// Where it is named, and the nearest known tail.
+impl std::fmt::Display for UnknownTail {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: tail {} has neither an installation nor a log", self.named_in, self.tail_number)?;
+        self.nearest.iter().try_for_each(|near| write!(f, "; nearest: {near}"))
+    }
+}
+
+/// The tails of the flights table and of overrides that nothing else names.
+pub(crate) fn unknown_tails<'a>(
+    config: &Config,
+    installations: &'a Installations,
+    accounts: impl Iterator<Item = &'a LogRecord>,
+) -> Vec<UnknownTail> {
+    let installed = installations.iter().map(|i| i.tail_number.as_str());
+    let known: BTreeSet<&str> = accounts.filter_map(|a| a.tail_number.as_deref()).chain(installed).collect();
+    let unknown = |named_in: &str, tail: &str| UnknownTail {
+        named_in: named_in.to_owned(),
+        tail_number: tail.to_owned(),
+        nearest: nearest(tail, known.iter().copied()).map(str::to_owned),
+    };
+    let mut found = BTreeSet::new();
+    let flights = config.document.logs.flights.as_deref().unwrap_or_default();
+    let flown: BTreeSet<&str> = config.flights.iter().map(|flight| flight.tail_number.as_str()).collect();
+    found.extend(flown.difference(&known).map(|tail| unknown(flights, tail)));
+    for pattern in config.document.overrides.iter().flat_map(|one| &one.tails) {
+        let fits = |tail: &&str| glob::Pattern::new(pattern).is_ok_and(|pattern| pattern.matches(tail));
+        if !known.is_empty() && !known.iter().any(fits) {
+            found.insert(unknown("[[override]]", pattern));
+        }
+    }
+    found.into_iter().collect()
+}

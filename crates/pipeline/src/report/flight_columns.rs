@@ -1,0 +1,123 @@
+//! What the report shows of flights, read from the columns of the store that hold it.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use arrow::array::{Array, AsArray, ListArray, RecordBatch};
+use ingest::tables::TableBatch;
+use jiff::{SignedDuration, Timestamp};
+use records::Quantity;
+use store::{Query, Store};
+
+use crate::error::Error;
+use crate::history::builder::{HistoryBuilder, at};
+use crate::history::histories::{Histories, UnitKey};
+use crate::history::parallel_scan::read_each;
+use crate::history::row_keys::{KeyCache, KeyColumns, TextColumn};
+
+/// Columns of numbers that a page shows and no assessment needs.
+const NUMBERS: [&str; 6] =
+    ["unit_hours", "gap_p05_m", "gap_p95_m", "gap_midrange_m", "load_p05_n", "load_p95_n"];
+
+/// All flights of all units.
+pub(super) struct StoreContents {
+    pub(super) histories: Histories,
+    /// Further columns of each unit's flights, in the order of arrival, which each flight's `row` counts.
+    pub(super) extras: BTreeMap<UnitKey, Vec<FlightExtras>>,
+    pub(super) store_version: u64,
+}
+
+/// Columns of a flight that a page shows in addition to those used by the assessment.
+#[derive(Debug, Clone)]
+pub(super) struct FlightExtras {
+    /// In the order of [`NUMBERS`]; NaN for none.
+    numbers: [f64; NUMBERS.len()],
+    /// Rejection code, or the most severe flag.
+    pub(super) reason: Option<Box<str>>,
+    pub(super) flags: Box<[Box<str>]>,
+    /// Followed quantities, in the order of [`Quantity::ALL`]; NaN for none.
+    pub(super) quantities: [f32; Quantity::ALL.len()],
+}
+
+impl FlightExtras {
+    /// The number of a column.
+    pub(super) fn number(&self, column: &str) -> Option<f64> {
+        let index = NUMBERS.iter().position(|name| *name == column)?;
+        Some(self.numbers[index]).filter(|value| !value.is_nan())
+    }
+}
+
+impl StoreContents {
+    /// Reads the flights that departed until a time, with it.
+    pub(super) fn until(last: Option<Timestamp>, store: &Store) -> Result<Self, Error> {
+        let until_utc = last.and_then(|last| last.checked_add(SignedDuration::from_micros(1)).ok());
+        let mut columns = HistoryBuilder::of_store();
+        columns.extend(NUMBERS.into_iter().chain(["reason"]));
+        columns.extend(Quantity::ALL.map(Quantity::as_str));
+        columns.sort_unstable();
+        columns.dedup();
+        let scan = store.scan_columns(&Query { until_utc, ..Query::default() }, &columns)?;
+        let (mut gathering, mut further) = (HistoryBuilder::default(), ExtrasReader::default());
+        read_each(&scan, |batch| {
+            further.add(batch)?;
+            gathering.add_store_batch(batch.clone())
+        })?;
+        let unit = |(name, unit): (UnitKey, usize)| {
+            let mut extras = std::mem::take(&mut further.units[unit]);
+            extras.shrink_to_fit();
+            (name, extras)
+        };
+        let extras = further.names.into_iter().map(unit).collect();
+        Ok(Self { histories: gathering.into_store(), extras, store_version: scan.version() })
+    }
+}
+
+/// Further columns while their rows come in.
+#[derive(Default)]
+struct ExtrasReader {
+    names: BTreeMap<UnitKey, usize>,
+    units: Vec<Vec<FlightExtras>>,
+}
+
+impl ExtrasReader {
+    fn add(&mut self, batch: &RecordBatch) -> Result<(), ingest::Error> {
+        let chunk = TableBatch::new(Path::new("results"), batch.clone(), 0);
+        let keys = KeyColumns::of(&chunk)?;
+        let column = |name: &str| chunk.numbers(Some(chunk.column(&[name])?));
+        let numbers = NUMBERS.into_iter().map(column).collect::<Result<Vec<_>, _>>()?;
+        let quantities = Quantity::ALL.map(|quantity| column(quantity.as_str()));
+        let quantities = quantities.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let reasons = TextColumn::of(&chunk, &["reason"])?;
+        let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>());
+        let mut seen = KeyCache::default();
+        for row in 0..chunk.len() {
+            let Some(who) = keys.key_at(row) else { continue };
+            let unit = seen.get(&keys, row).unwrap_or_else(|| {
+                let name = (who.part_number.map(str::to_owned), who.serial_number.to_owned());
+                let units = &mut self.units;
+                let unit = *self.names.entry(name).or_insert_with(|| {
+                    units.push(Vec::new());
+                    units.len() - 1
+                });
+                seen.put(&keys, row, unit);
+                unit
+            });
+            self.units[unit].push(FlightExtras {
+                numbers: std::array::from_fn(|k| at(&numbers[k], row).unwrap_or(f64::NAN)),
+                reason: reasons.get(row).map(Into::into),
+                flags: flags.map(|flags| flags_of(flags, row)).unwrap_or_default(),
+                quantities: std::array::from_fn(|k| at(&quantities[k], row).unwrap_or(f64::NAN) as f32),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The flags of a row.
+fn flags_of(flags: &ListArray, row: usize) -> Box<[Box<str>]> {
+    if flags.is_null(row) || flags.value_length(row) == 0 {
+        return Box::default();
+    }
+    let of_row = flags.value(row);
+    of_row.as_string_opt::<i32>().into_iter().flatten().flatten().map(Into::into).collect()
+}
