@@ -26,8 +26,8 @@ pub enum Error {
     /// A template could not be rendered.
     #[error("a page cannot be written: {0}")]
     Template(#[from] askama::Error),
-    /// `report.json` could not be serialised.
-    #[error("the machine-readable twin cannot be written: {0}")]
+    /// The data of a plot could not be serialised.
+    #[error("the data of a plot cannot be written: {0}")]
     Json(#[from] serde_json::Error),
     /// A plot could not be drawn.
     #[error("a picture cannot be drawn: {0}")]

@@ -1,6 +1,7 @@
 //! Publishes a report folder: written completely under a temporary name, then renamed.
 
 use std::fs;
+use std::io::BufWriter;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -94,7 +95,18 @@ fn all(
     report.units.par_iter().try_for_each(|unit| done(report::unit_page(report, &spreads, unit)?))?;
     report.tails.par_iter().try_for_each(|tail| done(report::tail_page(report, tail)?))?;
     report::part_pages(report)?.into_iter().chain(report::fleet_pages(report)?).try_for_each(put)?;
-    Ok(PublishSummary { files: files.into_inner(), bytes: bytes.into_inner() })
+    let json = write_json(report, &dir.join("report.json"))?;
+    Ok(PublishSummary { files: files.into_inner() + 1, bytes: bytes.into_inner() + json })
+}
+
+/// Writes a report's results for programs, without holding their text; returns its bytes.
+fn write_json(report: &Report, path: &Path) -> Result<u64, Error> {
+    let write = || {
+        let mut file = BufWriter::new(fs::File::create(path)?);
+        serde_json::to_writer(&mut file, report)?;
+        file.into_inner().map_err(std::io::IntoInnerError::into_error)?.metadata().map(|of| of.len())
+    };
+    write().map_err(|e| failed(path, e))
 }
 
 /// Start of the names of temporary folders of a report.

@@ -164,7 +164,7 @@ struct Cell {
     text: String,
 }
 
-/// Renders the fleet page, its continuation pages and `report.json`.
+/// Renders the fleet page and its continuation pages.
 ///
 /// # Errors
 /// When a template cannot be filled.
@@ -194,7 +194,6 @@ pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
     }
     let view = index_page(report, grouped(&work), more_work, tail_pages)?;
     pages.push(Page::html("index.html".to_owned(), &view.render()?));
-    pages.push(Page { path: "report.json".to_owned(), body: serde_json::to_vec(report)? });
     Ok(pages)
 }
 
