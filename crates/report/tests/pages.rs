@@ -117,7 +117,7 @@ fn the_fleet_page_opens_with_what_to_do_first() {
     let report = report(vec![unit("B", Some("normal")), soon]);
     let index = text(fleet_pages(&report).unwrap().iter().find(|p| p.path == "index.html").unwrap());
     assert!(
-        index.contains("aileron_left (EMA / A): inspect before 2026-12-24. In all: 1 plan, 1 normal."),
+        index.contains("aileron_left (EMA / A): inspect before <span class=\"d\">2026-12-24.</span> In all: 1 plan, 1 normal."),
         "{index}"
     );
     let calm = self::report(vec![unit("B", Some("normal"))]);
