@@ -13,3 +13,21 @@ pub(crate) const GAUSS_HERMITE_5: [(f64, f64); 5] = [
 
 /// Quantiles of an exponential wait, one for each tenth.
 pub(crate) const WAIT_QUANTILES: usize = 10;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rule of n points is exact for powers below 2n (Abramowitz and Stegun 1964, 25.4.46); the moments of a standard
+    /// normal variable are 1, 0, 1, 0, 3, 0, 15, 0, 105.
+    #[test]
+    fn rules_have_the_moments_of_a_normal_variable() {
+        const MOMENTS: [f64; 10] = [1.0, 0.0, 1.0, 0.0, 3.0, 0.0, 15.0, 0.0, 105.0, 0.0];
+        for rule in [&GAUSS_HERMITE_3[..], &GAUSS_HERMITE_5] {
+            for (power, moment) in MOMENTS.iter().enumerate().take(2 * rule.len()) {
+                let found: f64 = rule.iter().map(|(z, weight)| weight * z.powi(power as i32)).sum();
+                assert!((found - moment).abs() < 1e-12 * moment.max(1.0), "{power}: {found}, not {moment}");
+            }
+        }
+    }
+}

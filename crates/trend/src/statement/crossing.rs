@@ -158,3 +158,34 @@ fn is_ordered(crossing: &Crossing) -> bool {
     let Crossing { p05_hours, p50_hours, p95_hours } = *crossing;
     [p05_hours, p50_hours, p95_hours].map(|hours| hours.unwrap_or(f64::INFINITY)).is_sorted()
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// The probability within the hours of a quantile is that of the quantile, wherever it falls in a cell.
+        #[test]
+        fn the_probability_within_a_quantile_is_its_own(
+            cells in prop::collection::vec(0.0..1.0_f64, CELLS),
+            over in 0.0..1.0_f64,
+            probability in 0.0..1.0_f64,
+        ) {
+            let total = over + cells.iter().sum::<f64>();
+            let horizon_hours: f64 = 3000.0;
+            let found = RulDistribution {
+                cells: cells.iter().map(|cell| cell / total).collect(),
+                over: over / total,
+                horizon_hours,
+                scale: CELLS as f64 / horizon_hours.ln(),
+                calibration: CalibrationParams { low: -1.0, middle: 0.0, high: 1.0 },
+            };
+            let hours = found.quantile(probability);
+            prop_assume!(hours.is_some_and(|hours| hours > 0.0));
+            let within = found.within(hours.unwrap_or_default());
+            prop_assert!((within - probability).abs() < 1e-9, "{within}, not {probability}");
+        }
+    }
+}

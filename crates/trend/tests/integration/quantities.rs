@@ -178,3 +178,18 @@ fn too_few_or_constant_values_change_nothing() {
     let short = changed(flights(&mut Random::new(1), 5, 0.01, 0.0), |k| k as f64);
     assert_eq!(fit(&short).change, 0.0);
 }
+
+/// A staircase looks like a drift until its steps are known: no drift remains.
+#[test]
+fn equal_steps_up_are_steps_and_no_drift() {
+    let mut right = 0;
+    for seed in 0..20 {
+        let values = flights(&mut Random::new(seed), 400, 0.02, 0.0);
+        let found = fit(&changed(values, |k| 0.2 * (k / 100) as f64));
+        let dates: Vec<i64> = found.steps.iter().map(|step| step.departure_us * 3 / DAY_US).collect();
+        let are_dated = dates.iter().zip([100, 200, 300]).all(|(date, truth)| (date - truth).abs() <= 1);
+        right += usize::from(dates.len() == 3 && are_dated && !found.is_drifting);
+        assert!((found.change - 0.6).abs() < 4.0 * found.change_se.max(0.005), "{found:?}");
+    }
+    assert!(right >= 18, "{right} of 20");
+}
