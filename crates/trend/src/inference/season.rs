@@ -116,3 +116,19 @@ pub(crate) fn seasonal_fit(
         covariance_m2: [yy / determinant, -xy / determinant, xx / determinant],
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quarters of a year from 1970-01-01: cosine and sine of 0, π/2, π and 3π/2.
+    #[test]
+    fn the_waves_have_a_period_of_one_year() {
+        for (quarter, [cos, sin]) in
+            [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.0]].iter().enumerate()
+        {
+            let found = waves(quarter as f64 * 365.25 / 4.0 * 86_400e6);
+            assert!((found[0] - cos).abs() < 1e-3 && (found[1] - sin).abs() < 1e-3, "{quarter}: {found:?}");
+        }
+    }
+}

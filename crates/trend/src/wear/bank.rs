@@ -574,3 +574,42 @@ impl BasisMatrix {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A law of each kind, away from its knee.
+    fn laws(age: f64) -> Vec<WearLaw> {
+        let of_powers = (0..POWERS).map(|index| WearLaw::Power { index });
+        let bends = (0..BENDS.len())
+            .flat_map(|index| [0.5, 2.0].map(|times| WearLaw::Bend { knee: times * age, index }));
+        let exponential = (0..TIME_CONSTANTS.len()).map(|index| WearLaw::Exponential { index });
+        let settling = (0..SETTLING.len()).map(|index| WearLaw::Settling { index });
+        let onsets = [0.5, 2.0].map(|times| WearLaw::Onset { start: times * age });
+        let others = [WearLaw::None].into_iter().chain(onsets);
+        of_powers.chain(bends).chain(exponential).chain(settling).chain(others).collect()
+    }
+
+    proptest! {
+        /// The derivative is that of the value, by central differences; the inverse leads back to the age.
+        #[test]
+        fn derivative_and_inverse_are_those_of_the_value(age in 50.0..3000.0_f64) {
+            for law in laws(age) {
+                let step = 1e-4 * age;
+                let (low, high) = (law.value(age - step), law.value(age + step));
+                let slope = (high - low) / (2.0 * step);
+                let found = law.derivative(age);
+                prop_assert!((found - slope).abs() <= 1e-6 * slope.abs() + 1e-12, "{law:?}: {found}, not {slope}");
+                let value = law.value(age);
+                // A value that differs from one by less than rounding has no age of its own.
+                if value > 0.0 && slope * age > 1e-6 {
+                    let back = law.inverse(value);
+                    prop_assert!((back - age).abs() < 1e-6 * age, "{law:?}: {back}, not {age}");
+                }
+            }
+        }
+    }
+}
