@@ -105,7 +105,7 @@ pub fn assess_store_with_quantities(
         return Ok(StoreAssessment::default());
     };
     let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
-    let fleet = fleet.with_diagnostics(store, as_of)?;
+    let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
     let now = fleet.selected(ask, as_of)?;
     Ok(StoreAssessment {
         followed: fleet.followed_of(&now),
@@ -169,11 +169,13 @@ pub fn assess_run(
 ) -> Result<RunAssessments, Error> {
     let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
     let (all, of_run) = (load_histories(store)?, read_histories(store, &query)?);
-    let known: BTreeSet<UnitKey> = all.names().cloned().collect();
+    let has_flights = |row: &&TrendRow| all.get(&row.unit()).is_some();
+    let lost: Vec<&TrendRow> =
+        before.into_iter().flat_map(BTreeMap::values).filter(|row| !has_flights(row)).collect();
     let mut run = assess_run_from(config, installations, all, &of_run, units, Some(store))?;
     if let Some(before) = before {
         run.changed = changed(before, &run.now);
-        run.changed.extend(gone(before.values(), &run.now, &known));
+        run.changed.extend(lost.into_iter().map(|row| gone(row, &run.now)));
     }
     Ok(run)
 }
@@ -201,13 +203,14 @@ pub fn assess_run_from(
         config.flights.iter().next().is_none() && before_utc.is_none_or(|before| of_run.all_after(before));
     let earlier = if is_later { Histories::default() } else { all.without(&names, of_run) };
     let mut fleet = FleetContext::consuming(config, installations, &mut all, &days)?;
+    let mut recent = RecentDiagnostics::default();
     if let Some(store) = store {
-        fleet = fleet.with_diagnostics(store, as_of)?;
+        (fleet, recent) = fleet.with_diagnostics(store, as_of)?;
     }
     let mut now = fleet.statements(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
     let mut run = RunAssessments {
-        recent: std::mem::take(&mut fleet.recent),
+        recent,
         followed: fleet.followed.clone(),
         mapping_faults: fleet.mapping_faults.clone(),
         notes: coverage::notes(&now, config),
@@ -273,7 +276,8 @@ pub(crate) fn assess_for_report(
     let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
-    let fleet = FleetContext::new(config, installations, histories, &days)?.with_diagnostics(store, as_of)?;
+    let fleet = FleetContext::new(config, installations, histories, &days)?;
+    let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
     let now = fleet.selected(ask, as_of)?;
     let followed = fleet.followed_of(&now);
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
@@ -389,9 +393,7 @@ pub(crate) struct FleetContext<'a> {
     conditions: BTreeMap<UnitKey, Vec<String>>,
     /// Recorder changes of whole aircraft.
     moved: Vec<RecorderChange>,
-    /// Diagnostics of the last months.
-    recent: RecentDiagnostics,
-    /// Wrong mappings that they show.
+    /// Wrong mappings of all units.
     mapping_faults: Vec<MappingFault>,
     /// Installations of the store's own units; of external tables none apply.
     installations: Option<InstallationIndex<'a>>,
@@ -455,7 +457,6 @@ impl<'a> FleetContext<'a> {
             followed: FollowedQuantities::default(),
             conditions: BTreeMap::new(),
             moved: Vec::new(),
-            recent: RecentDiagnostics::default(),
             mapping_faults: Vec::new(),
             installations: None,
         }
@@ -489,8 +490,9 @@ impl<'a> FleetContext<'a> {
         Some(self.priors.of(name.0.as_deref(), as_of)?.1)
     }
 
-    /// The same, with what the store holds in addition to gaps: followed quantities, and wrong mappings.
-    fn with_diagnostics(self, store: &Store, as_of: Timestamp) -> Result<Self, Error> {
+    /// The same, with what the store holds in addition to gaps: followed quantities, and wrong mappings; and the
+    /// diagnostics of the last months, which show them.
+    fn with_diagnostics(self, store: &Store, as_of: Timestamp) -> Result<(Self, RecentDiagnostics), Error> {
         let followed = follow(&values::read(store, as_of)?, &Facts(&self), as_of);
         let moved = recorder_changes(&followed.changes, as_of);
         let mut conditions: BTreeMap<UnitKey, Vec<String>> = BTreeMap::new();
@@ -498,11 +500,8 @@ impl<'a> FleetContext<'a> {
             conditions.entry(row.unit()).or_default().push(state.to_owned());
         }
         let recent = recent_diagnostics(store, as_of)?;
-        let parts = &self.limits.config().parts;
-        let stiffness =
-            |number: &str| Some(parts.get(&PartNumber::new(number).ok()?)?.actuator.stiffness_n_per_m());
-        let mapping_faults = mapping_faults::detect(&recent, stiffness);
-        Ok(Self { followed, conditions, moved, recent, mapping_faults, ..self })
+        let mapping_faults = mapping_faults::detect(&recent, |part| self.limits.stiffness_n_per_m(part));
+        Ok((Self { followed, conditions, moved, mapping_faults, ..self }, recent))
     }
 
     /// The wrong mappings that concern some assessed units.

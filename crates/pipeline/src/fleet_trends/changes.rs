@@ -2,7 +2,7 @@
 //!
 //! Both assessments are computed now with one prior, so nothing is stored between runs, and a new training cut-off
 //! of a prior changes no state by itself. Where a run computes records again, the assessments before it are kept.
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
@@ -35,40 +35,31 @@ pub(crate) fn changed(before: &BTreeMap<UnitKey, TrendRow>, now: &[TrendRow]) ->
     now.iter().filter_map(|row| of_unit(before.get(&row.unit()), row)).collect()
 }
 
-/// The units of which no flight is left: the records of their logs belong to other units now. `known` are all units
-/// that have flights.
-pub(crate) fn gone<'a>(
-    before: impl Iterator<Item = &'a TrendRow>,
-    now: &[TrendRow],
-    known: &BTreeSet<UnitKey>,
-) -> Vec<UnitChange> {
-    let gone = before.filter(|row| row.flights > 0 && !known.contains(&row.unit()));
-    let change = |row: &TrendRow| {
-        let is_same_place =
-            |other: &&TrendRow| other.tail_number == row.tail_number && other.position == row.position;
-        let reason = match now.iter().find(is_same_place) {
-            Some(other) => format!(
-                "no flight is left; {} of {} is {} / {} now",
-                row.position.as_deref().unwrap_or("–"),
-                row.tail_number.as_deref().unwrap_or("–"),
-                other.part_number.as_deref().unwrap_or("–"),
-                other.serial_number
-            ),
-            None => "no flight is left".to_owned(),
-        };
-        UnitChange {
-            part_number: row.part_number.clone(),
-            serial_number: row.serial_number.clone(),
-            tail_number: row.tail_number.clone(),
-            position: row.position.clone(),
-            from: row.state,
-            to: None,
-            reason: Some(reason),
-            new_events: Vec::new(),
-            cleared_events: Vec::new(),
-        }
+/// The change of a unit of which no flight is left: the records of its logs belong to another unit now.
+pub(crate) fn gone(row: &TrendRow, now: &[TrendRow]) -> UnitChange {
+    let is_same_place =
+        |other: &&TrendRow| other.tail_number == row.tail_number && other.position == row.position;
+    let reason = match now.iter().find(is_same_place) {
+        Some(other) => format!(
+            "no flight is left; {} of {} is {} / {} now",
+            row.position.as_deref().unwrap_or("–"),
+            row.tail_number.as_deref().unwrap_or("–"),
+            other.part_number.as_deref().unwrap_or("–"),
+            other.serial_number
+        ),
+        None => "no flight is left".to_owned(),
     };
-    gone.map(change).collect()
+    UnitChange {
+        part_number: row.part_number.clone(),
+        serial_number: row.serial_number.clone(),
+        tail_number: row.tail_number.clone(),
+        position: row.position.clone(),
+        from: row.state,
+        to: None,
+        reason: Some(reason),
+        new_events: Vec::new(),
+        cleared_events: Vec::new(),
+    }
 }
 
 fn of_unit(before: Option<&TrendRow>, now: &TrendRow) -> Option<UnitChange> {

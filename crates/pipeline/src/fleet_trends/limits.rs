@@ -36,9 +36,9 @@ impl<'a> Limits<'a> {
         Self { config, scale_m: LIMIT_OVER_NEW_GAP * median_m.unwrap_or(1e-5) }
     }
 
-    /// The configuration that they come from.
-    pub(crate) fn config(self) -> &'a Config {
-        self.config
+    /// Configured stiffness of a part, N/m.
+    pub(crate) fn stiffness_n_per_m(self, part: &str) -> Option<f64> {
+        Some(self.part(Some(part))?.actuator.stiffness_n_per_m())
     }
 
     /// Configured usage axis of a part's wear; nothing where its histories decide.

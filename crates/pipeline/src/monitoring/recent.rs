@@ -88,11 +88,7 @@ impl Found {
         for row in 0..chunk.len() {
             let Ok(departure_utc) = Timestamp::from_microsecond(departures.value(row)) else { continue };
             let Some(who) = keys.key_at(row) else { continue };
-            let of_position = seen.get(&keys, row).unwrap_or_else(|| {
-                let found = self.of_position(who);
-                seen.put(&keys, row, found);
-                found
-            });
+            let of_position = seen.get_or(&keys, row, || self.of_position(who));
             self.diagnostics[of_position].push(FlightDiagnostics {
                 departure_utc,
                 flight_id: flights.get(row).unwrap_or_default().into(),

@@ -151,11 +151,7 @@ impl Reader {
         let mut seen = KeyCache::default();
         for row in 0..chunk.len() {
             let Some(who) = keys.key_at(row) else { continue };
-            let (unit, place) = seen.get(&keys, row).unwrap_or_else(|| {
-                let found = self.place(who);
-                seen.put(&keys, row, found);
-                found
-            });
+            let (unit, place) = seen.get_or(&keys, row, || self.place(who));
             let values = std::array::from_fn(|k| {
                 let (values, errors) = &columns[k];
                 (at(values, row).unwrap_or(f64::NAN) as f32, at(errors, row).unwrap_or(0.0) as f32)

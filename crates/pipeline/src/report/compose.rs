@@ -419,19 +419,20 @@ fn flight(
         None => format!("refused: {reason}"),
         Some(_) => reason.to_owned(),
     });
+    let [unit_hours, gap_p05_m, gap_p95_m, gap_midrange_m, load_p05_n, load_p95_n] = extras.numbers();
     FlightRow {
         departure_utc: flown.departure_utc(),
         flight_id: history.flight_id(flown).unwrap_or_default().into(),
         tail_number,
         position,
-        unit_hours: extras.number("unit_hours"),
+        unit_hours,
         gap_m: flown.gap_m(),
-        gap_p05_m: extras.number("gap_p05_m"),
-        gap_p95_m: extras.number("gap_p95_m"),
-        gap_midrange_m: extras.number("gap_midrange_m"),
+        gap_p05_m,
+        gap_p95_m,
+        gap_midrange_m,
         load_reversals: history.extras(flown).load_reversals(),
-        load_p05_n: extras.number("load_p05_n"),
-        load_p95_n: extras.number("load_p95_n"),
+        load_p05_n,
+        load_p95_n,
         remarks: reason
             .into_iter()
             .chain(others.map(ToString::to_string))

@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::history::builder::{HistoryBuilder, at};
 use crate::history::histories::{Histories, UnitKey};
 use crate::history::parallel_scan::read_each;
-use crate::history::row_keys::{KeyCache, KeyColumns, TextColumn};
+use crate::history::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
 
 /// Columns of numbers that a page shows and no assessment needs.
 const NUMBERS: [&str; 6] =
@@ -40,10 +40,9 @@ pub(super) struct FlightExtras {
 }
 
 impl FlightExtras {
-    /// The number of a column.
-    pub(super) fn number(&self, column: &str) -> Option<f64> {
-        let index = NUMBERS.iter().position(|name| *name == column)?;
-        Some(self.numbers[index]).filter(|value| !value.is_nan())
+    /// The numbers, in the order of [`NUMBERS`].
+    pub(super) fn numbers(&self) -> [Option<f64>; NUMBERS.len()] {
+        self.numbers.map(|value| Some(value).filter(|value| !value.is_nan()))
     }
 }
 
@@ -92,16 +91,7 @@ impl ExtrasReader {
         let mut seen = KeyCache::default();
         for row in 0..chunk.len() {
             let Some(who) = keys.key_at(row) else { continue };
-            let unit = seen.get(&keys, row).unwrap_or_else(|| {
-                let name = (who.part_number.map(str::to_owned), who.serial_number.to_owned());
-                let units = &mut self.units;
-                let unit = *self.names.entry(name).or_insert_with(|| {
-                    units.push(Vec::new());
-                    units.len() - 1
-                });
-                seen.put(&keys, row, unit);
-                unit
-            });
+            let unit = seen.get_or(&keys, row, || self.unit(who));
             self.units[unit].push(FlightExtras {
                 numbers: std::array::from_fn(|k| at(&numbers[k], row).unwrap_or(f64::NAN)),
                 reason: reasons.get(row).map(Into::into),
@@ -110,6 +100,16 @@ impl ExtrasReader {
             });
         }
         Ok(())
+    }
+
+    /// Index of a unit.
+    fn unit(&mut self, who: RowKey<'_>) -> usize {
+        let name = (who.part_number.map(str::to_owned), who.serial_number.to_owned());
+        let units = &mut self.units;
+        *self.names.entry(name).or_insert_with(|| {
+            units.push(Vec::new());
+            units.len() - 1
+        })
     }
 }
 

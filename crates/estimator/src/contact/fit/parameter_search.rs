@@ -27,8 +27,7 @@ const BRISTLES: [f64; 3] = [0.3, 1.0, 3.0];
 const REFINEMENTS: [[f64; 2]; 2] = [[0.6, 1.6], [0.8, 1.25]];
 /// First and last step of the load zero over the 95 % load; steps are halved in between.
 const ZERO_STEPS: (f64, f64) = (0.04, 0.002);
-
-/// Most steps of that search: twice the 95 % load and back.
+/// Most steps of that search; first steps alone reach four times the 95 % load.
 const MAX_ZERO_MOVES: usize = 100;
 /// Step over the 95 % load for the curvature of the misfit by the load zero.
 const ZERO_ERROR_STEP: f64 = 0.02;
