@@ -1,4 +1,5 @@
-//! Fuzzing on stable Rust: seeded mutations of a corpus of real files. An input with a new outcome joins the corpus.
+//! Fuzzing on stable Rust: seeded mutations of a corpus of real files. An input with a new outcome joins the corpus; in a
+//! build with counters (`tests/fuzz/run`), also an input that takes a branch as often as no input before.
 //!
 //! A gate run tries a fixed number of cases. `FREEPLAY_FUZZ_S` is the time of each target in seconds, and
 //! `FREEPLAY_FUZZ_SEED` another seed; `FREEPLAY_FUZZ_INPUT` is a kept input to try alone. `docs/reliability.md` has the
@@ -51,6 +52,63 @@ pub(crate) struct Input {
     pub(crate) bytes: Vec<u8>,
 }
 
+/// Counts of the branches that are taken, in a build that counts them.
+#[derive(Default)]
+struct Branches {
+    /// Of each branch, the classes of counts seen so far, a bit each.
+    seen: Vec<u8>,
+    /// Branches that some input has taken.
+    taken: usize,
+}
+
+impl Branches {
+    /// Sets all counts to zero.
+    fn clear() {
+        counters().fill(0);
+    }
+
+    /// Whether some branch was taken as often as never before: once, twice, three times, up to 7, 15, 31, 127 or more
+    /// (Zalewski 2014, American fuzzy lop, technical details).
+    fn are_new(&mut self) -> bool {
+        let counts = counters();
+        self.seen.resize(counts.len(), 0);
+        let mut is_new = false;
+        for (seen, count) in self.seen.iter_mut().zip(counts).filter(|(_, count)| **count > 0) {
+            let class = match *count {
+                count @ 0..=3 => 1 << (count.max(1) - 1),
+                4..=7 => 8,
+                8..=15 => 16,
+                16..=31 => 32,
+                32..=127 => 64,
+                128.. => 128,
+            };
+            self.taken += usize::from(*seen == 0);
+            is_new |= *seen & class == 0;
+            *seen |= class;
+        }
+        is_new
+    }
+}
+
+#[cfg(not(branch_counters))]
+fn counters() -> &'static mut [u8] {
+    &mut []
+}
+
+#[cfg(branch_counters)]
+#[allow(unsafe_code, reason = "the counters are an array of the linker")]
+fn counters() -> &'static mut [u8] {
+    unsafe extern "C" {
+        fn freeplay_branch_counters(count: *mut usize) -> *mut u8;
+    }
+    let mut count = 0;
+    // SAFETY: the array lives as long as the program; a lost increment of another thread is a slightly other count.
+    unsafe {
+        let first = freeplay_branch_counters(&raw mut count);
+        std::slice::from_raw_parts_mut(first, count)
+    }
+}
+
 /// A case in progress, for the thread that looks for hangs.
 type Watched = Arc<Mutex<Option<(Instant, Vec<u8>)>>>;
 
@@ -76,19 +134,24 @@ pub(crate) fn fuzz(
     let watched: Watched = Arc::default();
     watch(name, &watched);
     let (mut outcomes, mut failures, mut cases) = (BTreeSet::new(), Vec::new(), 0);
+    let mut branches = Branches::default();
     let begun = Instant::now();
     let originals = pool.len();
     while time.map_or(cases < gate_cases.max(originals), |time| begun.elapsed() < time) {
         // Each corpus file as it is, then mutations.
-        let mut input = if cases < originals { pool[cases].clone() } else { random.pick(&pool).clone() };
+        // Later inputs reach further and are chosen more often.
+        let place = random.below(pool.len()).max(random.below(pool.len()));
+        let mut input = pool[if cases < originals { cases } else { place }].clone();
         if cases >= originals {
             mutate(&mut random, &mut input);
         }
         cases += 1;
         *watched.lock().unwrap_or_else(PoisonError::into_inner) = Some((Instant::now(), input.bytes.clone()));
+        Branches::clear();
         match catch_unwind(AssertUnwindSafe(|| run(&input.bytes))) {
             Ok(outcome) => {
-                if outcomes.insert(outcome) && cases > originals && pool.len() < MAX_POOL {
+                let is_new = branches.are_new();
+                if (outcomes.insert(outcome) || is_new) && cases > originals && pool.len() < MAX_POOL {
                     pool.push(input);
                 }
             }
@@ -105,9 +168,11 @@ pub(crate) fn fuzz(
     }
     *watched.lock().unwrap_or_else(PoisonError::into_inner) = None;
     print(&format!(
-        "| {name} | {originals} | {} | {cases} | {} | {} |",
+        "| {name} | {originals} | {} | {cases} | {} | {} | {} | {} |",
         begun.elapsed().as_secs(),
         outcomes.len(),
+        branches.taken,
+        pool.len(),
         failures.len()
     ));
     assert!(failures.is_empty(), "{name}, seed {seed}:\n{}", failures.join("\n"));

@@ -11,9 +11,18 @@ use crate::mapping::column_pattern::PLACEHOLDER;
 /// Code of a read that failed for a cause which may pass by itself.
 const READ_FAILED: &str = "read_failed";
 
-/// Whether an error of this code may pass although nothing is changed here, so that the log is worth another attempt.
-pub fn is_passing(code: &str) -> bool {
+/// Code of a file that the system does not open or read, because of permissions for one.
+const UNREADABLE: &str = "unreadable";
+
+/// Whether an error of this code may pass within seconds, so that the log is worth another attempt at once.
+pub fn is_transient(code: &str) -> bool {
     code == READ_FAILED
+}
+
+/// Whether an error of this code may pass although the log stays as it is, so that each run tries it again: the system
+/// did not return the content.
+pub fn is_passing(code: &str) -> bool {
+    is_transient(code) || code == UNREADABLE
 }
 
 /// One file's trouble.
@@ -144,7 +153,7 @@ impl ErrorKind {
     pub fn code(&self) -> &'static str {
         match self {
             Self::Unreadable { source } if transient::is_transient(source) => READ_FAILED,
-            Self::Unreadable { .. } => "unreadable",
+            Self::Unreadable { .. } => UNREADABLE,
             Self::Object(source) => source.code(),
             Self::Empty => "empty_log",
             Self::NotParquet { .. } | Self::ForeignFormat { .. } => "not_parquet",
@@ -354,10 +363,14 @@ fn unreadable(source: &io::Error) -> String {
 fn missing_remedy(source: &io::Error) -> String {
     match source.kind() {
         io::ErrorKind::NotFound => "check the name, and that the disk or share is mounted",
-        io::ErrorKind::PermissionDenied => "run as a user with read access, or change the file mode",
+        io::ErrorKind::PermissionDenied => {
+            "run as a user with read access, or change the file mode; the next run tries again"
+        }
         io::ErrorKind::IsADirectory => "name the file, or the files in it: `FOLDER/*.parquet`",
-        _ if transient::is_transient(source) => "check the disk or share; the next run tries again",
-        _ => "check the disk",
+        _ if transient::is_file_limit(source) => {
+            "allow more open files (`ulimit -n 4096`); the next run tries again"
+        }
+        _ => "check the disk or share; the next run tries again",
     }
     .into()
 }

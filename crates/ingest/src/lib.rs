@@ -62,7 +62,7 @@ pub mod time;
 
 pub use channel::quality::Quality;
 pub use channel::si_conversion::Geometry;
-pub use error::{Error, ErrorKind, is_passing};
+pub use error::{Error, ErrorKind, is_passing, is_transient};
 pub use log::identity::Identity;
 pub use log::{ActuatorChannels, ActuatorColumns, Log, LogFiles};
 pub use mapping::{

@@ -88,8 +88,20 @@ impl Error {
         diagnostic.hint(self.remedy())
     }
 
+    /// The error of the system that caused this one, if one did: it says nothing about the content of the store.
+    fn system_error(&self) -> Option<&std::io::Error> {
+        match self {
+            Self::Io { source, .. } => Some(source),
+            Self::Table { source, .. } | Self::LogTable { source } => os_error(source),
+            Self::Frame(source) => os_error(source),
+            Self::Parquet(source) => os_error(source),
+            _ => None,
+        }
+    }
+
     fn code(&self) -> &'static str {
         match self {
+            _ if self.system_error().is_some() => "store_io",
             Self::Missing { .. } => "store_missing",
             Self::Foreign { .. } | Self::Name { .. } => "store_foreign",
             Self::Format { .. } | Self::Torn { .. } => "store_format",
@@ -117,6 +129,9 @@ impl Error {
     }
 
     fn remedy(&self) -> &'static str {
+        if let Some(error) = self.system_error() {
+            return io_remedy(error);
+        }
         match self {
             Self::Missing { .. } => "create it with `freeplay run`, or correct `path` under `[store]`",
             Self::Foreign { .. } => "name a new or an empty folder as `store` in the configuration",
@@ -127,10 +142,7 @@ impl Error {
             Self::Itself { .. } => {
                 "name the store of the trial, and let the configuration name the one that takes it over"
             }
-            Self::Io { source, .. } => io_remedy(source.kind()),
-            Self::Table { source, .. } if io_cause(source).is_some() => {
-                io_cause(source).map_or("", |cause| io_remedy(cause.kind()))
-            }
+            Self::Io { source, .. } => io_remedy(source),
             Self::Table { verb: "read", .. } => {
                 "its log (`_delta_log` in the table's folder) may be truncated: restore the store from a backup; without \
                  one, remove it and run its logs again"
@@ -159,8 +171,8 @@ impl Error {
 }
 
 /// What to do when the system refuses.
-fn io_remedy(kind: ErrorKind) -> &'static str {
-    match kind {
+fn io_remedy(error: &std::io::Error) -> &'static str {
+    match error.kind() {
         ErrorKind::NotFound => {
             "list all missing files with `freeplay store verify` and restore them from a \
              backup"
@@ -173,6 +185,10 @@ fn io_remedy(kind: ErrorKind) -> &'static str {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
             "free space and run again; earlier results are intact"
         }
+        // `EMFILE` and `ENFILE`, which `ErrorKind` does not know.
+        _ if cfg!(unix) && matches!(error.raw_os_error(), Some(23 | 24)) => {
+            "allow more open files (`ulimit -n 4096`), and run again"
+        }
         _ => {
             "check the disk or the mount, and run again: the system could not read or write, which says nothing about \
              the content of the store"
@@ -180,16 +196,11 @@ fn io_remedy(kind: ErrorKind) -> &'static str {
     }
 }
 
-/// The system error that caused an error of the Delta library.
-fn io_cause(error: &DeltaTableError) -> Option<&std::io::Error> {
-    let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
-    while let Some(error) = cause {
-        if let Some(found) = error.downcast_ref::<std::io::Error>() {
-            return Some(found);
-        }
-        cause = error.source();
-    }
-    None
+/// The error of the system below an error of a library; an `io::Error` that a library made of a truncated file is none.
+fn os_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a std::io::Error> {
+    std::iter::successors(Some(error), |error| error.source())
+        .filter_map(|error| error.downcast_ref::<std::io::Error>())
+        .find(|error| error.raw_os_error().is_some())
 }
 
 /// First line of the message. The libraries add the location in their own code, which does not help users.

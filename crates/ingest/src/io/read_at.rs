@@ -14,7 +14,21 @@ use crate::io::transient;
 
 /// A file for Parquet's readers.
 #[derive(Debug)]
-pub(crate) struct PreadFile(pub(crate) File);
+pub(crate) struct PreadFile {
+    file: File,
+    /// Length when it was opened, bytes: [`Length`] cannot report an error.
+    length: u64,
+}
+
+impl PreadFile {
+    /// A handle of its own on a file.
+    ///
+    /// # Errors
+    /// When the system gives no handle or no length.
+    pub(crate) fn new(file: &File) -> io::Result<Self> {
+        Ok(Self { file: transient::with_retry(|| file.try_clone())?, length: file_length(file)? })
+    }
+}
 
 /// A stretch of a file from some byte on.
 #[derive(Debug)]
@@ -33,7 +47,7 @@ impl Read for PreadCursor {
 
 impl Length for PreadFile {
     fn len(&self) -> u64 {
-        file_length(&self.0).unwrap_or(0)
+        self.length
     }
 }
 
@@ -41,12 +55,12 @@ impl ChunkReader for PreadFile {
     type T = BufReader<PreadCursor>;
 
     fn get_read(&self, start: u64) -> Result<Self::T> {
-        Ok(BufReader::new(PreadCursor { file: self.0.try_clone()?, at: start }))
+        Ok(BufReader::new(PreadCursor { file: self.file.try_clone()?, at: start }))
     }
 
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {
         let mut buffer = vec![0; length];
-        read_exact(&self.0, &mut buffer, start)?;
+        read_exact(&self.file, &mut buffer, start)?;
         Ok(buffer.into())
     }
 }
@@ -102,7 +116,7 @@ mod tests {
         let mut file = tempfile::tempfile().unwrap();
         let content: Vec<u8> = (0..251_u8).cycle().take(100_000).collect();
         file.write_all(&content).unwrap();
-        let file = PreadFile(file);
+        let file = PreadFile::new(&file).unwrap();
         std::thread::scope(|scope| {
             for reader in 0..8_usize {
                 let (file, content) = (&file, &content);

@@ -1,4 +1,4 @@
-//! Errors of local files that may pass by themselves: retried, and remembered when they do not pass.
+//! Errors of local files: retried where they may pass by themselves, and remembered where they do not pass.
 //!
 //! A disk or a network share may fail a read once and serve the next. A parser that stands between the read and the
 //! caller turns the cause into "not Parquet" or "a page cannot be decoded". The cause is therefore kept per thread
@@ -16,6 +16,8 @@ const DELAYS: [Duration; 3] =
 const INPUT_OUTPUT_ERROR: i32 = 5;
 /// `EREMOTEIO` of Linux.
 const REMOTE_INPUT_OUTPUT_ERROR: i32 = 121;
+/// `ENFILE` and `EMFILE`: the system, or the process, has as many files open as it may.
+const TOO_MANY_OPEN_FILES: [i32; 2] = [23, 24];
 
 thread_local! {
     static FAILED_READ: RefCell<Option<io::Error>> = const { RefCell::new(None) };
@@ -37,12 +39,19 @@ pub(crate) fn is_transient(error: &io::Error) -> bool {
             | Kind::ConnectionReset
             | Kind::ConnectionAborted
             | Kind::NotConnected
+            | Kind::OutOfMemory
     );
     let by_number = [INPUT_OUTPUT_ERROR, REMOTE_INPUT_OUTPUT_ERROR].map(Some).contains(&error.raw_os_error());
-    by_kind || (cfg!(unix) && by_number)
+    by_kind || (cfg!(unix) && by_number) || is_file_limit(error)
 }
 
-/// Repeats an operation while its error is transient, and remembers the last such error of this thread.
+/// Whether too many files are open.
+pub(crate) fn is_file_limit(error: &io::Error) -> bool {
+    cfg!(unix) && TOO_MANY_OPEN_FILES.map(Some).contains(&error.raw_os_error())
+}
+
+/// Repeats an operation while its error is transient, and remembers the error of this thread, since it says nothing about
+/// the content of the file. That a file is missing is an answer.
 pub(crate) fn with_retry<T>(mut operation: impl FnMut() -> io::Result<T>) -> io::Result<T> {
     let mut delays = DELAYS.into_iter();
     loop {
@@ -53,18 +62,20 @@ pub(crate) fn with_retry<T>(mut operation: impl FnMut() -> io::Result<T>) -> io:
             }
             Err(error) => error,
         };
-        if !is_transient(&error) {
-            return Err(error);
+        match delays.next().filter(|_| is_transient(&error)) {
+            Some(delay) => std::thread::sleep(delay),
+            None => {
+                let is_of_system = error.raw_os_error().is_some() && error.kind() != io::ErrorKind::NotFound;
+                if is_transient(&error) || is_of_system {
+                    FAILED_READ.set(Some(copy(&error)));
+                }
+                return Err(error);
+            }
         }
-        let Some(delay) = delays.next() else {
-            FAILED_READ.set(Some(copy(&error)));
-            return Err(error);
-        };
-        std::thread::sleep(delay);
     }
 }
 
-/// The transient error that the latest read of this thread ended with; it is forgotten.
+/// The error that the latest read of this thread ended with; it is forgotten.
 pub(crate) fn take_failed_read() -> Option<io::Error> {
     FAILED_READ.take()
 }
@@ -82,8 +93,9 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn errors_of_a_share_that_comes_back_are_transient_and_missing_files_are_not() {
-        let [eintr, eio, eagain, ebusy, etimedout, estale] = [4, 5, 11, 16, 110, 116];
-        for number in [eintr, eio, eagain, ebusy, etimedout, estale] {
+        let [eintr, eio, eagain, enomem, ebusy, enfile, emfile] = [4, 5, 11, 12, 16, 23, 24];
+        let [etimedout, estale] = [110, 116];
+        for number in [eintr, eio, eagain, enomem, ebusy, enfile, emfile, etimedout, estale] {
             assert!(is_transient(&io::Error::from_raw_os_error(number)), "{number}");
         }
         let [enoent, eacces, eisdir, enospc] = [2, 13, 21, 28];

@@ -110,8 +110,8 @@ impl LogFile {
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         // Parquet's own reader of files neither reads at a position nor repeats a read.
-        let reader = file.try_clone().map_err(|source| fail(ErrorKind::Unreadable { source }))?;
-        let footer = ArrowReaderMetadata::load(&PreadFile(reader), options).map_err(|e| {
+        let input = PreadFile::new(file).map_err(|source| fail(ErrorKind::Unreadable { source }))?;
+        let footer = ArrowReaderMetadata::load(&input, options).map_err(|e| {
             fail(match transient::take_failed_read() {
                 Some(source) => ErrorKind::Unreadable { source },
                 None => footer_error(&source, &e),
@@ -355,11 +355,11 @@ impl LogFile {
     }
 
     fn column(&self, group: usize, leaf: &LeafColumn, scan: Scan<'_>) -> Result<BatchIter, Error> {
-        let file =
-            self.source.file().try_clone().map_err(|source| self.error(ErrorKind::Unreadable { source }))?;
+        let input = PreadFile::new(self.source.file())
+            .map_err(|source| self.error(ErrorKind::Unreadable { source }))?;
         let is_coded = scan.as_codes && self.is_coded(group, leaf);
         let footer = if is_coded { self.coded_footer() } else { None }.unwrap_or(&self.footer);
-        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(PreadFile(file), footer.clone());
+        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(input, footer.clone());
         let mask = ProjectionMask::leaves(builder.parquet_schema(), [leaf.index]);
         let reader =
             builder.with_projection(mask).with_row_groups(vec![group]).with_batch_size(scan.batch_rows);
@@ -446,6 +446,10 @@ impl LogFile {
     }
 
     fn decode(&self, leaf: &LeafColumn, group: usize, detail: String) -> Error {
+        // Before the footer is read again, which would succeed.
+        if let Some(source) = transient::take_failed_read() {
+            return self.error(ErrorKind::Unreadable { source });
+        }
         if let Some(column) = raw_footer::encrypted(self.source.file(), leaf.index) {
             let column = column.then(|| leaf.name.clone());
             return self.error(ErrorKind::Encrypted { column });
@@ -459,7 +463,7 @@ impl LogFile {
 
     /// Feeds the footer and the chunks of the named leaves, in the order of the file, into a digest.
     ///
-    /// Equal digests mean equal data read, whatever the name of the file and whatever
+    /// Equal digests mean equal data read, whatever the name of the file and
     /// whatever else was added to it.
     pub(crate) fn feed(&self, names: &[&str], digest: &mut Digest) -> Result<(), Error> {
         let unreadable = |source| self.error(ErrorKind::Unreadable { source });

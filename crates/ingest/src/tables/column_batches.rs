@@ -237,8 +237,8 @@ fn parquet(
     coded: &[&str],
 ) -> Result<(File, ArrowReaderMetadata, ProjectionMask), ErrorKind> {
     let opened = whole(file)?;
-    let clone = opened.try_clone().map_err(|source| ErrorKind::Unreadable { source })?;
-    let found = ArrowReaderMetadata::load(&PreadFile(clone), ArrowReaderOptions::new());
+    let input = PreadFile::new(&opened).map_err(|source| ErrorKind::Unreadable { source })?;
+    let found = ArrowReaderMetadata::load(&input, ArrowReaderOptions::new());
     let found = found.map_err(|e| torn(&e))?;
     let footer = if coded.is_empty() { found } else { with_codes(found, coded) };
     let columns = footer.parquet_schema().root_schema().get_fields().iter().enumerate();
@@ -272,11 +272,11 @@ fn groups(
     mask: ProjectionMask,
     groups: Range<usize>,
 ) -> Result<(Rows, Arc<Schema>, usize), ErrorKind> {
-    let clone = file.try_clone().map_err(|source| ErrorKind::Unreadable { source })?;
+    let input = PreadFile::new(file).map_err(|source| ErrorKind::Unreadable { source })?;
     let some = footer.metadata().row_groups();
     let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();
     let groups = groups.start..groups.end.min(some.len());
-    let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(PreadFile(clone), footer.clone());
+    let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(input, footer.clone());
     let builder = builder.with_projection(mask).with_row_groups(groups.collect()).with_batch_size(ROWS);
     let reader = builder.build().map_err(|e| torn(&e))?;
     let schema = arrow::array::RecordBatchReader::schema(&reader);

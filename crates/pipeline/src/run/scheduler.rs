@@ -312,7 +312,7 @@ impl WorkerContext<'_> {
             let done = self.process_once(work);
             match &done {
                 LogOutcomeData::Read { diagnostics, .. }
-                    if diagnostics.iter().any(|diagnostic| ingest::is_passing(&diagnostic.code)) =>
+                    if diagnostics.iter().any(|diagnostic| ingest::is_transient(&diagnostic.code)) =>
                 {
                     std::thread::sleep(delay);
                 }
