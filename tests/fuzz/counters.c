@@ -13,3 +13,6 @@ unsigned char *freeplay_branch_counters(size_t *count) {
   *count = (size_t)(end - first);
   return first;
 }
+
+/* Indirect calls are instrumented too; each callee has its own counters. */
+void __sanitizer_cov_trace_pc_indir(void *callee) { (void)callee; }

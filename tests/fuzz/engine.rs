@@ -134,14 +134,14 @@ pub(crate) fn fuzz(
     let watched: Watched = Arc::default();
     watch(name, &watched);
     let (mut outcomes, mut failures, mut cases) = (BTreeSet::new(), Vec::new(), 0);
-    let mut branches = Branches::default();
+    let (mut branches, mut by_branch) = (Branches::default(), Vec::new());
     let begun = Instant::now();
     let originals = pool.len();
     while time.map_or(cases < gate_cases.max(originals), |time| begun.elapsed() < time) {
         // Each corpus file as it is, then mutations.
-        // Later inputs reach further and are chosen more often.
-        let place = random.below(pool.len()).max(random.below(pool.len()));
-        let mut input = pool[if cases < originals { cases } else { place }].clone();
+        // Inputs that only took new branches are often refused early: half of the cases start from others.
+        let from = if random.below(2) == 0 || by_branch.is_empty() { &pool } else { &by_branch };
+        let mut input = if cases < originals { pool[cases].clone() } else { random.pick(from).clone() };
         if cases >= originals {
             mutate(&mut random, &mut input);
         }
@@ -151,8 +151,10 @@ pub(crate) fn fuzz(
         match catch_unwind(AssertUnwindSafe(|| run(&input.bytes))) {
             Ok(outcome) => {
                 let is_new = branches.are_new();
-                if (outcomes.insert(outcome) || is_new) && cases > originals && pool.len() < MAX_POOL {
-                    pool.push(input);
+                let is_other = outcomes.insert(outcome);
+                let grown = if is_other { &mut pool } else { &mut by_branch };
+                if (is_other || is_new) && cases > originals && grown.len() < MAX_POOL {
+                    grown.push(input);
                 }
             }
             Err(panic) => {
@@ -172,7 +174,7 @@ pub(crate) fn fuzz(
         begun.elapsed().as_secs(),
         outcomes.len(),
         branches.taken,
-        pool.len(),
+        pool.len() + by_branch.len(),
         failures.len()
     ));
     assert!(failures.is_empty(), "{name}, seed {seed}:\n{}", failures.join("\n"));
