@@ -137,6 +137,8 @@ pub(crate) fn fuzz(
     let (mut branches, mut by_branch) = (Branches::default(), Vec::new());
     let begun = Instant::now();
     let originals = pool.len();
+    // Loops over long inputs take branches as often as never before, and are slow.
+    let longest = 1000 + 2 * pool.iter().map(|input| input.bytes.len()).max().unwrap_or(0);
     while time.map_or(cases < gate_cases.max(originals), |time| begun.elapsed() < time) {
         // Each corpus file as it is, then mutations.
         // Inputs that only took new branches are often refused early: half of the cases start from others.
@@ -153,7 +155,8 @@ pub(crate) fn fuzz(
                 let is_new = branches.are_new();
                 let is_other = outcomes.insert(outcome);
                 let grown = if is_other { &mut pool } else { &mut by_branch };
-                if (is_other || is_new) && cases > originals && grown.len() < MAX_POOL {
+                let is_short = input.bytes.len() <= longest;
+                if (is_other || is_new) && is_short && cases > originals && grown.len() < MAX_POOL {
                     grown.push(input);
                 }
             }

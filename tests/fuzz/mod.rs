@@ -186,6 +186,14 @@ fn fuzz_estimators() {
                         "{:?}",
                         found.gap_se_m
                     );
+                    assert!(found.stiffness_n_per_m.is_none_or(|k| k > 0.0), "{:?}", found.stiffness_n_per_m);
+                    let errors = [
+                        found.stiffness_se_n_per_m,
+                        found.skew_se_s,
+                        found.load_delay_se_s,
+                        found.load_zero_se_n,
+                    ];
+                    assert!(errors.into_iter().flatten().all(|se| se >= 0.0), "{errors:?}");
                 }
                 format!("{:?} {:?} {:?}", found.status, found.reason, found.flags)
             }

@@ -208,7 +208,8 @@ pub fn schema<R: Row>() -> SchemaRef {
     Arc::new(Schema::new(columns::<R>().iter().map(Column::field).collect::<Vec<_>>()))
 }
 
-/// Rows as columns. Times are cut to whole microseconds; every number keeps its bits.
+/// Rows as columns. Times are cut to whole microseconds; a number that is not finite is missing, where it may be, and every
+/// other keeps its bits.
 ///
 /// # Errors
 /// [`RowError::Arrow`] when there are more rows than a batch can hold.
@@ -410,7 +411,10 @@ cell!(Option<String>, DataType::Utf8, nullable: true, |cells| cells
     .collect::<StringArray>());
 cell!(Vec<String>, DataType::List(list_element()), nullable: false, |cells| texts(cells));
 cell!(f64, DataType::Float64, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<Float64Array>());
-cell!(Option<f64>, DataType::Float64, nullable: true, |cells| cells.iter().map(|c| **c).collect::<Float64Array>());
+cell!(Option<f64>, DataType::Float64, nullable: true, |cells| cells
+    .iter()
+    .map(|c| c.filter(|value| value.is_finite()))
+    .collect::<Float64Array>());
 cell!(i64, DataType::Int64, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<Int64Array>());
 cell!(Option<i64>, DataType::Int64, nullable: true, |cells| cells.iter().map(|c| **c).collect::<Int64Array>());
 cell!(bool, DataType::Boolean, nullable: false, |cells| cells.iter().map(|c| Some(**c)).collect::<BooleanArray>());
@@ -424,7 +428,7 @@ read_cell!(f64, |cells| {
     let number = cells.number();
     cells.required(number)
 });
-read_cell!(Option<f64>, |cells| Ok(cells.number()));
+read_cell!(Option<f64>, |cells| Ok(cells.number().filter(|value| value.is_finite())));
 read_cell!(i64, |cells| {
     let count = cells.count();
     cells.required(count)

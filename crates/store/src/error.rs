@@ -57,7 +57,7 @@ pub enum Error {
     #[error("column `{column}`, row {row}: {problem}")]
     Value { column: &'static str, row: usize, problem: String },
     /// The engine that reads data files gave up.
-    #[error("data files cannot be read: {0}")]
+    #[error("data files cannot be read: {}", without_setting(.0))]
     Frame(#[from] polars::error::PolarsError),
     /// Rows could not be brought into columns, or columns into a format.
     #[error("rows cannot be brought into columns: {0}")]
@@ -89,9 +89,8 @@ impl Error {
     }
 
     /// The error of the system that caused this one, if one did: it says nothing about the content of the store.
-    fn system_error(&self) -> Option<&std::io::Error> {
+    fn system_error(&self) -> Option<std::io::Error> {
         match self {
-            Self::Io { source, .. } => Some(source),
             Self::Table { source, .. } | Self::LogTable { source } => os_error(source),
             Self::Frame(source) => os_error(source),
             Self::Parquet(source) => os_error(source),
@@ -130,7 +129,7 @@ impl Error {
 
     fn remedy(&self) -> &'static str {
         if let Some(error) = self.system_error() {
-            return io_remedy(error);
+            return io_remedy(&error);
         }
         match self {
             Self::Missing { .. } => "create it with `freeplay run`, or correct `path` under `[store]`",
@@ -196,11 +195,20 @@ fn io_remedy(error: &std::io::Error) -> &'static str {
     }
 }
 
-/// The error of the system below an error of a library; an `io::Error` that a library made of a truncated file is none.
-fn os_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a std::io::Error> {
-    std::iter::successors(Some(error), |error| error.source())
-        .filter_map(|error| error.downcast_ref::<std::io::Error>())
-        .find(|error| error.raw_os_error().is_some())
+/// The error of the system below an error of a library. Some libraries keep only its text, whose end is of the standard
+/// library: `(os error 24)`.
+fn os_error(error: &(dyn std::error::Error + 'static)) -> Option<std::io::Error> {
+    let number = |error: &dyn std::error::Error| {
+        let text = error.to_string();
+        text.rsplit_once("(os error ")?.1.split_once(')')?.0.parse().ok()
+    };
+    let number = std::iter::successors(Some(error), |error| error.source()).find_map(number)?;
+    Some(std::io::Error::from_raw_os_error(number))
+}
+
+/// The message without a setting of Polars that shows longer paths.
+fn without_setting(error: &polars::error::PolarsError) -> String {
+    error.to_string().replace(" (set POLARS_VERBOSE=1 to see full path)", "")
 }
 
 /// First line of the message. The libraries add the location in their own code, which does not help users.
@@ -229,5 +237,19 @@ mod tests {
             let error = Error::Table { table: "gaps", verb: "read", source };
             assert!(error.remedy().contains("run again") && !error.remedy().contains("remove"), "{code}");
         }
+    }
+
+    /// Polars and the parquet crate wrap the error of the system, or keep its text alone.
+    #[test]
+    fn a_system_error_below_a_data_file_is_no_damage() {
+        let emfile = || std::io::Error::from_raw_os_error(24);
+        let of_parquet = parquet::errors::ParquetError::External(Box::new(emfile()));
+        let of_polars = polars::error::PolarsError::ComputeError(format!("{}: …/a.parquet", emfile()).into());
+        for error in [Error::Parquet(of_parquet), Error::Frame(of_polars)] {
+            assert_eq!(error.code(), "store_io");
+            assert!(error.remedy().contains("ulimit -n"), "{}", error.remedy());
+        }
+        let damage = parquet::errors::ParquetError::EOF("eof".to_owned());
+        assert_eq!(Error::Parquet(damage).code(), "store_unreadable");
     }
 }

@@ -13,7 +13,8 @@ pub enum Rejection {
     TravelTooSmall,
     /// Fewer than 20 samples a second, or a load that vibrates faster than it is sampled.
     RateTooLow,
-    /// δX travels further than gap and wind-up account for: friction may hold the screw within the gap.
+    /// δX travels further than gap and wind-up account for: friction may hold the screw within the gap. Or gap or stiffness
+    /// would be negative.
     MotionUnexplained,
     /// Under nine seconds of sound samples, or too few in contact.
     TooShort,

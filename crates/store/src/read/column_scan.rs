@@ -7,9 +7,9 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, BooleanArray, RecordBatch, new_null_array};
-use arrow::compute::{and, cast};
-use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use arrow::array::{ArrayRef, AsArray, BooleanArray, RecordBatch, new_null_array};
+use arrow::compute::{and, cast, nullif};
+use arrow::datatypes::{DataType, Field, Float64Type, Schema, SchemaRef};
 use arrow::error::ArrowError;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
@@ -79,7 +79,7 @@ impl ColumnScan {
         let mask = mask(&builder, self.schema.fields().iter().map(|field| field.name().as_str()));
         // A group's dictionary serves its rows alone.
         let rows = builder.with_projection(mask).with_batch_size(GROUP_ROWS).build()?;
-        rows.map(|batch| Ok(cast_to_schema(&batch?, &self.schema)?)).collect()
+        rows.map(|batch| Ok(without_infinities(cast_to_schema(&batch?, &self.schema)?)?)).collect()
     }
 
     /// Row filter on the selected columns.
@@ -111,6 +111,21 @@ pub(crate) fn cast_to_schema(batch: &RecordBatch, schema: &SchemaRef) -> Result<
     };
     let columns = schema.fields().iter().map(column).collect::<Result<Vec<ArrayRef>, _>>()?;
     RecordBatch::try_new(Arc::clone(schema), columns)
+}
+
+/// A batch whose numbers are finite or missing: an infinite diagnostic of one refused flight, written by a release
+/// before 2026-11-23, must not refuse the whole table.
+fn without_infinities(batch: RecordBatch) -> Result<RecordBatch, ArrowError> {
+    let column = |(field, column): (&Arc<Field>, &ArrayRef)| {
+        let numbers = column.as_primitive_opt::<Float64Type>().filter(|_| field.is_nullable());
+        match numbers.filter(|numbers| numbers.values().iter().any(|value| !value.is_finite())) {
+            Some(numbers) => nullif(column, &BooleanArray::from_unary(numbers, |value| !value.is_finite())),
+            None => Ok(Arc::clone(column)),
+        }
+    };
+    let schema = batch.schema();
+    let columns = schema.fields().iter().zip(batch.columns()).map(column).collect::<Result<_, _>>()?;
+    RecordBatch::try_new(schema, columns)
 }
 
 /// A column's form in a part.
@@ -154,7 +169,7 @@ fn fits(query: &Query, batch: &RecordBatch) -> Result<BooleanArray, ArrowError> 
 
 #[cfg(test)]
 mod tests {
-    use arrow::array::{LargeStringArray, TimestampNanosecondArray};
+    use arrow::array::{Float64Array, LargeStringArray, TimestampNanosecondArray};
     use jiff::Timestamp;
 
     use super::*;
@@ -178,5 +193,21 @@ mod tests {
         };
         assert_eq!(fits(&query, &found).unwrap(), BooleanArray::from(vec![false, false, true]));
         assert!(cast_to_schema(&batch, &schema_of(&["serial_number"]).unwrap()).is_err());
+    }
+
+    /// A NIS that overflowed, of a log with samples of 1e300, was stored as infinity: every trend ended with exit code 2.
+    #[test]
+    fn an_infinite_number_is_read_as_missing() {
+        let schema = schema_of(&["nis"]).unwrap();
+        let nis: ArrayRef = Arc::new(Float64Array::from(vec![
+            Some(1.0),
+            Some(f64::INFINITY),
+            None,
+            Some(f64::NAN),
+            Some(2.0),
+        ]));
+        let found = without_infinities(RecordBatch::try_new(schema, vec![nis]).unwrap()).unwrap();
+        let wanted = Float64Array::from(vec![Some(1.0), None, None, None, Some(2.0)]);
+        assert_eq!(found.column(0).as_primitive::<Float64Type>(), &wanted);
     }
 }

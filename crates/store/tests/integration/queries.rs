@@ -204,3 +204,29 @@ fn a_flipped_byte_is_an_error_and_not_a_number() {
     let error = Store::open(dir.path()).unwrap().records(&Query::default()).unwrap_err();
     assert!(matches!(error, store::Error::Damaged { .. }), "{error}");
 }
+
+#[test]
+fn a_number_that_is_not_finite_is_stored_as_missing() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut writer = writer(dir.path());
+    let mut overflowed = result(0, 0, 1e-5);
+    overflowed.records[0].estimate.nis = Some(f64::INFINITY);
+    overflowed.records[1].estimate.nis = Some(f64::NAN);
+    writer.commit(&[overflowed, result(1, 0, 1e-5)]).unwrap();
+    let records = writer.store().records(&Query::default()).unwrap();
+    assert_eq!(records.len(), 2 * POSITIONS.len());
+    let sound = result(1, 0, 1e-5).records[0].estimate.nis;
+    assert!(records.iter().all(|record| record.estimate.nis.is_none() || record.estimate.nis == sound));
+    let scan = writer.store().scan_columns(&Query::default(), &["nis"]).unwrap();
+    let stored = (0..scan.len()).flat_map(|part| scan.read(part).unwrap());
+    assert!(
+        stored
+            .flat_map(|batch| batch
+                .column(0)
+                .as_primitive::<Float64Type>()
+                .iter()
+                .flatten()
+                .collect::<Vec<_>>())
+            .all(f64::is_finite)
+    );
+}

@@ -30,6 +30,8 @@ const LOOKS: usize = 4000;
 /// did by 3 % at most, with positions that freeze for seconds by 15 %; over the flights that were given a wrong
 /// gap before by 50 % and more. Of 3,000 sound flights of the study twelve are refused for it.
 const UNEXPLAINED: f64 = 0.25;
+/// Standard errors by which no gap of a sound log is below zero.
+const IMPOSSIBLE_SIGMA: f64 = 5.0;
 /// Gauss–Newton iterations over the whole flight after a search in an excerpt: while that is cheap, and beyond.
 const WHOLE_ITERATIONS: (usize, usize) = (3, 1);
 /// Blocks up to which more iterations are cheap.
@@ -170,6 +172,12 @@ pub(crate) struct FlankFit {
 }
 
 impl FlankFit {
+    /// Whether the actuator gives way to the load, and its gap is not clearly negative.
+    fn is_possible(&self) -> bool {
+        let (gap_m, gap_se_m) = self.gap_m;
+        self.compliance_m_per_n.0 > 0.0 && gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m
+    }
+
     /// δX on a flank, m, under a force over the 95 % load. The side is +1, −1, or 0 in the gap.
     pub(crate) fn flank_m(&self, side: f64, force: f64) -> f64 {
         let beta = &self.line.fit.beta;
@@ -214,7 +222,11 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         is_soft: sigma > SOFT_CONTACT_SIGMA,
         line,
     };
-    if is_explained(workspace, scaling, &fit) { Ok(fit) } else { Err(Rejection::MotionUnexplained) }
+    if fit.is_possible() && is_explained(workspace, scaling, &fit) {
+        Ok(fit)
+    } else {
+        Err(Rejection::MotionUnexplained)
+    }
 }
 
 /// The published mid-range statistic (equations 18–31) of the block means, m, with what the regression found: stiffness,
