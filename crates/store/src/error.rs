@@ -88,7 +88,7 @@ impl Error {
         diagnostic.hint(self.remedy())
     }
 
-    /// The error of the system that caused this one, if one did: it says nothing about the content of the store.
+    /// The error of the system that caused this one, if one did: which is no finding about the content of the store.
     fn system_error(&self) -> Option<std::io::Error> {
         match self {
             Self::Table { source, .. } | Self::LogTable { source } => os_error(source),

@@ -50,7 +50,7 @@ pub(crate) fn is_file_limit(error: &io::Error) -> bool {
     cfg!(unix) && TOO_MANY_OPEN_FILES.map(Some).contains(&error.raw_os_error())
 }
 
-/// Repeats an operation while its error is transient, and remembers the error of this thread, since it says nothing about
+/// Repeats an operation while its error is transient, and remembers the error of this thread, since it is no finding about
 /// the content of the file. That a file is missing is an answer.
 pub(crate) fn with_retry<T>(mut operation: impl FnMut() -> io::Result<T>) -> io::Result<T> {
     let mut delays = DELAYS.into_iter();

@@ -15,7 +15,8 @@ use deltalake::logstore::object_store::{
     CopyOptions, Error, GetOptions, GetResult, ListResult, MultipartUpload, ObjectMeta, ObjectStore, PutMode,
     PutMultipartOptions, PutOptions, PutPayload, PutResult, RenameOptions, Result,
 };
-use futures::stream::BoxStream;
+use futures::stream::{self, BoxStream};
+use futures::{StreamExt, TryStreamExt};
 
 /// Writes a whole file under a new name. `false` when a file with other content has that name.
 pub(crate) fn create(path: &FsPath, content: &[u8]) -> io::Result<bool> {
@@ -153,7 +154,7 @@ impl ObjectStore for DurableFiles {
     }
 
     fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
-        self.inner.list(prefix)
+        self.complete(prefix, None, self.inner.list(prefix))
     }
 
     fn list_with_offset(
@@ -161,7 +162,7 @@ impl ObjectStore for DurableFiles {
         prefix: Option<&Path>,
         offset: &Path,
     ) -> BoxStream<'static, Result<ObjectMeta>> {
-        self.inner.list_with_offset(prefix, offset)
+        self.complete(prefix, Some(offset), self.inner.list_with_offset(prefix, offset))
     }
 
     async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
@@ -175,6 +176,57 @@ impl ObjectStore for DurableFiles {
     async fn rename_opts(&self, from: &Path, to: &Path, options: RenameOptions) -> Result<()> {
         self.inner.rename_opts(from, to, options).await
     }
+}
+
+impl DurableFiles {
+    /// A listing that fails where `object_store` leaves a file out whose `stat` fails: without the last commit, a table
+    /// would be read as it was before.
+    fn complete(
+        &self,
+        prefix: Option<&Path>,
+        offset: Option<&Path>,
+        listed: BoxStream<'static, Result<ObjectMeta>>,
+    ) -> BoxStream<'static, Result<ObjectMeta>> {
+        let prefix = prefix.cloned().unwrap_or_default();
+        let (folder, offset) = (self.inner.path_to_filesystem(&prefix), offset.cloned());
+        stream::once(async move {
+            let listed: Vec<ObjectMeta> = listed.try_collect().await?;
+            let is_wanted = |name: &str| {
+                let location = prefix.clone().join(name);
+                offset.as_ref().is_none_or(|offset| location > *offset)
+                    && !listed.iter().any(|found| found.location == location)
+            };
+            left_out(&folder?, is_wanted)
+                .map_err(|e| Error::Generic { store: "LocalFileSystem", source: Box::new(e) })?;
+            Ok::<_, Error>(stream::iter(listed.into_iter().map(Ok)))
+        })
+        .try_flatten()
+        .boxed()
+    }
+}
+
+/// Looks at the files of a folder that a listing should hold: they are gone by now, or the listing is not whole.
+fn left_out(folder: &FsPath, is_wanted: impl Fn(&str) -> bool) -> io::Result<()> {
+    let entries = match std::fs::read_dir(folder) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
+        entries => entries?,
+    };
+    for entry in entries {
+        let entry = entry?;
+        let name = entry.file_name();
+        // Staged files have a hash sign.
+        let Some(name) = name.to_str().filter(|name| !name.contains('#') && is_wanted(name)) else {
+            continue;
+        };
+        match std::fs::metadata(entry.path()) {
+            Ok(found) if found.is_file() => {
+                return Err(io::Error::other(format!("{name} was left out of the listing of its folder")));
+            }
+            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
