@@ -88,11 +88,16 @@ impl Error {
         diagnostic.hint(self.remedy())
     }
 
-    /// The error of the system that caused this one, if one did: which is no finding about the content of the store.
+    /// The error of the system that caused this one, if one did: it is no finding about the content of the store.
     fn system_error(&self) -> Option<std::io::Error> {
         match self {
+            // Tables are opened only in folders that were found: this one is gone, or its `stat` failed.
+            Self::Table { source, .. } if source.to_string().contains("Invalid table location") => {
+                Some(ErrorKind::Other.into())
+            }
             Self::Table { source, .. } | Self::LogTable { source } => os_error(source),
             Self::Frame(source) => os_error(source),
+            Self::Arrow(source) => os_error(source),
             Self::Parquet(source) => os_error(source),
             _ => None,
         }
@@ -239,13 +244,23 @@ mod tests {
         }
     }
 
+    /// Delta Lake takes a folder whose `stat` fails for one that does not exist.
+    #[test]
+    fn a_folder_that_is_not_found_by_the_library_is_no_damage() {
+        let source = Box::new(DeltaTableError::InvalidTableLocation("Invalid table location: /a".to_owned()));
+        let error = Error::Table { table: "gaps", verb: "read", source };
+        assert_eq!(error.code(), "store_io");
+        assert!(error.remedy().contains("run again") && !error.remedy().contains("remove"));
+    }
+
     /// Polars and the parquet crate wrap the error of the system, or keep its text alone.
     #[test]
     fn a_system_error_below_a_data_file_is_no_damage() {
         let emfile = || std::io::Error::from_raw_os_error(24);
         let of_parquet = parquet::errors::ParquetError::External(Box::new(emfile()));
         let of_polars = polars::error::PolarsError::ComputeError(format!("{}: …/a.parquet", emfile()).into());
-        for error in [Error::Parquet(of_parquet), Error::Frame(of_polars)] {
+        let of_arrow = arrow::error::ArrowError::ParquetError(format!("External: {}", emfile()));
+        for error in [Error::Parquet(of_parquet), Error::Frame(of_polars), Error::Arrow(of_arrow)] {
             assert_eq!(error.code(), "store_io");
             assert!(error.remedy().contains("ulimit -n"), "{}", error.remedy());
         }

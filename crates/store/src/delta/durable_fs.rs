@@ -12,8 +12,8 @@ use async_trait::async_trait;
 use deltalake::logstore::object_store::local::LocalFileSystem;
 use deltalake::logstore::object_store::path::Path;
 use deltalake::logstore::object_store::{
-    CopyOptions, Error, GetOptions, GetResult, ListResult, MultipartUpload, ObjectMeta, ObjectStore, PutMode,
-    PutMultipartOptions, PutOptions, PutPayload, PutResult, RenameOptions, Result,
+    CopyOptions, Error, GetOptions, GetResult, ListResult, MultipartUpload, ObjectMeta, ObjectStore,
+    ObjectStoreExt, PutMode, PutMultipartOptions, PutOptions, PutPayload, PutResult, RenameOptions, Result,
 };
 use futures::stream::{self, BoxStream};
 use futures::{StreamExt, TryStreamExt};
@@ -179,54 +179,50 @@ impl ObjectStore for DurableFiles {
 }
 
 impl DurableFiles {
-    /// A listing that fails where `object_store` leaves a file out whose `stat` fails: without the last commit, a table
-    /// would be read as it was before.
+    /// Adds the files of the folder that `object_store` leaves out because their `stat` fails, or fails: without the last
+    /// commit, a table would be read as it was before.
     fn complete(
         &self,
         prefix: Option<&Path>,
         offset: Option<&Path>,
         listed: BoxStream<'static, Result<ObjectMeta>>,
     ) -> BoxStream<'static, Result<ObjectMeta>> {
-        let prefix = prefix.cloned().unwrap_or_default();
-        let (folder, offset) = (self.inner.path_to_filesystem(&prefix), offset.cloned());
+        let (files, prefix) = (self.inner.clone(), prefix.cloned().unwrap_or_default());
+        let offset = offset.cloned();
         stream::once(async move {
-            let listed: Vec<ObjectMeta> = listed.try_collect().await?;
-            let is_wanted = |name: &str| {
-                let location = prefix.clone().join(name);
-                offset.as_ref().is_none_or(|offset| location > *offset)
-                    && !listed.iter().any(|found| found.location == location)
-            };
-            left_out(&folder?, is_wanted)
-                .map_err(|e| Error::Generic { store: "LocalFileSystem", source: Box::new(e) })?;
-            Ok::<_, Error>(stream::iter(listed.into_iter().map(Ok)))
+            let mut listed: Vec<ObjectMeta> = listed.try_collect().await?;
+            listed.sort_unstable_by(|a, b| a.location.cmp(&b.location));
+            let is_listed =
+                |location: &Path| listed.binary_search_by(|found| found.location.cmp(location)).is_ok();
+            let mut left_out = names(&files.path_to_filesystem(&prefix)?).map_err(failed)?;
+            left_out.retain(|name| {
+                let location = prefix.clone().join(name.as_str());
+                offset.as_ref().is_none_or(|offset| location > *offset) && !is_listed(&location)
+            });
+            for name in left_out {
+                match files.head(&prefix.clone().join(name)).await {
+                    Ok(found) => listed.push(found),
+                    // A folder, or removed by now.
+                    Err(Error::NotFound { .. }) => {}
+                    Err(error) => return Err(error),
+                }
+            }
+            Ok(stream::iter(listed.into_iter().map(Ok)))
         })
         .try_flatten()
         .boxed()
     }
 }
 
-/// Looks at the files of a folder that a listing should hold: they are gone by now, or the listing is not whole.
-fn left_out(folder: &FsPath, is_wanted: impl Fn(&str) -> bool) -> io::Result<()> {
+/// Names in a folder, without those of staged files; none when the folder does not exist.
+fn names(folder: &FsPath) -> io::Result<Vec<String>> {
     let entries = match std::fs::read_dir(folder) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         entries => entries?,
     };
-    for entry in entries {
-        let entry = entry?;
-        let name = entry.file_name();
-        // Staged files have a hash sign.
-        let Some(name) = name.to_str().filter(|name| !name.contains('#') && is_wanted(name)) else {
-            continue;
-        };
-        match std::fs::metadata(entry.path()) {
-            Ok(found) if found.is_file() => {
-                return Err(io::Error::other(format!("{name} was left out of the listing of its folder")));
-            }
-            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
-            _ => {}
-        }
-    }
-    Ok(())
+    let names: io::Result<Vec<_>> = entries.map(|entry| Ok(entry?.file_name())).collect();
+    let names = names?.into_iter().filter_map(|name| name.into_string().ok());
+    Ok(names.filter(|name| !name.contains('#')).collect())
 }
 
 #[cfg(test)]
@@ -253,5 +249,51 @@ mod tests {
         std::os::unix::fs::symlink(dir.path().join("nowhere"), &folder).unwrap();
         let error = create(&folder.join("a"), b"one").unwrap_err();
         assert_ne!(error.kind(), io::ErrorKind::AlreadyExists);
+    }
+
+    /// A listing without a file, as `object_store` gives it when the `stat` of the file fails.
+    #[tokio::test]
+    async fn a_file_that_a_listing_leaves_out_is_looked_for() {
+        let dir = tempfile::tempdir().unwrap();
+        let commits = ["00000.json", "00001.json", "00002.json"];
+        for name in commits.iter().chain(&["00003.json#7"]) {
+            std::fs::write(dir.path().join(name), name).unwrap();
+        }
+        std::fs::create_dir(dir.path().join("sidecars")).unwrap();
+        let prefix = Path::from_filesystem_path(dir.path()).unwrap();
+        let files = DurableFiles::default();
+        let listed = async |offset: Option<&Path>, left_out: &str| {
+            let inner = files.inner.list(Some(&prefix)).try_collect::<Vec<_>>().await.unwrap();
+            let kept: Vec<_> = inner
+                .into_iter()
+                .filter(|found| found.location.filename() != Some(left_out))
+                .map(Ok)
+                .collect();
+            let found = files.complete(Some(&prefix), offset, stream::iter(kept).boxed());
+            let found: Vec<ObjectMeta> = found.try_collect().await.unwrap();
+            let mut names: Vec<_> =
+                found.iter().map(|file| (file.location.filename().unwrap().to_owned(), file.size)).collect();
+            names.sort();
+            names
+        };
+        let wanted = commits.map(|name| (name.to_owned(), 10));
+        assert_eq!(listed(None, "").await, wanted);
+        assert_eq!(listed(None, "00002.json").await, wanted);
+        let offset = prefix.clone().join("00000.json");
+        assert_eq!(listed(Some(&offset), "00000.json").await, wanted[1..]);
+    }
+
+    /// A loop of links has a `stat` that fails for another reason than that the file is gone.
+    #[cfg(unix)]
+    #[tokio::test]
+    async fn a_listing_without_a_file_that_cannot_be_reached_fails() {
+        let dir = tempfile::tempdir().unwrap();
+        let looped = dir.path().join("00001.json");
+        std::os::unix::fs::symlink(&looped, &looped).unwrap();
+        let prefix = Path::from_filesystem_path(dir.path()).unwrap();
+        let files = DurableFiles::default();
+        let listed = files.complete(Some(&prefix), None, stream::empty().boxed());
+        let error = listed.try_collect::<Vec<_>>().await.unwrap_err().to_string();
+        assert!(error.contains("os error") && error.contains("00001.json"), "{error}");
     }
 }
