@@ -342,7 +342,7 @@ fn with_tables() -> TestFleet {
         ),
     ] {
         std::fs::write(fleet.path(&format!("{table}.csv")), text).unwrap();
-        named.push_str(&format!("\n{table} = \"{table}.csv\""));
+        named.extend(["\n", table, " = \"", table, ".csv\""]);
     }
     fleet.configure("installations = \"sample-data/installations.csv\"", &named);
     fleet

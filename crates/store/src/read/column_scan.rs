@@ -79,7 +79,7 @@ impl ColumnScan {
         let mask = mask(&builder, self.schema.fields().iter().map(|field| field.name().as_str()));
         // A group's dictionary serves its rows alone.
         let rows = builder.with_projection(mask).with_batch_size(GROUP_ROWS).build()?;
-        rows.map(|batch| Ok(without_infinities(cast_to_schema(&batch?, &self.schema)?)?)).collect()
+        rows.map(|batch| Ok(without_infinities(&cast_to_schema(&batch?, &self.schema)?)?)).collect()
     }
 
     /// Row filter on the selected columns.
@@ -115,7 +115,7 @@ pub(crate) fn cast_to_schema(batch: &RecordBatch, schema: &SchemaRef) -> Result<
 
 /// A batch whose numbers are finite or missing: an infinite diagnostic of one refused flight, written by a release
 /// before 2026-11-23, must not refuse the whole table.
-fn without_infinities(batch: RecordBatch) -> Result<RecordBatch, ArrowError> {
+fn without_infinities(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
     let column = |(field, column): (&Arc<Field>, &ArrayRef)| {
         let numbers = column.as_primitive_opt::<Float64Type>().filter(|_| field.is_nullable());
         match numbers.filter(|numbers| numbers.values().iter().any(|value| !value.is_finite())) {
@@ -206,7 +206,7 @@ mod tests {
             Some(f64::NAN),
             Some(2.0),
         ]));
-        let found = without_infinities(RecordBatch::try_new(schema, vec![nis]).unwrap()).unwrap();
+        let found = without_infinities(&RecordBatch::try_new(schema, vec![nis]).unwrap()).unwrap();
         let wanted = Float64Array::from(vec![Some(1.0), None, None, None, Some(2.0)]);
         assert_eq!(found.column(0).as_primitive::<Float64Type>(), &wanted);
     }
