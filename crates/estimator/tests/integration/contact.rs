@@ -409,4 +409,9 @@ fn a_picture_shows_the_flanks_a_gap_apart_and_the_stretches_on_them() {
     assert!(2 * believed.len() > picture.touches.len(), "{} of {}", believed.len(), picture.touches.len());
     assert!(20 * on_them > 19 * believed.len(), "{on_them} of {}", believed.len());
     assert!(picture.touches.iter().all(|t| (0.0..90.0).contains(&t.time_s) && t.duration_s > 0.0));
+    let firm_s: Vec<f64> = picture.touches.iter().filter(|t| t.trust.is_some()).map(|t| t.time_s).collect();
+    assert!(
+        firm_s.is_sorted_by(|a, b| *b > a - 5.0),
+        "in the order of the flight, but for blocks: {firm_s:?}"
+    );
 }

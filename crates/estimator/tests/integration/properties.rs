@@ -1,6 +1,6 @@
 //! Properties for any input: offset, scale, sign, restarts, missing samples, the configured bandwidth.
 
-use estimator::{ActuatorModel, Error, Filter, Samples, gap};
+use estimator::{ActuatorModel, Error, Filter, InnovationBuffers, Samples, gap};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -60,6 +60,8 @@ fn a_rotary_part_is_a_linear_one_at_its_radius() {
         ActuatorModel::linear(2e6, 150.0, 2.0).unwrap(),
     );
     assert!((turning.a() - pushing.a()).amax() < 1e-9 * pushing.a().amax());
+    assert!((turning.b() - pushing.b()).amax() < 1e-12);
+    assert!((turning.stiffness_n_per_m() - 2e6).abs() < 1e-6);
     assert!(ActuatorModel::rotary(2e4, 1.5, 0.02, 0.0).is_err());
 }
 
@@ -118,6 +120,36 @@ fn a_part_that_rings_at_a_multiple_of_the_rate_keeps_a_covariance() {
 }
 
 proptest! {
+    /// A log is filtered with the settled gain: each innovation, its variance and S are those of equations 24 to 28
+    /// taken one sample at a time, in segments, and after samples that are missing.
+    #[test]
+    fn the_innovations_are_those_of_single_steps(
+        dx in vec(-1e-4..1e-4, 4000), load in vec(-8e3..8e3, 4000),
+        (cut, missing) in (1500..2500_usize, vec(0..4000_usize, 0..4)),
+    ) {
+        let f = filter(0.004, 10.0);
+        let mut dx = dx;
+        missing.iter().filter(|&&k| k != 0 && k != cut).for_each(|&k| dx[k] = f64::NAN);
+        let segments = [0..cut, cut..dx.len()];
+        let samples = Samples { step_s: 0.004, motor_m: &dx, dx_m: &dx, load_n: &load, segments: &segments };
+        let mut found = InnovationBuffers::default();
+        let tracked = f.track(&samples, Some(&mut found)).unwrap();
+        prop_assert_eq!(&tracked.s_m, &f.track(&samples, None).unwrap().s_m);
+        for segment in segments {
+            let mut state = f.initial_state(dx[segment.start], load[segment.start]);
+            for k in segment {
+                let step = f.update(&state, dx[k]).unwrap();
+                prop_assert!((tracked.s_m[k] - step.posterior.x[2]).abs() < 1e-11, "S in row {}", k);
+                prop_assert_eq!(found.innovation_m[k].is_nan(), dx[k].is_nan(), "row {}", k);
+                let off_m = (found.innovation_m[k] - step.innovation_m).abs();
+                prop_assert!(dx[k].is_nan() || off_m < 1e-11, "innovation in row {}: {:e}", k, off_m);
+                let ratio = found.variance_m2[k] / step.innovation_variance_m2;
+                prop_assert!((ratio - 1.0).abs() < 1e-6, "variance in row {}: {}", k, ratio);
+                state = f.predict(&step.posterior, load[k]);
+            }
+        }
+    }
+
     /// Superposition: the track of two sums is the sum of two tracks.
     #[test]
     fn the_track_is_linear_in_position_and_load_together(

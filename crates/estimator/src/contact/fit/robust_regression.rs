@@ -280,3 +280,23 @@ impl<const N: usize> RobustFit<N> {
         (total * freedom + (0..N).map(|i| lent(i).powi(2)).sum::<f64>()).sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Huber's weights (Huber 1964), and none for an outlier in the last round.
+    #[test]
+    fn outliers_lose_weight_and_then_all_of_it() {
+        for (deviation, last, wanted) in [
+            (0.0, false, 1.0),
+            (HUBER, true, 1.0),
+            (2.0 * HUBER, false, 0.5),
+            (2.0 * HUBER, true, 0.5),
+            (2.0 * WILD, false, HUBER / (2.0 * WILD)),
+            (2.0 * WILD, true, 0.0),
+        ] {
+            assert!((trust(deviation, last) - wanted).abs() < 1e-15, "{deviation} {last}");
+        }
+    }
+}
