@@ -283,6 +283,15 @@ mod tests {
         assert_eq!(listed(Some(&offset), "00000.json").await, wanted[1..]);
     }
 
+    #[test]
+    fn a_folder_that_is_gone_has_no_names_and_one_that_cannot_be_listed_is_an_error() {
+        let dir = tempfile::tempdir().unwrap();
+        assert_eq!(names(&dir.path().join("gone")).unwrap(), Vec::<String>::new());
+        let file = dir.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        assert_eq!(names(&file).unwrap_err().kind(), io::ErrorKind::NotADirectory);
+    }
+
     /// A loop of links has a `stat` that fails for another reason than that the file is gone.
     #[cfg(unix)]
     #[tokio::test]
