@@ -1,7 +1,7 @@
 """Histories of a fleet: this code and Polars read one Parquet file of estimates and group it by unit.
 
-Usage: histories.py HISTORIES FOLDER [--units N] [--flights N] [--rounds N]: the release build of the example
-`histories` of crates/pipeline, and a folder for the file. Needs numpy, polars and pyarrow. Contestants run in turn, each
+Usage: histories.py HISTORIES FOLDER [--units N] [--flights N] [--rounds N]: the release build of
+crates/pipeline/benches/histories.rs, and a folder for the file. Needs numpy, polars and pyarrow. Contestants run in turn, each
 in its own process; the CPU time of importing Polars is not counted.
 """
 

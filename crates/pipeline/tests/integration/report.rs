@@ -2,9 +2,6 @@
 //!
 //! The fleet flies 6 h a day, as its hour meters show; one flight in five leaves a log. Wear is a line: 20 µm when new,
 //! limit 150 µm.
-#![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
-
-mod scatter;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -30,7 +27,7 @@ const DAYS: i32 = 400;
 const LIMIT_M: f64 = 150e-6;
 
 fn config() -> Config {
-    let text = include_str!("../../../tests/data/three-aircraft/pipeline.toml");
+    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml");
     Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
 }
 

@@ -13,7 +13,7 @@ use ingest::mapping::units::{TimeUnit, Unit};
 use ingest::{ChannelMapping, Channels, ClockMapping, Geometry, Layout, Log, LogFiles, Mapping};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let args: Vec<String> = std::env::args().skip(1).collect();
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let [log, name, value, time] = args.as_slice() else { return Err("four arguments are needed".into()) };
     let is_by_position = value == "-";
     let prefix = if is_by_position { "" } else { "{position}_" };

@@ -1,7 +1,4 @@
 //! Statements about a small fleet whose wear is a line: 2 h a day, 20 µm when new, limit 150 µm.
-#![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
-
-mod scatter;
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -23,7 +20,7 @@ const DAY: SignedDuration = SignedDuration::from_hours(24);
 const HOURS_A_DAY: f64 = 2.0;
 
 fn config() -> Config {
-    let text = include_str!("../../../tests/data/three-aircraft/pipeline.toml");
+    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml");
     Config::parse(text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
 }
 
@@ -191,7 +188,7 @@ fn a_fleet_that_no_unit_of_has_failed_is_held_against_the_levels_it_has_reached(
 }
 
 fn booked(file: &str) -> Config {
-    let text = include_str!("../../../tests/data/three-aircraft/pipeline.toml")
+    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
         .replace("[logs]", &format!("[logs]\nmaintenance = \"tests/data/{file}\""));
     Config::parse(&text, Path::new("pipeline.toml"), Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap()
 }
@@ -226,7 +223,7 @@ fn maintenance_of_a_kind_nobody_knows_is_refused_with_those_that_are_known() {
 }
 
 fn configured_axis(axis: &str) -> Config {
-    let text = include_str!("../../../tests/data/three-aircraft/pipeline.toml")
+    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
         .replace("[trend]", &format!("[trend]\naxis = \"{axis}\""));
     Config::parse(&text, Path::new("pipeline.toml"), Path::new(".")).unwrap()
 }
@@ -241,7 +238,7 @@ fn wear_follows_the_axis_of_the_configuration_a_parts_own_before_that_of_all() {
         rows.into_iter().map(|row| row.usage_axis).collect::<std::collections::BTreeSet<_>>()
     };
     assert_eq!(axes(&configured_axis("flights")), [Some("flights".to_owned())].into());
-    let text = include_str!("../../../tests/data/three-aircraft/pipeline.toml")
+    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
         .replace("[trend]", "[trend]\naxis = \"flights\"")
         .replace("[part.\"EMA-27-1040\"]", "[part.\"EMA-27-1040\"]\naxis = \"reversals\"");
     let own = Config::parse(&text, Path::new("pipeline.toml"), Path::new(".")).unwrap();
@@ -255,7 +252,7 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
     const UNITS: i32 = 14;
     const DAYS: i32 = 300;
     let folder = tempfile::tempdir().unwrap();
-    let text = include_str!("../../../tests/data/three-aircraft/pipeline.toml")
+    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml")
         .replace("[logs]", "[logs]\nflights = \"flights.csv\"");
     std::fs::write(folder.path().join("pipeline.toml"), text).unwrap();
     let row = |unit: i32, at: i32| format!("T{unit:02},{unit}-{at},{},2.0\n", day(at));

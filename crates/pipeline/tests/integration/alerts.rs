@@ -1,5 +1,4 @@
 //! Alerts under kills: every change is sent exactly once, or is marked as unconfirmed.
-#![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
 
 use std::collections::{BTreeMap, BTreeSet};
 

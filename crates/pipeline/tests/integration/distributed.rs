@@ -1,6 +1,5 @@
 //! Logs done elsewhere: whatever an engine does with its tasks, the store holds each record once, and those that a run
 //! on one machine makes.
-#![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;

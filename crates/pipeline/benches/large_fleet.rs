@@ -29,7 +29,7 @@ const ERROR_EVERY: usize = 997;
 const REFUSED_EVERY: usize = 19;
 
 fn main() -> Outcomes<()> {
-    let mut args = std::env::args().skip(1);
+    let mut args = std::env::args().skip(1).filter(|a| a != "--bench");
     let usage = "usage: large_fleet DIR UNITS FLIGHTS";
     let dir = args.next().ok_or(usage)?;
     let units: usize = args.next().ok_or(usage)?.parse()?;

@@ -3,7 +3,6 @@
 //!
 //! Six tails with four actuators of two part numbers fly three times a day for half a year. Friction follows a season
 //! of ± 10 % that no temperature channel shows.
-#![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
 
 use std::path::Path;
 
@@ -174,7 +173,7 @@ fn followed(plant: Plant) -> (Vec<TrendRow>, FollowedQuantities) {
 }
 
 fn assessed(plant: Plant, swaps: bool) -> (Vec<TrendRow>, FollowedQuantities) {
-    assessed_under(include_str!("../../../tests/data/three-aircraft/pipeline.toml"), plant, swaps)
+    assessed_under(include_str!("../../../../tests/data/three-aircraft/pipeline.toml"), plant, swaps)
 }
 
 fn assessed_under(text: &str, plant: Plant, swaps: bool) -> (Vec<TrendRow>, FollowedQuantities) {
@@ -250,7 +249,7 @@ fn changes_of_single_units_are_theirs() {
 
 #[test]
 fn a_part_has_limits_of_its_own() {
-    let text = include_str!("../../../tests/data/three-aircraft/pipeline.toml").to_owned()
+    let text = include_str!("../../../../tests/data/three-aircraft/pipeline.toml").to_owned()
         + "\n[part.\"EMA-27-1040\".quantity_limits]\nstiffness_share = 0.5\n";
     let (rows, _) = assessed_under(
         &text,

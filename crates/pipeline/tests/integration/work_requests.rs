@@ -1,5 +1,4 @@
 //! Work requests against the tables of an operator: what opens, moves, closes and reopens them.
-#![allow(clippy::unwrap_used, reason = "tests may fail loudly")]
 
 use jiff::Timestamp;
 use pipeline::follow_up::finding::{Finding, GAP};
