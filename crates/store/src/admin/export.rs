@@ -16,8 +16,8 @@ use std::sync::Arc;
 use crate::delta::snapshot::Snapshot;
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::polars_scan;
 use crate::read::query::Query;
+use crate::read::{frame, scan};
 
 /// Rows held in memory at a time; flights of one instant stay together.
 const WINDOW_ROWS: usize = 500_000;
@@ -59,8 +59,12 @@ impl Store {
         if query.last.is_some() {
             return Ok(vec![query.clone()]);
         }
-        let schema = polars_scan::only(&GapRecord::schema(), &["departure_utc"])?;
-        let departures = self.select(snapshot, query, schema)?;
+        let files = Self::candidate_files(snapshot, query);
+        self.check(&files)?;
+        let order = ["departure_utc"];
+        let schema = scan::only(&GapRecord::schema(), &order)?;
+        let rows = scan::read_files(&files, &schema, &query.conditions())?;
+        let departures = frame::sorted(&rows, &order, None)?;
         let departures = departures.column(0).as_primitive::<TimestampMicrosecondType>();
         let edges = (1..departures.len().div_ceil(WINDOW_ROWS)).map(|i| departures.value(i * WINDOW_ROWS));
         let mut windows = vec![query.clone()];

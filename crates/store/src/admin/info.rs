@@ -1,16 +1,14 @@
 //! Contents of the store, and its last run.
 
-use std::collections::{BTreeSet, HashSet};
 use std::path::PathBuf;
 
-use arrow::array::AsArray;
-use arrow::datatypes::TimestampMicrosecondType;
 use jiff::Timestamp;
+use polars::prelude::ChunkAgg;
 use records::GapRecord;
 
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::polars_scan::{self, ScanRequest};
+use crate::read::{frame, scan};
 use records::{LogOutcome, RunRecord};
 
 /// A store in numbers.
@@ -54,21 +52,19 @@ impl Store {
         let files: Vec<PathBuf> = snapshot.files.iter().map(|file| file.path.clone()).collect();
         self.check(&files)?;
         let names = ["departure_utc", "tail_number", "flight_id", "part_number", "serial_number"];
-        let schema = polars_scan::only(&GapRecord::schema(), &names)?;
-        let batch =
-            ScanRequest { files: &files, schema, condition: None, order: &[], last: None }.collect()?;
-        let departures = batch.column(0).as_primitive::<TimestampMicrosecondType>();
-        let text = |column: usize| batch.column(column).as_string::<i32>().iter().flatten();
+        let rows = scan::read_files(&files, &scan::only(&GapRecord::schema(), &names)?, &[])?;
+        let rows = frame::frame(&rows, &names)?;
+        let departures = rows.column(names[0])?.i64()?;
         let at = |micros: Option<i64>| micros.and_then(|us| Timestamp::from_microsecond(us).ok());
         let runs = self.runs()?;
         let accounts = self.accounts()?;
         Ok(Info {
-            records: batch.num_rows(),
-            flights: departures.values().iter().zip(text(1).zip(text(2))).collect::<HashSet<_>>().len(),
-            serials: text(3).zip(text(4)).collect::<HashSet<_>>().len(),
-            tails: text(1).collect::<BTreeSet<_>>().len(),
-            first_departure_utc: at(arrow::compute::min(departures)),
-            last_departure_utc: at(arrow::compute::max(departures)),
+            records: rows.height(),
+            flights: frame::distinct(&rows, &names[..3])?,
+            serials: frame::distinct(&rows, &names[3..])?,
+            tails: frame::distinct(&rows, &names[1..2])?,
+            first_departure_utc: at(departures.min()),
+            last_departure_utc: at(departures.max()),
             logs: accounts.len(),
             failed_logs: accounts.iter().filter(|log| log.outcome == LogOutcome::Error).count(),
             files: files.len(),

@@ -16,9 +16,9 @@ use crate::delta::snapshot::DataFile;
 use crate::delta::table::Table;
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::polars_scan::{self, ScanRequest};
 use crate::read::store_read::files_of;
-use crate::write::writer::keys;
+use crate::read::{frame, scan};
+use crate::write::writer::{key_columns, keys};
 use records::LogRecord;
 use records::RecordKey;
 
@@ -44,10 +44,10 @@ impl Store {
     /// Records that are stored twice, and logs whose records are not all stored.
     fn wrong_records(&self) -> Result<Vec<Diagnostic>, Error> {
         let files: Vec<PathBuf> = files_of(&self.gaps)?;
-        let schema = polars_scan::only(&GapRecord::schema(), &RecordKey::COLUMNS)?;
-        let order = &RecordKey::COLUMNS;
-        let batch = ScanRequest { files: &files, schema, condition: None, order, last: None }.collect()?;
-        let keys = keys(&batch)?;
+        let schema = GapRecord::schema();
+        let schema = Arc::new(schema.project(&key_columns(&schema)?)?);
+        let rows = scan::read_files(&files, &schema, &[])?;
+        let keys = keys(&frame::sorted(&rows, &RecordKey::COLUMNS, None)?)?;
         let twice: Vec<&RecordKey> = keys.windows(2).filter(|k| k[0] == k[1]).map(|k| &k[0]).collect();
         let mut findings: Vec<Diagnostic> = twice.iter().take(NAMED).map(|key| duplicate(key)).collect();
         if twice.len() > NAMED {
@@ -187,8 +187,7 @@ fn wrong_with(table: &Table, file: &DataFile) -> Option<Diagnostic> {
 /// The column by which a reader would skip a file that holds matching rows.
 fn missed_by_statistics(table: &Table, file: &DataFile) -> Result<Option<String>, Error> {
     let files = std::slice::from_ref(&file.path);
-    let schema = Arc::clone(&table.schema);
-    let content = ScanRequest { files, schema, condition: None, order: &[], last: None }.collect()?;
+    let content = scan::read_table(files, &table.schema, &[])?;
     Ok(file.stats.missed_by(&Stats::parse(Some(&file_stats::of(&content)))))
 }
 

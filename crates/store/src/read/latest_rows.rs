@@ -4,18 +4,15 @@
 //! for them that was a third of what a run with nothing to do takes.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::path::Path;
 
 use arrow::array::{AsArray, BooleanArray, RecordBatch};
 use arrow::compute::filter_record_batch;
-use arrow::datatypes::{Int64Type, SchemaRef};
-use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use arrow::datatypes::Int64Type;
 
-use crate::delta::data_file::GROUP_ROWS;
 use crate::delta::versioned;
 use crate::error::Error;
-use crate::read::column_scan::{cast_to_schema, mask};
+use crate::read::scan;
 use records::row_schema::{self, FromCells, Row};
 
 /// Rows in which a text column holds what is wanted; one that is empty there is not.
@@ -45,8 +42,7 @@ impl<R: Row + FromCells> LatestRows<R> {
         name: impl Fn(&R) -> String,
     ) -> Result<(), Error> {
         let schema = versioned::schema::<R>();
-        for batch in opened(file, &schema)? {
-            let mut batch = cast_to_schema(&batch?, &schema)?;
+        for mut batch in scan::read_file(file, &schema, &[])? {
             if let Some(wanted) = wanted {
                 batch = filter_record_batch(&batch, &wanted.of(&batch)?)?;
             }
@@ -79,15 +75,9 @@ impl TextFilter<'_> {
     }
 }
 
-fn opened(path: &Path, schema: &SchemaRef) -> Result<ParquetRecordBatchReader, Error> {
-    let file = File::open(path).map_err(Error::io(path, "opened"))?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(file)?;
-    let mask = mask(&builder, schema.fields().iter().map(|field| field.name().as_str()));
-    Ok(builder.with_projection(mask).with_batch_size(GROUP_ROWS).build()?)
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs::File;
     use std::sync::Arc;
 
     use arrow::array::{ArrayRef, Int64Array, LargeStringArray, TimestampNanosecondArray};

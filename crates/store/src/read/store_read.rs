@@ -1,10 +1,10 @@
 //! Answers: each is made from one version of a table, so it shows whole commits only.
 
-use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use arrow::array::{AsArray, RecordBatch};
+use arrow::array::RecordBatch;
 use arrow::datatypes::SchemaRef;
+use polars::prelude::{SortMultipleOptions, UniqueKeepStrategy};
 use records::{GapRecord, PartNumber, SerialNumber};
 
 use crate::delta::file_stats::Stats;
@@ -13,8 +13,8 @@ use crate::delta::table::Table;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::latest_rows::{LatestRows, TextFilter};
-use crate::read::polars_scan::{self, ScanRequest};
 use crate::read::query::Query;
+use crate::read::{frame, scan};
 use records::RecordKey;
 use records::row_schema::{FromCells, Row, from_batch};
 use records::{LogOutcome, LogRecord};
@@ -27,7 +27,7 @@ impl Store {
     ///
     /// # Errors
     /// [`Error::Table`] when the log cannot be read, [`Error::Damaged`] when a file is not the one that
-    /// was committed, [`Error::Frame`] when it cannot be decoded.
+    /// was committed, [`Error::Parquet`] when it cannot be decoded.
     pub fn scan(&self, query: &Query) -> Result<RecordBatch, Error> {
         self.select(&self.gaps.snapshot()?, query, GapRecord::schema())
     }
@@ -47,13 +47,15 @@ impl Store {
     pub fn serials(&self) -> Result<Vec<(PartNumber, SerialNumber)>, Error> {
         let files = files_of(&self.gaps)?;
         self.check(&files)?;
-        let schema = polars_scan::only(&GapRecord::schema(), &["part_number", "serial_number"])?;
-        let units =
-            ScanRequest { files: &files, schema, condition: None, order: &[], last: None }.collect()?;
-        let [parts, serials] = [0, 1].map(|column| units.column(column).as_string::<i32>());
-        let units: BTreeSet<_> = parts.iter().flatten().zip(serials.iter().flatten()).collect();
-        let named = |(part, serial)| Some((PartNumber::new(part).ok()?, SerialNumber::new(serial).ok()?));
-        Ok(units.into_iter().filter_map(named).collect())
+        let names = ["part_number", "serial_number"];
+        let rows = scan::read_files(&files, &scan::only(&GapRecord::schema(), &names)?, &[])?;
+        let units = frame::frame(&rows, &names)?.unique_stable(None, UniqueKeepStrategy::Any, None)?;
+        let units = units.sort(names, SortMultipleOptions::default())?;
+        let [parts, serials] = [units.column(names[0])?.str()?, units.column(names[1])?.str()?];
+        let named = |(part, serial): (Option<&str>, Option<&str>)| {
+            Some((PartNumber::new(part?).ok()?, SerialNumber::new(serial?).ok()?))
+        };
+        Ok(parts.iter().zip(serials.iter()).filter_map(named).collect())
     }
 
     /// The newest account of every log, by name.
@@ -126,8 +128,8 @@ impl Store {
     ) -> Result<RecordBatch, Error> {
         let files = Self::candidate_files(snapshot, query);
         self.check(&files)?;
-        let (condition, last) = (query.condition(), query.last);
-        ScanRequest { files: &files, schema, condition, order: &RecordKey::COLUMNS, last }.collect()
+        let rows = scan::read_files(&files, &schema, &query.conditions())?;
+        frame::sorted(&rows, &RecordKey::COLUMNS, query.last)
     }
 
     /// Files that may hold matching rows.

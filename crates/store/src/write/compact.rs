@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use arrow::array::{AsArray, RecordBatch};
+use arrow::array::RecordBatch;
 use arrow::datatypes::SchemaRef;
-use polars::prelude::{Expr, col, lit};
 
 use crate::delta::data_file;
 use crate::delta::snapshot::{DataFile, Snapshot};
@@ -14,7 +13,8 @@ use crate::delta::table::{Change, Table};
 use crate::delta::versioned;
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::polars_scan::{self, ScanRequest};
+use crate::read::frame;
+use crate::read::scan::{self, Condition};
 use crate::write::writer::Writer;
 
 /// Rows of a full file: many enough to open few, few enough to copy one for a flight estimated again.
@@ -138,23 +138,14 @@ impl RewritePlan {
     }
 
     fn counts(&self, files: &[PathBuf], schema: &SchemaRef) -> Result<BTreeMap<String, usize>, Error> {
-        let schema = polars_scan::only(schema, &[self.slice_by])?;
-        let values = ScanRequest { files, schema, condition: None, order: &[], last: None }.collect()?;
-        let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-        for value in values.column(0).as_string::<i32>().iter().flatten() {
-            match counts.get_mut(value) {
-                Some(count) => *count += 1,
-                None => drop(counts.insert(value.to_owned(), 1)),
-            }
-        }
-        Ok(counts)
+        let values = scan::read_files(files, &scan::only(schema, &[self.slice_by])?, &[])?;
+        let counts = frame::counts(&frame::frame(&values, &[self.slice_by])?, self.slice_by)?;
+        Ok(counts.into_iter().collect())
     }
 
     fn rows(&self, files: &[PathBuf], schema: &SchemaRef, slice: &OutputRange) -> Result<RecordBatch, Error> {
-        let value = || col(self.slice_by);
-        let from: Expr = value().gt_eq(lit(slice.first.clone()));
-        let condition = Some(from.and(value().lt_eq(lit(slice.last.clone()))));
-        ScanRequest { files, schema: schema.clone(), condition, order: self.order, last: None }.collect()
+        let condition = Condition::texts(self.slice_by, &slice.first, &slice.last);
+        frame::sorted(&scan::read_files(files, schema, &[condition])?, self.order, None)
     }
 }
 

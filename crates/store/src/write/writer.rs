@@ -1,13 +1,13 @@
 //! The writer: finished logs become records and accounts, whole flights at a time, each flight once.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::slice;
+use std::sync::Arc;
 use std::time::Duration;
 
 use arrow::array::{AsArray, BooleanArray, RecordBatch};
 use arrow::compute::filter_record_batch;
-use arrow::datatypes::{SchemaRef, TimestampMicrosecondType};
+use arrow::datatypes::{Schema, TimestampMicrosecondType};
 use records::GapRecord;
 
 use crate::delta::data_file;
@@ -16,7 +16,7 @@ use crate::delta::table::{Change, Table};
 use crate::delta::versioned;
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::polars_scan::{self, ScanRequest};
+use crate::read::scan;
 use crate::store_dir::{FORMAT, MARKER, check_marker, write_marker};
 use crate::write::lock::{Holder, Lock};
 use records::LogRecord;
@@ -116,11 +116,11 @@ impl Writer {
     fn without(&self, file: &DataFile, decisions: &MergeDecisions<'_>) -> Result<Option<RecordBatch>, Error> {
         let files = slice::from_ref(&file.path);
         self.store.check(files)?;
-        let keys = polars_scan::only(&GapRecord::schema(), &RecordKey::COLUMNS)?;
-        if is_kept(&rows(files, keys)?, decisions)?.false_count() == 0 {
+        let keys = Arc::new(GapRecord::schema().project(&key_columns(&GapRecord::schema())?)?);
+        if is_kept(&scan::read_table(files, &keys, &[])?, decisions)?.false_count() == 0 {
             return Ok(None);
         }
-        let all = rows(files, GapRecord::schema())?;
+        let all = scan::read_table(files, &GapRecord::schema(), &[])?;
         Ok(Some(filter_record_batch(&all, &is_kept(&all, decisions)?)?))
     }
 }
@@ -156,10 +156,6 @@ fn may_hold_any(file: &DataFile, decisions: &MergeDecisions<'_>) -> bool {
     in_time.map(|(key, _)| key).any(|key| file.stats.may_hold("tail_number", &key.tail_number))
 }
 
-fn rows(files: &[PathBuf], schema: SchemaRef) -> Result<RecordBatch, Error> {
-    ScanRequest { files, schema, condition: None, order: &[], last: None }.collect()
-}
-
 /// Mask of the rows without a merge decision.
 fn is_kept(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<BooleanArray, Error> {
     let keys = keys(batch)?;
@@ -168,7 +164,7 @@ fn is_kept(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<Boolea
 
 /// The keys of a batch, row by row.
 pub(crate) fn keys(batch: &RecordBatch) -> Result<Vec<RecordKey>, Error> {
-    let keys = batch.project(&indices(batch)?)?;
+    let keys = batch.project(&key_columns(batch.schema_ref())?)?;
     let departures = keys.column(0).as_primitive::<TimestampMicrosecondType>();
     let [tails, flights, positions] = [1, 2, 3].map(|column| keys.column(column).as_string::<i32>());
     let key = |row| RecordKey {
@@ -180,6 +176,7 @@ pub(crate) fn keys(batch: &RecordBatch) -> Result<Vec<RecordKey>, Error> {
     Ok((0..departures.len()).map(key).collect())
 }
 
-fn indices(batch: &RecordBatch) -> Result<Vec<usize>, Error> {
-    RecordKey::COLUMNS.iter().map(|name| Ok(batch.schema_ref().index_of(name)?)).collect()
+/// Where the columns of a key are.
+pub(crate) fn key_columns(schema: &Schema) -> Result<Vec<usize>, Error> {
+    RecordKey::COLUMNS.iter().map(|name| Ok(schema.index_of(name)?)).collect()
 }

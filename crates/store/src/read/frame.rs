@@ -1,0 +1,102 @@
+//! Order and groups of rows, by Polars.
+//!
+//! Only the columns that rows are ordered or grouped by become Polars columns. Polars returns the rows' numbers, and the
+//! rows themselves remain in Arrow.
+
+use arrow::array::{ArrayRef, AsArray, RecordBatch, StringArray};
+use arrow::compute::interleave_record_batch;
+use arrow::datatypes::{DataType, Int32Type, Int64Type, TimestampMicrosecondType};
+use polars::prelude::{
+    Column, DataFrame, Int64Chunked, IntoColumn, NewChunkedArray, SortMultipleOptions, StringChunked,
+};
+
+use crate::error::Error;
+
+/// The row's number among all rows of a frame.
+const ROW: &str = "row";
+
+/// Some columns of batches of one schema; times are microseconds.
+///
+/// # Errors
+/// [`Error::Column`] for a column that is not there, or has another type than text, time or whole number.
+pub(crate) fn frame(batches: &[RecordBatch], names: &[&str]) -> Result<DataFrame, Error> {
+    let height = batches.iter().map(RecordBatch::num_rows).sum();
+    let columns = names.iter().map(|name| column(batches, name));
+    Ok(DataFrame::new(height, columns.collect::<Result<_, _>>()?)?)
+}
+
+fn column(batches: &[RecordBatch], name: &str) -> Result<Column, Error> {
+    let fails = |problem: &str| Error::Column { column: name.to_owned(), problem: problem.to_owned() };
+    let arrays = batches.iter().map(|batch| batch.column_by_name(name).ok_or_else(|| fails("is missing")));
+    let arrays: Vec<&ArrayRef> = arrays.collect::<Result<_, _>>()?;
+    Ok(match arrays.first().map(|array| array.data_type()) {
+        Some(DataType::Utf8 | DataType::Dictionary(..)) => {
+            StringChunked::from_iter_options(name.into(), arrays.iter().flat_map(|array| texts(array)))
+                .into_column()
+        }
+        Some(DataType::Int64) => {
+            let numbers = arrays.iter().flat_map(|array| array.as_primitive::<Int64Type>());
+            Int64Chunked::from_iter_options(name.into(), numbers).into_column()
+        }
+        Some(DataType::Timestamp(..)) => {
+            let times = arrays.iter().flat_map(|array| array.as_primitive::<TimestampMicrosecondType>());
+            Int64Chunked::from_iter_options(name.into(), times).into_column()
+        }
+        _ => return Err(fails("cannot be ordered or grouped by")),
+    })
+}
+
+/// Texts, plain or as a dictionary.
+fn texts(array: &ArrayRef) -> Box<dyn Iterator<Item = Option<&str>> + '_> {
+    let coded = array.as_dictionary_opt::<Int32Type>();
+    match coded.and_then(|coded| coded.downcast_dict::<StringArray>()) {
+        Some(coded) => Box::new(coded.into_iter()),
+        None => Box::new(array.as_string::<i32>().iter()),
+    }
+}
+
+/// The rows of batches in one, ordered by some columns; rows that are equal in all of them keep their order. Only the
+/// last `last` where it is given.
+///
+/// # Errors
+/// As [`frame`].
+pub(crate) fn sorted(
+    batches: &[RecordBatch],
+    order: &[&str],
+    last: Option<usize>,
+) -> Result<RecordBatch, Error> {
+    let by = SortMultipleOptions::default().with_maintain_order(true);
+    let sorted = frame(batches, order)?.with_row_index(ROW.into(), None)?.sort(order, by)?;
+    let rows = sorted.tail(Some(last.unwrap_or(usize::MAX)));
+    let mut starts = vec![0];
+    starts.extend(batches.iter().scan(0, |rows, batch| {
+        *rows += batch.num_rows();
+        Some(*rows)
+    }));
+    let place = |row: u32| {
+        let batch = starts.partition_point(|&start| start <= row as usize) - 1;
+        (batch, row as usize - starts[batch])
+    };
+    let places: Vec<(usize, usize)> = rows.column(ROW)?.idx()?.iter().flatten().map(place).collect();
+    Ok(interleave_record_batch(&batches.iter().collect::<Vec<_>>(), &places)?)
+}
+
+/// The distinct texts of a column, and the number of rows of each.
+///
+/// # Errors
+/// [`Error::Frame`] when there is no such column of texts.
+pub(crate) fn counts(frame: &DataFrame, name: &str) -> Result<Vec<(String, usize)>, Error> {
+    let groups = frame.group_by([name])?;
+    let (values, rows) = (groups.keys(), groups.get_groups().iter().map(|group| group.len()));
+    let texts = values.first().map(|values| values.str()).transpose()?;
+    let texts = texts.into_iter().flat_map(|texts| texts.iter());
+    Ok(texts.zip(rows).filter_map(|(text, rows)| Some((text?.to_owned(), rows))).collect())
+}
+
+/// Number of distinct rows, by some columns.
+///
+/// # Errors
+/// [`Error::Frame`] when there is no such column.
+pub(crate) fn distinct(frame: &DataFrame, names: &[&str]) -> Result<usize, Error> {
+    Ok(frame.group_by(names.iter().copied())?.get_groups().len())
+}
