@@ -14,6 +14,24 @@ pub(crate) fn print_line(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
+/// Whether exhaustive tests run in full (`FREEPLAY_TESTS=gate`) instead of a seeded sample of their cases.
+pub(crate) fn is_gate() -> bool {
+    std::env::var_os("FREEPLAY_TESTS").is_some_and(|value| value == "gate")
+}
+
+/// All cases in the gate, else `count` of them, spread evenly with the first.
+pub(crate) fn spread<T: Copy>(cases: &[T], count: usize) -> Vec<T> {
+    let step = if is_gate() { 1 } else { cases.len().div_ceil(count) };
+    cases.iter().copied().step_by(step).collect()
+}
+
+/// Waits until a condition holds; it is looked at every millisecond.
+pub(crate) fn wait_until(mut condition: impl FnMut() -> bool) {
+    while !condition() {
+        std::thread::park_timeout(std::time::Duration::from_millis(1));
+    }
+}
+
 /// The top of the repository.
 pub(crate) fn top() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..")

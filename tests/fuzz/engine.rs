@@ -1,7 +1,7 @@
 //! Fuzzing on stable Rust: seeded mutations of a corpus of real files. An input with a new outcome joins the corpus; in a
 //! build with counters (`tests/fuzz/run`), also an input that takes a branch as often as no input before.
 //!
-//! A gate run tries a fixed number of cases. `FREEPLAY_FUZZ_S` is the time of each target in seconds, and
+//! The gate (`FREEPLAY_TESTS=gate`) tries a fixed number of cases, a test a fifth of them. `FREEPLAY_FUZZ_S` is the time of each target in seconds, and
 //! `FREEPLAY_FUZZ_SEED` another seed; `FREEPLAY_FUZZ_INPUT` is a kept input to try alone. `docs/reliability.md` has the
 //! command and its figures.
 
@@ -124,6 +124,8 @@ pub(crate) fn fuzz(
         print(&format!("{name}: {}", run(&std::fs::read(file).unwrap())));
         return;
     }
+    let is_gate = std::env::var_os("FREEPLAY_TESTS").is_some_and(|value| value == "gate");
+    let wanted_cases = if is_gate { gate_cases } else { gate_cases.div_ceil(5) };
     let number = |key: &str| std::env::var(key).ok().and_then(|text| text.parse::<u64>().ok());
     let time = number("FREEPLAY_FUZZ_S").map(Duration::from_secs);
     let seed = number("FREEPLAY_FUZZ_SEED").unwrap_or(1);
@@ -139,7 +141,7 @@ pub(crate) fn fuzz(
     let originals = pool.len();
     // Loops over long inputs take branches as often as never before, and are slow.
     let longest = 1000 + 2 * pool.iter().map(|input| input.bytes.len()).max().unwrap_or(0);
-    while time.map_or(cases < gate_cases.max(originals), |time| begun.elapsed() < time) {
+    while time.map_or(cases < wanted_cases.max(originals), |time| begun.elapsed() < time) {
         // Each corpus file as it is, then mutations.
         // Inputs that only took new branches are often refused early: half of the cases start from others.
         let from = if random.below(2) == 0 || by_branch.is_empty() { &pool } else { &by_branch };
@@ -208,7 +210,7 @@ fn watch(name: &'static str, watched: &Watched) {
                 std::process::abort();
             }
             drop(watched);
-            std::thread::sleep(Duration::from_millis(200));
+            std::thread::park_timeout(Duration::from_millis(200));
         }
     });
 }

@@ -1,14 +1,14 @@
 //! File-system calls of a run that fail, are killed at, or never return: `tests/data/disk/faults.c`, preloaded.
 //!
-//! Every call of the process on a folder is counted, so that each can be tried. The gate tries a sample; all of them
-//! are tried with `FREEPLAY_FAULTS=all`, and a number of calls of each row with a number. `docs/reliability.md` has the figures.
+//! Every call of the process on a folder is counted, so that each can be tried. A test tries one call of each row, the
+//! gate four; `FREEPLAY_FAULTS=all` tries all of them, and a number that many. `docs/reliability.md` has the figures.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::harness::{CommandResult, TestFleet, print_line};
+use crate::harness::{CommandResult, TestFleet, is_gate, print_line, wait_until};
 use crate::runs::interruption::{Chance, small, whole_flights};
 
 /// Numbers of `errno(3)`.
@@ -18,8 +18,8 @@ const ENOSPC: &str = "28";
 const EACCES: &str = "13";
 const EMFILE: &str = "24";
 
-/// Calls that the gate tries of each kind of fault.
-const SAMPLE: usize = 4;
+/// Calls that are tried of each kind of fault, by the tests and by the gate.
+const SAMPLE: [usize; 2] = [1, 4];
 
 /// The compiled injector, or why there is none.
 pub(crate) struct Injector {
@@ -127,9 +127,8 @@ impl Injector {
         let fault = self.hang(fleet);
         let mut other = self.command(fleet, &["run", "--jobs", "1", "-q"], &fault);
         let mut other = other.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        while !fleet.path("results/runs/_delta_log/00000000000000000001.json").exists() {
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        let started = fleet.path("results/runs/_delta_log/00000000000000000001.json");
+        wait_until(|| started.exists());
         let found = fleet.freeplay(&["run"]);
         other.kill().unwrap();
         other.wait().unwrap();
@@ -155,18 +154,24 @@ impl Injector {
     }
 }
 
+/// Seed of random calls: `FREEPLAY_SEED`, else a fixed one.
+pub(crate) fn seed() -> u64 {
+    std::env::var("FREEPLAY_SEED").ok().map_or(412, |seed| seed.parse().unwrap())
+}
+
 /// How many calls of each row are tried: all, a number, or those of the gate.
 fn sample() -> usize {
     match std::env::var("FREEPLAY_FAULTS") {
         Ok(which) if which == "all" => usize::MAX,
-        Ok(which) => which.parse().unwrap_or(SAMPLE),
-        Err(_) => SAMPLE,
+        Ok(which) => which.parse().unwrap(),
+        Err(_) => SAMPLE[usize::from(is_gate())],
     }
 }
 
-/// The calls to test, spread evenly.
+/// The calls to test, spread evenly from the middle of the first part.
 fn calls(count: usize) -> Vec<usize> {
-    (1..=count).step_by(count.div_ceil(sample()).max(1)).collect()
+    let step = count.div_ceil(sample()).max(1);
+    (1 + step / 2..=count).step_by(step).collect()
 }
 
 /// The logs that the small fleet's configuration names.
@@ -455,6 +460,36 @@ fn a_kill_at_any_call_loses_nothing() {
     strike(RUN, GROWN, ("results", "write", "kill"), false);
 }
 
+/// Run after run on one store is killed at a call from a seed, until a run finishes, and then from nothing again.
+#[test]
+fn kills_of_run_after_run_lose_nothing_and_double_nothing() {
+    let Some(injector) = Injector::new() else { return };
+    let kills = if is_gate() { 200 } else { 20 };
+    let plain = few();
+    plain.run_ok(RUN);
+    let wanted = plain.exported();
+    let count = injector.count(&few(), RUN, "results", "write");
+    let mut chance = Chance(seed());
+    let (mut fleet, mut kept, mut killed, mut finished, mut partly) = (few(), 0, 0, 0, 0);
+    while killed < kills {
+        let fault = Fault::at("results", "write", "kill", 1 + (chance.next() * count as f64) as usize);
+        let ended = injector.run(&fleet, RUN, &fault);
+        let now = whole_flights(&fleet);
+        assert!(now >= kept, "{kept} records were kept, now {now}, after {fault:?}");
+        kept = now;
+        if ended.code.is_some() {
+            assert!(fleet.exported() == wanted, "after kills, the finished store is another one: {ended:?}");
+            (fleet, kept, finished) = (few(), 0, finished + 1);
+        } else {
+            (killed, partly) = (killed + 1, partly + usize::from(now > 0));
+        }
+    }
+    fleet.run_ok(RUN);
+    assert_eq!(fleet.exported(), wanted);
+    print_line(&format!("{killed} runs were killed, {partly} with records stored, {finished} finished between"));
+    assert!(partly > 0 && finished > 0, "no kill came after a commit, or no run finished");
+}
+
 #[test]
 fn a_fault_in_a_compaction_loses_nothing() {
     const COMPACT: &[&str] = &["store", "compact"];
@@ -509,7 +544,7 @@ fn two_faults_in_one_run_lose_nothing() {
     let plain = few();
     plain.run_ok(&["run"]);
     let wanted = plain.exported();
-    let seed = std::env::var("FREEPLAY_FUZZ_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or(1);
+    let seed = seed();
     let mut chance = Chance(seed);
     for (make, store) in [NEW, GROWN] {
         let command = Struck { injector: &injector, before: make(), args: RUN, wanted: &wanted };
@@ -592,21 +627,18 @@ fn a_run_with_a_log_that_never_ends_answers_a_signal() {
     let Some(injector) = Injector::new() else { return };
     let fleet = small();
     let fault = injector.hang(&fleet);
-    let mut child =
-        injector.command(&fleet, &["run", "--jobs", "1"], &fault).stdout(Stdio::null()).spawn().unwrap();
-    std::thread::sleep(Duration::from_secs(3));
+    let hanging = fleet.path("hanging.txt");
+    let mut command = injector.command(&fleet, &["run", "--jobs", "1"], &fault);
+    let mut child = command.env("FAULT_COUNT", &hanging).stdout(Stdio::null()).spawn().unwrap();
+    wait_until(|| hanging.exists());
     let began = Instant::now();
     Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
-    let code = loop {
-        if let Some(status) = child.try_wait().unwrap() {
-            break status.code();
-        }
-        if began.elapsed() > Duration::from_secs(20) {
-            child.kill().unwrap();
-            panic!("no answer to SIGTERM in 20 s");
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    };
-    assert_eq!(code, Some(130));
+    let mut ended = None;
+    wait_until(|| {
+        ended = child.try_wait().unwrap();
+        ended.is_some() || began.elapsed() > Duration::from_secs(20)
+    });
+    child.kill().unwrap();
+    assert_eq!(ended.expect("no answer to SIGTERM in 20 s").code(), Some(130));
     fleet.run_ok(&["run"]);
 }

@@ -2,79 +2,29 @@
 
 use std::time::Duration;
 
-use crate::harness::{TestFleet, print_line};
+use crate::harness::{TestFleet, print_line, spread, wait_until};
 
-/// Records seen in the store by a reader, or none while there is no store yet.
-fn stored(fleet: &TestFleet) -> usize {
-    let result = fleet.freeplay(&["store", "export", "--format", "csv", "-q"]);
-    if result.code == Some(0) { result.out.lines().count().saturating_sub(1) } else { 0 }
+/// Sends an interrupt to a process.
+#[cfg(unix)]
+fn interrupt(child: &std::process::Child) {
+    std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
 }
 
-/// When a run is killed.
-#[derive(Debug, Clone, Copy)]
-enum When {
-    /// So long after its start: nothing may be there yet.
-    After(Duration),
-    /// As soon as the log of the table has this many commits of records.
-    Committed(usize),
-}
-
-/// Kills a run; on Unix this is SIGKILL, and nothing in the process gets a last word.
-fn kill(fleet: &TestFleet, when: When) {
-    let mut child =
-        fleet.command(&["run", "--jobs", "1"]).stderr(std::process::Stdio::null()).spawn().unwrap();
-    match when {
-        When::After(pause) => std::thread::sleep(pause),
-        When::Committed(commits) => {
-            let entry = fleet.path(&format!("results/gaps/_delta_log/{commits:020}.json"));
-            while !entry.exists() && child.try_wait().unwrap().is_none() {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-        }
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
-}
-
-#[test]
-fn a_killed_run_keeps_whole_flights_and_the_next_one_finishes() {
-    let plain = TestFleet::sample();
-    plain.run_ok(&["run"]);
-    let wanted = plain.exported();
-    let pauses = [0, 60, 200, 500].map(|ms| When::After(Duration::from_millis(ms)));
-    for when in pauses.into_iter().chain([1, 2].map(When::Committed)) {
-        let fleet = TestFleet::sample();
-        kill(&fleet, when);
-        let kept = stored(&fleet);
-        print_line(&format!("killed {when:?}: {kept} of 120 records kept"));
-        assert_eq!(kept % 4, 0, "half a flight, {when:?}: {kept} records");
-        assert!(matches!(when, When::After(_)) || kept > 0, "a finished flight is lost, {when:?}");
-        fleet.run_ok(&["run"]);
-        assert_eq!(fleet.exported(), wanted, "killed {when:?}");
-    }
-}
-
-/// A run that receives an interrupt finishes the flights in progress and reports it.
+/// A run that receives an interrupt finishes the flights in progress and reports the others.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_exits_with_130_and_the_next_one_finishes() {
     let fleet = TestFleet::sample();
-    let child = fleet.command(&["run", "--jobs", "1"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
-    std::thread::sleep(Duration::from_millis(250));
-    let pid = child.id().to_string();
-    std::process::Command::new("kill").args(["-INT", &pid]).status().unwrap();
+    let mut child = fleet.command(&["run", "--jobs", "1"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
+    let entry = fleet.path("results/gaps/_delta_log/00000000000000000001.json");
+    wait_until(|| entry.exists() || child.try_wait().unwrap().is_some());
+    interrupt(&child);
     let output = child.wait_with_output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    match output.status.code() {
-        // A fast machine may be done before the signal comes.
-        Some(0) => assert!(!text.contains("not processed"), "{text}"),
-        code => {
-            assert_eq!(code, Some(130), "{text}");
-            assert!(text.contains("not processed") || text.is_empty(), "{text}");
-        }
-    }
+    assert_eq!(output.status.code(), Some(130), "{text}");
+    assert!(text.contains("not processed"), "{text}");
     fleet.run_ok(&["run"]);
-    assert_eq!(stored(&fleet), 120);
+    assert_eq!(whole_flights(&fleet), 120);
 }
 
 /// A second interrupt ends the run at once, whatever is in progress.
@@ -84,67 +34,17 @@ fn an_interrupt_is_answered_within_a_second() {
     let fleet = TestFleet::sample();
     let mut child = fleet.command(&["run", "--jobs", "1", "--no-progress"]).stdout(null()).spawn().unwrap();
     let entry = fleet.path("results/gaps/_delta_log/00000000000000000001.json");
-    while !entry.exists() && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    let interrupt = |pid: u32| {
-        std::process::Command::new("kill").args(["-INT", &pid.to_string()]).status().unwrap();
-    };
+    wait_until(|| entry.exists() || child.try_wait().unwrap().is_some());
     let struck = std::time::Instant::now();
-    interrupt(child.id());
-    std::thread::sleep(Duration::from_millis(100));
-    interrupt(child.id());
+    interrupt(&child);
+    interrupt(&child);
     let code = child.wait().unwrap().code();
     let took = struck.elapsed();
     print_line(&format!("interrupted: exit {code:?} after {took:?}"));
     assert_eq!(code, Some(130));
     assert!(took < Duration::from_secs(1), "{took:?}");
     fleet.run_ok(&["run"]);
-    assert_eq!(stored(&fleet), 120);
-}
-
-/// Two hundred kills at random instants, run after run on the same store until it is finished, and then
-/// from nothing again. After each, the store opens, holds whole flights, and each of them once.
-#[test]
-fn two_hundred_kills_lose_nothing_and_double_nothing() {
-    const KILLS: usize = 200;
-    let plain = small();
-    plain.run_ok(&["run", "--jobs", "1"]);
-    let wanted = plain.exported();
-    // The machine may be busy with other tests: the fastest of three runs is the duration.
-    let took = |_| {
-        let fleet = small();
-        let started = std::time::Instant::now();
-        fleet.run_ok(&["run", "--jobs", "1"]);
-        started.elapsed()
-    };
-    let mut longest = (0..3).map(took).min().unwrap();
-    let seed = std::env::var("FREEPLAY_KILL_SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(412_u64);
-    print_line(&format!("killing {KILLS} runs of up to {longest:?}, seed {seed} (FREEPLAY_KILL_SEED)"));
-    let mut chance = Chance(seed);
-    let (mut fleet, mut finished, mut kept, mut partly, mut struck) = (small(), 0, 0, 0, 0);
-    while struck < KILLS {
-        let mut child = fleet.command(&["run", "--jobs", "1"]).stdout(null()).stderr(null()).spawn().unwrap();
-        std::thread::sleep(longest.mul_f64(1.05 * chance.next()));
-        let over = child.try_wait().unwrap().is_some();
-        child.kill().unwrap();
-        child.wait().unwrap();
-        let now = whole_flights(&fleet);
-        assert!(now >= kept, "{kept} records were kept, now {now}");
-        partly += usize::from(now > 0 && !over);
-        struck += usize::from(!over);
-        kept = now;
-        // However fast the machine is just now, about one run in six is to be over before its kill.
-        longest = longest.mul_f64(if over { 0.9 } else { 1.02 });
-        if over {
-            assert_eq!(fleet.exported(), wanted, "after kills, the finished store is another one");
-            (fleet, finished, kept) = (small(), finished + 1, 0);
-        }
-    }
-    fleet.run_ok(&["run"]);
-    assert_eq!(fleet.exported(), wanted);
-    print_line(&format!("{struck} runs were struck, {partly} with records stored, {finished} over before"));
-    assert!(partly > 0, "no kill came between two commits");
+    assert_eq!(whole_flights(&fleet), 120);
 }
 
 /// Ten flights of four actuators.
@@ -199,7 +99,7 @@ fn a_writer_that_fails_at_any_byte_leaves_the_store_whole() {
     plain.run_ok(&["run"]);
     let wanted = plain.exported();
     let mut failed = 0;
-    for blocks in [0, 1, 2, 4, 6, 8, 12, 16, 24, 32] {
+    for blocks in spread(&[0, 1, 2, 4, 6, 8, 12, 16, 24, 32], 3) {
         let fleet = small();
         let program = env!("CARGO_BIN_EXE_freeplay");
         // Blocks of 512 bytes: the limit takes effect inside data files and inside the table's log.
@@ -218,7 +118,7 @@ fn a_writer_that_fails_at_any_byte_leaves_the_store_whole() {
         fleet.run_ok(&["run"]);
         assert_eq!(fleet.exported(), wanted, "{blocks} blocks");
     }
-    assert!(failed > 2, "the limit struck {failed} times only");
+    assert!(failed > 1, "the limit struck {failed} times only");
 }
 
 /// Two runs at once: one works, the other names it or waits; nothing is done twice.
@@ -245,7 +145,7 @@ fn two_runs_at_once_store_each_flight_once() {
 }
 
 /// A run that waits for another hears the first signal.
-#[cfg(unix)]
+#[cfg(target_os = "linux")]
 #[test]
 fn a_run_that_waits_can_be_interrupted() {
     let fleet = small();
@@ -253,8 +153,10 @@ fn a_run_that_waits_can_be_interrupted() {
     let store = store::Store::open(fleet.path("results")).unwrap();
     let held = store.lock(&store::Holder::this_process(), None).unwrap();
     let child = fleet.command(&["run", "--wait", "10m"]).stdout(null()).stderr(null()).spawn().unwrap();
-    std::thread::sleep(Duration::from_millis(700));
-    std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let opened = format!("/proc/{}/fd/*", child.id());
+    let has_lock = |file: std::path::PathBuf| std::fs::read_link(file).is_ok_and(|file| file.ends_with("lock"));
+    wait_until(|| glob::glob(&opened).unwrap().flatten().any(has_lock));
+    interrupt(&child);
     let result = child.wait_with_output().unwrap();
     assert_eq!(result.status.code(), Some(130), "{result:?}");
     drop(held);

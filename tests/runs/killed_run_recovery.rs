@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::harness::TestFleet;
+use crate::harness::{TestFleet, wait_until};
 
 fn json(fleet: &TestFleet, args: &[&str]) -> Value {
     serde_json::from_str(&fleet.run_ok(args)).unwrap()
@@ -14,9 +14,7 @@ fn killed() -> TestFleet {
     std::fs::write(&fleet.logs()[0], b"broken").unwrap();
     let mut child = fleet.command(&["run", "--jobs", "1", "-q"]).spawn().unwrap();
     let entry = fleet.path("results/gaps/_delta_log/00000000000000000001.json");
-    while !entry.exists() && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
+    wait_until(|| entry.exists() || child.try_wait().unwrap().is_some());
     child.kill().unwrap();
     assert_eq!(child.wait().unwrap().code(), None, "the run ended before it could be killed");
     fleet

@@ -1,18 +1,18 @@
 //! A fleet whose logs arrive day by day, while runs are killed, meet failing disks, broken files and wrong clocks.
 //!
 //! At the end the store equals that of one run over the same logs, and a run needs no more memory than at first. The
-//! gate lasts some days; `FREEPLAY_SOAK=365` is a year.
+//! test lasts two days, the gate six; `FREEPLAY_SOAK=365` is a year.
 
 use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
-use crate::harness::{TestFleet, facts, print_line, rewrite};
+use crate::harness::{TestFleet, facts, is_gate, print_line, rewrite};
 use crate::runs::injected_faults::Injector;
 use crate::runs::interruption::{Chance, whole_flights};
 
-/// Nights of the gate.
-const DAYS: usize = 6;
+/// Days of the test, and of the gate.
+const DAYS: [usize; 2] = [2, 6];
 
 /// Flights that a day brings.
 const FLIGHTS: usize = 2;
@@ -78,14 +78,14 @@ fn run_watched(fleet: &TestFleet, kill_after: Option<Duration>) -> Option<u64> {
             child.wait().unwrap();
             return None;
         }
-        std::thread::sleep(Duration::from_millis(5));
+        std::thread::park_timeout(Duration::from_millis(5));
     }
 }
 
 #[test]
 fn a_year_of_faults_ends_with_the_store_of_one_run() {
     let Some(injector) = Injector::new() else { return };
-    let days = std::env::var("FREEPLAY_SOAK").ok().and_then(|n| n.parse().ok()).unwrap_or(DAYS);
+    let days = std::env::var("FREEPLAY_SOAK").ok().and_then(|n| n.parse().ok()).unwrap_or(DAYS[usize::from(is_gate())]);
     let mut chance = Chance(7);
     let (fleet, sources) = bare();
     let (mut peaks, mut counts) = (Vec::new(), [0; 6]);

@@ -5,7 +5,7 @@
    FAULT_MODE   an errno, or "kill" or "hang"
    FAULT_ALSO   number and mode of one more call, such as "17:5"
    FAULT_KIND   only calls of this kind count: "read" (open, read, stat and list) or "write"; both by default
-   FAULT_COUNT  file into which the number of calls is written at the end
+   FAULT_COUNT  file into which the number of calls is written at the end, and before a hang
    CLOCK_OFFSET_S  seconds by which the clock of the calendar is wrong */
 #define _GNU_SOURCE
 #include <dirent.h>
@@ -63,6 +63,7 @@ static int strike(const char *how) {
         for (;;) syscall(SYS_pause);
     }
     if (strcmp(how, "hang") == 0) {
+        finish();
         for (;;) usleep(1000000);
     }
     errno = atoi(how);

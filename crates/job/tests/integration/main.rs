@@ -5,5 +5,4 @@
 mod config;
 mod part_identification;
 mod reference;
-mod schema;
 mod unusual_parts;
