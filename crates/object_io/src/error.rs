@@ -12,6 +12,9 @@ pub enum Error {
     /// Credentials or an endpoint are missing or cannot be read.
     #[error("{place} cannot be asked: {detail}")]
     Settings { place: String, detail: String },
+    /// The program has no clients of object stores.
+    #[error("{address} cannot be asked: this program was built without the feature `cloud`")]
+    NotBuilt { address: String },
     /// The object or bucket does not exist.
     #[error("{address} does not exist")]
     Missing { address: String },
@@ -38,6 +41,7 @@ impl Error {
         match self {
             Self::Address { .. } => "object_address",
             Self::Settings { .. } => "object_settings",
+            Self::NotBuilt { .. } => "object_not_built",
             Self::Missing { .. } => "object_missing",
             Self::Denied { .. } => "object_denied",
             Self::Changed { .. } => "object_changed",
@@ -52,6 +56,7 @@ impl Error {
         match self {
             Self::Address { .. } => "write it as s3://bucket/key, gs://bucket/key or az://container/key",
             Self::Settings { .. } => "docs/objects.md lists the variables and profiles that are read",
+            Self::NotBuilt { .. } => "build it with its default features: `cargo build --release -p cli`",
             Self::Missing { .. } => "are bucket, key and region right? `aws s3 ls` shows what is there",
             Self::Denied { .. } => {
                 "are the credentials of the right account, not expired, and allowed to list and read here?"

@@ -1,12 +1,6 @@
-//! One JSON document posted to an address of HTTP, with the client that the object stores use.
+//! Addresses of HTTP, and what became of a document that was sent to one.
 
-use std::time::Duration;
-
-use object_store::ClientOptions;
-use object_store::client::{HttpConnector, HttpErrorKind, HttpRequest, ReqwestConnector};
 use url::Url;
-
-use crate::client::handle;
 
 /// Outcome of a post.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,7 +21,7 @@ pub fn check_url(text: &str) -> Result<(), String> {
     parse(text).map(drop)
 }
 
-fn parse(text: &str) -> Result<Url, String> {
+pub(crate) fn parse(text: &str) -> Result<Url, String> {
     let url = Url::parse(text).map_err(|e| e.to_string())?;
     match url.scheme() {
         _ if url.host_str().is_none_or(str::is_empty) => Err("it has no host".to_owned()),
@@ -37,110 +31,9 @@ fn parse(text: &str) -> Result<Url, String> {
     }
 }
 
-/// Posts a JSON document and waits for the status of the answer, at most `timeout`.
-///
-/// Redirections are followed as by other clients of HTTP. Messages hold no address, which may hold a secret.
-pub fn post_json(url: &str, body: &str, timeout: Duration) -> Posted {
-    let request = match request(url, body) {
-        Ok(request) => request,
-        Err(detail) => return Posted::NotSent(detail),
-    };
-    let options =
-        ClientOptions::new().with_timeout(timeout).with_connect_timeout(timeout).with_allow_http(true);
-    let client = match ReqwestConnector::default().connect(&options) {
-        Ok(client) => client,
-        Err(error) => return Posted::NotSent(error.to_string()),
-    };
-    let answer = match handle() {
-        Ok(runtime) => runtime.block_on(client.execute(request)),
-        Err(error) => return Posted::NotSent(error.to_string()),
-    };
-    match answer {
-        Ok(answer) => Posted::Answered(answer.status().as_u16()),
-        Err(error) if error.kind() == HttpErrorKind::Connect => Posted::NotSent(detail(&error)),
-        Err(error) if error.kind() == HttpErrorKind::Timeout => {
-            Posted::Unknown(format!("no answer within {:.1} s", timeout.as_secs_f64()))
-        }
-        Err(error) => Posted::Unknown(detail(&error)),
-    }
-}
-
-fn request(url: &str, body: &str) -> Result<HttpRequest, String> {
-    let url = parse(url)?;
-    let mut request = HttpRequest::new(body.to_owned().into());
-    *request.uri_mut() = url.as_str().parse().map_err(|_| "the address cannot be requested".to_owned())?;
-    let invalid = |_| "the request cannot be made".to_owned();
-    *request.method_mut() = "POST".parse().map_err(|_| "the request cannot be made".to_owned())?;
-    request.headers_mut().insert("content-type", "application/json".parse().map_err(invalid)?);
-    Ok(request)
-}
-
-/// Message of the innermost cause.
-fn detail(error: &object_store::client::HttpError) -> String {
-    let mut cause: &dyn std::error::Error = error;
-    while let Some(next) = cause.source() {
-        cause = next;
-    }
-    cause.to_string()
-}
-
 #[cfg(test)]
 mod tests {
-    use std::io::{Read, Write};
-    use std::net::TcpListener;
-
     use super::*;
-
-    const SOON: Duration = Duration::from_millis(500);
-
-    /// Accepts one request, hands it over and answers with `reply`; an empty reply never comes.
-    fn server(reply: &'static str) -> (String, std::thread::JoinHandle<String>) {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let url = format!("http://{}/hook?token=SECRET", listener.local_addr().unwrap());
-        let serve = move || {
-            let (mut stream, _) = listener.accept().unwrap();
-            stream.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
-            let mut request = Vec::new();
-            let mut chunk = [0; 1024];
-            while let Ok(n @ 1..) = stream.read(&mut chunk) {
-                request.extend_from_slice(&chunk[..n]);
-                if String::from_utf8_lossy(&request).ends_with('}') {
-                    break;
-                }
-            }
-            if reply.is_empty() {
-                std::thread::sleep(2 * SOON);
-            }
-            stream.write_all(reply.as_bytes()).unwrap();
-            String::from_utf8(request).unwrap()
-        };
-        (url, std::thread::spawn(serve))
-    }
-
-    #[test]
-    fn the_document_arrives_as_json_and_the_status_is_returned() {
-        for (reply, status) in [
-            ("HTTP/1.1 204 No Content\r\nContent-Length: 0\r\n\r\n", 204),
-            ("HTTP/1.1 500 Internal Server Error\r\nContent-Length: 0\r\n\r\n", 500),
-        ] {
-            let (url, served) = server(reply);
-            assert_eq!(post_json(&url, "{\"a\":\"µ\"}", SOON), Posted::Answered(status));
-            let request = served.join().unwrap();
-            assert!(request.starts_with("POST /hook?token=SECRET HTTP/1.1\r\n"), "{request}");
-            assert!(request.to_lowercase().contains("content-type: application/json\r\n"), "{request}");
-            assert!(request.ends_with("\r\n\r\n{\"a\":\"µ\"}"), "{request}");
-        }
-    }
-
-    #[test]
-    fn a_silent_receiver_may_have_the_document_and_a_closed_port_has_not() {
-        let (url, served) = server("");
-        assert_eq!(post_json(&url, "{}", SOON), Posted::Unknown("no answer within 0.5 s".to_owned()));
-        served.join().unwrap();
-        let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-        let closed = post_json(&format!("http://{free}/SECRET"), "{}", SOON);
-        assert!(matches!(&closed, Posted::NotSent(detail) if !detail.contains("SECRET")), "{closed:?}");
-    }
 
     #[test]
     fn an_address_of_another_kind_is_refused_without_being_quoted() {

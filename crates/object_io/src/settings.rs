@@ -30,6 +30,7 @@ pub fn configure(settings: Settings) {
     *SETTINGS.write().unwrap_or_else(PoisonError::into_inner) = settings;
 }
 
+#[cfg(feature = "cloud")]
 pub(crate) fn settings() -> Settings {
     *SETTINGS.read().unwrap_or_else(PoisonError::into_inner)
 }

@@ -34,15 +34,28 @@ First steps:
 Exit codes: 0 success, 1 some logs failed, 2 usage or configuration, 3 the run failed,
 4 a unit met --fail-on, 5 an alert was not sent, 130 interrupted.";
 
+/// The text of `--version`, with the features that may be left out.
+macro_rules! long_version {
+    ($optional:literal) => {
+        concat!(
+            env!("CARGO_PKG_VERSION"),
+            "\ncommit: ",
+            env!("FREEPLAY_COMMIT"),
+            "\nbuild: ",
+            env!("FREEPLAY_BUILD"),
+            "\nfeatures: ",
+            $optional,
+            "Parquet snappy, zstd, lz4, brotli, gzip"
+        )
+    };
+}
+
 /// What `--version` prints after the name; `-V` prints the first line only.
-const LONG_VERSION: &str = concat!(
-    env!("CARGO_PKG_VERSION"),
-    "\ncommit: ",
-    env!("FREEPLAY_COMMIT"),
-    "\nbuild: ",
-    env!("FREEPLAY_BUILD"),
-    "\nfeatures: object stores S3, Google Cloud Storage and Azure with rustls; Parquet snappy, zstd, lz4, brotli, gzip"
-);
+const LONG_VERSION: &str = if cfg!(feature = "cloud") {
+    long_version!("object stores S3, Google Cloud Storage and Azure with rustls; ")
+} else {
+    long_version!("")
+};
 
 /// Estimate actuator backlash (free play) from flight logs and forecast when each unit reaches its limit.
 #[derive(Debug, Parser)]
