@@ -4,20 +4,22 @@ use rayon::prelude::*;
 use validation::methods::{MethodResults, estimate_flight};
 use validation::scenarios::{Class, Kind, classes};
 
-/// Flights of each class.
-const FLIGHTS: u64 = 3;
+/// Flights of each class in a test, and in the gate; and the least share of intervals that hold.
+const SIZES: [(u64, f64); 2] = [(1, 0.76), (3, 0.83)];
 /// First flight, apart from those of the study.
 const FIRST: u64 = 40_000;
 
-/// Of 100 intervals 90 should hold. With some 200 flights chance alone leaves 83 to 96 (binomial, 99.9 %); a miss of
-/// more than six standard errors is no chance.
+/// Of 100 intervals 90 should hold. With some 200 flights chance alone leaves 83 to 96, with 70 flights 76 to 99 (binomial,
+/// 99.9 %); a miss of more than six standard errors is no chance.
 #[test]
 fn nine_in_ten_intervals_hold_and_no_blind_flight_is_estimated() {
+    let is_gate = std::env::var_os("FREEPLAY_TESTS").is_some_and(|value| value == "gate");
+    let (of_class, least) = SIZES[usize::from(is_gate)];
     let flights: Vec<(&Class, u64)> = classes()
         .iter()
-        .flat_map(|class| (FIRST..FIRST + FLIGHTS).map(move |index| (class, index)))
+        .flat_map(|class| (FIRST..FIRST + of_class).map(move |index| (class, index)))
         .collect();
-    assert!(flights.len() >= 200, "{} flights", flights.len());
+    assert!(flights.len() >= 68 * of_class as usize, "{} flights", flights.len());
     let results: Vec<(&Class, MethodResults)> =
         flights.par_iter().map(|(class, index)| (*class, estimate_flight(class, *index).unwrap())).collect();
     let (mut held, mut estimated, mut refused, mut far) = (0_usize, 0_usize, 0_usize, Vec::new());
@@ -36,7 +38,7 @@ fn nine_in_ten_intervals_hold_and_no_blind_flight_is_estimated() {
         }
     }
     let share = held as f64 / estimated as f64;
-    assert!((0.83..=0.97).contains(&share), "{held} of {estimated} intervals hold; far off: {far:?}");
+    assert!((least..=0.99).contains(&share), "{held} of {estimated} intervals hold; far off: {far:?}");
     assert!(far.len() * 100 <= estimated, "{far:?}");
     assert!(refused * 25 <= estimated, "{refused} of {estimated} sound flights were refused");
 }
