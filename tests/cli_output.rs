@@ -268,8 +268,7 @@ fn an_estimate_is_drawn_in_the_form_its_ending_names() {
 /// A reader that closes the pipe after a line ends the program quietly.
 #[test]
 fn a_closed_pipe_ends_quietly() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run"]);
+    let fleet = TestFleet::processed();
     let mut child = fleet
         .command(&["store", "export", "--format", "csv"])
         .stdout(std::process::Stdio::piped())
@@ -389,8 +388,7 @@ fn a_limit_for_all_parts_serves_those_that_state_none() {
 
 #[test]
 fn the_store_tells_what_it_holds_and_whether_it_is_fed() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run"]);
+    let fleet = TestFleet::processed();
     let info: serde_json::Value = serde_json::from_str(&fleet.run_ok(&["store", "info", "--json"])).unwrap();
     assert_eq!(
         (info["records"].as_i64(), info["flights"].as_i64(), info["serials"].as_i64()),
@@ -474,8 +472,7 @@ fn the_version_has_a_commit_and_features_below_the_line_that_scripts_read() {
 /// What a planner needs is there at 80 columns, and no line is longer; the reason wraps in its column, complete.
 #[test]
 fn tables_fit_80_columns_and_keep_what_matters() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run"]);
+    let fleet = TestFleet::processed();
     let at_80 = |args: &[&str]| {
         let output = fleet.command(args).env("COLUMNS", "80").output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{args:?}");

@@ -25,7 +25,7 @@ pub(crate) fn spread<T: Copy>(cases: &[T], count: usize) -> Vec<T> {
     cases.iter().copied().step_by(step).collect()
 }
 
-/// Waits until a condition holds; it is looked at every millisecond.
+/// Waits until a condition holds; it is tested every millisecond.
 pub(crate) fn wait_until(mut condition: impl FnMut() -> bool) {
     while !condition() {
         std::thread::park_timeout(std::time::Duration::from_millis(1));
@@ -54,6 +54,19 @@ impl TestFleet {
     /// A copy of the tests' small fleet: three aircraft with ten flights each, all with a log.
     pub(crate) fn sample() -> Self {
         Self::of("three-aircraft")
+    }
+
+    /// The same after a run, which is made once for all tests.
+    pub(crate) fn processed() -> Self {
+        static PROCESSED: std::sync::OnceLock<TestFleet> = std::sync::OnceLock::new();
+        let processed = || {
+            let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+            copy(&top().join("tests/data/three-aircraft"), folder.path());
+            let fleet = Self { folder };
+            fleet.run_ok(&["run", "--quiet"]);
+            fleet
+        };
+        PROCESSED.get_or_init(processed).copied()
     }
 
     /// A copy of the sample fleet, `sample-data/`.

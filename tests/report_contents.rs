@@ -49,8 +49,7 @@ fn a_flight_leads_to_its_diagnostic_plot() {
 
 #[test]
 fn every_unit_is_on_the_page_of_its_part_once() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--quiet"]);
+    let fleet = TestFleet::processed();
     fleet.run_ok(&["report", "-o", "pages", "--data"]);
     let report: serde_json::Value = serde_json::from_str(&read(&fleet, "pages/report.json")).unwrap();
     let units = report["units"].as_array().unwrap();

@@ -171,8 +171,7 @@ fn dates_of_installations_that_are_still_to_come_are_named() {
 /// A serial number typed again moves a history to a unit that does not exist.
 #[test]
 fn a_serial_number_that_loses_all_flights_is_named_with_the_one_that_has_them() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run", "--quiet"]);
+    let fleet = TestFleet::processed();
     edit(&fleet, "sample-data/installations.csv", |table| table.replace("1040-0005", "1040-0050"));
     let run = fleet.run_ok(&["run"]);
     let changes = run.split("state changes in this run: ").nth(1).unwrap();

@@ -1,6 +1,5 @@
-//! Documentation: links, documented commands, error messages and vocabulary.
+//! Documentation: links, documented commands, and error messages.
 
 mod docs_links;
 mod documented_commands;
 mod error_messages;
-mod prose;

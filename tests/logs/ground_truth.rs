@@ -95,8 +95,7 @@ fn one_worker_and_two_store_the_same_bytes() {
 /// The serial that changed tails keeps its history, although the logs hold no serial numbers.
 #[test]
 fn a_swapped_serial_keeps_its_history_across_tails() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run"]);
+    let fleet = TestFleet::processed();
     fleet.run_ok(&["query", "serial", "1060-0008", "--format", "parquet", "--output", "unit.parquet"]);
     let tails = Table::read(&fleet.path("unit.parquet")).texts("tail_number");
     assert_eq!(tails, [["N412FP"; 5], ["N413FP"; 5]].concat());

@@ -8,8 +8,7 @@ fn to_do(account: &str) -> String {
 
 #[test]
 fn a_second_run_does_nothing() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run"]);
+    let fleet = TestFleet::processed();
     let before = fleet.exported();
     let account = fleet.run_ok(&["run"]);
     assert!(to_do(&account).ends_with("30 logs: 0 new or changed, 30 already processed"), "{account}");
@@ -33,16 +32,14 @@ fn a_changed_part_redoes_only_the_logs_it_flew_in() {
 
 #[test]
 fn a_changed_limit_moves_no_gap_and_redoes_nothing() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run"]);
+    let fleet = TestFleet::processed();
     fleet.configure("limit_m = 150e-6", "limit_m = 160e-6");
     assert!(to_do(&fleet.run_ok(&["run"])).ends_with("30 logs: 0 new or changed, 30 already processed"));
 }
 
 #[test]
 fn a_renamed_or_touched_log_is_recognised_by_its_content() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run"]);
+    let fleet = TestFleet::processed();
     let before = fleet.exported();
     let log = &fleet.logs()[0];
     std::fs::rename(log, log.with_file_name("renamed.parquet")).unwrap();
@@ -97,8 +94,7 @@ fn a_copy_of_a_log_adds_nothing_whichever_is_read_first() {
     let log = &fleet.logs()[3];
     std::fs::copy(log, log.with_file_name("copy.parquet")).unwrap();
     fleet.run_ok(&["run"]);
-    let plain = TestFleet::sample();
-    plain.run_ok(&["run"]);
+    let plain = TestFleet::processed();
     assert_eq!(fleet.exported(), plain.exported());
 }
 
@@ -114,16 +110,14 @@ fn a_rival_log_of_the_same_flight_is_in_error_whichever_is_read_first() {
         assert_eq!(result.code, Some(1), "{result:?}");
         assert!(result.err.contains("error[duplicate_flight]"), "{}", result.err);
         assert!(result.err.contains("z_rival.parquet"), "{}", result.err);
-        let plain = TestFleet::sample();
-        plain.run_ok(&["run"]);
+        let plain = TestFleet::processed();
         assert_eq!(fleet.exported(), plain.exported());
     }
 }
 
 #[test]
 fn redo_does_all_again_and_stores_each_flight_once() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run"]);
+    let fleet = TestFleet::processed();
     let before = fleet.exported();
     let account = fleet.run_ok(&["run", "--redo", "--tail", "N413FP"]);
     assert!(account.contains("40 records of 10 flights"), "{account}");

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 use crate::harness::{CommandResult, TestFleet, is_gate, print_line, wait_until};
@@ -180,11 +181,21 @@ fn logs_of(fleet: &TestFleet) -> Vec<PathBuf> {
 }
 
 /// Three flights of four actuators.
-fn few() -> TestFleet {
+pub(crate) fn few() -> TestFleet {
     let fleet = small();
     let kept = logs_of(&fleet).into_iter().take(3).collect::<Vec<_>>();
     fleet.logs().iter().filter(|log| !kept.contains(log)).for_each(|log| std::fs::remove_file(log).unwrap());
     fleet
+}
+
+/// Records of the three flights without a fault.
+pub(crate) fn few_records() -> &'static str {
+    static RECORDS: OnceLock<String> = OnceLock::new();
+    RECORDS.get_or_init(|| {
+        let fleet = few();
+        fleet.run_ok(RUN);
+        fleet.exported()
+    })
 }
 
 /// The fleet with a run behind it and a log that is new.
@@ -465,9 +476,7 @@ fn a_kill_at_any_call_loses_nothing() {
 fn kills_of_run_after_run_lose_nothing_and_double_nothing() {
     let Some(injector) = Injector::new() else { return };
     let kills = if is_gate() { 200 } else { 20 };
-    let plain = few();
-    plain.run_ok(RUN);
-    let wanted = plain.exported();
+    let wanted = few_records();
     let count = injector.count(&few(), RUN, "results", "write");
     let mut chance = Chance(seed());
     let (mut fleet, mut kept, mut killed, mut finished, mut partly) = (few(), 0, 0, 0, 0);
@@ -541,13 +550,11 @@ fn a_fault_in_a_report_changes_no_store_and_the_next_report_is_whole() {
 fn two_faults_in_one_run_lose_nothing() {
     const MODES: [&str; 4] = [EIO, ESTALE, ENOSPC, "kill"];
     let Some(injector) = Injector::new() else { return };
-    let plain = few();
-    plain.run_ok(&["run"]);
-    let wanted = plain.exported();
+    let wanted = few_records();
     let seed = seed();
     let mut chance = Chance(seed);
     for (make, store) in [NEW, GROWN] {
-        let command = Struck { injector: &injector, before: make(), args: RUN, wanted: &wanted };
+        let command = Struck { injector: &injector, before: make(), args: RUN, wanted };
         let count = injector.count(&command.before.copied(), RUN, "results", "both");
         let tries = sample().min(count);
         let mut codes = ExitCodes::default();
@@ -581,15 +588,12 @@ fn reduced(command: &Struck<'_>, fault: Fault) -> Fault {
 #[test]
 fn a_log_that_never_ends_is_an_error_of_that_log_and_the_rest_is_stored() {
     let Some(injector) = Injector::new() else { return };
-    let plain = small();
-    plain.run_ok(&["run"]);
-    let wanted = plain.exported();
     for jobs in ["1", "2"] {
-        let fleet = small();
+        let fleet = few();
         let logs = logs_of(&fleet).len();
         let fault = injector.hang(&fleet);
         let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
-        std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 5\n")).unwrap();
+        std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 2\n")).unwrap();
         let began = Instant::now();
         let struck = injector.run(&fleet, &["run", "--jobs", jobs], &fault);
         assert!(began.elapsed() < Duration::from_mins(1), "{:?}", began.elapsed());
@@ -599,7 +603,7 @@ fn a_log_that_never_ends_is_an_error_of_that_log_and_the_rest_is_stored() {
         assert_eq!(stored, (logs - 1) * 4, "{struck:?}");
         // The cause may have passed: no `--retry` is needed.
         fleet.run_ok(&["run"]);
-        assert_eq!(fleet.exported(), wanted);
+        assert_eq!(fleet.exported(), few_records());
     }
 }
 
@@ -609,7 +613,7 @@ fn estimate_and_check_give_up_a_log_that_never_ends_and_go_on() {
     let fleet = small();
     let fault = injector.hang(&fleet);
     let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
-    std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 5\n")).unwrap();
+    std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 2\n")).unwrap();
     let logs = logs_of(&fleet);
     let names: Vec<&str> = logs.iter().take(3).map(|log| log.to_str().unwrap()).collect();
     for command in ["estimate", "check"] {

@@ -20,8 +20,7 @@ fn states(fleet: &TestFleet) -> Vec<(String, Value)> {
 #[test]
 fn a_reversed_load_sign_is_an_error_of_the_parts_and_names_the_units_that_lose_their_state() {
     const REMEDY: &str = "reverse the sign of the load";
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run"]);
+    let fleet = TestFleet::processed();
     let before = states(&fleet);
     fleet.configure("[channel.load]\n", "[channel.load]\nsign = -1\n");
 
@@ -122,8 +121,7 @@ fn a_copy_of_a_log_is_counted_and_named_with_the_log_that_owns_the_flight() {
 
 #[test]
 fn names_and_ranges_that_cannot_be_are_errors_with_the_nearest_name() {
-    let fleet = TestFleet::sample();
-    fleet.run_ok(&["run"]);
+    let fleet = TestFleet::processed();
     let is_refused = |args: &[&str], code: &str, hint: &str| {
         let result = fleet.freeplay(args);
         assert_eq!(result.code, Some(2), "{args:?}: {result:?}");
