@@ -131,8 +131,14 @@ fn cut(disk: &mut Disk<'_>, chance: &mut Chance, preload: Option<&Path>, mid: bo
         // A run makes some twenty files.
         let files = files_of(disk.fleet) + 1 + (chance.next() * 20.0) as usize;
         let mut child = run().spawn().unwrap();
-        wait_until(|| files_of(disk.fleet) >= files || child.try_wait().unwrap().is_some());
-        done(Command::new("kill").args(["-STOP", &child.id().to_string()])).unwrap();
+        let mut is_over = false;
+        wait_until(|| {
+            is_over = child.try_wait().unwrap().is_some();
+            is_over || files_of(disk.fleet) >= files
+        });
+        if !is_over {
+            done(Command::new("kill").args(["-STOP", &child.id().to_string()])).unwrap();
+        }
         let copy = disk.copy();
         child.kill().unwrap();
         child.wait().unwrap();

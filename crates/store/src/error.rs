@@ -56,8 +56,8 @@ pub enum Error {
     /// A value is not valid in its column.
     #[error("column `{column}`, row {row}: {problem}")]
     Value { column: &'static str, row: usize, problem: String },
-    /// The engine that reads data files gave up.
-    #[error("data files cannot be read: {}", without_setting(.0))]
+    /// Rows could not be ordered or grouped.
+    #[error("rows cannot be sorted: {0}")]
     Frame(#[from] polars::error::PolarsError),
     /// Rows could not be brought into columns, or columns into a format.
     #[error("rows cannot be brought into columns: {0}")]
@@ -96,7 +96,6 @@ impl Error {
                 Some(ErrorKind::Other.into())
             }
             Self::Table { source, .. } | Self::LogTable { source } => os_error(source),
-            Self::Frame(source) => os_error(source),
             Self::Arrow(source) => os_error(source),
             Self::Parquet(source) => os_error(source),
             _ => None,
@@ -115,8 +114,8 @@ impl Error {
             Self::Table { .. } | Self::LogTable { .. } => "store_table",
             Self::Damaged { .. } | Self::LogDamaged { .. } => "store_damaged",
             Self::Object(error) => error.code(),
-            Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) => "store_value",
-            Self::Frame(_) | Self::Parquet(_) => "store_unreadable",
+            Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) | Self::Frame(_) => "store_value",
+            Self::Parquet(_) => "store_unreadable",
         }
     }
 
@@ -161,10 +160,10 @@ impl Error {
             Self::Damaged { .. } => {
                 "restore this file from a backup; without one, remove the store and run its logs again"
             }
-            Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) => {
+            Self::Column { .. } | Self::Value { .. } | Self::Arrow(_) | Self::Frame(_) => {
                 "was the table changed by another program? `freeplay store verify` shows details"
             }
-            Self::Frame(_) | Self::Parquet(_) => "`freeplay store verify` lists the damaged files",
+            Self::Parquet(_) => "`freeplay store verify` lists the damaged files",
         }
     }
 
@@ -211,11 +210,6 @@ fn os_error(error: &(dyn std::error::Error + 'static)) -> Option<std::io::Error>
     Some(std::io::Error::from_raw_os_error(number))
 }
 
-/// The message without a setting of Polars that shows longer paths.
-fn without_setting(error: &polars::error::PolarsError) -> String {
-    error.to_string().replace(" (set POLARS_VERBOSE=1 to see full path)", "")
-}
-
 /// First line of the message. The libraries add the location in their own code, which does not help users.
 fn first_line(error: &DeltaTableError) -> String {
     error.to_string().lines().next().unwrap_or_default().to_owned()
@@ -253,14 +247,13 @@ mod tests {
         assert!(error.remedy().contains("run again") && !error.remedy().contains("remove"));
     }
 
-    /// Polars and the parquet crate wrap the error of the system, or keep its text alone.
+    /// The parquet crate wraps the error of the system, or keeps its text alone.
     #[test]
     fn a_system_error_below_a_data_file_is_no_damage() {
         let emfile = || std::io::Error::from_raw_os_error(24);
         let of_parquet = parquet::errors::ParquetError::External(Box::new(emfile()));
-        let of_polars = polars::error::PolarsError::ComputeError(format!("{}: …/a.parquet", emfile()).into());
         let of_arrow = arrow::error::ArrowError::ParquetError(format!("External: {}", emfile()));
-        for error in [Error::Parquet(of_parquet), Error::Frame(of_polars), Error::Arrow(of_arrow)] {
+        for error in [Error::Parquet(of_parquet), Error::Arrow(of_arrow)] {
             assert_eq!(error.code(), "store_io");
             assert!(error.remedy().contains("ulimit -n"), "{}", error.remedy());
         }

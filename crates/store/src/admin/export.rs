@@ -46,7 +46,7 @@ impl Store {
         let mut sink = ExportWriter::new(format, to)?;
         let mut rows = 0;
         for window in self.windows(&snapshot, query)? {
-            let batch = self.select(&snapshot, &window, GapRecord::schema())?;
+            let batch = self.select(&snapshot, &window)?;
             rows += batch.num_rows();
             sink.write(&batch)?;
         }
@@ -59,11 +59,9 @@ impl Store {
         if query.last.is_some() {
             return Ok(vec![query.clone()]);
         }
-        let files = Self::candidate_files(snapshot, query);
-        self.check(&files)?;
-        let order = ["departure_utc"];
+        let (files, order) = (Self::candidate_files(snapshot, query), ["departure_utc"]);
         let schema = scan::only(&GapRecord::schema(), &order)?;
-        let rows = scan::read_files(&files, &schema, &query.conditions())?;
+        let rows = self.read_rows(&files, &schema, &query.conditions())?;
         let departures = frame::sorted(&rows, &order, None)?;
         let departures = departures.column(0).as_primitive::<TimestampMicrosecondType>();
         let edges = (1..departures.len().div_ceil(WINDOW_ROWS)).map(|i| departures.value(i * WINDOW_ROWS));

@@ -49,10 +49,9 @@ impl Store {
     /// As [`Store::scan`].
     pub fn info(&self) -> Result<Info, Error> {
         let snapshot = self.gaps.snapshot()?;
-        let files: Vec<PathBuf> = snapshot.files.iter().map(|file| file.path.clone()).collect();
-        self.check(&files)?;
+        let files: Vec<PathBuf> = snapshot.paths().collect();
         let names = ["departure_utc", "tail_number", "flight_id", "part_number", "serial_number"];
-        let rows = scan::read_files(&files, &scan::only(&GapRecord::schema(), &names)?, &[])?;
+        let rows = self.read_rows(&files, &scan::only(&GapRecord::schema(), &names)?, &[])?;
         let rows = frame::frame(&rows, &names)?;
         let departures = rows.column(names[0])?.i64()?;
         let at = |micros: Option<i64>| micros.and_then(|us| Timestamp::from_microsecond(us).ok());

@@ -16,7 +16,6 @@ use crate::delta::snapshot::DataFile;
 use crate::delta::table::Table;
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::store_read::files_of;
 use crate::read::{frame, scan};
 use crate::write::writer::{key_columns, keys};
 use records::LogRecord;
@@ -43,7 +42,7 @@ impl Store {
 
     /// Records that are stored twice, and logs whose records are not all stored.
     fn wrong_records(&self) -> Result<Vec<Diagnostic>, Error> {
-        let files: Vec<PathBuf> = files_of(&self.gaps)?;
+        let files: Vec<PathBuf> = self.gaps.snapshot()?.paths().collect();
         let schema = GapRecord::schema();
         let schema = Arc::new(schema.project(&key_columns(&schema)?)?);
         let rows = scan::read_files(&files, &schema, &[])?;

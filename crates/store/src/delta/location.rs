@@ -16,8 +16,8 @@ use object_io::{Address, Client, block_on};
 use tokio::runtime::{Builder, Handle, Runtime};
 use url::Url;
 
-use crate::delta::digested_log::DigestedLog;
-use crate::delta::durable_fs::{self, DurableFiles};
+use crate::delta::durable_fs;
+use crate::delta::log_storage::LogStorage;
 use crate::error::Error;
 
 /// A store's or a table's location.
@@ -37,7 +37,8 @@ struct BucketLocation {
     _copies: Arc<tempfile::TempDir>,
 }
 
-/// What runs Delta's asynchronous library: threads of our own, or those that serve the bucket's connections.
+/// What runs Delta's asynchronous library: threads of our own, which a process has that was forked from one with
+/// another store, or those that serve the bucket's connections.
 #[derive(Debug)]
 enum RuntimeHandle {
     Own(Runtime),
@@ -55,7 +56,7 @@ impl Location {
         Ok(Self { dir, bucket, runtime })
     }
 
-    /// A folder that exists. The Delta library is asynchronous and gets one worker thread of its own.
+    /// A folder that exists.
     fn folder(path: &Path) -> Result<Self, Error> {
         let dir = std::fs::canonicalize(path).map_err(Error::io(path, "opened"))?;
         let own = Builder::new_multi_thread().worker_threads(1).thread_name("store").enable_all().build();
@@ -103,14 +104,16 @@ impl Location {
         let Some(bucket) = &self.bucket else {
             let url = Url::from_directory_path(&self.dir).map_err(|()| invalid())?;
             let builder = DeltaTableBuilder::from_url(url.clone())?;
-            return builder
-                .with_storage_backend(Arc::new(DigestedLog::new(DurableFiles::default())), url)
-                .build_storage();
+            return builder.with_storage_backend(Arc::new(LogStorage::folder()), url).build_storage();
         };
         let url = Url::parse(&bucket.address.to_string()).map_err(|_| invalid())?;
         let below = PrefixStore::new(Arc::clone(&bucket.client), bucket.address.key());
-        let below = Arc::new(DigestedLog::new(below));
-        Ok(default_logstore(below, Arc::clone(&bucket.client), &url, &StorageConfig::default()))
+        Ok(default_logstore(
+            Arc::new(LogStorage::bucket(below)),
+            Arc::clone(&bucket.client),
+            &url,
+            &StorageConfig::default(),
+        ))
     }
 
     /// Creates the folder, or the folder of the copies.

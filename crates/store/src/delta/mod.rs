@@ -1,12 +1,12 @@
 //! Delta tables: log, data files, statistics and durable writes.
 
 pub(crate) mod data_file;
-pub(crate) mod digested_log;
 pub(crate) mod durable_fs;
 pub(crate) mod file_stats;
 pub(crate) mod foreign_table;
 pub(crate) mod location;
 pub(crate) mod log_digests;
+pub(crate) mod log_storage;
 pub(crate) mod snapshot;
 pub(crate) mod snapshot_cache;
 pub(crate) mod table;

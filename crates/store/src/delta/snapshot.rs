@@ -17,6 +17,13 @@ pub(crate) struct Snapshot {
     pub(crate) delta: DeltaTable,
 }
 
+impl Snapshot {
+    /// Paths of the data files.
+    pub(crate) fn paths(&self) -> impl Iterator<Item = PathBuf> {
+        self.files.iter().map(|file| file.path.clone())
+    }
+}
+
 /// Data file as recorded in the log.
 pub(crate) struct DataFile {
     pub(crate) path: PathBuf,

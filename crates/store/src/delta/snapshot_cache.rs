@@ -10,8 +10,8 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
-use crate::delta::digested_log::LOG;
 use crate::delta::location::Location;
+use crate::delta::log_digests::LOG;
 use crate::delta::snapshot::Snapshot;
 
 /// A snapshot that is kept, shared by all who hold the table.

@@ -17,10 +17,9 @@ use futures::TryStreamExt;
 use jiff::Timestamp;
 
 use crate::delta::data_file;
-use crate::delta::digested_log::LOG;
 use crate::delta::file_stats::Stats;
 use crate::delta::location::Location;
-use crate::delta::log_digests::{self, LogDigests};
+use crate::delta::log_digests::{self, LOG, LogDigests};
 use crate::delta::snapshot::{DataFile, Snapshot};
 use crate::delta::snapshot_cache::{SnapshotCache, commit_file};
 use crate::error::Error;

@@ -4,14 +4,17 @@
 //! for them that was a third of what a run with nothing to do takes.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::PathBuf;
 
 use arrow::array::{AsArray, BooleanArray, RecordBatch};
 use arrow::compute::filter_record_batch;
 use arrow::datatypes::Int64Type;
 
+use crate::delta::file_stats::Stats;
+use crate::delta::table::Table;
 use crate::delta::versioned;
 use crate::error::Error;
+use crate::handle::Store;
 use crate::read::scan;
 use records::row_schema::{self, FromCells, Row};
 
@@ -22,50 +25,50 @@ pub(crate) struct TextFilter<'a> {
     pub(crate) is_wanted: &'a dyn Fn(&str) -> bool,
 }
 
-/// Rows by name, and the commit that each came with.
-pub(crate) struct LatestRows<R>(BTreeMap<String, (i64, R)>);
-
-impl<R: Row + FromCells> LatestRows<R> {
-    pub(crate) fn new() -> Self {
-        Self(BTreeMap::new())
-    }
-
-    /// Takes in the rows of a file that are wanted; all without a condition.
+impl Store {
+    /// Of the rows that fit, the newest of each name, by name; files that cannot hold one are passed over.
     ///
     /// # Errors
-    /// [`Error::Io`], [`Error::Parquet`] and [`Error::Arrow`] when it cannot be read; [`Error::Value`] when a cell
-    /// is not valid in its column.
-    pub(crate) fn take(
-        &mut self,
-        file: &Path,
+    /// As [`Store::records`].
+    pub(crate) fn newest<R: Row + FromCells>(
+        &self,
+        table: &Table,
         wanted: Option<TextFilter<'_>>,
+        may_hold: impl Fn(&Stats) -> bool,
         name: impl Fn(&R) -> String,
-    ) -> Result<(), Error> {
-        let schema = versioned::schema::<R>();
+    ) -> Result<Vec<R>, Error> {
+        let snapshot = table.snapshot()?;
+        let files = snapshot.files.iter().filter(|file| file.has_rows() && may_hold(&file.stats));
+        let files: Vec<PathBuf> = files.map(|file| file.path.clone()).collect();
+        self.check(&files)?;
+        newest_of(&files, wanted, name)
+    }
+}
+
+fn newest_of<R: Row + FromCells>(
+    files: &[PathBuf],
+    wanted: Option<TextFilter<'_>>,
+    name: impl Fn(&R) -> String,
+) -> Result<Vec<R>, Error> {
+    let schema = versioned::schema::<R>();
+    let commit_column = schema.index_of(versioned::COMMIT)?;
+    // By name: the row, and the commit that it came with.
+    let mut newest: BTreeMap<String, (i64, R)> = BTreeMap::new();
+    for file in files {
         for mut batch in scan::read_file(file, &schema, &[])? {
             if let Some(wanted) = wanted {
                 batch = filter_record_batch(&batch, &wanted.of(&batch)?)?;
             }
-            let commits = batch.column(schema.index_of(versioned::COMMIT)?).as_primitive::<Int64Type>();
+            let commits = batch.column(commit_column).as_primitive::<Int64Type>();
             for (&commit, row) in commits.values().iter().zip(row_schema::from_batch::<R>(&batch)?) {
-                self.put(name(&row), commit, row);
+                let name = name(&row);
+                if newest.get(&name).is_none_or(|(known, _)| *known <= commit) {
+                    newest.insert(name, (commit, row));
+                }
             }
         }
-        Ok(())
     }
-
-    fn put(&mut self, name: String, commit: i64, row: R) {
-        match self.0.get_mut(&name) {
-            Some(known) if known.0 > commit => (),
-            Some(known) => *known = (commit, row),
-            None => drop(self.0.insert(name, (commit, row))),
-        }
-    }
-
-    /// The newest of each name, by name.
-    pub(crate) fn into_rows(self) -> Vec<R> {
-        self.0.into_values().map(|(_, row)| row).collect()
-    }
+    Ok(newest.into_values().map(|(_, row)| row).collect())
 }
 
 impl TextFilter<'_> {
@@ -108,16 +111,14 @@ mod tests {
 
     fn taken(batches: &[RecordBatch], wanted: Option<TextFilter<'_>>) -> Result<Vec<(String, i64)>, Error> {
         let dir = tempfile::tempdir().unwrap();
-        let mut newest = LatestRows::<RunRecord>::new();
-        for (k, batch) in batches.iter().enumerate() {
-            let path = dir.path().join(k.to_string());
-            let mut writer =
-                ArrowWriter::try_new(File::create(&path).unwrap(), batch.schema(), None).unwrap();
+        let files: Vec<PathBuf> = (0..batches.len()).map(|k| dir.path().join(k.to_string())).collect();
+        for (path, batch) in files.iter().zip(batches) {
+            let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), batch.schema(), None).unwrap();
             writer.write(batch).unwrap();
             writer.close().unwrap();
-            newest.take(&path, wanted, |run| run.run_id.clone())?;
         }
-        Ok(newest.into_rows().into_iter().map(|run| (run.run_id, run.found)).collect())
+        let newest = newest_of(&files, wanted, |run: &RunRecord| run.run_id.clone())?;
+        Ok(newest.into_iter().map(|run| (run.run_id, run.found)).collect())
     }
 
     #[test]

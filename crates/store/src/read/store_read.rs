@@ -7,16 +7,15 @@ use arrow::datatypes::SchemaRef;
 use polars::prelude::{SortMultipleOptions, UniqueKeepStrategy};
 use records::{GapRecord, PartNumber, SerialNumber};
 
-use crate::delta::file_stats::Stats;
 use crate::delta::snapshot::Snapshot;
-use crate::delta::table::Table;
 use crate::error::Error;
 use crate::handle::Store;
-use crate::read::latest_rows::{LatestRows, TextFilter};
+use crate::read::frame;
+use crate::read::latest_rows::TextFilter;
 use crate::read::query::Query;
-use crate::read::{frame, scan};
+use crate::read::scan::{self, Condition};
 use records::RecordKey;
-use records::row_schema::{FromCells, Row, from_batch};
+use records::row_schema::from_batch;
 use records::{LogOutcome, LogRecord};
 
 impl Store {
@@ -29,7 +28,7 @@ impl Store {
     /// [`Error::Table`] when the log cannot be read, [`Error::Damaged`] when a file is not the one that
     /// was committed, [`Error::Parquet`] when it cannot be decoded.
     pub fn scan(&self, query: &Query) -> Result<RecordBatch, Error> {
-        self.select(&self.gaps.snapshot()?, query, GapRecord::schema())
+        self.select(&self.gaps.snapshot()?, query)
     }
 
     /// The same as rows.
@@ -45,10 +44,9 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn serials(&self) -> Result<Vec<(PartNumber, SerialNumber)>, Error> {
-        let files = files_of(&self.gaps)?;
-        self.check(&files)?;
+        let files: Vec<PathBuf> = self.gaps.snapshot()?.paths().collect();
         let names = ["part_number", "serial_number"];
-        let rows = scan::read_files(&files, &scan::only(&GapRecord::schema(), &names)?, &[])?;
+        let rows = self.read_rows(&files, &scan::only(&GapRecord::schema(), &names)?, &[])?;
         let units = frame::frame(&rows, &names)?.unique_stable(None, UniqueKeepStrategy::Any, None)?;
         let units = units.sort(names, SortMultipleOptions::default())?;
         let [parts, serials] = [units.column(names[0])?.str()?, units.column(names[1])?.str()?];
@@ -81,54 +79,34 @@ impl Store {
     /// # Errors
     /// [`Error::Table`] when the log cannot be read.
     pub fn files(&self) -> Result<Vec<PathBuf>, Error> {
-        self.named_files(&self.gaps)
+        self.table_files(self.gaps.name)
     }
 
-    /// The same of the accounts of logs.
+    /// The same of a table by its name: `gaps`, `logs`, `runs`, `alerts` or `work`; empty where it does not exist.
     ///
     /// # Errors
     /// As [`Store::files`].
-    pub fn log_files(&self) -> Result<Vec<PathBuf>, Error> {
-        self.named_files(&self.logs)
+    pub fn table_files(&self, name: &str) -> Result<Vec<PathBuf>, Error> {
+        let Some(table) = self.existing_tables().into_iter().find(|table| table.name == name) else {
+            return Ok(Vec::new());
+        };
+        Ok(table.snapshot()?.paths().map(|file| self.location.display_path(&file)).collect())
     }
 
-    /// The same of the accounts of runs.
-    ///
-    /// # Errors
-    /// As [`Store::files`].
-    pub fn run_files(&self) -> Result<Vec<PathBuf>, Error> {
-        self.named_files(&self.runs)
-    }
-
-    /// The same of alerts; empty where none has been written.
-    ///
-    /// # Errors
-    /// As [`Store::files`].
-    pub fn alert_files(&self) -> Result<Vec<PathBuf>, Error> {
-        if self.alerts.exists()? { self.named_files(&self.alerts) } else { Ok(Vec::new()) }
-    }
-
-    /// The same of events of work requests.
-    ///
-    /// # Errors
-    /// As [`Store::files`].
-    pub fn work_files(&self) -> Result<Vec<PathBuf>, Error> {
-        if self.work.exists()? { self.named_files(&self.work) } else { Ok(Vec::new()) }
-    }
-
-    fn named_files(&self, table: &Table) -> Result<Vec<PathBuf>, Error> {
-        Ok(files_of(table)?.iter().map(|file| self.location.display_path(file)).collect())
-    }
-
-    pub(crate) fn select(
+    /// Some columns of the matching rows of files, after a check of their digests.
+    pub(crate) fn read_rows(
         &self,
-        snapshot: &Snapshot,
-        query: &Query,
-        schema: SchemaRef,
-    ) -> Result<RecordBatch, Error> {
+        files: &[PathBuf],
+        schema: &SchemaRef,
+        conditions: &[Condition],
+    ) -> Result<Vec<RecordBatch>, Error> {
+        self.check(files)?;
+        scan::read_files(files, schema, conditions)
+    }
+
+    pub(crate) fn select(&self, snapshot: &Snapshot, query: &Query) -> Result<RecordBatch, Error> {
         let files = Self::candidate_files(snapshot, query);
-        self.check(&files)?;
-        let rows = scan::read_files(&files, &schema, &query.conditions())?;
+        let rows = self.read_rows(&files, &GapRecord::schema(), &query.conditions())?;
         frame::sorted(&rows, &RecordKey::COLUMNS, query.last)
     }
 
@@ -137,25 +115,4 @@ impl Store {
         let files = snapshot.files.iter().filter(|file| file.has_rows() && query.may_be_in(&file.stats));
         files.map(|file| file.path.clone()).collect()
     }
-
-    /// Of the rows that fit, the newest of each name, by name; files that cannot hold one are passed over.
-    pub(crate) fn newest<R: Row + FromCells>(
-        &self,
-        table: &Table,
-        wanted: Option<TextFilter<'_>>,
-        may_hold: impl Fn(&Stats) -> bool,
-        name: impl Fn(&R) -> String,
-    ) -> Result<Vec<R>, Error> {
-        let snapshot = table.snapshot()?;
-        let files = snapshot.files.iter().filter(|file| file.has_rows() && may_hold(&file.stats));
-        let files: Vec<PathBuf> = files.map(|file| file.path.clone()).collect();
-        self.check(&files)?;
-        let mut newest = LatestRows::new();
-        files.iter().try_for_each(|file| newest.take(file, wanted, &name))?;
-        Ok(newest.into_rows())
-    }
-}
-
-pub(crate) fn files_of(table: &Table) -> Result<Vec<PathBuf>, Error> {
-    Ok(table.snapshot()?.files.iter().map(|file| file.path.clone()).collect())
 }

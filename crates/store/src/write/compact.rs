@@ -115,7 +115,7 @@ impl RewritePlan {
         snapshot: &'a Snapshot,
         check: impl Fn(&[PathBuf]) -> Result<(), Error>,
     ) -> Result<Change<'a>, Error> {
-        let files: Vec<PathBuf> = snapshot.files.iter().map(|file| file.path.clone()).collect();
+        let files: Vec<PathBuf> = snapshot.paths().collect();
         // A flipped byte must not be given a new digest.
         check(&files)?;
         let schema = &table.schema;

@@ -54,7 +54,7 @@ fn a_store_is_scattered_once_a_table_has_a_hundred_files_too_many() {
     assert!(writer.store().needs_compaction().unwrap());
     writer.compact().unwrap();
     assert!(!writer.store().needs_compaction().unwrap());
-    assert_eq!(writer.store().run_files().unwrap().len(), 1);
+    assert_eq!(writer.store().table_files("runs").unwrap().len(), 1);
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod runs;
 use std::path::Path;
 use std::time::Duration;
 
+use clap::ValueEnum;
 use jiff::Timestamp;
 use job::Config;
 use records::Diagnostic;
@@ -45,13 +46,8 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Resul
 }
 
 fn files(store: &Store, table: Table, output: &Output) -> Result<Code, Failure> {
-    let files = match table {
-        Table::Gaps => store.files()?,
-        Table::Logs => store.log_files()?,
-        Table::Runs => store.run_files()?,
-        Table::Alerts => store.alert_files()?,
-        Table::Work => store.work_files()?,
-    };
+    let name = table.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default();
+    let files = store.table_files(&name)?;
     let lines: Vec<String> = files.iter().map(|file| file.display().to_string() + "\n").collect();
     output.write_result(&lines.concat())?;
     Ok(Code::Success)
