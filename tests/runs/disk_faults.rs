@@ -5,12 +5,11 @@
 //! was not synced is still in the kernel's memory and not in the image, and mounting the copy replays its
 //! journal.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use crate::harness::{TestFleet, is_gate, print_line, spread, wait_until};
 use crate::runs::injected_faults::{few, few_records, seed};
 use crate::runs::interruption::{Chance, small, whole_flights};
-
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 /// Power cuts with syncing as it is, by the tests and by the gate, and the most without it: the first of those should be
 /// caught.

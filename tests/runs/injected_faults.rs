@@ -495,7 +495,9 @@ fn kills_of_run_after_run_lose_nothing_and_double_nothing() {
     }
     fleet.run_ok(RUN);
     assert_eq!(fleet.exported(), wanted);
-    print_line(&format!("{killed} runs were killed, {partly} with records stored, {finished} finished between"));
+    print_line(&format!(
+        "{killed} runs were killed, {partly} with records stored, {finished} finished between"
+    ));
     assert!(partly > 0 && finished > 0, "no kill came after a commit, or no run finished");
 }
 

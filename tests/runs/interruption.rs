@@ -16,7 +16,8 @@ fn interrupt(child: &std::process::Child) {
 #[test]
 fn an_interrupted_run_exits_with_130_and_the_next_one_finishes() {
     let fleet = TestFleet::sample();
-    let mut child = fleet.command(&["run", "--jobs", "1"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
+    let mut child =
+        fleet.command(&["run", "--jobs", "1"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
     let entry = fleet.path("results/gaps/_delta_log/00000000000000000001.json");
     wait_until(|| entry.exists() || child.try_wait().unwrap().is_some());
     interrupt(&child);
@@ -152,7 +153,8 @@ fn a_run_that_waits_can_be_interrupted() {
     let held = store.lock(&store::Holder::this_process(), None).unwrap();
     let child = fleet.command(&["run", "--wait", "10m"]).stdout(null()).stderr(null()).spawn().unwrap();
     let opened = format!("/proc/{}/fd/*", child.id());
-    let has_lock = |file: std::path::PathBuf| std::fs::read_link(file).is_ok_and(|file| file.ends_with("lock"));
+    let has_lock =
+        |file: std::path::PathBuf| std::fs::read_link(file).is_ok_and(|file| file.ends_with("lock"));
     wait_until(|| glob::glob(&opened).unwrap().flatten().any(has_lock));
     interrupt(&child);
     let result = child.wait_with_output().unwrap();

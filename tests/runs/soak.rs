@@ -85,7 +85,10 @@ fn run_watched(fleet: &TestFleet, kill_after: Option<Duration>) -> Option<u64> {
 #[test]
 fn a_year_of_faults_ends_with_the_store_of_one_run() {
     let Some(injector) = Injector::new() else { return };
-    let days = std::env::var("FREEPLAY_SOAK").ok().and_then(|n| n.parse().ok()).unwrap_or(DAYS[usize::from(is_gate())]);
+    let days = std::env::var("FREEPLAY_SOAK")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(DAYS[usize::from(is_gate())]);
     let mut chance = Chance(7);
     let (fleet, sources) = bare();
     let (mut peaks, mut counts) = (Vec::new(), [0; 6]);

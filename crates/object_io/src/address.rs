@@ -1,8 +1,14 @@
 //! Object address: scheme, bucket and key.
 
 use std::path::Path;
+use std::sync::Arc;
+
+use object_store::ObjectStore;
 
 use crate::error::Error;
+
+/// Client of a bucket, shared by all requests to that bucket.
+pub type Client = Arc<dyn ObjectStore>;
 
 /// Kind of object store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

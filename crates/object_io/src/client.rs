@@ -4,15 +4,11 @@ use std::collections::HashMap;
 use std::future::Future;
 use std::sync::{Arc, LazyLock, Mutex, OnceLock, PoisonError};
 
-use object_store::ObjectStore;
 use tokio::runtime::{Builder, Handle, Runtime};
 
-use crate::address::{Address, Scheme};
-use crate::buckets;
+use crate::address::{Address, Client, Scheme};
+use crate::cloud;
 use crate::error::Error;
-
-/// Client of a bucket, shared by all requests to that bucket.
-pub type Client = Arc<dyn ObjectStore>;
 
 static CLIENTS: LazyLock<Mutex<HashMap<(Scheme, String), Client>>> = LazyLock::new(Mutex::default);
 
@@ -50,7 +46,7 @@ impl Address {
         if let Some(known) = clients.get(&name) {
             return Ok(Arc::clone(known));
         }
-        let built = buckets::client(self)?;
+        let built = cloud::client(self)?;
         clients.insert(name, Arc::clone(&built));
         Ok(built)
     }

@@ -9,34 +9,24 @@
 //! (`docs/objects.md`). Without the feature `cloud`, every address is an error that names this feature.
 
 mod address;
-#[cfg(feature = "cloud")]
-mod aws_profile;
-#[cfg(feature = "cloud")]
-mod buckets;
 mod byte_ranges;
 mod client;
-mod error;
 #[cfg(feature = "cloud")]
-mod http_client;
+mod cloud;
+#[cfg(not(feature = "cloud"))]
+#[path = "without_cloud.rs"]
+mod cloud;
+mod error;
 mod http_post;
 mod listing;
 mod object_file;
-#[cfg(feature = "cloud")]
-mod retry;
 mod settings;
-#[cfg(not(feature = "cloud"))]
-mod without_cloud;
 
-pub use address::{Address, is_address};
-pub use client::{Client, block_on, handle};
+pub use address::{Address, Client, is_address};
+pub use client::{block_on, handle};
+pub use cloud::post_json;
 pub use error::Error;
-#[cfg(feature = "cloud")]
-pub use http_client::post_json;
 pub use http_post::{Posted, check_url};
 pub use listing::{ListEntry, head, list, list_first};
 pub use object_file::{ObjectFile, read_all};
 pub use settings::{Settings, configure};
-#[cfg(not(feature = "cloud"))]
-use without_cloud as buckets;
-#[cfg(not(feature = "cloud"))]
-pub use without_cloud::post_json;

@@ -14,9 +14,9 @@ use bytes::Bytes;
 use futures::{StreamExt, stream};
 use object_store::{GetOptions, GetRange, ObjectMeta, ObjectStore, ObjectStoreExt};
 
-use crate::address::Address;
+use crate::address::{Address, Client};
 use crate::byte_ranges::RangeSet;
-use crate::client::{Client, block_on};
+use crate::client::block_on;
 use crate::error::Error;
 
 /// Requests in flight at once, for one object.

@@ -2,8 +2,7 @@
 
 use std::time::Duration;
 
-use crate::address::Address;
-use crate::client::Client;
+use crate::address::{Address, Client};
 use crate::error::Error;
 use crate::http_post::Posted;
 

@@ -12,7 +12,10 @@ use pipeline::history::external_estimates;
 use store::Store;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let source = std::env::args().skip(1).find(|a| a != "--bench").ok_or("usage: histories STORE|ESTIMATES.parquet")?;
+    let source = std::env::args()
+        .skip(1)
+        .find(|a| a != "--bench")
+        .ok_or("usage: histories STORE|ESTIMATES.parquet")?;
     let begun = Instant::now();
     let histories = if source.ends_with(".parquet") {
         external_estimates::read(Path::new(&source))?

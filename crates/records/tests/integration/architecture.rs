@@ -3,7 +3,6 @@
 //! The test reads `Cargo.toml` and the `mod` and `use` declarations of every crate. It needs no compiler, so it runs
 //! in a second and covers all targets and features. Test modules (`#[cfg(test)]`) are not checked.
 
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -7,26 +7,8 @@ use std::time::SystemTime;
 use serde_json::{Map, Value};
 
 use crate::delta::location::Location;
+use crate::delta::log_storage::{DIGESTS, LOG, log_file, version};
 use crate::error::Error;
-
-/// Folder of the log.
-pub(crate) const LOG: &str = "_delta_log";
-/// Folder of the digests.
-pub(crate) const DIGESTS: &str = "_digests";
-/// Digits of the version at the beginning of a log file's name.
-const VERSION_DIGITS: usize = 20;
-/// The name of a commit or checkpoint; `None` for another file of the log.
-pub(crate) fn log_file(path: &Path) -> Option<&str> {
-    let name = path.file_name()?.to_str()?;
-    let is_log = path.extension().is_some_and(|kind| kind == "json" || kind == "parquet");
-    (is_log && version(name).is_some()).then_some(name)
-}
-
-/// The version that a log file belongs to.
-pub(crate) fn version(name: &str) -> Option<u64> {
-    let (digits, rest) = name.split_at_checked(VERSION_DIGITS)?;
-    rest.starts_with('.').then(|| digits.parse().ok()).flatten()
-}
 
 /// Actions of the Delta protocol. Readers skip others, so a changed name would remove files without an error.
 const ACTIONS: [&str; 10] = [

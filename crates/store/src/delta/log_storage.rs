@@ -27,7 +27,25 @@ use futures::stream::{self, BoxStream};
 use futures::{StreamExt, TryStreamExt};
 
 use crate::delta::durable_fs::{create_parts, replace_parts};
-use crate::delta::log_digests::{DIGESTS, LOG, log_file};
+
+/// Folder of the log.
+pub(crate) const LOG: &str = "_delta_log";
+/// Folder of the digests.
+pub(crate) const DIGESTS: &str = "_digests";
+/// Digits of the version at the beginning of a log file's name.
+const VERSION_DIGITS: usize = 20;
+/// The name of a commit or checkpoint; `None` for another file of the log.
+pub(crate) fn log_file(path: &FsPath) -> Option<&str> {
+    let name = path.file_name()?.to_str()?;
+    let is_log = path.extension().is_some_and(|kind| kind == "json" || kind == "parquet");
+    (is_log && version(name).is_some()).then_some(name)
+}
+
+/// The version that a log file belongs to.
+pub(crate) fn version(name: &str) -> Option<u64> {
+    let (digits, rest) = name.split_at_checked(VERSION_DIGITS)?;
+    rest.starts_with('.').then(|| digits.parse().ok()).flatten()
+}
 
 /// A folder or a prefix of a bucket.
 #[derive(Debug)]

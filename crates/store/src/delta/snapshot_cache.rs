@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
 use crate::delta::location::Location;
-use crate::delta::log_digests::LOG;
+use crate::delta::log_storage::LOG;
 use crate::delta::snapshot::Snapshot;
 
 /// A snapshot that is kept, shared by all who hold the table.

@@ -14,3 +14,8 @@ mod queries;
 mod round_trip;
 mod runs;
 mod timings;
+
+/// Whether exhaustive tests run in full (`FREEPLAY_TESTS=gate`).
+fn is_gate() -> bool {
+    std::env::var_os("FREEPLAY_TESTS").is_some_and(|value| value == "gate")
+}

@@ -7,11 +7,10 @@ use object_store::azure::MicrosoftAzureBuilder;
 use object_store::gcp::GoogleCloudStorageBuilder;
 use object_store::{ClientOptions, RetryConfig};
 
-use crate::address::{Address, Scheme};
-use crate::aws_profile::AwsProfileSource;
-use crate::client::Client;
+use crate::address::{Address, Client, Scheme};
+use crate::cloud::aws_profile::AwsProfileSource;
+use crate::cloud::retry::RetryingStore;
 use crate::error::Error;
-use crate::retry::RetryingStore;
 use crate::settings::settings;
 
 /// A client of the address's bucket that retries.
