@@ -6,7 +6,7 @@ use crate::error::Error;
 pub(crate) const DAY_US: i64 = 86_400_000_000;
 
 /// One flight of a unit, as a caller knows it; order does not matter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Observation {
     /// Departure, microseconds since 1970 UTC.
     pub departure_us: i64,
@@ -23,6 +23,8 @@ pub struct Observation {
     pub gap_m: Option<f64>,
     /// Its standard error, metres; `None` where nothing was stated.
     pub gap_se_m: Option<f64>,
+    /// Whether the estimator itself doubts the gap: such a record alone neither confirms nor clears anything.
+    pub is_doubtful: bool,
 }
 
 /// Defaults for unknown usage, and the start of a unit's own hours.
@@ -71,6 +73,8 @@ pub struct Gap {
     pub gap_m: f64,
     /// Its stated standard error, metres; `NaN` where nothing was stated.
     pub se_m: f64,
+    /// Whether its estimator doubts it.
+    pub is_doubtful: bool,
 }
 
 /// One flight with the unit's usage at its end, counted from the start of its first flight here.
@@ -178,7 +182,7 @@ impl Series {
         &self.flights[..self.flights.partition_point(|flight| flight.departure_us <= as_of_us)]
     }
 
-    /// The gaps known on a day, in order of departure: input of the [classic statistics](crate::classic).
+    /// The gaps known on a day, in order of departure.
     pub fn gaps_until(&self, as_of_us: i64) -> Vec<f64> {
         self.flights_until(as_of_us).iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect()
     }
@@ -241,7 +245,7 @@ fn forget_implausible(row: &mut Observation) {
 fn order(a: &Observation, b: &Observation) -> std::cmp::Ordering {
     let number = |v: Option<f64>| v.unwrap_or(f64::INFINITY);
     let numbers = |o: &Observation| [o.gap_se_m, o.gap_m, o.tail_hours_end, o.flight_hours].map(number);
-    let place = |o: &Observation| (o.departure_us, o.installation, o.gap_m.is_none());
+    let place = |o: &Observation| (o.departure_us, o.installation, o.gap_m.is_none(), o.is_doubtful);
     let by_number = || numbers(a).iter().zip(numbers(b)).map(|(a, b)| a.total_cmp(&b)).find(|o| o.is_ne());
     place(a)
         .cmp(&place(b))
@@ -295,7 +299,11 @@ impl UsageAccumulator {
             hours: self.hours,
             flights: self.flights,
             reversals: self.reversals,
-            gap: row.gap_m.map(|gap_m| Gap { gap_m, se_m: row.gap_se_m.unwrap_or(f64::NAN) }),
+            gap: row.gap_m.map(|gap_m| Gap {
+                gap_m,
+                se_m: row.gap_se_m.unwrap_or(f64::NAN),
+                is_doubtful: row.is_doubtful,
+            }),
         }
     }
 

@@ -68,12 +68,6 @@ pub(crate) fn detect_steps(estimates: &[WeightedGap], limit_m: f64) -> Vec<StepC
     found
 }
 
-/// Whether a step shows at one of the places from which the estimates from `since` on are in reach, the
-/// first estimate being the first one since the last step.
-pub(crate) fn has_step(estimates: &[WeightedGap], since: usize, limit_m: f64) -> bool {
-    PrefixSums::new(estimates, limit_m).largest(0, since.saturating_sub(FARTHEST), estimates.len()).is_some()
-}
-
 /// Squared steps at changes of installation, less what their errors explain, and how many there are.
 ///
 /// Half of the mean is the variance of what one installation adds to every gap measured in it.

@@ -137,22 +137,6 @@ impl RulDistribution {
     }
 }
 
-impl RulDistribution {
-    /// Probability that the limit is met within some hours, with the calibration of the fleet's past forecasts: the
-    /// quantiles of [`crossing`](Self::crossing) are those of this distribution.
-    pub(crate) fn chance_by(&self, hours: f64) -> f64 {
-        let Some(middle) = self.quantile(0.5).filter(|middle| *middle > 1.0) else {
-            return self.within(hours);
-        };
-        let CalibrationParams { low, high, .. } = self.calibration;
-        let width = if hours < middle { high } else { -low };
-        if width.is_nan() || width <= 0.0 {
-            return self.within(hours);
-        }
-        self.within(middle * (hours.max(1.0) / middle).powf(width.recip()))
-    }
-}
-
 /// Whether the quantiles increase; one beyond the horizon is larger than all others.
 fn is_ordered(crossing: &Crossing) -> bool {
     let Crossing { p05_hours, p50_hours, p95_hours } = *crossing;

@@ -1,6 +1,6 @@
 //! A unit's history read: outliers out, offsets of the measurement undone, cut where it was reset.
 
-use crate::data::outliers::{CleanedSeries, NoiseScale, WeightedGap, mark_outliers};
+use crate::data::outliers::{CleanedSeries, WeightedGap, mark_outliers};
 use crate::data::segment::Segment;
 use crate::data::series::{Flight, MaintenanceEvent};
 use crate::data::steps::{StepChange, detect_steps};
@@ -23,7 +23,8 @@ const RECORD_FLIGHTS: usize = 3;
 pub(crate) struct History {
     pub(crate) estimates: Vec<WeightedGap>,
     pub(crate) outliers: Vec<usize>,
-    pub(crate) scatter: NoiseScale,
+    /// Variance found between flights over the variance stated.
+    pub(crate) noise_factor: f64,
     pub(crate) changes: Vec<ChangePoint>,
     /// Variance that the sizes of undone offsets leave in the level, m².
     pub(crate) offset_m2: f64,
@@ -32,8 +33,6 @@ pub(crate) struct History {
     begins: Vec<SegmentStart>,
     /// What has been taken off the last estimates, metres.
     pub(crate) undone_m: f64,
-    /// The first estimate after the last step.
-    pub(crate) last_step: usize,
     now: f64,
     known_age: Option<f64>,
 }
@@ -55,7 +54,7 @@ pub(crate) fn read_history(
     prior: &FleetPrior,
 ) -> History {
     let now = flights.last().map_or(0.0, |f| prior.usage(f));
-    let CleanedSeries { mut estimates, outliers, scatter } = mark_outliers(flights, prior.limit_m());
+    let CleanedSeries { mut estimates, outliers, noise_factor } = mark_outliers(flights, prior.limit_m());
     let found = detect_steps(&estimates, prior.limit_m());
     for estimate in &mut estimates {
         estimate.usage = prior.usage(&flights[estimate.flight]);
@@ -63,13 +62,12 @@ pub(crate) fn read_history(
     let mut history = History {
         estimates,
         outliers,
-        scatter,
+        noise_factor,
         changes: Vec::new(),
         offset_m2: 0.0,
         kind_m2: 0.0,
         begins: vec![SegmentStart { estimate: 0, usage: 0.0, fresh: false }],
         undone_m: 0.0,
-        last_step: found.last().map_or(0, |step| step.at),
         now,
         known_age,
     };
@@ -128,8 +126,8 @@ impl History {
         if begins_anew {
             self.begin(step.at, true);
             self.kind_m2 = kind_m2;
-        } else if self.undone_m + step.step_m > MAX_RIGGING_STEP * prior.limit_m() {
-            // To undo what may be damage would hide it.
+        } else if step.step_m > 0.0 && kind == ChangePointKind::Step {
+            // To undo a rise that no record explains would hide damage.
             let hidden_m = std::mem::take(&mut self.undone_m);
             self.shift(step.at, hidden_m);
             self.begin(step.at, false);

@@ -7,14 +7,14 @@
 )]
 
 mod assessment;
-mod checkpoints;
-mod classic;
 mod degenerate;
 mod fleet;
 mod forecast;
+mod histories;
 mod fuzz;
 mod quantities;
 mod random;
 mod scale;
 mod series;
+mod states;
 mod steps;

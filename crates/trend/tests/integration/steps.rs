@@ -20,6 +20,7 @@ fn series(seed: u64, flights: i64, growth_um: f64, (at, fall_um): (i64, f64)) ->
             load_reversals: Some(100),
             gap_m: Some((gap_um + NOISE_UM * random.normal()) * 1e-6),
             gap_se_m: Some(NOISE_UM * 1e-6),
+            is_doubtful: false,
         }
     };
     let rows: Vec<Observation> = (0..flights).map(row).collect();
@@ -37,7 +38,7 @@ fn falls_beyond_five_standard_errors_are_dated_at_their_flight_and_sized_without
             let at = 8 + (seed * 7 % 9) as i64;
             let series = series(seed, flights, growth_um, (at, fall_um));
             let settings = Settings::for_limit(2e-4);
-            let assessment = assess(&series, i64::MAX / 2, &settings, None, None).unwrap();
+            let assessment = assess(&series, i64::MAX / 2, &settings, None).unwrap();
             let change = assessment.changes.iter().filter(|change| change.step_m < 0.0);
             let Some(change) = change.min_by(|a, b| a.step_m.total_cmp(&b.step_m)) else { continue };
             found += 1;
@@ -62,7 +63,7 @@ fn a_fall_that_may_be_re_rigging_or_reset_leaves_its_doubt_in_the_level() {
     let settings = Settings::for_limit(1e-4);
     let se_um = |fall_um: f64| {
         let series = series(3, 60, 0.2, (30, fall_um));
-        let assessment = assess(&series, i64::MAX / 2, &settings, None, None).unwrap();
+        let assessment = assess(&series, i64::MAX / 2, &settings, None).unwrap();
         let kinds: Vec<ChangePointKind> = assessment.changes.iter().map(|change| change.kind).collect();
         (assessment.level.unwrap().se_m * 1e6, kinds)
     };
