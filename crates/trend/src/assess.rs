@@ -49,7 +49,9 @@ pub fn assess(
     });
     let forecast = Forecasts::of(&unit, flights, settings);
     let earliest = forecast.crossing.and_then(|crossing| crossing.p05_hours);
-    let earliest = earliest.map(|p05_hours| EarliestCrossing { p05_hours, elapsed_hours });
+    let rises = unit.measured.rise.map(|_| 1.0);
+    let growth_probability = rises.or(forecast.growth_probability).unwrap_or_default();
+    let earliest = earliest.map(|p05_hours| EarliestCrossing { p05_hours, growth_probability, elapsed_hours });
     let (state, reason) = alert_state(as_of_us, &unit.measured, earliest, &unit.changes, settings);
     let last_us = unit.measured.last_sound_us();
     Ok(Assessment {

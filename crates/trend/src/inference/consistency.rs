@@ -15,6 +15,9 @@ use crate::statement::history::History;
 /// Standard errors beyond which the level is not that of the records.
 const REACH: f64 = 5.0;
 
+/// Records from which their scatter is a measure.
+const SCATTER_RECORDS: usize = 8;
+
 /// The posterior's rate over that of a significant line.
 const RATE_RATIO: std::ops::RangeInclusive<f64> = 0.6..=2.0;
 
@@ -45,7 +48,7 @@ impl Evidence {
         // Stated errors that are too large would accept any level: the scatter is a second criterion.
         let scatter_m2 = mean(&|r| (gap(r) - gap_m).powi(2));
         let error_m2 =
-            if records.len() > 2 { weight.recip().min(scatter_m2) } else { weight.recip() };
+            if records.len() >= SCATTER_RECORDS { weight.recip().min(scatter_m2) } else { weight.recip() };
         Some(Self { usage: mean(&|r| prior.usage(&flights[r.flight])), gap_m, error_m2, rise: measured.rise })
     }
 
@@ -79,14 +82,13 @@ impl Evidence {
     }
 }
 
-/// The records of the measured level; without a lone last record that is no jump, which the next one may refute.
+/// The records of the measured level; without a lone last record, which the next one confirms or refutes.
 fn last_records(measured: &Measured, limit_m: f64) -> Option<&[Record]> {
     let (level, sound) = (measured.level?, &measured.sound[..]);
-    let is_lone = level.records == 1 && measured.jump.is_none() && measured.exceedance.is_none();
-    if is_lone && let Some((_, before)) = sound.split_last() {
-        if let Some(rest) = measured_level(before, limit_m).filter(|rest| rest.period == level.period) {
-            return Some(&before[before.len().saturating_sub(rest.window)..]);
-        }
+    let before = sound.split_last().filter(|_| level.records == 1).map(|(_, before)| before);
+    let rest = before.and_then(|before| Some((before, measured_level(before, limit_m)?)));
+    if let Some((before, rest)) = rest.filter(|(_, rest)| rest.period == level.period && rest.records > 1) {
+        return Some(&before[before.len().saturating_sub(rest.window)..]);
     }
     Some(&sound[sound.len().saturating_sub(level.window)..])
 }

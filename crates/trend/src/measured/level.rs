@@ -82,9 +82,9 @@ impl Line {
         })
     }
 
-    /// Whether the residuals are those of the errors: 99.5 % of sound windows pass.
+    /// Whether the residuals are those of the errors: 99.8 % of sound windows pass.
     pub(crate) fn explains(&self) -> bool {
-        self.chi2 <= self.freedom + 3.0 * (2.0 * self.freedom).sqrt() + 2.0 && self.last_two.abs() <= 2.5
+        self.chi2 <= self.freedom + 4.0 * (2.0 * self.freedom).sqrt() + 3.0 && self.last_two.abs() <= 3.0
     }
 
     /// Factor of the variances by the scatter about the line, at least one.

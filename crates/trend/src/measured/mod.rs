@@ -88,7 +88,10 @@ impl Measured {
 
 /// The last jump of the level that is still reported.
 fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
+    /// Share of a jump that must be left.
+    const LEFT: f64 = 0.8;
     let last = sound.last()?;
+    let present = measured_level(sound, settings.limit_m)?;
     let mut to = sound.len();
     loop {
         let now = measured_level(&sound[..to], settings.limit_m)?;
@@ -102,7 +105,8 @@ fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
         let after_m = now.at(first.hours);
         let error_m = before.se_m.hypot(now.se_m.min(first.error_m)).max(first.error_m);
         let least_m = (JUMP_SHARE * settings.limit_m).max(JUMP_ERRORS * error_m);
-        if after_m - before.at(first.hours) > least_m && after_m - before.gap_m > least_m {
+        let is_left = present.gap_m - before.gap_m > LEFT * least_m;
+        if is_left && after_m - before.at(first.hours) > least_m && after_m - before.gap_m > least_m {
             return Some(Jump { departure_us: first.departure_us, before_m: before.gap_m, after_m, records });
         }
         to = from;

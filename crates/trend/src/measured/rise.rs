@@ -13,6 +13,9 @@ const SLOPE_ERRORS: f64 = 4.0;
 const RISE_SHARE: f64 = 0.05;
 const RISE_ERRORS: f64 = 6.0;
 
+/// Standard errors by which every record is above the one before where they rise along no line.
+const EACH_ERRORS: f64 = 4.0;
+
 /// The share of the time by the line after which the limit may be met where the rate still grows.
 const ACCELERATION: f64 = 0.75;
 
@@ -42,7 +45,7 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
         let left_m = (settings.limit_m - line.end_m).max(0.0);
         let se = (line.slope_variance * line.inflation()).sqrt();
         let p05_hours = ACCELERATION * left_m / (line.slope + NORMAL_95 * se);
-        let slow = line.slope - NORMAL_95 * se;
+        let slow = (line.slope - NORMAL_95 * se).max(0.0);
         found = Some(Rise {
             records,
             m_per_hour: line.slope,
@@ -55,13 +58,14 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
     found
 }
 
-/// The line of some records, where it explains them and rises.
+/// The line of some records, where it explains them and rises, or where they rise from each to the next.
 fn significant(records: &[Record], limit_m: f64) -> Option<Line> {
-    let line = Line::fit(records, false).filter(Line::explains)?;
+    let line = Line::fit(records, false)?;
+    let is_each = records.array_windows().all(|[a, b]| b.gap_m - a.gap_m > EACH_ERRORS * a.error_m.hypot(b.error_m));
     let span_hours = records.last()?.hours - records.first()?.hours;
     let error_m = (records.iter().map(|r| r.error_m.powi(2)).sum::<f64>() / records.len() as f64).sqrt();
     let rise_m = line.slope * span_hours;
-    let is_significant = line.slope > SLOPE_ERRORS * (line.slope_variance * line.inflation()).sqrt()
-        && rise_m > (RISE_SHARE * limit_m).max(RISE_ERRORS * error_m);
-    is_significant.then_some(line)
+    let is_steep = line.slope > SLOPE_ERRORS * (line.slope_variance * line.inflation()).sqrt();
+    let is_large = rise_m > (RISE_SHARE * limit_m).max(RISE_ERRORS * error_m);
+    (is_large && (is_each || (is_steep && line.explains()))).then_some(line)
 }

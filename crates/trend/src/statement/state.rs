@@ -158,10 +158,15 @@ impl fmt::Display for Reason {
     }
 }
 
+/// Probability of growth from which a crossing to come is planned for below the watch limit.
+const LIKELY_GROWTH: f64 = 0.8;
+
 /// Earliest crossing of the limit by a forecast, flight hours from the last flight.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct EarliestCrossing {
     pub(crate) p05_hours: f64,
+    /// Probability of visible growth.
+    pub(crate) growth_probability: f64,
     /// Hours that have passed since the last flight, at the unit's own rate.
     pub(crate) elapsed_hours: f64,
 }
@@ -191,8 +196,9 @@ pub(crate) fn alert_state(
     if let Some(utc_us) = measured.renewed_us {
         return (State::Unassessed, Reason::Renewed { days: days_since(utc_us) });
     }
+    let is_supported = |e: &EarliestCrossing| gap_m >= watch_m || e.growth_probability > LIKELY_GROWTH;
     let soon = earliest.filter(|e| e.p05_hours - e.elapsed_hours <= planning_horizon_hours);
-    if let Some(EarliestCrossing { p05_hours, elapsed_hours }) = soon {
+    if let Some(EarliestCrossing { p05_hours, elapsed_hours, .. }) = soon.filter(is_supported) {
         let p05_hours = (p05_hours - elapsed_hours).max(0.0);
         let by_line = measured.rise.filter(|rise| rise.p05_hours - elapsed_hours <= p05_hours);
         let reason = match by_line {

@@ -83,7 +83,7 @@ impl Drawn {
     /// A calm history; returns its gap, µm.
     pub(crate) fn calm(&mut self, count: usize) -> f64 {
         let um = self.between(40.0, 90.0);
-        (0..count).for_each(|_| drop(self.log(um)));
+        self.logs(count, |_| um);
         um
     }
 
@@ -124,8 +124,8 @@ impl Drawn {
 }
 
 /// The prior of a fleet of histories.
-pub(crate) fn prior(fleet: &[Drawn]) -> FleetPrior {
-    let series: Vec<Series> = fleet.iter().map(Drawn::series).collect();
+pub(crate) fn prior<'a>(fleet: impl IntoIterator<Item = &'a Drawn>) -> FleetPrior {
+    let series: Vec<Series> = fleet.into_iter().map(Drawn::series).collect();
     FleetPrior::learn(&series, i64::MAX, LIMIT_M, None)
 }
 

@@ -10,6 +10,7 @@ mod assessment;
 mod degenerate;
 mod fleet;
 mod forecast;
+mod forecasts;
 mod histories;
 mod fuzz;
 mod quantities;
