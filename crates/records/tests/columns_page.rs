@@ -11,7 +11,7 @@ use records::report_rows::{
 };
 use records::row_schema::{self, Column, Row};
 use records::{
-    AlertRecord, GapRecord, InspectionInterval, QuantityChange, QuantityRow, TrendRow, WorkRequest,
+    AlertRecord, GapRecord, QuantityChange, QuantityRow, TrendRow, WorkRequest,
 };
 
 #[test]
@@ -24,7 +24,6 @@ fn the_page_lists_every_column_with_its_type_and_meaning() {
         ("trends", table::<TrendRow>()),
         ("quantities", table::<QuantityRow>()),
         ("changes", table::<QuantityChange>()),
-        ("intervals", table::<InspectionInterval>()),
         ("work requests", table::<WorkRequest>()),
         ("alerts", table::<AlertRecord>()),
         ("report flights", table::<ReportFlightRow>()),

@@ -62,8 +62,6 @@ fn report(units: Vec<UnitView>) -> Report {
         quantity_changes: Vec::new(),
         mapping_faults: Vec::new(),
         notes: Vec::new(),
-        inspection_intervals: Vec::new(),
-        interval_advice: Vec::new(),
         trend_rows: Vec::new(),
     }
 }

@@ -95,7 +95,7 @@ fn line_ahead(
 
 impl Interval {
     /// The band in the widths that the fleet's past was found to need.
-    fn calibrated(self, CalibrationParams { low, middle, high }: CalibrationParams) -> Self {
+    fn calibrated(self, CalibrationParams { low, middle, high, .. }: CalibrationParams) -> Self {
         let at =
             |width: f64| self.m + width * if width > 0.0 { self.p95_m - self.m } else { self.m - self.p05_m };
         let interval = Self { p05_m: at(low), m: at(middle), p95_m: at(high) };

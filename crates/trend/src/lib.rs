@@ -59,7 +59,7 @@ mod wear;
 
 pub use assess::assess;
 pub use data::series;
-pub use data::series::{MaintenanceEvent, Observation, Series, UsageDefaults, UsageSource};
+pub use data::series::{MaintenanceEvent, Observation, RowFaults, Series, UsageDefaults, UsageSource};
 pub use error::Error;
 pub use executor::{Executor, SerialExecutor};
 pub use forecast::{Forecast, Interval, forecast};

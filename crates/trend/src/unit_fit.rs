@@ -4,10 +4,10 @@ use std::borrow::Cow;
 
 use crate::assess::{RiseCrossing, hours_per_usage};
 use crate::data::segment::Segment;
-use crate::data::series::{Flight, Series};
+use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::inference::consistency::Evidence;
 use crate::inference::posterior::{Posterior, posterior};
-use crate::measured::Measured;
+use crate::measured::{Jump, Measured};
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
 use crate::statement::history::{self, History};
@@ -41,6 +41,7 @@ impl<'a> UnitFit<'a> {
         let history = history::read_history(flights, maintenance, series.unit_hours_at_start(), prior);
         let mut changes = history.changes.clone();
         changes.extend(&measured.events);
+        changes.extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, flights, maintenance)));
         let segments: Vec<Segment<'_>> = history.segments().collect();
         let (mut ended, mut fit) = (Vec::new(), None);
         if let Some((last, before)) = segments.split_last() {
@@ -107,6 +108,25 @@ fn consistent_fit<'a>(
     let last = history.segments().last()?;
     let posterior = fitted(&last, &own)?;
     Some(Fit { posterior, prior: Cow::Owned(own), method: ForecastMethod::SingleUnit })
+}
+
+/// The jump of the level as a change point, unless the history has it already.
+fn jump_event(
+    jump: &Jump,
+    known: &[ChangePoint],
+    flights: &[Flight],
+    maintenance: &[MaintenanceEvent],
+) -> Option<ChangePoint> {
+    let at = flights.partition_point(|flight| flight.departure_us < jump.departure_us);
+    let near = flights.get(at.saturating_sub(history::RECORD_FLIGHTS))?.departure_us
+        ..=flights[(at + history::RECORD_FLIGHTS).min(flights.len() - 1)].departure_us;
+    if known.iter().any(|change| near.contains(&change.departure_us)) {
+        return None;
+    }
+    let is_recorded = history::is_recorded(flights, maintenance, at);
+    let kind = if is_recorded { ChangePointKind::Recorded } else { ChangePointKind::Step };
+    let step_m = jump.after_m - jump.before_m;
+    Some(ChangePoint { departure_us: jump.departure_us, kind, step_m, se_m: jump.error_m, certainty: 1.0 })
 }
 
 /// The onset of wear that a posterior found in a segment, as a change point.

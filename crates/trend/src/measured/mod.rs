@@ -33,6 +33,7 @@ pub(crate) struct Jump {
     pub(crate) departure_us: i64,
     pub(crate) before_m: f64,
     pub(crate) after_m: f64,
+    pub(crate) error_m: f64,
     /// Records since the jump.
     pub(crate) records: usize,
 }
@@ -107,7 +108,8 @@ fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
         let least_m = (JUMP_SHARE * settings.limit_m).max(JUMP_ERRORS * error_m);
         let is_left = present.gap_m - before.gap_m > LEFT * least_m;
         if is_left && after_m - before.at(first.hours) > least_m && after_m - before.gap_m > least_m {
-            return Some(Jump { departure_us: first.departure_us, before_m: before.gap_m, after_m, records });
+            let (departure_us, before_m) = (first.departure_us, before.gap_m);
+            return Some(Jump { departure_us, before_m, after_m, error_m, records });
         }
         to = from;
     }

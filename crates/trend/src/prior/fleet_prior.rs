@@ -177,6 +177,11 @@ impl FleetPrior {
         0.5 * (self.calibration.high - self.calibration.low) / USUAL_WIDTH
     }
 
+    /// Number of past forecasts of the fleet that the intervals' widths were learned from.
+    pub fn scored_forecasts(&self) -> usize {
+        self.calibration.scored
+    }
+
     /// The usage of a unit up to a flight, hours' worth.
     pub(crate) fn usage(&self, flight: &Flight) -> f64 {
         self.axis.of(flight) * self.hours_per_unit

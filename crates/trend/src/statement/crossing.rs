@@ -102,7 +102,7 @@ impl RulDistribution {
             let hours = middle * (bound.max(1.0) / middle).powf(width.abs());
             (hours < self.horizon_hours).then_some(if hours > 1.0 { hours } else { 0.0 })
         };
-        let CalibrationParams { low, middle: shift, high } = self.calibration;
+        let CalibrationParams { low, middle: shift, high, .. } = self.calibration;
         let crossing = Crossing {
             p05_hours: at(high),
             p50_hours: at(shift),
@@ -164,7 +164,7 @@ mod tests {
                 over: over / total,
                 horizon_hours,
                 scale: CELLS as f64 / horizon_hours.ln(),
-                calibration: CalibrationParams { low: -1.0, middle: 0.0, high: 1.0 },
+                calibration: CalibrationParams { low: -1.0, middle: 0.0, high: 1.0, scored: 0 },
             };
             let hours = found.quantile(probability);
             prop_assume!(hours.is_some_and(|hours| hours > 0.0));

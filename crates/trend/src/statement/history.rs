@@ -16,7 +16,7 @@ const MAX_RIGGING_STEP: f64 = 0.15;
 const LEAST_DOUBT: f64 = 0.02;
 
 /// Flights from a change of installation within which a step is the books' own.
-const RECORD_FLIGHTS: usize = 3;
+pub(crate) const RECORD_FLIGHTS: usize = 3;
 
 /// What a unit's flights show, apart from wear.
 #[derive(Debug, Clone)]
@@ -201,6 +201,11 @@ impl History {
             }
         })
     }
+}
+
+/// Whether installations or maintenance explain a change at a flight.
+pub(crate) fn is_recorded(flights: &[Flight], maintenance: &[MaintenanceEvent], flight: usize) -> bool {
+    maintenance.iter().any(|entry| is_near(entry, flights, flight)) || near_installation_change(flights, flight)
 }
 
 /// Whether a maintenance entry lies within a few flights of a step.

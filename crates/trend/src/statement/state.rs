@@ -50,6 +50,8 @@ impl State {
 pub enum Reason {
     /// No flight has a gap.
     NoRecord,
+    /// No limit is configured.
+    NoLimit,
     /// No sound record for some days; what the last one showed stays known.
     Stale { days: f64, gap_m: f64 },
     /// No record since a renewal.
@@ -74,6 +76,27 @@ pub enum Reason {
     Clear { records: usize },
 }
 
+impl Reason {
+    /// Its code in columns.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::NoRecord => "no_record",
+            Self::NoLimit => "no_limit",
+            Self::Stale { .. } => "stale",
+            Self::Renewed { .. } => "renewed",
+            Self::AboveLimit { .. } => "above_limit",
+            Self::LimitHeld { .. } => "limit_held",
+            Self::Unconfirmed { .. } => "unconfirmed",
+            Self::CrossesSoon { .. } => "crosses_soon",
+            Self::RisesToLimit { .. } => "rises_to_limit",
+            Self::AtWatch { .. } => "at_watch",
+            Self::Jumped { .. } => "jumped",
+            Self::Changed { .. } => "changed",
+            Self::Clear { .. } => "clear",
+        }
+    }
+}
+
 /// A count with its noun.
 fn records(count: usize) -> String {
     format!("{count} record{}", if count == 1 { "" } else { "s" })
@@ -84,6 +107,7 @@ impl fmt::Display for Reason {
         let um = |m: f64| m * 1e6;
         match *self {
             Self::NoRecord => write!(f, "no record of a gap"),
+            Self::NoLimit => write!(f, "no limit is configured"),
             Self::Stale { days, gap_m } => {
                 write!(f, "no sound record for {days:.0} days; the gap was {:.1} µm then", um(gap_m))
             }

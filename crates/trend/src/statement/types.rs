@@ -40,6 +40,18 @@ pub enum ForecastMethod {
     Line,
 }
 
+impl ForecastMethod {
+    /// Its word in columns.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Fleet => "fleet",
+            Self::SingleUnit => "single_unit",
+            Self::Line => "line",
+        }
+    }
+}
+
 /// Growth in metres per flight hour, with its 90 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rate {

@@ -28,7 +28,7 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
     row_output::check_folder(&args.output)?;
     note_future(args.as_of, output);
     let (config, installations) = load_with_installations(global)?;
-    let ask = UnitSelection { statistics: true, ..args.units.selection(args.as_of) };
+    let ask = args.units.selection(args.as_of);
     let store = Store::open(config.store())?;
     let program = format!("Freeplay {VERSION}");
     let mut report = compose::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
