@@ -7,6 +7,7 @@
 )]
 
 mod assessment;
+mod cost;
 mod degenerate;
 mod fleet;
 mod forecast;

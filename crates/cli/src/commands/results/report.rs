@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 use pipeline::Event;
-use pipeline::fleet_trends::assess::UnitSelection;
 use pipeline::report::{compose, data, flight_plots, publish};
 use store::Store;
 
