@@ -29,11 +29,7 @@ fn table<R: Row>(py: Python<'_>, rows: Result<Vec<R>, pipeline::Error>) -> PyRes
     Ok(Table::of(batch.map_err(|error| to_run_exception(py, error))?))
 }
 
-fn selection(
-    py: Python<'_>,
-    units: [Option<String>; 3],
-    as_of: Option<&str>,
-) -> PyResult<UnitSelection> {
+fn selection(py: Python<'_>, units: [Option<String>; 3], as_of: Option<&str>) -> PyResult<UnitSelection> {
     let [tail_number, serial_number, part_number] = units;
     let as_of_utc = instant(py, as_of)?;
     Ok(UnitSelection { tail_number, serial_number, part_number, as_of_utc })

@@ -10,9 +10,7 @@ use records::report_rows::{
     ReportRemovalsRow, ReportTailRow,
 };
 use records::row_schema::{self, Column, Row};
-use records::{
-    AlertRecord, GapRecord, QuantityChange, QuantityRow, TrendRow, WorkRequest,
-};
+use records::{AlertRecord, GapRecord, QuantityChange, QuantityRow, TrendRow, WorkRequest};
 
 #[test]
 fn the_page_lists_every_column_with_its_type_and_meaning() {

@@ -10,9 +10,7 @@ use crate::statement::assessment::Assessment;
 use crate::statement::crossing::RulDistribution;
 use crate::statement::level;
 use crate::statement::state::{EarliestCrossing, alert_state};
-use crate::statement::types::{
-    Crossing, ForecastMethod, LatestRecord, Level, Rate, Utilization, WearStatus,
-};
+use crate::statement::types::{Crossing, ForecastMethod, LatestRecord, Level, Rate, Utilization, WearStatus};
 use crate::unit_fit::{Fit, UnitFit};
 
 /// Number of last days that give the utilisation.
@@ -51,7 +49,8 @@ pub fn assess(
     let earliest = forecast.crossing.and_then(|crossing| crossing.p05_hours);
     let rises = unit.measured.rise.map(|_| 1.0);
     let growth_probability = rises.or(forecast.growth_probability).unwrap_or_default();
-    let earliest = earliest.map(|p05_hours| EarliestCrossing { p05_hours, growth_probability, elapsed_hours });
+    let earliest =
+        earliest.map(|p05_hours| EarliestCrossing { p05_hours, growth_probability, elapsed_hours });
     let (state, reason) = alert_state(as_of_us, &unit.measured, earliest, &unit.changes, settings);
     let last_us = unit.measured.last_sound_us();
     Ok(Assessment {
@@ -131,7 +130,8 @@ impl Forecasts {
                 check_probability: None,
             },
         };
-        let is_over = matches!(unit.measured.exceedance, Some(Exceedance::Confirmed { .. } | Exceedance::Held));
+        let is_over =
+            matches!(unit.measured.exceedance, Some(Exceedance::Confirmed { .. } | Exceedance::Held));
         if is_over {
             let over = Some(0.0);
             forecasts.crossing = Some(Crossing { p05_hours: over, p50_hours: over, p95_hours: over });
@@ -144,6 +144,9 @@ impl Forecasts {
     fn by_laws(fit: &Fit<'_>, unit: &UnitFit<'_>, flights: &[Flight], settings: &Settings) -> Self {
         let ratio = hours_per_usage(flights, &fit.prior);
         let offset_m2 = unit.history.offset_m2 + unit.history.kind_m2;
+        // A rise that was taken off for the law is still there.
+        let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
+        let settings = &Settings { limit_m, ..*settings };
         let remaining = RulDistribution::new(&fit.posterior, &fit.prior, settings, ratio, offset_m2);
         let growth_probability = level::growth_probability(&fit.posterior, fit.prior.limit_m());
         Self {

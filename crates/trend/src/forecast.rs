@@ -1,8 +1,8 @@
 //! Plotted forecast of an assessment: smoothed past levels, and quantiles of the future gap.
 
+use crate::assess::hours_per_usage;
 use crate::data::bins::{self, BINS, Bin};
 use crate::data::segment::Segment;
-use crate::assess::hours_per_usage;
 use crate::data::series::{Flight, Series};
 use crate::error::Error;
 use crate::inference::posterior::{Posterior, mean_growth};
@@ -70,7 +70,8 @@ pub fn forecast(
     let variance_m2 = unit.history.offset_m2 + unit.history.kind_m2 + prior.bias_sd_m.powi(2);
     let after = |hours: f64| {
         let [p05_m, m, p95_m] = forecast_quantiles(posterior, hours / ratio, variance_m2, prior);
-        let band = Interval { p05_m, m, p95_m };
+        let risen_m = unit.history.undone_m.max(0.0);
+        let band = Interval { p05_m: p05_m + risen_m, m: m + risen_m, p95_m: p95_m + risen_m };
         (hours, if hours > 0.0 { band.calibrated(prior.calibration) } else { band })
     };
     Ok(Forecast { past, ahead: hours.into_iter().map(after).collect() })
@@ -86,7 +87,8 @@ fn line_ahead(
     let since = |record: &Record| flights.last().map_or(0.0, |last| last.hours - record.hours);
     let flown = unit.measured.sound.last().map_or(0.0, since);
     let after = |hours: f64| {
-        let at = |rate: f64, errors: f64| level.gap_m + rate * (hours + flown) + errors * NORMAL_95 * level.se_m;
+        let at =
+            |rate: f64, errors: f64| level.gap_m + rate * (hours + flown) + errors * NORMAL_95 * level.se_m;
         let slope = |errors: f64| (rise.m_per_hour + errors * NORMAL_95 * rise.m_per_hour_se).max(0.0);
         (hours, Interval { p05_m: at(slope(-1.0), -1.0), m: at(slope(0.0), 0.0), p95_m: at(slope(1.0), 1.0) })
     };

@@ -41,7 +41,8 @@ impl<'a> UnitFit<'a> {
         let history = history::read_history(flights, maintenance, series.unit_hours_at_start(), prior);
         let mut changes = history.changes.clone();
         changes.extend(&measured.events);
-        changes.extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, flights, maintenance)));
+        changes
+            .extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, flights, maintenance)));
         let segments: Vec<Segment<'_>> = history.segments().collect();
         let (mut ended, mut fit) = (Vec::new(), None);
         if let Some((last, before)) = segments.split_last() {

@@ -90,9 +90,8 @@ struct GapSpan {
 
 impl GapSpan {
     fn of((history, trend): &(&History, &Assessment), tail: &str) -> Option<Self> {
-        let is_on_tail = |f: &&FlightRow| {
-            f.gap_m().is_some() && history.place(f).tail_number.as_deref() == Some(tail)
-        };
+        let is_on_tail =
+            |f: &&FlightRow| f.gap_m().is_some() && history.place(f).tail_number.as_deref() == Some(tail);
         let known = history.until(Timestamp::from_microsecond(trend.as_of_us).ok()?);
         let departure = |flown: &FlightRow| flown.departure_utc();
         let first_utc = known.iter().find(is_on_tail).map(departure)?;
@@ -105,7 +104,8 @@ fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], units: &[GapSpan]) -> bool 
     let near = |step: &&&Made<'_>| days_between(step.departure_utc, change.departure_utc).abs() <= SAME_DAYS;
     let stepped: BTreeSet<usize> = steps.iter().filter(near).map(|step| step.unit).collect();
     let is_there = |unit: &&GapSpan| {
-        days_between(unit.first_utc, change.departure_utc) > SAME_DAYS && unit.last_utc >= change.departure_utc
+        days_between(unit.first_utc, change.departure_utc) > SAME_DAYS
+            && unit.last_utc >= change.departure_utc
     };
     stepped.len() > 1 && stepped.len() as f64 >= SHARE * units.iter().filter(is_there).count() as f64
 }

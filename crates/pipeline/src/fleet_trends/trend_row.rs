@@ -38,8 +38,11 @@ pub(crate) fn row(
     let use_now = trend.utilization;
     let flights = |hours: Option<f64>| Some(hours? / use_now?.hours_per_flight);
     // Usage goes on at the unit's own rate after its last flight.
-    let day = |hours: Option<f64>| days_after(as_of, (hours? - trend.elapsed_hours).max(0.0) / use_now?.hours_per_day);
-    let (state, cause) = if limit_m.is_some() { (trend.state, trend.reason) } else { (State::Unassessed, Reason::NoLimit) };
+    let day = |hours: Option<f64>| {
+        days_after(as_of, (hours? - trend.elapsed_hours).max(0.0) / use_now?.hours_per_day)
+    };
+    let (state, cause) =
+        if limit_m.is_some() { (trend.state, trend.reason) } else { (State::Unassessed, Reason::NoLimit) };
     let utc = |us: i64| Timestamp::from_microsecond(us).ok();
     TrendRow {
         part_number: name.0.clone(),

@@ -26,7 +26,8 @@ pub fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
             units(of_logs)
         ));
     }
-    let is_quiet = |row: &&TrendRow| row.latest_utc.is_some_and(|at| days_between(at, row.as_of_utc) > QUIET_DAYS);
+    let is_quiet =
+        |row: &&TrendRow| row.latest_utc.is_some_and(|at| days_between(at, row.as_of_utc) > QUIET_DAYS);
     let quiet = installed().filter(is_quiet).count();
     if quiet > 0 {
         notes.push(format!(

@@ -1,7 +1,7 @@
 //! A unit's estimates made ready: outliers marked, and how large the scatter really is.
 
-use crate::math::median::{SD_OVER_MAD, median};
 use crate::data::series::{Flight, Gap};
+use crate::math::median::{SD_OVER_MAD, median};
 
 /// Residuals beyond this many standard deviations are outliers.
 const OUTLIER_SIGMA: f64 = 4.0;

@@ -230,7 +230,8 @@ fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observat
     let mut faults = RowFaults::default();
     for row in &mut rows {
         let is_negative = |hours: Option<f64>| hours.is_some_and(|hours| hours < 0.0);
-        faults.negative_usage += usize::from(is_negative(row.flight_hours) || is_negative(row.tail_hours_end));
+        faults.negative_usage +=
+            usize::from(is_negative(row.flight_hours) || is_negative(row.tail_hours_end));
         forget_implausible(row);
     }
     rows.sort_unstable_by(order);

@@ -73,7 +73,10 @@ pub(crate) fn detect_steps(estimates: &[WeightedGap], limit_m: f64) -> Vec<StepC
         match step {
             // Places before the block hold no step, unless the new one changes their windows.
             Some(step) => {
-                open.extend([(step.at, step.at, high), (low, from.saturating_sub(FARTHEST).max(low), step.at)]);
+                open.extend([
+                    (step.at, step.at, high),
+                    (low, from.saturating_sub(FARTHEST).max(low), step.at),
+                ]);
                 found.push(step);
             }
             None if to < high => open.push((low, to, high)),

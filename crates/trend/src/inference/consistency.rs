@@ -3,10 +3,11 @@
 //! A confident prior can outweigh the data of a unit: a fleet without wear, with equal new gaps, leaves no candidate
 //! for a unit near its limit. Such a posterior gives no forecast; the measured state stays.
 
+use crate::data::outliers::WeightedGap;
 use crate::data::series::Flight;
 use crate::inference::posterior::{Component, Posterior};
 use crate::measured::Measured;
-use crate::measured::level::measured_level;
+use crate::measured::level::{WINDOW, measured_level};
 use crate::measured::record::Record;
 use crate::measured::rise::Rise;
 use crate::prior::fleet_prior::FleetPrior;
@@ -30,26 +31,39 @@ pub(crate) struct Evidence {
 }
 
 impl Evidence {
-    /// The last records, their undone offset and season removed.
+    /// The last records, their undone offset and season removed: of a calm unit its last estimates without outliers.
     pub(crate) fn of(
         measured: &Measured,
         history: &History,
         flights: &[Flight],
         prior: &FleetPrior,
     ) -> Option<Self> {
-        let records = last_records(measured, prior.limit_m())?;
-        let weight: f64 = records.iter().map(|r| r.error_m.powi(-2)).sum();
-        let mean = |of: &dyn Fn(&Record) -> f64| {
-            records.iter().map(|r| r.error_m.powi(-2) * of(r)).sum::<f64>() / weight
+        let season = |us: i64| prior.season.mean_m * prior.season.wave(us as f64);
+        let measured_records = || {
+            let records = last_records(measured, prior.limit_m())?;
+            let entry = |r: &Record| {
+                let gap_m = r.gap_m - history.undone_m - season(r.departure_us);
+                (prior.usage(&flights[r.flight]), gap_m, r.error_m.powi(-2))
+            };
+            Some(records.iter().map(entry).collect::<Vec<_>>())
         };
-        let season = |r: &Record| prior.season.mean_m * prior.season.wave(r.departure_us as f64);
-        let gap = |r: &Record| r.gap_m - history.undone_m - season(r);
-        let gap_m = mean(&gap);
+        let is_calm = measured.jump.is_none() && measured.exceedance.is_none() && measured.rise.is_none();
+        let records = if is_calm {
+            let last = history.estimates.len().saturating_sub(WINDOW);
+            let entry = |e: &WeightedGap| (e.usage, e.gap_m - season(e.departure_us), e.weight);
+            history.estimates[last..].iter().map(entry).collect()
+        } else {
+            measured_records()?
+        };
+        let weight: f64 = records.iter().map(|r| r.2).sum();
+        let mean =
+            |of: &dyn Fn(&(f64, f64, f64)) -> f64| records.iter().map(|r| r.2 * of(r)).sum::<f64>() / weight;
+        let gap_m = mean(&|r| r.1);
         // Stated errors that are too large would accept any level: the scatter is a second criterion.
-        let scatter_m2 = mean(&|r| (gap(r) - gap_m).powi(2));
+        let scatter_m2 = mean(&|r| (r.1 - gap_m).powi(2));
         let error_m2 =
             if records.len() >= SCATTER_RECORDS { weight.recip().min(scatter_m2) } else { weight.recip() };
-        Some(Self { usage: mean(&|r| prior.usage(&flights[r.flight])), gap_m, error_m2, rise: measured.rise })
+        Some(Self { usage: mean(&|r| r.0), gap_m, error_m2, rise: measured.rise })
     }
 
     /// Whether a posterior has this level at this usage, and the rate of a significant line now; also false where a
@@ -87,7 +101,7 @@ fn last_records(measured: &Measured, limit_m: f64) -> Option<&[Record]> {
     let (level, sound) = (measured.level?, &measured.sound[..]);
     let before = sound.split_last().filter(|_| level.records == 1).map(|(_, before)| before);
     let rest = before.and_then(|before| Some((before, measured_level(before, limit_m)?)));
-    if let Some((before, rest)) = rest.filter(|(_, rest)| rest.period == level.period && rest.records > 1) {
+    if let Some((before, rest)) = rest.filter(|(_, rest)| rest.records > 1) {
         return Some(&before[before.len().saturating_sub(rest.window)..]);
     }
     Some(&sound[sound.len().saturating_sub(level.window)..])

@@ -73,13 +73,16 @@ pub(crate) fn exceedance(
             run = None;
         }
     }
-    let is_held =
-        |level: MeasuredLevel| level.gap_m >= HYSTERESIS * limit_m && ended_at.is_some_and(|k| k + RECALLED >= records.len());
+    let is_held = |level: MeasuredLevel| {
+        level.gap_m >= HYSTERESIS * limit_m && ended_at.is_some_and(|k| k + RECALLED >= records.len())
+    };
     let by_level = level.filter(|level| level.records > 1 && level.gap_m >= limit_m);
     let last_period = records.last().map(|record| record.period);
     let found = match (run, by_level) {
         _ if level.map(|level| level.period) != last_period => None,
-        (Some(run), _) if run.is_confirmed && run.below == 0 => Some(Exceedance::Confirmed { records: run.above }),
+        (Some(run), _) if run.is_confirmed && run.below == 0 => {
+            Some(Exceedance::Confirmed { records: run.above })
+        }
         (_, Some(level)) => Some(Exceedance::Confirmed { records: level.records }),
         (Some(run), None) if run.is_confirmed => Some(Exceedance::Held),
         (_, None) if level.is_some_and(is_held) => Some(Exceedance::Held),

@@ -58,7 +58,8 @@ impl Line {
         let last = records.last()?;
         let weight = |r: &Record| r.error_m.powi(-2);
         let total: f64 = records.iter().map(weight).sum();
-        let mean = |of: &dyn Fn(&Record) -> f64| records.iter().map(|r| weight(r) * of(r)).sum::<f64>() / total;
+        let mean =
+            |of: &dyn Fn(&Record) -> f64| records.iter().map(|r| weight(r) * of(r)).sum::<f64>() / total;
         let (x, y) = (mean(&|r| r.hours - last.hours), mean(&|r| r.gap_m));
         let xx = total * mean(&|r| (r.hours - last.hours - x).powi(2));
         let xy = total * mean(&|r| (r.hours - last.hours - x) * (r.gap_m - y));

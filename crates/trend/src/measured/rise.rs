@@ -61,7 +61,8 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
 /// The line of some records, where it explains them and rises, or where they rise from each to the next.
 fn significant(records: &[Record], limit_m: f64) -> Option<Line> {
     let line = Line::fit(records, false)?;
-    let is_each = records.array_windows().all(|[a, b]| b.gap_m - a.gap_m > EACH_ERRORS * a.error_m.hypot(b.error_m));
+    let is_each =
+        records.array_windows().all(|[a, b]| b.gap_m - a.gap_m > EACH_ERRORS * a.error_m.hypot(b.error_m));
     let span_hours = records.last()?.hours - records.first()?.hours;
     let error_m = (records.iter().map(|r| r.error_m.powi(2)).sum::<f64>() / records.len() as f64).sqrt();
     let rise_m = line.slope * span_hours;

@@ -31,7 +31,7 @@ pub(crate) struct History {
     /// Variance of the level from the uncertain kinds of the last segment's steps, m².
     pub(crate) kind_m2: f64,
     begins: Vec<SegmentStart>,
-    /// What has been taken off the last estimates, metres.
+    /// What has been taken off the last estimates, metres. The forecast adds a rise again: only the law is without it.
     pub(crate) undone_m: f64,
     now: f64,
     known_age: Option<f64>,
@@ -126,8 +126,8 @@ impl History {
         if begins_anew {
             self.begin(step.at, true);
             self.kind_m2 = kind_m2;
-        } else if step.step_m > 0.0 && kind == ChangePointKind::Step {
-            // To undo a rise that no record explains would hide damage.
+        } else if self.undone_m + step.step_m > MAX_RIGGING_STEP * prior.limit_m() {
+            // To undo what may be damage would hide it.
             let hidden_m = std::mem::take(&mut self.undone_m);
             self.shift(step.at, hidden_m);
             self.begin(step.at, false);
@@ -205,7 +205,8 @@ impl History {
 
 /// Whether installations or maintenance explain a change at a flight.
 pub(crate) fn is_recorded(flights: &[Flight], maintenance: &[MaintenanceEvent], flight: usize) -> bool {
-    maintenance.iter().any(|entry| is_near(entry, flights, flight)) || near_installation_change(flights, flight)
+    maintenance.iter().any(|entry| is_near(entry, flights, flight))
+        || near_installation_change(flights, flight)
 }
 
 /// Whether a maintenance entry lies within a few flights of a step.

@@ -128,7 +128,10 @@ impl fmt::Display for Reason {
             ),
             Self::Unconfirmed { gap_m, limit_m, before_m } => {
                 let (gap_um, limit_um) = (um(gap_m), um(limit_m));
-                write!(f, "1 record of {gap_um:.1} µm is above the limit of {limit_um:.1} µm, not confirmed yet")?;
+                write!(
+                    f,
+                    "1 record of {gap_um:.1} µm is above the limit of {limit_um:.1} µm, not confirmed yet"
+                )?;
                 match before_m {
                     Some(before_m) => write!(f, "; the records before read {:.1} µm", um(before_m)),
                     None => write!(f, "; no record before it"),
@@ -251,7 +254,9 @@ pub(crate) fn alert_state(
     }
     match changes.iter().rev().find(|change| change.kind.is_unexplained()) {
         // Counted to the last record: that no flight follows clears nothing.
-        Some(change) if days_since(change.departure_us) - days.unwrap_or(0.0) <= settings.change_watch_days => {
+        Some(change)
+            if days_since(change.departure_us) - days.unwrap_or(0.0) <= settings.change_watch_days =>
+        {
             (State::Watch, Reason::Changed { kind: change.kind, days: days_since(change.departure_us) })
         }
         _ => (State::Normal, Reason::Clear { records: level.records }),

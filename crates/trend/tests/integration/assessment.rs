@@ -1,8 +1,6 @@
 //! Statements about units whose truth is known.
 
-use trend::{
-    Assessment, Observation, Reason, Series, Settings, State, UsageDefaults, WearStatus, assess,
-};
+use trend::{Assessment, Observation, Reason, Series, Settings, State, UsageDefaults, WearStatus, assess};
 
 const DAY_US: i64 = 86_400_000_000;
 
@@ -90,7 +88,11 @@ fn silence_clears_no_alarm() {
     ] {
         let (last, silent) = (state_of(&series, 399), state_of(&series, 500));
         assert_eq!((last.state, last.stale_days), (state, None), "{last:?}");
-        assert_eq!((silent.state, silent.stale_days), (state.max(State::Unassessed), Some(101.0)), "{silent:?}");
+        assert_eq!(
+            (silent.state, silent.stale_days),
+            (state.max(State::Unassessed), Some(101.0)),
+            "{silent:?}"
+        );
         assert_eq!((silent.level, silent.crossing), (last.level, last.crossing));
     }
 }
@@ -101,7 +103,10 @@ fn a_state_stands_from_the_first_record_on() {
     let young = state_of(&series, 3);
     assert_eq!((young.state, young.reason), (State::Normal, Reason::Clear { records: 4 }));
     assert_eq!(state_of(&series, 0).reason.to_string(), "below all limits, by the last 1 record");
-    assert_eq!((state_of(&series, -1).state, state_of(&series, -1).reason), (State::Unassessed, Reason::NoRecord));
+    assert_eq!(
+        (state_of(&series, -1).state, state_of(&series, -1).reason),
+        (State::Unassessed, Reason::NoRecord)
+    );
 }
 
 #[test]
@@ -122,9 +127,8 @@ fn a_remembered_state_does_not_flap_around_its_limit_and_follows_from_the_flight
     // 20 µm per 1,000 h from 20 µm: past the watch limit of 60 µm at 2,000 h, day 1,000; ± 1 µm of scatter.
     let series = unit(1100, |h| 20.0 + 0.02 * h);
     let settings = Settings { watch_m: 60e-6, planning_horizon_hours: 1.0, ..Settings::for_limit(1e-4) };
-    let states: Vec<State> = (940..1060)
-        .map(|day| assess(&series, day * DAY_US, &settings, None).unwrap().state)
-        .collect();
+    let states: Vec<State> =
+        (940..1060).map(|day| assess(&series, day * DAY_US, &settings, None).unwrap().state).collect();
     let changes = states.windows(2).filter(|pair| pair[0] != pair[1]).count();
     assert_eq!((states.first(), states.last(), changes), (Some(&State::Normal), Some(&State::Watch), 1));
 }

@@ -43,7 +43,11 @@ fn time_grows_in_proportion_to_flights() {
     for (name, rho, step_um) in [("calm", 0.0, 0.0), ("autocorrelated", 0.8, 0.0), ("steps", 0.0, 15.0)] {
         let (short, long) = (time(2_000, rho, step_um), time(8_000, rho, step_um));
         let exponent = (long.as_secs_f64() / short.as_secs_f64()).log(4.0);
-        println!("{name}: {:.2} ms, {:.2} ms a unit, exponent {exponent:.2}", short.as_secs_f64() * 50.0, long.as_secs_f64() * 50.0);
+        println!(
+            "{name}: {:.2} ms, {:.2} ms a unit, exponent {exponent:.2}",
+            short.as_secs_f64() * 50.0,
+            long.as_secs_f64() * 50.0
+        );
         // Other work on the machine moves a single time.
         assert!(exponent <= 1.3, "{name}: {exponent}");
     }

@@ -1,9 +1,7 @@
 //! Fleets with too much or no information: whatever the prior, the level of a unit is where its estimates are.
 
 use proptest::prelude::*;
-use trend::{
-    Assessment, FleetPrior, Observation, Series, Settings, State, UsageDefaults, assess, forecast,
-};
+use trend::{Assessment, FleetPrior, Observation, Series, Settings, State, UsageDefaults, assess, forecast};
 
 use crate::random::Random;
 

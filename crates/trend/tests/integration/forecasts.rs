@@ -55,7 +55,8 @@ fn score(class: &Class) -> Score {
         let units: Vec<(Drawn, f64)> = (0..units).map(|k| unit(class, 10_000 * fleet as u64 + k)).collect();
         let prior = prior(units.iter().map(|(d, _)| d));
         for (drawn, left) in units {
-            let found: Assessment = assess(&drawn.series(), drawn.now_us(), &settings(), Some(&prior)).unwrap();
+            let found: Assessment =
+                assess(&drawn.series(), drawn.now_us(), &settings(), Some(&prior)).unwrap();
             count += 1;
             let Some(crossing) = found.crossing else {
                 none += 1;
@@ -66,7 +67,12 @@ fn score(class: &Class) -> Score {
             late += usize::from(is_late);
             held += usize::from(!is_late && left <= hours(crossing.p95_hours));
             errors.push((hours(crossing.p50_hours) - left).abs() / left);
-            assert!(found.state >= State::Plan || left > 375.0, "{}: {} with {left} h left", class.name, found.reason);
+            assert!(
+                found.state >= State::Plan || left > 375.0,
+                "{}: {} with {left} h left",
+                class.name,
+                found.reason
+            );
         }
     }
     errors.sort_by(f64::total_cmp);
@@ -79,8 +85,12 @@ fn fast_wear_is_seldom_forecast_late() {
     let mut missed = Vec::new();
     for class in &CLASSES {
         let Score { late, held, error, none } = score(class);
-        println!("{}: late {late:.3}, held {held:.3}, median error {error:.3}, without forecast {none}", class.name);
-        let is_met = late <= class.late && (class.held.0..=class.held.1).contains(&held) && error <= class.error;
+        println!(
+            "{}: late {late:.3}, held {held:.3}, median error {error:.3}, without forecast {none}",
+            class.name
+        );
+        let is_met =
+            late <= class.late && (class.held.0..=class.held.1).contains(&held) && error <= class.error;
         if !is_met {
             missed.push(class.name);
         }

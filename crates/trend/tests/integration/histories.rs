@@ -114,7 +114,8 @@ impl Drawn {
         let since = self.maintenance.last().map_or(i64::MIN, |entry| entry.utc_us);
         let here = |row: &&Observation| row.installation == self.installation && row.departure_us > since;
         let last = self.rows.iter().rev().filter(here).filter_map(|row| Some((row.gap_m?, row.is_doubtful)));
-        let above: Vec<bool> = last.take_while(|(gap_m, _)| *gap_m >= LIMIT_M).map(|(_, doubt)| !doubt).collect();
+        let above: Vec<bool> =
+            last.take_while(|(gap_m, _)| *gap_m >= LIMIT_M).map(|(_, doubt)| !doubt).collect();
         match above.len() {
             0 => State::Normal,
             2.. if above.contains(&true) => State::Act,

@@ -255,14 +255,21 @@ fn silence_is_unassessed_and_clears_no_alarm() {
     let (calm, above) = (at(CALM[0], 20), at(URGENT[1], 20));
     assert_eq!((calm.state, above.state), (State::Normal, State::Act));
     let (calm, above) = (at(CALM[0], 31), at(URGENT[1], 400));
-    assert_eq!((calm.state, above.state), (State::Unassessed, State::Act), "{} {}", calm.reason, above.reason);
+    assert_eq!(
+        (calm.state, above.state),
+        (State::Unassessed, State::Act),
+        "{} {}",
+        calm.reason,
+        above.reason
+    );
     assert!(calm.reason.to_string().starts_with("no sound record for 31 days"), "{}", calm.reason);
 }
 
 #[test]
 fn a_lowered_limit_is_an_exceedance() {
     for (drawn, _) in drawn(CALM[0], 8) {
-        let last_m = drawn.rows[drawn.rows.len() - 2..].iter().filter_map(|r| r.gap_m).fold(f64::MAX, f64::min);
+        let last_m =
+            drawn.rows[drawn.rows.len() - 2..].iter().filter_map(|r| r.gap_m).fold(f64::MAX, f64::min);
         let settings = Settings::for_limit(0.95 * last_m);
         assert_eq!(assess(&drawn.series(), drawn.now_us(), &settings, None).unwrap().state, State::Act);
     }
