@@ -11,7 +11,7 @@ use crate::statement::crossing::RulDistribution;
 use crate::statement::level;
 use crate::statement::state::{EarliestCrossing, alert_state};
 use crate::statement::types::{Crossing, ForecastMethod, LatestRecord, Level, Rate, Utilization, WearStatus};
-use crate::unit_fit::{Fit, UnitFit};
+use crate::unit_fit::{Fit, RiseCrossing, UnitFit, hours_per_usage};
 
 /// Number of last days that give the utilisation.
 const UTILIZATION_DAYS: i64 = 90;
@@ -183,28 +183,6 @@ fn chance_by(hours: f64, rise: &RiseCrossing) -> f64 {
     }
     let spread = (rise.p50_hours / rise.p05_hours.max(f64::MIN_POSITIVE)).ln() / NORMAL_95;
     distributions::cdf((hours / rise.p50_hours).ln() / spread.max(1e-3))
-}
-
-/// Hours from the last flight to the limit by the line through the last records.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RiseCrossing {
-    pub(crate) p05_hours: f64,
-    pub(crate) p50_hours: f64,
-    pub(crate) p95_hours: f64,
-}
-
-/// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or over its last
-/// flights while that is young.
-pub(crate) fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
-    /// Flights of the present installation below which it is young, and the last ones that show the use.
-    const YOUNG: usize = 20;
-    const LAST: usize = 300;
-    let Some(last) = flights.last() else { return 1.0 };
-    let here = flights.iter().rev().take_while(|f| f.installation == last.installation).count();
-    let back = if here < YOUNG { LAST } else { here.min(LAST) };
-    let first = &flights[flights.len().saturating_sub(back)];
-    let ratio = (last.hours - first.hours) / (prior.usage(last) - prior.usage(first));
-    if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
 }
 
 /// The pace of the last ninety days of flights; nothing when they show no hours.

@@ -1,6 +1,5 @@
 //! Plotted forecast of an assessment: smoothed past levels, and quantiles of the future gap.
 
-use crate::assess::hours_per_usage;
 use crate::data::bins::{self, BINS, Bin};
 use crate::data::segment::Segment;
 use crate::data::series::{Flight, Series};
@@ -13,7 +12,7 @@ use crate::measured::record::Record;
 use crate::prior::calibration_params::CalibrationParams;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
-use crate::unit_fit::{Fit, UnitFit};
+use crate::unit_fit::{Fit, UnitFit, hours_per_usage};
 
 /// A gap and its 90 % interval, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,11 +67,18 @@ pub fn forecast(
     past.extend(on_axis.segments().last().iter().flat_map(|segment| levels(segment, posterior, prior)));
     let ratio = hours_per_usage(flights, prior);
     let variance_m2 = unit.history.offset_m2 + unit.history.kind_m2 + prior.bias_sd_m.powi(2);
+    let steepest = unit.rise_now(flights).zip(unit.measured.level);
     let after = |hours: f64| {
         let [p05_m, m, p95_m] = forecast_quantiles(posterior, hours / ratio, variance_m2, prior);
         let risen_m = unit.history.undone_m.max(0.0);
         let band = Interval { p05_m: p05_m + risen_m, m: m + risen_m, p95_m: p95_m + risen_m };
-        (hours, if hours > 0.0 { band.calibrated(prior.calibration) } else { band })
+        let mut band = if hours > 0.0 { band.calibrated(prior.calibration) } else { band };
+        // The upper edge meets the limit no later than the line through the last records.
+        if let Some((rise, level)) = steepest.filter(|(rise, _)| rise.p05_hours > 0.0) {
+            let line_m = level.gap_m + (settings.limit_m - level.gap_m) * hours / rise.p05_hours;
+            band.p95_m = band.p95_m.max(line_m);
+        }
+        (hours, band)
     };
     Ok(Forecast { past, ahead: hours.into_iter().map(after).collect() })
 }

@@ -2,7 +2,6 @@
 
 use std::borrow::Cow;
 
-use crate::assess::{RiseCrossing, hours_per_usage};
 use crate::data::segment::Segment;
 use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::inference::consistency::Evidence;
@@ -141,4 +140,26 @@ fn onset(
     let first = flights.partition_point(|flight| prior.usage(flight) < segment.begin + start);
     let departure_us = flights.get(first)?.departure_us;
     Some(ChangePoint { departure_us, kind: ChangePointKind::Onset, step_m: 0.0, se_m: 0.0, certainty })
+}
+
+/// Hours from the last flight to the limit by the line through the last records.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RiseCrossing {
+    pub(crate) p05_hours: f64,
+    pub(crate) p50_hours: f64,
+    pub(crate) p95_hours: f64,
+}
+
+/// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or over its last
+/// flights while that is young.
+pub(crate) fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
+    /// Flights of the present installation below which it is young, and the last ones that show the use.
+    const YOUNG: usize = 20;
+    const LAST: usize = 300;
+    let Some(last) = flights.last() else { return 1.0 };
+    let here = flights.iter().rev().take_while(|f| f.installation == last.installation).count();
+    let back = if here < YOUNG { LAST } else { here.min(LAST) };
+    let first = &flights[flights.len().saturating_sub(back)];
+    let ratio = (last.hours - first.hours) / (prior.usage(last) - prior.usage(first));
+    if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
 }

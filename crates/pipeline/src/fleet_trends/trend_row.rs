@@ -103,6 +103,7 @@ pub(crate) fn row(
         conditions: Vec::new(),
         action: None,
         due_utc: None,
+        elapsed_hours: NoColumn(trend.elapsed_hours),
         sketch_m: sketched(&gaps_m),
     }
 }

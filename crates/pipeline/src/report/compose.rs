@@ -295,7 +295,7 @@ fn forecast(drawn: &Forecast, row: &TrendRow) -> Vec<TimedInterval> {
     let Some(hours_per_day) = row.hours_per_day.filter(|_| row.removed_utc.is_none()) else {
         return Vec::new();
     };
-    let at = |hours: f64| days_after(row.as_of_utc, hours / hours_per_day);
+    let at = |hours: f64| days_after(row.as_of_utc, (hours - row.elapsed_hours.0) / hours_per_day);
     drawn.ahead.iter().filter_map(|(hours, band)| timed_interval(at(*hours), band)).collect()
 }
 

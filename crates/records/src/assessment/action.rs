@@ -42,7 +42,7 @@ impl Action {
 }
 
 /// Reasons whose inspection is due at once: the next record alone would be too late.
-const DUE_NOW: [&str; 2] = ["unconfirmed", "jumped"];
+const DUE_NOW: [&str; 3] = ["unconfirmed", "jumped", "changed"];
 
 impl TrendRow {
     /// The row with its action and the date until when.

@@ -131,7 +131,8 @@ row! {
         /// `normal`, `watch`, `unassessed`, `plan`, `act`, from least to most urgent; null for a removed unit.
         pub state: Option<&'static str>,
         /// Code of the reason: `no_record`, `no_limit`, `stale`, `renewed`, `above_limit`, `limit_held`, `unconfirmed`,
-        /// `crosses_soon`, `rises_to_limit`, `at_watch`, `jumped`, `changed`, `clear`.
+        /// `crosses_soon`, `rises_to_limit`, `at_watch`, `jumped`, `changed`, `onset`,
+        /// `clear`.
         pub reason_code: Option<&'static str>,
         /// Reason of the state, in words.
         pub reason: Option<String>,
@@ -144,6 +145,9 @@ row! {
         /// Date until when: `as_of_utc` to replace, or to inspect after a jump; `not_before_utc` to inspect; null where it
         /// is not known.
         pub due_utc: Option<Timestamp>,
+        /// Flight hours since the last flight, at the unit's own rate.
+        #[serde(skip)]
+        pub elapsed_hours: NoColumn<f64>,
         /// The estimated gaps in order of flights, at most a hundred means of neighbours, m: for a sparkline.
         #[serde(skip)]
         pub sketch_m: NoColumn<Vec<f64>>,

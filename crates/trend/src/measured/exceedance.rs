@@ -2,7 +2,7 @@
 
 use crate::measured::level::MeasuredLevel;
 use crate::measured::record::Record;
-use crate::measured::{HYSTERESIS, JUMP_ERRORS, JUMP_SHARE, RECALLED};
+use crate::measured::thresholds::{HYSTERESIS, JUMP_ERRORS, JUMP_SHARE, RECALLED};
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
 /// The gap is at or above its limit.

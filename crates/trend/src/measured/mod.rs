@@ -7,25 +7,16 @@ pub(crate) mod exceedance;
 pub(crate) mod level;
 pub(crate) mod record;
 pub(crate) mod rise;
+pub(crate) mod thresholds;
 
 use crate::data::series::{DAY_US, Flight, MaintenanceEvent};
 use crate::measured::exceedance::{Exceedance, exceedance};
 use crate::measured::level::{MeasuredLevel, measured_level};
 use crate::measured::record::{Record, records};
 use crate::measured::rise::{Rise, rise};
+use crate::measured::thresholds::{HYSTERESIS, JUMP_ERRORS, JUMP_RECORDS, JUMP_SHARE, RECALLED};
 use crate::settings::Settings;
 use crate::statement::types::ChangePoint;
-
-/// A rise of the level that counts as a jump, a share of the limit, and in standard errors.
-pub(crate) const JUMP_SHARE: f64 = 0.15;
-pub(crate) const JUMP_ERRORS: f64 = 6.0;
-
-/// Records for which a jump is reported, however long they take.
-const JUMP_RECORDS: usize = 12;
-
-/// A level that was at the watch limit stays there until it is this share of it, or for this many records.
-pub(crate) const HYSTERESIS: f64 = 0.97;
-pub(crate) const RECALLED: usize = 24;
 
 /// The level rose at once by more than wear and errors explain.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,7 +4,8 @@ use std::fmt;
 
 use crate::data::series::DAY_US;
 use crate::measured::exceedance::Exceedance;
-use crate::measured::{HYSTERESIS, Jump, Measured};
+use crate::measured::thresholds::HYSTERESIS;
+use crate::measured::{Jump, Measured};
 use crate::settings::Settings;
 use crate::statement::types::{ChangePoint, ChangePointKind};
 
@@ -91,6 +92,7 @@ impl Reason {
             Self::RisesToLimit { .. } => "rises_to_limit",
             Self::AtWatch { .. } => "at_watch",
             Self::Jumped { .. } => "jumped",
+            Self::Changed { kind: ChangePointKind::Onset, .. } => "onset",
             Self::Changed { .. } => "changed",
             Self::Clear { .. } => "clear",
         }

@@ -27,7 +27,8 @@ fn unit(seed: u64, flights: i64, rho: f64, step_um: f64) -> Series {
 
 /// Shortest of several times to assess twenty units of each length, which take turns.
 fn times(lengths: [i64; 2], rho: f64, step_um: f64) -> [Duration; 2] {
-    let units = lengths.map(|flights| (0..20).map(|seed| unit(seed, flights, rho, step_um)).collect::<Vec<_>>());
+    let units =
+        lengths.map(|flights| (0..20).map(|seed| unit(seed, flights, rho, step_um)).collect::<Vec<_>>());
     let once = |units: &[Series]| {
         let begin = Instant::now();
         for series in units {
