@@ -212,7 +212,7 @@ def test_results_are_converted_and_shown(logs: list[str]) -> None:
 
 def test_followed_quantities_are_the_commands(fleet: Path, command: Command) -> None:
     command("run")
-    for option, ours in [("quantities", fp.quantities), ("changes", fp.changes), ("intervals", fp.intervals)]:
+    for option, ours in [("quantities", fp.quantities), ("changes", fp.changes)]:
         command("trend", f"--{option}", "--format", "parquet", "--output", f"{option}.parquet")
         assert differing(pa.table(ours()), pq.read_table(f"{option}.parquet")) == [], option
     assert len(fp.quantities(tail="N412FP")) < len(fp.quantities())

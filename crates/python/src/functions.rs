@@ -107,7 +107,7 @@ pub(crate) fn trace(
 
 /// Trends of the store, or of an external estimates table; one row for each unit, or for each query.
 #[pyfunction]
-#[pyo3(signature = (estimates, config, tail, serial, part_number, as_of, queries, statistics))]
+#[pyo3(signature = (estimates, config, tail, serial, part_number, as_of, queries))]
 #[expect(clippy::too_many_arguments, reason = "they are Python's keywords")]
 pub(crate) fn trend(
     py: Python<'_>,
@@ -118,11 +118,10 @@ pub(crate) fn trend(
     part_number: Option<String>,
     as_of: Option<&str>,
     queries: Option<&Bound<'_, PyAny>>,
-    statistics: bool,
 ) -> PyResult<Table> {
     let installations = config.installations(py)?;
     let as_of_utc = instant(py, as_of)?;
-    let ask = UnitSelection { tail_number: tail, serial_number: serial, part_number, as_of_utc, statistics };
+    let ask = UnitSelection { tail_number: tail, serial_number: serial, part_number, as_of_utc };
     let estimate_batches = estimates.map(arrow_capsule::batches).transpose()?;
     let queries_table = queries.map(|table| to_table(table, "queries")).transpose()?;
     let found =
@@ -157,7 +156,6 @@ fn assess(
             installations,
             histories,
             &external_estimates::queries_of(queries_table)?,
-            ask.statistics,
         ),
     }
 }

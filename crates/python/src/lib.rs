@@ -31,7 +31,6 @@ fn _freeplay(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(functions::run, module)?)?;
     module.add_function(wrap_pyfunction!(store_results::quantities, module)?)?;
     module.add_function(wrap_pyfunction!(store_results::changes, module)?)?;
-    module.add_function(wrap_pyfunction!(store_results::intervals, module)?)?;
     module.add_function(wrap_pyfunction!(store_results::backtest_forecasts, module)?)?;
     module.add_function(wrap_pyfunction!(store_results::diff, module)?)?;
     module.add_function(wrap_pyfunction!(store_results::explain, module)?)?;

@@ -10,7 +10,6 @@ use jiff::Timestamp;
 use pipeline::explain::RecordKey;
 use pipeline::fleet_trends::assess::{self, StoreAssessment, UnitSelection};
 use pipeline::fleet_trends::backtest;
-use pipeline::fleet_trends::inspection_interval::inspection_intervals;
 use pipeline::follow_up::work_requests::{self, WorkSelection};
 use pipeline::history::external_estimates;
 use pipeline::report::{compose, data, publish};
@@ -30,15 +29,10 @@ fn table<R: Row>(py: Python<'_>, rows: Result<Vec<R>, pipeline::Error>) -> PyRes
     Ok(Table::of(batch.map_err(|error| to_run_exception(py, error))?))
 }
 
-fn selection(
-    py: Python<'_>,
-    units: [Option<String>; 3],
-    as_of: Option<&str>,
-    statistics: bool,
-) -> PyResult<UnitSelection> {
+fn selection(py: Python<'_>, units: [Option<String>; 3], as_of: Option<&str>) -> PyResult<UnitSelection> {
     let [tail_number, serial_number, part_number] = units;
     let as_of_utc = instant(py, as_of)?;
-    Ok(UnitSelection { tail_number, serial_number, part_number, as_of_utc, statistics })
+    Ok(UnitSelection { tail_number, serial_number, part_number, as_of_utc })
 }
 
 /// What `trend` shows of the followed quantities.
@@ -46,7 +40,6 @@ fn selection(
 enum Followed {
     Quantities,
     Changes,
-    Intervals,
 }
 
 fn followed(
@@ -56,18 +49,15 @@ fn followed(
     as_of: Option<&str>,
     what: Followed,
 ) -> PyResult<Table> {
-    let (installations, ask) = (config.installations(py)?, selection(py, units, as_of, false)?);
+    let (installations, ask) = (config.installations(py)?, selection(py, units, as_of)?);
     let config = &config.inner;
     let found = py.detach(|| {
         assess::assess_store_with_quantities(config, installations, &Store::open(config.store())?, &ask)
     });
-    let StoreAssessment { now, followed, .. } = found.map_err(|error| to_run_exception(py, error))?;
+    let StoreAssessment { followed, .. } = found.map_err(|error| to_run_exception(py, error))?;
     match what {
         Followed::Quantities => table(py, Ok(followed.rows)),
         Followed::Changes => table(py, Ok(followed.changes)),
-        Followed::Intervals => {
-            table(py, Ok(inspection_intervals(&now, config.document.trend.inspection_risk)))
-        }
     }
 }
 
@@ -91,17 +81,6 @@ pub(crate) fn changes(
     as_of: Option<&str>,
 ) -> PyResult<Table> {
     followed(py, config, units, as_of, Followed::Changes)
-}
-
-/// Chance of meeting the limit before the next inspection, by part and interval.
-#[pyfunction]
-pub(crate) fn intervals(
-    py: Python<'_>,
-    config: &Config,
-    units: [Option<String>; 3],
-    as_of: Option<&str>,
-) -> PyResult<Table> {
-    followed(py, config, units, as_of, Followed::Intervals)
 }
 
 /// Past forecasts against later measurements.
@@ -159,7 +138,7 @@ pub(crate) fn report(
     as_of: Option<&str>,
     with_data: bool,
 ) -> PyResult<(u64, u64)> {
-    let (installations, ask) = (config.installations(py)?, selection(py, units, as_of, true)?);
+    let (installations, ask) = (config.installations(py)?, selection(py, units, as_of)?);
     let config = &config.inner;
     let composed = py
         .detach(|| {

@@ -20,7 +20,7 @@ pub mod uncertainty;
 pub use assessment::action::Action;
 pub use assessment::quantity_row::{ChangeScope, Quantity, QuantityChange, QuantityRow, QuantityStep};
 pub use assessment::report_rows;
-pub use assessment::trend_row::{ChangePoint, InspectionInterval, TrendRow};
+pub use assessment::trend_row::{ChangePoint, TrendRow};
 pub use diagnostic::Diagnostic;
 pub use flight::Flight;
 pub use follow_up::alert_record::{AlertRecord, AlertStatus};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 use records::WorkRequest;
-use records::{InspectionInterval, QuantityChange, QuantityRow, TrendRow};
+use records::{QuantityChange, QuantityRow, TrendRow};
 use serde::Serialize;
 
 use crate::state_badge::StateBadge;
@@ -30,10 +30,6 @@ pub struct Report {
     pub priors: Vec<FleetPriorView>,
     pub tails: Vec<Tail>,
     pub units: Vec<UnitView>,
-    /// Chances of meeting the limit before the next inspection, by part and interval.
-    pub inspection_intervals: Vec<InspectionInterval>,
-    /// The advice for each part, in words.
-    pub interval_advice: Vec<String>,
     /// Changes of quantities other than the gap, of units, tails and parts; the newest first.
     pub quantity_changes: Vec<QuantityChange>,
     /// Wrong mappings with evidence and remedy, in words.
@@ -64,6 +60,8 @@ pub struct FleetPriorView {
     pub life_p95_hours: f64,
     /// Calibration factor of the forecast intervals; 1 is the model's own width.
     pub widening: f64,
+    /// Past forecasts that it was learned from.
+    pub scored_forecasts: usize,
 }
 
 /// Gap and its 90 % interval at a time.
@@ -160,6 +158,14 @@ pub struct Assessment {
     pub unit_hours: Option<f64>,
     pub gap_m: Option<f64>,
     pub gap_se_m: Option<f64>,
+    /// Records that the gap rests on.
+    pub gap_records: Option<i64>,
+    /// The latest record.
+    pub latest_utc: Option<Timestamp>,
+    pub latest_gap_m: Option<f64>,
+    pub latest_gap_se_m: Option<f64>,
+    /// What an installation may add to every gap measured in it, standard deviation.
+    pub installation_sd_m: Option<f64>,
     pub limit_m: Option<f64>,
     pub watch_m: Option<f64>,
     pub rate_m_per_hour: Option<f64>,
@@ -169,6 +175,7 @@ pub struct Assessment {
     pub crossing_hours_p05: Option<f64>,
     pub crossing_hours_p50: Option<f64>,
     pub crossing_hours_p95: Option<f64>,
+    pub forecast_method: Option<String>,
     pub not_before_utc: Option<Timestamp>,
     pub likely_utc: Option<Timestamp>,
     pub not_after_utc: Option<Timestamp>,
@@ -179,11 +186,6 @@ pub struct Assessment {
     pub check_probability: Option<f64>,
     pub law: Option<String>,
     pub axis: Option<String>,
-    pub mann_kendall_p: Option<f64>,
-    pub hamed_rao_p: Option<f64>,
-    pub sen_rate_m_per_hour: Option<f64>,
-    pub sen_low_m_per_hour: Option<f64>,
-    pub sen_high_m_per_hour: Option<f64>,
     /// State one day earlier; the outer `None` if the unit had no record then.
     pub state_day_before: Option<Option<String>>,
 }

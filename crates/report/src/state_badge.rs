@@ -2,7 +2,7 @@
 
 use trend::State;
 
-/// State of a unit as readers see it. Not assessed, for lack of data, must never be read as normal.
+/// State of a unit as readers see it; a removed unit has none. An unknown word must never be read as normal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StateBadge(Option<State>);
 
@@ -11,28 +11,28 @@ impl StateBadge {
     pub(crate) const NORMAL: Self = Self(Some(State::Normal));
 
     /// All states, in the order of the counts at the top of the fleet page.
-    pub const ALL: [Self; 5] =
-        [Self(Some(State::Act)), Self(Some(State::Plan)), Self(Some(State::Watch)), Self::NORMAL, Self(None)];
+    pub const ALL: [Self; 6] = [
+        Self(Some(State::Act)),
+        Self(Some(State::Plan)),
+        Self(Some(State::Unassessed)),
+        Self(Some(State::Watch)),
+        Self::NORMAL,
+        Self(None),
+    ];
 
-    /// Parses the `state` of an assessment; `None` or an unknown word means not assessed.
+    /// Parses the `state` of an assessment; `None` is a removed unit, an unknown word an unassessed one.
     pub fn from_state(word: Option<&str>) -> Self {
-        Self(word.and_then(State::from_word))
+        Self(word.map(|word| State::from_word(word).unwrap_or(State::Unassessed)))
     }
 
-    /// Rank by urgency, the most urgent first. A unit that is not assessed comes before a normal one.
+    /// Rank by urgency, the most urgent first; a removed unit last.
     pub fn rank(self) -> u8 {
-        match self.0 {
-            Some(State::Act) => 0,
-            Some(State::Plan) => 1,
-            Some(State::Watch) => 2,
-            None => 3,
-            Some(State::Normal) => 4,
-        }
+        Self::ALL.iter().position(|badge| *badge == self).map_or(u8::MAX, |rank| rank as u8)
     }
 
     /// Word shown to readers.
     pub fn word(self) -> &'static str {
-        self.0.map_or("not assessed", State::as_str)
+        self.0.map_or("removed", State::as_str)
     }
 
     /// Shape, distinguishable without colour.
@@ -40,6 +40,7 @@ impl StateBadge {
         match self.0 {
             Some(State::Act) => "◆",
             Some(State::Plan) => "▲",
+            Some(State::Unassessed) => "?",
             Some(State::Watch) => "●",
             Some(State::Normal) => "○",
             None => "–",
@@ -48,12 +49,10 @@ impl StateBadge {
 
     /// CSS class that sets the colour.
     pub fn class(self) -> &'static str {
-        self.0.map_or("unstated", State::as_str)
-    }
-
-    /// Whether the unit must be replaced now.
-    pub(crate) fn is_act(self) -> bool {
-        self.0 == Some(State::Act)
+        match self.0 {
+            None | Some(State::Unassessed) => "unstated",
+            Some(state) => state.as_str(),
+        }
     }
 
     /// Whether the unit belongs on the work list.
@@ -67,8 +66,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_missing_or_unknown_word_is_never_normal() {
-        assert_eq!(StateBadge::from_state(None), StateBadge(None));
-        assert_eq!(StateBadge::from_state(Some("fine")), StateBadge(None));
+    fn an_unknown_word_is_never_normal_and_ranks_follow_the_states() {
+        assert_eq!(StateBadge::from_state(Some("fine")), StateBadge(Some(State::Unassessed)));
+        let ranks = State::ALL.map(|state| StateBadge::from_state(Some(state.as_str())).rank());
+        assert!(ranks.is_sorted_by(|a, b| a > b), "{ranks:?}");
     }
 }

@@ -62,8 +62,6 @@ fn report(units: Vec<UnitView>) -> Report {
         quantity_changes: Vec::new(),
         mapping_faults: Vec::new(),
         notes: Vec::new(),
-        inspection_intervals: Vec::new(),
-        interval_advice: Vec::new(),
         trend_rows: Vec::new(),
     }
 }
@@ -104,9 +102,9 @@ fn every_page_forbids_scripts_that_are_not_files_of_the_report() {
 
 #[test]
 fn a_unit_without_a_statement_is_never_called_normal() {
-    let report = report(vec![unit("A", None)]);
+    let report = report(vec![unit("A", Some("unassessed"))]);
     let html = text(&unit_page(&report, &RateSpreads::of(&report), &report.units[0]).unwrap());
-    assert!(html.contains("not assessed") && html.contains("no data") && !html.contains("normal"));
+    assert!(html.contains("unassessed") && html.contains("no data") && !html.contains("normal"));
 }
 
 #[test]

@@ -1,22 +1,32 @@
 //! Assessment of one unit at a date.
 
-use crate::data::series::Series;
+use crate::data::series::{DAY_US, Flight, Series};
 use crate::error::Error;
-use crate::incremental::snapshot::UnitSnapshot;
+use crate::math::distributions::{self, NORMAL_95};
+use crate::measured::exceedance::Exceedance;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
 use crate::statement::assessment::Assessment;
-use crate::statement::state::State;
+use crate::statement::crossing::RulDistribution;
+use crate::statement::level;
+use crate::statement::state::{EarliestCrossing, alert_state};
+use crate::statement::types::{Crossing, ForecastMethod, LatestRecord, Level, Rate, Utilization, WearStatus};
+use crate::unit_fit::{Fit, RiseCrossing, UnitFit, hours_per_usage};
 
-/// Assesses a unit at a date from its flights until then: posterior of a bank of wear laws by Bayesian model averaging
-/// (Hoeting et al. 1999, <https://doi.org/10.1214/ss/1009212519>), the level as a random walk behind a Kalman filter.
+/// Number of last days that give the utilisation.
+const UTILIZATION_DAYS: i64 = 90;
+
+/// Assesses a unit at a date from its flights until then.
+///
+/// The state is the more urgent of two: the measured one, of the last records of the installation alone, and that of the
+/// forecast, a posterior of a bank of wear laws by Bayesian model averaging (Hoeting et al. 1999,
+/// <https://doi.org/10.1214/ss/1009212519>) where it agrees with these records, else the line through them.
 ///
 /// Dates are microseconds since 1970 UTC, gaps metres, usage flight hours; `docs/prognostics.md` describes the method.
 /// The crate page has an example.
 ///
 /// `prior` is the prior of the part number's fleet, learned from nothing later than the same date; without one the
-/// unit is assessed by its own data alone. `previous` is the unit's previous state, which it leaves only when it is
-/// clearly past the limit that caused it.
+/// forecast uses the unit's own data alone.
 ///
 /// # Errors
 /// [`Error::Setting`] or [`Error::LimitOrder`] for unusable settings.
@@ -25,11 +35,176 @@ pub fn assess(
     as_of_us: i64,
     settings: &Settings,
     prior: Option<&FleetPrior>,
-    previous: Option<State>,
 ) -> Result<Assessment, Error> {
     settings.check()?;
     let uninformative = FleetPrior::uninformative(settings.limit_m);
     let prior = prior.unwrap_or(&uninformative);
-    let (snapshot, current) = UnitSnapshot::current(series, as_of_us, prior);
-    Ok(snapshot.statement(current, as_of_us, series.maintenance_until(as_of_us), settings, prior, previous))
+    let flights = series.flights_until(as_of_us);
+    let unit = UnitFit::new(series, as_of_us, settings, prior);
+    let utilization = utilization(flights);
+    let elapsed_hours = flights.last().zip(utilization).map_or(0.0, |(last, now)| {
+        now.hours_per_day * as_of_us.saturating_sub(last.departure_us).max(0) as f64 / DAY_US as f64
+    });
+    let forecast = Forecasts::of(&unit, flights, settings);
+    let earliest = forecast.crossing.and_then(|crossing| crossing.p05_hours);
+    let rises = unit.measured.rise.map(|_| 1.0);
+    let growth_probability = rises.or(forecast.growth_probability).unwrap_or_default();
+    let earliest =
+        earliest.map(|p05_hours| EarliestCrossing { p05_hours, growth_probability, elapsed_hours });
+    let (state, reason) = alert_state(as_of_us, &unit.measured, earliest, &unit.changes, settings);
+    let last_us = unit.measured.last_sound_us();
+    Ok(Assessment {
+        as_of_us,
+        flights: flights.len(),
+        estimates: unit.history.estimates.len(),
+        unit_hours: series.unit_hours_at_start().zip(flights.last()).map(|(start, last)| start + last.hours),
+        level: unit.measured.level.map(|level| Level {
+            gap_m: level.gap_m,
+            se_m: level.se_m,
+            records: level.records,
+        }),
+        latest: unit.measured.latest.map(|record| LatestRecord {
+            departure_us: record.departure_us,
+            gap_m: record.gap_m,
+            se_m: record.error_m,
+        }),
+        installation_sd_m: prior.bias_sd_m,
+        rate: forecast.rate,
+        wear: forecast.wear,
+        growth_probability: forecast.growth_probability,
+        law: unit.fit.as_ref().and_then(|f| level::law(&f.posterior, forecast.wear == WearStatus::Wearing)),
+        crossing: forecast.crossing,
+        method: forecast.method,
+        elapsed_hours,
+        check_probability: forecast.check_probability,
+        utilization,
+        outliers_us: unit.outliers_us(flights),
+        noise_factor: unit.history.noise_factor,
+        stale_days: last_us
+            .map(|last_us| as_of_us.saturating_sub(last_us) as f64 / DAY_US as f64)
+            .filter(|days| *days > settings.stale_after_days),
+        state,
+        reason,
+        changes: unit.changes,
+    })
+}
+
+/// Numbers of an assessment that need a forecast.
+struct Forecasts {
+    crossing: Option<Crossing>,
+    method: Option<ForecastMethod>,
+    rate: Option<Rate>,
+    wear: WearStatus,
+    growth_probability: Option<f64>,
+    check_probability: Option<f64>,
+}
+
+impl Forecasts {
+    fn of(unit: &UnitFit<'_>, flights: &[Flight], settings: &Settings) -> Self {
+        let mut forecasts = match (&unit.fit, unit.rise_now(flights)) {
+            (Some(fit), rise) => {
+                let mut forecasts = Self::by_laws(fit, unit, flights, settings);
+                if let (Some(crossing), Some(rise)) = (&mut forecasts.crossing, rise) {
+                    *crossing = not_after(*crossing, rise.p05_hours);
+                }
+                forecasts
+            }
+            (None, Some(rise)) => Self {
+                crossing: Some(within(rise, settings.horizon_hours)),
+                method: Some(ForecastMethod::Line),
+                rate: unit.measured.rise.map(|rise| Rate {
+                    p05_m_per_hour: rise.m_per_hour - NORMAL_95 * rise.m_per_hour_se,
+                    m_per_hour: rise.m_per_hour,
+                    p95_m_per_hour: rise.m_per_hour + NORMAL_95 * rise.m_per_hour_se,
+                }),
+                wear: WearStatus::Wearing,
+                growth_probability: Some(1.0),
+                check_probability: Some(chance_by(settings.check_interval_hours, &rise)),
+            },
+            (None, None) => Self {
+                crossing: None,
+                method: None,
+                rate: None,
+                wear: WearStatus::Unknown,
+                growth_probability: None,
+                check_probability: None,
+            },
+        };
+        let is_over =
+            matches!(unit.measured.exceedance, Some(Exceedance::Confirmed { .. } | Exceedance::Held));
+        if is_over {
+            let over = Some(0.0);
+            forecasts.crossing = Some(Crossing { p05_hours: over, p50_hours: over, p95_hours: over });
+            forecasts.method = Some(ForecastMethod::Measured);
+            forecasts.check_probability = Some(1.0);
+        }
+        forecasts
+    }
+
+    fn by_laws(fit: &Fit<'_>, unit: &UnitFit<'_>, flights: &[Flight], settings: &Settings) -> Self {
+        let ratio = hours_per_usage(flights, &fit.prior);
+        let offset_m2 = unit.history.offset_m2 + unit.history.kind_m2;
+        // A rise that was taken off for the law is still there.
+        let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
+        let settings = &Settings { limit_m, ..*settings };
+        let remaining = RulDistribution::new(&fit.posterior, &fit.prior, settings, ratio, offset_m2);
+        let growth_probability = level::growth_probability(&fit.posterior, fit.prior.limit_m());
+        Self {
+            crossing: Some(remaining.crossing()),
+            method: Some(fit.method),
+            rate: Some(level::rate(&fit.posterior, ratio)),
+            wear: wear_status(growth_probability),
+            growth_probability: Some(growth_probability),
+            check_probability: Some(remaining.within(settings.check_interval_hours)),
+        }
+    }
+}
+
+/// The crossing with an earliest time that is not after that of the line through the last records.
+fn not_after(crossing: Crossing, p05_hours: f64) -> Crossing {
+    let earliest = crossing.p05_hours.map_or(p05_hours, |hours| hours.min(p05_hours));
+    Crossing { p05_hours: Some(earliest), ..crossing }
+}
+
+/// The crossing without times beyond the horizon.
+fn within(crossing: RiseCrossing, horizon_hours: f64) -> Crossing {
+    let within = |hours: f64| Some(hours).filter(|hours| *hours <= horizon_hours);
+    Crossing {
+        p05_hours: within(crossing.p05_hours),
+        p50_hours: within(crossing.p50_hours),
+        p95_hours: within(crossing.p95_hours),
+    }
+}
+
+/// Probability that the line meets the limit within some hours: log-normal through its early and middle time.
+fn chance_by(hours: f64, rise: &RiseCrossing) -> f64 {
+    if rise.p50_hours <= hours {
+        return 1.0 - 0.5 * rise.p50_hours / hours.max(f64::MIN_POSITIVE);
+    }
+    let spread = (rise.p50_hours / rise.p05_hours.max(f64::MIN_POSITIVE)).ln() / NORMAL_95;
+    distributions::cdf((hours / rise.p50_hours).ln() / spread.max(1e-3))
+}
+
+/// The pace of the last ninety days of flights; nothing when they show no hours.
+fn utilization(flights: &[Flight]) -> Option<Utilization> {
+    let last = flights.last()?;
+    let since = |flight: &Flight| last.departure_us.saturating_sub(flight.departure_us);
+    let first = &flights[flights.partition_point(|f| since(f) > UTILIZATION_DAYS * DAY_US)];
+    let (hours, days) = (last.hours - first.hours, since(first) as f64 / DAY_US as f64);
+    let flights = last.flights - first.flights;
+    (hours > 0.0 && days > 0.0).then(|| Utilization {
+        hours_per_day: hours / days,
+        hours_per_day_se: hours / days / flights.max(1.0).sqrt(),
+        flights_per_day: flights / days,
+        hours_per_flight: hours / flights,
+    })
+}
+
+/// Between one half and 95 % neither growth nor its absence is reported.
+fn wear_status(growth_probability: f64) -> WearStatus {
+    match growth_probability {
+        probability if probability > 0.95 => WearStatus::Wearing,
+        probability if probability < 0.5 => WearStatus::Steady,
+        _ => WearStatus::Unknown,
+    }
 }

@@ -15,13 +15,4 @@ pub enum Error {
     /// The watch limit does not lie below the act limit.
     #[error("watch limit is {watch_m:e} m and act limit {limit_m:e} m: watch must come first")]
     LimitOrder { watch_m: f64, limit_m: f64 },
-    /// Too few values for this statistic.
-    #[error("{statistic} needs at least {needed} values and was given {given}")]
-    TooFew { statistic: &'static str, needed: usize, given: usize },
-    /// Two slices that belong together differ in length.
-    #[error("{statistic} was given {left} and {right} values that belong in pairs")]
-    Lengths { statistic: &'static str, left: usize, right: usize },
-    /// A value is not finite, or every abscissa is the same.
-    #[error("{statistic} cannot use its values: {hint}")]
-    Values { statistic: &'static str, hint: &'static str },
 }

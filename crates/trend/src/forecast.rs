@@ -2,19 +2,17 @@
 
 use crate::data::bins::{self, BINS, Bin};
 use crate::data::segment::Segment;
-use crate::data::series::Series;
+use crate::data::series::{Flight, Series};
 use crate::error::Error;
-use crate::incremental::snapshot::UnitSnapshot;
-use crate::inference::consistency::fit_consistent;
 use crate::inference::posterior::{Posterior, mean_growth};
 use crate::inference::segment_fit::process_variance;
 use crate::learning::calibrate::forecast_quantiles;
 use crate::math::distributions::NORMAL_95;
+use crate::measured::record::Record;
 use crate::prior::calibration_params::CalibrationParams;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
-use crate::statement::history;
-use crate::statement::types::MIN_ESTIMATES;
+use crate::unit_fit::{Fit, UnitFit, hours_per_usage};
 
 /// A gap and its 90 % interval, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +39,7 @@ pub struct Forecast {
 /// (Rauch, Tung and Striebel 1965, <https://doi.org/10.2514/3.3166>), m, and the 5, 50 and 95 % quantiles of the gap, m,
 /// after more `hours`, flight hours, from the same mixture and calibration as the crossing.
 ///
-/// Empty for a unit with too few estimates for an assessment.
+/// Empty ahead for a unit whose records neither a wear law nor a line explains.
 ///
 /// # Errors
 /// As [`crate::assess()`].
@@ -56,49 +54,56 @@ pub fn forecast(
     let uninformative = FleetPrior::uninformative(settings.limit_m);
     let prior = prior.unwrap_or(&uninformative);
     let flights = series.flights_until(as_of_us);
-    let history = history::read_history(
-        flights,
-        series.maintenance_until(as_of_us),
-        series.unit_hours_at_start(),
-        prior,
-    );
-    if history.estimates.len() < MIN_ESTIMATES {
-        return Ok(Forecast::default());
-    }
-    let single_unit = prior.single_unit();
-    let (snapshot, current) = UnitSnapshot::current(series, as_of_us, prior);
+    let unit = UnitFit::new(series, as_of_us, settings, prior);
     let mut past = Vec::new();
-    let mut segments = history.segments().peekable();
-    while let Some(segment) = segments.next() {
-        // The last one as it was stated.
-        let fitted = if segments.peek().is_none() {
-            current.fitted().map(|(posterior, is_single_unit)| (posterior.clone(), is_single_unit))
-        } else {
-            let fitted = fit_consistent(&segment, prior, &single_unit, history.offset_m2).ok();
-            fitted.map(|fitted| (fitted.posterior, fitted.is_single_unit))
-        };
-        let prior = |is_single_unit: bool| if is_single_unit { &single_unit } else { prior };
-        past.extend(
-            fitted.iter().flat_map(|(on, is_single_unit)| levels(&segment, on, prior(*is_single_unit))),
-        );
+    let segments: Vec<Segment<'_>> = unit.history.segments().collect();
+    for (segment, fitted) in segments.iter().zip(&unit.ended) {
+        past.extend(fitted.iter().flat_map(|posterior| levels(segment, posterior, prior)));
     }
-    let Some((fitted, is_single_unit)) = current.fitted() else {
-        return Ok(Forecast { past, ahead: Vec::new() });
+    let Some(Fit { posterior, prior, .. }) = &unit.fit else {
+        return Ok(Forecast { past, ahead: line_ahead(&unit, flights, hours) });
     };
-    let prior = if is_single_unit { &single_unit } else { prior };
-    let ratio = snapshot.hours_per_usage(prior);
-    let variance_m2 = history.offset_m2 + history.kind_m2 + prior.bias_sd_m.powi(2);
+    let on_axis = unit.history.on_axis(flights, prior);
+    past.extend(on_axis.segments().last().iter().flat_map(|segment| levels(segment, posterior, prior)));
+    let ratio = hours_per_usage(flights, prior);
+    let variance_m2 = unit.history.offset_m2 + unit.history.kind_m2 + prior.bias_sd_m.powi(2);
+    let steepest = unit.rise_now(flights).zip(unit.measured.level);
     let after = |hours: f64| {
-        let [p05_m, m, p95_m] = forecast_quantiles(fitted, hours / ratio, variance_m2, prior);
-        let band = Interval { p05_m, m, p95_m };
-        (hours, if hours > 0.0 { band.calibrated(prior.calibration) } else { band })
+        let [p05_m, m, p95_m] = forecast_quantiles(posterior, hours / ratio, variance_m2, prior);
+        let risen_m = unit.history.undone_m.max(0.0);
+        let band = Interval { p05_m: p05_m + risen_m, m: m + risen_m, p95_m: p95_m + risen_m };
+        let mut band = if hours > 0.0 { band.calibrated(prior.calibration) } else { band };
+        // The upper edge meets the limit no later than the line through the last records.
+        if let Some((rise, level)) = steepest.filter(|(rise, _)| rise.p05_hours > 0.0) {
+            let line_m = level.gap_m + (settings.limit_m - level.gap_m) * hours / rise.p05_hours;
+            band.p95_m = band.p95_m.max(line_m);
+        }
+        (hours, band)
     };
     Ok(Forecast { past, ahead: hours.into_iter().map(after).collect() })
 }
 
+/// The line through the last records, with the bounds of its slope; empty where they do not rise.
+fn line_ahead(
+    unit: &UnitFit<'_>,
+    flights: &[Flight],
+    hours: impl IntoIterator<Item = f64>,
+) -> Vec<(f64, Interval)> {
+    let (Some(rise), Some(level)) = (unit.measured.rise, unit.measured.level) else { return Vec::new() };
+    let since = |record: &Record| flights.last().map_or(0.0, |last| last.hours - record.hours);
+    let flown = unit.measured.sound.last().map_or(0.0, since);
+    let after = |hours: f64| {
+        let at =
+            |rate: f64, errors: f64| level.gap_m + rate * (hours + flown) + errors * NORMAL_95 * level.se_m;
+        let slope = |errors: f64| (rise.m_per_hour + errors * NORMAL_95 * rise.m_per_hour_se).max(0.0);
+        (hours, Interval { p05_m: at(slope(-1.0), -1.0), m: at(slope(0.0), 0.0), p95_m: at(slope(1.0), 1.0) })
+    };
+    hours.into_iter().map(after).collect()
+}
+
 impl Interval {
     /// The band in the widths that the fleet's past was found to need.
-    fn calibrated(self, CalibrationParams { low, middle, high }: CalibrationParams) -> Self {
+    fn calibrated(self, CalibrationParams { low, middle, high, .. }: CalibrationParams) -> Self {
         let at =
             |width: f64| self.m + width * if width > 0.0 { self.p95_m - self.m } else { self.m - self.p05_m };
         let interval = Self { p05_m: at(low), m: at(middle), p95_m: at(high) };

@@ -51,7 +51,7 @@ pub(crate) enum QueryKey {
 pub(crate) struct TrendArgs {
     #[command(flatten)]
     pub units: UnitFilterArgs,
-    /// Date of the assessment; default: that of the newest record. Later data are ignored.
+    /// Date of the assessment; default: now, or as `trend.as_of` says. Later data are ignored.
     #[arg(long, value_parser = parse_utc, value_name = "UTC", help_heading = "Selection")]
     pub as_of: Option<Timestamp>,
     #[command(flatten)]
@@ -59,8 +59,8 @@ pub(crate) struct TrendArgs {
     /// Table of (`serial_number`, `as_of_utc`, optional `part_number`) to assess, one row each.
     #[arg(long, value_name = "FILE", help_heading = "Selection", conflicts_with_all = ["as_of", "tail", "serial", "part"])]
     pub queries: Option<PathBuf>,
-    /// Also compute the Theil–Sen slope and the Hamed–Rao test (slow: quadratic in history length).
-    #[arg(long, help_heading = "Views")]
+    /// Without effect: the classic statistics are no longer computed. Scripts may still pass it.
+    #[arg(long, hide = true)]
     pub statistics: bool,
     /// Show every followed quantity of the units instead: stiffness, friction, delays, load zero, lost motion, NIS.
     #[arg(long, help_heading = "Views", conflicts_with_all = ["queries", "statistics", "estimates"])]
@@ -68,9 +68,6 @@ pub(crate) struct TrendArgs {
     /// Show what changed instead, of units, tails and parts, with the evidence.
     #[arg(long, help_heading = "Views", conflicts_with_all = ["quantities", "queries", "statistics", "estimates"])]
     pub changes: bool,
-    /// Show inspection intervals by part instead: the chance of meeting the limit before the next inspection.
-    #[arg(long, help_heading = "Views", conflicts_with_all = ["quantities", "changes", "queries", "statistics", "estimates"])]
-    pub intervals: bool,
     #[command(flatten)]
     pub rows: RowFormatArgs,
 }

@@ -58,6 +58,8 @@ pub(crate) struct RunArgs {
 pub(crate) enum FailOn {
     /// Watch limit.
     Watch,
+    /// No sound record of late, or no limit.
+    Unassessed,
     /// Planning horizon.
     Plan,
     /// Act limit.

@@ -168,7 +168,6 @@ impl UnitFilterArgs {
             serial_number: self.serial.clone(),
             part_number: self.part.clone(),
             as_of_utc,
-            statistics: false,
         }
     }
 }

@@ -25,7 +25,7 @@ pub const QUANTITY_STATES: [&str; 11] = [
     "settings_moved",
 ];
 
-/// Word for a unit without a state, in `states` and in messages.
+/// Word for a removed unit in `states` and in messages; in older configurations for an unassessed one as well.
 pub const NOT_ASSESSED: &str = "not_assessed";
 
 /// Longest time limit of one message, s: a run waits for it.
@@ -44,9 +44,10 @@ pub struct AlertChannel {
     /// Address (`https://` or `http://`) that the message is posted to as JSON. An answer of 200 to 299 means sent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
-    /// New states that are sent: of the gap `normal`, `watch`, `plan`, `act`, `not_assessed`; of other quantities
-    /// `normal`, `softening`, `friction_rising` and the others in the column `state` of
-    /// `freeplay trend --quantities`. Default: all but `normal` and `not_assessed`.
+    /// New states that are sent: of the gap `normal`, `watch`, `unassessed`, `plan`, `act`, and `not_assessed` (removed,
+    /// or unassessed); of other quantities `normal`, `softening`, `friction_rising` and the others in the column `state` of
+    /// `freeplay trend --quantities`. Default: all but `normal` and
+    /// `not_assessed`.
     pub states: Vec<String>,
     /// Only these part numbers, `*` and `?` stand for anything; every part when not given.
     pub parts: Vec<String>,
@@ -78,14 +79,15 @@ impl Default for AlertChannel {
 
 /// Every state that a person should know of.
 fn default_states() -> Vec<String> {
-    ["watch", "plan", "act"].into_iter().chain(QUANTITY_STATES).map(str::to_owned).collect()
+    ["watch", "unassessed", "plan", "act"].into_iter().chain(QUANTITY_STATES).map(str::to_owned).collect()
 }
 
 impl AlertChannel {
     /// Whether a unit's change to a state is sent: state, part and tail are selected.
     pub fn selects(&self, state: Option<&str>, part: Option<&str>, tail: Option<&str>) -> bool {
-        let state = state.unwrap_or(NOT_ASSESSED);
-        self.states.iter().any(|wanted| wanted == state)
+        let word = state.unwrap_or(NOT_ASSESSED);
+        let is_unassessed = state.is_none_or(|state| state == trend::State::Unassessed.as_str());
+        self.states.iter().any(|wanted| wanted == word || (is_unassessed && wanted == NOT_ASSESSED))
             && is_among(&self.parts, part)
             && is_among(&self.tails, tail)
     }

@@ -239,12 +239,16 @@ pub struct TrendSettings {
     pub planning_horizon_hours: f64,
     /// Beyond these hours a crossing is not stated. Default 20 000.
     pub horizon_hours: f64,
-    /// Days without an estimate after which a state is marked as stale. Default 30.
+    /// Days without a sound record after which a unit is `unassessed`. Default 30.
     pub stale_after_days: f64,
     /// Hours until the next check, for the probability of meeting the limit before it. Default 300.
     pub next_check_hours: f64,
-    /// Chance of meeting the limit before the next inspection that is accepted, for advice on intervals. Default 0.01.
-    pub inspection_risk: f64,
+    /// Without effect since inspection intervals are no longer advised; accepted so that older files still load.
+    #[serde(skip_serializing)]
+    pub inspection_risk: Option<f64>,
+    /// Date of assessments without `--as-of`: `now`, the time of the run, or `newest_record`, for data of the past.
+    /// Default `now`.
+    pub as_of: AsOf,
     /// What wear follows: `hours`, `flights` or `reversals`; by default what each part number's own
     /// histories speak for. A part's `axis` goes before it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -256,6 +260,17 @@ pub struct TrendSettings {
     pub quantity_limits: QuantityLimits,
 }
 
+/// Date of assessments.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AsOf {
+    /// The time of the run.
+    #[default]
+    Now,
+    /// The newest departure of all records.
+    NewestRecord,
+}
+
 impl Default for TrendSettings {
     fn default() -> Self {
         // The limit is not used.
@@ -265,7 +280,8 @@ impl Default for TrendSettings {
             horizon_hours: defaults.horizon_hours,
             stale_after_days: defaults.stale_after_days,
             next_check_hours: defaults.check_interval_hours,
-            inspection_risk: 0.01,
+            inspection_risk: None,
+            as_of: AsOf::Now,
             axis: None,
             limit_m: None,
             quantity_limits: QuantityLimits::default(),
@@ -340,7 +356,6 @@ impl Document {
             ("horizon_hours", self.trend.horizon_hours),
             ("stale_after_days", self.trend.stale_after_days),
             ("next_check_hours", self.trend.next_check_hours),
-            ("inspection_risk", self.trend.inspection_risk),
         ] {
             found.extend(bounded(key, Some(hours)).map(|c| source.at(&["trend", key], c)));
         }

@@ -54,7 +54,6 @@ pub const PLAUSIBLE: &[(&str, f64, f64)] = &[
     ("horizon_hours", 1e-3, 1e7),
     ("stale_after_days", 1e-3, 1e5),
     ("next_check_hours", 1e-3, 1e7),
-    ("inspection_risk", 1e-9, 0.5),
     ("stiffness_share", 1e-4, 10.0),
     ("friction_share", 1e-4, 100.0),
     ("lost_motion_share", 1e-4, 100.0),

@@ -22,7 +22,7 @@ use serde::Serialize;
 
 pub use alerts::AlertChannel;
 pub use document::{
-    Document, EstimateSettings, LogSettings, Method, Override, StoreSettings, TableNames, TrendSettings,
+    AsOf, Document, EstimateSettings, LogSettings, Method, Override, StoreSettings, TableNames, TrendSettings,
 };
 use layers::{ConfigLayer, Source};
 use overrides::Overrides;

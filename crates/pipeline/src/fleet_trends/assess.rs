@@ -7,7 +7,7 @@ use job::Config;
 use rayon::prelude::*;
 use records::{Installations, PartNumber, QuantityChange, QuantityRow, SerialNumber};
 use store::{Query, Store};
-use trend::{Assessment, FleetPrior, Series, State, UsageDefaults, classic};
+use trend::{Assessment, FleetPrior, Series, State, UsageDefaults};
 
 use crate::error::Error;
 use crate::fleet_trends::changes::{UnitChange, changed, gone};
@@ -29,7 +29,7 @@ use crate::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
 use crate::monitoring::recorder_change::{RecorderChange, recorder_changes};
 use crate::quantities::follow::{FollowedQuantities, UnitFacts, follow, gap_row};
 use crate::quantities::values;
-use job::config::QuantityLimits;
+use job::config::{AsOf, QuantityLimits};
 use records::TrendRow;
 
 /// A unit, by part and serial number.
@@ -44,10 +44,8 @@ pub struct UnitSelection {
     pub serial_number: Option<String>,
     /// This part number only.
     pub part_number: Option<String>,
-    /// The day; the newest departure in the store when not given.
+    /// The date; that of the configuration when not given.
     pub as_of_utc: Option<Timestamp>,
-    /// Theil–Sen and Hamed–Rao as well: their time grows with the square of a history's length.
-    pub statistics: bool,
 }
 
 impl UnitSelection {
@@ -61,6 +59,20 @@ impl UnitSelection {
     fn fits(&self, row: &TrendRow) -> bool {
         row.flights > 0 && (self.tail_number.is_none() || row.tail_number == self.tail_number)
     }
+}
+
+/// The date of assessments: the given one, else that of the configuration, by default the time of the run. None without
+/// a record.
+pub(crate) fn as_of_date(
+    config: &Config,
+    given: Option<Timestamp>,
+    histories: &Histories,
+) -> Option<Timestamp> {
+    let newest_utc = histories.newest_utc()?;
+    Some(given.unwrap_or(match config.document.trend.as_of {
+        AsOf::Now => Timestamp::now(),
+        AsOf::NewestRecord => newest_utc,
+    }))
 }
 
 /// Assesses the selected units.
@@ -101,7 +113,7 @@ pub fn assess_store_with_quantities(
 ) -> Result<StoreAssessment, Error> {
     // An assessment uses the fleet prior of the part, so the selection applies to rows, not to records.
     let mut histories = load_histories(store)?;
-    let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else {
+    let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else {
         return Ok(StoreAssessment::default());
     };
     let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
@@ -128,7 +140,7 @@ pub struct RunAssessments {
     pub followed: FollowedQuantities,
     /// Number of units of the fleet by state.
     pub states: BTreeMap<&'static str, usize>,
-    /// Units of the whole fleet in state `watch`, `plan` or `act`, touched by the run or not.
+    /// Units of the whole fleet in another state than `normal`, touched by the run or not.
     pub work_list: Vec<TrendRow>,
     /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
     pub mapping_faults: Vec<MappingFault>,
@@ -194,7 +206,7 @@ pub fn assess_run_from(
 ) -> Result<RunAssessments, Error> {
     let names: BTreeSet<UnitKey> =
         units.iter().map(|(part, serial)| (Some(part.to_string()), serial.to_string())).collect();
-    let Some(as_of) = all.newest_utc() else { return Ok(RunAssessments::default()) };
+    let Some(as_of) = as_of_date(config, None, &all) else { return Ok(RunAssessments::default()) };
     let before_utc = all.newest_without_utc(of_run);
     let days: Vec<Timestamp> = before_utc.into_iter().chain([as_of]).collect();
     // Flights later than all others do not change an assessment at an earlier date; but where a flights
@@ -271,8 +283,9 @@ pub(crate) fn assess_for_report(
     days_before: &[i64],
     store: &Store,
 ) -> Result<ReportAssessments, Error> {
-    let newest = || histories.newest_utc();
-    let Some(as_of) = ask.as_of_utc.or_else(newest) else { return Ok(ReportAssessments::default()) };
+    let Some(as_of) = as_of_date(config, ask.as_of_utc, histories) else {
+        return Ok(ReportAssessments::default());
+    };
     let earlier = |days: &i64| (*days, as_of - jiff::SignedDuration::from_hours(24 * days));
     let earlier: Vec<(i64, Timestamp)> = days_before.iter().map(earlier).collect();
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
@@ -308,16 +321,12 @@ pub fn assess_queries(
     installations: &Installations,
     mut histories: Histories,
     queries: &[AsOfQuery],
-    statistics: bool,
 ) -> Result<Vec<TrendRow>, Error> {
     let days: Vec<Timestamp> = queries.iter().map(|query| query.as_of_utc).collect();
     let selected: Vec<UnitKey> = queries.iter().map(|query| unit_of(query, &histories)).collect();
     let fleet = FleetContext::consuming(config, installations, &mut histories, &days)?;
     let statement = |(query, unit): (&AsOfQuery, &UnitKey)| fleet.statement(unit, query.as_of_utc);
-    let mut rows: Vec<TrendRow> =
-        queries.par_iter().zip(&selected).map(statement).collect::<Result<_, _>>()?;
-    fleet.add_statistics(&mut rows, statistics);
-    Ok(rows)
+    queries.par_iter().zip(&selected).map(statement).collect()
 }
 
 /// The unit a query means; one that never flew has a name all the same.
@@ -359,7 +368,7 @@ pub fn assess_histories(
     mut histories: Histories,
     ask: &UnitSelection,
 ) -> Result<Vec<TrendRow>, Error> {
-    let Some(as_of) = ask.as_of_utc.or_else(|| histories.newest_utc()) else { return Ok(Vec::new()) };
+    let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else { return Ok(Vec::new()) };
     FleetContext::consuming(config, installations, &mut histories, &[as_of])?.selected(ask, as_of)
 }
 
@@ -530,12 +539,11 @@ impl<'a> FleetContext<'a> {
         FollowedQuantities { rows: of_units, changes }
     }
 
-    /// The selected assessments, with classic statistics if selected.
+    /// The selected assessments.
     fn selected(&self, ask: &UnitSelection, as_of: Timestamp) -> Result<Vec<TrendRow>, Error> {
         let names = self.units.keys().copied();
         let mut rows = self.statements(names.filter(|name| ask.names(name)), as_of)?;
         rows.retain(|row| ask.fits(row));
-        self.add_statistics(&mut rows, ask.statistics);
         Ok(rows)
     }
 
@@ -567,25 +575,7 @@ impl<'a> FleetContext<'a> {
         let nothing = (&History::default(), Series::new([], &UsageDefaults::default())?);
         let (_, series) = self.units.get(name).unwrap_or(&nothing);
         let prior = self.prior(name, as_of);
-        Ok(trend::assess_with_hysteresis(series, as_of.as_microsecond(), &self.settings(name), prior)?)
-    }
-
-    /// Adds the classic trend statistics, from which no alarm is raised.
-    fn add_statistics(&self, rows: &mut [TrendRow], are_asked: bool) {
-        let add = |row: &mut TrendRow| {
-            let Some(series) = self.series(&row.unit()) else { return };
-            let known = series.flights_until(row.as_of_utc.as_microsecond()).iter();
-            let (hours, gaps_m): (Vec<f64>, Vec<f64>) =
-                known.filter_map(|f| Some((f.hours, f.gap?.gap_m))).unzip();
-            let sen = classic::theil_sen(&hours, &gaps_m, 0.90).ok();
-            row.sen_rate_m_per_hour = sen.map(|s| s.slope);
-            row.sen_low_m_per_hour = sen.map(|s| s.slope_low);
-            row.sen_high_m_per_hour = sen.map(|s| s.slope_high);
-            row.hamed_rao_p_value = classic::hamed_rao(&gaps_m).ok().map(|test| test.p_value);
-        };
-        if are_asked {
-            rows.par_iter_mut().for_each(add);
-        }
+        Ok(trend::assess(series, as_of.as_microsecond(), &self.settings(name), prior)?)
     }
 
     /// Assessment of one unit, without the tail-wide steps.

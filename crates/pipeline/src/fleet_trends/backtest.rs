@@ -89,8 +89,8 @@ fn past(fleet: &FleetContext<'_>, name: &UnitKey, day: Timestamp) -> Result<Opti
     let prior = fleet.prior(name, day);
     let as_of_us = day.as_microsecond();
     let last_us = series.flights().last().map_or(as_of_us, |f| f.departure_us);
-    let then = trend::assess(series, as_of_us, &settings, prior, None)?;
-    let now = trend::assess(series, last_us, &settings, prior, None)?;
+    let then = trend::assess(series, as_of_us, &settings, prior)?;
+    let now = trend::assess(series, last_us, &settings, prior)?;
     let disturbed = |c: &trend::ChangePoint| {
         c.departure_us > as_of_us && matches!(c.kind, ChangePointKind::Step | ChangePointKind::Reset)
     };
@@ -107,7 +107,7 @@ fn past(fleet: &FleetContext<'_>, name: &UnitKey, day: Timestamp) -> Result<Opti
     };
     let true_hours = at_hours - then_hours;
     let asked = trend::Settings { limit_m: target_m, watch_m: settings.watch_m.min(target_m), ..settings };
-    let said = trend::assess(series, as_of_us, &asked, prior, None)?;
+    let said = trend::assess(series, as_of_us, &asked, prior)?;
     let Some(crossing) = said.crossing.filter(|_| true_hours > 10.0) else { return Ok(None) };
     let [low, likely, high] = [crossing.p05_hours, crossing.p50_hours, crossing.p95_hours]
         .map(|hours| hours.unwrap_or(settings.horizon_hours));

@@ -3,7 +3,6 @@
 pub mod assess;
 pub mod backtest;
 pub mod changes;
-pub mod inspection_interval;
 mod limits;
 mod priors;
 mod tail_wide_steps;

@@ -38,10 +38,19 @@ impl TailWide {
         for change in made.iter().filter(|change| change.kind == ChangePointKind::Step) {
             by_tail.entry(change.tail_number).or_default().push(change);
         }
+        let mut units: BTreeMap<&str, Vec<GapSpan>> = BTreeMap::new();
+        for unit in judged {
+            for tail in unit.0.tails().collect::<BTreeSet<_>>() {
+                if let Some(span) = by_tail.contains_key(tail).then(|| GapSpan::of(unit, tail)).flatten() {
+                    units.entry(tail).or_default().push(span);
+                }
+            }
+        }
         let is_wide = |change: &&Made<'_>| {
             let steps = by_tail.get(change.tail_number).map_or(&[][..], Vec::as_slice);
+            let units = units.get(change.tail_number).map_or(&[][..], Vec::as_slice);
             is_explained(change, moved)
-                || (change.kind == ChangePointKind::Step && is_of_all(change, steps, judged))
+                || (change.kind == ChangePointKind::Step && is_of_all(change, steps, units))
         };
         let wide = made.iter().filter(is_wide).map(|c| (c.tail_number.to_owned(), c.departure_utc));
         Self(wide.collect())
@@ -73,28 +82,30 @@ fn is_explained(change: &Made<'_>, moved: &[RecorderChange]) -> bool {
     moved.iter().any(|moved| moved.explains(change.tail_number, change.departure_utc))
 }
 
-/// Whether the units that flew on the tail before and after made it together.
-fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], judged: &[(&History, &Assessment)]) -> bool {
-    let near = |step: &&&Made<'_>| days_between(step.departure_utc, change.departure_utc).abs() <= SAME_DAYS;
-    let stepped: BTreeSet<usize> = steps.iter().filter(near).map(|step| step.unit).collect();
-    if stepped.len() < 2 {
-        return false;
-    }
-    let able = judged.iter().filter(|(history, trend)| is_there(history, trend.as_of_us, change)).count();
-    stepped.len() as f64 >= SHARE * able as f64
+/// First and last gap of a unit on a tail.
+struct GapSpan {
+    first_utc: Timestamp,
+    last_utc: Timestamp,
 }
 
-/// Whether a unit has gaps on the change's tail some time before it, and after, by a day.
-fn is_there(history: &History, as_of_us: i64, change: &Made<'_>) -> bool {
-    let known = history.flights().iter().take_while(|f| f.departure_us() <= as_of_us);
-    let on_tail = known.filter(|f| {
-        f.gap_m().is_some() && history.place(f).tail_number.as_deref() == Some(change.tail_number)
-    });
-    let away = |f: &FlightRow| days_between(change.departure_utc, f.departure_utc());
-    let (mut before, mut after) = (false, false);
-    for days in on_tail.map(away) {
-        before |= days < -SAME_DAYS;
-        after |= days >= 0.0;
+impl GapSpan {
+    fn of((history, trend): &(&History, &Assessment), tail: &str) -> Option<Self> {
+        let is_on_tail =
+            |f: &&FlightRow| f.gap_m().is_some() && history.place(f).tail_number.as_deref() == Some(tail);
+        let known = history.until(Timestamp::from_microsecond(trend.as_of_us).ok()?);
+        let departure = |flown: &FlightRow| flown.departure_utc();
+        let first_utc = known.iter().find(is_on_tail).map(departure)?;
+        Some(Self { first_utc, last_utc: known.iter().rev().find(is_on_tail).map(departure)? })
     }
-    before && after
+}
+
+/// Whether the units that flew on the tail some time before it, and after, made it together.
+fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], units: &[GapSpan]) -> bool {
+    let near = |step: &&&Made<'_>| days_between(step.departure_utc, change.departure_utc).abs() <= SAME_DAYS;
+    let stepped: BTreeSet<usize> = steps.iter().filter(near).map(|step| step.unit).collect();
+    let is_there = |unit: &&GapSpan| {
+        days_between(unit.first_utc, change.departure_utc) > SAME_DAYS
+            && unit.last_utc >= change.departure_utc
+    };
+    stepped.len() > 1 && stepped.len() as f64 >= SHARE * units.iter().filter(is_there).count() as f64
 }

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 use records::row_schema::NoColumn;
 use records::time::days_after;
 use records::{ChangePoint, Installation, TrendRow};
-use trend::{Assessment, Series, classic};
+use trend::{Assessment, ForecastMethod, Reason, Series, State};
 
 use crate::fleet_trends::tail_wide_steps::TailWide;
 use crate::history::histories::{History, UnitKey};
@@ -37,7 +37,13 @@ pub(crate) fn row(
     let crossing = trend.crossing.filter(|_| is_judged);
     let use_now = trend.utilization;
     let flights = |hours: Option<f64>| Some(hours? / use_now?.hours_per_flight);
-    let day = |hours: Option<f64>| days_after(as_of, hours? / use_now?.hours_per_day);
+    // Usage goes on at the unit's own rate after its last flight.
+    let day = |hours: Option<f64>| {
+        days_after(as_of, (hours? - trend.elapsed_hours).max(0.0) / use_now?.hours_per_day)
+    };
+    let (state, cause) =
+        if limit_m.is_some() { (trend.state, trend.reason) } else { (State::Unassessed, Reason::NoLimit) };
+    let utc = |us: i64| Timestamp::from_microsecond(us).ok();
     TrendRow {
         part_number: name.0.clone(),
         serial_number: name.1.clone(),
@@ -48,6 +54,11 @@ pub(crate) fn row(
         unit_hours: trend.unit_hours,
         gap_m: trend.level.map(|l| l.gap_m),
         gap_se_m: trend.level.map(|l| l.se_m),
+        gap_records: trend.level.map(|l| l.records as i64),
+        latest_utc: trend.latest.and_then(|record| utc(record.departure_us)),
+        latest_gap_m: trend.latest.map(|record| record.gap_m),
+        latest_gap_se_m: trend.latest.map(|record| record.se_m),
+        installation_sd_m: Some(trend.installation_sd_m),
         estimates: trend.estimates as i64,
         outliers: trend.outliers_us.len() as i64,
         noise_factor: trend.noise_factor,
@@ -59,11 +70,7 @@ pub(crate) fn row(
         wear_law: trend.law.map(|(law, _)| law.to_string()),
         wear_law_probability: trend.law.map(|(_, share)| share),
         usage_axis: None,
-        trend_p_value: classic::mann_kendall(&gaps_m).ok().map(|test| test.p_value),
-        sen_rate_m_per_hour: None,
-        sen_low_m_per_hour: None,
-        sen_high_m_per_hour: None,
-        hamed_rao_p_value: None,
+        trend_p_value: None,
         change_points: trend.changes.iter().filter_map(|c| change_point(c, history, wide)).collect(),
         limit_m,
         crossing_hours_p05: crossing.and_then(|c| c.p05_hours),
@@ -75,6 +82,7 @@ pub(crate) fn row(
         not_before_utc: day(crossing.and_then(|c| c.p05_hours)),
         likely_utc: day(crossing.and_then(|c| c.p50_hours)),
         not_after_utc: day(crossing.and_then(|c| c.p95_hours)),
+        forecast_method: trend.method.filter(|_| is_judged).map(ForecastMethod::as_str),
         check_probability: trend.check_probability.filter(|_| is_judged),
         hours_per_day: use_now.map(|u| u.hours_per_day),
         hours_per_day_se: use_now.map(|u| u.hours_per_day_se),
@@ -83,24 +91,36 @@ pub(crate) fn row(
         usage_source: use_now.and(series).map(|series| series.usage_source().to_string()),
         stale_days: trend.stale_days.filter(|_| removal.is_none()),
         removed_utc: removal.and_then(|installation| installation.removed_utc),
-        state: trend.state.filter(|_| is_judged).map(trend::State::as_str),
-        reason: Some(match (removal, limit_m) {
-            (Some(installation), _) => removed(installation),
-            (None, Some(_)) => reason(trend, history, wide, as_of, fault),
-            (None, None) => "no limit is configured".into(),
+        state: removal.is_none().then(|| state.as_str()),
+        reason_code: removal.is_none().then(|| cause.code()),
+        reason: Some(match removal {
+            Some(installation) => removed(installation),
+            None => {
+                let reason = reason(cause, trend, history, wide, as_of, fault);
+                row_faults(series, history, as_of).fold(reason, |all, fault| format!("{all}; {fault}"))
+            }
         }),
         conditions: Vec::new(),
         action: None,
         due_utc: None,
-        interval_chances: NoColumn(
-            trend
-                .interval_chances
-                .filter(|_| is_judged)
-                .map(|chances| trend::INTERVAL_HOURS.into_iter().zip(chances).collect())
-                .unwrap_or_default(),
-        ),
+        elapsed_hours: NoColumn(trend.elapsed_hours),
         sketch_m: sketched(&gaps_m),
     }
+}
+
+/// Rows of a unit that cannot be right, in words.
+fn row_faults(series: Option<&Series>, history: &History, as_of: Timestamp) -> impl Iterator<Item = String> {
+    let faults = series.map(Series::faults).unwrap_or_default();
+    let counted = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
+    // A report of a past date leaves later records out on purpose.
+    let now = as_of.max(Timestamp::now());
+    [
+        counted(faults.contradictions, "flights with records that contradict each other"),
+        counted(faults.negative_usage, "rows with negative usage, left out"),
+        counted(history.flights().len() - history.until(now).len(), "records dated ahead, left out"),
+    ]
+    .into_iter()
+    .flatten()
 }
 
 /// Why a removed unit has no state.
@@ -111,6 +131,7 @@ fn removed(last: &Installation) -> String {
 
 /// Why a state, and how old it is where no estimate has followed.
 fn reason(
+    cause: Reason,
     trend: &Assessment,
     history: &History,
     wide: &TailWide,
@@ -118,7 +139,7 @@ fn reason(
     fault: Option<&MappingFault>,
 ) -> String {
     const LATEST: usize = 12;
-    let mut reason = reason_of_state(trend, history, wide);
+    let mut reason = reason_of_state(cause, trend, history, wide);
     if let Some(fault) = fault {
         reason = format!("{reason}; {} of {}", fault.evidence(), fault.scope());
     }
@@ -128,22 +149,25 @@ fn reason(
         );
     }
     match trend.stale_days {
-        Some(days) => format!("{reason}; no estimate for {days:.0} days"),
-        None => reason,
+        Some(days) if !matches!(cause, Reason::Stale { .. }) => {
+            format!("{reason}; no sound record for {days:.0} days")
+        }
+        _ => reason,
     }
 }
 
 /// Why a state; a change that the tail's other units made as well is named for what it is.
-fn reason_of_state(trend: &Assessment, history: &History, wide: &TailWide) -> String {
-    let unknown = trend.changes.iter().rev().find(|c| c.kind != trend::ChangePointKind::Recorded);
-    match (trend.reason, unknown.and_then(|change| wide.tail(change, history))) {
-        (trend::Reason::Changed { kind, days }, Some(tail)) => format!(
-            "{kind} {days:.0} days ago with all actuators of {tail} at once: a sensor or recorder, not wear"
-        ),
-        (trend::Reason::NoEstimate, _) if trend.flights > 0 => {
-            format!("no estimate: all of {} flights are without a gap", trend.flights)
+fn reason_of_state(cause: Reason, trend: &Assessment, history: &History, wide: &TailWide) -> String {
+    let unexplained = trend.changes.iter().rev().find(|change| change.kind.is_unexplained());
+    let tail = unexplained.and_then(|change| wide.tail(change, history));
+    match (cause, tail) {
+        (Reason::NoRecord, _) if trend.flights > 0 => {
+            format!("no record of a gap: all of {} flights are without one", trend.flights)
         }
-        (other, _) => other.to_string(),
+        (Reason::Clear { .. } | Reason::Stale { .. } | Reason::NoLimit, _) | (_, None) => cause.to_string(),
+        (_, Some(tail)) => format!(
+            "{cause}; the actuators of {tail} changed together: its sensor or recorder is the likelier cause"
+        ),
     }
 }
 
@@ -153,12 +177,7 @@ fn change_point(change: &trend::ChangePoint, history: &History, wide: &TailWide)
     Some(ChangePoint {
         departure_utc,
         flight_id: flight.and_then(|f| history.flight_id(f)).map(str::to_owned),
-        kind: match change.kind {
-            trend::ChangePointKind::Step => "step",
-            trend::ChangePointKind::Reset => "reset",
-            trend::ChangePointKind::Onset => "onset",
-            trend::ChangePointKind::Recorded => "recorded",
-        },
+        kind: change.kind.as_str(),
         step_m: change.step_m,
         step_se_m: change.se_m,
         certainty: change.certainty,

@@ -185,17 +185,12 @@ fn open(finding: &Finding, tables: &Tables<'_>, now: Timestamp) -> Option<WorkEv
 
 /// Whether a state opens a request.
 fn wants_work(state: Option<&str>) -> bool {
-    rank(state) >= rank(Some(State::Plan.as_str()))
+    rank(state) >= State::Plan
 }
 
-/// Order of states; a unit that is not assessed is as urgent as a normal one.
-fn rank(state: Option<&str>) -> u8 {
-    match state.and_then(State::from_word) {
-        Some(State::Act) => 3,
-        Some(State::Plan) => 2,
-        Some(State::Watch) => 1,
-        Some(State::Normal) | None => 0,
-    }
+/// Order of states; a removed unit is as urgent as a normal one.
+fn rank(state: Option<&str>) -> State {
+    state.and_then(State::from_word).unwrap_or(State::Normal)
 }
 
 impl<'a> Tables<'a> {

@@ -6,12 +6,10 @@ use ingest::tables::{Table, TableBatch, TableSplits, name, utc};
 
 use crate::error::Error;
 use crate::history::builder::HistoryBuilder;
-use crate::history::flight_row::FlightRow;
-use crate::history::histories::{Histories, History};
+use crate::history::histories::Histories;
 use crate::history::merge::of_parts;
 use crate::history::row_keys::KeyColumns;
 use jiff::Timestamp;
-use records::Diagnostic;
 
 /// A unit and a day.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,11 +29,10 @@ pub struct AsOfQuery {
 /// When the table cannot be read, lacks one of these, or holds a cell that cannot be read.
 pub fn read(file: &Path) -> Result<Histories, Error> {
     let table = TableSplits::open(file, Some(&HistoryBuilder::COLUMNS), &KeyColumns::COLUMNS).map_err(bad)?;
-    let histories = of_parts(table.len(), false, |gathering, some| {
+    of_parts(table.len(), false, |gathering, some| {
         let mut chunks = table.batches(some).map_err(bad)?;
         chunks.try_for_each(|chunk| gathering.add(&chunk?)).map_err(bad)
-    })?;
-    without_conflicts(histories, &file.display().to_string())
+    })
 }
 
 /// The histories of an estimates table in memory.
@@ -43,49 +40,9 @@ pub fn read(file: &Path) -> Result<Histories, Error> {
 /// # Errors
 /// As [`read`].
 pub fn from_batches(chunks: &[TableBatch]) -> Result<Histories, Error> {
-    let histories = of_parts(chunks.len(), false, |gathering, some| {
+    of_parts(chunks.len(), false, |gathering, some| {
         chunks[some].iter().try_for_each(|chunk| gathering.add(chunk)).map_err(bad)
-    })?;
-    without_conflicts(histories, "estimates")
-}
-
-/// The histories, unless two rows give different gaps or hours for one flight of a unit.
-fn without_conflicts(histories: Histories, table: &str) -> Result<Histories, Error> {
-    const MOST_REPORTED: usize = 3;
-    let conflicts = histories.iter().flat_map(|(name, history)| {
-        let pairs = history.flights().windows(2).map(|pair| (&pair[0], &pair[1]));
-        pairs.filter(|(a, b)| is_conflict(history, a, b)).map(move |(a, b)| (name, history, a, b))
-    });
-    let found: Vec<Diagnostic> = conflicts
-        .take(MOST_REPORTED)
-        .map(|((_, serial), history, a, b)| {
-            let row = |flown: &FlightRow| {
-                let gap = flown.gap_m().map_or("no gap".to_owned(), |m| format!("{:.2} µm", m * 1e6));
-                let hours = history.extras(flown).tail_hours_end().map(|h| format!(", {h} tail hours"));
-                let flight = history.flight_id(flown).map(|id| format!("flight {id}, ")).unwrap_or_default();
-                format!("{flight}{gap}{}", hours.unwrap_or_default())
-            };
-            let what = format!(
-                "two rows contradict each other for unit {serial}, departure {}: {} and {}",
-                a.departure_utc(),
-                row(a),
-                row(b)
-            );
-            Diagnostic::new("conflicting_rows", what)
-                .in_file(table)
-                .hint("keep one row for each unit and flight")
-        })
-        .collect();
-    if found.is_empty() { Ok(histories) } else { Err(Error::Refused(found)) }
-}
-
-/// Whether two neighbouring rows are of one flight and differ in what they measured.
-fn is_conflict(history: &History, a: &FlightRow, b: &FlightRow) -> bool {
-    let extras = |flown: &FlightRow| {
-        let extras = history.extras(flown);
-        (flown.gap_m(), extras.gap_se_m(), extras.flight_hours(), extras.tail_hours_end())
-    };
-    a.departure_us() == b.departure_us() && history.place(a) == history.place(b) && extras(a) != extras(b)
+    })
 }
 
 /// Reads a table of queries: `serial_number` (or `serial`), `as_of_utc`, optionally `part_number`.

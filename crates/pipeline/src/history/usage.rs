@@ -80,6 +80,7 @@ fn observations(
             load_reversals: extras.load_reversals(),
             gap_m: f.gap_m(),
             gap_se_m: extras.gap_se_m().filter(|se| *se > 0.0),
+            is_doubtful: extras.is_disputed(),
         }
     });
     let mut observations: Vec<Observation> = seen.collect();
@@ -88,9 +89,7 @@ fn observations(
         installation: numbers.of(&TailPosition::of(installation), Some(installation)),
         flight_hours: flight.flight_hours,
         tail_hours_end: flight.tail_hours_end,
-        load_reversals: None,
-        gap_m: None,
-        gap_se_m: None,
+        ..Observation::default()
     }));
     observations
 }

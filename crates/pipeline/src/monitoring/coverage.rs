@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use ingest::mapping::column_pattern::nearest;
 use job::Config;
+use records::time::days_between;
 use records::{Installations, PartNumber, TrendRow};
 use serde::Serialize;
 use store::LogRecord;
 
 /// Limits and hours that the assessments of some units lack, in words.
-pub(crate) fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
+pub fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
     let installed = || rows.iter().filter(|row| row.removed_utc.is_none());
     let mut without_limit = BTreeMap::<&str, usize>::new();
     for row in installed().filter(|row| row.limit_m.is_none()) {
@@ -25,8 +26,20 @@ pub(crate) fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
             units(of_logs)
         ));
     }
+    let is_quiet =
+        |row: &&TrendRow| row.latest_utc.is_some_and(|at| days_between(at, row.as_of_utc) > QUIET_DAYS);
+    let quiet = installed().filter(is_quiet).count();
+    if quiet > 0 {
+        notes.push(format!(
+            "{}: no record for more than {QUIET_DAYS:.0} days; dates count on from the last flight at the unit's own rate",
+            units(quiet)
+        ));
+    }
     notes
 }
+
+/// Days without a record from which a note says that usage is assumed to go on.
+const QUIET_DAYS: f64 = 3.0;
 
 fn units(count: usize) -> String {
     if count == 1 { "1 unit".to_owned() } else { format!("{count} units") }
@@ -34,7 +47,7 @@ fn units(count: usize) -> String {
 
 fn no_limit(part: &str, count: usize, config: &Config) -> String {
     let units = units(count);
-    let lost = format!("{units} without a state, which `--fail-on` does not see");
+    let lost = format!("{units} unassessed");
     if PartNumber::new(part).is_ok_and(|part| config.parts.contains_key(&part)) {
         return format!("part {part} has no limit: {lost}; add `limit_m` to `[part.\"{part}\"]`");
     }

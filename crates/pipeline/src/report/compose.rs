@@ -11,14 +11,12 @@ use ingest::tables::{Table, name, number, utc};
 use jiff::Timestamp;
 use job::Config;
 use job::config::limits::PLAUSIBLE_LIMIT_M;
-use records::uncertainty::SD_OVER_MAD;
 use records::{Installations, PartNumber, Quantity, QuantityRow, SerialNumber};
 use store::{LogOutcome, Store};
 use trend::Forecast;
 
 use crate::error::Error;
 use crate::fleet_trends::assess::{self, ReportAssessments, UnitSelection};
-use crate::fleet_trends::inspection_interval::{inspection_intervals, interval_advice};
 use crate::follow_up::work_requests;
 use crate::history::flight_row::FlightRow as FlownRow;
 use crate::history::histories::{Histories, History, TailPosition, UnitKey as Name};
@@ -75,7 +73,6 @@ pub fn compose(
     };
     let units: Vec<UnitView> = now.iter().zip(&drawn).map(unit).collect();
     let shown: BTreeSet<&str> = units.iter().filter_map(|u| u.tail_number.as_deref()).collect();
-    let intervals = inspection_intervals(&now, config.document.trend.inspection_risk);
     let scope = scope(ask);
     let narrowed = scope.is_some();
     attribute_by_path(&mut logs.faults, &tails, installations);
@@ -98,11 +95,6 @@ pub fn compose(
         inspections_given: checks.is_some(),
         inspections_unmatched,
         units,
-        interval_advice: intervals
-            .chunk_by(|a, b| a.part_number == b.part_number)
-            .map(|of_part| interval_advice(&of_part[0]))
-            .collect(),
-        inspection_intervals: intervals,
         quantity_changes: followed.changes,
         notes,
         mapping_faults: mapping_faults.iter().map(ToString::to_string).collect(),
@@ -198,7 +190,7 @@ impl ReportComposer<'_> {
             forecast: forecast(drawn, row),
             sketch_m: row.sketch_m.0.clone(),
             assessment: self.statement(row, history, &name),
-            quality: quality(history, extras, row.as_of_utc),
+            quality: quality(history, extras, row),
             events: events(row, &installations),
             past_forecasts: self.past(row, &name),
             inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.extras(flown)).collect(),
@@ -227,6 +219,11 @@ impl ReportComposer<'_> {
             unit_hours: row.unit_hours,
             gap_m: row.gap_m,
             gap_se_m: row.gap_se_m,
+            gap_records: row.gap_records,
+            latest_utc: row.latest_utc,
+            latest_gap_m: row.latest_gap_m,
+            latest_gap_se_m: row.latest_gap_se_m,
+            installation_sd_m: row.installation_sd_m,
             limit_m: row.limit_m,
             watch_m: part.and_then(|p| p.watch_m),
             rate_m_per_hour: row.rate_m_per_hour,
@@ -236,6 +233,7 @@ impl ReportComposer<'_> {
             crossing_hours_p05: row.crossing_hours_p05,
             crossing_hours_p50: row.crossing_hours_p50,
             crossing_hours_p95: row.crossing_hours_p95,
+            forecast_method: row.forecast_method.map(str::to_owned),
             not_before_utc: row.not_before_utc,
             likely_utc: row.likely_utc,
             not_after_utc: row.not_after_utc,
@@ -244,11 +242,6 @@ impl ReportComposer<'_> {
             check_probability: row.check_probability,
             law: row.wear_law.clone(),
             axis: row.usage_axis.clone(),
-            mann_kendall_p: row.trend_p_value,
-            hamed_rao_p: row.hamed_rao_p_value,
-            sen_rate_m_per_hour: row.sen_rate_m_per_hour,
-            sen_low_m_per_hour: row.sen_low_m_per_hour,
-            sen_high_m_per_hour: row.sen_high_m_per_hour,
             state_day_before: self
                 .before
                 .get(&1)
@@ -302,7 +295,7 @@ fn forecast(drawn: &Forecast, row: &TrendRow) -> Vec<TimedInterval> {
     let Some(hours_per_day) = row.hours_per_day.filter(|_| row.removed_utc.is_none()) else {
         return Vec::new();
     };
-    let at = |hours: f64| days_after(row.as_of_utc, hours / hours_per_day);
+    let at = |hours: f64| days_after(row.as_of_utc, (hours - row.elapsed_hours.0) / hours_per_day);
     drawn.ahead.iter().filter_map(|(hours, band)| timed_interval(at(*hours), band)).collect()
 }
 
@@ -325,6 +318,7 @@ fn prior(
         life_p50_hours: prior.median_life_hours(),
         life_p95_hours,
         widening: prior.interval_scale(),
+        scored_forecasts: prior.scored_forecasts(),
     }
 }
 
@@ -346,7 +340,7 @@ fn events(row: &TrendRow, installations: &[Installation]) -> Vec<Event> {
     row.change_points.iter().map(event).collect()
 }
 
-fn quality(history: &History, extras: &[FlightExtras], as_of: Timestamp) -> Quality {
+fn quality(history: &History, extras: &[FlightExtras], row: &TrendRow) -> Quality {
     let records = history.flights();
     let (mut reasons, mut doubts) = (BTreeMap::new(), BTreeMap::new());
     for (flown, extras) in records.iter().map(|flown| (flown, &extras[flown.row as usize])) {
@@ -370,8 +364,8 @@ fn quality(history: &History, extras: &[FlightExtras], as_of: Timestamp) -> Qual
         reasons: ranked(reasons),
         flags: ranked(doubts),
         last_estimate_utc: last,
-        days_since_estimate: last.map(|last| days_between(last, as_of)),
-        noise_ratio: successive_difference_ratio(history),
+        days_since_estimate: last.map(|last| days_between(last, row.as_of_utc)),
+        noise_ratio: (count > 1).then(|| row.noise_factor.sqrt()),
     }
 }
 
@@ -379,16 +373,6 @@ fn ranked(counts: BTreeMap<String, usize>) -> Vec<(String, usize)> {
     let mut counts: Vec<(String, usize)> = counts.into_iter().collect();
     counts.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     counts
-}
-
-/// The spread of neighbouring flights' differences, by the median, over the joint standard error.
-fn successive_difference_ratio(history: &History) -> Option<f64> {
-    let gap = |r: &FlownRow| Some((r.gap_m()?, history.extras(r).gap_se_m()?));
-    let gaps: Vec<(f64, f64)> = history.flights().iter().filter_map(gap).collect();
-    let ratio = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0).abs() / pair[0].1.hypot(pair[1].1);
-    let mut ratios: Vec<f64> = gaps.windows(2).map(ratio).filter(|r| r.is_finite()).collect();
-    ratios.sort_by(f64::total_cmp);
-    (ratios.len() >= 5).then(|| SD_OVER_MAD * ratios[ratios.len() / 2])
 }
 
 /// Tail and position.

@@ -28,7 +28,6 @@ pub fn tables(report: &Report) -> Result<Vec<Page>, Error> {
         table("work_requests", &requests)?,
         table("past_forecasts", &each(units, past_forecasts))?,
         table("inspections", &each(units, inspections))?,
-        table("inspection_intervals", &report.inspection_intervals)?,
         table("removals", &removals(report))?,
         table("tails", &tails(report))?,
         table("log_errors", &log_errors(report))?,

@@ -164,8 +164,6 @@ mod tests {
             quantity_changes: Vec::new(),
             mapping_faults: Vec::new(),
             notes: Vec::new(),
-            inspection_intervals: Vec::new(),
-            interval_advice: Vec::new(),
             trend_rows: Vec::new(),
         }
     }

@@ -55,7 +55,6 @@ __all__ = [
     "estimate",
     "estimate_arrays",
     "explain",
-    "intervals",
     "load",
     "normalize",
     "quantities",
@@ -182,18 +181,18 @@ def trend(
     ``estimates`` is any Arrow table with ``serial_number`` (or ``serial``), ``departure_utc`` and ``gap_m``, such as
     that of :func:`estimate`; without it the store of the configuration is read. ``queries`` (``serial_number``,
     ``as_of_utc``, optional ``part_number``) asks for one row each, using nothing later than its date. ``statistics``
-    adds Theil-Sen's slope and Hamed and Rao's test, which take longer than all the rest. ``limit_m`` is the removal
+    has no effect: the classic statistics are no longer computed. ``limit_m`` is the removal
     limit in m for parts without one in the configuration; where no configuration is named and there is no
     ``pipeline.toml``, ``estimates`` are judged by it alone.
 
     >>> import freeplay_ema as fp, glob, pyarrow as pa
     >>> estimates = fp.estimate(sorted(glob.glob("sample-data/logs/*/*.parquet")))
     >>> rows = pa.table(fp.trend(estimates)).to_pylist()
-    >>> {row["state"] for row in rows} <= {"act", "plan", "watch", "normal", None}
+    >>> {row["state"] for row in rows} <= {"act", "plan", "unassessed", "watch", "normal", None}
     True
     """
     judging = _judging(estimates, config, limit_m)
-    return _freeplay.trend(estimates, judging, tail, serial, part, _text(as_of), queries, statistics)
+    return _freeplay.trend(estimates, judging, tail, serial, part, _text(as_of), queries)
 
 
 def records(
@@ -287,18 +286,6 @@ def changes(
 ) -> Table:
     """What changed on units, tails and parts, with the evidence: the rows of ``freeplay trend --changes``."""
     return _freeplay.changes(load(config), [tail, serial, part], _text(as_of))
-
-
-def intervals(
-    config: Settings = _USUAL,
-    *,
-    tail: str | None = None,
-    serial: str | None = None,
-    part: str | None = None,
-    as_of: Instant | None = None,
-) -> Table:
-    """Chance of meeting the limit before the next inspection, by part and interval: ``freeplay trend --intervals``."""
-    return _freeplay.intervals(load(config), [tail, serial, part], _text(as_of))
 
 
 def backtest(

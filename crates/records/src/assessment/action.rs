@@ -11,6 +11,10 @@ pub enum Action {
     Replace,
     /// State `plan` or `watch`, or another quantity changed.
     Inspect,
+    /// State `unassessed`: no record says how large the gap is.
+    CheckLogs,
+    /// State `unassessed` without a limit.
+    SetLimit,
 }
 
 impl Action {
@@ -19,32 +23,43 @@ impl Action {
         match self {
             Self::Replace => "replace",
             Self::Inspect => "inspect",
+            Self::CheckLogs => "check_logs",
+            Self::SetLimit => "set_limit",
         }
     }
 
-    /// The action that a state asks for, with the states of other quantities.
-    pub fn of(state: Option<&str>, conditions: &[String]) -> Option<Self> {
+    /// The action that a state and its reason ask for, with the states of other quantities.
+    pub fn of(state: Option<&str>, reason_code: Option<&str>, conditions: &[String]) -> Option<Self> {
         match state {
             Some("act") => Some(Self::Replace),
             Some("plan" | "watch") => Some(Self::Inspect),
+            Some("unassessed") if reason_code == Some("no_limit") => Some(Self::SetLimit),
+            Some("unassessed") => Some(Self::CheckLogs),
             Some(_) if !conditions.is_empty() => Some(Self::Inspect),
             _ => None,
         }
     }
 }
 
+/// Reasons whose inspection is due at once: the next record alone would be too late.
+const DUE_NOW: [&str; 3] = ["unconfirmed", "jumped", "changed"];
+
 impl TrendRow {
     /// The row with its action and the date until when.
     ///
-    /// A unit in `act` is due at once; one in `plan` or `watch` before the earliest date on which it reaches its limit.
+    /// A unit in `act`, and one whose gap jumped, is due at once; another in `plan` or `watch` before the earliest date on
+    /// which it reaches its limit.
     #[must_use]
     pub fn with_action(mut self) -> Self {
-        let action = Action::of(self.state, &self.conditions);
+        let action = Action::of(self.state, self.reason_code, &self.conditions);
         self.action = action.map(Action::as_str);
         self.due_utc = match action {
             Some(Action::Replace) => Some(self.as_of_utc),
+            Some(Action::Inspect) if self.reason_code.is_some_and(|code| DUE_NOW.contains(&code)) => {
+                Some(self.as_of_utc)
+            }
             Some(Action::Inspect) => self.not_before_utc,
-            None => None,
+            Some(Action::CheckLogs | Action::SetLimit) | None => None,
         };
         self
     }
@@ -62,12 +77,12 @@ impl TrendRow {
 
     /// What to do, for readers: `replace now`, `inspect before 2026-12-28`, `inspect`.
     pub fn action_text(&self) -> Option<String> {
-        let action = self.action?;
+        let action = self.action?.replace('_', " ");
         Some(match self.due_text() {
             Some(due) if due == "now" => format!("{action} now"),
             Some(due) if due.ends_with(" FH") => format!("{action} within {due}"),
             Some(due) => format!("{action} before {due}"),
-            None => action.to_owned(),
+            None => action,
         })
     }
 
@@ -76,10 +91,11 @@ impl TrendRow {
         let rank = match self.state {
             Some("act") => 0,
             Some("plan") => 1,
-            Some("watch") => 2,
-            Some(_) if self.action.is_some() => 3,
-            Some(_) => 4,
-            None => 5,
+            Some("unassessed") => 2,
+            Some("watch") => 3,
+            Some(_) if self.action.is_some() => 4,
+            Some(_) => 5,
+            None => 6,
         };
         (rank, self.crossing_hours_p05.unwrap_or(f64::INFINITY))
     }

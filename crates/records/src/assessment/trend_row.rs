@@ -14,7 +14,7 @@ row! {
         pub departure_utc: Timestamp,
         /// That flight.
         pub flight_id: Option<String>,
-        /// `step`, `reset`, `onset` or `recorded`.
+        /// `step`, `reset`, `onset`, `recorded`, `exceedance` or `exceedance_not_confirmed`.
         pub kind: &'static str,
         /// Size, m.
         pub step_m: f64,
@@ -40,16 +40,26 @@ row! {
         pub tail_number: Option<String>,
         /// Position of the unit's last flight.
         pub position: Option<String>,
-        /// Date of the assessment: the newest departure in the store, unless `--as-of` sets it. Later data are ignored.
+        /// Date of the assessment: the time of the run, unless `--as-of` or `trend.as_of` sets it. Later data are ignored.
         pub as_of_utc: Timestamp,
         /// Flights.
         pub flights: i64,
         /// The unit's hours.
         pub unit_hours: Option<f64>,
-        /// Level of the gap, m.
+        /// Measured level of the gap at the last record of the installation, m.
         pub gap_m: Option<f64>,
-        /// Standard error of `gap_m`, m.
+        /// Standard error of `gap_m`, from the errors and the scatter of its records, m.
         pub gap_se_m: Option<f64>,
+        /// Records that `gap_m` rests on.
+        pub gap_records: Option<i64>,
+        /// Departure of the latest record.
+        pub latest_utc: Option<Timestamp>,
+        /// Gap of the latest record, m.
+        pub latest_gap_m: Option<f64>,
+        /// Standard error of `latest_gap_m`, with the scatter found between flights, m.
+        pub latest_gap_se_m: Option<f64>,
+        /// Spread of what an installation adds to every gap measured in it, m; no part of `gap_se_m`.
+        pub installation_sd_m: Option<f64>,
         /// Flights with a gap.
         pub estimates: i64,
         /// Gaps excluded as outliers.
@@ -74,16 +84,8 @@ row! {
         /// Measure that the wear of the part number follows, as found or configured: `flight_hours`, `flights` or
         /// `load_reversals`.
         pub usage_axis: Option<String>,
-        /// Two-sided p-value of the Mann–Kendall test.
+        /// Null: the Mann–Kendall test is no longer made. The column stays for scripts that select it.
         pub trend_p_value: Option<f64>,
-        /// Theil–Sen slope, m per flight hour; null without `--statistics`.
-        pub sen_rate_m_per_hour: Option<f64>,
-        /// Lower 90 % limit of the Theil–Sen slope, m per flight hour; null without `--statistics`.
-        pub sen_low_m_per_hour: Option<f64>,
-        /// Upper 90 % limit of the Theil–Sen slope, m per flight hour; null without `--statistics`.
-        pub sen_high_m_per_hour: Option<f64>,
-        /// p-value of the Mann–Kendall test corrected for autocorrelation (Hamed–Rao); null without `--statistics`.
-        pub hamed_rao_p_value: Option<f64>,
         /// Change points: `departure_utc`, `flight_id`, `kind`, `step_m`, `step_se_m`, `certainty`, `tail_wide`.
         pub change_points: Vec<ChangePoint>,
         /// Act limit, m.
@@ -100,12 +102,15 @@ row! {
         pub crossing_flights_p50: Option<f64>,
         /// Flights to `limit_m`, latest (95 %).
         pub crossing_flights_p95: Option<f64>,
-        /// Date on which `limit_m` is reached, earliest (5 %): from `as_of_utc` on, at `hours_per_day`.
+        /// Date on which `limit_m` is reached, earliest (5 %): from the last flight on, at `hours_per_day`.
         pub not_before_utc: Option<Timestamp>,
         /// Date on which `limit_m` is reached, median.
         pub likely_utc: Option<Timestamp>,
         /// Date on which `limit_m` is reached, latest (95 %).
         pub not_after_utc: Option<Timestamp>,
+        /// What the crossing follows from: `measured` (at the limit), `fleet` (wear laws by the part's fleet), `single_unit`
+        /// (wear laws by the unit alone), `line` (the last records).
+        pub forecast_method: Option<&'static str>,
         /// Probability of reaching the limit within `next_check_hours`, from the curves alone.
         pub check_probability: Option<f64>,
         /// Flight hours per day in the last ninety days; dates, the report's chart and its removals use it.
@@ -119,27 +124,30 @@ row! {
         /// Source of the hours: `flights_table`, `tail_hours` or `logged_flights` (flights without a log are then
         /// missing).
         pub usage_source: Option<String>,
-        /// Days since the last estimate, when more than `stale_after_days`; the state is then that of the last
-        /// estimate.
+        /// Days since the last sound record, when more than `stale_after_days`.
         pub stale_days: Option<f64>,
         /// Removal date of a unit that is installed nowhere on `as_of_utc`; it has no state and no dates.
         pub removed_utc: Option<Timestamp>,
-        /// `normal`, `watch`, `plan`, `act`, or null (not assessed).
+        /// `normal`, `watch`, `unassessed`, `plan`, `act`, from least to most urgent; null for a removed unit.
         pub state: Option<&'static str>,
+        /// Code of the reason: `no_record`, `no_limit`, `stale`, `renewed`, `above_limit`, `limit_held`, `unconfirmed`,
+        /// `crosses_soon`, `rises_to_limit`, `at_watch`, `jumped`, `changed`, `onset`,
+        /// `clear`.
+        pub reason_code: Option<&'static str>,
         /// Reason of the state, in words.
         pub reason: Option<String>,
         /// States of the other followed quantities of the unit: `softening`, `friction_rising`, …; all in the
         /// quantities table.
         pub conditions: Vec<String>,
-        /// What the state asks for: `replace` (state `act`), `inspect` (`plan`, `watch`, or another quantity changed), or
-        /// null.
+        /// What the state asks for: `replace` (state `act`), `inspect` (`plan`, `watch`, or another quantity changed),
+        /// `check_logs` or `set_limit` (`unassessed`), or null.
         pub action: Option<&'static str>,
-        /// Date until when: `as_of_utc` to replace, `not_before_utc` to inspect; null where it is not known.
+        /// Date until when: `as_of_utc` to replace, or to inspect after a jump; `not_before_utc` to inspect; null where it
+        /// is not known.
         pub due_utc: Option<Timestamp>,
-        /// Probabilities of reaching the limit within intervals of flight hours, from the hours up: for advice on
-        /// inspection intervals.
+        /// Flight hours since the last flight, at the unit's own rate.
         #[serde(skip)]
-        pub interval_chances: NoColumn<Vec<(f64, f64)>>,
+        pub elapsed_hours: NoColumn<f64>,
         /// The estimated gaps in order of flights, at most a hundred means of neighbours, m: for a sparkline.
         #[serde(skip)]
         pub sketch_m: NoColumn<Vec<f64>>,
@@ -150,29 +158,5 @@ impl TrendRow {
     /// Part number, if known, and serial number.
     pub fn unit(&self) -> (Option<String>, String) {
         (self.part_number.clone(), self.serial_number.clone())
-    }
-}
-
-row! {
-    /// Inspection interval of a part: the chance that a unit meets its limit before the next inspection.
-    #[derive(Debug, Clone, PartialEq, Serialize)]
-    pub struct InspectionInterval {
-        /// The part.
-        pub part_number: Option<String>,
-        /// Interval between inspections, flight hours.
-        pub interval_hours: f64,
-        /// Units of the part in state `normal` or `watch`; those in `plan` and `act` have dates of their own.
-        pub units: i64,
-        /// Mean chance of a unit.
-        pub mean_chance: f64,
-        /// Chance of the unit that is likeliest to meet its limit.
-        pub largest_chance: f64,
-        /// That unit.
-        pub serial_number: String,
-        /// Accepted chance, from `trend.inspection_risk`.
-        pub risk: f64,
-        /// Longest interval for which no unit exceeds `risk`, flight hours; null below the shortest listed, and at most
-        /// the longest listed.
-        pub longest_hours: Option<f64>,
     }
 }

@@ -9,9 +9,7 @@ use records::report_rows::{
     ReportRemovalsRow, ReportTailRow,
 };
 use records::row_schema::{self, Column, Row};
-use records::{
-    AlertRecord, GapRecord, InspectionInterval, QuantityChange, QuantityRow, TrendRow, WorkRequest,
-};
+use records::{AlertRecord, GapRecord, QuantityChange, QuantityRow, TrendRow, WorkRequest};
 
 #[test]
 fn the_page_lists_every_column_with_its_type_and_meaning() {
@@ -23,7 +21,6 @@ fn the_page_lists_every_column_with_its_type_and_meaning() {
         ("trends", table::<TrendRow>()),
         ("quantities", table::<QuantityRow>()),
         ("changes", table::<QuantityChange>()),
-        ("intervals", table::<InspectionInterval>()),
         ("work requests", table::<WorkRequest>()),
         ("alerts", table::<AlertRecord>()),
         ("report flights", table::<ReportFlightRow>()),

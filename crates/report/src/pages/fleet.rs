@@ -125,8 +125,6 @@ struct FleetView {
     forecast_accuracy: Vec<(String, String, String)>,
     inspections: String,
     inspection_bias: Vec<(String, String, String, String)>,
-    intervals: Vec<(String, String, String, String, String, String)>,
-    interval_advice: Vec<String>,
     scatter: String,
     pairs: Vec<(String, String, String, String, String, String)>,
 }
@@ -248,8 +246,6 @@ fn index_page(
         forecast_accuracy: forecast_accuracy(report),
         inspections,
         inspection_bias: inspection_bias(report),
-        intervals: intervals(report),
-        interval_advice: report.interval_advice.clone(),
         scatter: agreement_plot(&inspection_pairs(report))?,
         pairs,
     })
@@ -272,9 +268,8 @@ fn decision(report: &Report) -> String {
         counts.into_iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{} {word}", count(n))).collect();
     let first = work(report).into_iter().find(|unit| unit.badge().needs_action());
     let Some(unit) = first else {
-        let is_assessed = report.units.iter().any(|unit| unit.badge() != StateBadge::from_state(None));
-        let what = if is_assessed { "No unit needs action" } else { "No unit could be assessed" };
-        return format!("{what}: {}.", counts.join(", "));
+        let counts = if counts.is_empty() { "no unit".to_owned() } else { counts.join(", ") };
+        return format!("No unit needs action: {counts}.");
     };
     let action = unit.assessment.action_text.as_deref().unwrap_or("inspect");
     format!("{} ({}): {action}. In all: {}.", unit.place(), unit.name(), counts.join(", "))
@@ -294,9 +289,9 @@ fn work(report: &Report) -> Vec<&UnitView> {
     units
 }
 
-fn urgency(unit: &UnitView) -> (f64, u8, String) {
-    let days = unit.assessment.not_before_utc.map(|t| t.as_second() as f64);
-    (if unit.badge().is_act() { 0.0 } else { days.unwrap_or(f64::MAX) }, unit.badge().rank(), unit.name())
+fn urgency(unit: &UnitView) -> (u8, f64, String) {
+    let due = unit.assessment.due_utc.map(|t| t.as_second() as f64);
+    (unit.badge().rank(), due.unwrap_or(f64::MAX), unit.name())
 }
 
 fn grouped(units: &[&UnitView]) -> Vec<Group> {
@@ -332,11 +327,11 @@ fn changes(report: &Report) -> Vec<(String, String, String, String)> {
             if age.is_some_and(|age| age <= 30.0) {
                 let books = match (event.is_on_record, event.is_tail_wide) {
                     (true, _) => "on record",
-                    (false, true) => "whole tail: sensor or recorder",
+                    (false, true) => "whole tail at once: its sensor or recorder is likelier",
                     (false, false) => "not on record",
                 };
                 add(
-                    event.kind.clone(),
+                    event.kind.replace('_', " "),
                     format!("{}, {} µm, {books}", date(event.departure_utc), micrometres(event.step_m)),
                 );
             }
@@ -465,21 +460,6 @@ fn inspection_bias(report: &Report) -> Vec<(String, String, String, String)> {
         })
     };
     parts.into_iter().filter_map(row).collect()
-}
-
-/// Inspection intervals as table rows.
-fn intervals(report: &Report) -> Vec<(String, String, String, String, String, String)> {
-    let row = |i: &records::InspectionInterval| {
-        (
-            i.part_number.clone().unwrap_or_else(|| NO_DATA.to_owned()),
-            hours(i.interval_hours),
-            i.units.to_string(),
-            format!("{:.2} %", 100.0 * i.mean_chance),
-            format!("{:.2} %", 100.0 * i.largest_chance),
-            i.serial_number.clone(),
-        )
-    };
-    report.inspection_intervals.iter().map(row).collect()
 }
 
 /// Agreement of estimates with hangar inspections: summary and pairs.

@@ -130,7 +130,13 @@ fn now(spreads: &RateSpreads<'_>, unit: &UnitView) -> Facts {
         |f| format!("{} ({} to {}), {}", rate(f.median), rate(f.low), rate(f.high), counted(f.units, "unit")),
     );
     vec![
-        ("Gap now", level(s.gap_m, s.gap_se_m)),
+        ("Gap at the last record", level(s.gap_m, s.gap_se_m)),
+        ("Records behind it", s.gap_records.map_or_else(|| NO_DATA.to_owned(), |n| count(n as usize))),
+        ("Latest record", latest_record(unit)),
+        (
+            "An installation may shift all gaps by [µm] (90 %)",
+            s.installation_sd_m.map_or_else(|| NO_DATA.to_owned(), |sd_m| micrometres(NORMAL_95 * sd_m)),
+        ),
         ("Act limit", s.limit_m.map_or_else(|| NO_DATA.to_owned(), |l| format!("{} µm", micrometres(l)))),
         ("% of limit", unit.share().map_or_else(|| NO_DATA.to_owned(), percent)),
         (
@@ -140,6 +146,14 @@ fn now(spreads: &RateSpreads<'_>, unit: &UnitView) -> Facts {
         ("Fleet rate [µm per 1000 FH]: median, 5–95 %, units", fleet),
         ("Trend", s.trend.clone()),
     ]
+}
+
+fn latest_record(unit: &UnitView) -> String {
+    let s = &unit.assessment;
+    s.latest_utc.map_or_else(
+        || NO_DATA.to_owned(),
+        |at| format!("{}, {}", level(s.latest_gap_m, s.latest_gap_se_m), minute(at)),
+    )
 }
 
 fn rates(low: Option<f64>, middle: Option<f64>, high: Option<f64>) -> String {
@@ -188,9 +202,9 @@ fn events(unit: &UnitView) -> Vec<(String, String, String, &'static str)> {
     let row = |e: &crate::model::Event| {
         let size = if e.kind == "onset" { "–".to_owned() } else { micrometres(e.step_m) };
         let kind = if e.is_tail_wide {
-            format!("{}, whole tail: sensor or recorder", e.kind)
+            format!("{}, whole tail at once: its sensor or recorder is likelier", e.kind.replace('_', " "))
         } else {
-            e.kind.clone()
+            e.kind.replace('_', " ")
         };
         (date(e.departure_utc), kind, size, if e.is_on_record { "yes" } else { "no" })
     };
@@ -218,12 +232,11 @@ fn quality(unit: &UnitView) -> Facts {
         if words.is_empty() { "none".to_owned() } else { words.join(", ") }
     };
     let remedies: Vec<String> = q.remedies.iter().map(|(code, remedy)| format!("{code}: {remedy}")).collect();
-    let remedies = if remedies.is_empty() { "nothing".to_owned() } else { remedies.join("; ") };
-    vec![
+    let remedies = (!remedies.is_empty()).then(|| ("Remedies of rejections", remedies.join("; ")));
+    let facts = vec![
         ("Flights used", count(q.estimated)),
         ("Flights rejected", count(q.refused)),
         ("Rejection reasons", list(&q.reasons)),
-        ("What to do", remedies),
         ("Quality flags", list(&q.flags)),
         ("Last estimate", date_or(q.last_estimate_utc)),
         ("Days since", q.days_since_estimate.map_or_else(|| NO_DATA.to_owned(), |d| format!("{d:.0}"))),
@@ -231,7 +244,8 @@ fn quality(unit: &UnitView) -> Facts {
             "Scatter / reported uncertainty",
             q.noise_ratio.map_or_else(|| NO_DATA.to_owned(), |r| format!("{r:.2}")),
         ),
-    ]
+    ];
+    facts.into_iter().chain(remedies).collect()
 }
 
 fn past_forecasts(unit: &UnitView) -> Vec<(String, String, String, String, String, &'static str)> {
@@ -270,15 +284,7 @@ fn statistics(unit: &UnitView) -> Facts {
         ("Unit hours [FH]", s.unit_hours.map_or_else(|| NO_DATA.to_owned(), hours)),
         ("Most probable wear law", s.law.clone().unwrap_or_else(|| NO_DATA.to_owned())),
         ("Usage axis", s.axis.as_ref().map_or_else(|| NO_DATA.to_owned(), |axis| axis.replace('_', " "))),
-        ("Mann–Kendall p (two-sided)", s.mann_kendall_p.map_or_else(|| NO_DATA.to_owned(), p_value)),
-        (
-            "Hamed–Rao p (autocorrelation-corrected)",
-            s.hamed_rao_p.map_or_else(|| NO_DATA.to_owned(), p_value),
-        ),
-        (
-            "Sen's slope [µm per 1000 FH], 95 % interval",
-            rates(s.sen_low_m_per_hour, s.sen_rate_m_per_hour, s.sen_high_m_per_hour),
-        ),
+        ("Forecast by", method(s.forecast_method.as_deref()).to_owned()),
         (
             "Previous-day state",
             match &s.state_day_before {
@@ -298,17 +304,18 @@ fn prior(report: &Report, unit: &UnitView) -> String {
         || NO_DATA.to_owned(),
         |p| {
             let part = p.part_number.as_deref().unwrap_or("units without a part number");
-            let wider = if p.widening > WIDER {
-                format!(
-                    "Past forecast coverage was too low: intervals are widened {:.1} times.",
+            let wider = match p.scored_forecasts {
+                0 => String::new(),
+                scored if p.widening > WIDER => format!(
+                    " {} were scored: their coverage was too low, intervals are widened {:.1} times.",
+                    counted(scored, "past forecast"),
                     p.widening
-                )
-            } else {
-                "Past forecast coverage was adequate; intervals not widened.".to_owned()
+                ),
+                scored => format!(" {} were scored.", counted(scored, "past forecast")),
             };
             format!(
                 "Learned from {part} until {}: a new unit has {} ± {} µm (90 %); time from new to the act limit: median {} FH, \
-                 90 % of units between {} and {} FH; wear follows {}. {wider}",
+                 90 % of units between {} and {} FH; wear follows {}.{wider}",
                 date(p.learned_until_utc),
                 micrometres(p.new_m),
                 micrometres(NORMAL_95 * p.new_sd_m),
@@ -331,9 +338,15 @@ fn band(unit: &UnitView) -> Vec<(String, &'static str, String, String, String)> 
     unit.level.iter().map(row("level")).chain(drawn_forecast(unit).iter().map(row("forecast"))).collect()
 }
 
-/// A probability; one too p_value for three places is never shown as none.
-fn p_value(p: f64) -> String {
-    if p < 0.001 { "below 0.001".to_owned() } else { format!("{p:.3}") }
+/// What a forecast follows from, in words.
+fn method(word: Option<&str>) -> &'static str {
+    match word {
+        Some("measured") => "none: records are at the limit",
+        Some("fleet") => "wear laws, weighted by the part's fleet",
+        Some("single_unit") => "wear laws, weighted by this unit's records alone",
+        Some("line") => "line through the last records: no wear law explains them",
+        _ => NO_DATA,
+    }
 }
 
 fn flight(f: &FlightRow) -> Flight {

@@ -1,7 +1,7 @@
 //! A unit's estimates made ready: outliers marked, and how large the scatter really is.
 
-use crate::classic::median;
 use crate::data::series::{Flight, Gap};
+use crate::math::median::{SD_OVER_MAD, median};
 
 /// Residuals beyond this many standard deviations are outliers.
 const OUTLIER_SIGMA: f64 = 4.0;
@@ -11,9 +11,6 @@ const WINDOW: usize = 11;
 
 /// Flights on one side of a gap that vouch for it.
 const SIDE: usize = WINDOW / 2;
-
-/// Gaps before another one that its window, or the window of one in that window, reaches back to.
-const RECENT: usize = WINDOW - 1;
 
 /// Standard errors are taken to lie between these, shares of the limit: their squares must be numbers to
 /// reckon with.
@@ -43,29 +40,8 @@ pub(crate) struct CleanedSeries {
     pub(crate) estimates: Vec<WeightedGap>,
     /// Flights whose gap is an outlier.
     pub(crate) outliers: Vec<usize>,
-    /// The noise scale by which outliers were found.
-    pub(crate) scatter: NoiseScale,
-}
-
-/// How a unit's gaps scatter: enough to clean the gaps of the flights that follow.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct NoiseScale {
     /// Variance found over variance stated.
     pub(crate) noise_factor: f64,
-    /// The stated error of a gap that states none, metres.
-    pub(crate) typical_m: f64,
-    /// The act limit, metres.
-    pub(crate) limit_m: f64,
-    /// The last gaps, as far back as the window of a new one reaches.
-    pub(crate) recent: Vec<OutlierResult>,
-}
-
-/// A gap that was cleaned.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct OutlierResult {
-    pub(crate) gap_m: f64,
-    pub(crate) error_m: f64,
-    pub(crate) is_outlier: bool,
 }
 
 /// Marks outliers against the median of their neighbours and rescales the stated standard errors.
@@ -76,69 +52,31 @@ pub(crate) struct OutlierResult {
 pub(crate) fn mark_outliers(flights: &[Flight], limit_m: f64) -> CleanedSeries {
     let stated: Vec<(usize, Gap)> =
         flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?))).collect();
-    let typical_m = typical_error(&stated, limit_m);
-    let errors: Vec<f64> = stated.iter().map(|(_, gap)| error(*gap, typical_m, limit_m)).collect();
     let gaps: Vec<f64> = stated.iter().map(|(_, gap)| gap.gap_m).collect();
-    let noise_factor = noise_factor(&gaps, &errors);
-    let scatter = NoiseScale { noise_factor, typical_m, limit_m, recent: Vec::new() };
-    let mut mark_outliers =
-        CleanedSeries { estimates: Vec::with_capacity(gaps.len()), outliers: Vec::new(), scatter };
+    let (errors, noise_factor) = errors(&stated.iter().map(|(_, gap)| *gap).collect::<Vec<_>>(), limit_m);
+    let mut cleaned =
+        CleanedSeries { estimates: Vec::with_capacity(gaps.len()), outliers: Vec::new(), noise_factor };
     for (k, &(flight, _)) in stated.iter().enumerate() {
-        let variance = mark_outliers.scatter.variance(errors[k]);
-        let is_outlier = is_outlier(&gaps, k, variance);
-        if is_outlier {
-            mark_outliers.outliers.push(flight);
+        let variance = errors[k] * errors[k];
+        if is_outlier(&gaps, k, variance) {
+            cleaned.outliers.push(flight);
         } else {
-            mark_outliers.estimates.push(estimate(flights, flight, gaps[k], variance));
-        }
-        if stated.len() - k <= RECENT {
-            mark_outliers.scatter.recent.push(OutlierResult {
-                gap_m: gaps[k],
-                error_m: errors[k],
-                is_outlier,
-            });
+            cleaned.estimates.push(estimate(flights, flight, gaps[k], variance));
         }
     }
-    mark_outliers
+    cleaned
 }
 
-impl NoiseScale {
-    /// The estimates and the outliers of flights that follow, counted from the first of them; nothing where
-    /// they show that one of the last gaps before was mistaken for an outlier, or for none, or where those
-    /// were too few.
-    pub(crate) fn mark_outliers(&self, flights: &[Flight]) -> Option<(Vec<WeightedGap>, Vec<usize>)> {
-        let stated: Vec<(usize, Gap)> =
-            flights.iter().enumerate().filter_map(|(i, f)| Some((i, f.gap?))).collect();
-        if stated.is_empty() {
-            return Some((Vec::new(), Vec::new()));
-        }
-        if self.recent.len() < RECENT {
-            return None;
-        }
-        let before = self.recent.iter().map(|seen| seen.gap_m);
-        let gaps: Vec<f64> = before.chain(stated.iter().map(|(_, gap)| gap.gap_m)).collect();
-        let other = |(k, seen): (usize, &OutlierResult)| {
-            is_outlier(&gaps, k, self.variance(seen.error_m)) != seen.is_outlier
-        };
-        if self.recent.iter().enumerate().skip(WINDOW / 2).any(other) {
-            return None;
-        }
-        let (mut estimates, mut outliers) = (Vec::with_capacity(stated.len()), Vec::new());
-        for (k, &(flight, gap)) in (RECENT..).zip(&stated) {
-            let variance = self.variance(error(gap, self.typical_m, self.limit_m));
-            if is_outlier(&gaps, k, variance) {
-                outliers.push(flight);
-            } else {
-                estimates.push(estimate(flights, flight, gap.gap_m, variance));
-            }
-        }
-        Some((estimates, outliers))
+/// Standard errors of some gaps in order, with the scatter that was found, m, and the factor of their variances.
+pub(crate) fn errors(gaps: &[Gap], limit_m: f64) -> (Vec<f64>, f64) {
+    let typical_m = typical_error(gaps, limit_m);
+    let mut errors: Vec<f64> = gaps.iter().map(|gap| error(*gap, typical_m, limit_m)).collect();
+    let values: Vec<f64> = gaps.iter().map(|gap| gap.gap_m).collect();
+    let factor = noise_factor(&values, &errors);
+    for error in &mut errors {
+        *error = (factor.sqrt() * *error).max(LEAST_ERROR * limit_m);
     }
-
-    /// A gap's variance, with the scatter that was found.
-    fn variance(&self, error_m: f64) -> f64 {
-        (self.noise_factor * error_m * error_m).max((LEAST_ERROR * self.limit_m).powi(2))
-    }
+    (errors, factor)
 }
 
 /// Whether a gap is far from the level of its neighbours, with or without wear.
@@ -183,9 +121,9 @@ fn estimate(flights: &[Flight], flight: usize, gap_m: f64, variance: f64) -> Wei
 }
 
 /// The median stated error; where nothing is stated, a share of the limit.
-fn typical_error(stated: &[(usize, Gap)], limit_m: f64) -> f64 {
-    let mut errors: Vec<f64> = stated.iter().map(|(_, gap)| gap.se_m).filter(|se| se.is_finite()).collect();
-    if errors.is_empty() { UNSTATED_ERROR * limit_m } else { median(&mut errors) }
+fn typical_error(stated: &[Gap], limit_m: f64) -> f64 {
+    let mut errors: Vec<f64> = stated.iter().map(|gap| gap.se_m).filter(|se| se.is_finite()).collect();
+    median(&mut errors).unwrap_or(UNSTATED_ERROR * limit_m)
 }
 
 /// Standard error of a gap, at least half the typical one: an unknown between-flight scatter
@@ -198,23 +136,37 @@ fn error(gap: Gap, typical_m: f64, limit_m: f64) -> f64 {
 /// Found over stated variance from successive differences, drawn to one while they are few.
 fn noise_factor(gaps: &[f64], errors: &[f64]) -> f64 {
     const PRIOR_COUNT: f64 = 4.0;
-    let (Some((_, later)), Some((_, later_errors))) = (gaps.split_first(), errors.split_first()) else {
-        return 1.0;
-    };
-    let differences = later.iter().zip(gaps).map(|(after, before)| after - before);
-    let joint = later_errors.iter().zip(errors).map(|(a, b)| (a * a + b * b).sqrt());
-    let mut ratios: Vec<f64> = differences.zip(joint).map(|(difference, error)| difference / error).collect();
-    if ratios.is_empty() {
-        return 1.0;
-    }
+    /// Differences below which a jump among them may pass for noise, and the most that they are believed.
+    const FEW: usize = 9;
+    const MOST_OF_FEW: f64 = 4.0;
+    /// Second differences are taken for the noise where they show so much less of it: the rate changes.
+    const CHANGING_RATE: f64 = 0.7;
+    let first = gaps.array_windows().zip(errors.array_windows());
+    let mut ratios: Vec<f64> = first.map(|([a, b], [ea, eb])| (b - a) / ea.hypot(*eb)).collect();
     let count = ratios.len() as f64;
     // Wear that shows from one flight to the next is no noise: it moves all differences equally.
-    let wear = median(&mut ratios);
+    let Some(wear) = median(&mut ratios) else { return 1.0 };
     ratios.iter_mut().for_each(|ratio| *ratio = (*ratio - wear).abs());
-    let found = (1.4826 * median(&mut ratios)).powi(2);
+    let mut found = scatter(ratios);
+    let second = gaps.array_windows().zip(errors.array_windows());
+    let bends: Vec<f64> = second
+        .map(|([a, b, c], [ea, eb, ec])| (a - 2.0 * b + c).abs() / (ea * ea + 4.0 * eb * eb + ec * ec).sqrt())
+        .collect();
+    if !bends.is_empty() {
+        let bent = scatter(bends);
+        found = if bent < CHANGING_RATE * found { bent } else { found };
+    }
+    if gaps.len() <= FEW {
+        found = found.min(MOST_OF_FEW);
+    }
     // A common factor of the stated errors is limited; exactly repeating gaps carry no information about it.
     let stated = if found > 0.0 { (100.0 * found).min(1.0) } else { 1.0 };
     ((found * count + PRIOR_COUNT * stated) / (count + PRIOR_COUNT)).max(0.05 * stated)
+}
+
+/// Variance of normal deviates by the median of their amounts.
+fn scatter(mut amounts: Vec<f64>) -> f64 {
+    median(&mut amounts).map_or(0.0, |middle| (SD_OVER_MAD * middle).powi(2))
 }
 
 /// Level of a flight from its neighbours under even wear: the median of their pairwise
@@ -243,12 +195,12 @@ fn on_line(window: &[f64], at: f64) -> f64 {
             count += 1;
         }
     }
-    let slope = median(&mut slopes[..count]);
+    let slope = median(&mut slopes[..count]).unwrap_or_default();
     let mut levels = [0.0; WINDOW];
     for (k, (level, gap)) in levels.iter_mut().zip(window).enumerate() {
         *level = gap - slope * k as f64;
     }
-    median(&mut levels[..width]) + slope * at
+    median(&mut levels[..width]).unwrap_or_default() + slope * at
 }
 
 #[cfg(test)]
@@ -262,7 +214,7 @@ mod tests {
             hours: k as f64,
             flights: k as f64,
             reversals: 0.0,
-            gap: Some(Gap { gap_m: um * 1e-6, se_m: 0.3e-6 }),
+            gap: Some(Gap { gap_m: um * 1e-6, se_m: 0.3e-6, is_doubtful: false }),
         };
         gaps_um.iter().enumerate().map(flight).collect()
     }
@@ -278,7 +230,7 @@ mod tests {
     fn a_unit_that_wears_fast_is_no_row_of_outliers() {
         let found = mark_outliers(&flights(&wearing(10, 3.0)), 1e-4);
         assert!(found.outliers.is_empty(), "{:?}", found.outliers);
-        assert!(found.scatter.noise_factor < 3.0, "{}", found.scatter.noise_factor);
+        assert!(found.noise_factor < 3.0, "{}", found.noise_factor);
     }
 
     /// Against the definition: every window sorted.
@@ -296,48 +248,6 @@ mod tests {
                     assert_eq!(is_far_from_median(&values, at, reach), apart > reach, "{at} of {length}");
                 }
             }
-        }
-    }
-
-    #[test]
-    fn a_wild_estimate_among_later_flights_is_one_too() {
-        let mut gaps = wearing(60, 0.1);
-        gaps[47] += 40.0;
-        let (before, after) = gaps.split_at(40);
-        let scatter = mark_outliers(&flights(before), 1e-4).scatter;
-        let (estimates, outliers) = scatter.mark_outliers(&flights(after)).unwrap();
-        assert_eq!((estimates.len(), outliers), (19, vec![7]));
-    }
-
-    /// Three flights after a step are outliers, until eight more show that it is one.
-    #[test]
-    fn later_flights_that_make_an_outlier_none_are_not_cleaned_apart() {
-        let gaps: Vec<f64> = (0..48).map(|k| wearing(48, 0.0)[k] + if k < 37 { 0.0 } else { 40.0 }).collect();
-        let (before, after) = gaps.split_at(40);
-        let known = mark_outliers(&flights(before), 1e-4);
-        assert_eq!(known.outliers, [37, 38, 39]);
-        assert!(known.scatter.mark_outliers(&flights(after)).is_none());
-        assert!(known.scatter.mark_outliers(&flights(&[])).is_some());
-    }
-
-    /// Two micrometres a flight and a fall of forty: a line through both sides misses the flights next to it.
-    #[test]
-    fn flights_beside_a_step_of_a_wearing_unit_are_no_outliers() {
-        let gaps: Vec<f64> = wearing(30, 2.0)
-            .into_iter()
-            .enumerate()
-            .map(|(k, um)| um - if k < 12 { 0.0 } else { 40.0 })
-            .collect();
-        let found = mark_outliers(&flights(&gaps), 1e-4);
-        assert!(found.outliers.is_empty(), "{:?}", found.outliers);
-    }
-
-    #[test]
-    fn a_wild_estimate_is_one_whether_the_unit_wears_or_not() {
-        for slope in [0.0, 3.0] {
-            let mut gaps = wearing(20, slope);
-            gaps[7] += 40.0;
-            assert_eq!(mark_outliers(&flights(&gaps), 1e-4).outliers, [7]);
         }
     }
 }

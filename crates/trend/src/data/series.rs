@@ -6,7 +6,7 @@ use crate::error::Error;
 pub(crate) const DAY_US: i64 = 86_400_000_000;
 
 /// One flight of a unit, as a caller knows it; order does not matter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Observation {
     /// Departure, microseconds since 1970 UTC.
     pub departure_us: i64,
@@ -23,6 +23,8 @@ pub struct Observation {
     pub gap_m: Option<f64>,
     /// Its standard error, metres; `None` where nothing was stated.
     pub gap_se_m: Option<f64>,
+    /// Whether the estimator itself doubts the gap: such a record alone neither confirms nor clears anything.
+    pub is_doubtful: bool,
 }
 
 /// Defaults for unknown usage, and the start of a unit's own hours.
@@ -71,6 +73,8 @@ pub struct Gap {
     pub gap_m: f64,
     /// Its stated standard error, metres; `NaN` where nothing was stated.
     pub se_m: f64,
+    /// Whether its estimator doubts it.
+    pub is_doubtful: bool,
 }
 
 /// One flight with the unit's usage at its end, counted from the start of its first flight here.
@@ -118,28 +122,38 @@ impl MaintenanceEvent {
 ///    is the flight's own hours, and the nominal ones where it states none.
 /// 3. Hours beyond the flight's own belong to flights without a row. They count as flights and as
 ///    load reversals at the unit's mean so far. A flight that states no reversals adds that mean, too.
-/// 4. Two rows of one installation and departure are one flight: the row with a gap wins, then the
-///    smaller standard error, then the smaller numbers, whatever the order of arrival.
+/// 4. Two rows of one installation and departure are one flight: the row with a gap wins, then the larger gap, then the
+///    smaller other numbers, whatever the order of arrival. Where the gaps differ, the kept one is doubtful.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     flights: Vec<Flight>,
     unit_hours_at_start: Option<f64>,
     source: UsageSource,
     maintenance: Vec<MaintenanceEvent>,
+    faults: RowFaults,
+}
+
+/// Rows that cannot be right, by what was done about them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct RowFaults {
+    /// Flights with records that contradict each other: the largest gap is kept, as a doubtful one.
+    pub contradictions: usize,
+    /// Rows with negative usage, which is left out.
+    pub negative_usage: usize,
 }
 
 impl Series {
     /// Puts a unit's rows in order and adds up their usage.
     ///
     /// # Errors
-    /// [`Error::Observation`] for hours, a gap or a standard error that is not finite or is negative
-    /// (a gap may be: the estimate of a small one), [`Error::Setting`] for unusable nominal hours.
+    /// [`Error::Observation`] for hours, a gap or a standard error that is not finite, or a standard error that is not
+    /// positive, [`Error::Setting`] for unusable nominal hours.
     pub fn new(rows: impl IntoIterator<Item = Observation>, usage: &UsageDefaults) -> Result<Self, Error> {
         let nominal = usage.nominal_flight_hours;
         if !(nominal.is_finite() && nominal > 0.0) {
             return Err(Error::Setting { name: "nominal_flight_hours", value: nominal });
         }
-        let rows = in_order(rows)?;
+        let (rows, faults) = in_order(rows)?;
         let mut meter = UsageAccumulator::new(nominal);
         let flights: Vec<Flight> = rows.iter().map(|row| meter.add_flight(row)).collect();
         debug_assert!(
@@ -152,6 +166,7 @@ impl Series {
             unit_hours_at_start: usage.unit_hours_at_start,
             source: usage.source,
             maintenance: Vec::new(),
+            faults,
         })
     }
 
@@ -178,9 +193,14 @@ impl Series {
         &self.flights[..self.flights.partition_point(|flight| flight.departure_us <= as_of_us)]
     }
 
-    /// The gaps known on a day, in order of departure: input of the [classic statistics](crate::classic).
+    /// The gaps known on a day, in order of departure.
     pub fn gaps_until(&self, as_of_us: i64) -> Vec<f64> {
         self.flights_until(as_of_us).iter().filter_map(|flight| Some(flight.gap?.gap_m)).collect()
+    }
+
+    /// Rows that cannot be right.
+    pub fn faults(&self) -> RowFaults {
+        self.faults
     }
 
     /// Where the unit's hours are known from.
@@ -204,20 +224,33 @@ const MIN_GAP_SE_M: f64 = 1e-18;
 const MAX_HOURS: (f64, f64) = (1e5, 1e9);
 
 /// Rows in the order of the flights, each flight once.
-fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<Vec<Observation>, Error> {
+fn in_order(rows: impl IntoIterator<Item = Observation>) -> Result<(Vec<Observation>, RowFaults), Error> {
     let mut rows: Vec<Observation> = rows.into_iter().collect();
     rows.iter().try_for_each(check)?;
-    rows.iter_mut().for_each(forget_implausible);
+    let mut faults = RowFaults::default();
+    for row in &mut rows {
+        let is_negative = |hours: Option<f64>| hours.is_some_and(|hours| hours < 0.0);
+        faults.negative_usage +=
+            usize::from(is_negative(row.flight_hours) || is_negative(row.tail_hours_end));
+        forget_implausible(row);
+    }
     rows.sort_unstable_by(order);
-    rows.dedup_by_key(|row| (row.departure_us, row.installation));
-    Ok(rows)
+    rows.dedup_by(|next, kept| {
+        let is_same = (next.departure_us, next.installation) == (kept.departure_us, kept.installation);
+        if is_same && next.gap_m.is_some() && next.gap_m != kept.gap_m && !kept.is_doubtful {
+            kept.is_doubtful = true;
+            faults.contradictions += 1;
+        }
+        is_same
+    });
+    Ok((rows, faults))
 }
 
 /// Rejects values that are not finite or out of range.
 fn check(row: &Observation) -> Result<(), Error> {
     let numbers = [
-        ("flight_hours", row.flight_hours, 0.0),
-        ("tail_hours_end", row.tail_hours_end, 0.0),
+        ("flight_hours", row.flight_hours, f64::MIN),
+        ("tail_hours_end", row.tail_hours_end, f64::MIN),
         ("gap_m", row.gap_m, f64::MIN),
         ("gap_se_m", row.gap_se_m, f64::MIN_POSITIVE),
     ];
@@ -233,20 +266,22 @@ fn check(row: &Observation) -> Result<(), Error> {
 fn forget_implausible(row: &mut Observation) {
     row.gap_m = row.gap_m.filter(|gap_m| gap_m.abs() <= MAX_GAP_M);
     row.gap_se_m = row.gap_se_m.filter(|se_m| (MIN_GAP_SE_M..=MAX_GAP_M).contains(se_m));
-    row.flight_hours = row.flight_hours.filter(|hours| *hours <= MAX_HOURS.0);
-    row.tail_hours_end = row.tail_hours_end.filter(|hours| *hours <= MAX_HOURS.1);
+    row.flight_hours = row.flight_hours.filter(|hours| (0.0..=MAX_HOURS.0).contains(hours));
+    row.tail_hours_end = row.tail_hours_end.filter(|hours| (0.0..=MAX_HOURS.1).contains(hours));
 }
 
 /// A total order, so that neither arrival nor duplicates decide anything.
 fn order(a: &Observation, b: &Observation) -> std::cmp::Ordering {
     let number = |v: Option<f64>| v.unwrap_or(f64::INFINITY);
-    let numbers = |o: &Observation| [o.gap_se_m, o.gap_m, o.tail_hours_end, o.flight_hours].map(number);
+    let larger = |o: &Observation| o.gap_m.map(|gap_m| -gap_m);
+    let numbers = |o: &Observation| [larger(o), o.gap_se_m, o.tail_hours_end, o.flight_hours].map(number);
     let place = |o: &Observation| (o.departure_us, o.installation, o.gap_m.is_none());
     let by_number = || numbers(a).iter().zip(numbers(b)).map(|(a, b)| a.total_cmp(&b)).find(|o| o.is_ne());
     place(a)
         .cmp(&place(b))
         .then_with(|| by_number().unwrap_or(std::cmp::Ordering::Equal))
         .then_with(|| a.load_reversals.cmp(&b.load_reversals))
+        .then_with(|| a.is_doubtful.cmp(&b.is_doubtful))
 }
 
 /// The unit's usage so far, and the hour meter it was last read against.
@@ -295,7 +330,11 @@ impl UsageAccumulator {
             hours: self.hours,
             flights: self.flights,
             reversals: self.reversals,
-            gap: row.gap_m.map(|gap_m| Gap { gap_m, se_m: row.gap_se_m.unwrap_or(f64::NAN) }),
+            gap: row.gap_m.map(|gap_m| Gap {
+                gap_m,
+                se_m: row.gap_se_m.unwrap_or(f64::NAN),
+                is_doubtful: row.is_doubtful,
+            }),
         }
     }
 

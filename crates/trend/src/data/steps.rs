@@ -6,7 +6,7 @@ use crate::data::outliers::WeightedGap;
 const REACHES: [usize; 4] = [15, 30, 60, FARTHEST];
 
 /// The longest of them.
-pub(crate) const FARTHEST: usize = 120;
+const FARTHEST: usize = 120;
 
 /// Places passed over in the first search.
 const STRIDE: usize = 3;
@@ -53,25 +53,38 @@ pub(crate) struct StepChange {
     pub(crate) jump_se_m: f64,
 }
 
-/// All steps of a history, by place: the largest first, then what it left on either side.
+/// Places searched at once: far more than a window reaches, so that the search grows with the history's length alone.
+const BLOCK: usize = 480;
+
+/// All steps of a history, by place: in each block the largest first, then what it left on either side.
 pub(crate) fn detect_steps(estimates: &[WeightedGap], limit_m: f64) -> Vec<StepChange> {
     let sums = PrefixSums::new(estimates, limit_m);
-    let mut found = Vec::new();
-    let mut open = vec![(0, estimates.len())];
-    while let Some((low, high)) = open.pop() {
-        if let Some(step) = sums.largest(low, low, high) {
-            open.extend([(low, step.at), (step.at, high)]);
-            found.push(step);
+    let mut found: Vec<StepChange> = Vec::new();
+    // Begin of the range between two steps, first place of the block, and end of the range.
+    let mut open = vec![(0, 0, estimates.len())];
+    while let Some((low, from, high)) = open.pop() {
+        let mut to = (from + BLOCK).min(high);
+        let mut step = sums.largest(low, (from, to), high);
+        // A larger step may follow just after the block.
+        while to < high && step.is_some_and(|step| step.at + FARTHEST > to) {
+            to = (to + BLOCK).min(high);
+            step = sums.largest(low, (from, to), high);
+        }
+        match step {
+            // Places before the block hold no step, unless the new one changes their windows.
+            Some(step) => {
+                open.extend([
+                    (step.at, step.at, high),
+                    (low, from.saturating_sub(FARTHEST).max(low), step.at),
+                ]);
+                found.push(step);
+            }
+            None if to < high => open.push((low, to, high)),
+            None => {}
         }
     }
     found.sort_unstable_by_key(|step| step.at);
     found
-}
-
-/// Whether a step shows at one of the places from which the estimates from `since` on are in reach, the
-/// first estimate being the first one since the last step.
-pub(crate) fn has_step(estimates: &[WeightedGap], since: usize, limit_m: f64) -> bool {
-    PrefixSums::new(estimates, limit_m).largest(0, since.saturating_sub(FARTHEST), estimates.len()).is_some()
 }
 
 /// Squared steps at changes of installation, less what their errors explain, and how many there are.
@@ -194,12 +207,12 @@ impl PrefixSums {
         (side.xy + self.slope_information * other) / (side.xx + self.slope_information)
     }
 
-    /// The step with the largest ratio to its standard error, over all places from one on and all window lengths.
+    /// The step with the largest ratio to its standard error, over a range of places and all window lengths.
     ///
     /// Every third place is tested first, then all places near those with half the required ratio.
-    fn largest(&self, low: usize, from: usize, high: usize) -> Option<StepChange> {
+    fn largest(&self, low: usize, (from, to): (usize, usize), high: usize) -> Option<StepChange> {
         let ratio = |step: &StepChange| (step.step_m / step.se_m).abs();
-        let places = from.max(low + MIN_ESTIMATES)..(high + 1).saturating_sub(MIN_ESTIMATES);
+        let places = from.max(low + MIN_ESTIMATES)..(high + 1).saturating_sub(MIN_ESTIMATES).min(to);
         let is_half = |at: usize, reach: usize| {
             let (step_m, variance, _) =
                 self.step_with_slope(at.saturating_sub(reach).max(low), at, (at + reach).min(high));

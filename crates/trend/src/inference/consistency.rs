@@ -1,101 +1,108 @@
-//! Consistency check: the posterior level must agree with the unit's latest estimates.
+//! Consistency check: a posterior must agree with the unit's last records, in level and in rate.
 //!
-//! A confident prior can outweigh the data of a unit: a fleet without wear, with equal new gaps,
-//! leaves no candidate for a unit near its limit. Then the unit is assessed with the single-unit prior,
-//! and where that does not agree either, it is not assessed.
+//! A confident prior can outweigh the data of a unit: a fleet without wear, with equal new gaps, leaves no candidate
+//! for a unit near its limit. Such a posterior gives no forecast; the measured state stays.
 
 use crate::data::outliers::WeightedGap;
-use crate::data::segment::Segment;
-use crate::inference::posterior::{Component, Posterior, posterior};
+use crate::data::series::Flight;
+use crate::inference::posterior::{Component, Posterior};
+use crate::measured::Measured;
+use crate::measured::level::{WINDOW, measured_level};
+use crate::measured::record::Record;
+use crate::measured::rise::Rise;
 use crate::prior::fleet_prior::FleetPrior;
+use crate::statement::history::History;
 
-/// Number of latest estimates of the check.
-const RECENT: usize = 12;
-
-/// Standard errors beyond which the level is not theirs.
+/// Standard errors beyond which the level is not that of the records.
 const REACH: f64 = 5.0;
 
-/// A segment's mixture, and whether it uses the single-unit prior.
-pub(crate) struct ConsistentPosterior {
-    pub(crate) posterior: Posterior,
-    pub(crate) is_single_unit: bool,
+/// Records from which their scatter is a measure.
+const SCATTER_RECORDS: usize = 8;
+
+/// The posterior's rate over that of a significant line.
+const RATE_RATIO: std::ops::RangeInclusive<f64> = 0.6..=2.0;
+
+/// Weighted mean of the last records that a line explains.
+pub(crate) struct Evidence {
+    usage: f64,
+    gap_m: f64,
+    error_m2: f64,
+    rise: Option<Rise>,
 }
 
-/// Why a segment has no mixture.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Inconsistency {
-    /// It has no estimate, or no usage.
-    Empty,
-    /// Neither the fleet nor the unit alone explains its last estimates.
-    Unsupported { level_m: f64, recent_m: f64 },
-}
-
-/// Judges a segment by its fleet's prior, or else by the one of a unit `single_unit`, as the last estimates allow.
-///
-/// Offsets that were undone leave `offset_m2` in the level.
-pub(crate) fn fit_consistent(
-    segment: &Segment<'_>,
-    prior: &FleetPrior,
-    single_unit: &FleetPrior,
-    offset_m2: f64,
-) -> Result<ConsistentPosterior, Inconsistency> {
-    let mut why = Inconsistency::Empty;
-    for (is_single_unit, prior) in [(false, prior), (true, single_unit)] {
-        let Some(posterior) = posterior(segment, prior) else { return Err(Inconsistency::Empty) };
-        let level_check =
-            level_check(recent_estimates(segment.estimates), segment.now, &posterior, prior, offset_m2);
-        if level_check.holds() {
-            return Ok(ConsistentPosterior { posterior, is_single_unit });
-        }
-        why = Inconsistency::Unsupported { level_m: level_check.level_m, recent_m: level_check.recent_m };
+impl Evidence {
+    /// The last records, their undone offset and season removed: of a calm unit its last estimates without outliers.
+    pub(crate) fn of(
+        measured: &Measured,
+        history: &History,
+        flights: &[Flight],
+        prior: &FleetPrior,
+    ) -> Option<Self> {
+        let season = |us: i64| prior.season.mean_m * prior.season.wave(us as f64);
+        let measured_records = || {
+            let records = last_records(measured, prior.limit_m())?;
+            let entry = |r: &Record| {
+                let gap_m = r.gap_m - history.undone_m - season(r.departure_us);
+                (prior.usage(&flights[r.flight]), gap_m, r.error_m.powi(-2))
+            };
+            Some(records.iter().map(entry).collect::<Vec<_>>())
+        };
+        let is_calm = measured.jump.is_none() && measured.exceedance.is_none() && measured.rise.is_none();
+        let records = if is_calm {
+            let last = history.estimates.len().saturating_sub(WINDOW);
+            let entry = |e: &WeightedGap| (e.usage, e.gap_m - season(e.departure_us), e.weight);
+            history.estimates[last..].iter().map(entry).collect()
+        } else {
+            measured_records()?
+        };
+        let weight: f64 = records.iter().map(|r| r.2).sum();
+        let mean =
+            |of: &dyn Fn(&(f64, f64, f64)) -> f64| records.iter().map(|r| r.2 * of(r)).sum::<f64>() / weight;
+        let gap_m = mean(&|r| r.1);
+        // Stated errors that are too large would accept any level: the scatter is a second criterion.
+        let scatter_m2 = mean(&|r| (r.1 - gap_m).powi(2));
+        let error_m2 =
+            if records.len() >= SCATTER_RECORDS { weight.recip().min(scatter_m2) } else { weight.recip() };
+        Some(Self { usage: mean(&|r| r.0), gap_m, error_m2, rise: measured.rise })
     }
-    Err(why)
-}
 
-/// Level of the mixture, and level of the latest estimates.
-pub(crate) struct LevelCheck {
-    level_m: f64,
-    recent_m: f64,
-    reach_m: f64,
-}
-
-impl LevelCheck {
-    /// Whether the level is theirs; also false where a figure is not a number.
-    pub(crate) fn holds(&self) -> bool {
-        (self.level_m - self.recent_m).abs() <= self.reach_m
+    /// Whether a posterior has this level at this usage, and the rate of a significant line now; also false where a
+    /// figure is not a number.
+    pub(crate) fn agrees(
+        &self,
+        posterior: &Posterior,
+        now: f64,
+        prior: &FleetPrior,
+        offset_m2: f64,
+        hours_per_usage: f64,
+    ) -> bool {
+        let since = now - self.usage;
+        let then = |component: &Component| {
+            let value = |age: f64| component.law.value(age);
+            let grown = value(component.age_now) - value(component.age_now - since);
+            component.weight * (component.level_m - component.amplitude_m * grown)
+        };
+        let level_m: f64 = posterior.components.iter().map(then).sum();
+        let systematic_m2 = prior.bias_sd_m.powi(2) + prior.season.sd_m.powi(2) + offset_m2;
+        let has_level = (level_m - self.gap_m).abs() <= REACH * (self.error_m2 + systematic_m2).sqrt();
+        let has_rate = self.rise.is_none_or(|rise| {
+            let rate = |n: &Component| n.weight * n.amplitude_m * n.law.derivative(n.age_now);
+            let m_per_hour = posterior.components.iter().map(rate).sum::<f64>() / hours_per_usage;
+            let within = REACH * rise.m_per_hour_se;
+            m_per_hour >= RATE_RATIO.start() * rise.m_per_hour - within
+                && m_per_hour <= RATE_RATIO.end() * rise.m_per_hour + within
+        });
+        has_level && has_rate
     }
 }
 
-/// The latest estimates, which the check uses.
-pub(crate) fn recent_estimates(estimates: &[WeightedGap]) -> &[WeightedGap] {
-    &estimates[estimates.len().saturating_sub(RECENT)..]
-}
-
-/// Holds the mixture's level at a usage against a segment's last estimates.
-pub(crate) fn level_check(
-    recent: &[WeightedGap],
-    now: f64,
-    posterior: &Posterior,
-    prior: &FleetPrior,
-    offset_m2: f64,
-) -> LevelCheck {
-    let weight: f64 = recent.iter().map(|e| e.weight).sum();
-    let mean =
-        |of: &dyn Fn(&WeightedGap) -> f64| recent.iter().map(|e| e.weight * of(e)).sum::<f64>() / weight;
-    let since = now - mean(&|e| e.usage);
-    let season = |e: &WeightedGap| prior.season.mean_m * prior.season.wave(e.departure_us as f64);
-    let then = |component: &Component| {
-        let grown = component.law.value(component.age_now) - component.law.value(component.age_now - since);
-        component.weight * (component.level_m - component.amplitude_m * grown)
-    };
-    let systematic_m2 = prior.bias_sd_m.powi(2) + prior.season.sd_m.powi(2) + offset_m2;
-    let recent_m = mean(&|e| e.gap_m - season(e));
-    // Stated errors that are too large would accept any level: the scatter is a second criterion.
-    let scatter_m2 = mean(&|e| (e.gap_m - season(e) - recent_m).powi(2));
-    let error_m2 = weight.recip().min(scatter_m2);
-    LevelCheck {
-        level_m: posterior.components.iter().map(then).sum(),
-        recent_m,
-        reach_m: REACH * (error_m2 + systematic_m2).sqrt(),
+/// The records of the measured level; without a lone last record, which the next one confirms or refutes.
+fn last_records(measured: &Measured, limit_m: f64) -> Option<&[Record]> {
+    let (level, sound) = (measured.level?, &measured.sound[..]);
+    let before = sound.split_last().filter(|_| level.records == 1).map(|(_, before)| before);
+    let rest = before.and_then(|before| Some((before, measured_level(before, limit_m)?)));
+    if let Some((before, rest)) = rest.filter(|(_, rest)| rest.records > 1) {
+        return Some(&before[before.len().saturating_sub(rest.window)..]);
     }
+    Some(&sound[sound.len().saturating_sub(level.window)..])
 }

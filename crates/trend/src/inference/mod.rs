@@ -3,8 +3,6 @@
 pub(crate) mod bank_regression;
 pub(crate) mod consistency;
 pub(crate) mod level_filter;
-pub(crate) mod mixture;
 pub(crate) mod posterior;
 pub(crate) mod season;
 pub(crate) mod segment_fit;
-pub(crate) mod update;

@@ -55,8 +55,6 @@ pub(crate) struct Component {
     pub(crate) level_m: f64,
     /// The gap of this unit when new, metres.
     pub(crate) new_m: f64,
-    /// The unit's seasonal amplitude in addition to the fleet's mean one, metres.
-    pub(crate) seasonal_m: f64,
     /// What had to be guessed of its age at first sight.
     pub(crate) age_assumption: AgeAssumption,
     /// Onset not seen yet: it comes after an exponential wait.
@@ -69,15 +67,10 @@ pub(crate) struct Component {
 #[derive(Debug, Clone)]
 pub(crate) struct Posterior {
     pub(crate) components: Vec<Component>,
-    /// Usage since the bin whose level it is: wear has gone on, as the curves have it.
-    pub(crate) since: f64,
     /// Variance of every node's level.
     pub(crate) level_m2: f64,
     /// Variance of every node's growth since the segment began.
     pub(crate) growth_m2: f64,
-    /// Variance of every component's seasonal amplitude, and its covariance with the level.
-    pub(crate) seasonal_m2: f64,
-    pub(crate) level_seasonal_m2: f64,
     /// Log of the sum of the weights before they were normalised.
     pub(crate) log_evidence: f64,
 }
@@ -145,11 +138,8 @@ fn finish(fit: &SegmentFit<'_>, mut believed: Vec<(usize, Component)>) -> Option
     let log_sum = normalise(&mut believed, THOROUGH.drop);
     (!believed.is_empty()).then(|| Posterior {
         components: believed.into_iter().map(|(_, component)| component).collect(),
-        since: fit.segment.now - fit.bins.last().map_or(fit.segment.begin, |bin| bin.usage),
         level_m2: fit.level_m2(),
         growth_m2: fit.filter.end_m2 + fit.filter.start_m2,
-        seasonal_m2: fit.seasonal_m2,
-        level_seasonal_m2: fit.level_seasonal_m2(),
         log_evidence: log_sum + fit.shared_log_likelihood(),
     })
 }
@@ -317,7 +307,6 @@ fn try_lives(
             ln_life,
             level_m: fit.gaps.end + amplitude_m * (height_now - pass.end),
             new_m,
-            seasonal_m: fit.seasonal_m(amplitude_m * pass.sfs),
             age_assumption,
             onset_pending: false,
             weight,
@@ -372,7 +361,6 @@ fn flat(fit: &SegmentFit<'_>, push: &mut dyn FnMut(Component)) {
         ln_life: prior.ln_life,
         level_m: gaps.end,
         new_m: gaps.start,
-        seasonal_m: fit.seasonal_m(0.0),
         age_assumption: AgeAssumption::NotNeeded,
         onset_pending: false,
         weight: log_likelihood + logs.share(WearLaw::None),

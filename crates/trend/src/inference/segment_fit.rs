@@ -76,16 +76,6 @@ impl<'a> SegmentFit<'a> {
         self.filter.end_m2 + self.wave.end * self.wave.end * self.seasonal_m2
     }
 
-    /// Covariance of the present level and the unit's seasonal amplitude; the same for every curve.
-    pub(crate) fn level_seasonal_m2(&self) -> f64 {
-        -self.wave.end * self.seasonal_m2
-    }
-
-    /// The unit's own seasonal amplitude with a candidate, whose basis values explain a part of it.
-    pub(crate) fn seasonal_m(&self, explained: f64) -> f64 {
-        (self.wave_by_gaps - explained) * self.seasonal_m2
-    }
-
     /// What every curve's likelihood shares; it matters when one usage axis is weighed against another.
     pub(crate) fn shared_log_likelihood(&self) -> f64 {
         let fitted = self.wave_by_gaps * self.wave_by_gaps / self.wave_information;

@@ -34,12 +34,13 @@ pub(crate) fn learn_calibration(
 ) -> CalibrationParams {
     let usual = CalibrationParams::USUAL;
     let errors = executor.map(segments, |segment| CUTS.map(|share| normalised_error(segment, share, prior)));
-    let errors = errors.into_iter().flatten().flatten().map(|error| (error, 1.0));
+    let errors: Vec<(f64, f64)> = errors.into_iter().flatten().flatten().map(|error| (error, 1.0)).collect();
+    let scored = errors.len();
     let pseudo = LONG_QUANTILES.map(|z| (USUAL_WIDTH * z, PSEUDO_CUTS / LONG_QUANTILES.len() as f64));
-    let errors = WeightedSamples::new(errors.chain(pseudo));
+    let errors = WeightedSamples::new(errors.into_iter().chain(pseudo));
     let [low, middle, high] = [0.05, 0.5, 0.95].map(|share| errors.quantile(share));
     debug_assert!(low <= middle && middle <= high, "quantiles {low}, {middle}, {high}");
-    CalibrationParams { low: low.min(usual.low), middle, high: high.max(usual.high) }
+    CalibrationParams { low: low.min(usual.low), middle, high: high.max(usual.high), scored }
 }
 
 /// Quantiles at 2.5 %, 7.5 % … 97.5 % of a normal distribution whose 95 % bound is at one.

@@ -15,9 +15,11 @@ pub(crate) struct CalibrationParams {
     pub(crate) low: f64,
     pub(crate) middle: f64,
     pub(crate) high: f64,
+    /// Past forecasts that they were learned from.
+    pub(crate) scored: usize,
 }
 
 impl CalibrationParams {
     /// Parameters of a fleet without past forecasts.
-    pub(crate) const USUAL: Self = Self { low: -USUAL_WIDTH, middle: 0.0, high: USUAL_WIDTH };
+    pub(crate) const USUAL: Self = Self { low: -USUAL_WIDTH, middle: 0.0, high: USUAL_WIDTH, scored: 0 };
 }

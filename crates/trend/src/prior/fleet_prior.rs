@@ -27,6 +27,9 @@ const NEW_SPREAD: f64 = 0.05;
 const DRIFT_PER_HOUR: f64 = 1e-8;
 const BIAS_SPREAD: f64 = 0.015;
 
+/// Spread of the first gap of a unit without support from its fleet, a share of the limit.
+const FIRST_SPREAD: f64 = 0.1;
+
 /// Share of the fleet below which a family of laws is not tried: a unit that needs it is assessed without the
 /// fleet.
 const RULED_OUT: f64 = 0.003;
@@ -128,6 +131,19 @@ impl FleetPrior {
         Self { axis, hours_per_unit, ..Self::uninformative(self.limit_m()) }
     }
 
+    /// Prior of a unit that wears by some rate, m per flight hour, from a first gap: lives around that of the rate, any
+    /// law. All laws run on the usage that such a life is worth, since the bank's grids are those of usual lives.
+    pub(crate) fn of_fast_wear(&self, m_per_hour: f64, first_m: f64) -> Self {
+        let prior = Self::uninformative(self.limit_m());
+        let life_hours = prior.span_m / m_per_hour;
+        Self {
+            hours_per_unit: prior.ln_life.exp() / life_hours,
+            new_m: first_m,
+            new_sd_m: FIRST_SPREAD * prior.limit_m(),
+            ..prior
+        }
+    }
+
     /// The act limit that the prior was made for, metres.
     pub(crate) fn limit_m(&self) -> f64 {
         self.span_m / (1.0 - NEW_SHARE)
@@ -159,6 +175,11 @@ impl FleetPrior {
     /// one for a fleet without past forecasts (method: `docs/prognostics.md`).
     pub fn interval_scale(&self) -> f64 {
         0.5 * (self.calibration.high - self.calibration.low) / USUAL_WIDTH
+    }
+
+    /// Number of past forecasts of the fleet that the intervals' widths were learned from.
+    pub fn scored_forecasts(&self) -> usize {
+        self.calibration.scored
     }
 
     /// The usage of a unit up to a flight, hours' worth.

@@ -1,9 +1,8 @@
 //! Scatter of a quantity from flight to flight, as steps and drift leave it alone.
 
 use super::QuantityValue;
+pub(super) use crate::math::median::SD_OVER_MAD;
 
-/// Standard deviation of a normal distribution over its median absolute deviation: 1/Φ⁻¹(3/4).
-pub(super) const SD_OVER_MAD: f64 = 1.482_602_218_505_602;
 /// Flights of a batch whose means show a scatter that neighbours share.
 const BATCH: usize = 8;
 /// Variance inflation assumed before a batch is seen, and the number of batches it counts for.
@@ -80,11 +79,5 @@ pub fn without_outliers(values: &[QuantityValue], scatter: &Scatter) -> Vec<Quan
 
 /// The median; none of nothing.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    let (middle, is_even) = (values.len() / 2, values.len().is_multiple_of(2));
-    if values.is_empty() {
-        return None;
-    }
-    let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
-    let lower = below.iter().copied().max_by(f64::total_cmp).filter(|_| is_even);
-    Some(lower.map_or(*upper, |lower| 0.5 * (lower + *upper)))
+    crate::math::median::median(&mut values)
 }

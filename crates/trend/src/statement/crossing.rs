@@ -102,7 +102,7 @@ impl RulDistribution {
             let hours = middle * (bound.max(1.0) / middle).powf(width.abs());
             (hours < self.horizon_hours).then_some(if hours > 1.0 { hours } else { 0.0 })
         };
-        let CalibrationParams { low, middle: shift, high } = self.calibration;
+        let CalibrationParams { low, middle: shift, high, .. } = self.calibration;
         let crossing = Crossing {
             p05_hours: at(high),
             p50_hours: at(shift),
@@ -137,22 +137,6 @@ impl RulDistribution {
     }
 }
 
-impl RulDistribution {
-    /// Probability that the limit is met within some hours, with the calibration of the fleet's past forecasts: the
-    /// quantiles of [`crossing`](Self::crossing) are those of this distribution.
-    pub(crate) fn chance_by(&self, hours: f64) -> f64 {
-        let Some(middle) = self.quantile(0.5).filter(|middle| *middle > 1.0) else {
-            return self.within(hours);
-        };
-        let CalibrationParams { low, high, .. } = self.calibration;
-        let width = if hours < middle { high } else { -low };
-        if width.is_nan() || width <= 0.0 {
-            return self.within(hours);
-        }
-        self.within(middle * (hours.max(1.0) / middle).powf(width.recip()))
-    }
-}
-
 /// Whether the quantiles increase; one beyond the horizon is larger than all others.
 fn is_ordered(crossing: &Crossing) -> bool {
     let Crossing { p05_hours, p50_hours, p95_hours } = *crossing;
@@ -180,7 +164,7 @@ mod tests {
                 over: over / total,
                 horizon_hours,
                 scale: CELLS as f64 / horizon_hours.ln(),
-                calibration: CalibrationParams { low: -1.0, middle: 0.0, high: 1.0 },
+                calibration: CalibrationParams { low: -1.0, middle: 0.0, high: 1.0, scored: 0 },
             };
             let hours = found.quantile(probability);
             prop_assume!(hours.is_some_and(|hours| hours > 0.0));

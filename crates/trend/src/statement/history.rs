@@ -1,6 +1,6 @@
 //! A unit's history read: outliers out, offsets of the measurement undone, cut where it was reset.
 
-use crate::data::outliers::{CleanedSeries, NoiseScale, WeightedGap, mark_outliers};
+use crate::data::outliers::{CleanedSeries, WeightedGap, mark_outliers};
 use crate::data::segment::Segment;
 use crate::data::series::{Flight, MaintenanceEvent};
 use crate::data::steps::{StepChange, detect_steps};
@@ -16,24 +16,23 @@ const MAX_RIGGING_STEP: f64 = 0.15;
 const LEAST_DOUBT: f64 = 0.02;
 
 /// Flights from a change of installation within which a step is the books' own.
-const RECORD_FLIGHTS: usize = 3;
+pub(crate) const RECORD_FLIGHTS: usize = 3;
 
 /// What a unit's flights show, apart from wear.
 #[derive(Debug, Clone)]
 pub(crate) struct History {
     pub(crate) estimates: Vec<WeightedGap>,
     pub(crate) outliers: Vec<usize>,
-    pub(crate) scatter: NoiseScale,
+    /// Variance found between flights over the variance stated.
+    pub(crate) noise_factor: f64,
     pub(crate) changes: Vec<ChangePoint>,
     /// Variance that the sizes of undone offsets leave in the level, m².
     pub(crate) offset_m2: f64,
     /// Variance of the level from the uncertain kinds of the last segment's steps, m².
     pub(crate) kind_m2: f64,
     begins: Vec<SegmentStart>,
-    /// What has been taken off the last estimates, metres.
+    /// What has been taken off the last estimates, metres. The forecast adds a rise again: only the law is without it.
     pub(crate) undone_m: f64,
-    /// The first estimate after the last step.
-    pub(crate) last_step: usize,
     now: f64,
     known_age: Option<f64>,
 }
@@ -55,7 +54,7 @@ pub(crate) fn read_history(
     prior: &FleetPrior,
 ) -> History {
     let now = flights.last().map_or(0.0, |f| prior.usage(f));
-    let CleanedSeries { mut estimates, outliers, scatter } = mark_outliers(flights, prior.limit_m());
+    let CleanedSeries { mut estimates, outliers, noise_factor } = mark_outliers(flights, prior.limit_m());
     let found = detect_steps(&estimates, prior.limit_m());
     for estimate in &mut estimates {
         estimate.usage = prior.usage(&flights[estimate.flight]);
@@ -63,13 +62,12 @@ pub(crate) fn read_history(
     let mut history = History {
         estimates,
         outliers,
-        scatter,
+        noise_factor,
         changes: Vec::new(),
         offset_m2: 0.0,
         kind_m2: 0.0,
         begins: vec![SegmentStart { estimate: 0, usage: 0.0, fresh: false }],
         undone_m: 0.0,
-        last_step: found.last().map_or(0, |step| step.at),
         now,
         known_age,
     };
@@ -203,6 +201,12 @@ impl History {
             }
         })
     }
+}
+
+/// Whether installations or maintenance explain a change at a flight.
+pub(crate) fn is_recorded(flights: &[Flight], maintenance: &[MaintenanceEvent], flight: usize) -> bool {
+    maintenance.iter().any(|entry| is_near(entry, flights, flight))
+        || near_installation_change(flights, flight)
 }
 
 /// Whether a maintenance entry lies within a few flights of a step.

@@ -1,22 +1,14 @@
-//! Present gap, rate, growth and wear law of a unit, from the mixture over its curves.
+//! Rate, growth and wear law of a unit, from the mixture over its curves.
 
 use crate::inference::posterior::{Component, Posterior};
 use crate::math::distributions;
 use crate::math::weighted::WeightedSamples;
 use crate::prior::calibration_params::USUAL_WIDTH;
-use crate::prior::fleet_prior::FleetPrior;
-use crate::statement::types::{Level, Rate};
+use crate::statement::types::Rate;
 use crate::wear::bank::{WearClass, WearLaw};
 
 /// Growth that counts as visible, a share of the limit.
 const VISIBLE: f64 = 0.02;
-
-/// The mixture's mean and spread, the installation's bias and undone offsets included.
-pub(crate) fn level(posterior: &Posterior, prior: &FleetPrior, offset_m2: f64) -> Level {
-    let gap_m = posterior.components.iter().map(|n| n.weight * n.level_m).sum::<f64>();
-    let between = posterior.components.iter().map(|n| n.weight * (n.level_m - gap_m).powi(2)).sum::<f64>();
-    Level { gap_m, se_m: (between + posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2)).sqrt() }
-}
 
 /// Quantiles of the curves' rates now, per flight hour, as much wider as the future is stated.
 pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64) -> Rate {
@@ -36,7 +28,7 @@ pub(crate) fn growth_probability(posterior: &Posterior, limit_m: f64) -> f64 {
     probability(posterior.components.iter().map(grown).sum())
 }
 
-/// Weights come back from what is kept in single precision, so that together they may be a little more than one.
+/// Rounded sums of weights may be a little more than one.
 fn probability(sum: f64) -> f64 {
     sum.min(1.0)
 }

@@ -1,15 +1,13 @@
-//! Alert state of a unit, and its reason.
+//! Alert state of a unit, and its reason: the more urgent of the measured state and the forecast's.
 
 use std::fmt;
 
 use crate::data::series::DAY_US;
+use crate::measured::exceedance::Exceedance;
+use crate::measured::thresholds::HYSTERESIS;
+use crate::measured::{Jump, Measured};
 use crate::settings::Settings;
-use crate::statement::types::{ChangePoint, ChangePointKind, Crossing, Level, MIN_ESTIMATES};
-
-/// By how much a limit must be left before the state it caused is: three per cent of a gap, fifteen of
-/// the planning horizon. Without it a unit at a limit would change its state from run to run.
-const GAP_MARGIN: f64 = 0.97;
-const HORIZON_MARGIN: f64 = 1.15;
+use crate::statement::types::{ChangePoint, ChangePointKind};
 
 /// Alert state of a unit, from least to most urgent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,6 +16,8 @@ pub enum State {
     Normal,
     /// Inspect or monitor the unit.
     Watch,
+    /// Nothing is known: no sound record of late, or no limit.
+    Unassessed,
     /// Plan the replacement.
     Plan,
     /// Replace the unit.
@@ -26,13 +26,14 @@ pub enum State {
 
 impl State {
     /// All states, from least to most urgent.
-    pub const ALL: [Self; 4] = [Self::Normal, Self::Watch, Self::Plan, Self::Act];
+    pub const ALL: [Self; 5] = [Self::Normal, Self::Watch, Self::Unassessed, Self::Plan, Self::Act];
 
     /// Its word in columns, keys and messages.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Normal => "normal",
             Self::Watch => "watch",
+            Self::Unassessed => "unassessed",
             Self::Plan => "plan",
             Self::Act => "act",
         }
@@ -44,65 +45,104 @@ impl State {
     }
 }
 
-/// Why a state, or none.
+/// Why a state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub enum Reason {
-    /// No flight before the day, or none with a gap.
-    NoEstimate,
-    /// Too few estimates.
-    TooFew { estimates: usize },
-    /// No curve that explains the history has the gap where the last estimates are.
-    Unsupported { gap_m: f64, recent_m: f64 },
-    /// The gap is at its act limit.
-    AtLimit { gap_m: f64, limit_m: f64 },
-    /// The early crossing lies within the planning horizon.
+    /// No flight has a gap.
+    NoRecord,
+    /// No limit is configured.
+    NoLimit,
+    /// No sound record for some days; what the last one showed stays known.
+    Stale { days: f64, gap_m: f64 },
+    /// No record since a renewal.
+    Renewed { days: f64 },
+    /// Records at or above the limit.
+    AboveLimit { gap_m: f64, limit_m: f64, records: usize },
+    /// An exceedance that nothing has ended.
+    LimitHeld { gap_m: f64, limit_m: f64 },
+    /// One record above the limit.
+    Unconfirmed { gap_m: f64, limit_m: f64, before_m: Option<f64> },
+    /// The early crossing by a wear law lies within the planning horizon.
     CrossesSoon { p05_hours: f64, planning_horizon_hours: f64 },
+    /// The early crossing by the line through the last records does.
+    RisesToLimit { p05_hours: f64, planning_horizon_hours: f64, records: usize, m_per_hour: f64 },
     /// The gap is at its watch limit.
-    AtWatch { gap_m: f64, watch_m: f64 },
+    AtWatch { gap_m: f64, watch_m: f64, records: usize },
+    /// The gap rose at once.
+    Jumped { before_m: f64, after_m: f64, records: usize },
     /// A recent unrecorded change.
     Changed { kind: ChangePointKind, days: f64 },
     /// Nothing calls for anything.
-    Clear,
+    Clear { records: usize },
+}
+
+impl Reason {
+    /// Its code in columns.
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::NoRecord => "no_record",
+            Self::NoLimit => "no_limit",
+            Self::Stale { .. } => "stale",
+            Self::Renewed { .. } => "renewed",
+            Self::AboveLimit { .. } => "above_limit",
+            Self::LimitHeld { .. } => "limit_held",
+            Self::Unconfirmed { .. } => "unconfirmed",
+            Self::CrossesSoon { .. } => "crosses_soon",
+            Self::RisesToLimit { .. } => "rises_to_limit",
+            Self::AtWatch { .. } => "at_watch",
+            Self::Jumped { .. } => "jumped",
+            Self::Changed { kind: ChangePointKind::Onset, .. } => "onset",
+            Self::Changed { .. } => "changed",
+            Self::Clear { .. } => "clear",
+        }
+    }
+}
+
+/// A count with its noun.
+fn records(count: usize) -> String {
+    format!("{count} record{}", if count == 1 { "" } else { "s" })
 }
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let um = |m: f64| m * 1e6;
         match *self {
-            Self::NoEstimate => write!(f, "no estimate yet"),
-            Self::TooFew { estimates } => {
-                let noun = if estimates == 1 { "estimate" } else { "estimates" };
-                write!(f, "only {estimates} {noun}; at least {MIN_ESTIMATES} are needed")
+            Self::NoRecord => write!(f, "no record of a gap"),
+            Self::NoLimit => write!(f, "no limit is configured"),
+            Self::Stale { days, gap_m } => {
+                write!(f, "no sound record for {days:.0} days; the gap was {:.1} µm then", um(gap_m))
             }
-            Self::Unsupported { gap_m, recent_m } => {
-                let (gap_um, recent_um) = (um(gap_m), um(recent_m));
-                write!(
-                    f,
-                    "fit ends at {gap_um:.1} µm but the latest estimates average {recent_um:.1} µm: not assessed"
-                )
-            }
-            Self::AtLimit { gap_m, limit_m } if gap_m < limit_m => write!(
+            Self::Renewed { days } => write!(f, "no record since the maintenance {days:.0} days ago"),
+            Self::AboveLimit { gap_m, limit_m, records: count } => write!(
                 f,
-                "gap {:.1} µm was at the limit of {:.1} µm; `act` holds until it is below {:.1} µm",
+                "gap {:.1} µm is at or above the limit of {:.1} µm, by the last {}",
                 um(gap_m),
                 um(limit_m),
-                um(GAP_MARGIN * limit_m)
+                records(count)
             ),
-            Self::AtLimit { gap_m, limit_m } => {
-                write!(f, "gap {:.1} µm is at or above the limit of {:.1} µm", um(gap_m), um(limit_m))
+            Self::LimitHeld { gap_m, limit_m } => write!(
+                f,
+                "was at the limit of {:.1} µm; gap {:.1} µm: `act` holds until two records are below {:.1} µm",
+                um(limit_m),
+                um(gap_m),
+                um(HYSTERESIS * limit_m)
+            ),
+            Self::Unconfirmed { gap_m, limit_m, before_m } => {
+                let (gap_um, limit_um) = (um(gap_m), um(limit_m));
+                write!(
+                    f,
+                    "1 record of {gap_um:.1} µm is above the limit of {limit_um:.1} µm, not confirmed yet"
+                )?;
+                match before_m {
+                    Some(before_m) => write!(f, "; the records before read {:.1} µm", um(before_m)),
+                    None => write!(f, "; no record before it"),
+                }
             }
             Self::CrossesSoon { p05_hours, planning_horizon_hours } if p05_hours < 0.5 => {
                 write!(
                     f,
                     "may already be at the limit (5 % point); planning horizon {planning_horizon_hours:.0} FH"
-                )
-            }
-            Self::CrossesSoon { p05_hours, planning_horizon_hours } if p05_hours > planning_horizon_hours => {
-                let held_hours = HORIZON_MARGIN * planning_horizon_hours;
-                write!(
-                    f,
-                    "could reach the limit in {p05_hours:.0} FH (5 % point); `plan` holds until that exceeds {held_hours:.0} FH"
                 )
             }
             Self::CrossesSoon { p05_hours, planning_horizon_hours } => {
@@ -111,75 +151,116 @@ impl fmt::Display for Reason {
                     "could reach the limit within {p05_hours:.0} FH (5 % point); planning horizon {planning_horizon_hours:.0} FH"
                 )
             }
-            Self::AtWatch { gap_m, watch_m } if gap_m < watch_m => write!(
+            Self::RisesToLimit { p05_hours, planning_horizon_hours, records: count, m_per_hour } => write!(
+                f,
+                "rises {:.2} µm/FH over the last {} and could reach the limit within {p05_hours:.0} FH; planning horizon {planning_horizon_hours:.0} FH",
+                um(m_per_hour),
+                records(count)
+            ),
+            Self::AtWatch { gap_m, watch_m, .. } if gap_m < watch_m => write!(
                 f,
                 "gap {:.1} µm was above the watch limit of {:.1} µm; `watch` holds until it is below {:.1} µm",
                 um(gap_m),
                 um(watch_m),
-                um(GAP_MARGIN * watch_m)
+                um(HYSTERESIS * watch_m)
             ),
-            Self::AtWatch { gap_m, watch_m } => {
-                write!(f, "gap {:.1} µm is above the watch limit of {:.1} µm", um(gap_m), um(watch_m))
-            }
+            Self::AtWatch { gap_m, watch_m, records: count } => write!(
+                f,
+                "gap {:.1} µm is above the watch limit of {:.1} µm, by the last {}",
+                um(gap_m),
+                um(watch_m),
+                records(count)
+            ),
+            Self::Jumped { before_m, after_m, records: count } => write!(
+                f,
+                "gap rose at once from {:.1} to {:.1} µm, {} ago",
+                um(before_m),
+                um(after_m),
+                records(count)
+            ),
             Self::Changed { kind: ChangePointKind::Onset, days } => {
                 write!(f, "wear began or sped up {days:.0} days ago")
             }
             Self::Changed { kind, days } => write!(f, "{kind} {days:.0} days ago, not on record"),
-            Self::Clear => write!(f, "below all limits"),
+            Self::Clear { records: count } => write!(f, "below all limits, by the last {}", records(count)),
         }
     }
 }
 
-/// Evidence for a state.
-pub(crate) struct Evidence<'a> {
-    /// Departure of the last flight with a gap.
-    pub(crate) last_gap_us: Option<i64>,
-    pub(crate) estimates: usize,
-    pub(crate) as_of_us: i64,
-    pub(crate) level: Option<Level>,
-    pub(crate) crossing: Option<Crossing>,
-    pub(crate) changes: &'a [ChangePoint],
-    /// The unsupported level, and the level of the last estimates.
-    pub(crate) unsupported: Option<(f64, f64)>,
+/// Probability of growth from which a crossing to come is planned for below the watch limit.
+const LIKELY_GROWTH: f64 = 0.8;
+
+/// Earliest crossing of the limit by a forecast, flight hours from the last flight.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct EarliestCrossing {
+    pub(crate) p05_hours: f64,
+    /// Probability of visible growth.
+    pub(crate) growth_probability: f64,
+    /// Hours that have passed since the last flight, at the unit's own rate.
+    pub(crate) elapsed_hours: f64,
 }
 
-/// The state and its reason, most urgent first; a `previous` state is left only past its margin.
+/// The most urgent state, and its reason.
 pub(crate) fn alert_state(
-    evidence: &Evidence<'_>,
+    as_of_us: i64,
+    measured: &Measured,
+    earliest: Option<EarliestCrossing>,
+    changes: &[ChangePoint],
     settings: &Settings,
-    previous: Option<State>,
-) -> (Option<State>, Reason) {
-    let Some(last_gap_us) = evidence.last_gap_us else {
-        return (None, Reason::NoEstimate);
-    };
-    let days_since =
-        |departure_us: i64| evidence.as_of_us.saturating_sub(departure_us) as f64 / DAY_US as f64;
-    let (Some(Level { gap_m, .. }), Some(crossing)) = (evidence.level, evidence.crossing) else {
-        let few = Reason::TooFew { estimates: evidence.estimates };
-        let unsupported = |(gap_m, recent_m)| Reason::Unsupported { gap_m, recent_m };
-        let enough = evidence.estimates >= MIN_ESTIMATES;
-        return (None, evidence.unsupported.filter(|_| enough).map_or(few, unsupported));
-    };
+) -> (State, Reason) {
+    let days_since = |utc_us: i64| as_of_us.saturating_sub(utc_us) as f64 / DAY_US as f64;
     let Settings { limit_m, watch_m, planning_horizon_hours, .. } = *settings;
-    let margin = |state: State, margin: f64| if previous >= Some(state) { margin } else { 1.0 };
-    if gap_m >= limit_m * margin(State::Act, GAP_MARGIN) {
-        return (Some(State::Act), Reason::AtLimit { gap_m, limit_m });
-    }
-    let horizon_hours = planning_horizon_hours * margin(State::Plan, HORIZON_MARGIN);
-    if let Some(p05_hours) = crossing.p05_hours.filter(|hours| *hours <= horizon_hours) {
-        return (Some(State::Plan), Reason::CrossesSoon { p05_hours, planning_horizon_hours });
-    }
-    if gap_m >= watch_m * margin(State::Watch, GAP_MARGIN) {
-        return (Some(State::Watch), Reason::AtWatch { gap_m, watch_m });
-    }
-    let unknown = |change: &&ChangePoint| change.kind != ChangePointKind::Recorded;
-    if let Some(change) = evidence.changes.iter().rev().find(unknown) {
-        let days = days_since(change.departure_us);
-        // Counted to the last estimate: that no flight follows clears nothing.
-        let days_until_estimate = days - days_since(last_gap_us);
-        if days_until_estimate <= settings.change_watch_days {
-            return (Some(State::Watch), Reason::Changed { kind: change.kind, days });
+    let Some(level) = measured.level else { return (State::Unassessed, Reason::NoRecord) };
+    let gap_m = level.gap_m;
+    match measured.exceedance {
+        Some(Exceedance::Confirmed { records }) => {
+            return (State::Act, Reason::AboveLimit { gap_m, limit_m, records });
         }
+        Some(Exceedance::Held) => return (State::Act, Reason::LimitHeld { gap_m, limit_m }),
+        Some(Exceedance::Unconfirmed { gap_m, before_m }) => {
+            return (State::Plan, Reason::Unconfirmed { gap_m, limit_m, before_m });
+        }
+        None => {}
     }
-    (Some(State::Normal), Reason::Clear)
+    if let Some(utc_us) = measured.renewed_us {
+        return (State::Unassessed, Reason::Renewed { days: days_since(utc_us) });
+    }
+    let is_supported = |e: &EarliestCrossing| gap_m >= watch_m || e.growth_probability > LIKELY_GROWTH;
+    let soon = earliest.filter(|e| e.p05_hours - e.elapsed_hours <= planning_horizon_hours);
+    if let Some(EarliestCrossing { p05_hours, elapsed_hours, .. }) = soon.filter(is_supported) {
+        let p05_hours = (p05_hours - elapsed_hours).max(0.0);
+        let by_line = measured.rise.filter(|rise| rise.p05_hours - elapsed_hours <= p05_hours);
+        let reason = match by_line {
+            Some(rise) => Reason::RisesToLimit {
+                p05_hours,
+                planning_horizon_hours,
+                records: rise.records,
+                m_per_hour: rise.m_per_hour,
+            },
+            None => Reason::CrossesSoon { p05_hours, planning_horizon_hours },
+        };
+        return (State::Plan, reason);
+    }
+    let days = measured.last_sound_us().map(days_since);
+    if let Some(days) = days.filter(|days| *days > settings.stale_after_days) {
+        return (State::Unassessed, Reason::Stale { days, gap_m });
+    }
+    if measured.last_sound_us().is_none() {
+        return (State::Unassessed, Reason::NoRecord);
+    }
+    if gap_m >= watch_m || (measured.was_at_watch && gap_m >= HYSTERESIS * watch_m) {
+        return (State::Watch, Reason::AtWatch { gap_m, watch_m, records: level.records });
+    }
+    if let Some(Jump { before_m, after_m, records, .. }) = measured.jump {
+        return (State::Watch, Reason::Jumped { before_m, after_m, records });
+    }
+    match changes.iter().rev().find(|change| change.kind.is_unexplained()) {
+        // Counted to the last record: that no flight follows clears nothing.
+        Some(change)
+            if days_since(change.departure_us) - days.unwrap_or(0.0) <= settings.change_watch_days =>
+        {
+            (State::Watch, Reason::Changed { kind: change.kind, days: days_since(change.departure_us) })
+        }
+        _ => (State::Normal, Reason::Clear { records: level.records }),
+    }
 }

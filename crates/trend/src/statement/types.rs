@@ -2,16 +2,54 @@
 
 use std::fmt;
 
-/// Number of estimates below which an assessment holds only a level.
-pub const MIN_ESTIMATES: usize = 8;
+/// Number of estimates below which no wear law is fitted.
+pub(crate) const MIN_ESTIMATES: usize = 8;
 
-/// The gap at the end of the last flight.
+/// The measured level of the gap at the last record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
     /// The gap, metres.
     pub gap_m: f64,
-    /// Its standard error, metres.
+    /// Its standard error from the errors and the scatter of its records, metres.
     pub se_m: f64,
+    /// Number of records that it rests on.
+    pub records: usize,
+}
+
+/// The latest record of a unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LatestRecord {
+    /// Departure of its flight, microseconds since 1970 UTC.
+    pub departure_us: i64,
+    /// The gap, metres.
+    pub gap_m: f64,
+    /// Its standard error with the scatter that was found, metres.
+    pub se_m: f64,
+}
+
+/// What a crossing was computed by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ForecastMethod {
+    /// The records are at the limit: nothing is left to forecast.
+    Measured,
+    /// Wear laws weighted by the part number's fleet.
+    Fleet,
+    /// Wear laws weighted by the unit's own records.
+    SingleUnit,
+    /// The line through the last records: no wear law explains them.
+    Line,
+}
+
+impl ForecastMethod {
+    /// Its word in columns.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Fleet => "fleet",
+            Self::SingleUnit => "single_unit",
+            Self::Line => "line",
+        }
+    }
 }
 
 /// Growth in metres per flight hour, with its 90 % interval.
@@ -91,15 +129,33 @@ pub enum ChangePointKind {
     Onset,
     /// Recorded: an installation or a maintenance entry; without a step where the gap shows none.
     Recorded,
+    /// Records above the limit, confirmed by a second one.
+    Exceedance,
+    /// One record above the limit that the next ones did not confirm.
+    UnconfirmedExceedance,
 }
 
-impl fmt::Display for ChangePointKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl ChangePointKind {
+    /// Its word in columns.
+    pub fn as_str(self) -> &'static str {
+        match self {
             Self::Step => "step",
             Self::Reset => "reset",
             Self::Onset => "onset",
             Self::Recorded => "recorded",
-        })
+            Self::Exceedance => "exceedance",
+            Self::UnconfirmedExceedance => "exceedance_not_confirmed",
+        }
+    }
+
+    /// A change of the gap that no record explains.
+    pub fn is_unexplained(self) -> bool {
+        matches!(self, Self::Step | Self::Reset | Self::Onset)
+    }
+}
+
+impl fmt::Display for ChangePointKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
     }
 }

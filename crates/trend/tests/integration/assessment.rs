@@ -1,9 +1,6 @@
 //! Statements about units whose truth is known.
 
-use trend::{
-    Assessment, Observation, Reason, Series, Settings, State, UsageDefaults, WearStatus, assess,
-    assess_with_hysteresis,
-};
+use trend::{Assessment, Observation, Reason, Series, Settings, State, UsageDefaults, WearStatus, assess};
 
 const DAY_US: i64 = 86_400_000_000;
 
@@ -27,12 +24,13 @@ fn unit(days: i64, gap_um: impl Fn(f64) -> f64) -> Series {
         load_reversals: Some(100),
         gap_m: Some((gap_um(2.0 * (day + 1) as f64) + scatter_um(day)) * 1e-6),
         gap_se_m: Some(1e-6),
+        is_doubtful: false,
     });
     Series::new(rows, &UsageDefaults { unit_hours_at_start: Some(0.0), ..UsageDefaults::default() }).unwrap()
 }
 
 fn state_of(series: &Series, day: i64) -> Assessment {
-    assess(series, day * DAY_US, &Settings::for_limit(1e-4), None, None).unwrap()
+    assess(series, day * DAY_US, &Settings::for_limit(1e-4), None).unwrap()
 }
 
 #[test]
@@ -48,7 +46,7 @@ fn a_unit_wearing_along_a_line_is_known_by_level_rate_and_crossing() {
     assert!(crossing.p05_hours < Some(3200.0) && crossing.p95_hours > Some(3200.0), "{crossing:?}");
     assert_eq!(
         (assessment.wear, assessment.state, assessment.unit_hours),
-        (WearStatus::Wearing, Some(State::Normal), Some(800.0))
+        (WearStatus::Wearing, State::Normal, Some(800.0))
     );
 }
 
@@ -57,7 +55,7 @@ fn a_unit_that_does_not_wear_is_steady_and_its_late_crossing_beyond_the_horizon(
     let assessment = state_of(&unit(400, |_| 20.0), 400);
     assert_eq!(
         (assessment.wear, assessment.state, assessment.reason),
-        (WearStatus::Steady, Some(State::Normal), Reason::Clear)
+        (WearStatus::Steady, State::Normal, Reason::Clear { records: 12 })
     );
     assert_eq!(assessment.crossing.unwrap().p95_hours, None);
 }
@@ -65,11 +63,11 @@ fn a_unit_that_does_not_wear_is_steady_and_its_late_crossing_beyond_the_horizon(
 #[test]
 fn a_unit_over_its_limit_must_act_and_has_no_hours_left() {
     let assessment = state_of(&unit(400, |h| 40.0 + 0.08 * h), 400);
-    assert_eq!(assessment.state, Some(State::Act));
+    assert_eq!(assessment.state, State::Act);
     assert_eq!(assessment.crossing.unwrap().p50_hours, Some(0.0));
     let text = assessment.reason.to_string();
     assert!(
-        text.starts_with("gap 104.") && text.ends_with(" µm is at or above the limit of 100.0 µm"),
+        text.starts_with("gap 10") && text.contains(" µm is at or above the limit of 100.0 µm, by the last"),
         "{text}"
     );
 }
@@ -77,7 +75,7 @@ fn a_unit_over_its_limit_must_act_and_has_no_hours_left() {
 #[test]
 fn a_unit_that_meets_its_limit_soon_is_planned() {
     let assessment = state_of(&unit(400, |h| 30.0 + 0.06 * h), 400);
-    assert_eq!(assessment.state, Some(State::Plan), "{assessment:?}");
+    assert_eq!(assessment.state, State::Plan, "{assessment:?}");
 }
 
 /// A unit at its limit whose aircraft sends nothing is still at its limit.
@@ -89,19 +87,26 @@ fn silence_clears_no_alarm() {
         (unit(400, |h| 20.0 + 0.02 * h + if h > 770.0 { 12.0 } else { 0.0 }), State::Watch),
     ] {
         let (last, silent) = (state_of(&series, 399), state_of(&series, 500));
-        assert_eq!((last.state, last.stale_days), (Some(state), None), "{last:?}");
-        assert_eq!((silent.state, silent.stale_days), (Some(state), Some(101.0)), "{silent:?}");
+        assert_eq!((last.state, last.stale_days), (state, None), "{last:?}");
+        assert_eq!(
+            (silent.state, silent.stale_days),
+            (state.max(State::Unassessed), Some(101.0)),
+            "{silent:?}"
+        );
         assert_eq!((silent.level, silent.crossing), (last.level, last.crossing));
     }
 }
 
 #[test]
-fn no_state_stands_on_few_estimates() {
+fn a_state_stands_from_the_first_record_on() {
     let series = unit(400, |h| 20.0 + 0.02 * h);
     let young = state_of(&series, 3);
-    assert_eq!((young.state, young.reason), (None, Reason::TooFew { estimates: 4 }));
-    assert_eq!(state_of(&series, 0).reason.to_string(), "only 1 estimate; at least 8 are needed");
-    assert_eq!(state_of(&series, -1).reason, Reason::NoEstimate);
+    assert_eq!((young.state, young.reason), (State::Normal, Reason::Clear { records: 4 }));
+    assert_eq!(state_of(&series, 0).reason.to_string(), "below all limits, by the last 1 record");
+    assert_eq!(
+        (state_of(&series, -1).state, state_of(&series, -1).reason),
+        (State::Unassessed, Reason::NoRecord)
+    );
 }
 
 #[test]
@@ -113,7 +118,7 @@ fn later_flights_do_not_change_an_assessment() {
 #[test]
 fn settings_nothing_can_be_judged_by_are_refused() {
     let settings = Settings { watch_m: 2e-4, ..Settings::for_limit(1e-4) };
-    let text = assess(&unit(9, |_| 20.0), 0, &settings, None, None).unwrap_err().to_string();
+    let text = assess(&unit(9, |_| 20.0), 0, &settings, None).unwrap_err().to_string();
     assert_eq!(text, "watch limit is 2e-4 m and act limit 1e-4 m: watch must come first");
 }
 
@@ -122,9 +127,8 @@ fn a_remembered_state_does_not_flap_around_its_limit_and_follows_from_the_flight
     // 20 µm per 1,000 h from 20 µm: past the watch limit of 60 µm at 2,000 h, day 1,000; ± 1 µm of scatter.
     let series = unit(1100, |h| 20.0 + 0.02 * h);
     let settings = Settings { watch_m: 60e-6, planning_horizon_hours: 1.0, ..Settings::for_limit(1e-4) };
-    let states: Vec<State> = (940..1060)
-        .filter_map(|day| assess_with_hysteresis(&series, day * DAY_US, &settings, None).unwrap().state)
-        .collect();
+    let states: Vec<State> =
+        (940..1060).map(|day| assess(&series, day * DAY_US, &settings, None).unwrap().state).collect();
     let changes = states.windows(2).filter(|pair| pair[0] != pair[1]).count();
     assert_eq!((states.first(), states.last(), changes), (Some(&State::Normal), Some(&State::Watch), 1));
 }

@@ -1,9 +1,7 @@
 //! Fleets with too much or no information: whatever the prior, the level of a unit is where its estimates are.
 
 use proptest::prelude::*;
-use trend::{
-    Assessment, FleetPrior, Observation, Reason, Series, Settings, State, UsageDefaults, assess, forecast,
-};
+use trend::{Assessment, FleetPrior, Observation, Series, Settings, State, UsageDefaults, assess, forecast};
 
 use crate::random::Random;
 
@@ -40,6 +38,7 @@ impl Unit {
                     load_reversals: Some(100),
                     gap_m: Some((self.new_um + worn_um + self.noise_um * random.normal()) * 1e-6),
                     gap_se_m: self.stated_um.map(|um| um * 1e-6),
+                    is_doubtful: false,
                 }
             })
             .collect();
@@ -52,7 +51,7 @@ impl Unit {
 
     fn assessment(self, seed: u64, prior: &FleetPrior) -> Assessment {
         let settings = Settings::for_limit(LIMIT_M);
-        assess(&self.series(seed), self.last_day_us(), &settings, Some(prior), None).unwrap()
+        assess(&self.series(seed), self.last_day_us(), &settings, Some(prior)).unwrap()
     }
 }
 
@@ -80,7 +79,7 @@ fn a_fleet_that_never_wears_does_not_talk_a_unit_near_its_limit_down() {
             Unit { new_um: 90.0 - 225.0 * um_per_hour, um_per_hour, ..STILL }.assessment(9, &prior);
         let level = assessment.level.unwrap();
         assert!((level.gap_m - 90e-6).abs() < 3e-6, "{level:?}");
-        assert!(assessment.state > Some(State::Normal), "{:?}: {}", assessment.state, assessment.reason);
+        assert!(assessment.state > State::Normal, "{:?}: {}", assessment.state, assessment.reason);
     }
 }
 
@@ -111,13 +110,14 @@ fn a_rise_beyond_what_rigging_does_is_damage_and_stays_in_the_level() {
             load_reversals: None,
             gap_m: flight.gap.map(|gap| gap.gap_m),
             gap_se_m: Some(1e-6),
+            is_doubtful: false,
         });
     }
     let series = Series::new(rows, &UsageDefaults::default()).unwrap();
-    let assessment = assess(&series, STILL.last_day_us(), &Settings::for_limit(LIMIT_M), None, None).unwrap();
+    let assessment = assess(&series, STILL.last_day_us(), &Settings::for_limit(LIMIT_M), None).unwrap();
     let level = assessment.level.unwrap();
     assert!((level.gap_m - 80e-6).abs() < 2e-6, "{level:?} {:?}", assessment.changes);
-    assert_eq!(assessment.state, Some(State::Watch), "{}", assessment.reason);
+    assert_eq!(assessment.state, State::Watch, "{}", assessment.reason);
 }
 
 fn units() -> impl Strategy<Value = Unit> {
@@ -149,21 +149,16 @@ proptest! {
         let fleet: Vec<Unit> = fleet.iter().copied().cycle().take(copies * fleet.len()).collect();
         let prior = learned(&fleet);
         let assessment = unit.assessment(1000, &prior);
-        let Some(level) = assessment.level else {
-            let known = matches!(assessment.reason, Reason::TooFew { .. } | Reason::Unsupported { .. });
-            prop_assert!(assessment.state.is_none() && known, "{}", assessment.reason);
-            return Ok(());
-        };
+        let level = assessment.level.unwrap();
         let (last_um, scatter_um) = last_um(&unit.series(1000));
         // Wear of a dozen flights, the scatter that was found, and what an installation or a season may add.
         let reach_um = 20.0 + 18.0 * unit.um_per_hour + 5.0 * scatter_um;
         prop_assert!((level.gap_m * 1e6 - last_um).abs() < reach_um, "{level:?} of {last_um} µm");
         prop_assert!(level.se_m > 0.0 && level.se_m.is_finite());
-        let crossing = assessment.crossing.unwrap();
+        let Some((crossing, rate)) = assessment.crossing.zip(assessment.rate) else { return Ok(()) };
         let hours = [crossing.p05_hours, crossing.p50_hours, crossing.p95_hours];
         let hours = hours.map(|h| h.unwrap_or(f64::INFINITY));
         prop_assert!(0.0 <= hours[0] && hours[0] <= hours[1] && hours[1] <= hours[2], "{hours:?}");
-        let rate = assessment.rate.unwrap();
         let rates = [rate.p05_m_per_hour, rate.m_per_hour, rate.p95_m_per_hour];
         prop_assert!(rates.iter().all(|r| r.is_finite()) && rates.is_sorted(), "{rates:?}");
         prop_assert!((0.0..=1.0 + 1e-9).contains(&assessment.check_probability.unwrap()));
@@ -187,11 +182,12 @@ fn gaps_beyond_every_curve_leave_numbers_or_nothing() {
             load_reversals: Some(100),
             gap_m: Some(30e-6 + 2e-7 * day as f64),
             gap_se_m: Some(1e-6),
+            is_doubtful: false,
         })
         .collect();
     rows[8..52].iter_mut().for_each(|row| row.gap_m = Some(1e9));
     let series = Series::new(rows, &UsageDefaults::default()).unwrap();
-    let found = assess(&series, 111 * DAY_US, &Settings::for_limit(LIMIT_M), None, None).unwrap();
+    let found = assess(&series, 111 * DAY_US, &Settings::for_limit(LIMIT_M), None).unwrap();
     assert!(found.level.is_none_or(|level| level.gap_m.is_finite()), "{found:?}");
     assert!(found.growth_probability.is_none_or(|p| (0.0..=1.0).contains(&p)), "{found:?}");
 }

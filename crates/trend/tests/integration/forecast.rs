@@ -31,13 +31,14 @@ fn series(days: i64) -> Series {
         load_reversals: None,
         gap_m: Some((true_um(day) + scatter_um(day)) * 1e-6),
         gap_se_m: Some(1e-6),
+        is_doubtful: false,
     };
     Series::new((0..days).map(row), &UsageDefaults::default()).unwrap()
 }
 
 fn drawn(days: i64, hours: &[f64]) -> (Crossing, Forecast) {
     let (series, settings, now) = (series(days), Settings::for_limit(LIMIT_M), days * DAY_US);
-    let crossing = assess(&series, now, &settings, None, None).unwrap().crossing.unwrap();
+    let crossing = assess(&series, now, &settings, None).unwrap().crossing.unwrap();
     (crossing, forecast(&series, now, &settings, None, hours.iter().copied()).unwrap())
 }
 

@@ -50,6 +50,7 @@ fn wearing(flights: i64) -> Vec<Observation> {
         load_reversals: Some(100),
         gap_m: Some(30e-6 + 2e-7 * day as f64 + 1e-6 * (day as f64).sin()),
         gap_se_m: Some(1e-6),
+        is_doubtful: false,
     };
     (0..flights).map(flight).collect()
 }
@@ -109,7 +110,7 @@ fn assess_any(bytes: &[u8]) -> String {
         .len()
         .is_multiple_of(2)
         .then(|| FleetPrior::learn(fleet.iter().chain([&series]), as_of_us, settings.limit_m, None));
-    let found = match assess(&series, as_of_us, &settings, prior.as_ref(), None) {
+    let found = match assess(&series, as_of_us, &settings, prior.as_ref()) {
         Ok(found) => found,
         Err(e) => return format!("{e:?}").chars().take(30).collect(),
     };
@@ -140,7 +141,7 @@ fn extreme_dates_and_horizons_leave_numbers() {
     for (as_of_us, horizon_hours) in [(i64::MAX, 20_000.0), (99 * DAY_US, 0.5), (99 * DAY_US, 1.0), (0, 1e-3)]
     {
         let settings = Settings { horizon_hours, ..plain };
-        let found = assess(&series, as_of_us, &settings, None, None).unwrap();
+        let found = assess(&series, as_of_us, &settings, None).unwrap();
         assert!(found.check_probability.is_none_or(|p| (0.0..=1.0).contains(&p)), "{found:?}");
     }
 }

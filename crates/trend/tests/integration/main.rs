@@ -7,14 +7,16 @@
 )]
 
 mod assessment;
-mod checkpoints;
-mod classic;
+mod cost;
 mod degenerate;
 mod fleet;
 mod forecast;
+mod forecasts;
 mod fuzz;
+mod histories;
 mod quantities;
 mod random;
 mod scale;
 mod series;
+mod states;
 mod steps;

@@ -34,6 +34,7 @@ fn rows(seed: u64) -> Vec<Observation> {
                 load_reversals: Some(150),
                 gap_m: Some(measured_um * 1e-6),
                 gap_se_m: states_errors.then_some(se_um * 1e-6),
+                is_doubtful: false,
             })
         })
         .collect()
@@ -44,6 +45,7 @@ fn assessments(factor: f64) -> Vec<Assessment> {
     let scaled = |row: Observation| Observation {
         gap_m: row.gap_m.map(|m| factor * m),
         gap_se_m: row.gap_se_m.map(|m| factor * m),
+        is_doubtful: false,
         ..row
     };
     let series = |seed| Series::new(rows(seed).into_iter().map(scaled), &UsageDefaults::default()).unwrap();
@@ -53,7 +55,7 @@ fn assessments(factor: f64) -> Vec<Assessment> {
     let assessment = |(unit, series): (usize, &Series)| {
         // Every sixth unit without the fleet, as a part number without history.
         let prior = (unit % 6 != 5).then_some(&prior);
-        assess(series, DAYS * DAY_US, &settings, prior, None).unwrap()
+        assess(series, DAYS * DAY_US, &settings, prior).unwrap()
     };
     fleet.iter().enumerate().map(assessment).collect()
 }

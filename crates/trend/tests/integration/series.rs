@@ -12,6 +12,7 @@ fn row(day: i64, installation: u32, hours: Option<f64>, meter: Option<f64>) -> O
         load_reversals: Some(100),
         gap_m: Some(1e-5),
         gap_se_m: Some(1e-6),
+        is_doubtful: false,
     }
 }
 

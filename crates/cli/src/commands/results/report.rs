@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 use pipeline::Event;
-use pipeline::fleet_trends::assess::UnitSelection;
 use pipeline::report::{compose, data, flight_plots, publish};
 use store::Store;
 
@@ -28,7 +27,7 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
     row_output::check_folder(&args.output)?;
     note_future(args.as_of, output);
     let (config, installations) = load_with_installations(global)?;
-    let ask = UnitSelection { statistics: true, ..args.units.selection(args.as_of) };
+    let ask = args.units.selection(args.as_of);
     let store = Store::open(config.store())?;
     let program = format!("Freeplay {VERSION}");
     let mut report = compose::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;

@@ -2,10 +2,9 @@
 
 use job::Config;
 use pipeline::fleet_trends::assess::{self, StoreAssessment, UnitSelection};
-use pipeline::fleet_trends::inspection_interval::{inspection_intervals, interval_advice};
 use pipeline::monitoring::mapping_faults::MappingFault;
 use records::uncertainty::NORMAL_95;
-use records::{InspectionInterval, Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
+use records::{Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
 use store::Store;
 
 use crate::args::{Global, TrendArgs};
@@ -24,8 +23,8 @@ use crate::commands::context::{KnownNames, load_trend_context, note_future, sele
 pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     note_future(args.as_of, output);
     let (config, installations) = load_trend_context(&args.external, global, output)?;
-    let ask = UnitSelection { statistics: args.statistics, ..args.units.selection(args.as_of) };
-    if args.quantities || args.changes || args.intervals {
+    let ask = args.units.selection(args.as_of);
+    if args.quantities || args.changes {
         return quantities(args, &ask, &config, &installations, output);
     }
     let (mut mapping_faults, mut notes) = (Vec::new(), Vec::new());
@@ -44,9 +43,13 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
             match queries {
                 Some(file) => {
                     let queries = pipeline::history::external_estimates::queries(file)?;
-                    assess::assess_queries(&config, &installations, histories, &queries, args.statistics)?
+                    assess::assess_queries(&config, &installations, histories, &queries)?
                 }
-                None => assess::assess_histories(&config, &installations, histories, &ask)?,
+                None => {
+                    let found = assess::assess_histories(&config, &installations, histories, &ask)?;
+                    notes = pipeline::monitoring::coverage::notes(&found, &config);
+                    found
+                }
             }
         }
     };
@@ -91,11 +94,7 @@ fn quantities(
         let known = KnownNames::read(config);
         known.check_units(&args.units)?;
     }
-    if args.intervals {
-        let found = inspection_intervals(&units, config.document.trend.inspection_risk);
-        let page = || intervals_page(&found);
-        row_output::write_rows(&args.rows, output, || row_output::batch(&found), page)?;
-    } else if args.changes {
+    if args.changes {
         let page = || changes_page(&followed.changes, units.len());
         row_output::write_rows(&args.rows, output, || row_output::batch(&followed.changes), page)?;
     } else {
@@ -143,37 +142,6 @@ fn quantities_page(rows: &[QuantityRow]) -> String {
         return "no unit was selected\n".to_owned();
     }
     table::layout(&columns, &rows.iter().map(cells).collect::<Vec<_>>())
-}
-
-fn intervals_page(rows: &[InspectionInterval]) -> String {
-    let columns = [
-        text("part", 0),
-        number("interval [FH]", 0),
-        number("units", 2),
-        number("mean chance", 1),
-        number("largest chance", 0),
-        text("serial", 1),
-    ];
-    let percent = |chance: f64| format!("{:.2} %", 100.0 * chance);
-    let cells = |row: &InspectionInterval| {
-        vec![
-            row.part_number.clone().unwrap_or_else(table::empty_cell),
-            format!("{:.0}", row.interval_hours),
-            row.units.to_string(),
-            percent(row.mean_chance),
-            percent(row.largest_chance),
-            row.serial_number.clone(),
-        ]
-    };
-    if rows.is_empty() {
-        return "no unit in state normal or watch has a forecast\n".to_owned();
-    }
-    let mut page = table::layout(&columns, &rows.iter().map(cells).collect::<Vec<_>>());
-    for of_part in rows.chunk_by(|a, b| a.part_number == b.part_number) {
-        page.push_str(&interval_advice(&of_part[0]));
-        page.push('\n');
-    }
-    page
 }
 
 /// A number with three significant digits.
@@ -242,6 +210,8 @@ pub(crate) fn unit_table(mut units: Vec<&TrendRow>) -> String {
         text("position", 0),
         text("part / serial", 1),
         number("gap [µm]", 0),
+        number("records", 8),
+        number("latest [µm]", 9),
         number("limit [µm]", 3),
         text("action", 4),
         text("due by", 0),
@@ -261,8 +231,10 @@ pub(crate) fn unit_table(mut units: Vec<&TrendRow>) -> String {
             r.position.clone().unwrap_or_else(table::empty_cell),
             format!("{} / {}", r.part_number.as_deref().unwrap_or("–"), r.serial_number),
             table::gap(r.gap_m, r.gap_se_m.map(|se_m| NORMAL_95 * se_m)),
+            r.gap_records.map_or_else(table::empty_cell, |n| n.to_string()),
+            table::micrometres(r.latest_gap_m),
             table::micrometres(r.limit_m),
-            r.action.map_or_else(table::empty_cell, str::to_owned),
+            r.action.map_or_else(table::empty_cell, |action| action.replace('_', " ")),
             r.due_text().unwrap_or_else(table::empty_cell),
             sparkline(&r.sketch_m.0, r.limit_m),
             r.rate_m_per_hour.map_or_else(table::empty_cell, |v| format!("{:.1}", v * 1e9)),

@@ -155,6 +155,7 @@ fn follow(event: &Event, progress: &Progress<'_>) {
 fn is_reached(report: &RunSummary, least: FailOn) -> bool {
     let least = match least {
         FailOn::Watch => State::Watch,
+        FailOn::Unassessed => State::Unassessed,
         FailOn::Plan => State::Plan,
         FailOn::Act => State::Act,
     };
@@ -446,16 +447,16 @@ fn work_list_section(rows: &[TrendRow], work_list: &[TrendRow]) -> String {
     if rows.is_empty() && work_list.is_empty() {
         return String::new();
     }
-    let silent = rows.iter().filter(|r| r.state.is_none()).count();
+    let removed = rows.iter().filter(|r| r.state.is_none()).count();
     let normal = rows.iter().filter(|r| r.state == Some(State::Normal.as_str())).count();
     let mut page = if rows.is_empty() {
         format!("\nno unit updated; {} in the fleet need attention\n", count(work_list.len(), "unit"))
     } else {
         format!(
-            "\n{} updated: {} need attention, {normal} normal, {silent} not assessed{}; {} in the fleet need attention\n",
+            "\n{} updated: {} need attention, {normal} normal{}; {} in the fleet need attention\n",
             count(rows.len(), "unit"),
-            rows.len() - normal - silent,
-            if silent > 0 { " (see `freeplay trend`)" } else { "" },
+            rows.len() - normal - removed,
+            if removed > 0 { format!(", {removed} removed") } else { String::new() },
             count(work_list.len(), "unit")
         )
     };

@@ -1,0 +1,107 @@
+//! Records above the limit: unconfirmed, confirmed, ended.
+
+use crate::measured::level::MeasuredLevel;
+use crate::measured::record::Record;
+use crate::measured::thresholds::{HYSTERESIS, JUMP_ERRORS, JUMP_SHARE, RECALLED};
+use crate::statement::types::{ChangePoint, ChangePointKind};
+
+/// The gap is at or above its limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Exceedance {
+    /// One record alone: the next one confirms or clears it.
+    Unconfirmed { gap_m: f64, before_m: Option<f64> },
+    /// Two records at least, or the level of the last records.
+    Confirmed { records: usize },
+    /// Confirmed before; neither two records below the limit nor maintenance have ended it, or the level is at 97 % of
+    /// the limit or more.
+    Held,
+}
+
+/// Records at or above the limit, one after the other.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    first: usize,
+    above: usize,
+    /// Records below the limit since.
+    below: usize,
+    is_confirmed: bool,
+    before_m: Option<f64>,
+}
+
+/// The exceedance at the last of some records, and the events of all of them.
+pub(crate) fn exceedance(
+    all: &[Record],
+    level: Option<MeasuredLevel>,
+    limit_m: f64,
+) -> (Option<Exceedance>, Vec<ChangePoint>) {
+    let is_above = |record: &Record| record.gap_m >= limit_m;
+    // A doubtful record below the limit clears nothing.
+    let records: Vec<Record> = all.iter().copied().filter(|r| r.is_sound || is_above(r)).collect();
+    let mut events = Vec::new();
+    let mut run: Option<Run> = None;
+    let mut ended_at = None;
+    for (k, record) in records.iter().enumerate() {
+        if k > 0 && record.period != records[k - 1].period {
+            (run, ended_at) = (None, None);
+        }
+        let mut current = match run {
+            None if !is_above(record) => continue,
+            None => Run { first: k, above: 0, below: 0, is_confirmed: false, before_m: before(&records, k) },
+            Some(run) => run,
+        };
+        if is_above(record) {
+            current.above += 1;
+            current.below = 0;
+            let is_any_sound = records[current.first..=k].iter().any(|r| r.is_sound && is_above(r));
+            if !current.is_confirmed && current.above > 1 && is_any_sound {
+                current.is_confirmed = true;
+                events.push(event(&records[current.first], &current, ChangePointKind::Exceedance));
+            }
+            run = Some(current);
+            continue;
+        }
+        current.below += 1;
+        let least_m = (JUMP_SHARE * limit_m).max(JUMP_ERRORS * record.error_m);
+        let has_returned = current.before_m.is_some_and(|before_m| record.gap_m <= before_m + least_m);
+        run = Some(current);
+        if current.below > 1 || (!current.is_confirmed && has_returned) {
+            if current.is_confirmed {
+                ended_at = Some(k);
+            } else {
+                events.push(event(&records[current.first], &current, ChangePointKind::UnconfirmedExceedance));
+            }
+            run = None;
+        }
+    }
+    let is_held = |level: MeasuredLevel| {
+        level.gap_m >= HYSTERESIS * limit_m && ended_at.is_some_and(|k| k + RECALLED >= records.len())
+    };
+    let by_level = level.filter(|level| level.records > 1 && level.gap_m >= limit_m);
+    let last_period = records.last().map(|record| record.period);
+    let found = match (run, by_level) {
+        _ if level.map(|level| level.period) != last_period => None,
+        (Some(run), _) if run.is_confirmed && run.below == 0 => {
+            Some(Exceedance::Confirmed { records: run.above })
+        }
+        (_, Some(level)) => Some(Exceedance::Confirmed { records: level.records }),
+        (Some(run), None) if run.is_confirmed => Some(Exceedance::Held),
+        (_, None) if level.is_some_and(is_held) => Some(Exceedance::Held),
+        (Some(run), None) => {
+            Some(Exceedance::Unconfirmed { gap_m: records[run.first].gap_m, before_m: run.before_m })
+        }
+        (None, None) => None,
+    };
+    (found, events)
+}
+
+/// The middle of the last three sound records before a record, in its period.
+fn before(records: &[Record], at: usize) -> Option<f64> {
+    let period = records[at].period;
+    let near = records[..at].iter().rev().take_while(|r| r.period == period).filter(|r| r.is_sound).take(3);
+    crate::math::median::median(&mut near.map(|r| r.gap_m).collect::<Vec<f64>>())
+}
+
+fn event(first: &Record, run: &Run, kind: ChangePointKind) -> ChangePoint {
+    let step_m = run.before_m.map_or(0.0, |before_m| first.gap_m - before_m);
+    ChangePoint { departure_us: first.departure_us, kind, step_m, se_m: first.error_m, certainty: 1.0 }
+}

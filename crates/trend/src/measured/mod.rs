@@ -1,0 +1,119 @@
+//! Measured state: what the last records of an installation show.
+//!
+//! No prior, no fleet, no minimum number of records. A forecast adds a date and may raise the urgency; nothing lowers
+//! what this module finds.
+
+pub(crate) mod exceedance;
+pub(crate) mod level;
+pub(crate) mod record;
+pub(crate) mod rise;
+pub(crate) mod thresholds;
+
+use crate::data::series::{DAY_US, Flight, MaintenanceEvent};
+use crate::measured::exceedance::{Exceedance, exceedance};
+use crate::measured::level::{MeasuredLevel, measured_level};
+use crate::measured::record::{Record, records};
+use crate::measured::rise::{Rise, rise};
+use crate::measured::thresholds::{HYSTERESIS, JUMP_ERRORS, JUMP_RECORDS, JUMP_SHARE, RECALLED};
+use crate::settings::Settings;
+use crate::statement::types::ChangePoint;
+
+/// The level rose at once by more than wear and errors explain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Jump {
+    pub(crate) departure_us: i64,
+    pub(crate) before_m: f64,
+    pub(crate) after_m: f64,
+    pub(crate) error_m: f64,
+    /// Records since the jump.
+    pub(crate) records: usize,
+}
+
+/// What the records of an installation show.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Measured {
+    pub(crate) level: Option<MeasuredLevel>,
+    /// The latest record, sound or not.
+    pub(crate) latest: Option<Record>,
+    pub(crate) exceedance: Option<Exceedance>,
+    pub(crate) jump: Option<Jump>,
+    pub(crate) rise: Option<Rise>,
+    /// Whether one of the last levels was at the watch limit.
+    pub(crate) was_at_watch: bool,
+    /// Renewing maintenance after the last record.
+    pub(crate) renewed_us: Option<i64>,
+    /// Records above the limit, confirmed and not.
+    pub(crate) events: Vec<ChangePoint>,
+    /// The sound records, oldest first.
+    pub(crate) sound: Vec<Record>,
+}
+
+impl Measured {
+    /// Reads the last records of a unit's present installation.
+    pub(crate) fn new(flights: &[Flight], maintenance: &[MaintenanceEvent], settings: &Settings) -> Self {
+        let (all, renewed_us) = records(flights, maintenance, settings.limit_m);
+        let Some(latest) = all.last().copied() else { return Self::default() };
+        let sound: Vec<Record> = all.iter().copied().filter(|record| record.is_sound).collect();
+        // Doubtful records are better than none.
+        let has_sound = sound.last().is_some_and(|record| record.period == latest.period);
+        let sound = if has_sound { sound } else { all.clone() };
+        let level = measured_level(&sound, settings.limit_m);
+        let (exceedance, events) = exceedance(&all, level, settings.limit_m);
+        Self {
+            level,
+            latest: Some(latest),
+            exceedance: exceedance.filter(|_| renewed_us.is_none()),
+            jump: jump(&sound, settings),
+            rise: rise(&sound, settings),
+            was_at_watch: was_at_watch(&sound, level, settings),
+            renewed_us,
+            events,
+            sound,
+        }
+    }
+
+    /// Departure of the last sound record.
+    pub(crate) fn last_sound_us(&self) -> Option<i64> {
+        self.sound.iter().rev().find(|record| record.is_sound).map(|record| record.departure_us)
+    }
+}
+
+/// The last jump of the level that is still reported.
+fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
+    /// Share of a jump that must be left.
+    const LEFT: f64 = 0.8;
+    let last = sound.last()?;
+    let present = measured_level(sound, settings.limit_m)?;
+    let mut to = sound.len();
+    loop {
+        let now = measured_level(&sound[..to], settings.limit_m)?;
+        let (from, records) = (to - now.window.min(to), sound.len() - (to - now.window.min(to)));
+        let first = sound.get(from)?;
+        let days = last.departure_us.saturating_sub(first.departure_us) as f64 / DAY_US as f64;
+        if from == 0 || (records > JUMP_RECORDS && days > settings.change_watch_days) {
+            return None;
+        }
+        let before = measured_level(&sound[..from], settings.limit_m)?;
+        let after_m = now.at(first.hours);
+        let error_m = before.se_m.hypot(now.se_m.min(first.error_m)).max(first.error_m);
+        let least_m = (JUMP_SHARE * settings.limit_m).max(JUMP_ERRORS * error_m);
+        let is_left = present.gap_m - before.gap_m > LEFT * least_m;
+        if is_left && after_m - before.at(first.hours) > least_m && after_m - before.gap_m > least_m {
+            let (departure_us, before_m) = (first.departure_us, before.gap_m);
+            return Some(Jump { departure_us, before_m, after_m, error_m, records });
+        }
+        to = from;
+    }
+}
+
+/// Whether one of the last levels was at the watch limit; asked only where it makes a difference.
+fn was_at_watch(sound: &[Record], level: Option<MeasuredLevel>, settings: &Settings) -> bool {
+    let Settings { watch_m, limit_m, .. } = *settings;
+    let Some(level) = level.filter(|level| level.gap_m >= HYSTERESIS * watch_m) else { return false };
+    let first = sound.len().saturating_sub(RECALLED).max(1);
+    let is_at_watch = |to| {
+        let earlier = measured_level(&sound[..to], limit_m);
+        earlier.is_some_and(|earlier| earlier.period == level.period && earlier.gap_m >= watch_m)
+    };
+    (first..sound.len()).any(is_at_watch)
+}

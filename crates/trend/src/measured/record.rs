@@ -1,0 +1,51 @@
+//! Records of a unit in order, with the periods in which they can be compared.
+
+use crate::data::outliers::errors;
+use crate::data::series::{Flight, Gap, MaintenanceEvent};
+
+/// Records that are looked at, the last ones.
+const MOST: usize = 400;
+
+/// One measured gap.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Record {
+    /// Index of its flight.
+    pub(crate) flight: usize,
+    pub(crate) departure_us: i64,
+    pub(crate) hours: f64,
+    pub(crate) gap_m: f64,
+    /// Standard error, with the scatter that was found.
+    pub(crate) error_m: f64,
+    /// Not doubted by its own estimator.
+    pub(crate) is_sound: bool,
+    /// A new one begins with each installation and after each renewal.
+    pub(crate) period: u32,
+}
+
+/// The last records of a unit, and the renewing maintenance after the last of them.
+pub(crate) fn records(
+    flights: &[Flight],
+    maintenance: &[MaintenanceEvent],
+    limit_m: f64,
+) -> (Vec<Record>, Option<i64>) {
+    let mut seen: Vec<(usize, &Flight, Gap)> =
+        flights.iter().enumerate().rev().filter_map(|(i, f)| Some((i, f, f.gap?))).take(MOST).collect();
+    seen.reverse();
+    let gaps: Vec<Gap> = seen.iter().map(|(_, _, gap)| *gap).collect();
+    let (errors, _) = errors(&gaps, limit_m);
+    let mut renewals = maintenance.iter().filter(|entry| entry.renews).map(|entry| entry.utc_us).peekable();
+    let (mut period, mut installation) = (0, None);
+    let mut records = Vec::with_capacity(seen.len());
+    for ((flight, flown, gap), error_m) in seen.into_iter().zip(errors) {
+        let mut is_new = installation.is_some_and(|before| before != flown.installation);
+        while renewals.next_if(|utc_us| *utc_us <= flown.departure_us).is_some() {
+            is_new = true;
+        }
+        period += u32::from(is_new);
+        installation = Some(flown.installation);
+        let Gap { gap_m, is_doubtful, .. } = gap;
+        let (departure_us, hours) = (flown.departure_us, flown.hours);
+        records.push(Record { flight, departure_us, hours, gap_m, error_m, is_sound: !is_doubtful, period });
+    }
+    (records, renewals.next())
+}

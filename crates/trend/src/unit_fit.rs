@@ -1,0 +1,165 @@
+//! Measured state and wear laws of one unit at a date.
+
+use std::borrow::Cow;
+
+use crate::data::segment::Segment;
+use crate::data::series::{Flight, MaintenanceEvent, Series};
+use crate::inference::consistency::Evidence;
+use crate::inference::posterior::{Posterior, posterior};
+use crate::measured::{Jump, Measured};
+use crate::prior::fleet_prior::FleetPrior;
+use crate::settings::Settings;
+use crate::statement::history::{self, History};
+use crate::statement::level;
+use crate::statement::types::{ChangePoint, ChangePointKind, ForecastMethod, MIN_ESTIMATES};
+
+/// Wear laws that agree with the last records.
+pub(crate) struct Fit<'a> {
+    pub(crate) posterior: Posterior,
+    pub(crate) prior: Cow<'a, FleetPrior>,
+    pub(crate) method: ForecastMethod,
+}
+
+/// What the flights of a unit show.
+pub(crate) struct UnitFit<'a> {
+    pub(crate) measured: Measured,
+    pub(crate) history: History,
+    /// All changes, by departure.
+    pub(crate) changes: Vec<ChangePoint>,
+    pub(crate) fit: Option<Fit<'a>>,
+    /// Posteriors of the segments before the last one.
+    pub(crate) ended: Vec<Option<Posterior>>,
+}
+
+impl<'a> UnitFit<'a> {
+    /// Reads the flights until a date, with a prior learned from nothing later.
+    pub(crate) fn new(series: &Series, as_of_us: i64, settings: &Settings, prior: &'a FleetPrior) -> Self {
+        let flights = series.flights_until(as_of_us);
+        let maintenance = series.maintenance_until(as_of_us);
+        let measured = Measured::new(flights, maintenance, settings);
+        let history = history::read_history(flights, maintenance, series.unit_hours_at_start(), prior);
+        let mut changes = history.changes.clone();
+        changes.extend(&measured.events);
+        changes
+            .extend(measured.jump.and_then(|jump| jump_event(&jump, &history.changes, flights, maintenance)));
+        let segments: Vec<Segment<'_>> = history.segments().collect();
+        let (mut ended, mut fit) = (Vec::new(), None);
+        if let Some((last, before)) = segments.split_last() {
+            for segment in before {
+                let fitted = posterior(segment, prior);
+                changes.extend(fitted.as_ref().and_then(|p| onset(p, segment, flights, prior)));
+                ended.push(fitted);
+            }
+            fit = consistent_fit(&measured, &history, last, flights, prior);
+            let onset_of = |fit: &Fit<'_>| onset(&fit.posterior, last, flights, &fit.prior);
+            let is_on_axis = |fit: &&Fit<'_>| fit.method == ForecastMethod::Fleet;
+            changes.extend(fit.as_ref().filter(is_on_axis).and_then(onset_of));
+        }
+        changes.sort_by_key(|change| change.departure_us);
+        Self { measured, history, changes, fit, ended }
+    }
+
+    /// Departures of the outliers: records that later ones did not confirm.
+    pub(crate) fn outliers_us(&self, flights: &[Flight]) -> Vec<i64> {
+        let level = self.measured.level.map_or(0, |level| level.records.min(2));
+        let kept = self.measured.sound.iter().rev().take(level).map(|r| r.flight).min().unwrap_or(usize::MAX);
+        let outliers = self.history.outliers.iter().filter(|flight| **flight < kept);
+        outliers.map(|flight| flights[*flight].departure_us).collect()
+    }
+
+    /// The line's crossing, counted from the last flight.
+    pub(crate) fn rise_now(&self, flights: &[Flight]) -> Option<RiseCrossing> {
+        let (rise, record) = (self.measured.rise?, self.measured.sound.last()?);
+        let flown = flights.last()?.hours - record.hours;
+        let left = |hours: f64| (hours - flown).max(0.0);
+        Some(RiseCrossing {
+            p05_hours: left(rise.p05_hours),
+            p50_hours: left(rise.p50_hours),
+            p95_hours: left(rise.p95_hours),
+        })
+    }
+}
+
+/// The wear laws of the last segment by the fleet's prior, or else by the unit's own, as the last records allow.
+fn consistent_fit<'a>(
+    measured: &Measured,
+    history: &History,
+    last: &Segment<'_>,
+    flights: &[Flight],
+    prior: &'a FleetPrior,
+) -> Option<Fit<'a>> {
+    if history.estimates.len() < MIN_ESTIMATES {
+        return None;
+    }
+    let fitted = |segment: &Segment<'_>, prior: &FleetPrior| {
+        let posterior = posterior(segment, prior)?;
+        let evidence = Evidence::of(measured, history, flights, prior)?;
+        let ratio = hours_per_usage(flights, prior);
+        evidence.agrees(&posterior, segment.now, prior, history.offset_m2, ratio).then_some(posterior)
+    };
+    if let Some(posterior) = fitted(last, prior) {
+        return Some(Fit { posterior, prior: Cow::Borrowed(prior), method: ForecastMethod::Fleet });
+    }
+    let own = match measured.rise {
+        Some(rise) => prior.of_fast_wear(rise.m_per_hour, last.estimates.first()?.gap_m),
+        None => prior.single_unit(),
+    };
+    let history = history.on_axis(flights, &own);
+    let last = history.segments().last()?;
+    let posterior = fitted(&last, &own)?;
+    Some(Fit { posterior, prior: Cow::Owned(own), method: ForecastMethod::SingleUnit })
+}
+
+/// The jump of the level as a change point, unless the history has it already.
+fn jump_event(
+    jump: &Jump,
+    known: &[ChangePoint],
+    flights: &[Flight],
+    maintenance: &[MaintenanceEvent],
+) -> Option<ChangePoint> {
+    let at = flights.partition_point(|flight| flight.departure_us < jump.departure_us);
+    let near = flights.get(at.saturating_sub(history::RECORD_FLIGHTS))?.departure_us
+        ..=flights[(at + history::RECORD_FLIGHTS).min(flights.len() - 1)].departure_us;
+    if known.iter().any(|change| near.contains(&change.departure_us)) {
+        return None;
+    }
+    let is_recorded = history::is_recorded(flights, maintenance, at);
+    let kind = if is_recorded { ChangePointKind::Recorded } else { ChangePointKind::Step };
+    let step_m = jump.after_m - jump.before_m;
+    Some(ChangePoint { departure_us: jump.departure_us, kind, step_m, se_m: jump.error_m, certainty: 1.0 })
+}
+
+/// The onset of wear that a posterior found in a segment, as a change point.
+fn onset(
+    posterior: &Posterior,
+    segment: &Segment<'_>,
+    flights: &[Flight],
+    prior: &FleetPrior,
+) -> Option<ChangePoint> {
+    let (start, certainty) = level::onset(posterior)?;
+    let first = flights.partition_point(|flight| prior.usage(flight) < segment.begin + start);
+    let departure_us = flights.get(first)?.departure_us;
+    Some(ChangePoint { departure_us, kind: ChangePointKind::Onset, step_m: 0.0, se_m: 0.0, certainty })
+}
+
+/// Hours from the last flight to the limit by the line through the last records.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RiseCrossing {
+    pub(crate) p05_hours: f64,
+    pub(crate) p50_hours: f64,
+    pub(crate) p95_hours: f64,
+}
+
+/// Flight hours per hour's worth of usage where the unit flies now: over its present installation, or over its last
+/// flights while that is young.
+pub(crate) fn hours_per_usage(flights: &[Flight], prior: &FleetPrior) -> f64 {
+    /// Flights of the present installation below which it is young, and the last ones that show the use.
+    const YOUNG: usize = 20;
+    const LAST: usize = 300;
+    let Some(last) = flights.last() else { return 1.0 };
+    let here = flights.iter().rev().take_while(|f| f.installation == last.installation).count();
+    let back = if here < YOUNG { LAST } else { here.min(LAST) };
+    let first = &flights[flights.len().saturating_sub(back)];
+    let ratio = (last.hours - first.hours) / (prior.usage(last) - prior.usage(first));
+    if ratio.is_finite() && ratio > 0.0 { ratio } else { 1.0 }
+}

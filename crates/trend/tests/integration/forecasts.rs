@@ -1,0 +1,99 @@
+//! Forecasts of young, fast and accelerating wear: seldom late, and their intervals hold.
+
+use trend::{Assessment, State, assess};
+
+use crate::histories::{Drawn, HOURS, LIMIT_UM, prior, settings};
+
+/// A class of wear g₀ + a·tᵖ: name, exponents, logs at the date of the forecast, calm logs before.
+struct Class {
+    name: &'static str,
+    power: (f64, f64),
+    logs: (usize, usize),
+    calm: (usize, usize),
+    /// Largest shares of late forecasts and error, and least and largest share held.
+    late: f64,
+    error: f64,
+    held: (f64, f64),
+}
+
+const fn class(name: &'static str, power: (f64, f64), logs: (usize, usize), calm: (usize, usize)) -> Class {
+    Class { name, power, logs, calm, late: 0.07, error: 0.25, held: (0.86, 1.0) }
+}
+
+const CLASSES: [Class; 7] = [
+    class("straight, 8-20 logs", (1.0, 1.0), (8, 20), (0, 0)),
+    class("calm, then straight for 6-15 logs", (1.0, 1.0), (6, 15), (10, 200)),
+    class("straight, 40-150 logs", (1.0, 1.0), (40, 150), (0, 0)),
+    class("accelerating (1.5-2), 10-25 logs", (1.5, 2.0), (10, 25), (0, 0)),
+    class("accelerating (2-3), 40-150 logs", (2.0, 3.0), (40, 150), (0, 0)),
+    class("slowing (.5-.7), 40-150 logs", (0.5, 0.7), (40, 150), (0, 0)),
+    class("accelerating (1.5-2.5), 20-50 logs", (1.5, 2.5), (20, 50), (0, 0)),
+];
+
+/// A unit cut below its limit, and its true hours left.
+fn unit(class: &Class, seed: u64) -> (Drawn, f64) {
+    let mut d = Drawn::new(seed, 1);
+    let (power, share) = (d.between(class.power.0, class.power.1), d.between(0.35, 0.92));
+    let (calm, logs) = (d.count(class.calm.0, class.calm.1), d.count(class.logs.0, class.logs.1));
+    let from_um = d.calm(calm);
+    let to_um = from_um + share * (LIMIT_UM - from_um);
+    d.logs(logs, |t| from_um + (to_um - from_um) * t.powf(power));
+    let life = share.powf(-power.recip());
+    (d, HOURS * logs as f64 * (life - 1.0))
+}
+
+struct Score {
+    late: f64,
+    held: f64,
+    error: f64,
+    none: usize,
+}
+
+fn score(class: &Class) -> Score {
+    let (mut late, mut held, mut errors, mut none, mut count) = (0, 0, Vec::new(), 0, 0);
+    for (fleet, units) in [12, 40, 92].into_iter().enumerate() {
+        let units: Vec<(Drawn, f64)> = (0..units).map(|k| unit(class, 10_000 * fleet as u64 + k)).collect();
+        let prior = prior(units.iter().map(|(d, _)| d));
+        for (drawn, left) in units {
+            let found: Assessment =
+                assess(&drawn.series(), drawn.now_us(), &settings(), Some(&prior)).unwrap();
+            count += 1;
+            let Some(crossing) = found.crossing else {
+                none += 1;
+                continue;
+            };
+            let hours = |h: Option<f64>| h.unwrap_or(f64::INFINITY);
+            let is_late = hours(crossing.p05_hours) > left;
+            late += usize::from(is_late);
+            held += usize::from(!is_late && left <= hours(crossing.p95_hours));
+            errors.push((hours(crossing.p50_hours) - left).abs() / left);
+            assert!(
+                found.state >= State::Plan || left > 375.0,
+                "{}: {} with {left} h left",
+                class.name,
+                found.reason
+            );
+        }
+    }
+    errors.sort_by(f64::total_cmp);
+    let share = |n: usize| n as f64 / count as f64;
+    Score { late: share(late), held: share(held), error: errors[errors.len() / 2], none }
+}
+
+#[test]
+fn fast_wear_is_seldom_forecast_late() {
+    let mut missed = Vec::new();
+    for class in &CLASSES {
+        let Score { late, held, error, none } = score(class);
+        println!(
+            "{}: late {late:.3}, held {held:.3}, median error {error:.3}, without forecast {none}",
+            class.name
+        );
+        let is_met =
+            late <= class.late && (class.held.0..=class.held.1).contains(&held) && error <= class.error;
+        if !is_met {
+            missed.push(class.name);
+        }
+    }
+    assert!(missed.is_empty(), "{missed:?}");
+}

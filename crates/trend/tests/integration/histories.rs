@@ -1,0 +1,135 @@
+//! Drawn histories with known truth: a calm unit, and what then happens to it.
+
+use trend::{FleetPrior, MaintenanceEvent, Observation, Series, Settings, State, UsageDefaults};
+
+use crate::random::Random;
+
+pub(crate) const DAY_US: i64 = 86_400_000_000;
+pub(crate) const LIMIT_M: f64 = 150e-6;
+pub(crate) const LIMIT_UM: f64 = 150.0;
+
+/// Hours of a flight.
+pub(crate) const HOURS: f64 = 2.0;
+
+/// A history that is being drawn.
+pub(crate) struct Drawn {
+    random: Random,
+    pub(crate) rows: Vec<Observation>,
+    pub(crate) maintenance: Vec<MaintenanceEvent>,
+    /// Standard error of a record, and what it is stated to be, µm.
+    pub(crate) error_um: f64,
+    stated: f64,
+    /// Flights from one log to the next.
+    pub(crate) every: i64,
+    flight: i64,
+    installation: u32,
+}
+
+impl Drawn {
+    pub(crate) fn new(seed: u64, every: i64) -> Self {
+        let mut random = Random::new(seed);
+        let error_um = random.between(0.3, 1.5);
+        let stated = random.between(0.8, 1.25);
+        let (rows, maintenance) = (Vec::new(), Vec::new());
+        Self { random, rows, maintenance, error_um, stated, every, flight: 0, installation: 0 }
+    }
+
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.random.between(low, high)
+    }
+
+    pub(crate) fn count(&mut self, low: usize, high: usize) -> usize {
+        low + (self.random.uniform() * (high - low + 1) as f64) as usize
+    }
+
+    /// A log whose true gap is this, µm; returns the measured one.
+    pub(crate) fn log(&mut self, true_um: f64) -> f64 {
+        let um = true_um + self.error_um * self.random.normal();
+        self.flown(Some(um), false);
+        um
+    }
+
+    /// Logs of a gap that grows from one value to another.
+    pub(crate) fn logs(&mut self, count: usize, gap_um: impl Fn(f64) -> f64) {
+        for k in 0..count {
+            self.log(gap_um((k + 1) as f64 / count as f64));
+        }
+    }
+
+    /// The last records doubted by their estimator.
+    pub(crate) fn doubt(&mut self, count: usize) {
+        let from = self.rows.len() - count;
+        self.rows[from..].iter_mut().for_each(|row| row.is_doubtful = true);
+    }
+
+    pub(crate) fn refused(&mut self, count: usize) {
+        (0..count).for_each(|_| self.flown(None, false));
+    }
+
+    fn flown(&mut self, gap_um: Option<f64>, is_doubtful: bool) {
+        self.flight += self.every;
+        self.rows.push(Observation {
+            departure_us: self.flight * DAY_US / 2,
+            installation: self.installation,
+            flight_hours: Some(HOURS),
+            tail_hours_end: Some(HOURS * self.flight as f64 + 5000.0 * f64::from(self.installation)),
+            load_reversals: Some(120),
+            gap_m: gap_um.map(|um| um * 1e-6),
+            gap_se_m: gap_um.map(|_| self.stated * self.error_um * 1e-6),
+            is_doubtful,
+        });
+    }
+
+    /// A calm history; returns its gap, µm.
+    pub(crate) fn calm(&mut self, count: usize) -> f64 {
+        let um = self.between(40.0, 90.0);
+        self.logs(count, |_| um);
+        um
+    }
+
+    pub(crate) fn moved(&mut self) {
+        self.installation += 1;
+    }
+
+    pub(crate) fn reshimmed(&mut self) {
+        let utc_us = self.now_us() + DAY_US / 4;
+        self.maintenance.push(MaintenanceEvent { utc_us, renews: true });
+    }
+
+    pub(crate) fn paused(&mut self, days: i64) {
+        self.flight += 2 * days;
+    }
+
+    pub(crate) fn now_us(&self) -> i64 {
+        self.flight * DAY_US / 2
+    }
+
+    pub(crate) fn series(&self) -> Series {
+        let series = Series::new(self.rows.iter().copied(), &UsageDefaults::default()).unwrap();
+        series.with_maintenance(self.maintenance.clone())
+    }
+
+    /// The state that the last records of the present installation call for by the two plain rules, at least.
+    pub(crate) fn due(&self) -> State {
+        let since = self.maintenance.last().map_or(i64::MIN, |entry| entry.utc_us);
+        let here = |row: &&Observation| row.installation == self.installation && row.departure_us > since;
+        let last = self.rows.iter().rev().filter(here).filter_map(|row| Some((row.gap_m?, row.is_doubtful)));
+        let above: Vec<bool> =
+            last.take_while(|(gap_m, _)| *gap_m >= LIMIT_M).map(|(_, doubt)| !doubt).collect();
+        match above.len() {
+            0 => State::Normal,
+            2.. if above.contains(&true) => State::Act,
+            _ => State::Plan,
+        }
+    }
+}
+
+/// The prior of a fleet of histories.
+pub(crate) fn prior<'a>(fleet: impl IntoIterator<Item = &'a Drawn>) -> FleetPrior {
+    let series: Vec<Series> = fleet.into_iter().map(Drawn::series).collect();
+    FleetPrior::learn(&series, i64::MAX, LIMIT_M, None)
+}
+
+pub(crate) fn settings() -> Settings {
+    Settings::for_limit(LIMIT_M)
+}
