@@ -3,7 +3,7 @@
 //! Only the columns that rows are ordered or grouped by become Polars columns. Polars returns the rows' numbers, and the
 //! rows themselves remain in Arrow.
 
-use arrow::array::{ArrayRef, AsArray, RecordBatch, StringArray};
+use arrow::array::{ArrayRef, AsArray, DictionaryArray, RecordBatch, StringArray};
 use arrow::compute::interleave_record_batch;
 use arrow::datatypes::{DataType, Int32Type, Int64Type, TimestampMicrosecondType};
 use polars::prelude::{
@@ -49,7 +49,7 @@ fn column(batches: &[RecordBatch], name: &str) -> Result<Column, Error> {
 /// Texts, plain or as a dictionary.
 fn texts(array: &ArrayRef) -> Box<dyn Iterator<Item = Option<&str>> + '_> {
     let coded = array.as_dictionary_opt::<Int32Type>();
-    match coded.and_then(|coded| coded.downcast_dict::<StringArray>()) {
+    match coded.and_then(DictionaryArray::downcast_dict::<StringArray>) {
         Some(coded) => Box::new(coded.into_iter()),
         None => Box::new(array.as_string::<i32>().iter()),
     }
@@ -89,7 +89,7 @@ pub(crate) fn counts(frame: &DataFrame, name: &str) -> Result<Vec<(String, usize
     let groups = frame.group_by([name])?;
     let (values, rows) = (groups.keys(), groups.get_groups().iter().map(|group| group.len()));
     let texts = values.first().map(|values| values.str()).transpose()?;
-    let texts = texts.into_iter().flat_map(|texts| texts.iter());
+    let texts = texts.into_iter().flat_map(StringChunked::iter);
     Ok(texts.zip(rows).filter_map(|(text, rows)| Some((text?.to_owned(), rows))).collect())
 }
 
