@@ -10,10 +10,8 @@ use std::sync::{Arc, OnceLock};
 use arrow::array::ArrayRef;
 use arrow::datatypes::{DataType, Field, Schema, TimeUnit};
 use arrow::error::ArrowError;
-use parquet::arrow::arrow_reader::{
-    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
-};
-use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels, parquet_to_arrow_schema};
 use parquet::basic::Encoding;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{ColumnChunkMetaData, RowGroupMetaData};
@@ -22,14 +20,15 @@ use crate::channel::column_builder::ColumnBuilder;
 use crate::error::{Error, ErrorKind};
 use crate::io::byte_source::ByteSource;
 use crate::io::digest::Digest;
+use crate::io::foreign_format;
 use crate::io::read_at::{self, PreadFile};
 use crate::io::transient;
 use crate::mapping::column_pattern::nearest;
 use crate::parquet::fast_decode;
-use crate::parquet::foreign_format;
 use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
 use crate::parquet::page_header::{self, Page};
+use crate::parquet::page_reader::{self, BoundedGroups};
 use crate::parquet::raw_footer;
 use crate::parquet::row_selection::RowSelection;
 
@@ -107,6 +106,7 @@ impl LogFile {
             return Err(fail(ErrorKind::Empty));
         }
         want_footer(&source, length.len()).map_err(fail)?;
+        raw_footer::check(file).map_err(fail)?;
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         // Parquet's own reader of files neither reads at a position nor repeats a read.
@@ -252,7 +252,11 @@ impl LogFile {
                 rows = rows.saturating_add(self.rows_of(group));
                 continue;
             }
-            leaves.iter().try_for_each(|leaf| self.pages(group, leaf).map(drop))?;
+            let mut scan = scan;
+            for leaf in &leaves {
+                let pages = self.pages(group, leaf)?;
+                scan.batch_rows = page_reader::batch_rows(self.chunk(group, leaf), &pages, scan.batch_rows);
+            }
             let read = self.each_row_group(group, &leaves, scan, |columns| {
                 take(names, columns.iter().map(leaf_columns::flatten).collect())
             })?;
@@ -359,11 +363,15 @@ impl LogFile {
             .map_err(|source| self.error(ErrorKind::Unreadable { source }))?;
         let is_coded = scan.as_codes && self.is_coded(group, leaf);
         let footer = if is_coded { self.coded_footer() } else { None }.unwrap_or(&self.footer);
-        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(input, footer.clone());
-        let mask = ProjectionMask::leaves(builder.parquet_schema(), [leaf.index]);
-        let reader =
-            builder.with_projection(mask).with_row_groups(vec![group]).with_batch_size(scan.batch_rows);
-        reader.build().map_err(|e| self.decode(leaf, group, e.to_string()))
+        let schema = footer.parquet_schema();
+        let mask = ProjectionMask::leaves(schema, [leaf.index]);
+        let hint = is_coded.then(|| footer.schema().fields());
+        let groups = BoundedGroups::new(input, footer.metadata(), vec![group], scan.batch_rows);
+        parquet_to_arrow_field_levels(schema, mask, hint)
+            .and_then(|levels| {
+                BatchIter::try_new_with_row_groups(&levels, &groups, scan.batch_rows, None)
+            })
+            .map_err(|e| self.decode(leaf, group, e.to_string()))
     }
 
     /// Whether a chunk is a text column of its own whose values are codes of a dictionary.
@@ -507,7 +515,7 @@ impl TextBounds<'_> {
     }
 }
 
-type BatchIter = parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+type BatchIter = ParquetRecordBatchReader;
 
 /// Whether an offset or a length of a chunk is negative, on which the parquet crate panics.
 fn is_before_start(chunk: &ColumnChunkMetaData) -> bool {

@@ -2,7 +2,6 @@
 
 pub(crate) mod dictionary;
 pub(crate) mod fast_decode;
-mod foreign_format;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod fuzz;
@@ -11,6 +10,7 @@ pub(crate) mod log_file;
 pub(crate) mod numeric;
 pub(crate) mod page_crc;
 pub(crate) mod page_header;
-mod raw_footer;
+pub(crate) mod page_reader;
+pub(crate) mod raw_footer;
 pub(crate) mod row_selection;
 pub mod writer;

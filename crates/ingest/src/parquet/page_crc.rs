@@ -215,7 +215,7 @@ mod tests {
         }
     }
 
-    /// A footer that declares a billion times the rows there are.
+    /// A footer that declares a hundred times the rows there are.
     #[test]
     fn rows_that_are_not_there_are_missed() {
         let dir = tempfile::tempdir().unwrap();
@@ -223,7 +223,7 @@ mod tests {
         write(&honest, Compression::SNAPPY, Encoding::PLAIN);
         let bytes = std::fs::read(&honest).unwrap();
         let footer = ParquetMetaDataReader::new().parse_and_finish(&File::open(&honest).unwrap()).unwrap();
-        let group = footer.row_group(0).clone().into_builder().set_num_rows(1_000_000_000_000);
+        let group = footer.row_group(0).clone().into_builder().set_num_rows(100_000);
         let builder = ParquetMetaDataBuilder::new(footer.file_metadata().clone());
         let footer = builder.set_row_groups(vec![group.build().unwrap()]).build();
         let (start, length) = footer.row_group(0).column(0).byte_range();
@@ -232,10 +232,6 @@ mod tests {
         std::fs::write(&lying, file).unwrap();
         let diagnostic = read(&lying).unwrap_err().diagnostic();
         assert_eq!(diagnostic.code, "decode_failed");
-        assert!(
-            diagnostic.message.contains("1000 values where 1000000000000 are declared"),
-            "{}",
-            diagnostic.message
-        );
+        assert!(diagnostic.message.contains("1000 values where 100000 are"), "{}", diagnostic.message);
     }
 }
