@@ -53,7 +53,7 @@ pub fn post_json(url: &str, body: &str, timeout: Duration) -> Posted {
     };
     let request = client.post(url).header(CONTENT_TYPE, "application/json").body(body.to_owned());
     let answer = match handle() {
-        Ok(runtime) => runtime.block_on(request.send()),
+        Ok(runtime) => runtime.block_on(async { request.send().await }),
         Err(error) => return Posted::NotSent(error.to_string()),
     };
     match answer.map_err(reqwest::Error::without_url) {
