@@ -83,3 +83,23 @@ fn normalize_overwrites_nothing_but_its_own() {
     assert_eq!(fleet.freeplay(&["normalize", &log, "--output", "normalized"]).code, Some(1));
     assert_eq!(std::fs::read_to_string(&written[0]).unwrap(), "years");
 }
+
+/// A log of the same flight whose name sorts first arrives a night later.
+#[test]
+fn a_stored_flight_is_not_displaced_by_a_later_claim() {
+    let fleet = TestFleet::sample();
+    let logs = fleet.logs();
+    fleet.run_ok(&["run", "-q"]);
+    let before = fleet.exported();
+    let rival = logs[3].with_file_name("0_rival.parquet");
+    let claimed = crate::harness::facts(&logs[3]);
+    crate::harness::rewrite(&logs[4], &rival, &claimed, |_| true, |_| true);
+    let result = fleet.freeplay(&["run"]);
+    assert_eq!(result.code, Some(1), "{result:?}");
+    let owner = logs[3].file_name().unwrap().to_str().unwrap();
+    assert!(result.err.contains("0_rival.parquet") && result.err.contains(owner), "{}", result.err);
+    assert_eq!(fleet.exported(), before);
+    let redone = fleet.freeplay(&["run", "--redo"]);
+    assert_eq!(redone.code, Some(1), "{redone:?}");
+    assert_eq!(fleet.exported(), before);
+}

@@ -1,5 +1,6 @@
 //! One Parquet file: its leaves by name, their values in batches, checked against the footer.
 
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::iter::once;
 use std::ops::Range;
@@ -73,6 +74,8 @@ pub(crate) struct LogFile {
     /// The same footer, by which text columns are read as the codes of their dictionary.
     coded: OnceLock<Option<ArrowReaderMetadata>>,
     leaves: Vec<LeafColumn>,
+    /// Places of the leaves of each name.
+    by_name: HashMap<String, Vec<usize>>,
 }
 
 /// How columns are scanned.
@@ -121,7 +124,11 @@ impl LogFile {
             return Err(fail(ErrorKind::NotParquet { detail: "its footer has an offset below zero".into() }));
         }
         let leaves = leaf_columns::leaves(footer.schema().fields());
-        let opened = Self { path: path.to_owned(), source, footer, coded: OnceLock::new(), leaves };
+        let mut by_name: HashMap<String, Vec<usize>> = HashMap::with_capacity(leaves.len());
+        for (place, leaf) in leaves.iter().enumerate() {
+            by_name.entry(leaf.name.clone()).or_default().push(place);
+        }
+        let opened = Self { path: path.to_owned(), source, footer, coded: OnceLock::new(), leaves, by_name };
         if opened.rows() == 0 {
             return Err(opened.error(ErrorKind::Empty));
         }
@@ -150,8 +157,12 @@ impl LogFile {
         self.find(name).is_some()
     }
 
+    fn named(&self, name: &str) -> impl Iterator<Item = &LeafColumn> {
+        self.by_name.get(name).into_iter().flatten().map(|place| &self.leaves[*place])
+    }
+
     fn find(&self, name: &str) -> Option<&LeafColumn> {
-        let mut named = self.leaves.iter().filter(|leaf| leaf.name == name);
+        let mut named = self.named(name);
         let first = named.next()?;
         // A column called `a.b` comes before field `b` of struct `a`.
         if first.is_field { named.find(|leaf| !leaf.is_field).or(Some(first)) } else { Some(first) }
@@ -159,7 +170,7 @@ impl LogFile {
 
     /// How many columns have this name, or fields where no column has.
     fn count_of(&self, found: &LeafColumn) -> usize {
-        self.leaves.iter().filter(|leaf| leaf.name == found.name && leaf.is_field == found.is_field).count()
+        self.named(&found.name).filter(|leaf| leaf.is_field == found.is_field).count()
     }
 
     /// A leaf by its name.
@@ -477,8 +488,9 @@ impl LogFile {
         let unreadable = |source| self.error(ErrorKind::Unreadable { source });
         let file = self.source.file();
         let length = read_at::file_length(file).map_err(unreadable)?;
+        let names: HashSet<&str> = names.iter().copied().collect();
         let wanted: Vec<&LeafColumn> =
-            self.leaves.iter().filter(|l| names.contains(&l.name.as_str())).collect();
+            self.leaves.iter().filter(|l| names.contains(l.name.as_str())).collect();
         self.want(&wanted)?;
         for group in 0..self.footer.metadata().num_row_groups() {
             for leaf in &wanted {

@@ -119,6 +119,13 @@ pub struct WorkItem {
     pub before: Option<LogRecord>,
 }
 
+impl WorkItem {
+    /// Whether an earlier run ended with an error of this log.
+    pub(crate) fn failed_before(&self) -> bool {
+        self.before.as_ref().is_some_and(|before| before.outcome == LogOutcome::Error)
+    }
+}
+
 /// Plan of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
@@ -126,7 +133,7 @@ pub struct Plan {
     pub found: usize,
     /// Number of logs already processed.
     pub known: usize,
-    /// Logs to be processed, largest first.
+    /// Logs to be processed, largest first; those that failed before come last.
     pub work: Vec<WorkItem>,
     /// Log records, by path, of the logs that still exist.
     pub accounts: BTreeMap<String, LogRecord>,
@@ -211,7 +218,10 @@ pub fn plan(
     let not_asked = verdicts.iter().filter(|v| matches!(v, Verdict::NotAsked)).count();
     let mut work: Vec<WorkItem> = verdicts.into_iter().filter_map(Verdict::work).collect();
     let size = |w: &WorkItem| w.stat.as_ref().map_or(0, |s| s.size_bytes);
-    work.sort_by(|a, b| size(b).cmp(&size(a)).then_with(|| a.log_path.cmp(&b.log_path)));
+    work.sort_by(|a, b| {
+        let by_size = || size(b).cmp(&size(a)).then_with(|| a.log_path.cmp(&b.log_path));
+        a.failed_before().cmp(&b.failed_before()).then_with(by_size)
+    });
     let wanted = work.len();
     work.truncate(request.limit.unwrap_or(usize::MAX));
     let left = wanted - work.len();
