@@ -103,7 +103,7 @@ fn log(kind: i64, codec: i64, rows: i64, has_dictionary: bool, pages: &[u8]) -> 
 }
 
 fn finish(mut file: Vec<u8>, schema: &[u8], elements: u64, rows: i64, groups: &[u8]) -> Vec<u8> {
-    let facts = [("tail_number", "N412FP"), ("flight_id", "H1"), ("departure_utc", "2026-09-01T00:00:00Z")];
+    let facts = [("tail_number", "N412FP"), ("flight_id", "H00"), ("departure_utc", "2026-10-15T00:00:00Z")];
     let pairs: Vec<u8> =
         facts.iter().flat_map(|(key, value)| [text(1, key), text(1, value), vec![0]].concat()).collect();
     let footer = [
@@ -181,7 +181,7 @@ pub(crate) fn all() -> Vec<Hostile> {
     ];
     let hostile = |name, bytes, code, says| Hostile { name, bytes, code, says };
     let rows = 1_000_000_000;
-    vec![
+    let mut all = vec![
         hostile("row_groups", footer(&one, 2, 10, &list(1, 12, many as u64, &[])), "not_parquet", "claims"),
         hostile("schema_elements", footer(&one, many as u64, 10, &[]), "not_parquet", "claims"),
         hostile(
@@ -218,5 +218,13 @@ pub(crate) fn all() -> Vec<Hostile> {
         hostile("brotli", bomb(BROTLI), "decode_failed", "8006 bytes"),
         hostile("gzip", bomb(GZIP), "decode_failed", "8006 bytes"),
         hostile("lz4", bomb(LZ4), "decode_failed", "8006 bytes"),
-    ]
+    ];
+    // Each is a flight of its own.
+    for (number, file) in all.iter_mut().enumerate() {
+        for (text, own) in [("H00", format!("H{number:02}")), ("T00:", format!("T{number:02}:"))] {
+            let at = file.bytes.windows(text.len()).rposition(|bytes| bytes == text.as_bytes()).unwrap();
+            file.bytes[at..at + text.len()].copy_from_slice(own.as_bytes());
+        }
+    }
+    all
 }

@@ -29,7 +29,7 @@ fn a_night_with_hostile_logs_stores_all_sound_ones() {
             std::fs::write(folder.join(format!("{}.parquet", hostile.name)), hostile.bytes).unwrap();
         }
     }
-    for command in ["check -q", "run --jobs 2"] {
+    for command in ["check -v", "run -v --jobs 2"] {
         let result = limited(&fleet, command, 1 << 20);
         assert_eq!(result.code, Some(1), "{command}: {}", result.err);
         for hostile in corpus::all() {
@@ -102,4 +102,38 @@ fn a_stored_flight_is_not_displaced_by_a_later_claim() {
     let redone = fleet.freeplay(&["run", "--redo"]);
     assert_eq!(redone.code, Some(1), "{redone:?}");
     assert_eq!(fleet.exported(), before);
+}
+
+/// A pipe, and folders that hold links to each other, among the logs.
+#[cfg(unix)]
+#[test]
+fn pipes_and_loops_are_named_and_the_logs_are_stored() {
+    let fleet = TestFleet::sample();
+    let folder = fleet.path("sample-data/logs");
+    for link in ["loop", "loop2"] {
+        std::os::unix::fs::symlink("..", folder.join("N412FP").join(link)).unwrap();
+        std::os::unix::fs::symlink("..", folder.join("N413FP").join(link)).unwrap();
+    }
+    let pipe = folder.join("pipe.parquet");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let result = fleet.freeplay(&["run"]);
+    assert_eq!(result.code, Some(1), "{result:?}");
+    assert!(result.out.contains("120 records of 30 flights"), "{}", result.out);
+    for named in ["pipe.parquet", "N412FP/loop", "leads back"] {
+        assert!(result.err.contains(named), "{named}: {}", result.err);
+    }
+}
+
+/// Thirty thousand columns of ten thousand positions, none of which is installed.
+#[test]
+fn a_log_of_ten_thousand_positions_costs_seconds() {
+    use ingest::parquet::writer::{Column, write_parquet};
+    let fleet = TestFleet::sample();
+    let log = &fleet.logs()[0];
+    let column = |name: String| (name, Column::Real(vec![0.0, 1.0]));
+    let columns: Vec<_> = (0..10_000).map(|k| column(format!("p{k}_motor_deg"))).collect();
+    write_parquet(log, &columns, &crate::harness::facts(log)).unwrap();
+    let begun = std::time::Instant::now();
+    assert_eq!(fleet.freeplay(&["check", &log.display().to_string()]).code, Some(1));
+    assert!(begun.elapsed() < std::time::Duration::from_secs(20), "{:?}", begun.elapsed());
 }
