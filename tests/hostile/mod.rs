@@ -1,17 +1,19 @@
 //! Inputs that would end a run, take files of others away, or run something: each is named, and the rest goes on.
 
 mod corpus;
+mod operations;
 
 use std::process::Stdio;
 
 use crate::harness::{CommandResult, TestFleet};
 
-/// The command under a limit of its address space, KiB.
+/// The command under a limit of its address space, KiB. The GNU allocator otherwise reserves 64 MiB of it per thread.
 fn limited(fleet: &TestFleet, args: &str, kib: u64) -> CommandResult {
     let script = format!("ulimit -v {kib} && exec \"$0\" {args}");
     let mut command = std::process::Command::new("sh");
     command.args(["-c", &script, env!("CARGO_BIN_EXE_freeplay")]).current_dir(fleet.path("."));
-    let output = command.env_remove("FREEPLAY_CONFIG").stdin(Stdio::null()).output().unwrap();
+    command.env("MALLOC_ARENA_MAX", "2").env_remove("FREEPLAY_CONFIG");
+    let output = command.stdin(Stdio::null()).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     CommandResult { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) }
 }

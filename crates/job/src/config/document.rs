@@ -85,6 +85,9 @@ pub struct LogSettings {
     /// flights of their own, also within 12 hours.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pieces: Option<bool>,
+    /// Patterns of logs whose errors are known: they are listed, and no longer make the exit code of later runs 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub acknowledged_errors: Vec<String>,
     /// The maintenance table, CSV or Parquet, if there is one.
     #[serde(default)]
     pub maintenance: Option<String>,
