@@ -14,6 +14,7 @@ pub(crate) struct Hostile {
 
 const DOUBLE: i64 = 5;
 const TEXT: i64 = 6;
+const SNAPPY: i64 = 1;
 const GZIP: i64 = 2;
 const BROTLI: i64 = 4;
 const LZ4: i64 = 5;
@@ -218,6 +219,18 @@ pub(crate) fn all() -> Vec<Hostile> {
         hostile("brotli", bomb(BROTLI), "decode_failed", "8006 bytes"),
         hostile("gzip", bomb(GZIP), "decode_failed", "8006 bytes"),
         hostile("lz4", bomb(LZ4), "decode_failed", "8006 bytes"),
+        hostile(
+            "page_bytes",
+            log(DOUBLE, SNAPPY, 1000, false, &page(0, 1000, many, 0, &[0; 8])),
+            "decode_failed",
+            "claims 2147483647 bytes",
+        ),
+        hostile(
+            "page_rows",
+            log(DOUBLE, 0, 100_000, false, &page(0, 1000, 8006, 0, &[levels(1000, true), vec![0; 8000]].concat())),
+            "decode_failed",
+            "1000 values where 100000 are declared",
+        ),
     ];
     // Each is a flight of its own.
     for (number, file) in all.iter_mut().enumerate() {

@@ -35,7 +35,9 @@ fn a_night_with_hostile_logs_stores_all_sound_ones() {
         let result = limited(&fleet, command, 1 << 20);
         assert_eq!(result.code, Some(1), "{command}: {}", result.err);
         for hostile in corpus::all() {
-            assert!(result.err.contains(hostile.says), "{} is not named: {}", hostile.name, result.err);
+            let code = format!("error[{}]", hostile.code);
+            let is_named = result.err.contains(hostile.says) && result.err.contains(&code);
+            assert!(is_named, "{} is not named: {}", hostile.name, result.err);
         }
         assert!(!result.err.contains("panicked"), "{}", result.err);
     }

@@ -25,11 +25,11 @@ use crate::io::foreign_format;
 use crate::io::read_at::{self, PreadFile};
 use crate::io::transient;
 use crate::mapping::column_pattern::nearest;
-use crate::parquet::fast_decode;
+use crate::parquet::column_numbers;
 use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
 use crate::parquet::page_header::{self, Page};
-use crate::parquet::page_reader::{self, BoundedGroups};
+use crate::parquet::page_reader::{self, BoundedGroups, Pages};
 use crate::parquet::raw_footer;
 use crate::parquet::row_selection::RowSelection;
 
@@ -313,9 +313,13 @@ impl LogFile {
                 rows += declared;
                 continue;
             }
-            let (pages, before) = (self.pages(group, leaf)?, into.len());
-            if fast_decode::decode_chunk((self.source.file(), self.chunk(group, leaf)), &pages, wanted, into)
-            {
+            let (pages, before, chunk) = (self.pages(group, leaf)?, into.len(), self.chunk(group, leaf));
+            if column_numbers::is_plain(chunk) {
+                let input = PreadFile::new(self.source.file())
+                    .map_err(|source| self.error(ErrorKind::Unreadable { source }))?;
+                let pages = Pages::new(Arc::new(input), chunk, pages, BATCH_ROWS);
+                column_numbers::append(pages, chunk, wanted, into)
+                    .map_err(|detail| self.decode(leaf, group, detail))?;
                 rows += into.len() - before;
                 continue;
             }

@@ -1,7 +1,6 @@
 //! Parquet files: leaf columns as numbers, page by page, and a writer.
 
-pub(crate) mod dictionary;
-pub(crate) mod fast_decode;
+mod column_numbers;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod fuzz;

@@ -1,6 +1,7 @@
 //! Pages for the parquet crate's column readers, unpacked here: the crate lets brotli, gzip and LZ4 grow past the size
 //! that the page's header claims, and texts past any.
 
+use std::cell::RefCell;
 use std::io::Read;
 use std::sync::Arc;
 use std::vec;
@@ -22,6 +23,11 @@ use crate::parquet::page_header::{self, Page as RawPage};
 
 /// Fewest rows of a batch, however long its texts may be.
 const LEAST_BATCH: usize = 64;
+
+thread_local! {
+    /// Pages come one after the other: a new context for each would cost more than many pages do.
+    static ZSTD: RefCell<Option<Decompressor<'static>>> = const { RefCell::new(None) };
+}
 
 fn fail<T>(detail: impl Into<String>) -> Result<T> {
     Err(ParquetError::General(detail.into()))
@@ -89,16 +95,14 @@ impl Iterator for Chunks {
     fn next(&mut self) -> Option<Self::Item> {
         let (chunk, rows) = self.chunks.next()?;
         let pages = page_header::bounded(self.file.file(), &chunk, rows).map_err(ParquetError::General);
-        Some(pages.map(|mut pages| {
-            pages.retain(|page| page.header.type_ != PageType::INDEX_PAGE);
-            let (file, batch_rows) = (Arc::clone(&self.file), self.batch_rows);
-            Box::new(Pages { file, chunk, pages: pages.into_iter(), batch_rows }) as Box<dyn PageReader>
+        Some(pages.map(|pages| {
+            Box::new(Pages::new(Arc::clone(&self.file), &chunk, pages, self.batch_rows)) as Box<dyn PageReader>
         }))
     }
 }
 
 /// The pages of one chunk.
-struct Pages {
+pub(crate) struct Pages {
     file: Arc<PreadFile>,
     chunk: ColumnChunkMetaData,
     pages: vec::IntoIter<RawPage>,
@@ -112,12 +116,11 @@ impl PageReader for Pages {
 
     fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {
         let Some(page) = self.pages.as_slice().first() else { return Ok(None) };
-        let (v1, v2) = (&page.header.data_page_header, &page.header.data_page_header_v2);
-        let levels = v1.as_ref().map(|h| h.num_values).or(v2.as_ref().map(|h| h.num_values));
+        let v2 = &page.header.data_page_header_v2;
         let count = |number: Option<i32>| number.and_then(|n| usize::try_from(n).ok());
         let is_dict = page.header.type_ == PageType::DICTIONARY_PAGE;
         let num_rows = count(v2.as_ref().map(|h| h.num_rows));
-        Ok(Some(PageMetadata { num_rows, num_levels: count(levels), is_dict }))
+        Ok(Some(PageMetadata { num_rows, num_levels: count(levels(page)), is_dict }))
     }
 
     fn skip_next_page(&mut self) -> Result<()> {
@@ -135,6 +138,23 @@ impl Iterator for Pages {
 }
 
 impl Pages {
+    /// The checked pages of a chunk, read in batches of so many rows at most.
+    pub(crate) fn new(
+        file: Arc<PreadFile>,
+        chunk: &ColumnChunkMetaData,
+        mut pages: Vec<RawPage>,
+        batch_rows: usize,
+    ) -> Self {
+        pages.retain(|page| page.header.type_ != PageType::INDEX_PAGE);
+        Self { file, chunk: chunk.clone(), pages: pages.into_iter(), batch_rows }
+    }
+
+    /// Values of each data page, nulls included.
+    pub(crate) fn values(&self) -> Vec<usize> {
+        let pages = self.pages.as_slice().iter().filter(|page| page.header.type_ != PageType::DICTIONARY_PAGE);
+        pages.map(|page| usize::try_from(levels(page).unwrap_or(0)).unwrap_or(0)).collect()
+    }
+
     fn read(&self, page: &RawPage) -> Result<Page> {
         let header = &page.header;
         let mut stored = vec![0; usize::try_from(header.compressed_page_size)?];
@@ -234,6 +254,12 @@ impl Pages {
     }
 }
 
+/// Values of a data page, nulls included.
+fn levels(page: &RawPage) -> Option<i32> {
+    let v1 = page.header.data_page_header.as_ref().map(|header| header.num_values);
+    v1.or(page.header.data_page_header_v2.as_ref().map(|header| header.num_values))
+}
+
 /// Rows of a batch of a column of which these are the pages. Texts that share beginnings may each be as long as a page.
 pub(crate) fn batch_rows(chunk: &ColumnChunkMetaData, pages: &[RawPage], usual: usize) -> usize {
     if !chunk.encodings().any(|encoding| encoding == Encoding::DELTA_BYTE_ARRAY) {
@@ -283,7 +309,13 @@ fn unpack(codec: Compression, packed: &[u8], size: usize, into: &mut Vec<u8>) ->
             fixed(left, into, |out| snap::raw::Decoder::new().decompress(packed, out).ok())?;
         }
         Compression::ZSTD(_) => {
-            fixed(left, into, |out| Decompressor::new().ok()?.decompress_to_buffer(packed, out).ok())?;
+            let unpack = |zstd: &mut Option<Decompressor<'static>>, out: &mut [u8]| {
+                if zstd.is_none() {
+                    *zstd = Decompressor::new().ok();
+                }
+                zstd.as_mut()?.decompress_to_buffer(packed, out).ok()
+            };
+            fixed(left, into, |out| ZSTD.with_borrow_mut(|zstd| unpack(zstd, out)))?;
         }
         Compression::UNCOMPRESSED => into.extend_from_slice(packed),
         other @ Compression::LZO => return fail(format!("its compression {other} is not read")),

@@ -525,7 +525,7 @@ fn change_text(unit: &UnitChange) -> String {
         changes.push(format!("{} → {}{why}", word(unit.from), word(unit.to)));
     }
     for (events, what) in [(&unit.new_events, "new"), (&unit.cleared_events, "cleared")] {
-        let day = |at: jiff::Timestamp| at.strftime("%Y-%m-%d").to_string();
+        let day = |at: Timestamp| at.strftime("%Y-%m-%d").to_string();
         changes.extend(events.iter().map(|e| format!("{what}: {} of {}", e.kind, day(e.departure_utc))));
     }
     changes.join("; ")
