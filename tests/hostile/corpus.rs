@@ -169,17 +169,14 @@ pub(crate) fn all() -> Vec<Hostile> {
     let mut writer = flate2::write::GzEncoder::new(&mut packed, flate2::Compression::best());
     writer.write_all(&long).unwrap();
     writer.finish().unwrap();
-    let texts = [
-        page(2, 1, long.len() as i64, 0, &packed),
-        {
-            let codes = [levels(100_000, true), vec![1], varint(100_000 << 1), vec![0]].concat();
-            let mut packed = Vec::new();
-            let mut writer = flate2::write::GzEncoder::new(&mut packed, flate2::Compression::best());
-            writer.write_all(&codes).unwrap();
-            writer.finish().unwrap();
-            page(0, 100_000, codes.len() as i64, 8, &packed)
-        },
-    ];
+    let texts = [page(2, 1, long.len() as i64, 0, &packed), {
+        let codes = [levels(100_000, true), vec![1], varint(100_000 << 1), vec![0]].concat();
+        let mut packed = Vec::new();
+        let mut writer = flate2::write::GzEncoder::new(&mut packed, flate2::Compression::best());
+        writer.write_all(&codes).unwrap();
+        writer.finish().unwrap();
+        page(0, 100_000, codes.len() as i64, 8, &packed)
+    }];
     let hostile = |name, bytes, code, says| Hostile { name, bytes, code, says };
     let rows = 1_000_000_000;
     let mut all = vec![
@@ -227,7 +224,13 @@ pub(crate) fn all() -> Vec<Hostile> {
         ),
         hostile(
             "page_rows",
-            log(DOUBLE, 0, 100_000, false, &page(0, 1000, 8006, 0, &[levels(1000, true), vec![0; 8000]].concat())),
+            log(
+                DOUBLE,
+                0,
+                100_000,
+                false,
+                &page(0, 1000, 8006, 0, &[levels(1000, true), vec![0; 8000]].concat()),
+            ),
             "decode_failed",
             "1000 values where 100000 are declared",
         ),

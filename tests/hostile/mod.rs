@@ -79,9 +79,13 @@ fn normalize_overwrites_nothing_but_its_own() {
     let (log, copy) = (log.display().to_string(), copy.display().to_string());
     let both = fleet.freeplay(&["normalize", &log, &copy, "--output", "normalized"]);
     assert_eq!(both.code, Some(1), "{both:?}");
-    assert!(both.err.contains("error[would_overwrite]") && both.out.contains("4 normalized logs"), "{both:?}");
+    assert!(
+        both.err.contains("error[would_overwrite]") && both.out.contains("4 normalized logs"),
+        "{both:?}"
+    );
     fleet.run_ok(&["normalize", &log, "--output", "normalized"]);
-    let written: Vec<_> = glob::glob(fleet.path("normalized/*/*/*").to_str().unwrap()).unwrap().flatten().collect();
+    let written: Vec<_> =
+        glob::glob(fleet.path("normalized/*/*/*").to_str().unwrap()).unwrap().flatten().collect();
     assert_eq!(written.len(), 4, "{written:?}");
     std::fs::write(&written[0], "years").unwrap();
     assert_eq!(fleet.freeplay(&["normalize", &log, "--output", "normalized"]).code, Some(1));

@@ -95,7 +95,21 @@ mod tests {
         for name in ["N412FP", "aileron_left", "1040-0013", "20260910T130719Z", "D-ÄB/7.1"] {
             assert!(is_plain(name), "{name}");
         }
-        for name in ["ZZ$(touch x)", "a`b`", "a;b", "a b", "a\nb", "-rf", "~root", "=ls", "a*", "{a,b}", "a'b", "!1", ""] {
+        for name in [
+            "ZZ$(touch x)",
+            "a`b`",
+            "a;b",
+            "a b",
+            "a\nb",
+            "-rf",
+            "~root",
+            "=ls",
+            "a*",
+            "{a,b}",
+            "a'b",
+            "!1",
+            "",
+        ] {
             assert!(!is_plain(name), "{name}");
         }
     }

@@ -78,7 +78,8 @@ pub fn limit_length(text: &str, max_chars: usize) -> Cow<'_, str> {
 /// ```
 pub fn csv_cell(text: &str) -> Cow<'_, str> {
     let is_hidden = |c: char| is_invisible(c) && c != '\r';
-    let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r', '＝', '＋', '－', '＠']) && text.parse::<f64>().is_err();
+    let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r', '＝', '＋', '－', '＠'])
+        && text.parse::<f64>().is_err();
     match (is_formula, escape(text, is_hidden)) {
         (false, shown) => shown,
         (true, shown) => Cow::Owned(format!("'{shown}")),

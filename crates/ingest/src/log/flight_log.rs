@@ -238,7 +238,8 @@ impl Log {
                 fewest = (count, map);
             }
         }
-        let (pattern, columns) = (fewest.1.column.clone(), self.names_for(fewest.1)?.iter().cloned().collect());
+        let (pattern, columns) =
+            (fewest.1.column.clone(), self.names_for(fewest.1)?.iter().cloned().collect());
         Ok(self.main.error(ErrorKind::NoPosition { pattern, columns }))
     }
 

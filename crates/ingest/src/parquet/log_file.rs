@@ -383,9 +383,7 @@ impl LogFile {
         let hint = is_coded.then(|| footer.schema().fields());
         let groups = BoundedGroups::new(input, footer.metadata(), vec![group], scan.batch_rows);
         parquet_to_arrow_field_levels(schema, mask, hint)
-            .and_then(|levels| {
-                BatchIter::try_new_with_row_groups(&levels, &groups, scan.batch_rows, None)
-            })
+            .and_then(|levels| BatchIter::try_new_with_row_groups(&levels, &groups, scan.batch_rows, None))
             .map_err(|e| self.decode(leaf, group, e.to_string()))
     }
 

@@ -96,7 +96,8 @@ impl Iterator for Chunks {
         let (chunk, rows) = self.chunks.next()?;
         let pages = page_header::bounded(self.file.file(), &chunk, rows).map_err(ParquetError::General);
         Some(pages.map(|pages| {
-            Box::new(Pages::new(Arc::clone(&self.file), &chunk, pages, self.batch_rows)) as Box<dyn PageReader>
+            Box::new(Pages::new(Arc::clone(&self.file), &chunk, pages, self.batch_rows))
+                as Box<dyn PageReader>
         }))
     }
 }
@@ -151,7 +152,8 @@ impl Pages {
 
     /// Values of each data page, nulls included.
     pub(crate) fn values(&self) -> Vec<usize> {
-        let pages = self.pages.as_slice().iter().filter(|page| page.header.type_ != PageType::DICTIONARY_PAGE);
+        let pages =
+            self.pages.as_slice().iter().filter(|page| page.header.type_ != PageType::DICTIONARY_PAGE);
         pages.map(|page| usize::try_from(levels(page).unwrap_or(0)).unwrap_or(0)).collect()
     }
 

@@ -358,9 +358,7 @@ impl Rows {
 
     fn next(&mut self, schema: &Arc<Schema>) -> Option<Result<RecordBatch, ErrorKind>> {
         match self {
-            Self::Parquet(reader) => {
-                caught(|| reader.next().transpose()).transpose()
-            }
+            Self::Parquet(reader) => caught(|| reader.next().transpose()).transpose(),
             Self::Csv(records) => texts(records, schema).transpose(),
         }
     }

@@ -89,7 +89,9 @@ impl LocalFiles {
         let Ok(real) = here.canonicalize() else { return };
         if !self.entered.insert((parts.len(), real.clone())) {
             // A link to a folder around it is a loop; another way to a folder is none.
-            if here.is_symlink() && here.parent().and_then(|p| p.canonicalize().ok()).is_some_and(|p| p.starts_with(&real)) {
+            if here.is_symlink()
+                && here.parent().and_then(|p| p.canonicalize().ok()).is_some_and(|p| p.starts_with(&real))
+            {
                 let loops = io::Error::other("the link leads back to a folder around it");
                 self.faults.push((folder.to_owned(), loops));
             }
@@ -139,19 +141,30 @@ mod tests {
     #[test]
     fn patterns_find_what_the_glob_crate_finds() {
         let dir = tempfile::tempdir().unwrap();
-        for file in ["a.parquet", "x/b.parquet", "x/y/c.parquet", "x/y/d.txt", "z [1]/e.parquet", ".h/f.parquet"] {
+        for file in
+            ["a.parquet", "x/b.parquet", "x/y/c.parquet", "x/y/d.txt", "z [1]/e.parquet", ".h/f.parquet"]
+        {
             let file = dir.path().join(file);
             fs::create_dir_all(file.parent().unwrap()).unwrap();
             fs::write(file, "").unwrap();
         }
-        for pattern in ["*.parquet", "**/*.parquet", "x/**/*", "x/*/c.parquet", "*/*.parquet", "x/y/d.txt", "./x/../a.*", "**/y/*"]
-        {
+        for pattern in [
+            "*.parquet",
+            "**/*.parquet",
+            "x/**/*",
+            "x/*/c.parquet",
+            "*/*.parquet",
+            "x/y/d.txt",
+            "./x/../a.*",
+            "**/y/*",
+        ] {
             let found = names(&matching(dir.path(), pattern).unwrap(), dir.path());
             let whole = dir.path().join(pattern);
             let mut wanted: Vec<_> = glob::glob(whole.to_str().unwrap()).unwrap().flatten().collect();
             wanted.retain(|path| path.is_file());
             let wanted: Vec<_> = wanted.iter().map(|path| path.canonicalize().unwrap()).collect();
-            let real: Vec<_> = found.iter().map(|path| dir.path().join(path).canonicalize().unwrap()).collect();
+            let real: Vec<_> =
+                found.iter().map(|path| dir.path().join(path).canonicalize().unwrap()).collect();
             assert_eq!(real, wanted, "{pattern}");
         }
         assert!(matching(dir.path(), "a**b").is_err());

@@ -71,8 +71,20 @@ fn write_file(folder: &Path, id: &str, message: &str) -> io::Result<()> {
 /// Variables that a command gets: what programs need to find others, files and words. Keys of object stores are not
 /// among them.
 const ENVIRONMENT: [&str; 14] = [
-    "PATH", "HOME", "USER", "LOGNAME", "SHELL", "LANG", "LC_ALL", "TZ", "TMPDIR", "TEMP", "TMP", "SYSTEMROOT",
-    "USERPROFILE", "PATHEXT",
+    "PATH",
+    "HOME",
+    "USER",
+    "LOGNAME",
+    "SHELL",
+    "LANG",
+    "LC_ALL",
+    "TZ",
+    "TMPDIR",
+    "TEMP",
+    "TMP",
+    "SYSTEMROOT",
+    "USERPROFILE",
+    "PATHEXT",
 ];
 
 /// Runs a program with the message on its standard input, and ends it at the time limit.
@@ -177,7 +189,13 @@ mod tests {
     const HOSTILE: &str = "{\"serial_number\":\"$(touch X)'; rm -rf \\\"\\n\u{202e}\"}";
 
     fn shell(script: &str, folder: &Path, timeout: Duration) -> Attempt {
-        command(&["sh".to_owned(), "-c".to_owned(), script.to_owned()], folder, HOSTILE, timeout, &["CARGO_PKG_NAME".to_owned()])
+        command(
+            &["sh".to_owned(), "-c".to_owned(), script.to_owned()],
+            folder,
+            HOSTILE,
+            timeout,
+            &["CARGO_PKG_NAME".to_owned()],
+        )
     }
 
     #[test]

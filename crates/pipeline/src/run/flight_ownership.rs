@@ -142,11 +142,8 @@ impl<'a> OwnershipLedger<'a> {
             account.log_digest == competing_log.log_digest || self.holds_the_same(&account, &competing_log);
         let is_behind = self.precedes(&competing_log, &account);
         if same {
-            let (log, owner) = if is_behind {
-                (&account, &competing_log)
-            } else {
-                (&competing_log, &account)
-            };
+            let (log, owner) =
+                if is_behind { (&account, &competing_log) } else { (&competing_log, &account) };
             let (log, owner) = (log.log_path.clone(), owner.log_path.clone());
             report.duplicates.push(DuplicateLog { log, owner });
         }

@@ -79,7 +79,11 @@ fn text(report: &RunSummary, code: Code, completed_before: Option<f64>) -> Strin
     gauge("logs_done", "Logs processed, including failed ones.", report.done as f64);
     gauge("logs_in_error", "Failed logs.", report.logs_in_error() as f64);
     let standing = report.unacknowledged() as f64;
-    gauge("logs_still_failed", "Failed logs of earlier runs that are not repaired or acknowledged.", standing);
+    gauge(
+        "logs_still_failed",
+        "Failed logs of earlier runs that are not repaired or acknowledged.",
+        standing,
+    );
     gauge("logs_not_reached", "Logs not processed because the run stopped.", report.not_reached as f64);
     gauge("records_estimated", "Stored records with a gap.", report.estimated as f64);
     gauge(

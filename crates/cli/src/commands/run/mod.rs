@@ -8,12 +8,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use jiff::Timestamp;
 use pipeline::fleet_trends::changes::UnitChange;
 use pipeline::history::histories::Histories;
 use pipeline::history::maintenance_log::UnknownUnit;
 use pipeline::monitoring::recorder_change::RecorderChange;
 use pipeline::run::scheduler::{self, Context};
-use jiff::Timestamp;
 use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
 use records::Quantity;
 use records::TrendRow;
