@@ -7,6 +7,7 @@ mod docs;
 mod follow_up;
 mod fuzz;
 mod harness;
+mod hostile;
 mod logs;
 mod markdown;
 mod mistakes;

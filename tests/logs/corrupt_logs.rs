@@ -35,7 +35,7 @@ fn an_error_is_not_tried_again_until_asked_or_mended() {
     spoil(&fleet);
     fleet.freeplay(&["run"]);
     let again = fleet.freeplay(&["run"]);
-    assert_eq!(again.code, Some(0), "nothing new, nothing wrong: {again:?}");
+    assert_eq!(again.code, Some(1), "nothing new, and the logs are still in error: {again:?}");
     let retried = fleet.freeplay(&["run", "--retry"]);
     assert_eq!(retried.code, Some(1), "{retried:?}");
     let sound = TestFleet::sample();

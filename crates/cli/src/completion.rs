@@ -60,8 +60,14 @@ pub(crate) fn queried(typed: &OsStr) -> Vec<CompletionCandidate> {
 fn candidates(typed: &OsStr, column: &str) -> Vec<CompletionCandidate> {
     let Some(typed) = typed.to_str() else { return Vec::new() };
     let names = names(column).unwrap_or_default();
-    let fitting = names.into_iter().filter(|name| name.starts_with(typed));
+    let fitting = names.into_iter().filter(|name| name.starts_with(typed) && is_plain(name));
     fitting.take(MAX_CANDIDATES).map(CompletionCandidate::new).collect()
+}
+
+/// Whether a name means itself in every shell: bash inserts it unquoted, and a name of a log may hold `$(…)`.
+fn is_plain(name: &str) -> bool {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_.+,:@/%".contains(c);
+    name.starts_with(char::is_alphanumeric) && name.chars().all(is_plain)
 }
 
 /// Different values of a column of the records; none where no store can be read.
@@ -78,4 +84,33 @@ fn names(column: &str) -> Option<BTreeSet<String>> {
         }
     }
     Some(names)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_a_shell_would_read_are_left_out() {
+        for name in ["N412FP", "aileron_left", "1040-0013", "20260910T130719Z", "D-ÄB/7.1"] {
+            assert!(is_plain(name), "{name}");
+        }
+        for name in [
+            "ZZ$(touch x)",
+            "a`b`",
+            "a;b",
+            "a b",
+            "a\nb",
+            "-rf",
+            "~root",
+            "=ls",
+            "a*",
+            "{a,b}",
+            "a'b",
+            "!1",
+            "",
+        ] {
+            assert!(!is_plain(name), "{name}");
+        }
+    }
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
-use crate::output::{Output, is_attended};
+use crate::output::{Output, escape, is_attended};
 
 /// Minimum interval between progress lines without a terminal.
 const SPARSE: Duration = Duration::from_secs(30);
@@ -93,7 +93,7 @@ impl<'t> Progress<'t> {
             state.errors += errors;
             let hand = state.in_hand.first().map(|path| path.rsplit('/').next().unwrap_or(path));
             let hand = hand.unwrap_or_default();
-            format!("errors {}  {hand}", state.errors)
+            format!("errors {}  {}", state.errors, escape(hand))
         });
         self.bar.set_message(message);
         self.bar.inc(1);

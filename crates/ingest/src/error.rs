@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use records::Diagnostic;
 
+use crate::bounds::Excess;
 use crate::io::transient;
 use crate::mapping::column_pattern::PLACEHOLDER;
 
@@ -71,6 +72,9 @@ pub enum ErrorKind {
     /// It is a file of another format.
     #[error("this is {format}, not a Parquet file")]
     ForeignFormat { format: &'static str },
+    /// It claims more than is read, or than it can hold.
+    #[error("{_0}")]
+    BeyondLimit(Excess),
     /// It, or a column of it, is encrypted.
     #[error("{}", match column { Some(column) => format!("column `{column}` is encrypted"), None => "the file is encrypted".into() })]
     Encrypted { column: Option<String> },
@@ -157,6 +161,7 @@ impl ErrorKind {
             Self::Object(source) => source.code(),
             Self::Empty => "empty_log",
             Self::NotParquet { .. } | Self::ForeignFormat { .. } => "not_parquet",
+            Self::BeyondLimit(_) => "beyond_limit",
             Self::Encrypted { .. } => "encrypted",
             Self::EncodingUnsupported { .. } => "encoding_unsupported",
             Self::DuplicateColumn { .. } => "duplicate_column",
@@ -264,6 +269,12 @@ impl ErrorKind {
             }
             Self::ForeignFormat { .. } => {
                 "convert it to Parquet (docs/convert-logs.md), or exclude it in `logs.files`"
+            }
+            Self::BeyondLimit(Excess { key: Some(key), .. }) => {
+                return format!("if the file is sound, raise `{key}`; docs/limits.md lists all limits");
+            }
+            Self::BeyondLimit(_) => {
+                "the file is damaged or made to exhaust memory: fetch it again, or exclude it in `logs.files` (docs/limits.md)"
             }
             Self::Encrypted { .. } => {
                 "have it decrypted before it arrives here: keys of encrypted Parquet files are not supported"

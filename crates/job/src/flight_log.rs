@@ -472,7 +472,7 @@ pub fn sample_digest(
 pub fn duplicate_flight(log: &str, owner: &str) -> Diagnostic {
     Diagnostic::new("duplicate_flight", format!("another log holds the same flight: {owner}")).in_file(log).hint(
         "if they are pieces of one flight, set `logs.pieces = true`; else remove one of them, or map an identity that \
-         separates the flights. The log whose name sorts first is used",
+         separates the flights. The stored log is used, or else the one whose name sorts first",
     )
 }
 
@@ -496,7 +496,7 @@ pub fn pieces_undeclared(
     );
     Diagnostic::new("pieces_undeclared", what).in_file(log).hint(
         "if they are pieces of one flight, set `logs.pieces = true`; if they are flights of their own, set \
-         `logs.pieces = false`, or map a flight id that separates them. Until then none of them is used",
+         `logs.pieces = false`, or map a flight id that separates them. Until then none of them is stored anew",
     )
 }
 

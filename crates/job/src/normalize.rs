@@ -14,6 +14,8 @@ use crate::flight_log::{FlightLog, catch_panic};
 ///
 /// An actuator that cannot be used becomes a diagnostic; the others are written.
 ///
+/// `claim` is asked before a file is written, with the digest of the log, and refuses a file of someone else.
+///
 /// # Errors
 /// A diagnostic when the log cannot be read or identified.
 pub fn normalize(
@@ -22,12 +24,13 @@ pub fn normalize(
     config: &Config,
     installations: &Installations,
     (folder, encoding): (&Path, Encoding),
+    claim: &dyn Fn(&Path, &str) -> Result<(), Diagnostic>,
 ) -> Result<(Vec<PathBuf>, Vec<Diagnostic>), Diagnostic> {
     catch_panic(log_path, || {
         let opened = FlightLog::open(files, log_path, config, installations)?;
         let (mut written, mut diagnostics) = (Vec::new(), Vec::new());
         for at in opened.actuators(installations).filter(|at| at.lacking.is_empty()) {
-            match one(&opened, at, config, installations, (folder, encoding)) {
+            match one(&opened, at, config, installations, (folder, encoding), claim) {
                 Ok(file) => written.push(file),
                 Err(diagnostic) => diagnostics.push(diagnostic.in_file(log_path)),
             }
@@ -42,12 +45,14 @@ fn one(
     config: &Config,
     installations: &Installations,
     (folder, encoding): (&Path, Encoding),
+    claim: &dyn Fn(&Path, &str) -> Result<(), Diagnostic>,
 ) -> Result<PathBuf, Diagnostic> {
     let (installation, part) = opened.unit(at, config, installations)?;
     let channels = opened.channels(at, part)?;
     let id = &opened.identity;
     let names = [id.tail_number.as_str(), id.flight_id.as_str(), at.position.as_str()].map(file_name);
     let file = folder.join(&names[0]).join(&names[1]).join(format!("{}.parquet", names[2]));
+    claim(&file, &opened.digest)?;
     let provenance = BTreeMap::from([
         ("source_log".to_owned(), opened.display_name().to_owned()),
         ("source_digest".to_owned(), opened.digest.clone()),

@@ -26,9 +26,12 @@ impl Scheme {
     }
 }
 
-/// Whether a path is an object address.
+/// Whether a path is an object address, or is meant as one: `S3://` and `s3:/` would otherwise become a folder's name.
 pub fn is_address(path: impl AsRef<Path>) -> bool {
-    path.as_ref().to_str().is_some_and(|text| Scheme::ALL.iter().any(|(_, prefix)| text.starts_with(prefix)))
+    const MEANT: [&str; 11] =
+        ["s3", "s3a", "s3n", "gs", "gcs", "az", "abfs", "abfss", "file", "http", "https"];
+    let scheme = path.as_ref().to_str().and_then(|text| text.split_once(":/"));
+    scheme.is_some_and(|(scheme, _)| MEANT.iter().any(|meant| scheme.eq_ignore_ascii_case(meant)))
 }
 
 /// Parsed object address.
@@ -43,11 +46,19 @@ impl Address {
     /// Parses an address; `None` when the path is not one.
     ///
     /// # Errors
-    /// [`Error::Address`] when it names no bucket.
+    /// [`Error::Address`] when it names no bucket, or its scheme is misspelled or unknown.
     pub fn parse(path: impl AsRef<Path>) -> Result<Option<Self>, Error> {
         let Some(text) = path.as_ref().to_str() else { return Ok(None) };
         let scheme = Scheme::ALL.iter().find_map(|(s, prefix)| Some((*s, text.strip_prefix(prefix)?)));
-        let Some((scheme, rest)) = scheme else { return Ok(None) };
+        let Some((scheme, rest)) = scheme else {
+            if !is_address(text) {
+                return Ok(None);
+            }
+            let (before, rest) = text.split_once(":/").unwrap_or((text, ""));
+            let whole = format!("{before}://{}", rest.trim_start_matches('/'));
+            let detail = "it begins with none of s3://, gs:// and az://".to_owned();
+            return Err(Error::Address { text: without_credentials(&whole).unwrap_or(whole), detail });
+        };
         if let Some(text) = without_credentials(text) {
             let detail = "it contains credentials: set them as variables or in a profile (docs/objects.md)";
             return Err(Error::Address { text, detail: detail.to_owned() });
@@ -143,7 +154,7 @@ mod tests {
 
     #[test]
     fn an_address_is_distinguished_from_a_path_and_parsed() {
-        for path in ["logs/a.parquet", "/s3/a", "s3:/bucket/a", "https://host/a"] {
+        for path in ["logs/a.parquet", "/s3/a", "C:/logs/a", "my:/logs"] {
             assert!(!is_address(path), "{path}");
             assert_eq!(Address::parse(path).unwrap(), None);
         }
@@ -159,6 +170,9 @@ mod tests {
             ("s3://AKIA:hunter2@fleet/logs", "s3://***@fleet/logs"),
             ("s3://AKIA:hun/ter2@fleet/logs", "s3://***@fleet/logs"),
             ("az://logs/a.parquet?sv=2022&sig=hunter2", "az://logs/a.parquet?***"),
+            ("S3://AKIA:hunter2@fleet/logs", "S3://***@fleet/logs"),
+            ("s3:/AKIA:hunter2@fleet/logs", "s3://***@fleet/logs"),
+            ("file://AKIA:hunter2@host/logs", "file://***@host/logs"),
             ("s3://fleet/a?X-Amz-Signature=hunter2", "s3://fleet/a?***"),
         ] {
             let error = Address::parse(text).unwrap_err().to_string();

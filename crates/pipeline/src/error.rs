@@ -56,7 +56,7 @@ impl Error {
 
 /// Whether the cause of a log's error may pass without a change of the log or a setting: each run tries the log again.
 pub(crate) fn is_passing(code: &str) -> bool {
-    code == "log_timeout"
+    ["log_timeout", "departure_ahead"].contains(&code)
         || is_unlisted(code)
         || ingest::is_passing(code)
         || object_io::Error::is_passing(code)

@@ -9,11 +9,13 @@ use std::fmt::Write;
 /// The longest text of one field of a diagnostic, in characters.
 pub const MAX_FIELD_CHARS: usize = 2000;
 
-/// Whether a character has an effect without being seen: controls, direction marks and overrides, zero widths
-/// (Unicode Standard Annex 9; UTR 36).
+/// Whether a character has an effect without being seen: controls, direction marks and overrides, zero widths, fillers,
+/// variation selectors and tags (Unicode Standard Annex 9; UTR 36; `Default_Ignorable_Code_Point`).
 fn is_invisible(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\t'))
-        || matches!(c, '\u{61c}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{feff}')
+        || matches!(c, '\u{ad}' | '\u{34f}' | '\u{61c}' | '\u{115f}' | '\u{1160}' | '\u{17b4}' | '\u{17b5}')
+        || matches!(c, '\u{180b}'..='\u{180f}' | '\u{200b}'..='\u{200f}' | '\u{3164}' | '\u{feff}' | '\u{ffa0}')
+        || matches!(c, '\u{fe00}'..='\u{fe0f}' | '\u{e0000}'..='\u{e0fff}')
         || ('\u{2028}'..='\u{202e}').contains(&c)
         || ('\u{2060}'..='\u{206f}').contains(&c)
 }
@@ -66,7 +68,7 @@ pub fn limit_length(text: &str, max_chars: usize) -> Cow<'_, str> {
 }
 
 /// A text cell of a CSV file that no spreadsheet takes for a formula (OWASP, *CSV Injection*): an apostrophe stands
-/// before a first `=`, `+`, `-`, `@`, tab or carriage return, unless the whole cell is a number. Control characters
+/// before a first `=`, `+`, `-`, `@` (full-width too), tab or carriage return, unless the whole cell is a number. Control characters
 /// and direction overrides are replaced by their code points.
 ///
 /// ```
@@ -76,7 +78,8 @@ pub fn limit_length(text: &str, max_chars: usize) -> Cow<'_, str> {
 /// ```
 pub fn csv_cell(text: &str) -> Cow<'_, str> {
     let is_hidden = |c: char| is_invisible(c) && c != '\r';
-    let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err();
+    let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r', '＝', '＋', '－', '＠'])
+        && text.parse::<f64>().is_err();
     match (is_formula, escape(text, is_hidden)) {
         (false, shown) => shown,
         (true, shown) => Cow::Owned(format!("'{shown}")),

@@ -19,13 +19,9 @@ pub(crate) fn file_stem(kind: &str, names: &[&str]) -> String {
         .map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' })
         .take(READABLE)
         .collect();
-    format!("{kind}-{shown}.{:016x}", digest(names))
-}
-
-/// FNV-1a with a separator between names, so that `a`, `bc` differs from `ab`, `c`.
-fn digest(names: &[&str]) -> u64 {
-    let bytes = names.iter().flat_map(|name| name.bytes().chain([0xff]));
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    // A separator between names, so that `a`, `bc` differs from `ab`, `c`.
+    let bytes: Vec<u8> = names.iter().flat_map(|name| name.bytes().chain([0xff])).collect();
+    format!("{kind}-{shown}.{:.32}", blake3::hash(&bytes).to_hex())
 }
 
 #[cfg(test)]

@@ -16,13 +16,6 @@ pub(crate) struct ColumnBuilder {
     scanner: Option<StatsAccumulator>,
 }
 
-/// How far a column was, to come back to.
-#[derive(Debug)]
-pub(crate) struct Checkpoint {
-    values: usize,
-    scanner: Option<StatsAccumulator>,
-}
-
 impl ColumnBuilder {
     /// An empty column with room for so many values, which become SI or stay raw.
     pub(crate) fn with_capacity(values: usize, to_si: Option<SiConversion>) -> Self {
@@ -38,19 +31,9 @@ impl ColumnBuilder {
         self.values.len()
     }
 
-    pub(crate) fn checkpoint(&self) -> Checkpoint {
-        Checkpoint { values: self.values.len(), scanner: self.scanner.clone() }
-    }
-
     /// Leaves out some values: they are missing.
     pub(crate) fn append_nulls(&mut self, values: usize) {
         self.values.resize(self.values.len() + values, f64::NAN);
-    }
-
-    /// Forgets what was added since.
-    pub(crate) fn rollback(&mut self, mark: Checkpoint) {
-        self.values.truncate(mark.values);
-        self.scanner = mark.scanner;
     }
 
     /// The values, and their statistics where requested.
@@ -70,22 +53,5 @@ impl Extend<f64> for ColumnBuilder {
         if let Some(scanner) = &mut self.scanner {
             scanner.advance(&self.values);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_taken_back_was_never_seen() {
-        let mut column = ColumnBuilder::with_capacity(4, None).with_stats();
-        column.extend((0..50).map(f64::from));
-        let mark = column.checkpoint();
-        column.extend([f64::NAN, 1e9, f64::NAN].into_iter().cycle().take(40));
-        column.rollback(mark);
-        column.extend((50..99).map(f64::from));
-        let wanted: Vec<f64> = (0..99).map(f64::from).collect();
-        assert_eq!(column.finish(), (wanted.clone(), Some(ChannelStats::of(&wanted))));
     }
 }

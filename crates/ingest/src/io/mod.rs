@@ -2,5 +2,6 @@
 
 pub(crate) mod byte_source;
 pub(crate) mod digest;
+pub(crate) mod foreign_format;
 pub(crate) mod read_at;
 pub(crate) mod transient;

@@ -28,6 +28,10 @@ impl PreadFile {
     pub(crate) fn new(file: &File) -> io::Result<Self> {
         Ok(Self { file: transient::with_retry(|| file.try_clone())?, length: file_length(file)? })
     }
+
+    pub(crate) fn file(&self) -> &File {
+        &self.file
+    }
 }
 
 /// A stretch of a file from some byte on.

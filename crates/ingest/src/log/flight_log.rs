@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use jiff::Timestamp;
 use records::Position;
@@ -31,7 +31,8 @@ pub struct Log {
     groups: BTreeMap<String, RowTable>,
     mapping: Arc<Mapping>,
     normalized: Option<Normalized>,
-    names: OnceLock<BTreeSet<String>>,
+    /// What channels may be called, in the main log and in each group: asked for every position and channel.
+    names: Mutex<BTreeMap<Option<String>, Arc<BTreeSet<String>>>>,
     /// What the conditions left of the actuator before: most ask the same of every one.
     selected: Mutex<Option<(SelectionKey, SampleSelection)>>,
 }
@@ -68,7 +69,7 @@ impl Log {
         };
         let normalized = Normalized::of(first)?;
         let mapping = Arc::clone(mapping);
-        let (names, selected) = (OnceLock::new(), Mutex::new(None));
+        let (names, selected) = (Mutex::default(), Mutex::new(None));
         let mut log = Self { main, groups, mapping, normalized, names, selected };
         log.order_pieces()?;
         Ok(log)
@@ -84,7 +85,7 @@ impl Log {
             }
         }
         self.mapping = Arc::clone(mapping);
-        (self.names, self.selected) = (OnceLock::new(), Mutex::new(None));
+        (self.names, self.selected) = (Mutex::default(), Mutex::new(None));
         self
     }
 
@@ -185,15 +186,15 @@ impl Log {
     }
 
     /// What channels may be called in the sheet of one.
-    fn names_for(&self, map: &ChannelMapping) -> Result<BTreeSet<String>, Error> {
-        if map.group.is_some() {
-            return self.sheet(map).map_or_else(|| Ok(BTreeSet::new()), RowTable::names);
+    fn names_for(&self, map: &ChannelMapping) -> Result<Arc<BTreeSet<String>>, Error> {
+        let known = self.names.lock().unwrap_or_else(PoisonError::into_inner).get(&map.group).cloned();
+        if let Some(names) = known {
+            return Ok(names);
         }
-        if self.names.get().is_none() {
-            let names = self.main.names()?;
-            return Ok(self.names.get_or_init(|| names).clone());
-        }
-        Ok(self.names.get().cloned().unwrap_or_default())
+        let names = Arc::new(self.sheet(map).map_or_else(|| Ok(BTreeSet::new()), RowTable::names)?);
+        let mut all = self.names.lock().unwrap_or_else(PoisonError::into_inner);
+        all.insert(map.group.clone(), Arc::clone(&names));
+        Ok(names)
     }
 
     /// The actuators whose columns are here, in order of their names.
@@ -237,7 +238,8 @@ impl Log {
                 fewest = (count, map);
             }
         }
-        let (pattern, columns) = (fewest.1.column.clone(), self.names_for(fewest.1)?.into_iter().collect());
+        let (pattern, columns) =
+            (fewest.1.column.clone(), self.names_for(fewest.1)?.iter().cloned().collect());
         Ok(self.main.error(ErrorKind::NoPosition { pattern, columns }))
     }
 
@@ -289,7 +291,7 @@ impl Log {
             let name = ColumnPattern::new(&map.column).column_for(position.as_str());
             if first.is_none() && role != Role::Temperature {
                 // A group without a file is no lack of this actuator, and neither is a struct in a number's place.
-                self.sheet_of(map)?.check_no_struct(&name)?;
+                self.sheet_of(map)?.check_no_struct(&name, &*self.names_for(map)?)?;
                 lacking.push(name.clone());
             }
             *slot = first.map(|(_, name)| name).or((role != Role::Temperature).then_some(name));

@@ -151,6 +151,14 @@ fn breaks_from(text: &str) -> Option<Vec<(usize, f64)>> {
     text.split(' ').map(one).collect()
 }
 
+/// Name and digest of the log that a normalized log was written from; none where the file is no such log.
+pub fn source(file: &Path) -> Option<(String, String)> {
+    let opened = LogFile::open(file).ok()?;
+    opened.metadata(KEY)?;
+    let text = |key: &str| opened.metadata(key).unwrap_or_default().to_owned();
+    Some((text("freeplay.source_log"), text("freeplay.source_digest")))
+}
+
 /// Writes one actuator's flight as a normalized log, with its `provenance`.
 ///
 /// # Errors

@@ -373,23 +373,22 @@ impl RowTable {
 
     /// The known name nearest to a channel that is not here.
     pub(crate) fn lacks(&self, name: &str) -> Error {
-        if let Err(error) = self.check_no_struct(name) {
+        let names = self.names().unwrap_or_default();
+        if let Err(error) = self.check_no_struct(name, &names) {
             return error;
         }
-        let names = self.names().unwrap_or_default();
         let nearest = nearest(name, names.iter().map(String::as_str)).map(str::to_owned);
         self.error(ErrorKind::ColumnMissing { column: name.to_owned(), nearest })
     }
 
     /// Whether this is the name of a column of structs, whose fields alone can be mapped.
-    pub(crate) fn check_no_struct(&self, name: &str) -> Result<(), Error> {
-        let field = |leaf: &str| leaf.strip_prefix(name)?.strip_prefix('.').map(|field| format!("`{field}`"));
-        let fields: BTreeSet<String> =
-            self.files.iter().flat_map(LogFile::leaves).filter_map(|leaf| field(&leaf.name)).collect();
-        if fields.is_empty() {
+    pub(crate) fn check_no_struct(&self, name: &str, names: &BTreeSet<String>) -> Result<(), Error> {
+        let first = format!("{name}.");
+        let fields = names.range(first.clone()..).map_while(|leaf| leaf.strip_prefix(&first));
+        let shown: Vec<String> = fields.take(8).map(|field| format!("`{field}`")).collect();
+        if shown.is_empty() || self.layout.name_column.is_some() {
             return Ok(());
         }
-        let shown: Vec<String> = fields.into_iter().take(8).collect();
         let found = format!("{STRUCT}{}", shown.join(", "));
         Err(self.error(ErrorKind::ColumnType { column: name.to_owned(), found, wanted: "numbers" }))
     }

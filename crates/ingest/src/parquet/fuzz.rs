@@ -1,7 +1,6 @@
 //! Fuzz targets of the Parquet reader, over files of eight writers.
 //!
-//! Of each column the fast decoder and the parquet crate must give the same numbers, and the fast decoder none where the
-//! parquet crate finds too few. Of a damaged page header, the fast decoder may skip a field that the parquet crate refuses.
+//! Of each column the column reader and Arrow's reader must give the same numbers.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -30,7 +29,6 @@ const HEADER_BYTES: usize = 48;
 enum Part {
     PageHeaders,
     Pages,
-    Dictionaries,
     Footer,
 }
 
@@ -96,8 +94,7 @@ fn ranges(bytes: &[u8], part: Part) -> Vec<Range<usize>> {
         let behind = |page: usize| (page + HEADER_BYTES).min(end)..end;
         match part {
             Part::PageHeaders => vec![start..start + HEADER_BYTES, first_data..first_data + HEADER_BYTES],
-            Part::Dictionaries => std::iter::once(behind(start)).filter(|_| first_data > start).collect(),
-            Part::Pages | Part::Footer => std::iter::once(behind(first_data)).collect(),
+            Part::Pages | Part::Footer => vec![behind(start), behind(first_data)],
         }
     };
     chunks.flat_map(of_chunk).collect()
@@ -116,18 +113,12 @@ fn read_both_ways(file: &Path) -> String {
         let mut plain = ColumnBuilder::with_capacity(0, None);
         let by_crate =
             opened.each_flat(&[&leaf.name], |_, flats| append(&leaf.name, &flats[0].values, &mut plain));
-        let (fast, plain) = (fast.finish().0, plain.finish().0);
-        match (&direct, &by_crate) {
-            (Ok(()), Ok(())) => {
-                let is_same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan());
-                assert_eq!(fast.len(), plain.len(), "rows of `{}`", leaf.name);
-                assert!(fast.iter().zip(&plain).all(is_same), "numbers of `{}` differ", leaf.name);
-            }
-            (Ok(()), Err(e)) => {
-                let why = e.diagnostic().to_string();
-                assert!(!why.contains("insufficient values"), "`{}` is read: {why}", leaf.name);
-            }
-            _ => {}
+        if direct.is_ok() && by_crate.is_ok() {
+            let bits = |built: ColumnBuilder| -> Vec<u64> {
+                let values = built.finish().0.into_iter();
+                values.map(|v| if v.is_nan() { u64::MAX } else { v.to_bits() }).collect()
+            };
+            assert_eq!(bits(fast), bits(plain), "numbers of `{}` differ", leaf.name);
         }
         outcome.push_str(&direct.as_ref().map_or_else(code, |()| "read ".to_owned()));
     }
@@ -164,13 +155,8 @@ fn fuzz_page_headers() {
 }
 
 #[test]
-fn fuzz_fast_decode() {
-    fuzz_part("fast decode", Part::Pages, 300);
-}
-
-#[test]
-fn fuzz_dictionary_decode() {
-    fuzz_part("dictionary decode", Part::Dictionaries, 300);
+fn fuzz_pages() {
+    fuzz_part("pages", Part::Pages, 600);
 }
 
 #[test]

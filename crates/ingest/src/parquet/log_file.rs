@@ -1,5 +1,6 @@
 //! One Parquet file: its leaves by name, their values in batches, checked against the footer.
 
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::iter::once;
 use std::ops::Range;
@@ -10,10 +11,8 @@ use std::sync::{Arc, OnceLock};
 use arrow::array::ArrayRef;
 use arrow::datatypes::{DataType, Field, Schema, TimeUnit};
 use arrow::error::ArrowError;
-use parquet::arrow::arrow_reader::{
-    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder,
-};
-use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels, parquet_to_arrow_schema};
 use parquet::basic::Encoding;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{ColumnChunkMetaData, RowGroupMetaData};
@@ -22,14 +21,15 @@ use crate::channel::column_builder::ColumnBuilder;
 use crate::error::{Error, ErrorKind};
 use crate::io::byte_source::ByteSource;
 use crate::io::digest::Digest;
+use crate::io::foreign_format;
 use crate::io::read_at::{self, PreadFile};
 use crate::io::transient;
 use crate::mapping::column_pattern::nearest;
-use crate::parquet::fast_decode;
-use crate::parquet::foreign_format;
+use crate::parquet::column_numbers;
 use crate::parquet::leaf_columns::{self, LeafColumn};
 use crate::parquet::numeric::append;
 use crate::parquet::page_header::{self, Page};
+use crate::parquet::page_reader::{self, BoundedGroups, Pages};
 use crate::parquet::raw_footer;
 use crate::parquet::row_selection::RowSelection;
 
@@ -74,6 +74,8 @@ pub(crate) struct LogFile {
     /// The same footer, by which text columns are read as the codes of their dictionary.
     coded: OnceLock<Option<ArrowReaderMetadata>>,
     leaves: Vec<LeafColumn>,
+    /// Places of the leaves of each name.
+    by_name: HashMap<String, Vec<usize>>,
 }
 
 /// How columns are scanned.
@@ -107,6 +109,7 @@ impl LogFile {
             return Err(fail(ErrorKind::Empty));
         }
         want_footer(&source, length.len()).map_err(fail)?;
+        raw_footer::check(file).map_err(fail)?;
         // The embedded Arrow schema adds only zones and dictionaries, and its decoder panics on some damage.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         // Parquet's own reader of files neither reads at a position nor repeats a read.
@@ -121,7 +124,11 @@ impl LogFile {
             return Err(fail(ErrorKind::NotParquet { detail: "its footer has an offset below zero".into() }));
         }
         let leaves = leaf_columns::leaves(footer.schema().fields());
-        let opened = Self { path: path.to_owned(), source, footer, coded: OnceLock::new(), leaves };
+        let mut by_name: HashMap<String, Vec<usize>> = HashMap::with_capacity(leaves.len());
+        for (place, leaf) in leaves.iter().enumerate() {
+            by_name.entry(leaf.name.clone()).or_default().push(place);
+        }
+        let opened = Self { path: path.to_owned(), source, footer, coded: OnceLock::new(), leaves, by_name };
         if opened.rows() == 0 {
             return Err(opened.error(ErrorKind::Empty));
         }
@@ -150,8 +157,12 @@ impl LogFile {
         self.find(name).is_some()
     }
 
+    fn named(&self, name: &str) -> impl Iterator<Item = &LeafColumn> {
+        self.by_name.get(name).into_iter().flatten().map(|place| &self.leaves[*place])
+    }
+
     fn find(&self, name: &str) -> Option<&LeafColumn> {
-        let mut named = self.leaves.iter().filter(|leaf| leaf.name == name);
+        let mut named = self.named(name);
         let first = named.next()?;
         // A column called `a.b` comes before field `b` of struct `a`.
         if first.is_field { named.find(|leaf| !leaf.is_field).or(Some(first)) } else { Some(first) }
@@ -159,7 +170,7 @@ impl LogFile {
 
     /// How many columns have this name, or fields where no column has.
     fn count_of(&self, found: &LeafColumn) -> usize {
-        self.leaves.iter().filter(|leaf| leaf.name == found.name && leaf.is_field == found.is_field).count()
+        self.named(&found.name).filter(|leaf| leaf.is_field == found.is_field).count()
     }
 
     /// A leaf by its name.
@@ -252,7 +263,11 @@ impl LogFile {
                 rows = rows.saturating_add(self.rows_of(group));
                 continue;
             }
-            leaves.iter().try_for_each(|leaf| self.pages(group, leaf).map(drop))?;
+            let mut scan = scan;
+            for leaf in &leaves {
+                let pages = self.pages(group, leaf)?;
+                scan.batch_rows = page_reader::batch_rows(self.chunk(group, leaf), &pages, scan.batch_rows);
+            }
             let read = self.each_row_group(group, &leaves, scan, |columns| {
                 take(names, columns.iter().map(leaf_columns::flatten).collect())
             })?;
@@ -298,9 +313,13 @@ impl LogFile {
                 rows += declared;
                 continue;
             }
-            let (pages, before) = (self.pages(group, leaf)?, into.len());
-            if fast_decode::decode_chunk((self.source.file(), self.chunk(group, leaf)), &pages, wanted, into)
-            {
+            let (pages, before, chunk) = (self.pages(group, leaf)?, into.len(), self.chunk(group, leaf));
+            if column_numbers::is_plain(chunk) {
+                let input = PreadFile::new(self.source.file())
+                    .map_err(|source| self.error(ErrorKind::Unreadable { source }))?;
+                let pages = Pages::new(Arc::new(input), chunk, pages, BATCH_ROWS);
+                column_numbers::append(pages, chunk, wanted, into)
+                    .map_err(|detail| self.decode(leaf, group, detail))?;
                 rows += into.len() - before;
                 continue;
             }
@@ -359,11 +378,13 @@ impl LogFile {
             .map_err(|source| self.error(ErrorKind::Unreadable { source }))?;
         let is_coded = scan.as_codes && self.is_coded(group, leaf);
         let footer = if is_coded { self.coded_footer() } else { None }.unwrap_or(&self.footer);
-        let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(input, footer.clone());
-        let mask = ProjectionMask::leaves(builder.parquet_schema(), [leaf.index]);
-        let reader =
-            builder.with_projection(mask).with_row_groups(vec![group]).with_batch_size(scan.batch_rows);
-        reader.build().map_err(|e| self.decode(leaf, group, e.to_string()))
+        let schema = footer.parquet_schema();
+        let mask = ProjectionMask::leaves(schema, [leaf.index]);
+        let hint = is_coded.then(|| footer.schema().fields());
+        let groups = BoundedGroups::new(input, footer.metadata(), vec![group], scan.batch_rows);
+        parquet_to_arrow_field_levels(schema, mask, hint)
+            .and_then(|levels| BatchIter::try_new_with_row_groups(&levels, &groups, scan.batch_rows, None))
+            .map_err(|e| self.decode(leaf, group, e.to_string()))
     }
 
     /// Whether a chunk is a text column of its own whose values are codes of a dictionary.
@@ -469,8 +490,9 @@ impl LogFile {
         let unreadable = |source| self.error(ErrorKind::Unreadable { source });
         let file = self.source.file();
         let length = read_at::file_length(file).map_err(unreadable)?;
+        let names: HashSet<&str> = names.iter().copied().collect();
         let wanted: Vec<&LeafColumn> =
-            self.leaves.iter().filter(|l| names.contains(&l.name.as_str())).collect();
+            self.leaves.iter().filter(|l| names.contains(l.name.as_str())).collect();
         self.want(&wanted)?;
         for group in 0..self.footer.metadata().num_row_groups() {
             for leaf in &wanted {
@@ -507,7 +529,7 @@ impl TextBounds<'_> {
     }
 }
 
-type BatchIter = parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+type BatchIter = ParquetRecordBatchReader;
 
 /// Whether an offset or a length of a chunk is negative, on which the parquet crate panics.
 fn is_before_start(chunk: &ColumnChunkMetaData) -> bool {

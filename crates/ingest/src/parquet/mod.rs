@@ -1,8 +1,6 @@
 //! Parquet files: leaf columns as numbers, page by page, and a writer.
 
-pub(crate) mod dictionary;
-pub(crate) mod fast_decode;
-mod foreign_format;
+mod column_numbers;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 mod fuzz;
@@ -11,6 +9,7 @@ pub(crate) mod log_file;
 pub(crate) mod numeric;
 pub(crate) mod page_crc;
 pub(crate) mod page_header;
-mod raw_footer;
+pub(crate) mod page_reader;
+pub(crate) mod raw_footer;
 pub(crate) mod row_selection;
 pub mod writer;

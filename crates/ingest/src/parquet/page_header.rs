@@ -11,10 +11,9 @@ use parquet::file::metadata::ColumnChunkMetaData;
 use polars_parquet_format::thrift::protocol::TCompactInputProtocol;
 use polars_parquet_format::{Encoding, PageHeader, PageType};
 
+use crate::bounds::{self, PAGE_BYTES};
 use crate::io::read_at;
 
-/// Largest page that is decoded. Writers make pages of about 1 MiB; a row group without cuts some tens.
-const LARGEST_PAGE: i64 = 256 << 20;
 /// A header holds two statistics at most; this is far beyond any.
 const LARGEST_HEADER: u64 = 1 << 20;
 const USUAL_HEADER: u64 = 256;
@@ -88,6 +87,8 @@ pub(crate) fn bounded(file: &File, chunk: &ColumnChunkMetaData, rows: i64) -> Re
     if start.checked_add(bytes).is_none_or(|end| end > length) {
         return Err(format!("its pages would end at byte {start} + {bytes} of a file of {length}"));
     }
+    let values = u64::try_from(chunk.num_values()).unwrap_or(u64::MAX);
+    bounds::check_rows("values of a column", values, length).map_err(|excess| excess.to_string())?;
     let is_flat = chunk.column_descr().max_rep_level() == 0;
     let (mut values, mut found) = (0_i64, Vec::new());
     let mut pages = Pages::of(file, start, bytes);
@@ -118,14 +119,16 @@ fn claimed(header: &PageHeader) -> Result<i64, String> {
 fn check_size(header: &PageHeader, chunk: &ColumnChunkMetaData, count: i64) -> Result<(), String> {
     let size = i64::from(header.uncompressed_page_size);
     let most = match width(chunk) {
-        Some(width) => count.saturating_mul(width + 4).saturating_add(SLACK_BYTES).min(LARGEST_PAGE),
-        None => LARGEST_PAGE,
+        Some(width) => count.saturating_mul(width + 4).saturating_add(SLACK_BYTES).min(PAGE_BYTES),
+        None => bounds::text_page_bytes(header.compressed_page_size.into()),
     };
     if !(0..=most).contains(&size) {
         return Err(format!("a page of {count} values claims {size} bytes"));
     }
-    match (width(chunk), present(header, chunk)) {
-        (Some(width), Some(present)) if present.saturating_mul(width) > size => {
+    // A text takes the four bytes of its length at least.
+    let width = width(chunk).unwrap_or(4);
+    match present(header, chunk) {
+        Some(present) if present.saturating_mul(width) > size => {
             Err(format!("a page of {size} bytes claims {present} values of {width} bytes"))
         }
         _ => Ok(()),
@@ -134,7 +137,13 @@ fn check_size(header: &PageHeader, chunk: &ColumnChunkMetaData, count: i64) -> R
 
 /// Values that surely lie in the page at their full width; nothing where nulls or an encoding hide it.
 fn present(header: &PageHeader, chunk: &ColumnChunkMetaData) -> Option<i64> {
-    let full = |encoding: Encoding| matches!(encoding, Encoding::PLAIN | Encoding::BYTE_STREAM_SPLIT);
+    let is_text = chunk.column_type() == Type::BYTE_ARRAY;
+    let full = |encoding: Encoding| {
+        encoding == Encoding::PLAIN || encoding == Encoding::BYTE_STREAM_SPLIT && !is_text
+    };
+    if let Some(dictionary) = &header.dictionary_page_header {
+        return Some(i64::from(dictionary.num_values));
+    }
     if let Some(v2) = header.data_page_header_v2.as_ref().filter(|h| full(h.encoding)) {
         return Some(i64::from(v2.num_values) - i64::from(v2.num_nulls));
     }

@@ -4,6 +4,7 @@
 use std::fs::{self, File};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use arrow::array::{
     ArrayRef, Float32Array, Float64Array, RecordBatch, StringArray, TimestampMicrosecondArray,
@@ -18,6 +19,9 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 
 use crate::error::{Error, ErrorKind};
 use crate::parquet::page_crc;
+
+/// Files that this process began.
+static WRITTEN: AtomicU64 = AtomicU64::new(0);
 
 /// A column to be written.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,14 +98,16 @@ pub fn write_encoded(
     if let Some(folder) = file.parent() {
         fs::create_dir_all(folder).map_err(io)?;
     }
-    let (bare, beside) = (file.with_extension("parquet.bare"), file.with_extension("parquet.part"));
-    let sink = File::create(&bare).map_err(io)?;
+    // Two processes, or workers, may write files of one name.
+    let own = format!("{}-{}", std::process::id(), WRITTEN.fetch_add(1, Ordering::Relaxed));
+    let [bare, beside] = ["bare", "part"].map(|end| file.with_extension(format!("{own}.{end}")));
+    let sink = object_io::create_fresh(&bare).map_err(io)?;
     let mut writer = ArrowWriter::try_new(sink, schema, Some(properties(&batch, metadata, encoding)))
         .map_err(|e| bad(e.to_string()))?;
     writer.write(&batch).map_err(|e| bad(e.to_string()))?;
     writer.close().map_err(|e| bad(e.to_string()))?;
     let from = File::open(&bare).map_err(io)?;
-    let mut to = File::create(&beside).map_err(io)?;
+    let mut to = object_io::create_fresh(&beside).map_err(io)?;
     page_crc::copy(&from, &mut to).map_err(|e| bad(e.to_string()))?;
     to.sync_all().map_err(io)?;
     fs::remove_file(&bare).map_err(io)?;

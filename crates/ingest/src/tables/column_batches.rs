@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -16,16 +17,16 @@ use arrow::array::{
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Schema, TimeUnit, TimestampMicrosecondType};
 use jiff::Timestamp;
-use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{
-    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
-};
-use parquet::errors::ParquetError;
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader};
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels};
 
+use crate::bounds::{self, TABLE_COLUMNS};
 use crate::error::{Error, ErrorKind};
 use crate::io::byte_source::whole;
 use crate::io::read_at::PreadFile;
 use crate::io::transient;
+use crate::parquet::page_reader::BoundedGroups;
+use crate::parquet::raw_footer;
 use crate::tables::cell::{bad_cell, missing, number, position, utc};
 
 /// Rows of a batch.
@@ -227,8 +228,13 @@ impl TableSplits {
     }
 }
 
-fn torn(error: &ParquetError) -> ErrorKind {
-    ErrorKind::NotParquet { detail: error.to_string() }
+/// A result of the parquet crate, which panics on some damaged bytes.
+fn caught<T, E: std::fmt::Display>(read: impl FnOnce() -> Result<T, E>) -> Result<T, ErrorKind> {
+    let torn = |detail: String| ErrorKind::NotParquet { detail };
+    match catch_unwind(AssertUnwindSafe(read)) {
+        Ok(result) => result.map_err(|e| torn(e.to_string())),
+        Err(_) => Err(torn("its pages are inconsistent".into())),
+    }
 }
 
 fn parquet(
@@ -237,9 +243,9 @@ fn parquet(
     coded: &[&str],
 ) -> Result<(File, ArrowReaderMetadata, ProjectionMask), ErrorKind> {
     let opened = whole(file)?;
+    raw_footer::check(&opened)?;
     let input = PreadFile::new(&opened).map_err(|source| ErrorKind::Unreadable { source })?;
-    let found = ArrowReaderMetadata::load(&input, ArrowReaderOptions::new());
-    let found = found.map_err(|e| torn(&e))?;
+    let found = caught(|| ArrowReaderMetadata::load(&input, ArrowReaderOptions::new()))?;
     let footer = if coded.is_empty() { found } else { with_codes(found, coded) };
     let columns = footer.parquet_schema().root_schema().get_fields().iter().enumerate();
     let is_wanted = |name: &str| wanted.is_none_or(|wanted| wanted.contains(&name.trim()));
@@ -276,9 +282,12 @@ fn groups(
     let some = footer.metadata().row_groups();
     let before = some.iter().take(groups.start).map(|group| group.num_rows() as usize).sum();
     let groups = groups.start..groups.end.min(some.len());
-    let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(input, footer.clone());
-    let builder = builder.with_projection(mask).with_row_groups(groups.collect()).with_batch_size(ROWS);
-    let reader = builder.build().map_err(|e| torn(&e))?;
+    let rows = BoundedGroups::new(input, footer.metadata(), groups.collect(), ROWS);
+    let reader = caught(|| {
+        let hint = Some(footer.schema().fields());
+        let levels = parquet_to_arrow_field_levels(footer.parquet_schema(), mask, hint)?;
+        ParquetRecordBatchReader::try_new_with_row_groups(&levels, &rows, ROWS, None)
+    })?;
     let schema = arrow::array::RecordBatchReader::schema(&reader);
     Ok((Rows::Parquet(reader), schema, before))
 }
@@ -337,6 +346,7 @@ impl Rows {
         text.set_position(mark);
         let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text);
         let header = reader.headers().map_err(|e| bad_row(&e))?;
+        bounds::check("columns", header.len() as u64, TABLE_COLUMNS as u64)?;
         let mut names = BTreeSet::new();
         if let Some(twice) = header.iter().find(|name| !name.is_empty() && !names.insert(*name)) {
             let detail = format!("the header has column `{twice}` twice: rename or remove one");
@@ -348,10 +358,7 @@ impl Rows {
 
     fn next(&mut self, schema: &Arc<Schema>) -> Option<Result<RecordBatch, ErrorKind>> {
         match self {
-            Self::Parquet(reader) => {
-                let torn = |e: arrow::error::ArrowError| ErrorKind::NotParquet { detail: e.to_string() };
-                Some(reader.next()?.map_err(torn))
-            }
+            Self::Parquet(reader) => caught(|| reader.next().transpose()).transpose(),
             Self::Csv(records) => texts(records, schema).transpose(),
         }
     }

@@ -10,6 +10,9 @@ use ingest::{ActuatorChannels, ClockMapping, Error, Geometry, Log, LogFiles, Map
 
 use crate::layouts::{channel, mapping, write};
 
+#[path = "../../../../tests/hostile/corpus.rs"]
+mod corpus;
+
 fn plain() -> Mapping {
     mapping(channel("m", Unit::Metre), channel("s", Unit::Metre), channel("f", Unit::Newton))
 }
@@ -249,4 +252,28 @@ fn encrypted_files_and_new_encodings_are_named() {
     let alp = diagnostic("alp.parquet");
     assert_eq!(alp.code, "encoding_unsupported");
     assert!(alp.message.contains("ALP"), "{alp}");
+}
+
+/// Files of a few kilobytes that claim gigabytes: as logs and as tables, each ends as an error that names the claim.
+#[test]
+fn no_claim_of_a_small_file_takes_memory() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("hostile.parquet");
+    let mut m = plain();
+    m.clock.column = Some("time_s".into());
+    m.channels.motor_position.column = "{position}_motor_deg".into();
+    m.channels.screw_position = Some(channel("{position}_screw_mm", Unit::Metre));
+    m.channels.load.column = "{position}_load_n".into();
+    let mut bytes = 0;
+    for hostile in corpus::all() {
+        std::fs::write(&file, &hostile.bytes).unwrap();
+        bytes += hostile.bytes.len();
+        let diagnostic = read(&file, &m).unwrap_err().diagnostic();
+        assert_eq!(diagnostic.code, hostile.code, "{}: {diagnostic}", hostile.name);
+        assert!(diagnostic.to_string().contains(hostile.says), "{}: {diagnostic}", hostile.name);
+        let table = ingest::tables::Table::read(&file).unwrap_err().diagnostic();
+        let codes = ["beyond_limit", "not_parquet"];
+        assert!(codes.contains(&table.code.as_str()), "{}: {table}", hostile.name);
+    }
+    assert!(bytes < 200_000, "{bytes} bytes");
 }

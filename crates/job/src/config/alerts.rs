@@ -38,10 +38,13 @@ pub struct AlertChannel {
     /// Program and arguments, without a shell: it gets the message as JSON on standard input. Exit code 0 means sent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub command: Option<Vec<String>>,
+    /// Variables of the environment that `command` gets beside `PATH`, `HOME`, `LANG` and a few others.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pass_environment: Vec<String>,
     /// Folder that gets one JSON file per message, named after the alert's `id`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub folder: Option<String>,
-    /// Address (`https://` or `http://`) that the message is posted to as JSON. An answer of 200 to 299 means sent.
+    /// Address (`https://` or `http://`) that the message is posted to as JSON. An answer of 200 to 299 means sent; redirections are not followed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
     /// New states that are sent: of the gap `normal`, `watch`, `unassessed`, `plan`, `act`, and `not_assessed` (removed,
@@ -65,6 +68,7 @@ impl Default for AlertChannel {
     fn default() -> Self {
         Self {
             command: None,
+            pass_environment: Vec::new(),
             folder: None,
             url: None,
             states: default_states(),

@@ -85,6 +85,9 @@ pub struct LogSettings {
     /// flights of their own, also within 12 hours.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pieces: Option<bool>,
+    /// Patterns of logs whose errors are known: they are listed, and no longer make the exit code of later runs 1.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub acknowledged_errors: Vec<String>,
     /// The maintenance table, CSV or Parquet, if there is one.
     #[serde(default)]
     pub maintenance: Option<String>,
@@ -167,11 +170,13 @@ pub struct RunSettings {
     pub memory_mib: Option<u64>,
     /// A log that takes longer than this, s, ends as an error of that log, and the run goes on. Default 600.
     pub log_timeout_s: f64,
+    /// A log or a table that claims more rows is refused before it is read. Default 200,000,000.
+    pub max_rows: u64,
 }
 
 impl Default for RunSettings {
     fn default() -> Self {
-        Self { memory_mib: None, log_timeout_s: 600.0 }
+        Self { memory_mib: None, log_timeout_s: 600.0, max_rows: ingest::bounds::DEFAULT_MAX_ROWS }
     }
 }
 
@@ -366,6 +371,8 @@ impl Document {
         found.extend(bounded("limit_m", self.trend.limit_m).map(|c| source.at(&["trend", "limit_m"], c)));
         let timeout = bounded("log_timeout_s", Some(self.run.log_timeout_s));
         found.extend(timeout.map(|c| source.at(&["run", "log_timeout_s"], c)));
+        let rows = bounded("max_rows", Some(self.run.max_rows as f64));
+        found.extend(rows.map(|c| source.at(&["run", "max_rows"], c)));
         for (key, seconds) in [("timeout_s", self.objects.timeout_s), ("give_up_s", self.objects.give_up_s)] {
             found.extend(positive(key, Some(seconds)).map(|c| source.at(&["objects", key], c)));
         }

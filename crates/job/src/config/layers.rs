@@ -133,5 +133,8 @@ fn at_span_of(layers: &[ConfigLayer], span: &Range<usize>, diagnostic: Diagnosti
     // Each diagnostic has its own copy.
     let content = text[line_start..].lines().next().unwrap_or_default();
     let content = content[..content.floor_char_boundary(MAX_CONTENT)].to_owned();
-    Diagnostic { line: Some((line, column)), text: Some(content), ..diagnostic.in_file(&layer.file) }
+    // A webhook's address holds its secret.
+    let is_secret = |line: &String| line.contains("http") || line.contains("://") && line.contains('@');
+    let content = Some(content).filter(|line| !is_secret(line));
+    Diagnostic { line: Some((line, column)), text: content, ..diagnostic.in_file(&layer.file) }
 }

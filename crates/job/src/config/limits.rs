@@ -62,6 +62,7 @@ pub const PLAUSIBLE: &[(&str, f64, f64)] = &[
     ("load_delay_s", 1e-7, 10.0),
     ("nis_share", 1e-3, 1e4),
     ("log_timeout_s", 1e-3, 86_400.0),
+    ("max_rows", 1.0, 1e11),
 ];
 
 /// A value outside the plausible range of its key. Zero, negative and non-finite values have diagnostics of their own.

@@ -84,6 +84,7 @@ impl Config {
         let mut config = Self::read_settings(files)?;
         // Before the first table is read: it may lie in an object store.
         object_io::configure(config.document.objects.retry_settings());
+        ingest::bounds::set_max_rows(config.document.run.max_rows);
         if let Some(table) = &config.document.logs.flights {
             let names = &config.document.columns.flights;
             let read = Flights::read(&config.path(table), names, &config.document.identity);

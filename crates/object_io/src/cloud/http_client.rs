@@ -2,52 +2,43 @@
 
 use std::time::Duration;
 
-use object_store::ClientOptions;
-use object_store::client::{HttpConnector, HttpErrorKind, HttpRequest, ReqwestConnector};
+use reqwest::header::CONTENT_TYPE;
+use reqwest::redirect::Policy;
 
 use crate::client::handle;
 use crate::http_post::{Posted, parse};
 
 /// Posts a JSON document and waits for the status of the answer, at most `timeout`.
 ///
-/// Redirections are followed as by other clients of HTTP. Messages hold no address, which may hold a secret.
+/// A redirection is an answer like any other: following it would turn the post into a request without the document, or
+/// send the document to a host that nobody named. Messages hold no address, which may hold a secret.
 pub fn post_json(url: &str, body: &str, timeout: Duration) -> Posted {
-    let request = match request(url, body) {
-        Ok(request) => request,
+    let url = match parse(url) {
+        Ok(url) => url,
         Err(detail) => return Posted::NotSent(detail),
     };
-    let options =
-        ClientOptions::new().with_timeout(timeout).with_connect_timeout(timeout).with_allow_http(true);
-    let client = match ReqwestConnector::default().connect(&options) {
+    let client = reqwest::Client::builder().redirect(Policy::none()).referer(false);
+    let client = match client.timeout(timeout).connect_timeout(timeout).build() {
         Ok(client) => client,
-        Err(error) => return Posted::NotSent(error.to_string()),
+        Err(error) => return Posted::NotSent(detail(&error)),
     };
+    let request = client.post(url).header(CONTENT_TYPE, "application/json").body(body.to_owned());
     let answer = match handle() {
-        Ok(runtime) => runtime.block_on(client.execute(request)),
+        Ok(runtime) => runtime.block_on(async { request.send().await }),
         Err(error) => return Posted::NotSent(error.to_string()),
     };
-    match answer {
+    match answer.map_err(reqwest::Error::without_url) {
         Ok(answer) => Posted::Answered(answer.status().as_u16()),
-        Err(error) if error.kind() == HttpErrorKind::Connect => Posted::NotSent(detail(&error)),
-        Err(error) if error.kind() == HttpErrorKind::Timeout => {
+        Err(error) if error.is_connect() => Posted::NotSent(detail(&error)),
+        Err(error) if error.is_timeout() => {
             Posted::Unknown(format!("no answer within {:.1} s", timeout.as_secs_f64()))
         }
         Err(error) => Posted::Unknown(detail(&error)),
     }
 }
 
-fn request(url: &str, body: &str) -> Result<HttpRequest, String> {
-    let url = parse(url)?;
-    let mut request = HttpRequest::new(body.to_owned().into());
-    *request.uri_mut() = url.as_str().parse().map_err(|_| "the address cannot be requested".to_owned())?;
-    let invalid = |_| "the request cannot be made".to_owned();
-    *request.method_mut() = "POST".parse().map_err(|_| "the request cannot be made".to_owned())?;
-    request.headers_mut().insert("content-type", "application/json".parse().map_err(invalid)?);
-    Ok(request)
-}
-
 /// Message of the innermost cause.
-fn detail(error: &object_store::client::HttpError) -> String {
+fn detail(error: &reqwest::Error) -> String {
     let mut cause: &dyn std::error::Error = error;
     while let Some(next) = cause.source() {
         cause = next;
@@ -80,7 +71,7 @@ mod tests {
                 }
             }
             if reply.is_empty() {
-                std::thread::sleep(2 * SOON);
+                std::thread::park_timeout(2 * SOON);
             }
             stream.write_all(reply.as_bytes()).unwrap();
             String::from_utf8(request).unwrap()
@@ -93,12 +84,15 @@ mod tests {
         for (reply, status) in [
             ("HTTP/1.1 204 No Content\r\nContent-Length: 0\r\n\r\n", 204),
             ("HTTP/1.1 500 Internal Server Error\r\nContent-Length: 0\r\n\r\n", 500),
+            ("HTTP/1.1 302 Found\r\nLocation: http://127.0.0.1:1/\r\nContent-Length: 0\r\n\r\n", 302),
+            ("HTTP/1.1 307 Moved\r\nLocation: http://127.0.0.1:1/\r\nContent-Length: 0\r\n\r\n", 307),
         ] {
             let (url, served) = server(reply);
             assert_eq!(post_json(&url, "{\"a\":\"µ\"}", SOON), Posted::Answered(status));
             let request = served.join().unwrap();
             assert!(request.starts_with("POST /hook?token=SECRET HTTP/1.1\r\n"), "{request}");
             assert!(request.to_lowercase().contains("content-type: application/json\r\n"), "{request}");
+            assert!(!request.to_lowercase().contains("referer"), "{request}");
             assert!(request.ends_with("\r\n\r\n{\"a\":\"µ\"}"), "{request}");
         }
     }

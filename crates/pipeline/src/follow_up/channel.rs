@@ -26,13 +26,18 @@ const LAST_WORDS: Duration = Duration::from_millis(200);
 pub(super) fn send(config: &Config, channel: &AlertChannel, row: &AlertRecord) -> Attempt {
     let message = row.message.as_deref().unwrap_or_default();
     match (&channel.command, &channel.folder, &channel.url) {
-        (Some(words), _, _) => command(words, &config.folder, message, channel.timeout()),
+        (Some(words), _, _) => {
+            command(words, &config.folder, message, channel.timeout(), &channel.pass_environment)
+        }
         (_, Some(folder), _) => match write_file(&config.path(folder), &row.alert_id, message) {
             Ok(()) => Attempt::Sent,
             Err(error) => Attempt::NotSent(format!("the file cannot be written: {error}")),
         },
         (_, _, Some(url)) => match object_io::post_json(url, message, channel.timeout()) {
             Posted::Answered(200..=299) => Attempt::Sent,
+            Posted::Answered(status @ 300..=399) => Attempt::NotSent(format!(
+                "the receiver answered {status}: it has moved, and redirections are not followed; set `url` to its new address"
+            )),
             Posted::Answered(status) => Attempt::NotSent(format!("the receiver answered {status}")),
             Posted::NotSent(why) => Attempt::NotSent(why),
             Posted::Unknown(why) => Attempt::Unknown(why),
@@ -49,7 +54,7 @@ fn write_file(folder: &Path, id: &str, message: &str) -> io::Result<()> {
         return Ok(());
     }
     let staged = folder.join(format!(".{id}.{}.part", std::process::id()));
-    let written = File::create(&staged).and_then(|mut to| {
+    let written = object_io::create_fresh(&staged).and_then(|mut to| {
         to.write_all(message.as_bytes())?;
         to.write_all(b"\n")?;
         to.sync_all()
@@ -63,12 +68,34 @@ fn write_file(folder: &Path, id: &str, message: &str) -> io::Result<()> {
     if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
+/// Variables that a command gets: what programs need to find others, files and words. Keys of object stores are not
+/// among them.
+const ENVIRONMENT: [&str; 14] = [
+    "PATH",
+    "HOME",
+    "USER",
+    "LOGNAME",
+    "SHELL",
+    "LANG",
+    "LC_ALL",
+    "TZ",
+    "TMPDIR",
+    "TEMP",
+    "TMP",
+    "SYSTEMROOT",
+    "USERPROFILE",
+    "PATHEXT",
+];
+
 /// Runs a program with the message on its standard input, and ends it at the time limit.
-fn command(words: &[String], folder: &Path, message: &str, timeout: Duration) -> Attempt {
+fn command(words: &[String], folder: &Path, message: &str, timeout: Duration, pass: &[String]) -> Attempt {
     let Some((program, arguments)) = words.split_first() else {
         return Attempt::NotSent("the command is empty".to_owned());
     };
     let mut command = Command::new(program);
+    let names = ENVIRONMENT.into_iter().chain(pass.iter().map(String::as_str));
+    let kept = names.filter_map(|name| Some((name, std::env::var_os(name)?)));
+    command.env_clear().envs(kept);
     command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
     if !folder.as_os_str().is_empty() {
         command.current_dir(folder);
@@ -162,7 +189,13 @@ mod tests {
     const HOSTILE: &str = "{\"serial_number\":\"$(touch X)'; rm -rf \\\"\\n\u{202e}\"}";
 
     fn shell(script: &str, folder: &Path, timeout: Duration) -> Attempt {
-        command(&["sh".to_owned(), "-c".to_owned(), script.to_owned()], folder, HOSTILE, timeout)
+        command(
+            &["sh".to_owned(), "-c".to_owned(), script.to_owned()],
+            folder,
+            HOSTILE,
+            timeout,
+            &["CARGO_PKG_NAME".to_owned()],
+        )
     }
 
     #[test]
@@ -173,13 +206,23 @@ mod tests {
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nothing in a name is executed");
     }
 
+    /// Cargo sets the variables of tests: keys of object stores are passed on as little as they are.
+    #[test]
+    fn a_command_gets_a_minimal_environment_and_what_is_passed_on() {
+        let dir = tempfile::tempdir().unwrap();
+        assert_eq!(shell("env > got", dir.path(), LONG), Attempt::Sent);
+        let got = fs::read_to_string(dir.path().join("got")).unwrap();
+        assert!(got.contains("CARGO_PKG_NAME=") && got.contains("PATH="), "{got}");
+        assert!(!got.contains("CARGO_MANIFEST_DIR="), "{got}");
+    }
+
     #[test]
     fn exit_codes_and_missing_programs_are_not_sent() {
         let dir = tempfile::tempdir().unwrap();
         let failed = shell("echo one >&2; echo 'no \u{1b}[31mroute' >&2; exit 75", dir.path(), LONG);
         let why = "the command ended with code 75: no [U+001B][31mroute";
         assert_eq!(failed, Attempt::NotSent(why.to_owned()));
-        let missing = command(&["/no/such/program".to_owned()], dir.path(), "{}", LONG);
+        let missing = command(&["/no/such/program".to_owned()], dir.path(), "{}", LONG, &[]);
         assert!(matches!(missing, Attempt::NotSent(_)), "{missing:?}");
         assert!(matches!(shell("kill -9 $$", dir.path(), LONG), Attempt::Unknown(_)));
     }
@@ -209,7 +252,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let message = "x".repeat(1 << 20);
         let words = ["sh", "-c", "head -c 5000000 /dev/zero >&2; exit 3"].map(str::to_owned);
-        let ended = command(&words, dir.path(), &message, LONG);
+        let ended = command(&words, dir.path(), &message, LONG, &[]);
         assert!(matches!(&ended, Attempt::NotSent(why) if why.contains("code 3")), "{ended:?}");
     }
 

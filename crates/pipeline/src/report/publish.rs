@@ -1,5 +1,6 @@
 //! Publishes a report folder: written completely under a temporary name, then renamed.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::BufWriter;
 use std::path::Path;
@@ -8,6 +9,7 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 use records::Diagnostic;
+use records::sanitize::escape_cell;
 use report::{Page, Report};
 use tempfile::TempDir;
 
@@ -16,6 +18,9 @@ use crate::run::event::Event;
 
 /// Age at which a temporary folder is one of a report that was killed.
 const LEFTOVER_AGE: Duration = Duration::from_hours(24);
+
+/// File of a report that lists all its files: nothing else is ever removed. A temporary folder has it from the start.
+const MANIFEST: &str = ".freeplay-report";
 
 /// What was written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +42,9 @@ pub fn write(
     dir: &Path,
     watch: &(impl Fn(Event) + Sync),
 ) -> Result<PublishSummary, Error> {
+    // A link stays one: the folder that it leads to is written.
+    let resolved = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
+    let dir = resolved.as_path();
     refuse_foreign(dir)?;
     let parent = dir.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     fs::create_dir_all(parent).map_err(|e| failed(parent, e))?;
@@ -44,6 +52,8 @@ pub fn write(
     // Both are removed when anything fails.
     let fresh = temporary(parent, dir)?;
     let written = all(report, files, fresh.path(), watch)?;
+    let list = fresh.path().join(MANIFEST);
+    fs::write(&list, entries(fresh.path()).join("\n")).map_err(|e| failed(&list, e))?;
     let old = temporary(parent, dir)?;
     if dir.exists() {
         fs::rename(dir, old.path().join("report")).map_err(|e| failed(dir, e))?;
@@ -52,16 +62,53 @@ pub fn write(
     Ok(written)
 }
 
-/// Refuses a folder with files but without `report.json`: it belongs to the user.
+/// Refuses a folder that holds anything but a report: replacing it would delete what belongs to someone else.
 fn refuse_foreign(dir: &Path) -> Result<(), Error> {
-    let holds = fs::read_dir(dir).is_ok_and(|mut entries| entries.next().is_some());
-    if !holds || dir.join("report.json").exists() {
-        return Ok(());
-    }
-    let what = format!("{} holds files that are not a report", dir.display());
+    let found = entries(dir);
+    let list = fs::read_to_string(dir.join(MANIFEST)).ok();
+    let ours: BTreeSet<&str> = list.iter().flat_map(|list| list.lines()).chain([MANIFEST]).collect();
+    let is_older = list.is_none() && dir.join("report.json").is_file();
+    let is_ours = |entry: &str| ours.contains(entry) || (is_older && is_of_older_report(entry));
+    let foreign: Vec<&String> = found.iter().filter(|entry| !is_ours(entry)).collect();
+    let Some(first) = foreign.first() else { return Ok(()) };
+    let more = match foreign.len() {
+        1 => String::new(),
+        count => format!(" and {} more", count - 1),
+    };
+    let what = format!("{} holds files that are not a report: {}{more}", dir.display(), escape_cell(first));
     let diagnostic = Diagnostic::new("would_overwrite", what)
-        .hint("name an empty folder, or one that a report was written to");
+        .hint("move these files away, or name an empty folder or one that only a report was written to");
     Err(Error::refused(diagnostic))
+}
+
+/// Whether a report without a list of its files may have written an entry.
+fn is_of_older_report(entry: &str) -> bool {
+    let mut names = entry.split('/');
+    let (first, rest) = (names.next().unwrap_or_default(), names.next());
+    let is_page = |name: &str| [".html", ".json", ".svg"].iter().any(|end| name.ends_with(end));
+    match (first, rest) {
+        ("assets" | "data", _) | ("tail" | "serial" | "part" | "flight", None) => true,
+        ("tail" | "serial" | "part" | "flight", Some(name)) => is_page(name),
+        (name, None) => is_page(name),
+        _ => false,
+    }
+}
+
+/// Everything in a folder, folders included, as paths from it with `/`, in order. Links are entries.
+fn entries(dir: &Path) -> Vec<String> {
+    fn walk(dir: &Path, before: &str, found: &mut Vec<String>) {
+        for entry in fs::read_dir(dir).into_iter().flatten().flatten() {
+            let name = format!("{before}{}", entry.file_name().to_string_lossy());
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                walk(&entry.path(), &format!("{name}/"), found);
+            }
+            found.push(name);
+        }
+    }
+    let mut found = Vec::new();
+    walk(dir, "", &mut found);
+    found.sort_unstable();
+    found
 }
 
 fn all(
@@ -122,13 +169,16 @@ fn temporary(parent: &Path, dir: &Path) -> Result<TempDir, Error> {
     builder.prefix(&prefix);
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
-    builder.tempdir_in(parent).map_err(|e| failed(dir, e))
+    let made = builder.tempdir_in(parent).map_err(|e| failed(dir, e))?;
+    fs::write(made.path().join(MANIFEST), "").map_err(|e| failed(dir, e))?;
+    Ok(made)
 }
 
 /// Removes the temporary folders of reports that were killed more than a day ago.
 fn remove_leftovers(parent: &Path, prefix: &str) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
-        let is_ours = entry.file_name().to_string_lossy().starts_with(prefix);
+        let is_named = entry.file_name().to_string_lossy().starts_with(prefix);
+        let is_ours = is_named && entry.path().join(MANIFEST).is_file();
         let age = entry.metadata().and_then(|of| of.modified()).ok().and_then(|at| at.elapsed().ok());
         if is_ours && age.is_some_and(|age| age > LEFTOVER_AGE) {
             // What cannot be removed now is removed by a later report.
@@ -183,9 +233,32 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
         let first = write(&empty(), Vec::new(), &out, &|_| ()).unwrap();
-        fs::write(out.join("serial/unit-GONE.html"), "old").unwrap();
+        let gone = Page { path: "serial/unit-GONE.html".to_owned(), body: b"old".to_vec() };
+        write(&empty(), vec![gone], &out, &|_| ()).unwrap();
+        assert!(out.join("serial/unit-GONE.html").exists());
         assert_eq!(write(&empty(), Vec::new(), &out, &|_| ()).unwrap(), first);
         assert!(out.join("index.html").exists() && !out.join("serial/unit-GONE.html").exists());
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    /// With and without the list of its files, which reports of older releases lack.
+    #[test]
+    fn notes_beside_a_report_are_named_and_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        write(&empty(), Vec::new(), &out, &|_| ()).unwrap();
+        for note in ["notes.txt", "serial/notes.txt", "mine/a.html"] {
+            let note = out.join(note);
+            fs::create_dir_all(note.parent().unwrap()).unwrap();
+            fs::write(&note, "years").unwrap();
+            let refused = write(&empty(), Vec::new(), &out, &|_| ());
+            assert!(matches!(refused, Err(Error::Refused(_))), "{refused:?}");
+            assert_eq!(fs::read_to_string(&note).unwrap(), "years");
+            fs::remove_file(&note).unwrap();
+            let _ = fs::remove_dir(out.join("mine"));
+            let _ = fs::remove_file(out.join(MANIFEST));
+        }
+        write(&empty(), Vec::new(), &out, &|_| ()).unwrap();
+        assert!(out.join(MANIFEST).exists());
     }
 }

@@ -10,6 +10,7 @@ use job::flight_log::{MAX_BETWEEN_PIECES, identify, identify_companion};
 use rayon::prelude::*;
 use records::{Diagnostic, Flight, FlightId, Position, TailNumber};
 
+use crate::discovery::local_files;
 use crate::discovery::table_folders::{TableFolders, TableMembership};
 use crate::discovery::temporary_files::{is_temporary, parts_written_out};
 use crate::error::{Error, is_passing};
@@ -226,20 +227,17 @@ fn matching(
             }
             continue;
         }
-        // The folder's own name may hold brackets; only what the user wrote is a pattern.
-        let folder = glob::Pattern::escape(&config.folder.to_string_lossy());
-        let full = Path::new(&folder).join(pattern);
-        let paths = glob::glob(&full.to_string_lossy()).map_err(|e| invalid(pattern, &e.msg))?;
+        let local = local_files::matching(&config.folder, pattern).map_err(|e| invalid(pattern, &e.msg))?;
         let written = config.folder.join(pattern);
         let mut files = Vec::new();
         let faults = unlisted.len();
-        for path in paths {
-            let listed =
-                path.map_err(|e| (e.path().to_owned(), e.into())).and_then(|path| match is_file(&path) {
-                    Ok(is_file) => Ok((path, is_file)),
-                    Err(e) => Err((path, e)),
-                });
-            match listed {
+        let faulty = local.faults.into_iter().map(Err);
+        for found in local.paths.into_iter().map(Ok).chain(faulty) {
+            let checked = found.and_then(|path| match is_file(&path) {
+                Ok(is_file) => Ok((path, is_file)),
+                Err(e) => Err((path, e)),
+            });
+            match checked {
                 Ok((path, is_file)) => {
                     let is_kept = is_file && !ours(&path) && !is_temporary(&path, &written);
                     files.extend(is_kept.then_some(path));
@@ -287,10 +285,12 @@ fn is_log(
     matches!(membership, TableMembership::Log)
 }
 
-/// Whether a path is a file; links that lead nowhere are errors, files that were deleted meanwhile are none.
+/// Whether a path is a file; links that lead nowhere, pipes and devices are errors, files that were deleted meanwhile
+/// are none.
 fn is_file(path: &Path) -> std::io::Result<bool> {
     match std::fs::metadata(path) {
-        Ok(data) => Ok(data.is_file()),
+        Ok(data) if data.is_file() || data.is_dir() => Ok(data.is_file()),
+        Ok(_) => Err(std::io::Error::other("it is a pipe, a socket or a device, not a file")),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound && path.symlink_metadata().is_err() => Ok(false),
         Err(e) => Err(e),
     }
@@ -309,9 +309,8 @@ fn no_log(config: &Config, silent: &BTreeSet<&str>) -> Diagnostic {
     let patterns = silent.iter().map(|p| format!("`{p}`")).collect::<Vec<_>>().join(", ");
     let folder = if config.folder.as_os_str().is_empty() { Path::new(".") } else { &config.folder };
     // Other files are passed over, so that a broad pattern may match notes and tables too.
-    let others =
-        silent.iter().flat_map(|p| glob::glob(&folder.join(p).to_string_lossy()).into_iter().flatten());
-    let what = match others.flatten().find(|path| path.is_file()) {
+    let others = silent.iter().filter_map(|p| local_files::matching(&config.folder, p).ok());
+    let what = match others.flat_map(|found| found.paths).find(|path| path.is_file()) {
         Some(other) => format!("{patterns} matches no Parquet file, but `{}`", log_path(config, &other)),
         None => format!("no log matches {patterns}"),
     };

@@ -1,9 +1,10 @@
 //! Flight ownership: two logs may hold the same flight, and the owner must not depend on the order of arrival.
 //!
-//! The log whose name sorts first owns the flight. A copy with the same content is skipped without an error; a
+//! The log that has the flight in the store keeps it: whoever writes a log later takes nothing away. Of two logs that
+//! are new, the one whose name sorts first owns the flight. A copy with the same content is skipped without an error; a
 //! log of the same flight with other content is in error, and the error names the owner. Logs with one flight id and
-//! departures a few hours apart may be pieces of one flight: unless the configuration declares what they are, all of them are
-//! in error.
+//! departures a few hours apart may be pieces of one flight: unless the configuration declares what they are, all of them
+//! that are not stored are in error.
 
 use std::collections::{BTreeSet, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -139,22 +140,37 @@ impl<'a> OwnershipLedger<'a> {
         };
         let same =
             account.log_digest == competing_log.log_digest || self.holds_the_same(&account, &competing_log);
+        let is_behind = self.precedes(&competing_log, &account);
         if same {
-            let (log, owner) = if competing_log.log_path < account.log_path {
-                (&account, &competing_log)
-            } else {
-                (&competing_log, &account)
-            };
+            let (log, owner) =
+                if is_behind { (&account, &competing_log) } else { (&competing_log, &account) };
             let (log, owner) = (log.log_path.clone(), owner.log_path.clone());
             report.duplicates.push(DuplicateLog { log, owner });
         }
-        if competing_log.log_path < account.log_path {
+        if is_behind {
             let (account, diagnostics) = superseded(account, &competing_log, same);
             return vec![self.store(account, Vec::new(), &diagnostics, report)];
         }
         let first = self.store(account, records, diagnostics, report);
         let (loser, diagnostics) = superseded(competing_log, &first.account, same);
         vec![first, self.store(loser, Vec::new(), &diagnostics, report)]
+    }
+
+    /// Whether a log comes before another in the ownership of a flight that both hold: the stored one, else by name.
+    fn precedes(&self, one: &LogRecord, other: &LogRecord) -> bool {
+        match (self.is_stored(one), self.is_stored(other)) {
+            (true, false) => true,
+            (false, true) => false,
+            _ => one.log_path < other.log_path,
+        }
+    }
+
+    /// Whether the store had records of a log's flight before this run.
+    fn is_stored(&self, log: &LogRecord) -> bool {
+        self.plan.accounts.get(&log.log_path).is_some_and(|before| {
+            before.estimated + before.refused > 0
+                && (&before.tail_number, before.departure_utc) == (&log.tail_number, log.departure_utc)
+        })
     }
 
     /// Logs with the tail, flight id and a position of this one, and another departure close by. What became of them does
@@ -175,7 +191,7 @@ impl<'a> OwnershipLedger<'a> {
         found
     }
 
-    /// Neither a log nor those that may be other pieces of its flight have records.
+    /// Neither a log nor those that may be other pieces of its flight have records, but for those that are stored.
     fn refuse_pieces(
         &mut self,
         account: LogRecord,
@@ -198,7 +214,8 @@ impl<'a> OwnershipLedger<'a> {
             (account, diagnostics.to_vec())
         };
         let mut results = vec![self.store(own.clone(), Vec::new(), &diagnostics, report)];
-        for piece in pieces.into_iter().filter(|piece| piece.estimated + piece.refused > 0) {
+        let pieces = pieces.into_iter().filter(|piece| piece.estimated + piece.refused > 0);
+        for piece in pieces.filter(|piece| !self.is_stored(piece)).collect::<Vec<_>>() {
             let (piece, diagnostics) = refused(piece, &own);
             results.push(self.store(piece, Vec::new(), &diagnostics, report));
         }

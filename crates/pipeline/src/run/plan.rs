@@ -75,7 +75,7 @@ pub enum WorkReason {
     OwnerGone,
     /// It failed before, and `--retry` is set.
     Retry,
-    /// An earlier run could not fetch or read it, for a passing cause.
+    /// It failed in an earlier run for a cause that may pass: a read, a time limit, a wrong clock.
     Unfetched,
     /// It cannot be listed.
     Unlisted,
@@ -94,7 +94,7 @@ impl WorkReason {
             Self::SettingChanged => "setting changed",
             Self::OwnerGone => "its flight has no other log now",
             Self::Retry => "in error, asked again",
-            Self::Unfetched => "could not be read completely before",
+            Self::Unfetched => "failed before for a passing cause",
             Self::Unlisted => "cannot be listed",
             Self::Asked => "asked again",
             Self::Verify => "content to be compared",
@@ -119,6 +119,13 @@ pub struct WorkItem {
     pub before: Option<LogRecord>,
 }
 
+impl WorkItem {
+    /// Whether an earlier run ended with an error of this log.
+    pub(crate) fn failed_before(&self) -> bool {
+        self.before.as_ref().is_some_and(|before| before.outcome == LogOutcome::Error)
+    }
+}
+
 /// Plan of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
@@ -126,7 +133,7 @@ pub struct Plan {
     pub found: usize,
     /// Number of logs already processed.
     pub known: usize,
-    /// Logs to be processed, largest first.
+    /// Logs to be processed, largest first; those that failed before come last.
     pub work: Vec<WorkItem>,
     /// Log records, by path, of the logs that still exist.
     pub accounts: BTreeMap<String, LogRecord>,
@@ -159,11 +166,14 @@ pub struct StandingError {
     pub detail: String,
     /// The run in which it failed.
     pub run_id: String,
+    /// Whether `logs.acknowledged_errors` names the log, so that it no longer makes the exit code 1.
+    pub is_acknowledged: bool,
 }
 
 impl StandingError {
-    fn of(account: &LogRecord) -> Self {
+    fn of(account: &LogRecord, acknowledged: &[glob::Pattern]) -> Self {
         Self {
+            is_acknowledged: acknowledged.iter().any(|pattern| pattern.matches(&account.log_path)),
             log: account.log_path.clone(),
             code: account.error_code.clone().unwrap_or_default(),
             detail: account.error_detail.clone().unwrap_or_default(),
@@ -211,16 +221,21 @@ pub fn plan(
     let not_asked = verdicts.iter().filter(|v| matches!(v, Verdict::NotAsked)).count();
     let mut work: Vec<WorkItem> = verdicts.into_iter().filter_map(Verdict::work).collect();
     let size = |w: &WorkItem| w.stat.as_ref().map_or(0, |s| s.size_bytes);
-    work.sort_by(|a, b| size(b).cmp(&size(a)).then_with(|| a.log_path.cmp(&b.log_path)));
+    work.sort_by(|a, b| {
+        let by_size = || size(b).cmp(&size(a)).then_with(|| a.log_path.cmp(&b.log_path));
+        a.failed_before().cmp(&b.failed_before()).then_with(by_size)
+    });
     let wanted = work.len();
     work.truncate(request.limit.unwrap_or(usize::MAX));
     let left = wanted - work.len();
     let known = found.len() - wanted - not_asked;
     let to_do: HashSet<&str> = work.iter().map(|work| work.log_path.as_str()).collect();
+    let patterns = config.document.logs.acknowledged_errors.iter();
+    let acknowledged: Vec<_> = patterns.filter_map(|text| glob::Pattern::new(text).ok()).collect();
     let standing_errors = accounts
         .values()
         .filter(|account| account.outcome == LogOutcome::Error && !to_do.contains(account.log_path.as_str()))
-        .map(StandingError::of)
+        .map(|account| StandingError::of(account, &acknowledged))
         .collect();
     drop(to_do);
     let mut plan = Plan {

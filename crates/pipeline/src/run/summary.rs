@@ -64,13 +64,17 @@ pub struct SilentTail {
     pub since_utc: Timestamp,
 }
 
-/// Aircraft without data for longer than `days` before the fleet's newest departure.
-fn quiet<'a>(accounts: impl Iterator<Item = &'a LogRecord>, days: f64) -> Vec<SilentTail> {
+/// Aircraft without data for longer than `days` before a date: the fleet's newest departure, or now.
+fn quiet<'a>(
+    accounts: impl Iterator<Item = &'a LogRecord>,
+    days: f64,
+    last: Option<Timestamp>,
+) -> Vec<SilentTail> {
     let mut newest: BTreeMap<&str, Timestamp> = BTreeMap::new();
     for (tail, at) in accounts.filter_map(|a| Some((a.tail_number.as_deref()?, a.departure_utc?))) {
         newest.entry(tail).and_modify(|known| *known = (*known).max(at)).or_insert(at);
     }
-    let Some(&last) = newest.values().max() else { return Vec::new() };
+    let Some(last) = last else { return Vec::new() };
     let is_late = |at: Timestamp| days_between(at, last) > days;
     let late = newest.into_iter().filter(|(_, at)| is_late(*at));
     late.map(|(tail, since_utc)| SilentTail { tail_number: tail.to_owned(), since_utc }).collect()
@@ -153,6 +157,12 @@ pub struct RunSummary {
     pub not_reached_logs: Vec<String>,
     /// Aircraft whose newest departure is older than the fleet's by more than `stale_after_days`.
     pub quiet: Vec<SilentTail>,
+    /// Number of tails without data for longer than `trend.stale_after_days` before now.
+    #[serde(skip)]
+    pub quiet_now: usize,
+    /// Newest departure of all logs.
+    #[serde(skip)]
+    pub newest_departure_utc: Option<Timestamp>,
     /// Skews, and stiffnesses of complete aircraft, that moved within the last month, on the aircraft of this run.
     pub recorder_moved: Vec<RecorderChange>,
     /// Followed quantities that changed within the last month, on units, tails and parts of the whole fleet.
@@ -245,6 +255,8 @@ impl RunSummary {
             not_reached: plan.work.len(),
             not_reached_logs: Vec::new(),
             quiet: Vec::new(),
+            quiet_now: 0,
+            newest_departure_utc: None,
             recorder_moved: Vec::new(),
             quantity_changes: Vec::new(),
             innovations_unlike: Vec::new(),
@@ -296,7 +308,10 @@ impl RunSummary {
         config: &Config,
         installations: &'a Installations,
     ) {
-        self.quiet = quiet(accounts.clone(), config.document.trend.stale_after_days);
+        let days = config.document.trend.stale_after_days;
+        self.newest_departure_utc = accounts.clone().filter_map(|account| account.departure_utc).max();
+        self.quiet = quiet(accounts.clone(), days, self.newest_departure_utc);
+        self.quiet_now = quiet(accounts.clone(), days, Some(Timestamp::now())).len();
         self.unmapped_positions = coverage::unmapped_positions(accounts.clone(), installations);
         self.unknown_tails = coverage::unknown_tails(config, installations, accounts);
     }
@@ -368,9 +383,15 @@ impl RunSummary {
         logs.len()
     }
 
+    /// Failed logs of earlier runs that no pattern of `logs.acknowledged_errors` fits.
+    pub fn unacknowledged(&self) -> usize {
+        self.standing_errors.iter().filter(|error| !error.is_acknowledged).count()
+    }
+
     /// How the run ended; `stopped` when it received an interrupt.
     pub fn end(&self, stopped: bool) -> RunEnd {
-        match (stopped && self.not_reached > 0, self.errors.is_empty() && !self.has_mapping_fault()) {
+        let is_sound = self.errors.is_empty() && self.unacknowledged() == 0 && !self.has_mapping_fault();
+        match (stopped && self.not_reached > 0, is_sound) {
             (true, _) => RunEnd::Interrupted,
             (false, false) => RunEnd::LogsInError,
             (false, true) => RunEnd::Complete,

@@ -6,6 +6,7 @@
 //! meanwhile, so the log with a step in progress is the late one, and the logs without one wait for it.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -73,7 +74,10 @@ pub(crate) enum Next {
 struct Shared {
     process_log: Box<ProcessLog>,
     steps: Vec<StepCount>,
-    next: AtomicUsize,
+    /// Logs that no worker has taken: those that never failed, and the others.
+    rest: Mutex<[Range<usize>; 2]>,
+    /// Whether a log passed its limit: the smallest logs come first then, as the least likely to do so.
+    has_late: AtomicBool,
     /// Logs to be done again, since their worker may wait for an abandoned one.
     again: Mutex<VecDeque<usize>>,
     is_stopped: AtomicBool,
@@ -87,8 +91,12 @@ impl Shared {
             return None;
         }
         let again = self.again.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
-        again
-            .or_else(|| Some(self.next.fetch_add(1, Ordering::Relaxed)).filter(|log| *log < self.steps.len()))
+        again.or_else(|| {
+            let mut rest = self.rest.lock().unwrap_or_else(PoisonError::into_inner);
+            let [sound, failed] = &mut *rest;
+            let is_late = self.has_late.load(Ordering::Relaxed);
+            if is_late { sound.next_back() } else { sound.next() }.or_else(|| failed.next())
+        })
     }
 
     /// One worker: one log at a time, in the threads that all workers share for actuators. A thread that waits for an
@@ -166,10 +174,12 @@ impl<'a> WorkerPool<'a> {
     /// When threads cannot be started.
     pub(crate) fn start(settings: PoolSettings<'a>, process_log: Box<ProcessLog>) -> Result<Self, Error> {
         let logs = settings.plan.work.len();
+        let sound = settings.plan.work.partition_point(|work| !work.failed_before());
         let shared = Shared {
             process_log,
             steps: (0..logs).map(|_| StepCount::default()).collect(),
-            next: AtomicUsize::new(0),
+            rest: Mutex::new([0..sound, sound..logs]),
+            has_late: AtomicBool::new(false),
             again: Mutex::default(),
             is_stopped: AtomicBool::new(false),
             generation: AtomicUsize::new(0),
@@ -277,6 +287,7 @@ impl<'a> WorkerPool<'a> {
     fn abandon(&mut self, log: usize) -> Result<Next, Error> {
         let late = self.in_progress.remove(&log);
         self.abandoned += 1;
+        self.shared.has_late.store(true, Ordering::Relaxed);
         let current = self.shared.generation.load(Ordering::Relaxed);
         if self.abandoned >= MAX_ABANDONED {
             self.shared.is_stopped.store(true, Ordering::Relaxed);

@@ -76,7 +76,7 @@ fn stage<'a>(path: &'a FsPath, parts: &[&[u8]]) -> io::Result<(&'a FsPath, PathB
 }
 
 fn write_synced(staged: &FsPath, parts: &[&[u8]]) -> io::Result<()> {
-    let mut file = File::create(staged)?;
+    let mut file = object_io::create_fresh(staged)?;
     for part in parts {
         file.write_all(part)?;
     }

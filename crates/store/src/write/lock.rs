@@ -56,6 +56,12 @@ impl Lock {
         let deadline = Instant::now() + wait.unwrap_or_default().max(LOOK_AGAIN);
         let mut options = OpenOptions::new();
         options.read(true).write(true).create(true).truncate(false);
+        // A link would lend its target's content to the holder's name.
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::custom_flags(
+            &mut options,
+            rustix::fs::OFlags::NOFOLLOW.bits().cast_signed(),
+        );
         let mut file = options.open(path).map_err(Error::io(path, "opened"))?;
         loop {
             match file.try_lock() {

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use jiff::Timestamp;
 use pipeline::fleet_trends::changes::UnitChange;
 use pipeline::history::histories::Histories;
 use pipeline::history::maintenance_log::UnknownUnit;
@@ -40,6 +41,23 @@ const MAX_CHANGES_SHOWN: usize = 20;
 /// # Errors
 /// If nothing could be run, or the store failed.
 pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
+    let started_utc = Timestamp::now();
+    let ended = execute(args, global, output);
+    let code = match &ended {
+        Err(failure) => failure.code(),
+        Ok(Code::Interrupted) => Code::Interrupted,
+        Ok(_) => return ended,
+    };
+    if let (Some(file), false) = (&args.metrics, args.dry_run)
+        && row_output::check_file(file, output).is_ok()
+        && !metrics::is_of(file, started_utc)
+    {
+        metrics::write_failed(file, started_utc, code)?;
+    }
+    ended
+}
+
+fn execute(args: &RunArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     check_range(args.departures.since, args.departures.until)?;
     args.metrics.as_deref().map_or(Ok(()), |file| row_output::check_file(file, output))?;
     let config = load_config(global)?;
@@ -89,11 +107,15 @@ pub(crate) fn run(args: &RunArgs, global: &Global, output: &Output) -> Result<Co
     if let Some(file) = &args.metrics {
         metrics::write(file, &report, code)?;
     }
-    if args.json {
+    let shown = if args.json {
         let text = serde_json::to_string_pretty(&report).map_err(std::io::Error::from)?;
-        output.write_exact(&(text + "\n"))?;
+        output.write_exact(&(text + "\n"))
     } else {
-        output.write_result(&summary_text(&report, &config.file.display().to_string(), code))?;
+        output.write_result(&summary_text(&report, &config.file.display().to_string(), code))
+    };
+    // The run is stored: a summary that cannot be written does not make it fail.
+    if let Err(Failure::Failed(diagnostic)) = shown {
+        output.diagnostics([&*diagnostic]);
     }
     Ok(code)
 }
@@ -401,6 +423,13 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     if code == Code::LogsInError && !report.errors.is_empty() {
         let failed = count(report.logs_in_error(), "log");
         let _ = writeln!(page, "Exit code 1: {failed} failed. After fixing them: `freeplay run --retry`");
+    } else if code == Code::LogsInError && report.unacknowledged() > 0 {
+        let failed = count(report.unacknowledged(), "log");
+        let _ = writeln!(
+            page,
+            "Exit code 1: {failed} of earlier runs still failed. After fixing them: `freeplay run --retry`; \
+             to accept them: `logs.acknowledged_errors`"
+        );
     } else if code == Code::LogsInError {
         let _ = writeln!(
             page,
@@ -497,7 +526,7 @@ fn change_text(unit: &UnitChange) -> String {
         changes.push(format!("{} → {}{why}", word(unit.from), word(unit.to)));
     }
     for (events, what) in [(&unit.new_events, "new"), (&unit.cleared_events, "cleared")] {
-        let day = |at: jiff::Timestamp| at.strftime("%Y-%m-%d").to_string();
+        let day = |at: Timestamp| at.strftime("%Y-%m-%d").to_string();
         changes.extend(events.iter().map(|e| format!("{what}: {} of {}", e.kind, day(e.departure_utc))));
     }
     changes.join("; ")

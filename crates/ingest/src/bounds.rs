@@ -1,0 +1,99 @@
+//! Bounds of logs and tables, checked before memory is taken: an allocation that fails ends the process, and no error
+//! can be caught then.
+//!
+//! A file of a kilobyte may claim 2³¹ row groups, values or bytes. Each claim is compared with what the file can hold
+//! and with what any recorder writes. `docs/limits.md` lists the bounds; a configured one names its key.
+
+use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::error::ErrorKind;
+
+/// Bytes of a footer: 1 KiB for each of 262,144 column chunks.
+pub(crate) const FOOTER_BYTES: u64 = 256 << 20;
+/// Groups inside groups of a schema: readers call themselves for each.
+pub(crate) const SCHEMA_DEPTH: usize = 64;
+/// Columns of all row groups together: each takes about 700 bytes of memory.
+pub(crate) const COLUMN_CHUNKS: u64 = 1 << 20;
+/// Columns of a CSV table: as many as a spreadsheet has.
+pub(crate) const TABLE_COLUMNS: usize = 16_384;
+/// Bytes of a page. Writers make pages of about 1 MiB; a row group without cuts some tens.
+pub(crate) const PAGE_BYTES: i64 = 256 << 20;
+/// Bytes that the texts of one batch may take when each is the longest of its dictionary.
+pub(crate) const BATCH_TEXT_BYTES: usize = 128 << 20;
+/// Bytes of text that a page may hold for each byte stored, beyond [`FREE_TEXT_BYTES`].
+const TEXT_RATIO: i64 = 1000;
+const FREE_TEXT_BYTES: i64 = 16 << 20;
+/// Rows of a log or a table where `run.max_rows` is not set: 55 h at 1 kHz.
+pub const DEFAULT_MAX_ROWS: u64 = 200_000_000;
+/// Rows that a file may hold for each of its bytes, beyond [`FREE_ROWS`]. A clock of even steps takes a byte for 20
+/// rows, constant channels a byte for some hundreds.
+const ROWS_PER_BYTE: u64 = 1000;
+const FREE_ROWS: u64 = 1 << 20;
+
+static MAX_ROWS: AtomicU64 = AtomicU64::new(DEFAULT_MAX_ROWS);
+
+/// Sets the most rows of a log or a table, `run.max_rows`, for the process.
+pub fn set_max_rows(rows: u64) {
+    MAX_ROWS.store(rows, Ordering::Relaxed);
+}
+
+/// A claim of a file beyond a bound.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Excess {
+    /// What is counted.
+    pub what: &'static str,
+    /// How many the file claims.
+    pub found: u64,
+    /// How many are read.
+    pub most: u64,
+    /// The key that raises the bound.
+    pub key: Option<&'static str>,
+}
+
+impl fmt::Display for Excess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { what, found, most, .. } = self;
+        write!(f, "the file claims {found} {what}, more than the limit of {most}")
+    }
+}
+
+impl From<Excess> for ErrorKind {
+    fn from(excess: Excess) -> Self {
+        Self::BeyondLimit(excess)
+    }
+}
+
+/// Compares a claim with its bound.
+pub(crate) fn check(what: &'static str, found: u64, most: u64) -> Result<(), Excess> {
+    if found <= most { Ok(()) } else { Err(Excess { what, found, most, key: None }) }
+}
+
+/// Compares rows, or values of a column, with the configured most and with the bytes of their file.
+pub(crate) fn check_rows(what: &'static str, found: u64, file_bytes: u64) -> Result<(), Excess> {
+    let configured = MAX_ROWS.load(Ordering::Relaxed);
+    if found > configured {
+        return Err(Excess { what, found, most: configured, key: Some("run.max_rows") });
+    }
+    check(what, found, file_bytes.saturating_mul(ROWS_PER_BYTE).saturating_add(FREE_ROWS))
+}
+
+/// The most bytes of a page of texts that takes so many bytes in the file.
+pub(crate) fn text_page_bytes(stored: i64) -> i64 {
+    stored.saturating_mul(TEXT_RATIO).clamp(FREE_TEXT_BYTES, PAGE_BYTES)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_bounded_by_the_setting_and_by_the_bytes_of_the_file() {
+        assert_eq!(check_rows("rows", 1 << 20, 100), Ok(()));
+        assert_eq!(check_rows("rows", 20_000_000, 100_000), Ok(()));
+        let small = check_rows("rows", 20_000_000, 2_400).unwrap_err();
+        assert_eq!((small.most, small.key), (2_400_000 + (1 << 20), None));
+        let large = check_rows("rows", 1_000_000_000, 1 << 40).unwrap_err();
+        assert_eq!((large.most, large.key), (DEFAULT_MAX_ROWS, Some("run.max_rows")));
+    }
+}

@@ -1,0 +1,349 @@
+//! Pages for the parquet crate's column readers, unpacked here: the crate lets brotli, gzip and LZ4 grow past the size
+//! that the page's header claims, and texts past any.
+
+use std::cell::RefCell;
+use std::io::Read;
+use std::sync::Arc;
+use std::vec;
+
+use bytes::Bytes;
+use flate2::read::MultiGzDecoder;
+use lz4_flex::{block, frame};
+use parquet::arrow::arrow_reader::RowGroups;
+use parquet::basic::{Compression, Encoding, Type};
+use parquet::column::page::{Page, PageIterator, PageMetadata, PageReader};
+use parquet::errors::{ParquetError, Result};
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMetaData};
+use polars_parquet_format::{Encoding as RawEncoding, PageType};
+use zstd::bulk::Decompressor;
+
+use crate::bounds::BATCH_TEXT_BYTES;
+use crate::io::read_at::{PreadFile, read_exact};
+use crate::parquet::page_header::{self, Page as RawPage};
+
+/// Fewest rows of a batch, however long its texts may be.
+const LEAST_BATCH: usize = 64;
+
+thread_local! {
+    /// Pages come one after the other: a new context for each would cost more than many pages do.
+    static ZSTD: RefCell<Option<Decompressor<'static>>> = const { RefCell::new(None) };
+}
+
+fn fail<T>(detail: impl Into<String>) -> Result<T> {
+    Err(ParquetError::General(detail.into()))
+}
+
+/// Some row groups of a file, whose pages keep to their claims.
+#[derive(Debug)]
+pub(crate) struct BoundedGroups<'m> {
+    file: Arc<PreadFile>,
+    metadata: &'m ParquetMetaData,
+    groups: Vec<usize>,
+    batch_rows: usize,
+}
+
+impl<'m> BoundedGroups<'m> {
+    pub(crate) fn new(
+        file: PreadFile,
+        metadata: &'m ParquetMetaData,
+        groups: Vec<usize>,
+        batch_rows: usize,
+    ) -> Self {
+        let groups = Self { file: Arc::new(file), metadata, groups, batch_rows };
+        // A table of few rows may hold long texts.
+        Self { batch_rows: batch_rows.min(groups.num_rows()), ..groups }
+    }
+
+    fn chosen(&self) -> impl Iterator<Item = &'m RowGroupMetaData> {
+        self.groups.iter().map(|group| self.metadata.row_group(*group))
+    }
+}
+
+impl RowGroups for BoundedGroups<'_> {
+    fn num_rows(&self) -> usize {
+        self.chosen().map(|group| usize::try_from(group.num_rows()).unwrap_or(0)).sum()
+    }
+
+    fn column_chunks(&self, column: usize) -> Result<Box<dyn PageIterator>> {
+        let chunks: Vec<_> =
+            self.chosen().map(|group| (group.column(column).clone(), group.num_rows())).collect();
+        let (file, batch_rows) = (Arc::clone(&self.file), self.batch_rows);
+        Ok(Box::new(Chunks { file, chunks: chunks.into_iter(), batch_rows }))
+    }
+
+    fn row_groups(&self) -> Box<dyn Iterator<Item = &RowGroupMetaData> + '_> {
+        Box::new(self.chosen())
+    }
+
+    fn metadata(&self) -> &ParquetMetaData {
+        self.metadata
+    }
+}
+
+/// The chunks of one column, each with the rows of its group.
+struct Chunks {
+    file: Arc<PreadFile>,
+    chunks: vec::IntoIter<(ColumnChunkMetaData, i64)>,
+    batch_rows: usize,
+}
+
+impl PageIterator for Chunks {}
+
+impl Iterator for Chunks {
+    type Item = Result<Box<dyn PageReader>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (chunk, rows) = self.chunks.next()?;
+        let pages = page_header::bounded(self.file.file(), &chunk, rows).map_err(ParquetError::General);
+        Some(pages.map(|pages| {
+            Box::new(Pages::new(Arc::clone(&self.file), &chunk, pages, self.batch_rows))
+                as Box<dyn PageReader>
+        }))
+    }
+}
+
+/// The pages of one chunk.
+pub(crate) struct Pages {
+    file: Arc<PreadFile>,
+    chunk: ColumnChunkMetaData,
+    pages: vec::IntoIter<RawPage>,
+    batch_rows: usize,
+}
+
+impl PageReader for Pages {
+    fn get_next_page(&mut self) -> Result<Option<Page>> {
+        self.pages.next().map(|page| self.read(&page)).transpose()
+    }
+
+    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {
+        let Some(page) = self.pages.as_slice().first() else { return Ok(None) };
+        let v2 = &page.header.data_page_header_v2;
+        let count = |number: Option<i32>| number.and_then(|n| usize::try_from(n).ok());
+        let is_dict = page.header.type_ == PageType::DICTIONARY_PAGE;
+        let num_rows = count(v2.as_ref().map(|h| h.num_rows));
+        Ok(Some(PageMetadata { num_rows, num_levels: count(levels(page)), is_dict }))
+    }
+
+    fn skip_next_page(&mut self) -> Result<()> {
+        self.pages.next();
+        Ok(())
+    }
+}
+
+impl Iterator for Pages {
+    type Item = Result<Page>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.get_next_page().transpose()
+    }
+}
+
+impl Pages {
+    /// The checked pages of a chunk, read in batches of so many rows at most.
+    pub(crate) fn new(
+        file: Arc<PreadFile>,
+        chunk: &ColumnChunkMetaData,
+        mut pages: Vec<RawPage>,
+        batch_rows: usize,
+    ) -> Self {
+        pages.retain(|page| page.header.type_ != PageType::INDEX_PAGE);
+        Self { file, chunk: chunk.clone(), pages: pages.into_iter(), batch_rows }
+    }
+
+    /// Values of each data page, nulls included.
+    pub(crate) fn values(&self) -> Vec<usize> {
+        let pages =
+            self.pages.as_slice().iter().filter(|page| page.header.type_ != PageType::DICTIONARY_PAGE);
+        pages.map(|page| usize::try_from(levels(page).unwrap_or(0)).unwrap_or(0)).collect()
+    }
+
+    fn read(&self, page: &RawPage) -> Result<Page> {
+        let header = &page.header;
+        let mut stored = vec![0; usize::try_from(header.compressed_page_size)?];
+        read_exact(self.file.file(), &mut stored, page.body_start)?;
+        if header.crc.is_some_and(|crc| crc32fast::hash(&stored) != crc as u32) {
+            return fail("Page CRC checksum mismatch");
+        }
+        let size = usize::try_from(header.uncompressed_page_size)?;
+        let (mut plain, mut is_packed) = (0, true);
+        if let Some(v2) = &header.data_page_header_v2 {
+            let levels = [v2.definition_levels_byte_length, v2.repetition_levels_byte_length];
+            let [definitions, repetitions] = levels.map(usize::try_from);
+            plain = definitions?.saturating_add(repetitions?);
+            is_packed = v2.is_compressed.unwrap_or(true);
+        }
+        if plain > size.min(stored.len()) {
+            return fail("its levels are longer than their page");
+        }
+        let codec = self.chunk.compression();
+        let buf: Bytes = if is_packed && codec != Compression::UNCOMPRESSED {
+            let mut whole = Vec::with_capacity(size);
+            whole.extend_from_slice(&stored[..plain]);
+            if size > plain {
+                unpack(codec, &stored[plain..], size, &mut whole)?;
+            }
+            if whole.len() != size {
+                return fail(format!("a page of {size} bytes unpacks to {}", whole.len()));
+            }
+            whole.into()
+        } else {
+            stored.into()
+        };
+        self.page(page, buf)
+    }
+
+    fn page(&self, page: &RawPage, buf: Bytes) -> Result<Page> {
+        let missing = || ParquetError::General("a page has no header of its kind".into());
+        match page.header.type_ {
+            PageType::DICTIONARY_PAGE => {
+                let header = page.header.dictionary_page_header.as_ref().ok_or_else(missing)?;
+                let num_values = u32::try_from(header.num_values)?;
+                self.check_texts(&buf)?;
+                let is_sorted = header.is_sorted.unwrap_or(false);
+                Ok(Page::DictionaryPage { buf, num_values, encoding: encoding(header.encoding)?, is_sorted })
+            }
+            PageType::DATA_PAGE => {
+                let header = page.header.data_page_header.as_ref().ok_or_else(missing)?;
+                Ok(Page::DataPage {
+                    buf,
+                    num_values: u32::try_from(header.num_values)?,
+                    encoding: encoding(header.encoding)?,
+                    def_level_encoding: encoding(header.definition_level_encoding)?,
+                    rep_level_encoding: encoding(header.repetition_level_encoding)?,
+                    statistics: None,
+                })
+            }
+            PageType::DATA_PAGE_V2 => {
+                let header = page.header.data_page_header_v2.as_ref().ok_or_else(missing)?;
+                Ok(Page::DataPageV2 {
+                    buf,
+                    num_values: u32::try_from(header.num_values)?,
+                    encoding: encoding(header.encoding)?,
+                    num_nulls: u32::try_from(header.num_nulls)?,
+                    num_rows: u32::try_from(header.num_rows)?,
+                    def_levels_byte_len: u32::try_from(header.definition_levels_byte_length)?,
+                    rep_levels_byte_len: u32::try_from(header.repetition_levels_byte_length)?,
+                    is_compressed: header.is_compressed.unwrap_or(true),
+                    statistics: None,
+                })
+            }
+            PageType(other) => fail(format!("a page is of the unknown kind {other}")),
+        }
+    }
+
+    /// Refuses a dictionary whose longest text would make a batch of rows larger than the bound.
+    fn check_texts(&self, dictionary: &[u8]) -> Result<()> {
+        let longest = match self.chunk.column_type() {
+            Type::BYTE_ARRAY => {
+                let (mut longest, mut rest) = (0, dictionary);
+                while let Some((length, texts)) = rest.split_first_chunk() {
+                    let length = u32::from_le_bytes(*length) as usize;
+                    longest = longest.max(length);
+                    rest = texts.get(length..).unwrap_or_default();
+                }
+                longest
+            }
+            Type::FIXED_LEN_BYTE_ARRAY => {
+                usize::try_from(self.chunk.column_descr().type_length()).unwrap_or(0)
+            }
+            _ => 0,
+        };
+        let most = BATCH_TEXT_BYTES / self.batch_rows.max(1);
+        if longest <= most {
+            return Ok(());
+        }
+        fail(format!("its dictionary holds a text of {longest} bytes, more than the limit of {most}"))
+    }
+}
+
+/// Values of a data page, nulls included.
+fn levels(page: &RawPage) -> Option<i32> {
+    let v1 = page.header.data_page_header.as_ref().map(|header| header.num_values);
+    v1.or(page.header.data_page_header_v2.as_ref().map(|header| header.num_values))
+}
+
+/// Rows of a batch of a column of which these are the pages. Texts that share beginnings may each be as long as a page.
+pub(crate) fn batch_rows(chunk: &ColumnChunkMetaData, pages: &[RawPage], usual: usize) -> usize {
+    if !chunk.encodings().any(|encoding| encoding == Encoding::DELTA_BYTE_ARRAY) {
+        return usual;
+    }
+    let largest = pages.iter().map(|page| page.header.uncompressed_page_size).max().unwrap_or(0);
+    let fitting = BATCH_TEXT_BYTES / usize::try_from(largest).unwrap_or(0).max(1);
+    fitting.clamp(LEAST_BATCH, usual.max(LEAST_BATCH))
+}
+
+fn encoding(raw: RawEncoding) -> Result<Encoding> {
+    Ok(match raw {
+        RawEncoding::PLAIN => Encoding::PLAIN,
+        RawEncoding::PLAIN_DICTIONARY => Encoding::PLAIN_DICTIONARY,
+        RawEncoding::RLE => Encoding::RLE,
+        #[expect(deprecated, reason = "old files have levels in it")]
+        RawEncoding::BIT_PACKED => Encoding::BIT_PACKED,
+        RawEncoding::DELTA_BINARY_PACKED => Encoding::DELTA_BINARY_PACKED,
+        RawEncoding::DELTA_LENGTH_BYTE_ARRAY => Encoding::DELTA_LENGTH_BYTE_ARRAY,
+        RawEncoding::DELTA_BYTE_ARRAY => Encoding::DELTA_BYTE_ARRAY,
+        RawEncoding::RLE_DICTIONARY => Encoding::RLE_DICTIONARY,
+        RawEncoding::BYTE_STREAM_SPLIT => Encoding::BYTE_STREAM_SPLIT,
+        RawEncoding(other) => return fail(format!("a page uses the unknown encoding {other}")),
+    })
+}
+
+/// Appends what `packed` unpacks to until `into` holds one byte more than the page claims.
+fn unpack(codec: Compression, packed: &[u8], size: usize, into: &mut Vec<u8>) -> Result<()> {
+    let left = size - into.len();
+    let mut stream = |stream: &mut dyn Read| stream.take(left as u64 + 1).read_to_end(into).map(drop);
+    match codec {
+        Compression::GZIP(_) => stream(&mut MultiGzDecoder::new(packed))?,
+        Compression::BROTLI(_) => {
+            stream(&mut brotli::Decompressor::new(packed, left.clamp(1, 1 << 16)))?;
+        }
+        Compression::LZ4 => {
+            let mut blocks = vec![0; left];
+            if hadoop_blocks(packed, &mut blocks).is_some() {
+                into.append(&mut blocks);
+            } else if stream(&mut frame::FrameDecoder::new(packed)).is_err() {
+                into.truncate(size - left);
+                fixed(left, into, |out| block::decompress_into(packed, out).ok())?;
+            }
+        }
+        Compression::LZ4_RAW => fixed(left, into, |out| block::decompress_into(packed, out).ok())?,
+        Compression::SNAPPY => {
+            fixed(left, into, |out| snap::raw::Decoder::new().decompress(packed, out).ok())?;
+        }
+        Compression::ZSTD(_) => {
+            let unpack = |zstd: &mut Option<Decompressor<'static>>, out: &mut [u8]| {
+                if zstd.is_none() {
+                    *zstd = Decompressor::new().ok();
+                }
+                zstd.as_mut()?.decompress_to_buffer(packed, out).ok()
+            };
+            fixed(left, into, |out| ZSTD.with_borrow_mut(|zstd| unpack(zstd, out)))?;
+        }
+        Compression::UNCOMPRESSED => into.extend_from_slice(packed),
+        other @ Compression::LZO => return fail(format!("its compression {other} is not read")),
+    }
+    Ok(())
+}
+
+/// Appends as many bytes as are unpacked into a buffer of this size.
+fn fixed(left: usize, into: &mut Vec<u8>, unpack: impl FnOnce(&mut [u8]) -> Option<usize>) -> Result<()> {
+    let before = into.len();
+    into.resize(before + left, 0);
+    match unpack(&mut into[before..]) {
+        Some(bytes) => Ok(into.truncate(before + bytes)),
+        None => fail("a page cannot be unpacked to the size that it claims"),
+    }
+}
+
+/// Hadoop's form of LZ4: blocks, each after its two sizes. `None` where the blocks do not fill the buffer exactly.
+fn hadoop_blocks(mut packed: &[u8], mut out: &mut [u8]) -> Option<()> {
+    while !packed.is_empty() {
+        let (size, rest) = packed.split_first_chunk()?;
+        let (stored, rest) = rest.split_first_chunk()?;
+        let (block, rest) = rest.split_at_checked(u32::from_be_bytes(*stored) as usize)?;
+        let (filled, free) = out.split_at_mut_checked(u32::from_be_bytes(*size) as usize)?;
+        (block::decompress_into(block, filled).ok()? == filled.len()).then_some(())?;
+        (packed, out) = (rest, free);
+    }
+    out.is_empty().then_some(())
+}

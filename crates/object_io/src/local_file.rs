@@ -1,0 +1,33 @@
+//! Local files that a program writes under a name of its own before it renames them.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+
+/// Creates a file in the place of what an earlier process left there. A link of that name is replaced, not followed.
+///
+/// # Errors
+/// When what is there cannot be removed, or another process creates it at the same time.
+pub fn create_fresh(path: &Path) -> io::Result<File> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    File::create_new(path)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_is_replaced_and_its_target_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let (target, link) = (dir.path().join("target"), dir.path().join("link"));
+        fs::write(&target, "years").unwrap();
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        create_fresh(&link).unwrap();
+        assert_eq!(fs::read_to_string(&target).unwrap(), "years");
+        assert!(fs::symlink_metadata(&link).unwrap().is_file());
+    }
+}

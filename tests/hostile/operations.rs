@@ -1,0 +1,60 @@
+//! What an operator sees of a run that failed, by its exit code and its metrics.
+
+use crate::harness::TestFleet;
+
+/// A value of the metrics file.
+fn metric(fleet: &TestFleet, name: &str) -> Option<f64> {
+    let text = std::fs::read_to_string(fleet.path("freeplay.prom")).unwrap();
+    let name = format!("freeplay_{name} ");
+    text.lines().find_map(|line| line.strip_prefix(&name)?.parse().ok())
+}
+
+/// The rules `FreeplayRunFailed` and `FreeplayRunOverdue` fire on what is written after code 2 and 3.
+#[test]
+fn a_failed_run_writes_its_code_and_keeps_when_one_last_completed() {
+    let fleet = TestFleet::sample();
+    let run = ["run", "-q", "--metrics", "freeplay.prom"];
+    fleet.run_ok(&run);
+    let completed = metric(&fleet, "run_completed_timestamp_seconds").unwrap();
+    let ended = metric(&fleet, "run_ended_timestamp_seconds").unwrap();
+    assert!(metric(&fleet, "newest_departure_timestamp_seconds").is_some_and(|newest| newest > 1.7e9));
+    let table = fleet.path("sample-data/installations.csv");
+    std::fs::rename(&table, fleet.path("moved.csv")).unwrap();
+    assert_eq!(fleet.freeplay(&run).code, Some(2));
+    assert_eq!(metric(&fleet, "run_exit_code"), Some(2.0));
+    std::fs::rename(fleet.path("moved.csv"), &table).unwrap();
+    let logs = fleet.path("results/logs/_delta_log");
+    std::fs::rename(&logs, fleet.path("moved")).unwrap();
+    assert_eq!(fleet.freeplay(&run).code, Some(3));
+    assert_eq!(metric(&fleet, "run_exit_code"), Some(3.0));
+    assert_eq!(metric(&fleet, "run_completed_timestamp_seconds"), Some(completed));
+    assert!(metric(&fleet, "run_ended_timestamp_seconds").unwrap() > ended);
+    assert_eq!(metric(&fleet, "logs_found"), Some(30.0), "values of the last run that had some");
+}
+
+/// The rule `FreeplayLogsInError` fires, and the exit code stays 1, until the log is repaired or acknowledged.
+#[test]
+fn a_failed_log_is_reported_every_night_until_it_is_acknowledged() {
+    let fleet = TestFleet::sample();
+    std::fs::write(&fleet.logs()[0], "broken").unwrap();
+    let run = ["run", "--metrics", "freeplay.prom"];
+    for standing in [0.0, 1.0, 1.0] {
+        let result = fleet.freeplay(&run);
+        assert_eq!(result.code, Some(1), "{result:?}");
+        assert_eq!(metric(&fleet, "logs_still_failed"), Some(standing));
+    }
+    fleet.configure("[logs]", "[logs]\nacknowledged_errors = [\"sample-data/logs/N412FP/*0001.parquet\"]");
+    fleet.run_ok(&run);
+    assert_eq!(metric(&fleet, "logs_still_failed"), Some(0.0));
+}
+
+/// All is stored when the summary cannot be written: `/dev/full` is a disk without space.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_summary_that_cannot_be_written_does_not_fail_the_run() {
+    let fleet = TestFleet::sample();
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let output = fleet.command(&["run"]).stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("output_failed"), "{output:?}");
+}
