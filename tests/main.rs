@@ -13,4 +13,5 @@ mod markdown;
 mod mistakes;
 mod report_contents;
 mod runs;
+mod states;
 mod wrong_inputs;

@@ -19,7 +19,7 @@ def test_tables_are_those_of_the_pages(fleet: Path, command: Command) -> None:
     command("report", "-o", "report", "--data", "--quiet")
     pages = json.loads(Path("report/report.json").read_text())
     table = {path.stem: pl.read_parquet(path) for path in Path("report/data").iterdir()}
-    command("trend", "--statistics", "--format", "parquet", "-o", "trend.parquet")
+    command("trend", "--format", "parquet", "-o", "trend.parquet")
     assert table["units"].equals(pl.read_parquet("trend.parquet").select(table["units"].columns))
     assert [unit["serial_number"] for unit in pages["units"]] == table["units"]["serial_number"].to_list()
     command("store", "export", "--format", "parquet", "-o", "records.parquet")

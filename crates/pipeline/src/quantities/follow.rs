@@ -366,12 +366,39 @@ impl Assessed<'_> {
             shown_change(*quantity, fit.change, subject.scale),
             shown(*quantity, fit.baseline),
             shown(*quantity, fit.baseline + fit.change),
-            if self.subject.treatment.is_of_position || self.subject.treatment.is_of_channel {
-                "its sensor or wiring"
-            } else {
-                ChangeScope::Unit.cause()
-            },
+            self.cause(),
         )
+    }
+
+    /// Likely cause of the unit's own change: the wear where the quantity follows the gap.
+    fn cause(&self) -> String {
+        const FOLLOWS: f64 = 0.8;
+        match self.gap_correlation() {
+            Some(r) if r.abs() > FOLLOWS => format!("it follows the gap (r = {r:.2})"),
+            _ if self.subject.treatment.is_of_position || self.subject.treatment.is_of_channel => {
+                "its sensor or wiring".to_owned()
+            }
+            _ => ChangeScope::Unit.cause().to_owned(),
+        }
+    }
+
+    /// Correlation with the gaps of the same flights.
+    fn gap_correlation(&self) -> Option<f64> {
+        let flights = self.facts.series(self.subject.name)?.flights();
+        let pairs: Vec<(f64, f64)> = self
+            .subject
+            .values
+            .iter()
+            .filter_map(|v| {
+                let at = flights.binary_search_by_key(&v.departure_us, |f| f.departure_us).ok()?;
+                Some((v.value, flights[at].gap?.gap_m))
+            })
+            .collect();
+        let count = pairs.len() as f64;
+        let (x, y) = pairs.iter().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x / count, sum.1 + y / count));
+        let sum = |of: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|(a, b)| of(a - x, b - y)).sum::<f64>();
+        let r = sum(&|a, b| a * b) / (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt();
+        (pairs.len() >= 8).then_some(r).filter(|r| r.is_finite())
     }
 
     /// The unit's own change, where it has a state.

@@ -20,7 +20,10 @@ const REACH: f64 = 5.0;
 const SCATTER_RECORDS: usize = 8;
 
 /// The posterior's rate over that of a significant line.
-const RATE_RATIO: std::ops::RangeInclusive<f64> = 0.6..=2.0;
+const RATE_RATIO: std::ops::RangeInclusive<f64> = 0.7..=1.8;
+
+/// Standard errors of the line's slope that are allowed in addition.
+const RATE_REACH: f64 = 2.0;
 
 /// Weighted mean of the last records that a line explains.
 pub(crate) struct Evidence {
@@ -88,7 +91,7 @@ impl Evidence {
         let has_rate = self.rise.is_none_or(|rise| {
             let rate = |n: &Component| n.weight * n.amplitude_m * n.law.derivative(n.age_now);
             let m_per_hour = posterior.components.iter().map(rate).sum::<f64>() / hours_per_usage;
-            let within = REACH * rise.m_per_hour_se;
+            let within = RATE_REACH * rise.m_per_hour_se;
             m_per_hour >= RATE_RATIO.start() * rise.m_per_hour - within
                 && m_per_hour <= RATE_RATIO.end() * rise.m_per_hour + within
         });

@@ -1,0 +1,104 @@
+//! States of units whose records are drawn here, through `freeplay trend --estimates`.
+
+use serde_json::Value;
+
+use crate::harness::TestFleet;
+
+/// Gaps of a unit, µm, one flight of 2 h a day, with a scatter of 0.3 µm.
+fn rows(serial: &str, gaps_um: &[f64]) -> String {
+    let row = |(day, um): (usize, &f64)| {
+        let wiggle = 0.3e-6 * (1.7 * day as f64).sin();
+        let date = jiff::civil::date(2026, 1, 1).saturating_add(jiff::Span::new().days(day as i64));
+        format!("{serial},{date}T06:00:00Z,{:e},0.3e-6,2.0\n", um * 1e-6 + wiggle)
+    };
+    gaps_um.iter().enumerate().map(row).collect()
+}
+
+/// The trend of each unit at a date, with a limit of 150 µm.
+fn trend(units: &[(&str, Vec<f64>)], as_of: &[&str]) -> Vec<Value> {
+    let fleet = TestFleet::empty();
+    let header = "serial_number,departure_utc,gap_m,gap_se_m,flight_hours\n".to_owned();
+    let table: String = std::iter::once(header).chain(units.iter().map(|(s, gaps)| rows(s, gaps))).collect();
+    std::fs::write(fleet.path("history.csv"), table).unwrap();
+    let args = ["trend", "--estimates", "history.csv", "--limit-m", "150e-6", "--json"];
+    serde_json::from_str(&fleet.run_ok(&[&args, as_of].concat())).unwrap()
+}
+
+#[test]
+fn a_unit_measured_above_its_limit_says_so() {
+    let rise =
+        |from: usize| (0..30).map(|k| 70.0 + 20.0 * (k as f64 - from as f64).max(0.0)).collect::<Vec<_>>();
+    let units = [
+        ("1-one-above", [vec![70.0; 20], vec![190.0]].concat()),
+        ("2-three-above", [vec![70.0; 12], vec![250.0; 3]].concat()),
+        ("3-two-in-all", vec![180.0; 2]),
+        ("4-rise", rise(23)),
+        ("5-hours-from-it", rise(26)),
+        ("6-calm", vec![70.0; 30]),
+    ];
+    let mut found = Vec::new();
+    for (serial, gaps) in units {
+        let day = format!("2026-01-{:02}T12:00:00Z", gaps.len());
+        let row = trend(&[(serial, gaps.clone())], &["--as-of", &day]).swap_remove(0);
+        let gap_um = row["gap_m"].as_f64().unwrap() * 1e6;
+        assert!((gap_um - gaps[gaps.len() - 1]).abs() < 2.0, "{serial}: {gap_um}");
+        found.push((
+            serial,
+            row["state"].as_str().unwrap().to_owned(),
+            row["action"].as_str().map(str::to_owned),
+        ));
+        assert_eq!(row["latest_utc"].as_str().unwrap()[..10], day[..10], "{row}");
+    }
+    let expected = [
+        ("1-one-above", "plan", Some("inspect")),
+        ("2-three-above", "act", Some("replace")),
+        ("3-two-in-all", "act", Some("replace")),
+        ("4-rise", "act", Some("replace")),
+        ("5-hours-from-it", "plan", Some("inspect")),
+        ("6-calm", "normal", None),
+    ];
+    let expected =
+        expected.map(|(serial, state, action)| (serial, state.to_owned(), action.map(str::to_owned)));
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn a_silent_unit_is_unassessed_and_one_above_its_limit_stays_so() {
+    let units = [("calm", vec![70.0; 20]), ("above", [vec![70.0; 18], vec![190.0; 2]].concat())];
+    let rows = trend(&units, &["--as-of", "2026-03-20T00:00:00Z"]);
+    let state =
+        |serial: &str| rows.iter().find(|row| row["serial_number"] == serial).unwrap()["state"].clone();
+    assert_eq!((state("calm"), state("above")), ("unassessed".into(), "act".into()));
+    // Without a date the time of the run counts, years after these flights.
+    assert!(trend(&units, &[]).iter().all(|row| row["state"] != "normal"), "{rows:?}");
+}
+
+#[test]
+fn records_dated_ahead_and_negative_usage_are_named_and_decide_nothing() {
+    let fleet = TestFleet::empty();
+    let ahead = "U,2199-01-01T06:00:00Z,400e-6,0.3e-6,2.0\nU,2026-01-31T06:00:00Z,70e-6,0.3e-6,-5\n";
+    let table =
+        format!("serial_number,departure_utc,gap_m,gap_se_m,flight_hours\n{}{ahead}", rows("U", &[70.0; 30]));
+    std::fs::write(fleet.path("history.csv"), table).unwrap();
+    let args = [
+        "trend",
+        "--estimates",
+        "history.csv",
+        "--limit-m",
+        "150e-6",
+        "--as-of",
+        "2026-02-01T00:00:00Z",
+        "--json",
+    ];
+    let found: Vec<Value> = serde_json::from_str(&fleet.run_ok(&args)).unwrap();
+    let reason = found[0]["reason"].as_str().unwrap();
+    assert_eq!(found[0]["state"], "normal", "{reason}");
+    assert!(
+        reason.contains("1 rows with negative usage") && reason.contains("1 records dated ahead"),
+        "{reason}"
+    );
+    for limit in ["0", "-1e-6"] {
+        let args = ["trend", "--estimates", "history.csv", "--limit-m", limit];
+        assert_eq!(fleet.freeplay(&args).code, Some(2), "a limit of {limit}");
+    }
+}
