@@ -23,8 +23,8 @@ fn a_failed_run_writes_its_code_and_keeps_when_one_last_completed() {
     assert_eq!(fleet.freeplay(&run).code, Some(2));
     assert_eq!(metric(&fleet, "run_exit_code"), Some(2.0));
     std::fs::rename(fleet.path("moved.csv"), &table).unwrap();
-    let logs = fleet.path("results/logs/_delta_log");
-    std::fs::rename(&logs, fleet.path("moved")).unwrap();
+    std::fs::remove_file(fleet.path("results/lock")).unwrap();
+    std::fs::create_dir(fleet.path("results/lock")).unwrap();
     assert_eq!(fleet.freeplay(&run).code, Some(3));
     assert_eq!(metric(&fleet, "run_exit_code"), Some(3.0));
     assert_eq!(metric(&fleet, "run_completed_timestamp_seconds"), Some(completed));

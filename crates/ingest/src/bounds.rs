@@ -15,7 +15,7 @@ pub(crate) const FOOTER_BYTES: u64 = 256 << 20;
 pub(crate) const SCHEMA_DEPTH: usize = 64;
 /// Columns of all row groups together: each takes about 700 bytes of memory.
 pub(crate) const COLUMN_CHUNKS: u64 = 1 << 20;
-/// Columns of a CSV table: as many as a spreadsheet has.
+/// Columns of a CSV table: those of a spreadsheet.
 pub(crate) const TABLE_COLUMNS: usize = 16_384;
 /// Bytes of a page. Writers make pages of about 1 MiB; a row group without cuts some tens.
 pub(crate) const PAGE_BYTES: i64 = 256 << 20;

@@ -343,7 +343,10 @@ pub fn config_digest(
 pub fn digest_without_identity(config: &Config, installations: &Installations) -> String {
     let mut hash = blake3::Hasher::new();
     hash.update(&crate::METHOD_VERSION.to_le_bytes());
-    hash.update(serde_json::to_string(&config.document).unwrap_or_default().as_bytes());
+    // That an error is known makes no log another.
+    let mut document = config.document.clone();
+    document.logs.acknowledged_errors.clear();
+    hash.update(serde_json::to_string(&document).unwrap_or_default().as_bytes());
     for installation in installations.iter() {
         hash.update(serde_json::to_string(installation).unwrap_or_default().as_bytes());
     }

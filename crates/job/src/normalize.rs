@@ -14,7 +14,7 @@ use crate::flight_log::{FlightLog, catch_panic};
 ///
 /// An actuator that cannot be used becomes a diagnostic; the others are written.
 ///
-/// `claim` is asked before a file is written, with the digest of the log, and refuses a file of someone else.
+/// `claim` is called before a file is written, with the digest of the log, and refuses a file of someone else.
 ///
 /// # Errors
 /// A diagnostic when the log cannot be read or identified.

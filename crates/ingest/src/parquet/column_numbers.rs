@@ -159,7 +159,7 @@ mod tests {
             writer.write(&batch).unwrap();
             writer.close().unwrap();
             let from = from.min(values.len());
-            let stretch = [from..values.len()];
+            let stretch = [from..values.len(), values.len()..values.len()];
             let mut read = ColumnBuilder::with_capacity(0, None);
             LogFile::open(&path).unwrap().append_numbers("x", RowSelection::of(&stretch), &mut read).unwrap();
             let read = read.finish().0;

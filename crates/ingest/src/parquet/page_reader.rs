@@ -139,7 +139,7 @@ impl Iterator for Pages {
 }
 
 impl Pages {
-    /// The checked pages of a chunk, read in batches of so many rows at most.
+    /// The checked pages of a chunk, read in batches of at most `batch_rows` rows.
     pub(crate) fn new(
         file: Arc<PreadFile>,
         chunk: &ColumnChunkMetaData,
@@ -330,7 +330,10 @@ fn fixed(left: usize, into: &mut Vec<u8>, unpack: impl FnOnce(&mut [u8]) -> Opti
     let before = into.len();
     into.resize(before + left, 0);
     match unpack(&mut into[before..]) {
-        Some(bytes) => Ok(into.truncate(before + bytes)),
+        Some(bytes) => {
+            into.truncate(before + bytes);
+            Ok(())
+        }
         None => fail("a page cannot be unpacked to the size that it claims"),
     }
 }

@@ -38,7 +38,7 @@ pub struct AlertChannel {
     /// Program and arguments, without a shell: it gets the message as JSON on standard input. Exit code 0 means sent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub command: Option<Vec<String>>,
-    /// Variables of the environment that `command` gets beside `PATH`, `HOME`, `LANG` and a few others.
+    /// Variables of the environment that `command` gets in addition to `PATH`, `HOME`, `LANG` and a few others.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pass_environment: Vec<String>,
     /// Folder that gets one JSON file per message, named after the alert's `id`.

@@ -11,7 +11,7 @@ use crate::http_post::{Posted, parse};
 /// Posts a JSON document and waits for the status of the answer, at most `timeout`.
 ///
 /// A redirection is an answer like any other: following it would turn the post into a request without the document, or
-/// send the document to a host that nobody named. Messages hold no address, which may hold a secret.
+/// send the document to another host. Messages hold no address, which may hold a secret.
 pub fn post_json(url: &str, body: &str, timeout: Duration) -> Posted {
     let url = match parse(url) {
         Ok(url) => url,

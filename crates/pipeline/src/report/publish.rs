@@ -43,9 +43,10 @@ pub fn write(
     watch: &(impl Fn(Event) + Sync),
 ) -> Result<PublishSummary, Error> {
     // A link stays one: the folder that it leads to is written.
+    let named = dir;
     let resolved = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
     let dir = resolved.as_path();
-    refuse_foreign(dir)?;
+    refuse_foreign(dir, named)?;
     let parent = dir.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     fs::create_dir_all(parent).map_err(|e| failed(parent, e))?;
     remove_leftovers(parent, &prefix(dir));
@@ -63,7 +64,7 @@ pub fn write(
 }
 
 /// Refuses a folder that holds anything but a report: replacing it would delete what belongs to someone else.
-fn refuse_foreign(dir: &Path) -> Result<(), Error> {
+fn refuse_foreign(dir: &Path, named: &Path) -> Result<(), Error> {
     let found = entries(dir);
     let list = fs::read_to_string(dir.join(MANIFEST)).ok();
     let ours: BTreeSet<&str> = list.iter().flat_map(|list| list.lines()).chain([MANIFEST]).collect();
@@ -75,7 +76,7 @@ fn refuse_foreign(dir: &Path) -> Result<(), Error> {
         1 => String::new(),
         count => format!(" and {} more", count - 1),
     };
-    let what = format!("{} holds files that are not a report: {}{more}", dir.display(), escape_cell(first));
+    let what = format!("{} holds files that are not a report: {}{more}", named.display(), escape_cell(first));
     let diagnostic = Diagnostic::new("would_overwrite", what)
         .hint("move these files away, or name an empty folder or one that only a report was written to");
     Err(Error::refused(diagnostic))

@@ -1,6 +1,6 @@
 //! Flight ownership: two logs may hold the same flight, and the owner must not depend on the order of arrival.
 //!
-//! The log that has the flight in the store keeps it: whoever writes a log later takes nothing away. Of two logs that
+//! The log that has the flight in the store keeps it: a later log takes nothing away. Of two logs that
 //! are new, the one whose name sorts first owns the flight. A copy with the same content is skipped without an error; a
 //! log of the same flight with other content is in error, and the error names the owner. Logs with one flight id and
 //! departures a few hours apart may be pieces of one flight: unless the configuration declares what they are, all of them
