@@ -51,7 +51,7 @@ pub(crate) enum QueryKey {
 pub(crate) struct TrendArgs {
     #[command(flatten)]
     pub units: UnitFilterArgs,
-    /// Date of the assessment; default: now, or as `trend.as_of` says. Later data are ignored.
+    /// Date of the assessment; default: now, or that of `trend.as_of`. Later data are ignored.
     #[arg(long, value_parser = parse_utc, value_name = "UTC", help_heading = "Selection")]
     pub as_of: Option<Timestamp>,
     #[command(flatten)]
