@@ -47,7 +47,6 @@ pub(crate) enum QueryKey {
 
 /// `trend`.
 #[derive(Debug, ClapArgs)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a flag that a user types")]
 pub(crate) struct TrendArgs {
     #[command(flatten)]
     pub units: UnitFilterArgs,
