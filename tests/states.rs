@@ -27,7 +27,7 @@ fn trend(units: &[(&str, Vec<f64>)], as_of: &[&str]) -> Vec<Value> {
 #[test]
 fn a_unit_measured_above_its_limit_says_so() {
     let rise =
-        |from: usize| (0..30).map(|k| 70.0 + 20.0 * (k as f64 - from as f64).max(0.0)).collect::<Vec<_>>();
+        |from: i32| (0..30_i32).map(|k| 70.0 + 20.0 * f64::from(k - from).max(0.0)).collect::<Vec<_>>();
     let units = [
         ("1-one-above", [vec![70.0; 20], vec![190.0]].concat()),
         ("2-three-above", [vec![70.0; 12], vec![250.0; 3]].concat()),

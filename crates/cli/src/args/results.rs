@@ -47,11 +47,10 @@ pub(crate) enum QueryKey {
 
 /// `trend`.
 #[derive(Debug, ClapArgs)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a flag that a user types")]
 pub(crate) struct TrendArgs {
     #[command(flatten)]
     pub units: UnitFilterArgs,
-    /// Date of the assessment; default: now, or as `trend.as_of` says. Later data are ignored.
+    /// Date of the assessment; default: now, or that of `trend.as_of`. Later data are ignored.
     #[arg(long, value_parser = parse_utc, value_name = "UTC", help_heading = "Selection")]
     pub as_of: Option<Timestamp>,
     #[command(flatten)]

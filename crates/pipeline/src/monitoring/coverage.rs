@@ -26,19 +26,17 @@ pub fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
             units(of_logs)
         ));
     }
-    let is_quiet =
-        |row: &&TrendRow| row.latest_utc.is_some_and(|at| days_between(at, row.as_of_utc) > QUIET_DAYS);
-    let quiet = installed().filter(is_quiet).count();
-    if quiet > 0 {
+    let newest = installed().filter_map(|row| Some((row.latest_utc?, row.as_of_utc))).max();
+    if let Some((at, _)) = newest.filter(|(at, as_of)| days_between(*at, *as_of) > QUIET_DAYS) {
         notes.push(format!(
-            "{}: no record for more than {QUIET_DAYS:.0} days; dates count on from the last flight at the unit's own rate",
-            units(quiet)
+            "no record after {}; usage goes on at each unit's own rate",
+            at.strftime("%Y-%m-%d")
         ));
     }
     notes
 }
 
-/// Days without a record from which a note says that usage is assumed to go on.
+/// Days without a record from which a note states that usage is assumed to go on.
 const QUIET_DAYS: f64 = 3.0;
 
 fn units(count: usize) -> String {

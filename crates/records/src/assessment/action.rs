@@ -11,7 +11,7 @@ pub enum Action {
     Replace,
     /// State `plan` or `watch`, or another quantity changed.
     Inspect,
-    /// State `unassessed`: no record says how large the gap is.
+    /// State `unassessed`: no record shows how large the gap is.
     CheckLogs,
     /// State `unassessed` without a limit.
     SetLimit,

@@ -23,7 +23,7 @@ pub struct Observation {
     pub gap_m: Option<f64>,
     /// Its standard error, metres; `None` where nothing was stated.
     pub gap_se_m: Option<f64>,
-    /// Whether the estimator itself doubts the gap: such a record alone neither confirms nor clears anything.
+    /// Whether the record has a quality flag that makes the gap uncertain: such a record alone neither confirms nor clears anything.
     pub is_doubtful: bool,
 }
 
@@ -73,7 +73,7 @@ pub struct Gap {
     pub gap_m: f64,
     /// Its stated standard error, metres; `NaN` where nothing was stated.
     pub se_m: f64,
-    /// Whether its estimator doubts it.
+    /// Whether a quality flag makes it uncertain.
     pub is_doubtful: bool,
 }
 
@@ -123,7 +123,7 @@ impl MaintenanceEvent {
 /// 3. Hours beyond the flight's own belong to flights without a row. They count as flights and as
 ///    load reversals at the unit's mean so far. A flight that states no reversals adds that mean, too.
 /// 4. Two rows of one installation and departure are one flight: the row with a gap wins, then the larger gap, then the
-///    smaller other numbers, whatever the order of arrival. Where the gaps differ, the kept one is doubtful.
+///    smaller other numbers, whatever the order of arrival. Where the gaps differ, the kept one is flagged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     flights: Vec<Flight>,
@@ -136,7 +136,7 @@ pub struct Series {
 /// Rows that cannot be right, by what was done about them.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct RowFaults {
-    /// Flights with records that contradict each other: the largest gap is kept, as a doubtful one.
+    /// Flights with records that contradict each other: the largest gap is kept, as a flagged one.
     pub contradictions: usize,
     /// Rows with negative usage, which is left out.
     pub negative_usage: usize,

@@ -17,7 +17,7 @@ mod tests {
     /// 50-digit values from mpmath.
     #[test]
     fn the_normal_tail_holds_to_the_last_digits() {
-        for (z, p) in [(-0.3, 0.382_088_577_811_047_36), (-5.0, 2.866_515_718_791_939e-7)] {
+        for (z, p) in [(-0.3, 0.382_088_577_811_047_4), (-5.0, 2.866_515_718_791_939e-7)] {
             assert!((cdf(z) / p - 1.0).abs() < 1e-14, "{z}: {}", cdf(z));
         }
     }

@@ -35,7 +35,7 @@ pub(crate) fn exceedance(
     limit_m: f64,
 ) -> (Option<Exceedance>, Vec<ChangePoint>) {
     let is_above = |record: &Record| record.gap_m >= limit_m;
-    // A doubtful record below the limit clears nothing.
+    // A flagged record below the limit clears nothing.
     let records: Vec<Record> = all.iter().copied().filter(|r| r.is_sound || is_above(r)).collect();
     let mut events = Vec::new();
     let mut run: Option<Run> = None;

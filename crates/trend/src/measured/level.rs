@@ -23,7 +23,7 @@ pub(crate) struct MeasuredLevel {
     pub(crate) se_m: f64,
     /// Records that it rests on.
     pub(crate) records: usize,
-    /// The same with wild ones among them, counted from the last.
+    /// The same with outliers among them, counted from the last.
     pub(crate) window: usize,
     pub(crate) period: u32,
     slope_m_per_hour: f64,
@@ -151,7 +151,7 @@ fn without_wild(records: &[Record]) -> Option<(Record, Vec<Record>)> {
     }
     let off = |[a, b, c]: &[Record; 3]| (b.gap_m - 0.5 * (a.gap_m + c.gap_m)).abs() / b.error_m;
     let inner = records.array_windows().map(off).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?.0 + 1;
-    // The first of a window may be the wild one as well; the window one shorter covers that.
+    // The first of a window may be the outlier as well; the window one shorter covers that.
     let others = records.iter().enumerate().filter(|(k, _)| *k != inner).map(|(_, r)| *r).collect();
     Some((records[inner], others))
 }

@@ -54,7 +54,7 @@ impl Measured {
         let (all, renewed_us) = records(flights, maintenance, settings.limit_m);
         let Some(latest) = all.last().copied() else { return Self::default() };
         let sound: Vec<Record> = all.iter().copied().filter(|record| record.is_sound).collect();
-        // Doubtful records are better than none.
+        // Flagged records are better than none.
         let has_sound = sound.last().is_some_and(|record| record.period == latest.period);
         let sound = if has_sound { sound } else { all.clone() };
         let level = measured_level(&sound, settings.limit_m);

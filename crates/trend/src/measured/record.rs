@@ -3,7 +3,7 @@
 use crate::data::outliers::errors;
 use crate::data::series::{Flight, Gap, MaintenanceEvent};
 
-/// Records that are looked at, the last ones.
+/// Number of last records that are read.
 const MOST: usize = 400;
 
 /// One measured gap.
@@ -16,7 +16,7 @@ pub(crate) struct Record {
     pub(crate) gap_m: f64,
     /// Standard error, with the scatter that was found.
     pub(crate) error_m: f64,
-    /// Not doubted by its own estimator.
+    /// Without a quality flag that makes it uncertain.
     pub(crate) is_sound: bool,
     /// A new one begins with each installation and after each renewal.
     pub(crate) period: u32,

@@ -50,7 +50,7 @@ struct Score {
 }
 
 fn score(class: &Class) -> Score {
-    let (mut late, mut held, mut errors, mut none, mut count) = (0, 0, Vec::new(), 0, 0);
+    let (mut late, mut held, mut errors, mut none, mut count) = (0, 0, Vec::new(), 0, 0_usize);
     for (fleet, units) in [12, 40, 92].into_iter().enumerate() {
         let units: Vec<(Drawn, f64)> = (0..units).map(|k| unit(class, 10_000 * fleet as u64 + k)).collect();
         let prior = prior(units.iter().map(|(d, _)| d));

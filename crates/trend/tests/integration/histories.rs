@@ -56,7 +56,7 @@ impl Drawn {
         }
     }
 
-    /// The last records doubted by their estimator.
+    /// Flags the last records.
     pub(crate) fn doubt(&mut self, count: usize) {
         let from = self.rows.len() - count;
         self.rows[from..].iter_mut().for_each(|row| row.is_doubtful = true);

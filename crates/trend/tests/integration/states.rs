@@ -4,7 +4,7 @@ use trend::{FleetPrior, Settings, State, assess};
 
 use crate::histories::{DAY_US, Drawn, LIMIT_M, LIMIT_UM, prior, settings};
 
-/// Draws the end of a history after a calm begin, and the state that is due at least; `None` where the records say it.
+/// Draws the end of a history after a calm begin, and the state that is due at least; `None` where the records alone give it.
 type Kind = (&'static str, fn(&mut Drawn) -> Option<State>);
 
 const UNITS: u64 = 100;
@@ -110,7 +110,7 @@ const URGENT: [Kind; 20] = [
         d.refused(count);
         Some(State::Act)
     }),
-    ("doubtful records above", |d| {
+    ("flagged records above", |d| {
         young_or_old(d);
         jump(d, 1, 5);
         let last = d.rows.len().min(3);
@@ -123,7 +123,7 @@ const URGENT: [Kind; 20] = [
         d.log(um);
         Some(State::Act)
     }),
-    ("above but for a wild record", |d| {
+    ("above but for an outlier", |d| {
         let um = young_or_old(d);
         jump(d, 4, 8);
         d.log(um);
@@ -163,7 +163,7 @@ const CALM: [Kind; 7] = [
         d.logs(count, |_| um);
         None
     }),
-    ("wild records that were not confirmed", |d| {
+    ("outliers that were not confirmed", |d| {
         let um = young_or_old(d);
         for _ in 0..d.count(1, 3) {
             jump(d, 1, 1);
