@@ -4,7 +4,7 @@
 
 use std::io::Write;
 
-/// A file, and what its error must say.
+/// A file, and a part of its error.
 pub(crate) struct Hostile {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,

@@ -92,7 +92,7 @@ fn normalize_overwrites_nothing_but_its_own() {
     assert_eq!(std::fs::read_to_string(&written[0]).unwrap(), "years");
 }
 
-/// A log of the same flight whose name sorts first arrives a night later.
+/// A log of the same flight whose name sorts first arrives for a later run.
 #[test]
 fn a_stored_flight_is_not_displaced_by_a_later_claim() {
     let fleet = TestFleet::sample();

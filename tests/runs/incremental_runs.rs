@@ -142,7 +142,7 @@ fn a_copy_speaks_when_the_first_log_breaks() {
     std::fs::write(log, b"broken").unwrap();
     assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
     assert!(fleet.run_ok(&["run", "--dry-run"]).contains("its flight has no other log now"));
-    // The broken log stays an error until it is repaired, whoever holds its flight.
+    // The broken log stays an error until it is repaired.
     assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
     assert_eq!(fleet.exported(), before);
     let again = fleet.freeplay(&["run"]);

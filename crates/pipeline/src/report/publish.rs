@@ -89,8 +89,7 @@ fn is_of_older_report(entry: &str) -> bool {
     let is_page = |name: &str| [".html", ".json", ".svg"].iter().any(|end| name.ends_with(end));
     match (first, rest) {
         ("assets" | "data", _) | ("tail" | "serial" | "part" | "flight", None) => true,
-        ("tail" | "serial" | "part" | "flight", Some(name)) => is_page(name),
-        (name, None) => is_page(name),
+        ("tail" | "serial" | "part" | "flight", Some(name)) | (name, None) => is_page(name),
         _ => false,
     }
 }
