@@ -67,5 +67,5 @@ fn every_unit_is_on_the_page_of_its_part_once() {
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
-    assert_eq!(tables.len(), 12, "{tables:?}");
+    assert_eq!(tables.len(), 11, "{tables:?}");
 }
