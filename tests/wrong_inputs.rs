@@ -187,7 +187,7 @@ fn units_that_no_limit_covers_are_named_by_run_trend_and_report() {
     let fleet = TestFleet::sample();
     edit(&fleet, "pipeline.toml", |text| text.replacen("limit_m = 150e-6\nwatch_m = 110e-6\n", "", 1));
     let run = fleet.run_ok(&["run", "--fail-on", "act"]);
-    let note = "part EMA-27-1040 has no limit: 6 units without a state, which `--fail-on` does not see; add `limit_m` to";
+    let note = "part EMA-27-1040 has no limit: 6 units unassessed; add `limit_m` to";
     assert!(run.contains(note), "{run}");
     assert!(fleet.run_ok(&["trend"]).contains(note));
     fleet.run_ok(&["report", "--output", "pages"]);

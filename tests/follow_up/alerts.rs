@@ -22,11 +22,11 @@ fn fleet(alerts: &str) -> TestFleet {
     fleet
 }
 
-/// The small fleet until October, where no unit has a state, with a baseline.
-fn fleet_of_october() -> TestFleet {
+/// The small fleet until September, where one unit is in `watch`, with a baseline.
+fn fleet_of_september() -> TestFleet {
     let fleet = TestFleet::sample();
     append(&fleet, "[alerts.files]\nfolder = \"alerts\"\n");
-    fleet.run_ok(&["run", "--quiet", "--until", "2026-10-10"]);
+    fleet.run_ok(&["run", "--quiet", "--until", "2026-09-22"]);
     fleet
 }
 
@@ -64,27 +64,23 @@ fn serials(messages: &[Value]) -> Vec<&str> {
 
 #[test]
 fn a_folder_gets_a_summary_first_and_then_one_file_for_each_change() {
-    let fleet = fleet_of_october();
+    let fleet = fleet_of_september();
     let first = files(&fleet, "alerts");
     assert_eq!(
-        (first.len(), &first[0]["kind"], &first[0]["states"]["not_assessed"]),
-        (1, &"baseline".into(), &12.into())
+        (first.len(), &first[0]["kind"], &first[0]["states"]["normal"], &first[0]["states"]["watch"]),
+        (1, &"baseline".into(), &11.into(), &1.into())
     );
-    // The run until October left logs out, but only those that were not selected.
+    // The run until September left logs out, but only those that were not selected.
     let result = run(&fleet);
     assert_eq!(result.code, Some(0), "{result:?}");
     let messages = files(&fleet, "alerts");
     assert_eq!(serials(&messages), IN_PLAN);
     let message = messages.iter().find(|message| message["serial_number"] == "1040-0013").unwrap();
-    assert_eq!((&message["from"], &message["to"]), (&"not_assessed".into(), &"plan".into()));
+    assert_eq!((&message["from"], &message["to"]), (&"watch".into(), &"plan".into()));
     assert_eq!((&message["tail_number"], &message["work_request"]), (&"N414FP".into(), &"W2".into()));
     let text = message["text"].as_str().unwrap();
-    assert!(
-        text.starts_with("EMA-27-1040 / 1040-0013 on N414FP aileron_left: not_assessed → plan ("),
-        "{text}"
-    );
-    // All twelve units changed; two of them into a selected state.
-    assert_eq!((&summary(&result)["changes"], &summary(&result)["sent"]), (&12.into(), &2.into()));
+    assert!(text.starts_with("EMA-27-1040 / 1040-0013 on N414FP aileron_left: watch → plan ("), "{text}");
+    assert_eq!((&summary(&result)["changes"], &summary(&result)["sent"]), (&2.into(), &2.into()));
     for _ in 0..2 {
         assert_eq!(summary(&run(&fleet))["sent"], 0);
     }
@@ -94,7 +90,7 @@ fn a_folder_gets_a_summary_first_and_then_one_file_for_each_change() {
 
 #[test]
 fn changes_wait_while_logs_are_left_for_later() {
-    let fleet = fleet_of_october();
+    let fleet = fleet_of_september();
     let part = fleet.freeplay(&["run", "--limit", "5", "--json"]);
     assert_eq!((&summary(&part)["is_held"], &summary(&part)["changes"]), (&true.into(), &0.into()));
     let text = fleet.run_ok(&["run", "--limit", "1"]);
@@ -301,7 +297,7 @@ fn the_examples_of_a_mail_and_of_a_chat_message_work() {
         let output = fleet.command(args).env("PATH", &path).output().unwrap();
         assert_eq!(output.status.code(), Some(0), "{output:?}");
     };
-    run(&["run", "--quiet", "--until", "2026-10-10"]);
+    run(&["run", "--quiet", "--until", "2026-09-22"]);
     run(&["run", "--quiet"]);
     let mails = std::fs::read_to_string(fleet.path("mails")).unwrap();
     let headers = |name: &str| mails.lines().filter(|line| line.starts_with(name)).count();

@@ -113,7 +113,7 @@ fn the_logs_of_a_run_are_reported_by_class_and_reason() {
     let content = std::fs::read(log).unwrap();
     std::fs::remove_file(log).unwrap();
     std::fs::write(log, content).unwrap();
-    fleet.run_ok(&["run"]);
+    assert_eq!(fleet.freeplay(&["run"]).code, Some(1), "the broken log is still in error");
     let page = fleet.run_ok(&["store", "runs", "--run", "last"]);
     assert!(page.contains("1 log (known 1)"), "{page}");
     assert_eq!(fleet.freeplay(&["store", "runs", "--run", "never"]).code, Some(2));

@@ -7,8 +7,6 @@
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::error::ErrorKind;
-
 /// Bytes of a footer: 1 KiB for each of 262,144 column chunks.
 pub(crate) const FOOTER_BYTES: u64 = 256 << 20;
 /// Groups inside groups of a schema: readers call themselves for each.
@@ -55,12 +53,6 @@ impl fmt::Display for Excess {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { what, found, most, .. } = self;
         write!(f, "the file claims {found} {what}, more than the limit of {most}")
-    }
-}
-
-impl From<Excess> for ErrorKind {
-    fn from(excess: Excess) -> Self {
-        Self::BeyondLimit(excess)
     }
 }
 

@@ -152,6 +152,12 @@ pub enum ErrorKind {
     Table { row: Option<u64>, column: Option<String>, detail: String },
 }
 
+impl From<Excess> for ErrorKind {
+    fn from(excess: Excess) -> Self {
+        Self::BeyondLimit(excess)
+    }
+}
+
 impl ErrorKind {
     /// The stable code; `docs/errors.md` has a paragraph for each.
     pub fn code(&self) -> &'static str {

@@ -124,8 +124,12 @@ fn jump_event(
         return None;
     }
     let is_recorded = history::is_recorded(flights, maintenance, at);
-    let kind = if is_recorded { ChangePointKind::Recorded } else { ChangePointKind::Step };
     let step_m = jump.after_m - jump.before_m;
+    let kind = match is_recorded {
+        true => ChangePointKind::Recorded,
+        false if step_m < 0.0 => ChangePointKind::Reset,
+        false => ChangePointKind::Step,
+    };
     Some(ChangePoint { departure_us: jump.departure_us, kind, step_m, se_m: jump.error_m, certainty: 1.0 })
 }
 

@@ -18,7 +18,7 @@ use crate::measured::thresholds::{HYSTERESIS, JUMP_ERRORS, JUMP_RECORDS, JUMP_SH
 use crate::settings::Settings;
 use crate::statement::types::ChangePoint;
 
-/// The level rose at once by more than wear and errors explain.
+/// The level rose or fell at once by more than wear and errors explain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Jump {
     pub(crate) departure_us: i64,
@@ -78,7 +78,7 @@ impl Measured {
     }
 }
 
-/// The last jump of the level that is still reported.
+/// The last jump of the level, up or down, that is still reported.
 fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
     /// Share of a jump that must be left.
     const LEFT: f64 = 0.8;
@@ -97,8 +97,13 @@ fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
         let after_m = now.at(first.hours);
         let error_m = before.se_m.hypot(now.se_m.min(first.error_m)).max(first.error_m);
         let least_m = (JUMP_SHARE * settings.limit_m).max(JUMP_ERRORS * error_m);
-        let is_left = present.gap_m - before.gap_m > LEFT * least_m;
-        if is_left && after_m - before.at(first.hours) > least_m && after_m - before.gap_m > least_m {
+        // A fall from one installation or maintenance to the next is what both are for.
+        let sign = if before.period == now.period { (after_m - before.gap_m).signum() } else { 1.0 };
+        let is_left = sign * (present.gap_m - before.gap_m) > LEFT * least_m;
+        let is_jump = |from_m: f64| sign * (after_m - from_m) > least_m;
+        // A rise is reported from its first record on. A fall may end a wild record, so it needs three on each side.
+        let is_certain = sign > 0.0 || before.records.min(records) > 2;
+        if is_certain && is_left && is_jump(before.at(first.hours)) && is_jump(before.gap_m) {
             let (departure_us, before_m) = (first.departure_us, before.gap_m);
             return Some(Jump { departure_us, before_m, after_m, error_m, records });
         }

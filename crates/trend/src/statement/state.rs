@@ -251,7 +251,8 @@ pub(crate) fn alert_state(
     if gap_m >= watch_m || (measured.was_at_watch && gap_m >= HYSTERESIS * watch_m) {
         return (State::Watch, Reason::AtWatch { gap_m, watch_m, records: level.records });
     }
-    if let Some(Jump { before_m, after_m, records, .. }) = measured.jump {
+    let rise = measured.jump.filter(|jump| jump.after_m > jump.before_m);
+    if let Some(Jump { before_m, after_m, records, .. }) = rise {
         return (State::Watch, Reason::Jumped { before_m, after_m, records });
     }
     match changes.iter().rev().find(|change| change.kind.is_unexplained()) {
