@@ -28,7 +28,7 @@ async function on(file, options, look) {
 const um = (m) => { const text = (m * 1e6).toFixed(1); return text === "-0.0" ? "0.0" : text; };
 const level = (s) => (s.gap_m === null ? "no data" : `${um(s.gap_m)} ± ${um(1.645 * s.gap_se_m)} µm (90 %)`);
 const name = (u) => (u.part_number === null ? u.serial_number : `${u.part_number} / ${u.serial_number}`);
-const calls = (u) => ["act", "plan", "watch"].includes(u.statement.state);
+const calls = (u) => ["act", "plan", "unassessed", "watch"].includes(u.statement.state);
 // A mark of direction is named in the pages, so that it cannot turn round what stands after it.
 const plain = (text) => text.replace("\u202e", "[U+202E]").replace(/\s+/gu, " ").trim();
 const all = (page, selector) => page.$$eval(selector, (found) => found.map((e) => e.textContent));
@@ -54,7 +54,7 @@ for (const which of Object.keys(reports)) {
         await visit(page, index(which));
         await toUnit(page, unit);
         assert.equal(plain(await page.locator("h1").textContent()), plain(name(unit)));
-        assert.equal(await fact(page, "Gap now"), level(unit.statement));
+        assert.equal(await fact(page, "Gap at the last record"), level(unit.statement));
         assert.equal(await fact(page, "Flights used"), String(unit.quality.estimated));
         const share = Math.round((100 * unit.statement.gap_m) / unit.statement.limit_m);
         assert.equal(await fact(page, "% of limit"), unit.statement.gap_m === null ? "no data" : `${share} %`);
@@ -70,8 +70,8 @@ for (const which of Object.keys(reports)) {
   test(`${which}: the front page counts states as the twin does and lists every unit that calls`, async () => {
     const report = twin(which);
     await on(index(which), {}, async (page) => {
-      const words = { act: "act", plan: "plan", watch: "watch", normal: "normal" };
-      for (const [word, state] of [...Object.entries(words), ["not assessed", null]]) {
+      for (const word of ["act", "plan", "unassessed", "watch", "normal", "removed"]) {
+        const state = word === "removed" ? null : word;
         const count = report.units.filter((u) => u.statement.state === state).length;
         const card = page.locator(".counts li", { hasText: word });
         assert.equal(await card.locator("b").textContent(), String(count), word);
