@@ -108,6 +108,8 @@ pub(crate) struct Pages {
     chunk: ColumnChunkMetaData,
     pages: vec::IntoIter<RawPage>,
     batch_rows: usize,
+    /// Bytes of the latest page as they are stored.
+    stored: Vec<u8>,
 }
 
 impl PageReader for Pages {
@@ -147,7 +149,7 @@ impl Pages {
         batch_rows: usize,
     ) -> Self {
         pages.retain(|page| page.header.type_ != PageType::INDEX_PAGE);
-        Self { file, chunk: chunk.clone(), pages: pages.into_iter(), batch_rows }
+        Self { file, chunk: chunk.clone(), pages: pages.into_iter(), batch_rows, stored: Vec::new() }
     }
 
     /// Values of each data page, nulls included.
@@ -157,9 +159,11 @@ impl Pages {
         pages.map(|page| usize::try_from(levels(page).unwrap_or(0)).unwrap_or(0)).collect()
     }
 
-    fn read(&self, page: &RawPage) -> Result<Page> {
+    fn read(&mut self, page: &RawPage) -> Result<Page> {
         let header = &page.header;
-        let mut stored = vec![0; usize::try_from(header.compressed_page_size)?];
+        // Each page is read into the memory of the one before.
+        let mut stored = std::mem::take(&mut self.stored);
+        stored.resize(usize::try_from(header.compressed_page_size)?, 0);
         read_exact(self.file.file(), &mut stored, page.body_start)?;
         if header.crc.is_some_and(|crc| crc32fast::hash(&stored) != crc as u32) {
             return fail("Page CRC checksum mismatch");
@@ -177,7 +181,7 @@ impl Pages {
         }
         let codec = self.chunk.compression();
         let buf: Bytes = if is_packed && codec != Compression::UNCOMPRESSED {
-            let mut whole = Vec::with_capacity(size);
+            let mut whole = Vec::new();
             whole.extend_from_slice(&stored[..plain]);
             if size > plain {
                 unpack(codec, &stored[plain..], size, &mut whole)?;
@@ -185,6 +189,7 @@ impl Pages {
             if whole.len() != size {
                 return fail(format!("a page of {size} bytes unpacks to {}", whole.len()));
             }
+            self.stored = stored;
             whole.into()
         } else {
             stored.into()
@@ -311,13 +316,18 @@ fn unpack(codec: Compression, packed: &[u8], size: usize, into: &mut Vec<u8>) ->
             fixed(left, into, |out| snap::raw::Decoder::new().decompress(packed, out).ok())?;
         }
         Compression::ZSTD(_) => {
-            let unpack = |zstd: &mut Option<Decompressor<'static>>, out: &mut [u8]| {
+            // Into fresh memory, which need not be set to zeros: no more than its capacity is filled.
+            let unpacked = ZSTD.with_borrow_mut(|zstd| {
                 if zstd.is_none() {
                     *zstd = Decompressor::new().ok();
                 }
-                zstd.as_mut()?.decompress_to_buffer(packed, out).ok()
-            };
-            fixed(left, into, |out| ZSTD.with_borrow_mut(|zstd| unpack(zstd, out)))?;
+                zstd.as_mut()?.decompress(packed, left).ok()
+            });
+            match unpacked {
+                Some(unpacked) if into.is_empty() => *into = unpacked,
+                Some(mut unpacked) => into.append(&mut unpacked),
+                None => return fail("a page cannot be unpacked to the size that it claims"),
+            }
         }
         Compression::UNCOMPRESSED => into.extend_from_slice(packed),
         other @ Compression::LZO => return fail(format!("its compression {other} is not read")),
