@@ -117,7 +117,7 @@ def test_a_run_on_spark_with_a_worker_killed_is_that_of_one_machine(
     command("store", "export", "--format", "parquet", "--output", "spark.parquet")
     assert differing(pq.read_table("spark.parquet"), pq.read_table(one_machine), OF_A_RUN) == []
     # The command knows every log, the one in error too, and answers from what Spark wrote.
-    assert "31 logs: 0 new or changed, 31 already processed" in command("run").stdout
+    assert "31 logs: 0 new or changed, 31 already processed" in command("run", code=1).stdout
     assert command("query", "tail", "N412FP", "--json").stdout.count('"flight_id"') == 40
     shutil.rmtree("results")
 
