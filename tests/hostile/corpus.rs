@@ -41,7 +41,7 @@ fn text(step: u8, text: &str) -> Vec<u8> {
     [vec![step << 4 | 8], varint(text.len() as u64), text.as_bytes().to_vec()].concat()
 }
 
-/// A list of so many elements of a type, whatever its body holds.
+/// Header of a list with a claimed number of elements of a type; its body may hold fewer.
 fn list(step: u8, kind: u8, count: u64, body: &[u8]) -> Vec<u8> {
     [&[step << 4 | 9, 0xf0 | kind][..], &varint(count), body].concat()
 }
@@ -54,7 +54,7 @@ fn leaf(name: &str, kind: i64) -> Vec<u8> {
     [int(0x15, kind), int(0x25, 1), text(1, name), vec![0]].concat()
 }
 
-/// A page: 0 data, 2 dictionary; its header claims so many values and bytes.
+/// A page (type 0: data, 2: dictionary) with claimed numbers of values and bytes.
 fn page(kind: i64, values: i64, claimed: i64, encoding: i64, body: &[u8]) -> Vec<u8> {
     let sizes = [int(0x15, kind), int(0x15, claimed), int(0x15, body.len() as i64)].concat();
     let of_kind = [int(0x15, values), int(0x15, encoding)].concat();

@@ -70,7 +70,7 @@ pub(crate) fn check_rows(what: &'static str, found: u64, file_bytes: u64) -> Res
     check(what, found, file_bytes.saturating_mul(ROWS_PER_BYTE).saturating_add(FREE_ROWS))
 }
 
-/// The most bytes of a page of texts that takes so many bytes in the file.
+/// Largest size of an unpacked page of texts, from its size in the file.
 pub(crate) fn text_page_bytes(stored: i64) -> i64 {
     stored.saturating_mul(TEXT_RATIO).clamp(FREE_TEXT_BYTES, PAGE_BYTES)
 }

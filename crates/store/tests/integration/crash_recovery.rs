@@ -65,7 +65,7 @@ fn a_writer_killed_at_any_instant_leaves_whole_flights_once_and_no_lock() {
     let mut committed = 0;
     for kill in 0..KILLS[usize::from(crate::is_gate())] {
         let mut child = child(dir.path());
-        // Spread over start, commit and compaction: the child has made so many files, and is somewhere after the last one.
+        // Spread over start, commit and compaction: the kill follows the child's next 0 to 40 files.
         let files = files_in(dir.path()) + (kill * 7_919) % 41;
         while files_in(dir.path()) < files {
             assert_eq!(child.try_wait().unwrap(), None, "the child gave up by itself");
