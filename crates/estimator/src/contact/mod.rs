@@ -8,8 +8,8 @@
 //! ```
 //! with c the force in the coupling (load less the zero of its cell and the screw's friction, see `friction_model`), d a
 //! slow drift, p the transducer's error over the stroke and τ the skew between the two position channels. ΔS is the
-//! coefficient of s/2 in a robust regression over blocks of about 4 ms, so that a vibrating load does not mix both
-//! flanks in one mean.
+//! coefficient of s/2 in a robust regression over blocks of 12 ms, or of 4 ms under a vibrating load, which would mix
+//! both flanks in one longer mean.
 //!
 //! 1. `block_means` averages whole samples, without missing ones and spikes; `sign_check` rejects wrong mappings.
 //! 2. `parameter_search` finds, in an excerpt of a long flight, what derivatives do not show: the zero of the load cell
@@ -46,7 +46,7 @@ use types::{LONGEST_STEP_S, NORMAL_95};
 
 /// Estimates the gap of one flight, over all its segments together, or returns the reason for its rejection.
 ///
-/// Time is linear in the samples; memory is some twenty numbers for each block of about 4 ms and a row of twenty for
+/// Time is linear in the samples; memory is some twenty numbers for each block and a row of twenty for
 /// each tenth of a second or more.
 ///
 /// # Errors

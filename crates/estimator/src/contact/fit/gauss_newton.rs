@@ -46,8 +46,6 @@ const MAX_LOAD_DELAY_S: f64 = 0.04;
 const MAX_GAP_WINDUPS: f64 = 20.0;
 /// An iteration that moves the state by less than this share of the gap's standard error is the last.
 const CONVERGENCE_SHARE: f64 = 0.05;
-/// Reweightings within an iteration.
-const IRLS_ITERATIONS: usize = 5;
 
 /// The last iteration: rows, coefficients, and the parameters they were made with and lead to.
 #[derive(Debug)]
@@ -60,7 +58,8 @@ pub(crate) struct GaussNewtonResult {
     pub(crate) state: FrictionState,
 }
 
-/// Iterates from a state: rows of that state, a fit, and the state the fit asks for.
+/// Iterates from a state: rows of that state, a fit, and the state the fit asks for; each fit reweights its rows `rounds`
+/// times.
 ///
 /// # Errors
 /// [`Rejection::NoLoadReversal`], [`Rejection::OneSideBrief`], [`Rejection::TooShort`].
@@ -68,14 +67,14 @@ pub(crate) fn search(
     (blocks, path): (&mut BlockMeans, &mut CouplingPath),
     scaling: &Scaling,
     mut state: FrictionState,
-    iterations: usize,
+    (iterations, rounds): (usize, usize),
 ) -> Result<GaussNewtonResult, Rejection> {
     let mut found = None;
     for iteration in 1..=iterations {
         blocks.apply_delays(state.skew_s, state.load_delay_s, state.load_lag_s);
         let design = design_matrix::rows(RowSource { blocks, scaling }, &state, path);
         check_contact(&design)?;
-        let fit = fit(&design.firm, &priors(scaling, &state), IRLS_ITERATIONS).ok_or(Rejection::TooShort)?;
+        let fit = fit(&design.firm, &priors(scaling, &state), rounds).ok_or(Rejection::TooShort)?;
         let after = next(scaling, &state, &fit);
         let moved_m = scaling.windup_m() * step(scaling, &state, &after);
         let is_last =

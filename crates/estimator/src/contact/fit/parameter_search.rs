@@ -20,7 +20,9 @@ const LEAST_SCALE_M: f64 = 1e-9;
 /// Starts of the friction: dry over the 95 % load, and lost share.
 const STARTS: [(f64, f64); 2] = [(0.02, 0.03), (0.10, 0.12)];
 /// Iterations from a start, and from a candidate near the best.
-const ITERATIONS: (usize, usize) = (6, 3);
+const ITERATIONS: (usize, usize) = (4, 1);
+/// Reweightings of the rows in each iteration.
+const REWEIGHTINGS: usize = 1;
 /// Compliances of the bristles over that of the coupling that are tried first.
 const BRISTLES: [f64; 3] = [0.3, 1.0, 3.0];
 /// Factors by which the best of them is refined.
@@ -128,7 +130,7 @@ impl<'a> ParameterSearch<'a> {
     }
 
     fn search(&mut self, state: FrictionState, iterations: usize) -> Result<GaussNewtonResult, Rejection> {
-        search((self.blocks, self.path), self.scaling, state, iterations)
+        search((self.blocks, self.path), self.scaling, state, (iterations, REWEIGHTINGS))
     }
 
     /// Takes a state's fit when it fits better.

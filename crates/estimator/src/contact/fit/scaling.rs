@@ -12,8 +12,10 @@ use crate::gap::load_band::quantiles;
 pub(crate) const SPEED_M_PER_S: f64 = 0.02;
 /// Time that scales the load rate's column, s.
 pub(crate) const LATE_S: f64 = 0.01;
-/// Blocks in a row, at least and at most; long flights need no finer rows.
-const ROW_BLOCKS: (usize, usize) = (25, 100);
+/// Length of a row, s, at least and at most; long flights need no finer rows.
+const ROW_S: [f64; 2] = [0.1, 0.4];
+/// Blocks of a row, at least.
+const LEAST_BLOCKS: usize = 6;
 /// The 95 % load must exceed the force the model does not know by this factor, or friction alone may hold the
 /// screw within the gap for the whole flight.
 const LEAST_LOAD: f64 = 1.5;
@@ -43,7 +45,10 @@ pub(crate) struct Scaling {
     /// What brings a difference over two blocks to the column of the speed, 1/m, and of the load's rate, 1/N.
     pub(crate) per_speed: f64,
     pub(crate) per_load_rate: f64,
+    /// Most blocks of a row.
     pub(crate) row_blocks: usize,
+    /// The same in the search, which needs no fine rows.
+    pub(crate) search_row_blocks: usize,
     /// Sense in which the motor drives the friction model: −1 where the load is the motor's own.
     pub(crate) motor_sense: f64,
     /// 2π over the travel of a period, 1/m; zero where nothing repeats, or too little of it is seen.
@@ -65,7 +70,8 @@ impl Scaling {
         if !prior.output_locked && 2.0 * place_m.1 < LEAST_TRAVEL * load_n / prior.stiffness_n_per_m {
             return Err(Rejection::TravelTooSmall);
         }
-        let (fewest, most) = ROW_BLOCKS;
+        let [fewest, most] =
+            ROW_S.map(|row_s| ((row_s / blocks.period_s).round() as usize).max(LEAST_BLOCKS));
         let (time_s, two_blocks_s) = (middle_and_half(&blocks.time_s), 2.0 * blocks.period_s);
         Ok(Self {
             load_n,
@@ -79,6 +85,7 @@ impl Scaling {
             per_speed: (two_blocks_s * SPEED_M_PER_S).recip(),
             per_load_rate: LATE_S / (two_blocks_s * load_n),
             row_blocks: (blocks.len() / BLOCKS_PER_ROW_BLOCK).clamp(fewest, most),
+            search_row_blocks: most,
             motor_sense: if prior.output_locked { -1.0 } else { 1.0 },
             per_period: prior.period_m.filter(|m| 2.0 * place_m.1 > PERIODS * m).map_or(0.0, |m| TAU / m),
         })
