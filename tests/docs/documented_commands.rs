@@ -1,10 +1,11 @@
-//! Every command that the README and the documentation show is run, and its output must match the page.
+//! Every command that the README and the documentation show is run, and its output must match the page. Only the gate
+//! tries every page.
 //!
 //! Each page starts in a copy of the sample fleet; its blocks of `sh` and `console` run one after the other.
 //! Comments above a block change the defaults: `first: COMMAND` runs before it and is not shown, `exit 1` is the
 //! expected exit code of its last command, `output` (above a block of `text`) marks the output of the block before,
 //! and `not run: WHY` exempts a block. A line `…` replaces omitted lines; times, sizes and digests may differ.
-//! `FREEPLAY_BLESS=1 cargo test -p cli documented_commands` writes the output into the pages, except where lines are
+//! `FREEPLAY_TESTS=gate FREEPLAY_BLESS=1 cargo test -p cli documented_commands` writes the output into the pages, except where lines are
 //! omitted.
 
 use std::fs;
@@ -13,8 +14,11 @@ use std::process::{Command, Stdio};
 
 use regex::Regex;
 
-use crate::harness::{TestFleet, top};
+use crate::harness::{TestFleet, spread, top};
 use crate::markdown::{Block, Page, all};
+
+/// Pages that are tried outside the gate, README first.
+const PAGES: usize = 3;
 
 /// Blocks that are not run here: they need a service manager, or simulate for a minute.
 const EXEMPT: usize = 3;
@@ -25,8 +29,10 @@ fn commands_in_the_pages_do_what_the_pages_say() {
     let exempt: Vec<&Block> =
         pages.iter().flat_map(|p| &p.blocks).filter(|b| runs(b) && b.mark("not run:").is_some()).collect();
     assert_eq!(exempt.len(), EXEMPT, "blocks that are not run: {:?}", marks(&exempt));
+    let pages: Vec<&Page> = pages.iter().collect();
     let faults: Vec<String> = std::thread::scope(|scope| {
-        let tried: Vec<_> = pages.iter().map(|page| scope.spawn(|| Try::of(page))).collect();
+        let tried: Vec<_> =
+            spread(&pages, PAGES).into_iter().map(|page| scope.spawn(|| Try::of(page))).collect();
         tried.into_iter().flat_map(|page| page.join().unwrap()).collect()
     });
     assert!(faults.is_empty(), "{}", faults.join("\n\n"));

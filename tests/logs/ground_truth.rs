@@ -1,6 +1,6 @@
 //! The sample fleet against its truth, and one worker against several.
 
-use crate::harness::{Table, TestFleet, print_line};
+use crate::harness::{Table, TestFleet, is_gate, print_line};
 
 #[test]
 fn the_sample_fleet_runs_well_and_its_median_error_is_below_one_per_cent() {
@@ -52,6 +52,10 @@ fn the_sample_fleet_shows_every_state_and_dates_within_months() {
 /// `init --sample` needs no source tree, and simulates the files of `sample-data/` again, byte for byte.
 #[test]
 fn the_sample_fleet_is_made_anywhere_and_is_the_same_again() {
+    if !is_gate() {
+        print_line("skipped: 20 s of simulation; set FREEPLAY_TESTS=gate");
+        return;
+    }
     let (made, kept) = (TestFleet::empty(), TestFleet::sample_data());
     let result = made.freeplay(&["init", "--sample", "demo"]);
     assert_eq!(result.code, Some(0), "{result:?}");

@@ -91,7 +91,7 @@ impl BlockMeans {
             }
         }
         if self.is_calm() {
-            self.merge(((CALM_PERIOD_S / self.period_s).round() as usize).max(1));
+            self.merge((CALM_PERIOD_S / self.period_s).ceil() as usize);
         }
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
         self.logged_n.extend_from_slice(&self.load_n);
