@@ -47,7 +47,6 @@ mod error;
 mod executor;
 mod forecast;
 mod inference;
-mod learning;
 mod math;
 mod measured;
 mod prior;

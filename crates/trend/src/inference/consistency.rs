@@ -5,13 +5,14 @@
 
 use crate::data::outliers::WeightedGap;
 use crate::data::series::Flight;
-use crate::inference::posterior::{Component, Posterior};
+use crate::inference::posterior::Posterior;
 use crate::measured::Measured;
 use crate::measured::level::{WINDOW, measured_level};
 use crate::measured::record::Record;
 use crate::measured::rise::Rise;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::statement::history::History;
+use crate::wear::component::Component;
 
 /// Standard errors beyond which the level is not that of the records.
 const REACH: f64 = 5.0;

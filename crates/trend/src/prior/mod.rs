@@ -1,5 +1,5 @@
-//! The fleet prior and its parameters.
+//! The fleet prior and how it is learned.
 
-pub(crate) mod calibration_params;
 pub(crate) mod fleet_prior;
+pub(crate) mod learn;
 pub(crate) mod season_params;

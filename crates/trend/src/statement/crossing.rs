@@ -1,12 +1,20 @@
 //! When the limit is met: every node's crossing, added up.
 
-use crate::inference::posterior::{Component, Posterior};
+use crate::inference::posterior::Posterior;
 use crate::math::quadrature::{GAUSS_HERMITE_3, GAUSS_HERMITE_5, WAIT_QUANTILES};
-use crate::prior::calibration_params::CalibrationParams;
+use crate::math::weighted::WeightedSamples;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
 use crate::statement::types::Crossing;
 use crate::wear::bank::WearLaw;
+use crate::wear::component::Component;
+
+/// Factor by which the distance of a 90 % bound from the median is larger than the mixture's own.
+///
+/// The true law is seldom in the bank, so the evidence for one candidate against its neighbours is worth less than the
+/// likelihood has it. Tempered weights (a power below one) would cover as well, but they move the median away from the
+/// truth.
+pub(crate) const INTERVAL_WIDTH: f64 = 1.25;
 
 /// Weight above which a node deserves the longer rule.
 const NOTABLE: f64 = 0.02;
@@ -22,7 +30,6 @@ pub(crate) struct RulDistribution {
     horizon_hours: f64,
     /// Cells for each ln hour.
     scale: f64,
-    calibration: CalibrationParams,
 }
 
 impl RulDistribution {
@@ -38,8 +45,7 @@ impl RulDistribution {
         let Settings { limit_m, horizon_hours, .. } = *settings;
         // Cells are of equal width in the logarithm of the hours from one hour on.
         let scale = CELLS as f64 / horizon_hours.max(std::f64::consts::E).ln();
-        let calibration = prior.calibration;
-        let mut remaining = Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, scale, calibration };
+        let mut remaining = Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, scale };
         let spread_m2 = posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2);
         let kept: f64 = posterior.significant_components().map(|n| n.weight).sum();
         for component in posterior.significant_components() {
@@ -86,28 +92,20 @@ impl RulDistribution {
         }
     }
 
-    /// Its 5 %, 50 % and 95 % quantiles, with the calibration of the fleet's past forecasts.
+    /// Its 5 %, 50 % and 95 % quantiles, the interval widened on the logarithm of the time.
     ///
-    /// Growth above the forecast is time below it: the widths on the logarithm of the time are
-    /// those that growth was found to need. A limit that is likely reached already, or likely beyond the horizon,
-    /// has no width to be corrected.
+    /// A limit that is likely reached already, or likely beyond the horizon, has no width to be corrected.
     pub(crate) fn crossing(&self) -> Crossing {
         let [p05_hours, p50_hours, p95_hours] = [0.05, 0.5, 0.95].map(|p| self.quantile(p));
         let (Some(early), Some(middle)) = (p05_hours, p50_hours.filter(|hours| *hours > 0.0)) else {
             return Crossing { p05_hours, p50_hours, p95_hours };
         };
-        let late = p95_hours.unwrap_or(self.horizon_hours);
-        let at = |width: f64| {
-            let bound = if width > 0.0 { early } else { late };
-            let hours = middle * (bound.max(1.0) / middle).powf(width.abs());
+        let widened = |bound: f64| {
+            let hours = middle * (bound.max(1.0) / middle).powf(INTERVAL_WIDTH);
             (hours < self.horizon_hours).then_some(if hours > 1.0 { hours } else { 0.0 })
         };
-        let CalibrationParams { low, middle: shift, high, .. } = self.calibration;
-        let crossing = Crossing {
-            p05_hours: at(high),
-            p50_hours: at(shift),
-            p95_hours: p95_hours.and_then(|_| at(low)),
-        };
+        let crossing =
+            Crossing { p05_hours: widened(early), p50_hours, p95_hours: p95_hours.and_then(widened) };
         debug_assert!(is_ordered(&crossing), "{crossing:?}");
         crossing
     }
@@ -137,6 +135,37 @@ impl RulDistribution {
     }
 }
 
+/// 5 %, 50 % and 95 % bounds of the gap after more usage, as measured with some variance.
+pub(crate) fn gap_quantiles(
+    fitted: &Posterior,
+    usage: f64,
+    variance_m2: f64,
+    prior: &FleetPrior,
+) -> [f64; 3] {
+    let mut points = Vec::with_capacity(GAUSS_HERMITE_5.len() * fitted.components.len() / 2);
+    let mut add = |component: &Component, grown_m: f64, share: f64| {
+        let sd_m = (fitted.level_m2 + variance_m2 + prior.wear_noise_m * grown_m).sqrt();
+        let point = |(z, weight): (f64, f64)| {
+            (component.level_m + grown_m + z * sd_m, component.weight * share * weight)
+        };
+        points.extend(GAUSS_HERMITE_5.map(point));
+    };
+    for component in fitted.significant_components() {
+        if component.onset_pending {
+            let rate = prior.span_m / component.ln_life.exp();
+            for wait in prior.onset_wait_quantiles() {
+                add(component, rate * (usage - wait).max(0.0), 1.0 / WAIT_QUANTILES as f64);
+            }
+        } else {
+            let grown =
+                component.law.value(component.age_now + usage) - component.law.value(component.age_now);
+            add(component, component.amplitude_m * grown, 1.0);
+        }
+    }
+    let points = WeightedSamples::new(points.into_iter());
+    [0.05, 0.5, 0.95].map(|share| points.quantile(share))
+}
+
 /// Whether the quantiles increase; one beyond the horizon is larger than all others.
 fn is_ordered(crossing: &Crossing) -> bool {
     let Crossing { p05_hours, p50_hours, p95_hours } = *crossing;
@@ -164,7 +193,6 @@ mod tests {
                 over: over / total,
                 horizon_hours,
                 scale: CELLS as f64 / horizon_hours.ln(),
-                calibration: CalibrationParams { low: -1.0, middle: 0.0, high: 1.0, scored: 0 },
             };
             let hours = found.quantile(probability);
             prop_assume!(hours.is_some_and(|hours| hours > 0.0));

@@ -6,12 +6,12 @@ use crate::data::segment::Segment;
 use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::data::steps::installation_steps;
 use crate::executor::{Executor, SerialExecutor};
-use crate::inference::posterior::{AgeAssumption, Component, Posterior, posterior};
+use crate::inference::posterior::{Posterior, posterior};
 use crate::inference::season::{SeasonalFit, learn_season, seasonal_fit};
-use crate::learning::calibrate::learn_calibration;
 use crate::prior::fleet_prior::{FleetPrior, UsageAxis};
 use crate::statement::history::{self, History};
-use crate::wear::bank::{FAMILIES, WearLaw};
+use crate::wear::bank::WearLaw;
+use crate::wear::component::AgeAssumption;
 
 /// Largest number of units used: more change the prior little and cost as much as their own assessments.
 const MOST_UNITS: usize = 150;
@@ -68,7 +68,7 @@ impl FleetPrior {
             .and_then(on_axis)
             .or_else(|| argmax_evidence(UsageAxis::ALL.into_iter().filter_map(on_axis)));
         let Some(axis_prior) = axis_prior else { return Self::uninformative(limit_m) };
-        axis_prior.with_likeliest_wear_noise(executor).em_iterate(executor).with_calibration(executor)
+        axis_prior.with_likeliest_wear_noise(executor).em_iterate(executor).learned
     }
 
     /// The median life of units, from new to the act limit, flight hours, from their first-pass
@@ -225,12 +225,6 @@ impl AxisPrior {
         }
     }
 
-    /// What was learned, with what its own forecasts of the fleet's past were worth.
-    fn with_calibration(self, executor: &impl Executor) -> FleetPrior {
-        let calibration = learn_calibration(&segments(&self.histories), &self.learned, executor);
-        FleetPrior { calibration, ..self.learned }
-    }
-
     /// Assesses every segment with the current prior and learns it again, by expectation–maximisation.
     ///
     /// Within an iteration the weights of the laws and lives move; a better known gap of a new unit
@@ -241,8 +235,7 @@ impl AxisPrior {
             executor.map(&segments(&self.histories), fitted).into_iter().flatten().collect();
         let round = |current: FleetPrior, _| step(&self.assumed, &self.learned, &current, &units);
         let learned = (0..ROUNDS).fold(self.learned.clone(), round);
-        let ratio = ImportanceRatio::new(&self.learned, &learned);
-        let change = |unit: &Posterior| ratio.weights(&unit.components).iter().sum::<f64>().ln();
+        let change = |unit: &Posterior| weights(unit, &self.learned, &learned).iter().sum::<f64>().ln();
         let evidence = units.iter().map(|unit| unit.log_evidence + change(unit)).sum();
         Self { learned, evidence, ..self }
     }
@@ -266,7 +259,6 @@ fn bias(histories: &[History], assumed_m: f64, limit_m: f64) -> f64 {
 /// One round: weights by `current` for units assessed with `base`, moments by weights, and `assumed` as the
 /// pseudo-units that keep a small fleet sane.
 fn step(assumed: &FleetPrior, base: &FleetPrior, current: &FleetPrior, units: &[Posterior]) -> FleetPrior {
-    let ratio = ImportanceRatio::new(base, current);
     let mut shares = assumed.shares.map(|share| share * PSEUDO_UNITS);
     let mut life = WeightedMoments::assumed(assumed.ln_life, assumed.ln_life_sd);
     let mut new = WeightedMoments::assumed(assumed.new_m, assumed.new_sd_m);
@@ -274,10 +266,10 @@ fn step(assumed: &FleetPrior, base: &FleetPrior, current: &FleetPrior, units: &[
         (PSEUDO_LIVES * assumed.fresh_share, PSEUDO_LIVES * (1.0 - assumed.fresh_share));
     let (mut onsets, mut waited_hours) = (1.0, assumed.onsets_per_hour.recip());
     for unit in units {
-        let weights = ratio.weights(&unit.components);
+        let weights = weights(unit, base, current);
         let total: f64 = weights.iter().sum();
         for (component, weight) in unit.components.iter().zip(weights.into_iter().map(|w| w / total)) {
-            shares[family(component)] += weight;
+            shares[component.family()] += weight;
             if component.law != WearLaw::None {
                 life.add(component.ln_life, weight);
             }
@@ -310,58 +302,10 @@ fn step(assumed: &FleetPrior, base: &FleetPrior, current: &FleetPrior, units: &[
     }
 }
 
-/// The family whose share a node counts for: one that waits will have an onset.
-fn family(component: &Component) -> usize {
-    if component.onset_pending {
-        WearLaw::Onset { start: component.age_now }.family()
-    } else {
-        component.law.family()
-    }
-}
-
-/// How one prior's weights follow from another's.
-struct ImportanceRatio<'a> {
-    base: &'a FleetPrior,
-    current: &'a FleetPrior,
-    shares: [f64; FAMILIES],
-    life: f64,
-    onset: f64,
-}
-
-impl<'a> ImportanceRatio<'a> {
-    fn new(base: &'a FleetPrior, current: &'a FleetPrior) -> Self {
-        let mut shares = current.shares;
-        for (share, base) in shares.iter_mut().zip(&base.shares) {
-            *share = (*share / base).ln();
-        }
-        let life = (base.ln_life_sd / current.ln_life_sd).ln();
-        let onset = (current.onsets_per_hour / base.onsets_per_hour).ln();
-        Self { base, current, shares, life, onset }
-    }
-
-    /// Weights under the current prior of nodes weighted under the base; they need not add up to one.
-    fn weights(&self, components: &[Component]) -> Vec<f64> {
-        components.iter().map(|component| component.weight * self.log(component).exp()).collect()
-    }
-
-    fn log(&self, component: &Component) -> f64 {
-        let mut log = self.shares[family(component)];
-        if component.law != WearLaw::None {
-            let square = |p: &FleetPrior| ((component.ln_life - p.ln_life) / p.ln_life_sd).powi(2);
-            log += self.life - 0.5 * (square(self.current) - square(self.base));
-        }
-        log += match component.age_assumption {
-            AgeAssumption::Fresh => (self.current.fresh_share / self.base.fresh_share).ln(),
-            AgeAssumption::Worn => ((1.0 - self.current.fresh_share) / (1.0 - self.base.fresh_share)).ln(),
-            AgeAssumption::NotNeeded => 0.0,
-        };
-        let sooner = self.current.onsets_per_hour - self.base.onsets_per_hour;
-        match component.law {
-            WearLaw::Onset { start } => log + self.onset - sooner * start,
-            _ if component.onset_pending => log - sooner * component.age_now,
-            _ => log,
-        }
-    }
+/// Weights under the current prior of components weighted under the base; they need not add up to one.
+fn weights(unit: &Posterior, base: &FleetPrior, current: &FleetPrior) -> Vec<f64> {
+    let (before, now) = (base.logs(), current.logs());
+    unit.components.iter().map(|n| n.weight * (now.of(n) - before.of(n)).exp()).collect()
 }
 
 /// Weighted mean and spread.
