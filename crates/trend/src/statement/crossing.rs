@@ -14,7 +14,7 @@ use crate::wear::component::Component;
 /// The true law is seldom in the bank, so the evidence for one candidate against its neighbours is worth less than the
 /// likelihood has it. Tempered weights (a power below one) would cover as well, but they move the median away from the
 /// truth.
-pub(crate) const INTERVAL_WIDTH: f64 = 1.25;
+pub(crate) const INTERVAL_WIDTH: f64 = 1.4;
 
 /// Weight above which a node deserves the longer rule.
 const NOTABLE: f64 = 0.02;
