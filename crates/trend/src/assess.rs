@@ -152,7 +152,7 @@ impl Forecasts {
         Self {
             crossing: Some(remaining.crossing()),
             method: Some(fit.method),
-            rate: Some(level::rate(&fit.posterior, ratio)),
+            rate: Some(level::rate(&fit.posterior, ratio, fit.prior.interval_width)),
             wear: wear_status(growth_probability),
             growth_probability: Some(growth_probability),
             check_probability: Some(remaining.within(settings.check_interval_hours)),

@@ -10,7 +10,7 @@ use crate::math::distributions::NORMAL_95;
 use crate::measured::record::Record;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
-use crate::statement::crossing::{INTERVAL_WIDTH, gap_quantiles};
+use crate::statement::crossing::gap_quantiles;
 use crate::unit_fit::{Fit, UnitFit, hours_per_usage};
 
 /// A gap and its 90 % interval, metres.
@@ -71,7 +71,7 @@ pub fn forecast(
         let [p05_m, m, p95_m] = gap_quantiles(posterior, hours / ratio, variance_m2, prior);
         let risen_m = unit.history.undone_m.max(0.0);
         let band = Interval { p05_m: p05_m + risen_m, m: m + risen_m, p95_m: p95_m + risen_m };
-        let mut band = if hours > 0.0 { band.widened() } else { band };
+        let mut band = if hours > 0.0 { band.widened(prior.interval_width) } else { band };
         // The upper edge meets the limit no later than the line through the last records.
         if let Some((rise, level)) = steepest.filter(|(rise, _)| rise.p05_hours > 0.0) {
             let line_m = level.gap_m + (settings.limit_m - level.gap_m) * hours / rise.p05_hours;
@@ -102,8 +102,8 @@ fn line_ahead(
 
 impl Interval {
     /// The band as much wider as a crossing's interval.
-    fn widened(self) -> Self {
-        let at = |bound_m: f64| self.m + INTERVAL_WIDTH * (bound_m - self.m);
+    fn widened(self, width: f64) -> Self {
+        let at = |bound_m: f64| self.m + width * (bound_m - self.m);
         Self { p05_m: at(self.p05_m), m: self.m, p95_m: at(self.p95_m) }
     }
 }

@@ -8,7 +8,7 @@ use crate::data::steps::installation_steps;
 use crate::executor::{Executor, SerialExecutor};
 use crate::inference::posterior::{Posterior, posterior};
 use crate::inference::season::{SeasonalFit, learn_season, seasonal_fit};
-use crate::prior::fleet_prior::{FleetPrior, UsageAxis};
+use crate::prior::fleet_prior::{FLEET_WIDTH, FleetPrior, UsageAxis};
 use crate::statement::history::{self, History};
 use crate::wear::bank::WearLaw;
 use crate::wear::component::AgeAssumption;
@@ -68,7 +68,8 @@ impl FleetPrior {
             .and_then(on_axis)
             .or_else(|| argmax_evidence(UsageAxis::ALL.into_iter().filter_map(on_axis)));
         let Some(axis_prior) = axis_prior else { return Self::uninformative(limit_m) };
-        axis_prior.with_likeliest_wear_noise(executor).em_iterate(executor).learned
+        let learned = axis_prior.with_likeliest_wear_noise(executor).em_iterate(executor).learned;
+        Self { interval_width: FLEET_WIDTH, ..learned }
     }
 
     /// The median life of units, from new to the act limit, flight hours, from their first-pass

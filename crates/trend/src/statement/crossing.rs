@@ -9,13 +9,6 @@ use crate::statement::types::Crossing;
 use crate::wear::bank::WearLaw;
 use crate::wear::component::Component;
 
-/// Factor by which the distance of a 90 % bound from the median is larger than the mixture's own.
-///
-/// The true law is seldom in the bank, so the evidence for one candidate against its neighbours is worth less than the
-/// likelihood has it. Tempered weights (a power below one) would cover as well, but they move the median away from the
-/// truth.
-pub(crate) const INTERVAL_WIDTH: f64 = 1.4;
-
 /// Weight above which a node deserves the longer rule.
 const NOTABLE: f64 = 0.02;
 
@@ -30,6 +23,8 @@ pub(crate) struct RulDistribution {
     horizon_hours: f64,
     /// Cells for each ln hour.
     scale: f64,
+    /// Factor of the interval's width.
+    width: f64,
 }
 
 impl RulDistribution {
@@ -45,7 +40,8 @@ impl RulDistribution {
         let Settings { limit_m, horizon_hours, .. } = *settings;
         // Cells are of equal width in the logarithm of the hours from one hour on.
         let scale = CELLS as f64 / horizon_hours.max(std::f64::consts::E).ln();
-        let mut remaining = Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, scale };
+        let mut remaining =
+            Self { cells: vec![0.0; CELLS], over: 0.0, horizon_hours, scale, width: prior.interval_width };
         let spread_m2 = posterior.level_m2 + offset_m2 + prior.bias_sd_m.powi(2);
         let kept: f64 = posterior.significant_components().map(|n| n.weight).sum();
         for component in posterior.significant_components() {
@@ -101,7 +97,7 @@ impl RulDistribution {
             return Crossing { p05_hours, p50_hours, p95_hours };
         };
         let widened = |bound: f64| {
-            let hours = middle * (bound.max(1.0) / middle).powf(INTERVAL_WIDTH);
+            let hours = middle * (bound.max(1.0) / middle).powf(self.width);
             (hours < self.horizon_hours).then_some(if hours > 1.0 { hours } else { 0.0 })
         };
         let crossing =
@@ -193,6 +189,7 @@ mod tests {
                 over: over / total,
                 horizon_hours,
                 scale: CELLS as f64 / horizon_hours.ln(),
+                width: 1.0,
             };
             let hours = found.quantile(probability);
             prop_assume!(hours.is_some_and(|hours| hours > 0.0));

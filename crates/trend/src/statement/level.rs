@@ -3,7 +3,6 @@
 use crate::inference::posterior::Posterior;
 use crate::math::distributions;
 use crate::math::weighted::WeightedSamples;
-use crate::statement::crossing::INTERVAL_WIDTH;
 use crate::statement::types::Rate;
 use crate::wear::bank::{WearClass, WearLaw};
 use crate::wear::component::Component;
@@ -12,11 +11,11 @@ use crate::wear::component::Component;
 const VISIBLE: f64 = 0.02;
 
 /// Quantiles of the curves' rates now, per flight hour, as much wider as the future is stated.
-pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64) -> Rate {
+pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64, width: f64) -> Rate {
     let of = |n: &Component| (n.amplitude_m * n.law.derivative(n.age_now) / hours_per_usage, n.weight);
     let rates = WeightedSamples::new(posterior.significant_components().map(of));
     let m_per_hour = rates.quantile(0.5);
-    let at = |share: f64| m_per_hour + INTERVAL_WIDTH * (rates.quantile(share) - m_per_hour);
+    let at = |share: f64| m_per_hour + width * (rates.quantile(share) - m_per_hour);
     Rate { p05_m_per_hour: at(0.05).max(0.0), m_per_hour, p95_m_per_hour: at(0.95) }
 }
 
