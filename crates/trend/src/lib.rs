@@ -53,6 +53,7 @@ mod prior;
 pub mod quantity;
 mod settings;
 mod statement;
+mod tail_wide;
 mod unit_fit;
 mod wear;
 
@@ -70,4 +71,5 @@ pub use statement::types::{
     ChangePoint, ChangePointKind, Crossing, ForecastMethod, LatestRecord, Level, Rate, Utilization,
     WearStatus,
 };
+pub use tail_wide::{TailWideStep, UnitOnTail, tail_wide_steps};
 pub use wear::bank::WearClass;
