@@ -65,7 +65,7 @@ pub fn forecast(
     let on_axis = unit.history.on_axis(flights, prior);
     past.extend(on_axis.segments().last().iter().flat_map(|segment| levels(segment, posterior, prior)));
     let ratio = hours_per_usage(flights, prior);
-    let variance_m2 = unit.history.offset_m2 + unit.history.kind_m2 + prior.bias_sd_m.powi(2);
+    let variance_m2 = unit.history.offset_m2 + prior.bias_sd_m.powi(2);
     let steepest = unit.rise_now(flights).zip(unit.measured.level);
     let after = |hours: f64| {
         let [p05_m, m, p95_m] = gap_quantiles(posterior, hours / ratio, variance_m2, prior);

@@ -373,7 +373,8 @@ pub fn assess_histories(
     ask: &UnitSelection,
 ) -> Result<Vec<TrendRow>, Error> {
     let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else { return Ok(Vec::new()) };
-    FleetContext::consuming(config, installations, &mut histories, &[as_of])?.selected(ask, as_of)
+    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
+    Ok(fleet.selected(ask, as_of)?.0)
 }
 
 /// What the followed quantities need to know of units.

@@ -12,7 +12,7 @@ const LARGEST_ERROR: f64 = 1e4;
 const UNSTATED_ERROR: f64 = 0.01;
 
 /// Standard deviations by which two gaps that agree differ at most.
-const AGREEMENT_SDS: f64 = 2.8;
+const AGREEMENT_SDS: f64 = 2.4;
 
 /// Differences of successive gaps that the stated errors count for.
 const STATED_COUNT: f64 = 4.0;

@@ -26,9 +26,8 @@ const PSEUDO_CHANGES: f64 = 4.0;
 /// Rounds of expectation and maximisation.
 const ROUNDS: usize = 8;
 
-/// Process noises tried in addition to the assumed one, as factors of it.
-const LESS_WEAR_NOISE: f64 = 0.7;
-const MORE_WEAR_NOISE: [f64; 2] = [1.5, 2.2];
+/// Process noises tried, as factors of the assumed one.
+const WEAR_NOISES: [f64; 4] = [1.0, 0.7, 1.5, 2.2];
 
 impl FleetPrior {
     /// Learns the fleet prior from the data of units until a day: the usage axis, the shares
@@ -146,13 +145,6 @@ fn argmax_evidence(priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior>
     priors.reduce(|best, next| if next.evidence > best.evidence { next } else { best })
 }
 
-/// The last axis prior of a sequence with increasing evidence above the given one.
-fn ascend_evidence(mut evidence: f64, priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior> {
-    let rises =
-        |axis_prior: &AxisPrior| std::mem::replace(&mut evidence, axis_prior.evidence) < axis_prior.evidence;
-    priors.take_while(rises).last()
-}
-
 /// What was known of a unit on a day.
 #[derive(Clone, Copy)]
 struct TrainingUnit<'a> {
@@ -206,24 +198,15 @@ impl AxisPrior {
         Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.em_iterate(executor))
     }
 
-    /// The same with another noise of wear.
-    fn with_wear_noise(&self, factor: f64) -> Self {
-        let mut axis_prior = self.clone();
-        axis_prior.assumed.wear_noise_m *= factor;
-        axis_prior.learned.wear_noise_m *= factor;
-        axis_prior
-    }
-
-    /// The same with the noise of wear that has most evidence, which first rises with it and then falls.
+    /// The same with the noise of wear that has most evidence.
     fn with_likeliest_wear_noise(&self, executor: &impl Executor) -> Self {
-        let of = |factor: &f64| self.with_wear_noise(*factor).em_iterate(executor);
-        let assumed = of(&1.0);
-        let up = MORE_WEAR_NOISE.iter().map(of);
-        let less = || Some(of(&LESS_WEAR_NOISE)).filter(|less| less.evidence > assumed.evidence);
-        match ascend_evidence(assumed.evidence, up) {
-            Some(more) => more,
-            None => less().unwrap_or(assumed),
-        }
+        let of = |factor: f64| {
+            let mut axis_prior = self.clone();
+            axis_prior.assumed.wear_noise_m *= factor;
+            axis_prior.learned.wear_noise_m *= factor;
+            axis_prior.em_iterate(executor)
+        };
+        argmax_evidence(WEAR_NOISES.into_iter().map(of)).unwrap_or_else(|| self.clone())
     }
 
     /// Assesses every segment with the current prior and learns it again, by expectation–maximisation.
