@@ -55,13 +55,12 @@ fn unit(seed: u64, law: WearLaw, flights: i64) -> Unit {
             let outlier = if random.uniform() < 0.02 { 40.0 } else { 0.0 };
             rows.push(Observation {
                 departure_us: flight * DAY_US / 2,
-                installation: 0,
                 flight_hours: Some(1.7),
                 tail_hours_end: Some(hours),
                 load_reversals: Some(150),
                 gap_m: Some((gap_um + se_um * random.normal() + outlier) * 1e-6),
                 gap_se_m: Some(se_um * 1e-6),
-                is_doubtful: false,
+                ..Observation::default()
             });
         } else if flight >= flights && crossing_hours.is_finite() {
             break;
@@ -145,13 +144,12 @@ fn rows(seed: u64, change_um: impl Fn(i64, f64) -> f64) -> Vec<Observation> {
             let hours = 1.7 * (flight + 1) as f64;
             Observation {
                 departure_us: flight * DAY_US / 2,
-                installation: 0,
                 flight_hours: Some(1.7),
                 tail_hours_end: Some(hours),
                 load_reversals: Some(150),
                 gap_m: Some((change_um(flight, 20.0 + 0.01 * hours) + 2.0 * random.normal()) * 1e-6),
                 gap_se_m: Some(2e-6),
-                is_doubtful: false,
+                ..Observation::default()
             }
         })
         .collect()
@@ -283,13 +281,11 @@ fn reshimmed(is_booked: bool) -> Vec<Series> {
                 let shim_um = if flight < HALF { 0.0 } else { 8.0 };
                 Observation {
                     departure_us: flight * DAY_US,
-                    installation: 0,
                     flight_hours: Some(1.5),
                     tail_hours_end: Some(hours),
-                    load_reversals: None,
                     gap_m: Some((new_um + 0.05 * hours - shim_um + 1.5 * random.normal()) * 1e-6),
                     gap_se_m: Some(1.5e-6),
-                    is_doubtful: false,
+                    ..Observation::default()
                 }
             })
             .collect();
