@@ -27,7 +27,7 @@ const FAST_LIFE_HOURS: f64 = 600.0;
 /// records show.
 pub(crate) const FLEET_WIDTH: f64 = 1.4;
 const SINGLE_WIDTH: f64 = 1.25;
-const FAST_WIDTH: f64 = 1.0;
+const FAST_WIDTH: f64 = 0.7;
 
 /// Spread of the first gap of a unit without support from its fleet, a share of the limit.
 const FIRST_SPREAD: f64 = 0.1;

@@ -1,5 +1,4 @@
-//! The fleet prior and how it is learned.
+//! The fleet prior and its parameters.
 
 pub(crate) mod fleet_prior;
-pub(crate) mod learn;
 pub(crate) mod season_params;
