@@ -100,7 +100,10 @@ impl<'a> TrainingSet<'a> {
         executor: &impl Executor,
     ) -> Self {
         let uninformative = FleetPrior::uninformative(limit_m);
-        let units = sample(fleet.into_iter().map(|series| TrainingUnit::on(series, as_of_us)));
+        let units = sample(fleet.into_iter().map(|series| TrainingUnit {
+            flights: series.flights_until(as_of_us),
+            maintenance: series.maintenance_until(as_of_us),
+        }));
         // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
         // their first hour on lead to a fleet prior without wear.
         let training_set =
@@ -150,12 +153,6 @@ fn argmax_evidence(priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior>
 struct TrainingUnit<'a> {
     flights: &'a [Flight],
     maintenance: &'a [MaintenanceEvent],
-}
-
-impl<'a> TrainingUnit<'a> {
-    fn on(series: &'a Series, as_of_us: i64) -> Self {
-        Self { flights: series.flights_until(as_of_us), maintenance: series.maintenance_until(as_of_us) }
-    }
 }
 
 /// Units in an order that does not depend on the input; of a large fleet an even sample.
