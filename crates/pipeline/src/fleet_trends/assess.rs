@@ -232,6 +232,7 @@ pub fn assess_run_from(
         ..RunAssessments::default()
     };
     run.followed.changes.extend(tail_wide);
+    run.followed.changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
     let states = now.iter().filter_map(|row| row.state);
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
@@ -541,7 +542,8 @@ impl<'a> FleetContext<'a> {
             },
         };
         let all = self.followed.changes.iter().chain(&tail_wide);
-        let changes = all.filter(concerns).cloned().collect();
+        let mut changes: Vec<QuantityChange> = all.filter(concerns).cloned().collect();
+        changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
         FollowedQuantities { rows: of_units, changes }
     }
 
