@@ -58,10 +58,6 @@ pub struct FleetPriorView {
     pub life_p05_hours: f64,
     pub life_p50_hours: f64,
     pub life_p95_hours: f64,
-    /// Calibration factor of the forecast intervals; 1 is the model's own width.
-    pub widening: f64,
-    /// Past forecasts that it was learned from.
-    pub scored_forecasts: usize,
 }
 
 /// Gap and its 90 % interval at a time.

@@ -143,16 +143,16 @@ impl Forecasts {
 
     fn by_laws(fit: &Fit<'_>, unit: &UnitFit<'_>, flights: &[Flight], settings: &Settings) -> Self {
         let ratio = hours_per_usage(flights, &fit.prior);
-        let offset_m2 = unit.history.offset_m2 + unit.history.kind_m2;
         // A rise that was taken off for the law is still there.
         let limit_m = (settings.limit_m - unit.history.undone_m.max(0.0)).max(f64::MIN_POSITIVE);
         let settings = &Settings { limit_m, ..*settings };
-        let remaining = RulDistribution::new(&fit.posterior, &fit.prior, settings, ratio, offset_m2);
+        let remaining =
+            RulDistribution::new(&fit.posterior, &fit.prior, settings, ratio, unit.history.offset_m2);
         let growth_probability = level::growth_probability(&fit.posterior, fit.prior.limit_m());
         Self {
             crossing: Some(remaining.crossing()),
             method: Some(fit.method),
-            rate: Some(level::rate(&fit.posterior, ratio)),
+            rate: Some(level::rate(&fit.posterior, ratio, fit.prior.interval_width)),
             wear: wear_status(growth_probability),
             growth_probability: Some(growth_probability),
             check_probability: Some(remaining.within(settings.check_interval_hours)),

@@ -6,12 +6,11 @@ use crate::data::series::{Flight, Series};
 use crate::error::Error;
 use crate::inference::posterior::{Posterior, mean_growth};
 use crate::inference::segment_fit::process_variance;
-use crate::learning::calibrate::forecast_quantiles;
 use crate::math::distributions::NORMAL_95;
 use crate::measured::record::Record;
-use crate::prior::calibration_params::CalibrationParams;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::settings::Settings;
+use crate::statement::crossing::gap_quantiles;
 use crate::unit_fit::{Fit, UnitFit, hours_per_usage};
 
 /// A gap and its 90 % interval, metres.
@@ -37,7 +36,7 @@ pub struct Forecast {
 
 /// Past levels and forecast of an assessment: the level through each segment's flights by a fixed-interval smoother
 /// (Rauch, Tung and Striebel 1965, <https://doi.org/10.2514/3.3166>), m, and the 5, 50 and 95 % quantiles of the gap, m,
-/// after more `hours`, flight hours, from the same mixture and calibration as the crossing.
+/// after more `hours`, flight hours, from the same mixture and as much wider as the crossing.
 ///
 /// Empty ahead for a unit whose records neither a wear law nor a line explains.
 ///
@@ -66,13 +65,13 @@ pub fn forecast(
     let on_axis = unit.history.on_axis(flights, prior);
     past.extend(on_axis.segments().last().iter().flat_map(|segment| levels(segment, posterior, prior)));
     let ratio = hours_per_usage(flights, prior);
-    let variance_m2 = unit.history.offset_m2 + unit.history.kind_m2 + prior.bias_sd_m.powi(2);
+    let variance_m2 = unit.history.offset_m2 + prior.bias_sd_m.powi(2);
     let steepest = unit.rise_now(flights).zip(unit.measured.level);
     let after = |hours: f64| {
-        let [p05_m, m, p95_m] = forecast_quantiles(posterior, hours / ratio, variance_m2, prior);
+        let [p05_m, m, p95_m] = gap_quantiles(posterior, hours / ratio, variance_m2, prior);
         let risen_m = unit.history.undone_m.max(0.0);
         let band = Interval { p05_m: p05_m + risen_m, m: m + risen_m, p95_m: p95_m + risen_m };
-        let mut band = if hours > 0.0 { band.calibrated(prior.calibration) } else { band };
+        let mut band = if hours > 0.0 { band.widened(prior.interval_width) } else { band };
         // The upper edge meets the limit no later than the line through the last records.
         if let Some((rise, level)) = steepest.filter(|(rise, _)| rise.p05_hours > 0.0) {
             let line_m = level.gap_m + (settings.limit_m - level.gap_m) * hours / rise.p05_hours;
@@ -102,13 +101,10 @@ fn line_ahead(
 }
 
 impl Interval {
-    /// The band in the widths that the fleet's past was found to need.
-    fn calibrated(self, CalibrationParams { low, middle, high, .. }: CalibrationParams) -> Self {
-        let at =
-            |width: f64| self.m + width * if width > 0.0 { self.p95_m - self.m } else { self.m - self.p05_m };
-        let interval = Self { p05_m: at(low), m: at(middle), p95_m: at(high) };
-        debug_assert!([interval.p05_m, interval.m, interval.p95_m].is_sorted(), "{interval:?}");
-        interval
+    /// The band as much wider as a crossing's interval.
+    fn widened(self, width: f64) -> Self {
+        let at = |bound_m: f64| self.m + width * (bound_m - self.m);
+        Self { p05_m: at(self.p05_m), m: self.m, p95_m: at(self.p95_m) }
     }
 }
 

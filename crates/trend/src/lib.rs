@@ -34,8 +34,7 @@
 //!
 //! # Limitations
 //!
-//! - A wear law far from every curve of the bank. Intervals widen by what the fleet's own past shows (calibration),
-//!   but a change of rate that no unit has shown yet is not learned.
+//! - A wear law far from every curve of the bank: a change of rate that no unit has shown yet is not learned.
 //! - Life that ends other than by growth to the limit, or growth that depends on what no usage axis measures.
 //! - A measurement whose bias drifts for years is taken for wear. A yearly seasonal component is not.
 //! - Maintenance that lowers the gap by less than about 5 µm: no step is detected and wear is underestimated.
@@ -47,13 +46,14 @@ mod error;
 mod executor;
 mod forecast;
 mod inference;
-mod learning;
+mod learn;
 mod math;
 mod measured;
 mod prior;
 pub mod quantity;
 mod settings;
 mod statement;
+mod tail_wide;
 mod unit_fit;
 mod wear;
 
@@ -71,4 +71,5 @@ pub use statement::types::{
     ChangePoint, ChangePointKind, Crossing, ForecastMethod, LatestRecord, Level, Rate, Utilization,
     WearStatus,
 };
+pub use tail_wide::{TailWideStep, UnitOnTail, tail_wide_steps};
 pub use wear::bank::WearClass;

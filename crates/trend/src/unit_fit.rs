@@ -97,17 +97,23 @@ fn consistent_fit<'a>(
         let ratio = hours_per_usage(flights, prior);
         evidence.agrees(&posterior, segment.now, prior, history.offset_m2, ratio).then_some(posterior)
     };
-    if let Some(posterior) = fitted(last, prior) {
-        return Some(Fit { posterior, prior: Cow::Borrowed(prior), method: ForecastMethod::Fleet });
-    }
-    let own = match measured.rise {
-        Some(rise) => prior.of_fast_wear(rise.m_per_hour, last.estimates.first()?.gap_m),
-        None => prior.single_unit(),
+    let by_fleet = || {
+        let posterior = fitted(last, prior)?;
+        Some(Fit { posterior, prior: Cow::Borrowed(prior), method: ForecastMethod::Fleet })
     };
-    let history = history.on_axis(flights, &own);
-    let last = history.segments().last()?;
-    let posterior = fitted(&last, &own)?;
-    Some(Fit { posterior, prior: Cow::Owned(own), method: ForecastMethod::SingleUnit })
+    let by_unit = || {
+        let own = match measured.rise {
+            Some(rise) => prior.of_fast_wear(rise.m_per_hour, last.estimates.first()?.gap_m),
+            None => prior.single_unit(),
+        };
+        let history = history.on_axis(flights, &own);
+        let posterior = fitted(&history.segments().last()?, &own)?;
+        Some(Fit { posterior, prior: Cow::Owned(own), method: ForecastMethod::SingleUnit })
+    };
+    match measured.rise {
+        Some(rise) if prior.is_fast(rise.m_per_hour) => by_unit().or_else(by_fleet),
+        _ => by_fleet().or_else(by_unit),
+    }
 }
 
 /// The jump of the level as a change point, unless the history has it already.

@@ -107,6 +107,7 @@ pub fn part(case: &Case) -> Result<Part, estimator::Error> {
         watch_m: None,
         filters: FilterCache::default(),
         axis: None,
+        at_limit: job::config::part::AtLimit::default(),
         quantity_limits: job::config::QuantityLimits::default(),
         output_locked: false,
     })

@@ -34,6 +34,17 @@ pub enum WearAxis {
     Reversals,
 }
 
+/// What a unit whose gap is at or above its limit asks for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AtLimit {
+    /// Replacement (the default).
+    #[default]
+    Replace,
+    /// An inspection, which decides.
+    Inspect,
+}
+
 /// `[part."EMA-27-1040"]`: what is known of a design.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -82,6 +93,9 @@ pub struct PartSettings {
     /// What wear follows: `hours`, `flights` or `reversals`; that of `[trend]` when not given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<WearAxis>,
+    /// Action in state `act`: `replace` (default) or `inspect`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_limit: Option<AtLimit>,
     /// Changes of its other followed quantities from which there is a state, where they differ from those of `[trend]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quantity_limits: Option<QuantityLimits>,
@@ -185,6 +199,8 @@ pub struct Part {
     pub filters: FilterCache,
     /// What wear follows, where that is known.
     pub axis: Option<WearAxis>,
+    /// What a unit at its limit asks for.
+    pub at_limit: AtLimit,
     /// Changes of its other followed quantities from which there is a state, as far as they are its own.
     pub quantity_limits: QuantityLimits,
 }
@@ -195,7 +211,14 @@ pub(crate) type SettingError = (&'static [&'static str], Diagnostic);
 impl PartSettings {
     /// The settings that can move a gap: limits and the axis of wear move none.
     pub(crate) fn without_limits(&self) -> Self {
-        Self { limit_m: None, watch_m: None, axis: None, quantity_limits: None, ..self.clone() }
+        Self {
+            limit_m: None,
+            watch_m: None,
+            axis: None,
+            at_limit: None,
+            quantity_limits: None,
+            ..self.clone()
+        }
     }
 
     /// Brings the settings to the screw axis.
@@ -233,6 +256,7 @@ impl PartSettings {
                 watch_m: self.watch_m,
                 filters: FilterCache::default(),
                 axis: self.axis,
+                at_limit: self.at_limit.unwrap_or_default(),
                 quantity_limits: self.quantity_limits.unwrap_or_default(),
             }),
             _ => Err(keys.found),

@@ -32,6 +32,9 @@ use crate::quantities::values;
 use job::config::{AsOf, QuantityLimits};
 use records::TrendRow;
 
+/// Assessments of units, and steps of the gap that whole tails made.
+type Statements = (Vec<TrendRow>, Vec<QuantityChange>);
+
 /// A unit, by part and serial number.
 pub type Unit = (PartNumber, SerialNumber);
 
@@ -118,9 +121,9 @@ pub fn assess_store_with_quantities(
     };
     let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
     let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
-    let now = fleet.selected(ask, as_of)?;
+    let (now, tail_wide) = fleet.selected(ask, as_of)?;
     Ok(StoreAssessment {
-        followed: fleet.followed_of(&now),
+        followed: fleet.followed_of(&now, tail_wide),
         mapping_faults: fleet.mapping_faults_of(&now),
         notes: coverage::notes(&now, config),
         now,
@@ -219,7 +222,7 @@ pub fn assess_run_from(
     if let Some(store) = store {
         (fleet, recent) = fleet.with_diagnostics(store, as_of)?;
     }
-    let mut now = fleet.statements(fleet.units.keys().copied(), as_of)?;
+    let (mut now, tail_wide) = fleet.statements_with_steps(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
     let mut run = RunAssessments {
         recent,
@@ -228,6 +231,8 @@ pub fn assess_run_from(
         notes: coverage::notes(&now, config),
         ..RunAssessments::default()
     };
+    run.followed.changes.extend(tail_wide);
+    run.followed.changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
     let states = now.iter().filter_map(|row| row.state);
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
@@ -291,8 +296,8 @@ pub(crate) fn assess_for_report(
     let days: Vec<Timestamp> = earlier.iter().map(|(_, at)| *at).chain([as_of]).collect();
     let fleet = FleetContext::new(config, installations, histories, &days)?;
     let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
-    let now = fleet.selected(ask, as_of)?;
-    let followed = fleet.followed_of(&now);
+    let (now, tail_wide) = fleet.selected(ask, as_of)?;
+    let followed = fleet.followed_of(&now, tail_wide);
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
     let drawn =
         names.par_iter().zip(&now).map(|(name, row)| fleet.forecast(name, row)).collect::<Result<_, _>>()?;
@@ -369,7 +374,8 @@ pub fn assess_histories(
     ask: &UnitSelection,
 ) -> Result<Vec<TrendRow>, Error> {
     let Some(as_of) = as_of_date(config, ask.as_of_utc, &histories) else { return Ok(Vec::new()) };
-    FleetContext::consuming(config, installations, &mut histories, &[as_of])?.selected(ask, as_of)
+    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
+    Ok(fleet.selected(ask, as_of)?.0)
 }
 
 /// What the followed quantities need to know of units.
@@ -521,7 +527,7 @@ impl<'a> FleetContext<'a> {
     }
 
     /// The followed quantities of some assessed units, the gap with them, and what changed on their tails and parts.
-    fn followed_of(&self, rows: &[TrendRow]) -> FollowedQuantities {
+    fn followed_of(&self, rows: &[TrendRow], tail_wide: Vec<QuantityChange>) -> FollowedQuantities {
         let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
         let tails: BTreeSet<Option<&str>> = rows.iter().map(|row| row.tail_number.as_deref()).collect();
         let parts: BTreeSet<Option<&str>> = rows.iter().map(|row| row.part_number.as_deref()).collect();
@@ -535,16 +541,19 @@ impl<'a> FleetContext<'a> {
                 None => parts.contains(&change.part_number.as_deref()),
             },
         };
-        let changes = self.followed.changes.iter().filter(concerns).cloned().collect();
+        let all = self.followed.changes.iter().chain(&tail_wide);
+        let mut changes: Vec<QuantityChange> = all.filter(concerns).cloned().collect();
+        changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
         FollowedQuantities { rows: of_units, changes }
     }
 
     /// The selected assessments.
-    fn selected(&self, ask: &UnitSelection, as_of: Timestamp) -> Result<Vec<TrendRow>, Error> {
+    fn selected(&self, ask: &UnitSelection, as_of: Timestamp) -> Result<Statements, Error> {
         let names = self.units.keys().copied();
-        let mut rows = self.statements(names.filter(|name| ask.names(name)), as_of)?;
+        let (mut rows, tail_wide) =
+            self.statements_with_steps(names.filter(|name| ask.names(name)), as_of)?;
         rows.retain(|row| ask.fits(row));
-        Ok(rows)
+        Ok((rows, tail_wide))
     }
 
     fn statements<'b>(
@@ -552,6 +561,15 @@ impl<'a> FleetContext<'a> {
         names: impl Iterator<Item = &'b UnitKey>,
         as_of: Timestamp,
     ) -> Result<Vec<TrendRow>, Error> {
+        Ok(self.statements_with_steps(names, as_of)?.0)
+    }
+
+    /// The same, with one change of the gap for each step of a whole tail.
+    fn statements_with_steps<'b>(
+        &self,
+        names: impl Iterator<Item = &'b UnitKey>,
+        as_of: Timestamp,
+    ) -> Result<Statements, Error> {
         let names: BTreeSet<&UnitKey> = names.collect();
         // A change is a tail's when its other units made it too, so they are assessed with the selected ones.
         let judged: Vec<&UnitKey> = self.tail_mates(&names).union(&names).copied().collect();
@@ -560,7 +578,8 @@ impl<'a> FleetContext<'a> {
         let known = judged.iter().zip(&trends).filter_map(|(name, t)| Some((self.units.get(*name)?.0, t)));
         let wide = TailWide::new(&known.collect::<Vec<_>>(), &self.moved);
         let selected = judged.par_iter().zip(&trends).filter(|(name, _)| names.contains(*name));
-        Ok(selected.map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect())
+        let rows = selected.map(|(name, trend)| self.row(name, trend, as_of, &wide)).collect();
+        Ok((rows, wide.changes().collect()))
     }
 
     /// All units that have flown on the tails of some units.
@@ -594,7 +613,7 @@ impl<'a> FleetContext<'a> {
         let fault = self.mapping_faults.iter().find(|fault| fault.units.contains(name));
         let row = trend_row::row(name, history, series, limit_m, trend, as_of, wide, removal, fault);
         let conditions = self.conditions.get(name).cloned().unwrap_or_default();
-        TrendRow { usage_axis, conditions, ..row }.with_action()
+        TrendRow { usage_axis, conditions, ..row }.with_action(self.limits.at_limit(name.0.as_deref()))
     }
 
     /// Forecasts of units at a date, for the hours flown until a later one.

@@ -2,8 +2,8 @@
 
 use job::Config;
 use job::config::QuantityLimits;
-use job::config::part::WearAxis;
-use records::PartNumber;
+use job::config::part::{AtLimit, WearAxis};
+use records::{Action, PartNumber};
 use trend::{Series, UsageAxis};
 
 /// Gaps of the fleet, by departure, that give its scale where no limit does.
@@ -60,6 +60,14 @@ impl<'a> Limits<'a> {
     /// The act limit, m, or its stand-in.
     pub(crate) fn limit_m(self, part: Option<&str>) -> f64 {
         self.settings(part).limit_m
+    }
+
+    /// What a unit of a part whose gap is at its limit asks for: a replacement where the part says nothing.
+    pub(crate) fn at_limit(self, part: Option<&str>) -> Action {
+        match self.part(part).map(|part| part.at_limit) {
+            Some(AtLimit::Inspect) => Action::Inspect,
+            _ => Action::Replace,
+        }
     }
 
     /// Changes from which other quantities than the gap have a state.

@@ -3,64 +3,114 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use jiff::Timestamp;
-use trend::{Assessment, ChangePoint, ChangePointKind};
+use records::{ChangeScope, Quantity, QuantityChange};
+use trend::{Assessment, ChangePoint, ChangePointKind, TailWideStep, UnitOnTail, tail_wide_steps};
 
 use crate::history::flight_row::FlightRow;
 use crate::history::histories::History;
 use crate::monitoring::recorder_change::RecorderChange;
-use records::time::days_between;
 
-/// Days within which steps of one tail are one step: a step is dated to within some flights.
-const SAME_DAYS: f64 = 7.0;
-
-/// Minimum share of the tail's units that make the step: single units may be too noisy.
-const SHARE: f64 = 0.75;
-
-/// Tail-wide changes, by tail and departure.
+/// Tail-wide steps by tail, and changes that a recorder change explains, by tail and departure.
 #[derive(Debug, Default)]
-pub(crate) struct TailWide(BTreeSet<(String, Timestamp)>);
-
-/// A change of one of the assessed units.
-struct Made<'a> {
-    tail_number: &'a str,
-    departure_utc: Timestamp,
-    kind: ChangePointKind,
-    unit: usize,
+pub(crate) struct TailWide {
+    steps: BTreeMap<String, Vec<TailWideStep>>,
+    /// Levels of the units on these tails, m.
+    levels_m: BTreeMap<String, Vec<f64>>,
+    explained: BTreeSet<(String, Timestamp)>,
 }
 
 impl TailWide {
-    /// Searches the units of one tail. Unrecorded changes count: a step of several units at once, and a
+    /// Searches the units of the tails. Unrecorded changes count: a step of several units at once, and a
     /// step or reset when what is fitted of all of them `moved`.
     pub(crate) fn new(judged: &[(&History, &Assessment)], moved: &[RecorderChange]) -> Self {
-        let made: Vec<Made<'_>> =
-            judged.iter().enumerate().flat_map(|(unit, (h, t))| changes(unit, h, t)).collect();
-        let mut by_tail: BTreeMap<&str, Vec<&Made<'_>>> = BTreeMap::new();
-        for change in made.iter().filter(|change| change.kind == ChangePointKind::Step) {
-            by_tail.entry(change.tail_number).or_default().push(change);
-        }
-        let mut units: BTreeMap<&str, Vec<GapSpan>> = BTreeMap::new();
-        for unit in judged {
-            for tail in unit.0.tails().collect::<BTreeSet<_>>() {
-                if let Some(span) = by_tail.contains_key(tail).then(|| GapSpan::of(unit, tail)).flatten() {
-                    units.entry(tail).or_default().push(span);
+        let mut on_tails: BTreeMap<&str, Vec<UnitOnTail>> = BTreeMap::new();
+        let mut explained = BTreeSet::new();
+        let mut levels_m: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+        let of_steps = |(history, trend): &(&History, &Assessment)| {
+            let steps = trend.changes.iter().filter(|change| change.kind == ChangePointKind::Step);
+            steps.filter_map(|change| Some(made_on(change, history)?.1.to_owned())).collect::<Vec<_>>()
+        };
+        let stepped: BTreeSet<String> = judged.iter().flat_map(of_steps).collect();
+        for (history, trend) in judged {
+            let mut of_unit: BTreeMap<&str, UnitOnTail> = BTreeMap::new();
+            for change in trend.changes.iter().filter(|change| is_unrecorded(change)) {
+                let Some((flown, tail)) = made_on(change, history) else { continue };
+                let departure_utc = flown.departure_utc();
+                if moved.iter().any(|moved| moved.explains(tail, departure_utc)) {
+                    explained.insert((tail.to_owned(), departure_utc));
+                }
+                if change.kind == ChangePointKind::Step {
+                    of_unit.entry(tail).or_default().steps.push((change.departure_us, change.step_m));
                 }
             }
+            if !history.tails().any(|tail| stepped.contains(tail)) {
+                continue;
+            }
+            for (tail, (first_us, last_us)) in spans(history, trend.as_of_us) {
+                levels_m.entry(tail.to_owned()).or_default().extend(trend.level.map(|level| level.gap_m));
+                let steps = of_unit.remove(tail).unwrap_or_default().steps;
+                on_tails.entry(tail).or_default().push(UnitOnTail { first_us, last_us, steps });
+            }
         }
-        let is_wide = |change: &&Made<'_>| {
-            let steps = by_tail.get(change.tail_number).map_or(&[][..], Vec::as_slice);
-            let units = units.get(change.tail_number).map_or(&[][..], Vec::as_slice);
-            is_explained(change, moved)
-                || (change.kind == ChangePointKind::Step && is_of_all(change, steps, units))
-        };
-        let wide = made.iter().filter(is_wide).map(|c| (c.tail_number.to_owned(), c.departure_utc));
-        Self(wide.collect())
+        let found = on_tails.iter().map(|(tail, units)| ((*tail).to_owned(), tail_wide_steps(units)));
+        let steps = found.filter(|(_, steps)| !steps.is_empty()).collect();
+        Self { steps, levels_m, explained }
     }
 
     /// The tail whose change it is; none where it is the unit's own.
     pub(crate) fn tail<'a>(&self, change: &ChangePoint, history: &'a History) -> Option<&'a str> {
-        let (flown, tail_number) = made_on(change, history)?;
-        self.0.contains(&(tail_number.to_owned(), flown.departure_utc())).then_some(tail_number)
+        let (flown, tail) = made_on(change, history)?;
+        let is_within = |step: &TailWideStep| (step.first_us..=step.last_us).contains(&change.departure_us);
+        let is_step = change.kind == ChangePointKind::Step
+            && self.steps.get(tail).is_some_and(|steps| steps.iter().any(is_within));
+        let is_wide = is_step
+            || (is_unrecorded(change) && self.explained.contains(&(tail.to_owned(), flown.departure_utc())));
+        is_wide.then_some(tail)
     }
+
+    /// One change of the gap for each tail-wide step.
+    pub(crate) fn changes(&self) -> impl Iterator<Item = QuantityChange> {
+        let of_tail = |(tail, steps): (&String, &Vec<TailWideStep>)| {
+            let level_m = trend::quantity::median(self.levels_m.get(tail).cloned().unwrap_or_default());
+            let of = |step: &TailWideStep| of_step(tail, step, level_m.unwrap_or_default());
+            steps.iter().filter_map(of).collect::<Vec<_>>()
+        };
+        self.steps.iter().flat_map(of_tail)
+    }
+}
+
+/// The change of the gap that a tail made, with the median level of its units now.
+fn of_step(tail: &str, step: &TailWideStep, level_m: f64) -> Option<QuantityChange> {
+    let scope = ChangeScope::Tail;
+    let since_utc = Timestamp::from_microsecond(step.first_us).ok()?;
+    Some(QuantityChange {
+        quantity: Quantity::GapM.as_str(),
+        scope: scope.as_str(),
+        kind: "step",
+        part_number: None,
+        tail_number: Some(tail.to_owned()),
+        serial_number: None,
+        positions: Vec::new(),
+        units: step.units as i64,
+        units_able: step.units_able as i64,
+        since_utc,
+        from: level_m - step.step_m,
+        to: level_m,
+        change_se: f64::NAN,
+        state: scope.state(),
+        evidence: format!(
+            "the gaps of {} of {} units of {tail} stepped by {:+.1} µm since {}: {}",
+            step.units,
+            step.units_able,
+            step.step_m * 1e6,
+            since_utc.strftime("%Y-%m-%d"),
+            scope.cause(),
+        ),
+    })
+}
+
+fn is_unrecorded(change: &ChangePoint) -> bool {
+    matches!(change.kind, ChangePointKind::Step | ChangePointKind::Reset)
 }
 
 /// The first flight after a change, and its tail.
@@ -69,43 +119,15 @@ fn made_on<'a>(change: &ChangePoint, history: &'a History) -> Option<(&'a Flight
     Some((flown, history.place(flown).tail_number.as_deref()?))
 }
 
-fn changes<'a>(unit: usize, history: &'a History, trend: &'a Assessment) -> impl Iterator<Item = Made<'a>> {
-    let unbooked =
-        trend.changes.iter().filter(|c| matches!(c.kind, ChangePointKind::Step | ChangePointKind::Reset));
-    unbooked.filter_map(move |change| {
-        let (flown, tail_number) = made_on(change, history)?;
-        Some(Made { tail_number, departure_utc: flown.departure_utc(), kind: change.kind, unit })
-    })
-}
-
-fn is_explained(change: &Made<'_>, moved: &[RecorderChange]) -> bool {
-    moved.iter().any(|moved| moved.explains(change.tail_number, change.departure_utc))
-}
-
-/// First and last gap of a unit on a tail.
-struct GapSpan {
-    first_utc: Timestamp,
-    last_utc: Timestamp,
-}
-
-impl GapSpan {
-    fn of((history, trend): &(&History, &Assessment), tail: &str) -> Option<Self> {
-        let is_on_tail =
-            |f: &&FlightRow| f.gap_m().is_some() && history.place(f).tail_number.as_deref() == Some(tail);
-        let known = history.until(Timestamp::from_microsecond(trend.as_of_us).ok()?);
-        let departure = |flown: &FlightRow| flown.departure_utc();
-        let first_utc = known.iter().find(is_on_tail).map(departure)?;
-        Some(Self { first_utc, last_utc: known.iter().rev().find(is_on_tail).map(departure)? })
+/// Departures of the first and last gap of a unit on each of its tails, microseconds since 1970 UTC.
+fn spans(history: &History, as_of_us: i64) -> BTreeMap<&str, (i64, i64)> {
+    let mut spans: BTreeMap<&str, (i64, i64)> = BTreeMap::new();
+    let known = Timestamp::from_microsecond(as_of_us).map_or(&[][..], |as_of| history.until(as_of));
+    for flown in known.iter().filter(|flown| flown.gap_m().is_some()) {
+        if let Some(tail) = history.place(flown).tail_number.as_deref() {
+            let at_us = flown.departure_us();
+            spans.entry(tail).and_modify(|span| span.1 = at_us).or_insert((at_us, at_us));
+        }
     }
-}
-
-/// Whether the units that flew on the tail some time before it, and after, made it together.
-fn is_of_all(change: &Made<'_>, steps: &[&Made<'_>], units: &[GapSpan]) -> bool {
-    let near = |step: &&&Made<'_>| days_between(step.departure_utc, change.departure_utc).abs() <= SAME_DAYS;
-    let stepped: BTreeSet<usize> = steps.iter().filter(near).map(|step| step.unit).collect();
-    let is_there = |unit: &&GapSpan| {
-        days_between(unit.first_utc, change.departure_utc) > SAME_DAYS
-            && unit.last_utc >= change.departure_utc
-    };
-    stepped.len() > 1 && stepped.len() as f64 >= SHARE * units.iter().filter(is_there).count() as f64
+    spans
 }

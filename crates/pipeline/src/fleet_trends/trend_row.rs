@@ -145,7 +145,7 @@ fn reason(
     }
     if let (disputed @ 1.., gaps) = history.disputed(as_of, LATEST) {
         reason = format!(
-            "{reason}; {disputed} of the latest {gaps} gaps have little weight (estimators_disagree)"
+            "{reason}; {disputed} of the latest {gaps} gaps are flagged (estimators_disagree, or of an external table) and confirm nothing alone"
         );
     }
     match trend.stale_days {

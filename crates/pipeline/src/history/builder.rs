@@ -66,7 +66,7 @@ pub(crate) struct StagedRow {
 
 impl HistoryBuilder {
     /// The columns a chunk may bring; `serial_number`, `departure_utc` and `gap_m` it must.
-    pub const COLUMNS: [&'static str; 13] = [
+    pub const COLUMNS: [&'static str; 14] = [
         "serial_number",
         "serial",
         "part_number",
@@ -80,11 +80,12 @@ impl HistoryBuilder {
         "load_reversals",
         "gap_m",
         "gap_se_m",
+        "flags",
     ];
 
     /// The columns that the store's own rows bring.
     pub(crate) fn of_store() -> Vec<&'static str> {
-        let stored = Self::COLUMNS.into_iter().filter(|name| !["serial", "tail"].contains(name));
+        let stored = Self::COLUMNS.into_iter().filter(|name| !["serial", "tail", "flags"].contains(name));
         stored.chain(["flags", OTHER_GAP]).collect()
     }
 
@@ -93,12 +94,15 @@ impl HistoryBuilder {
     /// # Errors
     /// When a column that must be there is not, and the first cell that cannot be read.
     pub fn add(&mut self, chunk: &TableBatch) -> Result<(), ingest::Error> {
-        self.add_with_flags(chunk, None)
+        let texts = TextColumn::of(chunk, &["flags"])?;
+        // A list without flags is written as `[]`.
+        let has_flags = |row: usize| texts.get(row).is_some_and(|flags| flags != "[]");
+        self.add_with_flags(chunk, &|row, gap_m, _| has_flags(row).then_some(gap_m))
     }
 
-    fn add_with_flags(&mut self, chunk: &TableBatch, flags: Option<&ListArray>) -> Result<(), ingest::Error> {
+    fn add_with_flags(&mut self, chunk: &TableBatch, other_gap: OtherGap<'_>) -> Result<(), ingest::Error> {
         chunk.column(&["serial_number", "serial"])?;
-        self.rows(chunk, &KeyColumns::of(chunk)?, &TextColumn::of(chunk, &["flight_id"])?, flags)
+        self.rows(chunk, &KeyColumns::of(chunk)?, &TextColumn::of(chunk, &["flight_id"])?, other_gap)
     }
 
     /// Adds rows of the store.
@@ -107,7 +111,9 @@ impl HistoryBuilder {
     /// The first cell that cannot be read.
     pub(crate) fn add_store_batch(&mut self, batch: RecordBatch) -> Result<(), ingest::Error> {
         let flags = batch.column_by_name("flags").and_then(|flags| flags.as_list_opt::<i32>()).cloned();
-        self.add_with_flags(&TableBatch::new(Path::new("results"), batch, 0), flags.as_ref())
+        let is_disputed = |row: usize| flags.as_ref().is_some_and(|flags| disagree(flags, row));
+        let other_gap = |row, _, other_m: Option<f64>| other_m.filter(|_| is_disputed(row));
+        self.add_with_flags(&TableBatch::new(Path::new("results"), batch, 0), &other_gap)
     }
 
     fn rows(
@@ -115,7 +121,7 @@ impl HistoryBuilder {
         chunk: &TableBatch,
         position_keys: &KeyColumns,
         flights: &TextColumn,
-        flags: Option<&ListArray>,
+        other_gap: OtherGap<'_>,
     ) -> Result<(), ingest::Error> {
         let column = |names: &[&str]| chunk.column(names).map(Some);
         let (serial, departure) = (chunk.find(&["serial_number", "serial"]), column(&["departure_utc"])?);
@@ -150,8 +156,8 @@ impl HistoryBuilder {
                 load_reversals: at(&reversals, row).map(|n| n as u64),
                 gap_m: at(&gaps_m, row),
                 gap_se_m: at(&errors_m, row),
-                disagreeing_gap_m: at(&others_m, row)
-                    .filter(|_| flags.is_some_and(|flags| disagree(flags, row))),
+                disagreeing_gap_m: at(&gaps_m, row)
+                    .and_then(|gap_m| other_gap(row, gap_m, at(&others_m, row))),
             };
             self.push_row(position_key, &said);
         }
@@ -222,6 +228,10 @@ struct RowTarget {
     unit: usize,
     place: u32,
 }
+
+/// The gap that contradicts that of a row, from the row, its gap and that of the other estimator, m; a record of an external
+/// table with any flag contradicts itself, so that it alone confirms nothing.
+type OtherGap<'a> = &'a dyn Fn(usize, f64, Option<f64>) -> Option<f64>;
 
 /// Whether the flags of a row hold the disagreement of the estimators.
 fn disagree(flags: &ListArray, row: usize) -> bool {

@@ -13,7 +13,8 @@ pub struct FlightInput<'a> {
     pub load_reversals: Option<u64>,
     pub gap_m: Option<f64>,
     pub gap_se_m: Option<f64>,
-    /// The gap by the other estimator where the record has the flag `estimators_disagree`.
+    /// The gap by the other estimator where the record has the flag `estimators_disagree`; of a flagged record of an
+    /// external table its own.
     pub disagreeing_gap_m: Option<f64>,
 }
 
@@ -73,7 +74,7 @@ pub struct FlightExtras {
     /// Numbers; `NaN` for none.
     flight_hours: f64,
     tail_hours_end: f64,
-    /// Negative where the estimators disagree.
+    /// With a negative sign where the record is uncertain.
     gap_se_m: f64,
     /// The largest number for none.
     load_reversals: u64,
@@ -123,9 +124,9 @@ impl FlightExtras {
         known(self.gap_se_m.abs())
     }
 
-    /// Whether the estimators disagree.
+    /// Whether the estimators disagree, or the record of an external table is flagged.
     pub(crate) fn is_disputed(&self) -> bool {
-        self.gap_se_m < 0.0
+        self.gap_se_m.is_sign_negative()
     }
 }
 

@@ -12,5 +12,5 @@ pub(crate) const REPORTED_DAYS: f64 = 30.0;
 
 /// The upper median; NaN of nothing.
 pub(crate) fn median(values: Vec<f64>) -> f64 {
-    trend::quantity::noise::median(values).unwrap_or(f64::NAN)
+    trend::quantity::median(values).unwrap_or(f64::NAN)
 }

@@ -317,8 +317,6 @@ fn prior(
         life_p05_hours,
         life_p50_hours: prior.median_life_hours(),
         life_p95_hours,
-        widening: prior.interval_scale(),
-        scored_forecasts: prior.scored_forecasts(),
     }
 }
 

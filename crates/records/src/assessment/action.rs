@@ -7,9 +7,9 @@ use crate::assessment::trend_row::TrendRow;
 /// What a unit's state asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// State `act`: the gap is at or above the limit.
+    /// State `act`: the gap is at or above the limit, and the part does not ask for an inspection first.
     Replace,
-    /// State `plan` or `watch`, or another quantity changed.
+    /// State `plan` or `watch`, or another quantity changed; state `act` where the part asks for it.
     Inspect,
     /// State `unassessed`: no record shows how large the gap is.
     CheckLogs,
@@ -29,9 +29,16 @@ impl Action {
     }
 
     /// The action that a state and its reason ask for, with the states of other quantities.
-    pub fn of(state: Option<&str>, reason_code: Option<&str>, conditions: &[String]) -> Option<Self> {
+    ///
+    /// `at_limit` is what the unit's part asks for in state `act`.
+    pub fn of(
+        state: Option<&str>,
+        reason_code: Option<&str>,
+        conditions: &[String],
+        at_limit: Self,
+    ) -> Option<Self> {
         match state {
-            Some("act") => Some(Self::Replace),
+            Some("act") => Some(at_limit),
             Some("plan" | "watch") => Some(Self::Inspect),
             Some("unassessed") if reason_code == Some("no_limit") => Some(Self::SetLimit),
             Some("unassessed") => Some(Self::CheckLogs),
@@ -45,21 +52,21 @@ impl Action {
 const DUE_NOW: [&str; 3] = ["unconfirmed", "jumped", "changed"];
 
 impl TrendRow {
-    /// The row with its action and the date until when.
+    /// The row with its action and the date until when; `at_limit` is what its part asks for in state `act`.
     ///
     /// A unit in `act`, and one whose gap jumped, is due at once; another in `plan` or `watch` before the earliest date on
     /// which it reaches its limit.
     #[must_use]
-    pub fn with_action(mut self) -> Self {
-        let action = Action::of(self.state, self.reason_code, &self.conditions);
+    pub fn with_action(mut self, at_limit: Action) -> Self {
+        let action = Action::of(self.state, self.reason_code, &self.conditions, at_limit);
         self.action = action.map(Action::as_str);
         self.due_utc = match action {
-            Some(Action::Replace) => Some(self.as_of_utc),
+            _ if self.state == Some("act") => Some(self.as_of_utc),
             Some(Action::Inspect) if self.reason_code.is_some_and(|code| DUE_NOW.contains(&code)) => {
                 Some(self.as_of_utc)
             }
             Some(Action::Inspect) => self.not_before_utc,
-            Some(Action::CheckLogs | Action::SetLimit) | None => None,
+            Some(Action::Replace | Action::CheckLogs | Action::SetLimit) | None => None,
         };
         self
     }

@@ -139,8 +139,8 @@ row! {
         /// States of the other followed quantities of the unit: `softening`, `friction_rising`, …; all in the
         /// quantities table.
         pub conditions: Vec<String>,
-        /// What the state asks for: `replace` (state `act`), `inspect` (`plan`, `watch`, or another quantity changed),
-        /// `check_logs` or `set_limit` (`unassessed`), or null.
+        /// What the state asks for: `replace` (state `act`, or `inspect` where the part's `at_limit` asks for it), `inspect`
+        /// (`plan`, `watch`, or another quantity changed), `check_logs` or `set_limit` (`unassessed`), or null.
         pub action: Option<&'static str>,
         /// Date until when: `as_of_utc` to replace, or to inspect after a jump; `not_before_utc` to inspect; null where it
         /// is not known.

@@ -295,27 +295,15 @@ fn statistics(unit: &UnitView) -> Facts {
     ]
 }
 
-/// Smallest widening that is reported: smaller values arise by chance from few past forecasts.
-const WIDER: f64 = 1.15;
-
 /// Fleet prior of the unit's part number, as text.
 fn prior(report: &Report, unit: &UnitView) -> String {
     report.priors.iter().find(|p| p.part_number == unit.part_number).map_or_else(
         || NO_DATA.to_owned(),
         |p| {
             let part = p.part_number.as_deref().unwrap_or("units without a part number");
-            let wider = match p.scored_forecasts {
-                0 => String::new(),
-                scored if p.widening > WIDER => format!(
-                    " {} were scored: their coverage was too low, intervals are widened {:.1} times.",
-                    counted(scored, "past forecast"),
-                    p.widening
-                ),
-                scored => format!(" {} were scored.", counted(scored, "past forecast")),
-            };
             format!(
                 "Learned from {part} until {}: a new unit has {} ± {} µm (90 %); time from new to the act limit: median {} FH, \
-                 90 % of units between {} and {} FH; wear follows {}.{wider}",
+                 90 % of units between {} and {} FH; wear follows {}.",
                 date(p.learned_until_utc),
                 micrometres(p.new_m),
                 micrometres(NORMAL_95 * p.new_sd_m),

@@ -3,15 +3,15 @@
 //! A confident prior can outweigh the data of a unit: a fleet without wear, with equal new gaps, leaves no candidate
 //! for a unit near its limit. Such a posterior gives no forecast; the measured state stays.
 
-use crate::data::outliers::WeightedGap;
 use crate::data::series::Flight;
-use crate::inference::posterior::{Component, Posterior};
+use crate::inference::posterior::Posterior;
 use crate::measured::Measured;
-use crate::measured::level::{WINDOW, measured_level};
+use crate::measured::level::measured_level;
 use crate::measured::record::Record;
 use crate::measured::rise::Rise;
 use crate::prior::fleet_prior::FleetPrior;
 use crate::statement::history::History;
+use crate::wear::component::Component;
 
 /// Standard errors beyond which the level is not that of the records.
 const REACH: f64 = 5.0;
@@ -34,7 +34,7 @@ pub(crate) struct Evidence {
 }
 
 impl Evidence {
-    /// The last records, their undone offset and season removed: of a calm unit its last estimates without outliers.
+    /// The last records, their undone offset and season removed.
     pub(crate) fn of(
         measured: &Measured,
         history: &History,
@@ -42,22 +42,12 @@ impl Evidence {
         prior: &FleetPrior,
     ) -> Option<Self> {
         let season = |us: i64| prior.season.mean_m * prior.season.wave(us as f64);
-        let measured_records = || {
-            let records = last_records(measured, prior.limit_m())?;
-            let entry = |r: &Record| {
-                let gap_m = r.gap_m - history.undone_m - season(r.departure_us);
-                (prior.usage(&flights[r.flight]), gap_m, r.error_m.powi(-2))
-            };
-            Some(records.iter().map(entry).collect::<Vec<_>>())
+        let entry = |r: &Record| {
+            let gap_m = r.gap_m - history.undone_m - season(r.departure_us);
+            (prior.usage(&flights[r.flight]), gap_m, r.error_m.powi(-2))
         };
-        let is_calm = measured.jump.is_none() && measured.exceedance.is_none() && measured.rise.is_none();
-        let records = if is_calm {
-            let last = history.estimates.len().saturating_sub(WINDOW);
-            let entry = |e: &WeightedGap| (e.usage, e.gap_m - season(e.departure_us), e.weight);
-            history.estimates[last..].iter().map(entry).collect()
-        } else {
-            measured_records()?
-        };
+        let records: Vec<(f64, f64, f64)> =
+            last_records(measured, prior.limit_m())?.iter().map(entry).collect();
         let weight: f64 = records.iter().map(|r| r.2).sum();
         let mean =
             |of: &dyn Fn(&(f64, f64, f64)) -> f64| records.iter().map(|r| r.2 * of(r)).sum::<f64>() / weight;

@@ -1,6 +1,5 @@
 //! Bayesian inference over one segment: a Kalman filter, the candidate bank, the posterior mixture.
 
-pub(crate) mod bank_regression;
 pub(crate) mod consistency;
 pub(crate) mod level_filter;
 pub(crate) mod posterior;

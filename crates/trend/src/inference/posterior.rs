@@ -2,11 +2,12 @@
 
 use crate::data::bins;
 use crate::data::segment::Segment;
-use crate::inference::bank_regression::regressions;
 use crate::inference::level_filter::Regression;
 use crate::inference::segment_fit::{SegmentFit, linear_growth};
-use crate::prior::fleet_prior::{FleetPrior, TimeConstantPrior};
-use crate::wear::bank::{Candidate, CandidateBank, WearLaw, power_of_ln_life};
+use crate::math::distributions::ln_peak_density;
+use crate::prior::fleet_prior::FleetPrior;
+use crate::wear::bank::{Candidate, WearLaw, candidates};
+use crate::wear::component::{AgeAssumption, Component};
 
 /// Bins of the first pass, which drops most curves.
 const COARSE_BINS: usize = 12;
@@ -32,36 +33,6 @@ struct LifeGrid {
 /// Enough to weigh a curve, and enough to state quantiles.
 const ROUGH: LifeGrid = LifeGrid { count: 3, reach: 1.7, drop: 7.0 };
 const THOROUGH: LifeGrid = LifeGrid { count: 7, reach: 3.5, drop: 7.0 };
-
-/// What had to be guessed of a unit's age at first sight, where the law makes a difference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum AgeAssumption {
-    NotNeeded,
-    Fresh,
-    Worn,
-}
-
-/// One wear law with one amplitude, and its weight.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Component {
-    pub(crate) law: WearLaw,
-    /// Usage at the segment's begin on the law's own clock, and at its end.
-    pub(crate) age_begin: f64,
-    pub(crate) age_now: f64,
-    /// Metres per unit of height.
-    pub(crate) amplitude_m: f64,
-    pub(crate) ln_life: f64,
-    /// The gap now, metres.
-    pub(crate) level_m: f64,
-    /// The gap of this unit when new, metres.
-    pub(crate) new_m: f64,
-    /// What had to be guessed of its age at first sight.
-    pub(crate) age_assumption: AgeAssumption,
-    /// Onset not seen yet: it comes after an exponential wait.
-    pub(crate) onset_pending: bool,
-    /// Log weight, then (normalised) weight.
-    pub(crate) weight: f64,
-}
 
 /// A mixture over the bank.
 #[derive(Debug, Clone)]
@@ -105,8 +76,8 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
         return None;
     }
     let starts = segment.estimates.len().clamp(1, bins::BINS) / 2 + 1;
-    let mut bank =
-        CandidateBank::new(segment.fresh, segment.known_age, span, starts, |law| prior.includes_law(law));
+    let is_tried = |law| prior.includes_law(law);
+    let mut bank = candidates(segment.fresh, segment.known_age, span, starts, is_tried);
     let coarse = bins::bin(segment.estimates, COARSE_BINS);
     let grown_m = linear_growth(&coarse);
     let first = SegmentFit::new(segment, prior, coarse, |usage| grown_m * usage / span);
@@ -118,7 +89,7 @@ pub(crate) fn posterior(segment: &Segment<'_>, prior: &FleetPrior) -> Option<Pos
     if believed.is_empty() {
         return None;
     }
-    retain(&mut bank.candidates, &believed);
+    retain(&mut bank, &believed);
     let likely = likeliest(&believed);
     let fine = bins::bin(segment.estimates, bins::BINS);
     let second = SegmentFit::new(segment, prior, fine, |usage| mean_growth(&likely, usage));
@@ -194,21 +165,33 @@ struct ScoredCandidate {
     bound: f64,
 }
 
+/// Curves that go through the filter together: each step of a curve waits for the one before it, and other curves fill
+/// the time.
+const LANES: usize = 4;
+
 /// Every curve of the bank against the bins.
-fn scored_candidates(fit: &SegmentFit<'_>, bank: &CandidateBank) -> Vec<ScoredCandidate> {
-    let passes = regressions(fit, bank).into_iter().map(|pass| fit.with_season(pass));
-    let candidates = bank.candidates.iter().enumerate();
-    candidates
-        .zip(passes)
-        .map(|((index, candidate), pass)| scored_candidate(fit, index, candidate, pass))
-        .collect()
+fn scored_candidates(fit: &SegmentFit<'_>, bank: &[Candidate]) -> Vec<ScoredCandidate> {
+    let usages: Vec<f64> = fit.bins.iter().map(|bin| bin.usage - fit.segment.begin).collect();
+    let mut scored = Vec::with_capacity(bank.len());
+    for of_lanes in bank.chunks(LANES) {
+        let height = |usage: &f64| {
+            let of = |lane| of_lanes.get(lane).map_or(0.0, |c: &Candidate| c.law.value(c.age + usage));
+            std::array::from_fn::<f64, LANES, _>(of)
+        };
+        let heights: Vec<[f64; LANES]> = usages.iter().map(height).collect();
+        let passes = fit.filter.regress_lanes(&fit.gaps, &fit.wave, &heights);
+        for (candidate, pass) in of_lanes.iter().zip(passes) {
+            scored.push(scored_candidate(fit, scored.len(), candidate, fit.with_season(pass)));
+        }
+    }
+    scored
 }
 
 /// The nodes, with log weights, of every curve that can matter.
-fn components(fit: &SegmentFit<'_>, bank: &CandidateBank, tried: LifeGrid) -> Vec<(usize, Component)> {
+fn components(fit: &SegmentFit<'_>, bank: &[Candidate], tried: LifeGrid) -> Vec<(usize, Component)> {
     let scored_candidates = scored_candidates(fit, bank);
     let add = |scored_candidate: &ScoredCandidate, least: f64, push: &mut dyn FnMut(Component)| {
-        let candidate = &bank.candidates[scored_candidate.index];
+        let candidate = &bank[scored_candidate.index];
         if candidate.law == WearLaw::None {
             flat(fit, push);
         } else {
@@ -223,7 +206,7 @@ fn components(fit: &SegmentFit<'_>, bank: &CandidateBank, tried: LifeGrid) -> Ve
     add(top, best, &mut |component| best = best.max(component.weight));
     // Where the prior excludes the best fit, its bound does not bound the others.
     let floor = top.bound.min(best + USUAL) - tried.drop - SLACK;
-    let flat = bank.candidates.iter().position(|candidate| candidate.law == WearLaw::None);
+    let flat = bank.iter().position(|candidate| candidate.law == WearLaw::None);
     for scored_candidate in scored_candidates.iter().filter(|c| c.bound > floor || Some(c.index) == flat) {
         add(scored_candidate, best - tried.drop, &mut |component| {
             best = best.max(component.weight);
@@ -252,8 +235,8 @@ fn scored_candidate(
     };
     let log_likelihood = best_m * pass.sfy - 0.5 * best_m * best_m * pass.sff;
     let new_m2 = spread + (best_m * candidate.age_spread).powi(2);
-    let bound =
-        log_likelihood - 0.5 * (off_m - best_m * pass.start).powi(2) / new_m2 + fit.logs.share(candidate.law);
+    let bound = log_likelihood - 0.5 * (off_m - best_m * pass.start).powi(2) / new_m2
+        + fit.logs.share(candidate.law.family());
     ScoredCandidate { index, pass, best_m, information, bound }
 }
 
@@ -266,40 +249,32 @@ fn try_lives(
     push: &mut dyn FnMut(Component),
 ) {
     let ScoredCandidate { pass, best_m, information, .. } = scored_candidate;
-    let prior = fit.prior;
+    let (prior, spread) = (fit.prior, fit.new_m2);
     let reach_m = tried.reach / information.sqrt();
     let Some((low, high)) = life_range(prior, candidate.law, best_m - reach_m, best_m + reach_m) else {
         return;
     };
     let step = (high - low) / (tried.count - 1) as f64;
-    let spread = fit.new_m2;
     let age_now = candidate.age + fit.segment.now - fit.segment.begin;
-    let mut height_now = None;
-    let shared = step.ln() + fit.logs.share(candidate.law) + fit.logs.cell(candidate, fit.segment);
-    let own = TimeConstantPrior::of(candidate);
+    let height_now = candidate.law.value(age_now);
     let age_assumption = match candidate.law {
         _ if fit.segment.is_of_known_age() => AgeAssumption::NotNeeded,
         WearLaw::Onset { .. } => AgeAssumption::NotNeeded,
         _ if candidate.age > 0.0 => AgeAssumption::Worn,
         _ => AgeAssumption::Fresh,
     };
-    let ln_age = (candidate.age > 0.0 && !fit.segment.is_of_known_age()).then_some(candidate.ln_age);
-    let mut amplitudes = AmplitudeGrid::new(candidate.law, prior.span_m, low, step);
     for i in 0..tried.count {
-        let (ln_life, amplitude_m) = (low + step * i as f64, amplitudes.next());
+        let ln_life = low + step * i as f64;
+        let amplitude_m = prior.span_m / candidate.law.growth_in(ln_life.exp());
         let new_m = fit.gaps.start - amplitude_m * pass.start;
         let smeared = (amplitude_m * candidate.age_spread).powi(2) / spread;
         let log_likelihood = amplitude_m * pass.sfy
             - 0.5 * amplitude_m * amplitude_m * pass.sff
-            - 0.5 * ((new_m - prior.new_m).powi(2) / (spread * (1.0 + smeared)) + fit.ln_new_m2);
-        let bound = log_likelihood + shared + fit.logs.life(ln_life, ln_age, own);
-        // A logarithm costs more than all the rest, and most nodes do not need it.
-        let weight = if smeared > 0.0 && bound > least { bound - 0.5 * (1.0 + smeared).ln() } else { bound };
-        if weight <= least {
-            continue;
-        }
-        let height_now = *height_now.get_or_insert_with(|| candidate.law.value(age_now));
-        push(Component {
+            - 0.5
+                * ((new_m - prior.new_m).powi(2) / (spread * (1.0 + smeared))
+                    + fit.ln_new_m2
+                    + smeared.ln_1p());
+        let component = Component {
             law: candidate.law,
             age_begin: candidate.age,
             age_now,
@@ -309,71 +284,60 @@ fn try_lives(
             new_m,
             age_assumption,
             onset_pending: false,
-            weight,
-        });
+            weight: 0.0,
+        };
+        let grid = step.ln() + candidate.ln_cell + ln_density_in_grid(candidate, &component);
+        let weight = log_likelihood + grid + fit.logs.of(&component);
+        if weight > least {
+            push(Component { weight, ..component });
+        }
     }
 }
 
-/// A law's amplitudes at lives that grow by one factor.
-enum AmplitudeGrid {
-    /// They fall by one factor, too.
-    Falling { next_m: f64, factor: f64 },
-    /// Growth of the law in a further life, hours, which is longer by the factor `longer`.
-    Evaluated { law: WearLaw, span_m: f64, life: f64, longer: f64 },
-}
+/// A unit first seen in service has seldom used more than this share of its life: an age beyond it is
+/// less likely by this power of how far. Forbidden outright, an overdue unit would have no curve at all.
+const WORN_SHARE: f64 = 0.9;
+const OVERDUE: f64 = 20.0;
 
-impl AmplitudeGrid {
-    fn new(law: WearLaw, span_m: f64, ln_life: f64, step: f64) -> Self {
-        match law.exponent() {
-            Some(p) => {
-                Self::Falling { next_m: span_m / power_of_ln_life(p, ln_life), factor: (-p * step).exp() }
-            }
-            None => Self::Evaluated { law, span_m, life: ln_life.exp(), longer: step.exp() },
-        }
+/// Log density of a candidate's time constant and of its age at first sight, given its life: the same for every fleet.
+fn ln_density_in_grid(candidate: &Candidate, component: &Component) -> f64 {
+    let life = candidate.ln_life.map_or(0.0, |(ln_life, sd)| {
+        let z = (component.ln_life - ln_life) / sd;
+        ln_peak_density(sd) - 0.5 * z * z
+    });
+    if component.age_assumption == AgeAssumption::Worn {
+        let used = candidate.ln_age - WORN_SHARE.ln() - component.ln_life;
+        return life - WORN_SHARE.ln() - component.ln_life - OVERDUE * used.max(0.0);
     }
-
-    fn next(&mut self) -> f64 {
-        match self {
-            Self::Falling { next_m, factor } => {
-                let falls_m = *next_m * *factor;
-                std::mem::replace(next_m, falls_m)
-            }
-            Self::Evaluated { law, span_m, life, longer } => {
-                let amplitude_m = *span_m / law.value(*life);
-                *life *= *longer;
-                amplitude_m
-            }
-        }
-    }
+    life
 }
 
 /// The unit that does not wear, and the one whose onset is yet to come.
 fn flat(fit: &SegmentFit<'_>, push: &mut dyn FnMut(Component)) {
     let SegmentFit { prior, logs, segment, gaps, .. } = fit;
-    let spread = fit.new_m2;
-    let log_likelihood = -0.5 * ((gaps.start - prior.new_m).powi(2) / spread + fit.ln_new_m2);
-    let usage = segment.now - segment.begin;
+    let log_likelihood = -0.5 * ((gaps.start - prior.new_m).powi(2) / fit.new_m2 + fit.ln_new_m2);
     let component = Component {
         law: WearLaw::None,
         age_begin: 0.0,
-        age_now: usage,
+        age_now: segment.now - segment.begin,
         amplitude_m: 0.0,
         ln_life: prior.ln_life,
         level_m: gaps.end,
         new_m: gaps.start,
         age_assumption: AgeAssumption::NotNeeded,
         onset_pending: false,
-        weight: log_likelihood + logs.share(WearLaw::None),
+        weight: 0.0,
     };
-    push(component);
-    push(Component { onset_pending: true, weight: log_likelihood + logs.waiting(usage), ..component });
+    for component in [component, Component { onset_pending: true, ..component }] {
+        push(Component { weight: log_likelihood + logs.of(&component), ..component });
+    }
 }
 
 /// Range of ln life worth trying: where the amplitude may be, within what a life may be.
 fn life_range(prior: &FleetPrior, law: WearLaw, low_m: f64, high_m: f64) -> Option<(f64, f64)> {
     let reach = LIFE_REACH * prior.ln_life_sd;
     let (shortest, longest) = (prior.ln_life - reach, prior.ln_life + reach);
-    let ln_life = |amplitude_m: f64| law.ln_life(prior.span_m / amplitude_m);
+    let ln_life = |amplitude_m: f64| law.life_of(prior.span_m / amplitude_m).ln();
     let low = ln_life(high_m).max(shortest);
     let high = if low_m > 0.0 { ln_life(low_m).min(longest) } else { longest };
     (low < high).then_some((low, high))

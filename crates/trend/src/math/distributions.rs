@@ -10,6 +10,14 @@ pub(crate) fn cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * FRAC_1_SQRT_2)
 }
 
+/// Log density of a normal distribution at its mean.
+pub(crate) fn ln_peak_density(sd: f64) -> f64 {
+    -sd.ln() - LN_ROOT_TAU
+}
+
+/// ln √(2π).
+const LN_ROOT_TAU: f64 = 0.918_938_533_204_672_7;
+
 #[cfg(test)]
 mod tests {
     use super::*;

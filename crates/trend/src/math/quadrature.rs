@@ -1,8 +1,6 @@
 //! Quadrature rules.
 
-/// Three-point and five-point Gauss–Hermite rules for a standard normal variable.
-pub(crate) const GAUSS_HERMITE_3: [(f64, f64); 3] =
-    [(-1.732_050_807_568_877_2, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.732_050_807_568_877_2, 1.0 / 6.0)];
+/// Five-point Gauss–Hermite rule for a standard normal variable.
 pub(crate) const GAUSS_HERMITE_5: [(f64, f64); 5] = [
     (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
     (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
@@ -23,11 +21,9 @@ mod tests {
     #[test]
     fn rules_have_the_moments_of_a_normal_variable() {
         const MOMENTS: [f64; 10] = [1.0, 0.0, 1.0, 0.0, 3.0, 0.0, 15.0, 0.0, 105.0, 0.0];
-        for rule in [&GAUSS_HERMITE_3[..], &GAUSS_HERMITE_5] {
-            for (power, moment) in MOMENTS.iter().enumerate().take(2 * rule.len()) {
-                let found: f64 = rule.iter().map(|(z, weight)| weight * z.powi(power as i32)).sum();
-                assert!((found - moment).abs() < 1e-12 * moment.max(1.0), "{power}: {found}, not {moment}");
-            }
+        for (power, moment) in MOMENTS.iter().enumerate() {
+            let found: f64 = GAUSS_HERMITE_5.iter().map(|(z, weight)| weight * z.powi(power as i32)).sum();
+            assert!((found - moment).abs() < 1e-12 * moment.max(1.0), "{power}: {found}, not {moment}");
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::measured::record::Record;
 
 /// Most records of a level.
-pub(crate) const WINDOW: usize = 12;
+const WINDOW: usize = 12;
 
 /// Records below which a constant is tried before a line.
 const LEAST_LINE: usize = 5;

@@ -1,6 +1,6 @@
 //! Records of a unit in order, with the periods in which they can be compared.
 
-use crate::data::outliers::errors;
+use crate::data::outliers::noise;
 use crate::data::series::{Flight, Gap, MaintenanceEvent};
 
 /// Number of last records that are read.
@@ -32,7 +32,7 @@ pub(crate) fn records(
         flights.iter().enumerate().rev().filter_map(|(i, f)| Some((i, f, f.gap?))).take(MOST).collect();
     seen.reverse();
     let gaps: Vec<Gap> = seen.iter().map(|(_, _, gap)| *gap).collect();
-    let (errors, _) = errors(&gaps, limit_m);
+    let errors = noise(&gaps, limit_m).errors;
     let mut renewals = maintenance.iter().filter(|entry| entry.renews).map(|entry| entry.utc_us).peekable();
     let (mut period, mut installation) = (0, None);
     let mut records = Vec::with_capacity(seen.len());

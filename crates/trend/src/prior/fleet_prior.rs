@@ -2,20 +2,13 @@
 
 use std::fmt;
 
-use crate::prior::calibration_params::{CalibrationParams, USUAL_WIDTH};
-
-use crate::data::segment::Segment;
 use crate::data::series::Flight;
 use crate::data::steps::WEAR_NOISE;
-use crate::math::distributions::NORMAL_95;
+use crate::math::distributions::{NORMAL_95, ln_peak_density};
 use crate::math::quadrature::WAIT_QUANTILES;
 use crate::prior::season_params::SeasonParams;
-use crate::wear::bank::{Candidate, FAMILIES, WearLaw, default_shares};
-
-/// A unit first seen in service has seldom used more than this share of its life: an age beyond it is
-/// less likely by this power of how far. Forbidden outright, an overdue unit would have no curve at all.
-const WORN_SHARE: f64 = 0.9;
-const OVERDUE: f64 = 20.0;
+use crate::wear::bank::{FAMILIES, WearLaw, default_shares};
+use crate::wear::component::{AgeAssumption, Component};
 
 /// The gap of a new unit as a share of the limit, while nothing is known.
 const NEW_SHARE: f64 = 0.2;
@@ -26,6 +19,15 @@ const NEW_SHARE: f64 = 0.2;
 const NEW_SPREAD: f64 = 0.05;
 const DRIFT_PER_HOUR: f64 = 1e-8;
 const BIAS_SPREAD: f64 = 0.015;
+
+/// A life shorter than this has laws of its own, hours.
+const FAST_LIFE_HOURS: f64 = 600.0;
+
+/// Widths of intervals: with a prior learned from a fleet, with one of no fleet, and of wear at a rate that the last
+/// records show.
+pub(crate) const FLEET_WIDTH: f64 = 1.4;
+const SINGLE_WIDTH: f64 = 1.25;
+const FAST_WIDTH: f64 = 0.7;
 
 /// Spread of the first gap of a unit without support from its fleet, a share of the limit.
 const FIRST_SPREAD: f64 = 0.1;
@@ -97,8 +99,12 @@ pub struct FleetPrior {
     pub(crate) drift_m2_per_hour: f64,
     /// Spread of what an installation adds to every gap measured in it, metres.
     pub(crate) bias_sd_m: f64,
-    /// How far the fleet's forecasts have missed so far.
-    pub(crate) calibration: CalibrationParams,
+    /// Factor by which the distance of a 90 % bound from the median is larger than the mixture's own.
+    ///
+    /// The true law is seldom in the bank, so the evidence for one candidate against its neighbours is worth less than
+    /// the likelihood has it. Tempered weights (a power below one) would cover as well, but they move the median away
+    /// from the truth.
+    pub(crate) interval_width: f64,
 }
 
 impl FleetPrior {
@@ -120,7 +126,7 @@ impl FleetPrior {
             wear_noise_m: WEAR_NOISE * limit_m,
             drift_m2_per_hour: DRIFT_PER_HOUR * limit_m * limit_m,
             bias_sd_m: BIAS_SPREAD * limit_m,
-            calibration: CalibrationParams::USUAL,
+            interval_width: SINGLE_WIDTH,
         }
     }
 
@@ -140,8 +146,14 @@ impl FleetPrior {
             hours_per_unit: prior.ln_life.exp() / life_hours,
             new_m: first_m,
             new_sd_m: FIRST_SPREAD * prior.limit_m(),
+            interval_width: FAST_WIDTH,
             ..prior
         }
+    }
+
+    /// Whether wear of this rate, m per flight hour, ends before the lives that the bank's grids are made for.
+    pub(crate) fn is_fast(&self, m_per_hour: f64) -> bool {
+        self.span_m / m_per_hour < FAST_LIFE_HOURS
     }
 
     /// The act limit that the prior was made for, metres.
@@ -171,17 +183,6 @@ impl FleetPrior {
         (self.new_m, self.new_sd_m)
     }
 
-    /// Factor by which forecast intervals are wider than usual, from the errors of the fleet's past forecasts, no unit;
-    /// one for a fleet without past forecasts (method: `docs/prognostics.md`).
-    pub fn interval_scale(&self) -> f64 {
-        0.5 * (self.calibration.high - self.calibration.low) / USUAL_WIDTH
-    }
-
-    /// Number of past forecasts of the fleet that the intervals' widths were learned from.
-    pub fn scored_forecasts(&self) -> usize {
-        self.calibration.scored
-    }
-
     /// The usage of a unit up to a flight, hours' worth.
     pub(crate) fn usage(&self, flight: &Flight) -> f64 {
         self.axis.of(flight) * self.hours_per_unit
@@ -199,8 +200,7 @@ impl FleetPrior {
             shares: self.shares.map(f64::ln),
             life: ln_peak_density(self.ln_life_sd),
             fresh: self.fresh_share.ln(),
-            worn: ((1.0 - self.fresh_share) / WORN_SHARE).ln(),
-            worn_share: WORN_SHARE.ln(),
+            worn: (1.0 - self.fresh_share).ln(),
             onset: self.onsets_per_hour.ln(),
         }
     }
@@ -219,73 +219,33 @@ pub(crate) struct LogPrior<'a> {
     life: f64,
     fresh: f64,
     worn: f64,
-    worn_share: f64,
     onset: f64,
 }
 
-/// Prior of a law's time constant given a life: the density of ln life.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct TimeConstantPrior {
-    ln_life: f64,
-    sd: f64,
-    log: f64,
-}
-
-impl TimeConstantPrior {
-    /// Prior of a candidate's time constant; `None` for a law without one.
-    pub(crate) fn of(candidate: &Candidate) -> Option<Self> {
-        let ln_time_constant = candidate.ln_time_constant_hours?;
-        let (ln_ratio, sd) = candidate.law.ln_life_over_time_constant();
-        Some(Self { ln_life: ln_time_constant + ln_ratio, sd, log: ln_peak_density(sd) })
-    }
-}
-
 impl LogPrior<'_> {
-    /// Of a law's family.
-    pub(crate) fn share(&self, law: WearLaw) -> f64 {
-        self.shares[law.family()]
+    /// Of a family of laws.
+    pub(crate) fn share(&self, family: usize) -> f64 {
+        self.shares[family]
     }
 
-    /// Of an onset that has not come in some hours.
-    pub(crate) fn waiting(&self, hours: f64) -> f64 {
-        self.share(WearLaw::Onset { start: hours }) - self.prior.onsets_per_hour * hours
-    }
-
-    /// Of a curve's cell in the onset's start or the time constant, and of its age at first sight as far
-    /// as that does not depend on its life.
-    pub(crate) fn cell(&self, candidate: &Candidate, segment: &Segment<'_>) -> f64 {
-        let law = match candidate.law {
-            WearLaw::Onset { start } => self.onset - self.prior.onsets_per_hour * start,
-            _ => 0.0,
-        };
-        let age = match candidate.law {
-            _ if segment.is_of_known_age() => 0.0,
-            WearLaw::Onset { .. } => 0.0,
-            _ if candidate.age == 0.0 => self.fresh,
-            _ => self.worn + candidate.ln_age_cell,
-        };
-        law + age + candidate.ln_law_cell
-    }
-
-    /// Of a life, per unit of ln life, and of a curve's age and own time given it.
-    pub(crate) fn life(&self, ln_life: f64, ln_age: Option<f64>, own: Option<TimeConstantPrior>) -> f64 {
-        let z = (ln_life - self.prior.ln_life) / self.prior.ln_life_sd;
-        let mut log = self.life - 0.5 * z * z;
-        if let Some(own) = own {
-            let z = (ln_life - own.ln_life) / own.sd;
-            log += own.log - 0.5 * z * z;
+    /// Of a component's law, ln life, age and onset, as far as they depend on the fleet.
+    pub(crate) fn of(&self, component: &Component) -> f64 {
+        let FleetPrior { onsets_per_hour, ln_life, ln_life_sd, .. } = *self.prior;
+        let share = self.shares[component.family()];
+        if component.onset_pending {
+            return share - onsets_per_hour * component.age_now;
         }
-        match ln_age {
-            Some(ln_age) => log - ln_life - OVERDUE * (ln_age - self.worn_share - ln_life).max(0.0),
-            None => log,
+        let z = (component.ln_life - ln_life) / ln_life_sd;
+        let life = self.life - 0.5 * z * z;
+        let age = match component.age_assumption {
+            AgeAssumption::NotNeeded => 0.0,
+            AgeAssumption::Fresh => self.fresh,
+            AgeAssumption::Worn => self.worn,
+        };
+        match component.law {
+            WearLaw::None => share,
+            WearLaw::Onset { start } => share + life + self.onset - onsets_per_hour * start,
+            _ => share + life + age,
         }
     }
 }
-
-/// Log density of a normal distribution at its mean.
-fn ln_peak_density(sd: f64) -> f64 {
-    -sd.ln() - LN_ROOT_TAU
-}
-
-/// ln √(2π).
-const LN_ROOT_TAU: f64 = 0.918_938_533_204_672_7;

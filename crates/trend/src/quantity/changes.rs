@@ -1,15 +1,15 @@
 //! Steps and drift of a quantity: forward selection of regressors, then elimination of those that do not hold.
 //!
 //! ```text
-//! y_i = b + d·(u_i − ū) + Σ_k s_k·[i ≥ k] + e_i         Var e_i = inflation · (ω² + se_i²)
+//! y_i = b + d·(u_i − ū) + Σ_k s_k·[i ≥ k] + e_i         Var e_i = inflation · factor · se_i²
 //! ```
 //! with u the usage. A step's place is that of the largest decrease of the weighted squares of what the other
 //! regressors leave (Bai & Perron 1998, one break at a time).
 
 use nalgebra::{SMatrix, SVector};
 
-use super::noise::{Scatter, without_outliers};
 use super::{MIN_FLIGHTS, QuantityValue};
+use crate::data::noise::{Assumed, Noise, inflation};
 
 /// Most steps of one unit.
 const MAX_STEPS: usize = 4;
@@ -22,6 +22,10 @@ const LEAST_AFTER: usize = 3;
 const STEP_GAIN: f64 = 32.0;
 /// Squared t-value from which a drift is selected.
 const DRIFT_GAIN: f64 = 18.0;
+/// Standard deviations by which two values that agree differ at most: neighbours share errors.
+const AGREEMENT_SDS: f64 = 6.0;
+/// Variance inflation of means assumed before neighbours were seen to share errors.
+const USUAL_INFLATION: f64 = 2.5;
 
 type Row = SVector<f64, COLUMNS>;
 type Square = SMatrix<f64, COLUMNS, COLUMNS>;
@@ -85,10 +89,17 @@ pub struct QuantityChanges {
 /// # Ok::<(), &str>(())
 /// ```
 pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChanges> {
-    let scatter = Scatter::of(values, least_scatter);
-    let sound = without_outliers(values, &scatter);
+    let (all, stated): (Vec<f64>, Vec<f64>) = values.iter().map(|v| (v.value, v.se)).unzip();
+    let (least, largest) = (least_scatter, f64::MAX);
+    // A stated error leaves out what differs from flight to flight: it counts for nothing.
+    let noise = Noise::of(&all, &stated, &Assumed { least, largest, unstated: least, differences: 0.0 });
+    let weighted = values.iter().zip(&noise.errors).zip(noise.are_sound(&all, AGREEMENT_SDS));
+    let sound = weighted.filter(|(_, is_sound)| *is_sound).map(|((value, error), _)| (*value, *error));
+    let (sound, errors): (Vec<QuantityValue>, Vec<f64>) = sound.unzip();
+    let inflation = inflation(&sound.iter().map(|v| v.value).collect::<Vec<_>>(), &errors, USUAL_INFLATION);
+    let weights: Vec<f64> = errors.iter().map(|error| (inflation * error * error).recip()).collect();
     let (first, last) = (sound.first()?, sound.last()?);
-    let mut model = Model::new(&sound, scatter);
+    let mut model = Model::new(&sound, &weights);
     if sound.len() >= MIN_FLIGHTS {
         model.select();
     }
@@ -122,7 +133,7 @@ pub fn fit(values: &[QuantityValue], least_scatter: f64) -> Option<QuantityChang
 /// Regressors: one, the drift if selected, and a step from each place on.
 struct Model<'a> {
     values: &'a [QuantityValue],
-    scatter: Scatter,
+    weights: &'a [f64],
     /// Middle and half the span of the usage, hours; the span zero where usage is constant.
     usage_hours: (f64, f64),
     has_drift: bool,
@@ -130,11 +141,11 @@ struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    fn new(values: &'a [QuantityValue], scatter: Scatter) -> Self {
+    fn new(values: &'a [QuantityValue], weights: &'a [f64]) -> Self {
         let low = values.iter().map(|v| v.usage_hours).fold(f64::INFINITY, f64::min);
         let high = values.iter().map(|v| v.usage_hours).fold(f64::NEG_INFINITY, f64::max);
         let usage_hours = (0.5 * (low + high), 0.5 * (high - low));
-        Self { values, scatter, usage_hours, has_drift: false, steps: Vec::new() }
+        Self { values, weights, usage_hours, has_drift: false, steps: Vec::new() }
     }
 
     fn first_step(&self) -> usize {
@@ -143,10 +154,6 @@ impl<'a> Model<'a> {
 
     fn columns(&self) -> usize {
         self.first_step() + self.steps.len()
-    }
-
-    fn weight(&self, value: &QuantityValue) -> f64 {
-        (self.scatter.inflation * self.scatter.variance(value)).recip()
     }
 
     /// Regressors of a value.
@@ -167,7 +174,7 @@ impl<'a> Model<'a> {
     fn normal(&self) -> (Square, Row) {
         let mut sums = (Square::zeros(), Row::zeros());
         for (index, value) in self.values.iter().enumerate() {
-            let (row, weight) = (self.row(index, value), self.weight(value));
+            let (row, weight) = (self.row(index, value), self.weights[index]);
             sums.0.ger(weight, &row, &row, 1.0);
             sums.1.axpy(weight * value.value, &row, 1.0);
         }
@@ -222,7 +229,7 @@ impl<'a> Model<'a> {
         let (mut residual, mut weight, mut shared) = (0.0, 0.0, Row::zeros());
         for (index, value) in self.values.iter().enumerate().rev() {
             let row = self.row(index, value);
-            let w = self.weight(value);
+            let w = self.weights[index];
             residual += w * (value.value - row.dot(&beta));
             weight += w;
             shared.axpy(w, &row, 1.0);

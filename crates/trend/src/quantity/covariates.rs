@@ -4,8 +4,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::QuantityValue;
-use super::noise::{SD_OVER_MAD, median};
+use super::{QuantityValue, median};
+use crate::math::median::SD_OVER_MAD;
 
 /// Standard errors from which a slope is applied.
 const SIGNIFICANT: f64 = 4.0;

@@ -12,9 +12,6 @@ use crate::statement::types::{ChangePoint, ChangePointKind};
 /// damage.
 const MAX_RIGGING_STEP: f64 = 0.15;
 
-/// Least probability that a fall within rigging's reach was the other of reset and re-rigging.
-const LEAST_DOUBT: f64 = 0.02;
-
 /// Flights from a change of installation within which a step is the books' own.
 pub(crate) const RECORD_FLIGHTS: usize = 3;
 
@@ -28,8 +25,6 @@ pub(crate) struct History {
     pub(crate) changes: Vec<ChangePoint>,
     /// Variance that the sizes of undone offsets leave in the level, m².
     pub(crate) offset_m2: f64,
-    /// Variance of the level from the uncertain kinds of the last segment's steps, m².
-    pub(crate) kind_m2: f64,
     begins: Vec<SegmentStart>,
     /// What has been taken off the last estimates, metres. The forecast adds a rise again: only the law is without it.
     pub(crate) undone_m: f64,
@@ -65,7 +60,6 @@ pub(crate) fn read_history(
         noise_factor,
         changes: Vec::new(),
         offset_m2: 0.0,
-        kind_m2: 0.0,
         begins: vec![SegmentStart { estimate: 0, usage: 0.0, fresh: false }],
         undone_m: 0.0,
         now,
@@ -104,7 +98,7 @@ impl History {
         let mut entries = maintenance.iter().filter(|entry| is_near(entry, flights, flight)).peekable();
         let kind = if entries.peek().is_some() || near_installation_change(flights, flight) {
             ChangePointKind::Recorded
-        } else if self.is_reset(step, prior) {
+        } else if self.reset_probability(step, prior) > 0.5 {
             ChangePointKind::Reset
         } else {
             ChangePointKind::Step
@@ -119,13 +113,8 @@ impl History {
         let (step_m, se_m) =
             if begins_anew { (step.jump_m, step.jump_se_m) } else { (step.step_m, step.se_m) };
         self.changes.push(ChangePoint { departure_us, kind, step_m, se_m, certainty });
-        let kind_m2 = match kind {
-            ChangePointKind::Recorded => 0.0,
-            _ => self.kind_variance(step, prior),
-        };
         if begins_anew {
             self.begin(step.at, true);
-            self.kind_m2 = kind_m2;
         } else if self.undone_m + step.step_m > MAX_RIGGING_STEP * prior.limit_m() {
             // To undo what may be damage would hide it.
             let hidden_m = std::mem::take(&mut self.undone_m);
@@ -135,37 +124,19 @@ impl History {
             self.undone_m += step.step_m;
             self.shift(step.at, -step.step_m);
             self.offset_m2 += step.se_m * step.se_m;
-            self.kind_m2 += kind_m2;
         }
     }
 
     /// Begins a segment, which knows nothing of what was undone before.
     fn begin(&mut self, estimate: usize, fresh: bool) {
         self.begins.push(SegmentStart { estimate, usage: self.estimates[estimate - 1].usage, fresh });
-        (self.offset_m2, self.kind_m2) = (0.0, 0.0);
+        self.offset_m2 = 0.0;
     }
 
     /// Moves every estimate from one on.
     fn shift(&mut self, from: usize, by_m: f64) {
         for estimate in &mut self.estimates[from..] {
             estimate.gap_m += by_m;
-        }
-    }
-
-    /// Whether a fall is likelier a reset than a re-rigging.
-    fn is_reset(&self, step: &StepChange, prior: &FleetPrior) -> bool {
-        self.reset_probability(step, prior) > 0.5
-    }
-
-    /// Variance of the level for what a step may have been: where it was the other of reset and re-rigging, the
-    /// level is wrong by the whole step.
-    fn kind_variance(&self, step: &StepChange, prior: &FleetPrior) -> f64 {
-        let reset = self.reset_probability(step, prior);
-        if reset > 0.0 && reset < 1.0 {
-            let other = reset.min(1.0 - reset).max(LEAST_DOUBT);
-            other * (1.0 - other) * step.step_m * step.step_m
-        } else {
-            0.0
         }
     }
 

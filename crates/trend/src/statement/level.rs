@@ -1,21 +1,21 @@
 //! Rate, growth and wear law of a unit, from the mixture over its curves.
 
-use crate::inference::posterior::{Component, Posterior};
+use crate::inference::posterior::Posterior;
 use crate::math::distributions;
 use crate::math::weighted::WeightedSamples;
-use crate::prior::calibration_params::USUAL_WIDTH;
 use crate::statement::types::Rate;
 use crate::wear::bank::{WearClass, WearLaw};
+use crate::wear::component::Component;
 
 /// Growth that counts as visible, a share of the limit.
 const VISIBLE: f64 = 0.02;
 
 /// Quantiles of the curves' rates now, per flight hour, as much wider as the future is stated.
-pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64) -> Rate {
+pub(crate) fn rate(posterior: &Posterior, hours_per_usage: f64, width: f64) -> Rate {
     let of = |n: &Component| (n.amplitude_m * n.law.derivative(n.age_now) / hours_per_usage, n.weight);
     let rates = WeightedSamples::new(posterior.significant_components().map(of));
     let m_per_hour = rates.quantile(0.5);
-    let at = |share: f64| m_per_hour + USUAL_WIDTH * (rates.quantile(share) - m_per_hour);
+    let at = |share: f64| m_per_hour + width * (rates.quantile(share) - m_per_hour);
     Rate { p05_m_per_hour: at(0.05).max(0.0), m_per_hour, p95_m_per_hour: at(0.95) }
 }
 

@@ -1,4 +1,4 @@
-//! Wear laws and the bank of candidate curves made of them.
+//! Wear laws, the bank of candidate curves made of them, and the components that fits leave.
 
 pub(crate) mod bank;
-pub(crate) mod life_curve;
+pub(crate) mod component;

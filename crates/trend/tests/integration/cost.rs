@@ -1,8 +1,8 @@
 //! The cost of an assessment grows with the number of flights, and no faster.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use trend::{Observation, Series, UsageDefaults, assess};
+use trend::{ChangePointKind, Observation, Series, UnitOnTail, UsageDefaults, assess, tail_wide_steps};
 
 use crate::histories::{DAY_US, settings};
 use crate::random::Random;
@@ -25,28 +25,84 @@ fn unit(seed: u64, flights: i64, rho: f64, step_um: f64) -> Series {
     Series::new((0..flights).map(row), &UsageDefaults::default()).unwrap()
 }
 
-/// Shortest of several times to assess twenty units of each length, which take turns.
-fn times(lengths: [i64; 2], rho: f64, step_um: f64) -> [Duration; 2] {
+/// Shortest of several times of two works, which take turns, s.
+fn shortest(mut work: impl FnMut(usize)) -> [f64; 2] {
+    let mut times = [f64::INFINITY; 2];
+    for round in 0..12 {
+        let begin = Instant::now();
+        work(round % 2);
+        times[round % 2] = times[round % 2].min(begin.elapsed().as_secs_f64());
+    }
+    times
+}
+
+/// Times to assess twenty units of each length.
+fn times(lengths: [i64; 2], rho: f64, step_um: f64) -> [f64; 2] {
     let units =
         lengths.map(|flights| (0..20).map(|seed| unit(seed, flights, rho, step_um)).collect::<Vec<_>>());
-    let once = |units: &[Series]| {
-        let begin = Instant::now();
-        for series in units {
+    shortest(|of| {
+        for series in &units[of] {
             assess(series, i64::MAX / 2, &settings(), None).unwrap();
         }
-        begin.elapsed()
-    };
-    let rounds: Vec<[Duration; 2]> = (0..6).map(|_| [once(&units[0]), once(&units[1])]).collect();
-    [0, 1].map(|of| rounds.iter().map(|round| round[of]).min().unwrap_or_default())
+    })
 }
 
 /// Exponents of 1.0 to 1.1 on a machine of its own; a quadratic search has two.
 #[test]
 fn time_grows_in_proportion_to_flights() {
     for (name, rho, step_um) in [("calm", 0.0, 0.0), ("autocorrelated", 0.8, 0.0), ("steps", 0.0, 15.0)] {
-        let [short, long] = times([1_500, 6_000], rho, step_um).map(|time| time.as_secs_f64());
+        let [short, long] = times([1_500, 6_000], rho, step_um);
         let exponent = (long / short).log(4.0);
         println!("{name}: {:.2} ms, {:.2} ms a unit, exponent {exponent:.2}", short * 50.0, long * 50.0);
         assert!(exponent <= 1.5, "{name}: {exponent}");
     }
+}
+
+/// Tails of four units that all step by 15 µm at flight 60: one finding for each tail, and four times the units take four
+/// times the time. A scan of the fleet for each step takes sixteen times.
+#[test]
+fn time_grows_in_proportion_to_units_whose_tails_step() {
+    let unit = |seed: u64| {
+        let mut random = Random::new(seed);
+        let row = |flight: i64| Observation {
+            departure_us: flight * DAY_US / 2,
+            flight_hours: Some(2.0),
+            gap_m: Some((40.0 + if flight < 60 { 0.0 } else { 15.0 } + random.normal()) * 1e-6),
+            gap_se_m: Some(1e-6),
+            ..Observation::default()
+        };
+        Series::new((0..120).map(row), &UsageDefaults::default()).unwrap()
+    };
+    let fleets = [125, 500].map(|units| (0..units).map(unit).collect::<Vec<_>>());
+    let mut found = [0, 0];
+    let [small, large] = shortest(|of| {
+        let on_tail = |series: &Series| {
+            let changes = assess(series, i64::MAX / 2, &settings(), None).unwrap().changes;
+            let steps = changes.iter().filter(|change| change.kind == ChangePointKind::Step);
+            let steps = steps.map(|change| (change.departure_us, change.step_m)).collect();
+            UnitOnTail { first_us: 0, last_us: 119 * DAY_US / 2, steps }
+        };
+        let units: Vec<UnitOnTail> = fleets[of].iter().map(on_tail).collect();
+        found[of] = units.chunks(4).map(|tail| tail_wide_steps(tail).len()).sum();
+    });
+    // The last tail of 125 units has one, which makes no step together.
+    assert_eq!(found, [31, 125]);
+    let exponent = (large / small).log(4.0);
+    println!("units whose tails step: {:.0} ms, {:.0} ms, exponent {exponent:.2}", small * 1e3, large * 1e3);
+    assert!(exponent <= 1.5, "{exponent}");
+}
+
+/// One tail with a step of all of its four units every ten days: four times the steps take four times the time.
+#[test]
+fn time_grows_in_proportion_to_the_steps_of_a_tail() {
+    let tails = [4_000, 16_000].map(|steps: i64| {
+        let steps: Vec<(i64, f64)> = (1..=steps).map(|k| (10 * k * DAY_US, 15e-6)).collect();
+        vec![UnitOnTail { first_us: 0, last_us: i64::MAX, steps }; 4]
+    });
+    let mut found = [0, 0];
+    let [short, long] = shortest(|of| found[of] = tail_wide_steps(&tails[of]).len());
+    assert_eq!(found, [4_000, 16_000]);
+    let exponent = (long / short).log(4.0);
+    println!("steps of a tail: {:.1} ms, {:.1} ms, exponent {exponent:.2}", short * 1e3, long * 1e3);
+    assert!(exponent <= 1.5, "{exponent}");
 }

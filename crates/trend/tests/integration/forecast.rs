@@ -3,19 +3,11 @@
 use trend::series::Observation;
 use trend::{Crossing, Forecast, Series, Settings, UsageDefaults, assess, forecast};
 
+use crate::random::Random;
+
 const DAY_US: i64 = 86_400_000_000;
 const HOURS: f64 = 2.0;
 const LIMIT_M: f64 = 60e-6;
-
-/// Scatter of one standard deviation of 1 µm: twelve uniform numbers less six.
-fn scatter_um(day: i64) -> f64 {
-    let mut state = (day as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let mut uniform = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
-    (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-}
 
 /// 20 µm when new, 30 µm in 1,000 h.
 fn true_um(day: i64) -> f64 {
@@ -25,13 +17,10 @@ fn true_um(day: i64) -> f64 {
 fn series(days: i64) -> Series {
     let row = |day| Observation {
         departure_us: day * DAY_US,
-        installation: 0,
         flight_hours: Some(HOURS),
-        tail_hours_end: None,
-        load_reversals: None,
-        gap_m: Some((true_um(day) + scatter_um(day)) * 1e-6),
+        gap_m: Some((true_um(day) + Random::new(day as u64).normal()) * 1e-6),
         gap_se_m: Some(1e-6),
-        is_doubtful: false,
+        ..Observation::default()
     };
     Series::new((0..days).map(row), &UsageDefaults::default()).unwrap()
 }

@@ -44,13 +44,12 @@ fn number(kind: u8, bits: [u8; 8]) -> f64 {
 fn wearing(flights: i64) -> Vec<Observation> {
     let flight = |day: i64| Observation {
         departure_us: day * DAY_US,
-        installation: 0,
         flight_hours: Some(1.5),
         tail_hours_end: Some(1.5 * (day + 1) as f64),
         load_reversals: Some(100),
         gap_m: Some(30e-6 + 2e-7 * day as f64 + 1e-6 * (day as f64).sin()),
         gap_se_m: Some(1e-6),
-        is_doubtful: false,
+        ..Observation::default()
     };
     (0..flights).map(flight).collect()
 }

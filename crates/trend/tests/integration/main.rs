@@ -8,7 +8,6 @@
 
 mod assessment;
 mod cost;
-mod degenerate;
 mod fleet;
 mod forecast;
 mod forecasts;

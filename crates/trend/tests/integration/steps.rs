@@ -14,13 +14,12 @@ fn series(seed: u64, flights: i64, growth_um: f64, (at, fall_um): (i64, f64)) ->
         let gap_um = 30.0 + growth_um * flight as f64 - if flight < at { 0.0 } else { fall_um };
         Observation {
             departure_us: 11 * flight * DAY_US,
-            installation: 0,
             flight_hours: Some(2.0),
             tail_hours_end: Some(44.0 * (flight + 1) as f64),
             load_reversals: Some(100),
             gap_m: Some((gap_um + NOISE_UM * random.normal()) * 1e-6),
             gap_se_m: Some(NOISE_UM * 1e-6),
-            is_doubtful: false,
+            ..Observation::default()
         }
     };
     let rows: Vec<Observation> = (0..flights).map(row).collect();

@@ -6,12 +6,12 @@ use crate::data::segment::Segment;
 use crate::data::series::{Flight, MaintenanceEvent, Series};
 use crate::data::steps::installation_steps;
 use crate::executor::{Executor, SerialExecutor};
-use crate::inference::posterior::{AgeAssumption, Component, Posterior, posterior};
+use crate::inference::posterior::{Posterior, posterior};
 use crate::inference::season::{SeasonalFit, learn_season, seasonal_fit};
-use crate::learning::calibrate::learn_calibration;
-use crate::prior::fleet_prior::{FleetPrior, UsageAxis};
+use crate::prior::fleet_prior::{FLEET_WIDTH, FleetPrior, UsageAxis};
 use crate::statement::history::{self, History};
-use crate::wear::bank::{FAMILIES, WearLaw};
+use crate::wear::bank::WearLaw;
+use crate::wear::component::AgeAssumption;
 
 /// Largest number of units used: more change the prior little and cost as much as their own assessments.
 const MOST_UNITS: usize = 150;
@@ -26,9 +26,8 @@ const PSEUDO_CHANGES: f64 = 4.0;
 /// Rounds of expectation and maximisation.
 const ROUNDS: usize = 8;
 
-/// Process noises tried in addition to the assumed one, as factors of it.
-const LESS_WEAR_NOISE: f64 = 0.7;
-const MORE_WEAR_NOISE: [f64; 2] = [1.5, 2.2];
+/// Process noises tried, as factors of the assumed one.
+const WEAR_NOISES: [f64; 4] = [1.0, 0.7, 1.5, 2.2];
 
 impl FleetPrior {
     /// Learns the fleet prior from the data of units until a day: the usage axis, the shares
@@ -68,7 +67,8 @@ impl FleetPrior {
             .and_then(on_axis)
             .or_else(|| argmax_evidence(UsageAxis::ALL.into_iter().filter_map(on_axis)));
         let Some(axis_prior) = axis_prior else { return Self::uninformative(limit_m) };
-        axis_prior.with_likeliest_wear_noise(executor).em_iterate(executor).with_calibration(executor)
+        let learned = axis_prior.with_likeliest_wear_noise(executor).em_iterate(executor).learned;
+        Self { interval_width: FLEET_WIDTH, ..learned }
     }
 
     /// The median life of units, from new to the act limit, flight hours, from their first-pass
@@ -100,7 +100,10 @@ impl<'a> TrainingSet<'a> {
         executor: &impl Executor,
     ) -> Self {
         let uninformative = FleetPrior::uninformative(limit_m);
-        let units = sample(fleet.into_iter().map(|series| TrainingUnit::on(series, as_of_us)));
+        let units = sample(fleet.into_iter().map(|series| TrainingUnit {
+            flights: series.flights_until(as_of_us),
+            maintenance: series.maintenance_until(as_of_us),
+        }));
         // Not from the hours that a unit had when it came: of a few units whose wear began late, curves from
         // their first hour on lead to a fleet prior without wear.
         let training_set =
@@ -145,24 +148,11 @@ fn argmax_evidence(priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior>
     priors.reduce(|best, next| if next.evidence > best.evidence { next } else { best })
 }
 
-/// The last axis prior of a sequence with increasing evidence above the given one.
-fn ascend_evidence(mut evidence: f64, priors: impl Iterator<Item = AxisPrior>) -> Option<AxisPrior> {
-    let rises =
-        |axis_prior: &AxisPrior| std::mem::replace(&mut evidence, axis_prior.evidence) < axis_prior.evidence;
-    priors.take_while(rises).last()
-}
-
 /// What was known of a unit on a day.
 #[derive(Clone, Copy)]
 struct TrainingUnit<'a> {
     flights: &'a [Flight],
     maintenance: &'a [MaintenanceEvent],
-}
-
-impl<'a> TrainingUnit<'a> {
-    fn on(series: &'a Series, as_of_us: i64) -> Self {
-        Self { flights: series.flights_until(as_of_us), maintenance: series.maintenance_until(as_of_us) }
-    }
 }
 
 /// Units in an order that does not depend on the input; of a large fleet an even sample.
@@ -205,30 +195,15 @@ impl AxisPrior {
         Some(Self { histories, assumed, learned, evidence: f64::NEG_INFINITY }.em_iterate(executor))
     }
 
-    /// The same with another noise of wear.
-    fn with_wear_noise(&self, factor: f64) -> Self {
-        let mut axis_prior = self.clone();
-        axis_prior.assumed.wear_noise_m *= factor;
-        axis_prior.learned.wear_noise_m *= factor;
-        axis_prior
-    }
-
-    /// The same with the noise of wear that has most evidence, which first rises with it and then falls.
+    /// The same with the noise of wear that has most evidence.
     fn with_likeliest_wear_noise(&self, executor: &impl Executor) -> Self {
-        let of = |factor: &f64| self.with_wear_noise(*factor).em_iterate(executor);
-        let assumed = of(&1.0);
-        let up = MORE_WEAR_NOISE.iter().map(of);
-        let less = || Some(of(&LESS_WEAR_NOISE)).filter(|less| less.evidence > assumed.evidence);
-        match ascend_evidence(assumed.evidence, up) {
-            Some(more) => more,
-            None => less().unwrap_or(assumed),
-        }
-    }
-
-    /// What was learned, with what its own forecasts of the fleet's past were worth.
-    fn with_calibration(self, executor: &impl Executor) -> FleetPrior {
-        let calibration = learn_calibration(&segments(&self.histories), &self.learned, executor);
-        FleetPrior { calibration, ..self.learned }
+        let of = |factor: f64| {
+            let mut axis_prior = self.clone();
+            axis_prior.assumed.wear_noise_m *= factor;
+            axis_prior.learned.wear_noise_m *= factor;
+            axis_prior.em_iterate(executor)
+        };
+        argmax_evidence(WEAR_NOISES.into_iter().map(of)).unwrap_or_else(|| self.clone())
     }
 
     /// Assesses every segment with the current prior and learns it again, by expectation–maximisation.
@@ -241,8 +216,7 @@ impl AxisPrior {
             executor.map(&segments(&self.histories), fitted).into_iter().flatten().collect();
         let round = |current: FleetPrior, _| step(&self.assumed, &self.learned, &current, &units);
         let learned = (0..ROUNDS).fold(self.learned.clone(), round);
-        let ratio = ImportanceRatio::new(&self.learned, &learned);
-        let change = |unit: &Posterior| ratio.weights(&unit.components).iter().sum::<f64>().ln();
+        let change = |unit: &Posterior| weights(unit, &self.learned, &learned).iter().sum::<f64>().ln();
         let evidence = units.iter().map(|unit| unit.log_evidence + change(unit)).sum();
         Self { learned, evidence, ..self }
     }
@@ -266,7 +240,6 @@ fn bias(histories: &[History], assumed_m: f64, limit_m: f64) -> f64 {
 /// One round: weights by `current` for units assessed with `base`, moments by weights, and `assumed` as the
 /// pseudo-units that keep a small fleet sane.
 fn step(assumed: &FleetPrior, base: &FleetPrior, current: &FleetPrior, units: &[Posterior]) -> FleetPrior {
-    let ratio = ImportanceRatio::new(base, current);
     let mut shares = assumed.shares.map(|share| share * PSEUDO_UNITS);
     let mut life = WeightedMoments::assumed(assumed.ln_life, assumed.ln_life_sd);
     let mut new = WeightedMoments::assumed(assumed.new_m, assumed.new_sd_m);
@@ -274,10 +247,10 @@ fn step(assumed: &FleetPrior, base: &FleetPrior, current: &FleetPrior, units: &[
         (PSEUDO_LIVES * assumed.fresh_share, PSEUDO_LIVES * (1.0 - assumed.fresh_share));
     let (mut onsets, mut waited_hours) = (1.0, assumed.onsets_per_hour.recip());
     for unit in units {
-        let weights = ratio.weights(&unit.components);
+        let weights = weights(unit, base, current);
         let total: f64 = weights.iter().sum();
         for (component, weight) in unit.components.iter().zip(weights.into_iter().map(|w| w / total)) {
-            shares[family(component)] += weight;
+            shares[component.family()] += weight;
             if component.law != WearLaw::None {
                 life.add(component.ln_life, weight);
             }
@@ -310,58 +283,10 @@ fn step(assumed: &FleetPrior, base: &FleetPrior, current: &FleetPrior, units: &[
     }
 }
 
-/// The family whose share a node counts for: one that waits will have an onset.
-fn family(component: &Component) -> usize {
-    if component.onset_pending {
-        WearLaw::Onset { start: component.age_now }.family()
-    } else {
-        component.law.family()
-    }
-}
-
-/// How one prior's weights follow from another's.
-struct ImportanceRatio<'a> {
-    base: &'a FleetPrior,
-    current: &'a FleetPrior,
-    shares: [f64; FAMILIES],
-    life: f64,
-    onset: f64,
-}
-
-impl<'a> ImportanceRatio<'a> {
-    fn new(base: &'a FleetPrior, current: &'a FleetPrior) -> Self {
-        let mut shares = current.shares;
-        for (share, base) in shares.iter_mut().zip(&base.shares) {
-            *share = (*share / base).ln();
-        }
-        let life = (base.ln_life_sd / current.ln_life_sd).ln();
-        let onset = (current.onsets_per_hour / base.onsets_per_hour).ln();
-        Self { base, current, shares, life, onset }
-    }
-
-    /// Weights under the current prior of nodes weighted under the base; they need not add up to one.
-    fn weights(&self, components: &[Component]) -> Vec<f64> {
-        components.iter().map(|component| component.weight * self.log(component).exp()).collect()
-    }
-
-    fn log(&self, component: &Component) -> f64 {
-        let mut log = self.shares[family(component)];
-        if component.law != WearLaw::None {
-            let square = |p: &FleetPrior| ((component.ln_life - p.ln_life) / p.ln_life_sd).powi(2);
-            log += self.life - 0.5 * (square(self.current) - square(self.base));
-        }
-        log += match component.age_assumption {
-            AgeAssumption::Fresh => (self.current.fresh_share / self.base.fresh_share).ln(),
-            AgeAssumption::Worn => ((1.0 - self.current.fresh_share) / (1.0 - self.base.fresh_share)).ln(),
-            AgeAssumption::NotNeeded => 0.0,
-        };
-        let sooner = self.current.onsets_per_hour - self.base.onsets_per_hour;
-        match component.law {
-            WearLaw::Onset { start } => log + self.onset - sooner * start,
-            _ if component.onset_pending => log - sooner * component.age_now,
-            _ => log,
-        }
-    }
+/// Weights under the current prior of components weighted under the base; they need not add up to one.
+fn weights(unit: &Posterior, base: &FleetPrior, current: &FleetPrior) -> Vec<f64> {
+    let (before, now) = (base.logs(), current.logs());
+    unit.components.iter().map(|n| n.weight * (now.of(n) - before.of(n)).exp()).collect()
 }
 
 /// Weighted mean and spread.

@@ -1,0 +1,205 @@
+//! Scatter of a unit's values from flight to flight, which neither a step nor wear enters, and which values are outliers.
+//!
+//! One estimator for gaps and for all other quantities.
+
+use crate::math::median::{SD_OVER_MAD, median};
+
+/// Flights of a batch whose means show a scatter that neighbours share.
+const BATCH: usize = 8;
+
+/// Batches that the assumption of the inflation counts for, and its largest value: beyond it, what neighbours share is a
+/// change, not scatter.
+const PRIOR_BATCHES: f64 = 5.0;
+const MAX_INFLATION: f64 = 8.0;
+
+/// Standard errors of a variance by the median of as many normal deviates, times the root of their number: two of 1.17 √2.
+const CERTAIN: f64 = 3.3;
+
+/// Values up to which a jump among them may pass for noise where stated errors count, and the most that they are believed.
+const FEW: usize = 9;
+const MOST_OF_FEW: f64 = 4.0;
+
+/// Second differences are taken for the noise where they show so much less of it: the rate changes.
+const CHANGING_RATE: f64 = 0.7;
+
+/// Neighbours on each side by which an outlier is judged, and how many of them must agree with it.
+const NEIGHBOURS: usize = 3;
+const AGREEING: usize = 2;
+
+/// Neighbours on each side that show the rate of fast wear.
+const RATE_NEIGHBOURS: usize = 5;
+
+/// What is assumed of standard errors.
+pub(crate) struct Assumed {
+    /// The least and the largest.
+    pub(crate) least: f64,
+    pub(crate) largest: f64,
+    /// The error where not one is stated.
+    pub(crate) unstated: f64,
+    /// Differences that the stated errors count for.
+    pub(crate) differences: f64,
+}
+
+/// Standard errors of some values in order.
+#[derive(Debug, Clone)]
+pub(crate) struct Noise {
+    /// Standard errors with the scatter that was found.
+    pub(crate) errors: Vec<f64>,
+    /// Variance found over variance stated.
+    pub(crate) factor: f64,
+}
+
+impl Noise {
+    /// Rescales stated standard errors by the variance factor from successive differences (von Neumann 1941, with
+    /// medians), (1.4826 · median |y(k+1) − y(k)| / √(se(k)² + se(k+1)²))².
+    ///
+    /// Where no error is stated (not a number, or zero), it is the median one. No error is less than half the median
+    /// one: an unknown scatter between flights bounds the weight of a single flight.
+    pub(crate) fn of(values: &[f64], stated: &[f64], assumed: &Assumed) -> Self {
+        let is_stated = |error: &f64| error.is_finite() && *error > 0.0;
+        let mut known: Vec<f64> = stated.iter().copied().filter(is_stated).collect();
+        let typical = median(&mut known).unwrap_or(assumed.unstated);
+        let error = |stated: &f64| {
+            let error = if is_stated(stated) { stated.max(0.5 * typical) } else { typical };
+            error.clamp(assumed.least, assumed.largest)
+        };
+        let mut errors: Vec<f64> = stated.iter().map(error).collect();
+        let factor = factor(values, &errors, assumed.differences);
+        errors.iter_mut().for_each(|error| *error = (factor.sqrt() * *error).max(assumed.least));
+        Self { errors, factor }
+    }
+
+    /// Whether each value agrees with at least two of its nearest neighbours, as it is or along the rate around it: it
+    /// differs by at most so many standard deviations.
+    ///
+    /// The flights after a step agree with each other from the third on.
+    pub(crate) fn are_sound(&self, values: &[f64], sds: f64) -> Vec<bool> {
+        let agreeing = |at: usize, rate: f64| {
+            let near = at.saturating_sub(NEIGHBOURS)..(at + 1 + NEIGHBOURS).min(values.len());
+            let agrees = |other: &usize| {
+                let moved = values[at] - values[*other] - rate * (at as f64 - *other as f64);
+                let variance = self.errors[at].powi(2) + self.errors[*other].powi(2);
+                moved * moved <= sds * sds * variance
+            };
+            near.filter(|other| *other != at && agrees(other)).count()
+        };
+        let is_sound = |at: usize| {
+            values.len() <= AGREEING
+                || agreeing(at, 0.0) >= AGREEING
+                || agreeing(at, local_rate(values, at)) >= AGREEING
+        };
+        (0..values.len()).map(is_sound).collect()
+    }
+}
+
+/// Factor of the variance of a mean of many values, because neighbouring flights share errors; at least one. Of
+/// values without outliers.
+///
+/// `usual` is assumed before any batch is seen.
+pub(crate) fn inflation(values: &[f64], errors: &[f64], usual: f64) -> f64 {
+    let (means, errors) = batches(values, errors);
+    let (found, seen) = (first_differences(&means, &errors, false).unwrap_or(0.0), comparisons(&means));
+    ((seen * found + PRIOR_BATCHES * usual) / (seen + PRIOR_BATCHES)).clamp(1.0, MAX_INFLATION)
+}
+
+/// The same as far as it is beyond the chance of a few batches.
+pub(crate) fn certain_inflation(values: &[f64], errors: &[f64]) -> f64 {
+    let (means, errors) = batches(values, errors);
+    let (found, seen) = (successive(&means, &errors).unwrap_or(0.0), comparisons(&means));
+    (found / (1.0 + CERTAIN / seen.sqrt())).clamp(1.0, MAX_INFLATION)
+}
+
+/// Means of successive batches, with the errors that independent flights would give.
+fn batches(values: &[f64], errors: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let mean = |(values, errors): (&[f64], &[f64])| {
+        let weight: f64 = errors.iter().map(|error| error.powi(-2)).sum();
+        let sum: f64 = values.iter().zip(errors).map(|(value, error)| value * error.powi(-2)).sum();
+        (sum / weight, weight.recip().sqrt())
+    };
+    values.chunks_exact(BATCH).zip(errors.chunks_exact(BATCH)).map(mean).unzip()
+}
+
+fn comparisons(means: &[f64]) -> f64 {
+    means.len().saturating_sub(1) as f64
+}
+
+/// Found over stated variance from successive differences, drawn to one while they are few.
+fn factor(values: &[f64], errors: &[f64], prior: f64) -> f64 {
+    // Values without trusted errors hold no wear whose rate could change: the larger estimate is the safer one.
+    let found =
+        if prior > 0.0 { successive(values, errors) } else { first_differences(values, errors, false) };
+    let Some(mut found) = found else { return 1.0 };
+    let count = values.len() as f64 - 1.0;
+    if values.len() <= FEW && prior > 0.0 {
+        found = found.min(MOST_OF_FEW);
+    }
+    // A common factor of the stated errors is limited; exactly repeating values carry no information about it.
+    let stated = if found > 0.0 { (100.0 * found).min(1.0) } else { 1.0 };
+    ((found * count + prior * stated) / (count + prior)).max(0.05 * stated)
+}
+
+/// Found over stated variance from successive differences, or from second ones where the rate changes; none of a single
+/// value.
+fn successive(values: &[f64], errors: &[f64]) -> Option<f64> {
+    let found = first_differences(values, errors, true)?;
+    let windows = values.array_windows().zip(errors.array_windows());
+    let bend = |([a, b, c], [ea, eb, ec]): (&[f64; 3], &[f64; 3])| {
+        (a - 2.0 * b + c).abs() / (ea * ea + 4.0 * eb * eb + ec * ec).sqrt()
+    };
+    let bent =
+        median(&mut windows.map(bend).collect::<Vec<f64>>()).map(|middle| (SD_OVER_MAD * middle).powi(2));
+    Some(bent.filter(|bent| *bent < CHANGING_RATE * found).unwrap_or(found))
+}
+
+/// The same from first differences, less their median where they are centred: wear that shows from one flight to the next is no noise, it moves all
+/// differences equally.
+fn first_differences(values: &[f64], errors: &[f64], is_centred: bool) -> Option<f64> {
+    let windows = values.array_windows().zip(errors.array_windows());
+    let mut ratios: Vec<f64> = windows.map(|([a, b], [ea, eb])| (b - a) / ea.hypot(*eb)).collect();
+    let middle = if is_centred { median(&mut ratios)? } else { 0.0 };
+    ratios.iter_mut().for_each(|ratio| *ratio = (*ratio - middle).abs());
+    Some((SD_OVER_MAD * median(&mut ratios)?).powi(2))
+}
+
+/// Change from one flight to the next around a value: the median of pairwise slopes (Theil 1950) of near flights, few of
+/// which lie on both sides of a step.
+fn local_rate(values: &[f64], at: usize) -> f64 {
+    let near = &values[at.saturating_sub(RATE_NEIGHBOURS)..(at + 1 + RATE_NEIGHBOURS).min(values.len())];
+    let apart = |k: usize| near.iter().zip(&near[k..]).map(move |(a, b)| (b - a) / k as f64);
+    let mut slopes: Vec<f64> = (1..=NEIGHBOURS.min(near.len() - 1)).flat_map(apart).collect();
+    median(&mut slopes).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three micrometres a flight at a third of one of noise: wear, all of it.
+    #[test]
+    fn a_unit_that_wears_fast_is_no_row_of_outliers() {
+        const WIGGLE: [f64; 10] = [0.2, -0.3, 0.1, 0.3, -0.2, 0.0, -0.1, 0.3, -0.3, 0.1];
+        let values: Vec<f64> =
+            (0..10).map(|k| 60.0 + 3.0 * f64::from(k) + WIGGLE[k as usize * 7 % 10]).collect();
+        let noise = Noise::of(
+            &values,
+            &[0.3; 10],
+            &Assumed { least: 1e-3, largest: 1e6, unstated: 1.0, differences: 4.0 },
+        );
+        assert!(noise.are_sound(&values, 3.0).into_iter().all(|is_sound| is_sound));
+        assert!(noise.factor < 3.0, "{}", noise.factor);
+    }
+
+    /// Eight neighbours share one normal error of the stated size: a batch mean varies by 1, not by 1/8.
+    #[test]
+    fn errors_that_neighbours_share_inflate_the_variance_of_means() {
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let errors: Vec<f64> = (0..8000).map(|_| (0..12).map(|_| uniform()).sum::<f64>() - 6.0).collect();
+        let shared: Vec<f64> = (0..8000).map(|k| errors[k / BATCH]).collect();
+        let found = |values: &[f64]| certain_inflation(values, &vec![1.0; values.len()]);
+        assert!(found(&shared) > 4.0 && found(&errors) < 1.1, "{} {}", found(&shared), found(&errors));
+    }
+}
