@@ -18,7 +18,7 @@ fn an_interrupted_run_exits_with_130_and_the_next_one_finishes() {
     let fleet = TestFleet::sample();
     let mut child =
         fleet.command(&["run", "--jobs", "1"]).stdout(std::process::Stdio::piped()).spawn().unwrap();
-    let entry = fleet.path("results/gaps/_delta_log/00000000000000000001.json");
+    let entry = fleet.path("results/runs/_delta_log/00000000000000000001.json");
     wait_until(|| entry.exists() || child.try_wait().unwrap().is_some());
     interrupt(&child);
     let output = child.wait_with_output().unwrap();
@@ -35,7 +35,7 @@ fn an_interrupted_run_exits_with_130_and_the_next_one_finishes() {
 fn an_interrupt_is_answered_within_a_second() {
     let fleet = TestFleet::sample();
     let mut child = fleet.command(&["run", "--jobs", "1", "--no-progress"]).stdout(null()).spawn().unwrap();
-    let entry = fleet.path("results/gaps/_delta_log/00000000000000000001.json");
+    let entry = fleet.path("results/runs/_delta_log/00000000000000000001.json");
     wait_until(|| entry.exists() || child.try_wait().unwrap().is_some());
     let struck = std::time::Instant::now();
     interrupt(&child);
