@@ -159,7 +159,7 @@ fn stream(bencher: Bencher, start: fn(&Filter) -> Stream, restart_each: usize) {
         for (dx_m, load_n) in dx_m.chunks(restart_each).zip(load_n.chunks(restart_each)) {
             stream.restart();
             for (y, u) in dx_m.iter().zip(load_n) {
-                sum_m += stream.push(*y, *u).unwrap();
+                sum_m += stream.push(*y, *u).unwrap().s_m();
             }
         }
         sum_m
