@@ -236,12 +236,12 @@ impl Filter {
     }
 }
 
-/// The largest difference of two covariances. Entries are of several units; each is held against the
+/// The largest difference of two symmetric covariances. Entries are of several units; each is held against the
 /// spread of its own two states.
 pub(crate) fn distance(p: &Matrix3<f64>, other: &Matrix3<f64>) -> f64 {
     let entry =
         |i: usize, j: usize| (p[(i, j)] - other[(i, j)]).abs() / ComplexField::sqrt(p[(i, i)] * p[(j, j)]);
-    (0..9).map(|k| entry(k / 3, k % 3)).fold(0.0, f64::max)
+    [(0, 0), (1, 1), (2, 2), (1, 0), (2, 0), (2, 1)].map(|(i, j)| entry(i, j)).into_iter().fold(0.0, f64::max)
 }
 
 /// Whether no variance is negative by more than rounding of the variances before.

@@ -161,7 +161,10 @@ impl Stream {
     /// The settled gain and the x(k+1/k) it is applied to, while it is.
     #[inline]
     fn settled_state(&self) -> Option<(SteadyGain, Vector3<f64>)> {
-        self.steady.zip(self.prior).filter(|_| self.settled).map(|(steady, prior)| (steady, prior.x))
+        if !self.settled {
+            return None;
+        }
+        self.steady.zip(self.prior.map(|prior| prior.x))
     }
 
     #[inline]
