@@ -37,7 +37,7 @@ impl Monitor {
 
     /// One sample: positions at the screw axis, m, and the load, N. Returns S, m.
     fn step(&mut self, motor_m: f64, screw_m: f64, load_n: f64) -> Result<f64, Error> {
-        let s_m = self.stream.push(screw_m - motor_m, load_n)?;
+        let s_m = self.stream.push(screw_m - motor_m, load_n)?.s_m();
         self.gap.push(s_m);
         Ok(s_m)
     }

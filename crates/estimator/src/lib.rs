@@ -28,7 +28,7 @@ pub use error::Error;
 #[cfg(feature = "std")]
 pub use gap::midrange::{self, MidRangeEstimate};
 pub use gap::{BoundedGap, GapStatistic, StreamingGap};
-pub use kalman::{Filter, FilterStep, InitialVariances, KalmanState, Stream};
+pub use kalman::{Filter, FilterStep, InitialVariances, KalmanState, Stream, StreamStep};
 #[cfg(feature = "std")]
 pub use kalman::{FilterOutput, FilterWorkspace, GainSchedule, InnovationBuffers, Nis};
 pub use model::{ActuatorModel, DiscreteModel, NoiseCovariances, NoiseModel, SensorNoise};

@@ -105,10 +105,8 @@ fn relative_motion(
         stream.restart();
         for k in segment.clone() {
             let pushed = stream.push(channels.dx_m[k], channels.load_n[k]);
-            pushed.map_err(|e| Diagnostic::new("estimate_failed", e))?;
-            if let Some(state) = stream.estimate() {
-                (motion[0][k], motion[1][k]) = (state.x[0], state.x[1]);
-            }
+            let step = pushed.map_err(|e| Diagnostic::new("estimate_failed", e))?;
+            (motion[0][k], motion[1][k]) = (step.x[0], step.x[1]);
         }
     }
     Ok(motion)

@@ -49,7 +49,7 @@ fn follows(mut stream: Stream, wrong: bool) -> Result<bool, Error> {
     let (mut peak_m, mut worst_m) = (0.0_f64, 0.0_f64);
     for (k, ((y_m, load_n), wanted_m)) in POSITION_M.iter().zip(LOAD_N).zip(S_M).enumerate() {
         let error_m = if wrong && k == WRONG.0 { WRONG.1 } else { 0.0 };
-        let s_m = stream.push(y_m + error_m, load_n)?;
+        let s_m = stream.push(y_m + error_m, load_n)?.s_m();
         gap.push(s_m);
         (peak_m, worst_m) = (peak_m.max(wanted_m.abs()), worst_m.max((s_m - wanted_m).abs()));
     }

@@ -88,7 +88,7 @@ fn filter() -> Result<Filter, Error> {
 /// One sample; a function of its own, so that its stack is seen.
 #[inline(never)]
 fn step(stream: &mut Stream, y_m: f64, load_n: f64) -> Result<f64, Error> {
-    stream.push(y_m, load_n)
+    Ok(stream.push(y_m, load_n)?.s_m())
 }
 
 /// Takes a sample at each tick of 1 kHz; whether S is the reference's.

@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use crate::simd::dispatch::{pad_with_nan, simd_dispatch};
+use multiversion::multiversion;
+
+use crate::simd::pad_with_nan;
 
 /// A load counts as being on a side beyond this share of its greater quantile, so noise about zero is no reversal.
 const SIDE_SHARE: f64 = 0.12;
@@ -50,23 +52,22 @@ fn reversals(load_n: &[f64], threshold_n: f64) -> usize {
     changes
 }
 
-simd_dispatch! {
-    /// Number of blocks from here on that stay on one side, or between the two sides.
-    fn run_length_on_side(load_n: &[f64], side: f64) -> usize {
-        let (blocks, _) = load_n.as_chunks::<BLOCK>();
-        let mut count = 0;
-        for block in blocks {
-            let mut against = 0_u64;
-            for f in block {
-                against += u64::from(f * side < 0.0);
-            }
-            if side == 0.0 || against != 0 {
-                return count;
-            }
-            count += 1;
+/// Number of blocks from here on that stay on one side, or between the two sides.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn run_length_on_side(load_n: &[f64], side: f64) -> usize {
+    let (blocks, _) = load_n.as_chunks::<BLOCK>();
+    let mut count = 0;
+    for block in blocks {
+        let mut against = 0_u64;
+        for f in block {
+            against += u64::from(f * side < 0.0);
         }
-        count
+        if side == 0.0 || against != 0 {
+            return count;
+        }
+        count += 1;
     }
+    count
 }
 
 /// Loads that brackets are laid by.
@@ -106,21 +107,20 @@ pub(crate) fn quantiles<const N: usize>(
     if found.iter().all(Option::is_some) { Some(found.map(Option::unwrap_or_default)) } else { in_order() }
 }
 
-simd_dispatch! {
-    /// Shows loads to all brackets, and counts those that are there.
-    fn count_into_brackets<const N: usize>(load_n: &[f64], brackets: &mut [QuantileBracket; N]) -> usize {
-        let (blocks, rest) = load_n.as_chunks::<BLOCK>();
-        let mut there = 0_u64;
-        for block in blocks.iter().chain([&pad_with_nan(rest)]) {
-            for f in block {
-                there += u64::from(!f.is_nan());
-            }
-            for bracket in brackets.iter_mut() {
-                bracket.take(block);
-            }
+/// Shows loads to all brackets, and counts those that are there.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn count_into_brackets<const N: usize>(load_n: &[f64], brackets: &mut [QuantileBracket; N]) -> usize {
+    let (blocks, rest) = load_n.as_chunks::<BLOCK>();
+    let mut there = 0_u64;
+    for block in blocks.iter().chain([&pad_with_nan(rest)]) {
+        for f in block {
+            there += u64::from(!f.is_nan());
         }
-        there as usize
+        for bracket in brackets.iter_mut() {
+            bracket.take(block);
+        }
     }
+    there as usize
 }
 
 /// Where a share of the order lies, counted from zero to the last.
@@ -147,7 +147,7 @@ impl QuantileBracket {
     }
 
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+    #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
     fn take(&mut self, block: &[f64; BLOCK]) {
         let (mut below, mut not_above) = (0_u64, 0_u64);
         for &f in block {

@@ -3,9 +3,8 @@
 use crate::error::Error;
 use crate::gap::load_band::{self, LoadBand};
 use crate::gap::statistic::{self, GapStatistic};
-use crate::kalman::batch::FilterWorkspace;
+use crate::kalman::batch::{FilterWorkspace, GainSchedule};
 use crate::kalman::filter::Filter;
-use crate::kalman::gain_schedule::GainSchedule;
 use crate::kalman::nis::Nis;
 use crate::samples::Samples;
 

@@ -1,7 +1,10 @@
 //! The gap statistic (equations 29–31).
 
+#[cfg(feature = "std")]
+use multiversion::multiversion;
+
 use crate::error::Error;
-use crate::simd::dispatch::{pad_with_nan, simd_dispatch};
+use crate::simd::pad_with_nan;
 
 /// ΔS and what it is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,24 +67,23 @@ pub fn mid_range(s_m: &[f64]) -> Result<GapStatistic, Error> {
 /// part of the number: sample k belongs to chain k mod 8, and the chains are added up in their order.
 const CHAINS: usize = 8;
 
-simd_dispatch! {
-    /// Samples at or above a level and below it, by chains: the sums of what they differ from it, m, and how many
-    /// they are. NaN is neither.
-    fn halves(s_m: &[f64], level_m: f64) -> ([[f64; CHAINS]; 2], [[u64; CHAINS]; 2]) {
-        let ([mut upper_m, mut lower_m], mut counts) = ([[0.0; CHAINS]; 2], [[0; CHAINS]; 2]);
-        let (eights, rest) = s_m.as_chunks::<CHAINS>();
-        for eight in eights.iter().chain([&pad_with_nan(rest)]) {
-            for (chain, &s) in eight.iter().enumerate() {
-                // Both sums at every sample, of which at least one is of nothing: no branch to guess.
-                let (is_upper, is_lower) = (s >= level_m, s < level_m);
-                upper_m[chain] += if is_upper { s - level_m } else { 0.0 };
-                lower_m[chain] += if is_lower { s - level_m } else { 0.0 };
-                counts[0][chain] += u64::from(is_upper);
-                counts[1][chain] += u64::from(is_lower);
-            }
+/// Samples at or above a level and below it, by chains: the sums of what they differ from it, m, and how many
+/// they are. NaN is neither.
+#[cfg_attr(feature = "std", multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2")))]
+fn halves(s_m: &[f64], level_m: f64) -> ([[f64; CHAINS]; 2], [[u64; CHAINS]; 2]) {
+    let ([mut upper_m, mut lower_m], mut counts) = ([[0.0; CHAINS]; 2], [[0; CHAINS]; 2]);
+    let (eights, rest) = s_m.as_chunks::<CHAINS>();
+    for eight in eights.iter().chain([&pad_with_nan(rest)]) {
+        for (chain, &s) in eight.iter().enumerate() {
+            // Both sums at every sample, of which at least one is of nothing: no branch to guess.
+            let (is_upper, is_lower) = (s >= level_m, s < level_m);
+            upper_m[chain] += if is_upper { s - level_m } else { 0.0 };
+            lower_m[chain] += if is_lower { s - level_m } else { 0.0 };
+            counts[0][chain] += u64::from(is_upper);
+            counts[1][chain] += u64::from(is_lower);
         }
-        ([upper_m, lower_m], counts)
     }
+    ([upper_m, lower_m], counts)
 }
 
 /// Least and greatest; the wrong way round where there is no sample.
@@ -90,17 +92,16 @@ fn range(s_m: &[f64]) -> (f64, f64) {
     (least.into_iter().fold(f64::INFINITY, f64::min), greatest.into_iter().fold(f64::NEG_INFINITY, f64::max))
 }
 
-simd_dispatch! {
-    /// Least and greatest of each chain.
-    pub(crate) fn extremes(s_m: &[f64]) -> ([f64; CHAINS], [f64; CHAINS]) {
-        let (mut least, mut greatest) = ([f64::INFINITY; CHAINS], [f64::NEG_INFINITY; CHAINS]);
-        let (eights, rest) = s_m.as_chunks::<CHAINS>();
-        for eight in eights.iter().chain([&pad_with_nan(rest)]) {
-            for (chain, &s) in eight.iter().enumerate() {
-                least[chain] = if s < least[chain] { s } else { least[chain] };
-                greatest[chain] = if s > greatest[chain] { s } else { greatest[chain] };
-            }
+/// Least and greatest of each chain.
+#[cfg_attr(feature = "std", multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2")))]
+pub(crate) fn extremes(s_m: &[f64]) -> ([f64; CHAINS], [f64; CHAINS]) {
+    let (mut least, mut greatest) = ([f64::INFINITY; CHAINS], [f64::NEG_INFINITY; CHAINS]);
+    let (eights, rest) = s_m.as_chunks::<CHAINS>();
+    for eight in eights.iter().chain([&pad_with_nan(rest)]) {
+        for (chain, &s) in eight.iter().enumerate() {
+            least[chain] = if s < least[chain] { s } else { least[chain] };
+            greatest[chain] = if s > greatest[chain] { s } else { greatest[chain] };
         }
-        (least, greatest)
     }
+    (least, greatest)
 }

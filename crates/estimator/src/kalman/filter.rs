@@ -211,46 +211,37 @@ impl Filter {
     /// # Errors
     /// As [`Filter::steady_state_gain`].
     pub fn bandwidth_hz(&self) -> Result<f64, Error> {
-        Ok(self.bandwidth_at_hz(self.spectral_radius()?))
-    }
-
-    /// The bandwidth that belongs to a spectral radius, Hz.
-    pub(crate) fn bandwidth_at_hz(&self, radius: f64) -> f64 {
-        -ComplexField::ln(radius) / (core::f64::consts::TAU * self.step_s)
+        Ok(-ComplexField::ln(self.spectral_radius()?) / (core::f64::consts::TAU * self.step_s))
     }
 
     /// Spectral radius ρ of (I − K C) A_d, no unit: an initial-state error decays by this factor per step
-    /// (error dynamics of 24 and 27).
+    /// (error dynamics of 24 and 27). Infinite where the eigenvalues cannot be found.
     ///
     /// # Errors
     /// As [`Filter::steady_state_gain`].
     pub fn spectral_radius(&self) -> Result<f64, Error> {
-        Ok(self.radius_at(&self.steady_state_gain()?.0))
-    }
-
-    /// ρ at a gain; infinite where the eigenvalues cannot be found.
-    pub(crate) fn radius_at(&self, gain: &Vector3<f64>) -> f64 {
         // Without a bound the iteration never ends on matrices that are not finite, or barely so.
         const MAX_ITERATIONS: usize = 1000;
+        let (gain, _) = self.steady_state_gain()?;
         let mut keep = Matrix3::<f64>::identity();
         for row in 0..3 {
             keep[(row, 0)] -= gain[row];
         }
         let error = keep * self.discrete.a_d;
         let schur = nalgebra::Schur::try_new(error, f64::EPSILON, MAX_ITERATIONS);
-        match schur.filter(|_| error.iter().all(|entry: &f64| f64::is_finite(*entry))) {
-            Some(schur) => schur.complex_eigenvalues().iter().map(|pole| pole.modulus()).fold(0.0, f64::max),
-            None => f64::INFINITY,
-        }
+        let schur = schur.filter(|_| error.iter().all(|entry: &f64| f64::is_finite(*entry)));
+        Ok(schur.map_or(f64::INFINITY, |schur| {
+            schur.complex_eigenvalues().iter().map(|pole| pole.modulus()).fold(0.0, f64::max)
+        }))
     }
 }
 
-/// The largest difference of two covariances. Entries are of several units; each is held against the
+/// The largest difference of two symmetric covariances. Entries are of several units; each is held against the
 /// spread of its own two states.
 pub(crate) fn distance(p: &Matrix3<f64>, other: &Matrix3<f64>) -> f64 {
     let entry =
         |i: usize, j: usize| (p[(i, j)] - other[(i, j)]).abs() / ComplexField::sqrt(p[(i, i)] * p[(j, j)]);
-    (0..9).map(|k| entry(k / 3, k % 3)).fold(0.0, f64::max)
+    [(0, 0), (1, 1), (2, 2), (1, 0), (2, 0), (2, 1)].map(|(i, j)| entry(i, j)).into_iter().fold(0.0, f64::max)
 }
 
 /// Whether no variance is negative by more than rounding of the variances before.

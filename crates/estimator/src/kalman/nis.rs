@@ -1,9 +1,12 @@
 //! Mean normalised innovation squared, with its standard error from blocks.
 
-/// Samples of a block outside the eight parts of a long run.
-pub(crate) const BLOCK_SAMPLES: usize = 512;
+use crate::error::Error;
+
+/// Samples of a block: an eighth of the flight within these bounds. Neighbouring blocks of a short one are coupled.
+const SHORTEST_BLOCK: usize = 512;
+const LONGEST_BLOCK: usize = 2048;
 /// Fewer blocks give no standard error.
-const MIN_BLOCKS: f64 = 8.0;
+const MIN_BLOCKS: usize = 8;
 
 /// How well the model explained a flight's measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,48 +22,68 @@ pub struct Nis {
 }
 
 /// Sums over the blocks of a flight: of q, the sum of a block's normalised squares, and of n, its number of samples.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct NisBlocks {
+    /// Samples of a full block.
+    full: usize,
     blocks: f64,
+    sum_q: f64,
+    measured: usize,
     q_q: f64,
     q_n: f64,
     n_n: f64,
+    /// q and n of the block that is not full.
     open: (f64, usize),
 }
 
 impl NisBlocks {
-    /// Adds a block.
-    pub(crate) fn add(&mut self, q: f64, samples: usize) {
+    /// No sample yet, of a flight of so many samples.
+    pub(crate) fn new(samples: usize) -> Self {
+        let full = (samples / MIN_BLOCKS).clamp(SHORTEST_BLOCK, LONGEST_BLOCK);
+        Self { full, blocks: 0.0, sum_q: 0.0, measured: 0, q_q: 0.0, q_n: 0.0, n_n: 0.0, open: (0.0, 0) }
+    }
+
+    /// Adds one innovation, m, by its variance, m²; a missing one (NaN) is skipped.
+    #[inline]
+    pub(crate) fn add_sample(&mut self, innovation_m: f64, variance_m2: f64) {
+        if !innovation_m.is_nan() {
+            self.open.0 += innovation_m * innovation_m / variance_m2;
+            self.open.1 += 1;
+            if self.open.1 == self.full {
+                self.close();
+            }
+        }
+    }
+
+    fn close(&mut self) {
+        let (q, samples) = std::mem::take(&mut self.open);
         if samples > 0 {
             let n = samples as f64;
             self.blocks += 1.0;
+            self.sum_q += q;
+            self.measured += samples;
             self.q_q += q * q;
             self.q_n += q * n;
             self.n_n += n * n;
         }
     }
 
-    /// Adds one sample, to a block that closes when it is full.
-    pub(crate) fn add_sample(&mut self, square: f64) {
-        let (q, samples) = &mut self.open;
-        *q += square;
-        *samples += 1;
-        if *samples == BLOCK_SAMPLES {
-            let (q, samples) = std::mem::take(&mut self.open);
-            self.add(q, samples);
-        }
-    }
-
     /// The mean of all samples, with its standard error: √(B/(B−1) Σ(q − mean·n)²) / Σn.
-    pub(crate) fn finish(mut self, sum: f64, measured: usize) -> Nis {
-        let (q, samples) = std::mem::take(&mut self.open);
-        self.add(q, samples);
-        let mean = sum / measured as f64;
+    ///
+    /// # Errors
+    /// [`Error::NothingMeasured`] without a sample.
+    pub(crate) fn finish(mut self) -> Result<Nis, Error> {
+        self.close();
+        if self.measured == 0 {
+            return Err(Error::NothingMeasured);
+        }
+        let (measured, count) = (self.measured, self.measured as f64);
+        let mean = self.sum_q / count;
         let scatter = (self.q_q - 2.0 * mean * self.q_n + mean * mean * self.n_n).max(0.0);
-        let standard_error = (self.blocks >= MIN_BLOCKS)
-            .then(|| (self.blocks / (self.blocks - 1.0) * scatter).sqrt() / measured as f64)
+        let standard_error = (self.blocks >= MIN_BLOCKS as f64)
+            .then(|| (self.blocks / (self.blocks - 1.0) * scatter).sqrt() / count)
             .filter(|se| se.is_finite());
-        Nis { mean, standard_error, measured }
+        Ok(Nis { mean, standard_error, measured })
     }
 }
 
@@ -69,17 +92,21 @@ impl NisBlocks {
 mod tests {
     use super::*;
 
+    fn of(squares: impl ExactSizeIterator<Item = f64>) -> Nis {
+        let mut blocks = NisBlocks::new(squares.len());
+        squares.for_each(|square| blocks.add_sample(square.sqrt(), 1.0));
+        blocks.finish().unwrap()
+    }
+
     /// Blocks of equal length: the textbook's standard error of a mean.
     #[test]
     fn equal_blocks_give_the_standard_error_of_their_means() {
-        let means = [0.9, 1.3, 1.1, 0.7, 1.0, 1.2, 0.8, 1.4, 1.05];
-        let mut blocks = NisBlocks::default();
-        means.iter().for_each(|mean| blocks.add(mean * 100.0, 100));
-        let found = blocks.finish(means.iter().sum::<f64>() * 100.0, 900);
-        let mean = means.iter().sum::<f64>() / 9.0;
-        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 8.0;
+        let means = [0.9, 1.3, 1.1, 0.7, 1.0, 1.2, 0.8, 1.4];
+        let found = of((0..8 * SHORTEST_BLOCK).map(|k| means[k / SHORTEST_BLOCK]));
+        let mean = means.iter().sum::<f64>() / 8.0;
+        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 7.0;
         assert!((found.mean - mean).abs() < 1e-12);
-        assert!((found.standard_error.unwrap() - (variance / 9.0).sqrt()).abs() < 1e-12);
+        assert!((found.standard_error.unwrap() - (variance / 8.0).sqrt()).abs() < 1e-9);
     }
 
     /// Independent normal innovations: squares of variance 2.
@@ -92,18 +119,14 @@ mod tests {
             let (u, v): (f64, f64) = (random.random(), random.random());
             (-2.0 * (1.0 - u).ln()).sqrt() * (v * std::f64::consts::TAU).cos()
         };
-        let squares: Vec<f64> = (0..200_000).map(|_| normal().powi(2)).collect();
-        let mut blocks = NisBlocks::default();
-        squares.iter().for_each(|square| blocks.add_sample(*square));
-        let found = blocks.finish(squares.iter().sum(), squares.len());
-        let expected = (2.0 / squares.len() as f64).sqrt();
+        let found = of((0..200_000).map(|_| normal().powi(2)));
+        let expected = (2.0 / found.measured as f64).sqrt();
         assert!((found.standard_error.unwrap() / expected - 1.0).abs() < 0.15, "{found:?}");
     }
 
     #[test]
     fn few_blocks_give_none() {
-        let mut blocks = NisBlocks::default();
-        (0..3_000).for_each(|_| blocks.add_sample(1.0));
-        assert_eq!(blocks.finish(3_000.0, 3_000), Nis { mean: 1.0, standard_error: None, measured: 3_000 });
+        assert_eq!(of((0..3_000).map(|_| 1.0)), Nis { mean: 1.0, standard_error: None, measured: 3_000 });
+        assert_eq!(NisBlocks::new(9).finish(), Err(Error::NothingMeasured));
     }
 }

@@ -353,7 +353,7 @@ fn the_initial_variances_are_forgotten() {
     let (mut first_m, mut last_m) = (0.0_f64, 0.0_f64);
     for k in 0..1000 {
         let y_m = if k < 5 { 0.0 } else { 100e-6 };
-        let apart_m = (usual.push(y_m, 0.0).unwrap() - unusual.push(y_m, 0.0).unwrap()).abs();
+        let apart_m = (usual.push(y_m, 0.0).unwrap().s_m() - unusual.push(y_m, 0.0).unwrap().s_m()).abs();
         first_m = if k < 100 { first_m.max(apart_m) } else { first_m };
         last_m = apart_m;
     }

@@ -2,8 +2,10 @@
 
 use std::ops::Range;
 
+use multiversion::multiversion;
+
 use crate::Samples;
-use crate::simd::dispatch::{Lanes, simd_dispatch};
+use crate::simd::Lanes;
 
 use crate::contact::blocks::spikes::SpikeThreshold;
 use crate::contact::codes::Rejection;
@@ -350,25 +352,24 @@ pub(crate) fn is_complete(time_s: f64, dx_m: f64, motor_m: &[f64; 3], load_n: &[
     (time_s > START_S) & (all.abs() < f64::INFINITY)
 }
 
-simd_dispatch! {
-    /// The furthest that a value lies from the one before it; a missing one lies nowhere.
-    fn furthest_leap(values: &[f64]) -> f64 {
-        let (mut furthest, mut done) = (Lanes::ZERO, 0);
-        while let Some(group) = values[done..].first_chunk::<{ Lanes::COUNT + 1 }>() {
-            for lane in 0..Lanes::COUNT {
-                furthest.0[lane] = greater(furthest.0[lane], (group[lane + 1] - group[lane]).abs());
-            }
-            done += Lanes::COUNT;
+/// The furthest that a value lies from the one before it; a missing one lies nowhere.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn furthest_leap(values: &[f64]) -> f64 {
+    let (mut furthest, mut done) = (Lanes::ZERO, 0);
+    while let Some(group) = values[done..].first_chunk::<{ Lanes::COUNT + 1 }>() {
+        for lane in 0..Lanes::COUNT {
+            furthest.0[lane] = greater(furthest.0[lane], (group[lane + 1] - group[lane]).abs());
         }
-        let mut all = 0.0;
-        for lane in furthest.0 {
-            all = greater(all, lane);
-        }
-        for pair in values[done..].windows(2) {
-            all = greater(all, (pair[1] - pair[0]).abs());
-        }
-        all
+        done += Lanes::COUNT;
     }
+    let mut all = 0.0;
+    for lane in furthest.0 {
+        all = greater(all, lane);
+    }
+    for pair in values[done..].windows(2) {
+        all = greater(all, (pair[1] - pair[0]).abs());
+    }
+    all
 }
 
 /// Appends the mean of each block, summed in its own order, eight side by side.

@@ -2,11 +2,13 @@
 
 use std::ops::Range;
 
+use multiversion::multiversion;
+
 use crate::contact::blocks::block_means::BlockMeans;
 use crate::contact::fit::scaling::Scaling;
 use crate::contact::friction::coupling_path::{CouplingPath, PathColumns, Touch};
 use crate::contact::friction::friction_model::FrictionState;
-use crate::simd::dispatch::{Lanes, simd_dispatch};
+use crate::simd::Lanes;
 
 /// Columns of the regression.
 pub(crate) const COLUMNS: usize = 17;
@@ -199,65 +201,73 @@ impl RowSource<'_> {
 /// What [`channel_sums`] sums: δX, c, its three derivatives, t, t², X, X², X³ and c·t.
 const SUMS: usize = 11;
 
-simd_dispatch! {
-    /// Sums over the blocks of a run, in eight lanes: `[X₁, δX, time]` and `[c, ∂c/∂F_d, ∂c/∂η, ∂c/∂p]`; time and
-    /// position from a middle and times a scale.
-    fn channel_sums(
-        channels: [&[f64]; 3],
-        coupling: [&[f64]; 4],
-        time: (f64, f64),
-        place: (f64, f64),
-    ) -> [f64; SUMS] {
-        let mut lanes = [Lanes::ZERO; SUMS];
-        let blocks = channels[0].len();
-        let mut first = 0;
-        while first < blocks {
-            let count = if blocks - first < Lanes::COUNT { blocks - first } else { Lanes::COUNT };
-            if count == Lanes::COUNT {
-                for lane in 0..Lanes::COUNT {
-                    let k = first + lane;
-                    let (motor_m, dx_m) = (channels[0][k], channels[1][k]);
-                    let t = (channels[2][k] - time.0) * time.1;
-                    // The screw's own: its transducer's slope acts on the gap as well.
-                    let x = (motor_m + dx_m - place.0) * place.1;
-                    let force_n = coupling[0][k];
-                    lanes[0].0[lane] += dx_m;
-                    lanes[1].0[lane] += force_n;
-                    lanes[2].0[lane] += coupling[1][k];
-                    lanes[3].0[lane] += coupling[2][k];
-                    lanes[4].0[lane] += coupling[3][k];
-                    lanes[5].0[lane] += t;
-                    lanes[6].0[lane] += t * t;
-                    lanes[7].0[lane] += x;
-                    lanes[8].0[lane] += x * x;
-                    lanes[9].0[lane] += x * x * x;
-                    lanes[10].0[lane] += force_n * t;
-                }
-            } else {
-                for k in first..blocks {
-                    let (motor_m, dx_m) = (channels[0][k], channels[1][k]);
-                    let t = (channels[2][k] - time.0) * time.1;
-                    let x = (motor_m + dx_m - place.0) * place.1;
-                    let force_n = coupling[0][k];
-                    let all = [
-                        dx_m, force_n, coupling[1][k], coupling[2][k], coupling[3][k], t, t * t, x, x * x,
-                        x * x * x, force_n * t,
-                    ];
-                    for sum in 0..SUMS {
-                        lanes[sum].0[k - first] += all[sum];
-                    }
-                }
-            }
-            first += count;
-        }
-        let mut sums = [0.0; SUMS];
-        for sum in 0..SUMS {
+/// Sums over the blocks of a run, in eight lanes: `[X₁, δX, time]` and `[c, ∂c/∂F_d, ∂c/∂η, ∂c/∂p]`; time and
+/// position from a middle and times a scale.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn channel_sums(
+    channels: [&[f64]; 3],
+    coupling: [&[f64]; 4],
+    time: (f64, f64),
+    place: (f64, f64),
+) -> [f64; SUMS] {
+    let mut lanes = [Lanes::ZERO; SUMS];
+    let blocks = channels[0].len();
+    let mut first = 0;
+    while first < blocks {
+        let count = if blocks - first < Lanes::COUNT { blocks - first } else { Lanes::COUNT };
+        if count == Lanes::COUNT {
             for lane in 0..Lanes::COUNT {
-                sums[sum] += lanes[sum].0[lane];
+                let k = first + lane;
+                let (motor_m, dx_m) = (channels[0][k], channels[1][k]);
+                let t = (channels[2][k] - time.0) * time.1;
+                // The screw's own: its transducer's slope acts on the gap as well.
+                let x = (motor_m + dx_m - place.0) * place.1;
+                let force_n = coupling[0][k];
+                lanes[0].0[lane] += dx_m;
+                lanes[1].0[lane] += force_n;
+                lanes[2].0[lane] += coupling[1][k];
+                lanes[3].0[lane] += coupling[2][k];
+                lanes[4].0[lane] += coupling[3][k];
+                lanes[5].0[lane] += t;
+                lanes[6].0[lane] += t * t;
+                lanes[7].0[lane] += x;
+                lanes[8].0[lane] += x * x;
+                lanes[9].0[lane] += x * x * x;
+                lanes[10].0[lane] += force_n * t;
+            }
+        } else {
+            for k in first..blocks {
+                let (motor_m, dx_m) = (channels[0][k], channels[1][k]);
+                let t = (channels[2][k] - time.0) * time.1;
+                let x = (motor_m + dx_m - place.0) * place.1;
+                let force_n = coupling[0][k];
+                let all = [
+                    dx_m,
+                    force_n,
+                    coupling[1][k],
+                    coupling[2][k],
+                    coupling[3][k],
+                    t,
+                    t * t,
+                    x,
+                    x * x,
+                    x * x * x,
+                    force_n * t,
+                ];
+                for sum in 0..SUMS {
+                    lanes[sum].0[k - first] += all[sum];
+                }
             }
         }
-        sums
+        first += count;
     }
+    let mut sums = [0.0; SUMS];
+    for sum in 0..SUMS {
+        for lane in 0..Lanes::COUNT {
+            sums[sum] += lanes[sum].0[lane];
+        }
+    }
+    sums
 }
 
 impl<const N: usize> DesignRow<N> {

@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
+use multiversion::multiversion;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
 use crate::contact::fit::design_matrix::DesignRow;
 use crate::contact::stats::{MAD, median};
-use crate::simd::dispatch::{Lanes, simd_dispatch};
+use crate::simd::Lanes;
 
 /// Residuals beyond this many times their spread lose weight (Huber).
 const HUBER: f64 = 2.0;
@@ -134,32 +135,31 @@ struct NormalEquations {
     right: [Lanes; ROW_LANES],
 }
 
-simd_dispatch! {
-    /// Whole squares: what is above the diagonal comes for nothing, and would come apart if it were left out.
-    fn products<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> NormalEquations {
-        const { assert!(N <= ROW_LANES * Lanes::COUNT) };
-        let mut squares = [[Lanes::ZERO; Lanes::COUNT]; SQUARES];
-        let mut right = [Lanes::ZERO; ROW_LANES];
-        for (row, &w) in rows.iter().zip(weights) {
-            let (w, y_m) = (Lanes::all(w), Lanes::all(row.y_m));
-            let mut x = [Lanes::ZERO; ROW_LANES];
-            for line in 0..N.div_ceil(Lanes::COUNT) {
-                x[line] = Lanes::of(&row.x, line * Lanes::COUNT);
-                let wx = w.times(x[line]);
-                right[line] = right[line].plus(wx.times(y_m));
-                let count = (N - line * Lanes::COUNT).min(Lanes::COUNT);
-                for column in 0..=line {
-                    add_products(&mut squares[square_index(line, column)], count, wx, x[column]);
-                }
+/// Whole squares: what is above the diagonal comes for nothing, and would come apart if it were left out.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn products<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> NormalEquations {
+    const { assert!(N <= ROW_LANES * Lanes::COUNT) };
+    let mut squares = [[Lanes::ZERO; Lanes::COUNT]; SQUARES];
+    let mut right = [Lanes::ZERO; ROW_LANES];
+    for (row, &w) in rows.iter().zip(weights) {
+        let (w, y_m) = (Lanes::all(w), Lanes::all(row.y_m));
+        let mut x = [Lanes::ZERO; ROW_LANES];
+        for line in 0..N.div_ceil(Lanes::COUNT) {
+            x[line] = Lanes::of(&row.x, line * Lanes::COUNT);
+            let wx = w.times(x[line]);
+            right[line] = right[line].plus(wx.times(y_m));
+            let count = (N - line * Lanes::COUNT).min(Lanes::COUNT);
+            for column in 0..=line {
+                add_products(&mut squares[square_index(line, column)], count, wx, x[column]);
             }
         }
-        NormalEquations { squares, right }
     }
+    NormalEquations { squares, right }
 }
 
 /// Adds a product to each entry of a square's first lines: lines by columns.
 #[inline(always)]
-#[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+#[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
 fn add_products(square: &mut [Lanes; Lanes::COUNT], count: usize, lines: Lanes, columns: Lanes) {
     for (sum, line) in square.iter_mut().zip(lines.0).take(count) {
         *sum = sum.plus(Lanes::all(line).times(columns));

@@ -2,12 +2,14 @@
 
 use std::ops::Range;
 
+use multiversion::multiversion;
+
 use crate::contact::blocks::block_means::{BlockMeans, is_complete};
 use crate::contact::friction::flank::{FIRM_SHARE, Flank};
 use crate::contact::friction::friction_model::{
     CouplingForce, CouplingIntegrator, CouplingParams, Drive, FrictionState, ScrewState,
 };
-use crate::simd::dispatch::{Lanes, simd_dispatch};
+use crate::simd::Lanes;
 
 /// Blocks before one that must keep its flank and firmness; one after it must as well.
 const BEFORE: usize = 2;
@@ -156,7 +158,7 @@ struct Channels<'a> {
 
 impl Channels<'_> {
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+    #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
     fn at(&self, k: usize) -> Drive {
         Drive { motor_m: self.motor_m[k], load_n: self.load_n[k], slowness: self.slowness[k] }
     }
@@ -171,7 +173,7 @@ struct SegmentColumns<'a> {
     relative_m: &'a mut [f64],
 }
 
-#[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+#[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
 impl SegmentColumns<'_> {
     /// Integrates through a part until its values are those found before: once the screw has slipped, its force
     /// determines all of its state. False where it integrated to the end.
@@ -211,7 +213,7 @@ struct ScrewStates8 {
     memory: [[f64; Lanes::COUNT]; 3],
 }
 
-#[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+#[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
 impl ScrewStates8 {
     const ZERO: Self = Self {
         motor_m: [0.0; Lanes::COUNT],
@@ -241,70 +243,67 @@ impl ScrewStates8 {
     }
 }
 
-simd_dispatch! {
-    /// Integrates eight parts of a segment, all of one length, each from an arbitrary state; the final states.
-    fn integrate_lanes(
-        params: CouplingParams,
-        channels: Channels<'_>,
-        part: usize,
-        found: &mut SegmentColumns<'_>,
-    ) -> ScrewStates8 {
-        let mut screws = ScrewStates8::ZERO;
-        for k in 0..part {
-            let mut drives = [Drive { motor_m: 0.0, load_n: 0.0, slowness: 0.0 }; Lanes::COUNT];
-            for (lane, drive) in drives.iter_mut().enumerate() {
-                *drive = channels.at(lane * part + k);
-            }
-            let mut is_known = [false; Lanes::COUNT];
-            let mut couplings = [(CouplingForce::UNKNOWN, f64::NAN); Lanes::COUNT];
-            for lane in 0..Lanes::COUNT {
-                is_known[lane] = (drives[lane].motor_m + drives[lane].load_n).abs() < f64::INFINITY;
-                let screw = params.step(&screws.get(lane), drives[lane]);
-                screws.set(lane, is_known[lane], &screw);
-                couplings[lane] = (screw.coupling, screw.relative_m);
-            }
-            for lane in 0..Lanes::COUNT {
-                let (coupling, relative_m) = couplings[lane];
-                let known = if is_known[lane] { coupling } else { CouplingForce::UNKNOWN };
-                found.put(lane * part + k, &known, if is_known[lane] { relative_m } else { f64::NAN });
-            }
+/// Integrates eight parts of a segment, all of one length, each from an arbitrary state; the final states.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn integrate_lanes(
+    params: CouplingParams,
+    channels: Channels<'_>,
+    part: usize,
+    found: &mut SegmentColumns<'_>,
+) -> ScrewStates8 {
+    let mut screws = ScrewStates8::ZERO;
+    for k in 0..part {
+        let mut drives = [Drive { motor_m: 0.0, load_n: 0.0, slowness: 0.0 }; Lanes::COUNT];
+        for (lane, drive) in drives.iter_mut().enumerate() {
+            *drive = channels.at(lane * part + k);
         }
-        screws
+        let mut is_known = [false; Lanes::COUNT];
+        let mut couplings = [(CouplingForce::UNKNOWN, f64::NAN); Lanes::COUNT];
+        for lane in 0..Lanes::COUNT {
+            is_known[lane] = (drives[lane].motor_m + drives[lane].load_n).abs() < f64::INFINITY;
+            let screw = params.step(&screws.get(lane), drives[lane]);
+            screws.set(lane, is_known[lane], &screw);
+            couplings[lane] = (screw.coupling, screw.relative_m);
+        }
+        for lane in 0..Lanes::COUNT {
+            let (coupling, relative_m) = couplings[lane];
+            let known = if is_known[lane] { coupling } else { CouplingForce::UNKNOWN };
+            found.put(lane * part + k, &known, if is_known[lane] { relative_m } else { f64::NAN });
+        }
+    }
+    screws
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn touches(force_n: &[f64], firm_n: f64, touches: &mut [Touch]) {
+    for (&force_n, touch) in force_n.iter().zip(touches) {
+        let (upper, lower) = (u8::from(force_n > 0.0), u8::from(force_n < 0.0));
+        let firm = u8::from(force_n.abs() > firm_n);
+        *touch = Touch((upper * Touch::UPPER) | (lower * Touch::LOWER) | (firm * Touch::FIRM));
     }
 }
 
-simd_dispatch! {
-    fn touches(force_n: &[f64], firm_n: f64, touches: &mut [Touch]) {
-        for (&force_n, touch) in force_n.iter().zip(touches) {
-            let (upper, lower) = (u8::from(force_n > 0.0), u8::from(force_n < 0.0));
-            let firm = u8::from(force_n.abs() > firm_n);
-            *touch = Touch((upper * Touch::UPPER) | (lower * Touch::LOWER) | (firm * Touch::FIRM));
-        }
+/// Of the blocks of a segment.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn kept(touches: &[Touch], kept: &mut [Touch]) {
+    for (around, kept) in touches.array_windows::<KEPT>().zip(kept.iter_mut().skip(BEFORE)) {
+        let here = around[BEFORE].0;
+        let all = around[0].0 & around[1].0 & here & around[3].0;
+        let is_kept = all & (Touch::UPPER | Touch::LOWER) != 0 && here & !all & Touch::FIRM == 0;
+        *kept = Touch(here * u8::from(is_kept));
     }
 }
 
-simd_dispatch! {
-    /// Of the blocks of a segment.
-    fn kept(touches: &[Touch], kept: &mut [Touch]) {
-        for (around, kept) in touches.array_windows::<KEPT>().zip(kept.iter_mut().skip(BEFORE)) {
-            let here = around[BEFORE].0;
-            let all = around[0].0 & around[1].0 & here & around[3].0;
-            let is_kept = all & (Touch::UPPER | Touch::LOWER) != 0 && here & !all & Touch::FIRM == 0;
-            *kept = Touch(here * u8::from(is_kept));
-        }
-    }
-}
-
-simd_dispatch! {
-    /// Drops the blocks of which something is missing or whose neighbours do, and those at the very beginning.
-    fn clear_incomplete(blocks: &BlockMeans, kept: &mut [Touch]) {
-        let inner = 1..kept.len().max(2) - 1;
-        let (time_s, dx_m) = (&blocks.time_s[inner.clone()], &blocks.dx_m[inner.clone()]);
-        let rates = blocks.motor_m.array_windows::<3>().zip(blocks.load_n.array_windows::<3>());
-        for (((motor_m, load_n), (time_s, dx_m)), kept) in rates.zip(time_s.iter().zip(dx_m)).zip(&mut kept[inner])
-        {
-            *kept = Touch(kept.0 * u8::from(is_complete(*time_s, *dx_m, motor_m, load_n)));
-        }
+/// Drops the blocks of which something is missing or whose neighbours do, and those at the very beginning.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq", "x86_64+avx2"))]
+fn clear_incomplete(blocks: &BlockMeans, kept: &mut [Touch]) {
+    let inner = 1..kept.len().max(2) - 1;
+    let (time_s, dx_m) = (&blocks.time_s[inner.clone()], &blocks.dx_m[inner.clone()]);
+    let rates = blocks.motor_m.array_windows::<3>().zip(blocks.load_n.array_windows::<3>());
+    for (((motor_m, load_n), (time_s, dx_m)), kept) in
+        rates.zip(time_s.iter().zip(dx_m)).zip(&mut kept[inner])
+    {
+        *kept = Touch(kept.0 * u8::from(is_complete(*time_s, *dx_m, motor_m, load_n)));
     }
 }
 

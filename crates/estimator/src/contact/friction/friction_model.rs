@@ -132,7 +132,7 @@ impl CouplingParams {
     /// The screw a block later. Both the held and the slipping solution are computed and one is selected, so that
     /// several screws can be integrated in parallel lanes.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+    #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
     pub(crate) fn step(&self, before: &ScrewState, drive: Drive) -> ScrewState {
         let load_n = drive.load_n - self.load_zero_n;
         let anchor_m = before.anchor_m - self.motor_sense * (drive.motor_m - before.motor_m);
@@ -189,7 +189,7 @@ impl CouplingParams {
 
     /// Relative position on a flank under a force, m.
     #[inline(always)]
-    #[allow(clippy::inline_always, reason = "see `simd_dispatch`")]
+    #[allow(clippy::inline_always, reason = "compiled within each version of its caller")]
     fn relative_m(&self, force_n: f64) -> f64 {
         let above_m = if force_n > 0.0 { self.half_gap_m } else { 0.0 };
         let flank_m = if force_n < 0.0 { -self.half_gap_m } else { above_m };
