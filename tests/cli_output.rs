@@ -495,7 +495,7 @@ fn tables_fit_80_columns_and_keep_what_matters() {
     let reason = lines[2..6].iter().map(|line| line.chars().skip(57).collect::<String>());
     let reason = words(&reason.collect::<Vec<_>>().join(" "));
     let all: String = fleet.run_ok(&["trend"]);
-    assert!(reason.starts_with("rises 0.75 µm/FH over the last 8 records"), "{reason}");
+    assert!(reason.starts_with("could reach the limit within 8 FH (5 % point)"), "{reason}");
     assert!(words(&all).contains(&reason), "{reason}: {all}");
     assert!(trend.contains("hidden: ") && words(&trend).contains("| less -S"), "{trend}");
     let query = at_80(&["query", "tail", "N412FP", "--last", "3"]);

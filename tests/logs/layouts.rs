@@ -118,9 +118,11 @@ fn loads_in_files_of_their_own_find_their_flights() {
         }
         fleet.run_ok(&["store", "export", "--format", "parquet", "--output", "half.parquet"]);
         let truth = Table::read(&fleet.path("sample-data/truth.parquet")).by_flight("gap_m");
-        let worst = Table::read(&fleet.path("half.parquet")).by_flight("gap_m").into_iter();
-        let worst = worst.map(|(key, gap)| (gap / truth[&key] - 1.0).abs()).fold(0.0, f64::max);
-        assert!(worst < 0.02, "a load at 50 Hz costs {worst}");
+        let found = Table::read(&fleet.path("half.parquet")).by_flight("gap_m").into_iter();
+        let mut errors: Vec<f64> = found.map(|(key, gap)| (gap / truth[&key] - 1.0).abs()).collect();
+        errors.sort_by(f64::total_cmp);
+        let (median, worst) = (errors[errors.len() / 2], errors[errors.len() - 1]);
+        assert!(median < 0.008 && worst < 0.03, "a load at 50 Hz costs {median}, at most {worst}");
     }
 }
 
