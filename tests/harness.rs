@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use arrow::array::{Array, AsArray, RecordBatch};
 use arrow::compute::{cast, concat_batches};
@@ -56,17 +57,24 @@ impl TestFleet {
         Self::of("three-aircraft")
     }
 
-    /// The same after a run, which is made once for all tests.
+    /// The same after a run.
     pub(crate) fn processed() -> Self {
-        static PROCESSED: std::sync::OnceLock<TestFleet> = std::sync::OnceLock::new();
-        let processed = || {
-            let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
-            copy(&top().join("tests/data/three-aircraft"), folder.path());
-            let fleet = Self { folder };
+        static PROCESSED: OnceLock<TestFleet> = OnceLock::new();
+        Self::once(&PROCESSED, || {
+            let fleet = Self::sample();
             fleet.run_ok(&["run", "--quiet"]);
             fleet
+        })
+    }
+
+    /// A copy of a fleet that is made once for all tests.
+    pub(crate) fn once(made: &OnceLock<Self>, make: fn() -> Self) -> Self {
+        let keep = || {
+            let fleet = Self { folder: tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap() };
+            copy(make().folder.path(), fleet.folder.path());
+            fleet
         };
-        PROCESSED.get_or_init(processed).copied()
+        made.get_or_init(keep).copied()
     }
 
     /// A copy of the sample fleet, `sample-data/`.

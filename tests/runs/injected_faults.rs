@@ -51,8 +51,14 @@ impl Fault {
 }
 
 impl Injector {
-    pub(crate) fn new() -> Option<Self> {
-        let folder = tempfile::tempdir().unwrap();
+    /// The injector, compiled once for all tests; none without a C compiler.
+    pub(crate) fn get() -> Option<&'static Self> {
+        static INJECTOR: OnceLock<Option<Injector>> = OnceLock::new();
+        INJECTOR.get_or_init(Self::compile).as_ref()
+    }
+
+    fn compile() -> Option<Self> {
+        let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
         let library = folder.path().join("faults.so");
         let source = crate::harness::top().join("tests/data/disk/faults.c");
         let mut compile = Command::new("cc");
@@ -119,7 +125,7 @@ impl Injector {
     pub(crate) fn hanging_log(&self, fleet: &TestFleet) -> CommandResult {
         let fault = self.hang(fleet);
         let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
-        std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 2\n")).unwrap();
+        std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 1\n")).unwrap();
         self.run(fleet, &["run", "--jobs", "1"], &fault)
     }
 
@@ -200,20 +206,26 @@ pub(crate) fn few_records() -> &'static str {
 
 /// The fleet with a run behind it and a log that is new.
 fn grown() -> TestFleet {
-    let fleet = few();
-    let log = logs_of(&fleet)[0].clone();
-    let bytes = std::fs::read(&log).unwrap();
-    std::fs::remove_file(&log).unwrap();
-    fleet.run_ok(&["run", "-q"]);
-    std::fs::write(&log, bytes).unwrap();
-    fleet
+    static GROWN: OnceLock<TestFleet> = OnceLock::new();
+    TestFleet::once(&GROWN, || {
+        let fleet = few();
+        let log = logs_of(&fleet)[0].clone();
+        let bytes = std::fs::read(&log).unwrap();
+        std::fs::remove_file(&log).unwrap();
+        fleet.run_ok(&["run", "-q"]);
+        std::fs::write(&log, bytes).unwrap();
+        fleet
+    })
 }
 
 /// The fleet with every log in its store, in commits of their own.
 fn stored() -> TestFleet {
-    let fleet = grown();
-    fleet.run_ok(&["run", "-q"]);
-    fleet
+    static STORED: OnceLock<TestFleet> = OnceLock::new();
+    TestFleet::once(&STORED, || {
+        let fleet = grown();
+        fleet.run_ok(&["run", "-q"]);
+        fleet
+    })
 }
 
 /// A command under faults.
@@ -292,13 +304,10 @@ fn strike(
     (under, kind, mode): (&'static str, &'static str, &'static str),
     from: bool,
 ) {
-    let Some(injector) = Injector::new() else { return };
-    let plain = make();
-    plain.run_ok(&["run"]);
-    let wanted = plain.exported();
+    let Some(injector) = Injector::get() else { return };
     let before = make();
     let count = injector.count(&before.copied(), args, under, kind);
-    let command = Struck { injector: &injector, before, args, wanted: &wanted };
+    let command = Struck { injector, before, args, wanted: few_records() };
     let mut codes = ExitCodes::default();
     let tried = calls(count);
     for &at in &tried {
@@ -384,7 +393,7 @@ fn a_read_that_fails_makes_no_command_print_less() {
         &["store", "runs", "--format", "csv"],
         &["work", "list", "--format", "csv"],
     ];
-    let Some(injector) = Injector::new() else { return };
+    let Some(injector) = Injector::get() else { return };
     let fleet = stored();
     for command in COMMANDS {
         let sound = injector.run(&fleet, command, &Fault::at("results", "read", EIO, 0));
@@ -430,12 +439,12 @@ fn table() -> TestFleet {
 #[test]
 fn a_look_at_a_table_that_fails_stores_no_withdrawn_flight() {
     const UNDER: &str = "logs/N413FP/_delta_log";
-    let Some(injector) = Injector::new() else { return };
+    let Some(injector) = Injector::get() else { return };
     let plain = table();
     plain.run_ok(RUN);
     let wanted = plain.exported();
     assert_eq!(wanted.lines().count() - 1, 8);
-    let command = Struck { injector: &injector, before: table(), args: RUN, wanted: &wanted };
+    let command = Struck { injector, before: table(), args: RUN, wanted: &wanted };
     for (under, mode) in [(UNDER, EIO), (UNDER, ESTALE)] {
         let count = injector.count(&command.before.copied(), RUN, under, "read");
         assert!(count > 0, "no call on {under}");
@@ -474,7 +483,7 @@ fn a_kill_at_any_call_loses_nothing() {
 /// Run after run on one store is killed at a call from a seed, until a run finishes, and then from nothing again.
 #[test]
 fn kills_of_run_after_run_lose_nothing_and_double_nothing() {
-    let Some(injector) = Injector::new() else { return };
+    let Some(injector) = Injector::get() else { return };
     let kills = if is_gate() { 200 } else { 20 };
     let wanted = few_records();
     let count = injector.count(&few(), RUN, "results", "write");
@@ -513,7 +522,7 @@ fn a_fault_in_a_compaction_loses_nothing() {
 fn a_fault_in_a_report_changes_no_store_and_the_next_report_is_whole() {
     const REPORT: &[&str] = &["report", "--output", "pages"];
     strike(REPORT, STORED, ("results", "read", EIO), false);
-    let Some(injector) = Injector::new() else { return };
+    let Some(injector) = Injector::get() else { return };
     let names = |fleet: &TestFleet| {
         let pattern = fleet.path("pages/**/*");
         let found = glob::glob(pattern.to_str().unwrap()).unwrap().flatten();
@@ -551,12 +560,12 @@ fn a_fault_in_a_report_changes_no_store_and_the_next_report_is_whole() {
 #[test]
 fn two_faults_in_one_run_lose_nothing() {
     const MODES: [&str; 4] = [EIO, ESTALE, ENOSPC, "kill"];
-    let Some(injector) = Injector::new() else { return };
+    let Some(injector) = Injector::get() else { return };
     let wanted = few_records();
     let seed = seed();
     let mut chance = Chance(seed);
     for (make, store) in [NEW, GROWN] {
-        let command = Struck { injector: &injector, before: make(), args: RUN, wanted };
+        let command = Struck { injector, before: make(), args: RUN, wanted };
         let count = injector.count(&command.before.copied(), RUN, "results", "both");
         let tries = sample().min(count);
         let mut codes = ExitCodes::default();
@@ -589,13 +598,13 @@ fn reduced(command: &Struck<'_>, fault: Fault) -> Fault {
 
 #[test]
 fn a_log_that_never_ends_is_an_error_of_that_log_and_the_rest_is_stored() {
-    let Some(injector) = Injector::new() else { return };
+    let Some(injector) = Injector::get() else { return };
     for jobs in ["1", "2"] {
         let fleet = few();
         let logs = logs_of(&fleet).len();
         let fault = injector.hang(&fleet);
         let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
-        std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 2\n")).unwrap();
+        std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 1\n")).unwrap();
         let began = Instant::now();
         let struck = injector.run(&fleet, &["run", "--jobs", jobs], &fault);
         assert!(began.elapsed() < Duration::from_mins(1), "{:?}", began.elapsed());
@@ -611,11 +620,11 @@ fn a_log_that_never_ends_is_an_error_of_that_log_and_the_rest_is_stored() {
 
 #[test]
 fn estimate_and_check_give_up_a_log_that_never_ends_and_go_on() {
-    let Some(injector) = Injector::new() else { return };
+    let Some(injector) = Injector::get() else { return };
     let fleet = small();
     let fault = injector.hang(&fleet);
     let config = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
-    std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 2\n")).unwrap();
+    std::fs::write(fleet.path("pipeline.toml"), format!("{config}\n[run]\nlog_timeout_s = 1\n")).unwrap();
     let logs = logs_of(&fleet);
     let names: Vec<&str> = logs.iter().take(3).map(|log| log.to_str().unwrap()).collect();
     for command in ["estimate", "check"] {
@@ -630,7 +639,7 @@ fn estimate_and_check_give_up_a_log_that_never_ends_and_go_on() {
 
 #[test]
 fn a_run_with_a_log_that_never_ends_answers_a_signal() {
-    let Some(injector) = Injector::new() else { return };
+    let Some(injector) = Injector::get() else { return };
     let fleet = small();
     let fault = injector.hang(&fleet);
     let hanging = fleet.path("hanging.txt");

@@ -84,7 +84,7 @@ fn run_watched(fleet: &TestFleet, kill_after: Option<Duration>) -> Option<u64> {
 
 #[test]
 fn a_year_of_faults_ends_with_the_store_of_one_run() {
-    let Some(injector) = Injector::new() else { return };
+    let Some(injector) = Injector::get() else { return };
     let days = std::env::var("FREEPLAY_SOAK")
         .ok()
         .and_then(|n| n.parse().ok())
