@@ -51,6 +51,24 @@ fn a_unit_that_does_not_wear_is_steady_and_its_late_crossing_beyond_the_horizon(
     assert_eq!(assessment.crossing.unwrap().p95_hours, None);
 }
 
+/// A unit at its limit whose aircraft sends nothing is still at its limit.
+#[test]
+fn silence_clears_no_alarm() {
+    for (series, state) in [
+        (unit(400, |h| 20.0 + 0.15 * h), State::Act),
+        (unit(400, |h| 30.0 + 0.06 * h), State::Plan),
+        (unit(400, |h| 20.0 + 0.02 * h + if h > 770.0 { 12.0 } else { 0.0 }), State::Watch),
+    ] {
+        let (last, silent) = (state_of(&series, 399), state_of(&series, 500));
+        assert_eq!((last.state, last.stale_days), (state, None), "{last:?}");
+        assert_eq!(
+            (silent.state, silent.stale_days),
+            (state.max(State::Unassessed), Some(101.0)),
+            "{silent:?}"
+        );
+    }
+}
+
 #[test]
 fn a_state_stands_from_the_first_record_on() {
     let series = unit(400, |h| 20.0 + 0.02 * h);
