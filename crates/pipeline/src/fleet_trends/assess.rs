@@ -123,7 +123,7 @@ pub fn assess_store_with_quantities(
     let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
     Ok(StoreAssessment {
-        followed: fleet.followed_of(&now, tail_wide),
+        followed: fleet.followed_of(&now, &tail_wide),
         mapping_faults: fleet.mapping_faults_of(&now),
         notes: coverage::notes(&now, config),
         now,
@@ -297,7 +297,7 @@ pub(crate) fn assess_for_report(
     let fleet = FleetContext::new(config, installations, histories, &days)?;
     let (fleet, _) = fleet.with_diagnostics(store, as_of)?;
     let (now, tail_wide) = fleet.selected(ask, as_of)?;
-    let followed = fleet.followed_of(&now, tail_wide);
+    let followed = fleet.followed_of(&now, &tail_wide);
     let names: Vec<UnitKey> = now.iter().map(TrendRow::unit).collect();
     let drawn =
         names.par_iter().zip(&now).map(|(name, row)| fleet.forecast(name, row)).collect::<Result<_, _>>()?;
@@ -527,7 +527,7 @@ impl<'a> FleetContext<'a> {
     }
 
     /// The followed quantities of some assessed units, the gap with them, and what changed on their tails and parts.
-    fn followed_of(&self, rows: &[TrendRow], tail_wide: Vec<QuantityChange>) -> FollowedQuantities {
+    fn followed_of(&self, rows: &[TrendRow], tail_wide: &[QuantityChange]) -> FollowedQuantities {
         let units: BTreeSet<UnitKey> = rows.iter().map(TrendRow::unit).collect();
         let tails: BTreeSet<Option<&str>> = rows.iter().map(|row| row.tail_number.as_deref()).collect();
         let parts: BTreeSet<Option<&str>> = rows.iter().map(|row| row.part_number.as_deref()).collect();
@@ -541,7 +541,7 @@ impl<'a> FleetContext<'a> {
                 None => parts.contains(&change.part_number.as_deref()),
             },
         };
-        let all = self.followed.changes.iter().chain(&tail_wide);
+        let all = self.followed.changes.iter().chain(tail_wide);
         let mut changes: Vec<QuantityChange> = all.filter(concerns).cloned().collect();
         changes.sort_by_key(|change| std::cmp::Reverse(change.since_utc));
         FollowedQuantities { rows: of_units, changes }
