@@ -145,9 +145,15 @@ def damage(fleet: Path, freeplay: str) -> str:
 
 
 def interrupt(fleet: Path, freeplay: str) -> str:
-    """An interrupt after half a second of work: code 130."""
+    """An interrupt once the run is in the list of runs: code 130."""
     program = fleet / "interrupted"
-    program.write_text(f'#!/bin/sh\nexec timeout --preserve-status -s INT 0.5 "{freeplay}" "$@" --redo\n')
+    runs = fleet / "results/runs/_delta_log"
+    begun = len(list(runs.glob("*.json"))) + 1
+    program.write_text(
+        f'#!/bin/sh\n"{freeplay}" "$@" --redo --jobs 1 &\n'
+        f'until [ "$(ls "{runs}" 2>/dev/null | grep -c json$)" -ge {begun} ]; do :; done\n'
+        "kill -INT $!\nwait $!\n"
+    )
     program.chmod(0o755)
     return str(program)
 
