@@ -116,8 +116,8 @@ def estimate(
     4
     >>> table["position"].to_pylist()
     ['aileron_left', 'aileron_right', 'elevator_left', 'elevator_right']
-    >>> [f"{1e6 * gap:.1f} um" for gap in table["gap_m"].to_pylist()][:2]
-    ['62.3 um', '96.3 um']
+    >>> [f"{1e6 * gap:.0f} um" for gap in table["gap_m"].to_pylist()][:2]
+    ['62 um', '96 um']
 
     A log, or an actuator in it, that cannot be used is a row of ``Table.errors``. One path alone raises
     :class:`LogError` instead, with the other rows as its ``answer``; ``raise_on_error`` chooses explicitly.
