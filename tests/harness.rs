@@ -10,14 +10,11 @@ use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Float64Type};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
+use crate::gate::is_gate;
+
 /// Prints a measurement past the test runner, which captures what tests print.
 pub(crate) fn print_line(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
-}
-
-/// Whether exhaustive tests run in full (`FREEPLAY_TESTS=gate`) instead of a seeded sample of their cases.
-pub(crate) fn is_gate() -> bool {
-    std::env::var_os("FREEPLAY_TESTS").is_some_and(|value| value == "gate")
 }
 
 /// All cases in the gate, else `count` of them, spread evenly with the first.

@@ -102,3 +102,47 @@ fn records_dated_ahead_and_negative_usage_are_named_and_decide_nothing() {
         assert_eq!(fleet.freeplay(&args).code, Some(2), "a limit of {limit}");
     }
 }
+
+/// Four actuators of a tail step by 90 µm with one flight to above their limit, as a sensor of the tail would make them
+/// do; a fifth on another tail has one record above its limit, which its estimator doubts.
+#[test]
+fn neither_a_flag_nor_a_step_of_the_whole_tail_hides_records_above_the_limit() {
+    let fleet = TestFleet::empty();
+    let mut table = "serial_number,departure_utc,gap_m,gap_se_m,flight_hours,tail_number,flags\n".to_owned();
+    let mut add = |serial: &str, gaps_um: &[f64], ending: &dyn Fn(usize) -> &'static str| {
+        let rows = rows(serial, gaps_um);
+        table.extend(rows.lines().enumerate().map(|(day, row)| format!("{row}{}\n", ending(day))));
+    };
+    let step: Vec<f64> = (0..28).map(|day| if day < 24 { 70.0 } else { 160.0 }).collect();
+    for serial in ["A", "B", "C", "D"] {
+        add(serial, &step, &|_| ",T77,");
+    }
+    let last_above: Vec<f64> = (0..28).map(|day| if day < 27 { 70.0 } else { 190.0 }).collect();
+    add("E", &last_above, &|day| if day < 27 { ",T88," } else { ",T88,estimators_disagree" });
+    std::fs::write(fleet.path("history.csv"), table).unwrap();
+    let day = ["--as-of", "2026-01-28T12:00:00Z", "--json"];
+    let args = [&["trend", "--estimates", "history.csv", "--limit-m", "150e-6"], &day[..]].concat();
+    let found: Vec<Value> = serde_json::from_str(&fleet.run_ok(&args)).unwrap();
+    for row in &found {
+        let (serial, reason) = (row["serial_number"].as_str().unwrap(), row["reason"].as_str().unwrap());
+        let is_doubted = serial == "E";
+        let expected = if is_doubted { ("plan", "inspect") } else { ("act", "replace") };
+        assert_eq!((row["state"].as_str().unwrap(), row["action"].as_str().unwrap()), expected, "{row}");
+        assert_eq!(reason.contains("the actuators of T77 changed together"), !is_doubted, "{reason}");
+    }
+    assert_eq!(found.len(), 5);
+}
+
+/// Limits lowered below what every log shows: the next run says so of every unit, and ends as a scheduler was asked to.
+#[test]
+fn a_lowered_limit_makes_every_unit_of_the_logs_due() {
+    let fleet = TestFleet::sample();
+    for (limit, watch) in [("150e-6", "110e-6"), ("180e-6", "135e-6")] {
+        fleet.configure(&format!("limit_m = {limit}\nwatch_m = {watch}"), "limit_m = 20e-6\nwatch_m = 10e-6");
+    }
+    let run = fleet.freeplay(&["run", "--quiet", "--fail-on", "act"]);
+    let found: Vec<Value> = serde_json::from_str(&fleet.run_ok(&["trend", "--json"])).unwrap();
+    let states: Vec<&str> = found.iter().map(|row| row["state"].as_str().unwrap()).collect();
+    assert_eq!((states.len(), run.code), (12, Some(4)), "{run:?}");
+    assert!(states.iter().all(|state| *state == "act"), "{states:?}");
+}

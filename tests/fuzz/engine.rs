@@ -1,12 +1,15 @@
 //! Fuzzing on stable Rust: seeded mutations of a corpus of real files. An input with a new outcome joins the corpus; in a
 //! build with counters (`tests/fuzz/run`), also an input that takes a branch as often as no input before.
 //!
-//! The gate (`FREEPLAY_TESTS=gate`) tries a fixed number of cases, a test a fifth of them. `FREEPLAY_FUZZ_S` is the time of each target in seconds, and
+//! The gate (`FREEPLAY_TESTS=gate`) tries a fixed number of cases, a test a tenth of them. `FREEPLAY_FUZZ_S` is the time of each target in seconds, and
 //! `FREEPLAY_FUZZ_SEED` another seed; `FREEPLAY_FUZZ_INPUT` is a kept input to try alone. `docs/reliability.md` has the
 //! command and its figures.
 
 #![allow(dead_code, reason = "each of the test programs that include this file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+#[path = "../gate.rs"]
+mod gate;
 
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -124,8 +127,7 @@ pub(crate) fn fuzz(
         print(&format!("{name}: {}", run(&std::fs::read(file).unwrap())));
         return;
     }
-    let is_gate = std::env::var_os("FREEPLAY_TESTS").is_some_and(|value| value == "gate");
-    let wanted_cases = if is_gate { gate_cases } else { gate_cases.div_ceil(5) };
+    let wanted_cases = if gate::is_gate() { gate_cases } else { gate_cases.div_ceil(10) };
     let number = |key: &str| std::env::var(key).ok().and_then(|text| text.parse::<u64>().ok());
     let time = number("FREEPLAY_FUZZ_S").map(Duration::from_secs);
     let seed = number("FREEPLAY_FUZZ_SEED").unwrap_or(1);

@@ -1,6 +1,7 @@
 //! The sample fleet against its truth, and one worker against several.
 
-use crate::harness::{Table, TestFleet, is_gate, print_line};
+use crate::gate::is_gate;
+use crate::harness::{Table, TestFleet, print_line};
 
 #[test]
 fn the_sample_fleet_runs_well_and_its_median_error_is_below_one_per_cent() {

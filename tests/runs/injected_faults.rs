@@ -9,7 +9,8 @@ use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use crate::harness::{CommandResult, TestFleet, is_gate, print_line, wait_until};
+use crate::gate::is_gate;
+use crate::harness::{CommandResult, TestFleet, print_line, spread, wait_until};
 use crate::runs::interruption::{Chance, small, whole_flights};
 
 /// Numbers of `errno(3)`.
@@ -375,7 +376,9 @@ fn with_tables() -> TestFleet {
 
 #[test]
 fn a_table_that_cannot_be_read_is_reported_and_heals() {
-    for table in ["installations.csv", "flights.csv", "maintenance.csv", "inspections.csv", "pipeline.toml"] {
+    const TABLES: [&str; 5] =
+        ["installations.csv", "flights.csv", "maintenance.csv", "inspections.csv", "pipeline.toml"];
+    for table in spread(&TABLES, 2) {
         strike(RUN, (with_tables, "new store"), (table, "read", EIO), false);
     }
 }
@@ -484,7 +487,7 @@ fn a_kill_at_any_call_loses_nothing() {
 #[test]
 fn kills_of_run_after_run_lose_nothing_and_double_nothing() {
     let Some(injector) = Injector::get() else { return };
-    let kills = if is_gate() { 200 } else { 20 };
+    let kills = if is_gate() { 200 } else { 8 };
     let wanted = few_records();
     let count = injector.count(&few(), RUN, "results", "write");
     let mut chance = Chance(seed());

@@ -24,8 +24,8 @@ use crate::time_limit::log_timeout;
 /// Interval at which the time limits are checked while no worker reports.
 const TURN: Duration = Duration::from_millis(100);
 
-/// Time for logs in progress to finish after an interrupt.
-const STOP_GRACE: Duration = Duration::from_secs(5);
+/// Time for logs in progress to finish after an interrupt: a signal is answered within two seconds.
+const STOP_GRACE: Duration = Duration::from_millis(1500);
 
 /// Abandoned workers still use processor time: a run in which more logs than this pass their limit ends.
 const MAX_ABANDONED: usize = 16;

@@ -129,7 +129,7 @@ fn results() -> impl Strategy<Value = LogResult> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(10) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(6) })]
 
     #[test]
     fn a_store_is_a_map_from_actuators_flights_to_their_newest_records(

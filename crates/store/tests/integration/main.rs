@@ -9,13 +9,10 @@ mod exports;
 mod fixtures;
 mod folder;
 mod fuzz;
+#[path = "../../../../tests/gate.rs"]
+mod gate;
 mod maintenance;
 mod queries;
 mod round_trip;
 mod runs;
 mod timings;
-
-/// Whether exhaustive tests run in full (`FREEPLAY_TESTS=gate`).
-fn is_gate() -> bool {
-    std::env::var_os("FREEPLAY_TESTS").is_some_and(|value| value == "gate")
-}

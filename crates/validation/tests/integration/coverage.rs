@@ -13,8 +13,7 @@ const FIRST: u64 = 40_000;
 /// 99.9 %); a miss of more than six standard errors is no chance.
 #[test]
 fn nine_in_ten_intervals_hold_and_no_blind_flight_is_estimated() {
-    let is_gate = std::env::var_os("FREEPLAY_TESTS").is_some_and(|value| value == "gate");
-    let (of_class, least) = SIZES[usize::from(is_gate)];
+    let (of_class, least) = SIZES[usize::from(crate::gate::is_gate())];
     let flights: Vec<(&Class, u64)> = classes()
         .iter()
         .flat_map(|class| (FIRST..FIRST + of_class).map(move |index| (class, index)))
