@@ -43,7 +43,7 @@ pub struct Flight {
     pub screw_m: Vec<f64>,
     /// Load as logged, N, positive along +X.
     pub load_n: Vec<f64>,
-    /// The true gap, metres.
+    /// The true gap, metres: its mean over the time of the log.
     pub gap_m: f64,
     /// The true stiffness of a flank, N/m.
     pub stiffness_n_per_m: f64,
@@ -64,14 +64,14 @@ pub fn simulate(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) 
     plant.check()?;
     profile.check()?;
     sensors.check()?;
-    let [motor, screw, load] = fly(plant, profile, sensors, seed);
+    let ([motor, screw, load], gap_m) = fly(plant, profile, sensors, seed);
     let rate_hz = profile.sample_rate_hz;
     Ok(Flight {
         time_s: sensors.stamps(profile.samples(), rate_hz, seed),
         motor_m: sensors.motor.read_log(motor, profile, seed, "motor"),
         screw_m: sensors.screw.read_log(screw, profile, seed, "screw"),
         load_n: sensors.load.read_log(load, profile, seed, "load"),
-        gap_m: plant.contact.gap_m,
+        gap_m,
         stiffness_n_per_m: plant.contact.stiffness_n_per_m,
         skew_s: sensors.skew_s(),
         expected: if profile.is_one_sided() { ExpectedOutcome::Refuse } else { ExpectedOutcome::Estimate },
@@ -81,8 +81,8 @@ pub fn simulate(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) 
 /// Steps between two looks at what changes slowly in a plant: 10 ms.
 const SLOW_STEPS: u64 = 100;
 
-/// Motor position, screw position and load at each channel's own sample instants.
-fn fly(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) -> [Vec<f64>; 3] {
+/// Motor position, screw position and load at each channel's own sample instants, and the mean gap.
+fn fly(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) -> ([Vec<f64>; 3], f64) {
     let commands = CommandProfile::generate(profile, seed);
     let mut buffet = VibrationSource::new(&profile.buffet, profile.load_n, STEP_S, seed, "load");
     let mut shake = VibrationSource::new(&profile.motor_vibration, 1.0, STEP_S, seed, "motor");
@@ -95,12 +95,14 @@ fn fly(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) -> [Vec<f
     let mut samplers: [ChannelSampler; 3] =
         std::array::from_fn(|k| ChannelSampler::new(channels[k], profile, STEP_S, reading[k]));
     let (is_varying, mut now) = (plant.is_varying(), plant.at(-LEAD_IN_S, profile.duration_s));
-    let mut steps = 0_u64;
+    let (mut steps, mut gaps_m) = (0_u64, 0.0);
     while samplers.iter().any(|sampler| !sampler.is_full()) {
         let now_s = steps as f64 * STEP_S - LEAD_IN_S;
         if is_varying && steps.is_multiple_of(SLOW_STEPS) {
             now = plant.at(now_s, profile.duration_s);
         }
+        let gap_m = now.contact.gap_at_m(state.screw_m);
+        gaps_m += gap_m;
         steps += 1;
         let (next_buffet_n, next_shake_m) = (buffet.next(), shake.next());
         let middle_m = state.screw_m + 0.5 * STEP_S * state.screw_m_per_s;
@@ -111,7 +113,7 @@ fn fly(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) -> [Vec<f
             shake_m,
             shake_m_per_s: (next_shake_m - shake_m) / STEP_S,
         };
-        state = advance(&now, &state, forces, STEP_S);
+        state = advance(&now.with_gap_m(gap_m), &state, forces, STEP_S);
         (buffet_n, shake_m) = (next_buffet_n, next_shake_m);
         let air_n = load_n(&commands, now_s + STEP_S, state.screw_m);
         let next = [state.motor_m + shake_m, state.screw_m, air_n + buffet_n];
@@ -120,7 +122,8 @@ fn fly(plant: &Plant, profile: &Profile, sensors: &Sensors, seed: u64) -> [Vec<f
         }
         reading = next;
     }
-    samplers.map(ChannelSampler::into_samples)
+    let mean_m = if plant.contact.worn_m > 0.0 { gaps_m / steps as f64 } else { plant.contact.gap_m };
+    (samplers.map(ChannelSampler::into_samples), mean_m)
 }
 
 /// The aerodynamic load at a deflection, N.

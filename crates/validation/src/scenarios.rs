@@ -230,6 +230,27 @@ static CLASSES: &[Class] = &[
     drawn("soft flanks, bilinear", |c, rng| soft(c, rng, bilinear)),
     drawn("soft flanks, Hertz", |c, rng| soft(c, rng, hertz)),
     drawn("soft flanks, exponential toe", |c, rng| soft(c, rng, toe)),
+    drawn("all channels lag", |c, rng| {
+        let lag_s = log_uniform(rng, 5e-3..80e-3);
+        for channel in [&mut c.sensors.motor, &mut c.sensors.screw, &mut c.sensors.load] {
+            channel.lag_s = lag_s;
+        }
+    }),
+    drawn("screw channel lags", |c, rng| c.sensors.screw.lag_s = log_uniform(rng, 3e-3..30e-3)),
+    drawn("load at 10 Hz", |c, _| c.sensors.load.rate_hz = 10.0),
+    drawn("screw at 25 Hz", |c, _| c.sensors.screw.rate_hz = 25.0),
+    drawn("worn in mid-stroke", |c, rng| worn(c, rng, 0.0)),
+    drawn("worn off centre", |c, rng| worn(c, rng, 0.2)),
+    drawn("load cell clipped", |c, rng| c.sensors.load.clip = rng.random_range(0.45..0.9) * c.profile.load_n),
+    Class {
+        name: "preloaded nut",
+        kind: Kind::Drawn,
+        gap_m: 0.0,
+        change: |c, rng| {
+            let windup_m = c.profile.load_n / c.plant.contact.stiffness_n_per_m;
+            c.plant.contact.gap_m = -rng.random_range(0.1..0.6) * windup_m;
+        },
+    },
     Class {
         name: "zero gap, drawn wide",
         kind: Kind::Drawn,
@@ -248,6 +269,12 @@ static CLASSES: &[Class] = &[
     blind("the load never reverses", "no_load_reversal", |c, rng| {
         mixture(c, rng);
         c.profile.no_reversal = true;
+    }),
+    blind("load on one side, its zero off", "no_load_reversal", |c, rng| {
+        mixture(c, rng);
+        c.profile.no_reversal = true;
+        c.profile.load_n = rng.random_range(2.5e3..4e3);
+        c.sensors.load.bias = rng.random_range(0.25..0.4) * c.profile.load_n;
     }),
     blind("load sign flipped", "load_sign_flipped", |c, rng| {
         mixture(c, rng);
@@ -462,6 +489,14 @@ fn moving_stiffness(case: &mut Case, rng: &mut ChaCha8Rng) {
     case.plant.contact.stiffness_phase_factors = std::array::from_fn(|_| rng.random_range(0.93..1.07));
 }
 
+/// A screw that is worn where it works, the middle of that place off the middle of the stroke by a share of it.
+fn worn(case: &mut Case, rng: &mut ChaCha8Rng, off: f64) {
+    let stroke_m = case.profile.stroke_m;
+    case.plant.contact.gap_m = rng.random_range(20e-6..80e-6);
+    case.plant.contact.worn_m = rng.random_range(30e-6..120e-6);
+    case.plant.contact.worn_at_m = [either(rng) * off * stroke_m, rng.random_range(0.05..0.3) * stroke_m];
+}
+
 /// Draws the law of one flank.
 type LawDraw = fn(&mut ChaCha8Rng) -> ContactLaw;
 
@@ -611,7 +646,7 @@ impl Case {
         let extrapolated_gap_m = if self.has_soft_flanks() {
             contact.extrapolated_gap_m(STIFF_BAND.0 * p95_n, STIFF_BAND.1 * p95_n)
         } else {
-            contact.gap_m
+            flight.gap_m.max(0.0)
         };
         Ok(FlownCase { flight, extrapolated_gap_m, case: self })
     }

@@ -122,7 +122,7 @@ pub struct Contact {
     pub stiffness_n_per_m: f64,
     /// f, N·s/m: acts while a flank is touched, and never makes it pull.
     pub damping_n_s_per_m: f64,
-    /// Total free travel, metres.
+    /// Total free travel, metres; negative for a preloaded nut, whose flanks both press that deep in the middle.
     pub gap_m: f64,
     /// δX₀: the relative position X₂ − X₁ in the middle of the gap, metres.
     pub offset_m: f64,
@@ -136,6 +136,10 @@ pub struct Contact {
     pub stiffness_drift: f64,
     /// Growth of the gap from the start to the end of the log, as a share, −1 to 10. Default 0.
     pub gap_drift: f64,
+    /// Gap that the most worn place of the stroke has in addition to `gap_m`, metres. Default 0.
+    pub worn_m: f64,
+    /// Screw position of that place, and distance at which the wear has fallen to 61 % (a bell curve), metres.
+    pub worn_at_m: [f64; 2],
     /// Stiffness in the middle of each phase (preflight, take-off, climb, cruise, approach, landing)
     /// over `stiffness_n_per_m`, changing linearly between, 0.2 to 5. Default 1 in each.
     pub stiffness_phase_factors: [f64; 6],
@@ -153,6 +157,8 @@ impl Default for Contact {
             lower_stiffness_factor: 1.0,
             stiffness_drift: 0.0,
             gap_drift: 0.0,
+            worn_m: 0.0,
+            worn_at_m: [0.0, 5e-3],
             stiffness_phase_factors: [1.0; 6],
         }
     }
@@ -171,7 +177,10 @@ impl Contact {
     pub(crate) fn check(&self) -> Result<(), Error> {
         positive("contact.stiffness_n_per_m", self.stiffness_n_per_m)?;
         not_negative("contact.damping_n_s_per_m", self.damping_n_s_per_m)?;
-        not_negative("contact.gap_m", self.gap_m)?;
+        crate::error::finite("contact.gap_m", self.gap_m)?;
+        not_negative("contact.worn_m", self.worn_m)?;
+        crate::error::finite("contact.worn_at_m", self.worn_at_m[0])?;
+        positive("contact.worn_at_m", self.worn_at_m[1])?;
         crate::error::finite("contact.offset_m", self.offset_m)?;
         self.law.check("contact.law")?;
         self.lower_law.map_or(Ok(()), |law| law.check("contact.lower_law"))?;
@@ -191,6 +200,15 @@ impl Contact {
         let drift = 1.0 + self.stiffness_drift * progress;
         let gap_m = self.gap_m * (1.0 + self.gap_drift * progress);
         Self { stiffness_n_per_m: self.stiffness_n_per_m * factor * drift, gap_m, ..*self }
+    }
+
+    /// The gap with the screw at a place of its stroke, metres.
+    pub(crate) fn gap_at_m(&self, screw_m: f64) -> f64 {
+        if self.worn_m == 0.0 {
+            return self.gap_m;
+        }
+        let off = (screw_m - self.worn_at_m[0]) / self.worn_at_m[1];
+        self.gap_m + self.worn_m * (-0.5 * off * off).exp()
     }
 
     /// Whether stiffness or gap change during a log.
@@ -227,10 +245,12 @@ impl Contact {
     /// Elastic energy at a relative position δX, J.
     pub fn energy_j(&self, delta_m: f64) -> f64 {
         let from_m = delta_m - self.offset_m;
-        let beyond_m = (from_m.abs() - 0.5 * self.gap_m).max(0.0);
-        let upper = (self.law, self.stiffness_n_per_m);
-        let (law, stiffness_n_per_m) = if from_m < 0.0 { self.lower() } else { upper };
-        stiffness_n_per_m * law.potential_m2(beyond_m)
+        let energy_j = |(law, stiffness_n_per_m): (ContactLaw, f64), depth_m: f64| {
+            stiffness_n_per_m * law.potential_m2(depth_m.max(0.0))
+        };
+        let half_m = 0.5 * self.gap_m;
+        energy_j((self.law, self.stiffness_n_per_m), from_m - half_m)
+            + energy_j(self.lower(), -from_m - half_m)
     }
 
     /// The mean force of a step that starts at δX and moves at the mean relative speed given.

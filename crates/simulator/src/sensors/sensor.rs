@@ -135,6 +135,8 @@ pub struct Channel {
     pub hysteresis: f64,
     /// Travel within which the hysteretic error turns to the other side, up to a factor e. Default 1000.
     pub hysteresis_length: f64,
+    /// Largest size that the channel shows, noise excepted; 0 for any. Default 0.
+    pub clip: f64,
     /// Time constant of a first-order lag, seconds, 0 to 1.
     pub lag_s: f64,
     /// Each sample is the mean over the sample period that ends at its instant (anti-alias filter).
@@ -169,6 +171,7 @@ impl Default for Channel {
             freeze_s: 0.0,
             hysteresis: 0.0,
             hysteresis_length: 1000.0,
+            clip: 0.0,
             lag_s: 0.0,
             box_average: false,
             rate_hz: 0.0,
@@ -222,6 +225,7 @@ impl Channel {
         not_negative(&named("freeze_s"), self.freeze_s)?;
         not_negative(&named("hysteresis"), self.hysteresis)?;
         positive(&named("hysteresis_length"), self.hysteresis_length)?;
+        not_negative(&named("clip"), self.clip)?;
         within(&named("lag_s"), self.lag_s, 0.0, 1.0, "between 0 and 1 s")?;
         within(&named("rate_hz"), self.rate_hz, 0.0, 5e3, "between 0 and 5000 Hz")?;
         self.periodic.check(&named("periodic"))?;
@@ -304,7 +308,8 @@ impl Channel {
                 + coloured.get(k).copied().unwrap_or(0.0);
             let white: f64 = StandardNormal.sample(rng);
             let level = (*value + bent) * (1.0 + self.gain_error) + self.bias + self.drift * k as f64 / last;
-            *value = self.rounded(level + self.noise_rms * white);
+            let most = if self.clip > 0.0 { self.clip } else { f64::INFINITY };
+            *value = self.rounded(level.clamp(-most, most) + self.noise_rms * white);
         }
         self.freeze(&mut values, rate_hz, rng);
         self.spike(&mut values, rate_hz, rng);
