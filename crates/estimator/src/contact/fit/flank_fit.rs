@@ -11,7 +11,7 @@ use crate::contact::codes::Rejection;
 use crate::contact::fit::design_matrix::{
     COLUMNS, DRY, DesignRow, FORCE, GAP, LOAD_RATE, ORIGIN, PERIODIC, RowSource, SHARE, SIDE_FORCE, SPEED,
 };
-use crate::contact::fit::gauss_newton::{GaussNewtonResult, search};
+use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
 use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
 use crate::contact::fit::workspace::ContactWorkspace;
@@ -30,6 +30,10 @@ const LOOKS: usize = 4000;
 /// did by 3 % at most, with positions that freeze for seconds by 15 %; over the flights that were given a wrong
 /// gap before by 50 % and more. Of 3,000 sound flights of the study twelve are refused for it.
 const UNEXPLAINED: f64 = 0.25;
+/// A gap under this share of the wind-up does not show the zero of the load cell.
+const UNSEEN_GAP: f64 = 0.1;
+/// Largest error of that zero that is to be expected, over the 95 % load.
+const ZERO_ERROR: f64 = 0.45;
 /// Standard errors by which no gap of a sound log is below zero.
 const IMPOSSIBLE_SIGMA: f64 = 5.0;
 /// Gauss–Newton iterations over the whole flight after the search: while that is cheap, and beyond.
@@ -224,11 +228,24 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         is_soft: sigma > SOFT_CONTACT_SIGMA,
         line,
     };
+    if gap_m < UNSEEN_GAP * windup_m {
+        check_both_sides(&workspace.whole, scaling)?;
+    }
     if fit.is_possible() && is_explained(workspace, scaling, &fit) {
         Ok(fit)
     } else {
         Err(Rejection::MotionUnexplained)
     }
+}
+
+/// Without a gap nothing in a flight shows the zero of its load cell. A flank then counts as pressed under loads that no
+/// zero error explains: a load that only seems to change its side shows no gap either.
+fn check_both_sides(blocks: &BlockMeans, scaling: &Scaling) -> Result<(), Rejection> {
+    let beyond_s = |side: f64| {
+        let is_beyond = |load_n: &&f64| side * **load_n > ZERO_ERROR * scaling.load_n;
+        blocks.load_n.iter().filter(is_beyond).count() as f64 * blocks.period_s
+    };
+    rejection_of_contact(beyond_s(1.0).min(beyond_s(-1.0)))
 }
 
 /// The published mid-range statistic (equations 18–31) of the block means, m, with what the regression found: stiffness,

@@ -120,7 +120,11 @@ pub(crate) fn start(scaling: &Scaling) -> FrictionState {
 }
 
 fn check_contact(design: &DesignMatrix) -> Result<(), Rejection> {
-    let least_s = design.touched_s.0.min(design.touched_s.1);
+    rejection_of_contact(design.touched_s.0.min(design.touched_s.1))
+}
+
+/// The reason of a flight whose less pressed flank is pressed for a time, s.
+pub(crate) fn rejection_of_contact(least_s: f64) -> Result<(), Rejection> {
     if least_s < MIN_CONTACT_S {
         Err(Rejection::NoLoadReversal)
     } else if least_s < REQUIRED_CONTACT_S {
