@@ -11,6 +11,7 @@ use crate::contact::blocks::spikes::SpikeThreshold;
 use crate::contact::codes::Rejection;
 use crate::contact::stats::{middle_and_half, rms, second_difference_rms};
 use crate::contact::types::{PartPrior, SHORTEST_S};
+use crate::gap::load_band::quantiles;
 
 /// Length of a block, s: short against vibration of the load, which would mix both flanks in one mean.
 const PERIOD_S: f64 = 0.004;
@@ -38,6 +39,13 @@ const STRETCH_S: f64 = 2.0;
 /// channel is read in long enough runs to be prefetched.
 const SPAN: usize = 16;
 
+/// A load cell's end lies near this quantile of the loads of its side, within this share of it ...
+const PILE_QUANTILE: f64 = 0.998;
+const PILE_WIDTH: f64 = 0.03;
+/// ... where so many times as many loads lie as in the two widths before it, and so long in all, s.
+const PILE_RATIO: f64 = 2.0;
+const SHORTEST_PILE_S: f64 = 1.0;
+
 /// Blocks that the search begins with, in windows of this many.
 const EXCERPT_BLOCKS: usize = 6000;
 /// See [`EXCERPT_BLOCKS`].
@@ -60,6 +68,8 @@ pub(crate) struct BlockMeans {
     pub(crate) dx_m: Vec<f64>,
     /// F, N: as logged, then brought to the motor's clock.
     pub(crate) load_n: Vec<f64>,
+    /// Loads, N, beyond which the load cell is at its end: no row is made of such blocks.
+    pub(crate) in_range_n: Range<f64>,
     /// e^−(v/v_s)²: how near the motor is to rest.
     pub(crate) slowness: Vec<f64>,
     /// X₂ as it was logged, m.
@@ -98,6 +108,7 @@ impl BlockMeans {
         self.screw_m.extend(self.motor_m.iter().zip(&self.dx_m).map(|(x, dx)| x + dx));
         self.logged_n.extend_from_slice(&self.load_n);
         self.find_slowness();
+        self.in_range_n = -self.clipped_above_n(-1.0)..self.clipped_above_n(1.0);
         if !prior.output_locked && self.is_still() {
             return Err(Rejection::ChannelConstant);
         }
@@ -115,6 +126,25 @@ impl BlockMeans {
         starts.clear();
         self.phases.clear();
         self.period_s = period_s;
+    }
+
+    /// The load of one side beyond which the load cell shows its end, N; infinite where it shows none.
+    ///
+    /// Loads thin out towards the largest. At the end of a cell's range they pile up instead.
+    fn clipped_above_n(&self, side: f64) -> f64 {
+        let sided_n: Vec<f64> = self.load_n.iter().map(|load_n| side * load_n).collect();
+        let all = 0..sided_n.len();
+        let Some([top_n]) = quantiles(&sided_n, std::slice::from_ref(&all), [PILE_QUANTILE]) else {
+            return f64::INFINITY;
+        };
+        let width_n = PILE_WIDTH * top_n;
+        let between = |low_n: f64, high_n: f64| {
+            sided_n.iter().filter(|load_n| (low_n..high_n).contains(*load_n)).count() as f64
+        };
+        let pile = between(top_n - width_n, f64::INFINITY);
+        let beside = between(top_n - 3.0 * width_n, top_n - width_n);
+        let is_pile = pile > PILE_RATIO * beside && pile * self.period_s > SHORTEST_PILE_S;
+        if is_pile { top_n - width_n } else { f64::INFINITY }
     }
 
     /// Takes the means of a span of whole blocks in which nothing leaps; none of them, and false, where something is
@@ -201,13 +231,17 @@ impl BlockMeans {
     pub(crate) fn is_complete(&self, k: usize) -> bool {
         let around = |values: &[f64]| values.get(k.wrapping_sub(1)..k + 2)?.as_array().copied();
         let rates = around(&self.motor_m).zip(around(&self.load_n));
-        rates.is_some_and(|(motor_m, load_n)| is_complete(self.time_s[k], self.dx_m[k], &motor_m, &load_n))
+        rates.is_some_and(|(motor_m, load_n)| {
+            is_complete(self.time_s[k], self.dx_m[k], &motor_m, &load_n)
+                && self.in_range_n.contains(&load_n[1])
+        })
     }
 
     /// Takes in a part of a long flight: windows in which the load changes sides most often, and others spread over the
     /// flight. Nothing of a short flight. δX and the load are there once [delays are applied](Self::apply_delays).
     pub(crate) fn excerpt_of(&mut self, whole: &Self, load_n: f64) {
         self.clear(EXCERPT_BLOCKS.min(whole.len()), whole.period_s);
+        self.in_range_n = whole.in_range_n.clone();
         if whole.len() < EXCERPT_BLOCKS * 3 / 2 {
             return;
         }

@@ -303,7 +303,10 @@ fn clear_incomplete(blocks: &BlockMeans, kept: &mut [Touch]) {
     for (((motor_m, load_n), (time_s, dx_m)), kept) in
         rates.zip(time_s.iter().zip(dx_m)).zip(&mut kept[inner])
     {
-        *kept = Touch(kept.0 * u8::from(is_complete(*time_s, *dx_m, motor_m, load_n)));
+        let is_kept = is_complete(*time_s, *dx_m, motor_m, load_n)
+            & (load_n[1] >= blocks.in_range_n.start)
+            & (load_n[1] < blocks.in_range_n.end);
+        *kept = Touch(kept.0 * u8::from(is_kept));
     }
 }
 
