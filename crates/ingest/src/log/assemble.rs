@@ -8,6 +8,7 @@ use crate::log::channel_reader::Channel;
 use crate::log::selection::SampleSelection;
 use crate::log::types::ActuatorChannels;
 use crate::time::clock::TimeBase;
+use crate::time::slow_channel::join_samples;
 use crate::time::zero_order_hold::{non_empty_segments, zero_order_hold};
 
 /// Channels as read, on one clock.
@@ -41,6 +42,10 @@ pub(crate) fn assemble(
         let longest = quality[0].longest_run.max(quality[1].longest_run);
         flags.extend(quality::drop_frozen_samples(&mut motor_m, &mut dx_m, longest, line.step_s));
     }
+    if !is_relative {
+        join_samples(&mut dx_m, &segments);
+    }
+    join_samples(&mut motor_m, &segments);
     let (travel_m, missing) = relative(&motor_m, &mut dx_m, is_relative);
     flags.extend(quality::coarse_resolution(&quality, travel_m));
     flags.extend(quality::load_frozen(&load_n, &motor_m, quality[2].longest_run, line.step_s));
@@ -50,6 +55,7 @@ pub(crate) fn assemble(
     } else {
         zero_order_hold(&mut load_n, &segments, line.step_s)
     };
+    join_samples(&mut load_n, &segments);
     ActuatorChannels {
         position,
         step_s: line.step_s,

@@ -2,4 +2,5 @@
 
 pub mod clock;
 pub(crate) mod resample;
+pub(crate) mod slow_channel;
 pub(crate) mod zero_order_hold;

@@ -58,7 +58,7 @@ fn actuators(files: &LogFiles, mapping: &Mapping) -> Vec<ActuatorChannels> {
 }
 
 /// The samples that `make.py` wrote, from its formulas.
-fn assert_is_the_flight(found: &[ActuatorChannels], name: &str, rounding: f64, load_every: usize) {
+fn assert_is_the_flight(found: &[ActuatorChannels], name: &str, rounding: f64, load_every: i32) {
     let names: Vec<&str> = found.iter().map(|a| a.position.as_str()).collect();
     assert_eq!(names, ["left", "right"], "{name}");
     for (a, actuator) in found.iter().enumerate() {
@@ -69,8 +69,11 @@ fn assert_is_the_flight(found: &[ActuatorChannels], name: &str, rounding: f64, l
             let t = f64::from(k) / 100.0;
             let motor_m = (720.0 * (0.5 * t).sin() + 90.0 * a as f64) / 360.0 * 0.005;
             let at = k as usize;
-            let held = f64::from(k - k % load_every as i32) / 100.0;
-            let load_n = 1000.0 * (0.7 * held).cos() + a as f64;
+            // A line between the load's own samples; the last one is held.
+            let own_n = |k: i32| 1000.0 * (0.7 * f64::from(k) / 100.0).cos() + a as f64;
+            let (since, every) = (k % load_every, load_every);
+            let (before_n, after_n) = (own_n(k - since), own_n((k - since + every).min(400 - every)));
+            let load_n = before_n + (after_n - before_n) * f64::from(since) / f64::from(every);
             assert!((actuator.motor_m[at] - motor_m).abs() < 1e-9 + rounding, "{name}: motor at {k}");
             let dx_m = 5e-5 * t.cos();
             assert!((actuator.dx_m[at] - dx_m).abs() < 1e-9 + 2.0 * rounding, "{name}: dx at {k}");
@@ -171,7 +174,7 @@ fn hive_folders_say_which_flight_and_actuator_a_file_is() {
 }
 
 #[test]
-fn loads_in_a_file_of_their_own_at_their_own_rate_are_held() {
+fn loads_in_a_file_of_their_own_at_their_own_rate_move_in_lines() {
     let mut m = wide();
     m.groups = [("loads".to_owned(), GroupMapping::default())].into();
     m.channels.load.group = Some("loads".into());
