@@ -6,7 +6,6 @@ mod cli_output;
 mod docs;
 mod follow_up;
 mod fuzz;
-mod gate;
 mod harness;
 mod hostile;
 mod logs;

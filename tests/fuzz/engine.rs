@@ -8,15 +8,17 @@
 #![allow(dead_code, reason = "each of the test programs that include this file uses a part of it")]
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-#[path = "../gate.rs"]
-mod gate;
-
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+
+#[path = "../gate.rs"]
+mod gate;
+
+pub(crate) use gate::is_gate;
 
 /// A case that takes longer is a hang: the process ends, since no thread can be ended from outside.
 const HANG: Duration = Duration::from_mins(1);
@@ -127,7 +129,7 @@ pub(crate) fn fuzz(
         print(&format!("{name}: {}", run(&std::fs::read(file).unwrap())));
         return;
     }
-    let wanted_cases = if gate::is_gate() { gate_cases } else { gate_cases.div_ceil(10) };
+    let wanted_cases = if is_gate() { gate_cases } else { gate_cases.div_ceil(10) };
     let number = |key: &str| std::env::var(key).ok().and_then(|text| text.parse::<u64>().ok());
     let time = number("FREEPLAY_FUZZ_S").map(Duration::from_secs);
     let seed = number("FREEPLAY_FUZZ_SEED").unwrap_or(1);

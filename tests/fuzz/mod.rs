@@ -12,7 +12,7 @@ use records::{PartNumber, Status, TailNumber};
 use self::engine::{Input, Random, change_edits, edit_text, fuzz};
 use crate::harness::top;
 
-mod engine;
+pub(crate) mod engine;
 
 /// Bytes of one change to a channel.
 const EDIT: usize = 13;

@@ -83,7 +83,7 @@ mod tests {
     fn a_slow_channel_moves_in_lines_whether_it_is_repeated_or_left_empty() {
         let most = (8.0 / 200.0_f64).powi(2) * (2.0 * std::f64::consts::TAU).powi(2) / 8.0;
         for is_repeated in [true, false] {
-            let slow = |k: usize| if is_repeated || k % 8 == 0 { sine(k - k % 8) } else { f64::NAN };
+            let slow = |k: usize| if is_repeated || k.is_multiple_of(8) { sine(k - k % 8) } else { f64::NAN };
             let mut values: Vec<f64> = (0..2000).map(slow).collect();
             join_samples(&mut values, &[0..1000, 1000..2000]);
             let off = (0..990).chain(1000..1990).map(|k| (values[k] - sine(k)).abs()).fold(0.0, f64::max);

@@ -8,7 +8,7 @@ use self::engine::{Input, Random, edit_text, fuzz, overwrite};
 use crate::fixtures::{result, run, writer};
 
 #[path = "../../../../tests/fuzz/engine.rs"]
-mod engine;
+pub(crate) mod engine;
 
 /// A store of several commits, with a compaction behind it.
 fn grown(dir: &Path) -> Store {

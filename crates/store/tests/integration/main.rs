@@ -9,8 +9,6 @@ mod exports;
 mod fixtures;
 mod folder;
 mod fuzz;
-#[path = "../../../../tests/gate.rs"]
-mod gate;
 mod maintenance;
 mod queries;
 mod round_trip;

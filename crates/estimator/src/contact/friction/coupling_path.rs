@@ -303,9 +303,7 @@ fn clear_incomplete(blocks: &BlockMeans, kept: &mut [Touch]) {
     for (((motor_m, load_n), (time_s, dx_m)), kept) in
         rates.zip(time_s.iter().zip(dx_m)).zip(&mut kept[inner])
     {
-        let is_kept = is_complete(*time_s, *dx_m, motor_m, load_n)
-            & (load_n[1] >= blocks.in_range_n.start)
-            & (load_n[1] < blocks.in_range_n.end);
+        let is_kept = is_complete(*time_s, *dx_m, motor_m, load_n) && blocks.in_range_n.contains(&load_n[1]);
         *kept = Touch(kept.0 * u8::from(is_kept));
     }
 }
