@@ -22,13 +22,16 @@ pub(crate) fn flags(
     let least_m = (SEEN * found.gap_se_m).max(DETECTION_SHARE * frame.windup_m());
     let is_negative = found.gap_m < -SEEN * found.gap_se_m;
     let compliance = part_stiffness_n_per_m / found.stiffness_n_per_m;
+    let is_preloaded = found.preload_n.is_some();
     let doubts = [
+        (QualityFlag::Preloaded, is_preloaded),
         (QualityFlag::GapNegative, is_negative),
-        (QualityFlag::BelowDetection, found.gap_m < least_m && !is_negative && agrees),
-        (QualityFlag::EstimatorsDisagree, !agrees),
+        (QualityFlag::BelowDetection, found.gap_m < least_m && !is_negative && agrees && !is_preloaded),
+        (QualityFlag::EstimatorsDisagree, !agrees && !is_preloaded),
+        (QualityFlag::GapVaries, found.gap_largest_m.is_some()),
         (QualityFlag::StiffnessImplausible, (compliance - 1.0).abs() > IMPLAUSIBLE),
         (QualityFlag::FrictionHeavy, found.friction.is_heavy(found.load_p95_n)),
-        (QualityFlag::SoftContact, is_soft),
+        (QualityFlag::SoftContact, is_soft && !is_preloaded),
         (QualityFlag::Imprecise, found.gap_se_m > VAGUE * frame.windup_m()),
     ];
     doubts.into_iter().filter_map(|(flag, holds)| holds.then_some(flag)).collect()

@@ -97,10 +97,14 @@ pub enum QualityFlag {
     FrictionHeavy,
     /// Flanks are soft at low load: a fit of higher loads alone reads another gap.
     SoftContact,
+    /// The gap depends on the place of the stroke: `gap_m` is its mean over time, and the largest stands beside it.
+    GapVaries,
     /// The gap is negative by more than two standard errors, which no gap can be.
     GapNegative,
     /// The standard error exceeds a tenth of the wind-up.
     Imprecise,
+    /// Both flanks press at low load, so that there is no gap; the preload stands beside it.
+    Preloaded,
 }
 
 impl QualityFlag {
@@ -112,8 +116,10 @@ impl QualityFlag {
             Self::StiffnessImplausible => "stiffness_implausible",
             Self::FrictionHeavy => "friction_heavy",
             Self::SoftContact => "soft_contact",
+            Self::GapVaries => "gap_varies",
             Self::GapNegative => "gap_negative",
             Self::Imprecise => "imprecise",
+            Self::Preloaded => "preloaded",
         }
     }
 }

@@ -126,7 +126,9 @@ fn report(
     contact: &FlankFit,
     midrange_at_fit_m: Option<f64>,
 ) -> ContactEstimate {
-    let (gap_m, gap_se_m) = contact.gap_m;
+    let preload_n = contact.preload_n();
+    let gap_m = if preload_n.is_some() { 0.0 } else { contact.gap_m.0 };
+    let gap_se_m = contact.gap_m.1;
     let (compliance, compliance_se) = contact.compliance_m_per_n;
     let loop_width = lost_motion::loop_width_m(contact);
     let lost_motion =
@@ -145,6 +147,8 @@ fn report(
         load_delay_se_s: contact.load_delay_se_s,
         friction: contact.state.friction,
         friction_se: contact.friction_se,
+        gap_largest_m: contact.profile.map(|p| (p.largest_m.0, p.largest_m.1, p.largest_at_m)),
+        preload_n,
         loop_width_m: loop_width.map(|(m, _)| m),
         loop_width_se_m: loop_width.map(|(_, se_m)| se_m),
         lost_motion_m: lost_motion.map(|(m, _)| m),

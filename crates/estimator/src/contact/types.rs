@@ -88,6 +88,10 @@ pub struct ContactEstimate {
     pub friction: Friction,
     /// Its standard errors.
     pub friction_se: FrictionErrors,
+    /// Where the gap varies along the stroke: the largest gap, its standard error, and the screw position where it is, m.
+    pub gap_largest_m: Option<(f64, f64, f64)>,
+    /// Force with which both flanks of a preloaded nut press under no load, and its standard error, N.
+    pub preload_n: Option<(f64, f64)>,
     /// Lost motion at zero load, m, from lightly loaded samples that the fit leaves out. On soft flanks it is narrower
     /// than the gap.
     pub loop_width_m: Option<f64>,

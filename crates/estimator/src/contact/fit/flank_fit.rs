@@ -14,9 +14,11 @@ use crate::contact::fit::design_matrix::{
 use crate::contact::fit::gauss_newton::{GaussNewtonResult, rejection_of_contact, search};
 use crate::contact::fit::parameter_search::{ParameterSearch, SearchResult};
 use crate::contact::fit::scaling::{LATE_S, SPEED_M_PER_S, Scaling};
+use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::fit::workspace::ContactWorkspace;
 use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::FrictionState;
+use crate::contact::lost_motion;
 use crate::contact::stats::{median, second_difference_rms};
 use crate::contact::types::FrictionErrors;
 use crate::gap::midrange;
@@ -36,6 +38,11 @@ const UNSEEN_GAP: f64 = 0.1;
 const ZERO_ERROR: f64 = 0.45;
 /// Standard errors by which no gap of a sound log is below zero.
 const IMPOSSIBLE_SIGMA: f64 = 5.0;
+/// Standard errors, and metres, by which the flanks of a preloaded nut overlap.
+const PRELOAD_SIGMA: f64 = 3.0;
+const LEAST_OVERLAP_M: f64 = 2e-6;
+/// Share of the overlap of which the loop at zero load is narrower there.
+const CLOSED: f64 = 0.5;
 /// Gauss–Newton iterations over the whole flight after the search: while that is cheap, and beyond.
 const WHOLE_ITERATIONS: (usize, usize) = (2, 1);
 /// Reweightings of the rows in each of them.
@@ -171,6 +178,8 @@ pub(crate) struct FlankFit {
     /// Length of a block, s.
     pub(crate) period_s: f64,
     pub(crate) state: FrictionState,
+    /// The gap along the stroke, where it varies.
+    pub(crate) profile: Option<StrokeProfile>,
     /// Whether higher loads alone read another gap.
     pub(crate) is_soft: bool,
     /// The fit and its rows.
@@ -178,10 +187,25 @@ pub(crate) struct FlankFit {
 }
 
 impl FlankFit {
-    /// Whether the actuator gives way to the load, and its gap is not clearly negative.
+    /// Whether the actuator gives way to the load, and its gap is not clearly negative unless its nut is preloaded.
     fn is_possible(&self) -> bool {
         let (gap_m, gap_se_m) = self.gap_m;
-        self.compliance_m_per_n.0 > 0.0 && gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m
+        self.compliance_m_per_n.0 > 0.0 && (gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || self.is_preloaded())
+    }
+
+    /// Whether both flanks press at low load, as in a preloaded nut: its flanks, extrapolated to zero load, overlap, and
+    /// lightly loaded contact lies outwards of both, so that the loop closes at zero load instead of overlapping too.
+    pub(crate) fn is_preloaded(&self) -> bool {
+        let overlap_m = -self.gap_m.0;
+        let is_clear = overlap_m > PRELOAD_SIGMA * self.gap_m.1 && overlap_m > LEAST_OVERLAP_M;
+        is_clear && lost_motion::loop_width_m(self).is_some_and(|(loop_m, _)| loop_m > -CLOSED * overlap_m)
+    }
+
+    /// Force with which both flanks of a preloaded nut press under no load, and its standard error, N: half of the overlap
+    /// of the flanks times their stiffness.
+    pub(crate) fn preload_n(&self) -> Option<(f64, f64)> {
+        let force_n = |length_m: f64| 0.5 * length_m / self.compliance_m_per_n.0;
+        self.is_preloaded().then(|| (force_n(-self.gap_m.0), force_n(self.gap_m.1)))
     }
 
     /// δX on a flank, m, under a force over the 95 % load. The side is +1, −1, or 0 in the gap.
@@ -214,8 +238,16 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         return Err(Rejection::RateTooLow);
     }
     let (gap_m, doubt, sigma) = gap_and_doubt(&line, spread_m, scale_m, vibration_n, scaling);
+    let profile = stroke_profile(&line, &workspace.whole, scaling);
+    let gap_m = profile.map_or((gap_m, doubt.standard_error_m()), |profile| {
+        let (mean_m, jackknife_m) = profile.mean_m;
+        // What one gap for the whole stroke leaves unexplained is explained now.
+        let (search_m, choice_m, bend_m, light_m) = (0.0, 0.0, 0.0, 0.0);
+        (mean_m, Doubt { jackknife_m, search_m, choice_m, bend_m, light_m, ..doubt }.standard_error_m())
+    });
     let fit = FlankFit {
-        gap_m: (gap_m, doubt.standard_error_m()),
+        gap_m,
+        profile,
         compliance_m_per_n: (line.fit.beta[FORCE] / scaling.load_n, error_m(FORCE) / scaling.load_n),
         skew_se_s: error_m(SPEED) / SPEED_M_PER_S,
         load_zero_se_n,
@@ -228,7 +260,7 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         is_soft: sigma > SOFT_CONTACT_SIGMA,
         line,
     };
-    if gap_m < UNSEEN_GAP * windup_m {
+    if gap_m.0 < UNSEEN_GAP * windup_m {
         check_both_sides(&workspace.whole, scaling)?;
     }
     if fit.is_possible() && is_explained(workspace, scaling, &fit) {

@@ -134,7 +134,7 @@ pub(crate) fn rejection_of_contact(least_s: f64) -> Result<(), Rejection> {
     }
 }
 
-fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior; COLUMNS] {
+pub(crate) fn priors(scaling: &Scaling, state: &FrictionState) -> [GaussianPrior; COLUMNS] {
     let windup_m = scaling.windup_m();
     let here_m = scaling.load_n / state.stiffness_n_per_m;
     let lack = |(usual, spread): (f64, f64), now: f64| GaussianPrior {

@@ -7,4 +7,5 @@ mod parameter_search;
 mod robust_regression;
 pub(super) mod scaling;
 pub(super) mod sign_check;
+pub(super) mod stroke_profile;
 pub(super) mod workspace;

@@ -16,6 +16,9 @@ const WILD: f64 = 10.0;
 /// The least spread of residuals, m; below any sensor's, it keeps exact data from dividing by zero.
 const LEAST_SPREAD_M: f64 = 1e-12;
 
+/// Precision of a belief in the first round, in units of the rows' weights.
+const DEPENDENT: f64 = 1e-9;
+
 /// What a coefficient is believed to be, m.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GaussianPrior {
@@ -53,7 +56,9 @@ pub(crate) fn fit<const N: usize>(
     }
     let mean_blocks = rows.iter().map(|r| r.blocks).sum::<f64>() / rows.len() as f64;
     let even: Vec<f64> = rows.iter().map(|r| r.blocks / mean_blocks).collect();
-    let mut found = solve(rows, beliefs, even.clone(), [0.0; N])?;
+    // Before the noise is known, beliefs only tell dependent columns apart.
+    let hint = beliefs.map(|b| if b.sd.is_finite() { DEPENDENT } else { 0.0 });
+    let mut found = solve(rows, beliefs, even.clone(), hint)?;
     for round in 1..=rounds {
         let residuals_m: Vec<f64> = rows.iter().map(|r| found.residual_m(r)).collect();
         let spread_m = spread_m(&residuals_m);
@@ -120,7 +125,7 @@ fn normal_equations<const N: usize>(rows: &[DesignRow<N>], weights: &[f64]) -> (
 }
 
 /// Lanes of a row.
-const ROW_LANES: usize = 3;
+const ROW_LANES: usize = 5;
 /// Squares on and below the diagonal.
 const SQUARES: usize = ROW_LANES * (ROW_LANES + 1) / 2;
 
@@ -255,8 +260,16 @@ impl<const N: usize> RobustFit<N> {
 
     /// As [`standard_error_m`](Self::standard_error_m), of a sum of coefficients.
     pub(crate) fn standard_error_of_sum_m(&self, columns: &[usize], rows: &[DesignRow<N>]) -> f64 {
-        let influence: [f64; N] =
-            std::array::from_fn(|i| columns.iter().map(|&column| self.inverse[(column, i)]).sum());
+        let mut combination = [0.0; N];
+        columns.iter().for_each(|&column| combination[column] = 1.0);
+        self.standard_error_of_m(&combination, rows)
+    }
+
+    /// As [`standard_error_m`](Self::standard_error_m), of a weighted sum of all coefficients.
+    pub(crate) fn standard_error_of_m(&self, combination: &[f64; N], rows: &[DesignRow<N>]) -> f64 {
+        let influence: [f64; N] = std::array::from_fn(|i| {
+            (0..N).map(|column| combination[column] * self.inverse[(column, i)]).sum()
+        });
         let (mut total, mut sum, mut stretches) = (0.0, 0.0, 0_usize);
         let mut stretch = None;
         for (row, w) in rows.iter().zip(&self.weights) {

@@ -1,0 +1,135 @@
+//! The gap along the stroke: a screw wears where it works.
+//!
+//! Where the residuals of the fit with one gap show that the gap depends on the place, the regression is repeated with
+//! a gap, and a common error of the transducer, at each of some knots in addition; between knots both change linearly.
+
+use crate::contact::blocks::block_means::BlockMeans;
+use crate::contact::fit::design_matrix::{COLUMNS, DesignRow, GAP, PLACE};
+use crate::contact::fit::gauss_newton::{GaussNewtonResult, priors};
+use crate::contact::fit::robust_regression::{GaussianPrior, fit};
+use crate::contact::fit::scaling::Scaling;
+
+/// Knots, evenly from one end of the stroke seen to the other.
+const KNOTS: usize = 9;
+/// Columns with a gap and an error at each knot.
+const ALL: usize = COLUMNS + 2 * KNOTS;
+/// Spread of the gap and of the transducer's error at a knot about what the whole stroke has, m.
+const KNOT_GAP_M: f64 = 60e-6;
+const KNOT_ERROR_M: f64 = 10e-6;
+/// Mean residual at a knot, outwards or inwards of both flanks, that asks for a second look: m, and a share of the gap.
+const SUSPECT_M: f64 = 1e-6;
+const SUSPECT_SHARE: f64 = 0.02;
+/// Standard errors, and share of the mean gap, by which the largest gap must exceed the mean.
+const CERTAIN: f64 = 4.0;
+const LEAST_SHARE: f64 = 0.1;
+/// Least share of the time near a knot that counts.
+const VISITED: f64 = 0.05;
+/// Reweightings of the rows.
+const REWEIGHTINGS: usize = 3;
+
+/// A gap that varies along the stroke.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct StrokeProfile {
+    /// Mean over the time that the screw spent at each place, and its standard error, m.
+    pub(crate) mean_m: (f64, f64),
+    /// The largest gap and its standard error, m.
+    pub(crate) largest_m: (f64, f64),
+    /// Screw position of the largest gap, m.
+    pub(crate) largest_at_m: f64,
+}
+
+/// The profile of a flight whose gap varies along the stroke for certain.
+pub(crate) fn stroke_profile(
+    line: &GaussNewtonResult,
+    blocks: &BlockMeans,
+    scaling: &Scaling,
+) -> Option<StrokeProfile> {
+    if scaling.per_place == 0.0 || !is_suspect(line) {
+        return None;
+    }
+    let rows: Vec<DesignRow<ALL>> = line.design.firm.iter().map(with_knots).collect();
+    let known = priors(scaling, &line.at);
+    let at_knot = |sd| GaussianPrior { mean: 0.0, sd };
+    let beliefs: [GaussianPrior; ALL] = std::array::from_fn(|column| match column {
+        0..COLUMNS => known[column],
+        _ if column < COLUMNS + KNOTS => at_knot(KNOT_GAP_M),
+        _ => at_knot(KNOT_ERROR_M),
+    });
+    let found = fit(&rows, &beliefs, REWEIGHTINGS)?;
+    let shares = time_shares(blocks, scaling);
+    let value_m = |weights: &[f64; KNOTS]| -> f64 {
+        found.beta[GAP] + weights.iter().zip(&found.beta[COLUMNS..]).map(|(w, b)| w * b).sum::<f64>()
+    };
+    let error_m = |gap: f64, weights: &[f64; KNOTS]| {
+        let mut combination = [0.0; ALL];
+        combination[GAP] = gap;
+        combination[COLUMNS..COLUMNS + KNOTS].copy_from_slice(weights);
+        found.standard_error_of_m(&combination, &rows)
+    };
+    let only = |knot: usize| std::array::from_fn(|k| f64::from(u8::from(k == knot)));
+    let mean_m = value_m(&shares);
+    let (largest_m, knot) = (0..KNOTS)
+        .filter(|&k| shares[k] >= VISITED)
+        .map(|k| (value_m(&only(k)), k))
+        .max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let at = only(knot);
+    let excess: [f64; KNOTS] = std::array::from_fn(|k| at[k] - shares[k]);
+    let excess_m = largest_m - mean_m;
+    let is_certain = excess_m > CERTAIN * error_m(0.0, &excess) && excess_m > LEAST_SHARE * mean_m.abs();
+    is_certain.then(|| StrokeProfile {
+        mean_m: (mean_m, error_m(1.0, &shares)),
+        largest_m: (largest_m, error_m(1.0, &at)),
+        largest_at_m: scaling.place_m.0 + scaling.place_m.1 * place_of(knot),
+    })
+}
+
+/// Whether the rows near some knot lie outwards, or inwards, of both flanks by more than matters.
+fn is_suspect(line: &GaussNewtonResult) -> bool {
+    let (mut sums_m, mut blocks) = ([0.0; KNOTS], [0.0; KNOTS]);
+    for row in &line.design.firm {
+        let outward_m = row.x[GAP].signum() * line.fit.residual_m(row);
+        for (knot, share) in hats(row.x[PLACE]).into_iter().enumerate() {
+            sums_m[knot] += share * row.blocks * outward_m;
+            blocks[knot] += share * row.blocks;
+        }
+    }
+    let (all, gap_m) = (blocks.iter().sum::<f64>(), line.fit.beta[GAP].abs());
+    let is_off = |k: &usize| sums_m[*k].abs() > (SUSPECT_M + SUSPECT_SHARE * gap_m) * blocks[*k];
+    (0..KNOTS).filter(|&k| blocks[k] > VISITED * all).any(|k| is_off(&k))
+}
+
+/// A row with a gap and an error at each knot.
+fn with_knots(row: &DesignRow<COLUMNS>) -> DesignRow<ALL> {
+    let mut x = [0.0; ALL];
+    x[..COLUMNS].copy_from_slice(&row.x);
+    for (knot, share) in hats(row.x[PLACE]).into_iter().enumerate() {
+        x[COLUMNS + knot] = share * row.x[GAP];
+        x[COLUMNS + KNOTS + knot] = share;
+    }
+    DesignRow { x, y_m: row.y_m, blocks: row.blocks, stretch: row.stretch }
+}
+
+/// Place of a knot, from −1 to 1.
+fn place_of(knot: usize) -> f64 {
+    2.0 * knot as f64 / (KNOTS - 1) as f64 - 1.0
+}
+
+/// How much each knot counts at a place from −1 to 1: linear between neighbours.
+fn hats(place: f64) -> [f64; KNOTS] {
+    let at = (0.5 * (place.clamp(-1.0, 1.0) + 1.0)) * (KNOTS - 1) as f64;
+    std::array::from_fn(|knot| (1.0 - (at - knot as f64).abs()).max(0.0))
+}
+
+/// Share of the time that the screw spent near each knot.
+fn time_shares(blocks: &BlockMeans, scaling: &Scaling) -> [f64; KNOTS] {
+    let mut shares = [0.0; KNOTS];
+    let mut all = 0.0;
+    for (motor_m, dx_m) in blocks.motor_m.iter().zip(&blocks.dx_m) {
+        let place = (motor_m + dx_m - scaling.place_m.0) * scaling.per_place;
+        if place.is_finite() {
+            shares.iter_mut().zip(hats(place)).for_each(|(sum, share)| *sum += share);
+            all += 1.0;
+        }
+    }
+    shares.map(|sum| sum / f64::max(all, 1.0))
+}
