@@ -247,6 +247,11 @@ fn from_contact(found: &ContactEstimate) -> GapEstimate {
         friction_dry_se_n: Some(found.friction_se.dry_n),
         friction_load_share: Some(found.friction.lost_share),
         friction_load_share_se: Some(found.friction_se.lost_share),
+        gap_largest_m: found.gap_largest_m.map(|largest| largest.0),
+        gap_largest_se_m: found.gap_largest_m.map(|largest| largest.1),
+        gap_largest_at_m: found.gap_largest_m.map(|largest| largest.2),
+        preload_n: found.preload_n.map(|preload| preload.0),
+        preload_se_n: found.preload_n.map(|preload| preload.1),
         gap_midrange_fitted_m: found.midrange_at_fit_m,
         reason: None,
         ..GapEstimate::refused("")

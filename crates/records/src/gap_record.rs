@@ -136,6 +136,17 @@ stored_row! {
         pub friction_load_share_se: Option<f64>,
         /// Standard error of `nis`.
         pub nis_se: Option<f64>,
+        /// Largest gap along the stroke where the gap varies, m, averaged over an eighth of the stroke seen; `gap_m` is
+        /// then the mean over time.
+        pub gap_largest_m: Option<f64>,
+        /// Standard error of `gap_largest_m`, m.
+        pub gap_largest_se_m: Option<f64>,
+        /// Screw position of `gap_largest_m`, m.
+        pub gap_largest_at_m: Option<f64>,
+        /// Force with which both flanks of a preloaded nut press under no load, N.
+        pub preload_n: Option<f64>,
+        /// Standard error of `preload_n`, N.
+        pub preload_se_n: Option<f64>,
     }
 }
 

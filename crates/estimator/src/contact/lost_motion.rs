@@ -13,6 +13,26 @@ const MEDIAN: f64 = 1.253_314_137_315_5;
 /// Rows on each flank below which a median carries no information.
 const FEWEST_ROWS: usize = 5;
 
+/// Standard errors, and metres, by which the flanks of a preloaded nut overlap.
+const PRELOAD_SIGMA: f64 = 3.0;
+const LEAST_OVERLAP_M: f64 = 2e-6;
+/// The loop at zero load of a preloaded nut overlaps by a smaller share than its extrapolated flanks do.
+const CLOSED: f64 = 0.5;
+
+/// Force with which both flanks of a preloaded nut press under no load, and its standard error, N: half of the overlap of
+/// the flanks times their stiffness.
+///
+/// While both flanks press, the coupling is twice as stiff. So the flanks, extrapolated from higher loads to zero load,
+/// overlap; and lightly loaded contact lies outwards of both, so that the loop closes at zero load.
+pub(crate) fn preload_n(contact: &FlankFit) -> Option<(f64, f64)> {
+    let (gap_m, gap_se_m) = contact.gap_m;
+    let overlap_m = -gap_m;
+    let force_n = |length_m: f64| 0.5 * length_m / contact.compliance_m_per_n.0;
+    let is_overlap = overlap_m > PRELOAD_SIGMA * gap_se_m && overlap_m > LEAST_OVERLAP_M;
+    let closes = || loop_width_m(contact).is_some_and(|(loop_m, _)| loop_m > -CLOSED * overlap_m);
+    (is_overlap && closes()).then(|| (force_n(overlap_m), force_n(gap_se_m)))
+}
+
 /// Lost motion at zero load and its standard error, m, from the lightly loaded rows, which the straight fit
 /// never saw.
 pub(crate) fn loop_width_m(contact: &FlankFit) -> Option<(f64, f64)> {

@@ -44,6 +44,9 @@ use fit::scaling::Scaling;
 use fit::sign_check;
 use types::{LONGEST_STEP_S, NORMAL_95};
 
+/// Standard errors by which no gap of a sound log is below zero.
+const IMPOSSIBLE_SIGMA: f64 = 5.0;
+
 /// Estimates the gap of one flight, over all its segments together, or returns the reason for its rejection.
 ///
 /// Time is linear in the samples; memory is some twenty numbers for each block and a row of twenty for
@@ -112,8 +115,10 @@ fn look(
     }
     let contact = flank_fit::fit(room, &frame)?;
     let (gap_m, gap_se_m) = contact.gap_m;
+    let gives_way = contact.compliance_m_per_n.0 > 0.0;
+    let is_possible = gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || lost_motion::preload_n(&contact).is_some();
     // Channels of absurd size overflow the sums of the fit.
-    if gap_m.is_finite() && gap_se_m.is_finite() {
+    if gap_m.is_finite() && gap_se_m.is_finite() && gives_way && is_possible {
         Ok((frame, contact))
     } else {
         Err(Rejection::MotionUnexplained)
@@ -126,7 +131,7 @@ fn report(
     contact: &FlankFit,
     midrange_at_fit_m: Option<f64>,
 ) -> ContactEstimate {
-    let preload_n = contact.preload_n();
+    let preload_n = lost_motion::preload_n(contact);
     let gap_m = if preload_n.is_some() { 0.0 } else { contact.gap_m.0 };
     let gap_se_m = contact.gap_m.1;
     let (compliance, compliance_se) = contact.compliance_m_per_n;

@@ -18,7 +18,6 @@ use crate::contact::fit::stroke_profile::{StrokeProfile, stroke_profile};
 use crate::contact::fit::workspace::ContactWorkspace;
 use crate::contact::friction::flank::FIRM_SHARE;
 use crate::contact::friction::friction_model::FrictionState;
-use crate::contact::lost_motion;
 use crate::contact::stats::{median, second_difference_rms};
 use crate::contact::types::FrictionErrors;
 use crate::gap::midrange;
@@ -36,13 +35,6 @@ const UNEXPLAINED: f64 = 0.25;
 const UNSEEN_GAP: f64 = 0.1;
 /// Largest error of that zero that is to be expected, over the 95 % load.
 const ZERO_ERROR: f64 = 0.45;
-/// Standard errors by which no gap of a sound log is below zero.
-const IMPOSSIBLE_SIGMA: f64 = 5.0;
-/// Standard errors, and metres, by which the flanks of a preloaded nut overlap.
-const PRELOAD_SIGMA: f64 = 3.0;
-const LEAST_OVERLAP_M: f64 = 2e-6;
-/// Share of the overlap of which the loop at zero load is narrower there.
-const CLOSED: f64 = 0.5;
 /// Gauss–Newton iterations over the whole flight after the search: while that is cheap, and beyond.
 const WHOLE_ITERATIONS: (usize, usize) = (2, 1);
 /// Reweightings of the rows in each of them.
@@ -187,27 +179,6 @@ pub(crate) struct FlankFit {
 }
 
 impl FlankFit {
-    /// Whether the actuator gives way to the load, and its gap is not clearly negative unless its nut is preloaded.
-    fn is_possible(&self) -> bool {
-        let (gap_m, gap_se_m) = self.gap_m;
-        self.compliance_m_per_n.0 > 0.0 && (gap_m >= -IMPOSSIBLE_SIGMA * gap_se_m || self.is_preloaded())
-    }
-
-    /// Whether both flanks press at low load, as in a preloaded nut: its flanks, extrapolated to zero load, overlap, and
-    /// lightly loaded contact lies outwards of both, so that the loop closes at zero load instead of overlapping too.
-    pub(crate) fn is_preloaded(&self) -> bool {
-        let overlap_m = -self.gap_m.0;
-        let is_clear = overlap_m > PRELOAD_SIGMA * self.gap_m.1 && overlap_m > LEAST_OVERLAP_M;
-        is_clear && lost_motion::loop_width_m(self).is_some_and(|(loop_m, _)| loop_m > -CLOSED * overlap_m)
-    }
-
-    /// Force with which both flanks of a preloaded nut press under no load, and its standard error, N: half of the overlap
-    /// of the flanks times their stiffness.
-    pub(crate) fn preload_n(&self) -> Option<(f64, f64)> {
-        let force_n = |length_m: f64| 0.5 * length_m / self.compliance_m_per_n.0;
-        self.is_preloaded().then(|| (force_n(-self.gap_m.0), force_n(self.gap_m.1)))
-    }
-
     /// δX on a flank, m, under a force over the 95 % load. The side is +1, −1, or 0 in the gap.
     pub(crate) fn flank_m(&self, side: f64, force: f64) -> f64 {
         let beta = &self.line.fit.beta;
@@ -263,11 +234,7 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
     if gap_m.0 < UNSEEN_GAP * windup_m {
         check_both_sides(&workspace.whole, scaling)?;
     }
-    if fit.is_possible() && is_explained(workspace, scaling, &fit) {
-        Ok(fit)
-    } else {
-        Err(Rejection::MotionUnexplained)
-    }
+    if is_explained(workspace, scaling, &fit) { Ok(fit) } else { Err(Rejection::MotionUnexplained) }
 }
 
 /// Without a gap nothing in a flight shows the zero of its load cell. A flank then counts as pressed under loads that no
