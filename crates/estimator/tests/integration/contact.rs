@@ -417,3 +417,57 @@ fn a_picture_shows_the_flanks_a_gap_apart_and_the_stretches_on_them() {
         "in the order of the flight, but for blocks: {firm_s:?}"
     );
 }
+
+/// A screw worn by 80 µm in the middle of its stroke: mean over time, largest gap and its place.
+#[test]
+fn a_gap_along_the_stroke_has_a_mean_and_a_largest_place() {
+    let case = Case::with(40e-6, |case| {
+        (case.plant.contact.worn_m, case.plant.contact.worn_at_m) = (80e-6, [4e-3, 8e-3]);
+    });
+    let flight = case.fly(5);
+    let found = gap(case.outcome(&flight));
+    assert!(found.flags.contains(&QualityFlag::GapVaries), "{found:?}");
+    assert!((found.gap_m - flight.gap_m).abs() < 2e-6, "{found:?}, true mean {:e}", flight.gap_m);
+    let (largest_m, largest_se_m, at_m) = found.gap_largest_m.unwrap();
+    // Between knots the gap is a line: the peak of a bell curve is cut.
+    assert!((largest_m - 118e-6).abs() < 4e-6 + 2.0 * largest_se_m, "{found:?}");
+    assert!((at_m - 4e-3).abs() < 3e-3, "{found:?}");
+    assert_eq!(Case::nominal(80e-6).gap(5).gap_largest_m, None);
+}
+
+/// 30 µm of overlap at 5·10⁷ N/m: 750 N on each flank under no load.
+#[test]
+fn a_preloaded_nut_has_no_gap_and_shows_its_preload() {
+    let case = Case::nominal(-30e-6);
+    for seed in 0..4 {
+        let found = case.gap(seed);
+        assert_eq!((found.gap_m, found.flags[0]), (0.0, QualityFlag::Preloaded), "{found:?}");
+        let (preload_n, preload_se_n) = found.preload_n.unwrap();
+        assert!((preload_n - 750.0).abs() < 75.0 + 2.0 * preload_se_n, "{preload_n} ± {preload_se_n} N");
+    }
+    assert!(Case::nominal(0.0).gap(1).preload_n.is_none());
+}
+
+/// The load stays on one side; the zero of its cell is off by so much that the log shows both.
+#[test]
+fn a_load_that_only_seems_to_reverse_is_refused() {
+    for seed in 0..4 {
+        let case = Case::with(100e-6, |case| {
+            (case.profile.load_n, case.profile.no_reversal) = (3e3, true);
+            case.sensors.load.bias = 900.0;
+        });
+        let refusal = case.outcome(&case.fly(seed));
+        let one_sided = [Rejection::NoLoadReversal, Rejection::OneSideBrief].map(ContactOutcome::Refused);
+        assert!(one_sided.contains(&refusal), "{refusal:?}");
+    }
+}
+
+/// A cell that ends at 70 % of the load that one sample in twenty exceeds.
+#[test]
+fn a_clipped_load_moves_no_gap() {
+    let case = Case::with(100e-6, |case| case.sensors.load.clip = 5600.0);
+    for seed in 0..4 {
+        let found = case.gap(seed);
+        assert!((found.gap_m - 100e-6).abs() < 1.5e-6, "{found:?}");
+    }
+}
