@@ -60,7 +60,7 @@ impl UnitSelection {
 
     /// Whether an assessed unit is selected: it has flown, and on the selected tail.
     fn fits(&self, row: &TrendRow) -> bool {
-        row.flights > 0 && (self.tail_number.is_none() || row.tail_number == self.tail_number)
+        self.tail_number.is_none() || row.tail_number == self.tail_number
     }
 }
 
@@ -552,7 +552,12 @@ impl<'a> FleetContext<'a> {
         let names = self.units.keys().copied();
         let (mut rows, tail_wide) =
             self.statements_with_steps(names.filter(|name| ask.names(name)), as_of)?;
-        rows.retain(|row| ask.fits(row));
+        // A unit that flew later than the date asked for did not exist then; one whose records are all dated ahead of
+        // today's clock does, and nothing is known of it.
+        let now = Timestamp::now();
+        let is_ahead =
+            |row: &TrendRow| self.units.get(&row.unit()).is_some_and(|unit| unit.0.until(now).is_empty());
+        rows.retain(|row| (row.flights > 0 || is_ahead(row)) && ask.fits(row));
         Ok((rows, tail_wide))
     }
 

@@ -161,7 +161,7 @@ fn reason_of_state(cause: Reason, trend: &Assessment, history: &History, wide: &
     let unexplained = trend.changes.iter().rev().find(|change| change.kind.is_unexplained());
     let tail = unexplained.and_then(|change| wide.tail(change, history));
     match (cause, tail) {
-        (Reason::NoRecord, _) if trend.flights > 0 => {
+        (Reason::NoRecord { flagged: 0 }, _) if trend.flights > 0 => {
             format!("no record of a gap: all of {} flights are without one", trend.flights)
         }
         (Reason::Clear { .. } | Reason::Stale { .. } | Reason::NoLimit, _) | (_, None) => cause.to_string(),

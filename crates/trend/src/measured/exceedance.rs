@@ -8,8 +8,8 @@ use crate::statement::types::{ChangePoint, ChangePointKind};
 /// The gap is at or above its limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Exceedance {
-    /// One record alone: the next one confirms or clears it.
-    Unconfirmed { gap_m: f64, before_m: Option<f64> },
+    /// One record alone, or flagged ones: the next sound one confirms or clears it.
+    Unconfirmed { gap_m: f64, before_m: Option<f64>, records: usize },
     /// Two records at least, or the level of the last records.
     Confirmed { records: usize },
     /// Confirmed before; neither two records below the limit nor maintenance have ended it, or the level is at 97 % of
@@ -77,19 +77,20 @@ pub(crate) fn exceedance(
         level.gap_m >= HYSTERESIS * limit_m && ended_at.is_some_and(|k| k + RECALLED >= records.len())
     };
     let by_level = level.filter(|level| level.records > 1 && level.gap_m >= limit_m);
-    let last_period = records.last().map(|record| record.period);
+    let last_period = |records: &[Record]| records.last().map(|record| record.period);
     let found = match (run, by_level) {
-        _ if level.map(|level| level.period) != last_period => None,
+        // The records of an earlier installation.
+        _ if last_period(&records) != last_period(all) => None,
         (Some(run), _) if run.is_confirmed && run.below == 0 => {
             Some(Exceedance::Confirmed { records: run.above })
         }
+        (Some(run), _) if run.is_confirmed => Some(Exceedance::Held),
         (_, Some(level)) => Some(Exceedance::Confirmed { records: level.records }),
-        (Some(run), None) if run.is_confirmed => Some(Exceedance::Held),
-        (_, None) if level.is_some_and(is_held) => Some(Exceedance::Held),
         (Some(run), None) => {
-            Some(Exceedance::Unconfirmed { gap_m: records[run.first].gap_m, before_m: run.before_m })
+            let gap_m = records[run.first..].iter().map(|record| record.gap_m).fold(0.0, f64::max);
+            Some(Exceedance::Unconfirmed { gap_m, before_m: run.before_m, records: run.above })
         }
-        (None, None) => None,
+        (None, None) => level.is_some_and(is_held).then_some(Exceedance::Held),
     };
     (found, events)
 }

@@ -83,6 +83,21 @@ impl Line {
         })
     }
 
+    /// Sum of squared residuals, in standard errors.
+    pub(crate) fn chi2(&self) -> f64 {
+        self.chi2
+    }
+
+    /// How far a record lies from the line whose last record is given, m.
+    pub(crate) fn off_m(&self, record: &Record, last: &Record) -> f64 {
+        record.gap_m - self.end_m - self.slope * (record.hours - last.hours)
+    }
+
+    /// Sum of squared residuals over that about the constant.
+    pub(crate) fn unexplained_share(&self, records: &[Record]) -> f64 {
+        Self::fit(records, true).map_or(1.0, |constant| self.chi2 / constant.chi2.max(f64::MIN_POSITIVE))
+    }
+
     /// Whether the residuals are those of the errors: 99.8 % of sound windows pass.
     pub(crate) fn explains(&self) -> bool {
         self.chi2 <= self.freedom + 4.0 * (2.0 * self.freedom).sqrt() + 3.0 && self.last_two.abs() <= 3.0
@@ -140,8 +155,7 @@ fn explained(records: &[Record]) -> Option<MeasuredLevel> {
     let (wild, others) = without_wild(records)?;
     let line = fitted(&others)?;
     let last = others.last()?;
-    let off_m = wild.gap_m - line.end_m - line.slope * (wild.hours - last.hours);
-    (off_m.abs() > WILD * wild.error_m).then(|| level(line, others.len()))
+    (line.off_m(&wild, last).abs() > WILD * wild.error_m).then(|| level(line, others.len()))
 }
 
 /// The record between others that lies farthest from the line through its neighbours, and the others.

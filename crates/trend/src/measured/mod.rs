@@ -58,7 +58,16 @@ impl Measured {
         let has_sound = sound.last().is_some_and(|record| record.period == latest.period);
         let sound = if has_sound { sound } else { all.clone() };
         let level = measured_level(&sound, settings.limit_m);
-        let (exceedance, events) = exceedance(&all, level, settings.limit_m);
+        let (exceedance, events) = exceedance(&all, level.filter(|_| has_sound), settings.limit_m);
+        // The gap that is shown is that of the records which make the state.
+        let above =
+            |records: usize| measured_level(&sound[sound.len().saturating_sub(records)..], settings.limit_m);
+        let level = match exceedance {
+            Some(Exceedance::Confirmed { records }) if level.is_some_and(|l| l.gap_m < settings.limit_m) => {
+                above(records).or(level)
+            }
+            _ => level,
+        };
         Self {
             level,
             latest: Some(latest),
@@ -72,9 +81,11 @@ impl Measured {
         }
     }
 
-    /// Departure of the last sound record.
+    /// Departure of the last sound record of the present installation.
     pub(crate) fn last_sound_us(&self) -> Option<i64> {
-        self.sound.iter().rev().find(|record| record.is_sound).map(|record| record.departure_us)
+        let period = self.latest?.period;
+        let is_last = |record: &&Record| record.is_sound && record.period == period;
+        self.sound.iter().rev().find(is_last).map(|record| record.departure_us)
     }
 }
 
@@ -84,17 +95,18 @@ fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
     const LEFT: f64 = 0.8;
     let last = sound.last()?;
     let present = measured_level(sound, settings.limit_m)?;
-    let mut to = sound.len();
+    // The last record first: a line through few records may follow it.
+    let mut from = sound.len() - 1;
+    let mut now = measured_level(sound, settings.limit_m)?;
     loop {
-        let now = measured_level(&sound[..to], settings.limit_m)?;
-        let (from, records) = (to - now.window.min(to), sound.len() - (to - now.window.min(to)));
+        let records = sound.len() - from;
         let first = sound.get(from)?;
         let days = last.departure_us.saturating_sub(first.departure_us) as f64 / DAY_US as f64;
         if from == 0 || (records > JUMP_RECORDS && days > settings.change_watch_days) {
             return None;
         }
         let before = measured_level(&sound[..from], settings.limit_m)?;
-        let after_m = now.at(first.hours);
+        let after_m = if records == 1 { last.gap_m } else { now.at(first.hours) };
         let error_m = before.se_m.hypot(now.se_m.min(first.error_m)).max(first.error_m);
         let least_m = (JUMP_SHARE * settings.limit_m).max(JUMP_ERRORS * error_m);
         // A fall from one installation or maintenance to the next is what both are for.
@@ -102,12 +114,18 @@ fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
         let is_left = sign * (present.gap_m - before.gap_m) > LEFT * least_m;
         let is_jump = |from_m: f64| sign * (after_m - from_m) > least_m;
         // A rise is reported from its first record on. A fall may end a wild record, so it needs three on each side.
-        let is_certain = sign > 0.0 || before.records.min(records) > 2;
+        // The first record of all may be the wild one.
+        let is_certain =
+            if sign > 0.0 { before.records > 1 || from > 1 } else { before.records.min(records) > 2 };
         if is_certain && is_left && is_jump(before.at(first.hours)) && is_jump(before.gap_m) {
             let (departure_us, before_m) = (first.departure_us, before.gap_m);
             return Some(Jump { departure_us, before_m, after_m, error_m, records });
         }
-        to = from;
+        let to = if records == 1 { sound.len() } else { from };
+        now = measured_level(&sound[..to], settings.limit_m)?;
+        let next = to - now.window.min(to);
+        // A level of the last record alone was looked at already.
+        from = if next == from { 0 } else { next };
     }
 }
 

@@ -6,6 +6,10 @@ use crate::data::series::{Flight, Gap, MaintenanceEvent};
 /// Number of last records that are read.
 const MOST: usize = 400;
 
+/// Standard errors, and share of the limit, by which no sound record is below zero.
+const IMPOSSIBLE_ERRORS: f64 = 6.0;
+const IMPOSSIBLE_SHARE: f64 = 0.05;
+
 /// One measured gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Record {
@@ -45,7 +49,10 @@ pub(crate) fn records(
         installation = Some(flown.installation);
         let Gap { gap_m, is_doubtful, .. } = gap;
         let (departure_us, hours) = (flown.departure_us, flown.hours);
-        records.push(Record { flight, departure_us, hours, gap_m, error_m, is_sound: !is_doubtful, period });
+        // No gap is below zero: such a record shows a fault, and nothing of the unit.
+        let is_possible = gap_m > -(IMPOSSIBLE_ERRORS * error_m).max(IMPOSSIBLE_SHARE * limit_m);
+        let is_sound = is_possible && !is_doubtful;
+        records.push(Record { flight, departure_us, hours, gap_m, error_m, is_sound, period });
     }
     (records, renewals.next())
 }

@@ -11,13 +11,28 @@ const WINDOWS: [usize; 8] = [3, 4, 5, 6, 8, 12, 16, 20];
 /// Standard errors of the slope, and share of the limit and errors of the rise, from which a line is significant.
 const SLOPE_ERRORS: f64 = 4.0;
 const RISE_SHARE: f64 = 0.05;
-const RISE_ERRORS: f64 = 6.0;
+const RISE_ERRORS: f64 = 5.0;
 
 /// Standard errors by which every record is above the one before where they rise along no line.
 const EACH_ERRORS: f64 = 4.0;
 
+/// Records of a window for each one that may be left out as wild, and the standard errors by which it is.
+const PER_WILD: usize = 5;
+const WILD: f64 = 5.0;
+
+/// Share of the records' variance about their mean that a line leaves where they rise evenly, if not by their errors.
+const UNEVEN: f64 = 0.12;
+/// Fewest records that rise evenly.
+const LEAST_EVEN: usize = 6;
+
+/// Standard errors by which the last record is above the one before where its rate counts.
+const LAST_ERRORS: f64 = 4.0;
+
 /// The share of the time by the line after which the limit may be met where the rate still grows.
-const ACCELERATION: f64 = 0.75;
+const ACCELERATION: f64 = 0.65;
+
+/// Least factor of the earliest time where short lines are steeper than the longest.
+const SPED_UP: f64 = 0.7;
 
 /// A significant rise of the last records.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,10 +53,14 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
     let most = sound.iter().rev().take_while(|r| r.period == last.period).count();
     let lines = WINDOWS.into_iter().filter(|count| *count <= most).filter_map(|count| {
         let records = &sound[sound.len() - count..];
-        significant(records, settings.limit_m).map(|line| (count, line))
+        significant(records, settings.limit_m)
+            .or_else(|| significant(&without_wild(records)?, settings.limit_m))
+            .map(|line| (count, line))
     });
     let mut found: Option<Rise> = None;
+    let mut steepest = 0.0_f64;
     for (records, line) in lines {
+        steepest = steepest.max(line.slope);
         let left_m = (settings.limit_m - line.end_m).max(0.0);
         let se = (line.slope_variance * line.inflation()).sqrt();
         let p05_hours = ACCELERATION * left_m / (line.slope + NORMAL_95 * se);
@@ -55,7 +74,16 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
             p95_hours: left_m / slow / ACCELERATION,
         });
     }
-    found
+    // Where they rise, the last two show whether they rise faster now.
+    if let (Some(rise), [.., before, last]) = (&mut found, sound) {
+        let (step_m, hours) = (last.gap_m - before.gap_m, last.hours - before.hours);
+        if before.period == last.period && step_m > LAST_ERRORS * before.error_m.hypot(last.error_m) {
+            let p05_hours = ACCELERATION * (settings.limit_m - last.gap_m).max(0.0) * hours / step_m;
+            rise.p05_hours = rise.p05_hours.min(p05_hours);
+        }
+    }
+    // What has sped up may speed up more.
+    found.map(|rise| Rise { p05_hours: rise.p05_hours * (rise.m_per_hour / steepest).max(SPED_UP), ..rise })
 }
 
 /// The line of some records, where it explains them and rises, or where they rise from each to the next.
@@ -68,5 +96,24 @@ fn significant(records: &[Record], limit_m: f64) -> Option<Line> {
     let rise_m = line.slope * span_hours;
     let is_steep = line.slope > SLOPE_ERRORS * (line.slope_variance * line.inflation()).sqrt();
     let is_large = rise_m > (RISE_SHARE * limit_m).max(RISE_ERRORS * error_m);
-    (is_large && (is_each || (is_steep && line.explains()))).then_some(line)
+    let is_even = || records.len() >= LEAST_EVEN && line.unexplained_share(records) < UNEVEN;
+    (is_large && (is_each || (is_steep && (line.explains() || is_even())))).then_some(line)
+}
+
+/// The records without those, one in five at most, that lie far from the line of the others; none where none does.
+fn without_wild(records: &[Record]) -> Option<Vec<Record>> {
+    let mut kept = records.to_vec();
+    for _ in 0..records.len() / PER_WILD {
+        let without = |k: usize| -> Vec<Record> { [&kept[..k], &kept[k + 1..]].concat() };
+        let chi2 = |others: &[Record]| Line::fit(others, false).map_or(f64::INFINITY, |line| line.chi2());
+        let worst = (0..kept.len()).min_by(|a, b| chi2(&without(*a)).total_cmp(&chi2(&without(*b))))?;
+        let others = without(worst);
+        let is_wild =
+            Line::fit(&others, false)?.off_m(&kept[worst], others.last()?).abs() > WILD * kept[worst].error_m;
+        if !is_wild {
+            break;
+        }
+        kept = others;
+    }
+    (kept.len() < records.len()).then_some(kept)
 }

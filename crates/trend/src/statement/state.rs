@@ -49,8 +49,8 @@ impl State {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub enum Reason {
-    /// No flight has a gap.
-    NoRecord,
+    /// No flight of this installation has a gap without a doubt.
+    NoRecord { flagged: usize },
     /// No limit is configured.
     NoLimit,
     /// No sound record for some days; what the last one showed stays known.
@@ -60,9 +60,9 @@ pub enum Reason {
     /// Records at or above the limit.
     AboveLimit { gap_m: f64, limit_m: f64, records: usize },
     /// An exceedance that nothing has ended.
-    LimitHeld { gap_m: f64, limit_m: f64 },
-    /// One record above the limit.
-    Unconfirmed { gap_m: f64, limit_m: f64, before_m: Option<f64> },
+    LimitHeld { gap_m: f64, limit_m: f64, latest_m: f64 },
+    /// One record above the limit, or flagged ones.
+    Unconfirmed { gap_m: f64, limit_m: f64, before_m: Option<f64>, records: usize },
     /// The early crossing by a wear law lies within the planning horizon.
     CrossesSoon { p05_hours: f64, planning_horizon_hours: f64 },
     /// The early crossing by the line through the last records does.
@@ -81,7 +81,7 @@ impl Reason {
     /// Its code in columns.
     pub fn code(self) -> &'static str {
         match self {
-            Self::NoRecord => "no_record",
+            Self::NoRecord { .. } => "no_record",
             Self::NoLimit => "no_limit",
             Self::Stale { .. } => "stale",
             Self::Renewed { .. } => "renewed",
@@ -108,7 +108,10 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let um = |m: f64| m * 1e6;
         match *self {
-            Self::NoRecord => write!(f, "no record of a gap"),
+            Self::NoRecord { flagged: 0 } => write!(f, "no record of a gap"),
+            Self::NoRecord { flagged } => {
+                write!(f, "no sound record of this installation: {} with a quality flag", records(flagged))
+            }
             Self::NoLimit => write!(f, "no limit is configured"),
             Self::Stale { days, gap_m } => {
                 write!(f, "no sound record for {days:.0} days; the gap was {:.1} µm then", um(gap_m))
@@ -121,22 +124,25 @@ impl fmt::Display for Reason {
                 um(limit_m),
                 records(count)
             ),
-            Self::LimitHeld { gap_m, limit_m } => write!(
+            Self::LimitHeld { gap_m, limit_m, latest_m } => write!(
                 f,
-                "was at the limit of {:.1} µm; gap {:.1} µm: `act` holds until two records are below {:.1} µm",
+                "was at the limit of {:.1} µm; gap {:.1} µm, latest record {:.1} µm: `act` holds until two records are below {:.1} µm",
                 um(limit_m),
                 um(gap_m),
+                um(latest_m),
                 um(HYSTERESIS * limit_m)
             ),
-            Self::Unconfirmed { gap_m, limit_m, before_m } => {
+            Self::Unconfirmed { gap_m, limit_m, before_m, records: count } => {
                 let (gap_um, limit_um) = (um(gap_m), um(limit_m));
-                write!(
-                    f,
-                    "1 record of {gap_um:.1} µm is above the limit of {limit_um:.1} µm, not confirmed yet"
-                )?;
+                if count > 1 {
+                    write!(f, "{} with quality flags, up to {gap_um:.1} µm, are", records(count))?;
+                } else {
+                    write!(f, "1 record of {gap_um:.1} µm is")?;
+                }
+                write!(f, " above the limit of {limit_um:.1} µm, not confirmed yet")?;
                 match before_m {
                     Some(before_m) => write!(f, "; the records before read {:.1} µm", um(before_m)),
-                    None => write!(f, "; no record before it"),
+                    None => write!(f, "; no record of this installation before"),
                 }
             }
             Self::CrossesSoon { p05_hours, planning_horizon_hours } if p05_hours < 0.5 => {
@@ -149,6 +155,14 @@ impl fmt::Display for Reason {
                 write!(
                     f,
                     "could reach the limit within {p05_hours:.0} FH (5 % point); planning horizon {planning_horizon_hours:.0} FH"
+                )
+            }
+            Self::RisesToLimit { p05_hours, records: count, m_per_hour, .. } if p05_hours < 0.5 => {
+                write!(
+                    f,
+                    "rises {:.2} µm/FH over the last {} and may be at the limit with the next flight",
+                    um(m_per_hour),
+                    records(count)
                 )
             }
             Self::RisesToLimit { p05_hours, planning_horizon_hours, records: count, m_per_hour } => write!(
@@ -210,15 +224,18 @@ pub(crate) fn alert_state(
 ) -> (State, Reason) {
     let days_since = |utc_us: i64| as_of_us.saturating_sub(utc_us) as f64 / DAY_US as f64;
     let Settings { limit_m, watch_m, planning_horizon_hours, .. } = *settings;
-    let Some(level) = measured.level else { return (State::Unassessed, Reason::NoRecord) };
+    let Some(level) = measured.level else { return (State::Unassessed, Reason::NoRecord { flagged: 0 }) };
     let gap_m = level.gap_m;
     match measured.exceedance {
         Some(Exceedance::Confirmed { records }) => {
             return (State::Act, Reason::AboveLimit { gap_m, limit_m, records });
         }
-        Some(Exceedance::Held) => return (State::Act, Reason::LimitHeld { gap_m, limit_m }),
-        Some(Exceedance::Unconfirmed { gap_m, before_m }) => {
-            return (State::Plan, Reason::Unconfirmed { gap_m, limit_m, before_m });
+        Some(Exceedance::Held) => {
+            let latest_m = measured.latest.map_or(gap_m, |record| record.gap_m);
+            return (State::Act, Reason::LimitHeld { gap_m, limit_m, latest_m });
+        }
+        Some(Exceedance::Unconfirmed { gap_m, before_m, records }) => {
+            return (State::Plan, Reason::Unconfirmed { gap_m, limit_m, before_m, records });
         }
         None => {}
     }
@@ -227,7 +244,14 @@ pub(crate) fn alert_state(
     }
     let is_supported = |e: &EarliestCrossing| gap_m >= watch_m || e.growth_probability > LIKELY_GROWTH;
     let soon = earliest.filter(|e| e.p05_hours - e.elapsed_hours <= planning_horizon_hours);
+    // A jump is inspected now, whatever date a forecast gives.
+    let jump = measured.jump.filter(|jump| jump.after_m > jump.before_m);
+    let jumped =
+        jump.map(|Jump { before_m, after_m, records, .. }| Reason::Jumped { before_m, after_m, records });
     if let Some(EarliestCrossing { p05_hours, elapsed_hours, .. }) = soon.filter(is_supported) {
+        if let Some(jumped) = jumped {
+            return (State::Plan, jumped);
+        }
         let p05_hours = (p05_hours - elapsed_hours).max(0.0);
         let by_line = measured.rise.filter(|rise| rise.p05_hours - elapsed_hours <= p05_hours);
         let reason = match by_line {
@@ -246,14 +270,14 @@ pub(crate) fn alert_state(
         return (State::Unassessed, Reason::Stale { days, gap_m });
     }
     if measured.last_sound_us().is_none() {
-        return (State::Unassessed, Reason::NoRecord);
+        let flagged = measured.sound.iter().filter(|record| record.period == level.period).count();
+        return (State::Unassessed, Reason::NoRecord { flagged });
+    }
+    if let Some(jumped) = jumped {
+        return (State::Watch, jumped);
     }
     if gap_m >= watch_m || (measured.was_at_watch && gap_m >= HYSTERESIS * watch_m) {
         return (State::Watch, Reason::AtWatch { gap_m, watch_m, records: level.records });
-    }
-    let rise = measured.jump.filter(|jump| jump.after_m > jump.before_m);
-    if let Some(Jump { before_m, after_m, records, .. }) = rise {
-        return (State::Watch, Reason::Jumped { before_m, after_m, records });
     }
     match changes.iter().rev().find(|change| change.kind.is_unexplained()) {
         // Counted to the last record: that no flight follows clears nothing.

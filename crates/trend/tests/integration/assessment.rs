@@ -77,7 +77,7 @@ fn a_state_stands_from_the_first_record_on() {
     assert_eq!(state_of(&series, 0).reason.to_string(), "below all limits, by the last 1 record");
     assert_eq!(
         (state_of(&series, -1).state, state_of(&series, -1).reason),
-        (State::Unassessed, Reason::NoRecord)
+        (State::Unassessed, Reason::NoRecord { flagged: 0 })
     );
 }
 

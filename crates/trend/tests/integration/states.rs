@@ -26,7 +26,7 @@ fn rise(d: &mut Drawn, from_um: f64, (least, most): (usize, usize), (low, high):
 }
 
 /// The kinds that must be acted on.
-const URGENT: [Kind; 20] = [
+const URGENT: [Kind; 25] = [
     ("one above the limit", |d| {
         young_or_old(d);
         jump(d, 1, 1);
@@ -84,6 +84,44 @@ const URGENT: [Kind; 20] = [
         let um = young_or_old(d);
         rise(d, um, (6, 20), (0.88, 0.985), 2.0);
         Some(State::Plan)
+    }),
+    ("hours from the limit, one of the last three records wild", |d| {
+        let um = young_or_old(d);
+        rise(d, um, (10, 20), (0.88, 0.96), 1.0);
+        let (back, off_um) = (d.count(1, 3), 30.0 * (d.between(0.0, 2.0).floor() - 0.5));
+        let at = d.rows.len() - back;
+        d.rows[at].gap_m = d.rows[at].gap_m.map(|gap_m| gap_m + 1e-6 * off_um);
+        Some(State::Plan)
+    }),
+    ("rise in stairs", |d| {
+        let um = young_or_old(d);
+        let (step_um, every) = (d.between(5.0, 12.0), d.count(2, 4));
+        let steps = ((0.93 * LIMIT_UM - um) / step_um) as usize;
+        (1..=steps).for_each(|step| d.logs(every, |_| um + step_um * step as f64));
+        Some(State::Plan)
+    }),
+    ("first records of an installation, all flagged", |d| {
+        young_or_old(d);
+        d.moved();
+        let count = d.count(1, 6);
+        d.logs(count, |_| 70.0);
+        d.doubt(count);
+        Some(State::Unassessed)
+    }),
+    ("one above the limit, then an impossible record", |d| {
+        young_or_old(d);
+        jump(d, 1, 1);
+        d.log(-40.0);
+        Some(State::Plan)
+    }),
+    ("jump that no line swallows", |d| {
+        d.error_um = d.between(3.0, 5.0);
+        let um = d.between(45.0, 55.0);
+        let count = d.count(5, 8);
+        d.logs(count, |_| um);
+        let rise_um = d.between(18.0, 22.0) * d.error_um;
+        d.logs(1, |_| um + rise_um);
+        Some(State::Watch)
     }),
     ("jump at an installation", |d| {
         young_or_old(d);
