@@ -29,10 +29,10 @@ const LEAST_EVEN: usize = 6;
 const LAST_ERRORS: f64 = 4.0;
 
 /// The share of the time by the line after which the limit may be met where the rate still grows.
-const ACCELERATION: f64 = 0.65;
+const ACCELERATION: f64 = 0.75;
 
 /// Least factor of the earliest time where short lines are steeper than the longest.
-const SPED_UP: f64 = 0.7;
+const SPED_UP: f64 = 0.6;
 
 /// A significant rise of the last records.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,11 +60,11 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
     let mut found: Option<Rise> = None;
     let mut steepest = 0.0_f64;
     for (records, line) in lines {
-        steepest = steepest.max(line.slope);
         let left_m = (settings.limit_m - line.end_m).max(0.0);
         let se = (line.slope_variance * line.inflation()).sqrt();
         let p05_hours = ACCELERATION * left_m / (line.slope + NORMAL_95 * se);
         let slow = (line.slope - NORMAL_95 * se).max(0.0);
+        steepest = steepest.max(slow);
         found = Some(Rise {
             records,
             m_per_hour: line.slope,
@@ -83,7 +83,10 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
         }
     }
     // What has sped up may speed up more.
-    found.map(|rise| Rise { p05_hours: rise.p05_hours * (rise.m_per_hour / steepest).max(SPED_UP), ..rise })
+    found.map(|rise| Rise {
+        p05_hours: rise.p05_hours * (rise.m_per_hour / steepest).clamp(SPED_UP, 1.0),
+        ..rise
+    })
 }
 
 /// The line of some records, where it explains them and rises, or where they rise from each to the next.
