@@ -95,13 +95,13 @@ fn time_grows_in_proportion_to_units_whose_tails_step() {
 /// One tail with a step of all of its four units every ten days: four times the steps take four times the time.
 #[test]
 fn time_grows_in_proportion_to_the_steps_of_a_tail() {
-    let tails = [4_000, 16_000].map(|steps: i64| {
+    let tails = [32_000, 128_000].map(|steps: i64| {
         let steps: Vec<(i64, f64)> = (1..=steps).map(|k| (10 * k * DAY_US, 15e-6)).collect();
         vec![UnitOnTail { first_us: 0, last_us: i64::MAX, steps }; 4]
     });
     let mut found = [0, 0];
     let [short, long] = shortest(|of| found[of] = tail_wide_steps(&tails[of]).len());
-    assert_eq!(found, [4_000, 16_000]);
+    assert_eq!(found, [32_000, 128_000]);
     let exponent = (long / short).log(4.0);
     println!("steps of a tail: {:.1} ms, {:.1} ms, exponent {exponent:.2}", short * 1e3, long * 1e3);
     assert!(exponent <= 1.5, "{exponent}");
