@@ -276,3 +276,13 @@ fn units_and_formats_of_single_files_are_refused_with_what_is_wanted() {
         trace.err
     );
 }
+
+#[test]
+fn a_named_pipe_as_a_table_is_refused_at_once() {
+    let fleet = TestFleet::empty();
+    let made = std::process::Command::new("mkfifo").arg(fleet.path("history.csv")).status().unwrap();
+    assert!(made.success());
+    let found = fleet.freeplay(&["trend", "--estimates", "history.csv", "--limit-m", "150e-6"]);
+    assert_eq!(found.code, Some(2), "{found:?}");
+    assert!(found.err.contains("it is a pipe, a socket or a device"), "{found:?}");
+}

@@ -15,6 +15,8 @@ use crate::handle::Store;
 /// 3: files of one table may differ in later columns.
 /// Every earlier format is read, and is raised to the current one when the store is next written.
 pub(crate) const FORMAT: u32 = 3;
+/// The oldest one.
+const FIRST_FORMAT: u32 = 1;
 pub(crate) const MARKER: &str = "store.json";
 
 /// Content of `store.json`.
@@ -139,9 +141,20 @@ fn make_folder(dir: &Path) -> Result<(), Error> {
     parent.map_or(Ok(()), |parent| durable_fs::sync_dir(parent).map_err(Error::io(parent, "synced")))
 }
 
-/// The format version, if the folder is a store of a known format.
+/// Whether the folder holds the tables of a store: whoever lost its marker, as in a copy, still has the store.
+fn has_tables(location: &Location) -> Result<bool, Error> {
+    let mut tables = ["gaps", "logs", "runs"].iter();
+    tables.try_fold(true, |all, table| Ok(all && location.has(&format!("{table}/_delta_log"))?))
+}
+
+/// The format version, if the folder is a store of a known format. A store that lost its marker counts as one of the
+/// first format, so that the next writer writes the marker again.
 pub(crate) fn check_marker(location: &Location, found: &str) -> Result<u32, Error> {
     let file = location.display_path(&location.dir().join(MARKER));
+    let is_lost = || Ok::<_, Error>(!location.has(MARKER)? && has_tables(location)?);
+    if is_lost()? {
+        return Ok(FIRST_FORMAT);
+    }
     if found != MARKER {
         return Err(Error::Foreign { dir: location.display_path(location.dir()), found: found.to_owned() });
     }

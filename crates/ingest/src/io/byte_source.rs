@@ -4,6 +4,7 @@
 //! reads files reads it the same way, once its bytes are [wanted](ByteSource::want).
 
 use std::fs::File;
+use std::io;
 use std::ops::Range;
 use std::path::Path;
 
@@ -51,6 +52,11 @@ pub(crate) fn whole(path: &Path) -> Result<File, ErrorKind> {
     open_local(path)
 }
 
+/// Opens a regular file; opening a named pipe would wait for its writer for ever.
 fn open_local(path: &Path) -> Result<File, ErrorKind> {
-    transient::with_retry(|| File::open(path)).map_err(|source| ErrorKind::Unreadable { source })
+    let opened = transient::with_retry(|| match std::fs::metadata(path)?.file_type() {
+        kind if kind.is_file() || kind.is_dir() => File::open(path),
+        _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a pipe, a socket or a device")),
+    });
+    opened.map_err(|source| ErrorKind::Unreadable { source })
 }

@@ -42,6 +42,16 @@ fn another_format_is_refused_by_number_and_a_torn_mark_by_its_text() {
 }
 
 #[test]
+fn a_store_that_lost_its_mark_is_read_and_marked_again_by_the_next_writer() {
+    let dir = tempfile::tempdir().unwrap();
+    writer(dir.path()).commit(&[result(1, 0, 1e-6)]).unwrap();
+    std::fs::remove_file(dir.path().join("store.json")).unwrap();
+    assert!(!Store::open(dir.path()).unwrap().records(&Query::default()).unwrap().is_empty());
+    drop(writer(dir.path()));
+    assert!(std::fs::read_to_string(dir.path().join("store.json")).unwrap().contains("freeplay_store"));
+}
+
+#[test]
 fn a_store_whose_making_was_cut_short_is_finished_by_the_next() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("store.json"), "{\"freeplay_store\":1}").unwrap();
