@@ -84,7 +84,7 @@ stored_row! {
         pub stiffness_se_n_per_m: Option<f64>,
         /// Time skew fitted in this flight, s: delay of the screw channel relative to the motor channel.
         pub skew_s: Option<f64>,
-        /// Loop width at zero load, m.
+        /// Width of the loop of relative position against load at zero load, m: gap and friction wind-up together.
         pub loop_width_m: Option<f64>,
         /// Lost motion between plus and minus the part's reference load, m.
         pub lost_motion_m: Option<f64>,

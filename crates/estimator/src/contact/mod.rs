@@ -72,7 +72,8 @@ pub fn estimate_with(
     Ok(match look(samples, prior, room) {
         Ok((frame, contact)) => {
             let midrange_m = flank_fit::midrange_at_fit_m(room, &frame, &contact, prior.unknown_force_n);
-            ContactOutcome::Estimated(Box::new(report(&frame, prior, &contact, midrange_m)))
+            let loop_width_m = lost_motion::loop_width_m(&contact, &room.whole, &frame);
+            ContactOutcome::Estimated(Box::new(report(&frame, prior, &contact, midrange_m, loop_width_m)))
         }
         Err(refusal) => ContactOutcome::Refused(refusal),
     })
@@ -130,12 +131,13 @@ fn report(
     prior: &PartPrior,
     contact: &FlankFit,
     midrange_at_fit_m: Option<f64>,
+    loop_width: Option<(f64, f64)>,
 ) -> ContactEstimate {
     let preload_n = lost_motion::preload_n(contact);
     let gap_m = if preload_n.is_some() { 0.0 } else { contact.gap_m.0 };
     let gap_se_m = contact.gap_m.1;
     let (compliance, compliance_se) = contact.compliance_m_per_n;
-    let loop_width = lost_motion::loop_width_m(contact);
+
     let lost_motion =
         prior.reference_load_n.and_then(|load_n| lost_motion::lost_motion_m(contact, frame, load_n));
     let mut found = ContactEstimate {

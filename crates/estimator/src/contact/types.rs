@@ -92,8 +92,8 @@ pub struct ContactEstimate {
     pub gap_largest_m: Option<(f64, f64, f64)>,
     /// Force with which both flanks of a preloaded nut press under no load, and its standard error, N.
     pub preload_n: Option<(f64, f64)>,
-    /// Lost motion at zero load, m, from lightly loaded samples that the fit leaves out. On soft flanks it is narrower
-    /// than the gap.
+    /// Width of the loop of δX against the load at zero load, m: gap and friction wind-up together, measured rather than
+    /// extrapolated. On soft flanks the gap in it is narrower.
     pub loop_width_m: Option<f64>,
     /// Its standard error, m.
     pub loop_width_se_m: Option<f64>,

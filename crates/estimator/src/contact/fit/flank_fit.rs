@@ -185,6 +185,13 @@ impl FlankFit {
         beta[ORIGIN] + side * (0.5 * beta[GAP] + force * beta[FORCE]) + force * beta[SIDE_FORCE]
     }
 
+    /// δX of a block without drift, skew and transducer error, m.
+    pub(crate) fn without_slow_parts_m(&self, source: RowSource<'_>, k: usize) -> f64 {
+        let (x, y_m) = source.slow_columns(k);
+        let slow = x.iter().zip(&self.line.fit.beta).skip(ORIGIN + 1).map(|(x, b)| x * b);
+        y_m - slow.sum::<f64>()
+    }
+
     /// What δX holds in addition to gap and wind-up, m: drift, skew, transducer error and wrong friction.
     pub(crate) fn other_m(&self, row: &DesignRow<COLUMNS>) -> f64 {
         (FORCE + 1..COLUMNS)
@@ -272,16 +279,9 @@ fn midrange_of_m(
     fit: &FlankFit,
     unknown_force_n: Option<f64>,
 ) -> Option<f64> {
-    let mut beta = fit.line.fit.beta;
-    beta[ORIGIN] = 0.0;
     let source = RowSource { blocks, scaling };
-    let residual = |k: usize| {
-        if !blocks.is_complete(k) {
-            return f64::NAN;
-        }
-        let (x, y_m) = source.slow_columns(k);
-        y_m - x.iter().zip(&beta).map(|(x, b)| x * b).sum::<f64>()
-    };
+    let residual =
+        |k: usize| if blocks.is_complete(k) { fit.without_slow_parts_m(source, k) } else { f64::NAN };
     let dx_m: Vec<f64> = (0..blocks.len()).map(residual).collect();
     let load_n: Vec<f64> = blocks.load_n.iter().map(|load_n| load_n - fit.line.at.load_zero_n).collect();
     let segments: Vec<Range<usize>> = blocks.segments().collect();
