@@ -105,6 +105,11 @@ fn significant(records: &[Record], limit_m: f64) -> Option<Line> {
 
 /// The records without those, one in five at most, that lie far from the line of the others; none where none does.
 fn without_wild(records: &[Record]) -> Option<Vec<Record>> {
+    // One that lies far from the line of the others lies half as far from the line of all.
+    let (line, last) = (Line::fit(records, false)?, records.last()?);
+    if !records.iter().any(|record| line.off_m(record, last).abs() > 0.5 * WILD * record.error_m) {
+        return None;
+    }
     let mut kept = records.to_vec();
     for _ in 0..records.len() / PER_WILD {
         let without = |k: usize| -> Vec<Record> { [&kept[..k], &kept[k + 1..]].concat() };
