@@ -43,7 +43,7 @@ const SPAN: usize = 16;
 const PILE_QUANTILE: f64 = 0.998;
 const PILE_WIDTH: f64 = 0.03;
 /// ... where so many times as many loads lie as in the two widths before it, and so long in all, s.
-const PILE_RATIO: f64 = 2.0;
+const PILE_RATIO: f64 = 1.7;
 const SHORTEST_PILE_S: f64 = 1.0;
 
 /// Blocks that the search begins with, in windows of this many.
@@ -132,7 +132,10 @@ impl BlockMeans {
     ///
     /// Loads thin out towards the largest. At the end of a cell's range they pile up instead.
     fn clipped_above_n(&self, side: f64) -> f64 {
-        let sided_n: Vec<f64> = self.load_n.iter().map(|load_n| side * load_n).collect();
+        // Noise of single samples would spread a pile.
+        let count = (CALM_PERIOD_S / self.period_s).ceil() as usize;
+        let sided_n: Vec<f64> =
+            self.load_n.chunks(count).map(|loads_n| side * mean_of_sound(loads_n)).collect();
         let all = 0..sided_n.len();
         let Some([top_n]) = quantiles(&sided_n, std::slice::from_ref(&all), [PILE_QUANTILE]) else {
             return f64::INFINITY;
@@ -143,7 +146,7 @@ impl BlockMeans {
         };
         let pile = between(top_n - width_n, f64::INFINITY);
         let beside = between(top_n - 3.0 * width_n, top_n - width_n);
-        let is_pile = pile > PILE_RATIO * beside && pile * self.period_s > SHORTEST_PILE_S;
+        let is_pile = pile > PILE_RATIO * beside && pile * count as f64 * self.period_s > SHORTEST_PILE_S;
         if is_pile { top_n - width_n } else { f64::INFINITY }
     }
 

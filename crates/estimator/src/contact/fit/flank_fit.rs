@@ -74,6 +74,9 @@ const ALIASED_RESIDUAL: f64 = 0.16;
 /// Periodic errors that are smaller do not matter, m.
 const LEAST_PERIODIC_M: f64 = 2e-7;
 
+/// Factor of the error where the load cell is at its end for a part of the time: the friction model is driven by its reading.
+const CLIPPED: f64 = 1.5;
+
 /// Weight of each part of the uncertainty of a gap; see [`Doubt`].
 const WEIGHTS: Doubt = Doubt {
     jackknife_m: 0.92,
@@ -223,6 +226,9 @@ pub(crate) fn fit(workspace: &mut ContactWorkspace, scaling: &Scaling) -> Result
         let (search_m, choice_m, bend_m, light_m) = (0.0, 0.0, 0.0, 0.0);
         (mean_m, Doubt { jackknife_m, search_m, choice_m, bend_m, light_m, ..doubt }.standard_error_m())
     });
+    let is_clipped =
+        workspace.whole.in_range_n.start.is_finite() || workspace.whole.in_range_n.end.is_finite();
+    let gap_m = (gap_m.0, gap_m.1 * if is_clipped { CLIPPED } else { 1.0 });
     let fit = FlankFit {
         gap_m,
         profile,
