@@ -43,7 +43,7 @@ const SPAN: usize = 16;
 const PILE_QUANTILE: f64 = 0.998;
 const PILE_WIDTH: f64 = 0.03;
 /// ... where so many times as many loads lie as in the two widths before it, and so long in all, s.
-const PILE_RATIO: f64 = 1.7;
+const PILE_RATIO: f64 = 2.0;
 const SHORTEST_PILE_S: f64 = 1.0;
 
 /// Blocks that the search begins with, in windows of this many.
