@@ -187,7 +187,11 @@ const STORES: &[Spoil] = &[
     ),
     (
         "a folder that is no store",
-        |fleet| fs::rename(fleet.path("results/store.json"), fleet.path("results/notes.txt")).unwrap(),
+        |fleet| {
+            fs::remove_dir_all(fleet.path("results")).unwrap();
+            fs::create_dir(fleet.path("results")).unwrap();
+            fs::write(fleet.path("results/notes.txt"), "not a store").unwrap();
+        },
         &["store", "info"],
     ),
     (
