@@ -151,8 +151,8 @@ fn has_tables(location: &Location) -> Result<bool, Error> {
 /// first format, so that the next writer writes the marker again.
 pub(crate) fn check_marker(location: &Location, found: &str) -> Result<u32, Error> {
     let file = location.display_path(&location.dir().join(MARKER));
-    let is_lost = || Ok::<_, Error>(!location.has(MARKER)? && has_tables(location)?);
-    if is_lost()? {
+    // A bucket without the mark gets it where the store is opened for writing.
+    if !location.is_bucket() && !location.has(MARKER)? && has_tables(location)? {
         return Ok(FIRST_FORMAT);
     }
     if found != MARKER {
