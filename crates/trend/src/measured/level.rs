@@ -46,7 +46,7 @@ pub(crate) struct Line {
     pub(crate) slope: f64,
     pub(crate) slope_variance: f64,
     /// Sum of squared residuals in standard errors, and degrees of freedom.
-    chi2: f64,
+    pub(crate) chi2: f64,
     freedom: f64,
     /// Mean residual of the last two records, in its standard errors.
     last_two: f64,
@@ -81,11 +81,6 @@ impl Line {
             freedom: records.len() as f64 - if is_constant { 1.0 } else { 2.0 },
             last_two,
         })
-    }
-
-    /// Sum of squared residuals, in standard errors.
-    pub(crate) fn chi2(&self) -> f64 {
-        self.chi2
     }
 
     /// How far a record lies from the line whose last record is given, m.

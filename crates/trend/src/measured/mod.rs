@@ -91,42 +91,56 @@ impl Measured {
 
 /// The last jump of the level, up or down, that is still reported.
 fn jump(sound: &[Record], settings: &Settings) -> Option<Jump> {
-    /// Share of a jump that must be left.
-    const LEFT: f64 = 0.8;
     let last = sound.last()?;
     let present = measured_level(sound, settings.limit_m)?;
     // The last record first: a line through few records may follow it.
-    let mut from = sound.len() - 1;
-    let mut now = measured_level(sound, settings.limit_m)?;
+    let alone = jump_at(sound, sound.len() - 1, (last.gap_m, last.error_m), &present, settings);
+    if alone.is_some() {
+        return alone;
+    }
+    let mut to = sound.len();
     loop {
-        let records = sound.len() - from;
+        let now = measured_level(&sound[..to], settings.limit_m)?;
+        let from = to - now.window.min(to);
         let first = sound.get(from)?;
         let days = last.departure_us.saturating_sub(first.departure_us) as f64 / DAY_US as f64;
-        if from == 0 || (records > JUMP_RECORDS && days > settings.change_watch_days) {
+        if from == 0 || (sound.len() - from > JUMP_RECORDS && days > settings.change_watch_days) {
             return None;
         }
-        let before = measured_level(&sound[..from], settings.limit_m)?;
-        let after_m = if records == 1 { last.gap_m } else { now.at(first.hours) };
-        let error_m = before.se_m.hypot(now.se_m.min(first.error_m)).max(first.error_m);
-        let least_m = (JUMP_SHARE * settings.limit_m).max(JUMP_ERRORS * error_m);
-        // A fall from one installation or maintenance to the next is what both are for.
-        let sign = if before.period == now.period { (after_m - before.gap_m).signum() } else { 1.0 };
-        let is_left = sign * (present.gap_m - before.gap_m) > LEFT * least_m;
-        let is_jump = |from_m: f64| sign * (after_m - from_m) > least_m;
-        // A rise is reported from its first record on. A fall may end a wild record, so it needs three on each side.
-        // The first record of all may be the wild one.
-        let is_certain =
-            if sign > 0.0 { before.records > 1 || from > 1 } else { before.records.min(records) > 2 };
-        if is_certain && is_left && is_jump(before.at(first.hours)) && is_jump(before.gap_m) {
-            let (departure_us, before_m) = (first.departure_us, before.gap_m);
-            return Some(Jump { departure_us, before_m, after_m, error_m, records });
+        let found = jump_at(sound, from, (now.at(first.hours), now.se_m), &present, settings);
+        if found.is_some() {
+            return found;
         }
-        let to = if records == 1 { sound.len() } else { from };
-        now = measured_level(&sound[..to], settings.limit_m)?;
-        let next = to - now.window.min(to);
-        // A level of the last record alone was looked at already.
-        from = if next == from { 0 } else { next };
+        to = from;
     }
+}
+
+/// The jump from the level before a record to a level, with its standard error, from that record on.
+fn jump_at(
+    sound: &[Record],
+    from: usize,
+    (after_m, after_se_m): (f64, f64),
+    present: &MeasuredLevel,
+    settings: &Settings,
+) -> Option<Jump> {
+    /// Share of a jump that must be left.
+    const LEFT: f64 = 0.8;
+    /// Records that contradict a lone first record, which may be the wild one.
+    const CONTRADICTING: usize = 3;
+    let before = measured_level(&sound[..from], settings.limit_m)?;
+    let (first, records) = (&sound[from], sound.len() - from);
+    let error_m = before.se_m.hypot(after_se_m.min(first.error_m)).max(first.error_m);
+    let least_m = (JUMP_SHARE * settings.limit_m).max(JUMP_ERRORS * error_m);
+    // A fall from one installation or maintenance to the next is what both are for.
+    let sign = if before.period == first.period { (after_m - before.gap_m).signum() } else { 1.0 };
+    let is_left = sign * (present.gap_m - before.gap_m) > LEFT * least_m;
+    let is_jump = |from_m: f64| sign * (after_m - from_m) > least_m;
+    // A rise is reported from its first record on. A fall may end a wild record, so it needs three on each side.
+    let is_certain =
+        if sign > 0.0 { from > 1 || records < CONTRADICTING } else { before.records.min(records) > 2 };
+    let is_found = is_certain && is_left && is_jump(before.at(first.hours)) && is_jump(before.gap_m);
+    let (departure_us, before_m) = (first.departure_us, before.gap_m);
+    is_found.then_some(Jump { departure_us, before_m, after_m, error_m, records })
 }
 
 /// Whether one of the last levels was at the watch limit; asked only where it makes a difference.

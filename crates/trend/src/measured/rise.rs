@@ -54,7 +54,7 @@ pub(crate) fn rise(sound: &[Record], settings: &Settings) -> Option<Rise> {
     let lines = WINDOWS.into_iter().filter(|count| *count <= most).filter_map(|count| {
         let records = &sound[sound.len() - count..];
         significant(records, settings.limit_m)
-            .or_else(|| significant(&without_wild(records)?, settings.limit_m))
+            .or_else(|| significant(&without_outliers(records)?, settings.limit_m))
             .map(|line| (count, line))
     });
     let mut found: Option<Rise> = None;
@@ -104,7 +104,7 @@ fn significant(records: &[Record], limit_m: f64) -> Option<Line> {
 }
 
 /// The records without those, one in five at most, that lie far from the line of the others; none where none does.
-fn without_wild(records: &[Record]) -> Option<Vec<Record>> {
+fn without_outliers(records: &[Record]) -> Option<Vec<Record>> {
     // One that lies far from the line of the others lies half as far from the line of all.
     let (line, last) = (Line::fit(records, false)?, records.last()?);
     if !records.iter().any(|record| line.off_m(record, last).abs() > 0.5 * WILD * record.error_m) {
@@ -113,7 +113,7 @@ fn without_wild(records: &[Record]) -> Option<Vec<Record>> {
     let mut kept = records.to_vec();
     for _ in 0..records.len() / PER_WILD {
         let without = |k: usize| -> Vec<Record> { [&kept[..k], &kept[k + 1..]].concat() };
-        let chi2 = |others: &[Record]| Line::fit(others, false).map_or(f64::INFINITY, |line| line.chi2());
+        let chi2 = |others: &[Record]| Line::fit(others, false).map_or(f64::INFINITY, |line| line.chi2);
         let worst = (0..kept.len()).min_by(|a, b| chi2(&without(*a)).total_cmp(&chi2(&without(*b))))?;
         let others = without(worst);
         let is_wild =

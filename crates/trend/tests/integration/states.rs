@@ -26,7 +26,7 @@ fn rise(d: &mut Drawn, from_um: f64, (least, most): (usize, usize), (low, high):
 }
 
 /// The kinds that must be acted on.
-const URGENT: [Kind; 25] = [
+const URGENT: [Kind; 27] = [
     ("one above the limit", |d| {
         young_or_old(d);
         jump(d, 1, 1);
@@ -121,6 +121,21 @@ const URGENT: [Kind; 25] = [
         d.logs(count, |_| um);
         let rise_um = d.between(18.0, 22.0) * d.error_um;
         d.logs(1, |_| um + rise_um);
+        Some(State::Watch)
+    }),
+    ("jump below the limit, then a record off its level", |d| {
+        let um = d.between(40.0, 60.0);
+        let count = d.count(8, 60);
+        d.logs(count, |_| um);
+        let count = d.count(4, 8);
+        d.logs(count, |_| um + 45.0);
+        d.log(um + 45.0 + 12.0 * d.error_um.max(1.0));
+        Some(State::Watch)
+    }),
+    ("two records, the second a jump", |d| {
+        let um = d.between(40.0, 60.0);
+        d.logs(1, |_| um);
+        d.logs(1, |_| um + 60.0);
         Some(State::Watch)
     }),
     ("jump at an installation", |d| {
