@@ -141,7 +141,7 @@ fn make_folder(dir: &Path) -> Result<(), Error> {
     parent.map_or(Ok(()), |parent| durable_fs::sync_dir(parent).map_err(Error::io(parent, "synced")))
 }
 
-/// Whether the folder holds the tables of a store: whoever lost its marker, as in a copy, still has the store.
+/// Whether the folder holds the tables of a store. A copy may have lost the marker alone.
 fn has_tables(location: &Location) -> Result<bool, Error> {
     let mut tables = ["gaps", "logs", "runs"].iter();
     tables.try_fold(true, |all, table| Ok(all && location.has(&format!("{table}/_delta_log"))?))

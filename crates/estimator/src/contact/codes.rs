@@ -97,13 +97,13 @@ pub enum QualityFlag {
     FrictionHeavy,
     /// Flanks are soft at low load: a fit of higher loads alone reads another gap.
     SoftContact,
-    /// The gap depends on the place of the stroke: `gap_m` is its mean over time, and the largest stands beside it.
+    /// The gap depends on the place of the stroke: `gap_m` is its mean over time.
     GapVaries,
     /// The gap is negative by more than two standard errors, which no gap can be.
     GapNegative,
     /// The standard error exceeds a tenth of the wind-up.
     Imprecise,
-    /// Both flanks press at low load, so that there is no gap; the preload stands beside it.
+    /// Both flanks press at low load, so that there is no gap.
     Preloaded,
 }
 

@@ -129,7 +129,7 @@ fn beyond_m<'a>(
     Some(median_and_error_m(&mut outward_m, stretches.len()))
 }
 
-/// A median, and its standard error where so many of the values are independent, m.
+/// The median of some values and its standard error for a number of independent ones, m.
 fn median_and_error_m(values_m: &mut [f64], independent: usize) -> (f64, f64) {
     let median_m = median(values_m);
     values_m.iter_mut().for_each(|e| *e = (*e - median_m).abs());

@@ -472,3 +472,22 @@ fn a_clipped_load_moves_no_gap() {
         assert!((found.gap_m - 100e-6).abs() < 1.5e-6, "{found:?}");
     }
 }
+
+/// A bench that holds the load at its ends for most of the time: loads pile up there without any clipping.
+#[test]
+fn held_loads_are_not_taken_for_clipped_ones() {
+    let (rate, samples) = (125.0, 90 * 125);
+    let case = Case::nominal(100e-6);
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let (mut motor_m, mut dx_m, mut load_n) = (Vec::new(), Vec::new(), Vec::new());
+    for k in 0..samples {
+        let t = k as f64 / rate;
+        let ramp = (3.0 * (std::f64::consts::TAU * 0.25 * t).sin()).clamp(-1.0, 1.0);
+        let load = 6000.0 * ramp;
+        motor_m.push(0.02 * (std::f64::consts::TAU * 0.11 * t).sin() + 1e-6 * random.random_range(-1.0..1.0));
+        dx_m.push(50e-6 * load.signum() + load / 5e7 + 3e-6 * random.random_range(-1.0..1.0));
+        load_n.push(load + 40.0 * random.random_range(-1.0..1.0));
+    }
+    let found = gap(case.look(&motor_m, &dx_m, &load_n));
+    assert!((found.gap_m - 100e-6).abs() < 1e-6, "{found:?}");
+}

@@ -58,7 +58,7 @@ impl UnitSelection {
             && (self.part_number.is_none() || self.part_number == name.0)
     }
 
-    /// Whether an assessed unit is selected: it has flown, and on the selected tail.
+    /// Whether an assessed unit is on the selected tail.
     fn fits(&self, row: &TrendRow) -> bool {
         self.tail_number.is_none() || row.tail_number == self.tail_number
     }

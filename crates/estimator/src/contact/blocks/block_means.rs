@@ -39,11 +39,14 @@ const STRETCH_S: f64 = 2.0;
 /// channel is read in long enough runs to be prefetched.
 const SPAN: usize = 16;
 
-/// A load cell's end lies near this quantile of the loads of its side, within this share of it ...
+/// The end of a clipped load cell's range is near this quantile of the loads of one side.
 const PILE_QUANTILE: f64 = 0.998;
+/// Width of the band of loads at that end, as a share of it.
 const PILE_WIDTH: f64 = 0.03;
-/// ... where so many times as many loads lie as in the two widths before it, and so long in all, s.
+/// Ratio of the loads in that band to those in the two bands below it from which the cell counts as clipped: 0.5 for evenly
+/// spread loads, 1.35 for a sine.
 const PILE_RATIO: f64 = 2.0;
+/// Shortest time in that band of a clipped cell, s.
 const SHORTEST_PILE_S: f64 = 1.0;
 
 /// Blocks that the search begins with, in windows of this many.
@@ -145,8 +148,8 @@ impl BlockMeans {
             sided_n.iter().filter(|load_n| (low_n..high_n).contains(*load_n)).count() as f64
         };
         let pile = between(top_n - width_n, f64::INFINITY);
-        let beside = between(top_n - 3.0 * width_n, top_n - width_n);
-        let is_pile = pile > PILE_RATIO * beside && pile * count as f64 * self.period_s > SHORTEST_PILE_S;
+        let below = between(top_n - 3.0 * width_n, top_n - width_n);
+        let is_pile = pile > PILE_RATIO * below && pile * count as f64 * self.period_s > SHORTEST_PILE_S;
         if is_pile { top_n - width_n } else { f64::INFINITY }
     }
 
