@@ -481,7 +481,7 @@ fn held_loads_are_not_taken_for_clipped_ones() {
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let (mut motor_m, mut dx_m, mut load_n) = (Vec::new(), Vec::new(), Vec::new());
     for k in 0..samples {
-        let t = k as f64 / rate;
+        let t = f64::from(k) / rate;
         let ramp = (3.0 * (std::f64::consts::TAU * 0.25 * t).sin()).clamp(-1.0, 1.0);
         let load = 6000.0 * ramp;
         motor_m.push(0.02 * (std::f64::consts::TAU * 0.11 * t).sin() + 1e-6 * random.random_range(-1.0..1.0));
