@@ -129,8 +129,8 @@ impl FlightLog {
         Ok(GapRecord {
             flight: self.flight(),
             position: at.position.clone(),
-            part_number: installation.part_number.clone(),
-            serial_number: installation.serial_number.clone(),
+            part_number: installation.unit().0.clone(),
+            serial_number: installation.unit().1.clone(),
             unit_hours: installation.unit_hours(self.identity.tail_hours_end),
             estimate,
             provenance: Provenance {
@@ -309,9 +309,10 @@ fn no_installation(id: &Identity, position: &Position, installations: &Installat
     }
 }
 
-/// The log-level digest of settings: of every unit that sat in one of its positions that day.
+/// The log-level digest of settings: of everything that can move the numbers of its records or its identity.
 ///
-/// It changes when a part's settings change, or another serial number is installed, and with nothing else.
+/// It covers how the aircraft's logs are read, and the settings of the part in each position. Serial numbers and hours are
+/// bookkeeping, which is joined to stored records without the log.
 pub fn config_digest(
     config: &Config,
     installations: &Installations,
@@ -321,20 +322,20 @@ pub fn config_digest(
     let mut hash = blake3::Hasher::new();
     for position in positions {
         let installation = installations.installed_at(&flight.tail_number, position, flight.departure_utc);
-        // The whole installation with its hours, which are columns of the record too.
-        let stay_text = installation.map(|s| serde_json::to_string(s).unwrap_or_default());
         let digest = installation.map(|s| config.digest(&flight.tail_number, &s.part_number));
-        for text in [Some(position.as_str()), stay_text.as_deref(), digest.as_deref()] {
+        for text in [Some(position.as_str()), digest.as_deref()] {
             hash.update(text.unwrap_or_default().as_bytes());
             hash.update(&[0]);
         }
     }
     hash.update(config.mapping_text(&flight.tail_number).as_bytes());
-    // Hours are columns of the record too, and the flights table may supply them later.
-    if let Some(fallback) = config.flights.of(flight) {
-        let hours =
-            [fallback.flight_hours, fallback.tail_hours_end].map(|h| h.map_or(0, f64::to_bits).to_le_bytes());
-        hash.update(&hours.concat());
+    // A flights table may supply the identity of a log: when its row changes, the log may be another flight.
+    let (tail, id) = (flight.tail_number.as_str(), flight.flight_id.as_str());
+    if let Some(row) = config.flights.of(tail, id, flight.departure_utc) {
+        for text in [row.flight_id.as_str(), &row.departure_utc.to_string()] {
+            hash.update(text.as_bytes());
+            hash.update(&[0]);
+        }
     }
     hash.finalize().to_hex().to_string()
 }
@@ -349,6 +350,9 @@ pub fn digest_without_identity(config: &Config, installations: &Installations) -
     hash.update(serde_json::to_string(&document).unwrap_or_default().as_bytes());
     for installation in installations.iter() {
         hash.update(serde_json::to_string(installation).unwrap_or_default().as_bytes());
+    }
+    for flight in config.flights.iter() {
+        hash.update(serde_json::to_string(flight).unwrap_or_default().as_bytes());
     }
     hash.finalize().to_hex().to_string()
 }
@@ -381,8 +385,9 @@ pub fn identify_companion(
     config: &Config,
 ) -> Result<(Flight, Option<Position>), Diagnostic> {
     catch_panic(display_name, || {
-        let fallback =
-            |fields: &IdentityFields| config.flights.facts(path, fields, &config.document.identity);
+        let fallback = |fields: &IdentityFields, start| {
+            config.flights.facts(path, fields, start, &config.document.identity)
+        };
         let id = ingest::log::companion_identity(path, config.base_mapping(), group, fallback)
             .map_err(|e| e.diagnostic().in_file(display_name))?;
         Ok((flight_of(&id), id.position))
@@ -404,7 +409,7 @@ fn check_not_ahead(identity: &Identity, now: Timestamp) -> Result<(), Diagnostic
 /// The identity that the log holds, completed from the flights table.
 fn identity_of(log: &Log, files: &LogFiles, config: &Config) -> Result<Identity, ingest::Error> {
     let path = files.main.first().map_or(Path::new(""), PathBuf::as_path);
-    log.identity(|fields| config.flights.facts(path, fields, &config.document.identity))
+    log.identity(|fields, start| config.flights.facts(path, fields, start, &config.document.identity))
 }
 
 type Mapped = (ActuatorColumns, Arc<Mapping>);

@@ -200,7 +200,7 @@ fn result(tail_at: usize, flight: usize, units: &[Unit]) -> Outcomes<LogResult> 
         run_id: "made".to_owned(),
         processed_utc: departure(flight)?,
     };
-    Ok(LogResult { account, records: if bad { Vec::new() } else { records }, retires: Vec::new() })
+    Ok(LogResult { account, records: if bad { Vec::new() } else { records }, moved_from: Vec::new() })
 }
 
 fn fill(store: &Path, tails: usize, flights: usize) -> Outcomes<()> {
@@ -231,6 +231,7 @@ fn fill(store: &Path, tails: usize, flights: usize) -> Outcomes<()> {
         errors: 0,
         not_reached: 0,
         exit_code: Some(0),
+        tables_digest: None,
     })?;
     Ok(())
 }

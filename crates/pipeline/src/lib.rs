@@ -4,6 +4,7 @@
 //! This crate alone uses rayon. It prints nothing: it reports [`Event`]s and returns a [`RunSummary`]. Results depend
 //! neither on the number of workers nor on the order in which they finish.
 
+pub mod bookkeeping;
 pub mod check;
 pub mod discovery;
 mod error;
@@ -22,6 +23,7 @@ pub mod simulate;
 pub mod store_diff;
 pub mod time_limit;
 
+pub use bookkeeping::join::open_store;
 pub use error::Error;
 pub use run::event::Event;
 pub use run::plan::{Plan, Request, WorkReason};

@@ -17,7 +17,7 @@ use pipeline::fleet_trends::assess::{self, UnitSelection};
 use pipeline::history::external_estimates;
 use pipeline::run::scheduler::Context;
 use pyo3::prelude::*;
-use store::{Holder, Query, Store};
+use store::{Holder, Query};
 
 use crate::VERSION;
 use crate::arrow_capsule::{self, arrow_error};
@@ -144,10 +144,15 @@ fn assess(
 ) -> Result<Vec<TrendRow>, pipeline::Error> {
     let histories = match (estimate_batches, queries_table) {
         (None, None) => {
-            return assess::assess_store(config, installations, &Store::open(config.store())?, ask);
+            return assess::assess_store(
+                config,
+                installations,
+                &pipeline::open_store(config, installations)?,
+                ask,
+            );
         }
         (Some(batches), _) => external_estimates::from_batches(&chunks(batches))?,
-        (None, Some(_)) => assess::load_histories(&Store::open(config.store())?)?,
+        (None, Some(_)) => assess::load_histories(&pipeline::open_store(config, installations)?)?,
     };
     match queries_table {
         None => assess::assess_histories(config, installations, histories, ask),
@@ -195,8 +200,9 @@ pub(crate) fn records(
         last,
         ..Query::default()
     };
-    let found = py.detach(|| Store::open(config.inner.store())?.scan(&query));
-    Ok(Table::of(found.map_err(|error| to_run_exception(py, error.into()))?))
+    let (installations, config) = (config.installations(py)?, &config.inner);
+    let found = py.detach(|| Ok(pipeline::open_store(config, installations)?.scan(&query)?));
+    Ok(Table::of(found.map_err(|error| to_run_exception(py, error))?))
 }
 
 /// Writes normalized logs below a folder.

@@ -52,7 +52,12 @@ fn followed(
     let (installations, ask) = (config.installations(py)?, selection(py, units, as_of)?);
     let config = &config.inner;
     let found = py.detach(|| {
-        assess::assess_store_with_quantities(config, installations, &Store::open(config.store())?, &ask)
+        assess::assess_store_with_quantities(
+            config,
+            installations,
+            &pipeline::open_store(config, installations)?,
+            &ask,
+        )
     });
     let StoreAssessment { followed, .. } = found.map_err(|error| to_run_exception(py, error))?;
     match what {
@@ -96,7 +101,7 @@ pub(crate) fn backtest_forecasts(
     let rows = py.detach(|| {
         let histories = match batches {
             Some(batches) => external_estimates::from_batches(&chunks(batches))?,
-            None => assess::load_histories(&Store::open(config.store())?)?,
+            None => assess::load_histories(&pipeline::open_store(config, installations)?)?,
         };
         backtest::of_histories(config, installations, &histories)
     });
@@ -122,7 +127,14 @@ pub(crate) fn explain(
     let config = &config.inner;
     let key = RecordKey { flight_id: flight, position, tail_number: tail };
     let found = py
-        .detach(|| pipeline::explain::explain(config, installations, &Store::open(config.store())?, &key))
+        .detach(|| {
+            pipeline::explain::explain(
+                config,
+                installations,
+                &pipeline::open_store(config, installations)?,
+                &key,
+            )
+        })
         .map_err(|error| to_run_exception(py, error))?;
     let facts = found.to_json(config).to_string();
     Ok((facts, table(py, Ok::<Vec<GapRecord>, _>(vec![found.record]))?))
@@ -142,7 +154,7 @@ pub(crate) fn report(
     let config = &config.inner;
     let composed = py
         .detach(|| {
-            let store = Store::open(config.store())?;
+            let store = pipeline::open_store(config, installations)?;
             let program = format!("Freeplay {VERSION}");
             compose::compose(config, installations, &store, &ask, Timestamp::now(), &program)
         })

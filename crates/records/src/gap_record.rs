@@ -18,6 +18,8 @@ pub enum Status {
     /// The log is readable, but allows no estimate; `reason` holds the rejection code.
     #[default]
     Refused,
+    /// `freeplay store forget` took the record out: no command of Freeplay reads it, and it can be brought back.
+    Withdrawn,
 }
 
 impl Status {
@@ -26,11 +28,14 @@ impl Status {
         match self {
             Self::Estimated => "estimated",
             Self::Refused => "refused",
+            Self::Withdrawn => "withdrawn",
         }
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let known = [Self::Estimated, Self::Refused].into_iter().find(|status| status.as_str() == text);
+        let known = [Self::Estimated, Self::Refused, Self::Withdrawn]
+            .into_iter()
+            .find(|status| status.as_str() == text);
         known.ok_or_else(|| format!("`{text}` is no status"))
     }
 }

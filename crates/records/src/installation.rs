@@ -27,12 +27,33 @@ pub struct Installation {
     pub unit_hours_at_install: Option<f64>,
     /// Total hours of the tail at installation, if recorded.
     pub tail_hours_at_install: Option<f64>,
+    /// Part and serial number of the unit today, where it was modified or re-identified since this installation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub today: Option<(PartNumber, SerialNumber)>,
+}
+
+/// A unit's former part and serial number, and those that it has today.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Alias {
+    /// Former part number; `None` for any.
+    pub former_part_number: Option<PartNumber>,
+    /// Former serial number.
+    pub former_serial_number: SerialNumber,
+    /// Part number today; `None` where it is unchanged.
+    pub part_number: Option<PartNumber>,
+    /// Serial number today.
+    pub serial_number: SerialNumber,
 }
 
 impl Installation {
     /// Age of the unit when the tail has `tail_hours` total hours, if the installation records both hours.
     pub fn unit_hours(&self, tail_hours: Option<f64>) -> Option<f64> {
         Some(self.unit_hours_at_install? + (tail_hours? - self.tail_hours_at_install?).max(0.0))
+    }
+
+    /// Part and serial number by which the unit is followed: those of today.
+    pub fn unit(&self) -> (&PartNumber, &SerialNumber) {
+        self.today.as_ref().map_or((&self.part_number, &self.serial_number), |(part, serial)| (part, serial))
     }
 
     /// Whether the unit was installed at that instant.
@@ -104,7 +125,36 @@ impl Installations {
             return Err(errors);
         }
         rows.sort_unstable_by(|a, b| place(a).cmp(&place(b)).then_with(|| period(a).cmp(&period(b))));
+        follow_modifications(&mut rows);
         Ok(Self { rows })
+    }
+
+    /// The same with units under the part and serial numbers that they have today.
+    #[must_use]
+    pub fn with_aliases(mut self, aliases: &[Alias]) -> Self {
+        for row in &mut self.rows {
+            // Each alias leads to a later name; as many steps as there are aliases end a circle.
+            for _ in 0..aliases.len() {
+                let (part, serial) = row.unit();
+                let is_former = |alias: &&Alias| {
+                    alias.former_serial_number == *serial
+                        && alias.former_part_number.as_ref().is_none_or(|former| former == part)
+                };
+                let Some(alias) = aliases.iter().find(is_former) else { break };
+                let part = alias.part_number.clone().unwrap_or_else(|| part.clone());
+                row.today = Some((part, alias.serial_number.clone()));
+            }
+        }
+        self
+    }
+
+    /// Every installation in one position of a tail, by date.
+    pub fn of_position(&self, tail: &str, position: &str) -> &[Installation] {
+        let key =
+            |row: &Installation| (row.tail_number.as_str(), row.position.as_str()).cmp(&(tail, position));
+        let first = self.rows.partition_point(|row| key(row).is_lt());
+        let count = self.rows[first..].partition_point(|row| key(row).is_eq());
+        &self.rows[first..first + count]
     }
 
     /// The unit installed in that position at that instant.
@@ -114,11 +164,8 @@ impl Installations {
         position: &Position,
         at: Timestamp,
     ) -> Option<&Installation> {
-        let rows =
-            &self.rows[self.rows.partition_point(|installation| place(installation) < (tail, position))..];
-        rows.iter()
-            .take_while(|installation| place(installation) == (tail, position))
-            .find(|installation| installation.covers(at))
+        let rows = self.of_position(tail.as_str(), position.as_str());
+        rows.iter().find(|installation| installation.covers(at))
     }
 
     /// Every unit installed on that tail at that instant, by position.
@@ -151,6 +198,23 @@ impl Installations {
 
 fn place(installation: &Installation) -> (&TailNumber, &Position) {
     (&installation.tail_number, &installation.position)
+}
+
+/// A part number that changes on the same serial number, in the same position and without a gap in time, is a modification:
+/// the unit is followed under its last part number.
+fn follow_modifications(rows: &mut [Installation]) {
+    for later in (1..rows.len()).rev() {
+        let (earlier, next) = (&rows[later - 1], &rows[later]);
+        let is_modified = place(earlier) == place(next)
+            && earlier.serial_number == next.serial_number
+            && earlier.part_number != next.part_number
+            && earlier.removed_utc == Some(next.installed_utc);
+        if is_modified {
+            let (part, serial) = next.unit();
+            let today = (part.clone(), serial.clone());
+            rows[later - 1].today = Some(today);
+        }
+    }
 }
 
 /// Start and end, the end of a unit that is still installed last: an installation without length is before one that follows.
@@ -199,6 +263,7 @@ mod tests {
             removed_utc: to.map(|t| t.parse().unwrap()),
             unit_hours_at_install: None,
             tail_hours_at_install: None,
+            today: None,
         }
     }
 
@@ -247,6 +312,39 @@ mod tests {
         let errors =
             Installations::new(vec![installation("N1", "aileron", "A", MAR, Some(JAN))]).unwrap_err();
         assert!(matches!(errors[0], Error::Reversed { row: 1, .. }));
+    }
+
+    #[test]
+    fn a_unit_keeps_its_history_through_a_modification_and_a_new_serial_number() {
+        let part = |text: &str| PartNumber::new(text).unwrap();
+        let serial = |text: &str| SerialNumber::new(text).unwrap();
+        let mut rows = vec![
+            installation("N1", "aileron", "A", JAN, Some(FEB)),
+            installation("N1", "aileron", "A", FEB, Some(MAR)),
+            installation("N2", "aileron", "B", MAR, None),
+        ];
+        rows[0].part_number = part("EMA-OLD");
+        let unit = |row: &Installation| (row.unit().0.to_string(), row.unit().1.to_string());
+        let table = Installations::new(rows.clone()).unwrap();
+        let units: Vec<_> = table.iter().map(unit).collect();
+        let named = |serial: &str| ("EMA".to_owned(), serial.to_owned());
+        assert_eq!(units, [named("A"), named("A"), named("B")]);
+        let alias = Alias {
+            former_part_number: Some(part("EMA")),
+            former_serial_number: serial("A"),
+            part_number: None,
+            serial_number: serial("B"),
+        };
+        let units: Vec<_> =
+            table.clone().with_aliases(std::slice::from_ref(&alias)).iter().map(unit).collect();
+        assert_eq!(units, [named("B"), named("B"), named("B")]);
+        // A circle of aliases ends.
+        let back = Alias { former_serial_number: serial("B"), serial_number: serial("A"), ..alias.clone() };
+        assert_eq!(table.with_aliases(&[alias, back]).iter().count(), 3);
+        // With a gap in time, one of the same serial number and another part number is another unit.
+        rows[1].installed_utc = "2026-02-02T00:00:00Z".parse().unwrap();
+        let apart = Installations::new(rows).unwrap();
+        assert_eq!(unit(apart.iter().next().unwrap()), ("EMA-OLD".to_owned(), "A".to_owned()));
     }
 
     proptest! {

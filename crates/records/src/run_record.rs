@@ -34,6 +34,8 @@ stored_row! {
         pub not_reached: i64,
         /// Exit code; none for a run that was killed or is still active.
         pub exit_code: Option<i64>,
+        /// blake3 of the tables whose bookkeeping is in all records; none until the run has ended.
+        pub tables_digest: Option<String>,
     }
 }
 

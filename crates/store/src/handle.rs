@@ -11,7 +11,8 @@ use crate::delta::location::Location;
 use crate::delta::table::Table;
 use crate::delta::versioned;
 use crate::error::Error;
-use records::{AlertRecord, LogRecord, RunRecord, WorkEvent};
+use crate::read::join::Join;
+use records::{AlertRecord, LogRecord, RunRecord, UnitState, WorkEvent};
 
 const LOCK: &str = "lock";
 
@@ -27,6 +28,10 @@ pub struct Store {
     pub(crate) alerts: Table,
     /// Events of work requests; the table exists from its first row on.
     pub(crate) work: Table,
+    /// States of units after the last run; the table exists from its first row on.
+    pub(crate) states: Table,
+    /// Bookkeeping that is joined to records when they are read.
+    pub(crate) join: Option<Join>,
     /// Data files whose digests this process has verified.
     verified: Arc<Mutex<HashSet<PathBuf>>>,
 }
@@ -39,8 +44,20 @@ impl Store {
         let runs = table("runs", versioned::schema::<RunRecord>());
         let alerts = table("alerts", versioned::schema::<AlertRecord>());
         let work = table("work", versioned::schema::<WorkEvent>());
+        let states = table("states", versioned::schema::<UnitState>());
         let display_path = location.display_path(location.dir());
-        Self { gaps, logs, runs, alerts, work, verified: Arc::default(), display_path, location }
+        Self {
+            gaps,
+            logs,
+            runs,
+            alerts,
+            work,
+            states,
+            join: None,
+            verified: Arc::default(),
+            display_path,
+            location,
+        }
     }
 
     /// The folder or the object address.
@@ -61,7 +78,9 @@ impl Store {
     /// The tables of this store: those of every store, and those of alerts and work requests where they exist.
     pub(crate) fn existing_tables(&self) -> Vec<&Table> {
         // A table that cannot be read is kept: its reader reports why.
-        let later = [&self.alerts, &self.work].into_iter().filter(|table| table.exists().unwrap_or(true));
+        let later = [&self.alerts, &self.work, &self.states]
+            .into_iter()
+            .filter(|table| table.exists().unwrap_or(true));
         self.tables().into_iter().chain(later).collect()
     }
 

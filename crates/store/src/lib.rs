@@ -11,6 +11,7 @@
 //!   runs/        one row at the start of a run and one at its end
 //!   alerts/      changes of state, and what became of their messages; from the first alert on
 //!   work/        events of work requests; from the first request on
+//!   states/      state of each unit after the last run, for the next run to tell what changed
 //! ```
 //!
 //! A prefix of a bucket holds the same, except for the lock: see `docs/store.md`.
@@ -49,9 +50,10 @@ pub use delta::foreign_table::{LiveFile, live_files};
 pub use error::Error;
 pub use handle::Store;
 pub use read::column_scan::ColumnScan;
+pub use read::join::Join;
 pub use read::query::Query;
 pub use records::{AlertRecord, LogOutcome, LogRecord, RecordKey, RunRecord, WorkEvent};
 pub use write::compact::Compaction;
 pub use write::lock::Holder;
 pub use write::promote::PromotionSummary;
-pub use write::writer::{LogResult, Writer};
+pub use write::writer::{HeldRecord, LogResult, Writer};

@@ -8,7 +8,6 @@ use job::Config;
 use pipeline::fleet_trends::assess::{self, UnitSelection};
 use pipeline::history::histories::Histories;
 use records::Installations;
-use store::Store;
 
 use crate::args::{CONFIG, ExternalEstimatesArgs, Global, UnitFilterArgs};
 use crate::exit::Failure;
@@ -102,9 +101,9 @@ impl KnownNames {
 
     /// Reads the names of a store; a missing store or table has none.
     pub(crate) fn read(config: &Config) -> Self {
-        let histories =
-            Store::open(config.store()).ok().and_then(|store| assess::load_histories(&store).ok());
         let installations = pipeline::run::scheduler::installations(config).unwrap_or_default();
+        let store = pipeline::open_store(config, &installations).ok();
+        let histories = store.and_then(|store| assess::load_histories(&store).ok());
         Self { histories: histories.unwrap_or_default(), installations }
     }
 

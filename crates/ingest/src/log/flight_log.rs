@@ -139,20 +139,29 @@ impl Log {
         Ok(true)
     }
 
-    /// Which flight this is; `known` fills what the log itself leaves open.
+    /// Which flight this is; `known` fills what the log itself leaves open, from what it holds and from the first instant
+    /// of its clock. That instant is read only where the log holds no departure and `known` finds no flight without it.
     ///
     /// # Errors
     /// When tail or departure stand nowhere, cannot be read, or change within the log.
-    pub fn identity(&self, known: impl Fn(&IdentityFields) -> IdentityFields) -> Result<Identity, Error> {
+    pub fn identity(
+        &self,
+        known: impl Fn(&IdentityFields, Option<Timestamp>) -> IdentityFields,
+    ) -> Result<Identity, Error> {
         if let Some(normalized) = &self.normalized {
             let own = crate::mapping::IdentityMapping::default();
             return identity::read(&normalized.facts, &own, None).map_err(|f| self.main.error(f));
         }
         let mut facts = facts(&self.main, &self.mapping.identity)?;
-        for (fact, text) in known(&facts) {
+        let mut found = known(&facts, None);
+        let is_dated = |fields: &IdentityFields| fields.contains_key(&IdentityField::DepartureUtc);
+        let start = if is_dated(&facts) || is_dated(&found) { None } else { self.start_utc()? };
+        if start.is_some() {
+            found = known(&facts, start);
+        }
+        for (fact, text) in found {
             facts.entry(fact).or_insert(text);
         }
-        let start = if facts.contains_key(&IdentityField::DepartureUtc) { None } else { self.start_utc()? };
         identity::read(&facts, &self.mapping.identity, start).map_err(|f| self.main.error(f))
     }
 
@@ -627,7 +636,7 @@ pub fn companion_identity(
     path: &Path,
     mapping: &Mapping,
     group: &str,
-    known: impl Fn(&IdentityFields) -> IdentityFields,
+    known: impl Fn(&IdentityFields, Option<Timestamp>) -> IdentityFields,
 ) -> Result<Identity, Error> {
     let settings = mapping.groups.get(group);
     let identity = settings.and_then(|g| g.identity.clone()).unwrap_or_else(|| mapping.identity.clone());

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 use records::{Flight, FlightId, TailNumber};
 
 use crate::error::Error;
@@ -17,13 +17,23 @@ const OVERLAP_SHARE: f64 = 1.25;
 /// See [`OVERLAP_SHARE`].
 const OVERLAP_HOURS: f64 = 1.0;
 
+/// A departure in the table and one in a log are those of one flight of the same id when they differ by at most this:
+/// airlines use an id again every day.
+const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
+
 /// Flights, found by the path of their log, or by the identity in the log.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Flights {
     rows: Vec<Row>,
     by_path: HashMap<String, usize>,
-    by_flight: HashMap<(String, String), usize>,
-    by_departure: BTreeMap<(String, Timestamp), usize>,
+    by_tail: HashMap<String, TailRows>,
+}
+
+/// The rows of one aircraft.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct TailRows {
+    by_departure: BTreeMap<Timestamp, usize>,
+    by_id: HashMap<String, Vec<usize>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -118,9 +128,9 @@ impl Flights {
         if let Some(path) = path.and_then(|column| table.text(row, column)) {
             self.by_path.insert(path.replace('\\', "/"), index);
         }
-        let tail = flown.tail_number.to_string();
-        self.by_flight.insert((tail.clone(), flown.flight_id.to_string()), index);
-        self.by_departure.insert((tail, flown.departure_utc), index);
+        let of_tail = self.by_tail.entry(flown.tail_number.to_string()).or_default();
+        of_tail.by_departure.insert(flown.departure_utc, index);
+        of_tail.by_id.entry(flown.flight_id.to_string()).or_default().push(index);
         self.rows.push(Row { flight: flown, facts });
         Ok(())
     }
@@ -130,30 +140,55 @@ impl Flights {
         self.rows.iter().map(|row| &row.flight)
     }
 
-    /// The table's row of a flight.
-    pub fn of(&self, flight: &Flight) -> Option<&Flight> {
-        let tail = flight.tail_number.to_string();
-        let by_flight = self.by_flight.get(&(tail.clone(), flight.flight_id.to_string()));
-        by_flight
-            .or_else(|| self.by_departure.get(&(tail, flight.departure_utc)))
-            .map(|&row| &self.rows[row].flight)
+    /// Whether the table has no flight.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
     }
 
-    /// What the table knows of a log: by its path, else by its tail and flight, else by its tail and
-    /// departure.
-    pub fn facts(&self, path: &Path, said: &IdentityFields, identity: &IdentityMapping) -> IdentityFields {
+    /// The table's row of a flight: the one with its departure, else the one with its id that departs nearest to it,
+    /// within 12 hours.
+    pub fn of(&self, tail_number: &str, flight_id: &str, departure_utc: Timestamp) -> Option<&Flight> {
+        self.row_of(tail_number, Some(flight_id), departure_utc).map(|row| &self.rows[row].flight)
+    }
+
+    fn row_of(&self, tail_number: &str, flight_id: Option<&str>, departure_utc: Timestamp) -> Option<usize> {
+        let of_tail = self.by_tail.get(tail_number)?;
+        if let Some(row) = of_tail.by_departure.get(&departure_utc) {
+            return Some(*row);
+        }
+        let away = |row: &usize| self.rows[*row].flight.departure_utc.duration_since(departure_utc).abs();
+        let same_id = of_tail.by_id.get(flight_id?)?.iter().copied();
+        same_id.filter(|row| away(row) <= SAME_FLIGHT).min_by_key(away)
+    }
+
+    /// What the table knows of a log: by its path, else by its tail and departure, else by its tail and flight id. An id that
+    /// several rows have is found by the departure alone, which may be that of the log's clock.
+    pub fn facts(
+        &self,
+        path: &Path,
+        said: &IdentityFields,
+        start: Option<Timestamp>,
+        identity: &IdentityMapping,
+    ) -> IdentityFields {
         if self.rows.is_empty() {
             return IdentityFields::new();
         }
-        let text = |fact: IdentityField| said.get(&fact).map(|t| t.trim().to_owned());
-        let by_flight = || {
-            self.by_flight.get(&(text(IdentityField::TailNumber)?, text(IdentityField::FlightId)?)).copied()
+        let text = |fact: IdentityField| said.get(&fact).map(|t| t.trim());
+        let by_identity = || {
+            let (tail, id) = (text(IdentityField::TailNumber)?, text(IdentityField::FlightId));
+            let departure = match text(IdentityField::DepartureUtc) {
+                Some(text) => Some(instant(text, identity).ok()?),
+                None => start,
+            };
+            match departure {
+                Some(at) => self.row_of(tail, id, at),
+                None => match self.by_tail.get(tail)?.by_id.get(id?)?[..] {
+                    [row] => Some(row),
+                    _ => None,
+                },
+            }
         };
-        let by_departure = || {
-            let at = instant(&text(IdentityField::DepartureUtc)?, identity).ok()?;
-            self.by_departure.get(&(text(IdentityField::TailNumber)?, at)).copied()
-        };
-        let found = self.of_path(path).or_else(by_flight).or_else(by_departure);
+        let found = self.of_path(path).or_else(by_identity);
         found.map(|row| self.rows[row].facts.clone()).unwrap_or_default()
     }
 
@@ -184,7 +219,7 @@ mod tests {
         let names = names.map(|(ours, theirs)| (ours.to_owned(), theirs.to_owned())).into();
         let identity = IdentityMapping::default();
         let flights = Flights::read(&file, &names, &identity).unwrap();
-        let by_path = flights.facts(Path::new("/logs/N1/a.parquet"), &IdentityFields::new(), &identity);
+        let by_path = flights.facts(Path::new("/logs/N1/a.parquet"), &IdentityFields::new(), None, &identity);
         assert_eq!(
             (by_path[&IdentityField::FlightId].as_str(), by_path[&IdentityField::FlightHours].as_str()),
             ("0413", "2.5")
@@ -193,8 +228,35 @@ mod tests {
             (IdentityField::TailNumber, "N1".into()),
             (IdentityField::DepartureUtc, "2026-11-20T05:00:00Z".into()),
         ]);
-        let by_departure = flights.facts(Path::new("/logs/x.parquet"), &said, &identity);
+        let by_departure = flights.facts(Path::new("/logs/x.parquet"), &said, None, &identity);
         assert_eq!(by_departure[&IdentityField::FlightId], "0500");
-        assert!(flights.facts(Path::new("/logs/y.parquet"), &IdentityFields::new(), &identity).is_empty());
+        assert!(
+            flights.facts(Path::new("/logs/y.parquet"), &IdentityFields::new(), None, &identity).is_empty()
+        );
+    }
+
+    /// A flight number that flies every day: only the departure tells which row is meant.
+    #[test]
+    fn an_id_that_recurs_is_found_by_departure() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("flights.csv");
+        let row = |day: u32| format!("N1,FP100,2026-03-{day:02}T06:10:00Z,{day}.5\n");
+        let rows: String = (1..=9).map(row).collect();
+        std::fs::write(&file, format!("tail_number,flight_id,departure_utc,flight_hours\n{rows}")).unwrap();
+        let identity = IdentityMapping::default();
+        let flights = Flights::read(&file, &ColumnAliases::new(), &identity).unwrap();
+        let said = IdentityFields::from([
+            (IdentityField::TailNumber, "N1".into()),
+            (IdentityField::FlightId, "FP100".into()),
+        ]);
+        let at = |text: &str| text.parse::<Timestamp>().unwrap();
+        let hours = |start: Option<Timestamp>| {
+            flights.facts(Path::new("/x"), &said, start, &identity).get(&IdentityField::FlightHours).cloned()
+        };
+        assert_eq!(hours(None), None, "nine flights have this id");
+        assert_eq!(hours(Some(at("2026-03-04T06:25:00Z"))).as_deref(), Some("4.5"));
+        assert_eq!(hours(Some(at("2026-03-20T06:10:00Z"))), None);
+        let of = |text: &str| flights.of("N1", "FP100", at(text)).and_then(|flight| flight.flight_hours);
+        assert_eq!((of("2026-03-07T06:10:00Z"), of("2026-03-07T07:00:00Z")), (Some(7.5), Some(7.5)));
     }
 }

@@ -64,6 +64,7 @@ impl InstallationColumns {
             removed_utc: table.optional(row, self.removed, removal)?.flatten(),
             unit_hours_at_install: table.optional(row, self.hours[0], number)?,
             tail_hours_at_install: table.optional(row, self.hours[1], number)?,
+            today: None,
         })
     }
 }

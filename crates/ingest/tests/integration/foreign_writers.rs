@@ -52,7 +52,7 @@ pub(crate) fn wide() -> Mapping {
 
 fn actuators(files: &LogFiles, mapping: &Mapping) -> Vec<ActuatorChannels> {
     let log = Log::open(files, &Arc::new(mapping.clone())).unwrap();
-    let own = log.identity(|_| IdentityFields::new()).unwrap().position;
+    let own = log.identity(|_, _| IdentityFields::new()).unwrap().position;
     let found = log.actuators(&mapping.channels, own.as_ref()).unwrap();
     found.iter().map(|at| log.read_actuator(at, &mapping.channels, LINEAR).unwrap()).collect()
 }
@@ -165,7 +165,7 @@ fn hive_folders_say_which_flight_and_actuator_a_file_is() {
         let path =
             file(&format!("hive/tail=N1/off=2026-11-19T04%3A13%3A00Z/actuator={position}/part-0.parquet"));
         let log = Log::open(&LogFiles::one(&path), &Arc::new(m.clone())).unwrap();
-        let identity = log.identity(|_| IdentityFields::new()).unwrap();
+        let identity = log.identity(|_, _| IdentityFields::new()).unwrap();
         assert_eq!(identity.departure_utc.to_string(), "2026-11-19T04:13:00Z");
         assert_eq!(identity.position, Some(Position::new(position).unwrap()));
         found.extend(actuators(&LogFiles::one(path), &m));

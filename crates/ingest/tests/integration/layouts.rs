@@ -234,7 +234,7 @@ fn a_wide_log_offers_each_position_and_names_what_one_lacks() {
     let found = log.actuators(&m.channels, None).unwrap();
     let told: Vec<_> = found.iter().map(|p| (p.position.as_str(), p.lacking.clone())).collect();
     assert_eq!(told, [("left", vec![]), ("right", vec!["right_f".to_owned()])]);
-    let identity = log.identity(|_| IdentityFields::new()).unwrap();
+    let identity = log.identity(|_, _| IdentityFields::new()).unwrap();
     assert_eq!(identity.tail_number.as_str(), "N1");
     assert_eq!(identity.departure_utc.to_string(), "2026-11-19T04:13:00Z");
 }
@@ -259,7 +259,7 @@ fn metadata_wins_over_columns_and_columns_over_the_path() {
     ]);
     let tail = |m: &Mapping| {
         let log = Log::open(&LogFiles::one(&file), &Arc::new(m.clone())).unwrap();
-        log.identity(|_| IdentityFields::new()).unwrap()
+        log.identity(|_, _| IdentityFields::new()).unwrap()
     };
     assert_eq!(tail(&m).tail_number.as_str(), "N2");
     m.identity.metadata = BTreeMap::from([

@@ -43,7 +43,7 @@ pub struct Config {
     /// Its parts, checked.
     pub parts: BTreeMap<PartNumber, Part>,
     /// The flights table; empty when there is none.
-    pub flights: Flights,
+    pub flights: Arc<Flights>,
     overrides: Overrides,
     layers: Arc<[ConfigLayer]>,
 }
@@ -70,7 +70,7 @@ impl Config {
             folder: PathBuf::new(),
             document: Document::default(),
             parts: BTreeMap::new(),
-            flights: Flights::default(),
+            flights: Arc::default(),
             overrides: Overrides::none(),
             layers: Arc::default(),
         }
@@ -88,7 +88,8 @@ impl Config {
         if let Some(table) = &config.document.logs.flights {
             let names = &config.document.columns.flights;
             let read = Flights::read(&config.path(table), names, &config.document.identity);
-            config.flights = read.map_err(|e| e.iter().map(ingest::Error::diagnostic).collect::<Vec<_>>())?;
+            let read = read.map_err(|e| e.iter().map(ingest::Error::diagnostic).collect::<Vec<_>>())?;
+            config.flights = Arc::new(read);
         }
         Ok(config)
     }
@@ -163,7 +164,7 @@ impl Config {
         let overrides = Overrides::check(&document, &source);
         match overrides {
             Ok(overrides) if diagnostics.is_empty() => {
-                let (file, folder, flights) = (file.to_owned(), folder.to_owned(), Flights::default());
+                let (file, folder, flights) = (file.to_owned(), folder.to_owned(), Arc::default());
                 Ok(Self { file, folder, document, parts, flights, overrides, layers: layers.into() })
             }
             Ok(_) => Err(diagnostics),
@@ -174,6 +175,20 @@ impl Config {
     /// Adds to a diagnostic the line of the configuration that holds a text.
     pub fn at(&self, text: &str, diagnostic: Diagnostic) -> Diagnostic {
         layers::at_text(&self.layers, text, diagnostic)
+    }
+
+    /// File and line of the limit of a part, as text.
+    pub fn limit_place(&self, part: Option<&str>) -> String {
+        let Ok(source) = Source::parse(&self.layers) else { return self.file.display().to_string() };
+        let own =
+            part.filter(|part| self.document.part.get(*part).is_some_and(|part| part.limit_m.is_some()));
+        let path = match own {
+            Some(part) => vec!["part", part, "limit_m"],
+            None => vec!["trend", "limit_m"],
+        };
+        let place = source.at(&path, Diagnostic::new("limit", ""));
+        let line = place.line.map(|(line, _)| format!(" line {line}")).unwrap_or_default();
+        format!("{}{line}", place.file.unwrap_or_default())
     }
 
     /// A path of the configuration, seen from the current folder.

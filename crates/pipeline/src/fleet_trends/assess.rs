@@ -5,12 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
-use records::{Installations, PartNumber, QuantityChange, QuantityRow, SerialNumber};
+use records::{Installations, QuantityChange, QuantityRow};
 use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series, State, UsageDefaults};
 
+use crate::bookkeeping::installation_index::InstallationIndex;
+use crate::bookkeeping::usage::UsageSources;
 use crate::error::Error;
-use crate::fleet_trends::changes::{UnitChange, changed, gone};
+use crate::fleet_trends::changes::{Changes, RunFacts, changes};
 use crate::fleet_trends::limits::Limits;
 use crate::fleet_trends::priors::FleetPriors;
 use crate::fleet_trends::tail_wide_steps::TailWide;
@@ -20,9 +22,7 @@ use crate::history::builder::HistoryBuilder;
 use crate::history::external_estimates::AsOfQuery;
 use crate::history::flight_row::FlightRow;
 use crate::history::histories::{Histories, History, UnitKey};
-use crate::history::installation_index::InstallationIndex;
 use crate::history::merge::of_parts;
-use crate::history::usage::UsageSources;
 use crate::monitoring::coverage;
 use crate::monitoring::mapping_faults::{self, MappingFault};
 use crate::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
@@ -34,9 +34,6 @@ use records::TrendRow;
 
 /// Assessments of units, and steps of the gap that whole tails made.
 type Statements = (Vec<TrendRow>, Vec<QuantityChange>);
-
-/// A unit, by part and serial number.
-pub type Unit = (PartNumber, SerialNumber);
 
 /// Which units to assess, and at which date.
 #[derive(Debug, Clone, Default)]
@@ -135,8 +132,8 @@ pub fn assess_store_with_quantities(
 pub struct RunAssessments {
     /// Assessments at the newest date in the store.
     pub now: Vec<TrendRow>,
-    /// Changes against the assessments without the run's records; empty if the store holds no others.
-    pub changed: Vec<UnitChange>,
+    /// Changes against the states after the run before.
+    pub changes: Changes,
     /// Recent diagnostics in addition to gaps, of all tails.
     pub recent: RecentDiagnostics,
     /// Followed quantities of all units, and what changed.
@@ -153,24 +150,8 @@ pub struct RunAssessments {
     pub findings: Vec<Finding>,
 }
 
-/// Assessments of all units of a store, by unit.
-pub(crate) type RowsByUnit = BTreeMap<UnitKey, TrendRow>;
-
-/// The present assessments of all units of a store, by its own records.
-///
-/// # Errors
-/// As [`assess_store`].
-pub(crate) fn by_unit(
-    config: &Config,
-    installations: &Installations,
-    store: &Store,
-) -> Result<RowsByUnit, Error> {
-    let rows = assess_store(config, installations, store, &UnitSelection::default())?;
-    Ok(rows.into_iter().map(|row| (row.unit(), row)).collect())
-}
-
-/// Assesses the fleet after a run: the units whose records it changed, and the work list of all units. `before` holds
-/// the assessments before a run that computed records again.
+/// Assesses the fleet after a run: the units whose records it changed, the work list of all units, and what differs from the
+/// states after the run before.
 ///
 /// # Errors
 /// As [`assess_store`].
@@ -178,50 +159,13 @@ pub fn assess_run(
     config: &Config,
     installations: &Installations,
     store: &Store,
-    units: &[Unit],
-    run_id: &str,
-    before: Option<&RowsByUnit>,
+    units: &BTreeSet<UnitKey>,
+    run: RunFacts<'_>,
 ) -> Result<RunAssessments, Error> {
-    let query = Query { run_id: Some(run_id.to_owned()), ..Query::default() };
-    let (all, of_run) = (load_histories(store)?, read_histories(store, &query)?);
-    let has_flights = |row: &&TrendRow| all.get(&row.unit()).is_some();
-    let lost: Vec<&TrendRow> =
-        before.into_iter().flat_map(BTreeMap::values).filter(|row| !has_flights(row)).collect();
-    let mut run = assess_run_from(config, installations, all, &of_run, units, Some(store))?;
-    if let Some(before) = before {
-        run.changed = changed(before, &run.now);
-        run.changed.extend(lost.into_iter().map(|row| gone(row, &run.now)));
-    }
-    Ok(run)
-}
-
-/// The same from all flights that are known after a run, and those of the run; with the followed quantities of a store.
-///
-/// # Errors
-/// As [`assess_histories`].
-pub fn assess_run_from(
-    config: &Config,
-    installations: &Installations,
-    mut all: Histories,
-    of_run: &Histories,
-    units: &[Unit],
-    store: Option<&Store>,
-) -> Result<RunAssessments, Error> {
-    let names: BTreeSet<UnitKey> =
-        units.iter().map(|(part, serial)| (Some(part.to_string()), serial.to_string())).collect();
-    let Some(as_of) = as_of_date(config, None, &all) else { return Ok(RunAssessments::default()) };
-    let before_utc = all.newest_without_utc(of_run);
-    let days: Vec<Timestamp> = before_utc.into_iter().chain([as_of]).collect();
-    // Flights later than all others do not change an assessment at an earlier date; but where a flights
-    // table is given, those without a row are counted from a unit's rows.
-    let is_later =
-        config.flights.iter().next().is_none() && before_utc.is_none_or(|before| of_run.all_after(before));
-    let earlier = if is_later { Histories::default() } else { all.without(&names, of_run) };
-    let mut fleet = FleetContext::consuming(config, installations, &mut all, &days)?;
-    let mut recent = RecentDiagnostics::default();
-    if let Some(store) = store {
-        (fleet, recent) = fleet.with_diagnostics(store, as_of)?;
-    }
+    let mut histories = load_histories(store)?;
+    let Some(as_of) = as_of_date(config, None, &histories) else { return Ok(RunAssessments::default()) };
+    let fleet = FleetContext::consuming(config, installations, &mut histories, &[as_of])?;
+    let (fleet, recent) = fleet.with_diagnostics(store, as_of)?;
     let (mut now, tail_wide) = fleet.statements_with_steps(fleet.units.keys().copied(), as_of)?;
     now.retain(|row| row.flights > 0);
     let mut run = RunAssessments {
@@ -229,6 +173,7 @@ pub fn assess_run_from(
         followed: fleet.followed.clone(),
         mapping_faults: fleet.mapping_faults.clone(),
         notes: coverage::notes(&now, config),
+        changes: changes(config, &store.states()?, &now, run),
         ..RunAssessments::default()
     };
     run.followed.changes.extend(tail_wide);
@@ -241,18 +186,8 @@ pub fn assess_run_from(
     run.findings =
         now.iter().map(gap).chain(Finding::of_quantities(&run.followed.rows)).chain(of_common).collect();
     run.work_list = now.iter().filter(needs_attention).cloned().collect();
-    now.retain(|row| names.contains(&row.unit()));
-    let Some(before_utc) = before_utc else { return Ok(RunAssessments { now, ..run }) };
-    let before = if is_later {
-        fleet.statements(names.iter(), before_utc)?
-    } else {
-        let read = FleetContext::read(config, installations, &earlier)?;
-        let fleet = FleetContext { priors: fleet.priors, ..read };
-        fleet.statements(earlier.names(), before_utc)?
-    };
-    let before = before.into_iter().filter(|row| row.flights > 0).map(|row| (row.unit(), row)).collect();
-    let changed = changed(&before, &now);
-    Ok(RunAssessments { now, changed, ..run })
+    now.retain(|row| units.contains(&row.unit()));
+    Ok(RunAssessments { now, ..run })
 }
 
 /// Assessments of the selected units with everything that a report shows.
@@ -422,7 +357,13 @@ impl<'a> FleetContext<'a> {
         histories: &'a Histories,
         days: &[Timestamp],
     ) -> Result<Self, Error> {
-        Ok(Self::read(config, installations, histories)?.taught_by(days))
+        let books = UsageSources::read(config, installations)?;
+        let is_booked = histories.is_booked();
+        let units: Vec<_> = histories.iter().collect();
+        let read = |(name, history)| books.series(name, history, is_booked);
+        let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
+        let installations = is_booked.then(|| InstallationIndex::new(installations));
+        Ok(Self { installations, ..Self::of(config, histories, series) }.taught_by(days))
     }
 
     /// The same for a caller that no longer needs the histories: columns that the series hold are dropped.
@@ -443,21 +384,6 @@ impl<'a> FleetContext<'a> {
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
         let installations = is_booked.then(|| InstallationIndex::new(installations));
         Ok(Self { installations, ..Self::of(config, histories, series) }.taught_by(days))
-    }
-
-    /// Reads all histories and learns nothing.
-    fn read(
-        config: &'a Config,
-        installations: &'a Installations,
-        histories: &'a Histories,
-    ) -> Result<Self, Error> {
-        let books = UsageSources::read(config, installations)?;
-        let is_booked = histories.is_booked();
-        let units: Vec<_> = histories.iter().collect();
-        let read = |(name, history)| books.series(name, history, is_booked);
-        let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
-        let installations = is_booked.then(|| InstallationIndex::new(installations));
-        Ok(Self { installations, ..Self::of(config, histories, series) })
     }
 
     /// Histories, and the usage series of each.
@@ -614,9 +540,12 @@ impl<'a> FleetContext<'a> {
         let limit_m = self.limits.stated_m(name.0.as_deref());
         let prior = self.prior(name, as_of).filter(|_| trend.flights > 0);
         let usage_axis = prior.map(|prior| prior.axis().to_string());
-        let removal = self.installations.as_ref().and_then(|index| index.removal(name, as_of));
+        let index = self.installations.as_ref();
+        let installed = index.and_then(|index| index.installed(name, as_of));
+        let removal = index.and_then(|index| index.removal(name, as_of));
         let fault = self.mapping_faults.iter().find(|fault| fault.units.contains(name));
-        let row = trend_row::row(name, history, series, limit_m, trend, as_of, wide, removal, fault);
+        let row =
+            trend_row::row(name, history, series, limit_m, trend, as_of, wide, (installed, removal), fault);
         let conditions = self.conditions.get(name).cloned().unwrap_or_default();
         TrendRow { usage_axis, conditions, ..row }.with_action(self.limits.at_limit(name.0.as_deref()))
     }

@@ -7,7 +7,7 @@ use records::{ChangePoint, Installation, TrendRow};
 use trend::{Assessment, ForecastMethod, Reason, Series, State};
 
 use crate::fleet_trends::tail_wide_steps::TailWide;
-use crate::history::histories::{History, UnitKey};
+use crate::history::histories::{History, TailPosition, UnitKey};
 use crate::monitoring::mapping_faults::MappingFault;
 
 /// Means of neighbours, at most a hundred.
@@ -27,10 +27,12 @@ pub(crate) fn row(
     trend: &Assessment,
     as_of: Timestamp,
     wide: &TailWide,
-    removal: Option<&Installation>,
+    (installed, removal): (Option<&Installation>, Option<&Installation>),
     fault: Option<&MappingFault>,
 ) -> TrendRow {
-    let last = history.until(as_of).last().map(|flown| history.place(flown));
+    // The installations table says where a unit is; of an external table, its last flight does.
+    let place = installed.or(removal).map(TailPosition::of);
+    let last = place.or_else(|| history.until(as_of).last().map(|flown| history.place(flown).clone()));
     let gaps_m = series.map(|series| series.gaps_until(trend.as_of_us)).unwrap_or_default();
     // A removed unit wears no more: it has no state, no date and no place among the expected removals.
     let is_judged = limit_m.is_some() && removal.is_none();
@@ -47,8 +49,8 @@ pub(crate) fn row(
     TrendRow {
         part_number: name.0.clone(),
         serial_number: name.1.clone(),
-        tail_number: last.and_then(|place| place.tail_number.clone()),
-        position: last.and_then(|place| place.position.clone()),
+        tail_number: last.as_ref().and_then(|place| place.tail_number.clone()),
+        position: last.and_then(|place| place.position),
         as_of_utc: as_of,
         flights: trend.flights as i64,
         unit_hours: trend.unit_hours,
@@ -117,6 +119,7 @@ fn row_faults(series: Option<&Series>, history: &History, as_of: Timestamp) -> i
     [
         counted(faults.contradictions, "flights with records that contradict each other"),
         counted(faults.negative_usage, "rows with negative usage, left out"),
+        counted(faults.meter_readings, "hour-meter readings that contradict the others, left out"),
         counted(history.flights().len() - history.until(now).len(), "records dated ahead, left out"),
     ]
     .into_iter()
@@ -142,6 +145,12 @@ fn reason(
     let mut reason = reason_of_state(cause, trend, history, wide);
     if let Some(fault) = fault {
         reason = format!("{reason}; {} of {}", fault.evidence(), fault.scope());
+    }
+    if let Some((others, last, all)) = history.other_settings() {
+        reason = format!(
+            "{reason}; {others} of {all} gaps, until {}, were estimated with other settings: where logs are left, `freeplay run` makes them anew",
+            last.strftime("%Y-%m-%d")
+        );
     }
     if let (disputed @ 1.., gaps) = history.disputed(as_of, LATEST) {
         reason = format!(

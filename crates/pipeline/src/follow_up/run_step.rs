@@ -8,6 +8,7 @@ use job::Config;
 use records::{AlertRecord, AlertStatus, Diagnostic, Installations, WorkEventKind, WorkRequest};
 use store::Writer;
 
+use crate::bookkeeping::maintenance_log::{self, MaintenanceLog};
 use crate::error::Error;
 use crate::follow_up::alert_changes::{self, Channels};
 use crate::follow_up::channel;
@@ -16,7 +17,6 @@ use crate::follow_up::finding::Finding;
 use crate::follow_up::summary::{AlertSummary, FollowUpSummary, WorkSummary};
 use crate::follow_up::work_requests::{requests, unit};
 use crate::follow_up::work_update::{self, Tables};
-use crate::history::maintenance_log::{self, MaintenanceLog};
 
 /// Inputs of the step.
 pub(crate) struct FollowUp<'a> {

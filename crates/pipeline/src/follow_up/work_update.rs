@@ -6,11 +6,11 @@ use jiff::Timestamp;
 use records::{Installation, Installations, WorkEvent, WorkEventKind, WorkRequest};
 use trend::State;
 
+use crate::bookkeeping::installation_index::InstallationIndex;
+use crate::bookkeeping::maintenance_log::MaintenanceLog;
 use crate::follow_up::finding::Finding;
 use crate::follow_up::work_requests::{event_of, next_number, requests, unit};
 use crate::history::histories::UnitKey;
-use crate::history::installation_index::InstallationIndex;
-use crate::history::maintenance_log::MaintenanceLog;
 
 /// Microseconds of a day.
 const DAY_US: i64 = 86_400_000_000;
@@ -207,7 +207,7 @@ impl<'a> Tables<'a> {
 
     /// Where a unit is installed.
     fn place(&self, name: &UnitKey) -> Option<&'a Installation> {
-        self.installations.of(name).into_iter().find(|installation| installation.covers(self.at))
+        self.installations.installed(name, self.at)
     }
 
     /// The first repair after a date that makes the unit as good as new. A repair without a time counts for its whole

@@ -1,6 +1,6 @@
 //! Histories while their rows come in, from tables of any length.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use arrow::array::{Array, AsArray, Float64Array, ListArray, RecordBatch};
@@ -17,6 +17,8 @@ const BLOCK_ROWS: usize = 1 << 19;
 /// The flag of a record whose two estimators disagree, and the column with the gap of the other one.
 const DISAGREE: &str = "estimators_disagree";
 const OTHER_GAP: &str = "gap_midrange_fitted_m";
+/// The column with the digest of the settings of the estimate.
+const SETTINGS: &str = "config_digest";
 
 /// Builder of histories from rows.
 ///
@@ -34,14 +36,19 @@ pub struct HistoryBuilder {
 }
 
 /// A unit, and the number of its stored rows.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct UnitEntry {
     pub(crate) name: UnitKey,
     pub(crate) places: Positions,
     pub(crate) rows: usize,
     /// Of its flights' names.
     pub(crate) bytes: usize,
+    /// Its gaps by the settings that they were estimated with.
+    pub(crate) settings: SettingsCounts,
 }
+
+/// Number of gaps and latest departure, µs since 1970 UTC, by the digest of the settings of the estimate.
+pub(crate) type SettingsCounts = BTreeMap<String, (usize, i64)>;
 
 /// Rows in the order of arrival, and their flights' names one after the other.
 #[derive(Debug, Default)]
@@ -86,7 +93,7 @@ impl HistoryBuilder {
     /// The columns that the store's own rows bring.
     pub(crate) fn of_store() -> Vec<&'static str> {
         let stored = Self::COLUMNS.into_iter().filter(|name| !["serial", "tail", "flags"].contains(name));
-        stored.chain(["flags", OTHER_GAP]).collect()
+        stored.chain(["flags", OTHER_GAP, SETTINGS]).collect()
     }
 
     /// Adds the rows of a batch.
@@ -133,6 +140,8 @@ impl HistoryBuilder {
         let (hours, meters, reversals, errors_m) = (hours?, meters?, reversals?, errors_m?);
         let others_m = chunk.numbers(chunk.find(&[OTHER_GAP]))?;
         let mut seen = KeyCache::default();
+        let settings = TextColumn::of(chunk, &[SETTINGS])?;
+        let mut counts = HashMap::<(usize, &str), (usize, i64)>::new();
         for row in 0..chunk.len() {
             let empty = |column| chunk.error(row, column, "it is empty".into());
             let position_key = match seen.get(position_keys, row) {
@@ -160,6 +169,13 @@ impl HistoryBuilder {
                     .and_then(|gap_m| other_gap(row, gap_m, at(&others_m, row))),
             };
             self.push_row(position_key, &said);
+            if let Some(settings) = settings.get(row).filter(|_| said.gap_m.is_some()) {
+                let count = counts.entry((position_key.unit, settings)).or_insert((0, i64::MIN));
+                *count = (count.0 + 1, count.1.max(said.departure_utc.as_microsecond()));
+            }
+        }
+        for ((unit, settings), count) in counts {
+            add_settings(&mut self.units[unit].settings, settings, count);
         }
         Ok(())
     }
@@ -216,10 +232,16 @@ impl HistoryBuilder {
     fn new_unit(&mut self, part_number: Option<&str>, serial_number: &str) -> usize {
         let (unit, name) = (self.units.len(), (part_number.map(str::to_owned), serial_number.to_owned()));
         self.by_serial.entry(name.1.clone()).or_default().push(unit);
-        self.units.push(UnitEntry { name, places: Positions::default(), rows: 0, bytes: 0 });
+        self.units.push(UnitEntry { name, ..UnitEntry::default() });
         self.follows.push(0);
         unit
     }
+}
+
+/// Adds gaps to the count of their settings.
+pub(crate) fn add_settings(counts: &mut SettingsCounts, settings: &str, (gaps, latest_us): (usize, i64)) {
+    let known = counts.entry(settings.to_owned()).or_insert((0, i64::MIN));
+    *known = (known.0 + gaps, known.1.max(latest_us));
 }
 
 /// A unit, and one of its places.

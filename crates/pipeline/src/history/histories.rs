@@ -4,11 +4,12 @@
 //! trend is made from, and names once for each unit.
 
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use jiff::Timestamp;
 use records::Installation;
 
+use crate::history::builder::SettingsCounts;
 use crate::history::extras::UnitExtras;
 use crate::history::flight_row::{FlightExtras, FlightRow};
 
@@ -78,6 +79,7 @@ pub struct History {
     names: String,
     /// Departures of the flights whose estimators disagree, µs since 1970 UTC, in order.
     disputed_us: Vec<i64>,
+    settings: SettingsCounts,
 }
 
 impl History {
@@ -103,6 +105,16 @@ impl History {
             let is_disputed = self.disputed_us.binary_search(&flown.departure_us()).is_ok();
             (disputed + usize::from(is_disputed), count + 1)
         })
+    }
+
+    /// Number of gaps by other settings of the estimate than the latest gap, the departure of the last of them, and the number
+    /// of all gaps; none where all are by the same.
+    pub(crate) fn other_settings(&self) -> Option<(usize, Timestamp, usize)> {
+        let latest_us = self.settings.values().map(|(_, us)| *us).max()?;
+        let others = || self.settings.values().filter(|(_, us)| *us < latest_us);
+        let all = self.settings.values().map(|(gaps, _)| gaps).sum();
+        let last_us = others().map(|(_, us)| *us).max()?;
+        Some((others().map(|(gaps, _)| gaps).sum(), Timestamp::from_microsecond(last_us).ok()?, all))
     }
 
     /// The one that departed then.
@@ -146,18 +158,20 @@ impl History {
         installations.iter().find(is_here).copied()
     }
 
-    fn key<'a>(&'a self, flown: &FlightRow) -> Key<'a> {
-        (flown.departure_us(), self.place(flown), self.flight_id(flown))
-    }
-
     /// One with positions, and capacity for a number of flights and bytes of their names.
-    pub(crate) fn with_capacity(places: Positions, flights: usize, names: usize) -> Self {
+    pub(crate) fn with_capacity(
+        places: Positions,
+        flights: usize,
+        names: usize,
+        settings: SettingsCounts,
+    ) -> Self {
         Self {
             places: places.0,
             flights: Vec::with_capacity(flights),
             extras: UnitExtras::default(),
             names: String::with_capacity(names),
             disputed_us: Vec::new(),
+            settings,
         }
     }
 
@@ -245,49 +259,4 @@ impl Histories {
         let first = self.units.values().filter_map(|history| history.flights.first());
         first.map(FlightRow::departure_utc).min()
     }
-
-    /// The last departure of all but the flights that others hold.
-    pub(crate) fn newest_without_utc(&self, others: &Self) -> Option<Timestamp> {
-        let last = |(name, history): (&UnitKey, &History)| {
-            let held = others.flight_keys(name);
-            history
-                .flights
-                .iter()
-                .rev()
-                .find(|f| !held.contains(&history.key(f)))
-                .map(FlightRow::departure_utc)
-        };
-        Some(self.units.iter().filter_map(last).max()?.min(Timestamp::now()))
-    }
-
-    /// The histories of some units without the flights that others hold; a unit left with none goes.
-    pub(crate) fn without(&self, names: &BTreeSet<UnitKey>, others: &Self) -> Self {
-        let left = |name: &UnitKey| {
-            let (history, held) = (self.get(name)?, others.flight_keys(name));
-            let flights = history.flights.iter().filter(|f| !held.contains(&history.key(f)));
-            let left = History {
-                places: history.places.clone(),
-                flights: flights.copied().collect(),
-                extras: history.extras.clone(),
-                names: history.names.clone(),
-                disputed_us: history.disputed_us.clone(),
-            };
-            (!left.flights.is_empty()).then(|| (name.clone(), left))
-        };
-        Self { units: names.iter().filter_map(left).collect(), is_booked: self.is_booked }
-    }
-
-    /// Whether all flights of these are later than a time.
-    pub(crate) fn all_after(&self, time: Timestamp) -> bool {
-        let first = |history: &History| history.flights.first().is_none_or(|f| f.departure_utc() > time);
-        self.units.values().all(first)
-    }
-
-    fn flight_keys(&self, name: &UnitKey) -> BTreeSet<Key<'_>> {
-        let Some(history) = self.get(name) else { return BTreeSet::new() };
-        history.flights.iter().map(|f| history.key(f)).collect()
-    }
 }
-
-/// By what a unit's flight is known.
-type Key<'a> = (i64, &'a TailPosition, Option<&'a str>);

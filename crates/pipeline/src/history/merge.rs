@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::error::Error;
-use crate::history::builder::{HistoryBuilder, RowBlock, StagedRow, UnitEntry};
+use crate::history::builder::{HistoryBuilder, RowBlock, SettingsCounts, StagedRow, UnitEntry, add_settings};
 use crate::history::extras::ExtrasArena;
 use crate::history::flight_row::FlightRow;
 use crate::history::histories::{Histories, History, Positions, UnitKey};
@@ -42,6 +42,7 @@ struct UnitCapacity {
     places: Positions,
     rows: usize,
     bytes: usize,
+    settings: SettingsCounts,
 }
 
 fn capacities(gathered: &[HistoryBuilder]) -> BTreeMap<UnitKey, UnitCapacity> {
@@ -50,6 +51,9 @@ fn capacities(gathered: &[HistoryBuilder]) -> BTreeMap<UnitKey, UnitCapacity> {
         let capacity = capacities.entry(unit.name.clone()).or_default();
         capacity.rows += unit.rows;
         capacity.bytes += unit.bytes;
+        unit.settings
+            .iter()
+            .for_each(|(settings, count)| add_settings(&mut capacity.settings, settings, *count));
     }
     for (rank, capacity) in capacities.values_mut().enumerate() {
         capacity.rank = rank as u32;
@@ -115,7 +119,8 @@ impl Partition<'_> {
     fn histories(self) -> Vec<(UnitKey, History)> {
         let mut arena = ExtrasArena::with_capacity(self.section.iter().map(|(_, capacity)| capacity.rows));
         let history = |(name, capacity): (_, UnitCapacity)| {
-            (name, History::with_capacity(capacity.places, capacity.rows, capacity.bytes))
+            let UnitCapacity { places, rows, bytes, settings, .. } = capacity;
+            (name, History::with_capacity(places, rows, bytes, settings))
         };
         let mut units: Vec<(UnitKey, History)> = self.section.into_iter().map(history).collect();
         for (targets, block) in self.blocks {

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use ingest::mapping::column_pattern::nearest;
+use jiff::Timestamp;
 use job::Config;
 use records::time::days_between;
 use records::{Installations, PartNumber, TrendRow};
@@ -33,7 +34,33 @@ pub fn notes(rows: &[TrendRow], config: &Config) -> Vec<String> {
             at.strftime("%Y-%m-%d")
         ));
     }
+    notes.extend(flights_table_ends(rows, config));
     notes
+}
+
+/// A flights table that ends before the logs do: from then on, usage is that of logged flights.
+fn flights_table_ends(rows: &[TrendRow], config: &Config) -> Option<String> {
+    let mut ends = BTreeMap::<&str, Timestamp>::new();
+    for flight in config.flights.iter() {
+        let end = ends.entry(flight.tail_number.as_str()).or_default();
+        *end = flight.departure_utc.max(*end);
+    }
+    let ended = rows.iter().filter_map(|row| {
+        let (tail, latest) = (row.tail_number.as_deref()?, row.latest_utc?);
+        let end = *ends.get(tail)?;
+        (days_between(end, latest) > QUIET_DAYS).then_some((tail, end, latest))
+    });
+    let ended: BTreeSet<(&str, Timestamp, Timestamp)> = ended.collect();
+    let tails: BTreeSet<&str> = ended.iter().map(|(tail, ..)| *tail).collect();
+    let (end, latest) = (ended.iter().map(|row| row.1).min()?, ended.iter().map(|row| row.2).max()?);
+    let day = |at: Timestamp| at.strftime("%Y-%m-%d").to_string();
+    let table = config.document.logs.flights.as_deref().unwrap_or_default();
+    Some(format!(
+        "{table} ends on {} and logs go on until {} ({}): usage after it is that of logged flights; bring it up to date",
+        day(end),
+        day(latest),
+        tails.into_iter().collect::<Vec<_>>().join(", ")
+    ))
 }
 
 /// Days without a record from which a note states that usage is assumed to go on.

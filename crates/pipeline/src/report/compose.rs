@@ -15,12 +15,12 @@ use records::{Installations, PartNumber, Quantity, QuantityRow, SerialNumber};
 use store::{LogOutcome, Store};
 use trend::Forecast;
 
+use crate::bookkeeping::installation_index::InstallationIndex;
 use crate::error::Error;
 use crate::fleet_trends::assess::{self, ReportAssessments, UnitSelection};
 use crate::follow_up::work_requests;
 use crate::history::flight_row::FlightRow as FlownRow;
 use crate::history::histories::{Histories, History, TailPosition, UnitKey as Name};
-use crate::history::installation_index::InstallationIndex;
 use crate::report::flight_columns::{FlightExtras, StoreContents};
 use records::time::{days_after, days_between};
 use records::{ChangePoint, TrendRow, WorkRequest};

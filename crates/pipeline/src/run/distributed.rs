@@ -22,12 +22,11 @@ use serde::{Deserialize, Serialize};
 use store::{LogOutcome, LogRecord, LogResult, RecordKey, Writer};
 
 use crate::error::Error;
-use crate::fleet_trends::assess;
 use crate::run::event::Event;
 use crate::run::flight_ownership::{LogOutcomeData, OwnershipLedger};
 use crate::run::memory_budget::MemoryBudget;
 use crate::run::plan::{Plan, Request, WorkItem, WorkReason};
-use crate::run::scheduler::{Context, WorkerContext, execute_run};
+use crate::run::scheduler::{Context, Touched, WorkerContext, execute_run};
 use crate::run::summary::{self, RunSummary};
 use crate::run::worker_pool::StepCount;
 
@@ -168,7 +167,7 @@ pub fn run(
         }
         report.not_reached = report.not_reached_logs.len();
         report.add_coverage(ledger.accounts(), worker.config, worker.installations);
-        Ok(ledger.touched.into_iter().collect::<Vec<assess::Unit>>())
+        Ok(Touched { units: ledger.touched, renamed: ledger.renamed })
     })
 }
 
@@ -194,7 +193,7 @@ fn process_batch(
             }
         };
         (context.watch)(done.event(work));
-        results.extend(ledger.resolve(done, report));
+        results.extend(ledger.resolve(done, writer, report)?);
     }
     if !results.is_empty() {
         writer.commit(&results)?;

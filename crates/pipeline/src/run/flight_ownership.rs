@@ -1,22 +1,25 @@
 //! Flight ownership: two logs may hold the same flight, and the owner must not depend on the order of arrival.
 //!
-//! The log that has the flight in the store keeps it: a later log takes nothing away. Of two logs that
-//! are new, the one whose name sorts first owns the flight. A copy with the same content is skipped without an error; a
-//! log of the same flight with other content is in error, and the error names the owner. Logs with one flight id and
-//! departures a few hours apart may be pieces of one flight: unless the configuration declares what they are, all of them
-//! that are not stored are in error.
+//! A record is only replaced by a record of the same tail, flight and position. For each position the better record
+//! counts: one with a gap before a refused one, then the stored one, then that of the log whose name sorts first. A copy
+//! with the same content is skipped without an error; a log of the same flight with other content is in error, and the
+//! error names the owner. Logs with one flight id and departures a few hours apart may be pieces of one flight: unless the
+//! configuration declares what they are, all of them that are not stored are in error.
+//!
+//! A log that fails, or lost a position, takes nothing away: its last good records stay.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use job::Config;
 use job::flight_log::{duplicate_flight, may_be_pieces, pieces_undeclared, sample_digest};
-use records::{Diagnostic, GapRecord, Installations};
-use store::{LogOutcome, LogRecord, LogResult, RecordKey};
+use records::{Diagnostic, GapRecord, Installations, Status};
+use store::{HeldRecord, LogOutcome, LogRecord, LogResult, RecordKey, Writer};
 
-use crate::fleet_trends::assess::Unit;
+use crate::error::Error;
+use crate::history::histories::UnitKey;
 use crate::run::event::Event;
-use crate::run::plan::{Plan, WorkItem};
+use crate::run::plan::{self, Plan, WorkItem};
 use crate::run::summary::{self, DuplicateLog, RunSummary};
 
 /// Outcome of one log.
@@ -53,13 +56,26 @@ pub(crate) struct OwnershipLedger<'a> {
     installations: &'a Installations,
     plan: &'a Plan,
     accounts: HashMap<String, LogRecord>,
-    owners: HashMap<RecordKey, String>,
+    /// Records of this run.
+    own: HashMap<RecordKey, HeldRecord>,
     /// Logs by the hash of their tail and flight id, unless the configuration declares whether they are pieces.
     same_id: HashMap<u64, Vec<String>>,
     /// Units whose records changed.
-    pub(crate) touched: BTreeSet<Unit>,
-    /// Records that were removed and not stored again.
-    withdrawn: BTreeSet<RecordKey>,
+    pub(crate) touched: BTreeSet<UnitKey>,
+    /// New paths of logs that were renamed, by their old ones.
+    pub(crate) renamed: BTreeMap<String, String>,
+}
+
+/// What becomes of a record that another log holds too.
+enum Claim {
+    /// The new record counts.
+    Takes,
+    /// The other log's record stays; it has the same samples.
+    IsCopy,
+    /// The other log's record stays, since it has a gap and the new one has none.
+    IsWorse,
+    /// The other log's record stays, and the two contradict each other.
+    Contradicts,
 }
 
 impl<'a> OwnershipLedger<'a> {
@@ -69,10 +85,10 @@ impl<'a> OwnershipLedger<'a> {
             installations,
             plan,
             accounts: HashMap::new(),
-            owners: HashMap::new(),
+            own: HashMap::new(),
             same_id: HashMap::new(),
             touched: BTreeSet::new(),
-            withdrawn: BTreeSet::new(),
+            renamed: BTreeMap::new(),
         };
         if !plan.work.is_empty() {
             plan.accounts.values().for_each(|account| ledger.insert(account.clone()));
@@ -87,8 +103,6 @@ impl<'a> OwnershipLedger<'a> {
     }
 
     fn insert(&mut self, account: LogRecord) {
-        let names = account.record_keys();
-        self.owners.extend(names.into_iter().map(|name| (name, account.log_path.clone())));
         if self.config.document.logs.pieces.is_none()
             && let Some(id) = hash_of_id(&account)
         {
@@ -101,76 +115,158 @@ impl<'a> OwnershipLedger<'a> {
     }
 
     /// Converts the outcome of a log to rows, and counts it.
-    pub(crate) fn resolve(&mut self, done: LogOutcomeData, report: &mut RunSummary) -> Vec<LogResult> {
+    ///
+    /// # Errors
+    /// When the stored records of its flight cannot be read.
+    pub(crate) fn resolve(
+        &mut self,
+        done: LogOutcomeData,
+        writer: &Writer,
+        report: &mut RunSummary,
+    ) -> Result<Vec<LogResult>, Error> {
         match done {
             LogOutcomeData::Same(account) => {
                 report.known += 1;
-                let keys = account.record_keys();
-                let owner = keys
-                    .iter()
-                    .find_map(|key| self.owners.get(key))
-                    .filter(|owner| **owner != account.log_path);
-                if let Some(owner) = owner.filter(|_| account.estimated + account.refused == 0) {
-                    report
-                        .duplicates
-                        .push(DuplicateLog { log: account.log_path.clone(), owner: owner.clone() });
+                if let Some(digests) = plan::digests(&account) {
+                    let gone = self.plan.gone.get(&digests.0).into_iter().flatten();
+                    let same = gone.filter(|gone| plan::is_same_flight(gone, &account));
+                    self.renamed.extend(same.map(|gone| (gone.log_path.clone(), account.log_path.clone())));
+                    let owner = self.plan.here.get(&digests).filter(|owner| **owner != account.log_path);
+                    if let Some(owner) = owner.filter(|_| account.estimated + account.refused == 0) {
+                        let (log, owner) = (account.log_path.clone(), owner.clone());
+                        report.duplicates.push(DuplicateLog { log, owner });
+                    }
                 }
                 self.insert((*account).clone());
-                vec![LogResult { account: *account, records: Vec::new(), retires: Vec::new() }]
+                Ok(vec![LogResult { account: *account, records: Vec::new(), moved_from: Vec::new() }])
             }
             LogOutcomeData::Read { account, records, diagnostics } => {
-                self.read(*account, records, &diagnostics, report)
+                self.read(*account, records, diagnostics, writer, report)
             }
         }
     }
 
     fn read(
         &mut self,
-        account: LogRecord,
+        mut account: LogRecord,
         records: Vec<GapRecord>,
-        diagnostics: &[Diagnostic],
+        mut diagnostics: Vec<Diagnostic>,
+        writer: &Writer,
         report: &mut RunSummary,
-    ) -> Vec<LogResult> {
+    ) -> Result<Vec<LogResult>, Error> {
         let pieces = self.undeclared_pieces(&account);
         if !pieces.is_empty() {
-            return self.refuse_pieces(account, diagnostics, pieces, report);
+            return Ok(self.refuse_pieces(account, diagnostics, pieces, report));
         }
-        let Some(competing_log) = self.competing_log(&account, &records) else {
-            return vec![self.store(account, records, diagnostics, report)];
-        };
-        let same =
-            account.log_digest == competing_log.log_digest || self.holds_the_same(&account, &competing_log);
-        let is_behind = self.precedes(&competing_log, &account);
-        if same {
-            let (log, owner) =
-                if is_behind { (&account, &competing_log) } else { (&competing_log, &account) };
-            let (log, owner) = (log.log_path.clone(), owner.log_path.clone());
-            report.duplicates.push(DuplicateLog { log, owner });
+        let held = self.held(&account, &records, writer)?;
+        let moved_from = self.moved_from(&account, &records, writer)?;
+        let (mut kept, mut displaced) = (Vec::new(), BTreeMap::<String, bool>::new());
+        let (mut copy_of, mut contradicts, mut worse_than) = (None, None, None);
+        for record in records {
+            let Some(other) = held.get(&RecordKey::of(&record)) else {
+                kept.push(record);
+                continue;
+            };
+            let owner = other.log_path.clone();
+            match self.claim(&account, &record, other) {
+                Claim::Takes if self.own.contains_key(&RecordKey::of(&record)) => {
+                    displaced.entry(owner).or_insert(other.log_digest == record.provenance.log_digest);
+                    kept.push(record);
+                }
+                Claim::Takes => kept.push(record),
+                Claim::IsCopy => copy_of = Some(owner),
+                Claim::IsWorse => worse_than = Some(owner),
+                Claim::Contradicts => contradicts = Some(owner),
+            }
         }
-        if is_behind {
-            let (account, diagnostics) = superseded(account, &competing_log, same);
-            return vec![self.store(account, Vec::new(), &diagnostics, report)];
+        if let Some(owner) = contradicts {
+            diagnostics.push(duplicate_flight(&account.log_path, &owner));
+            summary::set_error(&mut account, &diagnostics);
+        } else if let Some(owner) = copy_of.filter(|_| kept.is_empty()) {
+            account.error_detail = Some(format!("copy of {owner}"));
+            report.duplicates.push(DuplicateLog { log: account.log_path.clone(), owner });
+        } else if let Some(owner) = worse_than {
+            account.error_detail = Some(format!("the records with a gap of {owner} stay"));
         }
-        let first = self.store(account, records, diagnostics, report);
-        let (loser, diagnostics) = superseded(competing_log, &first.account, same);
-        vec![first, self.store(loser, Vec::new(), &diagnostics, report)]
+        let mut results = vec![self.store(account, kept, &diagnostics, moved_from, report)];
+        for (log, is_same) in displaced {
+            let Some(loser) = self.accounts.get(&log).cloned() else { continue };
+            let (loser, diagnostics) = superseded(loser, &results[0].account, is_same);
+            if is_same {
+                let (log, owner) = (log, results[0].account.log_path.clone());
+                report.duplicates.push(DuplicateLog { log, owner });
+            }
+            results.push(self.store(loser, Vec::new(), &diagnostics, Vec::new(), report));
+        }
+        Ok(results)
     }
 
-    /// Whether a log comes before another in the ownership of a flight that both hold: the stored one, else by name.
-    fn precedes(&self, one: &LogRecord, other: &LogRecord) -> bool {
-        match (self.is_stored(one), self.is_stored(other)) {
-            (true, false) => true,
-            (false, true) => false,
-            _ => one.log_path < other.log_path,
+    /// The records that other logs hold of the same flights: those of this run, and stored ones.
+    fn held(
+        &self,
+        account: &LogRecord,
+        records: &[GapRecord],
+        writer: &Writer,
+    ) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
+        let keys: BTreeSet<RecordKey> = records.iter().map(RecordKey::of).collect();
+        let (own, others): (BTreeSet<_>, BTreeSet<_>) =
+            keys.into_iter().partition(|key| self.own.contains_key(key));
+        let mut held = if others.is_empty() { BTreeMap::new() } else { writer.held(&others)? };
+        held.extend(own.into_iter().filter_map(|key| Some((key.clone(), self.own.get(&key)?.clone()))));
+        held.retain(|_, record| record.log_path != account.log_path);
+        Ok(held)
+    }
+
+    /// What becomes of a record of a log where another log's record of the same flight is held.
+    fn claim(&self, account: &LogRecord, record: &GapRecord, held: &HeldRecord) -> Claim {
+        let is_estimated = record.estimate.status == Status::Estimated;
+        let is_gone = !self.accounts.contains_key(&held.log_path);
+        match (is_estimated, held.is_estimated) {
+            (true, false) => Claim::Takes,
+            (false, true) => Claim::IsWorse,
+            _ if is_gone => Claim::Takes,
+            _ => {
+                let is_new = self.own.contains_key(&RecordKey::of(record));
+                let takes = is_new && !self.is_stored(account) && account.log_path < held.log_path;
+                let is_same = held.log_digest == record.provenance.log_digest
+                    || self.holds_the_same(account, &held.log_path);
+                match (takes || (is_new && self.is_stored(account)), is_same) {
+                    (true, _) => Claim::Takes,
+                    (false, true) => Claim::IsCopy,
+                    (false, false) => Claim::Contradicts,
+                }
+            }
         }
     }
 
     /// Whether the store had records of a log's flight before this run.
     fn is_stored(&self, log: &LogRecord) -> bool {
-        self.plan.accounts.get(&log.log_path).is_some_and(|before| {
-            before.estimated + before.refused > 0
-                && (&before.tail_number, before.departure_utc) == (&log.tail_number, log.departure_utc)
-        })
+        self.plan
+            .accounts
+            .get(&log.log_path)
+            .is_some_and(|before| before.estimated + before.refused > 0 && plan::is_same_flight(before, log))
+    }
+
+    /// Keys under which the same samples are stored: the log was the same, and its flight had another identity.
+    fn moved_from(
+        &self,
+        account: &LogRecord,
+        records: &[GapRecord],
+        writer: &Writer,
+    ) -> Result<Vec<RecordKey>, Error> {
+        let Some(digest) = account.log_digest.as_ref().filter(|_| !records.is_empty()) else {
+            return Ok(Vec::new());
+        };
+        let own = self.plan.accounts.get(&account.log_path);
+        let gone = self.plan.gone.get(digest).into_iter().flatten();
+        let before = own.into_iter().chain(gone).filter(|before| before.log_digest.as_ref() == Some(digest));
+        let before = before.filter(|before| !plan::is_same_flight(before, account));
+        let keys: BTreeSet<RecordKey> = before.flat_map(LogRecord::keys).collect();
+        if keys.is_empty() {
+            return Ok(Vec::new());
+        }
+        let held = writer.held(&keys)?.into_iter();
+        Ok(held.filter(|(_, record)| record.log_digest == *digest).map(|(key, _)| key).collect())
     }
 
     /// Logs with the tail, flight id and a position of this one, and another departure close by. What became of them does
@@ -195,7 +291,7 @@ impl<'a> OwnershipLedger<'a> {
     fn refuse_pieces(
         &mut self,
         account: LogRecord,
-        diagnostics: &[Diagnostic],
+        diagnostics: Vec<Diagnostic>,
         pieces: Vec<LogRecord>,
         report: &mut RunSummary,
     ) -> Vec<LogResult> {
@@ -208,69 +304,67 @@ impl<'a> OwnershipLedger<'a> {
             (account, vec![diagnostic])
         };
         // A log with an error of its own keeps it.
-        let (own, diagnostics) = if diagnostics.is_empty() {
-            refused(account, &pieces[0])
-        } else {
-            (account, diagnostics.to_vec())
-        };
-        let mut results = vec![self.store(own.clone(), Vec::new(), &diagnostics, report)];
+        let (own, diagnostics) =
+            if diagnostics.is_empty() { refused(account, &pieces[0]) } else { (account, diagnostics) };
+        let mut results = vec![self.store(own.clone(), Vec::new(), &diagnostics, Vec::new(), report)];
         let pieces = pieces.into_iter().filter(|piece| piece.estimated + piece.refused > 0);
         for piece in pieces.filter(|piece| !self.is_stored(piece)).collect::<Vec<_>>() {
+            // Records of this run that are taken back: they were stored before their other pieces were known.
+            let keys = piece.keys();
+            keys.iter().for_each(|key| drop(self.own.remove(key)));
             let (piece, diagnostics) = refused(piece, &own);
-            results.push(self.store(piece, Vec::new(), &diagnostics, report));
+            results.push(self.store(piece, Vec::new(), &diagnostics, keys, report));
         }
         results
     }
 
     /// Whether two logs hold the same samples in different encodings. Rare, so both are read.
-    fn holds_the_same(&self, one: &LogRecord, other: &LogRecord) -> bool {
-        let digest = |account: &LogRecord| {
-            let files = self.plan.files.get(&account.log_path)?;
-            sample_digest(files, &account.log_path, self.config, self.installations).ok()
+    fn holds_the_same(&self, one: &LogRecord, other: &str) -> bool {
+        let digest = |log_path: &str| {
+            let files = self.plan.files.get(log_path)?;
+            sample_digest(files, log_path, self.config, self.installations).ok()
         };
-        digest(one).is_some_and(|one| digest(other) == Some(one))
-    }
-
-    /// Another log that owns one of these flights.
-    fn competing_log(&self, account: &LogRecord, records: &[GapRecord]) -> Option<LogRecord> {
-        let owner = |r: &GapRecord| self.owners.get(&RecordKey::of(r));
-        let other = records.iter().filter_map(owner).find(|path| **path != account.log_path)?;
-        self.accounts.get(other).cloned()
+        digest(&one.log_path).is_some_and(|one| digest(other) == Some(one))
     }
 
     fn store(
         &mut self,
-        account: LogRecord,
+        mut account: LogRecord,
         records: Vec<GapRecord>,
         diagnostics: &[Diagnostic],
+        moved_from: Vec<RecordKey>,
         report: &mut RunSummary,
     ) -> LogResult {
         report.count(&account, &records, diagnostics);
-        let unit = |r: &GapRecord| (r.part_number.clone(), r.serial_number.clone());
-        self.touched.extend(records.iter().map(unit));
-        let retires = self.stale_records(&account, &records);
-        self.withdrawn.extend(retires.iter().cloned());
+        let refused = records.iter().filter(|record| record.estimate.status == Status::Refused).count();
+        (account.estimated, account.refused) = ((records.len() - refused) as i64, refused as i64);
+        self.keep_counts(&mut account, report);
         for record in &records {
-            self.withdrawn.remove(&RecordKey::of(record));
+            self.touched.insert((Some(record.part_number.to_string()), record.serial_number.to_string()));
+            let held = HeldRecord {
+                log_path: account.log_path.clone(),
+                log_digest: record.provenance.log_digest.clone(),
+                is_estimated: record.estimate.status == Status::Estimated,
+            };
+            self.own.insert(RecordKey::of(record), held);
         }
-        report.withdrawn = self.withdrawn.len();
         self.insert(account.clone());
-        let is_owner = |r: &GapRecord| self.owners.get(&RecordKey::of(r)) == Some(&account.log_path);
-        debug_assert!(records.iter().all(is_owner), "{} owns its flights", account.log_path);
-        LogResult { account, records, retires }
+        LogResult { account, records, moved_from }
     }
 
-    /// Records of this log under another identity, or for positions it no longer has.
-    fn stale_records(&mut self, account: &LogRecord, records: &[GapRecord]) -> Vec<RecordKey> {
-        let Some(before) = self.accounts.get(&account.log_path) else { return Vec::new() };
-        let now: BTreeSet<RecordKey> = records.iter().map(RecordKey::of).collect();
-        let mine = |name: &RecordKey| self.owners.get(name) == Some(&account.log_path);
-        let gone: Vec<RecordKey> =
-            before.record_keys().into_iter().filter(|n| mine(n) && !now.contains(n)).collect();
-        for name in &gone {
-            self.owners.remove(name);
+    /// A log that failed keeps the records that it had, and its account says so.
+    fn keep_counts(&self, account: &mut LogRecord, report: &mut RunSummary) {
+        let before =
+            self.plan.accounts.get(&account.log_path).filter(|_| account.outcome == LogOutcome::Error);
+        let Some(before) = before.filter(|before| before.estimated + before.refused > 0) else { return };
+        if account.estimated + account.refused == 0
+            && account.error_code.as_deref() != Some("duplicate_flight")
+        {
+            report.kept += (before.estimated + before.refused) as usize;
+            if plan::is_same_flight(before, account) {
+                (account.estimated, account.refused) = (before.estimated, before.refused);
+            }
         }
-        gone
     }
 }
 
@@ -284,7 +378,6 @@ fn hash_of_id(account: &LogRecord) -> Option<u64> {
 
 /// Status of a log whose flight belongs to another log.
 fn superseded(mut account: LogRecord, owner: &LogRecord, is_same: bool) -> (LogRecord, Vec<Diagnostic>) {
-    (account.estimated, account.refused) = (0, 0);
     account.outcome = LogOutcome::Done;
     if is_same {
         account.error_detail = Some(format!("copy of {}", owner.log_path));

@@ -137,11 +137,11 @@ pub struct Plan {
     pub work: Vec<WorkItem>,
     /// Log records, by path, of the logs that still exist.
     pub accounts: BTreeMap<String, LogRecord>,
-    /// Content and settings digests of existing logs; empty without work.
-    pub here: HashSet<Digests>,
-    /// The same of deleted logs, with their records: a log may have been renamed.
-    pub gone: HashMap<Digests, (i64, i64)>,
-    /// Number of deleted logs, or logs that no pattern matches any more, with stored records.
+    /// Existing logs by their digests; empty without work.
+    pub here: HashMap<Digests, String>,
+    /// Deleted logs by the digest of their content: a log may have been renamed.
+    pub gone: HashMap<String, Vec<LogRecord>>,
+    /// Number of logs with stored records that were deleted, or that no pattern matches any more, and that lie nowhere else.
     pub absent: usize,
     /// Number of logs excluded by the selection.
     pub not_asked: usize,
@@ -202,8 +202,10 @@ pub fn plan(
     logs.extend(found.faulty.into_iter().map(faulty));
     let found = logs;
     let (here, gone): (Vec<_>, Vec<_>) = accounts.into_iter().partition(|a| found.contains_key(&a.log_path));
-    let absent = gone.iter().filter(|a| a.estimated + a.refused > 0).count();
-    let gone = gone.iter().filter_map(|a| Some((digests(a)?, (a.estimated, a.refused)))).collect();
+    let contents: HashSet<&String> = here.iter().filter_map(|a| a.log_digest.as_ref()).collect();
+    let lies_elsewhere =
+        |a: &&LogRecord| a.log_digest.as_ref().is_some_and(|digest| contents.contains(digest));
+    let absent = gone.iter().filter(|a| a.estimated + a.refused > 0 && !lies_elsewhere(a)).count();
     let accounts: BTreeMap<String, LogRecord> = here.into_iter().map(|a| (a.log_path.clone(), a)).collect();
     // Names and digests of a hundred thousand logs are made only where they decide something.
     let owned: HashSet<RecordKey> = if accounts.values().any(is_silent) {
@@ -243,7 +245,6 @@ pub fn plan(
         known,
         work,
         accounts,
-        gone,
         absent,
         not_asked,
         left,
@@ -252,7 +253,14 @@ pub fn plan(
         ..Plan::default()
     };
     if !plan.work.is_empty() {
-        plan.here = plan.accounts.values().filter_map(digests).collect();
+        let here = |account: &LogRecord| Some((digests(account)?, account.log_path.clone()));
+        // Of copies, the one with records comes last and is kept.
+        let mut all: Vec<&LogRecord> = plan.accounts.values().collect();
+        all.sort_by_key(|account| account.estimated + account.refused);
+        plan.here = all.into_iter().filter_map(here).collect();
+        for account in gone.into_iter().filter(|account| digests(account).is_some()) {
+            plan.gone.entry(account.log_digest.clone().unwrap_or_default()).or_default().push(account);
+        }
         plan.files = found.into_iter().map(|(log_path, (files, _))| (log_path, files)).collect();
     }
     plan
@@ -265,6 +273,12 @@ pub fn digests(account: &LogRecord) -> Option<(String, String)> {
         .is_success()
         .then(|| Some((account.log_digest.clone()?, account.config_digest.clone()?)))
         .flatten()
+}
+
+/// Whether two logs are of one flight, by tail, flight id and departure.
+pub fn is_same_flight(one: &LogRecord, other: &LogRecord) -> bool {
+    (&one.tail_number, &one.flight_id, one.departure_utc)
+        == (&other.tail_number, &other.flight_id, other.departure_utc)
 }
 
 /// Flight of a log record, where its log was identified.

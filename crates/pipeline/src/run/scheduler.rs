@@ -5,6 +5,7 @@
 //! whole flights at a time, so an interrupted run keeps what it finished. Workers without a log left
 //! take actuators of the logs that are still in work.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -17,11 +18,14 @@ use rayon::prelude::*;
 use records::{Diagnostic, GapRecord, Installations, Status};
 use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
 
+use crate::bookkeeping::installation_index::dates_ahead;
+use crate::bookkeeping::join::Bookkeeping;
+use crate::bookkeeping::maintenance_log::unknown_units;
 use crate::error::Error;
 use crate::fleet_trends::assess;
+use crate::fleet_trends::changes::RunFacts;
 use crate::follow_up::FollowUp;
-use crate::history::installation_index::dates_ahead;
-use crate::history::maintenance_log::unknown_units;
+use crate::history::histories::UnitKey;
 use crate::run::discover;
 use crate::run::event::Event;
 use crate::run::flight_ownership::{LogOutcomeData, OwnershipLedger};
@@ -85,18 +89,22 @@ pub fn run(config: &Config, request: &Request, context: &Context<'_>) -> Result<
     })
 }
 
+/// What the logs of a run changed.
+#[derive(Debug, Default)]
+pub(crate) struct Touched {
+    /// Units with new records.
+    pub(crate) units: BTreeSet<UnitKey>,
+    /// New paths of renamed logs, by their old ones.
+    pub(crate) renamed: BTreeMap<String, String>,
+}
+
 /// A run from plan to summary; `work` processes the logs.
 pub(crate) fn execute_run(
     config: &Config,
     request: &Request,
     context: &Context<'_>,
     workers: usize,
-    work: impl FnOnce(
-        &Arc<RunInputs>,
-        &RunPlanRows,
-        &mut Writer,
-        &mut RunSummary,
-    ) -> Result<Vec<assess::Unit>, Error>,
+    work: impl FnOnce(&Arc<RunInputs>, &RunPlanRows, &mut Writer, &mut RunSummary) -> Result<Touched, Error>,
 ) -> Result<RunSummary, Error> {
     let clock = Instant::now();
     let installations = installations(config)?;
@@ -117,12 +125,6 @@ pub(crate) fn execute_run(
     let bytes = plan.work.iter().filter_map(|w| w.stat.as_ref()).map(|s| s.size_bytes as u64).sum();
     (context.watch)(Event::Planned { logs: plan.work.len(), bytes });
 
-    // Records that are computed again replace those by which the present states are known.
-    let is_again = |work: &WorkItem| {
-        work.before.is_some() && !matches!(work.why, WorkReason::Retry | WorkReason::Unfetched)
-    };
-    let is_repeated = plan.work.iter().any(is_again);
-    let before = is_repeated.then(|| assess::by_unit(config, &installations, &store)).transpose()?;
     let intent = RunPlanRows { run: report.row(context.program_version, &config_path, None), to_do };
     let inputs = Arc::new(RunInputs {
         config: config.clone(),
@@ -131,12 +133,18 @@ pub(crate) fn execute_run(
         run_id: report.run_id.clone(),
         program_version: context.program_version.to_owned(),
     });
-    let touched = work(&inputs, &intent, &mut writer, &mut report)?;
+    let Touched { mut units, renamed } = work(&inputs, &intent, &mut writer, &mut report)?;
+    let tables = Bookkeeping::new(config, &inputs.installations);
+    report.moved = tables.write(&mut writer, &renamed)?.moved;
+    let with_records = units.clone();
+    units.extend(report.moved.iter().flat_map(|moved| [moved.from_unit(), moved.to_unit()]));
 
-    (context.watch)(Event::Trends { units: touched.len() });
-    let mut assessments =
-        assess::assess_run(config, &inputs.installations, &store, &touched, &report.run_id, before.as_ref())?;
+    (context.watch)(Event::Trends { units: units.len() });
+    let moved = report.moved.clone();
+    let facts = RunFacts { run_id: &inputs.run_id, with_records: &with_records, moved: &moved };
+    let mut assessments = assess::assess_run(config, &inputs.installations, &store, &units, facts)?;
     let findings = std::mem::take(&mut assessments.findings);
+    let states = std::mem::take(&mut assessments.changes.states);
     report.add_assessments(assessments);
     if report.is_partial() {
         // A run that left logs out cannot determine which tails have no data.
@@ -147,7 +155,9 @@ pub(crate) fn execute_run(
     if store.needs_compaction()? {
         writer.compact()?;
     }
-    writer.end_run(&report.row(context.program_version, &config_path, Some(exit_code)))?;
+    writer.write_states(&states)?;
+    let ended = Some((exit_code, tables.digest()));
+    writer.end_run(&report.row(context.program_version, &config_path, ended))?;
     // After the end of the run is stored: what fails from here on loses nothing of it.
     let follow_up = FollowUp {
         config,
@@ -248,7 +258,7 @@ fn process_all(
     context: &Context<'_>,
     workers: usize,
     (intent, writer, report): (&RunPlanRows, &mut Writer, &mut RunSummary),
-) -> Result<Vec<assess::Unit>, Error> {
+) -> Result<Touched, Error> {
     raise_mmap_threshold();
     let shared = Arc::clone(inputs);
     let process_log = move |log: usize, budget: &MemoryBudget, steps: &StepCount| {
@@ -279,18 +289,21 @@ fn write(
     pool: &mut WorkerPool<'_>,
     writer: &mut Writer,
     report: &mut RunSummary,
-) -> Result<Vec<assess::Unit>, Error> {
+) -> Result<Touched, Error> {
     let mut ledger = OwnershipLedger::of(&inputs.plan, &inputs.config, &inputs.installations);
     while let Next::Log(first) = pool.next(None)? {
         let gathered = collect_batch(*first, pool)?.into_iter();
-        let results: Vec<LogResult> = gathered.flat_map(|done| ledger.resolve(done, report)).collect();
+        let mut results: Vec<LogResult> = Vec::new();
+        for done in gathered {
+            results.extend(ledger.resolve(done, writer, report)?);
+        }
         if !results.is_empty() {
             writer.commit(&results)?;
             (context.watch)(Event::Stored { logs: results.len() });
         }
     }
     report.add_coverage(ledger.accounts(), &inputs.config, &inputs.installations);
-    Ok(ledger.touched.into_iter().collect())
+    Ok(Touched { units: ledger.touched, renamed: ledger.renamed })
 }
 
 /// Input of a worker, shared by all.
@@ -374,17 +387,23 @@ impl WorkerContext<'_> {
         self.read(&opened, account)
     }
 
-    /// The records that are known of this content under these settings: its own, those of a log that
+    /// The records that are known of this flight's content under these settings: its own, those of a log that
     /// is gone, whose place it takes, or none, when another existing log owns them.
     pub(crate) fn already_recorded(&self, work: &WorkItem, account: &LogRecord) -> Option<(i64, i64)> {
         let digests = plan::digests(account)?;
         if matches!(work.why, WorkReason::Asked | WorkReason::OwnerGone) {
             return None;
         }
-        let own = work.before.as_ref().filter(|before| plan::digests(before).as_ref() == Some(&digests));
-        own.map(|before| (before.estimated, before.refused))
-            .or_else(|| self.plan.here.contains(&digests).then_some((0, 0)))
-            .or_else(|| self.plan.gone.get(&digests).copied())
+        let is_known = |before: &&LogRecord| {
+            plan::digests(before).as_ref() == Some(&digests) && plan::is_same_flight(before, account)
+        };
+        if let Some(own) = work.before.as_ref().filter(is_known) {
+            return Some((own.estimated, own.refused));
+        }
+        let here = self.plan.here.get(&digests).and_then(|path| self.plan.accounts.get(path));
+        let is_copy = here.filter(is_known).map(|_| (0, 0));
+        let gone = self.plan.gone.get(&digests.0).into_iter().flatten();
+        is_copy.or_else(|| gone.filter(is_known).map(|gone| (gone.estimated, gone.refused)).next())
     }
 
     fn read(&self, opened: &FlightLog, mut account: LogRecord) -> LogOutcomeData {

@@ -8,13 +8,14 @@ use records::time::days_between;
 use records::{Diagnostic, GapRecord, Installations, Status};
 use store::{LogOutcome, LogRecord, RunRecord};
 
+use crate::bookkeeping::installation_index::DateAhead;
+use crate::bookkeeping::join::MovedFlights;
+use crate::bookkeeping::maintenance_log::UnknownUnit;
 use crate::error::is_passing;
 use crate::fleet_trends::assess::RunAssessments;
 use crate::fleet_trends::changes::UnitChange;
 use crate::follow_up::summary::FollowUpSummary;
 use crate::history::histories::UnitKey;
-use crate::history::installation_index::DateAhead;
-use crate::history::maintenance_log::UnknownUnit;
 use crate::monitoring::REPORTED_DAYS;
 use crate::monitoring::coverage::{self, UnknownTail, UnmappedPositions};
 use crate::monitoring::innovations::{self, InnovationOutlier};
@@ -135,8 +136,10 @@ pub struct RunSummary {
     pub duplicates: Vec<DuplicateLog>,
     /// Parts, tails and actuators most of whose latest flights are rejected for a wrong mapping.
     pub mapping_faults: Vec<MappingFault>,
-    /// Stored records that this run removed because their log cannot be used any more or holds another flight.
-    pub withdrawn: usize,
+    /// Stored records that stay as they are because their log failed in this run.
+    pub kept: usize,
+    /// Flights that a corrected table gave to another unit.
+    pub moved: Vec<MovedFlights>,
     /// Units of the maintenance and the inspections table that the installations table does not know.
     pub unknown_units: Vec<UnknownUnit>,
     /// Dates of the installations table that are still to come.
@@ -179,7 +182,7 @@ pub struct RunSummary {
     pub workers: usize,
     /// Assessments of the units whose records changed.
     pub trends: Vec<TrendRow>,
-    /// Units whose assessment differs from the one without this run's records.
+    /// Units whose state or events differ from those after the run before, each with its cause.
     pub changed: Vec<UnitChange>,
     /// Failed logs of earlier runs, reported until they are fixed.
     pub standing_errors: Vec<StandingError>,
@@ -244,7 +247,8 @@ impl RunSummary {
             refusals: Vec::new(),
             duplicates: Vec::new(),
             mapping_faults: Vec::new(),
-            withdrawn: 0,
+            kept: 0,
+            moved: Vec::new(),
             unknown_units: Vec::new(),
             dates_ahead: Vec::new(),
             unmapped_positions: Vec::new(),
@@ -278,7 +282,7 @@ impl RunSummary {
     pub(crate) fn add_assessments(&mut self, assessments: RunAssessments) {
         let RunAssessments {
             now,
-            changed,
+            changes,
             recent,
             followed,
             states,
@@ -297,7 +301,7 @@ impl RunSummary {
         self.samples_repeated = repeated_samples::detect(&recent);
         self.innovations_unlike =
             innovations::find_outliers(&recent).into_iter().filter(|u| touched(&u.tail_number)).collect();
-        (self.trends, self.changed, self.states) = (now, changed, states);
+        (self.trends, self.changed, self.states) = (now, changes.changed, states);
         (self.work_list, self.mapping_faults, self.notes) = (work_list, mapping_faults, notes);
     }
 
@@ -325,6 +329,7 @@ impl RunSummary {
         for record in records {
             match record.estimate.status {
                 Status::Estimated => counted.estimated += 1,
+                Status::Withdrawn => {}
                 Status::Refused => {
                     let reason = record.estimate.reason.clone().unwrap_or_default();
                     *counted.refused.entry(reason).or_default() += 1;
@@ -398,12 +403,17 @@ impl RunSummary {
         }
     }
 
-    /// The row kept in the store.
-    pub(crate) fn row(&self, program_version: &str, config_path: &str, exit_code: Option<i64>) -> RunRecord {
+    /// The row kept in the store; of a run that ended, with its exit code and the digest of its tables.
+    pub(crate) fn row(
+        &self,
+        program_version: &str,
+        config_path: &str,
+        ended: Option<(i64, &str)>,
+    ) -> RunRecord {
         RunRecord {
             run_id: self.run_id.clone(),
             started_utc: self.started_utc,
-            finished_utc: exit_code.map(|_| Timestamp::now()),
+            finished_utc: ended.map(|_| Timestamp::now()),
             program_version: program_version.to_owned(),
             config_path: config_path.to_owned(),
             found: self.found as i64,
@@ -413,7 +423,8 @@ impl RunSummary {
             refused: self.refusals() as i64,
             errors: self.logs_in_error() as i64,
             not_reached: self.not_reached as i64,
-            exit_code,
+            exit_code: ended.map(|(code, _)| code),
+            tables_digest: ended.map(|(_, digest)| digest.to_owned()),
         }
     }
 }

@@ -164,7 +164,7 @@ fn result(tail: i32, flight: i32, plant: Plant, swaps: bool) -> LogResult {
         run_id: "run".into(),
         processed_utc: departure(FLIGHTS),
     };
-    LogResult { account, records, retires: Vec::new() }
+    LogResult { account, records, moved_from: Vec::new() }
 }
 
 /// Assessments of a fleet in which something is planted.

@@ -110,7 +110,7 @@ fn every_number_of_the_report_is_that_of_the_assessments() {
     let flown =
         (0..UNITS).flat_map(|unit| (0..DAYS).step_by(DAYS_A_LOG as usize).map(move |at| record(unit, at)));
     let results: Vec<LogResult> = flown
-        .map(|record| LogResult { account: log(&record), records: vec![record], retires: Vec::new() })
+        .map(|record| LogResult { account: log(&record), records: vec![record], moved_from: Vec::new() })
         .collect();
     store.lock(&Holder::this_process(), None).unwrap().commit(&results).unwrap();
 

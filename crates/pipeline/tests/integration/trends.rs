@@ -7,6 +7,7 @@ use jiff::{SignedDuration, Timestamp};
 use job::Config;
 use pipeline::fleet_trends::assess::{self, UnitSelection};
 use pipeline::fleet_trends::backtest;
+use pipeline::fleet_trends::changes::{Cause, RunFacts, changes};
 use pipeline::history::builder::HistoryBuilder;
 use pipeline::history::flight_row::FlightInput;
 use pipeline::history::histories::Histories;
@@ -272,6 +273,7 @@ fn flights_of_the_flights_table_that_left_no_log_are_usage() {
         removed_utc: None,
         unit_hours_at_install: Some(100.0),
         tail_hours_at_install: None,
+        today: None,
     };
     let installations = Installations::new((0..UNITS).map(installation).collect()).unwrap();
     let ask = UnitSelection { as_of_utc: Some(day(DAYS - 1)), ..UnitSelection::default() };
@@ -305,39 +307,49 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     for row in rows.iter_mut().filter(|row| row.unit == 5 && row.assess.departure_utc >= day(200)) {
         row.assess.gap_m = row.assess.gap_m.map(|gap| gap - 12e-6);
     }
-    let name = |serial: &str| {
-        (records::PartNumber::new("EMA-27-1040").unwrap(), records::SerialNumber::new(serial).unwrap())
+    let known: Vec<Row> = rows.iter().filter(|row| row.assess.departure_utc < day(200)).cloned().collect();
+    let assess = |rows: &[Row]| {
+        assess::assess_histories(&config(), &nobody, histories(rows), &UnitSelection::default()).unwrap()
     };
-    let units = [name("S03"), name("S05")];
-    let all = || histories(&rows);
-    let of_last_run: Vec<Row> =
-        rows.iter().filter(|row| row.assess.departure_utc >= day(200)).cloned().collect();
-    let night = |of_last_run: &Histories| {
-        assess::assess_run_from(&config(), &nobody, all(), of_last_run, &units, None).unwrap()
+    let states = |rows: &[Row]| -> Vec<records::UnitState> {
+        assess(rows).iter().map(|row| records::UnitState::of(row, None, "before")).collect()
     };
-    let of_night = |of_last_run: &Histories| {
-        let night = night(of_last_run);
-        (night.now, night.changed)
+    let nothing = std::collections::BTreeSet::new();
+    let with_records = [(Some("EMA-27-1040".to_owned()), "S05".to_owned())].into();
+    let night = |before: &[records::UnitState], with_records, config: &Config| {
+        changes(config, before, &assess(&rows), RunFacts { run_id: "now", with_records, moved: &[] })
     };
-    let (now, news) = of_night(&histories(&of_last_run));
-    let counted = night(&histories(&of_last_run));
-    let mut states = std::collections::BTreeMap::new();
-    for row in assess::assess_histories(&config(), &nobody, all(), &UnitSelection::default()).unwrap() {
-        row.state.into_iter().for_each(|state| *states.entry(state).or_default() += 1);
-    }
-    assert_eq!((states.values().sum::<usize>(), &counted.states), (14, &states));
-    assert_eq!(now.len(), 2);
-    let serials: Vec<&str> = news.iter().map(|unit| unit.serial_number.as_str()).collect();
-    assert_eq!(serials, ["S05"]);
-    assert_eq!(news[0].new_events.len(), 1, "{news:?}");
-    assert_eq!(news[0].new_events[0].departure_utc, day(200));
-    assert!(news[0].cleared_events.is_empty());
-    assert_eq!((news[0].from, news[0].to), (Some("normal"), Some("watch")));
-    // A flight of another unit that arrives late has the days before read from what was known then.
-    let late = rows.iter().find(|row| row.unit == 9 && row.assess.departure_utc == day(100)).unwrap();
-    let with_late = histories(&[&of_last_run[..], std::slice::from_ref(late)].concat());
-    assert_eq!(of_night(&with_late), (now, news));
-    assert!(of_night(&all()).1.is_empty());
+    let found = night(&states(&known), &with_records, &config());
+    let [change] = &found.changed[..] else { panic!("{:?}", found.changed) };
+    assert_eq!(change.serial_number, "S05");
+    assert_eq!(change.new_events.len(), 1, "{change:?}");
+    assert_eq!(change.new_events[0].departure_utc, day(200));
+    assert!(change.cleared_events.is_empty());
+    assert_eq!(
+        (change.from.as_deref(), change.to, change.cause),
+        (Some("normal"), Some("watch"), Cause::Records)
+    );
+    // What is stored is what the next run compares with: it finds nothing.
+    let stored: Vec<_> = found.states.iter().chain(&states(&known)).cloned().collect();
+    let stored: std::collections::BTreeMap<_, _> = stored.into_iter().rev().map(|s| (s.unit(), s)).collect();
+    let stored: Vec<records::UnitState> = stored.into_values().collect();
+    assert!(night(&stored, &nothing, &config()).changed.is_empty());
+    // A first night stores states and tells nothing.
+    let first = night(&[], &with_records, &config());
+    assert_eq!((first.changed.len(), first.states.len()), (0, 14));
+    // The same records under another limit: the limit is the cause, with its line.
+    let mut lower = states(&rows);
+    lower.iter_mut().for_each(|state| {
+        state.limit_m = Some(40e-6);
+        state.state = Some("act".to_owned());
+    });
+    let limit = &night(&lower, &nothing, &config()).changed[0];
+    assert_eq!(limit.cause, Cause::Limit);
+    assert!(
+        limit.because.contains("limit_m changed from 40 to 150 µm (pipeline.toml line"),
+        "{}",
+        limit.because
+    );
 }
 
 /// Four units of a tail step together; two more on it measure nothing around the step, and do again after the day.

@@ -1,10 +1,10 @@
 //! Work requests against the tables of an operator: what opens, moves, closes and reopens them.
 
 use jiff::Timestamp;
+use pipeline::bookkeeping::maintenance_log::MaintenanceLog;
 use pipeline::follow_up::finding::{Finding, GAP};
 use pipeline::follow_up::work_requests::{self, Decision};
 use pipeline::follow_up::work_update::{self, Tables};
-use pipeline::history::maintenance_log::MaintenanceLog;
 use records::{
     Installation, Installations, PartNumber, Position, SerialNumber, TailNumber, WorkEvent, WorkEventKind,
     WorkRequest,
@@ -26,6 +26,7 @@ fn installation(serial: &str, tail: &str, from: &str, to: Option<&str>) -> Insta
         removed_utc: to.map(utc),
         unit_hours_at_install: None,
         tail_hours_at_install: None,
+        today: None,
     }
 }
 

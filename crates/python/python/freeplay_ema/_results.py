@@ -75,8 +75,10 @@ class RunSummary:
     refusals: list[Refusals]
     errors: list[LogFailure]
     duplicates: list[DuplicateLog]
-    #: Stored records that this run removed: their log cannot be used any more, or holds another flight.
-    withdrawn: int
+    #: Stored records that stay as they were because their log failed in this run.
+    kept: int
+    #: Flights that a corrected table gave to another unit.
+    moved: list[dict[str, Any]]
     #: Units of the maintenance and the inspections table that the installations table does not know.
     unknown_units: list[dict[str, Any]]
     quiet: list[SilentTail]

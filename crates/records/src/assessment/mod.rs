@@ -4,3 +4,4 @@ pub mod action;
 pub mod quantity_row;
 pub mod report_rows;
 pub mod trend_row;
+pub mod unit_state;

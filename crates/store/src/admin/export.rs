@@ -59,9 +59,8 @@ impl Store {
         if query.last.is_some() {
             return Ok(vec![query.clone()]);
         }
-        let (files, order) = (Self::candidate_files(snapshot, query), ["departure_utc"]);
-        let schema = scan::only(&GapRecord::schema(), &order)?;
-        let rows = self.read_rows(&files, &schema, &query.conditions())?;
+        let order = ["departure_utc"];
+        let rows = self.read_rows(snapshot, query, &scan::only(&GapRecord::schema(), &order)?)?;
         let departures = frame::sorted(&rows, &order, None)?;
         let departures = departures.column(0).as_primitive::<TimestampMicrosecondType>();
         let edges = (1..departures.len().div_ceil(WINDOW_ROWS)).map(|i| departures.value(i * WINDOW_ROWS));

@@ -1,7 +1,7 @@
-//! Alerts and work events: two small tables that are created with their first row.
+//! Alerts, work events and states of units: small tables that are created with their first row.
 
 use records::row_schema::{FromCells, Row};
-use records::{AlertRecord, WorkEvent};
+use records::{AlertRecord, UnitState, WorkEvent};
 
 use crate::delta::table::Table;
 use crate::error::Error;
@@ -37,6 +37,16 @@ impl Store {
         self.rows(&self.work, name)
     }
 
+    /// The newest state of every unit; none before the first run that ended.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn states(&self) -> Result<Vec<UnitState>, Error> {
+        self.rows(&self.states, |state: &UnitState| {
+            format!("{} {}", state.part_number.as_deref().unwrap_or_default(), state.serial_number)
+        })
+    }
+
     fn rows<R: Row + FromCells>(&self, table: &Table, name: impl Fn(&R) -> String) -> Result<Vec<R>, Error> {
         if table.exists()? { self.newest(table, None, |_| true, name) } else { Ok(Vec::new()) }
     }
@@ -49,6 +59,14 @@ impl Writer {
     /// As [`Writer::commit`].
     pub fn write_alerts(&mut self, alerts: &[AlertRecord]) -> Result<(), Error> {
         append(&self.store().alerts, alerts)
+    }
+
+    /// Writes states of units; each takes the place of the unit's earlier one.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`].
+    pub fn write_states(&mut self, states: &[UnitState]) -> Result<(), Error> {
+        append(&self.store().states, states)
     }
 
     /// Adds events of work requests, in one commit.

@@ -8,6 +8,7 @@ use records::GapRecord;
 
 use crate::error::Error;
 use crate::handle::Store;
+use crate::read::query::Query;
 use crate::read::{frame, scan};
 use records::{LogOutcome, RunRecord};
 
@@ -51,7 +52,8 @@ impl Store {
         let snapshot = self.gaps.snapshot()?;
         let files: Vec<PathBuf> = snapshot.paths().collect();
         let names = ["departure_utc", "tail_number", "flight_id", "part_number", "serial_number"];
-        let rows = self.read_rows(&files, &scan::only(&GapRecord::schema(), &names)?, &[])?;
+        let rows =
+            self.read_rows(&snapshot, &Query::default(), &scan::only(&GapRecord::schema(), &names)?)?;
         let rows = frame::frame(&rows, &names)?;
         let departures = rows.column(names[0])?.i64()?;
         let at = |micros: Option<i64>| micros.and_then(|us| Timestamp::from_microsecond(us).ok());
@@ -107,6 +109,7 @@ mod tests {
             errors: 0,
             not_reached: 0,
             exit_code: Some(0),
+            tables_digest: None,
         }
     }
 

@@ -168,6 +168,7 @@ fn count(log: &mut LogRecord, record: &GapRecord) {
     match record.estimate.status {
         Status::Estimated => log.estimated += 1,
         Status::Refused => log.refused += 1,
+        Status::Withdrawn => {}
     }
 }
 

@@ -17,7 +17,7 @@ use crate::delta::table::Table;
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::{frame, scan};
-use crate::write::writer::{key_columns, keys};
+use crate::write::writer::{key_columns, keys_of};
 use records::LogRecord;
 use records::RecordKey;
 
@@ -46,7 +46,7 @@ impl Store {
         let schema = GapRecord::schema();
         let schema = Arc::new(schema.project(&key_columns(&schema)?)?);
         let rows = scan::read_files(&files, &schema, &[])?;
-        let keys = keys(&frame::sorted(&rows, &RecordKey::COLUMNS, None)?)?;
+        let keys = keys_of(&frame::sorted(&rows, &RecordKey::COLUMNS, None)?)?;
         let twice: Vec<&RecordKey> = keys.windows(2).filter(|k| k[0] == k[1]).map(|k| &k[0]).collect();
         let mut findings: Vec<Diagnostic> = twice.iter().take(NAMED).map(|key| duplicate(key)).collect();
         if twice.len() > NAMED {

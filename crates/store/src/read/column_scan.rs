@@ -3,24 +3,20 @@
 //! A whole fleet's records are tens of millions of rows with repeated names, so text columns remain dictionaries as
 //! stored, numbers are not copied, and a caller with threads may read several files at once.
 
-use std::path::PathBuf;
-
 use arrow::array::RecordBatch;
-use arrow::datatypes::SchemaRef;
 use records::GapRecord;
 
 use crate::error::Error;
 use crate::handle::Store;
 use crate::read::query::Query;
-use crate::read::scan::{self, Condition};
+use crate::read::scan;
+use crate::read::selection::Selection;
 
 /// Files that may hold records that fit, of one version of the table.
 #[derive(Debug)]
 pub struct ColumnScan {
     store: Store,
-    files: Vec<PathBuf>,
-    conditions: Vec<Condition>,
-    schema: SchemaRef,
+    selection: Selection,
     version: u64,
 }
 
@@ -33,16 +29,15 @@ impl Store {
     /// [`Error::Table`] when the log cannot be read, and for a name that no column has.
     pub fn scan_columns(&self, query: &Query, names: &[&str]) -> Result<ColumnScan, Error> {
         let (snapshot, schema) = (self.gaps.snapshot()?, scan::only(&GapRecord::schema(), names)?);
-        let files = Self::candidate_files(&snapshot, query);
-        let (store, conditions, version) = (self.clone(), query.conditions(), snapshot.version);
-        Ok(ColumnScan { store, files, conditions, schema, version })
+        let selection = Selection::of(self, &snapshot, query, &schema);
+        Ok(ColumnScan { store: self.clone(), selection, version: snapshot.version })
     }
 }
 
 impl ColumnScan {
     /// How many there are.
     pub fn len(&self) -> usize {
-        self.files.len()
+        self.selection.files.len()
     }
 
     /// Version of the store that they are of.
@@ -52,17 +47,17 @@ impl ColumnScan {
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.files.is_empty()
+        self.selection.files.is_empty()
     }
 
-    /// The rows of one that fit, as they are stored: times in µs UTC, texts as dictionaries of `Int32` keys.
+    /// The rows of one that fit, with the bookkeeping joined: times in µs UTC, texts as dictionaries of `Int32` keys.
     ///
     /// # Errors
     /// [`Error::Damaged`] when the file is not the one that was committed, [`Error::Io`], [`Error::Parquet`] and
     /// [`Error::Arrow`] when it cannot be read.
     pub fn read(&self, part: usize) -> Result<Vec<RecordBatch>, Error> {
-        let path = &self.files[part];
+        let path = &self.selection.files[part];
         self.store.check(std::slice::from_ref(path))?;
-        scan::read_file(path, &self.schema, &self.conditions)
+        self.selection.read_file(path)
     }
 }

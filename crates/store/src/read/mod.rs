@@ -2,7 +2,9 @@
 
 pub(crate) mod column_scan;
 pub(crate) mod frame;
+pub(crate) mod join;
 pub(crate) mod latest_rows;
 pub(crate) mod query;
 pub(crate) mod scan;
+pub(crate) mod selection;
 pub(crate) mod store_read;

@@ -42,10 +42,10 @@ impl Query {
         .filter_map(|(column, value)| Some((column, value.as_deref()?)))
     }
 
-    /// Whether a file may hold matching records, by its statistics.
-    pub(crate) fn may_be_in(&self, stats: &Stats) -> bool {
+    /// Whether a file may hold matching records, by its statistics of the text columns that `is_known` names, and by time.
+    pub(crate) fn may_be_in(&self, stats: &Stats, is_known: impl Fn(&str) -> bool) -> bool {
         let (earliest_us, latest_us) = stats.times_us("departure_utc");
-        self.texts().all(|(column, value)| stats.may_hold(column, value))
+        self.texts().all(|(column, value)| !is_known(column) || stats.may_hold(column, value))
             && self.since_utc.is_none_or(|since| since.as_microsecond() <= latest_us)
             && self.until_utc.is_none_or(|until| earliest_us < until_us(until))
     }

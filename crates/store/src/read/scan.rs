@@ -31,7 +31,7 @@ type Builder = ParquetRecordBatchReaderBuilder<File>;
 /// Rows whose value in a column lies between two values, both included.
 #[derive(Debug, Clone)]
 pub(crate) struct Condition {
-    column: &'static str,
+    pub(crate) column: &'static str,
     first: Option<Scalar<ArrayRef>>,
     last: Option<Scalar<ArrayRef>>,
 }
@@ -53,7 +53,7 @@ impl Condition {
     }
 
     /// Mask of the matching values.
-    fn matches(&self, values: &ArrayRef) -> Result<BooleanArray, ArrowError> {
+    pub(crate) fn matches(&self, values: &ArrayRef) -> Result<BooleanArray, ArrowError> {
         let values = self.comparable(values)?;
         let first = self.first.as_ref().map(|first| gt_eq(&values, first)).transpose()?;
         let last = self.last.as_ref().map(|last| lt_eq(&values, last)).transpose()?;
@@ -229,7 +229,8 @@ pub(crate) fn only(schema: &Schema, names: &[&str]) -> Result<SchemaRef, Error> 
     Ok(Arc::new(Schema::new(fields.collect::<Result<Vec<_>, Error>>()?)))
 }
 
-fn coded(field: &Field) -> Field {
+/// A column of text as dictionary codes, any other as it is.
+pub(crate) fn coded(field: &Field) -> Field {
     match field.data_type() {
         DataType::Utf8 => field.clone().with_data_type(dictionary()),
         _ => field.clone(),

@@ -13,7 +13,8 @@ use crate::handle::Store;
 use crate::read::frame;
 use crate::read::latest_rows::TextFilter;
 use crate::read::query::Query;
-use crate::read::scan::{self, Condition};
+use crate::read::scan;
+use crate::read::selection::Selection;
 use records::RecordKey;
 use records::row_schema::from_batch;
 use records::{LogOutcome, LogRecord};
@@ -44,9 +45,9 @@ impl Store {
     /// # Errors
     /// As [`Store::records`].
     pub fn serials(&self) -> Result<Vec<(PartNumber, SerialNumber)>, Error> {
-        let files: Vec<PathBuf> = self.gaps.snapshot()?.paths().collect();
         let names = ["part_number", "serial_number"];
-        let rows = self.read_rows(&files, &scan::only(&GapRecord::schema(), &names)?, &[])?;
+        let schema = scan::only(&GapRecord::schema(), &names)?;
+        let rows = self.read_rows(&self.gaps.snapshot()?, &Query::default(), &schema)?;
         let units = frame::frame(&rows, &names)?.unique_stable(None, UniqueKeepStrategy::Any, None)?;
         let units = units.sort(names, SortMultipleOptions::default())?;
         let [parts, serials] = [units.column(names[0])?.str()?, units.column(names[1])?.str()?];
@@ -93,26 +94,20 @@ impl Store {
         Ok(table.snapshot()?.paths().map(|file| self.location.display_path(&file)).collect())
     }
 
-    /// Some columns of the matching rows of files, after a check of their digests.
+    /// Some columns of the matching rows, after a check of the digests of their files.
     pub(crate) fn read_rows(
         &self,
-        files: &[PathBuf],
+        snapshot: &Snapshot,
+        query: &Query,
         schema: &SchemaRef,
-        conditions: &[Condition],
     ) -> Result<Vec<RecordBatch>, Error> {
-        self.check(files)?;
-        scan::read_files(files, schema, conditions)
+        let selection = Selection::of(self, snapshot, query, schema);
+        self.check(&selection.files)?;
+        selection.read()
     }
 
     pub(crate) fn select(&self, snapshot: &Snapshot, query: &Query) -> Result<RecordBatch, Error> {
-        let files = Self::candidate_files(snapshot, query);
-        let rows = self.read_rows(&files, &GapRecord::schema(), &query.conditions())?;
+        let rows = self.read_rows(snapshot, query, &GapRecord::schema())?;
         frame::sorted(&rows, &RecordKey::COLUMNS, query.last)
-    }
-
-    /// Files that may hold matching rows.
-    pub(crate) fn candidate_files(snapshot: &Snapshot, query: &Query) -> Vec<PathBuf> {
-        let files = snapshot.files.iter().filter(|file| file.has_rows() && query.may_be_in(&file.stats));
-        files.map(|file| file.path.clone()).collect()
     }
 }

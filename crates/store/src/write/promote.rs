@@ -1,6 +1,6 @@
 //! Promotion: the results of a trial store replace the results of the same logs in the store.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use crate::error::Error;
 use crate::handle::Store;
@@ -16,12 +16,10 @@ pub struct PromotionSummary {
     pub logs: usize,
     /// Records stored.
     pub records: usize,
-    /// Records of the same logs that the trial did not make, and that are gone now.
-    pub retired: usize,
 }
 
 impl Writer {
-    /// Takes over the records, log status and runs of another store; flights of logs that it does not have are kept.
+    /// Takes over the records, log status and runs of another store; records that it does not have are kept.
     ///
     /// `watch` receives each finished tail, and the number of tails.
     ///
@@ -39,7 +37,6 @@ impl Writer {
         if trial.dir() == self.store().dir() {
             return Err(Error::Itself { dir: trial.dir().to_owned() });
         }
-        let before = by_name(self.store().accounts()?);
         let mut tails: BTreeMap<Option<String>, Vec<LogRecord>> = BTreeMap::new();
         for account in trial.accounts()? {
             tails.entry(account.tail_number.clone()).or_default().push(account);
@@ -47,7 +44,7 @@ impl Writer {
         let mut adopted = PromotionSummary::default();
         let total = tails.len();
         for (tail, accounts) in tails {
-            let results = results(trial, tail.as_deref(), accounts, &before)?;
+            let results = results(trial, tail.as_deref(), accounts)?;
             self.commit(&results)?;
             adopted.count(&results);
             watch(tail.as_deref().unwrap_or("logs without identity"), total);
@@ -64,33 +61,22 @@ impl PromotionSummary {
     fn count(&mut self, results: &[LogResult]) {
         self.logs += results.len();
         self.records += results.iter().map(|result| result.records.len()).sum::<usize>();
-        self.retired += results.iter().map(|result| result.retires.len()).sum::<usize>();
     }
 }
 
 /// The trial's results of one tail, or of the logs without a tail.
-fn results(
-    trial: &Store,
-    tail: Option<&str>,
-    accounts: Vec<LogRecord>,
-    before: &BTreeMap<String, LogRecord>,
-) -> Result<Vec<LogResult>, Error> {
+fn results(trial: &Store, tail: Option<&str>, accounts: Vec<LogRecord>) -> Result<Vec<LogResult>, Error> {
     let records = match tail {
         Some(tail) => trial.records(&Query { tail_number: Some(tail.to_owned()), ..Query::default() })?,
         None => Vec::new(),
     };
-    let made: BTreeSet<RecordKey> = records.iter().map(RecordKey::of).collect();
     let mut owner = BTreeMap::new();
     for (at, account) in accounts.iter().enumerate() {
         owner.extend(account.record_keys().into_iter().map(|key| (key, at)));
     }
-    let retires = |account: &LogRecord| match before.get(&account.log_path) {
-        Some(before) => before.record_keys().into_iter().filter(|key| !made.contains(key)).collect(),
-        None => Vec::new(),
-    };
     let mut results: Vec<LogResult> = accounts
         .into_iter()
-        .map(|account| LogResult { retires: retires(&account), account, records: Vec::new() })
+        .map(|account| LogResult { account, records: Vec::new(), moved_from: Vec::new() })
         .collect();
     for record in records {
         // A record without an account was cut off by a kill: the trial's next run makes it again.
@@ -99,8 +85,4 @@ fn results(
         }
     }
     Ok(results)
-}
-
-fn by_name(accounts: Vec<LogRecord>) -> BTreeMap<String, LogRecord> {
-    accounts.into_iter().map(|account| (account.log_path.clone(), account)).collect()
 }

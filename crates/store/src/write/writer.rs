@@ -1,6 +1,6 @@
 //! The writer: finished logs become records and accounts, whole flights at a time, each flight once.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::slice;
 use std::sync::Arc;
 use std::time::Duration;
@@ -8,7 +8,8 @@ use std::time::Duration;
 use arrow::array::{AsArray, BooleanArray, RecordBatch};
 use arrow::compute::filter_record_batch;
 use arrow::datatypes::{Schema, TimestampMicrosecondType};
-use records::GapRecord;
+use arrow::error::ArrowError;
+use records::{GapRecord, Status};
 
 use crate::delta::data_file;
 use crate::delta::snapshot::{DataFile, Snapshot};
@@ -30,8 +31,19 @@ pub struct LogResult {
     pub account: LogRecord,
     /// Its records; each takes the place of a stored one with the same key.
     pub records: Vec<GapRecord>,
-    /// Records stored before that are no longer true.
-    pub retires: Vec<RecordKey>,
+    /// Keys under which the same samples were stored before: their flight was given another identity since.
+    pub moved_from: Vec<RecordKey>,
+}
+
+/// A stored record's log and settings.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HeldRecord {
+    /// Path of the log that it was computed from.
+    pub log_path: String,
+    /// Digest of that log.
+    pub log_digest: String,
+    /// Whether it has a gap.
+    pub is_estimated: bool,
 }
 
 /// The one who writes, for as long as it lives.
@@ -70,7 +82,8 @@ impl Writer {
         &self.store
     }
 
-    /// Stores what came of some logs; where two of them speak of one record, the later one counts.
+    /// Stores what came of some logs; where two of them speak of one record, the later one counts. A record is only ever
+    /// replaced by one of the same key, or by one of the same samples under another key.
     ///
     /// The records of all of them appear in one commit, and their accounts in the next. A process that
     /// dies in between has stored whole flights without accounts: its logs are run again, and supersede
@@ -88,6 +101,80 @@ impl Writer {
             results.iter().map(|result| (result.account.log_path.as_str(), &result.account)).collect();
         let accounts: Vec<LogRecord> = newest.into_values().cloned().collect();
         if accounts.is_empty() { Ok(()) } else { account(&self.store.logs, &accounts) }
+    }
+
+    /// The stored records of some keys; withdrawn ones are left out.
+    ///
+    /// # Errors
+    /// As [`Store::records`].
+    pub fn held(&self, keys: &BTreeSet<RecordKey>) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
+        const COLUMNS: [&str; 7] =
+            ["departure_utc", "tail_number", "flight_id", "position", "log_path", "log_digest", "status"];
+        let wanted: MergeDecisions<'_> = keys.iter().map(|key| (key.clone(), None)).collect();
+        let snapshot = self.store.gaps.snapshot()?;
+        let may_hold = |file: &&DataFile| file.has_rows() && may_hold_any(file, &wanted);
+        let files: Vec<_> = snapshot.files.iter().filter(may_hold).map(|file| file.path.clone()).collect();
+        self.store.check(&files)?;
+        let schema = GapRecord::schema();
+        let columns = COLUMNS.iter().map(|name| schema.index_of(name)).collect::<Result<Vec<_>, _>>()?;
+        let mut held = BTreeMap::new();
+        for batch in scan::read_files(&files, &Arc::new(schema.project(&columns)?), &[])? {
+            let [logs, digests, statuses] = [4, 5, 6].map(|at| batch.column(at).as_string::<i32>());
+            for (row, key) in keys_of(&batch)?.into_iter().enumerate() {
+                let status = statuses.value(row);
+                if keys.contains(&key) && status != Status::Withdrawn.as_str() {
+                    let record = HeldRecord {
+                        log_path: logs.value(row).to_owned(),
+                        log_digest: digests.value(row).to_owned(),
+                        is_estimated: status == Status::Estimated.as_str(),
+                    };
+                    held.insert(key, record);
+                }
+            }
+        }
+        Ok(held)
+    }
+
+    /// Rewrites those data files whose rows a function changes, in one commit, and returns the number of changed rows.
+    /// The function sees some columns of the stored records, in this order, and returns them with as many rows.
+    ///
+    /// # Errors
+    /// As [`Writer::commit`], and what the function fails with.
+    pub fn rewrite(
+        &mut self,
+        columns: &[&str],
+        change: &dyn Fn(&RecordBatch) -> Result<RecordBatch, ArrowError>,
+    ) -> Result<usize, Error> {
+        let schema = GapRecord::schema();
+        let places = columns.iter().map(|name| schema.index_of(name)).collect::<Result<Vec<_>, _>>()?;
+        let some = Arc::new(schema.project(&places)?);
+        let mut changed = 0;
+        self.store.gaps.change(|snapshot| {
+            changed = 0;
+            let (location, version) = (&self.store.gaps.location, snapshot.version + 1);
+            let mut commit = Change::default();
+            for file in snapshot.files.iter().filter(|file| file.has_rows()) {
+                let files = slice::from_ref(&file.path);
+                self.store.check(files)?;
+                let before = scan::read_table(files, &some, &[])?;
+                let after = change(&before)?;
+                let rows = differing_rows(&before, &after);
+                if rows == 0 {
+                    continue;
+                }
+                changed += rows;
+                let all = scan::read_table(files, &schema, &[])?;
+                let mut arrays = all.columns().to_vec();
+                for (place, array) in places.iter().zip(after.columns()) {
+                    arrays[*place] = Arc::clone(array);
+                }
+                let all = RecordBatch::try_new(Arc::clone(&schema), arrays)?;
+                commit.remove.push(file);
+                commit.add.push(data_file::write(location, version, &all, true)?);
+            }
+            Ok(commit)
+        })?;
+        Ok(changed)
     }
 
     fn supersede<'a>(
@@ -125,6 +212,15 @@ impl Writer {
     }
 }
 
+/// Number of rows that differ between two batches of the same columns.
+fn differing_rows(before: &RecordBatch, after: &RecordBatch) -> usize {
+    if before.columns() == after.columns() {
+        return 0;
+    }
+    let is_other = |row: &usize| before.slice(*row, 1).columns() != after.slice(*row, 1).columns();
+    (0..before.num_rows()).filter(is_other).count()
+}
+
 /// Appends rows to a table of which the newest counts.
 pub(crate) fn account<R: Row + FromCells>(table: &Table, rows: &[R]) -> Result<(), Error> {
     table.change(|snapshot| {
@@ -137,7 +233,7 @@ pub(crate) fn account<R: Row + FromCells>(table: &Table, rows: &[R]) -> Result<(
 fn decisions(results: &[LogResult]) -> MergeDecisions<'_> {
     let mut decisions = MergeDecisions::new();
     for result in results {
-        decisions.extend(result.retires.iter().map(|key| (key.clone(), None)));
+        decisions.extend(result.moved_from.iter().map(|key| (key.clone(), None)));
         decisions.extend(result.records.iter().map(|record| (RecordKey::of(record), Some(record))));
     }
     decisions
@@ -158,12 +254,12 @@ fn may_hold_any(file: &DataFile, decisions: &MergeDecisions<'_>) -> bool {
 
 /// Mask of the rows without a merge decision.
 fn is_kept(batch: &RecordBatch, decisions: &MergeDecisions<'_>) -> Result<BooleanArray, Error> {
-    let keys = keys(batch)?;
+    let keys = keys_of(batch)?;
     Ok(keys.iter().map(|key| Some(!decisions.contains_key(key))).collect())
 }
 
 /// The keys of a batch, row by row.
-pub(crate) fn keys(batch: &RecordBatch) -> Result<Vec<RecordKey>, Error> {
+pub(crate) fn keys_of(batch: &RecordBatch) -> Result<Vec<RecordKey>, Error> {
     let keys = batch.project(&key_columns(batch.schema_ref())?)?;
     let departures = keys.column(0).as_primitive::<TimestampMicrosecondType>();
     let [tails, flights, positions] = [1, 2, 3].map(|column| keys.column(column).as_string::<i32>());

@@ -67,9 +67,9 @@ fn a_retired_record_is_gone_and_a_later_result_has_the_last_word() {
     let mut writer = writer(dir.path());
     writer.commit(&[result(1, 0, 30e-6), result(1, 1, 30e-6)]).unwrap();
     let mut gone = result(1, 0, 30e-6);
-    gone.retires = gone.records.drain(..).map(|record| RecordKey::of(&record)).collect();
+    gone.moved_from = gone.records.drain(..).map(|record| RecordKey::of(&record)).collect();
     let mut again = result(1, 1, 44e-6);
-    again.retires = gone.retires.clone();
+    again.moved_from = gone.moved_from.clone();
     again.records.push(record(1, 0, "elevator", 45e-6));
     writer.commit(&[gone, again]).unwrap();
     let records = writer.store().records(&Query::default()).unwrap();
@@ -120,7 +120,7 @@ fn results() -> impl Strategy<Value = LogResult> {
         LogResult {
             account: account(tail, flight),
             records: there.iter().map(|position| record(tail, flight, position, gap_m)).collect(),
-            retires: gone
+            moved_from: gone
                 .iter()
                 .map(|position| RecordKey::of(&record(tail, flight, position, 0.0)))
                 .collect(),
@@ -141,7 +141,7 @@ proptest! {
         let mut map: BTreeMap<RecordKey, GapRecord> = BTreeMap::new();
         for (i, commit) in commits.iter().enumerate() {
             for result in commit {
-                map.retain(|key, _| !result.retires.contains(key));
+                map.retain(|key, _| !result.moved_from.contains(key));
                 map.extend(result.records.iter().map(|record| (RecordKey::of(record), record.clone())));
             }
             writer.commit(commit).unwrap();

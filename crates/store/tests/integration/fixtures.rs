@@ -80,7 +80,7 @@ pub(crate) fn account(tail: usize, flight: i64) -> LogRecord {
 /// What comes of the log of that flight: a record for each position.
 pub(crate) fn result(tail: usize, flight: i64, gap_m: f64) -> LogResult {
     let records = POSITIONS.iter().map(|position| record(tail, flight, position, gap_m)).collect();
-    LogResult { account: account(tail, flight), records, retires: Vec::new() }
+    LogResult { account: account(tail, flight), records, moved_from: Vec::new() }
 }
 
 pub(crate) fn run(run_id: &str, started: &str, exit_code: Option<i64>) -> RunRecord {
@@ -98,6 +98,7 @@ pub(crate) fn run(run_id: &str, started: &str, exit_code: Option<i64>) -> RunRec
         errors: 1,
         not_reached: 0,
         exit_code,
+        tables_digest: None,
     }
 }
 

@@ -113,7 +113,7 @@ proptest! {
         all.dedup_by_key(|record| RecordKey::of(record));
         let dir = tempfile::tempdir().unwrap();
         let mut writer = writer(dir.path());
-        writer.commit(&[LogResult { account: account(0, 0), records: all.clone(), retires: Vec::new() }]).unwrap();
+        writer.commit(&[LogResult { account: account(0, 0), records: all.clone(), moved_from: Vec::new() }]).unwrap();
         prop_assert_eq!(bits(&writer.store().records(&Query::default()).unwrap()), bits(&all));
         for record in &all {
             let tail = record.flight.tail_number.to_string();
@@ -121,7 +121,7 @@ proptest! {
             let found = writer.store().records(&query).unwrap();
             prop_assert!(bits(&found).contains(&bits(std::slice::from_ref(record))[0]));
         }
-        writer.commit(&[LogResult { account: account(0, 0), records: all.clone(), retires: Vec::new() }]).unwrap();
+        writer.commit(&[LogResult { account: account(0, 0), records: all.clone(), moved_from: Vec::new() }]).unwrap();
         prop_assert_eq!(bits(&writer.store().records(&Query::default()).unwrap()), bits(&all));
     }
 

@@ -17,7 +17,7 @@ fn cut_short(writer: &mut Writer) {
     }
     let mut broken = account(1, 2);
     (broken.outcome, broken.estimated) = (LogOutcome::Error, 0);
-    let broken = store::LogResult { account: broken, records: Vec::new(), retires: Vec::new() };
+    let broken = store::LogResult { account: broken, records: Vec::new(), moved_from: Vec::new() };
     writer.commit(&[result(1, 0, 30e-6), refused, broken]).unwrap();
 }
 
@@ -123,7 +123,7 @@ fn a_table_always_has_a_file() {
     writer.commit(&[retired.clone()]).unwrap();
     writer.compact().unwrap();
     let position = |name| store::RecordKey::of(&record(1, 0, name, 0.0));
-    retired.retires = crate::fixtures::POSITIONS.map(position).to_vec();
+    retired.moved_from = crate::fixtures::POSITIONS.map(position).to_vec();
     retired.records.clear();
     (retired.account.estimated, retired.account.refused) = (0, 0);
     writer.commit(&[retired]).unwrap();

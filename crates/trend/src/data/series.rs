@@ -140,6 +140,8 @@ pub struct RowFaults {
     pub contradictions: usize,
     /// Rows with negative usage, which is left out.
     pub negative_usage: usize,
+    /// Hour-meter readings that contradict the others, which a caller left out.
+    pub meter_readings: usize,
 }
 
 impl Series {
@@ -175,6 +177,13 @@ impl Series {
     pub fn with_maintenance(mut self, mut maintenance: Vec<MaintenanceEvent>) -> Self {
         maintenance.sort_unstable_by_key(MaintenanceEvent::order);
         self.maintenance = maintenance;
+        self
+    }
+
+    /// The same with the number of hour-meter readings that were left out.
+    #[must_use]
+    pub fn without_readings(mut self, count: usize) -> Self {
+        self.faults.meter_readings = count;
         self
     }
 

@@ -2,7 +2,6 @@
 
 use pipeline::fleet_trends::assess;
 use pipeline::fleet_trends::backtest::{self, BacktestRow};
-use store::Store;
 
 use crate::args::{BacktestArgs, Global};
 use crate::exit::{Code, Failure};
@@ -28,7 +27,7 @@ pub(crate) fn backtest(args: &BacktestArgs, global: &Global, output: &Output) ->
     let (config, installations) = load_trend_context(&args.external, global, output)?;
     let histories = match &args.external.estimates {
         Some(file) => pipeline::history::external_estimates::read(file)?,
-        None => assess::load_histories(&Store::open(config.store())?)?,
+        None => assess::load_histories(&pipeline::open_store(&config, &installations)?)?,
     };
     let found = backtest::of_histories(&config, &installations, &histories)?;
     row_output::write_rows(&args.rows, output, || row_output::batch(&found), || page(&found))?;

@@ -7,7 +7,6 @@ use job::Config;
 use pipeline::explain::{Explanation, Recomputation, RecordKey, remedy};
 use records::uncertainty::NORMAL_95;
 use serde_json::Value;
-use store::Store;
 
 use crate::args::{ExplainArgs, Global};
 use crate::exit::{Code, Failure};
@@ -28,7 +27,7 @@ pub(crate) fn explain(args: &ExplainArgs, global: &Global, output: &Output) -> R
         position: args.position.clone(),
         tail_number: args.tail.clone(),
     };
-    let store = Store::open(config.store())?;
+    let store = pipeline::open_store(&config, &installations)?;
     let found = match pipeline::explain::explain(&config, &installations, &store, &key) {
         Ok(found) => found,
         Err(error) => {

@@ -9,7 +9,7 @@ use job::Config;
 use pipeline::explain::remedy;
 use records::row_schema::to_batch;
 use records::{GapRecord, PartNumber};
-use store::{Query, Store};
+use store::Query;
 
 use crate::args::{Global, QueryArgs, QueryKey};
 use crate::exit::{Code, Failure};
@@ -18,7 +18,7 @@ use crate::row_output;
 use crate::sparkline::sparkline;
 use crate::table::{self, count, number, text};
 
-use crate::commands::context::{KnownNames, check_name, check_range, load_config};
+use crate::commands::context::{KnownNames, check_name, check_range, load_with_installations};
 
 /// Minimum number of estimates for a history line.
 const LEAST_HISTORY: usize = 3;
@@ -29,8 +29,8 @@ const LEAST_HISTORY: usize = 3;
 /// If configuration or store cannot be read.
 pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     check_range(args.departures.since, args.departures.until)?;
-    let config = load_config(global)?;
-    let records = Store::open(config.store())?.records(&query_of(args))?;
+    let (config, installations) = load_with_installations(global)?;
+    let records = pipeline::open_store(&config, &installations)?.records(&query_of(args))?;
     if records.is_empty() {
         check_names(args, &KnownNames::read(&config))?;
     }
@@ -195,7 +195,7 @@ pub(crate) fn load(e: &records::GapEstimate) -> String {
 pub(crate) fn flags_text(e: &records::GapEstimate) -> String {
     let reason = e.reason.iter().map(|reason| match e.status {
         records::Status::Refused => format!("refused: {reason}"),
-        records::Status::Estimated => reason.clone(),
+        records::Status::Estimated | records::Status::Withdrawn => reason.clone(),
     });
     let others = e.flags.iter().filter(|flag| Some(*flag) != e.reason.as_ref()).cloned();
     reason.chain(others).collect::<Vec<_>>().join(", ")

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use jiff::Timestamp;
 use pipeline::Event;
 use pipeline::report::{compose, data, flight_plots, publish};
-use store::Store;
 
 use crate::args::{Global, ReportArgs};
 use crate::exit::{Code, Failure};
@@ -28,7 +27,7 @@ pub(crate) fn report(args: &ReportArgs, global: &Global, output: &Output) -> Res
     note_future(args.as_of, output);
     let (config, installations) = load_with_installations(global)?;
     let ask = args.units.selection(args.as_of);
-    let store = Store::open(config.store())?;
+    let store = pipeline::open_store(&config, &installations)?;
     let program = format!("Freeplay {VERSION}");
     let mut report = compose::compose(&config, &installations, &store, &ask, Timestamp::now(), &program)?;
     if report.units.is_empty() {

@@ -5,7 +5,6 @@ use pipeline::fleet_trends::assess::{self, StoreAssessment, UnitSelection};
 use pipeline::monitoring::mapping_faults::MappingFault;
 use records::uncertainty::NORMAL_95;
 use records::{Installations, Quantity, QuantityChange, QuantityRow, TrendRow};
-use store::Store;
 
 use crate::args::{Global, TrendArgs};
 use crate::exit::{Code, Failure};
@@ -30,7 +29,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
     let (mut mapping_faults, mut notes) = (Vec::new(), Vec::new());
     let found = match (&args.external.estimates, &args.queries) {
         (None, None) => {
-            let store = Store::open(config.store())?;
+            let store = pipeline::open_store(&config, &installations)?;
             let found = assess::assess_store_with_quantities(&config, &installations, &store, &ask)?;
             (mapping_faults, notes) = (found.mapping_faults, found.notes);
             found.now
@@ -38,7 +37,7 @@ pub(crate) fn trend(args: &TrendArgs, global: &Global, output: &Output) -> Resul
         (estimates, queries) => {
             let histories = match estimates {
                 Some(file) => pipeline::history::external_estimates::read(file)?,
-                None => assess::load_histories(&Store::open(config.store())?)?,
+                None => assess::load_histories(&pipeline::open_store(&config, &installations)?)?,
             };
             match queries {
                 Some(file) => {
@@ -87,7 +86,7 @@ fn quantities(
     installations: &Installations,
     output: &Output,
 ) -> Result<Code, Failure> {
-    let store = Store::open(config.store())?;
+    let store = pipeline::open_store(config, installations)?;
     let StoreAssessment { now: units, followed, .. } =
         assess::assess_store_with_quantities(config, installations, &store, ask)?;
     if units.is_empty() {

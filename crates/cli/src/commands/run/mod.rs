@@ -9,9 +9,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use jiff::Timestamp;
-use pipeline::fleet_trends::changes::UnitChange;
+use pipeline::bookkeeping::maintenance_log::UnknownUnit;
+use pipeline::fleet_trends::changes::{Cause, UnitChange};
 use pipeline::history::histories::Histories;
-use pipeline::history::maintenance_log::UnknownUnit;
 use pipeline::monitoring::recorder_change::RecorderChange;
 use pipeline::run::scheduler::{self, Context};
 use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
@@ -345,11 +345,11 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
     }
     some_of("mapping", "fault", &report.mapping_faults, &mut page);
     some_of("repeated", "pair", &report.samples_repeated, &mut page);
-    if report.withdrawn > 0 {
-        let records = count(report.withdrawn, "stored record");
-        let text = format!("{records} removed: their log cannot be used any more, or holds another flight");
-        line(&mut page, "withdrawn", &text);
+    if report.kept > 0 {
+        let records = count(report.kept, "stored record");
+        line(&mut page, "kept", &format!("{records} of logs that failed now stay as they were"));
     }
+    some_of("moved", "place", &report.moved, &mut page);
     table_findings(report, &mut page);
     duplicates(report, &mut page);
     if !report.errors.is_empty() {
@@ -519,15 +519,19 @@ fn changes_section(changed: &[UnitChange]) -> String {
 
 /// State and event changes of a unit as text.
 fn change_text(unit: &UnitChange) -> String {
-    let word = |state: Option<&'static str>| state.unwrap_or("no state");
+    let word = |state: Option<&str>| state.unwrap_or("no state").to_owned();
     let mut changes = Vec::new();
-    if unit.from != unit.to || (unit.new_events.is_empty() && unit.cleared_events.is_empty()) {
+    if unit.from.as_deref() != unit.to || (unit.new_events.is_empty() && unit.cleared_events.is_empty()) {
         let why = unit.reason.as_deref().map(|why| format!(" ({why})")).unwrap_or_default();
-        changes.push(format!("{} → {}{why}", word(unit.from), word(unit.to)));
+        changes.push(format!("{} → {}{why}", word(unit.from.as_deref()), word(unit.to)));
     }
-    for (events, what) in [(&unit.new_events, "new"), (&unit.cleared_events, "cleared")] {
-        let day = |at: Timestamp| at.strftime("%Y-%m-%d").to_string();
-        changes.extend(events.iter().map(|e| format!("{what}: {} of {}", e.kind, day(e.departure_utc))));
+    let day = |at: Timestamp| at.strftime("%Y-%m-%d").to_string();
+    let new = unit.new_events.iter().map(|e| format!("new: {} of {}", e.kind, day(e.departure_utc)));
+    let cleared =
+        unit.cleared_events.iter().map(|e| format!("cleared: {} of {}", e.kind, day(e.departure_utc)));
+    changes.extend(new.chain(cleared));
+    if unit.cause != Cause::Records {
+        changes.push(format!("cause: {}", unit.because));
     }
     changes.join("; ")
 }

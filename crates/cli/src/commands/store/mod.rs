@@ -41,7 +41,7 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Resul
         StoreCommand::Verify => verify(&store, output),
         StoreCommand::Compact => compact(&store, output),
         StoreCommand::Adopt { trial } => adopt(&store, trial, output),
-        StoreCommand::Export { rows } => export(&store, &config, rows, output),
+        StoreCommand::Export { rows } => export(&config, rows, output),
     }
 }
 
@@ -197,14 +197,10 @@ fn adopt(store: &Store, trial: &Path, output: &Output) -> Result<Code, Failure> 
     progress.end();
     let done = done?;
     output.write_result(&format!(
-        "adopted {} of {} from {}{}\n  next  copy the settings of the trial into pipeline.toml; `freeplay run --dry-run` must then list no logs\n",
+        "adopted {} of {} from {}\n  next  copy the settings of the trial into pipeline.toml; `freeplay run --dry-run` must then list no logs\n",
         count(done.records, "record"),
         count(done.logs, "log"),
         trial.dir().display(),
-        match done.retired {
-            0 => String::new(),
-            retired => format!("; {} absent there removed", count(retired, "record")),
-        },
     ))?;
     Ok(Code::Success)
 }
@@ -220,7 +216,9 @@ fn compact(store: &Store, output: &Output) -> Result<Code, Failure> {
     Ok(Code::Success)
 }
 
-fn export(store: &Store, config: &Config, format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
+fn export(config: &Config, format: &RowFormatArgs, output: &Output) -> Result<Code, Failure> {
+    let installations = pipeline::run::scheduler::installations(config)?;
+    let store = pipeline::open_store(config, &installations)?;
     if format.format() == Format::Table {
         let records = store.records(&Query::default())?;
         row_output::write_rows(

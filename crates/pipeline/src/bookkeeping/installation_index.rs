@@ -17,7 +17,7 @@ impl<'a> InstallationIndex<'a> {
     pub(crate) fn new(installations: &'a Installations) -> Self {
         let mut by_serial: HashMap<&str, Vec<&Installation>> = HashMap::new();
         for installation in installations.iter() {
-            by_serial.entry(installation.serial_number.as_str()).or_default().push(installation);
+            by_serial.entry(installation.unit().1.as_str()).or_default().push(installation);
         }
         by_serial
             .values_mut()
@@ -33,10 +33,15 @@ impl<'a> InstallationIndex<'a> {
         if before.iter().any(is_open) { None } else { before.into_iter().max_by_key(|i| i.removed_utc) }
     }
 
+    /// The installation that a unit is in on a date.
+    pub(crate) fn installed(&self, name: &UnitKey, as_of: Timestamp) -> Option<&'a Installation> {
+        self.of(name).into_iter().find(|installation| installation.covers(as_of))
+    }
+
     /// A unit's installations; where its part number is unknown, by its serial number.
     pub(crate) fn of(&self, (part, serial): &UnitKey) -> Vec<&'a Installation> {
         let is_of = |installation: &&&Installation| {
-            part.as_deref().is_none_or(|part| installation.part_number.as_str() == part)
+            part.as_deref().is_none_or(|part| installation.unit().0.as_str() == part)
         };
         self.0.get(serial.as_str()).into_iter().flatten().filter(is_of).copied().collect()
     }
@@ -113,6 +118,7 @@ mod tests {
             removed_utc: Some("2026-12-10T06:00:00Z".parse().unwrap()),
             unit_hours_at_install: None,
             tail_hours_at_install: None,
+            today: None,
         };
         let table = Installations::new(vec![installation]).unwrap();
         let named = |now: &str| {

@@ -5,12 +5,13 @@ use job::Config;
 use records::{Installation, Installations};
 use trend::{Observation, Series, UsageDefaults, UsageSource};
 
+use crate::bookkeeping::hour_meter::drop_contradicting;
+use crate::bookkeeping::installation_index::InstallationIndex;
+use crate::bookkeeping::maintenance_log;
+use crate::bookkeeping::unlogged_flights::UnloggedFlights;
 use crate::error::Error;
 use crate::history::flight_row::FlightRow;
 use crate::history::histories::{History, TailPosition, UnitKey};
-use crate::history::installation_index::InstallationIndex;
-use crate::history::maintenance_log;
-use crate::history::unlogged_flights::UnloggedFlights;
 
 /// Sources of usage in addition to rows: installations, maintenance, flights without a log.
 pub(crate) struct UsageSources<'a> {
@@ -48,10 +49,12 @@ impl<'a> UsageSources<'a> {
         let installed = if is_booked { &installations[..] } else { &[] };
         let first = installations.iter().min_by_key(|installation| installation.installed_utc);
         let unit_hours_at_start = first.and_then(|installation| installation.unit_hours_at_install);
-        let observations = observations(history, installed, &self.unlogged.of_unit(history, installed));
+        let mut observations = observations(history, installed, &self.unlogged.of_unit(history, installed));
+        let dropped = drop_contradicting(&mut observations);
         let source = self.source(history);
         let usage = UsageDefaults { unit_hours_at_start, source, ..UsageDefaults::default() };
-        Ok(Series::new(observations, &usage)?.with_maintenance(maintenance_events(&self.maintenance, name)))
+        let series = Series::new(observations, &usage)?.without_readings(dropped);
+        Ok(series.with_maintenance(maintenance_events(&self.maintenance, name)))
     }
 }
 

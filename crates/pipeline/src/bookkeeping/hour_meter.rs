@@ -1,0 +1,120 @@
+//! Check of hour-meter readings against each other: one misread digit must not become usage.
+//!
+//! Of two readings of one aircraft the later one is not smaller, and the meter gains no more hours than passed between the
+//! ends of the two flights. The longest chain of readings that agree is kept.
+
+use trend::Observation;
+
+/// Length of a flight that states none, hours; the allowance for rounded readings and times is as long.
+const ALLOWANCE_HOURS: f64 = 2.0;
+/// Readings that a chain may skip in a row.
+const MAX_SKIPPED: usize = 200;
+
+/// Drops the readings that contradict the others, installation by installation, and returns their number. Where fewer than
+/// half agree, the meter does not count hours, and all its readings are dropped.
+pub(crate) fn drop_contradicting(rows: &mut [Observation]) -> usize {
+    let mut order: Vec<usize> = (0..rows.len()).filter(|&row| rows[row].tail_hours_end.is_some()).collect();
+    order.sort_by_key(|&row| (rows[row].installation, rows[row].departure_us));
+    let mut dropped = 0;
+    let mut begin = 0;
+    while begin < order.len() {
+        let installation = rows[order[begin]].installation;
+        let end = begin + order[begin..].partition_point(|&row| rows[row].installation <= installation);
+        let readings: Vec<Reading> =
+            order[begin..end].iter().filter_map(|&row| Reading::of(&rows[row])).collect();
+        for (at, is_kept) in agreeing(&readings).into_iter().enumerate() {
+            if !is_kept {
+                rows[order[begin + at]].tail_hours_end = None;
+                dropped += 1;
+            }
+        }
+        begin = end;
+    }
+    dropped
+}
+
+/// A reading, and when its flight ended.
+#[derive(Debug, Clone, Copy)]
+struct Reading {
+    end_h: f64,
+    meter_h: f64,
+}
+
+impl Reading {
+    fn of(row: &Observation) -> Option<Self> {
+        const HOUR_US: f64 = 3.6e9;
+        let flown_h = row.flight_hours.unwrap_or(ALLOWANCE_HOURS);
+        Some(Self { end_h: row.departure_us as f64 / HOUR_US + flown_h, meter_h: row.tail_hours_end? })
+    }
+
+    fn agrees_with_later(&self, later: &Self) -> bool {
+        let gained_h = later.meter_h - self.meter_h;
+        gained_h >= -f64::EPSILON * later.meter_h && gained_h <= later.end_h - self.end_h + ALLOWANCE_HOURS
+    }
+}
+
+/// Whether each reading belongs to the longest chain in which neighbours agree.
+fn agreeing(readings: &[Reading]) -> Vec<bool> {
+    if readings.windows(2).all(|pair| pair[0].agrees_with_later(&pair[1])) {
+        return vec![true; readings.len()];
+    }
+    // Length of the longest chain that ends with each reading, and the reading before it.
+    let mut chains: Vec<(usize, Option<usize>)> = Vec::with_capacity(readings.len());
+    for (at, reading) in readings.iter().enumerate() {
+        let before = (at.saturating_sub(MAX_SKIPPED)..at).filter(|&b| readings[b].agrees_with_later(reading));
+        let longest = before.max_by_key(|&b| (chains[b].0, b));
+        chains.push((1 + longest.map_or(0, |b| chains[b].0), longest));
+    }
+    let mut kept = vec![false; readings.len()];
+    let mut last = (0..chains.len()).max_by_key(|&at| (chains[at].0, at));
+    if last.is_some_and(|at| 2 * chains[at].0 < readings.len()) {
+        return kept;
+    }
+    while let Some(at) = last {
+        kept[at] = true;
+        last = chains[at].1;
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Flights every twelve hours of two hours each, with the readings of their meter.
+    fn rows(meters_h: impl IntoIterator<Item = f64>) -> Vec<Observation> {
+        let row = |(at, meter_h): (i64, f64)| Observation {
+            departure_us: at * 12 * 3_600_000_000,
+            flight_hours: Some(2.0),
+            tail_hours_end: Some(meter_h),
+            ..Observation::default()
+        };
+        (0..).zip(meters_h).map(row).collect()
+    }
+
+    fn kept(mut rows: Vec<Observation>) -> (usize, Vec<bool>) {
+        let dropped = drop_contradicting(&mut rows);
+        (dropped, rows.iter().map(|row| row.tail_hours_end.is_some()).collect())
+    }
+
+    #[test]
+    fn a_misread_digit_up_or_down_is_dropped_and_the_rest_stays() {
+        let sound = |at: usize| 2_000.0 + 2.0 * at as f64;
+        for wrong_h in [38_095.0, 205.2, 2_900.0, 0.0] {
+            for wrong in [0, 7, 19] {
+                let meters = (0..20).map(|at| if at == wrong { wrong_h } else { sound(at) });
+                let (dropped, kept) = kept(rows(meters));
+                assert_eq!((dropped, kept[wrong]), (1, false), "{wrong_h} at {wrong}");
+            }
+        }
+        assert_eq!(kept(rows((0..20).map(sound))).0, 0);
+    }
+
+    #[test]
+    fn a_meter_in_minutes_is_no_hour_meter_and_one_that_was_exchanged_keeps_its_longer_side() {
+        assert_eq!(kept(rows((0..20).map(|at| 60.0 * (2_000.0 + 2.0 * f64::from(at))))).0, 20);
+        let exchanged = (0..20).map(|at| if at < 6 { 9_000.0 } else { 0.0 } + 2.0 * f64::from(at));
+        let (dropped, kept) = kept(rows(exchanged));
+        assert_eq!((dropped, &kept[..7]), (6, &[false, false, false, false, false, false, true][..]));
+    }
+}

@@ -1,0 +1,9 @@
+//! Bookkeeping of the operator: which unit was where, how many hours it had, what was done to it. It is joined to records
+//! when they are read.
+
+mod hour_meter;
+pub mod installation_index;
+pub mod join;
+pub mod maintenance_log;
+mod unlogged_flights;
+pub(crate) mod usage;
