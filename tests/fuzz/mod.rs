@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use ingest::log::in_memory::ChannelArrays;
 use job::Config;
-use pipeline::history::{external_estimates, maintenance_log};
+use pipeline::bookkeeping::maintenance_log;
+use pipeline::history::external_estimates;
 use records::{PartNumber, Status, TailNumber};
 
 use self::engine::{Input, Random, change_edits, edit_text, fuzz};

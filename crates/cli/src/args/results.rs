@@ -14,12 +14,24 @@ use crate::completion;
 /// `query`.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct QueryArgs {
-    /// Selection field.
-    #[arg(value_enum)]
-    pub by: QueryKey,
+    /// `tail`, `serial`, `flight` or `position`; may be left out where the value is known.
+    #[arg(value_name = "BY", required_unless_present_any = ["tail", "serial", "flight", "position"])]
+    pub first: Option<String>,
     /// Value to match.
-    #[arg(add = ArgValueCompleter::new(completion::queried))]
-    pub id: String,
+    #[arg(value_name = "ID", add = ArgValueCompleter::new(completion::queried))]
+    pub second: Option<String>,
+    /// Records of this tail.
+    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = ArgValueCompleter::new(completion::tails))]
+    pub tail: Option<String>,
+    /// Records of this unit.
+    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = ArgValueCompleter::new(completion::serials))]
+    pub serial: Option<String>,
+    /// Records of this flight.
+    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = ArgValueCompleter::new(completion::flights))]
+    pub flight: Option<String>,
+    /// Records of this position.
+    #[arg(long, help_heading = "Selection", conflicts_with = "first", add = ArgValueCompleter::new(completion::positions))]
+    pub position: Option<String>,
     #[command(flatten)]
     pub departures: DepartureArgs,
     /// Show only the newest N records.

@@ -3,9 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, Subcommand, ValueEnum};
+use clap_complete::ArgValueCompleter;
+use jiff::Timestamp;
 
-use super::parse::{parse_count, parse_span};
+use super::parse::{parse_count, parse_span, parse_utc};
 use super::rows::RowFormatArgs;
+use crate::completion;
 
 /// `store`.
 #[derive(Debug, ClapArgs)]
@@ -64,11 +67,39 @@ pub(crate) enum StoreCommand {
         #[arg(value_name = "TRIAL")]
         trial: PathBuf,
     },
+    /// Take records out, e.g. those of a log that was sent under a wrong tail; nothing is deleted
+    Forget(ForgetArgs),
     /// Export all records
     Export {
         #[command(flatten)]
         rows: RowFormatArgs,
     },
+}
+
+/// `store forget`: the records that meet all of its options.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ForgetArgs {
+    /// Records of this flight.
+    #[arg(long, value_name = "ID", add = ArgValueCompleter::new(completion::flights))]
+    pub flight: Option<String>,
+    /// Records of this log, by its path in the store.
+    #[arg(long, value_name = "PATH")]
+    pub log: Option<String>,
+    /// Records of this tail.
+    #[arg(long, add = ArgValueCompleter::new(completion::tails))]
+    pub tail: Option<String>,
+    /// Records of this position.
+    #[arg(long)]
+    pub position: Option<String>,
+    /// Departures at or after this UTC time.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub since: Option<Timestamp>,
+    /// Departures before this UTC time.
+    #[arg(long, value_parser = parse_utc, value_name = "UTC")]
+    pub until: Option<Timestamp>,
+    /// Bring forgotten records back instead.
+    #[arg(long)]
+    pub undo: bool,
 }
 
 /// Tables of the store.
@@ -84,4 +115,6 @@ pub(crate) enum Table {
     Alerts,
     /// Events of work requests.
     Work,
+    /// State of each unit after the last run.
+    States,
 }

@@ -1,13 +1,15 @@
-//! Tables in addition to the logs (CSV or Parquet): installations, flights, maintenance, estimates.
+//! Tables in addition to the logs (CSV or Parquet): installations, aliases, flights, maintenance, estimates.
 //!
 //! A small table is read whole as text ([`Table`]), a long one in batches with typed columns ([`TableBatch`]).
 
+mod aliases;
 pub mod cell;
 mod column_batches;
 pub mod flights;
 mod installations;
 mod table;
 
+pub use aliases::aliases;
 pub use cell::{name, number, utc};
 pub use column_batches::{StringColumn, TableBatch, TableBatches, TableSplits, batches, trim_ascii_fast};
 pub use installations::installations;

@@ -77,6 +77,10 @@ pub struct LogSettings {
     pub files: Vec<String>,
     /// The installations table, CSV or Parquet.
     pub installations: String,
+    /// Units that were modified or re-identified, CSV or Parquet: `former_serial_number`, `serial_number`; optional
+    /// `former_part_number`, `part_number`. A unit keeps its history under its numbers of today.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub aliases: Option<String>,
     /// The flights table, CSV or Parquet: facts about flights that the logs do not hold.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flights: Option<String>,

@@ -199,8 +199,11 @@ fn matching(
     let (mut silent, mut tables) = (BTreeSet::new(), TableFolders::default());
     // `**` reaches our own results and tables, which are no logs.
     let logs = &config.document.logs;
-    let user_tables: Vec<PathBuf> =
-        std::iter::once(&logs.installations).chain(&logs.flights).map(|table| config.path(table)).collect();
+    let user_tables: Vec<PathBuf> = std::iter::once(&logs.installations)
+        .chain(&logs.flights)
+        .chain(&logs.aliases)
+        .map(|table| config.path(table))
+        .collect();
     let store = config.store();
     let ours = |path: &PathBuf| path.starts_with(&store) || user_tables.contains(path);
     let invalid = |pattern: &str, e: &dyn std::fmt::Display| {

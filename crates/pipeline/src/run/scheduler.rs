@@ -55,14 +55,20 @@ pub struct Context<'a> {
     pub watch: &'a (dyn Fn(Event) + Sync),
 }
 
-/// Reads the installations table that the configuration names.
+/// Reads the installations table that the configuration names, with the units' numbers of today.
 ///
 /// # Errors
 /// [`Error::Refused`] with every diagnostic about it.
 pub fn installations(config: &Config) -> Result<Installations, Error> {
     let file = config.path(&config.document.logs.installations);
-    ingest::tables::installations(&file, &config.document.columns.installations)
-        .map_err(|found| Error::Refused(found.iter().map(ingest::Error::diagnostic).collect()))
+    let refused =
+        |found: Vec<ingest::Error>| Error::Refused(found.iter().map(ingest::Error::diagnostic).collect());
+    let table =
+        ingest::tables::installations(&file, &config.document.columns.installations).map_err(refused)?;
+    let aliases =
+        config.document.logs.aliases.as_ref().map(|file| ingest::tables::aliases(&config.path(file)));
+    let aliases = aliases.transpose().map_err(|error| refused(vec![error]))?;
+    Ok(table.with_aliases(&aliases.unwrap_or_default()))
 }
 
 /// Dry run: returns the plan of a run without executing it.

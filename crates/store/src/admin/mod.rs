@@ -5,3 +5,4 @@ pub(crate) mod follow_up;
 pub(crate) mod info;
 pub(crate) mod run_log;
 pub(crate) mod verify;
+pub(crate) mod withdraw;

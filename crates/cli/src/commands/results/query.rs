@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use arrow::array::{RecordBatch, StringArray};
 use arrow::datatypes::{DataType, Field, Schema};
+use clap::ValueEnum;
 use job::Config;
 use pipeline::explain::remedy;
 use records::row_schema::to_batch;
@@ -30,9 +31,10 @@ const LEAST_HISTORY: usize = 3;
 pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Result<Code, Failure> {
     check_range(args.departures.since, args.departures.until)?;
     let (config, installations) = load_with_installations(global)?;
-    let records = pipeline::open_store(&config, &installations)?.records(&query_of(args))?;
+    let query = query_of(args, &config)?;
+    let records = pipeline::open_store(&config, &installations)?.records(&query)?;
     if records.is_empty() {
-        check_names(args, &KnownNames::read(&config))?;
+        check_names(&query, &KnownNames::read(&config))?;
     }
     row_output::write_rows(
         &args.rows,
@@ -42,9 +44,8 @@ pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Resul
     )?;
     if records.is_empty() {
         output.note(&format!(
-            "no record of {} `{}`{}; list the store's contents with `freeplay store info`",
-            word(args.by),
-            args.id,
+            "no record of {}{}; list the store's contents with `freeplay store info`",
+            selected(&query),
             range(args)
         ));
     }
@@ -52,15 +53,12 @@ pub(crate) fn query(args: &QueryArgs, global: &Global, output: &Output) -> Resul
 }
 
 /// Refuses an unknown name of the selection.
-fn check_names(args: &QueryArgs, known: &KnownNames) -> Result<(), Failure> {
-    let id = Some(args.id.as_str());
-    match args.by {
-        QueryKey::Tail => check_name("tail", id, known.tails())?,
-        QueryKey::Serial => check_name("serial number", id, known.serials())?,
-        QueryKey::Flight => check_name("flight", id, known.flights())?,
-        QueryKey::Position => check_name("position", id, known.positions())?,
-    }
-    check_name("part number", args.part.as_deref(), known.parts())
+fn check_names(query: &Query, known: &KnownNames) -> Result<(), Failure> {
+    check_name("tail", query.tail_number.as_deref(), known.tails())?;
+    check_name("serial number", query.serial_number.as_deref(), known.serials())?;
+    check_name("flight", query.flight_id.as_deref(), known.flights())?;
+    check_name("position", query.position.as_deref(), known.positions())?;
+    check_name("part number", query.part_number.as_deref(), known.parts())
 }
 
 /// The searched range as text.
@@ -71,27 +69,66 @@ fn range(args: &QueryArgs) -> String {
     [part, since, until].into_iter().flatten().collect()
 }
 
-fn word(by: QueryKey) -> &'static str {
-    match by {
-        QueryKey::Tail => "tail",
-        QueryKey::Serial => "serial",
-        QueryKey::Flight => "flight",
-        QueryKey::Position => "position",
-    }
+/// The selected names as text.
+fn selected(query: &Query) -> String {
+    let names = [
+        ("tail", &query.tail_number),
+        ("serial", &query.serial_number),
+        ("flight", &query.flight_id),
+        ("position", &query.position),
+    ];
+    let names = names.iter().filter_map(|(word, name)| Some(format!("{word} `{}`", name.as_ref()?)));
+    names.collect::<Vec<_>>().join(", ")
 }
 
-fn query_of(args: &QueryArgs) -> Query {
-    let id = |by: QueryKey| (args.by == by).then(|| args.id.clone());
-    Query {
-        tail_number: id(QueryKey::Tail),
-        serial_number: id(QueryKey::Serial),
-        flight_id: id(QueryKey::Flight),
-        position: id(QueryKey::Position),
+/// The selection: by options, by a word and a value, or by a value alone that a tail, serial number, flight or position has.
+fn query_of(args: &QueryArgs, config: &Config) -> Result<Query, Failure> {
+    let base = Query {
+        tail_number: args.tail.clone(),
+        serial_number: args.serial.clone(),
+        flight_id: args.flight.clone(),
+        position: args.position.clone(),
         part_number: args.part.clone(),
         run_id: None,
         since_utc: args.departures.since,
         until_utc: args.departures.until,
         last: args.last,
+    };
+    let by = |by: QueryKey, id: &str| {
+        let id = Some(id.to_owned());
+        match by {
+            QueryKey::Tail => Query { tail_number: id, ..base.clone() },
+            QueryKey::Serial => Query { serial_number: id, ..base.clone() },
+            QueryKey::Flight => Query { flight_id: id, ..base.clone() },
+            QueryKey::Position => Query { position: id, ..base.clone() },
+        }
+    };
+    match (args.first.as_deref(), args.second.as_deref()) {
+        (None, _) => Ok(base),
+        (Some(word), Some(id)) => match QueryKey::from_str(word, false) {
+            Ok(key) => Ok(by(key, id)),
+            Err(_) => Err(Failure::usage(
+                "unknown_field",
+                format!("records cannot be selected by `{word}`"),
+                "use `tail`, `serial`, `flight` or `position`, e.g. `freeplay query tail N412FP`",
+            )),
+        },
+        (Some(id), None) => {
+            let known = KnownNames::read(config);
+            let key = if known.tails().any(|name| name == id) {
+                QueryKey::Tail
+            } else if known.serials().any(|name| name == id) {
+                QueryKey::Serial
+            } else if known.flights().any(|name| name == id) {
+                QueryKey::Flight
+            } else {
+                let positions =
+                    known.tails().chain(known.serials()).chain(known.flights()).chain(known.positions());
+                check_name("tail, serial number, flight or position", Some(id), positions)?;
+                QueryKey::Position
+            };
+            Ok(by(key, id))
+        }
     }
 }
 

@@ -14,7 +14,7 @@ use records::row_schema::to_batch;
 use serde_json::json;
 use store::{Holder, Info, Query, RunRecord, Store};
 
-use crate::args::{Format, Global, RowFormatArgs, StoreArgs, StoreCommand, Table};
+use crate::args::{ForgetArgs, Format, Global, RowFormatArgs, StoreArgs, StoreCommand, Table};
 use crate::exit::{Code, Failure};
 use crate::output::Output;
 use crate::progress::{Progress, span};
@@ -41,6 +41,7 @@ pub(crate) fn store(args: &StoreArgs, global: &Global, output: &Output) -> Resul
         StoreCommand::Verify => verify(&store, output),
         StoreCommand::Compact => compact(&store, output),
         StoreCommand::Adopt { trial } => adopt(&store, trial, output),
+        StoreCommand::Forget(args) => forget(&store, args, output),
         StoreCommand::Export { rows } => export(&config, rows, output),
     }
 }
@@ -203,6 +204,34 @@ fn adopt(store: &Store, trial: &Path, output: &Output) -> Result<Code, Failure> 
         trial.dir().display(),
     ))?;
     Ok(Code::Success)
+}
+
+fn forget(store: &Store, args: &ForgetArgs, output: &Output) -> Result<Code, Failure> {
+    let query = Query {
+        tail_number: args.tail.clone(),
+        flight_id: args.flight.clone(),
+        position: args.position.clone(),
+        since_utc: args.since,
+        until_utc: args.until,
+        ..Query::default()
+    };
+    let selects = query != Query::default() || args.log.is_some();
+    if !selects {
+        let hint = "give `--flight`, `--log`, `--tail`, `--position`, `--since` or `--until`";
+        return Err(Failure::usage("nothing_selected", "no record is selected", hint));
+    }
+    let changed =
+        store.lock(&Holder::this_process(), None)?.withdraw(&query, args.log.as_deref(), args.undo)?;
+    let records = count(changed, "record");
+    output.write_result(&match (changed, args.undo) {
+        (0, _) => "no stored record matches\n".to_owned(),
+        (_, true) => format!("brought back {records}\n  next  `freeplay run` assesses the fleet with them\n"),
+        (_, false) => format!(
+            "took out {records}; nothing is deleted, the same command with `--undo` brings them back\n  \
+             next  `freeplay run` assesses the fleet without them; with `--retry` it also stores another log of these flights\n"
+        ),
+    })?;
+    Ok(if changed == 0 { Code::LogsInError } else { Code::Success })
 }
 
 fn compact(store: &Store, output: &Output) -> Result<Code, Failure> {

@@ -1,0 +1,58 @@
+//! Withdrawal: records that no command reads any more, and their return.
+//!
+//! A withdrawn record keeps all its columns except its status, so nothing is lost, and other programs that select by status
+//! leave it out too.
+
+use std::sync::Arc;
+
+use arrow::array::{Array, ArrayRef, AsArray, BooleanArray, RecordBatch, StringArray};
+use arrow::compute::and;
+use arrow::error::ArrowError;
+use records::Status;
+
+use crate::error::Error;
+use crate::read::query::Query;
+use crate::read::scan::Condition;
+use crate::write::writer::Writer;
+
+const COLUMNS: [&str; 7] =
+    ["status", "gap_m", "tail_number", "flight_id", "position", "departure_utc", "log_path"];
+
+impl Writer {
+    /// Withdraws the matching records, or brings withdrawn ones back, in one commit, and returns their number.
+    ///
+    /// A query selects by tail, flight, position and departure, and `log_path` the records of one log.
+    ///
+    /// # Errors
+    /// As [`Writer::rewrite`].
+    pub fn withdraw(&mut self, query: &Query, log_path: Option<&str>, undo: bool) -> Result<usize, Error> {
+        let of_log = log_path.map(|path| Condition::texts("log_path", path, path));
+        let conditions: Vec<Condition> = query.conditions().into_iter().chain(of_log).collect();
+        self.rewrite(&COLUMNS, &|batch| with_status(batch, &conditions, undo))
+    }
+}
+
+/// A batch of [`COLUMNS`] in which the matching rows have their new status.
+fn with_status(batch: &RecordBatch, conditions: &[Condition], undo: bool) -> Result<RecordBatch, ArrowError> {
+    let mut matches = BooleanArray::from(vec![true; batch.num_rows()]);
+    for condition in conditions {
+        let column = batch.column(batch.schema_ref().index_of(condition.column)?);
+        matches = and(&matches, &condition.matches(column)?)?;
+    }
+    let (statuses, gaps) = (batch.column(0).as_string::<i32>(), batch.column(1));
+    let status = |row: usize| match (matches.value(row), undo) {
+        (true, false) => Status::Withdrawn.as_str(),
+        (true, true) if statuses.value(row) == Status::Withdrawn.as_str() => {
+            if gaps.is_valid(row) {
+                Status::Estimated.as_str()
+            } else {
+                Status::Refused.as_str()
+            }
+        }
+        _ => statuses.value(row),
+    };
+    let new: StringArray = (0..batch.num_rows()).map(|row| Some(status(row))).collect();
+    let mut columns: Vec<ArrayRef> = batch.columns().to_vec();
+    columns[0] = Arc::new(new);
+    RecordBatch::try_new(batch.schema(), columns)
+}
