@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+mod bookkeeping;
 mod cli_output;
 mod docs;
 mod follow_up;

@@ -92,15 +92,18 @@ fn work_on_a_unit_that_was_never_installed_is_named() {
     assert_eq!(json["unknown_units"].as_array().unwrap().len(), 2);
 }
 
-/// A typo of a part number takes the part's records away until it is corrected: the run counts them.
+/// A typo of a part number takes nothing away: the records and the states of its units stay until it is corrected.
 #[test]
-fn records_that_a_run_removes_are_counted() {
+fn a_misspelt_part_number_takes_nothing_away() {
     let fleet = TestFleet::sample();
     fleet.run_ok(&["run", "--tail", "N412FP", "--quiet"]);
+    let before = fleet.exported();
     edit(&fleet, "pipeline.toml", |toml| toml.replace("EMA-27-1040", "EMA-27-1004"));
     let run = fleet.freeplay(&["run", "--tail", "N412FP"]);
     assert_eq!(run.code, Some(1), "{run:?}");
-    assert!(run.out.contains("withdrawn   20 stored records removed"), "{}", run.out);
+    assert!(run.out.contains("20 stored records of logs that failed now stay"), "{}", run.out);
+    let gaps = |rows: &str| rows.lines().filter(|line| line.contains("EMA-27-1040")).count();
+    assert_eq!(gaps(&fleet.exported()), gaps(&before));
     let log = "N412FP/";
     let listed: Vec<&str> =
         run.out.lines().filter(|l| l.contains(log) && l.contains("part_unknown")).collect();
@@ -175,7 +178,8 @@ fn a_serial_number_that_loses_all_flights_is_named_with_the_one_that_has_them() 
     edit(&fleet, "sample-data/installations.csv", |table| table.replace("1040-0005", "1040-0050"));
     let run = fleet.run_ok(&["run"]);
     let changes = run.split("state changes in this run: ").nth(1).unwrap();
-    let lost = "1040-0005: normal → no state (no flight is left; aileron_left of N412FP is EMA-27-1040 / 1040-0050 now)";
+    let lost = "1040-0005: normal → no state (no flight is left); cause: 10 flights of N412FP aileron_left (2026-09-10 to 2026-11-10) \
+                moved from EMA-27-1040 / 1040-0005 to EMA-27-1040 / 1040-0050";
     assert!(changes.starts_with("2 units\n") && changes.contains(lost), "{run}");
     // What has another serial number is all that changed: the other units of the tail have the state they had.
     assert!(!changes.contains("1040-0006"), "{run}");

@@ -39,10 +39,15 @@ impl Explanation {
         matches!(self.verdict, ReplayVerdict::Same | ReplayVerdict::OtherSettings)
     }
 
+    /// Whether the settings of the record are those of the configuration.
+    pub fn has_current_settings(&self) -> bool {
+        self.config_digest == self.record.provenance.config_digest
+    }
+
     /// Record, remedy, settings and result of the recomputation, SI.
     pub fn to_json(&self, config: &Config) -> Value {
         let digest = self.config_digest.as_str();
-        let is_current = *digest == *self.record.provenance.config_digest;
+        let is_current = self.has_current_settings();
         let part = config.document.part.get(self.record.part_number.as_str());
         json!({
             "record": self.record,
@@ -71,7 +76,10 @@ pub fn explain(
 ) -> Result<Explanation, Error> {
     let record = find(key, store)?;
     let replayed = replay(&record, config, installations);
-    let config_digest = config.digest(&record.flight.tail_number, &record.part_number).to_string();
+    let flight = &record.flight;
+    let installed = installations.installed_at(&flight.tail_number, &record.position, flight.departure_utc);
+    let part = installed.map_or(&record.part_number, |installation| &installation.part_number);
+    let config_digest = config.digest(&flight.tail_number, part).to_string();
     let verdict = ReplayVerdict::of(&record, &replayed, &config_digest);
     Ok(Explanation { record, replayed, verdict, config_digest })
 }

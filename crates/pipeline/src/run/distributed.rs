@@ -160,7 +160,7 @@ pub fn run(
         let budget = MemoryBudget::new(config.document.run.memory_mib);
         let steps = StepCount::default();
         let worker = &inputs.worker(&budget, &steps);
-        let mut ledger = OwnershipLedger::of(worker.plan, worker.config, worker.installations);
+        let mut ledger = OwnershipLedger::of(worker.plan, worker.config);
         report.not_reached = 0;
         for works in worker.plan.work.chunks(at_a_time.max(1)) {
             process_batch((worker, context), works, engine, (writer, &mut ledger, report))?;

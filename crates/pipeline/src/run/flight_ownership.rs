@@ -12,8 +12,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use job::Config;
-use job::flight_log::{duplicate_flight, may_be_pieces, pieces_undeclared, sample_digest};
-use records::{Diagnostic, GapRecord, Installations, Status};
+use job::flight_log::{duplicate_flight, may_be_pieces, pieces_undeclared};
+use records::{Diagnostic, GapRecord, Status};
 use store::{HeldRecord, LogOutcome, LogRecord, LogResult, RecordKey, Writer};
 
 use crate::error::Error;
@@ -53,7 +53,6 @@ impl LogOutcomeData {
 /// Ledger of the writer: which log owns which flight, in the store and after this run.
 pub(crate) struct OwnershipLedger<'a> {
     config: &'a Config,
-    installations: &'a Installations,
     plan: &'a Plan,
     accounts: HashMap<String, LogRecord>,
     /// Records of this run.
@@ -68,8 +67,8 @@ pub(crate) struct OwnershipLedger<'a> {
 
 /// What becomes of a record that another log holds too.
 enum Claim {
-    /// The new record counts.
-    Takes,
+    /// The new record counts; the other one may have the same samples.
+    Takes { is_same: bool },
     /// The other log's record stays; it has the same samples.
     IsCopy,
     /// The other log's record stays, since it has a gap and the new one has none.
@@ -79,10 +78,9 @@ enum Claim {
 }
 
 impl<'a> OwnershipLedger<'a> {
-    pub(crate) fn of(plan: &'a Plan, config: &'a Config, installations: &'a Installations) -> Self {
+    pub(crate) fn of(plan: &'a Plan, config: &'a Config) -> Self {
         let mut ledger = Self {
             config,
-            installations,
             plan,
             accounts: HashMap::new(),
             own: HashMap::new(),
@@ -168,12 +166,15 @@ impl<'a> OwnershipLedger<'a> {
                 continue;
             };
             let owner = other.log_path.clone();
-            match self.claim(&account, &record, other) {
-                Claim::Takes if self.own.contains_key(&RecordKey::of(&record)) => {
-                    displaced.entry(owner).or_insert(other.log_digest == record.provenance.log_digest);
+            let new = HeldRecord::of(&record);
+            let is_same = other.log_digest == new.log_digest || other.fingerprint == new.fingerprint;
+            match self.claim(&account, &record, other, is_same) {
+                Claim::Takes { is_same } => {
+                    if self.own.contains_key(&RecordKey::of(&record)) {
+                        displaced.entry(owner).or_insert(is_same);
+                    }
                     kept.push(record);
                 }
-                Claim::Takes => kept.push(record),
                 Claim::IsCopy => copy_of = Some(owner),
                 Claim::IsWorse => worse_than = Some(owner),
                 Claim::Contradicts => contradicts = Some(owner),
@@ -218,24 +219,33 @@ impl<'a> OwnershipLedger<'a> {
     }
 
     /// What becomes of a record of a log where another log's record of the same flight is held.
-    fn claim(&self, account: &LogRecord, record: &GapRecord, held: &HeldRecord) -> Claim {
+    fn claim(&self, account: &LogRecord, record: &GapRecord, held: &HeldRecord, is_same: bool) -> Claim {
         let is_estimated = record.estimate.status == Status::Estimated;
-        let is_gone = !self.accounts.contains_key(&held.log_path);
+        let holder = self.accounts.get(&held.log_path);
+        let is_gone = holder.is_none();
+        // A log that broke speaks for no record any more; a copy of what it was takes its place.
+        let is_broken = holder.is_some_and(|holder| holder.estimated + holder.refused == 0);
         match (is_estimated, held.is_estimated) {
-            (true, false) => Claim::Takes,
+            (true, false) => Claim::Takes { is_same: false },
             (false, true) => Claim::IsWorse,
-            _ if is_gone => Claim::Takes,
-            _ => {
-                let is_new = self.own.contains_key(&RecordKey::of(record));
-                let takes = is_new && !self.is_stored(account) && account.log_path < held.log_path;
-                let is_same = held.log_digest == record.provenance.log_digest
-                    || self.holds_the_same(account, &held.log_path);
-                match (takes || (is_new && self.is_stored(account)), is_same) {
-                    (true, _) => Claim::Takes,
-                    (false, true) => Claim::IsCopy,
-                    (false, false) => Claim::Contradicts,
-                }
-            }
+            _ if is_gone || (is_broken && is_same) => Claim::Takes { is_same },
+            _ => match (self.precedes(account, record, held), is_same) {
+                (true, is_same) => Claim::Takes { is_same },
+                (false, true) => Claim::IsCopy,
+                (false, false) => Claim::Contradicts,
+            },
+        }
+    }
+
+    /// Whether a log comes before the holder of its flight: the one that was stored before this run, else by name.
+    fn precedes(&self, account: &LogRecord, record: &GapRecord, held: &HeldRecord) -> bool {
+        let is_held_by_run = self.own.contains_key(&RecordKey::of(record));
+        let holder = self.accounts.get(&held.log_path);
+        match (self.is_stored(account), holder.is_some_and(|holder| self.is_stored(holder))) {
+            _ if !is_held_by_run => false,
+            (true, false) => true,
+            (false, true) => false,
+            _ => account.log_path < held.log_path,
         }
     }
 
@@ -318,15 +328,6 @@ impl<'a> OwnershipLedger<'a> {
         results
     }
 
-    /// Whether two logs hold the same samples in different encodings. Rare, so both are read.
-    fn holds_the_same(&self, one: &LogRecord, other: &str) -> bool {
-        let digest = |log_path: &str| {
-            let files = self.plan.files.get(log_path)?;
-            sample_digest(files, log_path, self.config, self.installations).ok()
-        };
-        digest(&one.log_path).is_some_and(|one| digest(other) == Some(one))
-    }
-
     fn store(
         &mut self,
         mut account: LogRecord,
@@ -341,12 +342,7 @@ impl<'a> OwnershipLedger<'a> {
         self.keep_counts(&mut account, report);
         for record in &records {
             self.touched.insert((Some(record.part_number.to_string()), record.serial_number.to_string()));
-            let held = HeldRecord {
-                log_path: account.log_path.clone(),
-                log_digest: record.provenance.log_digest.clone(),
-                is_estimated: record.estimate.status == Status::Estimated,
-            };
-            self.own.insert(RecordKey::of(record), held);
+            self.own.insert(RecordKey::of(record), HeldRecord::of(record));
         }
         self.insert(account.clone());
         LogResult { account, records, moved_from }
@@ -354,13 +350,12 @@ impl<'a> OwnershipLedger<'a> {
 
     /// A log that failed keeps the records that it had, and its account says so.
     fn keep_counts(&self, account: &mut LogRecord, report: &mut RunSummary) {
-        let before =
-            self.plan.accounts.get(&account.log_path).filter(|_| account.outcome == LogOutcome::Error);
-        let Some(before) = before.filter(|before| before.estimated + before.refused > 0) else { return };
-        if account.estimated + account.refused == 0
-            && account.error_code.as_deref() != Some("duplicate_flight")
-        {
-            report.kept += (before.estimated + before.refused) as usize;
+        let is_failed =
+            account.outcome == LogOutcome::Error && account.error_code.as_deref() != Some("duplicate_flight");
+        let Some(before) = self.plan.accounts.get(&account.log_path).filter(|_| is_failed) else { return };
+        let left = before.estimated + before.refused - account.estimated - account.refused;
+        if left > 0 {
+            report.kept += left as usize;
             if plan::is_same_flight(before, account) {
                 (account.estimated, account.refused) = (before.estimated, before.refused);
             }

@@ -151,8 +151,6 @@ pub struct Plan {
     pub standing_errors: Vec<StandingError>,
     /// Files of groups whose flight has no main log.
     pub strays: Vec<String>,
-    /// Files of every log found; empty without work.
-    pub files: BTreeMap<String, LogFiles>,
 }
 
 /// An error of an earlier run whose log has not changed since: it is reported until the log or a setting is fixed.
@@ -261,7 +259,6 @@ pub fn plan(
         for account in gone.into_iter().filter(|account| digests(account).is_some()) {
             plan.gone.entry(account.log_digest.clone().unwrap_or_default()).or_default().push(account);
         }
-        plan.files = found.into_iter().map(|(log_path, (files, _))| (log_path, files)).collect();
     }
     plan
 }

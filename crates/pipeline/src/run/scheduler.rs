@@ -140,6 +140,7 @@ pub(crate) fn execute_run(
         program_version: context.program_version.to_owned(),
     });
     let Touched { mut units, renamed } = work(&inputs, &intent, &mut writer, &mut report)?;
+    report.absent = report.absent.saturating_sub(renamed.len());
     let tables = Bookkeeping::new(config, &inputs.installations);
     report.moved = tables.write(&mut writer, &renamed)?.moved;
     let with_records = units.clone();
@@ -296,7 +297,7 @@ fn write(
     writer: &mut Writer,
     report: &mut RunSummary,
 ) -> Result<Touched, Error> {
-    let mut ledger = OwnershipLedger::of(&inputs.plan, &inputs.config, &inputs.installations);
+    let mut ledger = OwnershipLedger::of(&inputs.plan, &inputs.config);
     while let Next::Log(first) = pool.next(None)? {
         let gathered = collect_batch(*first, pool)?.into_iter();
         let mut results: Vec<LogResult> = Vec::new();

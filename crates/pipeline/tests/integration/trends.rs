@@ -346,7 +346,7 @@ fn a_night_tells_what_its_flights_changed_and_of_a_first_night_nothing() {
     let limit = &night(&lower, &nothing, &config()).changed[0];
     assert_eq!(limit.cause, Cause::Limit);
     assert!(
-        limit.because.contains("limit_m changed from 40 to 150 µm (pipeline.toml line"),
+        limit.because.contains("limit_m changed from 40 µm to 150 µm (pipeline.toml line"),
         "{}",
         limit.because
     );

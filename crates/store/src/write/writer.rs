@@ -5,9 +5,9 @@ use std::slice;
 use std::sync::Arc;
 use std::time::Duration;
 
-use arrow::array::{AsArray, BooleanArray, RecordBatch};
+use arrow::array::{Array, AsArray, BooleanArray, RecordBatch};
 use arrow::compute::filter_record_batch;
-use arrow::datatypes::{Schema, TimestampMicrosecondType};
+use arrow::datatypes::{Float64Type, Int64Type, Schema, TimestampMicrosecondType};
 use arrow::error::ArrowError;
 use records::{GapRecord, Status};
 
@@ -44,6 +44,23 @@ pub struct HeldRecord {
     pub log_digest: String,
     /// Whether it has a gap.
     pub is_estimated: bool,
+    /// Both gaps, the load's quantiles and the number of samples, bit by bit: equal samples give equal bits.
+    pub fingerprint: [Option<u64>; 5],
+}
+
+impl HeldRecord {
+    /// Of a record that is about to be stored.
+    pub fn of(record: &GapRecord) -> Self {
+        let estimate = &record.estimate;
+        let numbers = [estimate.gap_m, estimate.gap_midrange_m, estimate.load_p05_n, estimate.load_p95_n];
+        let [gap, midrange, low, high] = numbers.map(|number| number.map(f64::to_bits));
+        Self {
+            log_path: record.provenance.log_path.clone(),
+            log_digest: record.provenance.log_digest.clone(),
+            is_estimated: estimate.status == Status::Estimated,
+            fingerprint: [gap, midrange, low, high, Some(estimate.samples as u64)],
+        }
+    }
 }
 
 /// The one who writes, for as long as it lives.
@@ -108,8 +125,20 @@ impl Writer {
     /// # Errors
     /// As [`Store::records`].
     pub fn held(&self, keys: &BTreeSet<RecordKey>) -> Result<BTreeMap<RecordKey, HeldRecord>, Error> {
-        const COLUMNS: [&str; 7] =
-            ["departure_utc", "tail_number", "flight_id", "position", "log_path", "log_digest", "status"];
+        const COLUMNS: [&str; 12] = [
+            "departure_utc",
+            "tail_number",
+            "flight_id",
+            "position",
+            "log_path",
+            "log_digest",
+            "status",
+            "gap_m",
+            "gap_midrange_m",
+            "load_p05_n",
+            "load_p95_n",
+            "samples",
+        ];
         let wanted: MergeDecisions<'_> = keys.iter().map(|key| (key.clone(), None)).collect();
         let snapshot = self.store.gaps.snapshot()?;
         let may_hold = |file: &&DataFile| file.has_rows() && may_hold_any(file, &wanted);
@@ -120,10 +149,15 @@ impl Writer {
         let mut held = BTreeMap::new();
         for batch in scan::read_files(&files, &Arc::new(schema.project(&columns)?), &[])? {
             let [logs, digests, statuses] = [4, 5, 6].map(|at| batch.column(at).as_string::<i32>());
+            let numbers = [7, 8, 9, 10].map(|at| batch.column(at).as_primitive::<Float64Type>());
+            let samples = batch.column(11).as_primitive::<Int64Type>();
             for (row, key) in keys_of(&batch)?.into_iter().enumerate() {
                 let status = statuses.value(row);
                 if keys.contains(&key) && status != Status::Withdrawn.as_str() {
+                    let bits = numbers.map(|n| n.is_valid(row).then(|| n.value(row).to_bits()));
+                    let [gap, midrange, low, high] = bits;
                     let record = HeldRecord {
+                        fingerprint: [gap, midrange, low, high, Some(samples.value(row) as u64)],
                         log_path: logs.value(row).to_owned(),
                         log_digest: digests.value(row).to_owned(),
                         is_estimated: status == Status::Estimated.as_str(),

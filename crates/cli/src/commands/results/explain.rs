@@ -103,15 +103,16 @@ fn page(found: &Explanation, config: &Config) -> String {
         ),
     );
     line("log", &format!("{} ({})", p.log_path, short(&p.log_digest)));
-    line(
-        "settings",
-        &format!(
-            "{} ({}), method {}",
-            config.file.display(),
-            short(&p.config_digest),
-            config.document.estimate.method.as_str()
-        ),
-    );
+    let (file, method) = (config.file.display(), config.document.estimate.method.as_str());
+    let settings = if found.has_current_settings() {
+        format!("{file} ({}), method {method}", short(&p.config_digest))
+    } else {
+        format!(
+            "others than today's in {file} ({}); what follows of the part is today's",
+            short(&p.config_digest)
+        )
+    };
+    line("settings", &settings);
     line(
         "computed by",
         &format!(

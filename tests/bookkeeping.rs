@@ -1,0 +1,331 @@
+//! Corrected tables: what is stored stays, and every surface shows the correction at once, with or without the logs.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::harness::{TestFleet, facts, rewrite};
+
+const TABLE: &str = "sample-data/installations.csv";
+
+fn edit(fleet: &TestFleet, file: &str, change: impl Fn(&str) -> String) {
+    let text = std::fs::read_to_string(fleet.path(file)).unwrap();
+    let changed = change(&text);
+    assert_ne!(changed, text, "{file} was not changed");
+    std::fs::write(fleet.path(file), changed).unwrap();
+}
+
+/// The trend of every unit, by serial number.
+fn trend(fleet: &TestFleet) -> BTreeMap<String, Value> {
+    let rows: Vec<Value> = serde_json::from_str(&fleet.run_ok(&["trend", "--json"])).unwrap();
+    rows.into_iter().map(|row| (row["serial_number"].as_str().unwrap().to_owned(), row)).collect()
+}
+
+fn run(fleet: &TestFleet) -> Value {
+    serde_json::from_str(&fleet.freeplay(&["run", "--json"]).out).unwrap()
+}
+
+/// Number of exported records that hold a text.
+fn records_with(fleet: &TestFleet, text: &str) -> usize {
+    fleet.exported().lines().filter(|line| line.contains(text)).count()
+}
+
+/// A unit that was exchanged on 1 October is entered when the logs are in the archive.
+#[test]
+fn a_corrected_table_counts_without_the_logs_and_before_the_next_run() {
+    let fleet = TestFleet::processed();
+    edit(&fleet, "pipeline.toml", |text| {
+        text.replacen("limit_m = 150e-6\nwatch_m = 110e-6", "limit_m = 60e-6", 1)
+    });
+    std::fs::rename(fleet.path("sample-data/logs/N414FP"), fleet.path("archive")).unwrap();
+    let before = trend(&fleet)["1040-0013"].clone();
+    assert_eq!(before["state"], "act", "{before}");
+    edit(&fleet, TABLE, |table| {
+        table.replace(
+            "N414FP,aileron_left,EMA-27-1040,1040-0013,2026-09-07T00:00:00Z,,2310.0,3744.0",
+            "N414FP,aileron_left,EMA-27-1040,1040-0013,2026-09-07T00:00:00Z,2026-10-01T00:00:00Z,2310.0,3744.0\n\
+             N414FP,aileron_left,EMA-27-1040,1040-0099,2026-10-01T00:00:00Z,,100.0,3760.0",
+        )
+    });
+    // The gaps above the limit are those of the unit that the table names now, before any run.
+    let now = trend(&fleet);
+    assert_eq!((&now["1040-0099"]["state"], &now["1040-0013"]["state"]), (&"act".into(), &Value::Null));
+    let flights = |row: &Value| row["flights"].as_i64().unwrap();
+    assert_eq!(flights(&now["1040-0099"]) + flights(&now["1040-0013"]), flights(&before));
+    let queried = fleet.run_ok(&["query", "serial", "1040-0099", "--format", "csv"]);
+    assert_eq!(queried.lines().count() as i64, 1 + flights(&now["1040-0099"]));
+    let summary = run(&fleet);
+    let moved = &summary["moved"][0];
+    assert_eq!(moved["from_serial_number"], "1040-0013");
+    assert_eq!(
+        (&moved["serial_number"], &moved["flights"]),
+        (&"1040-0099".into(), &now["1040-0099"]["flights"])
+    );
+    let changed = summary["changed"].as_array().unwrap();
+    let change = changed.iter().find(|change| change["serial_number"] == "1040-0099").unwrap();
+    assert_eq!((&change["cause"], &change["to"]), (&"bookkeeping".into(), &"act".into()), "{change}");
+    assert!(change["because"].as_str().unwrap().contains("N414FP aileron_left"), "{change}");
+    // What other programs read is rewritten, once.
+    assert_eq!(trend(&fleet), now);
+    let files = fleet.run_ok(&["store", "files"]);
+    assert!(run(&fleet)["moved"].as_array().unwrap().is_empty());
+    assert_eq!(fleet.run_ok(&["store", "files"]), files);
+    assert_eq!(fleet.freeplay(&["run", "--fail-on", "act"]).code, Some(4));
+}
+
+/// Departures are found before flight numbers, which fly every day again.
+#[test]
+fn a_flight_number_that_recurs_takes_the_hours_of_its_own_day() {
+    let fleet = TestFleet::processed();
+    let before = trend(&fleet)["1040-0005"].clone();
+    let flights = fleet.run_ok(&["query", "tail", "N412FP", "--format", "csv"]);
+    let header: Vec<&str> = flights.lines().next().unwrap().split(',').collect();
+    let column = |name: &str| header.iter().position(|column| *column == name).unwrap();
+    let cells = ["departure_utc", "flight_hours", "tail_hours_end"].map(column);
+    let rows: std::collections::BTreeSet<String> = flights
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let row: Vec<&str> = line.split(',').collect();
+            format!("N412FP,FP100,{},{},{}\n", row[cells[0]], row[cells[1]], row[cells[2]])
+        })
+        .collect();
+    assert_eq!(rows.len(), 10);
+    let table = "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n".to_owned();
+    std::fs::write(fleet.path("flights.csv"), rows.iter().fold(table, |all, row| all + row)).unwrap();
+    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\nflights = \"flights.csv\"\n"));
+    for log in fleet.logs().into_iter().filter(|log| log.to_str().unwrap().contains("N412FP")) {
+        let mut identity = facts(&log);
+        identity.retain(|(key, _)| key != "flight_hours" && key != "tail_hours_end");
+        identity.iter_mut().filter(|(key, _)| key == "flight_id").for_each(|(_, id)| *id = "FP100".into());
+        let new = log.with_extension("new");
+        rewrite(&log, &new, &identity, |_| true, |_| true);
+        std::fs::rename(&new, &log).unwrap();
+    }
+    std::fs::remove_dir_all(fleet.path("results")).unwrap();
+    fleet.run_ok(&["run"]);
+    let now = trend(&fleet)["1040-0005"].clone();
+    for column in ["flights", "unit_hours", "gap_m", "state"] {
+        assert_eq!(now[column], before[column], "{column}");
+    }
+}
+
+/// One digit of the hour meter of a flight without a log.
+#[test]
+fn a_misread_hour_meter_moves_no_usage_and_is_named() {
+    let fleet = TestFleet::processed();
+    let rows = |meter: &str| {
+        format!(
+            "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n\
+             N414FP,X1,2026-10-02T00:00:00Z,1.0,{meter}\n"
+        )
+    };
+    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\nflights = \"flights.csv\"\n"));
+    let with = |meter: &str| {
+        std::fs::write(fleet.path("flights.csv"), rows(meter)).unwrap();
+        trend(&fleet)["1040-0013"].clone()
+    };
+    let (without, slip) = (with(""), with("38095.0"));
+    let hours = |row: &Value| row["unit_hours"].as_f64().unwrap();
+    assert!((hours(&slip) - hours(&without)).abs() < 1e-6, "{slip}");
+    assert_eq!(slip["state"], without["state"]);
+    assert!(slip["reason"].as_str().unwrap().contains("1 hour-meter readings that contradict"), "{slip}");
+}
+
+/// The table says where a unit is, and not its last log.
+#[test]
+fn a_unit_is_where_the_table_has_it_now() {
+    let fleet = TestFleet::processed();
+    edit(&fleet, TABLE, |table| {
+        let out = "1040-0013,2026-09-07T00:00:00Z,2026-11-15T00:00:00Z,";
+        let moved = table.replace("1040-0013,2026-09-07T00:00:00Z,,", out);
+        let moved = moved.replace(
+            "1040-0005,2026-09-07T00:00:00Z,,",
+            "1040-0005,2026-09-07T00:00:00Z,2026-11-15T00:00:00Z,",
+        );
+        moved + "N412FP,aileron_left,EMA-27-1040,1040-0013,2026-11-15T00:00:00Z,,,\n"
+    });
+    edit(&fleet, "pipeline.toml", |text| text.replace("as_of = \"newest_record\"", "as_of = \"now\""));
+    let rows = trend(&fleet);
+    let place = |serial: &str| {
+        let row = &rows[serial];
+        ["tail_number", "position"].map(|column| row[column].as_str().unwrap_or_default().to_owned())
+    };
+    assert_eq!(place("1040-0013"), ["N412FP", "aileron_left"]);
+    let removed = &rows["1040-0005"];
+    assert_eq!((&removed["state"], &removed["removed_utc"]), (&Value::Null, &"2026-11-15T00:00:00Z".into()));
+}
+
+#[test]
+fn another_limit_is_told_as_the_cause_of_a_state() {
+    let fleet = TestFleet::processed();
+    edit(&fleet, "pipeline.toml", |text| text.replacen("limit_m = 150e-6", "limit_m = 1500e-6", 1));
+    edit(&fleet, "pipeline.toml", |text| text.replacen("watch_m = 110e-6", "watch_m = 20e-6", 1));
+    let summary = run(&fleet);
+    let changed = summary["changed"].as_array().unwrap();
+    assert!(!changed.is_empty(), "{summary}");
+    for change in changed {
+        assert_eq!(change["cause"], "limit", "{change}");
+        let because = change["because"].as_str().unwrap();
+        assert!(
+            because.contains("limit_m changed from 150 µm to 1500 µm (pipeline.toml line 38)"),
+            "{because}"
+        );
+    }
+}
+
+/// The inbox of a night: one path, another flight each time. And two configurations that share a store.
+#[test]
+fn a_path_that_comes_back_with_another_flight_adds_a_flight() {
+    let fleet = TestFleet::sample();
+    let logs = fleet.logs();
+    edit(&fleet, "pipeline.toml", |text| text.replace("sample-data/logs/**/*.parquet", "inbox/*.parquet"));
+    std::fs::create_dir(fleet.path("inbox")).unwrap();
+    for (night, log) in logs.iter().take(3).enumerate() {
+        std::fs::copy(log, fleet.path("inbox/N412FP.parquet")).unwrap();
+        fleet.run_ok(&["run"]);
+        assert_eq!(records_with(&fleet, "N412FP"), 4 * (night + 1));
+    }
+    let other = std::fs::read_to_string(fleet.path("pipeline.toml")).unwrap();
+    let other = other.replace("inbox/*.parquet", "sample-data/logs/N413FP/*.parquet");
+    std::fs::write(fleet.path("other.toml"), other).unwrap();
+    fleet.run_ok(&["--config", "other.toml", "run"]);
+    fleet.run_ok(&["run"]);
+    assert_eq!((records_with(&fleet, "N412FP"), records_with(&fleet, "N413FP")), (12, 40));
+}
+
+/// The same samples under another departure are the same flight: it moves, and is not there twice.
+#[test]
+fn a_corrected_departure_moves_a_flight() {
+    let fleet = TestFleet::sample();
+    edit(&fleet, "pipeline.toml", |text| {
+        let text = text.replace("departure_utc = \"departure_utc\", ", "");
+        text.replace("[logs]\n", "[logs]\nflights = \"flights.csv\"\n")
+            .replace("logs/**/*.parquet", "logs/N412FP/*.parquet")
+    });
+    let rows = |first_hour: u32| {
+        let row = |n: u32| {
+            let hour = if n == 1 { first_hour } else { 10 };
+            format!("N412FP,N412FP-{n:04},2026-10-{n:02}T{hour:02}:00:00Z\n")
+        };
+        let rows: String = (1..=10).map(row).collect();
+        std::fs::write(fleet.path("flights.csv"), format!("tail_number,flight_id,departure_utc\n{rows}"))
+            .unwrap();
+    };
+    rows(10);
+    // A log without its row fails, and is stored once the row is there.
+    edit(&fleet, "flights.csv", |text| text.lines().take(10).map(|line| format!("{line}\n")).collect());
+    assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
+    assert_eq!(records_with(&fleet, "N412FP"), 36);
+    rows(10);
+    fleet.run_ok(&["run"]);
+    assert_eq!(records_with(&fleet, "N412FP"), 40);
+    rows(12);
+    let summary = fleet.run_ok(&["run"]);
+    assert!(summary.contains("1 new or changed"), "{summary}");
+    assert_eq!((records_with(&fleet, "N412FP"), records_with(&fleet, "2026-10-01T12:00:00")), (40, 4));
+    assert!(fleet.run_ok(&["run"]).contains("0 new or changed"));
+    // A log that moved to another folder and name is no other flight.
+    let log = fleet.logs().into_iter().find(|log| log.to_str().unwrap().contains("N412FP")).unwrap();
+    std::fs::rename(&log, log.with_file_name("renamed.parquet")).unwrap();
+    let summary = fleet.run_ok(&["run"]);
+    assert!(!summary.contains("absent"), "{summary}");
+    assert_eq!(records_with(&fleet, "N412FP"), 40);
+    let explained = fleet.run_ok(&["explain", "N412FP-0001", "aileron_left"]);
+    assert!(explained.contains("renamed.parquet") && explained.contains("bit-identical"), "{explained}");
+}
+
+/// A log is sent again for the one position that failed.
+#[test]
+fn of_two_logs_of_a_flight_the_better_record_counts_position_by_position() {
+    let fleet = TestFleet::sample();
+    let log = fleet.logs().swap_remove(0);
+    let whole = log.with_file_name("z_whole.parquet");
+    let before = {
+        let fleet = TestFleet::processed();
+        fleet.exported()
+    };
+    std::fs::copy(&log, fleet.path("whole")).unwrap();
+    rewrite(
+        &fleet.path("whole"),
+        &log,
+        &facts(&log),
+        |column| !column.starts_with("aileron_left_load"),
+        |_| true,
+    );
+    fleet.freeplay(&["run"]);
+    assert_eq!(records_with(&fleet, "channel_unmapped"), 1);
+    std::fs::rename(fleet.path("whole"), &whole).unwrap();
+    fleet.run_ok(&["run"]);
+    let gaps = |text: &str| {
+        let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        let digest = header.iter().position(|name| *name == "log_digest").unwrap();
+        let line = |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            [&cells[..digest], &cells[digest + 1..]].concat().join(",")
+        };
+        text.lines().map(line).collect::<Vec<_>>()
+    };
+    assert_eq!(gaps(&fleet.exported()), gaps(&before));
+}
+
+#[test]
+fn records_are_taken_out_and_come_back() {
+    let fleet = TestFleet::processed();
+    let (before, states) = (fleet.exported(), trend(&fleet));
+    let nothing = fleet.freeplay(&["store", "forget"]);
+    assert_eq!(nothing.code, Some(2));
+    assert!(nothing.err.contains("nothing_selected"), "{nothing:?}");
+    let told = fleet.run_ok(&["store", "forget", "--tail", "N414FP"]);
+    assert!(told.contains("took out 40 records") && told.contains("--undo"), "{told}");
+    assert_eq!((records_with(&fleet, "N414FP"), trend(&fleet).contains_key("1040-0013")), (0, false));
+    // Neither a run nor a compaction brings them back; an unchanged log is not read again.
+    fleet.run_ok(&["run"]);
+    fleet.run_ok(&["store", "compact"]);
+    fleet.run_ok(&["store", "verify"]);
+    assert_eq!(records_with(&fleet, "N414FP"), 0);
+    assert!(
+        fleet.run_ok(&["store", "forget", "--tail", "N414FP", "--undo"]).contains("brought back 40 records")
+    );
+    assert_eq!((fleet.exported(), trend(&fleet)), (before, states));
+    assert_eq!(fleet.freeplay(&["store", "forget", "--flight", "X"]).code, Some(1));
+}
+
+#[test]
+fn a_unit_keeps_its_history_under_its_numbers_of_today() {
+    let fleet = TestFleet::processed();
+    let before = trend(&fleet)["1040-0013"].clone();
+    // A modification: another part number, on the same serial number, in the same place.
+    edit(&fleet, TABLE, |table| {
+        table.replace(
+            "N414FP,aileron_left,EMA-27-1040,1040-0013,2026-09-07T00:00:00Z,,2310.0,3744.0",
+            "N414FP,aileron_left,EMA-27-1060,1040-0013,2026-09-07T00:00:00Z,2026-10-01T00:00:00Z,2310.0,3744.0\n\
+             N414FP,aileron_left,EMA-27-1040,1040-0013,2026-10-01T00:00:00Z,,,",
+        )
+    });
+    assert_eq!(trend(&fleet)["1040-0013"]["flights"], before["flights"]);
+    // A new name plate.
+    std::fs::write(fleet.path("aliases.csv"), "former_serial_number,serial_number\n1040-0005,SN-5\n")
+        .unwrap();
+    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\naliases = \"aliases.csv\"\n"));
+    let rows = trend(&fleet);
+    assert_eq!(rows["SN-5"]["flights"], 10);
+    assert!(!rows.contains_key("1040-0005"));
+    assert!(Path::new(&fleet.path("aliases.csv")).exists());
+}
+
+/// `freeplay query N412FP`, with a word, with an option, and with a name that nothing has.
+#[test]
+fn a_known_name_is_enough_for_a_query() {
+    let fleet = TestFleet::processed();
+    let by_word = fleet.run_ok(&["query", "tail", "N412FP"]);
+    assert_eq!(fleet.run_ok(&["query", "N412FP"]), by_word);
+    assert_eq!(fleet.run_ok(&["query", "--tail", "N412FP"]), by_word);
+    assert_eq!(fleet.run_ok(&["query", "1040-0005"]), fleet.run_ok(&["query", "serial", "1040-0005"]));
+    let unknown = fleet.freeplay(&["query", "N412F"]);
+    assert_eq!(unknown.code, Some(2));
+    assert!(unknown.err.contains("`N412FP`"), "{}", unknown.err);
+    assert_eq!(fleet.freeplay(&["query"]).code, Some(2));
+    assert!(fleet.freeplay(&["query", "wing", "N412FP"]).err.contains("unknown_field"));
+}
