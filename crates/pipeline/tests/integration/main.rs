@@ -3,7 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod alerts;
+mod bookkeeping;
 mod distributed;
+#[path = "../../../../tests/gate.rs"]
+mod gate;
 mod quantities;
 mod report;
 mod scatter;

@@ -1,0 +1,255 @@
+//! Random sequences of logs, corrected tables, withdrawals and kills end where one ordered run over the last tables does:
+//! what is stored then is what that run makes of each log.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use ingest::Flights;
+use jiff::{SignedDuration, Timestamp};
+use job::Config;
+use pipeline::bookkeeping::join::Bookkeeping;
+use rayon::prelude::*;
+use records::{
+    Alias, Flight, FlightId, GapEstimate, GapRecord, Installation, Installations, LogOutcome, LogRecord,
+    PartNumber, Position, Provenance, RunRecord, SerialNumber, Status, TailNumber,
+};
+use store::{Holder, LogResult, Query, Store, Writer};
+
+use crate::gate::is_gate;
+
+const FLIGHTS: i64 = 6;
+const POSITIONS: [&str; 2] = ["aileron_left", "aileron_right"];
+const VERSIONS: u64 = 6;
+
+/// Pseudo-random whole numbers below a bound.
+struct Chance(u64);
+
+impl Chance {
+    fn below(&mut self, bound: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % bound
+    }
+}
+
+fn departure(flight: i64) -> Timestamp {
+    "2026-03-01T06:00:00Z".parse::<Timestamp>().unwrap() + SignedDuration::from_hours(24 * flight)
+}
+
+/// The tables of a version: each has a unit in every position at every time, so that every record has its place.
+fn tables(version: u64) -> (Config, Installations) {
+    let mut config = Config::parse(
+        include_str!("../../../../tests/data/three-aircraft/pipeline.toml"),
+        Path::new("pipeline.toml"),
+        Path::new("."),
+    )
+    .unwrap();
+    let change = departure(version as i64) - SignedDuration::from_hours(1);
+    let unit = |position: &str, serial: &str, from: Timestamp, to: Option<Timestamp>| Installation {
+        tail_number: TailNumber::new("N1").unwrap(),
+        position: Position::new(position).unwrap(),
+        part_number: PartNumber::new(if version == 4 { "EMA-27-1060" } else { "EMA-27-1040" }).unwrap(),
+        serial_number: SerialNumber::new(serial).unwrap(),
+        installed_utc: from,
+        removed_utc: to,
+        unit_hours_at_install: Some(100.0 * version as f64),
+        tail_hours_at_install: Some(1_000.0),
+        today: None,
+    };
+    let begin = departure(-1);
+    let rows = match version % 3 {
+        0 => vec![unit(POSITIONS[0], "A", begin, None), unit(POSITIONS[1], "B", begin, None)],
+        1 => vec![
+            unit(POSITIONS[0], "A", begin, Some(change)),
+            unit(POSITIONS[0], "C", change, None),
+            unit(POSITIONS[1], "B", begin, None),
+        ],
+        _ => vec![
+            unit(POSITIONS[0], "A", begin, Some(change)),
+            unit(POSITIONS[1], "B", begin, Some(change)),
+            unit(POSITIONS[0], "B", change, None),
+            unit(POSITIONS[1], "A", change, None),
+        ],
+    };
+    let alias = Alias {
+        former_part_number: None,
+        former_serial_number: SerialNumber::new("B").unwrap(),
+        part_number: None,
+        serial_number: SerialNumber::new("B-new").unwrap(),
+    };
+    let installations = Installations::new(rows).unwrap();
+    let aliases = if version == 5 { vec![alias] } else { Vec::new() };
+    let dir = tempfile::tempdir().unwrap();
+    let row = |flight: i64| {
+        let hours = 1.0 + 0.25 * version as f64;
+        format!("N1,FP1,{},{hours},{}\n", departure(flight), 1_000.0 + hours * (flight + 1) as f64)
+    };
+    let rows: String = (0..FLIGHTS).map(row).collect();
+    let head = "tail_number,flight_id,departure_utc,flight_hours,tail_hours_end\n";
+    std::fs::write(dir.path().join("flights.csv"), format!("{head}{rows}")).unwrap();
+    let identity = &config.document.identity;
+    let read = Flights::read(&dir.path().join("flights.csv"), &BTreeMap::new(), identity);
+    config.flights = Arc::new(read.unwrap());
+    (config, installations.with_aliases(&aliases))
+}
+
+/// What a run stores of a flight's log under some tables. `correction` is the state of the log's content.
+fn result(flight: i64, correction: u64, (config, installations): &(Config, Installations)) -> LogResult {
+    let at = departure(flight);
+    let log_path = format!("N1/{flight}.parquet");
+    let row = config.flights.of("N1", "FP1", at);
+    let record = |position: &str| {
+        let place = Position::new(position).unwrap();
+        let tail = TailNumber::new("N1").unwrap();
+        let installation = installations.installed_at(&tail, &place, at).unwrap();
+        let (part, serial) = installation.unit();
+        let meter = row.and_then(|row| row.tail_hours_end);
+        let gap_m = 1e-6 * (50 + flight) as f64 + 1e-7 * correction as f64;
+        let estimate =
+            GapEstimate { status: Status::Estimated, gap_m: Some(gap_m), ..GapEstimate::default() };
+        GapRecord {
+            flight: Flight {
+                tail_number: tail,
+                flight_id: FlightId::new("FP1").unwrap(),
+                departure_utc: at,
+                flight_hours: row.and_then(|row| row.flight_hours),
+                tail_hours_end: meter,
+            },
+            position: place,
+            part_number: part.clone(),
+            serial_number: serial.clone(),
+            unit_hours: installation.unit_hours(meter),
+            estimate,
+            provenance: Provenance {
+                log_path: log_path.clone(),
+                log_digest: format!("d{correction}"),
+                config_digest: "c".into(),
+                program_version: "0".into(),
+                run_id: "run".into(),
+                processed_utc: departure(FLIGHTS),
+            },
+        }
+    };
+    let records: Vec<GapRecord> = POSITIONS.map(record).to_vec();
+    let account = LogRecord {
+        log_path: log_path.clone(),
+        size_bytes: 1,
+        modified_utc_ns: 0,
+        file_id: String::new(),
+        log_digest: Some(format!("d{correction}")),
+        config_digest: Some("c".into()),
+        tail_number: Some("N1".into()),
+        flight_id: Some("FP1".into()),
+        departure_utc: Some(at),
+        positions: POSITIONS.map(str::to_owned).to_vec(),
+        outcome: LogOutcome::Done,
+        estimated: records.len() as i64,
+        refused: 0,
+        error_code: None,
+        error_detail: None,
+        duration_s: 0.1,
+        run_id: "run".into(),
+        processed_utc: departure(FLIGHTS),
+    };
+    LogResult { account, records, moved_from: Vec::new() }
+}
+
+fn run_row(number: i64, tables_digest: Option<String>) -> RunRecord {
+    RunRecord {
+        run_id: format!("run-{number}"),
+        started_utc: departure(100 + number),
+        finished_utc: Some(departure(100 + number)),
+        program_version: "0".into(),
+        config_path: String::new(),
+        found: 0,
+        known: 0,
+        done: 0,
+        estimated: 0,
+        refused: 0,
+        errors: 0,
+        not_reached: 0,
+        exit_code: tables_digest.as_ref().map(|_| 0),
+        tables_digest,
+    }
+}
+
+fn writer(folder: &Path) -> Writer {
+    Store::create_or_open(folder).unwrap().lock(&Holder::this_process(), None).unwrap()
+}
+
+/// A run: some logs, then the tables, then its end; a killed one stops after `steps`.
+fn run(
+    folder: &Path,
+    number: i64,
+    logs: &[(i64, u64)],
+    tables: &(Config, Installations),
+    steps: u64,
+) -> Vec<(i64, u64)> {
+    let mut writer = writer(folder);
+    writer.begin_run(&run_row(number, None), &[]).unwrap();
+    let done: Vec<(i64, u64)> = logs.iter().take(steps as usize).copied().collect();
+    let results: Vec<LogResult> =
+        done.iter().map(|(flight, content)| result(*flight, *content, tables)).collect();
+    if !results.is_empty() {
+        writer.commit(&results).unwrap();
+    }
+    if steps as usize > logs.len() {
+        let books = Bookkeeping::new(&tables.0, &tables.1);
+        books.write(&mut writer, &BTreeMap::new()).unwrap();
+        if steps as usize > logs.len() + 1 {
+            writer.end_run(&run_row(number, Some(books.digest().to_owned()))).unwrap();
+        }
+    }
+    done
+}
+
+fn records(folder: &Path, tables: &(Config, Installations)) -> Vec<GapRecord> {
+    let books = Bookkeeping::new(&tables.0, &tables.1);
+    books.join_to(Store::open(folder).unwrap()).unwrap().records(&Query::default()).unwrap()
+}
+
+#[test]
+fn any_order_of_logs_corrections_and_kills_ends_where_one_ordered_run_does() {
+    let versions: Vec<(Config, Installations)> = (0..VERSIONS).map(tables).collect();
+    let sequences = if is_gate() { 1_000 } else { 12 };
+    (0..sequences).into_par_iter().for_each(|seed| {
+        let mut chance = Chance(seed);
+        let dir = tempfile::tempdir().unwrap();
+        let mixed = dir.path().join("results");
+        // The content of each log that was stored last, and flights that are withdrawn.
+        let mut stored = BTreeMap::<i64, u64>::new();
+        let mut withdrawn = BTreeMap::<i64, u64>::new();
+        for number in 0..2 + chance.below(4) as i64 {
+            let logs: Vec<(i64, u64)> = (0..chance.below(4))
+                .map(|_| (chance.below(FLIGHTS as u64) as i64, chance.below(3)))
+                .collect();
+            let steps = chance.below(logs.len() as u64 + 4);
+            let version = &versions[chance.below(VERSIONS) as usize];
+            for (flight, correction) in run(&mixed, number, &logs, version, steps) {
+                stored.insert(flight, correction);
+                withdrawn.remove(&flight);
+            }
+            if chance.below(5) == 0 {
+                let flight = chance.below(FLIGHTS as u64) as i64;
+                let until_utc = Some(departure(flight) + SignedDuration::from_hours(1));
+                let query = Query { since_utc: Some(departure(flight)), until_utc, ..Query::default() };
+                let undo = withdrawn.contains_key(&flight);
+                let count = writer(&mixed).withdraw(&query, None, undo).unwrap();
+                assert_eq!(count > 0, stored.contains_key(&flight) || undo, "seed {seed}");
+                if undo {
+                    stored.extend(withdrawn.remove(&flight).map(|correction| (flight, correction)));
+                } else {
+                    withdrawn.extend(stored.remove(&flight).map(|correction| (flight, correction)));
+                }
+            }
+        }
+        let last = &versions[chance.below(VERSIONS) as usize];
+        // What one run over the last tables stores, in order of departure.
+        let logs = stored.into_iter().map(|(flight, content)| result(flight, content, last));
+        let expected: Vec<GapRecord> = logs.flat_map(|result| result.records).collect();
+        // Every reader joins the tables, before and after a run writes them.
+        assert_eq!(records(&mixed, last), expected, "seed {seed}, joined");
+        run(&mixed, 90, &[], last, u64::MAX);
+        assert_eq!(Store::open(&mixed).unwrap().records(&Query::default()).unwrap(), expected, "seed {seed}");
+    });
+}
