@@ -315,6 +315,43 @@ fn a_unit_keeps_its_history_under_its_numbers_of_today() {
     assert!(Path::new(&fleet.path("aliases.csv")).exists());
 }
 
+/// A play above the limit, measured by hand, on a unit whose records are below it.
+#[test]
+fn a_hangar_check_above_the_limit_makes_the_state_until_a_renewal() {
+    let fleet = TestFleet::processed();
+    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\ninspections = \"checks.csv\"\n"));
+    let check = |rows: &str| {
+        std::fs::write(fleet.path("checks.csv"), format!("serial_number,date_utc,play_m\n{rows}")).unwrap();
+    };
+    check("1040-0005,2026-11-01T00:00:00Z,410e-6\n1040-0006,2026-08-01T00:00:00Z,410e-6\n");
+    let row = trend(&fleet)["1040-0005"].clone();
+    assert_eq!(
+        (&row["state"], &row["reason_code"], &row["due_utc"]),
+        (&"act".into(), &"inspected".into(), &row["as_of_utc"])
+    );
+    let reason = row["reason"].as_str().unwrap();
+    assert!(
+        reason.contains("the hangar check of 2026-11-01 measured 410.0 µm where the records before it read"),
+        "{reason}"
+    );
+    assert!(reason.contains("at or above the limit of 150.0 µm"), "{reason}");
+    // One from before the installation is not of this gap.
+    assert_ne!(trend(&fleet)["1040-0006"]["state"], "act");
+    assert_eq!(fleet.freeplay(&["run", "--fail-on", "act"]).code, Some(4));
+    std::fs::write(
+        fleet.path("work.csv"),
+        "part_number,serial_number,utc,kind\nEMA-27-1040,1040-0005,2026-11-02T00:00:00Z,reshim\n",
+    )
+    .unwrap();
+    edit(&fleet, "pipeline.toml", |text| text.replace("[logs]\n", "[logs]\nmaintenance = \"work.csv\"\n"));
+    assert_ne!(trend(&fleet)["1040-0005"]["state"], "act");
+    // One that cannot be right is refused before anything is stored.
+    check("1040-0005,2026-11-01T00:00:00Z,410\n");
+    let refused = fleet.freeplay(&["run"]);
+    assert_eq!(refused.code, Some(2));
+    assert!(refused.err.contains("checks.csv") && refused.err.contains("64 µm are 64e-6"), "{}", refused.err);
+}
+
 /// `freeplay query N412FP`, with a word, with an option, and with a name that nothing has.
 #[test]
 fn a_known_name_is_enough_for_a_query() {
@@ -327,5 +364,5 @@ fn a_known_name_is_enough_for_a_query() {
     assert_eq!(unknown.code, Some(2));
     assert!(unknown.err.contains("`N412FP`"), "{}", unknown.err);
     assert_eq!(fleet.freeplay(&["query"]).code, Some(2));
-    assert!(fleet.freeplay(&["query", "wing", "N412FP"]).err.contains("unknown_field"));
+    assert!(fleet.freeplay(&["query", "wing", "N412FP"]).err.contains("cannot be selected by `wing`"));
 }

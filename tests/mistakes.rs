@@ -35,7 +35,7 @@ const TYPED: &[Mistake] = &[
     (Nothing, &["querry"], 2, &["querry", "'query'"]),
     (Nothing, &["store", "inf"], 2, &["inf", "'info'"]),
     (Nothing, &["run", "--tale", "N412FP"], 2, &["--tale", "--tail"]),
-    (Nothing, &["query"], 2, &["<BY>", "<ID>"]),
+    (Nothing, &["query"], 2, &["<BY>"]),
     (Nothing, &["diff", "results"], 2, &["<AFTER>"]),
     (Nothing, &["query", "tial", "N412FP"], 2, &["tial", "'tail'", "serial, flight, position"]),
     (Nothing, &["query", "tail", "N412FP", "--last", "0"], 2, &["--last", "`0`", "at least 1"]),

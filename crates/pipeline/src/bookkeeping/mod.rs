@@ -2,6 +2,7 @@
 //! when they are read.
 
 mod hour_meter;
+pub(crate) mod inspections;
 pub mod installation_index;
 pub mod join;
 pub mod maintenance_log;

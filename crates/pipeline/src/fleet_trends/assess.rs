@@ -1,14 +1,15 @@
 //! Fleet assessment: trends of units from the store's records, by part and serial number across tails.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use jiff::Timestamp;
 use job::Config;
 use rayon::prelude::*;
-use records::{Installations, QuantityChange, QuantityRow};
+use records::{Installation, Installations, QuantityChange, QuantityRow};
 use store::{Query, Store};
 use trend::{Assessment, FleetPrior, Series, State, UsageDefaults};
 
+use crate::bookkeeping::inspections::{self, InspectionRow};
 use crate::bookkeeping::installation_index::InstallationIndex;
 use crate::bookkeeping::usage::UsageSources;
 use crate::error::Error;
@@ -28,6 +29,7 @@ use crate::monitoring::mapping_faults::{self, MappingFault};
 use crate::monitoring::recent::{RecentDiagnostics, recent_diagnostics};
 use crate::monitoring::recorder_change::{RecorderChange, recorder_changes};
 use crate::quantities::follow::{FollowedQuantities, UnitFacts, follow, gap_row};
+use crate::quantities::peers;
 use crate::quantities::values;
 use job::config::{AsOf, QuantityLimits};
 use records::TrendRow;
@@ -122,7 +124,7 @@ pub fn assess_store_with_quantities(
     Ok(StoreAssessment {
         followed: fleet.followed_of(&now, &tail_wide),
         mapping_faults: fleet.mapping_faults_of(&now),
-        notes: coverage::notes(&now, config),
+        notes: fleet.notes(&now, config),
         now,
     })
 }
@@ -172,7 +174,7 @@ pub fn assess_run(
         recent,
         followed: fleet.followed.clone(),
         mapping_faults: fleet.mapping_faults.clone(),
-        notes: coverage::notes(&now, config),
+        notes: fleet.notes(&now, config),
         changes: changes(config, &store.states()?, &now, run),
         ..RunAssessments::default()
     };
@@ -181,7 +183,12 @@ pub fn assess_run(
     let states = now.iter().filter_map(|row| row.state);
     states.for_each(|state| *run.states.entry(state).or_default() += 1);
     let needs_attention = |row: &&TrendRow| row.state.is_some_and(|state| state != State::Normal.as_str());
-    let gap = |row: &TrendRow| Finding::of_gap(row, fleet.latest_flight(&row.unit(), as_of));
+    let causes: BTreeMap<UnitKey, &String> =
+        run.changes.changed.iter().map(|change| (change.unit(), &change.because)).collect();
+    let gap = |row: &TrendRow| Finding {
+        cause: causes.get(&row.unit()).map(|cause| (*cause).clone()),
+        ..Finding::of_gap(row, fleet.latest_flight(&row.unit(), as_of))
+    };
     let of_common = Finding::of_common_changes(&run.followed.changes, as_of);
     run.findings =
         now.iter().map(gap).chain(Finding::of_quantities(&run.followed.rows)).chain(of_common).collect();
@@ -248,7 +255,7 @@ pub(crate) fn assess_for_report(
         Some((part.map(str::to_owned), Timestamp::from_microsecond(turn).ok()?, prior.clone()))
     };
     let priors = selected.into_iter().filter_map(priors).collect();
-    let (mapping_faults, notes) = (fleet.mapping_faults_of(&now), coverage::notes(&now, config));
+    let (mapping_faults, notes) = (fleet.mapping_faults_of(&now), fleet.notes(&now, config));
     Ok(ReportAssessments { now, followed, mapping_faults, notes, drawn, before, past, priors })
 }
 
@@ -332,6 +339,35 @@ impl UnitFacts for Facts<'_, '_> {
     }
 }
 
+/// Inspections by serial number, earliest first.
+fn by_serial(rows: Option<Vec<InspectionRow>>) -> HashMap<String, Vec<InspectionRow>> {
+    let mut rows = rows.unwrap_or_default();
+    rows.sort_by_key(|row| row.date_utc);
+    let mut found = HashMap::<String, Vec<InspectionRow>>::new();
+    for row in rows {
+        found.entry(row.serial_number.clone()).or_default().push(row);
+    }
+    found
+}
+
+/// The row of a unit with its latest inspection: one at or above the limit makes the state, and one that contradicts the
+/// records is named.
+fn inspected(row: TrendRow, inspection: &InspectionRow, records: &[FlightRow]) -> TrendRow {
+    let (statement, contradicts) = inspection.statement(records);
+    let reason = row.reason.clone().unwrap_or_default();
+    let is_above = row.limit_m.is_some_and(|limit_m| inspection.play_m >= limit_m);
+    if is_above && row.state != Some(State::Act.as_str()) {
+        let limit_um = row.limit_m.unwrap_or_default() * 1e6;
+        let reason = format!("{statement}, at or above the limit of {limit_um:.1} µm; records: {reason}");
+        let (state, reason_code) = (Some(State::Act.as_str()), Some("inspected"));
+        return TrendRow { state, reason_code, reason: Some(reason), ..row };
+    }
+    if is_above || contradicts {
+        return TrendRow { reason: Some(format!("{reason}; {statement}")), ..row };
+    }
+    row
+}
+
 /// All units, and the fleet prior of each part by training cut-off.
 pub(crate) struct FleetContext<'a> {
     limits: Limits<'a>,
@@ -347,6 +383,8 @@ pub(crate) struct FleetContext<'a> {
     mapping_faults: Vec<MappingFault>,
     /// Installations of the store's own units; of external tables none apply.
     installations: Option<InstallationIndex<'a>>,
+    /// Inspections of the store's own units, by serial number, earliest first.
+    inspections: HashMap<String, Vec<InspectionRow>>,
 }
 
 impl<'a> FleetContext<'a> {
@@ -363,7 +401,8 @@ impl<'a> FleetContext<'a> {
         let read = |(name, history)| books.series(name, history, is_booked);
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
         let installations = is_booked.then(|| InstallationIndex::new(installations));
-        Ok(Self { installations, ..Self::of(config, histories, series) }.taught_by(days))
+        let inspections = if is_booked { by_serial(inspections::read(config)?) } else { HashMap::new() };
+        Ok(Self { installations, inspections, ..Self::of(config, histories, series) }.taught_by(days))
     }
 
     /// The same for a caller that no longer needs the histories: columns that the series hold are dropped.
@@ -383,7 +422,8 @@ impl<'a> FleetContext<'a> {
         let units: Vec<_> = histories.iter_mut().collect();
         let series = units.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?;
         let installations = is_booked.then(|| InstallationIndex::new(installations));
-        Ok(Self { installations, ..Self::of(config, histories, series) }.taught_by(days))
+        let inspections = if is_booked { by_serial(inspections::read(config)?) } else { HashMap::new() };
+        Ok(Self { installations, inspections, ..Self::of(config, histories, series) }.taught_by(days))
     }
 
     /// Histories, and the usage series of each.
@@ -400,6 +440,7 @@ impl<'a> FleetContext<'a> {
             moved: Vec::new(),
             mapping_faults: Vec::new(),
             installations: None,
+            inspections: HashMap::new(),
         }
     }
 
@@ -443,6 +484,13 @@ impl<'a> FleetContext<'a> {
         let recent = recent_diagnostics(store, as_of)?;
         let mapping_faults = mapping_faults::detect(&recent, |part| self.limits.stiffness_n_per_m(part));
         Ok((Self { followed, conditions, moved, mapping_faults, ..self }, recent))
+    }
+
+    /// What assessments lack, and what of the fleet differs from its peers, in words.
+    fn notes(&self, rows: &[TrendRow], config: &Config) -> Vec<String> {
+        let mut notes = coverage::notes(rows, config);
+        notes.extend(peers::notes(&self.followed.rows));
+        notes
     }
 
     /// The wrong mappings that concern some assessed units.
@@ -547,7 +595,32 @@ impl<'a> FleetContext<'a> {
         let row =
             trend_row::row(name, history, series, limit_m, trend, as_of, wide, (installed, removal), fault);
         let conditions = self.conditions.get(name).cloned().unwrap_or_default();
-        TrendRow { usage_axis, conditions, ..row }.with_action(self.limits.at_limit(name.0.as_deref()))
+        let row = TrendRow { usage_axis, conditions, ..row };
+        let row = match self.latest_inspection(name, series, installed, as_of) {
+            Some(inspection) => inspected(row, inspection, history.until(as_of)),
+            None => row,
+        };
+        row.with_action(self.limits.at_limit(name.0.as_deref()))
+    }
+
+    /// The latest inspection of a unit in its present installation, since its last renewal.
+    fn latest_inspection(
+        &self,
+        name: &UnitKey,
+        series: Option<&Series>,
+        installed: Option<&Installation>,
+        as_of: Timestamp,
+    ) -> Option<&InspectionRow> {
+        let installed_utc = installed?.installed_utc;
+        let renewals =
+            series.map(|series| series.maintenance_until(as_of.as_microsecond())).unwrap_or_default();
+        let renewed_us = renewals.iter().rev().find(|event| event.renews).map(|event| event.utc_us);
+        let of_unit = self.inspections.get(&name.1)?.iter().rev().filter(|inspection| inspection.is_of(name));
+        let is_of_now = |inspection: &&InspectionRow| {
+            (installed_utc..=as_of).contains(&inspection.date_utc)
+                && renewed_us.is_none_or(|us| us < inspection.date_utc.as_microsecond())
+        };
+        of_unit.filter(is_of_now).next()
     }
 
     /// Forecasts of units at a date, for the hours flown until a later one.

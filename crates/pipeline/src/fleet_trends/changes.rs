@@ -62,6 +62,13 @@ pub struct UnitChange {
     pub cleared_events: Vec<ClearedEvent>,
 }
 
+impl UnitChange {
+    /// Part number where known, and serial number.
+    pub fn unit(&self) -> UnitKey {
+        (self.part_number.clone(), self.serial_number.clone())
+    }
+}
+
 /// What a run knows of its own changes.
 #[derive(Debug, Clone, Copy)]
 pub struct RunFacts<'a> {

@@ -32,6 +32,7 @@ pub(super) fn change(id: &str, from: Option<&str>, to: &Finding, run_id: &str) -
         "text": change_text(from, to),
         "from": word(from),
         "to": word(to.state),
+        "cause": to.cause,
         "run_id": run_id,
     });
     merge(&mut message, head);
@@ -107,6 +108,7 @@ fn change_text(from: Option<&str>, to: &Finding) -> String {
         (None, Some(tail)) => format!("all of {tail}"),
         (None, None) => format!("all of {}", to.unit.0.as_deref().unwrap_or_default()),
     };
-    let text = format!("{name}: {quantity}{} → {}{reason}{gap}", word(from), word(to.state));
+    let cause = to.cause.as_deref().map(|cause| format!("; cause: {cause}")).unwrap_or_default();
+    let text = format!("{name}: {quantity}{} → {}{reason}{gap}{cause}", word(from), word(to.state));
     escape_cell(&text).into_owned()
 }

@@ -50,6 +50,8 @@ pub struct Delivery {
     pub unconfirmed_before: usize,
     /// Messages left for the next run without an attempt.
     pub waiting: usize,
+    /// Messages that were not sent to a channel that the configuration has no more, by its name.
+    pub without_channel: BTreeMap<String, usize>,
 }
 
 /// Where rows are written, and how messages are sent.
@@ -83,7 +85,15 @@ pub fn deliver<C: Courier>(
     let mut delivery = Delivery::default();
     let mut due = BTreeMap::<String, Vec<AlertRecord>>::new();
     for mut row in rows {
-        let Some(channel) = channels.get(&row.channel).filter(|channel| channel.enabled) else { continue };
+        let Some(channel) = channels.get(&row.channel) else {
+            if !row.channel.is_empty() && row.status == AlertStatus::Pending {
+                *delivery.without_channel.entry(row.channel).or_default() += 1;
+            }
+            continue;
+        };
+        if !channel.enabled {
+            continue;
+        }
         let is_repeatable = is_repeatable(channel);
         let is_cut = row.status == AlertStatus::Sending;
         if is_cut && !is_repeatable {

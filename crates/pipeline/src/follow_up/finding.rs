@@ -36,6 +36,8 @@ pub struct Finding {
     pub likely_utc: Option<Timestamp>,
     /// The open work request about it.
     pub work_request: Option<String>,
+    /// Why the state is another one than after the run before, where it is.
+    pub cause: Option<String>,
 }
 
 impl Finding {
@@ -56,6 +58,7 @@ impl Finding {
             not_before_utc: None,
             likely_utc: None,
             work_request: None,
+            cause: None,
         })
     }
 
@@ -76,6 +79,7 @@ impl Finding {
             not_before_utc: None,
             likely_utc: None,
             work_request: None,
+            cause: None,
         })
     }
 
@@ -106,6 +110,7 @@ impl Finding {
             not_before_utc: row.not_before_utc,
             likely_utc: row.likely_utc,
             work_request: None,
+            cause: None,
         }
     }
 }

@@ -141,6 +141,7 @@ impl AlertSummary {
         self.unconfirmed = delivery.unconfirmed.len();
         self.unconfirmed_before = delivery.unconfirmed_before;
         self.waiting = delivery.waiting;
+        self.without_channel.clone_from(&delivery.without_channel);
     }
 }
 

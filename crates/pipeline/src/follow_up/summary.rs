@@ -22,6 +22,8 @@ pub struct AlertSummary {
     pub unconfirmed_before: usize,
     /// Messages left for the next run without an attempt.
     pub waiting: usize,
+    /// Messages that were not sent to a channel that the configuration has no more, by its name.
+    pub without_channel: std::collections::BTreeMap<String, usize>,
 }
 
 /// Work requests after a run.

@@ -146,7 +146,11 @@ fn of_closed(
 }
 
 fn state_change(request: &WorkRequest, finding: &Finding, now: Timestamp) -> Option<WorkEvent> {
-    let state = finding.state.filter(|state| request.state.as_deref() != Some(state))?;
+    // An open request shows the finding of the latest run.
+    let is_other = |state: &&str| {
+        request.state.as_deref() != Some(state) || (request.is_open() && request.finding != finding.reason)
+    };
+    let state = finding.state.filter(is_other)?;
     Some(WorkEvent {
         event: WorkEventKind::StateChanged,
         state: Some(state.to_owned()),

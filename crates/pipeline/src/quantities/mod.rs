@@ -7,5 +7,6 @@
 pub mod attribution;
 pub mod follow;
 pub mod limits;
+pub(crate) mod peers;
 pub mod subject;
 pub mod values;

@@ -7,14 +7,13 @@ use ::report::{
     Assessment, Event, FleetPriorView, FlightRow, Inspection, Installation, LogError, PastForecast, Quality,
     QuantityView, Report, Tail, TimedInterval, UnitView,
 };
-use ingest::tables::{Table, name, number, utc};
 use jiff::Timestamp;
 use job::Config;
-use job::config::limits::PLAUSIBLE_LIMIT_M;
-use records::{Installations, PartNumber, Quantity, QuantityRow, SerialNumber};
+use records::{Installations, PartNumber, Quantity, QuantityRow};
 use store::{LogOutcome, Store};
 use trend::Forecast;
 
+use crate::bookkeeping::inspections::{self, InspectionRow};
 use crate::bookkeeping::installation_index::InstallationIndex;
 use crate::error::Error;
 use crate::fleet_trends::assess::{self, ReportAssessments, UnitSelection};
@@ -29,9 +28,6 @@ use records::{ChangePoint, TrendRow, WorkRequest};
 const LOOK_BACK_DAYS: [i64; 3] = [30, 90, 180];
 /// An installation within this number of days explains a change.
 const BOOKED_WITHIN_DAYS: f64 = 7.0;
-/// Estimates compared with an inspection: at most this many, from at most this many days before it.
-const MAX_COMPARED: usize = 10;
-const MAX_COMPARED_DAYS: f64 = 30.0;
 
 /// Composes the report of the asked units.
 ///
@@ -45,7 +41,7 @@ pub fn compose(
     made_utc: Timestamp,
     program: &str,
 ) -> Result<Report, Error> {
-    let checks = inspections(config)?;
+    let mut checks = inspections::read(config)?;
     let mut logs = Logs::of(store)?;
     let StoreContents { histories, mut extras, store_version } = StoreContents::until(ask.as_of_utc, store)?;
     let newest_departure_utc = histories.newest_utc();
@@ -53,6 +49,8 @@ pub fn compose(
     let ReportAssessments { now, followed, mapping_faults, notes, drawn, before, past, priors } =
         assess::assess_for_report(config, installations, &histories, ask, &days, store)?;
     let as_of_utc = now.first().map(|row| row.as_of_utc);
+    // A report of a past date knows nothing of later inspections.
+    checks.iter_mut().for_each(|rows| rows.retain(|row| as_of_utc.is_none_or(|as_of| row.date_utc <= as_of)));
     let known = |c: &InspectionRow| histories.names().any(|name| c.is_of(name));
     let inspections_unmatched = checks.iter().flatten().filter(|c| !known(c)).count();
     let requests = requests_by_unit(work_requests::requests(&store.work_events()?, made_utc));
@@ -193,7 +191,7 @@ impl ReportComposer<'_> {
             quality: quality(history, extras, row),
             events: events(row, &installations),
             past_forecasts: self.past(row, &name),
-            inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| c.extras(flown)).collect(),
+            inspections: self.checks.iter().filter(|c| c.is_of(&name)).map(|c| compared(c, flown)).collect(),
             flights: flights(history, extras),
             quantities: self.quantities(&name, history, extras),
             installations,
@@ -483,77 +481,17 @@ fn empty_tail(tail_number: &str) -> Tail {
     }
 }
 
-/// A hangar check as the table has it.
-#[derive(Debug, Clone, PartialEq)]
-struct InspectionRow {
-    part_number: Option<String>,
-    serial_number: String,
-    date_utc: Timestamp,
-    play_m: f64,
-    instrument: Option<String>,
-    force_n: Option<f64>,
-}
-
-impl InspectionRow {
-    fn is_of(&self, name: &Name) -> bool {
-        self.serial_number == name.1 && (self.part_number.is_none() || self.part_number == name.0)
+/// An inspection with the median of the last estimates before it: later estimates may be of another gap.
+fn compared(inspection: &InspectionRow, records: &[FlownRow]) -> Inspection {
+    let (estimate_m, estimates) = inspection.estimate_before(records);
+    Inspection {
+        date_utc: inspection.date_utc,
+        play_m: inspection.play_m,
+        instrument: inspection.instrument.clone(),
+        force_n: inspection.force_n,
+        estimate_m,
+        estimates,
     }
-
-    /// The inspection with the median of the last estimates before it: later estimates may be of another gap.
-    fn extras(&self, records: &[FlownRow]) -> Inspection {
-        let near = records
-            .iter()
-            .rev()
-            .filter(|r| (0.0..=MAX_COMPARED_DAYS).contains(&days_between(r.departure_utc(), self.date_utc)));
-        let mut gaps: Vec<f64> = near.filter_map(FlownRow::gap_m).take(MAX_COMPARED).collect();
-        gaps.sort_by(f64::total_cmp);
-        let middle = gaps.len() / 2;
-        let median = gaps
-            .get(middle)
-            .map(|upper| if gaps.len() % 2 == 1 { *upper } else { f64::midpoint(gaps[middle - 1], *upper) });
-        Inspection {
-            date_utc: self.date_utc,
-            play_m: self.play_m,
-            instrument: self.instrument.clone(),
-            force_n: self.force_n,
-            estimate_m: median,
-            estimates: gaps.len(),
-        }
-    }
-}
-
-/// A measured play, m.
-fn plausible_play(text: &str) -> Result<f64, String> {
-    let (least, most) = (0.0, PLAUSIBLE_LIMIT_M.1);
-    let play_m = number(text)?;
-    if (least..=most).contains(&play_m) {
-        return Ok(play_m);
-    }
-    Err(format!("`{text}` is not between {least} and {most} m: 64 µm are 64e-6"))
-}
-
-/// The configured table of hangar checks.
-fn inspections(config: &Config) -> Result<Option<Vec<InspectionRow>>, Error> {
-    let Some(file) = &config.document.logs.inspections else { return Ok(None) };
-    let bad = |e: ingest::Error| Error::refused(e.diagnostic());
-    let table = Table::read(&config.path(file)).map_err(bad)?;
-    let serial = table.column(&["serial_number", "serial"]).map_err(bad)?;
-    let date = table.column(&["date_utc", "date"]).map_err(bad)?;
-    let play = table.column(&["play_m"]).map_err(bad)?;
-    let [part, instrument, force] =
-        ["part_number", "instrument", "force_n"].map(|column| table.find(&[column]));
-    let text = |row, column: Option<usize>| column.and_then(|c| table.text(row, c)).map(str::to_owned);
-    let check = |row| {
-        Ok(InspectionRow {
-            part_number: text(row, part),
-            serial_number: table.required(row, serial, name::<SerialNumber>).map_err(bad)?.to_string(),
-            date_utc: table.required(row, date, utc).map_err(bad)?,
-            play_m: table.required(row, play, plausible_play).map_err(bad)?,
-            instrument: text(row, instrument),
-            force_n: table.optional(row, force, number).map_err(bad)?,
-        })
-    };
-    (0..table.len()).map(check).collect::<Result<Vec<_>, Error>>().map(Some)
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use records::{Diagnostic, GapRecord, Installations, Status};
 use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
 
+use crate::bookkeeping::inspections;
 use crate::bookkeeping::installation_index::dates_ahead;
 use crate::bookkeeping::join::Bookkeeping;
 use crate::bookkeeping::maintenance_log::unknown_units;
@@ -115,6 +116,7 @@ pub(crate) fn execute_run(
     let clock = Instant::now();
     let installations = installations(config)?;
     // Before a store is made: a refused run leaves nothing behind.
+    inspections::read(config)?;
     let found = discover::discover(config)?;
     let store = Store::create_or_open(config.store())?;
     let mut writer = acquire_lock(&store, context)?;

@@ -44,6 +44,7 @@ fn finding(serial: &str, state: Option<&'static str>, day: i64) -> Finding {
         not_before_utc: None,
         likely_utc: None,
         work_request: None,
+        cause: None,
     }
 }
 

@@ -73,6 +73,7 @@ impl Desk {
                 not_before_utc: None,
                 likely_utc: None,
                 work_request: None,
+                cause: None,
             })
             .collect();
         let installations = Installations::new(self.installations.clone()).unwrap();

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use arrow::array::{RecordBatch, StringArray};
 use arrow::datatypes::{DataType, Field, Schema};
 use clap::ValueEnum;
+use ingest::mapping::column_pattern::nearest;
 use job::Config;
 use pipeline::explain::remedy;
 use records::row_schema::to_batch;
@@ -107,11 +108,14 @@ fn query_of(args: &QueryArgs, config: &Config) -> Result<Query, Failure> {
         (None, _) => Ok(base),
         (Some(word), Some(id)) => match QueryKey::from_str(word, false) {
             Ok(key) => Ok(by(key, id)),
-            Err(_) => Err(Failure::usage(
-                "unknown_field",
-                format!("records cannot be selected by `{word}`"),
-                "use `tail`, `serial`, `flight` or `position`, e.g. `freeplay query tail N412FP`",
-            )),
+            Err(_) => {
+                const WORDS: [&str; 4] = ["tail", "serial", "flight", "position"];
+                let near =
+                    nearest(word, WORDS).map(|near| format!("; the nearest is '{near}'")).unwrap_or_default();
+                let what = format!("records cannot be selected by `{word}`{near}");
+                let hint = format!("possible are {}, e.g. `freeplay query tail N412FP`", WORDS.join(", "));
+                Err(Failure::usage("unknown_name", what, &hint))
+            }
         },
         (Some(id), None) => {
             let known = KnownNames::read(config);

@@ -65,5 +65,9 @@ fn alerts_text(alerts: &AlertSummary) -> String {
             parts.push(format!("{} {what}", count(n, "message")));
         }
     }
+    for (channel, n) in &alerts.without_channel {
+        let (messages, channel) = (count(*n, "message"), escape(channel));
+        parts.push(format!("{messages} wait for `[alerts.{channel}]`, which the configuration has no more"));
+    }
     parts.join("; ")
 }

@@ -3,6 +3,7 @@
 mod follow_up;
 mod metrics;
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,6 +15,7 @@ use pipeline::fleet_trends::changes::{Cause, UnitChange};
 use pipeline::history::histories::Histories;
 use pipeline::monitoring::recorder_change::RecorderChange;
 use pipeline::run::scheduler::{self, Context};
+use pipeline::run::summary::LogError;
 use pipeline::{Event, Plan, Request, RunEnd, RunSummary, State};
 use records::Quantity;
 use records::TrendRow;
@@ -196,9 +198,37 @@ fn code(report: &RunSummary, reached: bool, stopped: bool) -> Code {
 }
 
 /// A log in error with code and place; its actuators may share both.
-fn failed_log(error: &pipeline::run::summary::LogError) -> String {
+fn failed_log(error: &LogError) -> String {
     let place = error.diagnostic.location().map(|p| format!("  {p}")).unwrap_or_default();
     format!("{}  {}{place}", escape(&error.log), error.diagnostic.code)
+}
+
+/// Lists the causes of failures, most frequent first: with its logs where they are few, else with their number and the first.
+fn failures(report: &RunSummary, page: &mut String) {
+    const MAX_SHOWN: usize = 10;
+    const NAMED: usize = 3;
+    let mut causes = BTreeMap::<(&str, &str), Vec<&LogError>>::new();
+    for error in &report.errors {
+        let cause = (error.diagnostic.code.as_str(), error.diagnostic.message.as_str());
+        causes.entry(cause).or_default().push(error);
+    }
+    let mut causes: Vec<_> = causes.into_iter().collect();
+    causes.sort_by_key(|(_, errors)| std::cmp::Reverse(errors.len()));
+    let mut lines: Vec<String> = Vec::new();
+    for ((code, what), errors) in causes {
+        let logs: BTreeSet<&str> = errors.iter().map(|error| error.log.as_str()).collect();
+        if logs.len() > NAMED {
+            let (logs, first) = (count(logs.len(), "log"), escape(&errors[0].log));
+            lines.push(format!("{logs}  {code}: {}; first {first}", escape(what)));
+        } else {
+            lines.extend(errors.into_iter().map(failed_log));
+            lines.dedup();
+        }
+    }
+    lines.iter().take(MAX_SHOWN).for_each(|text| line(page, "", text));
+    if let Some(more @ 1..) = lines.len().checked_sub(MAX_SHOWN) {
+        line(page, "", &format!("and {more} more, all in `freeplay run --json`"));
+    }
 }
 
 /// Lists the units of the tables of work that were never installed, and the installations that are still to come.
@@ -359,12 +389,7 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
             &format!("{} could not be used; all others are stored", count(report.logs_in_error(), "log")),
         );
     }
-    let mut failed: Vec<String> = report.errors.iter().map(failed_log).collect();
-    failed.dedup();
-    failed.iter().take(10).for_each(|log| line(&mut page, "", log));
-    if failed.len() > 10 {
-        line(&mut page, "", &format!("and {} more, all in `freeplay run --json`", failed.len() - 10));
-    }
+    failures(report, &mut page);
     standing_errors(report, &mut page);
     if report.not_reached > 0 {
         line(
