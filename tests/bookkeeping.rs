@@ -215,7 +215,7 @@ fn a_corrected_departure_moves_a_flight() {
     };
     rows(10);
     // A log without its row fails, and is stored once the row is there.
-    edit(&fleet, "flights.csv", |text| text.lines().take(10).map(|line| format!("{line}\n")).collect());
+    edit(&fleet, "flights.csv", |text| text.lines().take(10).collect::<Vec<_>>().join("\n") + "\n");
     assert_eq!(fleet.freeplay(&["run"]).code, Some(1));
     assert_eq!(records_with(&fleet, "N412FP"), 36);
     rows(10);

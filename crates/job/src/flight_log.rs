@@ -351,9 +351,7 @@ pub fn digest_without_identity(config: &Config, installations: &Installations) -
     for installation in installations.iter() {
         hash.update(serde_json::to_string(installation).unwrap_or_default().as_bytes());
     }
-    for flight in config.flights.iter() {
-        hash.update(serde_json::to_string(flight).unwrap_or_default().as_bytes());
-    }
+    hash.update(config.flights.digest().as_bytes());
     hash.finalize().to_hex().to_string()
 }
 

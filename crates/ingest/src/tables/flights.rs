@@ -25,6 +25,7 @@ const SAME_FLIGHT: SignedDuration = SignedDuration::from_hours(12);
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Flights {
     rows: Vec<Row>,
+    digest: String,
     by_path: HashMap<String, usize>,
     by_tail: HashMap<String, TailRows>,
 }
@@ -68,7 +69,19 @@ impl Flights {
         if let (true, Some(hours)) = (errors.is_empty(), optional[0]) {
             errors = flights.overlapping(&table, hours);
         }
-        if errors.is_empty() { Ok(flights) } else { Err(errors) }
+        if !errors.is_empty() {
+            return Err(errors);
+        }
+        let mut hash = blake3::Hasher::new();
+        let columns: Vec<usize> = needed.into_iter().chain(optional.into_iter().flatten()).collect();
+        for row in 0..table.len() {
+            for column in &columns {
+                hash.update(table.text(row, *column).unwrap_or_default().as_bytes());
+                hash.update(&[0]);
+            }
+        }
+        flights.digest = hash.finalize().to_hex().to_string();
+        Ok(flights)
     }
 
     /// Flights that last beyond the next departure of their aircraft: hours in another unit, or a wrong row.
@@ -138,6 +151,11 @@ impl Flights {
     /// Every flight of the table.
     pub fn iter(&self) -> impl Iterator<Item = &Flight> {
         self.rows.iter().map(|row| &row.flight)
+    }
+
+    /// blake3 of all cells that are read; empty without a table.
+    pub fn digest(&self) -> &str {
+        &self.digest
     }
 
     /// Whether the table has no flight.

@@ -4,7 +4,7 @@
 //! corrected later, often after the log is gone. So every reader of the store joins them here, and each run writes them into
 //! the columns that other programs read.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use arrow::array::{ArrayRef, AsArray, DictionaryArray, Float64Array, Int32Array, RecordBatch, StringArray};
@@ -39,8 +39,8 @@ const COLUMNS: [&str; 10] = [
 pub struct Bookkeeping {
     installations: Arc<Installations>,
     flights: Arc<Flights>,
-    /// Whether a part is configured: a misspelt part number takes no record away from its unit.
-    parts: Arc<BTreeMap<String, ()>>,
+    /// Configured parts: a misspelt part number takes no record away from its unit.
+    parts: Arc<BTreeSet<String>>,
     /// Digest of the tables.
     digest: String,
 }
@@ -63,12 +63,12 @@ pub struct MovedFlights {
 
 impl MovedFlights {
     /// The unit that lost the flights.
-    pub(crate) fn from_unit(&self) -> UnitKey {
+    pub(crate) fn former_unit(&self) -> UnitKey {
         (Some(self.from_part_number.clone()), self.from_serial_number.clone())
     }
 
     /// The unit that has them now.
-    pub(crate) fn to_unit(&self) -> UnitKey {
+    pub(crate) fn present_unit(&self) -> UnitKey {
         (Some(self.part_number.clone()), self.serial_number.clone())
     }
 }
@@ -102,15 +102,15 @@ pub struct Rebooked {
 impl Bookkeeping {
     /// The tables of a configuration.
     pub fn new(config: &Config, installations: &Installations) -> Self {
-        let parts = config.parts.keys().map(|part| (part.to_string(), ())).collect();
+        let parts = config.parts.keys().map(ToString::to_string).collect();
         let mut hash = blake3::Hasher::new();
         let mut add = |row: Result<String, serde_json::Error>| {
             hash.update(row.unwrap_or_default().as_bytes());
             hash.update(b"\n");
         };
         installations.iter().for_each(|row| add(serde_json::to_string(row)));
-        config.flights.iter().for_each(|flight| add(serde_json::to_string(flight)));
         config.parts.keys().for_each(|part| add(serde_json::to_string(part)));
+        hash.update(config.flights.digest().as_bytes());
         Self {
             installations: Arc::new(installations.clone()),
             flights: Arc::clone(&config.flights),
@@ -171,7 +171,7 @@ impl Bookkeeping {
         let flights = if self.flights.is_empty() { None } else { Some(text("flight_id")?) };
         let departures = batch.column(schema.index_of("departure_utc")?).clone();
         let departures = departures.as_primitive::<TimestampMicrosecondType>();
-        let numbers = |name: &str| batch.column_by_name(name).map(|column| numbers(column));
+        let numbers = |name: &str| batch.column_by_name(name).map(numbers);
         let [mut hours, mut flown, mut meters] =
             ["unit_hours", "flight_hours", "tail_hours_end"].map(numbers);
         let mut places: HashMap<(i32, i32), &[Installation]> = HashMap::new();
@@ -192,7 +192,7 @@ impl Bookkeeping {
             let Some(installation) = installations.iter().find(|installation| installation.covers(at)) else {
                 continue;
             };
-            if !self.parts.contains_key(installation.part_number.as_str()) {
+            if !self.parts.contains(installation.part_number.as_str()) {
                 continue;
             }
             let (part, serial) = *names.entry(std::ptr::from_ref(installation)).or_insert_with(|| {

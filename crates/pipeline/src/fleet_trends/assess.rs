@@ -615,12 +615,13 @@ impl<'a> FleetContext<'a> {
         let renewals =
             series.map(|series| series.maintenance_until(as_of.as_microsecond())).unwrap_or_default();
         let renewed_us = renewals.iter().rev().find(|event| event.renews).map(|event| event.utc_us);
-        let of_unit = self.inspections.get(&name.1)?.iter().rev().filter(|inspection| inspection.is_of(name));
+        let mut of_unit =
+            self.inspections.get(&name.1)?.iter().rev().filter(|inspection| inspection.is_of(name));
         let is_of_now = |inspection: &&InspectionRow| {
             (installed_utc..=as_of).contains(&inspection.date_utc)
                 && renewed_us.is_none_or(|us| us < inspection.date_utc.as_microsecond())
         };
-        of_unit.filter(is_of_now).next()
+        of_unit.find(is_of_now)
     }
 
     /// Forecasts of units at a date, for the hours flown until a later one.

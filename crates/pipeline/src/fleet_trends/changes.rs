@@ -167,7 +167,7 @@ fn cause(config: &Config, before: Option<&UnitState>, now: &UnitState, run: RunF
             (Cause::Limit, format!("limit_m changed from {from} to {to} ({place})"))
         }
         _ if !moved.is_empty() => (Cause::Bookkeeping, moved.join("; ")),
-        Some(before) if is_other(&before.settings_digest, &now.settings_digest) => {
+        Some(before) if is_other(before.settings_digest.as_ref(), now.settings_digest.as_ref()) => {
             (Cause::Settings, "the settings of its estimates changed".to_owned())
         }
         Some(before) if (&before.tail_number, &before.position) != (&now.tail_number, &now.position) => {
@@ -187,12 +187,12 @@ fn cause(config: &Config, before: Option<&UnitState>, now: &UnitState, run: RunF
 }
 
 /// Whether two digests are known and differ.
-fn is_other(one: &Option<String>, other: &Option<String>) -> bool {
-    one.as_ref().zip(other.as_ref()).is_some_and(|(one, other)| one != other)
+fn is_other(one: Option<&String>, other: Option<&String>) -> bool {
+    one.zip(other).is_some_and(|(one, other)| one != other)
 }
 
 fn moved_of<'a>(unit: &'a UnitKey, run: RunFacts<'a>) -> impl Iterator<Item = String> + 'a {
-    let concerns = move |moved: &&MovedFlights| moved.from_unit() == *unit || moved.to_unit() == *unit;
+    let concerns = move |moved: &&MovedFlights| moved.former_unit() == *unit || moved.present_unit() == *unit;
     run.moved.iter().filter(concerns).map(ToString::to_string)
 }
 

@@ -151,6 +151,8 @@ pub struct Plan {
     pub standing_errors: Vec<StandingError>,
     /// Files of groups whose flight has no main log.
     pub strays: Vec<String>,
+    /// Digest of the settings of a log without an identity.
+    pub unidentified: String,
 }
 
 /// An error of an earlier run whose log has not changed since: it is reported until the log or a setting is fixed.
@@ -239,6 +241,7 @@ pub fn plan(
         .collect();
     drop(to_do);
     let mut plan = Plan {
+        unidentified,
         found: found.len(),
         known,
         work,

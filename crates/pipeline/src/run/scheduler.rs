@@ -146,7 +146,7 @@ pub(crate) fn execute_run(
     let tables = Bookkeeping::new(config, &inputs.installations);
     report.moved = tables.write(&mut writer, &renamed)?.moved;
     let with_records = units.clone();
-    units.extend(report.moved.iter().flat_map(|moved| [moved.from_unit(), moved.to_unit()]));
+    units.extend(report.moved.iter().flat_map(|moved| [moved.former_unit(), moved.present_unit()]));
 
     (context.watch)(Event::Trends { units: units.len() });
     let moved = report.moved.clone();
@@ -360,7 +360,11 @@ impl WorkerContext<'_> {
 
     fn failed(&self, work: &WorkItem, diagnostic: Diagnostic) -> LogOutcomeData {
         let mut account = summary::of_log(work, self.run_id);
-        account.config_digest = Some(digest_without_identity(self.config, self.installations));
+        let digest = match self.plan.unidentified.as_str() {
+            "" => digest_without_identity(self.config, self.installations),
+            known => known.to_owned(),
+        };
+        account.config_digest = Some(digest);
         summary::set_error(&mut account, std::slice::from_ref(&diagnostic));
         LogOutcomeData::Read {
             account: Box::new(account),
