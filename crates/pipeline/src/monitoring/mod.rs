@@ -1,7 +1,6 @@
-//! Diagnostics in addition to the gap: filter innovations and recorder changes.
+//! Diagnostics in addition to the gap: coverage, mapping faults, repeated samples and recorder changes.
 
 pub mod coverage;
-pub mod innovations;
 pub mod mapping_faults;
 pub mod recent;
 pub mod recorder_change;

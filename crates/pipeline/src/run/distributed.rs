@@ -14,7 +14,6 @@ use arrow::array::{Array, ArrayRef, AsArray, RecordBatch, StringArray, new_null_
 use arrow::compute::{cast, concat_batches, filter_record_batch, is_null};
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use ingest::LogFiles;
-use jiff::Timestamp;
 use job::Config;
 use records::row_schema::{from_batch, to_batch};
 use records::{Diagnostic, GapRecord, Installations};
@@ -46,19 +45,10 @@ pub struct Task {
 /// Processes tasks and returns their results in any order.
 pub type Engine<'a> = dyn FnMut(&[Task]) -> Result<Vec<RecordBatch>, String> + 'a;
 
-/// Status of a processed log, without its records.
+/// Status and diagnostics of a processed log, without its records.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct TaskResult {
-    log_digest: Option<String>,
-    config_digest: Option<String>,
-    tail_number: Option<String>,
-    flight_id: Option<String>,
-    departure_utc: Option<Timestamp>,
-    positions: Vec<String>,
-    estimated: i64,
-    refused: i64,
-    duration_s: f64,
-    processed_utc: Timestamp,
+    account: LogRecord,
     #[serde(rename = "complaints")]
     diagnostics: Vec<Diagnostic>,
 }
@@ -108,19 +98,7 @@ fn encode_result(
     records: &[GapRecord],
     diagnostics: Vec<Diagnostic>,
 ) -> Result<RecordBatch, Error> {
-    let results = TaskResult {
-        log_digest: account.log_digest.clone(),
-        config_digest: account.config_digest.clone(),
-        tail_number: account.tail_number.clone(),
-        flight_id: account.flight_id.clone(),
-        departure_utc: account.departure_utc,
-        positions: account.positions.clone(),
-        estimated: account.estimated,
-        refused: account.refused,
-        duration_s: account.duration_s,
-        processed_utc: account.processed_utc,
-        diagnostics,
-    };
+    let results = TaskResult { account: account.clone(), diagnostics };
     let results = serde_json::to_string(&results).map_err(|e| Error::Engine(e.to_string()))?;
     let schema = schema();
     let head = |field: &Arc<Field>| -> ArrayRef {
@@ -218,19 +196,10 @@ fn to_log_result(
     results: TaskResult,
     records: Vec<GapRecord>,
 ) -> LogOutcomeData {
-    let mut account = LogRecord {
-        log_digest: results.log_digest,
-        config_digest: results.config_digest,
-        tail_number: results.tail_number,
-        flight_id: results.flight_id,
-        departure_utc: results.departure_utc,
-        positions: results.positions,
-        estimated: results.estimated,
-        refused: results.refused,
-        duration_s: results.duration_s,
-        processed_utc: results.processed_utc,
-        ..summary::of_log(work, worker.run_id)
-    };
+    // The engine has seen the log, and this process its file.
+    let LogRecord { size_bytes, modified_utc_ns, file_id, log_path, .. } =
+        summary::of_log(work, worker.run_id);
+    let mut account = LogRecord { size_bytes, modified_utc_ns, file_id, log_path, ..results.account };
     if let Some((estimated, refused)) = worker.already_recorded(work, &account) {
         let already_recorded = LogRecord { outcome: LogOutcome::Known, estimated, refused, ..account };
         return LogOutcomeData::Same(Box::new(already_recorded));
@@ -262,7 +231,8 @@ fn read(batches: &[RecordBatch]) -> Result<TaskResults, Error> {
     }
     let whole = results.into_iter().filter_map(|(log, results)| {
         let records: Vec<GapRecord> = records.remove(&log).unwrap_or_default().into_values().collect();
-        (records.len() as i64 == results.estimated + results.refused).then_some((log, (results, records)))
+        (records.len() as i64 == results.account.estimated + results.account.refused)
+            .then_some((log, (results, records)))
     });
     Ok(whole.collect())
 }

@@ -18,7 +18,6 @@ use crate::follow_up::summary::FollowUpSummary;
 use crate::history::histories::UnitKey;
 use crate::monitoring::REPORTED_DAYS;
 use crate::monitoring::coverage::{self, UnknownTail, UnmappedPositions};
-use crate::monitoring::innovations::{self, InnovationOutlier};
 use crate::monitoring::mapping_faults::MappingFault;
 use crate::monitoring::recent;
 use crate::monitoring::recorder_change::{RecorderChange, recorder_changes};
@@ -106,7 +105,7 @@ impl From<RunRecord> for KilledRun {
 }
 
 /// Summary of a run.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct RunSummary {
     /// Identifier of the run.
     pub run_id: String,
@@ -170,8 +169,6 @@ pub struct RunSummary {
     pub recorder_moved: Vec<RecorderChange>,
     /// Followed quantities that changed within the last month, on units, tails and parts of the whole fleet.
     pub quantity_changes: Vec<QuantityChange>,
-    /// Flights of the last month, on those aircraft, with unusual innovations for their unit.
-    pub innovations_unlike: Vec<InnovationOutlier>,
     /// Pairs of flights of the last months with the samples of one.
     pub samples_repeated: Vec<RepeatedSamples>,
     /// The slowest log and its seconds.
@@ -235,46 +232,15 @@ impl RunSummary {
         Self {
             run_id,
             started_utc,
-            cut_short: Vec::new(),
             found: plan.found,
             known: plan.known,
             not_asked: plan.not_asked,
             left: plan.left,
-            done: 0,
-            flights: 0,
-            estimated: 0,
-            refused: BTreeMap::new(),
-            refusals: Vec::new(),
-            duplicates: Vec::new(),
-            mapping_faults: Vec::new(),
-            kept: 0,
-            moved: Vec::new(),
-            unknown_units: Vec::new(),
-            dates_ahead: Vec::new(),
-            unmapped_positions: Vec::new(),
-            unknown_tails: Vec::new(),
-            notes: Vec::new(),
             absent: plan.absent,
-            errors: Vec::new(),
             not_reached: plan.work.len(),
-            not_reached_logs: Vec::new(),
-            quiet: Vec::new(),
-            quiet_now: 0,
-            newest_departure_utc: None,
-            recorder_moved: Vec::new(),
-            quantity_changes: Vec::new(),
-            innovations_unlike: Vec::new(),
-            samples_repeated: Vec::new(),
-            slowest: None,
-            took_s: 0.0,
             workers,
-            trends: Vec::new(),
-            changed: Vec::new(),
             standing_errors: plan.standing_errors.clone(),
-            work_list: Vec::new(),
-            follow_up: FollowUpSummary::default(),
-            states: BTreeMap::new(),
-            logs: BTreeMap::new(),
+            ..Self::default()
         }
     }
 
@@ -299,8 +265,6 @@ impl RunSummary {
         self.quantity_changes = followed.changes;
         self.quantity_changes.retain(|change| days_between(change.since_utc, newest) <= REPORTED_DAYS);
         self.samples_repeated = repeated_samples::detect(&recent);
-        self.innovations_unlike =
-            innovations::find_outliers(&recent).into_iter().filter(|u| touched(&u.tail_number)).collect();
         (self.trends, self.changed, self.states) = (now, changes.changed, states);
         (self.work_list, self.mapping_faults, self.notes) = (work_list, mapping_faults, notes);
     }

@@ -32,9 +32,6 @@ use crate::table::{self, count, number, text};
 use crate::commands::context::{KnownNames, VERSION, check_range, load_config};
 use crate::commands::results::trend::unit_table;
 
-/// Maximum number of flights with unusual filter innovations in the summary.
-const MAX_UNUSUAL_SHOWN: usize = 5;
-
 /// Maximum number of changed units in the summary.
 const MAX_CHANGES_SHOWN: usize = 20;
 
@@ -311,24 +308,6 @@ fn standing_errors(report: &RunSummary, page: &mut String) {
     }
 }
 
-/// Lists flights with unusual filter innovations.
-fn unusual_innovations(report: &RunSummary, page: &mut String) {
-    for unlike in report.innovations_unlike.iter().take(MAX_UNUSUAL_SHOWN) {
-        let text = format!(
-            "{} {}, flight {}: filter residuals unusual (NIS {:.2}; this unit usually {:.2})",
-            escape(&unlike.tail_number),
-            escape(&unlike.position),
-            escape(&unlike.flight_id),
-            unlike.nis,
-            unlike.usual
-        );
-        line(page, "unusual", &text);
-    }
-    if let Some(more @ 1..) = report.innovations_unlike.len().checked_sub(MAX_UNUSUAL_SHOWN) {
-        line(page, "", &format!("and {more} more, all in `freeplay run --json`"));
-    }
-}
-
 /// Run summary as text.
 #[allow(clippy::too_many_lines, reason = "one line of the summary after the other")]
 fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
@@ -429,7 +408,6 @@ fn summary_text(report: &RunSummary, config: &str, code: Code) -> String {
         let more = report.quantity_changes.len() - MAX_CHANGES;
         line(&mut page, "", &format!("and {more} more, all in `freeplay trend --changes`"));
     }
-    unusual_innovations(report, &mut page);
     if let Some((log, seconds)) = &report.slowest {
         let took = span(Duration::from_secs_f64(report.took_s));
         line(
