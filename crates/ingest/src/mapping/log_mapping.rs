@@ -316,7 +316,7 @@ pub struct ChannelMapping {
     /// A column that marks valid samples; `{position}` as in `column`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub valid_column: Option<String>,
-    /// The values of `valid_column` that mean yes: numbers, texts, true or false. Default `[1]`, which is also *true*.
+    /// The values of `valid_column` that mean valid: numbers, texts, true or false. Default `[1]`, which is also *true*.
     #[serde(default = "yes", skip_serializing_if = "is_yes")]
     pub valid_values: Vec<RawValue>,
     /// The name of the `[group.…]` whose files hold this channel; the main logs when not given.
@@ -328,13 +328,13 @@ pub struct ChannelMapping {
     /// The channel's own rate, Hz, where it is recorded more slowly than its rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
-    /// How long after the stamp of its row the channel is sampled, s.
+    /// Time from the row's timestamp to the channel's sampling instant, s.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub instant_s: f64,
-    /// How late the channel is recorded, s: logged(t) = true(t − latency).
+    /// Recording delay of the channel, s: logged(t) = true(t − latency).
     #[serde(default, skip_serializing_if = "is_zero")]
     pub latency_s: f64,
-    /// Redundant channels to be taken, in this order, where this one does not live.
+    /// Redundant channels, best first: the first usable one is read where this channel is not usable.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alternatives: Vec<ChannelMapping>,
     /// Texts for which the channel is 1, and 0 for every other; of a condition on a column of texts.

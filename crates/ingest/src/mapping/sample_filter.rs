@@ -56,16 +56,16 @@ impl RawValue {
 pub struct SampleFilter {
     /// The column's name; `{position}` stands for the actuator's place.
     pub column: String,
-    /// Raw values that will do: numbers, texts, true or false.
+    /// Raw values that meet the condition: numbers, texts, true or false.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub equals: Vec<RawValue>,
-    /// The least raw value that will do.
+    /// Lowest raw value that meets the condition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_least: Option<f64>,
-    /// The greatest raw value that will do.
+    /// Highest raw value that meets the condition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at_most: Option<f64>,
-    /// Left out after it begins to hold and before it ends, s.
+    /// Time that is excluded after the condition begins to hold and before it ends, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin_s: Option<f64>,
     /// The name of the `[group.…]` whose files hold the column; the main logs when not given.

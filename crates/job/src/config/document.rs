@@ -129,11 +129,11 @@ pub struct Override {
     pub tails: Vec<String>,
     /// Part numbers, in the same way; every part when not given.
     pub parts: Vec<String>,
-    /// Keys of `[clock]` that are otherwise; not for single parts, since a log has one clock.
+    /// Keys of `[clock]` that differ; not for single parts, since a log has one clock.
     #[schemars(with = "Option<ClockMapping>")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clock: Option<toml::Table>,
-    /// Keys of `[channel]` that are otherwise.
+    /// Keys of `[channel]` that differ.
     #[schemars(with = "Option<Channels>")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<toml::Table>,
@@ -169,8 +169,8 @@ impl Default for StoreSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunSettings {
-    /// An actuator is not begun while those in work would need more memory with it, MiB; one is always let
-    /// in. No limit by default.
+    /// Memory limit of all actuators in progress, MiB, at 40 bytes per sample: an actuator waits until its channels
+    /// fit, and one is always admitted. No limit by default.
     pub memory_mib: Option<u64>,
     /// A log that takes longer than this, s, ends as an error of that log, and the run goes on. Default 600.
     pub log_timeout_s: f64,
@@ -188,10 +188,10 @@ impl Default for RunSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ObjectSettings {
-    /// A request to an object store without a whole answer is given up after this long, s, and made again.
+    /// A request without a complete answer is aborted after this time, s, and repeated.
     /// Default 30.
     pub timeout_s: f64,
-    /// After this long, s, it is not made again, and the log is in error. Default 180.
+    /// A request is not repeated after this time, s, and the log fails. Default 180.
     pub give_up_s: f64,
 }
 
@@ -244,13 +244,13 @@ pub struct EstimateSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrendSettings {
-    /// A limit that may be met within these hours makes state `plan`. Default 500.
+    /// A limit that may be reached within these flight hours makes state `plan`. Default 500.
     pub planning_horizon_hours: f64,
-    /// Beyond these hours a crossing is not stated. Default 20 000.
+    /// A crossing of the limit after more than these flight hours is not reported. Default 20 000.
     pub horizon_hours: f64,
     /// Days without a sound record after which a unit is `unassessed`. Default 30.
     pub stale_after_days: f64,
-    /// Hours until the next check, for the probability of meeting the limit before it. Default 300.
+    /// Flight hours until the next check, for the probability of reaching the limit before it. Default 300.
     pub next_check_hours: f64,
     /// Without effect since inspection intervals are no longer advised; accepted so that older files still load.
     #[serde(skip_serializing)]
@@ -258,8 +258,8 @@ pub struct TrendSettings {
     /// Date of assessments without `--as-of`: `now`, the time of the run, or `newest_record`, for data of the past.
     /// Default `now`.
     pub as_of: AsOf,
-    /// What wear follows: `hours`, `flights` or `reversals`; by default what each part number's own
-    /// histories speak for. A part's `axis` goes before it.
+    /// What wear follows: `hours`, `flights` or `reversals`; by default the one that fits each
+    /// part number's histories best. A part's `axis` takes precedence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axis: Option<WearAxis>,
     /// Removal limit of parts without a `limit_m` of their own, m.
