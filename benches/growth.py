@@ -2,7 +2,7 @@
 
     pip install matplotlib
     cargo build --release --locked
-    python benches/growth.py target/release/freeplay --picture docs/pictures/performance-growth.svg
+    python benches/growth.py target/release/freeplay --picture growth.svg
 
 Makes logs of one actuator with 10,000 to 10,000,000 rows, folders of 1 to 1,000 logs, and logs of 1 to 1,000
 actuators; runs each into a new store with one worker, the series in turn. CPU seconds are the operating system's

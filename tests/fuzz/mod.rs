@@ -34,7 +34,7 @@ fn codes(errors: &[records::Diagnostic]) -> String {
 fn fuzz_configuration() {
     let mut corpus =
         files(&["pipeline.toml", "tests/data/kr300/pipeline.toml", "tests/data/flights/pipeline.toml"]);
-    for page in ["docs/configuration.md", "docs/map-my-logs.md", "docs/layouts.md"] {
+    for page in ["docs/configuration.md", "docs/map-my-logs.md"] {
         let text = std::fs::read_to_string(top().join(page)).unwrap();
         let blocks = text.split("```toml\n").skip(1).filter_map(|block| block.split("```").next());
         // An example of single tables is put before a whole configuration.

@@ -1,4 +1,4 @@
-//! Changes planted in simulated flights, found again by the whole program: the second table of docs/other-quantities.md.
+//! Changes planted in simulated flights, and those that the whole program finds again.
 //!
 //! ```sh
 //! cargo bench -p pipeline --bench planted_changes -- FLEETS FLIGHTS

@@ -14,7 +14,8 @@ pub fn page(stats: &[ErrorStats], robot: &[RobotRow], gears: Option<&[GearBenchL
     let text = include_str!("../accuracy.md.in");
     let gears = gears.map_or_else(|| "Not run: `--gears DIR` was not given.\n".to_owned(), gear_bench_table);
     let visible: Vec<&ErrorStats> = visible(stats).collect();
-    text.replace("{{classes}}", &classes(&visible))
+    text.replace("{{method}}", &job::METHOD_VERSION.to_string())
+        .replace("{{classes}}", &classes(&visible))
         .replace("{{methods}}", &methods(&visible))
         .replace("{{alarms}}", &alarms(&visible))
         .replace("{{refusals}}", &refusals(stats))

@@ -1,6 +1,6 @@
 //! The normalized log: one actuator's channels in SI on one clock, as the estimator takes them.
 //!
-//! `docs/normalized.md` describes it. Values keep full precision, and step and segments are in
+//! `docs/columns.md` describes it. Values keep full precision, and step and segments are in
 //! the footer, so the samples read back, and the gap from them, are bitwise identical.
 
 use std::collections::BTreeMap;

@@ -60,7 +60,7 @@ impl Column {
 /// How numbers lie in the file; always under zstd, with a checksum on every page.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Encoding {
-    /// Byte stream split: the smallest, and in this program the quickest to read (`docs/normalized.md`).
+    /// Byte stream split: the smallest, and in this program the quickest to read (`docs/columns.md`).
     #[default]
     Split,
     /// Dictionary while it pays, then plain: every reader knows it, also those that know no byte stream

@@ -172,7 +172,7 @@ fn details(claims: &Claims) -> String {
         "\
 **Figure 8.** Operations of each equation in one step. The count is that of the recursion written out with numbers
 that count, and a test compares its result with the filter's. A step has no branch on a measured sample, so every
-step is the worst. [On board](on-board.md) has instructions and stack on a controller.
+step is the worst. [On board](rust.md#on-board) has instructions and stack on a controller.
 
 ![operations in a step](pictures/paper-operations.svg)
 
