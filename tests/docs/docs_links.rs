@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
+use regex::Regex;
+
 use crate::fuzz::engine::is_gate;
 use crate::harness::top;
 use crate::markdown::{Page, all};
@@ -64,6 +66,28 @@ fn every_page_is_in_the_contents_once() {
         .collect();
     assert_eq!(listed, written, "docs/SUMMARY.md against the pages of docs/");
     assert_eq!(listed.len(), contents.links.len(), "a page is listed twice in docs/SUMMARY.md");
+}
+
+/// A page names the constants that it quotes, with their values, in a comment.
+#[test]
+fn constants_that_pages_quote_are_those_of_the_code() {
+    let files = glob::glob(top().join("crates/*/src/**/*.rs").to_str().unwrap()).unwrap().flatten();
+    let sources: String = files.map(|file| std::fs::read_to_string(file).unwrap()).collect();
+    let comment = Regex::new("<!-- constants: (.*) -->").unwrap();
+    let pages = all();
+    let mut constants = Vec::new();
+    for page in &pages {
+        for quoted in comment.captures_iter(&page.text) {
+            constants.extend(quoted[1].split("; ").map(|one| (page.name.clone(), one.to_owned())));
+        }
+    }
+    let is_of_code = |quoted: &str| {
+        let (name, value) = quoted.split_once(" = ").unwrap();
+        let value = regex::escape(value);
+        Regex::new(&format!("const {name}: [^=]+ = {value};")).unwrap().is_match(&sources)
+    };
+    let wrong: Vec<_> = constants.iter().filter(|(_, quoted)| !is_of_code(quoted)).collect();
+    assert!(constants.len() > 50 && wrong.is_empty(), "{} constants, wrong: {wrong:?}", constants.len());
 }
 
 /// Errors of another method are not those of the program: the study is repeated when the method changes.
