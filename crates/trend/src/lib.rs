@@ -37,7 +37,7 @@
 //! - A wear law far from every curve of the bank: a change of rate that no unit has shown yet is not learned.
 //! - Life that ends other than by growth to the limit, or growth that depends on what no usage axis measures.
 //! - A measurement whose bias drifts for years is taken for wear. A yearly seasonal component is not.
-//! - Maintenance that lowers the gap by less than about 5 µm: no step is detected and wear is underestimated.
+//! - Maintenance that lowers the gap by less than about 5 % of the limit: no step is found, and wear is underestimated.
 //! - A fleet of fewer than about thirty units: the prior is then mostly the assumed one.
 
 mod assess;

@@ -10,7 +10,7 @@ const PLAUSIBLE: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
 pub struct Settings {
     /// Removal limit, m: state `act` at or above; a crossing is a crossing of this limit.
     pub limit_m: f64,
-    /// The gap that reports, metres: state `watch`.
+    /// Watch limit, m: state `watch` at or above.
     pub watch_m: f64,
     /// State `plan` when the 5 % crossing lies within this many flight hours.
     pub planning_horizon_hours: f64,
@@ -20,7 +20,7 @@ pub struct Settings {
     pub check_interval_hours: f64,
     /// An unrecorded change is reported for this many days.
     pub change_watch_days: f64,
-    /// Without an estimate for this many days there is no state.
+    /// Without a sound record for this many days the state is `unassessed`.
     pub stale_after_days: f64,
 }
 
