@@ -92,10 +92,12 @@ fn constants_that_pages_quote_are_those_of_the_code() {
 
 /// Errors of another method are not those of the program: the study is repeated when the method changes.
 #[test]
-fn the_accuracy_page_is_of_the_present_method() {
-    let page = std::fs::read_to_string(top().join("docs/accuracy.md")).unwrap();
-    let version = format!("here for method version {},", job::METHOD_VERSION);
-    assert!(!is_gate() || page.contains(&version), "docs/accuracy.md: cargo run --release -p validation");
+fn pages_of_errors_are_of_the_present_method() {
+    for name in ["docs/accuracy.md", "docs/limits.md"] {
+        let page = std::fs::read_to_string(top().join(name)).unwrap();
+        let version = format!("method version {}", job::METHOD_VERSION);
+        assert!(!is_gate() || page.contains(&version), "{name}: cargo run --release -p validation");
+    }
 }
 
 /// A page with the walk-through of a mapping and an example of every layout.
