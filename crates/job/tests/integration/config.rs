@@ -230,7 +230,7 @@ fn every_layout_of_the_documentation_is_read() {
     let page = include_str!("../../../../docs/map-my-logs.md");
     let examples: Vec<&str> = page.split("```toml\n").skip(1).filter_map(|t| t.split("```").next()).collect();
     assert!(examples.len() >= 12, "{} examples", examples.len());
-    let wide = examples.iter().find(|e| e.contains("{position}_motor_deg")).unwrap();
+    let wide = *examples.iter().find(|e| e.contains("{position}_motor_deg")).unwrap();
     let tail = "\n[part.EMA]\nstiffness_n_per_m = 5e7\ndamping_n_s_per_m = 2e3\nscrew_mass_kg = 8.0\nlead_m_per_rev = 0.005\n\
         noise = { screw_rms_m = 3e-6, screw_resolution_m = 1e-6, motor_rms_m = 1e-6, motor_resolution_m = 1e-6, \
         unknown_force_n = 200.0, bandwidth_hz = 10.0 }\n";
