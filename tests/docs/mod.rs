@@ -1,5 +1,6 @@
-//! Documentation: links, documented commands, and error messages.
+//! Documentation: links, documented commands, error messages, and walk-throughs.
 
 mod docs_links;
 mod documented_commands;
 mod error_messages;
+mod walk_throughs;

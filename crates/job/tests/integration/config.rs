@@ -250,7 +250,7 @@ fn every_layout_of_the_documentation_is_read() {
             let heading = table.lines().next().unwrap();
             !text.lines().any(|line| line == heading)
         });
-        let left_out: String = left_out.map(|table| format!("\n{table}\n")).collect();
+        let left_out: String = left_out.flat_map(|table| ["\n", table, "\n"]).collect();
         let left_out = if is_named_elsewhere { left_out.replace("{position}_", "") } else { left_out };
         // An override is for a part that is configured.
         let whole = text.replace("\"EMA-27-1060\"", "\"EMA\"") + &left_out + tail;
