@@ -183,8 +183,6 @@ fn result(tail_at: usize, flight: usize, units: &[Unit]) -> Outcomes<LogResult> 
     let account = LogRecord {
         log_path: log(tail_at, flight),
         size_bytes: 1_000,
-        modified_utc_ns: 0,
-        file_id: String::new(),
         log_digest: Some("made".to_owned()),
         config_digest: Some("made".to_owned()),
         tail_number: Some(tail(tail_at)),
@@ -199,6 +197,7 @@ fn result(tail_at: usize, flight: usize, units: &[Unit]) -> Outcomes<LogResult> 
         duration_s: 0.1,
         run_id: "made".to_owned(),
         processed_utc: departure(flight)?,
+        ..LogRecord::default()
     };
     Ok(LogResult { account, records: if bad { Vec::new() } else { records }, moved_from: Vec::new() })
 }
@@ -224,14 +223,9 @@ fn fill(store: &Path, tails: usize, flights: usize) -> Outcomes<()> {
         program_version: "made".to_owned(),
         config_path: "pipeline.toml".to_owned(),
         found: done,
-        known: 0,
         done,
-        estimated: 0,
-        refused: 0,
-        errors: 0,
-        not_reached: 0,
         exit_code: Some(0),
-        tables_digest: None,
+        ..RunRecord::default()
     })?;
     Ok(())
 }

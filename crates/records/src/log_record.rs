@@ -8,10 +8,11 @@ use crate::row_schema::text_cell;
 use crate::stored_row;
 
 /// How a log ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LogOutcome {
     /// The records of its flight are stored, or belong to another log.
+    #[default]
     Done,
     /// The log failed; `error_code` holds the reason.
     Error,
@@ -56,7 +57,7 @@ text_cell!(LogOutcome, LogOutcome::parse);
 
 stored_row! {
     /// Status of one log: enough to know, without opening it, whether it must be processed again.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+    #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
     pub struct LogRecord {
         /// Path of the log. Of its rows that are neither *not reached* nor *unaccounted*, the newest counts.
         pub log_path: String,

@@ -13,7 +13,7 @@ pub const GAP: &str = "gap";
 pub(crate) const UNCHANGED: &str = "normal";
 
 /// State of one quantity of one unit, or a change that a tail or a part made.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 #[expect(missing_docs, reason = "each field is named for what it holds, with its unit")]
 pub struct Finding {
     /// Without a serial number for a tail or a part.
@@ -52,13 +52,7 @@ impl Finding {
             reason: row.reason.clone(),
             since_utc: None,
             as_of_utc: row.as_of_utc,
-            latest_flight_utc: None,
-            gap_m: None,
-            limit_m: None,
-            not_before_utc: None,
-            likely_utc: None,
-            work_request: None,
-            cause: None,
+            ..Self::default()
         })
     }
 
@@ -73,13 +67,7 @@ impl Finding {
             reason: Some(change.evidence.clone()),
             since_utc: Some(change.since_utc),
             as_of_utc,
-            latest_flight_utc: None,
-            gap_m: None,
-            limit_m: None,
-            not_before_utc: None,
-            likely_utc: None,
-            work_request: None,
-            cause: None,
+            ..Self::default()
         })
     }
 
@@ -109,8 +97,7 @@ impl Finding {
             limit_m: row.limit_m,
             not_before_utc: row.not_before_utc,
             likely_utc: row.likely_utc,
-            work_request: None,
-            cause: None,
+            ..Self::default()
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Histories while their rows come in, from tables of any length.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::path::Path;
 
 use arrow::array::{Array, AsArray, Float64Array, ListArray, RecordBatch};
@@ -10,6 +10,7 @@ use jiff::Timestamp;
 use crate::history::flight_row::{FlightExtras, FlightInput};
 use crate::history::histories::{Positions, UnitKey};
 use crate::history::row_keys::{KeyCache, KeyColumns, RowKey, TextColumn};
+use crate::history::settings_counts::{SettingsCounts, add_settings};
 
 /// Rows of a block: its 32 MiB are more than what any allocator keeps to itself once they are given up.
 const BLOCK_ROWS: usize = 1 << 19;
@@ -46,9 +47,6 @@ pub(crate) struct UnitEntry {
     /// Its gaps by the settings that they were estimated with.
     pub(crate) settings: SettingsCounts,
 }
-
-/// Number of gaps and latest departure, µs since 1970 UTC, by the digest of the settings of the estimate.
-pub(crate) type SettingsCounts = BTreeMap<String, (usize, i64)>;
 
 /// Rows in the order of arrival, and their flights' names one after the other.
 #[derive(Debug, Default)]
@@ -236,12 +234,6 @@ impl HistoryBuilder {
         self.follows.push(0);
         unit
     }
-}
-
-/// Adds gaps to the count of their settings.
-pub(crate) fn add_settings(counts: &mut SettingsCounts, settings: &str, (gaps, latest_us): (usize, i64)) {
-    let known = counts.entry(settings.to_owned()).or_insert((0, i64::MIN));
-    *known = (known.0 + gaps, known.1.max(latest_us));
 }
 
 /// A unit, and one of its places.

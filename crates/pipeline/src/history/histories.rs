@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 use jiff::Timestamp;
 use records::Installation;
 
-use crate::history::builder::SettingsCounts;
 use crate::history::extras::UnitExtras;
 use crate::history::flight_row::{FlightExtras, FlightRow};
+use crate::history::settings_counts::SettingsCounts;
 
 /// Part number where known, and serial number.
 pub type UnitKey = (Option<String>, String);

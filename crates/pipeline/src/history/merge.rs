@@ -7,10 +7,11 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::error::Error;
-use crate::history::builder::{HistoryBuilder, RowBlock, SettingsCounts, StagedRow, UnitEntry, add_settings};
+use crate::history::builder::{HistoryBuilder, RowBlock, StagedRow, UnitEntry};
 use crate::history::extras::ExtrasArena;
 use crate::history::flight_row::FlightRow;
 use crate::history::histories::{Histories, History, Positions, UnitKey};
+use crate::history::settings_counts::{SettingsCounts, add_settings};
 
 /// Shares of a table that a worker is given: the slower one leaves some of its own to the others.
 const SHARES: usize = 4;

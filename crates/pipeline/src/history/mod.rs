@@ -8,3 +8,4 @@ pub mod histories;
 pub(crate) mod merge;
 pub(crate) mod parallel_scan;
 pub mod row_keys;
+mod settings_counts;

@@ -401,20 +401,9 @@ pub(crate) fn of_log(work: &WorkItem, run_id: &str) -> LogRecord {
         size_bytes: stat.map_or(0, |s| s.size_bytes),
         modified_utc_ns: stat.map_or(0, |s| s.modified_utc_ns),
         file_id: stat.map(|s| s.file_id.clone()).unwrap_or_default(),
-        log_digest: None,
-        config_digest: None,
-        tail_number: None,
-        flight_id: None,
-        departure_utc: None,
-        positions: Vec::new(),
-        outcome: LogOutcome::Done,
-        estimated: 0,
-        refused: 0,
-        error_code: None,
-        error_detail: None,
-        duration_s: 0.0,
         run_id: run_id.to_owned(),
         processed_utc: Timestamp::now(),
+        ..LogRecord::default()
     }
 }
 

@@ -41,10 +41,7 @@ fn finding(serial: &str, state: Option<&'static str>, day: i64) -> Finding {
         latest_flight_utc: Some(as_of_utc),
         gap_m: Some(1e-4),
         limit_m: Some(1.5e-4),
-        not_before_utc: None,
-        likely_utc: None,
-        work_request: None,
-        cause: None,
+        ..Finding::default()
     }
 }
 

@@ -11,8 +11,8 @@ use job::Config;
 use pipeline::bookkeeping::join::Bookkeeping;
 use rayon::prelude::*;
 use records::{
-    Alias, Flight, FlightId, GapEstimate, GapRecord, Installation, Installations, LogOutcome, LogRecord,
-    PartNumber, Position, Provenance, RunRecord, SerialNumber, Status, TailNumber,
+    Alias, Flight, FlightId, GapEstimate, GapRecord, Installation, Installations, LogRecord, PartNumber,
+    Position, Provenance, RunRecord, SerialNumber, Status, TailNumber,
 };
 use store::{Holder, LogResult, Query, Store, Writer};
 
@@ -134,22 +134,17 @@ fn result(flight: i64, correction: u64, (config, installations): &(Config, Insta
     let account = LogRecord {
         log_path: log_path.clone(),
         size_bytes: 1,
-        modified_utc_ns: 0,
-        file_id: String::new(),
         log_digest: Some(format!("d{correction}")),
         config_digest: Some("c".into()),
         tail_number: Some("N1".into()),
         flight_id: Some("FP1".into()),
         departure_utc: Some(at),
         positions: POSITIONS.map(str::to_owned).to_vec(),
-        outcome: LogOutcome::Done,
         estimated: records.len() as i64,
-        refused: 0,
-        error_code: None,
-        error_detail: None,
         duration_s: 0.1,
         run_id: "run".into(),
         processed_utc: departure(FLIGHTS),
+        ..LogRecord::default()
     };
     LogResult { account, records, moved_from: Vec::new() }
 }
@@ -160,16 +155,9 @@ fn run_row(number: i64, tables_digest: Option<String>) -> RunRecord {
         started_utc: departure(100 + number),
         finished_utc: Some(departure(100 + number)),
         program_version: "0".into(),
-        config_path: String::new(),
-        found: 0,
-        known: 0,
-        done: 0,
-        estimated: 0,
-        refused: 0,
-        errors: 0,
-        not_reached: 0,
         exit_code: tables_digest.as_ref().map(|_| 0),
         tables_digest,
+        ..RunRecord::default()
     }
 }
 

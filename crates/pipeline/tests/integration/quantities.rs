@@ -11,8 +11,8 @@ use job::Config;
 use pipeline::fleet_trends::assess::{self, UnitSelection};
 use pipeline::quantities::follow::FollowedQuantities;
 use records::{
-    Flight, FlightId, GapEstimate, GapRecord, Installations, LogOutcome, LogRecord, PartNumber, Position,
-    Provenance, QuantityChange, SerialNumber, Status, TailNumber, TrendRow,
+    Flight, FlightId, GapEstimate, GapRecord, Installations, LogRecord, PartNumber, Position, Provenance,
+    QuantityChange, SerialNumber, Status, TailNumber, TrendRow,
 };
 use store::{Holder, LogResult, Store};
 
@@ -147,22 +147,17 @@ fn result(tail: i32, flight: i32, plant: Plant, swaps: bool) -> LogResult {
     let account = LogRecord {
         log_path: records[0].provenance.log_path.clone(),
         size_bytes: 1,
-        modified_utc_ns: 0,
-        file_id: String::new(),
         log_digest: Some("d".into()),
         config_digest: Some("c".into()),
         tail_number: Some(records[0].flight.tail_number.to_string()),
         flight_id: Some(records[0].flight.flight_id.to_string()),
         departure_utc: Some(records[0].flight.departure_utc),
         positions: POSITIONS.map(str::to_owned).to_vec(),
-        outcome: LogOutcome::Done,
         estimated: records.len() as i64,
-        refused: 0,
-        error_code: None,
-        error_detail: None,
         duration_s: 0.1,
         run_id: "run".into(),
         processed_utc: departure(FLIGHTS),
+        ..LogRecord::default()
     };
     LogResult { account, records, moved_from: Vec::new() }
 }

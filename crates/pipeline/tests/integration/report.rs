@@ -15,7 +15,7 @@ use records::{
     Status, TailNumber, TrendRow,
 };
 use report::{Report, UnitView};
-use store::{Holder, LogOutcome, LogRecord, LogResult, Store};
+use store::{Holder, LogRecord, LogResult, Store};
 
 use crate::scatter::scatter_um;
 
@@ -74,22 +74,17 @@ fn log(record: &GapRecord) -> LogRecord {
     LogRecord {
         log_path: record.provenance.log_path.clone(),
         size_bytes: 1,
-        modified_utc_ns: 0,
-        file_id: String::new(),
         log_digest: Some("d".into()),
         config_digest: Some("c".into()),
         tail_number: Some(record.flight.tail_number.to_string()),
         flight_id: Some(record.flight.flight_id.to_string()),
         departure_utc: Some(record.flight.departure_utc),
         positions: vec![record.position.to_string()],
-        outcome: LogOutcome::Done,
         estimated: 1,
-        refused: 0,
-        error_code: None,
-        error_detail: None,
         duration_s: 0.1,
         run_id: "run".into(),
         processed_utc: day(DAYS),
+        ..LogRecord::default()
     }
 }
 

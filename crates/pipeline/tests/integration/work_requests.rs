@@ -70,12 +70,7 @@ impl Desk {
                 since_utc: None,
                 as_of_utc: flight,
                 latest_flight_utc: Some(flight),
-                gap_m: None,
-                limit_m: None,
-                not_before_utc: None,
-                likely_utc: None,
-                work_request: None,
-                cause: None,
+                ..Finding::default()
             })
             .collect();
         let installations = Installations::new(self.installations.clone()).unwrap();

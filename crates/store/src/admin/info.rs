@@ -100,16 +100,8 @@ mod tests {
             started_utc: at,
             finished_utc: Some(at),
             program_version: "0".to_owned(),
-            config_path: String::new(),
-            found: 0,
-            known: 0,
-            done: 0,
-            estimated: 0,
-            refused: 0,
-            errors: 0,
-            not_reached: 0,
             exit_code: Some(0),
-            tables_digest: None,
+            ..RunRecord::default()
         }
     }
 

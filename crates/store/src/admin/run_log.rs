@@ -130,23 +130,10 @@ impl Writer {
 fn log_of_record(record: &GapRecord) -> LogRecord {
     LogRecord {
         log_path: record.provenance.log_path.clone(),
-        size_bytes: 0,
-        modified_utc_ns: 0,
-        file_id: String::new(),
-        log_digest: None,
-        config_digest: None,
-        tail_number: None,
-        flight_id: None,
-        departure_utc: None,
-        positions: Vec::new(),
         outcome: LogOutcome::NotReached,
-        estimated: 0,
-        refused: 0,
-        error_code: None,
-        error_detail: None,
-        duration_s: 0.0,
         run_id: record.provenance.run_id.clone(),
         processed_utc: record.provenance.processed_utc,
+        ..LogRecord::default()
     }
 }
 

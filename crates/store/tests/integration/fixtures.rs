@@ -7,7 +7,7 @@ use records::{
     Flight, FlightId, GapEstimate, GapRecord, PartNumber, Position, Provenance, SerialNumber, Status,
     TailNumber,
 };
-use store::{Holder, LogOutcome, LogRecord, LogResult, RunRecord, Store, Writer};
+use store::{Holder, LogRecord, LogResult, RunRecord, Store, Writer};
 
 pub(crate) const POSITIONS: [&str; 3] = ["aileron_left", "aileron_right", "elevator"];
 
@@ -61,19 +61,15 @@ pub(crate) fn account(tail: usize, flight: i64) -> LogRecord {
         modified_utc_ns: 1_700_000_000_123_456_789,
         file_id: "1:2".into(),
         log_digest: Some("d1".into()),
-        config_digest: None,
         tail_number: Some(format!("N{tail}")),
         flight_id: Some(format!("F{flight:04}")),
         departure_utc: Some(departure(flight)),
         positions: POSITIONS.map(str::to_owned).to_vec(),
-        outcome: LogOutcome::Done,
         estimated: 3,
-        refused: 0,
-        error_code: None,
-        error_detail: None,
         duration_s: 0.25,
         run_id: "run".into(),
         processed_utc: time("2026-11-20T02:00:00Z"),
+        ..LogRecord::default()
     }
 }
 
@@ -96,9 +92,8 @@ pub(crate) fn run(run_id: &str, started: &str, exit_code: Option<i64>) -> RunRec
         estimated: 271,
         refused: 25,
         errors: 1,
-        not_reached: 0,
         exit_code,
-        tables_digest: None,
+        ..RunRecord::default()
     }
 }
 
