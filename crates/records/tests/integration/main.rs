@@ -4,3 +4,4 @@
 
 mod architecture;
 mod columns_page;
+mod outbound;
