@@ -180,11 +180,18 @@ pub(crate) fn is_recorded(flights: &[Flight], maintenance: &[MaintenanceEvent], 
         || near_installation_change(flights, flight)
 }
 
-/// Whether a maintenance entry lies within a few flights of a step.
+/// Flights near a step: as far as a few measured flights before and after it. Flights without a record lie between them.
+fn near(flights: &[Flight], flight: usize) -> std::ops::RangeInclusive<usize> {
+    let is_measured = |at: &usize| flights[*at].gap.is_some();
+    let from = (0..flight).rev().filter(is_measured).nth(RECORD_FLIGHTS).unwrap_or(0);
+    let to = (flight..flights.len()).filter(is_measured).nth(RECORD_FLIGHTS).unwrap_or(flights.len() - 1);
+    from..=to
+}
+
+/// Whether a maintenance entry lies within a few measured flights of a step.
 fn is_near(entry: &MaintenanceEvent, flights: &[Flight], flight: usize) -> bool {
-    let from = flights[flight.saturating_sub(RECORD_FLIGHTS + 1)].departure_us;
-    let to = flights[(flight + RECORD_FLIGHTS).min(flights.len() - 1)].departure_us;
-    (from..=to).contains(&entry.utc_us)
+    let near = near(flights, flight);
+    (flights[*near.start()].departure_us..=flights[*near.end()].departure_us).contains(&entry.utc_us)
 }
 
 /// Maintenance entries without a step in the gap, at the first flight after each.
@@ -212,7 +219,5 @@ fn events_without_step<'a>(
 
 /// Whether the books know of a change of installation near this flight.
 fn near_installation_change(flights: &[Flight], flight: usize) -> bool {
-    let from = flight.saturating_sub(RECORD_FLIGHTS + 1);
-    let to = (flight + RECORD_FLIGHTS + 1).min(flights.len());
-    flights[from..to].windows(2).any(|pair| pair[0].installation != pair[1].installation)
+    flights[near(flights, flight)].windows(2).any(|pair| pair[0].installation != pair[1].installation)
 }

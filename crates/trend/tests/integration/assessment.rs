@@ -104,3 +104,29 @@ fn a_remembered_state_does_not_flap_around_its_limit_and_follows_from_the_flight
     let changes = states.windows(2).filter(|pair| pair[0] != pair[1]).count();
     assert_eq!((states.first(), states.last(), changes), (Some(&State::Normal), Some(&State::Watch), 1));
 }
+
+/// One flight in ten has a record. The re-shim was entered five records before its fall shows, with fifty flights between.
+#[test]
+fn a_repair_is_on_record_whatever_the_number_of_flights_without_a_log() {
+    const HOUR_US: i64 = 3_600_000_000;
+    let row = |flight: i64| {
+        let um = if flight < 300 { 90.0 } else { 20.0 } + 0.2 * (1.7 * flight as f64).sin();
+        Observation {
+            departure_us: 8 * HOUR_US * flight,
+            flight_hours: Some(2.0),
+            gap_m: (flight % 10 == 0).then_some(um * 1e-6),
+            gap_se_m: (flight % 10 == 0).then_some(0.3e-6),
+            ..Observation::default()
+        }
+    };
+    let repair = trend::MaintenanceEvent { utc_us: 8 * HOUR_US * 285, renews: true };
+    let series = Series::new((0..600).map(row), &UsageDefaults::default()).unwrap();
+    let settings = Settings::for_limit(150e-6);
+    let with = series.clone().with_maintenance(vec![repair]);
+    let resets = |series: &Series| {
+        let found = assess(series, 8 * HOUR_US * 600, &settings, None).unwrap();
+        found.changes.iter().map(|change| change.kind).collect::<Vec<_>>()
+    };
+    assert_eq!(resets(&series), [trend::ChangePointKind::Reset]);
+    assert_eq!(resets(&with), [trend::ChangePointKind::Recorded]);
+}
