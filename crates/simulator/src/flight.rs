@@ -55,8 +55,8 @@ pub struct Flight {
 
 /// Simulates one actuator over one flight and records it. Equal arguments give bitwise identical logs.
 ///
-/// CommandProfile, clock and each channel draw from streams of their own: two calls that differ in the plant
-/// or in one sensor alone meet the same flight and the same noise elsewhere.
+/// Commands, clock and each channel draw from random streams of their own: two calls that differ only in the plant
+/// or in one sensor have the same commands, and the same noise in all other channels.
 ///
 /// # Errors
 /// [`Error::Value`] for a parameter outside its range.

@@ -19,6 +19,7 @@ mod load;
 mod plant;
 mod seeded_streams;
 mod sensors;
+mod up_to_three;
 
 pub use error::Error;
 pub use fleet::fleet_events::{FaultKind, LogFault, Place, PlayCheck, Replacement, Reshim, Swap};
@@ -41,3 +42,4 @@ pub use plant::friction::{Friction, FrictionLaw};
 pub use plant::motor_controller::{Drive, PositionLoop};
 pub use plant::two_mass;
 pub use sensors::sensor::{Channel, Clock, NoiseColour, PeriodicError, PeriodicErrors, Sensors};
+pub use up_to_three::UpToThree;

@@ -44,7 +44,6 @@ pub struct Replacement {
     #[serde(default)]
     pub unit_hours: f64,
     /// How it wears. Default the part's law.
-    #[serde(default)]
     pub wear: Option<WearLaw>,
 }
 

@@ -54,21 +54,20 @@ impl Plan {
         let log = simulate(&task.plant, &task.profile, &task.sensors, seed)?;
         let part = &self.parts[task.part];
         let (motor, motor_unit) = motor_as_logged(log.motor_m, part);
-        let position = truth.position.clone();
         let (mut screw, mut load) = (log.screw_m, log.load_n);
-        let Some(radius_m) = part.reference_radius_m else {
-            let (screw_unit, load_unit) = match part.screw_log {
-                ScrewLogUnit::Millimetre => (ChannelUnit::Metre, ChannelUnit::Newton),
-                ScrewLogUnit::Micrometre => {
-                    screw.iter_mut().for_each(|x| *x *= 1e6);
-                    (ChannelUnit::Micrometre, ChannelUnit::Newton)
-                }
-            };
-            return Ok(ActuatorLog { position, motor, motor_unit, screw, screw_unit, load, load_unit });
+        let (screw_unit, load_unit) = match (part.reference_radius_m, part.screw_log) {
+            (Some(radius_m), _) => {
+                screw.iter_mut().for_each(|x| *x /= radius_m);
+                load.iter_mut().for_each(|f| *f *= radius_m);
+                (ChannelUnit::Radian, ChannelUnit::NewtonMetre)
+            }
+            (None, ScrewLogUnit::Millimetre) => (ChannelUnit::Metre, ChannelUnit::Newton),
+            (None, ScrewLogUnit::Micrometre) => {
+                screw.iter_mut().for_each(|x| *x *= 1e6);
+                (ChannelUnit::Micrometre, ChannelUnit::Newton)
+            }
         };
-        screw.iter_mut().for_each(|x| *x /= radius_m);
-        load.iter_mut().for_each(|f| *f *= radius_m);
-        let (screw_unit, load_unit) = (ChannelUnit::Radian, ChannelUnit::NewtonMetre);
+        let position = truth.position.clone();
         Ok(ActuatorLog { position, motor, motor_unit, screw, screw_unit, load, load_unit })
     }
 }

@@ -5,7 +5,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::error::Error;
-use crate::fleet::calendar::{DAY_US, HOUR_US, midnight_us};
 use crate::fleet::fleet_events::FaultKind;
 use crate::fleet::fleet_plan_types::{
     ActuatorTruth, Assignment, Inspection, Installation, LogState, Maintenance, Plan, PlannedFlight,
@@ -16,6 +15,9 @@ use crate::fleet::planted_change::ActuatorFlight;
 use crate::fleet::wear;
 use crate::flight::ExpectedOutcome;
 use crate::seeded_streams::{derive_seed, seeded_rng};
+
+const HOUR_US: f64 = 3.6e9;
+const DAY_US: f64 = 24.0 * HOUR_US;
 
 /// A calendar in the making.
 pub(crate) struct Planner<'a> {
@@ -38,7 +40,7 @@ impl<'a> Planner<'a> {
         let wear = units.iter().map(|unit| seeded_rng(spec.seed, &["wear", &unit.serial_number])).collect();
         let mut planner = Self {
             spec,
-            start_us: midnight_us(&spec.start_date)?,
+            start_us: spec.start_us()?,
             unit_at: UnitAssignment::new(spec),
             units,
             wear,

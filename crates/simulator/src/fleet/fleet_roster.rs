@@ -3,7 +3,7 @@
 use rand::Rng;
 
 use crate::error::Error;
-use crate::fleet::fleet_events::{Place, Replacement};
+use crate::fleet::fleet_events::Replacement;
 use crate::fleet::fleet_spec::{Position, Spec};
 use crate::fleet::wear::WearLaw;
 use crate::seeded_streams::seeded_rng;
@@ -27,8 +27,7 @@ pub(crate) fn fleet_units(spec: &Spec) -> Result<Vec<FleetUnit>, Error> {
         .enumerate()
         .map(|(count, (tail, place))| unit(spec, tail, place, count))
         .collect::<Result<_, _>>()?;
-    let spares = spec.replacements.iter().map(|spare| spare_unit(spec, &units, spare));
-    let spares: Vec<FleetUnit> = spares.collect();
+    let spares: Vec<_> = spec.replacements.iter().map(|spare| spare_unit(spec, &units, spare)).collect();
     units.extend(spares);
     let names: Vec<_> = units.iter().map(|unit| (unit.part, unit.serial_number.as_str())).collect();
     match names.iter().enumerate().find(|(k, name)| names[..*k].contains(name)) {
@@ -59,8 +58,7 @@ fn unit(spec: &Spec, tail: &str, place: &Position, count: usize) -> Result<Fleet
 
 /// A spare of the part that its place holds, as stiff as the part.
 fn spare_unit(spec: &Spec, units: &[FleetUnit], spare: &Replacement) -> FleetUnit {
-    let place = Place { tail: spare.tail.clone(), position: spare.position.clone() };
-    let part = units[seat(spec, &place)].part;
+    let part = units[seat(spec, &spare.tail, &spare.position)].part;
     FleetUnit {
         part,
         serial_number: spare.serial_number.clone(),
@@ -72,9 +70,9 @@ fn spare_unit(spec: &Spec, units: &[FleetUnit], spare: &Replacement) -> FleetUni
 }
 
 /// Index of a place; the spec is checked before, so both names are found.
-fn seat(spec: &Spec, place: &Place) -> usize {
-    let tail = spec.tails.iter().take_while(|tail| **tail != place.tail).count();
-    let position = spec.positions.iter().take_while(|known| known.position != place.position).count();
+fn seat(spec: &Spec, tail: &str, position: &str) -> usize {
+    let tail = spec.tails.iter().take_while(|known| *known != tail).count();
+    let position = spec.positions.iter().take_while(|known| known.position != position).count();
     tail * spec.positions.len() + position
 }
 
@@ -99,7 +97,7 @@ impl UnitAssignment {
 
     /// The unit installed in a named place.
     pub(crate) fn installed(&self, spec: &Spec, tail: &str, position: &str) -> usize {
-        self.units[seat(spec, &Place { tail: tail.to_owned(), position: position.to_owned() })]
+        self.units[seat(spec, tail, position)]
     }
 
     /// Carries out the swaps and replacements due before a flight, counted from 1, and names the seats they
@@ -112,23 +110,23 @@ impl UnitAssignment {
     ) -> Result<Vec<(usize, usize)>, Error> {
         let mut touched = Vec::new();
         for swap in spec.swaps.iter().filter(|swap| swap.before_flight == flight) {
-            let (a, b) = (seat(spec, &swap.from), seat(spec, &swap.to));
+            let [a, b] = [&swap.from, &swap.to].map(|place| seat(spec, &place.tail, &place.position));
             let part = |seat: usize| units[self.units[seat]].part;
             if part(a) != part(b) {
                 let name = |seat| spec.parts[part(seat)].part_number.clone();
                 return Err(Error::Misfit { flight, from: name(a), to: name(b) });
             }
             self.units.swap(a, b);
-            touched.extend([a, b].map(|seat| (seat / self.positions, seat % self.positions)));
+            touched.extend([a, b]);
         }
         let first_spare = spec.tails.len() * self.positions;
         for (k, spare) in spec.replacements.iter().enumerate().filter(|(_, s)| s.before_flight == flight) {
-            let at = seat(spec, &Place { tail: spare.tail.clone(), position: spare.position.clone() });
+            let at = seat(spec, &spare.tail, &spare.position);
             self.units[at] = first_spare + k;
-            touched.push((at / self.positions, at % self.positions));
+            touched.push(at);
         }
         touched.sort_unstable();
         touched.dedup();
-        Ok(touched)
+        Ok(touched.into_iter().map(|seat| (seat / self.positions, seat % self.positions)).collect())
     }
 }

@@ -1,9 +1,9 @@
 //! Fleet specification `SPEC.toml`: every key has a default except names, parts and positions.
 
+use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, finite, not_negative, positive, within};
-use crate::fleet::calendar::midnight_us;
 use crate::fleet::fleet_events::{LogFault, PlayCheck, Replacement, Reshim, Swap};
 use crate::fleet::planted_change::PlantedChange;
 use crate::fleet::wear::WearLaw;
@@ -17,96 +17,52 @@ pub const SAMPLE_SPEC: &str = include_str!("../../specs/sample.toml");
 
 /// A fleet, its flights and its sensors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Spec {
     /// Everything random follows from this. Default 1.
-    #[serde(default = "default_seed")]
     pub seed: u64,
     /// Midnight UTC of this day opens the plan, `2026-03-02`.
-    #[serde(default = "default_start")]
     pub start_date: String,
     /// Tail numbers.
     pub tails: Vec<String>,
     /// How many flights each tail makes. Default 10.
-    #[serde(default = "default_flights")]
     pub flights_per_tail: usize,
     /// One flight of this many in a row, drawn at random, has a log. Default 1: each.
-    #[serde(default = "default_flights_per_log")]
     pub flights_per_log: usize,
     /// Each flight has a slot of so many days; below 1, several flights a day. Default 7.
-    #[serde(default = "default_days")]
     pub days_between_flights: f64,
     /// Mean length of a flight, hours. Default 1.8.
-    #[serde(default = "default_hours")]
     pub flight_hours: f64,
     /// Flights last evenly between ± this share of the mean. Default 0.3.
-    #[serde(default = "default_hours_spread")]
     pub flight_hours_spread: f64,
     /// What the first tail's meter reads at the start, hours; each further tail has 10 % more. Default 2000.
-    #[serde(default = "default_tail_hours")]
     pub tail_hours: f64,
     /// Length, rate and loads of the logs.
-    #[serde(default)]
     pub profile: Profile,
     /// The sensors of every actuator.
-    #[serde(default)]
     pub sensors: Sensors,
     /// How units, aircraft and flights differ from each other.
-    #[serde(default)]
     pub spread: ParameterSpread,
     /// The designs.
     pub parts: Vec<Part>,
     /// The places on each tail.
     pub positions: Vec<Position>,
     /// Units that are to differ from what chance gives.
-    #[serde(default)]
     pub units: Vec<UnitSpec>,
     /// Exchanges of two units.
-    #[serde(default)]
     pub swaps: Vec<Swap>,
     /// Removals of a unit for a spare.
-    #[serde(default)]
     pub replacements: Vec<Replacement>,
     /// Gaps set by a shim.
-    #[serde(default)]
     pub reshims: Vec<Reshim>,
     /// Play measured in the hangar.
-    #[serde(default)]
     pub play_checks: Vec<PlayCheck>,
     /// Log files that do not arrive as recorded.
-    #[serde(default)]
     pub log_faults: Vec<LogFault>,
     /// Aircraft whose load cells or structure differ from the others'.
-    #[serde(default)]
     pub aircraft: Vec<Aircraft>,
     /// Changes that come over the flights.
-    #[serde(default)]
     pub changes: Vec<PlantedChange>,
-}
-
-fn default_seed() -> u64 {
-    1
-}
-fn default_start() -> String {
-    "2026-03-02".to_owned()
-}
-fn default_flights() -> usize {
-    10
-}
-fn default_flights_per_log() -> usize {
-    1
-}
-fn default_days() -> f64 {
-    7.0
-}
-fn default_hours() -> f64 {
-    1.8
-}
-fn default_hours_spread() -> f64 {
-    0.3
-}
-fn default_tail_hours() -> f64 {
-    2000.0
 }
 
 /// What differs, drawn per unit, per place or per flight; every default is zero, no difference.
@@ -175,7 +131,6 @@ pub struct Part {
     pub screw_log: ScrewLogUnit,
     /// For a rotary actuator the radius r at which its metres and newtons are meant: the output is
     /// logged as `X/r` in radians and the load as `F·r` in N·m. Default none, a linear actuator.
-    #[serde(default)]
     pub reference_radius_m: Option<f64>,
     /// The gap at which a unit must be removed, metres. Default 200 µm.
     #[serde(default = "default_limit")]
@@ -239,19 +194,14 @@ pub struct UnitSpec {
     /// The place it starts in.
     pub position: String,
     /// Its serial number. Default: counted up from `S10001`.
-    #[serde(default)]
     pub serial_number: Option<String>,
     /// Its gap at the start, metres.
-    #[serde(default)]
     pub gap_m: Option<f64>,
     /// Its age at the start, hours.
-    #[serde(default)]
     pub unit_hours: Option<f64>,
     /// Its stiffness over the part's.
-    #[serde(default)]
     pub stiffness_factor: Option<f64>,
     /// How it wears.
-    #[serde(default)]
     pub wear: Option<WearLaw>,
 }
 
@@ -265,11 +215,47 @@ pub struct Aircraft {
     #[serde(default)]
     pub load_bias_n: f64,
     /// Vibration of its loads in place of the profile's. Default the profile's.
-    #[serde(default)]
     pub buffet: Option<Vibration>,
 }
 
+impl Default for Spec {
+    /// No aircraft; ten weekly flights from 2026-03-02 on.
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            start_date: "2026-03-02".to_owned(),
+            tails: Vec::new(),
+            flights_per_tail: 10,
+            flights_per_log: 1,
+            days_between_flights: 7.0,
+            flight_hours: 1.8,
+            flight_hours_spread: 0.3,
+            tail_hours: 2000.0,
+            profile: Profile::default(),
+            sensors: Sensors::default(),
+            spread: ParameterSpread::default(),
+            parts: Vec::new(),
+            positions: Vec::new(),
+            units: Vec::new(),
+            swaps: Vec::new(),
+            replacements: Vec::new(),
+            reshims: Vec::new(),
+            play_checks: Vec::new(),
+            log_faults: Vec::new(),
+            aircraft: Vec::new(),
+            changes: Vec::new(),
+        }
+    }
+}
+
 impl Spec {
+    /// Midnight UTC that opens the plan, microseconds since 1970.
+    pub(crate) fn start_us(&self) -> Result<i64, Error> {
+        let day = Date::strptime("%Y-%m-%d", &self.start_date)
+            .map_err(|_| Error::Date { text: self.start_date.clone() })?;
+        Ok(day.duration_since(Date::constant(1970, 1, 1)).as_micros() as i64)
+    }
+
     /// Where in `parts` the part of a name stands.
     pub(crate) fn part_index(&self, place: &str, part_number: &str) -> Result<usize, Error> {
         let mut names = self.parts.iter().map(|part| part.part_number.as_str());
@@ -282,7 +268,7 @@ impl Spec {
     /// # Errors
     /// The first diagnostic, any variant but [`Error::NoSuchFlight`] and [`Error::Misfit`].
     pub fn check(&self) -> Result<(), Error> {
-        midnight_us(&self.start_date)?;
+        self.start_us()?;
         self.check_names()?;
         self.check_flights()?;
         self.profile.check()?;

@@ -7,6 +7,5 @@ pub(crate) mod fleet_spec;
 pub(crate) mod planted_change;
 pub(crate) mod wear;
 
-mod calendar;
 mod fleet_planner;
 mod fleet_roster;

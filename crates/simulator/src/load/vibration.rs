@@ -10,9 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, not_negative, within};
 use crate::load::shaping_filter::ShapedNoise;
 use crate::seeded_streams::seeded_rng;
-
-/// The most lines a vibration can have.
-const LINES: usize = 3;
+use crate::up_to_three::UpToThree;
 
 /// A narrow spectral line, such as a structural mode or a rotor's harmonic.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -49,34 +47,7 @@ impl Default for Vibration {
 }
 
 /// Up to three lines; an unused line has no amplitude.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<Line>", into = "Vec<Line>")]
-pub struct Lines([Line; LINES]);
-
-impl TryFrom<Vec<Line>> for Lines {
-    type Error = String;
-
-    fn try_from(lines: Vec<Line>) -> Result<Self, String> {
-        if lines.len() > LINES {
-            return Err(format!("{} lines are given; at most {LINES} are possible", lines.len()));
-        }
-        let mut all = [Line::default(); LINES];
-        all[..lines.len()].copy_from_slice(&lines);
-        Ok(Self(all))
-    }
-}
-
-impl From<Lines> for Vec<Line> {
-    fn from(lines: Lines) -> Self {
-        lines.0.into_iter().filter(|line| line.amplitude > 0.0).collect()
-    }
-}
-
-impl From<[Line; LINES]> for Lines {
-    fn from(lines: [Line; LINES]) -> Self {
-        Self(lines)
-    }
-}
+pub type Lines = UpToThree<Line>;
 
 impl Vibration {
     /// Noise between two frequencies.

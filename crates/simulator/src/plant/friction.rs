@@ -21,7 +21,6 @@ pub struct Friction {
     /// `F_v`, N·s/m.
     pub viscous_n_s_per_m: f64,
     /// η while the load drives the motion. Default: `load_share`, the same in both directions of power.
-    #[serde(default)]
     pub backdriven_load_share: Option<f64>,
     /// Dry and load-dependent friction is `1 + asymmetry` times as high in motion along +X and
     /// `1 − asymmetry` times along −X, −0.9 to 0.9. Default 0.
@@ -175,35 +174,41 @@ pub enum FrictionLaw {
 
 impl FrictionLaw {
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let ratio_in_range = |law: &str, ratio| {
-            within(&format!("friction_law.{law}.ratio"), ratio, 1.0, 10.0, "between 1 and 10")
+        let law = match self {
+            Self::Coulomb => return Ok(()),
+            Self::Stribeck { .. } => "stribeck",
+            Self::Presliding { .. } => "presliding",
+            Self::LuGre { .. } => "lu_gre",
         };
+        let key = |name: &str| format!("friction_law.{law}.{name}");
+        let (ratio, speed_m_per_s, bristle) = self.parameters();
+        let (travel_m, damping_n_s_per_m) = bristle.unwrap_or((1.0, 0.0));
+        positive(&key("travel_m"), travel_m)?;
+        within(&key("ratio"), ratio, 1.0, 10.0, "between 1 and 10")?;
+        positive(&key("speed_m_per_s"), speed_m_per_s)?;
+        not_negative(&key("damping_n_s_per_m"), damping_n_s_per_m)
+    }
+
+    /// The law as `LuGre`'s parameters: break-away ratio, Stribeck speed, and the bristles' travel and damping, if any.
+    fn parameters(&self) -> (f64, f64, Option<(f64, f64)>) {
         match *self {
-            Self::Coulomb => Ok(()),
-            Self::Stribeck { ratio, speed_m_per_s } => {
-                ratio_in_range("stribeck", ratio)?;
-                positive("friction_law.stribeck.speed_m_per_s", speed_m_per_s)
-            }
-            Self::Presliding { travel_m } => positive("friction_law.presliding.travel_m", travel_m),
+            Self::Coulomb => (1.0, 1.0, None),
+            Self::Stribeck { ratio, speed_m_per_s } => (ratio, speed_m_per_s, None),
+            Self::Presliding { travel_m } => (1.0, 1.0, Some((travel_m, 0.0))),
             Self::LuGre { travel_m, ratio, speed_m_per_s, damping_n_s_per_m } => {
-                positive("friction_law.lu_gre.travel_m", travel_m)?;
-                ratio_in_range("lu_gre", ratio)?;
-                positive("friction_law.lu_gre.speed_m_per_s", speed_m_per_s)?;
-                not_negative("friction_law.lu_gre.damping_n_s_per_m", damping_n_s_per_m)
+                (ratio, speed_m_per_s, Some((travel_m, damping_n_s_per_m)))
             }
         }
     }
 
     /// The dry levels in force during a step that starts at the speed given.
     fn levels(&self, sliding: Levels, speed_m_per_s: f64) -> Levels {
-        match *self {
-            Self::Stribeck { ratio, speed_m_per_s: knee }
-            | Self::LuGre { ratio, speed_m_per_s: knee, .. } => {
-                let lift = 1.0 + (ratio - 1.0) * (-(speed_m_per_s / knee).powi(2)).exp();
-                Levels { up_n: sliding.up_n * lift, down_n: sliding.down_n * lift }
-            }
-            Self::Coulomb | Self::Presliding { .. } => sliding,
+        let (ratio, knee_m_per_s, _) = self.parameters();
+        if ratio <= 1.0 {
+            return sliding;
         }
+        let lift = 1.0 + (ratio - 1.0) * (-(speed_m_per_s / knee_m_per_s).powi(2)).exp();
+        Levels { up_n: sliding.up_n * lift, down_n: sliding.down_n * lift }
     }
 
     /// One mass under friction during a step.
@@ -219,11 +224,7 @@ impl FrictionLaw {
         step_s: f64,
     ) -> FrictionBody {
         let sliding = friction.sliding(load_n);
-        let bristle = match *self {
-            Self::Coulomb | Self::Stribeck { .. } => None,
-            Self::Presliding { travel_m } => Some((travel_m, 0.0)),
-            Self::LuGre { travel_m, damping_n_s_per_m, .. } => Some((travel_m, damping_n_s_per_m)),
-        };
+        let (_, _, bristle) = self.parameters();
         FrictionBody {
             inertia_n_s_per_m: inertia_n_s_per_m + friction.drag_n_s_per_m(speed_m_per_s),
             levels: self.levels(sliding, speed_m_per_s),

@@ -14,12 +14,10 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, finite, not_negative, positive, within};
 use crate::load::flight_profile::Profile;
 use crate::seeded_streams::seeded_rng;
+use crate::up_to_three::UpToThree;
 
 /// Height of `u − u³` at its peak, which `nonlinearity` is scaled by: `2/(3√3)`.
 const CUBIC_PEAK: f64 = 0.384_900_179_459_750_5;
-
-/// The most periodic errors a channel can have.
-const PERIODIC: usize = 3;
 
 /// An error that repeats with the travel: a pitch error, a gear or a resolver's harmonic.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -43,37 +41,7 @@ impl PeriodicError {
 }
 
 /// Up to three periodic errors; an unused one has no amplitude.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<PeriodicError>", into = "Vec<PeriodicError>")]
-pub struct PeriodicErrors([PeriodicError; PERIODIC]);
-
-impl TryFrom<Vec<PeriodicError>> for PeriodicErrors {
-    type Error = String;
-
-    fn try_from(errors: Vec<PeriodicError>) -> Result<Self, String> {
-        if errors.len() > PERIODIC {
-            return Err(format!(
-                "{} periodic errors are given; at most {PERIODIC} are possible",
-                errors.len()
-            ));
-        }
-        let mut all = [PeriodicError::default(); PERIODIC];
-        all[..errors.len()].copy_from_slice(&errors);
-        Ok(Self(all))
-    }
-}
-
-impl From<PeriodicErrors> for Vec<PeriodicError> {
-    fn from(errors: PeriodicErrors) -> Self {
-        errors.0.into_iter().filter(|error| error.amplitude != 0.0).collect()
-    }
-}
-
-impl From<[PeriodicError; PERIODIC]> for PeriodicErrors {
-    fn from(errors: [PeriodicError; PERIODIC]) -> Self {
-        Self(errors)
-    }
-}
+pub type PeriodicErrors = UpToThree<PeriodicError>;
 
 impl PeriodicErrors {
     fn check(&self, key: &str) -> Result<(), Error> {
