@@ -6,6 +6,7 @@
 //! `simulator` shares no equation with `estimator`, so neither can flatter the other.
 
 pub mod accuracy_page;
+mod drawing;
 pub mod gear_bench;
 pub mod methods;
 pub mod metrics;
@@ -13,3 +14,5 @@ pub mod paper;
 pub mod plots;
 pub mod robot_logs;
 pub mod scenarios;
+
+pub use drawing::Drawn;

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use records::uncertainty::NORMAL_95;
+
 use crate::methods::{METHODS, MethodResults};
 use crate::scenarios::{Class, Kind};
 
@@ -62,9 +64,6 @@ impl Errors {
         Self { median: at(0.5), p95: at(0.95), worst: at(1.0), count }
     }
 }
-
-/// Standard normal 95 % quantile: distance of a bound from the gap, in standard errors.
-const NORMAL_95: f64 = 1.644_853_626_951_472_2;
 
 impl Kind {
     /// The unit of the errors.

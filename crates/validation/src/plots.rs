@@ -3,27 +3,16 @@
 use plotters::coord::ranged1d::SegmentedCoord;
 use plotters::prelude::*;
 
+use crate::drawing::{
+    Axes, BLUE, Drawn, GREEN, GREY, GRID, INK, ORANGE, builder, chart, drawing, mesh, text,
+};
 use crate::methods::METHODS;
 use crate::metrics::ErrorStats;
 use crate::scenarios::Kind;
 
-const INK: RGBColor = RGBColor(0x1C, 0x25, 0x30);
-const GRID: RGBColor = RGBColor(0xE1, 0xE6, 0xEB);
-const COLOURS: [RGBColor; METHODS.len()] = [
-    RGBColor(0xC8, 0x52, 0x00),
-    RGBColor(0x1F, 0x6F, 0xB2),
-    RGBColor(0x5A, 0x8F, 0x3C),
-    RGBColor(0x9A, 0xA5, 0xB1),
-];
+const COLOURS: [RGBColor; METHODS.len()] = [ORANGE, BLUE, GREEN, GREY];
 /// Errors smaller than this are drawn at the edge.
 const LEAST: f64 = 0.03;
-
-/// An SVG drawing.
-pub type Drawn = Result<String, DrawingAreaErrorKind<std::io::Error>>;
-
-fn text(size: u32) -> TextStyle<'static> {
-    ("sans-serif", size).into_font().color(&INK)
-}
 
 /// Median (dot) and 95 % quantile (end of the bar) of each method in each scenario with one gap.
 ///
@@ -31,12 +20,9 @@ fn text(size: u32) -> TextStyle<'static> {
 /// The drawing backend fails.
 pub fn errors(tallies: &[ErrorStats]) -> Drawn {
     let rows: Vec<&ErrorStats> = tallies.iter().filter(|t| t.kind == Kind::Single).rev().collect();
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, (960, 60 + 34 * rows.len() as u32)).into_drawing_area();
-        root.fill(&WHITE)?;
+    drawing((960, 60 + 34 * rows.len() as u32), |root| {
         let rows_axis: SegmentedCoord<_> = (0..rows.len()).into_segmented();
-        let mut chart = ChartBuilder::on(&root)
+        let mut chart = ChartBuilder::on(root)
             .margin(10)
             .margin_top(28)
             .x_label_area_size(34)
@@ -72,93 +58,47 @@ pub fn errors(tallies: &[ErrorStats]) -> Drawn {
             root.draw(&Circle::new((x, 16), 4, colour.filled()))?;
             root.draw(&Text::new((*method).to_owned(), (x + 9, 10), text(13)))?;
         }
-        root.present()?;
-    }
-    Ok(svg)
+        Ok(())
+    })
 }
 
-/// Contact regression's error against the true gap, for each drawn flight.
+/// Contact regression's error against the true gap, for each flight of the classes `wide`.
 ///
 /// # Errors
 /// The drawing backend fails.
-pub fn scatter(tallies: &[ErrorStats]) -> Drawn {
+pub fn scatter(stats: &[ErrorStats]) -> Drawn {
     let rows: Vec<&ErrorStats> =
-        tallies.iter().filter(|t| matches!(t.kind, Kind::Wide | Kind::Foreign)).collect();
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, (960, 340)).into_drawing_area();
-        root.fill(&WHITE)?;
-        for (area, tally) in root.split_evenly((1, rows.len().max(1))).iter().zip(rows) {
-            let mut chart = ChartBuilder::on(area)
-                .margin(10)
-                .caption(tally.name, text(14))
-                .x_label_area_size(34)
-                .y_label_area_size(46)
-                .build_cartesian_2d(0.0..300.0, -4.0..4.0)?;
-            chart
-                .configure_mesh()
-                .light_line_style(TRANSPARENT)
-                .bold_line_style(GRID)
-                .axis_style(INK)
-                .label_style(text(12))
-                .x_labels(5)
-                .x_desc("true gap µm")
-                .y_desc("error µm, cut at ± 4")
-                .draw()?;
-            let dots = tally.scatter_um.iter().map(|(gap, error)| {
-                Circle::new((*gap, error.clamp(-4.0, 4.0)), 2, COLOURS[0].mix(0.6).filled())
-            });
-            chart.draw_series(dots)?;
-        }
-        root.present()?;
-    }
-    Ok(svg)
+        stats.iter().filter(|t| matches!(t.kind, Kind::Wide | Kind::Foreign)).collect();
+    error_panels(&rows, rows.len().max(1), (320, 340), 4.0)
 }
 
-/// Panels of [`classes`] side by side, their size, and the errors at which they are cut, µm.
-const PANELS: usize = 4;
-const PANEL_PX: (u32, u32) = (300, 220);
-const PANEL_UM: f64 = 8.0;
-
-/// Contact regression's error against the true gap: one panel for each class with drawn gaps.
+/// The same, one panel for each class with drawn gaps.
 ///
 /// # Errors
 /// The drawing backend fails.
-pub fn classes(tallies: &[ErrorStats]) -> Drawn {
-    let rows: Vec<&ErrorStats> = tallies.iter().filter(|t| t.kind == Kind::Drawn).collect();
-    let lines = rows.len().div_ceil(PANELS).max(1);
-    let mut svg = String::new();
-    {
-        let size = (PANEL_PX.0 * PANELS as u32, PANEL_PX.1 * lines as u32);
-        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        root.fill(&WHITE)?;
-        for (area, tally) in root.split_evenly((lines, PANELS)).iter().zip(rows) {
-            let mut chart = ChartBuilder::on(area)
-                .margin(8)
-                .caption(tally.name, text(13))
-                .x_label_area_size(28)
-                .y_label_area_size(34)
-                .build_cartesian_2d(0.0..310.0, -PANEL_UM..PANEL_UM)?;
-            chart
-                .configure_mesh()
-                .light_line_style(TRANSPARENT)
-                .bold_line_style(GRID)
-                .axis_style(INK)
-                .label_style(text(10))
-                .x_labels(4)
-                .y_labels(5)
-                .x_desc("gap [µm]")
-                .y_desc("error [µm]")
-                .draw()?;
-            let dots = tally.scatter_um.iter().map(|(gap, error)| {
-                let colour = COLOURS[usize::from(error.abs() > PANEL_UM)];
-                Circle::new((*gap, error.clamp(-PANEL_UM, PANEL_UM)), 2, colour.mix(0.6).filled())
+pub fn classes(stats: &[ErrorStats]) -> Drawn {
+    let rows: Vec<&ErrorStats> = stats.iter().filter(|t| t.kind == Kind::Drawn).collect();
+    error_panels(&rows, 4, (300, 220), 8.0)
+}
+
+/// Errors against the true gap: panels of a size, px, side by side, with errors cut at a bound, µm.
+fn error_panels(rows: &[&ErrorStats], columns: usize, panel_px: (u32, u32), bound_um: f64) -> Drawn {
+    let lines = rows.len().div_ceil(columns).max(1);
+    drawing((panel_px.0 * columns as u32, panel_px.1 * lines as u32), |root| {
+        for (area, row) in root.split_evenly((lines, columns)).iter().zip(rows) {
+            let axes = Axes { x: ("true gap [µm]", 0.0, 310.0), y: ("error [µm]", -bound_um, bound_um) };
+            let mut chart = builder(area)
+                .caption(row.name, text(13))
+                .build_cartesian_2d(axes.x.1..axes.x.2, axes.y.1..axes.y.2)?;
+            mesh(&mut chart, &axes)?;
+            let dots = row.scatter_um.iter().map(|(gap, error)| {
+                let colour = COLOURS[usize::from(error.abs() > bound_um)];
+                Circle::new((*gap, error.clamp(-bound_um, bound_um)), 2, colour.mix(0.6).filled())
             });
             chart.draw_series(dots)?;
         }
-        root.present()?;
-    }
-    Ok(svg)
+        Ok(())
+    })
 }
 
 /// Share of intervals that hold against the share they promise, from error over standard error.
@@ -166,25 +106,12 @@ pub fn classes(tallies: &[ErrorStats]) -> Drawn {
 /// # Errors
 /// The drawing backend fails.
 pub fn calibration(tallies: &[ErrorStats]) -> Drawn {
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, (560, 460)).into_drawing_area();
-        root.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(&root)
-            .margin(10)
-            .margin_top(16)
-            .x_label_area_size(36)
-            .y_label_area_size(50)
-            .build_cartesian_2d(0.0..3.0, 0.0..1.0)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(GRID)
-            .axis_style(INK)
-            .label_style(text(12))
-            .x_desc("half width of the interval, standard errors")
-            .y_desc("share of flights whose truth lies within")
-            .draw()?;
+    drawing((560, 460), |root| {
+        let axes = Axes {
+            x: ("half width of the interval, standard errors", 0.0, 3.0),
+            y: ("share of flights whose truth lies within", 0.0, 1.0),
+        };
+        let mut chart = chart(root, &axes)?;
         let normal = (0..=300).map(|k| 0.01 * f64::from(k)).map(|z| (z, within(z)));
         chart.draw_series(DashedLineSeries::new(normal, 6, 4, INK.stroke_width(1)))?;
         let rows = tallies.iter().filter(|t| matches!(t.kind, Kind::Wide | Kind::Foreign));
@@ -199,27 +126,13 @@ pub fn calibration(tallies: &[ErrorStats]) -> Drawn {
             root.draw(&Text::new(tally.name, (322, y), text(13)))?;
         }
         root.draw(&Text::new("dashed: normal errors", (300, 360), text(13)))?;
-        root.present()?;
-    }
-    Ok(svg)
+        Ok(())
+    })
 }
 
-/// P(|Z| ≤ z) of a standard normal, by Simpson's rule over its density.
+/// P(|Z| ≤ z) of a standard normal.
 fn within(z: f64) -> f64 {
-    const PANELS: usize = 60;
-    let step = z / PANELS as f64;
-    let density = |k: usize| {
-        let weight = if k == 0 || k == PANELS {
-            1.0
-        } else if k.is_multiple_of(2) {
-            2.0
-        } else {
-            4.0
-        };
-        let x = step * k as f64;
-        weight * (-0.5 * x * x).exp()
-    };
-    2.0 * step / 3.0 * (0..=PANELS).map(density).sum::<f64>() / std::f64::consts::TAU.sqrt()
+    libm::erf(z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 #[cfg(test)]

@@ -30,36 +30,7 @@ const WINDOW_S: f64 = 12.0;
 const CONVERGED: f64 = 0.01;
 
 /// An error of the simulator or the estimator.
-#[derive(Debug)]
-pub enum ClaimsError {
-    /// Of the simulator.
-    Simulator(simulator::Error),
-    /// Of the estimator.
-    Estimator(estimator::Error),
-}
-
-impl std::fmt::Display for ClaimsError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Simulator(error) => error.fmt(f),
-            Self::Estimator(error) => error.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for ClaimsError {}
-
-impl From<simulator::Error> for ClaimsError {
-    fn from(error: simulator::Error) -> Self {
-        Self::Simulator(error)
-    }
-}
-
-impl From<estimator::Error> for ClaimsError {
-    fn from(error: estimator::Error) -> Self {
-        Self::Estimator(error)
-    }
-}
+pub type ClaimsError = Box<dyn std::error::Error + Send + Sync>;
 
 /// A change of ΔS, % of the gap, over the flights.
 #[derive(Debug, Clone, Copy, PartialEq)]

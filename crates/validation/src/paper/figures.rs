@@ -1,20 +1,14 @@
 //! The figures as SVG drawings.
 
 use plotters::chart::ChartContext;
-use plotters::coord::ranged1d::ValueFormatter;
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
+use crate::drawing::{
+    Area, Axes, BLUE, Drawn, Failure, GREEN, GREY, GRID, INK, ORANGE, builder, chart, drawing, mesh, text,
+};
 use crate::paper::claims::{Change, Claims, Convergence};
 use crate::paper::{GAP_M, STEP_S};
-use crate::plots::Drawn;
 
-const INK: RGBColor = RGBColor(0x1C, 0x25, 0x30);
-const GRID: RGBColor = RGBColor(0xE1, 0xE6, 0xEB);
-const BLUE: RGBColor = RGBColor(0x1F, 0x6F, 0xB2);
-const ORANGE: RGBColor = RGBColor(0xC8, 0x52, 0x00);
-const GREEN: RGBColor = RGBColor(0x5A, 0x8F, 0x3C);
-const GREY: RGBColor = RGBColor(0x9A, 0xA5, 0xB1);
 const PURPLE: RGBColor = RGBColor(0x7B, 0x4F, 0x9E);
 const COLOURS: [RGBColor; 5] = [BLUE, ORANGE, GREEN, GREY, PURPLE];
 /// Width and height of a figure of one or two panels.
@@ -32,9 +26,6 @@ const LEAST_UM: f64 = 1e-4;
 
 /// A curve: its name, colour and points.
 type Curve = (String, RGBColor, Vec<(f64, f64)>);
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-type Chart<'r, 's> = ChartContext<'r, SVGBackend<'s>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-type Failure = DrawingAreaErrorKind<std::io::Error>;
 
 /// Every figure with the name of its file.
 pub fn pictures(claims: &Claims) -> Vec<(&'static str, Drawn)> {
@@ -45,7 +36,6 @@ pub fn pictures(claims: &Claims) -> Vec<(&'static str, Drawn)> {
         ("paper-5-backlash.svg", backlash(claims)),
         ("paper-6-speed.svg", against_speed(claims)),
         ("paper-7-load.svg", against_load(claims)),
-        ("paper-operations.svg", operations(claims)),
         ("paper-convergence.svg", convergences(claims)),
         ("paper-noise.svg", noises(claims)),
         ("paper-parameters.svg", parameters(claims)),
@@ -53,59 +43,9 @@ pub fn pictures(claims: &Claims) -> Vec<(&'static str, Drawn)> {
     ]
 }
 
-fn text(size: u32) -> TextStyle<'static> {
-    ("sans-serif", size).into_font().color(&INK)
-}
-
 /// A figure of panels side by side.
 fn figure(panels: usize, draw: impl FnOnce(&[Area<'_>]) -> Result<(), Failure>) -> Drawn {
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        root.fill(&WHITE)?;
-        draw(&root.split_evenly((1, panels)))?;
-        root.present()?;
-    }
-    Ok(svg)
-}
-
-/// Axes: their names and ranges.
-struct Axes<'t> {
-    x: (&'t str, f64, f64),
-    y: (&'t str, f64, f64),
-}
-
-fn chart<'r, 's>(area: &'r Area<'s>, axes: &Axes<'_>) -> Result<Chart<'r, 's>, Failure> {
-    let mut chart = builder(area).build_cartesian_2d(axes.x.1..axes.x.2, axes.y.1..axes.y.2)?;
-    mesh(&mut chart, axes)?;
-    Ok(chart)
-}
-
-fn builder<'r, 's>(area: &'r Area<'s>) -> ChartBuilder<'r, 'r, SVGBackend<'s>> {
-    let mut builder = ChartBuilder::on(area);
-    builder.margin(8).margin_right(16).x_label_area_size(34).y_label_area_size(52);
-    builder
-}
-
-fn mesh<'r, 's: 'r, X, Y>(
-    chart: &mut ChartContext<'r, SVGBackend<'s>, Cartesian2d<X, Y>>,
-    axes: &Axes<'_>,
-) -> Result<(), Failure>
-where
-    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
-    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
-{
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(GRID)
-        .axis_style(INK)
-        .label_style(text(12))
-        .x_labels(7)
-        .y_labels(6)
-        .x_desc(axes.x.0)
-        .y_desc(axes.y.0)
-        .draw()
+    drawing(SIZE, |root| draw(&root.split_evenly((1, panels))))
 }
 
 fn lines<'r, 's: 'r, X, Y>(
@@ -278,49 +218,6 @@ fn against_speed(claims: &Claims) -> Drawn {
 
 fn against_load(claims: &Claims) -> Drawn {
     scatter(claims, "load [kN]", &claims.flight.load_n.iter().map(|f| 1e-3 * f).collect::<Vec<_>>())
-}
-
-fn operations(claims: &Claims) -> Drawn {
-    let names = ["24 state", "25 covariance", "26 gain", "27 state", "28 covariance"];
-    let kinds = [("×", BLUE), ("+ −", ORANGE), ("÷", GREEN)];
-    figure(1, |areas| {
-        let most = claims.operations.iter().map(|c| c.total()).max().unwrap_or(1);
-        let axes = Axes { x: ("operations in a step", 0.0, 1.15 * f64::from(most)), y: ("", 0.0, 5.0) };
-        let mut chart = ChartBuilder::on(&areas[0])
-            .margin(8)
-            .margin_right(16)
-            .x_label_area_size(34)
-            .y_label_area_size(10)
-            .build_cartesian_2d(axes.x.1..axes.x.2, axes.y.1..axes.y.2)?;
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(GRID)
-            .axis_style(INK)
-            .label_style(text(12))
-            .y_labels(0)
-            .disable_y_mesh()
-            .x_desc(axes.x.0)
-            .draw()?;
-        for (k, (count, name)) in claims.operations.iter().zip(names).enumerate() {
-            let (bottom, mut from) = (4.15 - k as f64, 0.0);
-            let parts = [count.multiplications, count.additions, count.divisions];
-            for (part, (_, colour)) in parts.iter().zip(kinds) {
-                let to = from + f64::from(*part);
-                chart
-                    .draw_series([Rectangle::new([(from, bottom), (to, bottom + 0.45)], colour.filled())])?;
-                from = to;
-            }
-            let label = format!("({name}): {}", count.total());
-            chart.draw_series([Text::new(label, (1.0, bottom + 0.75), text(12))])?;
-        }
-        for (k, (kind, colour)) in kinds.into_iter().enumerate() {
-            let x = 640 + 60 * k as i32;
-            areas[0].draw(&Rectangle::new([(x, 200), (x + 12, 212)], colour.filled()))?;
-            areas[0].draw(&Text::new(kind, (x + 18, 198), text(14)))?;
-        }
-        Ok(())
-    })
 }
 
 /// Two panels of convergence on a logarithmic scale.

@@ -5,79 +5,52 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use estimator::{Filter, KalmanState};
 
-/// Additions (and subtractions), multiplications and divisions.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct OperationCount {
-    /// Additions and subtractions.
-    pub additions: u32,
-    /// Multiplications.
-    pub multiplications: u32,
-    /// Divisions.
-    pub divisions: u32,
-}
-
-impl OperationCount {
-    /// All of them.
-    pub fn total(self) -> u32 {
-        self.additions + self.multiplications + self.divisions
-    }
-
-    fn since(self, before: Self) -> Self {
-        Self {
-            additions: self.additions - before.additions,
-            multiplications: self.multiplications - before.multiplications,
-            divisions: self.divisions - before.divisions,
-        }
-    }
-}
+/// Multiplications, additions with subtractions, and divisions.
+pub type OperationCount = [u32; 3];
 
 thread_local! {
-    static DONE: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0 }) };
-}
-
-/// Counts additions, multiplications and divisions.
-fn note(additions: u32, multiplications: u32, divisions: u32) {
-    let before = DONE.get();
-    DONE.set(OperationCount {
-        additions: before.additions + additions,
-        multiplications: before.multiplications + multiplications,
-        divisions: before.divisions + divisions,
-    });
+    static DONE: Cell<OperationCount> = const { Cell::new([0; 3]) };
 }
 
 /// A number that counts what is done with it.
 #[derive(Debug, Clone, Copy)]
 struct Counted(f64);
 
-impl Add for Counted {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        note(1, 0, 0);
-        Self(self.0 + other.0)
-    }
-}
-
-impl Sub for Counted {
-    type Output = Self;
-    fn sub(self, other: Self) -> Self {
-        note(1, 0, 0);
-        Self(self.0 - other.0)
+impl Counted {
+    /// The result of an operation of a kind, an index into [`OperationCount`].
+    fn of(kind: usize, result: f64) -> Self {
+        let mut done = DONE.get();
+        done[kind] += 1;
+        DONE.set(done);
+        Self(result)
     }
 }
 
 impl Mul for Counted {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
-        note(0, 1, 0);
-        Self(self.0 * other.0)
+        Self::of(0, self.0 * other.0)
+    }
+}
+
+impl Add for Counted {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self::of(1, self.0 + other.0)
+    }
+}
+
+impl Sub for Counted {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        Self::of(1, self.0 - other.0)
     }
 }
 
 impl Div for Counted {
     type Output = Self;
     fn div(self, other: Self) -> Self {
-        note(0, 0, 1);
-        Self(self.0 / other.0)
+        Self::of(2, self.0 / other.0)
     }
 }
 
@@ -132,7 +105,8 @@ pub fn count_step(
         next.x[i] = x[i].0;
         (0..3).for_each(|j| next.p[(i, j)] = p[i][j].0);
     }
-    (std::array::from_fn(|k| marks[k + 1].since(marks[k])), next)
+    let since = |k: usize| std::array::from_fn(|kind| marks[k + 1][kind] - marks[k][kind]);
+    (std::array::from_fn(since), next)
 }
 
 #[cfg(test)]
@@ -147,9 +121,8 @@ mod tests {
         let filter = filter(Assumed::default(), &simulator::Sensors::default(), STEP_S).unwrap();
         let before = filter.update(&filter.initial_state(1e-4, 4e3), 1.1e-4).unwrap().posterior;
         let (counts, after) = count_step(&filter, &before, 3e3, 1.3e-4);
-        let triples = counts.map(|c| (c.multiplications, c.additions, c.divisions));
-        assert_eq!(triples, [(12, 9, 0), (63, 54, 0), (0, 1, 3), (3, 4, 0), (18, 18, 0)]);
-        assert_eq!(counts.iter().map(|c| c.total()).sum::<u32>(), 185);
+        assert_eq!(counts, [[12, 9, 0], [63, 54, 0], [0, 1, 3], [3, 4, 0], [18, 18, 0]]);
+        assert_eq!(counts.iter().flatten().sum::<u32>(), 185);
         let wanted = filter.update(&filter.predict(&before, 3e3), 1.3e-4).unwrap().posterior;
         let x_apart = (after.x - wanted.x).abs().component_div(&wanted.x.abs()).max();
         let p_apart = (after.p - wanted.p).abs().max() / wanted.p.abs().max();
