@@ -8,13 +8,23 @@ use records::uncertainty::NORMAL_95;
 /// Text for a missing value.
 pub(crate) const NO_DATA: &str = "no data";
 
-pub(crate) fn micrometres(m: f64) -> String {
-    let text = format!("{:.1}", m * 1e6);
+/// A value as text, or "no data".
+pub(crate) fn or_no_data<T>(value: Option<T>, text: impl FnOnce(T) -> String) -> String {
+    value.map_or_else(|| NO_DATA.to_owned(), text)
+}
+
+/// A number with a decimal place; never "-0.0".
+fn tenths(value: f64) -> String {
+    let text = format!("{value:.1}");
     if text == "-0.0" { "0.0".to_owned() } else { text }
 }
 
+pub(crate) fn micrometres(m: f64) -> String {
+    tenths(m * 1e6)
+}
+
 pub(crate) fn micrometres_or(m: Option<f64>) -> String {
-    m.map_or_else(|| NO_DATA.to_owned(), micrometres)
+    or_no_data(m, micrometres)
 }
 
 /// Cell of a long table: empty if the value is missing, as the table's caption explains.
@@ -33,8 +43,7 @@ pub(crate) fn level(gap_m: Option<f64>, se_m: Option<f64>) -> String {
 
 /// Converts metres per hour to µm per 1,000 h.
 pub(crate) fn rate(m_per_hour: f64) -> String {
-    let text = format!("{:.1}", m_per_hour * 1e9);
-    if text == "-0.0" { "0.0".to_owned() } else { text }
+    tenths(m_per_hour * 1e9)
 }
 
 /// HTML of a text whose dates and serial numbers do not break at their hyphens; one wider than a phone does.
@@ -53,7 +62,7 @@ pub(crate) fn date(t: Timestamp) -> String {
 }
 
 pub(crate) fn date_or(t: Option<Timestamp>) -> String {
-    t.map_or_else(|| NO_DATA.to_owned(), date)
+    or_no_data(t, date)
 }
 
 pub(crate) fn minute(t: Timestamp) -> String {
@@ -61,7 +70,7 @@ pub(crate) fn minute(t: Timestamp) -> String {
 }
 
 pub(crate) fn minute_or(t: Option<Timestamp>) -> String {
-    t.map_or_else(|| NO_DATA.to_owned(), |t| format!("{} UTC", minute(t)))
+    or_no_data(t, |t| format!("{} UTC", minute(t)))
 }
 
 /// `1 205`: thin groups of three.

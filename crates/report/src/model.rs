@@ -8,6 +8,7 @@ use records::WorkRequest;
 use records::{QuantityChange, QuantityRow, TrendRow};
 use serde::Serialize;
 
+use crate::format::{level, or_no_data, percent};
 use crate::state_badge::StateBadge;
 
 /// Content of a report. Serialised, it is `report.json`; field names there follow the first version.
@@ -250,6 +251,11 @@ pub struct PastForecast {
 }
 
 impl PastForecast {
+    /// State to show.
+    pub(crate) fn badge(&self) -> StateBadge {
+        StateBadge::from_state(self.state.as_deref())
+    }
+
     /// Whether the level found lies within the forecast interval.
     pub fn held(&self) -> bool {
         (self.predicted_low_m..=self.predicted_high_m).contains(&self.found_m)
@@ -267,6 +273,13 @@ pub struct Inspection {
     /// Median of the last estimates before the inspection; `None` if there is no recent one.
     pub estimate_m: Option<f64>,
     pub estimates: usize,
+}
+
+impl Inspection {
+    /// Estimate less inspection, m.
+    pub(crate) fn difference_m(&self) -> Option<f64> {
+        self.estimate_m.map(|estimate_m| estimate_m - self.play_m)
+    }
 }
 
 /// One flight of a unit; a report holds those of the whole fleet.
@@ -318,6 +331,21 @@ impl UnitView {
     /// Gap divided by limit.
     pub(crate) fn share(&self) -> Option<f64> {
         Some(self.assessment.gap_m? / self.assessment.limit_m?)
+    }
+
+    /// Gap divided by limit, as text.
+    pub(crate) fn share_text(&self) -> String {
+        or_no_data(self.share(), percent)
+    }
+
+    /// Gap with its 90 % interval, as text.
+    pub(crate) fn gap_text(&self) -> String {
+        level(self.assessment.gap_m, self.assessment.gap_se_m)
+    }
+
+    /// Number of flights with an estimate.
+    pub(crate) fn estimates(&self) -> usize {
+        self.flights.iter().filter(|flight| flight.gap_m.is_some()).count()
     }
 
     /// State to show.

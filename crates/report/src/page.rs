@@ -31,7 +31,7 @@ pub enum Error {
     Json(#[from] serde_json::Error),
     /// A plot could not be drawn.
     #[error("a picture cannot be drawn: {0}")]
-    Plot(String),
+    Plot(#[from] plotters::drawing::DrawingAreaErrorKind<std::io::Error>),
 }
 
 /// Path of a unit's page, relative to the report folder.

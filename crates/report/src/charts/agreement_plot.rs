@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use crate::charts::history::{DATA, GRID, INK, PLAN};
+use crate::charts::axes::{Area, Axes, DATA, DrawError, INK, PLAN, picture};
 use crate::page::Error;
 use crate::stats::agreement::Agreement;
 
@@ -14,32 +14,24 @@ pub(crate) fn agreement_plot(pairs: &[(f64, f64)]) -> Result<String, Error> {
     }
     let all = || um.iter().flat_map(|(play, estimate)| [*play, *estimate]);
     let (low, high) = (all().fold(0.0, f64::min), all().fold(1.0, f64::max) * 1.08);
-    let mut svg = String::new();
-    draw(&mut svg, &um, Agreement::of(pairs), (low, high)).map_err(|e| Error::Plot(e.to_string()))?;
-    Ok(svg)
+    picture((560, 420), |root| draw(root, &um, Agreement::of(pairs), (low, high)))
 }
 
 fn draw(
-    svg: &mut String,
+    root: &Area<'_>,
     points: &[(f64, f64)],
     agreement: Option<Agreement>,
     (low, high): (f64, f64),
-) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
-    let root = SVGBackend::with_string(svg, (560, 420)).into_drawing_area();
-    let mut chart = ChartBuilder::on(&root)
-        .margin(8)
-        .x_label_area_size(44)
-        .y_label_area_size(52)
-        .build_cartesian_2d(low..high, low..high)?;
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(GRID)
-        .axis_style(INK)
-        .label_style(("sans-serif", 13).into_font().color(&INK))
-        .x_desc("Inspection [µm]")
-        .y_desc("Estimate [µm]")
-        .draw()?;
+) -> Result<(), DrawError> {
+    let axes = Axes {
+        x: low..high,
+        y: low..high,
+        names: ["Inspection [µm]", "Estimate [µm]"],
+        margins: [8, 44, 52],
+        text_px: 13,
+        dates: None,
+    };
+    let mut chart = axes.draw(root)?;
     let shifted = |by_um: f64| [(low.max(low - by_um), low.max(low - by_um) + by_um), upper(high, by_um)];
     chart.draw_series(LineSeries::new(shifted(0.0), INK.stroke_width(1)))?;
     if let Some(a) = agreement {
@@ -49,8 +41,7 @@ fn draw(
             chart.draw_series(line)?;
         }
     }
-    chart.draw_series(points.iter().map(|p| Circle::new(*p, 3, DATA.filled())))?;
-    root.present()
+    chart.draw_series(points.iter().map(|p| Circle::new(*p, 3, DATA.filled()))).map(drop)
 }
 
 /// Upper end of a line of slope 1 that is `by_um` above the diagonal.

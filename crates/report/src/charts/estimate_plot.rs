@@ -1,11 +1,9 @@
 //! Diagnostic plot of one estimate: measured channels, filter output and the fitted contact flanks.
 
 use askama::Template;
-use plotters::coord::Shift;
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
-use crate::charts::history::{GRID, INK};
+use crate::charts::axes::{Area, Axes, Chart, DrawError, INK, picture};
 use crate::page::Error;
 
 const FAINT: RGBColor = RGBColor(0x9A, 0xA5, 0xB1);
@@ -71,18 +69,16 @@ pub struct ContactInterval {
     pub dx_m: f64,
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-type DrawError = DrawingAreaErrorKind<std::io::Error>;
-
 /// Draws all estimates into one SVG, one below the other.
 ///
 /// # Errors
 /// If the plot cannot be drawn.
 pub fn estimate_plot_svg(plots: &[EstimatePlot]) -> Result<String, Error> {
-    let mut svg = String::new();
-    draw(&mut svg, plots).map_err(|e| Error::Plot(e.to_string()))?;
-    Ok(svg)
+    let count = plots.len().max(1);
+    picture((SIZE.0, SIZE.1 * count as u32), |root| {
+        root.fill(&WHITE)?;
+        root.split_evenly((count, 1)).iter().zip(plots).try_for_each(|(area, plot)| draw_one(area, plot))
+    })
 }
 
 /// Writes a self-contained HTML page: each plot, and its curves as data to hover over and zoom into. `back` is the
@@ -160,16 +156,6 @@ fn data(plot: &EstimatePlot) -> Result<String, Error> {
     }))?)
 }
 
-fn draw(svg: &mut String, plots: &[EstimatePlot]) -> Result<(), DrawError> {
-    let height = SIZE.1 * plots.len().max(1) as u32;
-    let root = SVGBackend::with_string(svg, (SIZE.0, height)).into_drawing_area();
-    root.fill(&WHITE)?;
-    for (area, plot) in root.split_evenly((plots.len().max(1), 1)).iter().zip(plots) {
-        draw_one(area, plot)?;
-    }
-    root.present()
-}
-
 fn draw_one(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
     let (heading, body) = area.split_vertically(HEADING);
     let line = |text: &str, size: u32, y: i32| {
@@ -196,13 +182,10 @@ fn part_svg(
     plot: &EstimatePlot,
     part: fn(&Area<'_>, &EstimatePlot) -> Result<(), DrawError>,
 ) -> Result<String, Error> {
-    let mut svg = String::new();
-    let drawn = {
-        let root = SVGBackend::with_string(&mut svg, (width, SIZE.1 - HEADING)).into_drawing_area();
-        root.fill(&WHITE).and_then(|()| part(&root, plot)).and_then(|()| root.present())
-    };
-    drawn.map_err(|e| Error::Plot(e.to_string()))?;
-    Ok(svg)
+    picture((width, SIZE.1 - HEADING), |root| {
+        root.fill(&WHITE)?;
+        part(root, plot)
+    })
 }
 
 /// Draws δX, S(t) with both means, and the contact intervals as marks at the lower edge.
@@ -211,7 +194,7 @@ fn draw_positions(area: &Area<'_>, plot: &EstimatePlot, end_s: f64) -> Result<()
     let (low, high) = span(plot.dx_m.iter().chain(&plot.s_m).map(|v| to_um(*v)));
     let floor = low - 0.06 * (high - low);
     let mut chart =
-        axes(area, (0.0, end_s), (floor - 0.04 * (high - low), high), ("", "backlash S, δX [µm]"))?;
+        axes(area, (0.0, end_s), (floor - 0.04 * (high - low), high), ["", "backlash S, δX [µm]"])?;
     let curve = |values: &[f64]| curve(values, |at| plot.time_s(at), to_um);
     for piece in curve(&plot.dx_m) {
         chart.draw_series(LineSeries::new(piece, FAINT))?;
@@ -239,7 +222,7 @@ fn draw_positions(area: &Area<'_>, plot: &EstimatePlot, end_s: f64) -> Result<()
 fn draw_load(area: &Area<'_>, plot: &EstimatePlot, end_s: f64) -> Result<(), DrawError> {
     let kn = |v: f64| v / 1e3;
     let (low, high) = span(plot.load_n.iter().map(|v| kn(*v)));
-    let mut chart = axes(area, (0.0, end_s), (low, high), ("time [s]", "load [kN]"))?;
+    let mut chart = axes(area, (0.0, end_s), (low, high), ["time [s]", "load [kN]"])?;
     for piece in curve(&plot.load_n, |at| plot.time_s(at), kn) {
         chart.draw_series(LineSeries::new(piece, INK))?;
     }
@@ -251,7 +234,7 @@ fn draw_flanks(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
     let to_um = |v: f64| (v - origin_m(plot)) * 1e6;
     let (low, high) = span(plot.contacts.iter().map(|s| to_um(s.dx_m)));
     let (left, right) = span(plot.contacts.iter().map(|s| s.force_n / 1e3));
-    let mut chart = axes(area, (left, right), (low, high), ("coupling force [kN]", "corrected δX [µm]"))?;
+    let mut chart = axes(area, (left, right), (low, high), ["coupling force [kN]", "corrected δX [µm]"])?;
     let marks = |is_used: bool| {
         let which = downsampled(&plot.contacts).filter(move |s| s.is_used == is_used);
         which.map(move |s| {
@@ -272,28 +255,10 @@ fn draw_flanks(area: &Area<'_>, plot: &EstimatePlot) -> Result<(), DrawError> {
     Ok(())
 }
 
-fn axes<'a>(
-    area: &Area<'a>,
-    x: (f64, f64),
-    y: (f64, f64),
-    names: (&str, &str),
-) -> Result<Chart<'a>, DrawError> {
-    let mut chart = ChartBuilder::on(area)
-        .margin(10)
-        .margin_top(22)
-        .x_label_area_size(36)
-        .y_label_area_size(62)
-        .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(GRID)
-        .axis_style(INK)
-        .label_style(("sans-serif", 12).into_font().color(&INK))
-        .x_desc(names.0)
-        .y_desc(names.1)
-        .draw()?;
-    Ok(chart)
+fn axes<'a>(area: &Area<'a>, x: (f64, f64), y: (f64, f64), names: [&str; 2]) -> Result<Chart<'a>, DrawError> {
+    // The legend lies above the chart.
+    let area = area.margin(12, 0, 0, 0);
+    Axes { x: x.0..x.1, y: y.0..y.1, names, margins: [10, 36, 62], text_px: 12, dates: None }.draw(&area)
 }
 
 /// Draws the legend above the chart.

@@ -1,30 +1,23 @@
 //! Static plot of a unit's history, for readers without scripts and for print; CSS recolours it in dark mode.
 
 use jiff::Timestamp;
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use records::time::DAY_S;
 
-use crate::model::{TimedInterval, UnitView};
+use crate::charts::axes::{Axes, Chart, DATA, DrawError, INK, PLAN, day, picture, thinned};
+use crate::model::{FlightRow, TimedInterval, UnitView};
 use crate::page::Error;
 
-/// Colours of the style sheet, which replaces exactly these values in dark mode.
-pub(crate) const INK: RGBColor = RGBColor(0x1C, 0x25, 0x30);
-pub(crate) const GRID: RGBColor = RGBColor(0xE1, 0xE6, 0xEB);
-pub(crate) const DATA: RGBColor = RGBColor(0x5B, 0x8F, 0xB9);
 const WATCH: RGBColor = RGBColor(0xD9, 0xA9, 0x00);
-pub(crate) const PLAN: RGBColor = RGBColor(0xC8, 0x52, 0x00);
 const ACT: RGBColor = RGBColor(0x7A, 0x00, 0x44);
 
 /// Maximum number of points in the plot; above it, each point is the mean of neighbouring flights.
 const MAX_POINTS: usize = 120;
 
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-type DrawResult = Result<(), DrawingAreaErrorKind<std::io::Error>>;
-
+type DrawResult = Result<(), DrawError>;
 /// Day, and 5 %, median and 95 % of a gap, µm.
-type BandPoint = (f64, f64, f64, f64);
+type BandPoint = [f64; 4];
 
 /// Until when the forecast is drawn: the median crossing, or the latest one where it is not much later; a fifth more.
 /// Nothing beyond serves a plan.
@@ -47,83 +40,62 @@ pub(crate) fn drawn_forecast(unit: &UnitView) -> Vec<TimedInterval> {
 
 /// Draws gap against date: flights with error bars, smoothed level, limits, forecast band and events.
 pub(crate) fn history(unit: &UnitView) -> Result<String, Error> {
-    let points = downsampled(unit);
+    let points = thinned(&estimated(unit), MAX_POINTS);
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Ok(String::new()) };
-    let span = (last.0 - first.0).max(10.0);
-    let end = forecast_end(unit).map_or(last.0, day).max(last.0);
+    let span = (last[0] - first[0]).max(10.0);
+    let end = forecast_end(unit).map_or(last[0], day).max(last[0]);
     let ahead = unit.forecast.iter().map(|f| f.p95_m * 1e6);
     let limit = unit.assessment.limit_m.map(|l| l * 1e6);
     // A forecast far above the limit would squeeze the flights into the bottom of the plot.
     let ahead = ahead.fold(0.0, f64::max).min(limit.map_or(f64::INFINITY, |l| 1.15 * l));
-    let top = points.iter().map(|p| p.3).chain(limit).fold(ahead.max(1.0), f64::max) * 1.04;
-    let lowest = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+    let top = points.iter().map(|p| p[3]).chain(limit).fold(ahead.max(1.0), f64::max) * 1.04;
+    let lowest = points.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min);
     let bottom = (lowest - 0.2 * (top - lowest)).max(lowest.min(0.0));
-    let mut svg = String::new();
-    draw(&mut svg, unit, &points, (first.0 - 0.02 * span, end + 0.02 * span), (bottom, top))?;
-    Ok(svg)
+    let (x, y) = ((first[0] - 0.02 * span, end + 0.02 * span), (bottom, top));
+    let axes = Axes {
+        x: x.0..x.1,
+        y: y.0..y.1,
+        names: ["", "Gap [µm]"],
+        margins: [8, 28, 48],
+        text_px: 13,
+        dates: Some([7, 11]),
+    };
+    picture((860, 340), |root| {
+        let mut chart = axes.draw(root)?;
+        draw_flights(&mut chart, &points)?;
+        draw_band(&mut chart, &band_points(&unit.level), y, INK, false)?;
+        draw_band(&mut chart, &band_points(&drawn_forecast(unit)), y, PLAN, true)?;
+        draw_lines(&mut chart, unit, x, y)
+    })
 }
 
-fn draw(
-    svg: &mut String,
-    unit: &UnitView,
-    points: &[BandPoint],
-    x: (f64, f64),
-    y: (f64, f64),
-) -> Result<(), Error> {
-    let plot_error = |e: DrawingAreaErrorKind<std::io::Error>| Error::Plot(e.to_string());
-    let root = SVGBackend::with_string(svg, (860, 340)).into_drawing_area();
-    let mut chart = ChartBuilder::on(&root)
-        .margin(8)
-        .x_label_area_size(28)
-        .y_label_area_size(48)
-        .build_cartesian_2d(x.0..x.1, y.0..y.1)
-        .map_err(plot_error)?;
-    chart
-        .configure_mesh()
-        .disable_x_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(GRID)
-        .axis_style(INK)
-        .label_style(("sans-serif", 13).into_font().color(&INK))
-        .x_labels(7)
-        .x_label_formatter(&|d| date_of(*d))
-        .y_desc("Gap [µm]")
-        .draw()
-        .map_err(plot_error)?;
-    draw_flights(&mut chart, points).map_err(plot_error)?;
-    draw_band(&mut chart, &band_points(&unit.level), y, INK, false).map_err(plot_error)?;
-    draw_band(&mut chart, &band_points(&drawn_forecast(unit)), y, PLAN, true).map_err(plot_error)?;
-    draw_lines(&mut chart, unit, x, y).map_err(plot_error)?;
-    root.present().map_err(plot_error)
-}
-
-fn draw_flights(chart: &mut Chart<'_, '_>, points: &[BandPoint]) -> DrawResult {
-    let bars = points.iter().map(|p| PathElement::new(vec![(p.0, p.1), (p.0, p.3)], DATA));
+fn draw_flights(chart: &mut Chart<'_>, points: &[BandPoint]) -> DrawResult {
+    let bars = points.iter().map(|p| PathElement::new(vec![(p[0], p[1]), (p[0], p[3])], DATA));
     chart.draw_series(bars)?;
-    chart.draw_series(points.iter().map(|p| Circle::new((p.0, p.2), 3, DATA.filled()))).map(|_| ())
+    chart.draw_series(points.iter().map(|p| Circle::new((p[0], p[2]), 3, DATA.filled()))).map(drop)
 }
 
 /// Draws a band and its median, clipped to the plot.
 fn draw_band(
-    chart: &mut Chart<'_, '_>,
+    chart: &mut Chart<'_>,
     band: &[BandPoint],
     y: (f64, f64),
     colour: RGBColor,
     dashed: bool,
 ) -> DrawResult {
-    let edge = band.iter().map(|p| (p.0, p.3)).chain(band.iter().rev().map(|p| (p.0, p.1)));
+    let edge = band.iter().map(|p| (p[0], p[3])).chain(band.iter().rev().map(|p| (p[0], p[1])));
     let edge: Vec<(f64, f64)> = edge.map(|(d, gap)| (d, gap.clamp(y.0, y.1))).collect();
     chart.draw_series([Polygon::new(edge, colour.mix(0.18))])?;
-    let middle = band.iter().map(|p| (p.0, p.2)).take_while(|p| p.1 <= y.1);
+    let middle = band.iter().map(|p| (p[0], p[2])).take_while(|p| p.1 <= y.1);
     if dashed {
-        chart.draw_series(DashedLineSeries::new(middle, 6, 4, colour.stroke_width(2))).map(|_| ())
+        chart.draw_series(DashedLineSeries::new(middle, 6, 4, colour.stroke_width(2))).map(drop)
     } else {
-        chart.draw_series(LineSeries::new(middle, colour.stroke_width(2))).map(|_| ())
+        chart.draw_series(LineSeries::new(middle, colour.stroke_width(2))).map(drop)
     }
 }
 
 /// Draws limits as horizontal and events as vertical lines.
-fn draw_lines(chart: &mut Chart<'_, '_>, unit: &UnitView, x: (f64, f64), y: (f64, f64)) -> DrawResult {
+fn draw_lines(chart: &mut Chart<'_>, unit: &UnitView, x: (f64, f64), y: (f64, f64)) -> DrawResult {
     let s = &unit.assessment;
     for (name, limit, colour) in [("watch", s.watch_m, WATCH), ("act limit", s.limit_m, ACT)] {
         // A level outside the plot would be drawn along its edge.
@@ -142,7 +114,7 @@ fn draw_lines(chart: &mut Chart<'_, '_>, unit: &UnitView, x: (f64, f64), y: (f64
 }
 
 /// Draws the day of the assessment, and the crossing: its 90 % interval as a bar on the limit, its median as a mark.
-fn draw_crossing(chart: &mut Chart<'_, '_>, unit: &UnitView, x: (f64, f64), y: (f64, f64)) -> DrawResult {
+fn draw_crossing(chart: &mut Chart<'_>, unit: &UnitView, x: (f64, f64), y: (f64, f64)) -> DrawResult {
     let s = &unit.assessment;
     if let Some(today) = unit.forecast.first().map(|f| day(f.at_utc)).filter(|d| (x.0..x.1).contains(d)) {
         chart.draw_series(DashedLineSeries::new([(today, y.0), (today, y.1)], 2, 3, INK.stroke_width(1)))?;
@@ -163,33 +135,15 @@ fn draw_crossing(chart: &mut Chart<'_, '_>, unit: &UnitView, x: (f64, f64), y: (
 }
 
 fn band_points(band: &[TimedInterval]) -> Vec<BandPoint> {
-    band.iter().map(|b| (day(b.at_utc), b.p05_m * 1e6, b.m * 1e6, b.p95_m * 1e6)).collect()
+    band.iter().map(|b| [day(b.at_utc), b.p05_m * 1e6, b.m * 1e6, b.p95_m * 1e6]).collect()
 }
 
-/// Estimated flights, averaged in groups of neighbours to at most [`MAX_POINTS`].
-fn downsampled(unit: &UnitView) -> Vec<BandPoint> {
-    let all: Vec<BandPoint> = unit
-        .flights
-        .iter()
-        .filter_map(|f| {
-            let gap = f.gap_m?;
-            let (low, high) = (f.gap_p05_m.unwrap_or(gap), f.gap_p95_m.unwrap_or(gap));
-            Some((day(f.departure_utc), low * 1e6, gap * 1e6, high * 1e6))
-        })
-        .collect();
-    let size = all.len().div_ceil(MAX_POINTS).max(1);
-    let mean = |c: &[BandPoint]| {
-        let n = c.len() as f64;
-        let sum = c.iter().fold((0.0, 0.0, 0.0, 0.0), |a, p| (a.0 + p.0, a.1 + p.1, a.2 + p.2, a.3 + p.3));
-        (sum.0 / n, sum.1 / n, sum.2 / n, sum.3 / n)
+/// The flights with an estimate.
+fn estimated(unit: &UnitView) -> Vec<BandPoint> {
+    let point = |f: &FlightRow| {
+        let gap = f.gap_m?;
+        let (low, high) = (f.gap_p05_m.unwrap_or(gap), f.gap_p95_m.unwrap_or(gap));
+        Some([day(f.departure_utc), low * 1e6, gap * 1e6, high * 1e6])
     };
-    all.chunks(size).map(mean).collect()
-}
-
-fn day(t: Timestamp) -> f64 {
-    t.as_second() as f64 / DAY_S
-}
-
-fn date_of(day: f64) -> String {
-    Timestamp::from_second((day * DAY_S) as i64).map(crate::format::date).unwrap_or_default()
+    unit.flights.iter().filter_map(point).collect()
 }

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use jiff::Timestamp;
 
+use crate::charts::axes::thinned;
 use crate::model::UnitView;
 
 const WIDTH: f64 = 200.0;
@@ -41,12 +42,10 @@ impl SharedAxes {
     pub(crate) fn draw(self, unit: &UnitView) -> String {
         let y = |gap_m: f64| HEIGHT * (1.0 - (gap_m / self.full_m).clamp(0.0, 1.0));
         let x = |at_s: f64| WIDTH * (at_s - self.from_s) / (self.to_s - self.from_s);
-        let gaps: Vec<(f64, f64)> = gaps(unit).collect();
+        let gaps: Vec<[f64; 2]> = gaps(unit).map(|(at_s, gap_m)| [at_s, gap_m]).collect();
         let mut points = String::new();
-        for chunk in gaps.chunks(gaps.len().div_ceil(MAX_POINTS).max(1)) {
-            let n = chunk.len() as f64;
-            let mean = |pick: fn(&(f64, f64)) -> f64| chunk.iter().map(pick).sum::<f64>() / n;
-            let _ = write!(points, "{:.1},{:.1} ", x(mean(|p| p.0)), y(mean(|p| p.1)));
+        for [at_s, gap_m] in thinned(&gaps, MAX_POINTS) {
+            let _ = write!(points, "{:.1},{:.1} ", x(at_s), y(gap_m));
         }
         let limit = unit.assessment.limit_m.map_or_else(String::new, |limit_m| {
             let y = y(limit_m);

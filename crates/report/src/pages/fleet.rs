@@ -6,17 +6,16 @@ use askama::Template;
 use records::time::days_between;
 
 use crate::charts::agreement_plot::agreement_plot;
-use crate::charts::sparkline::sparkline;
 use crate::format::{
-    NO_DATA, count, counted, date, date_or, hours, level, micrometres, minute_or, percent, rate, unbroken,
+    NO_DATA, count, counted, date, date_or, hours, micrometres, micrometres_or, minute_or, or_no_data,
+    percent, rate, unbroken,
 };
-use crate::model::{Report, UnitView};
+use crate::model::{Inspection, Report, Tail, UnitView};
 use crate::page::{Error, Page, part_path, tail_path, unit_path};
 use crate::pages::quantities::{self, Change};
-use crate::pages::work_requests::request_badge;
 use crate::state_badge::StateBadge;
 use crate::stats::agreement::Agreement;
-use crate::stats::rate_spread::spreads;
+use crate::stats::rate_spread::{RateSpread, spreads};
 use crate::stats::removal_forecast::removal_forecast;
 
 /// Maximum number of work-list rows on one page.
@@ -26,47 +25,10 @@ const TAIL_ROWS: usize = 100;
 /// Maximum number of entries in the short lists.
 const FEW: usize = 40;
 
-/// A unit as a row of a table.
-#[derive(Debug, Clone)]
-pub(crate) struct Row {
-    pub(crate) badge: StateBadge,
-    pub(crate) link: String,
-    pub(crate) name: String,
-    pub(crate) position: String,
-    /// Tail and position.
-    pub(crate) place: String,
-    pub(crate) action: String,
-    /// Date of the action as a number that sorts; empty for none.
-    pub(crate) due: String,
-    pub(crate) gap: String,
-    pub(crate) share: String,
-    pub(crate) share_sort: String,
-    pub(crate) sparkline: String,
-    pub(crate) likely: String,
-    pub(crate) why: String,
-    pub(crate) work: String,
-}
-
-impl Row {
-    pub(crate) fn of(unit: &UnitView, root: &str) -> Self {
-        let s = &unit.assessment;
-        Self {
-            badge: unit.badge(),
-            link: format!("{root}{}", unit_path(unit)),
-            name: unit.name(),
-            position: unit.position.clone().unwrap_or_else(|| NO_DATA.to_owned()),
-            gap: level(s.gap_m, s.gap_se_m),
-            place: unit.place(),
-            action: s.action_text.clone().unwrap_or_else(|| "none".to_owned()),
-            due: s.due_utc.map(|due| due.as_second().to_string()).unwrap_or_default(),
-            share: unit.share().map_or_else(|| NO_DATA.to_owned(), percent),
-            share_sort: unit.share().map(|share| format!("{share:.4}")).unwrap_or_default(),
-            sparkline: sparkline(unit),
-            likely: when(s.crossing_hours_p50, s.likely_utc, unit),
-            why: why(unit),
-            work: unit.open_request().map(request_badge).unwrap_or_default(),
-        }
-    }
+/// Units below the heading of their tail; on the page of a tail, which needs no heading, its name is empty.
+pub(crate) struct Group<'a> {
+    pub(crate) tail: &'a str,
+    pub(crate) units: Vec<&'a UnitView>,
 }
 
 /// Reason of the state, with the states of the other followed quantities.
@@ -88,78 +50,64 @@ pub(crate) fn when(h: Option<f64>, at: Option<jiff::Timestamp>, unit: &UnitView)
     }
 }
 
-/// Part, units, 5 %, median, 95 %, and the outlying units' pages.
-type SpreadRow = (String, String, String, String, String, Vec<(String, String)>);
-/// A tail, its page and its units.
-type Group = (String, String, Vec<Row>);
-
 #[derive(Template)]
 #[template(path = "fleet.html")]
-struct FleetView {
+struct FleetView<'a> {
     root: &'static str,
     title: String,
     footer: String,
+    report: &'a Report,
     heading: String,
     decision: String,
     lead: String,
     counts: Vec<(StateBadge, String)>,
     data_summary: String,
-    groups: Vec<Group>,
+    groups: Vec<Group<'a>>,
     more_work: Vec<String>,
     label: &'static str,
     changes: Vec<(String, String, String, String)>,
     quantity_changes: Vec<Change>,
     more_quantity_changes: usize,
-    map: Map,
+    map: Map<'a>,
     tail_pages: Vec<String>,
-    /// Part numbers with their pages.
-    parts: Vec<(String, String)>,
+    /// Part numbers, each with a page.
+    parts: Vec<&'a str>,
     months: Vec<(String, String, String, u32)>,
     undated: usize,
-    spreads: Vec<SpreadRow>,
-    gaps: Vec<(String, String, String, String, String, String)>,
-    mapping_faults: Vec<String>,
-    notes: Vec<String>,
-    log_errors: Vec<(String, String)>,
+    spreads: Vec<RateSpread<'a>>,
+    /// The tails that have been without an estimate for longest.
+    gaps: Vec<&'a Tail>,
     more_log_errors: usize,
     forecast_accuracy: Vec<(String, String, String)>,
     inspections: String,
     inspection_bias: Vec<(String, String, String, String)>,
     scatter: String,
-    pairs: Vec<(String, String, String, String, String, String)>,
+    pairs: Vec<(&'a UnitView, &'a Inspection)>,
 }
 
 #[derive(Template)]
 #[template(path = "work.html")]
-struct WorkView {
+struct WorkView<'a> {
     root: &'static str,
     title: String,
     footer: String,
-    groups: Vec<Group>,
+    groups: Vec<Group<'a>>,
     label: &'static str,
 }
 
 #[derive(Template)]
 #[template(path = "tails.html")]
-struct TailsView {
+struct TailsView<'a> {
     root: &'static str,
     title: String,
     footer: String,
-    map: Map,
+    map: Map<'a>,
 }
 
-/// Tails by positions.
-struct Map {
-    positions: Vec<String>,
-    rows: Vec<(String, String, Vec<Vec<Cell>>)>,
-}
-
-/// One unit in the map.
-struct Cell {
-    link: String,
-    badge: StateBadge,
-    name: String,
-    text: String,
+/// Positions, and each tail with its units by position.
+struct Map<'a> {
+    positions: BTreeSet<&'a str>,
+    rows: Vec<(&'a str, Vec<Vec<&'a UnitView>>)>,
 }
 
 /// Renders the fleet page and its continuation pages.
@@ -195,24 +143,23 @@ pub fn fleet_pages(report: &Report) -> Result<Vec<Page>, Error> {
     Ok(pages)
 }
 
-fn index_page(
-    report: &Report,
-    groups: Vec<Group>,
+fn index_page<'a>(
+    report: &'a Report,
+    groups: Vec<Group<'a>>,
     more_work: Vec<String>,
     tail_pages: Vec<String>,
-) -> Result<FleetView, Error> {
+) -> Result<FleetView<'a>, Error> {
     let number = |s: StateBadge| report.units.iter().filter(|u| u.badge() == s).count();
     let worst = most_urgent_tails(report);
-    let log_errors = report.log_errors.iter().map(|f| (f.log_path.clone(), f.code.clone()));
-    let (inspections, pairs) = inspection_agreement(report);
+    let checks = report.units.iter().flat_map(|unit| unit.inspections.iter().map(move |check| (unit, check)));
+    let pairs = if report.inspections_given { checks.take(WORK_ROWS).collect() } else { Vec::new() };
     let quantity_changes = quantities::changes(report, "", |_| true);
     Ok(FleetView {
         root: "",
         title: "Actuator free play".to_owned(),
         heading: heading(report),
         decision: unbroken(&decision(report)),
-        mapping_faults: report.mapping_faults.clone(),
-        notes: report.notes.clone(),
+        report,
         footer: report.footer(),
         lead: format!(
             "{} · data to {} · assessed {}",
@@ -236,15 +183,14 @@ fn index_page(
         quantity_changes: quantity_changes.into_iter().take(FEW).collect(),
         map: map(report, &worst),
         tail_pages,
-        parts: report.by_part().into_keys().map(|part| (part.to_owned(), part_path(part, 0))).collect(),
+        parts: report.by_part().into_keys().collect(),
         months: months(report),
         undated: report.units.iter().filter(|u| u.assessment.hours_per_day.is_none()).count(),
-        spreads: spread_rows(report),
-        gaps: gap_rows(report),
+        spreads: spreads(report),
+        gaps: longest_without_estimate(report),
         more_log_errors: report.log_errors.len().saturating_sub(FEW),
-        log_errors: log_errors.take(FEW).collect(),
         forecast_accuracy: forecast_accuracy(report),
-        inspections,
+        inspections: inspection_agreement(report),
         inspection_bias: inspection_bias(report),
         scatter: agreement_plot(&inspection_pairs(report))?,
         pairs,
@@ -294,18 +240,13 @@ fn urgency(unit: &UnitView) -> (u8, f64, String) {
     (unit.badge().rank(), due.unwrap_or(f64::MAX), unit.name())
 }
 
-fn grouped(units: &[&UnitView]) -> Vec<Group> {
-    let mut groups: Vec<Group> = Vec::new();
-    for unit in units {
-        let tail = unit.tail_number.as_deref().unwrap_or("tail not known");
-        if groups.last().is_none_or(|(name, ..)| name != tail) {
-            groups.push((tail.to_owned(), tail_path(tail), Vec::new()));
-        }
-        if let Some((_, _, rows)) = groups.last_mut() {
-            rows.push(Row::of(unit, ""));
-        }
-    }
-    groups
+fn grouped<'a>(units: &[&'a UnitView]) -> Vec<Group<'a>> {
+    let tail = |unit: &UnitView| unit.tail_number.clone();
+    let group = |units: &[&'a UnitView]| Group {
+        tail: units[0].tail_number.as_deref().unwrap_or("tail not known"),
+        units: units.to_vec(),
+    };
+    units.chunk_by(|a, b| tail(a) == tail(b)).map(group).collect()
 }
 
 /// State changes since the day before, and events of the last 30 days.
@@ -353,27 +294,21 @@ fn most_urgent_tails(report: &Report) -> Vec<&str> {
     tails.into_iter().take(FEW).map(|(_, tail)| tail).collect()
 }
 
-fn map(report: &Report, tails: &[&str]) -> Map {
-    let mut cells: BTreeMap<(&str, &str), Vec<Cell>> = BTreeMap::new();
+fn map<'a>(report: &'a Report, tails: &[&'a str]) -> Map<'a> {
+    let mut cells: BTreeMap<(&str, &str), Vec<&UnitView>> = BTreeMap::new();
     let mut positions = BTreeSet::new();
     for unit in &report.units {
-        let (Some(tail), Some(position)) = (unit.tail_number.as_deref(), unit.position.as_deref()) else {
-            continue;
-        };
-        positions.insert(position);
-        cells.entry((tail, position)).or_default().push(Cell {
-            link: unit_path(unit),
-            badge: unit.badge(),
-            name: unit.name(),
-            text: unit.share().map_or_else(|| NO_DATA.to_owned(), percent),
-        });
+        if let (Some(tail), Some(position)) = (&unit.tail_number, &unit.position) {
+            positions.insert(position.as_str());
+            cells.entry((tail, position)).or_default().push(unit);
+        }
     }
-    let rows = tails.iter().map(|tail| {
-        let row = positions.iter().map(|p| cells.remove(&(*tail, *p)).unwrap_or_default()).collect();
-        ((*tail).to_owned(), tail_path(tail), row)
-    });
-    let rows = rows.collect();
-    Map { positions: positions.into_iter().map(str::to_owned).collect(), rows }
+    let row = |tail: &&'a str| {
+        let of_tail = positions.iter().map(|position| cells.remove(&(*tail, *position)).unwrap_or_default());
+        (*tail, of_tail.collect())
+    };
+    let rows = tails.iter().map(row).collect();
+    Map { positions, rows }
 }
 
 fn months(report: &Report) -> Vec<(String, String, String, u32)> {
@@ -386,35 +321,17 @@ fn months(report: &Report) -> Vec<(String, String, String, u32)> {
     months.iter().map(row).collect()
 }
 
-fn spread_rows(report: &Report) -> Vec<SpreadRow> {
-    let row = |s: crate::stats::rate_spread::RateSpread<'_>| {
-        let outlying = s.outliers.iter().take(10);
-        let outlying = outlying.map(|u| {
-            let speed = u.assessment.rate_m_per_hour.map_or_else(|| NO_DATA.to_owned(), rate);
-            (unit_path(u), format!("{} ({speed})", u.serial_number))
-        });
-        (s.part.to_owned(), count(s.units), rate(s.low), rate(s.median), rate(s.high), outlying.collect())
-    };
-    spreads(report).into_iter().map(row).collect()
+fn longest_without_estimate(report: &Report) -> Vec<&Tail> {
+    let mut tails: Vec<&Tail> = report.tails.iter().collect();
+    tails.sort_by_key(|t| (t.last_estimate_utc, t.tail_number.clone()));
+    tails.truncate(FEW);
+    tails
 }
 
-fn gap_rows(report: &Report) -> Vec<(String, String, String, String, String, String)> {
-    let mut tails: Vec<&crate::model::Tail> = report.tails.iter().collect();
-    tails.sort_by_key(|t| (t.last_estimate_utc, t.tail_number.clone()));
-    let row = |t: &crate::model::Tail| {
-        let age = t.last_estimate_utc.zip(report.as_of_utc).map(|(last, now)| days_between(last, now));
-        let age = age.map_or_else(|| NO_DATA.to_owned(), |d| format!("{d:.0}"));
-        let refused = format!("{} of {}", count(t.refused), count(t.records));
-        (
-            tail_path(&t.tail_number),
-            t.tail_number.clone(),
-            date_or(t.last_estimate_utc),
-            age,
-            refused,
-            count(t.logs_in_error),
-        )
-    };
-    tails.into_iter().take(FEW).map(row).collect()
+/// Days from a tail's last estimate to the date of the assessments.
+fn days_without(report: &Report, tail: &Tail) -> String {
+    let age = tail.last_estimate_utc.zip(report.as_of_utc).map(|(last, now)| days_between(last, now));
+    or_no_data(age, |days| format!("{days:.0}"))
 }
 
 /// Coverage of the 90 % forecast intervals by forecast lead.
@@ -435,8 +352,6 @@ fn forecast_accuracy(report: &Report) -> Vec<(String, String, String)> {
     ages.into_iter().map(row).collect()
 }
 
-type Pairs = Vec<(String, String, String, String, String, String)>;
-
 /// Pairs of estimate and hangar inspection, m.
 fn inspection_pairs(report: &Report) -> Vec<(f64, f64)> {
     let checks = report.units.iter().flat_map(|u| &u.inspections);
@@ -452,7 +367,7 @@ fn inspection_bias(report: &Report) -> Vec<(String, String, String, String)> {
     }
     let row = |(part, pairs): (&str, Vec<(f64, f64)>)| {
         let found = Agreement::of(&pairs);
-        let text = |value: fn(&Agreement) -> String| found.as_ref().map_or_else(|| NO_DATA.to_owned(), value);
+        let text = |value: fn(&Agreement) -> String| or_no_data(found.as_ref(), value);
         (!pairs.is_empty()).then(|| {
             let bias = text(|a| format!("{} ± {}", micrometres(a.bias_m), micrometres(a.bias_half_width_m)));
             let limits = text(|a| format!("{} to {}", micrometres(a.lower_m), micrometres(a.upper_m)));
@@ -462,12 +377,11 @@ fn inspection_bias(report: &Report) -> Vec<(String, String, String, String)> {
     parts.into_iter().filter_map(row).collect()
 }
 
-/// Agreement of estimates with hangar inspections: summary and pairs.
-fn inspection_agreement(report: &Report) -> (String, Pairs) {
+/// Agreement of estimates with hangar inspections, in words.
+fn inspection_agreement(report: &Report) -> String {
     if !report.inspections_given {
-        return ("No data: no inspections table is configured (`logs.inspections`).".to_owned(), Vec::new());
+        return "No data: no inspections table is configured (`logs.inspections`).".to_owned();
     }
-    let checks = || report.units.iter().flat_map(|u| u.inspections.iter().map(move |i| (u, i)));
     let pairs = inspection_pairs(report);
     let words = match Agreement::of(&pairs) {
         Some(a) => format!(
@@ -481,21 +395,8 @@ fn inspection_agreement(report: &Report) -> (String, Pairs) {
         None => format!("{}: at least 3 are needed to state a bias.", counted(pairs.len(), "pair")),
     };
     let unmatched = report.inspections_unmatched;
-    let words = if unmatched == 0 {
-        words
-    } else {
-        format!("{words} {} of units without records.", counted(unmatched, "check"))
-    };
-    let row = |(u, i): (&UnitView, &crate::model::Inspection)| {
-        let difference = i.estimate_m.map_or_else(|| NO_DATA.to_owned(), |e| micrometres(e - i.play_m));
-        (
-            unit_path(u),
-            u.name(),
-            date(i.date_utc),
-            micrometres(i.play_m),
-            crate::format::micrometres_or(i.estimate_m),
-            difference,
-        )
-    };
-    (words, checks().take(WORK_ROWS).map(row).collect())
+    if unmatched == 0 {
+        return words;
+    }
+    format!("{words} {} of units without records.", counted(unmatched, "check"))
 }

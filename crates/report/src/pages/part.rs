@@ -3,10 +3,9 @@
 use askama::Template;
 
 use crate::charts::small_multiple::SharedAxes;
-use crate::format::{NO_DATA, counted, date, level, micrometres};
+use crate::format::{counted, date_or, micrometres};
 use crate::model::{Report, UnitView};
 use crate::page::{Error, Page, part_path, unit_path};
-use crate::state_badge::StateBadge;
 
 /// Maximum number of units on one page.
 const UNITS: usize = 200;
@@ -18,21 +17,12 @@ struct View<'a> {
     title: String,
     footer: String,
     part: &'a str,
-    /// What the axes show.
-    axes: String,
-    units: Vec<Multiple>,
+    /// Axes of all pictures, and what they show.
+    axes: Option<SharedAxes>,
+    description: String,
+    units: &'a [&'a UnitView],
     /// Paths of all pages of the part, relative to this one.
     pages: Vec<String>,
-}
-
-/// A unit with its picture.
-struct Multiple {
-    link: String,
-    badge: StateBadge,
-    serial: String,
-    place: String,
-    gap: String,
-    svg: String,
 }
 
 /// Renders the pages of all part numbers: the most urgent units first, then by share of the limit.
@@ -52,8 +42,9 @@ pub fn part_pages(report: &Report) -> Result<Vec<Page>, Error> {
                 title: format!("{part} · actuator free play"),
                 footer: report.footer(),
                 part,
-                axes: axes.map(description).unwrap_or_default(),
-                units: units.iter().map(|unit| multiple(unit, axes)).collect(),
+                axes,
+                description: axes.map(description).unwrap_or_default(),
+                units,
                 pages: if paths.len() > 1 { paths.clone() } else { Vec::new() },
             };
             pages.push(Page::html(path.clone(), &view.render()?));
@@ -64,27 +55,10 @@ pub fn part_pages(report: &Report) -> Result<Vec<Page>, Error> {
 
 fn description(axes: SharedAxes) -> String {
     let (from, to, full_m) = axes.extent();
-    let day = |at: Option<jiff::Timestamp>| at.map_or_else(|| NO_DATA.to_owned(), date);
     format!(
         "Gap from {} to {}, 0 to {} µm, the same axes for all; dashed: act limit.",
-        day(from),
-        day(to),
+        date_or(from),
+        date_or(to),
         micrometres(full_m)
     )
-}
-
-fn multiple(unit: &UnitView, axes: Option<SharedAxes>) -> Multiple {
-    let estimated = unit.flights.iter().filter(|flight| flight.gap_m.is_some()).count();
-    Multiple {
-        link: format!("../{}", unit_path(unit)),
-        badge: unit.badge(),
-        serial: unit.serial_number.clone(),
-        place: unit.place(),
-        gap: format!(
-            "{}, {}",
-            level(unit.assessment.gap_m, unit.assessment.gap_se_m),
-            counted(estimated, "estimate")
-        ),
-        svg: axes.map(|axes| axes.draw(unit)).unwrap_or_default(),
-    }
 }

@@ -2,10 +2,10 @@
 
 use askama::Template;
 
-use crate::format::{count, minute_or};
-use crate::model::{Report, Tail};
+use crate::format::{NO_DATA, count, minute, minute_or};
+use crate::model::{LogError, Report, Tail, UnitView};
 use crate::page::{Error, Page, tail_path};
-use crate::pages::fleet::Row;
+use crate::pages::fleet::Group;
 use crate::pages::quantities::{self, Change, Chart};
 
 #[derive(Template)]
@@ -17,10 +17,10 @@ struct View<'a> {
     tail: &'a str,
     facts: Vec<(&'static str, String)>,
     label: &'static str,
-    groups: Vec<(String, String, Vec<Row>)>,
+    groups: Vec<Group<'a>>,
     quantity_changes: Vec<Change>,
     charts: Vec<Chart>,
-    log_errors: Vec<(String, String, String)>,
+    log_errors: Vec<&'a LogError>,
 }
 
 /// Renders the page of a tail.
@@ -29,9 +29,9 @@ struct View<'a> {
 /// When the template cannot be filled.
 pub fn tail_page(report: &Report, tail: &Tail) -> Result<Page, Error> {
     let name = tail.tail_number.as_str();
-    let mine = report.units.iter().filter(|u| u.tail_number.as_deref() == Some(name));
-    let mut rows: Vec<Row> = mine.map(|u| Row::of(u, "../")).collect();
-    rows.sort_by(|a, b| a.position.cmp(&b.position).then_with(|| a.name.cmp(&b.name)));
+    let mut units: Vec<&UnitView> =
+        report.units.iter().filter(|u| u.tail_number.as_deref() == Some(name)).collect();
+    units.sort_by_key(|unit| (unit.position.clone().unwrap_or_else(|| NO_DATA.to_owned()), unit.name()));
     let log_errors = report.log_errors.iter().filter(|f| f.tail_number.as_deref() == Some(name));
     let view = View {
         root: "../",
@@ -46,14 +46,12 @@ pub fn tail_page(report: &Report, tail: &Tail) -> Result<Page, Error> {
             ("Last estimate", minute_or(tail.last_estimate_utc)),
         ],
         label: "Actuators of this tail",
-        groups: if rows.is_empty() { Vec::new() } else { vec![(String::new(), String::new(), rows)] },
+        groups: if units.is_empty() { Vec::new() } else { vec![Group { tail: "", units }] },
         quantity_changes: quantities::changes(report, "../", |change| {
             change.tail_number.as_deref() == Some(name)
         }),
         charts: quantities::tail_charts(report, name)?,
-        log_errors: log_errors
-            .map(|f| (f.log_path.clone(), f.code.clone(), crate::format::minute(f.processed_utc)))
-            .collect(),
+        log_errors: log_errors.collect(),
     };
     Ok(Page::html(tail_path(name), &view.render()?))
 }

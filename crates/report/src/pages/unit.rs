@@ -6,23 +6,23 @@ use records::uncertainty::NORMAL_95;
 use crate::charts::history::{drawn_forecast, history};
 use crate::format::{
     NO_DATA, count, counted, date, date_or, hours, level, micrometres, micrometres_cell, micrometres_or,
-    minute, percent, rate,
+    minute, or_no_data, rate,
 };
-use crate::model::{FlightRow, Report, UnitView};
+use crate::model::{Report, TimedInterval, UnitView};
 use crate::page::{Error, Page, tail_path, unit_path};
 use crate::pages::fleet::{when, why};
 use crate::pages::quantities::{self, Change, Chart, Level};
-use crate::pages::work_requests::{RequestRow, request_rows};
 use crate::state_badge::StateBadge;
 use crate::stats::crossing_probability::probability_text;
 use crate::stats::rate_spread::RateSpreads;
 
 #[derive(Template)]
 #[template(path = "unit.html")]
-struct View {
+struct View<'a> {
     root: &'static str,
     title: String,
     footer: String,
+    unit: &'a UnitView,
     name: String,
     place: Option<(String, String, String)>,
     badge: StateBadge,
@@ -41,38 +41,16 @@ struct View {
     quantity_changes: Vec<Change>,
     charts: Vec<Chart>,
     levels: Vec<Level>,
-    events: Vec<(String, String, String, &'static str)>,
-    installations: Vec<(String, String, String, String, String)>,
     quality: Facts,
-    past_forecasts: Vec<(String, String, String, String, String, &'static str)>,
-    inspections: Vec<(String, String, String, String, String)>,
-    requests: Vec<RequestRow>,
     statistics: Facts,
     prior: String,
-    band: Vec<(String, &'static str, String, String, String)>,
-    flights: Vec<Flight>,
+    /// The forecast as far as it is drawn.
+    drawn_forecast: Vec<TimedInterval>,
     /// Number of flights with a diagnostic plot.
     plots: usize,
 }
 
 type Facts = Vec<(&'static str, String)>;
-
-/// A flight as a row.
-struct Flight {
-    when: String,
-    id: String,
-    /// Page of its diagnostic plot; empty where none is drawn.
-    plot: String,
-    place: String,
-    hours: String,
-    gap: String,
-    low: String,
-    high: String,
-    midrange: String,
-    reversals: String,
-    load: String,
-    remarks: String,
-}
 
 /// Renders the page of a unit.
 ///
@@ -86,6 +64,7 @@ pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) ->
         root: "../",
         title: format!("{} · actuator free play", unit.name()),
         footer: report.footer(),
+        unit,
         name: unit.name(),
         action: s.action_text.clone().unwrap_or_default(),
         crossing: forecast.map(|(_, at)| at.map(date).unwrap_or_default()),
@@ -107,16 +86,10 @@ pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) ->
         }),
         charts: quantities::unit_charts(unit)?,
         levels: quantities::levels(unit),
-        events: events(unit),
-        installations: installations(unit),
         quality: quality(unit),
-        past_forecasts: past_forecasts(unit),
-        inspections: inspections(unit),
-        requests: request_rows(unit),
         statistics: statistics(unit),
         prior: prior(report, unit),
-        band: band(unit),
-        flights: unit.flights.iter().map(flight).collect(),
+        drawn_forecast: drawn_forecast(unit),
         plots: unit.flights.iter().filter(|flight| flight.plot_path.is_some()).count(),
     };
     Ok(Page::html(unit_path(unit), &view.render()?))
@@ -125,20 +98,19 @@ pub fn unit_page(report: &Report, spreads: &RateSpreads<'_>, unit: &UnitView) ->
 fn now(spreads: &RateSpreads<'_>, unit: &UnitView) -> Facts {
     let s = &unit.assessment;
     let fleet = unit.part_number.as_deref().and_then(|part| spreads.part(part));
-    let fleet = fleet.map_or_else(
-        || NO_DATA.to_owned(),
-        |f| format!("{} ({} to {}), {}", rate(f.median), rate(f.low), rate(f.high), counted(f.units, "unit")),
-    );
+    let fleet = or_no_data(fleet, |f| {
+        format!("{} ({} to {}), {}", rate(f.median), rate(f.low), rate(f.high), counted(f.units, "unit"))
+    });
     vec![
-        ("Gap at the last record", level(s.gap_m, s.gap_se_m)),
-        ("Records behind it", s.gap_records.map_or_else(|| NO_DATA.to_owned(), |n| count(n as usize))),
+        ("Gap at the last record", unit.gap_text()),
+        ("Records behind it", or_no_data(s.gap_records, |n| count(n as usize))),
         ("Latest record", latest_record(unit)),
         (
             "An installation may shift all gaps by [µm] (90 %)",
-            s.installation_sd_m.map_or_else(|| NO_DATA.to_owned(), |sd_m| micrometres(NORMAL_95 * sd_m)),
+            or_no_data(s.installation_sd_m, |sd_m| micrometres(NORMAL_95 * sd_m)),
         ),
-        ("Act limit", s.limit_m.map_or_else(|| NO_DATA.to_owned(), |l| format!("{} µm", micrometres(l)))),
-        ("% of limit", unit.share().map_or_else(|| NO_DATA.to_owned(), percent)),
+        ("Act limit", or_no_data(s.limit_m, |l| format!("{} µm", micrometres(l)))),
+        ("% of limit", unit.share_text()),
         (
             "Rate [µm per 1000 FH], 90 % interval",
             rates(s.rate_p05_m_per_hour, s.rate_m_per_hour, s.rate_p95_m_per_hour),
@@ -150,10 +122,7 @@ fn now(spreads: &RateSpreads<'_>, unit: &UnitView) -> Facts {
 
 fn latest_record(unit: &UnitView) -> String {
     let s = &unit.assessment;
-    s.latest_utc.map_or_else(
-        || NO_DATA.to_owned(),
-        |at| format!("{}, {}", level(s.latest_gap_m, s.latest_gap_se_m), minute(at)),
-    )
+    or_no_data(s.latest_utc, |at| format!("{}, {}", level(s.latest_gap_m, s.latest_gap_se_m), minute(at)))
 }
 
 fn rates(low: Option<f64>, middle: Option<f64>, high: Option<f64>) -> String {
@@ -168,14 +137,14 @@ fn rates(low: Option<f64>, middle: Option<f64>, high: Option<f64>) -> String {
 fn remaining(report: &Report, unit: &UnitView) -> Facts {
     let s = &unit.assessment;
     let flights = s.crossing_hours_p50.zip(s.hours_per_flight).map(|(h, per)| h / per);
-    let pace = s.hours_per_day.map_or_else(|| NO_DATA.to_owned(), |h| format!("{h:.1} FH/day"));
+    let pace = or_no_data(s.hours_per_day, |h| format!("{h:.1} FH/day"));
     let check = probability_text(s, report.check_interval_hours);
     let check = format!("{check} ({} FH)", hours(report.check_interval_hours));
     vec![
         ("Earliest (5 %)", when(s.crossing_hours_p05, s.not_before_utc, unit)),
         ("Median", when(s.crossing_hours_p50, s.likely_utc, unit)),
         ("Latest (95 %)", when(s.crossing_hours_p95, s.not_after_utc, unit)),
-        ("Median, flights", flights.map_or_else(|| NO_DATA.to_owned(), |n| count(n.round() as usize))),
+        ("Median, flights", or_no_data(flights, |n| count(n.round() as usize))),
         ("Chance of reaching the limit before the next check", check),
         ("Utilisation, last 90 days", pace),
     ]
@@ -198,33 +167,6 @@ fn plot_description(unit: &UnitView) -> String {
     }
 }
 
-fn events(unit: &UnitView) -> Vec<(String, String, String, &'static str)> {
-    let row = |e: &crate::model::Event| {
-        let size = if e.kind == "onset" { "–".to_owned() } else { micrometres(e.step_m) };
-        let kind = if e.is_tail_wide {
-            format!("{}, whole tail at once: its sensor or recorder is likelier", e.kind.replace('_', " "))
-        } else {
-            e.kind.replace('_', " ")
-        };
-        (date(e.departure_utc), kind, size, if e.is_on_record { "yes" } else { "no" })
-    };
-    unit.events.iter().map(row).collect()
-}
-
-fn installations(unit: &UnitView) -> Vec<(String, String, String, String, String)> {
-    let row = |s: &crate::model::Installation| {
-        let until = s.removed_utc.map_or_else(|| "installed".to_owned(), date);
-        (
-            format!("../{}", tail_path(&s.tail_number)),
-            s.tail_number.clone(),
-            s.position.clone(),
-            date(s.installed_utc),
-            until,
-        )
-    };
-    unit.installations.iter().map(row).collect()
-}
-
 fn quality(unit: &UnitView) -> Facts {
     let q = &unit.quality;
     let list = |of: &[(String, usize)]| {
@@ -239,51 +181,18 @@ fn quality(unit: &UnitView) -> Facts {
         ("Rejection reasons", list(&q.reasons)),
         ("Quality flags", list(&q.flags)),
         ("Last estimate", date_or(q.last_estimate_utc)),
-        ("Days since", q.days_since_estimate.map_or_else(|| NO_DATA.to_owned(), |d| format!("{d:.0}"))),
-        (
-            "Scatter / reported uncertainty",
-            q.noise_ratio.map_or_else(|| NO_DATA.to_owned(), |r| format!("{r:.2}")),
-        ),
+        ("Days since", or_no_data(q.days_since_estimate, |d| format!("{d:.0}"))),
+        ("Scatter / reported uncertainty", or_no_data(q.noise_ratio, |r| format!("{r:.2}"))),
     ];
     facts.into_iter().chain(remedies).collect()
-}
-
-fn past_forecasts(unit: &UnitView) -> Vec<(String, String, String, String, String, &'static str)> {
-    let row = |p: &crate::model::PastForecast| {
-        let interval = format!(
-            "{} ({} to {})",
-            micrometres(p.predicted_m),
-            micrometres(p.predicted_low_m),
-            micrometres(p.predicted_high_m)
-        );
-        let state = StateBadge::from_state(p.state.as_deref()).word().to_owned();
-        (
-            date(p.as_of_utc),
-            state,
-            micrometres(p.gap_m),
-            interval,
-            micrometres(p.found_m),
-            if p.held() { "inside" } else { "outside" },
-        )
-    };
-    unit.past_forecasts.iter().map(row).collect()
-}
-
-fn inspections(unit: &UnitView) -> Vec<(String, String, String, String, String)> {
-    let row = |i: &crate::model::Inspection| {
-        let force = i.force_n.map_or_else(|| NO_DATA.to_owned(), |f| format!("{f:.0}"));
-        let instrument = i.instrument.clone().unwrap_or_else(|| NO_DATA.to_owned());
-        (date(i.date_utc), micrometres(i.play_m), micrometres_or(i.estimate_m), instrument, force)
-    };
-    unit.inspections.iter().map(row).collect()
 }
 
 fn statistics(unit: &UnitView) -> Facts {
     let s = &unit.assessment;
     vec![
-        ("Unit hours [FH]", s.unit_hours.map_or_else(|| NO_DATA.to_owned(), hours)),
+        ("Unit hours [FH]", or_no_data(s.unit_hours, hours)),
         ("Most probable wear law", s.law.clone().unwrap_or_else(|| NO_DATA.to_owned())),
-        ("Usage axis", s.axis.as_ref().map_or_else(|| NO_DATA.to_owned(), |axis| axis.replace('_', " "))),
+        ("Usage axis", or_no_data(s.axis.as_ref(), |axis| axis.replace('_', " "))),
         ("Forecast by", method(s.forecast_method.as_deref()).to_owned()),
         (
             "Previous-day state",
@@ -316,16 +225,6 @@ fn prior(report: &Report, unit: &UnitView) -> String {
     )
 }
 
-/// Smoothed level and forecast as table rows.
-fn band(unit: &UnitView) -> Vec<(String, &'static str, String, String, String)> {
-    let row = |what: &'static str| {
-        move |b: &crate::model::TimedInterval| {
-            (minute(b.at_utc), what, micrometres(b.m), micrometres(b.p05_m), micrometres(b.p95_m))
-        }
-    };
-    unit.level.iter().map(row("level")).chain(drawn_forecast(unit).iter().map(row("forecast"))).collect()
-}
-
 /// What a forecast follows from, in words.
 fn method(word: Option<&str>) -> &'static str {
     match word {
@@ -334,23 +233,5 @@ fn method(word: Option<&str>) -> &'static str {
         Some("single_unit") => "wear laws, weighted by this unit's records alone",
         Some("line") => "line through the last records: no wear law explains them",
         _ => NO_DATA,
-    }
-}
-
-fn flight(f: &FlightRow) -> Flight {
-    let load = f.load_p05_n.zip(f.load_p95_n).map(|(low, high)| format!("{low:.0} to {high:.0}"));
-    Flight {
-        when: minute(f.departure_utc),
-        id: f.flight_id.to_string(),
-        plot: f.plot_path.as_deref().unwrap_or_default().to_owned(),
-        place: format!("{} {}", f.tail_number, f.position),
-        hours: f.unit_hours.map(|h| format!("{h:.1}")).unwrap_or_default(),
-        gap: micrometres_cell(f.gap_m),
-        low: micrometres_cell(f.gap_p05_m),
-        high: micrometres_cell(f.gap_p95_m),
-        midrange: micrometres_cell(f.gap_midrange_m),
-        reversals: f.load_reversals.map(|n| n.to_string()).unwrap_or_default(),
-        load: load.unwrap_or_default(),
-        remarks: f.remarks.to_string(),
     }
 }
