@@ -10,7 +10,7 @@ use crate::address::Address;
 use crate::client::block_on;
 use crate::error::Error;
 
-/// ResumableList entry: address, size, modification time and entity tag of an object.
+/// Entry of a listing: address, size, modification time and entity tag of an object.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ListEntry {
     /// Its address.

@@ -106,7 +106,7 @@ impl RetryingStore {
         Ok(there.len() == payload.content_length() && there == Bytes::from(payload.clone()))
     }
 
-    /// ResumableList of the keys after `last`.
+    /// Listing of the keys after `last`.
     fn resume_list(
         &self,
         prefix: Option<&Path>,
@@ -186,7 +186,7 @@ impl ObjectStore for RetryingStore {
     }
 }
 
-/// ResumableList that resumes after the last received key.
+/// A listing that resumes after the last received key.
 struct ResumableList {
     store: RetryingStore,
     prefix: Option<Path>,

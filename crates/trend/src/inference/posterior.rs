@@ -38,29 +38,29 @@ const THOROUGH: LifeGrid = LifeGrid { count: 7, reach: 3.5, drop: 7.0 };
 #[derive(Debug, Clone)]
 pub(crate) struct Posterior {
     pub(crate) components: Vec<Component>,
-    /// Variance of every node's level.
+    /// Variance of the level, the same for every component.
     pub(crate) level_m2: f64,
-    /// Variance of every node's growth since the segment began.
+    /// Variance of the growth since the segment began, the same for every component.
     pub(crate) growth_m2: f64,
     /// Log of the sum of the weights before they were normalised.
     pub(crate) log_evidence: f64,
 }
 
 impl Posterior {
-    /// The nodes that can move a quantile.
+    /// The components whose weight can move a quantile.
     pub(crate) fn significant_components(&self) -> impl Iterator<Item = &Component> {
         let least = self.negligible();
         self.components.iter().filter(move |n| n.weight > least)
     }
 
-    /// Without the nodes that can move none.
+    /// Drops the components whose weight cannot move a quantile.
     pub(crate) fn drop_negligible(mut self) -> Self {
         let least = self.negligible();
         self.components.retain(|n| n.weight > least);
         self
     }
 
-    /// The weight, a share of the largest, below which a node cannot move a quantile.
+    /// Weight, a share of the largest, below which a component cannot move a quantile.
     fn negligible(&self) -> f64 {
         2e-3 * self.components.iter().map(|n| n.weight).fold(0.0, f64::max)
     }
@@ -115,7 +115,7 @@ fn finish(fit: &SegmentFit<'_>, mut believed: Vec<(usize, Component)>) -> Option
     })
 }
 
-/// The likeliest nodes, with weights that add up to one: enough for a mean.
+/// The likeliest components, with weights that add up to one: enough for a mean.
 fn likeliest(believed: &[(usize, Component)]) -> Vec<Component> {
     const FEW: usize = 10;
     let mut components: Vec<Component> = believed.iter().map(|(_, component)| *component).collect();
@@ -187,7 +187,7 @@ fn scored_candidates(fit: &SegmentFit<'_>, bank: &[Candidate]) -> Vec<ScoredCand
     scored
 }
 
-/// The nodes, with log weights, of every curve that can matter.
+/// Components, with log weights, of every curve that can matter.
 fn components(fit: &SegmentFit<'_>, bank: &[Candidate], tried: LifeGrid) -> Vec<(usize, Component)> {
     let scored_candidates = scored_candidates(fit, bank);
     let add = |scored_candidate: &ScoredCandidate, least: f64, push: &mut dyn FnMut(Component)| {
@@ -240,7 +240,7 @@ fn scored_candidate(
     ScoredCandidate { index, pass, best_m, information, bound }
 }
 
-/// Nodes of one curve over the lives its amplitude may have, of more than the least log weight.
+/// Components of one curve over the lives its amplitude may have, of more than the least log weight.
 fn try_lives(
     fit: &SegmentFit<'_>,
     candidate: &Candidate,

@@ -1,4 +1,4 @@
-//! When the limit is met: every node's crossing, added up.
+//! When the limit is met: the crossings of all components, added up.
 
 use crate::inference::posterior::Posterior;
 use crate::math::quadrature::{GAUSS_HERMITE_5, WAIT_QUANTILES};

@@ -41,7 +41,7 @@ pub(crate) fn onset(posterior: &Posterior) -> Option<(f64, f64)> {
     (starts.total > 0.5).then(|| (starts.quantile(0.5), probability(starts.total)))
 }
 
-/// When a node's wear began, in usage since the segment's begin, if it is an onset.
+/// When a component's wear began, in usage since the segment's begin, if it is an onset.
 pub(crate) fn onset_usage(component: &Component) -> Option<f64> {
     if let WearLaw::Onset { start } = component.law { Some(start) } else { None }
 }
